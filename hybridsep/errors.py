@@ -1,0 +1,60 @@
+"""The exceptions of this library.
+
+::
+
+    HybridSepError
+    ├── ParameterError   a parameter out of its range, or several that do not fit together
+    ├── SignalError      samples that cannot be used: NaN, wrong shape, wrong length
+    ├── LogError         a recorded log that cannot be read: columns, time axis, format
+    ├── MachineError     a machine file that cannot be read or does not hold together
+    ├── ModelError       a linear model that is unstable, improper or of an unsupported kind
+    ├── StateError       a saved state that is foreign, truncated or of another version
+    └── FmuError         an FMU that cannot be built, or a call that FMI does not allow now
+
+Each message names the thing, what was expected, what came and, where there is one, the way out.
+"""
+
+from __future__ import annotations
+
+__all__ = [
+    "FmuError",
+    "HybridSepError",
+    "LogError",
+    "MachineError",
+    "ModelError",
+    "ParameterError",
+    "SignalError",
+    "StateError",
+]
+
+
+class HybridSepError(Exception):
+    """Base of every error this library raises on purpose."""
+
+
+class ParameterError(HybridSepError, ValueError):
+    """A parameter is out of its range, or several do not fit together."""
+
+
+class SignalError(HybridSepError, ValueError):
+    """Samples cannot be used: NaN or infinite values, a wrong shape or length."""
+
+
+class LogError(HybridSepError, ValueError):
+    """A recorded log cannot be read: a missing column, a bad time axis, an unknown format."""
+
+
+class MachineError(HybridSepError, ValueError):
+    """A machine file cannot be read or its content does not hold together."""
+
+
+class ModelError(HybridSepError, ValueError):
+    """A linear model is unstable, improper or cannot be written as a sum of modes."""
+
+
+class StateError(HybridSepError, ValueError):
+    """A saved state is foreign, truncated or of another version."""
+
+
+class FmuError(HybridSepError, RuntimeError):
+    """An FMU cannot be built, or a call came that FMI does not allow at this point."""

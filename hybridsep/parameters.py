@@ -1,0 +1,198 @@
+"""Every parameter's range, unit, default and meaning, declared once.
+
+The library's checks, the FMUs' ``min``/``max``, the command line's help and the machine files' validation all
+come from :data:`PARAMETERS`. Section 2 of the paper's method fixes the limits that tie several together:
+``0 ≤ q < Np`` and ``1 ≤ p ≤ Np``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from .errors import ParameterError
+
+__all__ = [
+    "INPUT_HOLDS",
+    "PARAMETERS",
+    "Parameter",
+    "check",
+    "check_lags",
+    "check_together",
+    "warm_up_samples",
+]
+
+INPUT_HOLDS = ("zoh", "foh")
+"""How ``x_d`` runs between samples; the index is the FMU parameter ``input_hold``."""
+
+_INT_MAX = 2**31 - 1
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One scalar parameter.
+
+    Attributes
+    ----------
+    name : str
+        Name in the FMU and in messages.
+    kind : type
+        ``int`` or ``float``.
+    unit : str
+        SI unit in FMI's notation; ``"1"`` for a number.
+    minimum, maximum : float or None
+        Closed bounds.
+    above : float or None
+        Open lower bound: the value must exceed it.
+    default : int or float or None
+        Value when nothing is said.
+    display_unit : str or None
+        Unit a tool shows it in.
+    description : str
+        One line for people.
+    """
+
+    name: str
+    kind: type
+    unit: str
+    description: str
+    default: float | None = None
+    minimum: float | None = None
+    maximum: float | None = None
+    above: float | None = None
+    display_unit: str | None = None
+
+    @property
+    def range_text(self) -> str:
+        """The allowed range as people write it, for example ``"> 0"`` or ``"1 … 10000"``."""
+        if self.above is not None:
+            return f"> {self.above:g}" + ("" if self.maximum is None else f" and ≤ {self.maximum:g}")
+        if self.minimum is not None and self.maximum is not None and self.maximum != _INT_MAX:
+            return f"{self.minimum:g} … {self.maximum:g}"
+        if self.minimum is not None:
+            return f"≥ {self.minimum:g}"
+        return "finite"
+
+    @property
+    def help(self) -> str:
+        """Description, unit and range on one line."""
+        unit = "" if self.unit == "1" else f" [{self.unit}]"
+        return f"{self.description}{unit}, {self.range_text}"
+
+
+def _table(*parameters: Parameter) -> dict[str, Parameter]:
+    return {parameter.name: parameter for parameter in parameters}
+
+
+PARAMETERS: Mapping[str, Parameter] = _table(
+    # The predictor, eqs. (3) to (6).
+    Parameter("Np", int, "1", "samples in a look-ahead window (a batch)", 100, 1, 100_000),
+    Parameter("p", int, "1", "past residuals e_pb in the features", 50, 1, 100_000),
+    Parameter("q", int, "1", "past physics-based predictions x_pb in the features", 3, 0, 99_999),
+    Parameter("lambda", float, "m2", "ridge penalty on the weights", 1e-12, above=0.0),
+    Parameter("T_s", float, "s", "sampling interval", 1e-3, above=0.0, display_unit="ms"),
+    Parameter("t_init", float, "s", "warm-up: until then x_h = x_pb, while learning goes on", 0.3, 0.0),
+    Parameter("input_hold", int, "1", "x_d between samples: 0 zero-order, 1 first-order hold", 0, 0, 1),
+    Parameter("dead_time", int, "1", "whole samples of dead time in the physics model", 0, 0, 100_000),
+    # One mode of eq. (15).
+    Parameter("f_n", float, "Hz", "natural frequency of the mode", above=0.0),
+    Parameter("zeta", float, "1", "damping ratio of the mode", above=0.0),
+    Parameter("alpha", float, "1/s2", "numerator of the mode, constant term"),
+    Parameter("beta", float, "1/s", "numerator of the mode, factor of s"),
+    # The nonlinear drive of eq. (13).
+    Parameter("m", float, "kg", "moving mass", above=0.0),
+    Parameter("c", float, "N.s/m", "damping", above=0.0),
+    Parameter("k", float, "N/m", "stiffness", above=0.0),
+    Parameter("c_nl", float, "N.s2/m2", "quadratic damping, force c_nl·v·|v|", 0.0, 0.0),
+    Parameter("k_nl", float, "N/m2", "quadratic stiffness, force k_nl·x·|x|", 0.0, 0.0),
+    # The stage's disturbance and the encoder.
+    Parameter(
+        "f", float, "m", "friction of the carriage, as an offset of the command", 0.0, 0.0, display_unit="um"
+    ),
+    Parameter("kappa", float, "1/m", "cable stiffness, an offset kappa·x·|x| of the command", 0.0, 0.0),
+    Parameter(
+        "noise_std", float, "m", "standard deviation of the encoder noise", 0.0, 0.0, display_unit="um"
+    ),
+    Parameter("seed", int, "1", "seed of the encoder noise", 0, 0, _INT_MAX),
+)
+
+
+def check(name: str, value: Any, *, label: str | None = None) -> Any:
+    """Return ``value`` as the parameter's own type, or say why it cannot be one.
+
+    Parameters
+    ----------
+    name : str
+        Key of :data:`PARAMETERS`.
+    value : Any
+        What the user gave.
+    label : str, optional
+        Name to use in the message, for example ``"mode[2].zeta"``.
+
+    Returns
+    -------
+    int or float
+        The value.
+
+    Raises
+    ------
+    ParameterError
+        If the value is not a number of that kind, not finite, or out of range.
+    """
+    parameter = PARAMETERS[name]
+    shown = label or name
+    unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+    try:
+        number = float(value)
+    except (TypeError, ValueError, OverflowError):
+        raise ParameterError(f"{shown} must be a number, got {value!r}") from None
+    if not math.isfinite(number):
+        raise ParameterError(f"{shown} must be finite, got {value!r}")
+    if parameter.kind is int and (isinstance(value, bool) or number != int(number)):
+        raise ParameterError(f"{shown} must be a whole number, got {value!r}")
+    outside = (
+        (parameter.above is not None and number <= parameter.above)
+        or (parameter.minimum is not None and number < parameter.minimum)
+        or (parameter.maximum is not None and number > parameter.maximum)
+    )
+    if outside:
+        raise ParameterError(f"{shown} must be {parameter.range_text}{unit}, got {value!r}")
+    return parameter.kind(number)
+
+
+def check_together(*, Np: Any, p: Any, q: Any, lam: Any, Ts: Any, t_init: Any) -> None:
+    """Check the predictor's parameters, alone and together, and report all that is wrong at once.
+
+    Raises
+    ------
+    ParameterError
+        Naming every parameter that is out of range (section 2: ``Np ≥ 1``, ``0 ≤ q < Np``, ``1 ≤ p ≤ Np``,
+        ``λ > 0``, ``T_s > 0``).
+    """
+    problems: list[str] = []
+    for name, value in (("Np", Np), ("p", p), ("q", q), ("lambda", lam), ("T_s", Ts), ("t_init", t_init)):
+        try:
+            check(name, value)
+        except ParameterError as error:
+            problems.append(str(error))
+    if not problems:
+        problems = check_lags(Np=Np, p=p, q=q)
+    if problems:
+        raise ParameterError("; ".join(problems))
+
+
+def check_lags(*, Np: int, p: int, q: int) -> list[str]:
+    """Say what is wrong between ``Np``, ``p`` and ``q``; an empty list if nothing is."""
+    problems = []
+    if not 1 <= p <= Np:
+        problems.append(f"p must be 1 … Np = {Np}, got {p}; lower p or raise Np")
+    if not 0 <= q < Np:
+        problems.append(f"q must be 0 … Np − 1 = {Np - 1}, got {q}; lower q or raise Np")
+    return problems
+
+
+def warm_up_samples(t_init: float, Ts: float) -> int:
+    """Return how many samples have ``t < t_init``, counted in samples so that rounding of times cannot tell."""
+    return max(0, math.ceil(t_init / Ts - 1e-6))

@@ -1,0 +1,384 @@
+"""The linear hybrid model: predict a look-ahead window, then learn it; eqs. (2) to (6).
+
+``x_h(k) = x_pb(k) + wᵀφ(k)`` with ``φ(k) = [1, x_pb(k) … x_pb(k−q), e_pb(k−1) … e_pb(k−p)]`` and
+``e_pb = x − x_pb``. Inside a window the residuals that are not measured yet are their own predictions, so a window
+is one free run of an ARX recursion from the last ``p`` measured residuals, and stays affine in the command.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.lib.stride_tricks import as_strided
+from numpy.typing import ArrayLike
+from scipy.linalg import toeplitz
+from scipy.signal import lfilter
+
+from .errors import SignalError, StateError
+from .parameters import INPUT_HOLDS, check_together, warm_up_samples
+from .physics import ModalModel, Mode
+from .regression import RidgeRegression
+from .signals import Array, as_samples
+from .state import pack, unpack
+
+__all__ = ["HybridPredictor", "Prediction", "WindowOperator"]
+
+_KIND = "predictor"
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What is predicted for one window, before any of it is measured.
+
+    Attributes
+    ----------
+    x_pb : (n,) array, m
+        Physics-based prediction, eq. (2).
+    e_h : (n,) array, m
+        Predicted residual ``wᵀφ``, also while it is not published yet.
+    n_warm_up : int
+        Leading samples that still belong to the warm-up, where ``x_h = x_pb``.
+    """
+
+    x_pb: Array
+    e_h: Array
+    n_warm_up: int
+
+    @property
+    def x_h(self) -> Array:
+        """``(n,)`` array, m: the published prediction, eq. (4) after the warm-up."""
+        x_h = self.x_pb + self.e_h
+        x_h[: self.n_warm_up] = self.x_pb[: self.n_warm_up]
+        return x_h
+
+    @property
+    def active(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+        """``(n,)`` array of bool: whether ``x_h`` is the hybrid prediction there."""
+        return np.arange(len(self.x_pb)) >= self.n_warm_up
+
+
+@dataclass(frozen=True)
+class WindowOperator:
+    """The hybrid model over one window, affine in its commands; eq. (3).
+
+    ``x_h = G_h x_d + free`` with ``G_h`` lower-triangular Toeplitz, and the same for the physics model alone.
+
+    Attributes
+    ----------
+    g_h, g_pb : (n,) array, m/m
+        First columns of ``G_h`` and ``G_pb``.
+    free, free_pb : (n,) array, m
+        Responses to the past: what follows if every command of the window were 0.
+    """
+
+    g_h: Array
+    free: Array
+    g_pb: Array
+    free_pb: Array
+
+    @property
+    def G_h(self) -> Array:
+        """``(n, n)`` array, lower-triangular Toeplitz."""
+        return toeplitz(self.g_h, np.zeros(len(self.g_h)))
+
+    @property
+    def G_pb(self) -> Array:
+        """``(n, n)`` array, lower-triangular Toeplitz."""
+        return toeplitz(self.g_pb, np.zeros(len(self.g_pb)))
+
+    def __call__(self, x_d: ArrayLike) -> Array:
+        """Return ``G_h x_d + free`` for commands ``x_d``, ``(n,)``, m."""
+        command = as_samples(x_d, "x_d", len(self.g_h))
+        return np.asarray(lfilter(self.g_h, [1.0], command)) + self.free
+
+
+@dataclass(frozen=True)
+class _Pending:
+    """The last predicted window, waiting to be measured."""
+
+    x_d: Array
+    x_pb: Array
+    start: float
+
+
+class HybridPredictor:
+    """Predicts windows of a drive's position and learns from their measurement; eqs. (2) to (6).
+
+    Call :meth:`predict` with the commands of the next window, then :meth:`update` with what was measured over it,
+    window after window. Predicting changes nothing that is learned. Memory and cost per window are constant.
+
+    Parameters
+    ----------
+    model : ModalModel
+        ``G_pb``, eq. (15).
+    Ts : float
+        Sampling interval, s.
+    Np : int
+        Samples in a window (a batch), ≥ 1.
+    p, q : int
+        Lags of ``e_pb`` and of ``x_pb`` in φ, ``1 ≤ p ≤ Np`` and ``0 ≤ q < Np``; ``n = 2 + q + p`` features.
+    lam : float
+        λ of eq. (6), m², > 0.
+    t_init : float
+        Warm-up, s: for ``t < t_init``, ``x_h = x_pb`` is published.
+    input_hold : {"zoh", "foh"}
+        How ``x_d`` runs between samples in the physics model.
+    start : float, optional
+        Position, m, where the drive is at rest before the first sample; the first command if left out. All positions
+        are relative to it inside, because ridge regression is not invariant to an offset.
+
+    Raises
+    ------
+    ParameterError
+        If a parameter is out of its range or they do not fit together; all problems are named at once.
+    """
+
+    def __init__(
+        self,
+        model: ModalModel,
+        *,
+        Ts: float = 1e-3,
+        Np: int = 100,
+        p: int = 50,
+        q: int = 3,
+        lam: float = 1e-12,
+        t_init: float = 0.3,
+        input_hold: str = "zoh",
+        start: float | None = None,
+    ) -> None:
+        check_together(Np=Np, p=p, q=q, lam=lam, Ts=Ts, t_init=t_init)
+        self.Np, self.p, self.q = int(Np), int(p), int(q)
+        self.Ts, self.lam, self.t_init = float(Ts), float(lam), float(t_init)
+        self.model = model
+        self.discrete = model.discretise(self.Ts, input_hold, block=self.Np)
+        self.regression = RidgeRegression(2 + self.q + self.p, self.lam)
+        self._allocate()
+        self.new_run(start, t_init=t_init)
+
+    @classmethod
+    def with_parameters(
+        cls, model: ModalModel, parameters: Mapping[str, Any], **more: Any
+    ) -> HybridPredictor:
+        """Return a predictor from FMI parameter names (``lambda``, ``T_s``, ``input_hold`` as 0 or 1)."""
+        renamed = {"lambda": "lam", "T_s": "Ts"}
+        keywords = {renamed.get(name, name): value for name, value in parameters.items()}
+        if "input_hold" in keywords:
+            keywords["input_hold"] = INPUT_HOLDS[keywords["input_hold"]]
+        return cls(model, **keywords, **more)
+
+    @property
+    def n_features(self) -> int:
+        """``n = 2 + q + p``."""
+        return self.regression.n_features
+
+    @property
+    def weights(self) -> Array:
+        """``w`` of eq. (6) from all measured windows, ``(n,)``."""
+        return self.regression.weights
+
+    def new_run(self, start: float | None = None, *, t_init: float = 0.0) -> None:
+        """Begin another run, at rest at ``start``, with what is learned kept (a warm start).
+
+        Parameters
+        ----------
+        start : float, optional
+            Where the drive rests, m; the first command if left out.
+        t_init : float
+            Warm-up of the new run, s; none unless asked for.
+        """
+        self.start = None if start is None else float(as_samples([start], "start")[0])
+        self.n_init = warm_up_samples(t_init, self.Ts)
+        self.k = 0
+        self._state = self.discrete.rest()
+        # x_pb and e_pb before the first sample are zero in φ.
+        self._x[:], self._e[:] = 0.0, 0.0
+        self._pending: _Pending | None = None
+
+    def predict(self, x_d: ArrayLike) -> Prediction:
+        """Predict the next window from its commands and all that was measured before; eqs. (2), (4).
+
+        May be called again, with other commands or another length, before :meth:`update`; the last call counts.
+
+        Parameters
+        ----------
+        x_d : (n,) array_like, m
+            Commanded positions of the next ``n ≥ 1`` samples; usually ``n = Np``.
+
+        Returns
+        -------
+        Prediction
+
+        Raises
+        ------
+        SignalError
+            If ``x_d`` is empty, not one-dimensional or not finite.
+        """
+        command = as_samples(x_d, "x_d")
+        n = len(command)
+        if n == 0:
+            raise SignalError("x_d must have at least one sample, got none")
+        start = float(command[0]) if self.start is None else self.start
+        command = command - start
+        x_pb, _ = self.discrete.respond(self._state, command)  # Eq. (2)
+        self._pending = _Pending(command, x_pb, start)
+        return Prediction(x_pb + start, self._free_run(x_pb), min(max(self.n_init - self.k, 0), n))
+
+    def update(self, x: ArrayLike) -> None:
+        """Learn from the measurement of the predicted window, or of its beginning; eq. (6).
+
+        Parameters
+        ----------
+        x : (m,) array_like, m
+            Measured positions, ``1 ≤ m ≤ n`` of the last :meth:`predict`.
+
+        Raises
+        ------
+        SignalError
+            If nothing was predicted, ``x`` is longer than the window, or a value is not finite. Nothing is changed.
+        """
+        pending = self._pending
+        if pending is None:
+            raise SignalError("update must follow predict: there is no predicted window to measure")
+        measured = as_samples(x, "x")
+        if not 1 <= len(measured) <= len(pending.x_d):
+            raise SignalError(
+                f"x must have 1 … {len(pending.x_d)} samples, as predicted, got {len(measured)}"
+            )
+        m = len(measured)
+        e_pb = measured - pending.start - pending.x_pb[:m]
+        for i in range(0, m, self.Np):
+            self._learn(pending.x_pb[i : min(i + self.Np, m)], e_pb[i : i + self.Np])
+        _, self._state = self.discrete.respond(self._state, pending.x_d[:m])
+        self.start = pending.start
+        self.k += m
+        self._pending = None
+
+    def operator(self, n: int | None = None) -> WindowOperator:
+        """Return the model of the next ``n`` samples (``Np`` if left out) as an affine map of their commands; eq. (3).
+
+        It is the hybrid model whether or not the warm-up is over; a start that is not known yet counts as 0.
+        """
+        length = self.Np if n is None else n
+        if length < 1:
+            raise SignalError(f"n must be ≥ 1, got {length}")
+        start = self.start or 0.0
+        w_x, w_e = self.weights[1 : 2 + self.q], self.weights[2 + self.q :]
+        g_pb = self.discrete.impulse_response(length)
+        # x_h = x_pb + wᵀφ as filters: G_h = (1 + W_x(z) / (1 − W_e(z))) G_pb
+        denominator = np.concatenate(([1.0], -w_e))
+        g_h = g_pb + lfilter(w_x, denominator, g_pb)
+        free_pb, _ = self.discrete.respond(self._state, np.zeros(length))
+        free = free_pb + self._free_run(free_pb)
+        return WindowOperator(
+            g_h=g_h,
+            free=free + start * (1.0 - np.cumsum(g_h)),
+            g_pb=g_pb,
+            free_pb=free_pb + start * (1.0 - np.cumsum(g_pb)),
+        )
+
+    def last_residual(self) -> float:
+        """Return the last measured residual ``e_pb``, m; what the hold baseline keeps over a window."""
+        return float(self._e[self.p - 1])
+
+    def to_bytes(self) -> bytes:
+        """Return the whole state and the parameters, a window that waits for its measurement too, as a versioned blob."""
+        meta = {
+            **{
+                name: getattr(self, name)
+                for name in ("Ts", "Np", "p", "q", "lam", "t_init", "k", "n_init", "start")
+            },
+            "input_hold": self.discrete.input_hold,
+            "dead_time": self.model.dead_time,
+            "n_samples": self.regression.n_samples,
+            "pending_start": None if self._pending is None else self._pending.start,
+        }
+        modes = np.array([[mode.f_n, mode.zeta, mode.alpha, mode.beta] for mode in self.model.modes])
+        arrays = {
+            "modes": modes,
+            "state": self._state,
+            "x_pb": self._x[: self.q],
+            "e_pb": self._e[: self.p],
+            "factor": self.regression.factor,
+        }
+        if self._pending is not None:
+            arrays |= {"pending_x_d": self._pending.x_d, "pending_x_pb": self._pending.x_pb}
+        return pack(_KIND, meta, arrays)
+
+    @classmethod
+    def from_bytes(cls, blob: bytes) -> HybridPredictor:
+        """Return the predictor that :meth:`to_bytes` described.
+
+        Raises
+        ------
+        StateError
+            If the blob is foreign, truncated or of another version.
+        """
+        meta, arrays = unpack(_KIND, blob)
+        try:
+            model = ModalModel([Mode(*row) for row in arrays["modes"].tolist()], meta["dead_time"])
+            names = ("Ts", "Np", "p", "q", "lam", "t_init", "input_hold", "start")
+            predictor = cls(model, **{name: meta[name] for name in names})
+            predictor.k, predictor.n_init = meta["k"], meta["n_init"]
+            predictor._state[:] = arrays["state"]
+            predictor._x[: predictor.q] = arrays["x_pb"]
+            predictor._e[: predictor.p] = arrays["e_pb"]
+            predictor.regression.restore({"factor": arrays["factor"], "n_samples": meta["n_samples"]})
+            if meta["pending_start"] is not None:
+                pending = arrays["pending_x_d"], arrays["pending_x_pb"]
+                predictor._pending = _Pending(*pending, start=meta["pending_start"])
+        except (KeyError, ValueError) as error:
+            raise StateError(f"the saved predictor does not hold together: {error}") from error
+        return predictor
+
+    def save(self, path: str | Path) -> None:
+        """Write :meth:`to_bytes` to a file."""
+        Path(path).write_bytes(self.to_bytes())
+
+    @classmethod
+    def load(cls, path: str | Path) -> HybridPredictor:
+        """Read what :meth:`save` wrote; call :meth:`new_run` on it to start a second run warm.
+
+        Raises
+        ------
+        StateError
+            If the file is not a saved predictor.
+        """
+        return cls.from_bytes(Path(path).read_bytes())
+
+    def _allocate(self) -> None:
+        """Make the buffers: ``q`` and ``p`` past samples followed by one window, with the lags as views on them."""
+        p, q, Np = self.p, self.q, self.Np
+        self._x, self._e = np.zeros(q + Np), np.zeros(p + Np)
+        step = self._x.itemsize
+        self._x_lags = as_strided(self._x[q:], (Np, q + 1), (step, -step))  # x_pb(k) … x_pb(k−q)
+        self._e_lags = as_strided(self._e[p - 1 :], (Np, p), (step, -step))  # e_pb(k−1) … e_pb(k−p)
+        self._rows = np.empty((Np, self.n_features + 1), order="F")
+
+    def _free_run(self, x_pb: Array) -> Array:
+        """Return ``wᵀφ`` over a window whose residuals are predicted as it goes, ``(n,)``; eq. (4)."""
+        w, q, p = self.weights, self.q, self.p
+        # What the command drives: w₀ + Σ_i w_x,i x_pb(k−i)
+        drive = w[0] + np.convolve(np.concatenate((self._x[:q], x_pb)), w[1 : 2 + q], "valid")
+        # e(k) = drive(k) + Σ_i w_e,i e(k−i), an all-pole filter started from the measured residuals:
+        # its state is z_j = Σ_m w_e,j+m e(−m)
+        w_e = w[2 + q :]
+        state = np.correlate(w_e, self._e[:p][::-1], "full")[p - 1 :]
+        e_h, _ = lfilter([1.0], np.concatenate(([1.0], -w_e)), drive, zi=state)
+        return np.asarray(e_h)
+
+    def _learn(self, x_pb: Array, e_pb: Array) -> None:
+        """Fold one stretch of at most ``Np`` measured samples into the regression and into the lags."""
+        m, p, q = len(e_pb), self.p, self.q
+        self._x[q : q + m], self._e[p : p + m] = x_pb, e_pb
+        rows = self._rows if m == self.Np else np.empty((m, self.n_features + 1), order="F")
+        # Eq. (5): φ(k) = [1, x_pb(k) … x_pb(k−q), e_pb(k−1) … e_pb(k−p)], with its target e_pb(k) beside it
+        rows[:, 0] = 1.0
+        rows[:, 1 : 2 + q] = self._x_lags[:m]
+        rows[:, 2 + q : 2 + q + p] = self._e_lags[:m]
+        rows[:, -1] = e_pb
+        self.regression.update_stacked(rows)
+        self._x[:q], self._e[:p] = self._x[m : m + q].copy(), self._e[m : m + p].copy()

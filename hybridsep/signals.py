@@ -1,0 +1,47 @@
+"""Checks on samples, the same for every entry of the library."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import SignalError
+
+__all__ = ["Array", "as_samples"]
+
+Array = NDArray[np.float64]
+
+
+def as_samples(values: ArrayLike, name: str, length: int | None = None) -> Array:
+    """Return ``values`` as a contiguous float64 vector, or say what is wrong with them.
+
+    Parameters
+    ----------
+    values : array_like, (n,)
+        Samples.
+    name : str
+        Name for messages.
+    length : int, optional
+        Expected number of samples.
+
+    Raises
+    ------
+    SignalError
+        If they are not one-dimensional, of the wrong length, or not all finite.
+    """
+    samples: Any = np.asarray(values)
+    if samples.dtype != np.float64 or not samples.flags.c_contiguous:
+        try:
+            samples = np.ascontiguousarray(samples, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise SignalError(f"{name} must be numbers, got {samples.dtype}") from None
+    if samples.ndim != 1:
+        raise SignalError(f"{name} must be one-dimensional, got shape {samples.shape}")
+    if length is not None and len(samples) != length:
+        raise SignalError(f"{name} must have {length} samples, got {len(samples)}")
+    if not np.isfinite(samples).all():
+        i = int(np.flatnonzero(~np.isfinite(samples))[0])
+        raise SignalError(f"{name} must be finite, got {samples[i]} at sample {i}")
+    return samples  # type: ignore[no-any-return]
