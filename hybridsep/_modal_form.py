@@ -24,13 +24,9 @@ def modes_of(
     import control
 
     if getattr(system, "ninputs", 1) != 1 or getattr(system, "noutputs", 1) != 1:
-        raise ModelError(
-            f"G_pb must have one input and one output, got {system.ninputs} and {system.noutputs}"
-        )
+        raise ModelError(f"G_pb must have one input and one output, got {system.ninputs} and {system.noutputs}")
     if system.isdtime(strict=True):
-        raise ModelError(
-            "G_pb must be continuous, got a discrete system; convert it (for example with d2c) first"
-        )
+        raise ModelError("G_pb must be continuous, got a discrete system; convert it (for example with d2c) first")
     tf = control.tf(system)
     numerator = np.trim_zeros(np.atleast_1d(np.asarray(tf.num[0][0], dtype=float)), "f")
     denominator = np.trim_zeros(np.atleast_1d(np.asarray(tf.den[0][0], dtype=float)), "f")
@@ -41,7 +37,7 @@ def modes_of(
             "G_pb must be strictly proper, got a numerator of degree "
             f"{len(numerator) - 1} over a denominator of degree {len(denominator) - 1}"
         )
-    poles = np.roots(denominator)
+    poles = np.roots(denominator).astype(np.complex128)
     unstable = poles[poles.real >= 0]
     if unstable.size:
         raise ModelError(f"G_pb must be stable, got a pole at {unstable[0]:.6g} rad/s")
@@ -74,9 +70,7 @@ def _without_rounding(numerator: Array, system: control.StateSpace, length: int)
 def _quadratics(poles: NDArray[np.complex128], numerator: Array) -> tuple[list[Array], Array]:
     """Group the poles into real quadratic factors; a lone real pole brings a cancelling twin into the numerator."""
     is_complex = np.abs(poles.imag) > 1e-7 * np.abs(poles)
-    quadratics = [
-        np.array([1.0, -2 * pole.real, abs(pole) ** 2]) for pole in poles[is_complex] if pole.imag > 0
-    ]
+    quadratics = [np.array([1.0, -2 * pole.real, abs(pole) ** 2]) for pole in poles[is_complex] if pole.imag > 0]
     real = sorted(float(pole.real) for pole in poles[~is_complex])
     if len(real) % 2:
         twin = real[-1]
@@ -94,7 +88,7 @@ def _partial_fractions(quadratics: list[Array], numerator: Array) -> Array:
         rest = np.array([1.0])
         for j, quadratic in enumerate(quadratics):
             if j != i:
-                rest = np.polymul(rest, quadratic)
+                rest = np.asarray(np.polymul(rest, quadratic), dtype=np.float64)
         columns += [_padded(rest, 2 * m), _padded(np.polymul(rest, [1.0, 0.0]), 2 * m)]
     matrix = np.array(columns).T
     if np.linalg.cond(matrix / np.linalg.norm(matrix, axis=0)) > 1e10:

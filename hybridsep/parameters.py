@@ -108,13 +108,9 @@ PARAMETERS: Mapping[str, Parameter] = _table(
     Parameter("c_nl", float, "N.s2/m2", "quadratic damping, force c_nl·v·|v|", 0.0, 0.0),
     Parameter("k_nl", float, "N/m2", "quadratic stiffness, force k_nl·x·|x|", 0.0, 0.0),
     # The stage's disturbance and the encoder.
-    Parameter(
-        "f", float, "m", "friction of the carriage, as an offset of the command", 0.0, 0.0, display_unit="um"
-    ),
+    Parameter("f", float, "m", "friction of the carriage, as an offset of the command", 0.0, 0.0, display_unit="um"),
     Parameter("kappa", float, "1/m", "cable stiffness, an offset kappa·x·|x| of the command", 0.0, 0.0),
-    Parameter(
-        "noise_std", float, "m", "standard deviation of the encoder noise", 0.0, 0.0, display_unit="um"
-    ),
+    Parameter("noise_std", float, "m", "standard deviation of the encoder noise", 0.0, 0.0, display_unit="um"),
     Parameter("seed", int, "1", "seed of the encoder noise", 0, 0, _INT_MAX),
 )
 

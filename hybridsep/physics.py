@@ -106,9 +106,7 @@ class ModalModel:
         return cls((mode,), dead_time)
 
     @classmethod
-    def from_control(
-        cls, system: control.TransferFunction | control.StateSpace, dead_time: int = 0
-    ) -> ModalModel:
+    def from_control(cls, system: control.TransferFunction | control.StateSpace, dead_time: int = 0) -> ModalModel:
         """Return the modal form of a python-control system.
 
         Complex pole pairs become under-damped modes, real poles are paired into over-damped ones.

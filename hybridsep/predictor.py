@@ -160,9 +160,7 @@ class HybridPredictor:
         self.new_run(start, t_init=t_init)
 
     @classmethod
-    def with_parameters(
-        cls, model: ModalModel, parameters: Mapping[str, Any], **more: Any
-    ) -> HybridPredictor:
+    def with_parameters(cls, model: ModalModel, parameters: Mapping[str, Any], **more: Any) -> HybridPredictor:
         """Return a predictor from FMI parameter names (``lambda``, ``T_s``, ``input_hold`` as 0 or 1)."""
         renamed = {"lambda": "lam", "T_s": "Ts"}
         keywords = {renamed.get(name, name): value for name, value in parameters.items()}
@@ -245,9 +243,7 @@ class HybridPredictor:
             raise SignalError("update must follow predict: there is no predicted window to measure")
         measured = as_samples(x, "x")
         if not 1 <= len(measured) <= len(pending.x_d):
-            raise SignalError(
-                f"x must have 1 … {len(pending.x_d)} samples, as predicted, got {len(measured)}"
-            )
+            raise SignalError(f"x must have 1 … {len(pending.x_d)} samples, as predicted, got {len(measured)}")
         m = len(measured)
         e_pb = measured - pending.start - pending.x_pb[:m]
         for i in range(0, m, self.Np):
@@ -287,10 +283,7 @@ class HybridPredictor:
     def to_bytes(self) -> bytes:
         """Return the whole state and the parameters, a window that waits for its measurement too, as a versioned blob."""
         meta = {
-            **{
-                name: getattr(self, name)
-                for name in ("Ts", "Np", "p", "q", "lam", "t_init", "k", "n_init", "start")
-            },
+            **{name: getattr(self, name) for name in ("Ts", "Np", "p", "q", "lam", "t_init", "k", "n_init", "start")},
             "input_hold": self.discrete.input_hold,
             "dead_time": self.model.dead_time,
             "n_samples": self.regression.n_samples,

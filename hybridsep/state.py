@@ -48,18 +48,12 @@ def unpack(kind: str, blob: bytes) -> tuple[dict[str, Any], dict[str, Array]]:
         If the blob is not one, is truncated or damaged, or is of another kind or version.
     """
     if len(blob) < _PREFIX.size + _CRC.size or blob[:4] != MAGIC:
-        raise StateError(
-            f"a saved state of kind {kind!r} was expected, got {len(blob)} bytes of something else"
-        )
+        raise StateError(f"a saved state of kind {kind!r} was expected, got {len(blob)} bytes of something else")
     _, version, length = _PREFIX.unpack_from(blob)
     if version != VERSION:
-        raise StateError(
-            f"the saved state has format version {version}, this library reads version {VERSION}"
-        )
+        raise StateError(f"the saved state has format version {version}, this library reads version {VERSION}")
     if zlib.crc32(blob[: -_CRC.size]) != _CRC.unpack(blob[-_CRC.size :])[0]:
-        raise StateError(
-            f"the saved state is truncated or damaged: its {len(blob)} bytes do not fit its checksum"
-        )
+        raise StateError(f"the saved state is truncated or damaged: its {len(blob)} bytes do not fit its checksum")
     header = json.loads(blob[_PREFIX.size : _PREFIX.size + length])
     if header["kind"] != kind:
         raise StateError(f"a saved state of kind {kind!r} was expected, got one of kind {header['kind']!r}")

@@ -1,0 +1,1 @@
+"""Recorded logs of an axis."""
