@@ -1,0 +1,232 @@
+"""Reading a log: whole (:func:`read_log`) or chunk by chunk (:func:`open_log`), with the same checks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import LogError
+from ..parameters import check
+from ..signals import Array
+from .mat import MatSource
+from .npz import NpzSource
+from .source import Block, Source
+from .text import TextSource
+from .time_axis import TimeAxis
+
+__all__ = ["UNITS", "Log", "LogReader", "open_log", "read_log"]
+
+UNITS: Mapping[str, float] = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
+"""Metres in each unit a log's positions may have."""
+
+SPAN_MAX = 100.0
+"""Longest plausible travel of an axis, m; a longer one is a log in a smaller unit."""
+
+TS_TOLERANCE = 0.01
+"""Largest relative difference between a given ``Ts`` and the time column's."""
+
+_SOURCES: Mapping[str, type[Source]] = {
+    ".csv": TextSource,
+    ".tsv": TextSource,
+    ".txt": TextSource,
+    ".npz": NpzSource,
+    ".mat": MatSource,
+}
+_ROLES = ("t", "x_d", "x")
+_BLOCK = 10_000
+
+
+@dataclass(frozen=True)
+class Log:
+    """A recorded log.
+
+    Attributes
+    ----------
+    t : (n,) array, s
+        Times as recorded, or ``k·Ts`` if the file has no time column.
+    x_d, x : (n,) array, m
+        Commanded and measured positions.
+    Ts : float
+        Sampling interval, s.
+    path : Path
+        The file.
+    """
+
+    t: Array
+    x_d: Array
+    x: Array
+    Ts: float
+    path: Path
+
+
+class LogReader:
+    """A log that is read chunk by chunk; made by :func:`open_log`.
+
+    Opening goes once over the time column (over ``x_d`` if there is none), so that ``Ts`` is the mean over the whole
+    file and a bad time axis is reported before anything is predicted from it. No file stays open between calls.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    Ts : float
+        Sampling interval, s: the given one, or the mean of the time column's, rounded to what it determines.
+    n_samples : int
+        Samples in the log.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        *,
+        columns: Mapping[str, str] | None = None,
+        unit: str = "m",
+        Ts: float | None = None,
+    ) -> None:
+        self.path = Path(path)
+        if unit not in UNITS:
+            raise LogError(f"{self.path}: unit must be one of {', '.join(UNITS)}, got {unit!r}")
+        self._unit = unit
+        given = None if Ts is None else float(check("T_s", Ts, label="Ts"))
+        self._source = _open_source(self.path)
+        self._names = _column_names(self._source, columns, time_needed=given is None)
+        self.n_samples, found = self._scan()
+        if given is not None and found is not None and abs(found - given) > TS_TOLERANCE * given:
+            raise LogError(
+                f"{self.path}: Ts = {given:g} s was given, but column {self._names['t']!r} has an interval of "
+                f"{found:g} s; leave Ts out, or correct it or the column"
+            )
+        self.Ts = float(given or found or 0.0)  # one of them is there, both are > 0
+
+    def chunks(self, n: int = _BLOCK) -> Iterator[tuple[Array, Array]]:
+        """Give the log from its beginning as pairs ``(x_d, x)``, m, of at most ``n`` samples each.
+
+        Raises
+        ------
+        LogError
+            When the samples that are next cannot be used.
+        """
+        if n < 1:
+            raise LogError(f"{self.path}: a chunk must have n ≥ 1 samples, got {n}")
+        return ((x_d, x) for x_d, x in self._positions(n, ("x_d", "x")))
+
+    def read(self) -> Log:
+        """Return the whole log."""
+        roles = ("x_d", "x", "t") if "t" in self._names else ("x_d", "x")
+        columns = [np.concatenate(parts) for parts in zip(*self._positions(_BLOCK, roles), strict=True)]
+        if len(columns) == 2:
+            columns.append(np.arange(self.n_samples, dtype=np.float64) * self.Ts)
+        x_d, x, t = columns
+        return Log(t, x_d, x, self.Ts, self.path)
+
+    def _positions(self, n: int, roles: tuple[str, ...]) -> Iterator[tuple[Array, ...]]:
+        """Give the columns ``roles``, the first two being positions, checked and in SI units."""
+        names, metres = [self._names[role] for role in roles], UNITS[self._unit]
+        lowest, highest, count = np.inf, -np.inf, 0
+        for block in self._source.blocks(names, n):
+            for name, column in zip(names, block.columns, strict=True):
+                self._check_finite(block, name, column)
+            x_d, x = block.columns[0] * metres, block.columns[1] * metres
+            lowest, highest = min(lowest, float(x_d.min())), max(highest, float(x_d.max()))
+            if highest - lowest > SPAN_MAX:
+                smaller = "um" if self._unit != "m" else "mm"
+                raise LogError(
+                    f"{self.path}: column {names[0]!r} read in {self._unit} spans {highest - lowest:.4g} m, more than "
+                    f"{SPAN_MAX:g} m; if the log is in {smaller}, say unit='{smaller}' (--unit {smaller})"
+                )
+            count += len(x_d)
+            yield (x_d, x, *block.columns[2:])
+        if count != self.n_samples:
+            raise LogError(f"{self.path}: the file had {self.n_samples} samples when opened, now it has {count}")
+
+    def _scan(self) -> tuple[int, float | None]:
+        """Go over one column; return the number of samples and, if it is the time, the sampling interval."""
+        role = "t" if "t" in self._names else "x_d"
+        axis, count = TimeAxis(self.path, self._names[role]), 0
+        for block in self._source.blocks([self._names[role]], _BLOCK):
+            self._check_finite(block, self._names[role], block.columns[0])
+            if role == "t":
+                axis.extend(block)
+            count += len(block.columns[0])
+        if count < 2:
+            raise LogError(f"{self.path}: a log needs at least 2 samples, got {count or 'none'}")
+        return count, axis.interval() if role == "t" else None
+
+    def _check_finite(self, block: Block, name: str, column: Array) -> None:
+        finite = np.isfinite(column)
+        if not finite.all():
+            i = int(np.argmin(finite))
+            raise LogError(f"{self.path}, {block.where(i)}: column {name!r} must be finite, got {column[i]}")
+
+
+def open_log(
+    path: str | Path, *, columns: Mapping[str, str] | None = None, unit: str = "m", Ts: float | None = None
+) -> LogReader:
+    """Open a log for reading in bounded memory.
+
+    CSV files are streamed by lines and ``.npz`` files member by member; a ``.mat`` file is loaded whole, as SciPy
+    can do nothing else, so that its size is limited by the memory.
+
+    Parameters
+    ----------
+    path : str or Path
+        ``.csv`` (also ``.tsv``, ``.txt``; comma, semicolon, tab or blanks between columns), ``.npz`` or ``.mat``.
+    columns : mapping, optional
+        The file's names of ``"t"``, ``"x_d"`` and ``"x"`` where they are others, such as ``{"x_d": "qg", "x": "qm"}``.
+    unit : {"m", "mm", "um"}
+        Unit of the file's positions.
+    Ts : float, optional
+        Sampling interval, s; needed only if the file has no time column, checked against that if it has.
+
+    Returns
+    -------
+    LogReader
+
+    Raises
+    ------
+    LogError
+        If the file, its columns or its time axis cannot be used.
+    """
+    return LogReader(path, columns=columns, unit=unit, Ts=Ts)
+
+
+def read_log(
+    path: str | Path, *, columns: Mapping[str, str] | None = None, unit: str = "m", Ts: float | None = None
+) -> Log:
+    """Return a whole log; parameters and errors as for :func:`open_log`."""
+    return LogReader(path, columns=columns, unit=unit, Ts=Ts).read()
+
+
+def _open_source(path: Path) -> Source:
+    if path.suffix.lower() not in _SOURCES:
+        raise LogError(f"{path}: a log must be one of {', '.join(_SOURCES)}, got {path.suffix or 'no extension'!r}")
+    try:
+        if not path.is_file():
+            raise LogError(f"{path}: there is no such file" if not path.exists() else f"{path}: is not a file")
+        if path.stat().st_size == 0:
+            raise LogError(f"{path}: the file is empty")
+        return _SOURCES[path.suffix.lower()](path)
+    except OSError as error:
+        raise LogError(f"{path}: cannot be read: {error.strerror or error}") from error
+
+
+def _column_names(source: Source, columns: Mapping[str, str] | None, *, time_needed: bool) -> dict[str, str]:
+    """Return the file's name of each column that will be read."""
+    for role in columns or ():
+        if role not in _ROLES:
+            raise LogError(f"{source.path}: columns may name {', '.join(_ROLES)}, got {role!r}")
+    names = {role: role for role in _ROLES} | dict(columns or {})
+    if names["t"] not in source.names and "t" not in (columns or {}) and not time_needed:
+        del names["t"]
+    for role, name in names.items():
+        if name not in source.names:
+            there = ", ".join(repr(other) for other in source.names) or "none"
+            hint = "; give its name in columns, or Ts" if role == "t" else "; give its name in columns"
+            what = repr(name) if name == role else f"{name!r} ({role})"
+            raise LogError(f"{source.path}: column {what} is missing, the file has {there}{hint}{source.advice}")
+        if source.names.count(name) > 1:
+            raise LogError(f"{source.path}: column {name!r} must occur once, got it {source.names.count(name)} times")
+    return names

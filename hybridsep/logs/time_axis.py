@@ -1,0 +1,102 @@
+"""The time column of a log, checked block by block: increasing, uniform, and its sampling interval."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import LogError
+from ..signals import Array
+from .source import Block
+
+__all__ = ["TOLERANCE", "TimeAxis"]
+
+TOLERANCE = 0.05
+"""Largest relative deviation of an interval from the median one.
+
+A recorder's clock jitters by a few per cent at most and a lost sample doubles an interval. At a feed rate of 80 mm/s
+and 1 kHz, 5 % of an interval are 4 µm of travel, what an encoder's noise amounts to.
+"""
+
+_ROUNDING = 1e-8
+"""Relative rounding of the interval that is always allowed, so that 0.001000000003 s are 0.001 s."""
+
+
+class TimeAxis:
+    """Checks a time axis that arrives in blocks, in constant memory.
+
+    Every interval is compared with the median interval of the first block.
+
+    Parameters
+    ----------
+    path : Path
+        The file, for messages.
+    name : str
+        The column, for messages.
+    """
+
+    def __init__(self, path: Path, name: str) -> None:
+        self._path, self._name = path, name
+        self._n = 0
+        self._first = self._last = self._median = self._jitter = 0.0
+
+    def extend(self, block: Block) -> None:
+        """Take in the next times, s, the only column of the block.
+
+        Raises
+        ------
+        LogError
+            If a time does not follow the one before it by the median interval.
+        """
+        t = block.columns[0]
+        if self._n == 0:
+            self._first = self._last = float(t[0])
+            steps = np.diff(t)
+        else:
+            steps = np.diff(t, prepend=self._last)
+        # steps[i] ends at sample i + shift of this block.
+        shift = len(t) - len(steps)
+        if len(steps):
+            self._check_increasing(steps, shift, block)
+            if self._median == 0.0:
+                self._median = float(np.median(steps))
+            self._check_uniform(steps, shift, block)
+        self._n += len(t)
+        self._last = float(t[-1])
+
+    def interval(self) -> float:
+        """Return the mean interval, s, rounded to the digits that the jitter leaves certain; needs two samples."""
+        mean = (self._last - self._first) / (self._n - 1)
+        tolerance = _ROUNDING + min(1e-4, self._jitter / (self._n - 1))
+        # The shortest interval or the shortest rate that is near enough: 0.001 s, or 1/3000 s; ten digits always are.
+        candidates = (
+            candidate
+            for digits in range(10)
+            for candidate in (float(f"{mean:.{digits}e}"), 1 / float(f"{1 / mean:.{digits}e}"))
+        )
+        return next(candidate for candidate in candidates if abs(candidate - mean) <= tolerance * mean)
+
+    def _check_increasing(self, steps: Array, shift: int, block: Block) -> None:
+        if steps.min() <= 0.0:
+            i = int(np.argmax(steps <= 0.0))
+            now = float(block.columns[0][i + shift])
+            what = "repeats" if steps[i] == 0.0 else "runs backwards"
+            raise LogError(
+                f"{self._path}, {block.where(i + shift)}: time {self._name!r} {what}: a value above "
+                f"{now - float(steps[i]):.9g} s was expected, got {now:.9g} s"
+            )
+
+    def _check_uniform(self, steps: Array, shift: int, block: Block) -> None:
+        deviations = np.abs(steps / self._median - 1.0)
+        worst = float(deviations.max())
+        if worst > TOLERANCE:
+            i = int(np.argmax(deviations > TOLERANCE))
+            lost = round(float(steps[i]) / self._median) - 1
+            samples = f"; {lost} sample{'s' if lost > 1 else ''} may be lost" if lost >= 1 else ""
+            raise LogError(
+                f"{self._path}, {block.where(i + shift)}: time {self._name!r} must be uniform: an interval of "
+                f"{self._median:.6g} s ± {100 * TOLERANCE:g} % was expected, got {steps[i]:.6g} s{samples}; "
+                f"resample the log, or remove the time column and give Ts"
+            )
+        self._jitter = max(self._jitter, worst)
