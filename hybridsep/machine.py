@@ -1,0 +1,262 @@
+"""Machine files: everything the library, the FMUs and the command line need to know of one axis, as TOML.
+
+Values are SI. Ranges come from :data:`hybridsep.parameters.PARAMETERS`; a file that does not hold together is
+refused with a message that names the file, the entry, what was expected and what came.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, ValidationInfo, model_validator
+
+from ._data_files import data_folder
+from .errors import MachineError, ParameterError
+from .parameters import INPUT_HOLDS, PARAMETERS, check, check_lags
+from .physics import ModalModel, Mode
+from .plant import FeedDrive, Plant, StageDrive
+from .predictor import HybridPredictor
+from .trajectory import Limits
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+__all__ = ["DEFAULT_MACHINE", "Machine", "load_machine", "machine_names"]
+
+DEFAULT_MACHINE = "spring_mass_damper"
+
+
+def _checked(value: Any, info: ValidationInfo) -> Any:
+    """Check a field against the parameter of the same (FMI) name."""
+    names = {"lam": "lambda", "Ts": "T_s"}
+    name = str(info.field_name)
+    return check(names.get(name, name), value)
+
+
+Number = Annotated[float, BeforeValidator(_checked)]
+Whole = Annotated[int, BeforeValidator(_checked)]
+
+
+def _default(name: str) -> Any:
+    return PARAMETERS[name].default
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+
+
+class ModeSection(_Section):
+    """One mode of eq. (15)."""
+
+    f_n: Number
+    zeta: Number
+    alpha: Number
+    beta: Number = 0.0
+
+
+class SpringMassDamper(_Section):
+    """Eq. (11)."""
+
+    m: Number
+    c: Number
+    k: Number
+
+
+class Physics(_Section):
+    """``G_pb``: either ``[[physics.mode]]`` entries or one ``[physics.spring_mass_damper]``."""
+
+    mode: tuple[ModeSection, ...] = ()
+    spring_mass_damper: SpringMassDamper | None = None
+    dead_time: Whole = _default("dead_time")
+    input_hold: Literal["zoh", "foh"] = "zoh"
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> Physics:
+        if bool(self.mode) == (self.spring_mass_damper is not None):
+            raise ValueError("give either [[physics.mode]] entries or one [physics.spring_mass_damper]")
+        return self
+
+
+class PredictorSection(_Section):
+    """Parameters of the hybrid predictor."""
+
+    Np: Whole = _default("Np")
+    p: Whole = _default("p")
+    q: Whole = _default("q")
+    lam: Number = Field(default=_default("lambda"), alias="lambda")
+    t_init: Number = _default("t_init")
+
+    @model_validator(mode="after")
+    def _lags_fit(self) -> PredictorSection:
+        if problems := check_lags(Np=self.Np, p=self.p, q=self.q):
+            raise ValueError("; ".join(problems))
+        return self
+
+
+class FeedDriveSection(_Section):
+    """The drive of eq. (13); its linear part is ``[physics.spring_mass_damper]``."""
+
+    kind: Literal["feed_drive"]
+    c_nl: Number = _default("c_nl")
+    k_nl: Number = _default("k_nl")
+    noise_std: Number = _default("noise_std")
+    seed: Whole = _default("seed")
+
+
+class StageSection(_Section):
+    """The stage: ``[[physics.mode]]`` with friction and cable stiffness on the command."""
+
+    kind: Literal["stage"]
+    f: Number = _default("f")
+    kappa: Number = _default("kappa")
+    noise_std: Number = _default("noise_std")
+    seed: Whole = _default("seed")
+
+
+class LimitsSection(_Section):
+    """Velocity, acceleration and jerk of the reference trajectory, m/s, m/s², m/s³."""
+
+    velocity: float = Field(gt=0, allow_inf_nan=False)
+    acceleration: float = Field(gt=0, allow_inf_nan=False)
+    jerk: float = Field(gt=0, allow_inf_nan=False)
+
+
+class LogSection(_Section):
+    """Names of a recorded log's columns."""
+
+    t: str = "t"
+    x_d: str = "x_d"
+    x: str = "x"
+
+
+class Machine(_Section):
+    """One axis: what it is, its physics model, the predictor's parameters and, where there is one, its plant."""
+
+    name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")
+    title: str
+    sources: tuple[str, ...] = Field(min_length=1)
+    T_s: Number = _default("T_s")
+    physics: Physics
+    predictor: PredictorSection = PredictorSection()
+    plant: Annotated[FeedDriveSection | StageSection, Field(discriminator="kind")] | None = None
+    limits: LimitsSection | None = None
+    log: LogSection = LogSection()
+
+    @model_validator(mode="after")
+    def _plant_fits_physics(self) -> Machine:
+        if isinstance(self.plant, FeedDriveSection) and self.physics.spring_mass_damper is None:
+            raise ValueError("a plant of kind feed_drive needs [physics.spring_mass_damper]")
+        if isinstance(self.plant, StageSection) and not self.physics.mode:
+            raise ValueError("a plant of kind stage needs [[physics.mode]] entries")
+        if self.plant is not None and self.physics.dead_time:
+            raise ValueError("a machine with a plant must have physics.dead_time = 0: the plants have none")
+        return self
+
+    @property
+    def model(self) -> ModalModel:
+        """``G_pb``, eq. (15)."""
+        smd = self.physics.spring_mass_damper
+        if smd is not None:
+            return ModalModel.spring_mass_damper(smd.m, smd.c, smd.k, self.physics.dead_time)
+        return ModalModel([Mode(**mode.model_dump()) for mode in self.physics.mode], self.physics.dead_time)
+
+    def new_predictor(self, **changes: Any) -> HybridPredictor:
+        """Return a predictor for this machine; ``changes`` are arguments of :class:`HybridPredictor`."""
+        return HybridPredictor(
+            self.model,
+            **{"Ts": self.T_s, "input_hold": self.physics.input_hold, **self.predictor.model_dump(), **changes},
+        )
+
+    def new_plant(self, **changes: float) -> Plant:
+        """Return the nonlinear plant; ``changes`` are values of its own section, such as ``c_nl`` or ``kappa``.
+
+        Raises
+        ------
+        MachineError
+            If the file describes none: a recorded axis has only its log.
+        """
+        if self.plant is None:
+            raise MachineError(
+                f"machine {self.name} has no [plant] section; only a recorded log can show its nonlinearity"
+            )
+        values = {**self.plant.model_dump(exclude={"kind", "noise_std", "seed"}), **changes}
+        if isinstance(self.plant, FeedDriveSection):
+            assert self.physics.spring_mass_damper is not None  # by _plant_fits_physics
+            return FeedDrive(**self.physics.spring_mass_damper.model_dump(), **values)
+        return StageDrive(self.model, **values, Ts=self.T_s)
+
+    def fmi_parameters(self) -> dict[str, float | int]:
+        """Return the start values of the predictor FMU's scalar parameters, under their FMI names."""
+        values: dict[str, float | int] = self.predictor.model_dump(by_alias=True)
+        values["T_s"] = self.T_s
+        values["input_hold"] = INPUT_HOLDS.index(self.physics.input_hold)
+        values["dead_time"] = self.physics.dead_time
+        return values
+
+    def trajectory_limits(self) -> Limits:
+        """Return the limits of the reference trajectory.
+
+        Raises
+        ------
+        MachineError
+            If the file has no ``[limits]``.
+        """
+        if self.limits is None:
+            raise MachineError(f"machine {self.name} has no [limits] section")
+        return Limits(**self.limits.model_dump())
+
+
+def machine_names() -> list[str]:
+    """Return the names of the machines that come with the library."""
+    return sorted(path.stem for path in data_folder("models").glob("*.toml"))
+
+
+def load_machine(machine: str | Path) -> Machine:
+    """Read a machine file.
+
+    Parameters
+    ----------
+    machine : str or Path
+        Path of a ``.toml`` file, or the name of one that comes with the library.
+
+    Raises
+    ------
+    MachineError
+        If there is no such file, it is not TOML, or an entry is missing, unknown or out of range.
+    """
+    path = Path(machine)
+    if path.suffix != ".toml" and not path.is_file():
+        path = data_folder("models") / f"{machine}.toml"
+    if not path.is_file():
+        raise MachineError(f"no machine {str(machine)!r}: expected a .toml file or one of {', '.join(machine_names())}")
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise MachineError(f"{path.name} is not valid TOML: {error}") from error
+    try:
+        return Machine(**content)
+    except ValidationError as error:
+        problems = "; ".join(_describe(problem) for problem in error.errors())
+        raise MachineError(f"{path.name}: {problems}") from error
+    except (ParameterError, TypeError) as error:
+        raise MachineError(f"{path.name}: {error}") from error
+
+
+def _describe(problem: Any) -> str:
+    """Say one of pydantic's findings in our words: where, what was expected, what came."""
+    steps = [step for step in problem["loc"] if step not in ("feed_drive", "stage")]
+    where = ""
+    for step in steps:
+        where += f"[{step + 1}]" if isinstance(step, int) else f".{step}" if where else str(step)
+    kind = problem["type"]
+    if kind == "missing":
+        return f"{where} is missing"
+    if kind == "extra_forbidden":
+        return f"{where} is not an entry of a machine file; check its spelling"
+    if kind == "value_error":
+        return f"{where}: {problem['ctx']['error']}" if where else str(problem["ctx"]["error"])
+    return f"{where}: {problem['msg']}, got {problem.get('input')!r}"

@@ -1,0 +1,286 @@
+"""Nonlinear feed drives to validate the model against: eq. (13) and a stage with friction and cable stiffness.
+
+Both hold the command constant over a step, both are at rest at ``start`` at first, and both measure positions from
+there, as the predictor does. They are integrated by the classical Runge-Kutta method in internal steps of at most
+0.1 ms, in plain floats, without differentiating ``x_d``.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .errors import ParameterError, SignalError
+from .parameters import check
+from .physics import ModalModel
+from .signals import Array, as_samples
+
+__all__ = ["FRICTION_VELOCITY", "INTERNAL_STEP", "Encoder", "FeedDrive", "Plant", "StageDrive", "simulate"]
+
+INTERNAL_STEP = 1e-4
+"""Longest internal integration step, s."""
+
+FRICTION_VELOCITY = 2e-3
+"""Velocity over which the stage's friction changes sign, m/s."""
+
+
+class Plant(Protocol):
+    """A drive that can be stepped."""
+
+    def reset(self, start: float = 0.0) -> None:
+        """Put the drive to rest at ``start``, m."""
+
+    def step(self, x_d: float, h: float) -> None:
+        """Advance by ``h`` seconds with the command ``x_d``, m, held."""
+
+    @property
+    def x(self) -> float:
+        """True position, m."""
+
+    @property
+    def v(self) -> float:
+        """True velocity, m/s."""
+
+    def state(self) -> list[float]:
+        """Return the state as plain numbers."""
+
+    def restore(self, state: list[float]) -> None:
+        """Take over what :meth:`state` returned."""
+
+
+class FeedDrive:
+    """The spring-mass-damper drive with quadratic damping and stiffness, eq. (13).
+
+    ``m ẍ + c ẋ + k x + H_NL = c ẋ_d + k x_d`` with ``H_NL = c_nl·ẋ|ẋ| + k_nl·x|x|``, in the states
+    ``x`` and ``u = ẋ − (c/m) x_d``, which need no derivative of the command.
+
+    Parameters
+    ----------
+    m, c, k : float
+        Mass kg, damping N·s/m, stiffness N/m, > 0.
+    c_nl, k_nl : float
+        Quadratic damping N·s²/m² and stiffness N/m², ≥ 0; both 0 give eq. (11).
+    """
+
+    def __init__(self, m: float, c: float, k: float, c_nl: float = 0.0, k_nl: float = 0.0) -> None:
+        self.m: float = check("m", m)
+        self.c: float = check("c", c)
+        self.k: float = check("k", k)
+        self.c_nl: float = check("c_nl", c_nl)
+        self.k_nl: float = check("k_nl", k_nl)
+        self.reset()
+
+    def reset(self, start: float = 0.0) -> None:
+        """Put the drive to rest at ``start``, m."""
+        self._start, self._x, self._u, self._x_d = start, 0.0, 0.0, 0.0
+
+    @property
+    def x(self) -> float:
+        """True position, m."""
+        return self._start + self._x
+
+    @property
+    def v(self) -> float:
+        """True velocity under the command of the last step, m/s."""
+        return self._u + self.c / self.m * self._x_d
+
+    def step(self, x_d: float, h: float) -> None:
+        """Advance by ``h`` seconds with the command ``x_d``, m, held."""
+        n = _internal_steps(h)
+        dt = h / n
+        r = x_d - self._start
+        a, w2 = self.c / self.m, self.k / self.m
+        c_m, k_m = self.c_nl / self.m, self.k_nl / self.m
+
+        def f(x: float, u: float) -> tuple[float, float]:
+            v = u + a * r
+            # Eq. (13): u̇ = −(c/m) v − (k/m)(x − x_d) − H_NL/m
+            return v, -a * v - w2 * (x - r) - c_m * v * abs(v) - k_m * x * abs(x)
+
+        x, u = self._x, self._u
+        for _ in range(n):
+            p1, q1 = f(x, u)
+            p2, q2 = f(x + dt / 2 * p1, u + dt / 2 * q1)
+            p3, q3 = f(x + dt / 2 * p2, u + dt / 2 * q2)
+            p4, q4 = f(x + dt * p3, u + dt * q3)
+            x += dt / 6 * (p1 + 2 * p2 + 2 * p3 + p4)
+            u += dt / 6 * (q1 + 2 * q2 + 2 * q3 + q4)
+        if not (math.isfinite(x) and math.isfinite(u)):
+            raise SignalError(f"the drive's state left the range of numbers (x = {x}, command {x_d} m)")
+        self._x, self._u, self._x_d = x, u, r
+
+    def state(self) -> list[float]:
+        """Return ``[start, x, u, x_d]``."""
+        return [self._start, self._x, self._u, self._x_d]
+
+    def restore(self, state: list[float]) -> None:
+        """Take over what :meth:`state` returned."""
+        self._start, self._x, self._u, self._x_d = state
+
+
+class StageDrive:
+    """A linear-motor stage: a modal model whose command is disturbed by friction and cable stiffness.
+
+    ``x = G_pb (x_d − d)`` with ``d = f·tanh(v_d / 2 mm/s) + κ·x·|x|``: the carriage's friction follows the commanded
+    velocity ``v_d``, the backward difference of ``x_d`` over ``T_s``.
+
+    Parameters
+    ----------
+    model : ModalModel
+        ``G_pb``, eq. (15), without dead time.
+    f : float
+        Friction as an offset of the command, m, ≥ 0.
+    kappa : float
+        Cable stiffness as an offset of the command, 1/m, ≥ 0.
+    Ts : float
+        Interval at which the command is sampled, s, over which ``v_d`` is taken.
+    """
+
+    def __init__(self, model: ModalModel, f: float = 0.0, kappa: float = 0.0, Ts: float = 1e-3) -> None:
+        if model.dead_time:
+            raise ParameterError(f"the stage's model must have no dead time, got {model.dead_time} samples")
+        self.model = model
+        self.f: float = check("f", f)
+        self.kappa: float = check("kappa", kappa)
+        self.Ts: float = check("T_s", Ts)
+        self._modes = [(mode.omega**2, 2 * mode.zeta * mode.omega, mode.alpha, mode.beta) for mode in model.modes]
+        self.reset()
+
+    def reset(self, start: float = 0.0) -> None:
+        """Put the stage to rest at ``start``, m."""
+        self._start = start
+        self._z = [0.0] * (2 * len(self._modes))
+        # v_d is latched when at least T_s has passed since the command was last looked at.
+        self._last_x_d, self._v_d, self._elapsed, self._v = 0.0, 0.0, self.Ts, 0.0
+
+    @property
+    def x(self) -> float:
+        """True position, m."""
+        return self._start + self._position(self._z)
+
+    @property
+    def v(self) -> float:
+        """True velocity under the command of the last step, m/s."""
+        return self._v
+
+    def step(self, x_d: float, h: float) -> None:
+        """Advance by ``h`` seconds with the command ``x_d``, m, held."""
+        n = _internal_steps(h)
+        dt = h / n
+        r = x_d - self._start
+        last_x_d, v_d, elapsed = self._last_x_d, self._v_d, self._elapsed
+        if elapsed >= self.Ts * (1 - 1e-6):
+            last_x_d, v_d, elapsed = r, (r - last_x_d) / elapsed, 0.0
+        pushed = r - self.f * math.tanh(v_d / FRICTION_VELOCITY)
+        z, f = self._z, self._derivative
+        for _ in range(n):
+            k1 = f(z, pushed)
+            k2 = f([s + dt / 2 * k for s, k in zip(z, k1, strict=True)], pushed)
+            k3 = f([s + dt / 2 * k for s, k in zip(z, k2, strict=True)], pushed)
+            k4 = f([s + dt * k for s, k in zip(z, k3, strict=True)], pushed)
+            z = [s + dt / 6 * (a + 2 * b + 2 * c + d) for s, a, b, c, d in zip(z, k1, k2, k3, k4, strict=True)]
+        if not all(map(math.isfinite, z)):
+            raise SignalError(f"the stage's state left the range of numbers (command {x_d} m)")
+        self._z, self._v = z, self._position(f(z, pushed))
+        self._last_x_d, self._v_d, self._elapsed = last_x_d, v_d, elapsed + h
+
+    def state(self) -> list[float]:
+        """Return ``[start, last x_d, v_d, elapsed, v, z …]``."""
+        return [self._start, self._last_x_d, self._v_d, self._elapsed, self._v, *self._z]
+
+    def restore(self, state: list[float]) -> None:
+        """Take over what :meth:`state` returned."""
+        self._start, self._last_x_d, self._v_d, self._elapsed, self._v = state[:5]
+        self._z = list(state[5:])
+
+    def _position(self, z: list[float]) -> float:
+        return sum(alpha * z[2 * i] + beta * z[2 * i + 1] for i, (_, _, alpha, beta) in enumerate(self._modes))
+
+    def _derivative(self, z: list[float], pushed: float) -> list[float]:
+        x = self._position(z)
+        u = pushed - self.kappa * x * abs(x)
+        slope = []
+        for i, (w2, two_zw, _, _) in enumerate(self._modes):
+            # z̈ + 2ζω ż + ω² z = u, eq. (15)
+            slope += [z[2 * i + 1], u - two_zw * z[2 * i + 1] - w2 * z[2 * i]]
+        return slope
+
+
+class Encoder:
+    """A position sensor with normal noise that draws the same on every platform.
+
+    SplitMix64 (Steele, Lea and Flood 2014) gives two uniforms a draw, Box and Muller (1958) make one normal of them.
+
+    Parameters
+    ----------
+    noise_std : float
+        Standard deviation, m, ≥ 0.
+    seed : int
+        0 … 2³¹ − 1.
+    """
+
+    def __init__(self, noise_std: float = 0.0, seed: int = 0) -> None:
+        self.noise_std: float = check("noise_std", noise_std)
+        self.seed: int = check("seed", seed)
+        self.n_draws = 0
+
+    def measure(self, x: float) -> float:
+        """Return one measurement of the position ``x``, m."""
+        first = 2 * self.n_draws
+        self.n_draws += 1
+        # Uniform in (0, 1] and [0, 1), 53 bits each
+        u1 = ((_split_mix_64(self.seed, first) >> 11) + 1) * 2.0**-53
+        u2 = (_split_mix_64(self.seed, first + 1) >> 11) * 2.0**-53
+        return x + self.noise_std * math.sqrt(-2 * math.log(u1)) * math.cos(2 * math.pi * u2)
+
+    def measure_all(self, x: ArrayLike) -> Array:
+        """Return measurements of the positions ``x``, ``(n,)``, m, one draw each."""
+        return np.array([self.measure(position) for position in as_samples(x, "x").tolist()])
+
+
+def simulate(plant: Plant, x_d: ArrayLike, Ts: float, *, start: float | None = None) -> Array:
+    """Return the true positions of a plant that gets each command held over one sampling interval.
+
+    Parameters
+    ----------
+    plant : Plant
+        Reset first.
+    x_d : (n,) array_like, m
+        Commanded positions.
+    Ts : float
+        Sampling interval, s.
+    start : float, optional
+        Where the drive rests at first, m; the first command if left out.
+
+    Returns
+    -------
+    x : (n,) array, m
+        ``x(k)``, reached before ``x_d(k)`` acts.
+    """
+    commands = as_samples(x_d, "x_d")
+    plant.reset(float(commands[0]) if start is None else start)
+    x = np.empty(len(commands))
+    for k, command in enumerate(commands.tolist()):
+        x[k] = plant.x
+        plant.step(command, Ts)
+    return x
+
+
+def _internal_steps(h: float) -> int:
+    if not (math.isfinite(h) and h > 0):
+        raise ParameterError(f"the step size must be finite and > 0 s, got {h!r}")
+    return max(1, math.ceil(h / INTERNAL_STEP - 1e-6))
+
+
+_MASK: int = 0xFFFF_FFFF_FFFF_FFFF
+
+
+def _split_mix_64(seed: int, index: int) -> int:
+    """Return the ``index``-th number of the SplitMix64 sequence of ``seed``, 64 bits."""
+    z = (seed + (index + 1) * 0x9E3779B97F4A7C15) & _MASK
+    z = ((z ^ (z >> 30)) * 0xBF58476D1CE4E5B9) & _MASK
+    z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) & _MASK
+    return z ^ (z >> 31)
