@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
 from .errors import SignalError, StateError
-from .parameters import INPUT_HOLDS, check_together, warm_up_samples
+from .parameters import INPUT_HOLDS, check, check_together, warm_up_samples
 from .physics import ModalModel, Mode
 from .regression import RidgeRegression
 from .signals import Array, as_samples
@@ -51,14 +51,14 @@ class Prediction:
     @property
     def x_h(self) -> Array:
         """``(n,)`` array, m: the published prediction, eq. (4) after the warm-up."""
-        x_h = self.x_pb + self.e_h
+        x_h: Array = self.x_pb + self.e_h
         x_h[: self.n_warm_up] = self.x_pb[: self.n_warm_up]
         return x_h
 
     @property
-    def active(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    def active(self) -> NDArray[np.bool_]:
         """``(n,)`` array of bool: whether ``x_h`` is the hybrid prediction there."""
-        return np.arange(len(self.x_pb)) >= self.n_warm_up
+        return np.asarray(np.arange(len(self.x_pb)) >= self.n_warm_up)
 
 
 @dataclass(frozen=True)
@@ -83,12 +83,12 @@ class WindowOperator:
     @property
     def G_h(self) -> Array:
         """``(n, n)`` array, lower-triangular Toeplitz."""
-        return toeplitz(self.g_h, np.zeros(len(self.g_h)))
+        return np.asarray(toeplitz(self.g_h, np.zeros(len(self.g_h))))
 
     @property
     def G_pb(self) -> Array:
         """``(n, n)`` array, lower-triangular Toeplitz."""
-        return toeplitz(self.g_pb, np.zeros(len(self.g_pb)))
+        return np.asarray(toeplitz(self.g_pb, np.zeros(len(self.g_pb))))
 
     def __call__(self, x_d: ArrayLike) -> Array:
         """Return ``G_h x_d + free`` for commands ``x_d``, ``(n,)``, m."""
@@ -165,7 +165,7 @@ class HybridPredictor:
         renamed = {"lambda": "lam", "T_s": "Ts"}
         keywords = {renamed.get(name, name): value for name, value in parameters.items()}
         if "input_hold" in keywords:
-            keywords["input_hold"] = INPUT_HOLDS[keywords["input_hold"]]
+            keywords["input_hold"] = INPUT_HOLDS[check("input_hold", keywords["input_hold"])]
         return cls(model, **keywords, **more)
 
     @property
@@ -188,8 +188,9 @@ class HybridPredictor:
         t_init : float
             Warm-up of the new run, s; none unless asked for.
         """
-        self.start = None if start is None else float(as_samples([start], "start")[0])
-        self.n_init = warm_up_samples(t_init, self.Ts)
+        rest = None if start is None else float(as_samples([start], "start")[0])
+        self.n_init = warm_up_samples(check("t_init", t_init), self.Ts)
+        self.start = rest
         self.k = 0
         self._state = self.discrete.rest()
         # x_pb and e_pb before the first sample are zero in φ.
@@ -281,7 +282,7 @@ class HybridPredictor:
         return float(self._e[self.p - 1])
 
     def to_bytes(self) -> bytes:
-        """Return the whole state and the parameters, a window that waits for its measurement too, as a versioned blob."""
+        """Return parameters and state, a window that waits for its measurement too, as a versioned blob."""
         meta = {
             **{name: getattr(self, name) for name in ("Ts", "Np", "p", "q", "lam", "t_init", "k", "n_init", "start")},
             "input_hold": self.discrete.input_hold,
@@ -310,7 +311,7 @@ class HybridPredictor:
         StateError
             If the blob is foreign, truncated or of another version.
         """
-        meta, arrays = unpack(_KIND, blob)
+        meta, arrays, _ = unpack(_KIND, blob)
         try:
             model = ModalModel([Mode(*row) for row in arrays["modes"].tolist()], meta["dead_time"])
             names = ("Ts", "Np", "p", "q", "lam", "t_init", "input_hold", "start")
@@ -323,9 +324,13 @@ class HybridPredictor:
             if meta["pending_start"] is not None:
                 pending = arrays["pending_x_d"], arrays["pending_x_pb"]
                 predictor._pending = _Pending(*pending, start=meta["pending_start"])
-        except (KeyError, ValueError) as error:
+        except (KeyError, TypeError, ValueError) as error:
             raise StateError(f"the saved predictor does not hold together: {error}") from error
         return predictor
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Copies and pickles go through the saved state: the lags are views, which a plain copy would cut off.
+        return HybridPredictor.from_bytes, (self.to_bytes(),)
 
     def save(self, path: str | Path) -> None:
         """Write :meth:`to_bytes` to a file."""

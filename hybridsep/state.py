@@ -1,7 +1,8 @@
 """Saved states: plain data in a sized, versioned, checked blob.
 
 Layout, little-endian: magic ``HSEP``, u32 format version, u32 header length, header (JSON: kind, meta, array names
-and shapes), the arrays as float64, u32 CRC-32 of all before. The same state always gives the same bytes.
+and shapes), the arrays as float64, the parts, u32 CRC-32 of all before. The same state always gives the same
+bytes.
 """
 
 from __future__ import annotations
@@ -26,21 +27,25 @@ _PREFIX = struct.Struct("<4sII")
 _CRC = struct.Struct("<I")
 
 
-def pack(kind: str, meta: Mapping[str, Any], arrays: Mapping[str, Array]) -> bytes:
-    """Return a blob of the given kind with scalars ``meta`` and float64 ``arrays``."""
+def pack(
+    kind: str, meta: Mapping[str, Any], arrays: Mapping[str, Array], parts: Mapping[str, bytes] | None = None
+) -> bytes:
+    """Return a blob of the given kind with scalars ``meta``, float64 ``arrays`` and the blobs of its ``parts``."""
     header = {
         "kind": kind,
         "meta": dict(meta),
         "arrays": [[name, list(a.shape)] for name, a in arrays.items()],
+        "parts": [[name, len(part)] for name, part in (parts or {}).items()],
     }
     text = json.dumps(header, separators=(",", ":"), sort_keys=True).encode()
     body = b"".join(np.ascontiguousarray(array, dtype="<f8").tobytes() for array in arrays.values())
+    body += b"".join((parts or {}).values())
     blob = _PREFIX.pack(MAGIC, VERSION, len(text)) + text + body
     return blob + _CRC.pack(zlib.crc32(blob))
 
 
-def unpack(kind: str, blob: bytes) -> tuple[dict[str, Any], dict[str, Array]]:
-    """Return ``(meta, arrays)`` of a blob that :func:`pack` made.
+def unpack(kind: str, blob: bytes) -> tuple[dict[str, Any], dict[str, Array], dict[str, bytes]]:
+    """Return ``(meta, arrays, parts)`` of a blob that :func:`pack` made.
 
     Raises
     ------
@@ -54,12 +59,19 @@ def unpack(kind: str, blob: bytes) -> tuple[dict[str, Any], dict[str, Array]]:
         raise StateError(f"the saved state has format version {version}, this library reads version {VERSION}")
     if zlib.crc32(blob[: -_CRC.size]) != _CRC.unpack(blob[-_CRC.size :])[0]:
         raise StateError(f"the saved state is truncated or damaged: its {len(blob)} bytes do not fit its checksum")
-    header = json.loads(blob[_PREFIX.size : _PREFIX.size + length])
-    if header["kind"] != kind:
-        raise StateError(f"a saved state of kind {kind!r} was expected, got one of kind {header['kind']!r}")
-    arrays, offset = {}, _PREFIX.size + length
-    for name, shape in header["arrays"]:
-        count = math.prod(shape)
-        arrays[name] = np.frombuffer(blob, "<f8", count, offset).reshape(shape).astype(np.float64)
-        offset += 8 * count
-    return header["meta"], arrays
+    try:
+        header = json.loads(blob[_PREFIX.size : _PREFIX.size + length])
+        found, meta = header["kind"], header["meta"]
+        arrays, parts, offset = {}, {}, _PREFIX.size + length
+        for name, shape in header["arrays"]:
+            count = math.prod(shape)
+            arrays[name] = np.frombuffer(blob, "<f8", count, offset).reshape(shape).astype(np.float64)
+            offset += 8 * count
+        for name, count in header["parts"]:
+            parts[name] = blob[offset : offset + count]
+            offset += count
+    except (KeyError, TypeError, ValueError) as error:
+        raise StateError(f"the saved state has a header that cannot be read: {error}") from error
+    if found != kind:
+        raise StateError(f"a saved state of kind {kind!r} was expected, got one of kind {found!r}")
+    return meta, arrays, parts

@@ -1,0 +1,62 @@
+"""The nonlinear drives as a pythonfmu slave: eq. (13), or the stage where the FMU has modes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from hybridsep.errors import SignalError
+from hybridsep.fmi import slave
+from hybridsep.fmi.variables import modes_from
+from hybridsep.physics import ModalModel, Mode
+from hybridsep.plant import Encoder, FeedDrive, Plant, StageDrive
+
+
+class FeedDrivePy(slave.TableSlave):
+    """Follows the command that is constant over a step; its encoder draws anew at each communication point."""
+
+    def initialise(self) -> None:
+        """Make the plant, at rest at the start value of x_d, and its encoder."""
+        if not math.isfinite(self.values["x_d"]):
+            raise SignalError(f"the start value of x_d must be finite, got {self.values['x_d']}")
+        self.encoder = Encoder(self.values["noise_std"], self.values["seed"])
+        self.plant = self._new_plant()
+        self.plant.reset(self.values["x_d"])
+        self.x_meas = self.encoder.measure(self.plant.x)
+
+    def advance(self, t: float, h: float) -> None:
+        """Step the plant and measure it."""
+        if not math.isfinite(self.values["x_d"]):
+            raise SignalError(f"x_d must be finite, got {self.values['x_d']} at t = {t:g} s")
+        self.plant.step(self.values["x_d"], h)
+        self.x_meas = self.encoder.measure(self.plant.x)
+
+    def initial_value(self, name: str) -> float:
+        """Return the value at ``t_0``: at rest at the start value of x_d, measured once."""
+        if name == "v":
+            return 0.0
+        x = float(self.values["x_d"])
+        return Encoder(self.values["noise_std"], self.values["seed"]).measure(x) if name == "x_meas" else x
+
+    def current_value(self, name: str) -> float:
+        """Return the true position or velocity, or the measurement."""
+        return {"x": self.plant.x, "v": self.plant.v, "x_meas": self.x_meas}[name]
+
+    def core_state(self) -> tuple[dict[str, Any], bytes]:
+        """Return the plant's state and how far the noise has been drawn."""
+        meta = {"plant": self.plant.state(), "n_draws": self.encoder.n_draws, "x_meas": self.x_meas}
+        return meta, b""
+
+    def restore_core(self, meta: Mapping[str, Any], blob: bytes) -> None:
+        """Take over a plant's state and a place in the noise."""
+        self.plant, self.encoder = self._new_plant(), Encoder(self.values["noise_std"], self.values["seed"])
+        self.plant.restore(meta["plant"])
+        self.encoder.n_draws, self.x_meas = meta["n_draws"], meta["x_meas"]
+
+    def _new_plant(self) -> Plant:
+        values = self.values
+        modes = modes_from(values)
+        if modes:
+            return StageDrive(ModalModel([Mode(**mode) for mode in modes]), values["f"], values["kappa"], values["T_s"])
+        return FeedDrive(*(values[name] for name in ("m", "c", "k", "c_nl", "k_nl")))

@@ -1,0 +1,196 @@
+"""What every pythonfmu slave of this project shares: the variable table, the call order, states and errors.
+
+pythonfmu has no ``fmi2Error``: a step that returns False becomes ``fmi2Discard``, an exception ``fmi2Fatal``. A step
+that cannot be done is therefore refused with a logged message and False, and has changed nothing; what has no such
+way out (a bad parameter at the end of initialization, a call that is not allowed now) is an exception, whose message
+pythonfmu logs.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from functools import wraps
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real
+from pythonfmu.enums import Fmi2Status
+
+from ..errors import FmuError, HybridSepError, StateError
+from ..state import pack, unpack
+from .variables import Variable, variables_of
+
+__all__ = ["DESCRIPTION_FILE", "TableSlave"]
+
+DESCRIPTION_FILE = "machine.json"
+"""In the resources: model, start values of the parameters, modes and number of the FMU's content."""
+
+_KIND = "fmu"
+_TYPES = {"Real": Real, "Integer": Integer, "Boolean": Boolean}
+
+
+_Method = TypeVar("_Method", bound=Callable[..., Any])
+
+
+def _surviving(method: _Method) -> _Method:
+    """Keep the instance's objects alive when pythonfmu sees an exception.
+
+    pythonfmu 0.7 gives up its references to the slave, its class and its messages at every exception, and once more
+    when the instance is freed; without a reference in their place the second exception ends the importer's process.
+    """
+
+    @wraps(method)
+    def survive(self: TableSlave, *arguments: Any) -> Any:
+        try:
+            return method(self, *arguments)
+        except Exception:
+            for thing in (self, type(self), self.log_queue):
+                ctypes.pythonapi.Py_IncRef(ctypes.py_object(thing))
+            raise
+
+    return survive  # type: ignore[return-value]
+
+
+class TableSlave(Fmi2Slave):  # type: ignore[misc]
+    """A slave whose variables come from its table and whose arithmetic is in the library.
+
+    The machine's data are read from the instance's own resources: two FMUs that carry the same library share its
+    modules within one process, so nothing of a machine may live at module level.
+    """
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self.table_description: dict[str, Any] = json.loads(
+            (Path(self.resources) / DESCRIPTION_FILE).read_text(encoding="utf-8")
+        )
+        self.modelName = self.table_description["name"]
+        self.table = variables_of(self.table_description)
+        self.values: dict[str, Any] = {v.name: v.start for v in self.table if v.causality in ("input", "parameter")}
+        self.running = False
+        self.start_time = 0.0
+        for variable in self.table:
+            self.register_variable(self._as_pythonfmu(variable), nested=False)
+
+    # What a slave adds -----------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def initialise(self) -> None:
+        """Make the core from ``self.values``; raise HybridSepError if they do not fit."""
+
+    @abstractmethod
+    def initial_value(self, name: str) -> float | int | bool:
+        """Return an output or local variable at ``t_0``, before the core exists."""
+
+    @abstractmethod
+    def current_value(self, name: str) -> float | int | bool:
+        """Return an output or local variable now."""
+
+    @abstractmethod
+    def advance(self, t: float, h: float) -> None:
+        """Do one communication step; raise HybridSepError, with nothing changed, if it cannot be done."""
+
+    @abstractmethod
+    def core_state(self) -> tuple[dict[str, Any], bytes]:
+        """Return the core's scalars and its blob."""
+
+    @abstractmethod
+    def restore_core(self, meta: Mapping[str, Any], blob: bytes) -> None:
+        """Take over what :meth:`core_state` returned."""
+
+    # FMI -------------------------------------------------------------------------------------------------------
+
+    def setup_experiment(
+        self, start_time: float, stop_time: float | None = None, tolerance: float | None = None
+    ) -> None:
+        """Keep the start time; stop time and tolerance have no meaning here."""
+        self.start_time = start_time
+
+    def exit_initialization_mode(self) -> None:
+        """Check the parameters together and make the core."""
+        self.initialise()
+        self.running = True
+
+    def do_step(self, current_time: float, step_size: float) -> bool:
+        """Advance, or log why not and refuse the step."""
+        try:
+            if not self.running:
+                raise FmuError("doStep is not allowed before the initialization has ended")
+            self.advance(current_time, step_size)
+        except HybridSepError as error:
+            self.log(f"{self.instance_name}: {error}", Fmi2Status.error)
+            return False
+        return True
+
+    # The whole state, not only the registered variables --------------------------------------------------------
+
+    def _get_fmu_state(self) -> bytes:
+        meta: dict[str, Any] = {
+            "content": self.table_description["content"],
+            "running": self.running,
+            "start_time": self.start_time,
+            "values": self.values,
+        }
+        core: dict[str, bytes] = {}
+        if self.running:
+            meta["core"], core["core"] = self.core_state()
+        return pack(_KIND, meta, {}, core)
+
+    def _set_fmu_state(self, state: bytes) -> None:
+        meta, _, core = unpack(_KIND, state)
+        if meta["content"] != self.table_description["content"]:
+            raise StateError(f"the state belongs to another FMU than {self.modelName} as it is here")
+        self.running, self.start_time, self.values = meta["running"], meta["start_time"], dict(meta["values"])
+        if self.running:
+            self.restore_core(meta["core"], core["core"])
+
+    @staticmethod
+    def _fmu_state_to_bytes(state: bytes) -> bytes:
+        return state
+
+    @staticmethod
+    def _fmu_state_from_bytes(state: bytes) -> bytes:
+        # Checked when it is set: an exception here leaves pythonfmu with an object it has freed.
+        return bytes(state)
+
+    def _as_pythonfmu(self, variable: Variable) -> Any:
+        return _TYPES[variable.kind](
+            variable.name,
+            causality=Fmi2Causality[variable.causality],
+            variability=Fmi2Variability[variable.variability],
+            description=variable.description,
+            getter=self._getter(variable),
+            setter=self._setter(variable),
+        )
+
+    def _getter(self, variable: Variable) -> Callable[[], Any]:
+        name = variable.name
+        if variable.causality in ("input", "parameter"):
+            return lambda: self.values[name]
+        return lambda: self.current_value(name) if self.running else self.initial_value(name)
+
+    def _setter(self, variable: Variable) -> Callable[[Any], None]:
+        name, causality = variable.name, variable.causality
+
+        def refuse(value: Any) -> None:
+            raise FmuError(f"{name} is an {causality} variable and cannot be set")
+
+        def set_parameter(value: Any) -> None:
+            if self.running:
+                raise FmuError(f"{name} is a fixed parameter and cannot be set after initialization, got {value!r}")
+            self.values[name] = value
+
+        def set_input(value: Any) -> None:
+            self.values[name] = value
+
+        return {"input": set_input, "parameter": set_parameter}.get(causality, refuse)
+
+
+for _name in (
+    *("setup_experiment", "enter_initialization_mode", "exit_initialization_mode", "do_step", "terminate"),
+    *(f"{verb}_{kind}" for verb in ("get", "set") for kind in ("real", "integer", "boolean", "string")),
+    *("_get_fmu_state", "_set_fmu_state"),
+):
+    setattr(TableSlave, _name, _surviving(getattr(TableSlave, _name)))

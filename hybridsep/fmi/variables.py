@@ -1,0 +1,193 @@
+"""The variables of each FMU, in one table each.
+
+The modelDescription, the value references, the Python slave and the interface tables of the documentation all
+follow from these tables. This module travels inside the FMUs: it needs nothing but the standard library.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from ..parameters import PARAMETERS, check
+
+__all__ = ["MODELS", "Variable", "modes_from", "plant_variables", "predictor_variables", "variables_of"]
+
+Value = float | int | bool
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One FMI 2.0 scalar variable; its value reference is its place in the table.
+
+    Attributes
+    ----------
+    name, description : str
+    kind : {"Real", "Integer", "Boolean"}
+    causality : {"input", "output", "parameter", "local"}
+    variability : {"fixed", "continuous", "discrete"}
+    start : float, int, bool or None
+        Start value; None for what is calculated.
+    unit, display_unit : str or None
+        Of a Real; ``"1"`` is written without a unit.
+    minimum, maximum : float or None
+        Closed bounds for ``min``/``max``; an open bound is only checked.
+    nominal : float or None
+    initially_from : tuple of str
+        Inputs and parameters an output depends on during initialization; none at any later point.
+    """
+
+    name: str
+    kind: str
+    causality: str
+    variability: str
+    description: str
+    start: Value | None = None
+    unit: str | None = None
+    display_unit: str | None = None
+    minimum: float | None = None
+    maximum: float | None = None
+    nominal: float | None = None
+    initially_from: tuple[str, ...] = ()
+
+
+def _position(
+    name: str,
+    causality: str,
+    description: str,
+    *,
+    start: float | None = None,
+    display_unit: str = "mm",
+    variability: str = "discrete",
+    initially_from: tuple[str, ...] = (),
+) -> Variable:
+    return Variable(
+        name,
+        "Real",
+        causality,
+        "continuous" if causality == "input" else variability,
+        description,
+        start=start,
+        unit="m",
+        display_unit=display_unit,
+        nominal=1e-3 if display_unit == "mm" else 1e-6,
+        initially_from=initially_from,
+    )
+
+
+def _parameter(name: str, start: Value, *, label: str | None = None) -> Variable:
+    parameter = PARAMETERS[name]
+    return Variable(
+        label or name,
+        "Integer" if parameter.kind is int else "Real",
+        "parameter",
+        "fixed",
+        parameter.description,
+        start=start,
+        unit=None if parameter.kind is int else parameter.unit,
+        display_unit=parameter.display_unit,
+        minimum=parameter.minimum if parameter.above is None else parameter.above,
+        maximum=parameter.maximum,
+    )
+
+
+def _modes(modes: Sequence[Mapping[str, float]]) -> list[Variable]:
+    return [
+        _parameter(name, mode[name], label=f"mode[{i}].{name}")
+        for i, mode in enumerate(modes, start=1)
+        for name in ("f_n", "zeta", "alpha", "beta")
+    ]
+
+
+def modes_from(values: Mapping[str, Value]) -> list[dict[str, float]]:
+    """Return the modes that the variables ``mode[i].*`` describe.
+
+    Raises
+    ------
+    ParameterError
+        If one is out of its range, naming it with its place.
+    """
+    n = sum(name.endswith(".f_n") for name in values)
+    return [
+        {
+            key: check(key, values[f"mode[{i}].{key}"], label=f"mode[{i}].{key}")
+            for key in ("f_n", "zeta", "alpha", "beta")
+        }
+        for i in range(1, n + 1)
+    ]
+
+
+def predictor_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping[str, float]]) -> list[Variable]:
+    """Return the table of the HybridPredictor.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Start values of ``Np``, ``p``, ``q``, ``lambda``, ``T_s``, ``t_init``, ``input_hold``, ``dead_time``.
+    modes : sequence of mappings
+        ``f_n``, ``zeta``, ``alpha``, ``beta`` of each mode of eq. (15).
+    """
+    ahead = ("x_d_ahead",)
+    window = range(1, int(parameters["Np"]) + 1)
+    table = [
+        _position("x_d_ahead", "input", "commanded position entering the look-ahead, Np samples early", start=0.0),
+        _position("x_meas", "input", "measured position now", start=0.0),
+        _position("x_d", "output", "commanded position now: x_d_ahead, Np samples later", initially_from=ahead),
+        _position(
+            "x_pb", "output", "physics-based prediction for now, made when the batch began", initially_from=ahead
+        ),
+        _position("x_h", "output", "hybrid prediction for now, made when the batch began", initially_from=ahead),
+        _position("e_servo", "output", "predicted servo error x_d - x_h", display_unit="um"),
+        Variable("hybrid_active", "Boolean", "output", "discrete", "whether x_h is the hybrid prediction now"),
+        _position("rms_pb", "output", "running RMS of x_meas - x_pb since t_init", display_unit="um"),
+        _position("rms_h", "output", "running RMS of x_meas - x_h since t_init", display_unit="um"),
+        Variable("batch", "Integer", "output", "discrete", "number of the batch, floor(k / Np); 0 is the first fill"),
+    ]
+    names = ("Np", "p", "q", "lambda", "T_s", "t_init", "input_hold", "dead_time")
+    table += [_parameter(name, parameters[name]) for name in names]
+    table += _modes(modes)
+    for name, meaning in (
+        ("x_d", "commanded positions"),
+        ("x_pb", "physics-based predictions"),
+        ("x_h", "hybrid predictions"),
+    ):
+        table += [_position(f"{name}_window[{i}]", "local", f"{meaning} of the current window") for i in window]
+    return table
+
+
+def plant_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping[str, float]]) -> list[Variable]:
+    """Return the table of a FeedDrive: with ``modes`` of the stage, without of eq. (13).
+
+    Parameters
+    ----------
+    parameters : mapping
+        Start values of ``m``, ``c``, ``k``, ``c_nl``, ``k_nl`` or of ``f``, ``kappa``, ``T_s``; and of
+        ``noise_std`` and ``seed``.
+    modes : sequence of mappings
+        ``f_n``, ``zeta``, ``alpha``, ``beta`` of each mode.
+    """
+    velocity = Variable(
+        "v", "Real", "output", "continuous", "true velocity", unit="m/s", display_unit="mm/s", nominal=1e-2
+    )
+    names = (
+        ("f", "kappa", "T_s", "noise_std", "seed") if modes else ("m", "c", "k", "c_nl", "k_nl", "noise_std", "seed")
+    )
+    return [
+        _position("x_d", "input", "commanded position, constant over a step", start=0.0),
+        _position("x", "output", "true position", variability="continuous", initially_from=("x_d",)),
+        velocity,
+        _position(
+            "x_meas", "output", "measured position, with encoder noise", initially_from=("x_d", "noise_std", "seed")
+        ),
+        *_modes(modes),
+        *(_parameter(name, parameters[name]) for name in names),
+    ]
+
+
+MODELS = {"HybridPredictor": predictor_variables, "FeedDrive": plant_variables}
+"""The table of each model, from its parameters' start values and its modes."""
+
+
+def variables_of(description: Mapping[str, object]) -> list[Variable]:
+    """Return the table that an FMU's ``machine.json`` describes: its model, parameters and modes."""
+    return MODELS[str(description["model"])](description["parameters"], description["modes"])  # type: ignore[arg-type]

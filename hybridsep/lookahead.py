@@ -1,0 +1,179 @@
+"""The predictor, sample by sample: the look-ahead buffer between the interpolator and the drive.
+
+The FMU's timing contract. Sample ``k`` brings ``x_d_ahead = r(k)`` and ``x_meas = x(k)``; after it the outputs are
+those of ``k + 1``, and the drive gets ``x_d(k) = r(k − Np)``. When ``k + 1`` is a multiple of ``Np``, the whole next
+window and every measurement before it have arrived: the weights are solved and the window is predicted in that
+sample. The first fill (``k < Np``) keeps the drive at its start; it is neither learned nor used.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .errors import SignalError, StateError
+from .predictor import HybridPredictor
+from .signals import Array
+from .state import pack, unpack
+
+__all__ = ["LookAhead"]
+
+_KIND = "look-ahead"
+
+
+class LookAhead:
+    """Delays commands by ``Np`` samples and predicts the drive's position while they wait.
+
+    Parameters
+    ----------
+    predictor : HybridPredictor
+        What predicts; put to the beginning of a run here, with what it has learned kept.
+    start : float
+        Position where the drive is at rest, m; the drive's command until the first window is there.
+
+    Raises
+    ------
+    SignalError
+        If ``start`` is not finite.
+    """
+
+    def __init__(self, predictor: HybridPredictor, start: float) -> None:
+        if not math.isfinite(start):
+            raise SignalError(f"the start value of x_d_ahead must be finite, got {start}")
+        predictor.new_run(start, t_init=predictor.t_init)
+        self.predictor = predictor
+        self.Np = predictor.Np
+        self.start = start
+        self.k = 0
+        rest = np.full(self.Np, start)
+        self._ahead, self._measured = rest.copy(), rest.copy()
+        self.x_d_window: Array = rest
+        self.x_pb_window: Array = rest
+        self.x_h_window: Array = rest
+        self._n_warm_up = self.Np
+        # Sums of squares over the measured samples since t_init
+        self._n, self._sum_pb, self._sum_h = 0, 0.0, 0.0
+
+    @property
+    def batch(self) -> int:
+        """``⌊k/Np⌋``; 0 is the first fill."""
+        return self.k // self.Np
+
+    @property
+    def x_d(self) -> float:
+        """Commanded position now, m."""
+        return float(self.x_d_window[self.k % self.Np])
+
+    @property
+    def x_pb(self) -> float:
+        """Physics-based prediction for now, m."""
+        return float(self.x_pb_window[self.k % self.Np])
+
+    @property
+    def x_h(self) -> float:
+        """Hybrid prediction for now, m."""
+        return float(self.x_h_window[self.k % self.Np])
+
+    @property
+    def e_servo(self) -> float:
+        """Predicted servo error ``x_d − x_h``, m."""
+        return self.x_d - self.x_h
+
+    @property
+    def hybrid_active(self) -> bool:
+        """Whether ``x_h`` is the hybrid prediction now."""
+        return self.k % self.Np >= self._n_warm_up
+
+    @property
+    def rms_pb(self) -> float:
+        """Running RMS of ``x_meas − x_pb`` since ``t_init``, m; 0 before."""
+        return math.sqrt(self._sum_pb / self._n) if self._n else 0.0
+
+    @property
+    def rms_h(self) -> float:
+        """Running RMS of ``x_meas − x_h`` since ``t_init``, m; 0 before."""
+        return math.sqrt(self._sum_h / self._n) if self._n else 0.0
+
+    def check(self, x_d_ahead: float, x_meas: float) -> None:
+        """Raise SignalError if a value cannot be taken in; nothing is changed."""
+        for name, value in (("x_d_ahead", x_d_ahead), ("x_meas", x_meas)):
+            if not math.isfinite(value):
+                raise SignalError(f"{name} must be finite, got {value} at sample {self.k}")
+
+    def sample(self, x_d_ahead: float, x_meas: float) -> None:
+        """Take in sample ``k`` and move on to ``k + 1``.
+
+        Parameters
+        ----------
+        x_d_ahead : float, m
+            ``r(k)``, the command for ``Np`` samples later.
+        x_meas : float, m
+            ``x(k)``, the position measured now.
+
+        Raises
+        ------
+        SignalError
+            If one of them is not finite; nothing is changed then.
+        """
+        self.check(x_d_ahead, x_meas)
+        i = self.k % self.Np
+        self._ahead[i], self._measured[i] = x_d_ahead, x_meas
+        if self.k >= self.Np + self.predictor.n_init:
+            self._n += 1
+            self._sum_pb += (x_meas - self.x_pb) ** 2
+            self._sum_h += (x_meas - self.x_h) ** 2
+        self.k += 1
+        if self.k % self.Np == 0:
+            self._next_window()
+
+    def to_bytes(self) -> bytes:
+        """Return the whole state, the predictor's included, as a versioned blob."""
+        meta = {
+            "start": self.start,
+            "k": self.k,
+            "n_warm_up": self._n_warm_up,
+            "n": self._n,
+            "sum_pb": self._sum_pb,
+            "sum_h": self._sum_h,
+        }
+        arrays = {
+            "ahead": self._ahead,
+            "measured": self._measured,
+            "x_d": self.x_d_window,
+            "x_pb": self.x_pb_window,
+            "x_h": self.x_h_window,
+        }
+        return pack(_KIND, meta, arrays, {"predictor": self.predictor.to_bytes()})
+
+    @classmethod
+    def from_bytes(cls, blob: bytes) -> LookAhead:
+        """Return the look-ahead that :meth:`to_bytes` described.
+
+        Raises
+        ------
+        StateError
+            If the blob is foreign, truncated or of another version.
+        """
+        meta, arrays, parts = unpack(_KIND, blob)
+        try:
+            look_ahead = cls.__new__(cls)
+            look_ahead.predictor = HybridPredictor.from_bytes(parts["predictor"])
+            look_ahead.Np = look_ahead.predictor.Np
+            look_ahead.start, look_ahead.k, look_ahead._n_warm_up = meta["start"], meta["k"], meta["n_warm_up"]
+            look_ahead._n, look_ahead._sum_pb, look_ahead._sum_h = meta["n"], meta["sum_pb"], meta["sum_h"]
+            look_ahead._ahead, look_ahead._measured = arrays["ahead"], arrays["measured"]
+            look_ahead.x_d_window, look_ahead.x_pb_window = arrays["x_d"], arrays["x_pb"]
+            look_ahead.x_h_window = arrays["x_h"]
+        except KeyError as error:
+            raise StateError(f"the saved look-ahead does not hold together: {error} is missing") from error
+        return look_ahead
+
+    def _next_window(self) -> None:
+        if self.k > self.Np:  # the first fill was not predicted and is not learned
+            self.predictor.update(self._measured)
+        prediction = self.predictor.predict(self._ahead)
+        self.x_d_window = self._ahead.copy()
+        self.x_pb_window = prediction.x_pb
+        self.x_h_window = prediction.x_h
+        self._n_warm_up = prediction.n_warm_up
