@@ -1,5 +1,80 @@
-"""Servo-error prediction for CNC feed drives with the linear hybrid model."""
+"""Servo-error prediction for CNC feed drives with the linear hybrid model.
+
+A linear physics model of the drive predicts, a recursive ridge regression learns online what it misses, and the sum
+stays linear in the command (C.-H. Chou, M. Duan, C. E. Okwudire, CIRP Annals 2021). Start with
+:func:`load_machine`, :class:`HybridPredictor` and :func:`backtest`.
+"""
 
 from __future__ import annotations
 
 __version__ = "0.1.0"
+
+from .backtest import Backtest, Scores, backtest, backtest_stream
+from .cosim import CoSimulation, cosimulate
+from .errors import (
+    FmuError,
+    HybridSepError,
+    LogError,
+    MachineError,
+    ModelError,
+    ParameterError,
+    SignalError,
+    StateError,
+)
+from .fmi.archive import build_fmu, fmu_names
+from .importer import FmuInstance
+from .logs import Log, LogReader, open_log, read_log
+from .lookahead import LookAhead
+from .machine import Machine, load_machine, machine_names
+from .physics import DiscreteModel, ModalModel, Mode
+from .plant import Encoder, FeedDrive, StageDrive, simulate
+from .predictor import HybridPredictor, Prediction, WindowOperator
+from .regression import RidgeRegression
+from .trajectory import PAPER_LIMITS, Limits, along_path, archimedean_spiral, from_file, rest_to_rest, spiral, staircase
+
+__all__ = [
+    "PAPER_LIMITS",
+    "Backtest",
+    "CoSimulation",
+    "DiscreteModel",
+    "Encoder",
+    "FeedDrive",
+    "FmuError",
+    "FmuInstance",
+    "HybridPredictor",
+    "HybridSepError",
+    "Limits",
+    "Log",
+    "LogError",
+    "LogReader",
+    "LookAhead",
+    "Machine",
+    "MachineError",
+    "ModalModel",
+    "Mode",
+    "ModelError",
+    "ParameterError",
+    "Prediction",
+    "RidgeRegression",
+    "Scores",
+    "SignalError",
+    "StageDrive",
+    "StateError",
+    "WindowOperator",
+    "along_path",
+    "archimedean_spiral",
+    "backtest",
+    "backtest_stream",
+    "build_fmu",
+    "cosimulate",
+    "fmu_names",
+    "from_file",
+    "load_machine",
+    "machine_names",
+    "open_log",
+    "read_log",
+    "rest_to_rest",
+    "simulate",
+    "spiral",
+    "staircase",
+]

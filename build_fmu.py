@@ -1,0 +1,14 @@
+"""Build the FMUs: ``python build_fmu.py [--machine models/X.toml] [--backend python] [--out dist] [FMU …]``.
+
+A thin front of ``hybridsep build``; without arguments all FMUs go to ``dist/``.
+"""
+
+from __future__ import annotations
+
+import sys
+
+from hybridsep.cli import main
+
+if __name__ == "__main__":
+    sys.argv.insert(1, "build")
+    main()

@@ -1,0 +1,309 @@
+"""The command line: ``hybridsep demo | build | cosim | backtest``."""
+
+from __future__ import annotations
+
+import csv
+import json
+import sys
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from . import __version__
+from .backtest import Batch, Scores, backtest_stream
+from .cosim import cosimulate
+from .demo import PRINTED
+from .demo import demo as run_demo
+from .errors import HybridSepError, ParameterError
+from .fmi.archive import BACKENDS, build_fmu, fmu_names
+from .logs import open_log
+from .machine import DEFAULT_MACHINE, Machine, load_machine, machine_names
+from .parameters import PARAMETERS
+from .signals import Array
+from .trajectory import from_file, spiral, staircase
+
+__all__ = ["app", "main"]
+
+app = typer.Typer(
+    help="Predict a CNC feed drive's servo error one look-ahead window early, with a linear hybrid model.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    add_completion=False,
+)
+_out, _err = Console(), Console(stderr=True)
+
+JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and nothing else.")]
+MachineOption = Annotated[
+    str, typer.Option("--machine", "-m", help="Machine file (.toml), or the name of one that comes with the library.")
+]
+BackendOption = Annotated[str, typer.Option(help=f"Flavour of the FMUs: {', '.join(BACKENDS)}.")]
+UnitOption = Annotated[str, typer.Option(help="Unit of the positions in the file: m, mm or um.")]
+
+
+def _help(name: str) -> str:
+    return PARAMETERS[name].help + "; the machine's own if left out"
+
+
+NpOption = Annotated[int | None, typer.Option("--Np", help=_help("Np"))]
+POption = Annotated[int | None, typer.Option("--p", help=_help("p"))]
+QOption = Annotated[int | None, typer.Option("--q", help=_help("q"))]
+LamOption = Annotated[float | None, typer.Option("--lam", help=_help("lambda"))]
+InitOption = Annotated[float | None, typer.Option("--t-init", help=_help("t_init"))]
+
+
+@app.command()
+def demo(
+    out: Annotated[Path, typer.Option(help="Folder for FMUs, figures, results and summary.json.")] = Path("demo"),
+    emps: Annotated[Path | None, typer.Option(help="A DATA_EMPS.mat: replay this recorded axis too.")] = None,
+    seeds: Annotated[int, typer.Option(min=1, help="Noise seeds the staircase is averaged over.")] = 10,
+    backend: BackendOption = BACKENDS[0],
+    as_json: JsonOption = False,
+) -> None:
+    """Build the FMUs, co-simulate the paper's staircase and spiral, draw and score them."""
+    with _progress(as_json) as advance:
+        summary = run_demo(out, emps=emps, seeds=seeds, backend=backend, progress=advance)
+    if as_json:
+        _print_json(summary)
+        return
+    table = Table(title="Prediction error, RMS in µm against the measured position")
+    for column in ("case", "physics", "hold", "hybrid", "reduction", "printed in the paper"):
+        table.add_column(column, justify="left" if column == "case" else "right", no_wrap=column == "case")
+    for name, case in summary.items():
+        table.add_row(name, *_figures(case), _printed(PRINTED[name]))
+        for part in ("friction_alone", "stiffness_alone"):
+            if part in case:
+                table.add_row(f"  {part.replace('_', ' ')}", *_figures(case[part]), "")
+    _out.print(table)
+    for name, case in summary.items():
+        worse = case["batches_hybrid_worse"]
+        if worse:
+            times = ", ".join(f"{batch['t_s']:g}" for batch in worse)
+            _out.print(
+                f"{name}: hybrid worse than physics in {len(worse)} of {case['n_batches']} batches, from {times} s on"
+            )
+    _out.print(f"\nFigures, FMUs, results and summary.json are in {out}")
+
+
+@app.command()
+def build(
+    fmus: Annotated[
+        list[str] | None, typer.Argument(help="FMUs to build, by name; all of the machines' if left out.")
+    ] = None,
+    machine: Annotated[
+        list[str] | None,
+        typer.Option("--machine", "-m", help="Machine file (.toml) or name; may be repeated; all if left out."),
+    ] = None,
+    backend: BackendOption = BACKENDS[0],
+    out: Annotated[Path, typer.Option(help="Folder for the archives.")] = Path("dist"),
+    as_json: JsonOption = False,
+) -> None:
+    """Build FMUs from machine files; the same machine gives the same bytes."""
+    wanted = list(fmus or [])
+    jobs = []
+    for source in machine or machine_names():
+        axis = load_machine(source)
+        jobs += [(axis, name) for name in fmu_names(axis, backend)]
+    if unknown := sorted(set(wanted) - {name for _, name in jobs}):
+        raise ParameterError(f"no FMU {', '.join(unknown)}; there are {', '.join(name for _, name in jobs)}")
+    jobs = [(axis, name) for axis, name in jobs if not wanted or name in wanted]
+    paths = []
+    with _progress(as_json) as advance:
+        for i, (axis, name) in enumerate(jobs):
+            advance(name, i / len(jobs))
+            paths.append(build_fmu(axis, name, out, backend))
+        advance("done", 1.0)
+    if as_json:
+        _print_json([str(path) for path in paths])
+    else:
+        for path in paths:
+            _out.print(f"{path}  {path.stat().st_size / 1024:.0f} KiB", highlight=False)
+
+
+@app.command()
+def cosim(
+    machine: MachineOption = DEFAULT_MACHINE,
+    trajectory: Annotated[
+        str, typer.Option(help="staircase, spiral_x, spiral_y, or a CSV, .npz or .mat file with the columns t and x_d.")
+    ] = "staircase",
+    unit: UnitOption = "m",
+    predictor: Annotated[Path | None, typer.Option(help="Predictor FMU; built from the machine if left out.")] = None,
+    plant: Annotated[Path | None, typer.Option(help="Plant FMU; built from the machine if left out.")] = None,
+    seed: Annotated[int | None, typer.Option(help=_help("seed"))] = None,
+    Np: NpOption = None,
+    p: POption = None,
+    q: QOption = None,
+    lam: LamOption = None,
+    t_init: InitOption = None,
+    backend: BackendOption = BACKENDS[0],
+    out: Annotated[Path | None, typer.Option(help="File for all signals, .csv or .npz.")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Co-simulate a predictor FMU with a plant FMU over a trajectory."""
+    axis = load_machine(machine)
+    if out is not None and out.suffix not in (".csv", ".npz"):
+        raise ParameterError(f"--out must end in .csv or .npz, got {out.name!r}")
+    command = _command(trajectory, axis, unit)
+    values = {"Np": Np, "p": p, "q": q, "lambda": lam, "t_init": t_init}
+    with tempfile.TemporaryDirectory() as folder, _progress(as_json) as advance:
+        names = {model: name for name, model in fmu_names(axis, backend).items()}
+        if plant is None and "FeedDrive" not in names:
+            raise ParameterError(f"machine {axis.name} has no plant; name a plant FMU with --plant")
+        run = cosimulate(
+            predictor or build_fmu(axis, names["HybridPredictor"], folder, backend),
+            plant or build_fmu(axis, names["FeedDrive"], folder, backend),
+            command,
+            predictor_values={name: value for name, value in values.items() if value is not None},
+            plant_values={} if seed is None else {"seed": seed},
+            progress=lambda k, n: advance("co-simulation", k / n),
+        )
+    if out is not None:
+        run.save(out)
+    _print_scores(run.summary(), as_json, f"{axis.title}, {trajectory}")
+
+
+@app.command("backtest")
+def backtest_command(
+    log: Annotated[Path, typer.Argument(help="CSV with the columns t, x_d, x, or .npz or .mat with named columns.")],
+    machine: MachineOption,
+    unit: UnitOption = "m",
+    t: Annotated[str | None, typer.Option("--t", help="Name of the time column.")] = None,
+    x_d: Annotated[str | None, typer.Option("--x-d", help="Name of the commanded position's column.")] = None,
+    x: Annotated[str | None, typer.Option("--x", help="Name of the measured position's column.")] = None,
+    Np: NpOption = None,
+    p: POption = None,
+    q: QOption = None,
+    lam: LamOption = None,
+    t_init: InitOption = None,
+    out: Annotated[Path | None, typer.Option(help="CSV for the RMS errors batch by batch.")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Replay a recorded log causally: physics model, hold baseline and hybrid."""
+    axis = load_machine(machine)
+    given = {"t": t, "x_d": x_d, "x": x}
+    names = {role: given[role] or column for role, column in axis.log.model_dump().items()}
+    reader = open_log(log, columns=names, unit=unit)
+    if abs(reader.Ts - axis.T_s) > 0.01 * axis.T_s:
+        raise ParameterError(
+            f"{log.name} is sampled every {reader.Ts:g} s, but machine {axis.name} has T_s = {axis.T_s:g} s; "
+            "resample the log or correct T_s"
+        )
+    changes = {"Np": Np, "p": p, "q": q, "lam": lam, "t_init": t_init}
+    predictor = axis.new_predictor(**{name: value for name, value in changes.items() if value is not None})
+    with _progress(as_json) as advance, _batch_writer(out, reader.Ts) as write:
+
+        def on_batch(batch: Batch) -> None:
+            write(batch)
+            if batch.j % 100 == 0:
+                advance("replay", batch.k / reader.n_samples)
+
+        scores: Scores = backtest_stream(predictor, reader.chunks(), on_batch=on_batch)
+    _print_scores(scores.summary(), as_json, f"{axis.title}, {log.name}")
+
+
+@app.callback(invoke_without_command=True)
+def _version(version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False) -> None:
+    if version:
+        typer.echo(__version__)
+        raise typer.Exit
+
+
+def main() -> None:
+    """Run the command line; an error of ours is one line on stderr and exit status 2."""
+    try:
+        app()
+    except HybridSepError as error:
+        _err.print(f"[bold red]error:[/] {type(error).__name__}: ", end="")
+        _err.print(str(error), markup=False, highlight=False)
+        sys.exit(2)
+
+
+def _command(trajectory: str, axis: Machine, unit: str) -> Array:
+    """Return the samples of a named trajectory or of a file, at the machine's sampling interval."""
+    if trajectory == "staircase":
+        return staircase(axis.T_s)
+    if trajectory in ("spiral_x", "spiral_y"):
+        return spiral(axis.T_s)[trajectory == "spiral_y"]
+    command, Ts = from_file(trajectory, unit=unit)
+    if abs(Ts - axis.T_s) > 0.01 * axis.T_s:
+        raise ParameterError(
+            f"{trajectory} is sampled every {Ts:g} s, but machine {axis.name} has T_s = {axis.T_s:g} s; resample it"
+        )
+    return command
+
+
+@contextmanager
+def _progress(quiet: bool) -> Iterator[Any]:
+    """Show a progress bar on stderr; give a function of a message and the fraction done."""
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=_err, transient=True, disable=quiet or not _err.is_terminal) as bar:
+        task = bar.add_task("starting", total=1.0)
+        yield lambda message, fraction: bar.update(task, description=message, completed=fraction)
+
+
+@contextmanager
+def _batch_writer(path: Path | None, Ts: float) -> Iterator[Any]:
+    """Give a function that writes one batch to a CSV, or does nothing without a path."""
+    if path is None:
+        yield lambda batch: None
+        return
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["t", "rms_pb", "rms_hold", "rms_h"])
+        yield lambda batch: writer.writerow([round(batch.k * Ts, 9), batch.rms_pb, batch.rms_hold, batch.rms_h])
+
+
+def _figures(case: Mapping[str, Any]) -> list[str]:
+    """Return physics, hold, hybrid and reduction of a case as text."""
+    figures = [f"{case[name]:.2f}" for name in ("rms_pb_um", "rms_hold_um", "rms_h_um")]
+    return [*figures, f"{case['reduction_percent']:.1f} %"]
+
+
+def _printed(case: Mapping[str, float]) -> str:
+    """Return what the paper prints: physics, hybrid, reduction, as far as it does."""
+    figures = [f"{case[name]:g}" for name in ("rms_pb_um", "rms_h_um") if name in case]
+    if "reduction_percent" in case:
+        figures.append(f"{case['reduction_percent']:g} %")
+    return ", ".join(figures)
+
+
+def _print_scores(summary: Mapping[str, float | int], as_json: bool, title: str) -> None:
+    if as_json:
+        _print_json(summary)
+        return
+    table = Table(title=f"{title}: prediction error in µm against the measured position")
+    for column in ("", "physics", "hold", "hybrid", "reduction"):
+        table.add_column(column, justify="right")
+    for suffix, label in (("", ""), ("_after_warm_up", " after warm-up")):
+        if f"rms_pb_um{suffix}" in summary:
+            row = [f"{summary[f'rms_{name}_um{suffix}']:.2f}" for name in ("pb", "hold", "h")]
+            table.add_row(f"RMS{label}", *row, f"{summary[f'reduction_percent{suffix}']:.1f} %")
+        if f"max_pb_um{suffix}" in summary:
+            row = [f"{summary[f'max_{name}_um{suffix}']:.2f}" for name in ("pb", "hold", "h")]
+            table.add_row(f"max{label}", *row, "")
+    _out.print(table)
+
+
+def _print_json(result: Any) -> None:
+    """Print JSON; figures that do not exist, such as scores over no sample, are null."""
+    typer.echo(json.dumps(_finite(result), indent=2))
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+if __name__ == "__main__":
+    main()
