@@ -14,7 +14,7 @@ import numpy as np
 
 from .errors import SignalError, StateError
 from .predictor import HybridPredictor
-from .signals import Array
+from .signals import POSITION_MAX, Array
 from .state import pack, unpack
 
 __all__ = ["LookAhead"]
@@ -100,6 +100,8 @@ class LookAhead:
         for name, value in (("x_d_ahead", x_d_ahead), ("x_meas", x_meas)):
             if not math.isfinite(value):
                 raise SignalError(f"{name} must be finite, got {value} at sample {self.k}")
+            if abs(value) > POSITION_MAX:
+                raise SignalError(f"{name} must be within ±{POSITION_MAX:g} m, got {value:g} at sample {self.k}")
 
     def sample(self, x_d_ahead: float, x_meas: float) -> None:
         """Take in sample ``k`` and move on to ``k + 1``.

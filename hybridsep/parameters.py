@@ -69,8 +69,8 @@ class Parameter:
         """The allowed range as people write it, for example ``"> 0"`` or ``"1 … 10000"``."""
         if self.above is not None:
             return f"> {self.above:g}" + ("" if self.maximum is None else f" and ≤ {self.maximum:g}")
-        if self.minimum is not None and self.maximum is not None and self.maximum != _INT_MAX:
-            return f"{self.minimum:g} … {self.maximum:g}"
+        if self.minimum is not None and self.maximum is not None:
+            return f"{self.minimum:g} … {self.maximum:.10g}"
         if self.minimum is not None:
             return f"≥ {self.minimum:g}"
         return "finite"
@@ -112,6 +112,8 @@ PARAMETERS: Mapping[str, Parameter] = _table(
     Parameter("kappa", float, "1/m", "cable stiffness, an offset kappa·x·|x| of the command", 0.0, 0.0),
     Parameter("noise_std", float, "m", "standard deviation of the encoder noise", 0.0, 0.0, display_unit="um"),
     Parameter("seed", int, "1", "seed of the encoder noise", 0, 0, _INT_MAX),
+    # The source of commands.
+    Parameter("trajectory", int, "1", "0 staircase, 1 spiral X, 2 spiral Y, 3 samples given when built", 0, 0, 3),
 )
 
 
@@ -167,14 +169,20 @@ def check_together(*, Np: Any, p: Any, q: Any, lam: Any, Ts: Any, t_init: Any) -
         Naming every parameter that is out of range (section 2: ``Np ≥ 1``, ``0 ≤ q < Np``, ``1 ≤ p ≤ Np``,
         ``λ > 0``, ``T_s > 0``).
     """
+    given = {"Np": Np, "p": p, "q": q, "lambda": lam, "T_s": Ts, "t_init": t_init}
     problems: list[str] = []
-    for name, value in (("Np", Np), ("p", p), ("q", q), ("lambda", lam), ("T_s", Ts), ("t_init", t_init)):
+    known = {}
+    for name, value in given.items():
         try:
-            check(name, value)
+            known[name] = check(name, value)
         except ParameterError as error:
             problems.append(str(error))
     if not problems:
-        problems = check_lags(Np=Np, p=p, q=q)
+        problems = check_lags(Np=known["Np"], p=known["p"], q=known["q"])
+        try:
+            warm_up_samples(known["t_init"], known["T_s"])
+        except ParameterError as error:
+            problems.append(str(error))
     if problems:
         raise ParameterError("; ".join(problems))
 
@@ -190,5 +198,14 @@ def check_lags(*, Np: int, p: int, q: int) -> list[str]:
 
 
 def warm_up_samples(t_init: float, Ts: float) -> int:
-    """Return how many samples have ``t < t_init``, counted in samples so that rounding of times cannot tell."""
-    return max(0, math.ceil(t_init / Ts - 1e-6))
+    """Return how many samples have ``t < t_init``, counted in samples so that rounding of times cannot tell.
+
+    Raises
+    ------
+    ParameterError
+        If they are too many to be counted.
+    """
+    count = t_init / Ts
+    if not math.isfinite(count):
+        raise ParameterError(f"t_init must be a countable number of samples, got {t_init!r} s at T_s = {Ts!r} s")
+    return max(0, math.ceil(count - 1e-6))

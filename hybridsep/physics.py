@@ -121,7 +121,8 @@ class ModalModel:
         Raises
         ------
         ModelError
-            If the system is discrete, has several channels, is improper, unstable, or has repeated modes.
+            If the system is of another kind, discrete, zero, not finite, improper or unstable, has several channels,
+            or has repeated modes.
         """
         from ._modal_form import modes_of
 
@@ -168,7 +169,7 @@ class ModalModel:
         ParameterError
             If ``Ts ≤ 0`` or the hold is unknown.
         """
-        return DiscreteModel(self, check("T_s", Ts), input_hold, block)
+        return DiscreteModel(self, Ts, input_hold, block)
 
     def frequency_response(self, f: ArrayLike, Ts: float | None = None) -> NDArray[np.complex128]:
         """Return ``G_pb(j 2π f)``.
@@ -212,7 +213,8 @@ class ModalModel:
         if Ts is None:
             if self.dead_time:
                 raise ModelError(
-                    f"a dead time of {self.dead_time} samples has no continuous rational form; give Ts for a discrete one"
+                    f"a dead time of {self.dead_time} samples has no continuous rational form; "
+                    "give Ts for a discrete one"
                 )
             A, b, c = self.state_space()
             return control.ss(A, b[:, None], c[None, :], [[0.0]])
@@ -239,10 +241,10 @@ class DiscreteModel:
         if input_hold not in INPUT_HOLDS:
             raise ParameterError(f"input_hold must be one of {', '.join(INPUT_HOLDS)}, got {input_hold!r}")
         self.model = model
-        self.Ts = Ts
+        self.Ts: float = check("T_s", Ts)
         self.input_hold = input_hold
         self.dead_time = model.dead_time
-        self.A, self.b, self.c, self.d = _discrete(model, Ts, input_hold)
+        self.A, self.b, self.c, self.d = _discrete(model, self.Ts, input_hold)
         self._n = len(self.b)
         self._block = max(1, min(block, BLOCK_MAX))
         self._tabulate()

@@ -51,7 +51,7 @@ class RidgeRegression:
         # [R z; 0 ρ]: the factor of the rows [Φ | e_pb], with √λ·I as its first value.
         self._factor = np.zeros((n_features + 1, n_features + 1), order="F")
         np.fill_diagonal(self._factor[:-1, :-1], math.sqrt(self.lam))
-        self._weights: Array | None = np.zeros(n_features)
+        self._weights: Array | None = None
 
     @property
     def factor(self) -> Array:

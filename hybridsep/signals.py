@@ -9,9 +9,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import SignalError
 
-__all__ = ["Array", "as_samples"]
+__all__ = ["POSITION_MAX", "Array", "as_samples"]
 
 Array = NDArray[np.float64]
+
+POSITION_MAX = 1e9
+"""Largest magnitude taken for a position, m; its square must not spoil what has been learned."""
 
 
 def as_samples(values: ArrayLike, name: str, length: int | None = None) -> Array:
@@ -29,7 +32,7 @@ def as_samples(values: ArrayLike, name: str, length: int | None = None) -> Array
     Raises
     ------
     SignalError
-        If they are not one-dimensional, of the wrong length, or not all finite.
+        If they are not one-dimensional, of the wrong length, not all finite, or no positions in metres.
     """
     samples: Any = np.asarray(values)
     if samples.dtype != np.float64 or not samples.flags.c_contiguous:
@@ -44,4 +47,7 @@ def as_samples(values: ArrayLike, name: str, length: int | None = None) -> Array
     if not np.isfinite(samples).all():
         i = int(np.flatnonzero(~np.isfinite(samples))[0])
         raise SignalError(f"{name} must be finite, got {samples[i]} at sample {i}")
+    if len(samples) and np.abs(samples).max() > POSITION_MAX:
+        i = int(np.argmax(np.abs(samples)))
+        raise SignalError(f"{name} must be within ±{POSITION_MAX:g} m, got {samples[i]:g} at sample {i}")
     return samples  # type: ignore[no-any-return]

@@ -11,7 +11,15 @@ from dataclasses import dataclass
 
 from ..parameters import PARAMETERS, check
 
-__all__ = ["MODELS", "Variable", "modes_from", "plant_variables", "predictor_variables", "variables_of"]
+__all__ = [
+    "MODELS",
+    "Variable",
+    "modes_from",
+    "plant_variables",
+    "predictor_variables",
+    "trajectory_variables",
+    "variables_of",
+]
 
 Value = float | int | bool
 
@@ -25,13 +33,15 @@ class Variable:
     name, description : str
     kind : {"Real", "Integer", "Boolean"}
     causality : {"input", "output", "parameter", "local"}
-    variability : {"fixed", "continuous", "discrete"}
+    variability : {"fixed", "tunable", "continuous", "discrete"}
     start : float, int, bool or None
         Start value; None for what is calculated.
     unit, display_unit : str or None
         Of a Real; ``"1"`` is written without a unit.
     minimum, maximum : float or None
-        Closed bounds for ``min``/``max``; an open bound is only checked.
+        Bounds, as ``min``/``max`` show them.
+    above : bool
+        Whether the minimum itself is not allowed; FMI cannot say it, the check does.
     nominal : float or None
     initially_from : tuple of str
         Inputs and parameters an output depends on during initialization; none at any later point.
@@ -48,6 +58,7 @@ class Variable:
     minimum: float | None = None
     maximum: float | None = None
     nominal: float | None = None
+    above: bool = False
     initially_from: tuple[str, ...] = ()
 
 
@@ -88,6 +99,7 @@ def _parameter(name: str, start: Value, *, label: str | None = None) -> Variable
         display_unit=parameter.display_unit,
         minimum=parameter.minimum if parameter.above is None else parameter.above,
         maximum=parameter.maximum,
+        above=parameter.above is not None,
     )
 
 
@@ -184,7 +196,29 @@ def plant_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping[str
     ]
 
 
-MODELS = {"HybridPredictor": predictor_variables, "FeedDrive": plant_variables}
+def trajectory_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping[str, float]]) -> list[Variable]:
+    """Return the table of the ReferenceTrajectory, which has no modes.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Start values of ``trajectory`` and ``T_s``.
+    modes : sequence of mappings
+        Empty.
+    """
+    meaning = "commanded position at t; wire it to HybridPredictor.x_d_ahead"
+    return [
+        _position("r", "output", meaning, initially_from=("trajectory",)),
+        *_modes(modes),
+        *(_parameter(name, parameters[name]) for name in ("trajectory", "T_s")),
+    ]
+
+
+MODELS = {
+    "HybridPredictor": predictor_variables,
+    "FeedDrive": plant_variables,
+    "ReferenceTrajectory": trajectory_variables,
+}
 """The table of each model, from its parameters' start values and its modes."""
 
 

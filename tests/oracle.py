@@ -1,0 +1,185 @@
+"""A slow, obvious and independent oracle: equations (2) to (6) transcribed sample by sample.
+
+It shares no code with the library. The physics model is discretised as one transfer function, features are lists,
+the ridge problem is solved once per batch from all rows so far, and a window is a loop of its own predictions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import mpmath
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import cont2discrete, tf2ss
+
+Array = NDArray[np.float64]
+LongArray = NDArray[np.longdouble]
+
+
+def transfer_function(modes: Sequence[tuple[float, float, float, float]]) -> tuple[Array, Array]:
+    """Multiply out eq. (15).
+
+    Parameters
+    ----------
+    modes : sequence of (f_n, zeta, alpha, beta)
+        Hz, 1, 1/s², 1/s.
+
+    Returns
+    -------
+    numerator, denominator : arrays
+        Coefficients, highest power of s first.
+    """
+    numerator, denominator = np.array([0.0]), np.array([1.0])
+    for f_n, zeta, alpha, beta in modes:
+        omega = 2 * np.pi * f_n
+        quadratic = [1.0, 2 * zeta * omega, omega**2]
+        numerator = np.polyadd(np.polymul(numerator, quadratic), np.polymul([beta, alpha], denominator))
+        denominator = np.polymul(denominator, quadratic)
+    return np.trim_zeros(np.asarray(numerator, dtype=np.float64), "f"), np.asarray(denominator, dtype=np.float64)
+
+
+def physics(
+    numerator: Array, denominator: Array, x_d: Sequence[float], *, Ts: float, hold: str = "zoh", dead_time: int = 0
+) -> list[float]:
+    """Eq. (2): answer commands from rest, sample by sample.
+
+    Parameters
+    ----------
+    numerator, denominator : arrays
+        G_pb(s), highest power first.
+    x_d : sequence of float, m
+        Commands relative to the position of rest.
+    Ts : float, s
+    hold : {"zoh", "foh"}
+    dead_time : int, samples
+
+    Returns
+    -------
+    list of float, m
+    """
+    # With the sampling interval as the unit of time the coefficients stay near one another.
+    num = numerator * Ts ** -np.arange(len(numerator) - 1.0, -1.0, -1.0)
+    den = denominator * Ts ** -np.arange(len(denominator) - 1.0, -1.0, -1.0)
+    A, B, C, D = (np.asarray(matrix) for matrix in cont2discrete(tf2ss(num, den), 1.0, method=hold)[:4])
+    s = np.zeros(len(A))
+    x_pb = []
+    for k in range(len(x_d)):
+        u = x_d[k - dead_time] if k >= dead_time else 0.0
+        x_pb.append(float(C[0] @ s + D[0, 0] * u))
+        s = A @ s + B[:, 0] * u
+    return x_pb
+
+
+def features(x_pb: Sequence[float], e_pb: Sequence[float], k: int, p: int, q: int) -> list[float]:
+    """Eq. (5): ``[1, x_pb(k) … x_pb(k−q), e_pb(k−1) … e_pb(k−p)]``, zero before the first sample; ``(2+q+p,)``."""
+    past_x = [x_pb[k - i] if k - i >= 0 else 0.0 for i in range(q + 1)]
+    past_e = [e_pb[k - i] if k - i >= 0 else 0.0 for i in range(1, p + 1)]
+    return [1.0, *past_x, *past_e]
+
+
+def ridge(rows: Array, target: Array, lam: float) -> Array:
+    """Eq. (6), solved from all rows in double precision; ``(m, n), (m,) → (n,)``."""
+    n = rows.shape[1]
+    stacked = np.vstack((np.sqrt(lam) * np.eye(n), rows))
+    goal = np.concatenate((np.zeros(n), target))
+    R: Array = np.asarray(np.linalg.qr(np.column_stack((stacked, goal)), mode="r"), dtype=np.float64)
+    return np.asarray(np.linalg.solve(R[:n, :n], R[:n, n]), dtype=np.float64)
+
+
+def ridge_extended(rows: Array, target: Array, lam: float) -> LongArray:
+    """Eq. (6), solved from all rows by Householder QR in long double; ``(m, n), (m,) → (n,)``."""
+    m, n = rows.shape
+    work = np.zeros((n + m, n + 1), dtype=np.longdouble)
+    work[range(n), range(n)] = np.sqrt(np.longdouble(lam))
+    work[n:, :n], work[n:, n] = rows, target
+    for j in range(n):
+        # In column j only row j and the data's rows are not yet zero below the diagonal, and rows j+1 … n−1 of the
+        # penalty are zero in it: the reflection touches row j and the data's rows alone.
+        v = np.concatenate((work[j : j + 1, j], work[n:, j]))
+        norm = np.sqrt(np.sum(v * v))
+        if norm == 0:
+            continue
+        v[0] += norm if v[0] >= 0 else -norm
+        scale = 2 / np.sum(v * v)
+        projected = scale * (v[0] * work[j, j:] + v[1:] @ work[n:, j:])
+        work[j, j:] -= v[0] * projected
+        work[n:, j:] -= np.outer(v[1:], projected)
+    w = np.zeros(n, dtype=np.longdouble)
+    for j in range(n - 1, -1, -1):
+        w[j] = (work[j, n] - np.sum(work[j, j + 1 : n] * w[j + 1 :])) / work[j, j]
+    return w
+
+
+def ridge_exact(rows: Array, target: Array, lam: float, digits: int = 60) -> Array:
+    """Eq. (6), by its normal equations in ``digits`` decimal digits; for small problems; ``(m, n), (m,) → (n,)``."""
+    with mpmath.workdps(digits):
+        phi = mpmath.matrix(rows.tolist())
+        normal = phi.T * phi + mpmath.mpf(lam) * mpmath.eye(rows.shape[1])
+        w = mpmath.lu_solve(normal, phi.T * mpmath.matrix(target.tolist()))
+        return np.array([float(value) for value in w])
+
+
+@dataclass
+class OracleRun:
+    """What the oracle computed for a whole run, one entry per sample, m; ``weights`` one per batch."""
+
+    x_pb: list[float] = field(default_factory=list)
+    x_h: list[float] = field(default_factory=list)
+    active: list[bool] = field(default_factory=list)
+    weights: list[Array] = field(default_factory=list)
+
+
+def run(
+    numerator: Array,
+    denominator: Array,
+    x_d: Array,
+    x: Array,
+    *,
+    Ts: float,
+    Np: int,
+    p: int,
+    q: int,
+    lam: float,
+    t_init: float,
+    hold: str = "zoh",
+    dead_time: int = 0,
+) -> OracleRun:
+    """Predict batch after batch of a run from rest at ``x_d[0]``, eqs. (2) to (6).
+
+    Parameters
+    ----------
+    numerator, denominator : arrays
+        G_pb(s), highest power first.
+    x_d, x : (n,) arrays, m
+        Commanded and measured positions; the last batch may be short.
+    Ts, t_init : float, s
+    Np, p, q : int
+    lam : float, m²
+    hold : {"zoh", "foh"}
+    dead_time : int, samples
+    """
+    start = float(x_d[0])
+    relative = [float(value) - start for value in x_d]
+    x_pb = physics(numerator, denominator, relative, Ts=Ts, hold=hold, dead_time=dead_time)
+    out = OracleRun()
+    e_pb: list[float] = []  # measured residuals so far
+    rows: list[list[float]] = []
+    for first in range(0, len(relative), Np):
+        batch = range(first, min(first + Np, len(relative)))
+        # Eq. (6): the weights of this batch, from all rows before it
+        w = ridge(np.array(rows), np.array(e_pb), lam) if rows else np.zeros(2 + q + p)
+        out.weights.append(w)
+        # Eq. (4): residuals of this batch are unknown and stand as their own predictions
+        guessed = list(e_pb)
+        for k in batch:
+            guessed.append(float(w @ np.array(features(x_pb, guessed, k, p, q))))
+            warm = k * Ts < t_init - 1e-6 * Ts
+            out.x_pb.append(x_pb[k] + start)
+            out.x_h.append(x_pb[k] + start + (0.0 if warm else guessed[k]))
+            out.active.append(not warm)
+        # The batch is measured; e_pb = x − x_pb
+        e_pb += [float(x[k]) - start - x_pb[k] for k in batch]
+        rows += [features(x_pb, e_pb, k, p, q) for k in batch]
+    return out
