@@ -222,7 +222,7 @@ def main() -> None:
         app()
     except HybridSepError as error:
         _err.print(f"[bold red]error:[/] {type(error).__name__}: ", end="")
-        _err.print(str(error), markup=False, highlight=False)
+        _err.print(str(error), markup=False, highlight=False, soft_wrap=True)
         sys.exit(2)
 
 

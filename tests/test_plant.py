@@ -9,7 +9,17 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from hybridsep import Encoder, FeedDrive, ModalModel, Mode, ParameterError, SignalError, StageDrive, load_machine, simulate
+from hybridsep import (
+    Encoder,
+    FeedDrive,
+    ModalModel,
+    Mode,
+    ParameterError,
+    SignalError,
+    StageDrive,
+    load_machine,
+    simulate,
+)
 from hybridsep.plant import FRICTION_VELOCITY
 from hybridsep.trajectory import spiral, staircase
 
@@ -149,7 +159,7 @@ def test_what_cannot_be_is_refused() -> None:
         FeedDrive(1.0, 1.0, 1.0).step(0.0, 0.0)
     with pytest.raises(ParameterError, match=r"noise_std must be ≥ 0 m, got -1"):
         Encoder(-1.0)
-    with pytest.raises(ParameterError, match="seed must be a whole number, got 0.5"):
+    with pytest.raises(ParameterError, match=r"seed must be a whole number, got 0.5"):
         Encoder(1.0, seed=0.5)  # type: ignore[arg-type]
 
 

@@ -108,7 +108,7 @@ def test_what_cannot_be_planned_is_refused() -> None:
         Limits(1.0, 1.0, float("nan"))
     with pytest.raises(ParameterError, match=r"move 2 starts at 0.1 s, before the one before has ended at 0.143 s"):
         rest_to_rest([0, 0.01, 0.02], PAPER_LIMITS, start_times=[0.0, 0.1])
-    with pytest.raises(ParameterError, match="duration is 0.1 s, but the moves need 0.143 s"):
+    with pytest.raises(ParameterError, match=r"duration is 0.1 s, but the moves need 0.143 s"):
         rest_to_rest([0, 0.01], PAPER_LIMITS, duration=0.1)
     with pytest.raises(ParameterError, match="one time for each of 1 moves, got 2"):
         rest_to_rest([0, 0.01], PAPER_LIMITS, start_times=[0.0, 1.0])

@@ -1,0 +1,163 @@
+"""The command line as a user meets it: results, JSON, help and errors."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from staircase_data import commanded, measured
+
+from hybridsep import __version__, cli
+from hybridsep.parameters import PARAMETERS
+
+EMPS = Path(__file__).resolve().parents[2] / "shared" / "data" / "emps" / "DATA_EMPS.mat"
+
+
+@pytest.fixture
+def hybridsep(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
+    return Run(monkeypatch, capsys)
+
+
+class Run:
+    """Runs ``hybridsep`` with arguments in this process; returns exit status, stdout and stderr."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+        self.monkeypatch, self.capsys = monkeypatch, capsys
+
+    def __call__(self, *arguments: object) -> tuple[int, str, str]:
+        self.monkeypatch.setattr(sys, "argv", ["hybridsep", *map(str, arguments)])
+        self.monkeypatch.setenv("COLUMNS", "200")
+        status = 0
+        try:
+            cli.main()
+        except SystemExit as stop:
+            status = int(stop.code or 0)
+        out, err = self.capsys.readouterr()
+        return status, out, err
+
+
+def write_log(path: Path, *, n: int = 2500, header: str = "t,x_d,x", scale: float = 1.0) -> Path:
+    t = np.arange(n) * 1e-3
+    columns = np.column_stack((t, commanded()[:n] * scale, measured(0)[:n] * scale))
+    np.savetxt(path, columns, delimiter=",", header=header, comments="", fmt="%.17g")
+    return path
+
+
+def test_backtest_of_a_csv(hybridsep: Run, tmp_path: Path) -> None:
+    log = write_log(tmp_path / "log.csv", n=6001)
+    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--json", "--out", tmp_path / "batches.csv")
+    summary = json.loads(out)
+    assert status == 0
+    assert summary["rms_pb_um"] == pytest.approx(33.94, abs=0.1)
+    assert summary["rms_h_um"] == pytest.approx(14.9, abs=0.4)
+    assert (summary["n_samples"], summary["n_batches"]) == (6001, 61)
+    rows = (tmp_path / "batches.csv").read_text().splitlines()
+    assert (rows[0], len(rows)) == ("t,rms_pb,rms_hold,rms_h", 62)
+    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper")
+    assert status == 0
+    assert f"{summary['rms_h_um']:.2f}" in out
+    assert "after warm-up" in out
+
+
+def test_backtest_takes_units_columns_and_parameters(hybridsep: Run, tmp_path: Path) -> None:
+    log = write_log(tmp_path / "log.csv", header="time,command,position", scale=1e3)
+    names = ("--t", "time", "--x-d", "command", "--x", "position", "--unit", "mm")
+    sizes = ("--Np", 50, "--p", 20, "--q", 1, "--lam", 1e-11, "--t-init", 0.2)
+    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--json", *names, *sizes)
+    assert status == 0
+    assert json.loads(out)["n_batches"] == 50
+
+
+@pytest.mark.skipif(not EMPS.exists(), reason="needs ../shared/data/emps beside the repository")
+def test_backtest_of_a_recorded_axis(hybridsep: Run) -> None:
+    """Published constants, paper's settings: physics 15.45 µm, hold 5.93 µm, hybrid at most 5.55 µm."""
+    status, out, _ = hybridsep("backtest", EMPS, "-m", "emps", "--json")
+    summary = json.loads(out)
+    assert status == 0
+    assert summary["rms_pb_um"] == pytest.approx(15.45, abs=0.05)
+    assert summary["rms_hold_um"] == pytest.approx(5.93, abs=0.05)
+    assert summary["rms_h_um"] <= 5.55
+
+
+def test_json_has_null_where_there_is_no_figure(hybridsep: Run, tmp_path: Path) -> None:
+    log = write_log(tmp_path / "short.csv", n=150)
+    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--json")
+    assert status == 0
+    assert json.loads(out)["rms_h_um_after_warm_up"] is None
+
+
+def test_build(hybridsep: Run, tmp_path: Path) -> None:
+    status, out, _ = hybridsep("build", "FeedDrivePy", "--backend", "python", "--out", tmp_path, "--json")
+    assert status == 0
+    assert json.loads(out) == [str(tmp_path / "FeedDrivePy.fmu")]
+    status, out, _ = hybridsep("build", "-m", "emps", "--backend", "python", "--out", tmp_path)
+    assert status == 0
+    assert "HybridPredictorPy_emps.fmu" in out
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["FeedDrivePy.fmu", "HybridPredictorPy_emps.fmu"]
+
+
+def test_cosim_over_a_file(hybridsep: Run, tmp_path: Path) -> None:
+    path = tmp_path / "command.csv"
+    np.savetxt(
+        path, np.column_stack((np.arange(1500) * 1e-3, commanded()[:1500])), delimiter=",", header="t,x_d", comments=""
+    )
+    options = ("--backend", "python", "--seed", 2, "--out", tmp_path / "run.npz")
+    status, out, _ = hybridsep("cosim", "--trajectory", path, *options, "--json")
+    assert status == 0
+    assert json.loads(out)["n_samples"] == 1500
+    with np.load(tmp_path / "run.npz") as arrays:
+        assert len(arrays["x_h"]) == 1500
+    status, again, _ = hybridsep("cosim", "--trajectory", path, *options, "--p", 30, "--json")
+    assert json.loads(again)["rms_h_um"] != json.loads(out)["rms_h_um"]
+
+
+def test_help_shows_units_and_ranges(hybridsep: Run) -> None:
+    status, out, _ = hybridsep("backtest", "--help")
+    text = " ".join(out.split())
+    assert status == 0
+    for name in ("Np", "p", "q", "lambda", "t_init"):
+        assert PARAMETERS[name].range_text in text
+    assert "[m2]" in text
+    status, out, _ = hybridsep("--help")
+    assert all(command in out for command in ("demo", "build", "cosim", "backtest"))
+    assert hybridsep("--version")[1].strip() == __version__
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["backtest", "{log}", "-m", "robot"], "MachineError: no machine 'robot'"),
+        (["backtest", "{log}", "-m", "spring_mass_damper", "--p", "200"], "p must be 1 … Np = 100, got 200"),
+        (["backtest", "{log}", "-m", "spring_mass_damper", "--lam", "0"], "lambda must be > 0 m2, got 0"),
+        (["backtest", "{log}", "-m", "spring_mass_damper", "--x", "pos"], "column 'pos'"),
+        (
+            ["backtest", "{log}", "-m", "spring_mass_damper", "--unit", "inch"],
+            "unit must be one of m, mm, um, got 'inch'",
+        ),
+        (["backtest", "nothing.csv", "-m", "spring_mass_damper"], "nothing.csv"),
+        (["build", "Robot", "--backend", "python"], "no FMU Robot; there are HybridPredictorPy_als25010_x"),
+        (["build", "--backend", "cobol"], "backend must be one of"),
+        (["cosim", "-m", "emps", "--backend", "python"], "machine emps has no plant; name a plant FMU with --plant"),
+        (["cosim", "--trajectory", "zigzag"], "zigzag"),
+        (["cosim", "--out", "run.xlsx"], "--out must end in .csv or .npz, got 'run.xlsx'"),
+        (["cosim", "--Np", "10", "--backend", "python"], "p must be 1 … Np = 10, got 50"),
+    ],
+)
+def test_errors_are_one_line_and_status_2(hybridsep: Run, tmp_path: Path, arguments: list[str], message: str) -> None:
+    log = write_log(tmp_path / "log.csv", n=300)
+    status, out, err = hybridsep(*(argument.format(log=log) for argument in arguments))
+    assert (status, out) == (2, "")
+    assert err.startswith("error: ")
+    assert message.replace(" ", "") in "".join(err.split())
+    assert "Traceback" not in err
+
+
+def test_a_log_at_another_sampling_interval_is_refused(hybridsep: Run, tmp_path: Path) -> None:
+    log = tmp_path / "slow.csv"
+    log.write_text("t,x_d,x\n" + "".join(f"{k * 0.004},0,0\n" for k in range(10)))
+    status, _, err = hybridsep("backtest", log, "-m", "spring_mass_damper")
+    assert status == 2
+    assert "sampled every 0.004 s, but machine spring_mass_damper has T_s = 0.001 s" in " ".join(err.split())
