@@ -1,0 +1,87 @@
+"""The README is executed: its commands are the ones CI runs, its code runs, its tables are the FMUs'."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from hybridsep.demo import demo
+from hybridsep.fmi.tables import interface_table
+from hybridsep.fmi.variables import MODELS
+
+ROOT = Path(__file__).resolve().parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
+
+
+def test_the_two_commands_come_first_and_ci_runs_the_second() -> None:
+    first, second = (block.strip() for block in blocks("sh")[:2])
+    assert "\n" not in first + second
+    assert first.endswith(".venv/bin/hybridsep demo --out demo")
+    assert second in (ROOT / ".ci" / "run").read_text().splitlines()
+
+
+def test_python_blocks_run(tmp_path: Path) -> None:
+    (block,) = blocks("python")
+    assert len(block.strip().splitlines()) <= 12
+    done = subprocess.run([sys.executable, "-W", "error", "-c", block], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    rms_pb, rms_h = map(float, done.stdout.splitlines()[0].split())
+    assert rms_h < 0.5 * rms_pb
+
+
+def test_the_machine_file_in_the_readme_is_valid(tmp_path: Path) -> None:
+    from hybridsep import load_machine
+
+    (block,) = blocks("toml")
+    path = tmp_path / "my_axis.toml"
+    path.write_text(block, encoding="utf-8")
+    assert load_machine(path).model.dc_gain == pytest.approx(1.0, abs=1e-3)
+
+
+def test_links_lead_somewhere() -> None:
+    for target in re.findall(r"\]\((?!http)([^)#]+)\)", README):
+        assert (ROOT / target).exists(), target
+
+
+@pytest.mark.parametrize("model", ["HybridPredictor", "FeedDrive"])
+def test_interface_tables_are_the_fmus(model: str) -> None:
+    from hybridsep import load_machine
+
+    machine = load_machine("spring_mass_damper")
+    mode = machine.model.modes[0]
+    if model == "HybridPredictor":
+        modes = [{"f_n": mode.f_n, "zeta": mode.zeta, "alpha": mode.alpha, "beta": mode.beta}]
+        table = MODELS[model](machine.fmi_parameters(), modes)
+    else:
+        assert machine.plant is not None
+        assert machine.physics.spring_mass_damper is not None
+        values = machine.plant.model_dump(exclude={"kind"}) | machine.physics.spring_mass_damper.model_dump()
+        table = MODELS[model](values, [])
+    for name, *cells in interface_table(table):
+        row = f"| `{name}` | " + " | ".join(cell.replace("|", r"\|") for cell in cells) + " |"
+        assert row in README, row
+
+
+def test_results_table_is_what_the_demo_makes(tmp_path: Path) -> None:
+    summary = demo(tmp_path, backend="python")
+    for name, label in (("staircase", "staircase"), ("spiral_x", "spiral, stage X"), ("spiral_y", "spiral, stage Y")):
+        (row,) = re.findall(rf"^\| {label}[^|]*\| (.*) \| [^|]*\|$", README, re.MULTILINE)
+        shown = [float(cell.strip().rstrip("%")) for cell in row.split("|")]
+        case = summary[name]
+        figures = [case[key] for key in ("rms_pb_um", "rms_hold_um", "rms_h_um", "reduction_percent")]
+        assert shown == pytest.approx(figures, abs=0.06), name
+
+
+@pytest.mark.parametrize("example", sorted(path.name for path in (ROOT / "examples").glob("*.py")))
+def test_examples_run(example: str) -> None:
+    done = subprocess.run([sys.executable, "-W", "error", ROOT / "examples" / example], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout
