@@ -40,8 +40,8 @@ def test_demo_with_the_recorded_axis(tmp_path: Path) -> None:
 
 
 def test_build_fmu_is_a_front_of_the_command_line(tmp_path: Path) -> None:
-    command = [sys.executable, ROOT / "build_fmu.py", "--machine", ROOT / "models" / "als25010_x.toml"]
-    subprocess.run([*command, "--backend", "python", "--out", tmp_path], check=True, stdout=subprocess.DEVNULL)
+    command = [sys.executable, str(ROOT / "build_fmu.py"), "--machine", str(ROOT / "models" / "als25010_x.toml")]
+    subprocess.run([*command, "--backend", "python", "--out", str(tmp_path)], check=True, stdout=subprocess.DEVNULL)
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         "FeedDrivePy_als25010_x.fmu",
         "HybridPredictorPy_als25010_x.fmu",

@@ -17,7 +17,7 @@ def run(
     look_ahead: LookAhead, r: np.ndarray, x: np.ndarray, first: int = 0, last: int | None = None
 ) -> list[tuple[float, ...]]:
     """Feed samples ``first … last − 1`` and return the outputs after each."""
-    outputs = []
+    outputs: list[tuple[float, ...]] = []
     for k in range(first, len(r) if last is None else last):
         look_ahead.sample(float(r[k]), float(x[k]))
         outputs.append(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hybridsep import MachineError, load_machine, machine_names
-from hybridsep.machine import Machine
+from hybridsep.machine import Machine, Physics, SpringMassDamper
 
 GOOD = """
 name = "axis"
@@ -132,6 +132,6 @@ def test_a_machine_can_be_made_in_code() -> None:
         name="bench",
         title="bench",
         sources=("made up for this test",),
-        physics={"spring_mass_damper": {"m": 2.0, "c": 30.0, "k": 2e4}},
+        physics=Physics(spring_mass_damper=SpringMassDamper(m=2.0, c=30.0, k=2e4)),
     )
     assert machine.model.modes[0].alpha == 1e4

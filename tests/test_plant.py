@@ -32,7 +32,7 @@ def tight(slope: object, z: Array, commands: Array, position: object) -> Array:
     x = np.empty(len(commands))
     for k, r in enumerate(commands):
         x[k] = position(z)  # type: ignore[operator]
-        z = solve_ivp(slope, (0, TS), z, "DOP853", args=(k, r), rtol=1e-13, atol=1e-16).y[:, -1]  # type: ignore[call-overload]
+        z = solve_ivp(slope, (0, TS), z, "DOP853", args=(k, r), rtol=1e-13, atol=1e-16).y[:, -1]
     return x
 
 

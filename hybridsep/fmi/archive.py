@@ -102,10 +102,9 @@ def build_fmu(machine: Machine, name: str, out: str | Path, backend: str = "pyth
         raise FmuError(f"machine {machine.name} has no FMU {name!r}; it has {', '.join(names)}")
     model = names[name]
     files = _resources(model)
-    slave_module = files["resources/slavemodule.txt"].decode()
     description = _description(machine, model, name)
     table = variables_of(description)
-    files[f"documentation/{'index.html'}"] = _documentation(machine, name, model, description)
+    files["documentation/index.html"] = _documentation(machine, name, model, description)
     for source in ("linux64/libpythonfmu-export.so", "win64/pythonfmu-export.dll"):
         binary = Path(pythonfmu.__file__).parent / "resources" / "binaries" / source
         files[f"binaries/{Path(source).parent}/{name}{binary.suffix}"] = binary.read_bytes()
@@ -124,7 +123,6 @@ def build_fmu(machine: Machine, name: str, out: str | Path, backend: str = "pyth
         version=__version__,
     )
     files["modelDescription.xml"] = model_description(info, table)
-    assert slave_module
     path = Path(out) / f"{name}.fmu"
     path.parent.mkdir(parents=True, exist_ok=True)
     _write_archive(path, files)
@@ -152,18 +150,18 @@ def _resources(model: str) -> dict[str, bytes]:
     slave = data_folder("fmu_src") / "python" / _MODELS[model][0]
     library = {module: (_PACKAGE / module).read_bytes() for module in _TRAVELS}
     digest = hashlib.sha256(slave.read_bytes())
-    for module, source in library.items():
-        digest.update(module.encode() + source)
+    for module, text in library.items():
+        digest.update(module.encode() + text)
     number = digest.hexdigest()[:12]
     package, module_name = f"hybridsep_{number}", f"{slave.stem}_{number}"
-    source = re.sub(r"^from hybridsep\b", f"from {package}", slave.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    renamed = re.sub(r"^from hybridsep\b", f"from {package}", slave.read_text(encoding="utf-8"), flags=re.MULTILINE)
     files = {
         "resources/slavemodule.txt": module_name.encode(),
-        f"resources/{module_name}.py": source.encode(),
+        f"resources/{module_name}.py": renamed.encode(),
         f"resources/{package}/__init__.py": b"",
         f"resources/{package}/fmi/__init__.py": b"",
     }
-    files |= {f"resources/{package}/{module}": source for module, source in library.items()}
+    files |= {f"resources/{package}/{module}": text for module, text in library.items()}
     for path in sorted(Path(pythonfmu.__file__).parent.glob("*.py")):
         files[f"resources/pythonfmu/{path.name}"] = path.read_bytes()
     return files
