@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from .signals import Array
 
-__all__ = ["Replay", "batches_figure", "prediction_figure", "spiral_figure"]
+__all__ = ["Replay", "prediction_figure", "spiral_figure"]
 
 PHYSICS, HOLD, HYBRID = "#d95f02", "#7f7f7f", "#1b6ca8"
 
@@ -61,7 +61,7 @@ def prediction_figure(replay: Replay, title: str, path: str | Path) -> None:
     error.set_ylabel("prediction error\nx − x̂ [µm]")
     error.margins(y=0.15)
     error.legend(loc="upper right", ncols=2, frameon=False)
-    batches_axes(batches, replay)
+    _draw_batches(batches, replay)
     batches.set_xlabel("time [s]")
     for axes in (command, error, batches):
         axes.grid(alpha=0.3)
@@ -69,7 +69,7 @@ def prediction_figure(replay: Replay, title: str, path: str | Path) -> None:
     _save(figure, path)
 
 
-def batches_axes(axes: Axes, replay: Replay) -> None:
+def _draw_batches(axes: Axes, replay: Replay) -> None:
     """Draw the RMS error of each batch and mark the batches where the hybrid is worse than the physics model."""
     rms = {name: 1e6 * values for name, values in replay.batch_rms().items()}
     Ts = float(replay.t[1] - replay.t[0])
@@ -86,18 +86,6 @@ def batches_axes(axes: Axes, replay: Replay) -> None:
     axes.set_ylim(0.0, 1.35 * max(float(values.max()) for values in rms.values()))
     axes.set_ylabel("RMS of each\nbatch [µm]")
     axes.legend(loc="upper right", ncols=3, frameon=False, title="shaded: hybrid worse than physics", title_fontsize=8)
-
-
-def batches_figure(replay: Replay, title: str, path: str | Path) -> None:
-    """Draw only the RMS error of each batch to a PNG."""
-    figure = Figure(figsize=(9.0, 3.2), layout="constrained")
-    axes = figure.subplots()
-    axes.set_title(title)
-    batches_axes(axes, replay)
-    axes.set_xlabel("time [s]")
-    axes.grid(alpha=0.3)
-    axes.spines[["top", "right"]].set_visible(False)
-    _save(figure, path)
 
 
 def spiral_figure(x: Replay, y: Replay, path: str | Path) -> None:
