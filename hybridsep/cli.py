@@ -26,9 +26,9 @@ from .errors import HybridSepError, ParameterError
 from .fmi.archive import BACKENDS, build_fmu, fmu_names
 from .logs import open_log
 from .machine import DEFAULT_MACHINE, Machine, load_machine, machine_names
-from .parameters import PARAMETERS
+from .parameters import PARAMETERS, check
 from .signals import Array
-from .trajectory import from_file, spiral, staircase
+from .trajectory import PAPER_LIMITS, from_file, spiral, staircase
 
 __all__ = ["app", "main"]
 
@@ -46,6 +46,9 @@ MachineOption = Annotated[
     str, typer.Option("--machine", "-m", help="Machine file (.toml), or the name of one that comes with the library.")
 ]
 BackendOption = Annotated[str, typer.Option(help=f"Flavour of the FMUs: {', '.join(BACKENDS)}.")]
+TsOption = Annotated[
+    float | None, typer.Option("--Ts", help="Sampling interval [s], for a file without a time column.")
+]
 UnitOption = Annotated[str, typer.Option(help="Unit of the positions in the file: m, mm or um.")]
 
 
@@ -74,22 +77,26 @@ def demo(
     if as_json:
         _print_json(summary)
         return
-    table = Table(title="Prediction error, RMS in µm against the measured position")
-    for column in ("case", "physics", "hold", "hybrid", "reduction", "printed in the paper"):
+    table = Table(title="Prediction error, RMS in µm against the measured position; printed: the paper's figures")
+    for column in ("case", "physics", "hold", "hybrid", "reduction", "printed: physics", "hybrid", "reduction"):
         table.add_column(column, justify="left" if column == "case" else "right", no_wrap=column == "case")
     for name, case in summary.items():
-        table.add_row(name, *_figures(case), _printed(PRINTED[name]))
+        table.add_row(name, *_figures(case), *_figures(PRINTED[name], hold=False))
         for part in ("friction_alone", "stiffness_alone"):
             if part in case:
-                table.add_row(f"  {part.replace('_', ' ')}", *_figures(case[part]), "")
+                table.add_row(f" {part.replace('_', ' ')}", *_figures(case[part]))
     _out.print(table)
+    _out.print(
+        "The stage is tuned to the printed figures (see its machine file): there, their agreement is no evidence."
+    )
     for name, case in summary.items():
-        worse = case["batches_hybrid_worse"]
-        if worse:
-            times = ", ".join(f"{batch['t_s']:g}" for batch in worse)
-            _out.print(
-                f"{name}: hybrid worse than physics in {len(worse)} of {case['n_batches']} batches, from {times} s on"
-            )
+        n, worse = case["n_batches"], case["batches_hybrid_worse"]
+        text = f"{name}: of {n} batches the hybrid is worse than physics in {len(worse)}"
+        times = ", ".join(f"{batch['t_s']:g}" for batch in worse)
+        _out.print(
+            f"{text}{f' (from {times} s on)' if worse else ''}, worse than hold in {case['n_batches_worse_than_hold']}",
+            highlight=False,
+        )
     _out.print(f"\nFigures, FMUs, results and summary.json are in {out}")
 
 
@@ -135,6 +142,7 @@ def cosim(
         str, typer.Option(help="staircase, spiral_x, spiral_y, or a CSV, .npz or .mat file with the columns t and x_d.")
     ] = "staircase",
     unit: UnitOption = "m",
+    Ts: TsOption = None,
     predictor: Annotated[Path | None, typer.Option(help="Predictor FMU; built from the machine if left out.")] = None,
     plant: Annotated[Path | None, typer.Option(help="Plant FMU; built from the machine if left out.")] = None,
     seed: Annotated[int | None, typer.Option(help=_help("seed"))] = None,
@@ -149,10 +157,16 @@ def cosim(
 ) -> None:
     """Co-simulate a predictor FMU with a plant FMU over a trajectory."""
     axis = load_machine(machine)
-    if out is not None and out.suffix not in (".csv", ".npz"):
-        raise ParameterError(f"--out must end in .csv or .npz, got {out.name!r}")
-    command = _command(trajectory, axis, unit)
+    if out is not None:
+        if out.suffix.lower() not in (".csv", ".npz"):
+            raise ParameterError(f"--out must end in .csv or .npz, got {out.name!r}")
+        _make_folder(out)
+    command = _command(trajectory, axis, unit, Ts)
     values = {"Np": Np, "p": p, "q": q, "lambda": lam, "t_init": t_init}
+    if predictor is None:  # say what is wrong with them before anything is built
+        axis.new_predictor(**{"lam" if name == "lambda" else name: v for name, v in values.items() if v is not None})
+    if seed is not None:
+        check("seed", seed)
     with tempfile.TemporaryDirectory() as folder, _progress(as_json) as advance:
         names = {model: name for name, model in fmu_names(axis, backend).items()}
         if plant is None and "FeedDrive" not in names:
@@ -167,7 +181,8 @@ def cosim(
         )
     if out is not None:
         run.save(out)
-    _print_scores(run.summary(), as_json, f"{axis.title}, {trajectory}")
+    fmus = [path.name for path in (predictor, plant) if path is not None]
+    _print_scores(run.summary(), as_json, f"{' and '.join(fmus) or axis.title}, {trajectory}")
 
 
 @app.command("backtest")
@@ -175,6 +190,7 @@ def backtest_command(
     log: Annotated[Path, typer.Argument(help="CSV with the columns t, x_d, x, or .npz or .mat with named columns.")],
     machine: MachineOption,
     unit: UnitOption = "m",
+    Ts: TsOption = None,
     t: Annotated[str | None, typer.Option("--t", help="Name of the time column.")] = None,
     x_d: Annotated[str | None, typer.Option("--x-d", help="Name of the commanded position's column.")] = None,
     x: Annotated[str | None, typer.Option("--x", help="Name of the measured position's column.")] = None,
@@ -190,12 +206,10 @@ def backtest_command(
     axis = load_machine(machine)
     given = {"t": t, "x_d": x_d, "x": x}
     names = {role: given[role] or column for role, column in axis.log.model_dump().items()}
-    reader = open_log(log, columns=names, unit=unit)
-    if abs(reader.Ts - axis.T_s) > 0.01 * axis.T_s:
-        raise ParameterError(
-            f"{log.name} is sampled every {reader.Ts:g} s, but machine {axis.name} has T_s = {axis.T_s:g} s; "
-            "resample the log or correct T_s"
-        )
+    if out is not None:
+        _make_folder(out)
+    reader = open_log(log, columns=names, unit=unit, Ts=Ts)
+    _check_interval(log.name, reader.Ts, axis)
     changes = {"Np": Np, "p": p, "q": q, "lam": lam, "t_init": t_init}
     predictor = axis.new_predictor(**{name: value for name, value in changes.items() if value is not None})
     with _progress(as_json) as advance, _batch_writer(out, reader.Ts) as write:
@@ -221,23 +235,45 @@ def main() -> None:
     try:
         app()
     except HybridSepError as error:
-        _err.print(f"[bold red]error:[/] {type(error).__name__}: ", end="")
-        _err.print(str(error), markup=False, highlight=False, soft_wrap=True)
-        sys.exit(2)
+        _fail(f"{type(error).__name__}: {error}")
+    except OSError as error:
+        _fail(f"cannot read or write {error.filename}: {error.strerror}")
 
 
-def _command(trajectory: str, axis: Machine, unit: str) -> Array:
+def _fail(message: str) -> None:
+    _err.print("[bold red]error:[/] ", end="")
+    _err.print(message, markup=False, highlight=False, soft_wrap=True)
+    sys.exit(2)
+
+
+def _command(trajectory: str, axis: Machine, unit: str, Ts: float | None) -> Array:
     """Return the samples of a named trajectory or of a file, at the machine's sampling interval."""
+    limits = PAPER_LIMITS if axis.limits is None else axis.trajectory_limits()
     if trajectory == "staircase":
-        return staircase(axis.T_s)
+        return staircase(axis.T_s, limits=limits)
     if trajectory in ("spiral_x", "spiral_y"):
-        return spiral(axis.T_s)[trajectory == "spiral_y"]
-    command, Ts = from_file(trajectory, unit=unit)
-    if abs(Ts - axis.T_s) > 0.01 * axis.T_s:
-        raise ParameterError(
-            f"{trajectory} is sampled every {Ts:g} s, but machine {axis.name} has T_s = {axis.T_s:g} s; resample it"
-        )
+        return spiral(axis.T_s, limits=limits)[trajectory == "spiral_y"]
+    command, found = from_file(trajectory, unit=unit, Ts=Ts)
+    _check_interval(trajectory, found, axis)
     return command
+
+
+def _check_interval(name: str, Ts: float, axis: Machine) -> None:
+    """Say that a file is sampled at another interval than the machine, if it is."""
+    if abs(Ts - axis.T_s) <= 0.01 * axis.T_s:
+        return
+    hint = "resample the file or correct T_s"
+    for factor, unit in ((1e3, "ms"), (1e6, "µs")):
+        if abs(Ts / axis.T_s / factor - 1) < 0.01:
+            hint = f"is its time in {unit}? It must be in seconds"
+    raise ParameterError(f"{name} is sampled every {Ts:g} s, but machine {axis.name} has T_s = {axis.T_s:g} s; {hint}")
+
+
+def _make_folder(path: Path) -> None:
+    """Make the folder of a file that will be written, before the work whose result it takes."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if path.is_dir():
+        raise ParameterError(f"--out must be a file, got the folder {path}")
 
 
 @contextmanager
@@ -261,18 +297,16 @@ def _batch_writer(path: Path | None, Ts: float) -> Iterator[Any]:
         yield lambda batch: writer.writerow([round(batch.k * Ts, 9), batch.rms_pb, batch.rms_hold, batch.rms_h])
 
 
-def _figures(case: Mapping[str, Any]) -> list[str]:
-    """Return physics, hold, hybrid and reduction of a case as text."""
-    figures = [f"{case[name]:.2f}" for name in ("rms_pb_um", "rms_hold_um", "rms_h_um")]
-    return [*figures, f"{case['reduction_percent']:.1f} %"]
+def _figures(case: Mapping[str, Any], *, hold: bool = True) -> list[str]:
+    """Return physics, hold, hybrid and reduction of a case as text, a dash where there is no figure."""
+    names = ["rms_pb_um", *(["rms_hold_um"] if hold else []), "rms_h_um", "reduction_percent"]
+    return [_figure(case.get(name), " %" if name == "reduction_percent" else "") for name in names]
 
 
-def _printed(case: Mapping[str, float]) -> str:
-    """Return what the paper prints: physics, hybrid, reduction, as far as it does."""
-    figures = [f"{case[name]:g}" for name in ("rms_pb_um", "rms_h_um") if name in case]
-    if "reduction_percent" in case:
-        figures.append(f"{case['reduction_percent']:g} %")
-    return ", ".join(figures)
+def _figure(value: float | None, unit: str = "") -> str:
+    if value is None or not np.isfinite(value):
+        return "–"
+    return f"{value:.1f}{unit}" if unit else f"{value:.2f}"
 
 
 def _print_scores(summary: Mapping[str, float | int], as_json: bool, title: str) -> None:
@@ -283,12 +317,13 @@ def _print_scores(summary: Mapping[str, float | int], as_json: bool, title: str)
     for column in ("", "physics", "hold", "hybrid", "reduction"):
         table.add_column(column, justify="right")
     for suffix, label in (("", ""), ("_after_warm_up", " after warm-up")):
-        if f"rms_pb_um{suffix}" in summary:
-            row = [f"{summary[f'rms_{name}_um{suffix}']:.2f}" for name in ("pb", "hold", "h")]
-            table.add_row(f"RMS{label}", *row, f"{summary[f'reduction_percent{suffix}']:.1f} %")
-        if f"max_pb_um{suffix}" in summary:
-            row = [f"{summary[f'max_{name}_um{suffix}']:.2f}" for name in ("pb", "hold", "h")]
-            table.add_row(f"max{label}", *row, "")
+        for quantity in ("rms", "max"):
+            figures = [summary.get(f"{quantity}_{name}_um{suffix}") for name in ("pb", "hold", "h")]
+            if all(figure is not None for figure in figures):
+                reduction = summary[f"reduction_percent{suffix}"] if quantity == "rms" else None
+                shown = _figure(reduction, " %") if quantity == "rms" else ""
+                label_text = f"{quantity.upper() if quantity == 'rms' else quantity}{label}"
+                table.add_row(label_text, *map(_figure, figures), shown)
     _out.print(table)
 
 

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .errors import FmuError
 from .importer import FmuInstance
 from .signals import Array, as_samples
 
@@ -88,9 +89,10 @@ class CoSimulation:
         """
         path = Path(path)
         columns = {name: getattr(self, name) for name in (*_SIGNALS, "active")}
-        if path.suffix == ".npz":
+        suffix = path.suffix.lower()
+        if suffix == ".npz":
             np.savez_compressed(path, **columns)
-        elif path.suffix == ".csv":
+        elif suffix == ".csv":
             with path.open("w", newline="", encoding="utf-8") as file:
                 writer = csv.writer(file)
                 writer.writerow(columns)
@@ -139,12 +141,19 @@ def cosimulate(
     command = as_samples(r, "r")
     as_samples(command[:1], "r", 1)
     with FmuInstance(predictor, "predictor") as predictor_fmu, FmuInstance(plant, "plant") as plant_fmu:
+        _check_role(predictor_fmu, "predictor", ("x_d_ahead", "x_meas"), ("x_d", "x_pb", "x_h", "hybrid_active"))
+        _check_role(plant_fmu, "plant", ("x_d",), ("x", "x_meas"))
         start = float(command[0])
         predictor_fmu.initialise(
             {**(predictor_values or {}), "x_d_ahead": start, "x_meas": start}, start_time=start_time
         )
         plant_fmu.initialise({**(plant_values or {}), "x_d": start}, start_time=start_time)
         Np, h = int(predictor_fmu.get("Np")), float(predictor_fmu.get("T_s"))
+        if "T_s" in plant_fmu.variables and abs(float(plant_fmu.get("T_s")) - h) > 1e-6 * h:
+            raise FmuError(
+                f"{plant_fmu.path.name} has T_s = {plant_fmu.get('T_s'):g} s, but {predictor_fmu.path.name} has "
+                f"{h:g} s; they must agree"
+            )
         n = len(command) + Np
         every = max(1, n // 100)
         get_predictor, get_plant = (
@@ -179,6 +188,14 @@ def cosimulate(
         active=active,
         Np=Np,
     )
+
+
+def _check_role(fmu: FmuInstance, role: str, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> None:
+    """Say what an FMU lacks to be a predictor or a plant."""
+    for causality, names in (("input", inputs), ("output", outputs)):
+        for name in names:
+            if name not in fmu.variables or fmu.variables[name].causality != causality:
+                raise FmuError(f"{fmu.path.name} is no {role}: it has no {causality} {name}")
 
 
 def _hold(x_pb: Array, x: Array, active: NDArray[np.bool_], Np: int) -> Array:

@@ -41,12 +41,16 @@ Number = Annotated[float, BeforeValidator(_checked)]
 Whole = Annotated[int, BeforeValidator(_checked)]
 
 
+Line = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]+$")]
+"""One line of printable text; it goes into XML."""
+
+
 def _default(name: str) -> Any:
     return PARAMETERS[name].default
 
 
 class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class ModeSection(_Section):
@@ -137,8 +141,8 @@ class Machine(_Section):
     """One axis: what it is, its physics model, the predictor's parameters and, where there is one, its plant."""
 
     name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")
-    title: str
-    sources: tuple[str, ...] = Field(min_length=1)
+    title: Line
+    sources: tuple[Line, ...] = Field(min_length=1)
     T_s: Number = _default("T_s")
     physics: Physics
     predictor: PredictorSection = PredictorSection()
@@ -253,6 +257,12 @@ def _describe(problem: Any) -> str:
     for step in steps:
         where += f"[{step + 1}]" if isinstance(step, int) else f".{step}" if where else str(step)
     kind = problem["type"]
+    if kind == "tuple_type" and where.endswith(".mode"):
+        return f"{where} must be a list of modes: write [[{where}]], with double brackets"
+    if kind == "union_tag_not_found":
+        return f"{where}.kind is missing: feed_drive or stage"
+    if kind == "string_pattern_mismatch" and where != "name":
+        return f"{where} must be one line of printable text, got {problem['input']!r}"
     if kind == "missing":
         return f"{where} is missing"
     if kind == "extra_forbidden":

@@ -21,7 +21,7 @@ __all__ = [
     "check",
     "check_lags",
     "check_together",
-    "warm_up_samples",
+    "samples_before",
 ]
 
 INPUT_HOLDS = ("zoh", "foh")
@@ -143,12 +143,14 @@ def check(name: str, value: Any, *, label: str | None = None) -> Any:
     shown = label or name
     unit = "" if parameter.unit == "1" else f" {parameter.unit}"
     try:
+        if isinstance(value, (bool, str, bytes)):
+            raise TypeError
         number = float(value)
     except (TypeError, ValueError, OverflowError):
         raise ParameterError(f"{shown} must be a number, got {value!r}") from None
     if not math.isfinite(number):
         raise ParameterError(f"{shown} must be finite, got {value!r}")
-    if parameter.kind is int and (isinstance(value, bool) or number != int(number)):
+    if parameter.kind is int and number != int(number):
         raise ParameterError(f"{shown} must be a whole number, got {value!r}")
     outside = (
         (parameter.above is not None and number <= parameter.above)
@@ -180,7 +182,7 @@ def check_together(*, Np: Any, p: Any, q: Any, lam: Any, Ts: Any, t_init: Any) -
     if not problems:
         problems = check_lags(Np=known["Np"], p=known["p"], q=known["q"])
         try:
-            warm_up_samples(known["t_init"], known["T_s"])
+            samples_before(known["t_init"], known["T_s"])
         except ParameterError as error:
             problems.append(str(error))
     if problems:
@@ -197,15 +199,22 @@ def check_lags(*, Np: int, p: int, q: int) -> list[str]:
     return problems
 
 
-def warm_up_samples(t_init: float, Ts: float) -> int:
-    """Return how many samples have ``t < t_init``, counted in samples so that rounding of times cannot tell.
+def samples_before(t: float, Ts: float, name: str = "t_init") -> int:
+    """Return how many samples ``0, Ts, …`` come before ``t``, so that rounding of times cannot tell.
+
+    Parameters
+    ----------
+    t, Ts : float
+        Time and sampling interval, s.
+    name : str
+        What ``t`` is, for messages.
 
     Raises
     ------
     ParameterError
         If they are too many to be counted.
     """
-    count = t_init / Ts
+    count = t / Ts
     if not math.isfinite(count):
-        raise ParameterError(f"t_init must be a countable number of samples, got {t_init!r} s at T_s = {Ts!r} s")
+        raise ParameterError(f"{name} must be a countable number of samples, got {t!r} s at T_s = {Ts!r} s")
     return max(0, math.ceil(count - 1e-6))

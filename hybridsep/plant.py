@@ -1,8 +1,8 @@
 """Nonlinear feed drives to validate the model against: eq. (13) and a stage with friction and cable stiffness.
 
 Both hold the command constant over a step, both are at rest at ``start`` at first, and both measure positions from
-there, as the predictor does. They are integrated by the classical Runge-Kutta method in internal steps of at most
-0.1 ms, in plain floats, without differentiating ``x_d``.
+there, as the predictor does. They are integrated by the classical Runge-Kutta method, in plain floats, without
+differentiating ``x_d``; internal steps are at most 0.1 ms and 1/16 of the linear part's fastest time constant.
 """
 
 from __future__ import annotations
@@ -22,6 +22,9 @@ __all__ = ["FRICTION_VELOCITY", "INTERNAL_STEP", "Encoder", "FeedDrive", "Plant"
 
 INTERNAL_STEP = 1e-4
 """Longest internal integration step, s."""
+
+STEP_MAX = 100.0
+"""Longest step, s."""
 
 FRICTION_VELOCITY = 2e-3
 """Velocity over which the stage's friction changes sign, m/s."""
@@ -89,10 +92,10 @@ class FeedDrive:
 
     def step(self, x_d: float, h: float) -> None:
         """Advance by ``h`` seconds with the command ``x_d``, m, held."""
-        n = _internal_steps(h)
-        dt = h / n
         r = x_d - self._start
         a, w2 = self.c / self.m, self.k / self.m
+        n = _internal_steps(h, max(math.sqrt(w2), a))
+        dt = h / n
         c_m, k_m = self.c_nl / self.m, self.k_nl / self.m
 
         def f(x: float, u: float) -> tuple[float, float]:
@@ -147,6 +150,7 @@ class StageDrive:
         self.kappa: float = check("kappa", kappa)
         self.Ts: float = check("T_s", Ts)
         self._modes = [(mode.omega**2, 2 * mode.zeta * mode.omega, mode.alpha, mode.beta) for mode in model.modes]
+        self._rate = max(max(math.sqrt(w2), two_zw) for w2, two_zw, _, _ in self._modes)
         self.reset()
 
     def reset(self, start: float = 0.0) -> None:
@@ -168,7 +172,7 @@ class StageDrive:
 
     def step(self, x_d: float, h: float) -> None:
         """Advance by ``h`` seconds with the command ``x_d``, m, held."""
-        n = _internal_steps(h)
+        n = _internal_steps(h, self._rate)
         dt = h / n
         r = x_d - self._start
         last_x_d, v_d, elapsed = self._last_x_d, self._v_d, self._elapsed
@@ -261,6 +265,8 @@ def simulate(plant: Plant, x_d: ArrayLike, Ts: float, *, start: float | None = N
         ``x(k)``, reached before ``x_d(k)`` acts.
     """
     commands = as_samples(x_d, "x_d")
+    if len(commands) == 0:
+        raise SignalError("x_d must have at least one sample, got none")
     plant.reset(float(commands[0]) if start is None else start)
     x = np.empty(len(commands))
     for k, command in enumerate(commands.tolist()):
@@ -269,12 +275,17 @@ def simulate(plant: Plant, x_d: ArrayLike, Ts: float, *, start: float | None = N
     return x
 
 
-def _internal_steps(h: float) -> int:
+def _internal_steps(h: float, rate: float) -> int:
+    """Return how many internal steps a step of ``h`` seconds takes; ``rate``, 1/s, is that of the fastest mode."""
     if not (math.isfinite(h) and h > 0):
         raise ParameterError(f"the step size must be finite and > 0 s, got {h!r}")
-    return max(1, math.ceil(h / INTERNAL_STEP - 1e-6))
+    if h > STEP_MAX:
+        raise ParameterError(f"the step size must be at most {STEP_MAX:g} s, got {h!r}; make several steps")
+    n = math.ceil(max(h / INTERNAL_STEP, 16 * h * rate) - 1e-6)
+    return min(max(1, n), _STEPS_MAX)
 
 
+_STEPS_MAX = 1_000_000
 _MASK: int = 0xFFFF_FFFF_FFFF_FFFF
 
 

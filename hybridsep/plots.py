@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from .signals import Array
 
@@ -32,6 +33,8 @@ class Replay(Protocol):
     def x_hold(self) -> Array: ...  # noqa: D102
     @property
     def x_h(self) -> Array: ...  # noqa: D102
+    @property
+    def active(self) -> NDArray[np.bool_]: ...  # noqa: D102
     @property
     def Np(self) -> int: ...  # noqa: D102
 
@@ -57,7 +60,15 @@ def prediction_figure(replay: Replay, title: str, path: str | Path) -> None:
     command.plot(t, 1e3 * replay.x_d, color="black", linewidth=1.2)
     command.set_ylabel("commanded\nposition [mm]")
     error.plot(t, 1e6 * (replay.x_meas - replay.x_pb), color=PHYSICS, linewidth=0.8, label="physics-based model")
-    error.plot(t, 1e6 * (replay.x_meas - replay.x_h), color=HYBRID, linewidth=0.8, label="linear hybrid model")
+    hybrid = np.where(replay.active, 1e6 * (replay.x_meas - replay.x_h), np.nan)
+    error.plot(t, hybrid, color=HYBRID, linewidth=0.8, label="linear hybrid model, after the warm-up")
+    if not replay.active.all():
+        t_init = float(t[np.argmax(replay.active)])
+        for axes in (error, batches):
+            axes.axvline(t_init, color="black", linewidth=0.8, linestyle=":")
+        error.annotate(
+            "t_init", (t_init, 0.02), xycoords=("data", "axes fraction"), xytext=(4, 0), textcoords="offset points"
+        )
     error.set_ylabel("prediction error\nx − x̂ [µm]")
     error.margins(y=0.15)
     error.legend(loc="upper right", ncols=2, frameon=False)

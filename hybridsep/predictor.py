@@ -19,7 +19,7 @@ from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
 from .errors import SignalError, StateError
-from .parameters import INPUT_HOLDS, check, check_together, warm_up_samples
+from .parameters import INPUT_HOLDS, check, check_together, samples_before
 from .physics import ModalModel, Mode
 from .regression import RidgeRegression
 from .signals import Array, as_samples
@@ -189,7 +189,7 @@ class HybridPredictor:
             Warm-up of the new run, s; none unless asked for.
         """
         rest = None if start is None else float(as_samples([start], "start")[0])
-        self.n_init = warm_up_samples(check("t_init", t_init), self.Ts)
+        self.n_init = samples_before(check("t_init", t_init), self.Ts)
         self.start = rest
         self.k = 0
         self._state = self.discrete.rest()
@@ -226,13 +226,15 @@ class HybridPredictor:
         self._pending = _Pending(command, x_pb, start)
         return Prediction(x_pb + start, self._free_run(x_pb), min(max(self.n_init - self.k, 0), n))
 
-    def update(self, x: ArrayLike) -> None:
+    def update(self, x: ArrayLike, *, learn: bool = True) -> None:
         """Learn from the measurement of the predicted window, or of its beginning; eq. (6).
 
         Parameters
         ----------
         x : (m,) array_like, m
             Measured positions, ``1 ≤ m ≤ n`` of the last :meth:`predict`.
+        learn : bool
+            Whether the samples enter the regression; the next window starts from their residuals in any case.
 
         Raises
         ------
@@ -248,7 +250,7 @@ class HybridPredictor:
         m = len(measured)
         e_pb = measured - pending.start - pending.x_pb[:m]
         for i in range(0, m, self.Np):
-            self._learn(pending.x_pb[i : min(i + self.Np, m)], e_pb[i : i + self.Np])
+            self._take_in(pending.x_pb[i : min(i + self.Np, m)], e_pb[i : i + self.Np], learn)
         _, self._state = self.discrete.respond(self._state, pending.x_d[:m])
         self.start = pending.start
         self.k += m
@@ -257,12 +259,19 @@ class HybridPredictor:
     def operator(self, n: int | None = None) -> WindowOperator:
         """Return the model of the next ``n`` samples (``Np`` if left out) as an affine map of their commands; eq. (3).
 
-        It is the hybrid model whether or not the warm-up is over; a start that is not known yet counts as 0.
+        It is the hybrid model whether or not the warm-up is over.
+
+        Raises
+        ------
+        SignalError
+            If ``n < 1``, or the start is not known yet: it is given, or follows from the first predicted window.
         """
         length = self.Np if n is None else n
         if length < 1:
             raise SignalError(f"n must be ≥ 1, got {length}")
-        start = self.start or 0.0
+        start = self.start if self.start is not None or self._pending is None else self._pending.start
+        if start is None:
+            raise SignalError("the start is not known yet: give start= or predict the first window before")
         w_x, w_e = self.weights[1 : 2 + self.q], self.weights[2 + self.q :]
         g_pb = self.discrete.impulse_response(length)
         # x_h = x_pb + wᵀφ as filters: G_h = (1 + W_x(z) / (1 − W_e(z))) G_pb
@@ -320,7 +329,7 @@ class HybridPredictor:
             predictor._state[:] = arrays["state"]
             predictor._x[: predictor.q] = arrays["x_pb"]
             predictor._e[: predictor.p] = arrays["e_pb"]
-            predictor.regression.restore({"factor": arrays["factor"], "n_samples": meta["n_samples"]})
+            predictor.regression.restore(arrays["factor"], meta["n_samples"])
             if meta["pending_start"] is not None:
                 pending = arrays["pending_x_d"], arrays["pending_x_pb"]
                 predictor._pending = _Pending(*pending, start=meta["pending_start"])
@@ -368,15 +377,16 @@ class HybridPredictor:
         e_h, _ = lfilter([1.0], np.concatenate(([1.0], -w_e)), drive, zi=state)
         return np.asarray(e_h)
 
-    def _learn(self, x_pb: Array, e_pb: Array) -> None:
-        """Fold one stretch of at most ``Np`` measured samples into the regression and into the lags."""
+    def _take_in(self, x_pb: Array, e_pb: Array, learn: bool) -> None:
+        """Fold one stretch of at most ``Np`` samples into the regression, if it is to learn, and into the lags."""
         m, p, q = len(e_pb), self.p, self.q
         self._x[q : q + m], self._e[p : p + m] = x_pb, e_pb
-        rows = self._rows if m == self.Np else np.empty((m, self.n_features + 1), order="F")
-        # Eq. (5): φ(k) = [1, x_pb(k) … x_pb(k−q), e_pb(k−1) … e_pb(k−p)], with its target e_pb(k) beside it
-        rows[:, 0] = 1.0
-        rows[:, 1 : 2 + q] = self._x_lags[:m]
-        rows[:, 2 + q : 2 + q + p] = self._e_lags[:m]
-        rows[:, -1] = e_pb
-        self.regression.update_stacked(rows)
+        if learn:
+            rows = self._rows if m == self.Np else np.empty((m, self.n_features + 1), order="F")
+            # Eq. (5): φ(k) = [1, x_pb(k) … x_pb(k−q), e_pb(k−1) … e_pb(k−p)], with its target e_pb(k) beside it
+            rows[:, 0] = 1.0
+            rows[:, 1 : 2 + q] = self._x_lags[:m]
+            rows[:, 2 + q : 2 + q + p] = self._e_lags[:m]
+            rows[:, -1] = e_pb
+            self.regression.update_stacked(rows)
         self._x[:q], self._e[:p] = self._x[m : m + q].copy(), self._e[m : m + p].copy()

@@ -120,21 +120,16 @@ class RidgeRegression:
         self.n_samples += len(stacked)
         self._weights = None
 
-    def state(self) -> dict[str, Array | int]:
-        """Return all there is to know, as plain data."""
-        return {"factor": self.factor, "n_samples": self.n_samples}
-
-    def restore(self, state: dict[str, Array | int]) -> None:
-        """Take over what :meth:`state` returned.
+    def restore(self, factor: Array, n_samples: int) -> None:
+        """Take over a :attr:`factor` and the number of rows it was made of.
 
         Raises
         ------
         SignalError
             If the factor has another size.
         """
-        factor = np.asarray(state["factor"], dtype=np.float64)
         if factor.shape != self._factor.shape:
             raise SignalError(f"the factor must have shape {self._factor.shape}, got {factor.shape}")
-        self._factor = np.asfortranarray(factor).copy(order="F")
-        self.n_samples = int(state["n_samples"])
+        self._factor = np.array(factor, dtype=np.float64, order="F")
+        self.n_samples = int(n_samples)
         self._weights = None

@@ -13,8 +13,8 @@ __all__ = ["POSITION_MAX", "Array", "as_samples"]
 
 Array = NDArray[np.float64]
 
-POSITION_MAX = 1e9
-"""Largest magnitude taken for a position, m; its square must not spoil what has been learned."""
+POSITION_MAX = 1e3
+"""Largest magnitude taken for a position, m; what is larger is no position of an axis, or is in another unit."""
 
 
 def as_samples(values: ArrayLike, name: str, length: int | None = None) -> Array:

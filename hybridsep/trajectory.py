@@ -18,7 +18,7 @@ from ruckig import Trajectory as RuckigTrajectory
 
 from .errors import ParameterError, SignalError
 from .logs import read_log
-from .parameters import check, warm_up_samples
+from .parameters import check, samples_before
 from .signals import Array, as_samples
 
 __all__ = [
@@ -111,6 +111,8 @@ def rest_to_rest(
         raise ParameterError(
             f"start_times must have one time for each of {len(points) - 1} moves, got {len(start_times)}"
         )
+    if not (np.isfinite(dwell) and dwell >= 0):
+        raise ParameterError(f"dwell must be finite and ≥ 0 s, got {dwell!r}")
     moves, begin = [], 0.0
     for i, (here, there) in enumerate(pairwise(points.tolist())):
         start = begin if start_times is None else float(start_times[i])
@@ -122,11 +124,11 @@ def rest_to_rest(
     end = begin if duration is None else duration
     if end < begin - 1e-6 * Ts:
         raise ParameterError(f"duration is {end:g} s, but the moves need {begin:g} s")
-    n = warm_up_samples(end, Ts) + 1
+    n = samples_before(end, Ts, "duration") + 1
     x_d = np.empty(n)
     x_d[:] = points[0]
     for start, move in moves:
-        first = warm_up_samples(start, Ts)
+        first = samples_before(start, Ts, "start_times")
         for k in range(first, n):
             t = k * Ts - start
             if t >= move.duration:
@@ -136,16 +138,21 @@ def rest_to_rest(
     return x_d
 
 
-def staircase(Ts: float = 1e-3) -> Array:
+def staircase(Ts: float = 1e-3, *, limits: Limits = PAPER_LIMITS) -> Array:
     """Return the paper's staircase: a 10 mm move at the start of every second, three up, three down, 6 s.
 
     Returns
     -------
     x_d : (6 / Ts + 1,) array, m
         6001 samples at 1 ms; each move takes 0.143 s under eq. (14).
+
+    Raises
+    ------
+    ParameterError
+        If a move would take more than a second under other limits.
     """
     steps = np.array([0.0, 1, 2, 3, 2, 1, 0]) * 0.010
-    return rest_to_rest(steps, PAPER_LIMITS, Ts, start_times=range(6), duration=6.0)
+    return rest_to_rest(steps, limits, Ts, start_times=range(6), duration=6.0)
 
 
 def spiral(
@@ -195,6 +202,9 @@ def from_file(
 
 def archimedean_spiral(radius: float, turns: float) -> tuple[Curve, Curve, float]:
     """Return ``r = radius · θ / θ_end`` as position, derivative and end parameter for :func:`along_path`."""
+    for name, value in (("radius", radius), ("turns", turns)):
+        if not (np.isfinite(value) and value > 0):
+            raise ParameterError(f"{name} must be finite and > 0, got {value!r}")
     end = 2 * np.pi * turns
     pitch = radius / end
 

@@ -113,5 +113,18 @@ def test_what_is_refused(pair: tuple[Path, Path]) -> None:
         cosimulate(*pair, [0.0, 0.0], predictor_values={"p": 101})
     with pytest.raises(FmuError, match="has no variable 'stiffness'"):
         cosimulate(*pair, [0.0, 0.0], plant_values={"stiffness": 1.0})
-    with pytest.raises(FmuError, match=r"FeedDrivePy.fmu has no variable 'x_d_ahead'"):
+    with pytest.raises(FmuError, match=r"FeedDrivePy.fmu is no predictor: it has no input x_d_ahead"):
         cosimulate(pair[1], pair[0], [0.0, 0.0])
+    with pytest.raises(FmuError, match=r"HybridPredictorPy.fmu is no plant: it has no input x_d$"):
+        cosimulate(pair[0], pair[0], [0.0, 0.0])
+    for value in (99_999_999_999, 1.5, "one"):
+        with pytest.raises(FmuError, match=rf"seed must be a whole number within ±2147483647, got {value!r}"):
+            cosimulate(*pair, [0.0, 0.0], plant_values={"seed": value})
+
+
+def test_sampling_intervals_must_agree(python_fmu: Fmu) -> None:
+    fmus = python_fmu("HybridPredictorPy"), python_fmu("FeedDrivePy_als25010_x")
+    with pytest.raises(
+        FmuError, match=r"FeedDrivePy_als25010_x.fmu has T_s = 0.002 s, but HybridPredictorPy.fmu has 0.001 s"
+    ):
+        cosimulate(*fmus, [0.0, 0.0], plant_values={"T_s": 0.002})

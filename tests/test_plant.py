@@ -87,6 +87,15 @@ def test_without_nonlinearity_the_plants_are_their_models() -> None:
     np.testing.assert_allclose(simulate(StageDrive(modal), x_d, TS), x_pb, atol=1e-10)
 
 
+@pytest.mark.parametrize("f_n", [25.0, 500.0, 2000.0, 5000.0])
+def test_fast_modes_are_resolved(f_n: float) -> None:
+    x_d = staircase()[:300]
+    mode = Mode(f_n, 0.05, (2 * math.pi * f_n) ** 2)
+    discrete = ModalModel([mode]).discretise(TS)
+    x_pb, _ = discrete.respond(discrete.rest(), x_d)
+    assert np.max(np.abs(simulate(StageDrive(ModalModel([mode])), x_d, TS) - x_pb)) < 1e-9
+
+
 def test_velocity_is_the_derivative_of_the_position() -> None:
     for plant in (load_machine("spring_mass_damper").new_plant(), load_machine("als25010_x").new_plant()):
         plant.reset(0.0)
@@ -157,6 +166,10 @@ def test_what_cannot_be_is_refused() -> None:
         StageDrive(ModalModel([Mode(10, 0.5, 1.0)], dead_time=2))
     with pytest.raises(ParameterError, match=r"step size must be finite and > 0 s, got 0"):
         FeedDrive(1.0, 1.0, 1.0).step(0.0, 0.0)
+    with pytest.raises(ParameterError, match=r"step size must be at most 100 s, got 1000000000.0; make several steps"):
+        FeedDrive(1.0, 1.0, 1.0).step(0.0, 1e9)
+    with pytest.raises(SignalError, match="x_d must have at least one sample, got none"):
+        simulate(FeedDrive(1.0, 1.0, 1.0), [], TS)
     with pytest.raises(ParameterError, match=r"noise_std must be ≥ 0 m, got -1"):
         Encoder(-1.0)
     with pytest.raises(ParameterError, match=r"seed must be a whole number, got 0.5"):

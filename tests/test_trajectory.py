@@ -116,5 +116,15 @@ def test_what_cannot_be_planned_is_refused() -> None:
         rest_to_rest([0.0], PAPER_LIMITS)
     with pytest.raises(SignalError, match="positions must be finite, got nan at sample 1"):
         rest_to_rest([0.0, float("nan")], PAPER_LIMITS)
+    with pytest.raises(ParameterError, match=r"dwell must be finite and ≥ 0 s, got -0.05"):
+        rest_to_rest([0.0, 0.01, 0.02], PAPER_LIMITS, dwell=-0.05)
+    with pytest.raises(ParameterError, match="duration must be a countable number of samples, got inf s"):
+        rest_to_rest([0.0, 0.01], PAPER_LIMITS, duration=float("inf"))
+    with pytest.raises(ParameterError, match="turns must be finite and > 0, got 0"):
+        spiral(turns=0)
+    with pytest.raises(ParameterError, match="radius must be finite and > 0, got -1"):
+        spiral(radius=-1)
+    with pytest.raises(ParameterError, match="move 2 starts at 1 s, before the one before has ended"):
+        staircase(limits=Limits(0.005, 1.0, 10.0))
     with pytest.raises(ParameterError, match=r"T_s must be > 0 s, got 0"):
         rest_to_rest([0.0, 0.01], PAPER_LIMITS, 0.0)

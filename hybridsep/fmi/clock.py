@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 
 from ..errors import FmuError
@@ -37,7 +38,7 @@ class SampleClock:
         FmuError
             If ``h`` does not divide ``T_s``, differs within a sample, or ``t`` is not the communication point expected.
         """
-        parts = round(self.T_s / h) if h > 0 else 0
+        parts = round(self.T_s / h) if h > 0 and math.isfinite(self.T_s / h) else 0
         if parts < 1 or abs(parts * h - self.T_s) > 1e-6 * self.T_s:
             raise FmuError(f"the communication step size must divide T_s = {self.T_s:g} s, got {h:g} s")
         if self.done and parts != self.parts:

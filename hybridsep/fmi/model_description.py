@@ -8,7 +8,7 @@ from xml.etree import ElementTree as ET
 
 from .variables import Variable
 
-__all__ = ["FmuInfo", "model_description"]
+__all__ = ["FmuInfo", "build_description", "model_description"]
 
 _UNITS: dict[str, dict[str, int]] = {
     # FMI unit → exponents of the SI base units
@@ -40,7 +40,7 @@ class FmuInfo:
     description : str
         One line.
     guid : str
-        Follows from the content; see :mod:`hybridsep.fmi.archive`.
+        Follows from the content; see :mod:`hybridsep.fmi.content`.
     step_size : float
         Of the default experiment, s.
     stop_time : float
@@ -50,6 +50,9 @@ class FmuInfo:
     needs_execution_tool : bool
         Whether the FMU needs more than its own binary, here a Python.
     generation_tool, version : str
+    source_files : tuple of str
+        What is to be compiled, below ``sources/``; empty if the FMU brings none. An FMU of C sources takes its memory
+        from the importer's functions.
     """
 
     name: str
@@ -61,6 +64,7 @@ class FmuInfo:
     needs_execution_tool: bool
     generation_tool: str
     version: str
+    source_files: tuple[str, ...] = ()
 
 
 def model_description(info: FmuInfo, table: Sequence[Variable]) -> bytes:
@@ -84,16 +88,20 @@ def model_description(info: FmuInfo, table: Sequence[Variable]) -> bytes:
         variableNamingConvention="structured",
         numberOfEventIndicators="0",
     )
-    ET.SubElement(
+    simulation = ET.SubElement(
         root,
         "CoSimulation",
         modelIdentifier=info.name,
         needsExecutionTool=_text(info.needs_execution_tool),
         canHandleVariableCommunicationStepSize=_text(info.variable_step),
-        canNotUseMemoryManagementFunctions="true",
+        canNotUseMemoryManagementFunctions=_text(not info.source_files),
         canGetAndSetFMUstate="true",
         canSerializeFMUstate="true",
     )
+    if info.source_files:
+        files = ET.SubElement(simulation, "SourceFiles")
+        for file in info.source_files:
+            ET.SubElement(files, "File", name=file)
     _unit_definitions(root, table)
     categories = ET.SubElement(root, "LogCategories")
     for status in ("Warning", "Discard", "Error", "Fatal"):
@@ -108,6 +116,28 @@ def model_description(info: FmuInfo, table: Sequence[Variable]) -> bytes:
     for reference, variable in enumerate(table):
         _scalar_variable(variables, reference, variable)
     _structure(root, table)
+    return _document(root)
+
+
+def build_description(name: str, source_files: Sequence[str]) -> bytes:
+    """Return ``buildDescription.xml`` (FMI 3.0's, which FMI 2.0 tools read too): how the sources are compiled.
+
+    Parameters
+    ----------
+    name : str
+        Model identifier.
+    source_files : sequence of str
+        Below ``sources/``.
+    """
+    root = ET.Element("fmiBuildDescription", fmiVersion="3.0")
+    configuration = ET.SubElement(root, "BuildConfiguration", modelIdentifier=name)
+    files = ET.SubElement(configuration, "SourceFileSet", language="C99")
+    for file in source_files:
+        ET.SubElement(files, "SourceFile", name=file)
+    return _document(root)
+
+
+def _document(root: ET.Element) -> bytes:
     ET.indent(root)
     document: bytes = ET.tostring(root, encoding="UTF-8", xml_declaration=True)
     return document + b"\n"

@@ -142,9 +142,15 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
         meta, _, core = unpack(_KIND, state)
         if meta["content"] != self.table_description["content"]:
             raise StateError(f"the state belongs to another FMU than {self.modelName} as it is here")
-        self.running, self.start_time, self.values = meta["running"], meta["start_time"], dict(meta["values"])
-        if self.running:
-            self.restore_core(meta["core"], core["core"])
+        before = self.values
+        self.values = dict(meta["values"])
+        try:
+            if meta["running"]:
+                self.restore_core(meta["core"], core["core"])
+        except Exception:
+            self.values = before
+            raise
+        self.running, self.start_time = meta["running"], meta["start_time"]
 
     @staticmethod
     def _fmu_state_to_bytes(state: bytes) -> bytes:

@@ -1,0 +1,177 @@
+/* How long one step of HybridPredictor takes, step by step, beside a loop of the same length that does nothing.
+ *
+ * Usage: step_time STEPS LOG TIMES name=value ...
+ *   LOG    x_d, then x, doubles, m, as many of each; played over and over
+ *   TIMES  written: STEPS doubles, ns, the steps; then STEPS doubles, ns, the empty loop; "-" for none
+ * Prints one line of JSON. Pinned to the processor it starts on where the system allows it.
+ */
+#if defined(__linux__)
+#define _GNU_SOURCE
+#include <sched.h>
+#else
+#define _POSIX_C_SOURCE 200809L
+#endif
+
+#include "hsep_fmu.h"
+
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+static double now_ns(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return 1e9 * (double)t.tv_sec + (double)t.tv_nsec;
+}
+
+static int pin(void)
+{
+#if defined(__linux__)
+    cpu_set_t set;
+    CPU_ZERO(&set);
+    CPU_SET((size_t)sched_getcpu(), &set);
+    return sched_setaffinity(0, sizeof set, &set) == 0;
+#else
+    return 0;
+#endif
+}
+
+static void fail(const char *what)
+{
+    fprintf(stderr, "step_time: %s\n", what);
+    exit(2);
+}
+
+static int by_size(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static double *sorted(const double times[], size_t n)
+{
+    double *copy = malloc(n * sizeof *copy);
+    if (copy == NULL) {
+        fail("out of memory");
+    }
+    memcpy(copy, times, n * sizeof *copy);
+    qsort(copy, n, sizeof *copy, by_size);
+    return copy;
+}
+
+static void print_summary(const char *name, const double times[], size_t n)
+{
+    double *s = sorted(times, n);
+    printf(
+        "\"%s\": {\"median\": %.1f, \"p99\": %.1f, \"p99.9\": %.1f, \"max\": %.1f}", name, s[n / 2], s[n - 1 - n / 100],
+        s[n - 1 - n / 1000], s[n - 1]);
+    free(s);
+}
+
+/* Count to n; the compiler cannot know that this does nothing. */
+static void idle(size_t n)
+{
+    for (volatile size_t i = 0; i < n; i++) {
+    }
+}
+
+int main(int n_arguments, char *arguments[])
+{
+    static double values[HSEP_N_VARIABLES];
+    char message[HSEP_MESSAGE_SIZE] = "";
+    const hsep_context context = {hsep_variables, HSEP_N_VARIABLES, NULL};
+    if (n_arguments < 4) {
+        fail("usage: step_time STEPS LOG TIMES name=value ...");
+    }
+    const size_t steps = strtoul(arguments[1], NULL, 10);
+    for (size_t i = 0; i < HSEP_N_VARIABLES; i++) {
+        const size_t length = strlen(hsep_variables[i].name);
+        values[i] = hsep_variables[i].start;
+        for (int a = 4; a < n_arguments; a++) {
+            if (strncmp(arguments[a], hsep_variables[i].name, length) == 0 && arguments[a][length] == '=') {
+                values[i] = strtod(arguments[a] + length + 1, NULL);
+            }
+        }
+    }
+
+    FILE *file = fopen(arguments[2], "rb");
+    if (file == NULL || fseek(file, 0, SEEK_END) != 0) {
+        fail("the log cannot be read");
+    }
+    const size_t n_log = (size_t)ftell(file) / (2 * sizeof(double));
+    double *x_d = malloc(2 * n_log * sizeof *x_d), *x = x_d + n_log;
+    rewind(file);
+    if (x_d == NULL || n_log == 0 || fread(x_d, 2 * sizeof *x_d, n_log, file) != n_log) {
+        fail("the log cannot be read");
+    }
+    fclose(file);
+
+    size_t size = 0;
+    if (hsep_model_size(&context, values, &size, message) != HSEP_OK) {
+        fail(message);
+    }
+    void *state = calloc(1, size);
+    double *times = malloc(2 * steps * sizeof *times), *empty = times + steps;
+    if (steps == 0 || state == NULL || times == NULL) {
+        fail("out of memory, or no steps");
+    }
+    values[HSEP_VR_x_d_ahead] = x_d[0];
+    if (hsep_model_initialise(&context, state, values, 0.0, message) != HSEP_OK) {
+        fail(message);
+    }
+    memset(times, 1, 2 * steps * sizeof *times); /* every page is there before the first step */
+    const int pinned = pin();
+    const double T_s = values[HSEP_VR_T_s];
+    const size_t delay = (size_t)values[HSEP_VR_Np];
+    for (size_t k = 0; k < steps; k++) {
+        values[HSEP_VR_x_d_ahead] = x_d[k % n_log];
+        values[HSEP_VR_x_meas] = k < delay ? x_d[0] : x[(k - delay) % n_log];
+        const double t = (double)k * T_s, before = now_ns();
+        const hsep_status status = hsep_model_step(&context, state, values, t, T_s, message);
+        times[k] = now_ns() - before;
+        if (status != HSEP_OK) {
+            fail(message);
+        }
+    }
+
+    /* The same loop around nothing, made as long as the median step. */
+    double *order = sorted(times, steps);
+    const double median = order[steps / 2];
+    free(order);
+    size_t count = 1;
+    for (double took = 0.0; took < median && count < SIZE_MAX / 2;) {
+        count += count / 16 + 1;
+        took = 1e300;
+        for (int i = 0; i < 50; i++) {
+            const double before = now_ns();
+            idle(count);
+            const double once = now_ns() - before;
+            took = once < took ? once : took;
+        }
+    }
+    for (size_t k = 0; k < steps; k++) {
+        const double before = now_ns();
+        idle(count);
+        empty[k] = now_ns() - before;
+    }
+
+    printf("{\"steps\": %lu, \"pinned\": %s, ", (unsigned long)steps, pinned ? "true" : "false");
+    printf("\"state_bytes\": %lu, ", (unsigned long)size);
+    print_summary("step", times, steps);
+    printf(", ");
+    print_summary("empty", empty, steps);
+    printf("}\n");
+    if (strcmp(arguments[3], "-") != 0) {
+        file = fopen(arguments[3], "wb");
+        if (file == NULL || fwrite(times, sizeof *times, 2 * steps, file) != 2 * steps || fclose(file) != 0) {
+            fail("the times cannot be written");
+        }
+    }
+    free(times);
+    free(state);
+    free(x_d);
+    return 0;
+}

@@ -1,0 +1,268 @@
+"""How long one step of the native HybridPredictor takes, and how evenly, beside blocked LAPACK in the same run.
+
+Builds a C host around the model (``main.c``), times every step of it, times LAPACK's ``dtpqrt`` on the same rows
+batch by batch, counts instructions step by step where valgrind is installed, prints the ratios, draws the
+distribution, and ends with 1 if a limit is missed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import re
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.table import Table
+
+from hybridsep.fmi.c_header import c_header
+from hybridsep.fmi.compiler import COMPILE_FLAGS
+from hybridsep.lookahead import LookAhead
+from hybridsep.physics import ModalModel
+from hybridsep.plant import FeedDrive, simulate
+from hybridsep.predictor import HybridPredictor
+from hybridsep.regression import RidgeRegression
+from hybridsep.trajectory import staircase
+
+Array = NDArray[np.float64]
+
+HERE = Path(__file__).parent
+C_SOURCES = HERE.parents[1] / "fmu_src" / "c"
+CASES = ((50, 3), (100, 99))
+"""p and q: the paper's, n = 55, and the largest, n = 201."""
+
+NP, LAM, REPETITIONS = 100, 1e-12, 5
+COUNTED_STEPS = 360
+MEDIAN_OVER_LAPACK_MAX = 5.0
+"""Limit at n = 55; the aim is 3."""
+TAIL_OVER_MEDIAN_MAX = 15.0
+"""Limit of p99.9 in time and of the most expensive step in instructions, both over the median step."""
+
+
+@dataclass(frozen=True)
+class Host:
+    """The program that steps the model, and the log it plays."""
+
+    program: Path
+    log: Path
+
+    def command(self, p: int, q: int, steps: int, times: Path | str) -> list[str]:
+        """Return the command that does so many steps and writes their times to a file, or to none with "-"."""
+        return [str(self.program), str(steps), str(self.log), str(times), f"p={p}", f"q={q}"]
+
+
+def drive_log() -> tuple[Array, Array]:
+    """Return commands and measured positions of one staircase, (6000,), m."""
+    x_d = staircase()[:-1]
+    x = simulate(FeedDrive(m=1.0, c=15.7, k=24674.0, c_nl=100.0, k_nl=1000.0), x_d, 1e-3)
+    return x_d, x + np.random.default_rng(0).normal(0.0, 5e-6, len(x))
+
+
+def build(folder: Path) -> Host:
+    """Compile the host with the model of the paper's drive."""
+    mode = ModalModel.spring_mass_damper(m=1.0, c=15.7, k=24674.0).modes[0]
+    parameters = {"Np": NP, "p": 50, "q": 3, "lambda": LAM, "T_s": 1e-3, "t_init": 0.3}
+    description = {
+        "model": "HybridPredictor",
+        "name": "HybridPredictor",
+        "parameters": {**parameters, "input_hold": 0, "dead_time": 0},
+        "modes": [{"f_n": mode.f_n, "zeta": mode.zeta, "alpha": mode.alpha, "beta": mode.beta}],
+    }
+    (folder / "hsep_fmu.h").write_text(c_header(description, "{benchmark}"), encoding="utf-8")
+    compiler = os.environ.get("CC") or shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
+    command = compiler.split() if compiler else [sys.executable, "-m", "ziglang", "cc", "-mcpu=baseline"]
+    sources = sorted((C_SOURCES / "core").glob("*.c")) + sorted((C_SOURCES / "model").glob("*.c"))
+    includes = [f"-I{path}" for path in (folder, C_SOURCES / "core", C_SOURCES / "model")]
+    program = folder / "step_time"
+    subprocess.run(
+        [*command, *COMPILE_FLAGS, *includes, str(HERE / "main.c"), *map(str, sources), "-lm", "-o", str(program)],
+        check=True,
+    )
+    log = folder / "log.bin"
+    log.write_bytes(np.concatenate(drive_log()).astype("<f8").tobytes())
+    return Host(program, log)
+
+
+def lapack_ns_per_sample(n: int) -> float:
+    """Return the time of RidgeRegression's one dtpqrt call a batch, per sample, ns; the median of 300 batches."""
+    regression = RidgeRegression(n, LAM)
+    rng = np.random.default_rng(0)
+    rows = np.asfortranarray(np.cumsum(rng.normal(0.0, 1e-6, (NP, n + 1)), axis=0))
+    took = []
+    for _ in range(300):
+        stacked = rows.copy(order="F")
+        before = time.perf_counter_ns()
+        regression.update_stacked(stacked)
+        took.append((time.perf_counter_ns() - before) / NP)
+    return statistics.median(took)
+
+
+def python_ns(p: int, q: int) -> Array:
+    """Return the times of the library's look-ahead, which the pythonfmu flavour steps, (6000,), ns."""
+    x_d, x = drive_log()
+    model = ModalModel.spring_mass_damper(m=1.0, c=15.7, k=24674.0)
+    ahead = LookAhead(HybridPredictor(model, Np=NP, p=p, q=q, lam=LAM), 0.0)
+    took = np.empty(len(x_d))
+    for k, command in enumerate(x_d.tolist()):
+        before = time.perf_counter_ns()
+        ahead.sample(command, float(x[max(k - NP, 0)]))
+        took[k] = time.perf_counter_ns() - before
+    return took
+
+
+def padasip_ns(n: int) -> Array | None:
+    """Return the times of padasip's recursive least squares, one row a call, (2000,), ns; None if not installed."""
+    if find_spec("padasip") is None:
+        return None
+    import padasip
+
+    rls = padasip.filters.FilterRLS(n=n, mu=1.0, eps=LAM)
+    rows = np.random.default_rng(0).normal(0.0, 1e-3, (2000, n))
+    took = np.empty(len(rows))
+    for k, row in enumerate(rows):
+        before = time.perf_counter_ns()
+        rls.adapt(1e-3, row)
+        took[k] = time.perf_counter_ns() - before
+    return took
+
+
+def instructions(host: Host, p: int, q: int, folder: Path) -> Array | None:
+    """Return the instructions of each step once learning has begun; None without valgrind."""
+    valgrind = shutil.which("valgrind")
+    if valgrind is None:
+        return None
+    out = folder / f"callgrind_{p}"
+    out.mkdir()
+    options = ["--tool=callgrind", "--toggle-collect=hsep_model_step", "--dump-after=hsep_model_step"]
+    command = [valgrind, *options, f"--callgrind-out-file={out}/out", *host.command(p, q, COUNTED_STEPS, "-")]
+    subprocess.run(command, check=True, capture_output=True)
+    counts = {}
+    for file in out.glob("out.*"):
+        part, total = (
+            re.search(pattern, file.read_text(encoding="utf-8", errors="replace"), re.MULTILINE)
+            for pattern in (r"^part: (\d+)", r"^(?:summary|totals): (\d+)")
+        )
+        if part and total:
+            counts[int(part[1])] = int(total[1])
+    if len(counts) < COUNTED_STEPS:
+        raise SystemExit(f"callgrind wrote {len(counts)} counts for {COUNTED_STEPS} steps")
+    return np.array([counts[k] for k in sorted(counts)][NP:COUNTED_STEPS], dtype=np.float64)
+
+
+def measure(host: Host, p: int, q: int, steps: int, folder: Path) -> dict[str, Any]:
+    """Time host and LAPACK by turns; return medians over the turns, and the last turn's single times."""
+    n, times = 2 + q + p, folder / "times.bin"
+    turns, lapack = [], []
+    for _ in range(REPETITIONS):
+        lapack.append(lapack_ns_per_sample(n))
+        done = subprocess.run(host.command(p, q, steps, times), check=True, capture_output=True, text=True)
+        turns.append(json.loads(done.stdout))
+    both = np.fromfile(times).reshape(2, steps)
+    middle: dict[str, Any] = {
+        kind: {key: statistics.median(turn[kind][key] for turn in turns) for key in turns[0][kind]}
+        for kind in ("step", "empty")
+    }
+    ratio = statistics.median(turn["step"]["median"] / blocked for turn, blocked in zip(turns, lapack, strict=True))
+    more = {"lapack": statistics.median(lapack), "ratio": ratio, "pinned": turns[0]["pinned"], "times": both}
+    return {"n": n, "p": p, "q": q, "state_bytes": turns[0]["state_bytes"], **middle, **more}
+
+
+def show(result: dict[str, Any], counts: Array | None, console: Console) -> None:
+    """Print one case's table."""
+    n, p, q = result["n"], result["p"], result["q"]
+    table = Table(title=f"n = {n} (p = {p}, q = {q}), Np = {NP}, pinned: {result['pinned']}, ns")
+    for heading in ("", "median", "p99", "p99.9", "max"):
+        table.add_column(heading, justify="right" if heading else "left")
+    rows = [("hsep_model_step", result["step"]), ("empty loop of that length", result["empty"])]
+    for name, took in (("the library's LookAhead.sample", python_ns(p, q)), ("padasip FilterRLS.adapt", padasip_ns(n))):
+        if took is not None:
+            levels = np.percentile(took, [50, 99, 99.9, 100])
+            rows.append((name, dict(zip(("median", "p99", "p99.9", "max"), levels.tolist(), strict=True))))
+    for name, levels in rows:
+        table.add_row(name, *(f"{levels[key]:.0f}" for key in ("median", "p99", "p99.9", "max")))
+    table.add_row("blocked LAPACK dtpqrt, per sample", f"{result['lapack']:.0f}", "", "", "")
+    if counts is not None:
+        levels = np.percentile(counts, [50, 99, 99.9, 100])
+        table.add_row("instructions of a step", *(f"{level:.0f}" for level in levels))
+    console.print(table)
+    console.print(f"state of one instance: {result['state_bytes']} bytes", highlight=False)
+
+
+def limits(result: dict[str, Any], counts: Array | None) -> list[tuple[bool, str]]:
+    """Compare one case with its limits."""
+    n, step = result["n"], result["step"]
+    tail = step["p99.9"] / step["median"]
+    checks = [(tail <= TAIL_OVER_MEDIAN_MAX, f"n = {n}: p99.9 / median = {tail:.1f}, limit ≤ {TAIL_OVER_MEDIAN_MAX:g}")]
+    ratio = result["ratio"]
+    text = f"n = {n}: median step / blocked LAPACK per sample = {ratio:.2f}"
+    if n == 55:
+        checks.append((ratio <= MEDIAN_OVER_LAPACK_MAX, f"{text}, limit ≤ {MEDIAN_OVER_LAPACK_MAX:g}"))
+    else:
+        checks.append((True, f"{text}, no limit"))
+    if counts is not None:
+        worst = float(np.max(counts) / np.median(counts))
+        text = f"n = {n}: most expensive step / median step, instructions = {worst:.2f}"
+        checks.append((worst <= TAIL_OVER_MEDIAN_MAX, f"{text}, limit ≤ {TAIL_OVER_MEDIAN_MAX:g}"))
+    return checks
+
+
+def draw(results: list[dict[str, Any]], path: Path) -> None:
+    """Draw how many steps took longer than a time, beside the empty loop."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(1, len(results), figsize=(5.5 * len(results), 4), squeeze=False)
+    for axis, result in zip(axes[0], results, strict=True):
+        for took, name in zip(result["times"], ("step", "empty loop"), strict=True):
+            share = 1.0 - np.arange(len(took)) / len(took)
+            axis.loglog(np.sort(took) / 1e3, share, label=name, drawstyle="steps-post")
+        axis.axvline(result["lapack"] / 1e3, color="gray", linestyle=":", label="blocked LAPACK per sample")
+        axis.axhline(1e-3, color="lightgray", linewidth=0.8)
+        axis.set(title=f"n = {result['n']}", xlabel="time t [µs]", ylabel="share of steps that took t or longer")
+        axis.legend()
+    figure.tight_layout()
+    figure.savefig(path, dpi=150)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--steps", type=int, default=200_000, help="steps of each turn")
+    parser.add_argument("--plot", type=Path, default=HERE / "step_time.png", help="where the figure goes")
+    options = parser.parse_args()
+    console, missed, results = Console(width=110), 0, []
+    with tempfile.TemporaryDirectory(prefix="hsep_step_time_") as name:
+        folder = Path(name)
+        host = build(folder)
+        for p, q in CASES:
+            result = measure(host, p, q, options.steps, folder)
+            counts = instructions(host, p, q, folder)
+            show(result, counts, console)
+            for held, text in limits(result, counts):
+                console.print(f"{'held  ' if held else 'MISSED'} {text}", highlight=False)
+                missed += not held
+            results.append(result)
+    draw(results, options.plot)
+    if shutil.which("valgrind") is None:
+        console.print("instructions are not counted: valgrind is not installed", highlight=False)
+    console.print(f"figure: {options.plot}", highlight=False)
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

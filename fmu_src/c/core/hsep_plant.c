@@ -1,0 +1,184 @@
+#include "hsep_plant.h"
+
+#include <math.h>
+
+static const double plant_internal_step = 1e-4;      /* s */
+static const double plant_friction_velocity = 2e-3;  /* m/s, over which the stage's friction changes sign */
+static const double plant_steps_per_time = 16.0;     /* internal steps in the fastest time constant */
+static const double plant_steps_max = 1e6;           /* internal steps of one step */
+static const double plant_tolerance = 1e-6;          /* of an internal step, and of T_s */
+static const double plant_two_pi = 6.283185307179586;
+
+double hsep_plant_internal_steps(double h, double rate)
+{
+    const double n = fmax(h / plant_internal_step, h * rate * plant_steps_per_time);
+    return fmin(fmax(1.0, ceil(n - plant_tolerance)), plant_steps_max);
+}
+
+void hsep_feed_drive_reset(hsep_feed_drive *self, double start)
+{
+    self->start = start;
+    self->x = self->u = self->x_d = 0.0;
+}
+
+double hsep_feed_drive_x(const hsep_feed_drive *self) { return self->start + self->x; }
+
+double hsep_feed_drive_v(const hsep_feed_drive *self) { return self->u + self->c / self->m * self->x_d; }
+
+/* The slopes p = x' and q = u' of eq. (13) under the command r. */
+static void plant_slope(const hsep_feed_drive *d, double x, double u, double r, double *p, double *q)
+{
+    const double a = d->c / d->m, w2 = d->k / d->m, c_m = d->c_nl / d->m, k_m = d->k_nl / d->m;
+    const double v = u + a * r;
+    *p = v;
+    /* Eq. (13): u' = -(c/m) v - (k/m)(x - x_d) - H_NL/m */
+    *q = -a * v - w2 * (x - r) - c_m * v * fabs(v) - k_m * x * fabs(x);
+}
+
+int hsep_feed_drive_step(hsep_feed_drive *self, double x_d, double h, double *reached)
+{
+    const double rate = fmax(sqrt(self->k / self->m), self->c / self->m);
+    const double n = hsep_plant_internal_steps(h, rate), dt = h / n, r = x_d - self->start;
+    double x = self->x, u = self->u;
+    for (double i = 0.0; i < n; i += 1.0) {
+        double p1, p2, p3, p4, q1, q2, q3, q4;
+        plant_slope(self, x, u, r, &p1, &q1);
+        plant_slope(self, x + dt / 2.0 * p1, u + dt / 2.0 * q1, r, &p2, &q2);
+        plant_slope(self, x + dt / 2.0 * p2, u + dt / 2.0 * q2, r, &p3, &q3);
+        plant_slope(self, x + dt * p3, u + dt * q3, r, &p4, &q4);
+        x += dt / 6.0 * (p1 + 2.0 * p2 + 2.0 * p3 + p4);
+        u += dt / 6.0 * (q1 + 2.0 * q2 + 2.0 * q3 + q4);
+    }
+    *reached = x;
+    if (!isfinite(x) || !isfinite(u)) {
+        return 0;
+    }
+    self->x = x;
+    self->u = u;
+    self->x_d = r;
+    return 1;
+}
+
+double hsep_stage_size(uint64_t n_modes)
+{
+    return (double)sizeof(hsep_stage) + (double)n_modes * (double)sizeof(hsep_stage_mode);
+}
+
+void hsep_stage_init(
+    hsep_stage *self, const hsep_mode modes[], uint64_t n_modes, double f, double kappa, double T_s, double start)
+{
+    self->f = f;
+    self->kappa = kappa;
+    self->T_s = T_s;
+    self->start = start;
+    self->last_x_d = self->v_d = self->v = 0.0;
+    self->elapsed = T_s; /* the first command is looked at */
+    self->n_modes = n_modes;
+    hsep_stage_mode *stage = (hsep_stage_mode *)(self + 1);
+    for (uint64_t i = 0; i < n_modes; i++) {
+        const double omega = plant_two_pi * modes[i].f_n;
+        stage[i].omega2 = omega * omega;
+        stage[i].two_zeta_omega = 2.0 * modes[i].zeta * omega;
+        stage[i].alpha = modes[i].alpha;
+        stage[i].beta = modes[i].beta;
+        stage[i].z[0] = stage[i].z[1] = 0.0;
+    }
+}
+
+/* sum alpha z + beta z' over the modes, z: (2 n_modes,). */
+static double plant_position(const hsep_stage *s, const double z[])
+{
+    const hsep_stage_mode *mode = (const hsep_stage_mode *)(s + 1);
+    double x = 0.0;
+    for (uint64_t i = 0; i < s->n_modes; i++) {
+        x += mode[i].alpha * z[2 * i] + mode[i].beta * z[2 * i + 1];
+    }
+    return x;
+}
+
+/* The slope of z, (2 n_modes,), under a command that friction has pushed back already. */
+static void plant_stage_slope(const hsep_stage *s, const double z[], double pushed, double slope[])
+{
+    const hsep_stage_mode *mode = (const hsep_stage_mode *)(s + 1);
+    const double x = plant_position(s, z);
+    const double u = pushed - s->kappa * x * fabs(x);
+    for (uint64_t i = 0; i < s->n_modes; i++) {
+        /* z'' + 2 zeta omega z' + omega^2 z = u, eq. (15) */
+        slope[2 * i] = z[2 * i + 1];
+        slope[2 * i + 1] = u - mode[i].two_zeta_omega * z[2 * i + 1] - mode[i].omega2 * z[2 * i];
+    }
+}
+
+/* One Runge-Kutta step of z, (size,), with three more vectors of work space behind it. */
+static void plant_stage_internal_step(const hsep_stage *s, double z[], double pushed, double dt)
+{
+    static const double weight[4] = {1.0, 2.0, 2.0, 1.0};
+    const double reach[4] = {dt / 2.0, dt / 2.0, dt, 0.0}; /* from z to where the next slope is taken */
+    const uint64_t size = 2 * s->n_modes;
+    double *slope = z + size, *at = slope + size, *sum = at + size;
+    for (uint64_t i = 0; i < size; i++) {
+        at[i] = z[i];
+        sum[i] = 0.0;
+    }
+    for (int stage = 0; stage < 4; stage++) {
+        plant_stage_slope(s, at, pushed, slope);
+        for (uint64_t i = 0; i < size; i++) {
+            sum[i] += weight[stage] * slope[i];
+            at[i] = z[i] + reach[stage] * slope[i];
+        }
+    }
+    for (uint64_t i = 0; i < size; i++) {
+        z[i] += dt / 6.0 * sum[i];
+    }
+}
+
+int hsep_stage_step(hsep_stage *self, double x_d, double h, double work[])
+{
+    hsep_stage_mode *mode = (hsep_stage_mode *)(self + 1);
+    double rate = 0.0;
+    for (uint64_t i = 0; i < self->n_modes; i++) {
+        rate = fmax(rate, fmax(sqrt(mode[i].omega2), mode[i].two_zeta_omega));
+    }
+    const double n = hsep_plant_internal_steps(h, rate), dt = h / n, r = x_d - self->start;
+    double last_x_d = self->last_x_d, v_d = self->v_d, elapsed = self->elapsed;
+    if (elapsed >= self->T_s * (1.0 - plant_tolerance)) { /* v_d is taken once in T_s, at shorter steps too */
+        v_d = (r - last_x_d) / elapsed;
+        last_x_d = r;
+        elapsed = 0.0;
+    }
+    /* The carriage's friction follows the commanded velocity: d = f tanh(v_d / 2 mm/s) */
+    const double pushed = r - self->f * tanh(v_d / plant_friction_velocity);
+    double *z = work, *slope = work + 2 * self->n_modes;
+    for (uint64_t i = 0; i < self->n_modes; i++) {
+        z[2 * i] = mode[i].z[0];
+        z[2 * i + 1] = mode[i].z[1];
+    }
+    for (double i = 0.0; i < n; i += 1.0) {
+        plant_stage_internal_step(self, z, pushed, dt);
+    }
+    for (uint64_t i = 0; i < 2 * self->n_modes; i++) {
+        if (!isfinite(z[i])) {
+            return 0;
+        }
+    }
+    plant_stage_slope(self, z, pushed, slope);
+    self->v = plant_position(self, slope);
+    for (uint64_t i = 0; i < self->n_modes; i++) {
+        mode[i].z[0] = z[2 * i];
+        mode[i].z[1] = z[2 * i + 1];
+    }
+    self->last_x_d = last_x_d;
+    self->v_d = v_d;
+    self->elapsed = elapsed + h;
+    return 1;
+}
+
+double hsep_stage_x(const hsep_stage *self)
+{
+    const hsep_stage_mode *mode = (const hsep_stage_mode *)(self + 1);
+    double x = 0.0;
+    for (uint64_t i = 0; i < self->n_modes; i++) {
+        x += mode[i].alpha * mode[i].z[0] + mode[i].beta * mode[i].z[1];
+    }
+    return self->start + x;
+}

@@ -1,0 +1,69 @@
+/* Nonlinear feed drives: eq. (13), and a stage with friction and cable stiffness.
+ *
+ * Both hold the command constant over a step and measure positions from where they rested at first. Classical
+ * Runge-Kutta of order 4 in internal steps of at most 0.1 ms and 1/16 of the linear part's fastest time constant;
+ * the command is never differentiated.
+ * Cost of a step: 4 slopes for each internal step. Plain data; reentrant; allocates nothing.
+ */
+#ifndef HSEP_PLANT_H
+#define HSEP_PLANT_H
+
+#include "hsep_physics.h"
+
+#include <stdint.h>
+
+/* Number of internal steps for a step of h seconds, h > 0: the fewest that are at most 0.1 ms and 1/(16 rate) long,
+ * rate in 1/s; at most 10^6, which bounds the cost. */
+double hsep_plant_internal_steps(double h, double rate);
+
+/* m x'' + c x' + k x + H_NL = c x_d' + k x_d with H_NL = c_nl x'|x'| + k_nl x|x|, eq. (13), in the states x and
+ * u = x' - (c/m) x_d. */
+typedef struct {
+    double m, c, k;    /* kg, N.s/m, N/m, > 0 */
+    double c_nl, k_nl; /* N.s2/m2, N/m2, >= 0 */
+    double start;      /* position of rest, m */
+    double x, u, x_d;  /* m, m/s, and the last command, m, from there */
+} hsep_feed_drive;
+
+/* Put the drive to rest at start, m; its parameters are set by the caller. */
+void hsep_feed_drive_reset(hsep_feed_drive *self, double start);
+
+/* Advance by h, s, with the command x_d, m, held. Fails, and returns 0 with the state unchanged, if the state would
+ * leave the range of numbers; *x then tells the position reached, m. */
+int hsep_feed_drive_step(hsep_feed_drive *self, double x_d, double h, double *x);
+
+double hsep_feed_drive_x(const hsep_feed_drive *self); /* true position, m */
+double hsep_feed_drive_v(const hsep_feed_drive *self); /* true velocity under the last step's command, m/s */
+
+/* One mode of the stage: z'' + two_zeta_omega z' + omega2 z = command, eq. (15). */
+typedef struct {
+    double omega2, two_zeta_omega; /* 1/s^2, 1/s */
+    double alpha, beta;            /* 1/s^2, 1/s */
+    double z[2];                   /* z and z', m s^2 and m s */
+} hsep_stage_mode;
+
+/* x = G_pb (x_d - d) with d = f tanh(v_d / 2 mm/s) + kappa x|x|; v_d is the backward difference of x_d over T_s. */
+typedef struct {
+    double f, kappa, T_s;            /* m, 1/m, s */
+    double start;                    /* position of rest, m */
+    double last_x_d, v_d, elapsed;   /* m from there, m/s, s since the command was looked at */
+    double v;                        /* m/s */
+    uint64_t n_modes;
+    /* followed by hsep_stage_mode[n_modes] */
+} hsep_stage;
+
+#define HSEP_STAGE_WORK 8 /* doubles of work space for each mode */
+
+double hsep_stage_size(uint64_t n_modes); /* bytes of the block, counted in double */
+
+/* Put the stage to rest at start, m. modes: (n_modes,). */
+void hsep_stage_init(
+    hsep_stage *self, const hsep_mode modes[], uint64_t n_modes, double f, double kappa, double T_s, double start);
+
+/* Advance by h, s, with the command x_d, m, held. work: (HSEP_STAGE_WORK n_modes,). Fails, and returns 0 with the
+ * state unchanged, if the state would leave the range of numbers. */
+int hsep_stage_step(hsep_stage *self, double x_d, double h, double work[]);
+
+double hsep_stage_x(const hsep_stage *self); /* true position, m */
+
+#endif

@@ -1,0 +1,230 @@
+#include "hsep_predictor.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+/* Where the arrays begin, in doubles from the struct. */
+static const uint64_t predictor_first = sizeof(hsep_predictor) / sizeof(double);
+
+static double *predictor_at(hsep_predictor *self, uint64_t offset) { return (double *)self + offset; }
+
+static hsep_physics *predictor_physics(hsep_predictor *self)
+{
+    return (hsep_physics *)predictor_at(self, self->physics);
+}
+
+hsep_regression *hsep_predictor_regression(hsep_predictor *self)
+{
+    return (hsep_regression *)predictor_at(self, self->regression);
+}
+
+const double *hsep_predictor_array(const hsep_predictor *self, uint64_t offset)
+{
+    return (const double *)self + offset;
+}
+
+double hsep_predictor_size(const hsep_predictor_parameters *parameters)
+{
+    const double Np = (double)parameters->Np, p = (double)parameters->p, q = (double)parameters->q;
+    const double doubles = 5.0 * Np + (Np + q) + (Np + p) + (2.0 + q + p) + p;
+    return (double)sizeof(hsep_predictor) + doubles * (double)sizeof(double) +
+           hsep_physics_size(parameters->n_modes, parameters->dead_time) +
+           hsep_regression_size(2 + parameters->q + parameters->p);
+}
+
+/* Take count doubles behind what is taken already; return their offset. */
+static uint64_t predictor_take(uint64_t *end, double count)
+{
+    const uint64_t offset = *end;
+    *end += (uint64_t)count;
+    return offset;
+}
+
+/* Set what follows from the parameters alone: sizes and offsets. */
+static void predictor_lay_out(hsep_predictor *self, const hsep_predictor_parameters *parameters)
+{
+    const double Np = (double)parameters->Np, p = (double)parameters->p, q = (double)parameters->q;
+    self->Np = parameters->Np;
+    self->p = parameters->p;
+    self->q = parameters->q;
+    self->n_init = parameters->n_init;
+    self->size = (uint64_t)hsep_predictor_size(parameters);
+    uint64_t end = predictor_first;
+    self->ahead = predictor_take(&end, Np);
+    self->ahead_pb = predictor_take(&end, Np);
+    self->x_d = predictor_take(&end, Np);
+    self->x_pb = predictor_take(&end, Np);
+    self->x_h = predictor_take(&end, Np);
+    self->past_x = predictor_take(&end, Np + q);
+    self->past_e = predictor_take(&end, Np + p);
+    self->weights = predictor_take(&end, 2.0 + q + p);
+    self->backward = predictor_take(&end, p);
+    self->physics = predictor_take(
+        &end, hsep_physics_size(parameters->n_modes, parameters->dead_time) / (double)sizeof(double));
+    self->regression = end;
+}
+
+void hsep_predictor_init(hsep_predictor *self, const hsep_predictor_parameters *parameters, double start)
+{
+    memset(self, 0, sizeof *self);
+    predictor_lay_out(self, parameters);
+    self->start = start;
+    self->n_warm_up = self->Np; /* the first fill is not predicted */
+    for (uint64_t i = predictor_first; i < self->physics; i++) {
+        *predictor_at(self, i) = 0.0;
+    }
+    for (uint64_t i = 0; i < self->Np; i++) {
+        predictor_at(self, self->x_d)[i] = start;
+        predictor_at(self, self->x_pb)[i] = start;
+        predictor_at(self, self->x_h)[i] = start;
+    }
+    hsep_physics_init(
+        predictor_physics(self), parameters->modes, parameters->n_modes, parameters->dead_time, parameters->T_s,
+        parameters->hold);
+    hsep_regression_init(hsep_predictor_regression(self), 2 + self->q + self->p, parameters->lambda);
+}
+
+int hsep_predictor_valid(const void *block, const hsep_predictor_parameters *parameters)
+{
+    const char *bytes = block;
+    hsep_predictor expected, got;
+    hsep_physics physics;
+    hsep_regression regression;
+    memcpy(&got, bytes, sizeof got);
+    /* What may differ from a fresh block of these parameters is taken over, the rest must be equal. */
+    expected = got;
+    predictor_lay_out(&expected, parameters);
+    memcpy(&physics, bytes + expected.physics * sizeof(double), sizeof physics);
+    memcpy(&regression, bytes + expected.regression * sizeof(double), sizeof regression);
+    const uint64_t n = 2 + parameters->q + parameters->p;
+    return memcmp(&expected, &got, sizeof got) == 0 && got.n_warm_up <= got.Np &&
+           physics.n_modes == parameters->n_modes && physics.dead_time == parameters->dead_time &&
+           (physics.oldest == 0 || physics.oldest < physics.dead_time) && regression.n == n &&
+           regression.n_tiles == n / 4 + 1;
+}
+
+/* y += a x, all (n,); four at a time, which a compiler makes vectors of without knowing n. */
+static void predictor_axpy(double *restrict y, double a, const double *restrict x, uint64_t n)
+{
+    uint64_t i = 0;
+    for (; i + 4 <= n; i += 4) {
+        const double y0 = y[i] + a * x[i], y1 = y[i + 1] + a * x[i + 1];
+        const double y2 = y[i + 2] + a * x[i + 2], y3 = y[i + 3] + a * x[i + 3];
+        y[i] = y0;
+        y[i + 1] = y1;
+        y[i + 2] = y2;
+        y[i + 3] = y3;
+    }
+    for (; i < n; i++) {
+        y[i] += a * x[i];
+    }
+}
+
+/* Predict the residuals of the window that begins, newest first into past_e; eq. (4):
+ *   e_h(k) = w_0 + sum_i w_x,i x_pb(k-i) + sum_i w_e,i e(k-i),  e(k-i) measured or, inside the window, predicted.
+ * Sample k of the window is at place j = Np - 1 - k, its lag i at j + i. */
+static void predictor_free_run(hsep_predictor *self)
+{
+    const uint64_t Np = self->Np, p = self->p, q = self->q;
+    const double *w = predictor_at(self, self->weights);
+    const double *w_x = w + 1, *w_e = w + 1 + q; /* w_x[i] for lag i = 0 ... q, w_e[i] for lag i = 1 ... p */
+    const double *x = predictor_at(self, self->past_x), *backward = predictor_at(self, self->backward);
+    double *e = predictor_at(self, self->past_e);
+    for (uint64_t j = 0; j < Np; j++) {
+        e[j] = w[0];
+    }
+    for (uint64_t i = 0; i <= q; i++) {
+        predictor_axpy(e, w_x[i], x + i, Np);
+    }
+    for (uint64_t i = 1; i <= p; i++) { /* measured residuals reach the first i samples */
+        predictor_axpy(e + Np - i, w_e[i], e + Np, i);
+    }
+    for (uint64_t j = Np - 1; j > 0; j--) { /* e(k) is known now: push it into the samples that follow */
+        const uint64_t reach = p < j ? p : j;
+        predictor_axpy(e + j - reach, e[j], backward + p - reach, reach);
+    }
+}
+
+/* Solve the weights from all that was learned and predict the window that begins. */
+static void predictor_next_window(hsep_predictor *self)
+{
+    const uint64_t Np = self->Np, p = self->p, q = self->q;
+    double *past_x = predictor_at(self, self->past_x), *past_e = predictor_at(self, self->past_e);
+    double *w = predictor_at(self, self->weights), *backward = predictor_at(self, self->backward);
+    const double *ahead = predictor_at(self, self->ahead), *ahead_pb = predictor_at(self, self->ahead_pb);
+    double *x_d = predictor_at(self, self->x_d), *x_pb = predictor_at(self, self->x_pb);
+    double *x_h = predictor_at(self, self->x_h);
+
+    memcpy(past_x + Np, past_x, (size_t)q * sizeof(double)); /* q < Np, p <= Np: they do not overlap */
+    memcpy(past_e + Np, past_e, (size_t)p * sizeof(double));
+    hsep_regression_solve(hsep_predictor_regression(self), w); /* Eq. (6) */
+    for (uint64_t i = 0; i < p; i++) {
+        backward[i] = w[1 + q + p - i];
+    }
+    for (uint64_t i = 0; i < Np; i++) {
+        past_x[Np - 1 - i] = ahead_pb[i]; /* Eq. (2), answered command by command as they came */
+    }
+    predictor_free_run(self);
+
+    /* The fill is over at k = Np; the warm-up counts from there. */
+    const double warm_up = self->n_init - (double)(self->k - Np);
+    self->n_warm_up = warm_up >= (double)Np ? Np : warm_up > 0.0 ? (uint64_t)warm_up : 0;
+    for (uint64_t i = 0; i < Np; i++) {
+        x_d[i] = ahead[i];
+        x_pb[i] = ahead_pb[i] + self->start;
+        x_h[i] = i < self->n_warm_up ? x_pb[i] : x_pb[i] + past_e[Np - 1 - i]; /* Eq. (4) */
+    }
+}
+
+/* Fold the row of a sample, at place i of its window, into the regression; eqs. (5) and (6). */
+static void predictor_learn(hsep_predictor *self, uint64_t i, double x_meas)
+{
+    const uint64_t p = self->p, q = self->q, j = self->Np - 1 - i;
+    const double *x = predictor_at(self, self->past_x) + j;
+    double *e = predictor_at(self, self->past_e) + j;
+    double *row = hsep_regression_row(hsep_predictor_regression(self));
+    e[0] = x_meas - self->start - x[0]; /* e_pb = x - x_pb */
+    /* phi(k) = [1, x_pb(k) ... x_pb(k-q), e_pb(k-1) ... e_pb(k-p)], its target e_pb(k) beside it */
+    row[0] = 1.0;
+    memcpy(row + 1, x, (size_t)(q + 1) * sizeof(double));
+    memcpy(row + 2 + q, e + 1, (size_t)p * sizeof(double));
+    row[2 + q + p] = e[0];
+    hsep_regression_fold(hsep_predictor_regression(self));
+}
+
+int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, double x_meas)
+{
+    const uint64_t i = self->k % self->Np;
+    const double relative = x_d_ahead - self->start;
+    predictor_at(self, self->ahead)[i] = x_d_ahead;
+    hsep_physics_respond(predictor_physics(self), &relative, predictor_at(self, self->ahead_pb) + i, 1);
+    if (self->k >= self->Np) {
+        predictor_learn(self, i, x_meas);
+        if ((double)(self->k - self->Np) >= self->n_init) {
+            const double e_pb = x_meas - predictor_at(self, self->x_pb)[i];
+            const double e_h = x_meas - predictor_at(self, self->x_h)[i];
+            self->n_measured++;
+            self->sum_pb += e_pb * e_pb;
+            self->sum_h += e_h * e_h;
+        }
+    }
+    self->k++;
+    if (self->k % self->Np != 0) {
+        return 0;
+    }
+    predictor_next_window(self);
+    return 1;
+}
+
+void hsep_predictor_read(const hsep_predictor *self, hsep_predictor_outputs *outputs)
+{
+    const uint64_t i = self->k % self->Np;
+    outputs->x_d = hsep_predictor_array(self, self->x_d)[i];
+    outputs->x_pb = hsep_predictor_array(self, self->x_pb)[i];
+    outputs->x_h = hsep_predictor_array(self, self->x_h)[i];
+    outputs->rms_pb = self->n_measured > 0 ? sqrt(self->sum_pb / (double)self->n_measured) : 0.0;
+    outputs->rms_h = self->n_measured > 0 ? sqrt(self->sum_h / (double)self->n_measured) : 0.0;
+    outputs->batch = self->k / self->Np;
+    outputs->hybrid_active = i >= self->n_warm_up;
+}

@@ -1,0 +1,159 @@
+#include "hsep_check.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double check_warm_up_tolerance = 1e-6; /* samples */
+
+void hsep_message_add(char message[], const char *format, ...)
+{
+    size_t used = strlen(message);
+    if (used > 0 && used + 2 < HSEP_MESSAGE_SIZE) {
+        memcpy(message + used, "; ", 3);
+        used += 2;
+    }
+    va_list arguments;
+    va_start(arguments, format);
+    const int wanted = vsnprintf(message + used, HSEP_MESSAGE_SIZE - used, format, arguments);
+    va_end(arguments);
+    if (wanted < 0) {
+        message[used] = '\0';
+    } else if ((size_t)wanted >= HSEP_MESSAGE_SIZE - used) {
+        /* Cut off: take back an incomplete UTF-8 character, its following bytes (10xxxxxx) and its first one. */
+        size_t end = HSEP_MESSAGE_SIZE - 1;
+        message[end] = '\0';
+        while (end > used && ((unsigned char)message[end - 1] & 0xC0) == 0x80) {
+            message[--end] = '\0';
+        }
+        if (end > used && (unsigned char)message[end - 1] >= 0xC0) {
+            message[end - 1] = '\0';
+        }
+    }
+}
+
+const char *hsep_number(char text[HSEP_NUMBER_SIZE], double value, hsep_kind kind)
+{
+    if (!isfinite(value)) {
+        memcpy(text, isnan(value) ? "nan\0" : value > 0.0 ? "inf\0" : "-inf", 5);
+        return text;
+    }
+    int digits = 0;
+    do { /* the fewest digits behind the first one that read back as the same number */
+        snprintf(text, HSEP_NUMBER_SIZE, "%.*e", digits, value);
+    } while (strtod(text, NULL) != value && ++digits < 17); /* 17 digits always do */
+    const char *mark = strchr(text, 'e');
+    const int exponent = mark != NULL ? (int)strtol(mark + 1, NULL, 10) : 0;
+    const int decimals = digits > exponent ? digits - exponent : 0;
+    if (exponent >= -4 && exponent < 16) {
+        snprintf(text, HSEP_NUMBER_SIZE, "%.*f", decimals > 0 || kind != HSEP_REAL ? decimals : 1, value);
+    }
+    return text;
+}
+
+/* Write the allowed range of a parameter, with its unit. */
+static void check_range_text(char text[], size_t size, const hsep_variable *v)
+{
+    const int has_unit = v->unit[0] != '\0' && strcmp(v->unit, "1") != 0;
+    const char *space = has_unit ? " " : "", *unit = has_unit ? v->unit : "";
+    const int bounded = v->maximum < HUGE_VAL;
+    if (v->above && bounded) {
+        snprintf(text, size, "> %g and " HSEP_AT_MOST " %g%s%s", v->minimum, v->maximum, space, unit);
+    } else if (v->above) {
+        snprintf(text, size, "> %g%s%s", v->minimum, space, unit);
+    } else if (v->minimum > -HUGE_VAL && bounded) {
+        snprintf(text, size, "%g " HSEP_TO " %.10g%s%s", v->minimum, v->maximum, space, unit);
+    } else if (v->minimum > -HUGE_VAL) {
+        snprintf(text, size, HSEP_AT_LEAST " %g%s%s", v->minimum, space, unit);
+    } else {
+        snprintf(text, size, "finite%s%s", space, unit);
+    }
+}
+
+int hsep_check_parameters(const hsep_context *context, const double values[], char message[])
+{
+    char number[HSEP_NUMBER_SIZE], range[96];
+    int problems = 0;
+    for (size_t i = 0; i < context->n_variables; i++) {
+        const hsep_variable *v = &context->variables[i];
+        const double value = values[i];
+        if (v->causality != HSEP_PARAMETER) {
+            continue;
+        }
+        hsep_number(number, value, v->kind);
+        if (!isfinite(value)) {
+            hsep_message_add(message, "%s must be finite, got %s", v->name, number);
+        } else if (v->kind == HSEP_INTEGER && value != floor(value)) {
+            hsep_message_add(message, "%s must be a whole number, got %s", v->name, number);
+        } else if (value < v->minimum || (v->above && value <= v->minimum) || value > v->maximum) {
+            check_range_text(range, sizeof range, v);
+            hsep_message_add(message, "%s must be %s, got %s", v->name, range, number);
+        } else {
+            continue;
+        }
+        problems++;
+    }
+    return problems;
+}
+
+int hsep_check_lags(double Np, double p, double q, char message[])
+{
+    int problems = 0;
+    if (!(p >= 1.0 && p <= Np)) {
+        hsep_message_add(message, "p must be 1 " HSEP_TO " Np = %.0f, got %.0f; lower p or raise Np", Np, p);
+        problems++;
+    }
+    if (!(q >= 0.0 && q < Np)) {
+        hsep_message_add(
+            message, "q must be 0 " HSEP_TO " Np " HSEP_MINUS " 1 = %.0f, got %.0f; lower q or raise Np", Np - 1.0, q);
+        problems++;
+    }
+    return problems;
+}
+
+double hsep_warm_up_samples(double t_init, double T_s, char message[])
+{
+    char time[HSEP_NUMBER_SIZE], interval[HSEP_NUMBER_SIZE];
+    const double count = t_init / T_s;
+    if (!isfinite(count)) {
+        hsep_message_add(
+            message, "t_init must be a countable number of samples, got %s s at T_s = %s s",
+            hsep_number(time, t_init, HSEP_REAL), hsep_number(interval, T_s, HSEP_REAL));
+        return -1.0;
+    }
+    return fmax(0.0, ceil(count - check_warm_up_tolerance));
+}
+
+hsep_status hsep_check_start_time(double t_start, char message[])
+{
+    char number[HSEP_NUMBER_SIZE];
+    if (isfinite(t_start)) {
+        return HSEP_OK;
+    }
+    hsep_message_add(message, "the start time must be finite, got %s s", hsep_number(number, t_start, HSEP_REAL));
+    return HSEP_REFUSED;
+}
+
+hsep_status hsep_check_step(const hsep_clock *clock, double t, double h, int64_t *parts, char message[])
+{
+    switch (hsep_clock_check(clock, t, h, parts)) {
+    case HSEP_CLOCK_FITS:
+        return HSEP_OK;
+    case HSEP_CLOCK_STEP_SIZE:
+        hsep_message_add(
+            message, "the communication step size must divide T_s = %g s, got %g s", clock->T_s, h);
+        break;
+    case HSEP_CLOCK_MIXED_SIZE:
+        hsep_message_add(
+            message, "the communication step size must stay %g s within a sample of T_s = %g s, got %g s",
+            clock->T_s / (double)clock->parts, clock->T_s, h);
+        break;
+    case HSEP_CLOCK_POINT:
+        hsep_message_add(
+            message, "the communication point must be %.9g s, got %.9g s", hsep_clock_expected(clock, *parts), t);
+        break;
+    }
+    return HSEP_REFUSED;
+}

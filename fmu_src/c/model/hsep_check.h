@@ -1,0 +1,39 @@
+/* Messages and checks that every model shares; the wording is that of the Python library.
+ * Reentrant; allocates nothing; every message fits into HSEP_MESSAGE_SIZE bytes, cut off at a whole character. */
+#ifndef HSEP_CHECK_H
+#define HSEP_CHECK_H
+
+#include "hsep_clock.h"
+#include "hsep_model.h"
+
+#define HSEP_NUMBER_SIZE 40 /* bytes of a number as text */
+
+/* UTF-8, spelled out for compilers that read sources in another encoding */
+#define HSEP_TO "\xe2\x80\xa6"            /* the dots of a range */
+#define HSEP_AT_LEAST "\xe2\x89\xa5"      /* greater than or equal */
+#define HSEP_AT_MOST "\xe2\x89\xa4"       /* less than or equal */
+#define HSEP_MINUS "\xe2\x88\x92"
+
+/* Add a problem, formatted as by printf, to a message; "; " goes between two. */
+void hsep_message_add(char message[], const char *format, ...);
+
+/* Write the shortest decimal number that reads back as value, whole ones of a real with ".0"; return text. */
+const char *hsep_number(char text[HSEP_NUMBER_SIZE], double value, hsep_kind kind);
+
+/* Check every parameter alone, the range being the table's; return how many are wrong, each added to message. */
+int hsep_check_parameters(const hsep_context *context, const double values[], char message[]);
+
+/* Check 1 <= p <= Np and 0 <= q < Np; return how many are wrong, each added to message. */
+int hsep_check_lags(double Np, double p, double q, char message[]);
+
+/* Return how many samples have t < t_init, counted in samples so that rounding of times cannot tell; whole, >= 0.
+ * Fails, and returns a negative number with message set, if they are too many to be counted. */
+double hsep_warm_up_samples(double t_init, double T_s, char message[]);
+
+/* Check that the simulation starts at a number. */
+hsep_status hsep_check_start_time(double t_start, char message[]);
+
+/* Check that the step from t by h, s, comes next; parts is how many such steps make a sample. */
+hsep_status hsep_check_step(const hsep_clock *clock, double t, double h, int64_t *parts, char message[]);
+
+#endif

@@ -1,0 +1,71 @@
+/* What a model is to an adapter: sizes, an initialization, a step and values.
+ *
+ * An adapter (FMI 2.0 now, another one beside it later) owns one array of values, one place per variable of the
+ * generated table (hsep_fmu.h), and one block of memory, the state, whose size the model tells from the parameters.
+ * The state is plain data without pointers: saving, restoring and serialising it is one copy of its bytes. Outputs
+ * change only where their sample does, so what an adapter saves is the state together with the values.
+ * Numbers lie in memory and in files as a little-endian machine has them.
+ *
+ * Nothing here allocates. Each function is reentrant; two threads may use two different instances at once.
+ */
+#ifndef HSEP_MODEL_H
+#define HSEP_MODEL_H
+
+#include <stddef.h>
+
+#define HSEP_MESSAGE_SIZE 512 /* bytes of a message buffer, the final 0 included */
+
+typedef enum {
+    HSEP_OK = 0,
+    HSEP_REFUSED = 1 /* the call cannot be done; the state is unchanged and the message says why */
+} hsep_status;
+
+typedef enum { HSEP_REAL, HSEP_INTEGER, HSEP_BOOLEAN, HSEP_STRING } hsep_kind;
+typedef enum { HSEP_INPUT, HSEP_OUTPUT, HSEP_PARAMETER, HSEP_LOCAL } hsep_causality;
+
+/* One row of the generated table; its place is the value reference. Numbers of every kind are held as double. */
+typedef struct {
+    const char *name;
+    const char *unit; /* "" if it has none */
+    hsep_kind kind;
+    hsep_causality causality;
+    int tunable;    /* a parameter that may be set while the simulation runs */
+    double start;   /* 0 for what is calculated */
+    double minimum; /* -HUGE_VAL if there is none */
+    double maximum; /* HUGE_VAL if there is none */
+    int above;      /* the minimum itself is not allowed */
+} hsep_variable;
+
+/* What stays the same for one instance: the generated table and where its resources are. */
+typedef struct {
+    const hsep_variable *variables; /* (n_variables,) */
+    size_t n_variables;
+    const char *resources; /* folder with a trailing slash, decoded; NULL if there is none */
+} hsep_context;
+
+/* Check the parameters in values, alone and together, and tell how many bytes of state they need.
+ * Fails with a message that names every parameter that is out of its range, the range and what came.
+ * ReferenceTrajectory looks up the number of samples in its resource for that. */
+hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[]);
+
+/* Fill the state (size bytes, zeroed, aligned for double) for t_start; outputs and locals of t_start go to values.
+ * Reads the resources, as hsep_model_size and hsep_model_start_values do; no step touches a file.
+ * Fails if a start value is not finite or a resource cannot be read. */
+hsep_status hsep_model_initialise(
+    const hsep_context *context, void *state, double values[], double t_start, char message[]);
+
+/* Do one communication step from t by h with the inputs in values; outputs and locals go to values.
+ * Fails, with state and values unchanged, if an input is not finite or t and h do not fit.
+ * Cost: bounded by the parameters alone, the same at the first and at the 10^9th call; allocates nothing. */
+hsep_status hsep_model_step(
+    const hsep_context *context, void *state, double values[], double t, double h, char message[]);
+
+/* Write outputs and locals as they follow from inputs and parameters before hsep_model_initialise.
+ * Cannot fail: parameters that are out of range, and resources that are missing, leave start values. */
+void hsep_model_start_values(const hsep_context *context, double values[]);
+
+/* Check that a block of bytes is a state of this model for the parameters in values; message says why not. */
+hsep_status hsep_model_check_state(
+    const hsep_context *context, const void *state, size_t size, const double values[], char message[]);
+
+#endif

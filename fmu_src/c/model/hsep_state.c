@@ -1,0 +1,84 @@
+#include "hsep_state.h"
+
+#include "hsep_check.h"
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+static const double state_samples_max = 9007199254740992.0; /* 2^53: counted exactly in a double */
+
+hsep_status hsep_state_size(double bytes, size_t *size, char message[])
+{
+    if (!(bytes < 0.5 * (double)SIZE_MAX)) {
+        hsep_message_add(
+            message, "the state must fit into memory, got %.4g bytes for these parameters; lower Np, p or q", bytes);
+        return HSEP_REFUSED;
+    }
+    *size = (size_t)bytes;
+    return HSEP_OK;
+}
+
+/* FNV-1a (Fowler, Noll and Vo 1991) over the bytes of the parameters. */
+static uint64_t state_hash(const hsep_context *context, const double values[])
+{
+    uint64_t hash = UINT64_C(0xCBF29CE484222325);
+    for (size_t i = 0; i < context->n_variables; i++) {
+        if (context->variables[i].causality != HSEP_PARAMETER || context->variables[i].tunable) {
+            continue;
+        }
+        unsigned char bytes[sizeof(double)];
+        memcpy(bytes, &values[i], sizeof bytes);
+        for (size_t b = 0; b < sizeof bytes; b++) {
+            hash = (hash ^ bytes[b]) * UINT64_C(0x100000001B3);
+        }
+    }
+    return hash;
+}
+
+void hsep_state_mark(
+    hsep_state_header *header, const hsep_context *context, const double values[], uint64_t kind, size_t size)
+{
+    header->kind = kind;
+    header->version = HSEP_STATE_VERSION;
+    header->size = size;
+    header->parameters = state_hash(context, values);
+}
+
+hsep_status hsep_state_check(
+    const hsep_context *context, const double values[], const void *state, size_t size, uint64_t kind,
+    size_t expected, char message[])
+{
+    hsep_state_header header;
+    if (size < sizeof header || size != expected) {
+        hsep_message_add(
+            message, "the state must have %.0f bytes, got %.0f; it is truncated or of another FMU", (double)expected,
+            (double)size);
+        return HSEP_REFUSED;
+    }
+    memcpy(&header, state, sizeof header);
+    if (header.kind != kind) {
+        hsep_message_add(message, "the state belongs to another model than this one");
+    } else if (header.version != HSEP_STATE_VERSION) {
+        hsep_message_add(
+            message, "the state must be of version %d, got %.0f", HSEP_STATE_VERSION, (double)header.version);
+    } else if (header.size != size || header.parameters != state_hash(context, values)) {
+        hsep_message_add(message, "the state was saved with other parameters than those of this instance");
+    } else {
+        return HSEP_OK;
+    }
+    return HSEP_REFUSED;
+}
+
+int hsep_state_clock_valid(const hsep_clock *clock)
+{
+    return isfinite(clock->start) && clock->T_s > 0.0 && isfinite(clock->T_s) && clock->k >= 0 &&
+           (double)clock->k < state_samples_max && clock->parts >= 1 && clock->done >= 0 &&
+           (clock->done == 0 || clock->done < clock->parts);
+}
+
+hsep_status hsep_state_damaged(char message[])
+{
+    hsep_message_add(message, "the state does not hold together: it is damaged");
+    return HSEP_REFUSED;
+}

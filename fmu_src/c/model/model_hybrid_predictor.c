@@ -1,0 +1,250 @@
+/* HybridPredictor: the look-ahead buffer that predicts the drive's position one window early.
+ *
+ * Inputs are read at the first sub-step of a sample, outputs change after its last one; the arithmetic is
+ * hsep_predictor's. If the resources hold weights.bin, the first window is predicted with what was learned before:
+ *   "HSEPWGT1", n = 2 + q + p as uint64, the number of learned samples as uint64, then the upper triangle of the
+ *   factor [R z; 0 rho] by rows, (n + 1)(n + 2)/2 doubles, all little-endian.
+ */
+#include "hsep_fmu.h"
+
+#if defined(HSEP_MODEL_HYBRID_PREDICTOR)
+
+#include "hsep_check.h"
+#include "hsep_clock.h"
+#include "hsep_model.h"
+#include "hsep_predictor.h"
+#include "hsep_resource.h"
+#include "hsep_state.h"
+
+#include <math.h>
+#include <string.h>
+
+#define PREDICTOR_KIND UINT64_C(0x4453524550594848) /* any number that no other model has */
+#define PREDICTOR_WEIGHTS "weights.bin"
+
+typedef struct {
+    hsep_state_header header;
+    hsep_clock clock;
+    double x_d_ahead, x_meas; /* m, the inputs of the sample in progress */
+    hsep_predictor predictor; /* its arrays follow */
+} predictor_state;
+
+/* Read the parameters; those that are whole numbers must have been checked. modes: (HSEP_N_MODES,). */
+static hsep_predictor_parameters predictor_parameters(const double values[], double n_init, hsep_mode modes[])
+{
+    for (size_t i = 0; i < HSEP_N_MODES; i++) {
+        const double *mode = &values[HSEP_VR_mode + 4 * i];
+        modes[i] = (hsep_mode){.f_n = mode[0], .zeta = mode[1], .alpha = mode[2], .beta = mode[3]};
+    }
+    return (hsep_predictor_parameters){
+        .Np = (uint64_t)values[HSEP_VR_Np],
+        .p = (uint64_t)values[HSEP_VR_p],
+        .q = (uint64_t)values[HSEP_VR_q],
+        .dead_time = (uint64_t)values[HSEP_VR_dead_time],
+        .n_modes = HSEP_N_MODES,
+        .lambda = values[HSEP_VR_lambda],
+        .T_s = values[HSEP_VR_T_s],
+        .n_init = n_init,
+        .hold = values[HSEP_VR_input_hold] > 0.0 ? HSEP_FIRST_ORDER_HOLD : HSEP_ZERO_ORDER_HOLD,
+        .modes = modes};
+}
+
+/* Check all parameters and read them. */
+static hsep_status predictor_checked(
+    const hsep_context *context, const double values[], hsep_predictor_parameters *parameters, hsep_mode modes[],
+    char message[])
+{
+    message[0] = '\0';
+    if (hsep_check_parameters(context, values, message) > 0) {
+        return HSEP_REFUSED;
+    }
+    const int lags = hsep_check_lags(values[HSEP_VR_Np], values[HSEP_VR_p], values[HSEP_VR_q], message);
+    const double n_init = hsep_warm_up_samples(values[HSEP_VR_t_init], values[HSEP_VR_T_s], message);
+    if (lags > 0 || n_init < 0.0) {
+        return HSEP_REFUSED;
+    }
+    *parameters = predictor_parameters(values, n_init, modes);
+    return HSEP_OK;
+}
+
+hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[])
+{
+    hsep_mode modes[HSEP_N_MODES];
+    hsep_predictor_parameters parameters;
+    if (predictor_checked(context, values, &parameters, modes, message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
+    const double before = (double)(sizeof(predictor_state) - sizeof(hsep_predictor));
+    return hsep_state_size(before + hsep_predictor_size(&parameters), size, message);
+}
+
+static void predictor_write_outputs(const hsep_predictor *predictor, double values[])
+{
+    hsep_predictor_outputs outputs;
+    hsep_predictor_read(predictor, &outputs);
+    values[HSEP_VR_x_d] = outputs.x_d;
+    values[HSEP_VR_x_pb] = outputs.x_pb;
+    values[HSEP_VR_x_h] = outputs.x_h;
+    values[HSEP_VR_e_servo] = outputs.x_d - outputs.x_h; /* the predicted servo error */
+    values[HSEP_VR_hybrid_active] = outputs.hybrid_active;
+    values[HSEP_VR_rms_pb] = outputs.rms_pb;
+    values[HSEP_VR_rms_h] = outputs.rms_h;
+    values[HSEP_VR_batch] = (double)outputs.batch;
+}
+
+/* Entries past a smaller Np are 0, of a larger Np the first ones are shown. */
+static void predictor_write_windows(const hsep_predictor *predictor, double values[])
+{
+    const uint64_t shown = predictor->Np < HSEP_WINDOW ? predictor->Np : HSEP_WINDOW;
+    for (uint64_t i = 0; i < HSEP_WINDOW; i++) {
+        values[HSEP_VR_x_d_window + i] = i < shown ? hsep_predictor_array(predictor, predictor->x_d)[i] : 0.0;
+        values[HSEP_VR_x_pb_window + i] = i < shown ? hsep_predictor_array(predictor, predictor->x_pb)[i] : 0.0;
+        values[HSEP_VR_x_h_window + i] = i < shown ? hsep_predictor_array(predictor, predictor->x_h)[i] : 0.0;
+    }
+}
+
+/* Take over the factor that the resources hold, if they do; row after row through the regression's own row. */
+static hsep_status predictor_warm_start(const hsep_context *context, hsep_regression *regression, char message[])
+{
+    FILE *file = hsep_resource_open(context, PREDICTOR_WEIGHTS);
+    if (file == NULL) {
+        return HSEP_OK;
+    }
+    const double n = (double)regression->n;
+    uint64_t head[2] = {0, 0};
+    const double bytes = hsep_resource_head(file, "HSEPWGT1", head, 2);
+    int taken = bytes == 0.5 * (n + 1.0) * (n + 2.0) * (double)sizeof(double) && head[0] == regression->n;
+    if (bytes >= 0.0 && head[0] != regression->n) {
+        hsep_message_add(
+            message,
+            PREDICTOR_WEIGHTS " must have 2 + q + p = %.0f weights, got %.0f; set p and q as they were learned", n,
+            (double)head[0]);
+    }
+    for (uint64_t i = 0; taken && i <= regression->n; i++) {
+        const size_t left = (size_t)(regression->n + 1 - i);
+        taken = fread(hsep_regression_row(regression), sizeof(double), left, file) == left &&
+                hsep_regression_load(regression, i);
+    }
+    fclose(file);
+    if (!taken) {
+        if (message[0] == '\0') {
+            hsep_message_add(
+                message, PREDICTOR_WEIGHTS " must be a factor of learned rows; it is damaged or truncated");
+        }
+        return HSEP_REFUSED;
+    }
+    regression->n_samples = head[1];
+    return HSEP_OK;
+}
+
+hsep_status hsep_model_initialise(
+    const hsep_context *context, void *state, double values[], double t_start, char message[])
+{
+    char number[HSEP_NUMBER_SIZE];
+    predictor_state *self = state;
+    hsep_mode modes[HSEP_N_MODES];
+    hsep_predictor_parameters parameters;
+    size_t size = 0;
+    if (hsep_model_size(context, values, &size, message) != HSEP_OK ||
+        predictor_checked(context, values, &parameters, modes, message) != HSEP_OK ||
+        hsep_check_start_time(t_start, message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
+    const double start = values[HSEP_VR_x_d_ahead];
+    if (!isfinite(start)) {
+        hsep_message_add(
+            message, "the start value of x_d_ahead must be finite, got %s", hsep_number(number, start, HSEP_REAL));
+        return HSEP_REFUSED;
+    }
+    hsep_state_mark(&self->header, context, values, PREDICTOR_KIND, size);
+    hsep_clock_init(&self->clock, t_start, parameters.T_s);
+    self->x_d_ahead = start;
+    self->x_meas = start;
+    hsep_predictor_init(&self->predictor, &parameters, start);
+    if (predictor_warm_start(context, hsep_predictor_regression(&self->predictor), message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
+    predictor_write_outputs(&self->predictor, values);
+    predictor_write_windows(&self->predictor, values);
+    return HSEP_OK;
+}
+
+/* Refuse an input that is not finite at the sample that begins. */
+static hsep_status predictor_check_input(const predictor_state *self, const char *name, double value, char message[])
+{
+    char number[HSEP_NUMBER_SIZE];
+    if (isfinite(value)) {
+        return HSEP_OK;
+    }
+    hsep_message_add(
+        message, "%s must be finite, got %s at sample %.0f", name, hsep_number(number, value, HSEP_REAL),
+        (double)self->clock.k);
+    return HSEP_REFUSED;
+}
+
+hsep_status hsep_model_step(
+    const hsep_context *context, void *state, double values[], double t, double h, char message[])
+{
+    (void)context;
+    predictor_state *self = state;
+    int64_t parts = 0;
+    message[0] = '\0';
+    if (hsep_check_step(&self->clock, t, h, &parts, message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
+    if (self->clock.done == 0) { /* a sample begins: its inputs are read */
+        if (predictor_check_input(self, "x_d_ahead", values[HSEP_VR_x_d_ahead], message) != HSEP_OK ||
+            predictor_check_input(self, "x_meas", values[HSEP_VR_x_meas], message) != HSEP_OK) {
+            return HSEP_REFUSED;
+        }
+        self->x_d_ahead = values[HSEP_VR_x_d_ahead];
+        self->x_meas = values[HSEP_VR_x_meas];
+    }
+    if (hsep_clock_advance(&self->clock, parts)) {
+        if (hsep_predictor_sample(&self->predictor, self->x_d_ahead, self->x_meas)) {
+            predictor_write_windows(&self->predictor, values);
+        }
+        predictor_write_outputs(&self->predictor, values);
+    }
+    return HSEP_OK;
+}
+
+void hsep_model_start_values(const hsep_context *context, double values[])
+{
+    (void)context;
+    const double start = values[HSEP_VR_x_d_ahead]; /* the drive rests there */
+    values[HSEP_VR_x_d] = values[HSEP_VR_x_pb] = values[HSEP_VR_x_h] = start;
+    values[HSEP_VR_e_servo] = values[HSEP_VR_rms_pb] = values[HSEP_VR_rms_h] = 0.0;
+    values[HSEP_VR_hybrid_active] = values[HSEP_VR_batch] = 0.0;
+    for (size_t i = 0; i < HSEP_WINDOW; i++) {
+        const double position = (double)i < values[HSEP_VR_Np] ? start : 0.0;
+        values[HSEP_VR_x_d_window + i] = position;
+        values[HSEP_VR_x_pb_window + i] = position;
+        values[HSEP_VR_x_h_window + i] = position;
+    }
+}
+
+hsep_status hsep_model_check_state(
+    const hsep_context *context, const void *state, size_t size, const double values[], char message[])
+{
+    hsep_mode modes[HSEP_N_MODES];
+    hsep_predictor_parameters parameters;
+    predictor_state head;
+    size_t expected = 0;
+    if (hsep_model_size(context, values, &expected, message) != HSEP_OK ||
+        predictor_checked(context, values, &parameters, modes, message) != HSEP_OK ||
+        hsep_state_check(context, values, state, size, PREDICTOR_KIND, expected, message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
+    memcpy(&head, state, sizeof head);
+    const char *predictor = (const char *)state + (sizeof head - sizeof head.predictor);
+    if (!hsep_state_clock_valid(&head.clock) || head.clock.T_s != parameters.T_s ||
+        head.predictor.k != (uint64_t)head.clock.k || !hsep_predictor_valid(predictor, &parameters)) {
+        return hsep_state_damaged(message);
+    }
+    return HSEP_OK;
+}
+
+#else
+typedef int hsep_no_hybrid_predictor; /* a translation unit must not be empty */
+#endif

@@ -1,0 +1,170 @@
+/* ReferenceTrajectory: a source of commands, to be wired to HybridPredictor.x_d_ahead.
+ *
+ * The samples are those of the resource trajectory_<n>.bin, n being the parameter trajectory:
+ *   "HSEPTRJ1", their number as uint64, T_s as double, s, then the samples as doubles, m, all little-endian.
+ * Sample k is the output at t_k = t_start + k T_s; after the last one it stays. The samples are part of the state,
+ * so a state's size follows from the file.
+ */
+#include "hsep_fmu.h"
+
+#if defined(HSEP_MODEL_REFERENCE_TRAJECTORY)
+
+#include "hsep_check.h"
+#include "hsep_clock.h"
+#include "hsep_model.h"
+#include "hsep_resource.h"
+#include "hsep_state.h"
+#include "hsep_trajectory.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#define TRAJECTORY_KIND UINT64_C(0x59524F544A415254) /* any number that no other model has */
+#define TRAJECTORY_NAME_SIZE 32
+
+static const double trajectory_tolerance = 1e-6; /* of T_s */
+
+typedef struct {
+    hsep_state_header header;
+    hsep_clock clock;
+    hsep_trajectory trajectory; /* its samples follow */
+} trajectory_state;
+
+/* Open the chosen trajectory's file, read up to its first sample, and tell how many samples there are. The caller
+ * closes it; NULL with a message if it does not fit. */
+static FILE *trajectory_open(const hsep_context *context, const double values[], uint64_t *count, char message[])
+{
+    char name[TRAJECTORY_NAME_SIZE], expected[HSEP_NUMBER_SIZE], got[HSEP_NUMBER_SIZE];
+    uint64_t head[2] = {0, 0};
+    double T_s = 0.0;
+    snprintf(name, sizeof name, "trajectory_%.0f.bin", values[HSEP_VR_trajectory]);
+    FILE *file = hsep_resource_open(context, name);
+    if (file == NULL) {
+        hsep_message_add(
+            message, "%s must be in the resources (%s) and readable", name,
+            context->resources == NULL ? "none" : context->resources);
+        return NULL;
+    }
+    const double bytes = hsep_resource_head(file, "HSEPTRJ1", head, 2);
+    memcpy(&T_s, &head[1], sizeof T_s);
+    if (bytes < (double)sizeof(double) || (double)head[0] * (double)sizeof(double) != bytes) {
+        hsep_message_add(message, "%s must be samples of a trajectory, at least one; it is damaged or truncated", name);
+    } else if (!(fabs(T_s - values[HSEP_VR_T_s]) <= trajectory_tolerance * values[HSEP_VR_T_s])) {
+        hsep_message_add(
+            message, "T_s must be %s s, the interval of %s, got %s", hsep_number(expected, T_s, HSEP_REAL), name,
+            hsep_number(got, values[HSEP_VR_T_s], HSEP_REAL));
+    } else {
+        *count = head[0];
+        return file;
+    }
+    fclose(file);
+    return NULL;
+}
+
+hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[])
+{
+    uint64_t count = 0;
+    message[0] = '\0';
+    if (hsep_check_parameters(context, values, message) > 0) {
+        return HSEP_REFUSED;
+    }
+    FILE *file = trajectory_open(context, values, &count, message);
+    if (file == NULL) {
+        return HSEP_REFUSED;
+    }
+    fclose(file);
+    const double before = (double)(sizeof(trajectory_state) - sizeof(hsep_trajectory));
+    return hsep_state_size(before + hsep_trajectory_size(count), size, message);
+}
+
+hsep_status hsep_model_initialise(
+    const hsep_context *context, void *state, double values[], double t_start, char message[])
+{
+    char number[HSEP_NUMBER_SIZE];
+    trajectory_state *self = state;
+    size_t size = 0;
+    uint64_t count = 0;
+    if (hsep_model_size(context, values, &size, message) != HSEP_OK ||
+        hsep_check_start_time(t_start, message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
+    FILE *file = trajectory_open(context, values, &count, message);
+    if (file == NULL) {
+        return HSEP_REFUSED;
+    }
+    self->trajectory.count = count;
+    double *samples = hsep_trajectory_samples(&self->trajectory);
+    const size_t n_read = fread(samples, sizeof *samples, (size_t)count, file);
+    fclose(file);
+    for (uint64_t k = 0; k < count; k++) {
+        if (k >= n_read || !isfinite(samples[k])) {
+            hsep_message_add(
+                message, "trajectory_%.0f.bin must be finite, got %s at sample %.0f", values[HSEP_VR_trajectory],
+                k < n_read ? hsep_number(number, samples[k], HSEP_REAL) : "nothing", (double)k);
+            return HSEP_REFUSED;
+        }
+    }
+    hsep_state_mark(&self->header, context, values, TRAJECTORY_KIND, size);
+    hsep_clock_init(&self->clock, t_start, values[HSEP_VR_T_s]);
+    values[HSEP_VR_r] = hsep_trajectory_position(&self->trajectory, 0);
+    return HSEP_OK;
+}
+
+hsep_status hsep_model_step(
+    const hsep_context *context, void *state, double values[], double t, double h, char message[])
+{
+    (void)context;
+    trajectory_state *self = state;
+    int64_t parts = 0;
+    message[0] = '\0';
+    if (hsep_check_step(&self->clock, t, h, &parts, message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
+    if (hsep_clock_advance(&self->clock, parts)) {
+        values[HSEP_VR_r] = hsep_trajectory_position(&self->trajectory, self->clock.k);
+    }
+    return HSEP_OK;
+}
+
+void hsep_model_start_values(const hsep_context *context, double values[])
+{
+    char message[HSEP_MESSAGE_SIZE] = "";
+    uint64_t count = 0;
+    double first = 0.0;
+    values[HSEP_VR_r] = 0.0;
+    if (hsep_check_parameters(context, values, message) > 0) {
+        return;
+    }
+    FILE *file = trajectory_open(context, values, &count, message);
+    if (file == NULL) {
+        return;
+    }
+    if (fread(&first, sizeof first, 1, file) == 1 && isfinite(first)) {
+        values[HSEP_VR_r] = first;
+    }
+    fclose(file);
+}
+
+hsep_status hsep_model_check_state(
+    const hsep_context *context, const void *state, size_t size, const double values[], char message[])
+{
+    trajectory_state head;
+    size_t expected = 0;
+    if (hsep_model_size(context, values, &expected, message) != HSEP_OK ||
+        hsep_state_check(context, values, state, size, TRAJECTORY_KIND, expected, message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
+    memcpy(&head, state, sizeof head);
+    const double before = (double)(sizeof head - sizeof head.trajectory);
+    /* The size is that of the file's samples, so it bounds the state's own count. */
+    if (!hsep_state_clock_valid(&head.clock) || head.clock.T_s != values[HSEP_VR_T_s] ||
+        before + hsep_trajectory_size(head.trajectory.count) != (double)size) {
+        return hsep_state_damaged(message);
+    }
+    return HSEP_OK;
+}
+
+#else
+typedef int hsep_no_reference_trajectory; /* a translation unit must not be empty */
+#endif

@@ -1,0 +1,113 @@
+/* FeedDrive of a linear-motor stage: modes, with friction and cable stiffness, and an encoder.
+ *
+ * The command is constant over a step of any length up to 100 s. The encoder draws once when the initialization ends
+ * and once a step. Cost of a step: 4 slopes of all modes for each 0.1 ms of it.
+ */
+#include "hsep_fmu.h"
+
+#if defined(HSEP_MODEL_STAGE_DRIVE)
+
+#include "hsep_check.h"
+#include "hsep_drive.h"
+#include "hsep_encoder.h"
+#include "hsep_model.h"
+#include "hsep_plant.h"
+#include "hsep_state.h"
+
+#include <string.h>
+
+#define STAGE_DRIVE_KIND UINT64_C(0x4556495244475453) /* any number that no other model has */
+
+typedef struct {
+    hsep_state_header header;
+    hsep_encoder encoder;
+    hsep_stage stage; /* its modes follow */
+} stage_drive_state;
+
+hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[])
+{
+    message[0] = '\0';
+    if (hsep_check_parameters(context, values, message) > 0) {
+        return HSEP_REFUSED;
+    }
+    const double before = (double)(sizeof(stage_drive_state) - sizeof(hsep_stage));
+    return hsep_state_size(before + hsep_stage_size(HSEP_N_MODES), size, message);
+}
+
+static void stage_drive_write_outputs(const stage_drive_state *self, double values[], double x_meas)
+{
+    values[HSEP_VR_x] = hsep_stage_x(&self->stage);
+    values[HSEP_VR_v] = self->stage.v;
+    values[HSEP_VR_x_meas] = x_meas;
+}
+
+hsep_status hsep_model_initialise(
+    const hsep_context *context, void *state, double values[], double t_start, char message[])
+{
+    stage_drive_state *self = state;
+    hsep_mode modes[HSEP_N_MODES];
+    size_t size = 0;
+    if (hsep_model_size(context, values, &size, message) != HSEP_OK ||
+        hsep_check_start_time(t_start, message) != HSEP_OK ||
+        hsep_drive_check_start(values[HSEP_VR_x_d], message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
+    hsep_state_mark(&self->header, context, values, STAGE_DRIVE_KIND, size);
+    hsep_encoder_init(&self->encoder, values[HSEP_VR_noise_std], (uint64_t)values[HSEP_VR_seed]);
+    for (size_t i = 0; i < HSEP_N_MODES; i++) {
+        const double *mode = &values[HSEP_VR_mode + 4 * i];
+        modes[i] = (hsep_mode){.f_n = mode[0], .zeta = mode[1], .alpha = mode[2], .beta = mode[3]};
+    }
+    hsep_stage_init(
+        &self->stage, modes, HSEP_N_MODES, values[HSEP_VR_f], values[HSEP_VR_kappa], values[HSEP_VR_T_s],
+        values[HSEP_VR_x_d]);
+    const double x_meas = hsep_encoder_measure(&self->encoder, hsep_stage_x(&self->stage));
+    stage_drive_write_outputs(self, values, x_meas);
+    return HSEP_OK;
+}
+
+hsep_status hsep_model_step(
+    const hsep_context *context, void *state, double values[], double t, double h, char message[])
+{
+    (void)context;
+    stage_drive_state *self = state;
+    double work[HSEP_STAGE_WORK * HSEP_N_MODES];
+    message[0] = '\0';
+    if (hsep_drive_check(values[HSEP_VR_x_d], t, h, message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
+    if (!hsep_stage_step(&self->stage, values[HSEP_VR_x_d], h, work)) {
+        hsep_message_add(
+            message, "the stage's state left the range of numbers (command %g m)", values[HSEP_VR_x_d]);
+        return HSEP_REFUSED;
+    }
+    const double x_meas = hsep_encoder_measure(&self->encoder, hsep_stage_x(&self->stage));
+    stage_drive_write_outputs(self, values, x_meas);
+    return HSEP_OK;
+}
+
+void hsep_model_start_values(const hsep_context *context, double values[])
+{
+    (void)context;
+    const double x = values[HSEP_VR_x_d]; /* the stage rests there */
+    values[HSEP_VR_x] = x;
+    values[HSEP_VR_v] = 0.0;
+    values[HSEP_VR_x_meas] = hsep_drive_first_measurement(values[HSEP_VR_noise_std], values[HSEP_VR_seed], x);
+}
+
+hsep_status hsep_model_check_state(
+    const hsep_context *context, const void *state, size_t size, const double values[], char message[])
+{
+    stage_drive_state head;
+    size_t expected = 0;
+    if (hsep_model_size(context, values, &expected, message) != HSEP_OK ||
+        hsep_state_check(context, values, state, size, STAGE_DRIVE_KIND, expected, message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
+    memcpy(&head, state, sizeof head);
+    return head.stage.n_modes == HSEP_N_MODES ? HSEP_OK : hsep_state_damaged(message);
+}
+
+#else
+typedef int hsep_no_stage_drive; /* a translation unit must not be empty */
+#endif

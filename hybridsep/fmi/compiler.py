@@ -1,0 +1,164 @@
+"""From one C file to the shared libraries of an archive, on this machine for every platform.
+
+Two toolchains: the host's own C compiler for the host, and the ``ziglang`` wheel (``python -m ziglang cc``) for all.
+Both give the same bytes for the same sources: they compile in a folder of their own, by relative names, without build
+ids, dates or debug information.
+
+The folders follow FMI 2.0: ``linux64``, ``win64`` and ``darwin64`` mean x86, and every other platform goes by FMI 3.0's
+tuples. An ARM library is therefore in ``aarch64-linux`` alone, never in ``linux64``, where an importer on x86 would
+find it; importers on ARM that look in ``linux64`` only say that they cannot load it, and can compile ``sources/``.
+``darwin64`` holds one universal file, for importers that look nowhere else on either kind of Mac.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import shutil
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from ..errors import FmuError
+from .macho import universal
+
+__all__ = ["ALL_TARGETS", "COMPILE_FLAGS", "TARGETS", "Target", "binaries", "host_target"]
+
+COMPILE_FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-fvisibility=hidden")
+"""Never ``-ffast-math``: every platform is to give the same numbers."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """A platform an FMU can have a binary for.
+
+    Attributes
+    ----------
+    triple : str
+        Zig's name of it.
+    folders : tuple of str
+        Where importers look for the library, below ``binaries/``.
+    suffix : str
+    flags : tuple of str
+        What this platform needs besides :data:`COMPILE_FLAGS`.
+    """
+
+    triple: str
+    folders: tuple[str, ...]
+    suffix: str
+    flags: tuple[str, ...] = ()
+
+
+_ELF = ("-fPIC", "-Wl,--build-id=none", "-lm")
+
+TARGETS: Mapping[str, Target] = {
+    # glibc 2.17: every Linux distribution since 2014
+    "x86_64-linux": Target("x86_64-linux-gnu.2.17", ("linux64", "x86_64-linux"), ".so", _ELF),
+    "aarch64-linux": Target("aarch64-linux-gnu.2.17", ("aarch64-linux",), ".so", _ELF),
+    "x86_64-windows": Target("x86_64-windows-gnu", ("win64", "x86_64-windows"), ".dll"),
+    # SSE2, not the x87, whose extra digits would give other numbers
+    "x86-windows": Target("x86-windows-gnu", ("win32", "x86-windows"), ".dll", ("-msse2", "-mfpmath=sse")),
+    "x86_64-darwin": Target("x86_64-macos.11.0", ("x86_64-darwin",), ".dylib", ("-fPIC",)),
+    "aarch64-darwin": Target("aarch64-macos.11.0", ("aarch64-darwin",), ".dylib", ("-fPIC",)),
+}
+"""All platforms; the two Macs together also give ``darwin64``."""
+
+ALL_TARGETS = tuple(TARGETS)
+_MACS = ("x86_64-darwin", "aarch64-darwin")
+
+
+def host_target() -> str:
+    """Return the name of this machine's platform, a key of :data:`TARGETS`.
+
+    Raises
+    ------
+    FmuError
+        If it is another one.
+    """
+    machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(platform.machine().lower(), platform.machine().lower())
+    name = f"{machine}-{platform.system().lower()}"
+    if name not in TARGETS:
+        raise FmuError(f"this machine must be one of {', '.join(TARGETS)} to be compiled for, it is {name}")
+    return name
+
+
+def binaries(sources: Mapping[str, bytes], name: str, targets: Sequence[str]) -> dict[str, bytes]:
+    """Compile ``all.c`` of the sources.
+
+    Parameters
+    ----------
+    sources : mapping
+        File name → content.
+    name : str
+        Model identifier: the libraries' stem.
+    targets : sequence of str
+        Keys of :data:`TARGETS`, for which ``ziglang`` must be installed, or ``"host"``.
+
+    Returns
+    -------
+    dict
+        Path below ``binaries/`` → library.
+
+    Raises
+    ------
+    FmuError
+        If a target is unknown, there is no compiler, or it refuses.
+    """
+    if unknown := sorted(set(targets) - {*TARGETS, "host"}):
+        raise FmuError(f"no target {', '.join(unknown)}; there are host, {', '.join(TARGETS)}")
+
+    def build(target: str) -> bytes:
+        command = _host_compiler() if target == "host" else _zig(TARGETS[target].triple)
+        return _compile(command, TARGETS[keys[target]], sources, name)
+
+    keys = {target: host_target() if target == "host" else target for target in targets}
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        built = dict(zip(keys.values(), pool.map(build, keys), strict=True))
+    placed = {
+        f"{place}/{name}{TARGETS[key].suffix}": library
+        for key, library in built.items()
+        for place in TARGETS[key].folders
+    }
+    macs = [built[key] for key in _MACS if key in built]
+    if macs:
+        placed[f"darwin64/{name}.dylib"] = universal(macs) if len(macs) > 1 else macs[0]
+    return placed
+
+
+def _host_compiler() -> list[str]:
+    """Return the host's C compiler: ``$CC``, cc, gcc, clang, or zig."""
+    chosen = os.environ.get("CC", "").split()
+    if chosen:
+        return chosen
+    for compiler in ("cc", "gcc", "clang"):
+        if shutil.which(compiler):
+            return [compiler]
+    if find_spec("ziglang") is not None:
+        return _zig(TARGETS[host_target()].triple)
+    raise FmuError("no C compiler: none of $CC, cc, gcc, clang; install one, or pip install ziglang")
+
+
+def _zig(triple: str) -> list[str]:
+    if find_spec("ziglang") is None:
+        raise FmuError("compiling for other platforms needs ziglang: pip install ziglang, or ask for the target 'host'")
+    return [sys.executable, "-m", "ziglang", "cc", "-target", triple, "-fno-sanitize=undefined"]
+
+
+def _compile(command: Sequence[str], target: Target, sources: Mapping[str, bytes], name: str) -> bytes:
+    """Compile and link ``all.c`` into a stripped shared library."""
+    with TemporaryDirectory() as place:
+        folder = Path(place)
+        for file, text in sources.items():
+            (folder / file).write_bytes(text)
+        library = f"{name}{target.suffix}"
+        arguments = [*command, *COMPILE_FLAGS, "-g0", "-s", "-shared", "-I.", "all.c", "-o", library, *target.flags]
+        result = subprocess.run(arguments, cwd=folder, capture_output=True, text=True, errors="replace", check=False)
+        if result.returncode != 0:
+            complaint = f"{' '.join(arguments)}\n{result.stderr.strip()}"
+            raise FmuError(f"{name} cannot be compiled for {target.triple}: {complaint}")
+        return (folder / library).read_bytes()

@@ -1,0 +1,32 @@
+"""What both backends say about an FMU: what its models are, and the GUID that follows from its content."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import uuid
+from collections.abc import Mapping
+
+__all__ = ["MODEL_TITLES", "content_guid"]
+
+MODEL_TITLES = {
+    "HybridPredictor": "linear hybrid model: predicts the drive's position one look-ahead window early",
+    "FeedDrive": "nonlinear feed drive with encoder noise",
+    "ReferenceTrajectory": "source of commands: plays the paper's staircase and spirals, or given samples",
+}
+
+
+def content_guid(files: Mapping[str, bytes], description: Mapping[str, object]) -> str:
+    """Return a GUID that follows from files and description, and from nothing else.
+
+    Parameters
+    ----------
+    files : mapping
+        Archive name → content; binaries, which a compiler makes from the others, stay out.
+    description : mapping
+        What the FMU is made from.
+    """
+    digest = hashlib.sha256(json.dumps(description, sort_keys=True).encode())
+    for arcname in sorted(files):
+        digest.update(arcname.encode() + hashlib.sha256(files[arcname]).digest())
+    return f"{{{uuid.UUID(bytes=digest.digest()[:16])}}}"

@@ -1,0 +1,136 @@
+"""The FMUs that run anywhere: C99 sources, compiled for every platform, with nothing else needed.
+
+The archive holds the sources as well: ``sources/all.c`` includes all the others, and compiles without warnings.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+
+import fmpy
+from numpy.typing import ArrayLike
+
+from .. import __version__
+from .._data_files import data_folder
+from ..machine import Machine
+from ..signals import as_samples
+from ..trajectory import spiral, staircase
+from .c_header import c_header
+from .compiler import ALL_TARGETS, binaries
+from .content import MODEL_TITLES, content_guid
+from .icon import icon
+from .model_description import FmuInfo, build_description, model_description
+from .pages import index_page
+from .variables import variables_of
+
+__all__ = ["files", "sources"]
+
+_FOLDERS = ("core", "model", "fmi2")
+_FMI_HEADERS = ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")
+_TRAJECTORY_MAGIC = b"HSEPTRJ1"
+
+
+def files(
+    machine: Machine,
+    description: Mapping[str, object],
+    *,
+    targets: Sequence[str] | None = None,
+    samples: ArrayLike | None = None,
+) -> dict[str, bytes]:
+    """Return all files of one FMU: archive name → content.
+
+    Parameters
+    ----------
+    machine : Machine
+    description : mapping
+        ``model``, ``name``, ``parameters`` and ``modes``.
+    targets, samples
+        As in :func:`hybridsep.fmi.archive.build_fmu`.
+
+    Raises
+    ------
+    FmuError
+        If it cannot be compiled.
+    """
+    model, name = str(description["model"]), str(description["name"])
+    content = {f"sources/{file}": text for file, text in sources(description, guid="").items()}
+    del content["sources/hsep_fmu.h"]  # names the GUID
+    content |= {f"documentation/licenses/{file}": text for file, text in _licenses().items()}
+    content["documentation/index.html"] = index_page(machine, description, "The FMU needs nothing but its own binary.")
+    content["model.png"] = icon(model)
+    if model == "ReferenceTrajectory":
+        content |= {f"resources/{file}": data for file, data in _trajectories(machine.T_s, samples).items()}
+    guid = content_guid(content, description)
+    content["sources/hsep_fmu.h"] = c_header(description, guid).encode()
+    content["sources/buildDescription.xml"] = build_description(name, ["all.c"])
+    info = FmuInfo(
+        name=name,
+        description=f"{machine.title}: {MODEL_TITLES[model]}",
+        guid=guid,
+        step_size=machine.T_s,
+        stop_time=6.0,
+        variable_step=model == "FeedDrive",
+        needs_execution_tool=False,
+        generation_tool=f"hybridsep {__version__}",
+        version=__version__,
+        source_files=("all.c",),
+    )
+    content["modelDescription.xml"] = model_description(info, variables_of(description))
+    if targets is None:
+        targets = ALL_TARGETS if find_spec("ziglang") is not None else ("host",)
+    folder = "sources/"
+    unit = {file.removeprefix(folder): text for file, text in content.items() if file.startswith(folder)}
+    for path, binary in binaries(unit, name, targets).items():
+        content[f"binaries/{path}"] = binary
+    return content
+
+
+def sources(description: Mapping[str, object], guid: str) -> dict[str, bytes]:
+    """Return what is compiled: file name → content, ``all.c`` first, with the generated ``hsep_fmu.h``.
+
+    Parameters
+    ----------
+    description : mapping
+        ``model``, ``name``, ``parameters`` and ``modes``.
+    guid : str
+        The modelDescription's.
+    """
+    root = data_folder("fmu_src") / "c"
+    ours = {path.name: path.read_bytes() for folder in _FOLDERS for path in sorted((root / folder).glob("*.[ch]"))}
+    includes = "\n".join(f'#include "{file}"' for file in ours if file.endswith(".c"))
+    all_c = f"/* The whole FMU as one translation unit: compile this file alone. */\n{includes}\n"
+    headers = {file: _fmi_header(file) for file in _FMI_HEADERS}
+    return {"all.c": all_c.encode(), **ours, **headers, "hsep_fmu.h": c_header(description, guid).encode()}
+
+
+def _fmi_header(file: str) -> bytes:
+    """Return an official FMI header, as fmpy carries it, with the line ends of a text file."""
+    return (Path(fmpy.__file__).parent / "c-code" / file).read_bytes().replace(b"\r\n", b"\n")
+
+
+def _licenses() -> dict[str, bytes]:
+    """Return our licence and the one of the FMI headers, which they carry in their own comments."""
+    root = data_folder("fmu_src").parent
+    comment = _fmi_header("fmi2Functions.h").decode()
+    notice = re.search(r"^ *Copyright \(C\).*?DAMAGE\.$", comment, re.DOTALL | re.MULTILINE)
+    assert notice is not None  # the headers have been the same since 2019
+    lines = ["fmi2Functions.h, fmi2FunctionTypes.h and fmi2TypesPlatform.h in sources/:", ""]
+    lines += [line.strip() for line in notice.group().splitlines()]
+    fmi = "\n".join(lines) + "\n"
+    return {"license.txt": (root / "LICENSE").read_bytes(), "fmi-headers.txt": fmi.encode()}
+
+
+def _trajectories(T_s: float, samples: ArrayLike | None) -> dict[str, bytes]:
+    """Return ``trajectory_<n>.bin`` of the staircase, the spiral's axes and, if there are some, the user's samples."""
+    played = [staircase(T_s), *spiral(T_s)]
+    if samples is not None:
+        played.append(as_samples(samples, "samples"))
+        as_samples(played[-1][:1], "samples", 1)
+    return {
+        f"trajectory_{n}.bin": _TRAJECTORY_MAGIC + struct.pack("<Qd", len(x_d), T_s) + x_d.astype("<f8").tobytes()
+        for n, x_d in enumerate(played)
+    }

@@ -1,0 +1,101 @@
+"""The FMUs anyone can edit: a pythonfmu slave over this library.
+
+Such an FMU carries the slave, the part of this library that it needs, pythonfmu itself and pythonfmu's binaries.
+The library travels under a name with a number of its content (``hybridsep_1a2b…``), because two FMUs in one process
+share every module of the same name, and the one loaded first would silently serve both.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Mapping
+from importlib import metadata
+from pathlib import Path
+
+import pythonfmu
+
+from .. import __version__
+from .._data_files import data_folder
+from ..machine import Machine
+from .content import MODEL_TITLES, content_guid
+from .model_description import FmuInfo, model_description
+from .pages import index_page
+from .variables import variables_of
+
+__all__ = ["files"]
+
+_PACKAGE = Path(__file__).resolve().parent.parent
+_TRAVELS = (
+    "errors.py",
+    "parameters.py",
+    "signals.py",
+    "state.py",
+    "physics.py",
+    "regression.py",
+    "predictor.py",
+    "lookahead.py",
+    "plant.py",
+    "fmi/variables.py",
+    "fmi/clock.py",
+    "fmi/slave.py",
+)
+"""The modules an FMU needs; with NumPy and SciPy they need nothing else."""
+
+_SLAVES = {"HybridPredictor": "hybrid_predictor.py", "FeedDrive": "feed_drive.py"}
+
+
+def files(machine: Machine, description: Mapping[str, object]) -> dict[str, bytes]:
+    """Return all files of one FMU: archive name → content.
+
+    Parameters
+    ----------
+    machine : Machine
+    description : mapping
+        ``model``, ``name``, ``parameters`` and ``modes``.
+    """
+    model, name = str(description["model"]), str(description["name"])
+    content = _resources(model)
+    needs = "The FMU needs a Python 3 with NumPy and SciPy in the importing tool's process."
+    content["documentation/index.html"] = index_page(machine, description, needs)
+    for source in ("linux64/libpythonfmu-export.so", "win64/pythonfmu-export.dll"):
+        binary = Path(pythonfmu.__file__).parent / "resources" / "binaries" / source
+        content[f"binaries/{Path(source).parent}/{name}{binary.suffix}"] = binary.read_bytes()
+    guid = content_guid(content, description)
+    content["resources/machine.json"] = json.dumps({**description, "content": guid}, indent=1, sort_keys=True).encode()
+    info = FmuInfo(
+        name=name,
+        description=f"{machine.title}: {MODEL_TITLES[model]}",
+        guid=guid,
+        step_size=machine.T_s,
+        stop_time=6.0,
+        variable_step=model == "FeedDrive",
+        needs_execution_tool=True,
+        generation_tool=f"hybridsep {__version__} with pythonfmu {metadata.version('pythonfmu')}",
+        version=__version__,
+    )
+    content["modelDescription.xml"] = model_description(info, variables_of(description))
+    return content
+
+
+def _resources(model: str) -> dict[str, bytes]:
+    """Return the Python side of an FMU: slave, library and pythonfmu, under names of their content."""
+    slave = data_folder("fmu_src") / "python" / _SLAVES[model]
+    library = {module: (_PACKAGE / module).read_bytes() for module in _TRAVELS}
+    digest = hashlib.sha256(slave.read_bytes())
+    for module, text in library.items():
+        digest.update(module.encode() + text)
+    number = digest.hexdigest()[:12]
+    package, module_name = f"hybridsep_{number}", f"{slave.stem}_{number}"
+    source = re.sub(r"^from hybridsep\b", f"from {package}", slave.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    content = {
+        "resources/slavemodule.txt": module_name.encode(),
+        f"resources/{module_name}.py": source.encode(),
+        f"resources/{package}/__init__.py": b"",
+        f"resources/{package}/fmi/__init__.py": b"",
+    }
+    content |= {f"resources/{package}/{module}": text for module, text in library.items()}
+    for path in sorted(Path(pythonfmu.__file__).parent.glob("*.py")):
+        content[f"resources/pythonfmu/{path.name}"] = path.read_bytes()
+    return content

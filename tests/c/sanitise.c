@@ -1,0 +1,111 @@
+/* Run one model through its whole life, to be compiled with the sanitisers on: exact-size memory, a rollback, foreign
+ * and truncated states, inputs that are not finite. Arguments: the resources folder or "-", then name=value pairs. */
+#include "hsep_fmu.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define STEPS 700
+#define SAVED_AT 230
+#define STEP_SIZE 1e-3 /* s */
+
+static double values[HSEP_N_VARIABLES], saved_values[HSEP_N_VARIABLES], end_values[HSEP_N_VARIABLES];
+static char message[HSEP_MESSAGE_SIZE];
+
+static void expect(int held, const char *what)
+{
+    if (!held) {
+        fprintf(stderr, "failed: %s (%s)\n", what, message);
+        exit(1);
+    }
+}
+
+static void set_inputs(double k)
+{
+    for (size_t i = 0; i < HSEP_N_VARIABLES; i++) {
+        if (hsep_variables[i].causality == HSEP_INPUT) {
+            values[i] = 0.01 * sin(0.01 * k + 0.1 * (double)i);
+        }
+    }
+}
+
+static void run(const hsep_context *context, void *state, int from, int to)
+{
+    for (int k = from; k < to; k++) {
+        set_inputs(k);
+        expect(hsep_model_step(context, state, values, k * STEP_SIZE, STEP_SIZE, message) == HSEP_OK, "a step");
+    }
+}
+
+int main(int n_arguments, char *arguments[])
+{
+    const hsep_context context = {
+        hsep_variables, HSEP_N_VARIABLES, n_arguments > 1 && arguments[1][0] != '-' ? arguments[1] : NULL};
+    for (size_t i = 0; i < HSEP_N_VARIABLES; i++) {
+        values[i] = hsep_variables[i].start;
+        for (int a = 2; a < n_arguments; a++) {
+            const size_t length = strlen(hsep_variables[i].name);
+            if (strncmp(arguments[a], hsep_variables[i].name, length) == 0 && arguments[a][length] == '=') {
+                values[i] = strtod(arguments[a] + length + 1, NULL);
+            }
+        }
+    }
+    size_t size = 0;
+    hsep_model_start_values(&context, values);
+    expect(hsep_model_size(&context, values, &size, message) == HSEP_OK, "the size");
+    void *state = calloc(1, size);
+    char *saved = malloc(size + 1), *end = malloc(size);
+    expect(state != NULL && saved != NULL && end != NULL, "memory");
+    expect(hsep_model_initialise(&context, state, values, 0.0, message) == HSEP_OK, "the initialization");
+
+    /* On to the end, back to the middle, on to the end again: the same bits. */
+    run(&context, state, 0, SAVED_AT);
+    memcpy(saved + 1, state, size); /* not aligned, as a serialised state may be */
+    memcpy(saved_values, values, sizeof values);
+    run(&context, state, SAVED_AT, STEPS);
+    memcpy(end, state, size);
+    memcpy(end_values, values, sizeof values);
+    expect(hsep_model_check_state(&context, saved + 1, size, saved_values, message) == HSEP_OK, "the saved state");
+    memcpy(state, saved + 1, size);
+    memcpy(values, saved_values, sizeof values);
+    run(&context, state, SAVED_AT, STEPS);
+    expect(memcmp(state, end, size) == 0 && memcmp(values, end_values, sizeof values) == 0, "equal after a rollback");
+
+    /* What must be refused changes nothing. */
+    for (size_t i = 0; i < HSEP_N_VARIABLES; i++) {
+        if (hsep_variables[i].causality == HSEP_INPUT) {
+            const double before = values[i];
+            values[i] = NAN;
+            expect(
+                hsep_model_step(&context, state, values, STEPS * STEP_SIZE, STEP_SIZE, message) == HSEP_REFUSED, "NaN");
+            values[i] = before;
+        }
+    }
+    expect(hsep_model_step(&context, state, values, STEPS * STEP_SIZE, -1.0, message) == HSEP_REFUSED, "h < 0");
+    expect(memcmp(state, end, size) == 0 && memcmp(values, end_values, sizeof values) == 0, "equal after refusals");
+
+    /* Truncated anywhere, in memory of exactly that size; damaged anywhere in its head, which may still be valid. */
+    for (size_t cut = 0; cut < size; cut += cut < 64 ? 1 : 997) {
+        char *part = malloc(cut > 0 ? cut : 1);
+        expect(part != NULL, "memory");
+        memcpy(part, end, cut);
+        expect(hsep_model_check_state(&context, part, cut, values, message) == HSEP_REFUSED, "a truncated state");
+        free(part);
+    }
+    for (size_t i = 0; i < size && i < 400; i++) {
+        memcpy(saved, end, size);
+        saved[i] = (char)~saved[i];
+        if (hsep_model_check_state(&context, saved, size, values, message) == HSEP_OK) {
+            memcpy(state, saved, size);
+            for (int k = STEPS; k < STEPS + 3; k++) {
+                (void)hsep_model_step(&context, state, values, k * STEP_SIZE, STEP_SIZE, message);
+            }
+        }
+    }
+    free(state);
+    free(saved);
+    free(end);
+    return 0;
+}
