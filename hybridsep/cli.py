@@ -13,6 +13,7 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
+from rich import box
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
@@ -41,6 +42,8 @@ app = typer.Typer(
 )
 _out, _err = Console(), Console(stderr=True)
 
+PAPER_COLUMN = "paper: physics → hybrid, reduction, as printed there"
+
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and nothing else.")]
 MachineOption = Annotated[
     str, typer.Option("--machine", "-m", help="Machine file (.toml), or the name of one that comes with the library.")
@@ -68,7 +71,10 @@ def demo(
     out: Annotated[Path, typer.Option(help="Folder for FMUs, figures, results and summary.json.")] = Path("demo"),
     emps: Annotated[Path | None, typer.Option(help="A DATA_EMPS.mat: replay this recorded axis too.")] = None,
     seeds: Annotated[int, typer.Option(min=1, help="Noise seeds the staircase is averaged over.")] = 10,
-    backend: BackendOption = BACKENDS[0],
+    backend: Annotated[
+        str | None,
+        typer.Option(help=f"Flavour of the FMUs: {', '.join(BACKENDS)}; native where there is a C compiler."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Build the FMUs, co-simulate the paper's staircase and spiral, draw and score them."""
@@ -77,14 +83,19 @@ def demo(
     if as_json:
         _print_json(summary)
         return
-    table = Table(title="Prediction error, RMS in µm against the measured position; printed: the paper's figures")
-    for column in ("case", "physics", "hold", "hybrid", "reduction", "printed: physics", "hybrid", "reduction"):
-        table.add_column(column, justify="left" if column == "case" else "right", no_wrap=column == "case")
+    table = Table(
+        title="Prediction error, RMS in µm against the measured position",
+        caption=PAPER_COLUMN,
+        box=box.SIMPLE,
+        pad_edge=False,
+    )
+    for column in ("case", "physics", "hold", "hybrid", "reduction", "paper"):
+        table.add_column(column, justify="left" if column == "case" else "right", no_wrap=True)
     for name, case in summary.items():
-        table.add_row(name, *_figures(case), *_figures(PRINTED[name], hold=False))
+        table.add_row(name, *_figures(case), _printed(PRINTED[name]))
         for part in ("friction_alone", "stiffness_alone"):
             if part in case:
-                table.add_row(f" {part.replace('_', ' ')}", *_figures(case[part]))
+                table.add_row(f"  {part.replace('_', ' ')}", *_figures(case[part]))
     _out.print(table)
     _out.print(
         "The stage is tuned to the printed figures (see its machine file): there, their agreement is no evidence."
@@ -172,8 +183,8 @@ def cosim(
         if plant is None and "FeedDrive" not in names:
             raise ParameterError(f"machine {axis.name} has no plant; name a plant FMU with --plant")
         run = cosimulate(
-            predictor or build_fmu(axis, names["HybridPredictor"], folder, backend),
-            plant or build_fmu(axis, names["FeedDrive"], folder, backend),
+            predictor or build_fmu(axis, names["HybridPredictor"], folder, backend, targets=("host",)),
+            plant or build_fmu(axis, names["FeedDrive"], folder, backend, targets=("host",)),
             command,
             predictor_values={name: value for name, value in values.items() if value is not None},
             plant_values={} if seed is None else {"seed": seed},
@@ -206,6 +217,8 @@ def backtest_command(
     axis = load_machine(machine)
     given = {"t": t, "x_d": x_d, "x": x}
     names = {role: given[role] or column for role, column in axis.log.model_dump().items()}
+    if Ts is not None and t is None:
+        del names["t"]  # there may be none
     if out is not None:
         _make_folder(out)
     reader = open_log(log, columns=names, unit=unit, Ts=Ts)
@@ -297,10 +310,18 @@ def _batch_writer(path: Path | None, Ts: float) -> Iterator[Any]:
         yield lambda batch: writer.writerow([round(batch.k * Ts, 9), batch.rms_pb, batch.rms_hold, batch.rms_h])
 
 
-def _figures(case: Mapping[str, Any], *, hold: bool = True) -> list[str]:
+def _figures(case: Mapping[str, Any]) -> list[str]:
     """Return physics, hold, hybrid and reduction of a case as text, a dash where there is no figure."""
-    names = ["rms_pb_um", *(["rms_hold_um"] if hold else []), "rms_h_um", "reduction_percent"]
-    return [_figure(case.get(name), " %" if name == "reduction_percent" else "") for name in names]
+    figures = [_figure(case.get(name)) for name in ("rms_pb_um", "rms_hold_um", "rms_h_um")]
+    return [*figures, _figure(case.get("reduction_percent"), " %")]
+
+
+def _printed(case: Mapping[str, float]) -> str:
+    """Return what the paper prints of a case."""
+    if not case:
+        return ""
+    physics, hybrid = (f"{case[name]:g}" if name in case else "–" for name in ("rms_pb_um", "rms_h_um"))
+    return f"{physics}→{hybrid}, {case['reduction_percent']:g} %"
 
 
 def _figure(value: float | None, unit: str = "") -> str:

@@ -15,6 +15,7 @@ from . import plots
 from .backtest import Backtest, backtest
 from .cosim import CoSimulation, cosimulate
 from .fmi.archive import build_fmu, fmu_names
+from .fmi.compiler import can_compile
 from .logs import Log, read_log
 from .machine import Machine, load_machine
 from .signals import Array
@@ -93,7 +94,7 @@ def demo(
     *,
     emps: str | Path | None = None,
     seeds: int = SEEDS,
-    backend: str = "python",
+    backend: str | None = None,
     progress: Progress = lambda message, fraction: None,
 ) -> Summary:
     """Build the FMUs, co-simulate the staircase and the spiral, write figures and ``summary.json``.
@@ -106,8 +107,8 @@ def demo(
         A ``DATA_EMPS.mat`` to replay too.
     seeds : int
         Noise seeds the staircase is averaged over, ≥ 1.
-    backend : str
-        Flavour of the FMUs.
+    backend : {"native", "python"}, optional
+        Flavour of the FMUs; native where there is a C compiler, if left out.
     progress : callable
         Called with a message and the fraction done.
 
@@ -117,6 +118,8 @@ def demo(
         As written to ``summary.json``: for each case ``rms_pb_um``, ``rms_hold_um``, ``rms_h_um``,
         ``reduction_percent``, ``printed`` and more; RMS in µm against the measured position.
     """
+    if backend is None:
+        backend = "native" if can_compile() else "python"
     out = Path(out)
     out.mkdir(parents=True, exist_ok=True)
     total = seeds + 6 + (emps is not None)
@@ -190,9 +193,9 @@ def replay_emps(path: str | Path) -> RecordedReplay:
 def _build_pair(machine: Machine, out: Path, backend: str) -> tuple[Path, Path]:
     """Build a machine's predictor and plant FMU."""
     names = {model: name for name, model in fmu_names(machine, backend).items()}
-    return build_fmu(machine, names["HybridPredictor"], out, backend), build_fmu(
-        machine, names["FeedDrive"], out, backend
-    )
+    host = ("host",)
+    predictor = build_fmu(machine, names["HybridPredictor"], out, backend, targets=host)
+    return predictor, build_fmu(machine, names["FeedDrive"], out, backend, targets=host)
 
 
 def _mean(summaries: list[dict[str, float | int]]) -> dict[str, Any]:

@@ -143,7 +143,11 @@ def test_help_shows_units_and_ranges(hybridsep: Run) -> None:
         (["cosim", "-m", "emps", "--backend", "python"], "machine emps has no plant; name a plant FMU with --plant"),
         (["cosim", "--trajectory", "zigzag"], "zigzag"),
         (["cosim", "--out", "run.xlsx"], "--out must end in .csv or .npz, got 'run.xlsx'"),
-        (["cosim", "--Np", "10", "--backend", "python"], "p must be 1 … Np = 10, got 50"),
+        (["cosim", "--Np", "10"], "p must be 1 … Np = 10, got 50"),
+        (["cosim", "--seed", "99999999999"], "seed must be 0 … 2147483647, got 99999999999"),
+        (["cosim", "--out", "{log}/run.csv"], "cannot read or write"),
+        (["backtest", "{log}", "-m", "spring_mass_damper", "--out", "."], "--out must be a file, got the folder ."),
+        (["build", "FeedDrivePy", "--backend", "python", "--out", "{log}"], "cannot read or write"),
     ],
 )
 def test_errors_are_one_line_and_status_2(hybridsep: Run, tmp_path: Path, arguments: list[str], message: str) -> None:
@@ -153,6 +157,23 @@ def test_errors_are_one_line_and_status_2(hybridsep: Run, tmp_path: Path, argume
     assert err.startswith("error: ")
     assert message.replace(" ", "") in "".join(err.split())
     assert "Traceback" not in err
+    assert len(err.strip().splitlines()) == 1
+
+
+def test_a_log_in_milliseconds_gets_a_hint(hybridsep: Run, tmp_path: Path) -> None:
+    log = tmp_path / "ms.csv"
+    log.write_text("t,x_d,x\n" + "".join(f"{k},0,0\n" for k in range(10)))
+    status, _, err = hybridsep("backtest", log, "-m", "spring_mass_damper")
+    assert status == 2
+    assert "is its time in ms? It must be in seconds" in " ".join(err.split())
+
+
+def test_a_log_without_times(hybridsep: Run, tmp_path: Path) -> None:
+    log = tmp_path / "untimed.csv"
+    log.write_text("x_d,x\n" + "0,0\n" * 200)
+    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--Ts", 0.001, "--json")
+    assert status == 0
+    assert json.loads(out)["n_samples"] == 200
 
 
 def test_a_log_at_another_sampling_interval_is_refused(hybridsep: Run, tmp_path: Path) -> None:

@@ -96,6 +96,17 @@ def test_a_refused_step_is_logged_and_changes_nothing(predictor: FmuInstance) ->
         np.testing.assert_array_equal(drive(untroubled, r, x, 0, 400)[250:], after)
 
 
+def test_the_step_size_must_stay_within_a_sample(predictor: FmuInstance) -> None:
+    predictor.initialise()
+    predictor.step(0.0, TS / 4)
+    with pytest.raises(FmuError, match=r"must stay 0.00025 s within a sample of T_s = 0.001 s, got 0.0005 s"):
+        predictor.step(TS / 4, TS / 2)
+    with pytest.raises(FmuError, match=r"the communication step size must divide T_s = 0.001 s, got 9.99989e-321 s"):
+        predictor.step(TS / 4, 1e-320)
+    for i in range(1, 4):
+        predictor.step(i * TS / 4, TS / 4)
+
+
 def test_plants_refuse_bad_inputs(python_fmu: Fmu) -> None:
     with FmuInstance(python_fmu("FeedDrivePy")) as plant:
         plant.initialise()

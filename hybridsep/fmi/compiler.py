@@ -27,7 +27,7 @@ from tempfile import TemporaryDirectory
 from ..errors import FmuError
 from .macho import universal
 
-__all__ = ["ALL_TARGETS", "COMPILE_FLAGS", "TARGETS", "Target", "binaries", "host_target"]
+__all__ = ["ALL_TARGETS", "COMPILE_FLAGS", "TARGETS", "Target", "binaries", "can_compile", "host_target"]
 
 COMPILE_FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-fvisibility=hidden")
 """Never ``-ffast-math``: every platform is to give the same numbers."""
@@ -128,6 +128,15 @@ def binaries(sources: Mapping[str, bytes], name: str, targets: Sequence[str]) ->
     if macs:
         placed[f"darwin64/{name}.dylib"] = universal(macs) if len(macs) > 1 else macs[0]
     return placed
+
+
+def can_compile() -> bool:
+    """Return whether a native FMU can be compiled here, for this machine."""
+    try:
+        host_target()
+        return bool(_host_compiler())
+    except FmuError:
+        return False
 
 
 def _host_compiler() -> list[str]:
