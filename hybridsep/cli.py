@@ -6,7 +6,7 @@ import csv
 import json
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
@@ -25,6 +25,7 @@ from .demo import PRINTED
 from .demo import demo as run_demo
 from .errors import HybridSepError, ParameterError
 from .fmi.archive import BACKENDS, build_fmu, fmu_names
+from .fmi.compiler import TARGET_NAMES
 from .logs import open_log
 from .machine import DEFAULT_MACHINE, Machine, load_machine, machine_names
 from .parameters import PARAMETERS, check
@@ -121,6 +122,23 @@ def build(
         typer.Option("--machine", "-m", help="Machine file (.toml) or name; may be repeated; all if left out."),
     ] = None,
     backend: BackendOption = BACKENDS[0],
+    target: Annotated[
+        list[str] | None,
+        typer.Option(
+            help=f"Platform of a native FMU, may be repeated: {', '.join(TARGET_NAMES)}. If left out: all platforms "
+            "where ziglang is installed, this machine (host) otherwise."
+        ),
+    ] = None,
+    weights: Annotated[
+        Path | None,
+        typer.Option(help="A predictor saved with HybridPredictor.save: its machine's HybridPredictor starts warm."),
+    ] = None,
+    trajectory: Annotated[
+        Path | None,
+        typer.Option(help="CSV, .npz or .mat file with the columns t and x_d, for ReferenceTrajectory to play."),
+    ] = None,
+    unit: UnitOption = "m",
+    Ts: TsOption = None,
     out: Annotated[Path, typer.Option(help="Folder for the archives.")] = Path("dist"),
     as_json: JsonOption = False,
 ) -> None:
@@ -129,15 +147,26 @@ def build(
     jobs = []
     for source in machine or machine_names():
         axis = load_machine(source)
-        jobs += [(axis, name) for name in fmu_names(axis, backend)]
-    if unknown := sorted(set(wanted) - {name for _, name in jobs}):
-        raise ParameterError(f"no FMU {', '.join(unknown)}; there are {', '.join(name for _, name in jobs)}")
-    jobs = [(axis, name) for axis, name in jobs if not wanted or name in wanted]
+        jobs += [(axis, name, model) for name, model in fmu_names(axis, backend).items()]
+    if unknown := sorted(set(wanted) - {name for _, name, _ in jobs}):
+        raise ParameterError(f"no FMU {', '.join(unknown)}; there are {', '.join(name for _, name, _ in jobs)}")
+    jobs = [job for job in jobs if not wanted or job[1] in wanted]
+    if target and backend != "native":
+        raise ParameterError(f"--target is for native FMUs; with --backend {backend} leave it out")
+    extras: dict[str, dict[str, Any]] = {}
+    if weights is not None:
+        _one_of(jobs, "HybridPredictor", "--weights")
+        extras["HybridPredictor"] = {"weights": weights}
+    if trajectory is not None:
+        axis = _one_of(jobs, "ReferenceTrajectory", "--trajectory")
+        samples, found = from_file(trajectory, unit=unit, Ts=Ts)
+        _check_interval(trajectory.name, found, axis)
+        extras["ReferenceTrajectory"] = {"samples": samples}
     paths = []
     with _progress(as_json) as advance:
-        for i, (axis, name) in enumerate(jobs):
+        for i, (axis, name, model) in enumerate(jobs):
             advance(name, i / len(jobs))
-            paths.append(build_fmu(axis, name, out, backend))
+            paths.append(build_fmu(axis, name, out, backend, targets=target or None, **extras.get(model, {})))
         advance("done", 1.0)
     if as_json:
         _print_json([str(path) for path in paths])
@@ -269,6 +298,15 @@ def _command(trajectory: str, axis: Machine, unit: str, Ts: float | None) -> Arr
     command, found = from_file(trajectory, unit=unit, Ts=Ts)
     _check_interval(trajectory, found, axis)
     return command
+
+
+def _one_of(jobs: Sequence[tuple[Machine, str, str]], model: str, option: str) -> Machine:
+    """Return the machine of the only FMU of a model that is built, which an option is meant for."""
+    found = [(axis, name) for axis, name, built in jobs if built == model]
+    if len(found) != 1:
+        names = ", ".join(name for _, name in found) or "none"
+        raise ParameterError(f"{option} is for one {model}, this would build {names}; name one, or its --machine")
+    return found[0][0]
 
 
 def _check_interval(name: str, Ts: float, axis: Machine) -> None:

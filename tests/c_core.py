@@ -6,22 +6,29 @@ import ctypes
 import os
 import shlex
 import shutil
+import struct
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from hybridsep.fmi.c_header import c_header
 from hybridsep.fmi.variables import variables_of
+from hybridsep.lookahead import LookAhead
+from hybridsep.physics import ModalModel, Mode
+from hybridsep.predictor import HybridPredictor
 
 Array = NDArray[np.float64]
+
+TS = 1e-3  # s
 
 ROOT = Path(__file__).parents[1]
 C_SOURCES = ROOT / "fmu_src" / "c"
@@ -229,3 +236,33 @@ class CModel:
         assert message.raw[MESSAGE_SIZE:] == b"unwritten\0"
         if status:
             raise RefusedError(message.value.decode("utf-8"))
+
+
+def look_ahead(name: str, **parameters: float) -> tuple[LookAhead, CModel]:
+    """Return the library's look-ahead and the C model with the same parameters, start included."""
+    start = parameters.pop("start", 0.0)
+    values = {**PREDICTOR, **parameters}
+    model = ModalModel([Mode(**mode) for mode in DESCRIPTIONS[name]["modes"]], int(values["dead_time"]))
+    known = {key: value for key, value in values.items() if key != "dead_time"}
+    predictor = HybridPredictor.with_parameters(model, known)
+    return LookAhead(predictor, start), CModel(name, {**values, "x_d_ahead": start, "x_meas": start}).initialise()
+
+
+def write_weights(folder: Path, factor: Array, p: int, q: int, n_samples: int) -> None:
+    """Write ``weights.bin``, as the C model describes it, into a resources folder."""
+    triangle = np.concatenate([factor[i, i:] for i in range(len(factor))])
+    head = b"HSEPWGT1" + struct.pack("<3Q", p, q, n_samples)
+    (folder / "weights.bin").write_bytes(head + triangle.astype("<f8").tobytes())
+
+
+def write_trajectory(folder: Path, samples: Array, T_s: float = TS) -> None:
+    """Write ``trajectory_3.bin`` into a resources folder."""
+    head = b"HSEPTRJ1" + struct.pack("<Qd", len(samples), T_s)
+    (folder / "trajectory_3.bin").write_bytes(head + samples.astype("<f8").tobytes())
+
+
+def refusal(action: Callable[[], Any]) -> str:
+    """Return the message with which something is refused."""
+    with pytest.raises(RefusedError) as caught:
+        action()
+    return str(caught.value)

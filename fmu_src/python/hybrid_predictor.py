@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from hybridsep.fmi import slave
 from hybridsep.fmi.clock import SampleClock
 from hybridsep.fmi.variables import modes_from
+from hybridsep.fmi.weights import WEIGHTS_FILE, restore_weights
 from hybridsep.lookahead import LookAhead
 from hybridsep.physics import ModalModel, Mode
 from hybridsep.predictor import HybridPredictor
@@ -17,10 +19,13 @@ class HybridPredictorPy(slave.TableSlave):
     """Sits between the interpolator and the drive: delays the command by Np samples and predicts what follows."""
 
     def initialise(self) -> None:
-        """Make the look-ahead from the parameters as they are now."""
+        """Make the look-ahead from the parameters as they are now, with what the resources say was learned."""
         names = ("Np", "p", "q", "lambda", "T_s", "t_init", "input_hold")
         model = ModalModel([Mode(**mode) for mode in modes_from(self.values)], self.values["dead_time"])
         predictor = HybridPredictor.with_parameters(model, {name: self.values[name] for name in names})
+        trained = Path(self.resources) / WEIGHTS_FILE
+        if trained.exists():
+            restore_weights(predictor, trained.read_bytes())
         self.look_ahead = LookAhead(predictor, self.values["x_d_ahead"])
         self.clock = SampleClock(self.start_time, predictor.Ts)
 

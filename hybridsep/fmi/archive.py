@@ -9,12 +9,14 @@ from __future__ import annotations
 import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from numpy.typing import ArrayLike
 
 from ..errors import FmuError
 from ..machine import DEFAULT_MACHINE, FeedDriveSection, Machine
 from . import native_backend, python_backend
+from .warm_start import load_trained
 
 __all__ = ["BACKENDS", "build_fmu", "fmu_names"]
 
@@ -22,6 +24,9 @@ BACKENDS = ("native", "python")
 """Flavours, the default first."""
 
 _SUFFIX = {"native": "", "python": "Py"}
+_SAMPLES_TRAJECTORY = 3
+"""The number under which ReferenceTrajectory plays the samples it was built with."""
+
 _ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 
 
@@ -54,6 +59,7 @@ def build_fmu(
     *,
     targets: Sequence[str] | None = None,
     samples: ArrayLike | None = None,
+    weights: str | Path | None = None,
 ) -> Path:
     """Build one FMU.
 
@@ -68,10 +74,12 @@ def build_fmu(
     backend : {"native", "python"}
         Flavour.
     targets : sequence of str, optional
-        What a native FMU gets binaries for: names of :data:`hybridsep.fmi.compiler.TARGETS`, or ``"host"`` for this
-        machine alone. If left out: all targets where ``ziglang`` is installed, this machine otherwise.
+        What a native FMU gets binaries for: of :data:`hybridsep.fmi.compiler.TARGET_NAMES`, ``"host"`` being this
+        machine. If left out: all platforms where ``ziglang`` is installed, this machine otherwise.
     samples : (n,) array_like, m, optional
-        Trajectory 3 of ReferenceTrajectory, at the machine's ``T_s``.
+        Trajectory 3 of ReferenceTrajectory, at the machine's ``T_s``; played unless another one is chosen.
+    weights : str or Path, optional
+        What :meth:`HybridPredictor.save` wrote: a HybridPredictor starts with these weights, without a warm-up.
 
     Returns
     -------
@@ -81,25 +89,36 @@ def build_fmu(
     Raises
     ------
     FmuError
-        If the machine has no such FMU, or it cannot be compiled.
+        If the machine has no such FMU, it cannot be compiled, or it has no use for ``samples`` or ``weights``.
     SignalError
         If ``samples`` is not finite or empty.
+    StateError
+        If ``weights`` is no saved predictor, or one of another machine.
     """
     names = fmu_names(machine, backend)
     if name not in names:
         raise FmuError(f"machine {machine.name} has no FMU {name!r}; it has {', '.join(names)}")
-    description = _description(machine, names[name], name)
+    model = names[name]
+    for given, what, user in ((samples, "samples", "ReferenceTrajectory"), (weights, "weights", "HybridPredictor")):
+        if given is not None and model != user:
+            raise FmuError(f"{what} are for a {user}, {name} is a {model}")
+    trained = None if weights is None else load_trained(weights, machine)
+    description = _description(machine, model, name)
+    if samples is not None:
+        description["parameters"] = {**description["parameters"], "trajectory": _SAMPLES_TRAJECTORY}
+    if trained is not None:
+        description["parameters"] = {**description["parameters"], "t_init": 0.0}
     if backend == "native":
-        files = native_backend.files(machine, description, targets=targets, samples=samples)
+        files = native_backend.files(machine, description, targets=targets, samples=samples, trained=trained)
     else:
-        files = python_backend.files(machine, description)
+        files = python_backend.files(machine, description, trained=trained)
     path = Path(out) / f"{name}.fmu"
     path.parent.mkdir(parents=True, exist_ok=True)
     _write_archive(path, files)
     return path
 
 
-def _description(machine: Machine, model: str, name: str) -> dict[str, object]:
+def _description(machine: Machine, model: str, name: str) -> dict[str, Any]:
     """Return what an FMU is made from: model, name, start values and modes."""
     if model == "HybridPredictor":
         smd = [{"f_n": m.f_n, "zeta": m.zeta, "alpha": m.alpha, "beta": m.beta} for m in machine.model.modes]

@@ -27,7 +27,16 @@ from tempfile import TemporaryDirectory
 from ..errors import FmuError
 from .macho import universal
 
-__all__ = ["ALL_TARGETS", "COMPILE_FLAGS", "TARGETS", "Target", "binaries", "can_compile", "host_target"]
+__all__ = [
+    "ALL_TARGETS",
+    "COMPILE_FLAGS",
+    "TARGETS",
+    "TARGET_NAMES",
+    "Target",
+    "binaries",
+    "can_compile",
+    "host_target",
+]
 
 COMPILE_FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-fvisibility=hidden")
 """Never ``-ffast-math``: every platform is to give the same numbers."""
@@ -70,6 +79,16 @@ TARGETS: Mapping[str, Target] = {
 
 ALL_TARGETS = tuple(TARGETS)
 _MACS = ("x86_64-darwin", "aarch64-darwin")
+_FMI2_PLATFORMS = {
+    "linux64": ("x86_64-linux",),
+    "win64": ("x86_64-windows",),
+    "win32": ("x86-windows",),
+    "darwin64": _MACS,
+}
+"""FMI 2.0's names of platforms, which users know."""
+
+TARGET_NAMES = ("host", *TARGETS, *_FMI2_PLATFORMS)
+"""All that may be asked for."""
 
 
 def host_target() -> str:
@@ -97,7 +116,7 @@ def binaries(sources: Mapping[str, bytes], name: str, targets: Sequence[str]) ->
     name : str
         Model identifier: the libraries' stem.
     targets : sequence of str
-        Keys of :data:`TARGETS`, for which ``ziglang`` must be installed, or ``"host"``.
+        Of :data:`TARGET_NAMES`; for any but ``"host"``, ``ziglang`` must be installed.
 
     Returns
     -------
@@ -109,14 +128,15 @@ def binaries(sources: Mapping[str, bytes], name: str, targets: Sequence[str]) ->
     FmuError
         If a target is unknown, there is no compiler, or it refuses.
     """
-    if unknown := sorted(set(targets) - {*TARGETS, "host"}):
-        raise FmuError(f"no target {', '.join(unknown)}; there are host, {', '.join(TARGETS)}")
+    if unknown := sorted(set(targets) - set(TARGET_NAMES)):
+        raise FmuError(f"no target {', '.join(unknown)}; there are {', '.join(TARGET_NAMES)}")
 
     def build(target: str) -> bytes:
         command = _host_compiler() if target == "host" else _zig(TARGETS[target].triple)
         return _compile(command, TARGETS[keys[target]], sources, name)
 
-    keys = {target: host_target() if target == "host" else target for target in targets}
+    expanded = dict.fromkeys(key for target in targets for key in _FMI2_PLATFORMS.get(target, (target,)))
+    keys = {target: host_target() if target == "host" else target for target in expanded}
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         built = dict(zip(keys.values(), pool.map(build, keys), strict=True))
     placed = {
@@ -149,12 +169,17 @@ def _host_compiler() -> list[str]:
             return [compiler]
     if find_spec("ziglang") is not None:
         return _zig(TARGETS[host_target()].triple)
-    raise FmuError("no C compiler: none of $CC, cc, gcc, clang; install one, or pip install ziglang")
+    raise FmuError(
+        "no C compiler: none of $CC, cc, gcc, clang; install one, or pip install 'hybridsep[cross]', or build with "
+        "--backend python"
+    )
 
 
 def _zig(triple: str) -> list[str]:
     if find_spec("ziglang") is None:
-        raise FmuError("compiling for other platforms needs ziglang: pip install ziglang, or ask for the target 'host'")
+        raise FmuError(
+            "compiling for other platforms needs ziglang: pip install 'hybridsep[cross]', or ask for the target host"
+        )
     return [sys.executable, "-m", "ziglang", "cc", "-target", triple, "-fno-sanitize=undefined"]
 
 

@@ -22,7 +22,7 @@ def content_guid(files: Mapping[str, bytes], description: Mapping[str, object]) 
     Parameters
     ----------
     files : mapping
-        Archive name → content; binaries, which a compiler makes from the others, stay out.
+        Archive name → content; what is made from the others, binaries and reference results, stays out.
     description : mapping
         What the FMU is made from.
     """

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from .. import __version__
 from .._data_files import data_folder
 from ..machine import Machine
+from ..predictor import HybridPredictor
 from ..signals import as_samples
 from ..trajectory import spiral, staircase
 from .c_header import c_header
@@ -25,7 +26,9 @@ from .content import MODEL_TITLES, content_guid
 from .icon import icon
 from .model_description import FmuInfo, build_description, model_description
 from .pages import index_page
+from .reference import reference_files
 from .variables import variables_of
+from .weights import WEIGHTS_FILE, weights_file
 
 __all__ = ["files", "sources"]
 
@@ -40,6 +43,7 @@ def files(
     *,
     targets: Sequence[str] | None = None,
     samples: ArrayLike | None = None,
+    trained: HybridPredictor | None = None,
 ) -> dict[str, bytes]:
     """Return all files of one FMU: archive name → content.
 
@@ -50,6 +54,8 @@ def files(
         ``model``, ``name``, ``parameters`` and ``modes``.
     targets, samples
         As in :func:`hybridsep.fmi.archive.build_fmu`.
+    trained : HybridPredictor, optional
+        What a HybridPredictor starts warm with.
 
     Raises
     ------
@@ -60,11 +66,16 @@ def files(
     content = {f"sources/{file}": text for file, text in sources(description, guid="").items()}
     del content["sources/hsep_fmu.h"]  # names the GUID
     content |= {f"documentation/licenses/{file}": text for file, text in _licenses().items()}
-    content["documentation/index.html"] = index_page(machine, description, "The FMU needs nothing but its own binary.")
+    reference = reference_files(machine, description, samples=samples, trained=trained)
+    needs = "The FMU needs nothing but its own binary."
+    content["documentation/index.html"] = index_page(machine, description, needs, reference=bool(reference))
     content["model.png"] = icon(model)
     if model == "ReferenceTrajectory":
         content |= {f"resources/{file}": data for file, data in _trajectories(machine.T_s, samples).items()}
+    if trained is not None:
+        content[f"resources/{WEIGHTS_FILE}"] = weights_file(trained)
     guid = content_guid(content, description)
+    content |= reference  # computed by this machine's LAPACK: it stays out of the GUID, as the binaries do
     content["sources/hsep_fmu.h"] = c_header(description, guid).encode()
     content["sources/buildDescription.xml"] = build_description(name, ["all.c"])
     info = FmuInfo(

@@ -19,10 +19,12 @@ import pythonfmu
 from .. import __version__
 from .._data_files import data_folder
 from ..machine import Machine
+from ..predictor import HybridPredictor
 from .content import MODEL_TITLES, content_guid
 from .model_description import FmuInfo, model_description
 from .pages import index_page
 from .variables import variables_of
+from .weights import WEIGHTS_FILE, weights_file
 
 __all__ = ["files"]
 
@@ -39,6 +41,7 @@ _TRAVELS = (
     "plant.py",
     "fmi/variables.py",
     "fmi/clock.py",
+    "fmi/weights.py",
     "fmi/slave.py",
 )
 """The modules an FMU needs; with NumPy and SciPy they need nothing else."""
@@ -46,7 +49,9 @@ _TRAVELS = (
 _SLAVES = {"HybridPredictor": "hybrid_predictor.py", "FeedDrive": "feed_drive.py"}
 
 
-def files(machine: Machine, description: Mapping[str, object]) -> dict[str, bytes]:
+def files(
+    machine: Machine, description: Mapping[str, object], *, trained: HybridPredictor | None = None
+) -> dict[str, bytes]:
     """Return all files of one FMU: archive name → content.
 
     Parameters
@@ -54,9 +59,13 @@ def files(machine: Machine, description: Mapping[str, object]) -> dict[str, byte
     machine : Machine
     description : mapping
         ``model``, ``name``, ``parameters`` and ``modes``.
+    trained : HybridPredictor, optional
+        What a HybridPredictor starts warm with.
     """
     model, name = str(description["model"]), str(description["name"])
     content = _resources(model)
+    if trained is not None:
+        content[f"resources/{WEIGHTS_FILE}"] = weights_file(trained)
     needs = "The FMU needs a Python 3 with NumPy and SciPy in the importing tool's process."
     content["documentation/index.html"] = index_page(machine, description, needs)
     for source in ("linux64/libpythonfmu-export.so", "win64/pythonfmu-export.dll"):

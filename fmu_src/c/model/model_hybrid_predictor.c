@@ -2,8 +2,9 @@
  *
  * Inputs are read at the first sub-step of a sample, outputs change after its last one; the arithmetic is
  * hsep_predictor's. If the resources hold weights.bin, the first window is predicted with what was learned before:
- *   "HSEPWGT1", n = 2 + q + p as uint64, the number of learned samples as uint64, then the upper triangle of the
- *   factor [R z; 0 rho] by rows, (n + 1)(n + 2)/2 doubles, all little-endian.
+ *   "HSEPWGT1", p, q and the number of learned samples as uint64, then the upper triangle of the factor [R z; 0 rho]
+ *   by rows, (n + 1)(n + 2)/2 doubles with n = 2 + q + p, all little-endian.
+ * lambda is part of that factor; its parameter has no effect then.
  */
 #include "hsep_fmu.h"
 
@@ -104,21 +105,24 @@ static void predictor_write_windows(const hsep_predictor *predictor, double valu
 }
 
 /* Take over the factor that the resources hold, if they do; row after row through the regression's own row. */
-static hsep_status predictor_warm_start(const hsep_context *context, hsep_regression *regression, char message[])
+static hsep_status predictor_warm_start(
+    const hsep_context *context, const double values[], hsep_regression *regression, char message[])
 {
     FILE *file = hsep_resource_open(context, PREDICTOR_WEIGHTS);
     if (file == NULL) {
         return HSEP_OK;
     }
-    const double n = (double)regression->n;
-    uint64_t head[2] = {0, 0};
-    const double bytes = hsep_resource_head(file, "HSEPWGT1", head, 2);
-    int taken = bytes == 0.5 * (n + 1.0) * (n + 2.0) * (double)sizeof(double) && head[0] == regression->n;
-    if (bytes >= 0.0 && head[0] != regression->n) {
+    const double n = (double)regression->n, p = values[HSEP_VR_p], q = values[HSEP_VR_q];
+    uint64_t head[3] = {0, 0, 0}; /* p, q, learned samples */
+    const double bytes = hsep_resource_head(file, "HSEPWGT1", head, 3);
+    int taken = bytes == 0.5 * (n + 1.0) * (n + 2.0) * (double)sizeof(double);
+    if (bytes >= 0.0 && ((double)head[0] != p || (double)head[1] != q)) {
         hsep_message_add(
             message,
-            PREDICTOR_WEIGHTS " must have 2 + q + p = %.0f weights, got %.0f; set p and q as they were learned", n,
-            (double)head[0]);
+            PREDICTOR_WEIGHTS " was learned with p = %.0f, q = %.0f, got p = %.0f, q = %.0f; "
+                              "set p and q as they were learned",
+            (double)head[0], (double)head[1], p, q);
+        taken = 0;
     }
     for (uint64_t i = 0; taken && i <= regression->n; i++) {
         const size_t left = (size_t)(regression->n + 1 - i);
@@ -133,7 +137,7 @@ static hsep_status predictor_warm_start(const hsep_context *context, hsep_regres
         }
         return HSEP_REFUSED;
     }
-    regression->n_samples = head[1];
+    regression->n_samples = head[2];
     return HSEP_OK;
 }
 
@@ -161,7 +165,7 @@ hsep_status hsep_model_initialise(
     self->x_d_ahead = start;
     self->x_meas = start;
     hsep_predictor_init(&self->predictor, &parameters, start);
-    if (predictor_warm_start(context, hsep_predictor_regression(&self->predictor), message) != HSEP_OK) {
+    if (predictor_warm_start(context, values, hsep_predictor_regression(&self->predictor), message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     predictor_write_outputs(&self->predictor, values);

@@ -1,0 +1,69 @@
+"""Build and call ``main.c``: the C core for long, with the allocator's calls counted."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridsep.fmi.native_backend import sources
+from hybridsep.machine import load_machine
+
+Array = NDArray[np.float64]
+
+MAIN = Path(__file__).parent / "main.c"
+
+
+@dataclass(frozen=True)
+class Calls:
+    """Calls of the allocator up to the end of the initialization, and after it."""
+
+    before: int
+    after: int
+
+
+class Host:
+    """The program around the HybridPredictor of the paper's drive.
+
+    Parameters
+    ----------
+    folder : Path
+        Where it is built and works.
+    compiler : list of str
+        Command of a C compiler for glibc's Linux, whose allocator the program can stand in for.
+    flags : list of str
+        What it is compiled with.
+    """
+
+    def __init__(self, folder: Path, compiler: list[str], flags: list[str]) -> None:
+        self.folder, self.program = folder, folder / "long_run"
+        machine = load_machine("spring_mass_damper")
+        mode = machine.model.modes[0]
+        description: dict[str, Any] = {"model": "HybridPredictor", "name": "HybridPredictor"}
+        description["parameters"] = machine.fmi_parameters()
+        description["modes"] = [{name: getattr(mode, name) for name in ("f_n", "zeta", "alpha", "beta")}]
+        for file, content in sources(description, "{long run}").items():
+            (folder / file).write_bytes(content)
+        command = [*compiler, *flags, f"-I{folder}", str(MAIN), str(folder / "all.c"), "-lm", "-o", str(self.program)]
+        subprocess.run(command, check=True)
+
+    def fold(self, rows: Array, lam: float, repetitions: int) -> tuple[Array, Calls]:
+        """Fold rows ``[φ | target]``, (m, n + 1), over and over; return the weights, (n,), and the allocator's calls."""
+        data, weights = self.folder / "rows.bin", self.folder / "weights.out"
+        data.write_bytes(np.ascontiguousarray(rows, dtype="<f8").tobytes())
+        m, width = rows.shape
+        calls = self._call("fold", data, m, width - 1, repr(lam), repetitions, weights)
+        return np.fromfile(weights), calls
+
+    def step(self, samples: int) -> Calls:
+        """Step the FMU so many samples; return the allocator's calls."""
+        return self._call("step", samples)
+
+    def _call(self, *arguments: object) -> Calls:
+        done = subprocess.run([self.program, *map(str, arguments)], check=True, capture_output=True, text=True)
+        return Calls(**json.loads(done.stdout))

@@ -1,0 +1,94 @@
+"""A hundred million samples through the C core: does it keep its digits, and does it take memory?
+
+Folds a block of feature rows of the staircase over and over into the C regression, n = 55, and compares the weights
+with the exact ones: repeating rows m times is the same as taking them times √m, so one QR in extended precision gives
+them. Then steps the whole FMU. Every call of the allocator is counted. Ends with 1 if a limit is missed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+from time import perf_counter
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.common import (
+    exact_weights,
+    feature_rows,
+    physics_response,
+    relative_error,
+    require_extended_precision,
+    staircase_log,
+    staircase_predictor,
+)
+from benchmarks.long_run.host import Calls, Host
+from hybridsep.fmi.compiler import COMPILE_FLAGS
+
+P, Q, LAM = 50, 3, 1e-12
+BLOCK = 5000
+SKIPPED = 200
+"""Rows before the block: there the lags are not all measured yet."""
+
+ERROR_MAX = 1e-9
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--samples", type=int, default=100_000_000, help="samples folded; a multiple of 5000")
+    parser.add_argument("--steps", type=int, default=10_000_000, help="samples the whole FMU is stepped")
+    options = parser.parse_args()
+    if options.samples < BLOCK or options.samples % BLOCK:
+        parser.error(f"--samples must be a multiple of {BLOCK}, got {options.samples}")
+    require_extended_precision()
+    compiler = os.environ.get("CC") or shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
+    command = compiler.split() if compiler else [sys.executable, "-m", "ziglang", "cc"]
+    x_d, x = staircase_log(SKIPPED + BLOCK)
+    x_pb = physics_response(staircase_predictor(P, Q), x_d)
+    rows = feature_rows(x_pb, x - x_d[0] - x_pb, P, Q)[SKIPPED:]
+
+    table = Table(title=f"C core, n = {2 + Q + P} (p = {P}, q = {Q}), λ = {LAM:g} m²")
+    for heading in ("samples", "", "µs per sample", "‖w − w*‖/‖w*‖", "allocator calls: before", "after"):
+        table.add_column(heading, justify="right" if heading else "left")
+    worst, calls = 0.0, []
+
+    def add(samples: int, what: str, seconds: float, error: str, counted: Calls) -> None:
+        calls.append(counted)
+        took = f"{1e6 * seconds / samples:.3f}"
+        table.add_row(f"{samples:.0e}", what, took, error, str(counted.before), str(counted.after))
+
+    with tempfile.TemporaryDirectory(prefix="hsep_long_run_") as name:
+        host = Host(Path(name), command, list(COMPILE_FLAGS))
+        for samples in sorted({min(10**6, options.samples), min(10**7, options.samples), options.samples}):
+            begin = perf_counter()
+            weights, counted = host.fold(rows, LAM, samples // BLOCK)
+            seconds = perf_counter() - begin
+            error = relative_error(weights, exact_weights(rows, LAM, samples // BLOCK))
+            worst = max(worst, error)
+            add(samples, "rows folded", seconds, f"{error:.1e}", counted)
+        begin = perf_counter()
+        counted = host.step(options.steps)
+        add(options.steps, "fmi2DoStep, with its values", perf_counter() - begin, "", counted)
+    console = Console(width=110)
+    console.print(table)
+    taken = sum(counted.after for counted in calls)
+    checks = [
+        (worst <= ERROR_MAX, f"weights within {worst:.1e} of the exact ones, limit ≤ {ERROR_MAX:g}"),
+        (taken == 0, f"{taken} calls of the allocator after the initialization, limit 0"),
+        (all(counted.before > 0 for counted in calls), "the calls before it were seen, so the count works"),
+    ]
+    for held, text in checks:
+        console.print(f"{'held  ' if held else 'MISSED'} {text}", highlight=False)
+    return 0 if all(held for held, _ in checks) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,160 @@
+"""``documentation/reference/``: an input and the result it must give, for whoever imports the FMU.
+
+The files are named and written as the FMI cross-check has them: ``<name>_in.csv`` with the inputs at each
+communication point, ``<name>_ref.csv`` with the outputs there, ``<name>_ref.opt`` with the times of the run. All
+parameters have their start values. The result is the library's: a second implementation, not a recording of the FMU.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..lookahead import LookAhead
+from ..machine import Machine
+from ..plant import Encoder
+from ..predictor import HybridPredictor
+from ..signals import Array, as_samples
+from ..trajectory import staircase
+from .variables import variables_of
+from .weights import restore_weights, weights_file
+
+__all__ = ["REFERENCE_FOLDER", "reference_files"]
+
+REFERENCE_FOLDER = "documentation/reference"
+
+_SAMPLES = 600
+"""Length of a run; a predictor's is longer if its warm-up is."""
+
+_SAMPLES_MAX = 3000
+_WINDOW_MAX = 1000
+"""A predictor with a longer window gets no reference: no short run shows a prediction."""
+
+_RESOLUTION = 9
+"""Decimals of an input, m: what the CSV says is what the result was computed from."""
+
+_RESULT_RESOLUTION = 13
+_REL_TOL = 1e-4
+_GAIN, _NOISE_STD = 1.02, 5e-6
+
+Columns = dict[str, list[float]]
+
+
+def reference_files(
+    machine: Machine,
+    description: Mapping[str, Any],
+    *,
+    samples: ArrayLike | None = None,
+    trained: HybridPredictor | None = None,
+) -> dict[str, bytes]:
+    """Return reference input, result and options of one FMU: archive name → content; empty if it gets none.
+
+    Parameters
+    ----------
+    machine : Machine
+    description : mapping
+        ``model``, ``name``, ``parameters`` and ``modes``.
+    samples : (n,) array_like, m, optional
+        Trajectory 3 of ReferenceTrajectory.
+    trained : HybridPredictor, optional
+        What a HybridPredictor starts warm with.
+    """
+    table, T_s = variables_of(description), machine.T_s
+    if description["model"] == "HybridPredictor":
+        if description["parameters"]["Np"] > _WINDOW_MAX:
+            return {}
+        predictor = machine.new_predictor(t_init=description["parameters"]["t_init"])
+        if trained is not None:
+            restore_weights(predictor, weights_file(trained))
+        inputs, outputs = _predictor_run(machine, predictor)
+    elif description["model"] == "FeedDrive":
+        inputs, outputs = _plant_run(machine)
+    else:
+        command = staircase(T_s) if samples is None else as_samples(samples, "samples")
+        inputs = {}
+        outputs = {"r": [float(command[min(k, len(command) - 1)]) for k in range(_SAMPLES + 1)]}
+    names = [variable.name for variable in table if variable.causality == "output"]
+    count = len(outputs[names[0]])
+    times = [k * T_s for k in range(count)]
+    base = f"{REFERENCE_FOLDER}/{description['name']}"
+    options = {"StartTime": 0.0, "StopTime": times[-1], "StepSize": T_s, "RelTol": _REL_TOL}
+    files = {
+        f"{base}_ref.csv": _csv(times, {name: outputs[name] for name in names}, _RESULT_RESOLUTION),
+        f"{base}_ref.opt": "".join(f"{name}, {number!r}\n" for name, number in options.items()).encode(),
+    }
+    if inputs:
+        files[f"{base}_in.csv"] = _csv(times, inputs, _RESOLUTION)
+    return files
+
+
+def _predictor_run(machine: Machine, predictor: HybridPredictor) -> tuple[Columns, Columns]:
+    """Run the look-ahead over the staircase, with the machine's plant behind it, through two windows of prediction."""
+    look_ahead = LookAhead(predictor, 0.0)
+    n = min(max(_SAMPLES, 3 * predictor.Np + predictor.n_init), _SAMPLES_MAX)
+    command = _command(machine, n + 1)
+    measure = _drive(machine, predictor)
+    inputs: Columns = {"x_d_ahead": command.tolist(), "x_meas": []}
+    names = ("x_d", "x_pb", "x_h", "e_servo", "hybrid_active", "rms_pb", "rms_h", "batch")
+    outputs: Columns = {name: [] for name in names}
+    for k in range(n + 1):
+        for name in names:
+            outputs[name].append(getattr(look_ahead, name))
+        inputs["x_meas"].append(round(measure(look_ahead.x_d), _RESOLUTION))
+        look_ahead.sample(inputs["x_d_ahead"][k], inputs["x_meas"][k])
+    return inputs, outputs
+
+
+def _drive(machine: Machine, predictor: HybridPredictor) -> Callable[[float], float]:
+    """Return a function of ``x_d(k)`` that gives the measured ``x(k)``: the plant, or a linear drive 2 % off."""
+    if machine.plant is not None:
+        plant, encoder = machine.new_plant(), Encoder(machine.plant.noise_std, machine.plant.seed)
+        plant.reset(0.0)
+
+        def measure(x_d: float) -> float:
+            x = encoder.measure(plant.x)
+            plant.step(x_d, machine.T_s)
+            return x
+
+        return measure
+    state, encoder = predictor.discrete.rest(), Encoder(_NOISE_STD, 0)
+
+    def measure_linear(x_d: float) -> float:
+        nonlocal state
+        x, state = predictor.discrete.respond(state, np.array([x_d]))
+        return encoder.measure(_GAIN * float(x[0]))
+
+    return measure_linear
+
+
+def _plant_run(machine: Machine) -> tuple[Columns, Columns]:
+    """Run the plant over the staircase."""
+    assert machine.plant is not None  # by fmu_names
+    plant, encoder = machine.new_plant(), Encoder(machine.plant.noise_std, machine.plant.seed)
+    plant.reset(0.0)
+    command = _command(machine, _SAMPLES + 1).tolist()
+    outputs: Columns = {"x": [], "v": [], "x_meas": []}
+    for x_d in command:
+        for name, number in (("x", plant.x), ("v", plant.v), ("x_meas", encoder.measure(plant.x))):
+            outputs[name].append(number)
+        plant.step(x_d, machine.T_s)
+    return {"x_d": command}, outputs
+
+
+def _command(machine: Machine, n: int) -> Array:
+    """Return the staircase's first ``n`` samples, m, as the CSV says them."""
+    limits = {} if machine.limits is None else {"limits": machine.trajectory_limits()}
+    command = np.round(staircase(machine.T_s, **limits)[:n], _RESOLUTION)
+    return np.asarray(np.pad(command, (0, n - len(command)), mode="edge"))
+
+
+def _csv(times: Sequence[float], columns: Columns, decimals: int) -> bytes:
+    """Write columns over time, numbers so that they read back the same."""
+    head = ",".join(f'"{name}"' for name in ("time", *columns))
+    rows = (
+        ",".join([repr(t), *(repr(round(float(column[k]), decimals)) for column in columns.values())])
+        for k, t in enumerate(times)
+    )
+    return "\n".join((head, *rows, "")).encode()

@@ -1,0 +1,63 @@
+"""Check that a saved predictor belongs to a machine before its weights go into the machine's FMU."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..errors import StateError
+from ..machine import Machine
+from ..predictor import HybridPredictor
+
+__all__ = ["load_trained"]
+
+
+def load_trained(path: str | Path, machine: Machine) -> HybridPredictor:
+    """Return the predictor that :meth:`HybridPredictor.save` wrote.
+
+    Parameters
+    ----------
+    path : str or Path
+    machine : Machine
+        What it must have been trained for: its ``Np``, ``p``, ``q``, ``lambda``, ``T_s``, ``input_hold``, ``dead_time``
+        and modes.
+
+    Raises
+    ------
+    StateError
+        If the file is not a saved predictor, one of another machine, naming all that differs, or has learned nothing.
+    """
+    path = Path(path)
+    try:
+        trained = HybridPredictor.load(path)
+    except StateError as error:
+        raise StateError(f"{path.name}: {error}") from error
+    found, expected = _parameters(trained), _parameters(machine.new_predictor())
+    differing = [
+        f"{name} = {found.get(name, 'none')} instead of {expected.get(name, 'none')}"
+        for name in {**expected, **found}
+        if found.get(name) != expected.get(name)
+    ]
+    if differing:
+        raise StateError(
+            f"{path.name} was not trained for machine {machine.name}: it has {', '.join(differing)}; "
+            "train it with that machine, or correct the machine file"
+        )
+    if trained.regression.n_samples == 0:
+        raise StateError(f"{path.name} has learned no sample; save the predictor after a run")
+    return trained
+
+
+def _parameters(predictor: HybridPredictor) -> dict[str, object]:
+    """Return all that must agree, under the FMU's names."""
+    values: dict[str, object] = {
+        "Np": predictor.Np,
+        "p": predictor.p,
+        "q": predictor.q,
+        "lambda": predictor.lam,
+        "T_s": predictor.Ts,
+        "input_hold": predictor.discrete.input_hold,
+        "dead_time": predictor.model.dead_time,
+    }
+    for i, mode in enumerate(predictor.model.modes, start=1):
+        values |= {f"mode[{i}].{name}": getattr(mode, name) for name in ("f_n", "zeta", "alpha", "beta")}
+    return values

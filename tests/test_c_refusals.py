@@ -1,0 +1,193 @@
+"""What the C models refuse, in the library's words, and that a refusal changes nothing."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import c_core
+import numpy as np
+import pytest
+from c_core import TS, CModel, refusal, write_trajectory, write_weights
+
+from hybridsep.errors import FmuError, HybridSepError
+from hybridsep.fmi.clock import SampleClock
+from hybridsep.fmi.variables import modes_from
+from hybridsep.parameters import check, check_together
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"Np": 0},
+        {"Np": 100_001},
+        {"p": 120},
+        {"q": 100, "p": 101},
+        {"p": 0, "lambda": 0.0},
+        {"lambda": -1e-12, "T_s": 0.0, "t_init": -0.25},
+        {"lambda": math.nan},
+        {"lambda": math.inf},
+        {"T_s": -math.inf},
+        {"T_s": 1e-300, "t_init": 1e300},
+        {"t_init": -1e22},
+        {"T_s": -123456.789},
+        {"lambda": -1e16},
+        {"lambda": -5e-324},
+    ],
+)
+def test_bad_parameters_are_refused_in_the_librarys_words(wrong: dict[str, float]) -> None:
+    names = {"lambda": "lam", "T_s": "Ts"}
+    given: Any = {key: wrong.get(key, c_core.PREDICTOR[key]) for key in ("Np", "p", "q", "lambda", "T_s", "t_init")}
+    with pytest.raises(HybridSepError) as caught:
+        check_together(**{names.get(key, key): value for key, value in given.items()})
+    assert refusal(CModel("predictor", wrong).size) == str(caught.value)
+    assert refusal(CModel("predictor", wrong).initialise) == str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "parameter", "value"),
+    [
+        ("predictor", "input_hold", 2),
+        ("predictor", "dead_time", -1),
+        ("feed_drive", "m", 0.0),
+        ("feed_drive", "k", -24674.0),
+        ("feed_drive", "c_nl", -1.0),
+        ("feed_drive", "noise_std", math.nan),
+        ("feed_drive", "seed", -1),
+        ("stage_drive", "kappa", -0.5),
+        ("stage_drive", "T_s", 0.0),
+        ("trajectory", "trajectory", 4),
+    ],
+)
+def test_a_parameter_alone_is_refused_in_the_librarys_words(name: str, parameter: str, value: float) -> None:
+    with pytest.raises(HybridSepError) as caught:
+        check(parameter, value)
+    assert refusal(CModel(name, {parameter: value}).size) == str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["predictor_2", "stage_drive"])
+def test_a_modes_parameter_is_refused_with_its_place(name: str) -> None:
+    model = CModel(name, {"mode[2].zeta": 0.0})
+    with pytest.raises(HybridSepError) as caught:
+        modes_from({key: model[key] for key in model.place if key.startswith("mode[")})
+    assert refusal(model.size) == str(caught.value)
+
+
+def test_a_number_that_is_not_whole_is_refused() -> None:
+    assert refusal(CModel("predictor", {"p": 2.5}).size) == "p must be a whole number, got 2.5"
+
+
+def test_many_problems_are_cut_off_within_the_message() -> None:
+    wrong = {key: math.nan for key in CModel("predictor_2").place if key.startswith("mode[") or key in c_core.PREDICTOR}
+    message = refusal(CModel("predictor_2", wrong).size)
+    assert message.startswith("Np must be finite, got nan; p must be finite, got nan; ")
+    message = refusal(CModel("predictor_2", dict.fromkeys(wrong, -1.2345678901234567e-5)).size)
+    assert 450 < len(message.encode()) < c_core.MESSAGE_SIZE
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_values_that_are_not_finite_are_refused_and_change_nothing(value: float) -> None:
+    text = str(value)
+    assert refusal(CModel("predictor", {"x_d_ahead": value}).initialise) == (
+        f"the start value of x_d_ahead must be finite, got {text}"
+    )
+    assert refusal(CModel("feed_drive", {"x_d": value}).initialise) == (
+        f"the start value of x_d must be finite, got {text}"
+    )
+    assert refusal(lambda: CModel("predictor").initialise(value)) == f"the start time must be finite, got {text} s"
+    for name, variable, message in (
+        ("predictor", "x_d_ahead", f"x_d_ahead must be finite, got {text} at sample 1"),
+        ("predictor", "x_meas", f"x_meas must be finite, got {text} at sample 1"),
+        ("feed_drive", "x_d", f"x_d must be finite, got {text} at t = 0.001 s"),
+        ("stage_drive", "x_d", f"x_d must be finite, got {text} at t = 0.001 s"),
+    ):
+        model = CModel(name).initialise()
+        model.step(0.0)
+        state = model.state.tobytes()
+        model[variable] = value
+        values = model.values.copy()
+        assert refusal(lambda model=model: model.step(TS)) == message  # type: ignore[misc]
+        assert model.state.tobytes() == state
+        np.testing.assert_array_equal(model.values, values)
+
+
+@pytest.mark.parametrize(
+    ("t", "h"), [(0.001, 0.0), (0.001, -1e-3), (0.001, 2e-3), (0.001, 0.6e-3), (0.001, math.nan), (0.001, math.inf)]
+)
+def test_other_step_sizes_are_refused_in_the_librarys_words(t: float, h: float) -> None:
+    with pytest.raises(FmuError) as caught:
+        SampleClock(0.0, TS, k=1).check(t, h)
+    model = CModel("predictor").initialise()
+    model.step(0.0)
+    state = model.state.tobytes()
+    assert refusal(lambda: model.step(t, h)) == str(caught.value)
+    assert model.state.tobytes() == state
+
+
+def test_other_communication_points_are_refused_in_the_librarys_words() -> None:
+    clock, model = SampleClock(1.5, TS), CModel("predictor").initialise(1.5)
+    for t in (0.0, 1.501, math.nan):
+        with pytest.raises(FmuError) as caught:
+            clock.check(t, TS)
+        assert refusal(lambda t=t: model.step(t)) == str(caught.value)  # type: ignore[misc]
+    clock.advance(clock.check(1.5, TS / 2))
+    model.step(1.5, TS / 2)
+    for t, h in ((1.5, TS / 2), (1.5005, TS / 4)):
+        with pytest.raises(FmuError) as caught:
+            clock.check(t, h)
+        assert refusal(lambda t=t, h=h: model.step(t, h)) == str(caught.value)  # type: ignore[misc]
+
+
+@pytest.mark.parametrize("name", ["feed_drive", "stage_drive"])
+def test_steps_that_a_plant_cannot_do_are_refused(name: str) -> None:
+    model = CModel(name, {"x_d": 0.0}).initialise()
+    state = model.state.tobytes()
+    for t, h, message in (
+        (0.0, 0.0, "the step size must be finite and > 0 s, got 0.0"),
+        (0.0, -1.0, "the step size must be finite and > 0 s, got -1.0"),
+        (0.0, math.nan, "the step size must be finite and > 0 s, got nan"),
+        (0.0, 101.0, "the step size must be at most 100 s, got 101.0; make several steps"),
+        (math.inf, 1e-3, "the communication point must be finite, got inf s"),
+    ):
+        assert refusal(lambda t=t, h=h: model.step(t, h)) == message  # type: ignore[misc]
+    model["x_d"] = 1e308
+    assert "state left the range of numbers" in refusal(lambda: model.step(0.0, 1e-2))
+    assert model.state.tobytes() == state
+
+
+def test_resources_that_do_not_fit_are_refused(tmp_path: Path) -> None:
+    file = tmp_path / "trajectory_3.bin"
+    assert refusal(CModel("trajectory").size) == "trajectory_3.bin must be in the resources (none) and readable"
+    assert "must be in the resources" in refusal(CModel("trajectory", resources=tmp_path).size)
+    write_trajectory(tmp_path, np.arange(5.0), 2e-3)
+    model = CModel("trajectory", resources=tmp_path)
+    assert refusal(model.size) == "T_s must be 0.002 s, the interval of trajectory_3.bin, got 0.001"
+    model.start_values()
+    assert model["r"] == 0.0
+    write_trajectory(tmp_path, np.array([1.0, math.nan]))
+    assert refusal(model.initialise) == "trajectory_3.bin must be finite, got nan at sample 1"
+    write_trajectory(tmp_path, np.arange(5.0))
+    good = file.read_bytes()
+    for bad in (b"", good[:20], good[:-1], good[:24], b"X" + good[1:], good + b"\0" * 8):
+        file.write_bytes(bad)
+        assert "it is damaged or truncated" in refusal(model.size)
+
+
+def test_weights_that_do_not_fit_are_refused(tmp_path: Path) -> None:
+    factor = np.triu(np.ones((13, 13)))
+    model = CModel("predictor", {"p": 7}, tmp_path)
+    write_weights(tmp_path, factor, 7, 3, 5)
+    model.initialise()
+    good = (tmp_path / "weights.bin").read_bytes()
+    for bad in (b"", good[:-8], b"X" + good[1:]):
+        (tmp_path / "weights.bin").write_bytes(bad)
+        assert "it is damaged or truncated" in refusal(model.initialise)
+    factor[3, 3] = 0.0
+    write_weights(tmp_path, factor, 7, 3, 5)
+    assert "it is damaged or truncated" in refusal(model.initialise)
+    for p, q in ((3, 3), (8, 2)):
+        write_weights(tmp_path, np.eye(3 + p + q), p, q, 5)
+        assert refusal(model.initialise) == (
+            f"weights.bin was learned with p = {p}, q = {q}, got p = 7, q = 3; set p and q as they were learned"
+        )

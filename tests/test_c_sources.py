@@ -1,0 +1,77 @@
+"""The C sources themselves: what they need, that they compile, what the sanitisers say."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import c_core
+import pytest
+import staircase_data as staircase
+from c_core import write_trajectory
+
+
+def test_the_core_needs_libm_alone() -> None:
+    # No allocation, no file, no global: nothing but these is undefined in it, and nothing in it is writable.
+    nm = shutil.which("nm") or shutil.which("llvm-nm")
+    assert nm, "nm is needed to look into object files; install binutils"
+    allowed = {
+        "memcpy",
+        "memset",
+        "memcmp",
+        "sqrt",
+        "log",
+        "cos",
+        "tanh",
+        "ldexp",
+        "frexp",
+        "floor",
+        "ceil",
+        "fmax",
+        "fmin",
+    }
+    core = {path.stem for path in (c_core.C_SOURCES / "core").glob("*.c")}
+    for built in c_core.object_files():
+        if Path(built).stem not in core:
+            continue
+        lines = subprocess.run([nm, built], capture_output=True, text=True, check=True).stdout.splitlines()
+        for kind, symbol in (line.split()[-2:] for line in lines):
+            known = symbol in allowed or symbol.startswith(("hsep_", "_GLOBAL_OFFSET_TABLE_", "__stack_chk"))
+            assert kind != "U" or known, f"{built} uses {symbol}"
+            assert kind not in "bBdDC", f"{built} has the writable {symbol}"
+
+
+@pytest.mark.parametrize("name", list(c_core.DESCRIPTIONS))
+def test_everything_compiles_as_one_file(name: str) -> None:
+    folder = c_core.build_folder() / f"all_{name}"
+    c_core.write_header(name, folder)
+    everything = folder / "all.c"
+    everything.write_text("".join(f'#include "{source}"\n' for source in c_core.sources()))
+    for level in ("-O0", "-O3"):
+        c_core.run_compiler([level, f"-I{folder}", *c_core.include_flags(), "-c", everything, "-o", folder / "all.o"])
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments"),
+    [
+        ("predictor", [[], ["Np=7", "p=7", "q=6"], ["Np=1", "p=1", "q=0"], ["Np=150", "p=2", "q=0", "dead_time=13"]]),
+        ("predictor_2", [["input_hold=1", "t_init=0"], ["p=100", "q=99", "lambda=1e-300"]]),
+        ("feed_drive", [[]]),
+        ("stage_drive", [[]]),
+        ("trajectory", [[]]),
+    ],
+)
+def test_the_sanitisers_find_nothing(name: str, arguments: list[list[str]], tmp_path: Path) -> None:
+    folder = c_core.build_folder() / f"sanitise_{name}"
+    c_core.write_header(name, folder)
+    flags = ["-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer"]
+    driver = c_core.ROOT / "tests" / "c" / "sanitise.c"
+    program = folder / "sanitise"
+    c_core.run_compiler(
+        [*flags, f"-I{folder}", *c_core.include_flags(), *c_core.sources(), driver, "-lm", "-o", program]
+    )
+    write_trajectory(tmp_path, staircase.commanded()[:600])
+    for pairs in arguments:
+        done = subprocess.run([program, f"{tmp_path}/", *pairs], capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr

@@ -1,0 +1,84 @@
+"""The reference input and result that each native archive carries, played by fmpy as its users would."""
+
+from __future__ import annotations
+
+import re
+import zipfile
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.util import read_csv, read_ref_opt_file
+
+from hybridsep.fmi.archive import build_fmu, fmu_names
+from hybridsep.fmi.reference import reference_files
+from hybridsep.machine import load_machine, machine_names
+
+NAMES = [(machine, name) for machine in machine_names() for name in fmu_names(load_machine(machine))]
+TOLERANCE = 1e-11  # m and m/s
+
+
+@pytest.mark.parametrize(("machine", "name"), NAMES)
+def test_fmpy_gets_the_reference_result(machine: str, name: str, tmp_path: Path) -> None:
+    path = build_fmu(load_machine(machine), name, tmp_path, targets=("host",))
+    with zipfile.ZipFile(path) as archive:
+        archive.extractall(tmp_path)
+    base = tmp_path / "documentation" / "reference" / name
+    options = read_ref_opt_file(f"{base}_ref.opt")
+    expected = read_csv(f"{base}_ref.csv")
+    inputs = read_csv(f"{base}_in.csv") if Path(f"{base}_in.csv").exists() else None
+    outputs = [v.name for v in fmpy.read_model_description(str(path)).modelVariables if v.causality == "output"]
+    assert list(expected.dtype.names or ()) == ["time", *outputs]
+    result = fmpy.simulate_fmu(
+        str(path),
+        start_time=options["StartTime"],
+        stop_time=options["StopTime"],
+        output_interval=options["StepSize"],
+        input=inputs,
+        output=outputs,
+    )
+    assert len(result) == len(expected)
+    for output in outputs:
+        np.testing.assert_allclose(
+            result[output].astype(float), expected[output], rtol=0, atol=TOLERANCE, err_msg=output
+        )
+    if name.startswith("HybridPredictor"):
+        assert expected["hybrid_active"][-1] == 1.0
+        assert 0 < expected["rms_h"][-1] < 1e-4
+    page = (tmp_path / "documentation" / "index.html").read_text(encoding="utf-8")
+    for link in re.findall(r'href="(reference/[^"]+)"', page):
+        assert (tmp_path / "documentation" / link).is_file()
+
+
+def test_the_reference_is_short_and_the_same_every_time() -> None:
+    machine = load_machine("spring_mass_damper")
+    parameters = machine.fmi_parameters()
+    description = {"model": "HybridPredictor", "name": "H", "parameters": parameters, "modes": [{}]}
+    mode = machine.model.modes[0]
+    description["modes"] = [{"f_n": mode.f_n, "zeta": mode.zeta, "alpha": mode.alpha, "beta": mode.beta}]
+    files = reference_files(machine, description)
+    assert files == reference_files(machine, description)
+    assert sorted(files) == [f"documentation/reference/H_{kind}" for kind in ("in.csv", "ref.csv", "ref.opt")]
+    assert b"StopTime, 0.6\n" in files["documentation/reference/H_ref.opt"]
+    assert sum(map(len, files.values())) < 120_000
+
+
+def test_given_samples_are_the_reference_of_their_trajectory(tmp_path: Path) -> None:
+    machine = load_machine("spring_mass_damper")
+    samples = [0.1, 0.2, 0.3]
+    path = build_fmu(machine, "ReferenceTrajectory", tmp_path, targets=("host",), samples=samples)
+    with zipfile.ZipFile(path) as archive:
+        rows = archive.read("documentation/reference/ReferenceTrajectory_ref.csv").decode().splitlines()
+    assert rows[1:5] == ["0.0,0.1", "0.001,0.2", "0.002,0.3", "0.003,0.3"]
+    result = fmpy.simulate_fmu(str(path), stop_time=0.01, output_interval=1e-3)
+    np.testing.assert_array_equal(result["r"][:4], [0.1, 0.2, 0.3, 0.3])
+
+
+def test_windows_that_no_short_run_can_show_have_no_reference(tmp_path: Path) -> None:
+    machine = load_machine("spring_mass_damper")
+    large = machine.model_copy(update={"predictor": machine.predictor.model_copy(update={"Np": 1001})})
+    path = build_fmu(large, "HybridPredictor", tmp_path, targets=("host",))
+    with zipfile.ZipFile(path) as archive:
+        assert not [name for name in archive.namelist() if name.startswith("documentation/reference")]
+        assert b"reference/" not in archive.read("documentation/index.html")
