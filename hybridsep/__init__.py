@@ -10,6 +10,8 @@ from __future__ import annotations
 __version__ = "0.1.0"
 
 from .backtest import Backtest, Scores, backtest, backtest_stream
+from .closed_loop import ClosedLoop, contour_error, run_closed_loop
+from .compensator import SepCompensator, SepPlan, SepState
 from .cosim import CoSimulation, cosimulate
 from .errors import (
     FmuError,
@@ -30,11 +32,13 @@ from .physics import DiscreteModel, ModalModel, Mode
 from .plant import Encoder, FeedDrive, StageDrive, simulate
 from .predictor import HybridPredictor, Prediction, WindowOperator
 from .regression import RidgeRegression
+from .sep_lookahead import SepLookAhead
 from .trajectory import PAPER_LIMITS, Limits, along_path, archimedean_spiral, from_file, rest_to_rest, spiral, staircase
 
 __all__ = [
     "PAPER_LIMITS",
     "Backtest",
+    "ClosedLoop",
     "CoSimulation",
     "DiscreteModel",
     "Encoder",
@@ -57,6 +61,10 @@ __all__ = [
     "Prediction",
     "RidgeRegression",
     "Scores",
+    "SepCompensator",
+    "SepLookAhead",
+    "SepPlan",
+    "SepState",
     "SignalError",
     "StageDrive",
     "StateError",
@@ -66,6 +74,7 @@ __all__ = [
     "backtest",
     "backtest_stream",
     "build_fmu",
+    "contour_error",
     "cosimulate",
     "fmu_names",
     "from_file",
@@ -74,6 +83,7 @@ __all__ = [
     "open_log",
     "read_log",
     "rest_to_rest",
+    "run_closed_loop",
     "simulate",
     "spiral",
     "staircase",

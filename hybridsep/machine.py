@@ -129,6 +129,12 @@ class LimitsSection(_Section):
     jerk: float = Field(gt=0, allow_inf_nan=False)
 
 
+class DriveLimitsSection(LimitsSection):
+    """What the drive itself allows of a modified command, wider than the trajectory's limits."""
+
+    change_max: float = Field(default=1e-3, gt=0, allow_inf_nan=False)
+
+
 class LogSection(_Section):
     """Names of a recorded log's columns."""
 
@@ -148,6 +154,7 @@ class Machine(_Section):
     predictor: PredictorSection = PredictorSection()
     plant: Annotated[FeedDriveSection | StageSection, Field(discriminator="kind")] | None = None
     limits: LimitsSection | None = None
+    drive_limits: DriveLimitsSection | None = None
     log: LogSection = LogSection()
 
     @model_validator(mode="after")
@@ -212,6 +219,12 @@ class Machine(_Section):
         if self.limits is None:
             raise MachineError(f"machine {self.name} has no [limits] section")
         return Limits(**self.limits.model_dump())
+
+    def command_limits(self) -> tuple[Limits | None, float | None]:
+        """Return the drive's own limits and the bound on a command's change, m; None without ``[drive_limits]``."""
+        if self.drive_limits is None:
+            return None, None
+        return Limits(**self.drive_limits.model_dump(exclude={"change_max"})), self.drive_limits.change_max
 
 
 def machine_names() -> list[str]:

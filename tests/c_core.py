@@ -72,15 +72,40 @@ def compiler() -> list[str]:
     raise RuntimeError("the C core needs a C compiler: set CC, or install cc, gcc, clang or the ziglang package")
 
 
+@cache
+def sanitising_compiler() -> list[str]:
+    """Return the command of a C compiler that brings the address sanitizer as a library of its own; empty if none."""
+    for command in (compiler(), ["gcc"], ["cc"]):
+        if shutil.which(command[0]) and address_sanitizer(command):
+            return command
+    return []
+
+
+def address_sanitizer(command: Sequence[str]) -> str:
+    """Return the path of a compiler's libasan; empty if it has none."""
+    asked = subprocess.run([*command, "-print-file-name=libasan.so"], capture_output=True, text=True, check=False)
+    path = asked.stdout.strip()
+    return path if Path(path).is_absolute() and Path(path).exists() else ""
+
+
+needs_sanitisers = pytest.mark.skipif(
+    not sanitising_compiler(), reason="no C compiler here brings the address sanitizer; install gcc with libasan"
+)
+
+
 def sources() -> list[str]:
     """Return every C file of core and models."""
     return sorted(str(path) for folder in ("core", "model") for path in (C_SOURCES / folder).glob("*.c"))
 
 
-def run_compiler(arguments: Sequence[str | Path]) -> None:
-    """Compile, or raise with what the compiler said."""
+def run_compiler(arguments: Sequence[str | Path], *, command: Sequence[str] = ()) -> None:
+    """Compile, with the host's compiler if no other is asked for, or raise with what it said."""
     done = subprocess.run(
-        [*compiler(), *FLAGS, *map(str, arguments)], capture_output=True, text=True, check=False, cwd=build_folder()
+        [*(command or compiler()), *FLAGS, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=build_folder(),
     )
     if done.returncode:
         raise RuntimeError(f"the C compiler failed:\n{done.stderr}")

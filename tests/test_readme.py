@@ -29,12 +29,15 @@ def test_the_two_commands_come_first_and_ci_runs_the_second() -> None:
 
 
 def test_python_blocks_run(tmp_path: Path) -> None:
-    (block,) = blocks("python")
+    block, closed_loop = blocks("python")
     assert len(block.strip().splitlines()) <= 12
     done = subprocess.run([sys.executable, "-W", "error", "-c", block], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     rms_pb, rms_h = map(float, done.stdout.splitlines()[0].split())
     assert rms_h < 0.5 * rms_pb
+    done = subprocess.run([sys.executable, "-W", "error", "-c", closed_loop], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout.split()[0]) < 8.0
 
 
 def test_the_machine_file_in_the_readme_is_valid(tmp_path: Path) -> None:

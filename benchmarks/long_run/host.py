@@ -49,11 +49,12 @@ class Host:
         description["modes"] = [{name: getattr(mode, name) for name in ("f_n", "zeta", "alpha", "beta")}]
         for file, content in sources(description, "{long run}").items():
             (folder / file).write_bytes(content)
-        command = [*compiler, *flags, f"-I{folder}", str(MAIN), str(folder / "all.c"), "-lm", "-o", str(self.program)]
+        files = [f"-I{folder}", str(MAIN), str(folder / "all.c"), "-lm", "-o", str(self.program)]
+        command = [*compiler, *flags, *files]
         subprocess.run(command, check=True)
 
     def fold(self, rows: Array, lam: float, repetitions: int) -> tuple[Array, Calls]:
-        """Fold rows ``[φ | target]``, (m, n + 1), over and over; return the weights, (n,), and the allocator's calls."""
+        """Fold rows ``[φ | target]``, (m, n + 1), over and over; return the weights, (n,), and all calls."""
         data, weights = self.folder / "rows.bin", self.folder / "weights.out"
         data.write_bytes(np.ascontiguousarray(rows, dtype="<f8").tobytes())
         m, width = rows.shape

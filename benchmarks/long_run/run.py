@@ -1,4 +1,4 @@
-"""A hundred million samples through the C core: does it keep its digits, and does it take memory?
+"""Fold a hundred million samples through the C core and look at its digits and its memory.
 
 Folds a block of feature rows of the staircase over and over into the C regression, n = 55, and compares the weights
 with the exact ones: repeating rows m times is the same as taking them times √m, so one QR in extended precision gives

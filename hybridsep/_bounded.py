@@ -1,0 +1,170 @@
+"""The drive's limits on a plan: linear bounds on its coefficients, and the quadratic programme under them.
+
+Everything is measured in shares of a limit. What the rest of the last plan demands is always allowed: it was within
+the limits when it was made, so a plan that keeps the limits exists at any time, unless ``x_d`` itself exceeds them,
+and then the change does not make it worse.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import osqp
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
+from scipy.sparse import csc_matrix
+
+from ._splines import N_DECIDED, PlanCost, SplineBasis
+from .signals import Array
+from .trajectory import Limits
+
+__all__ = ["Bounds", "DriveBounds", "solve"]
+
+_MARGIN = 1e-3
+"""Share of a limit that the solver keeps free, so that its tolerance never exceeds the limit."""
+
+_TOLERANCE = 1e-5
+"""Share of a limit by which the solver is told to stay away from where the rest of the last plan is."""
+
+_ROUNDING = 1e-9
+"""Share of a limit that is taken for rounding."""
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """``low ≤ rows @ c ≤ high`` in shares of the limits, ``(m,)``.
+
+    Attributes
+    ----------
+    rows : (m, n) array, 1/m
+    low, high : (m,) arrays
+        Never to be exceeded.
+    aim_low, aim_high : (m,) arrays
+        What the solver is asked to keep, a little inside of them.
+    """
+
+    rows: Array
+    low: Array
+    high: Array
+    aim_low: Array
+    aim_high: Array
+
+    def allow(self, c: Array) -> bool:
+        """Return whether the coefficients keep the bounds."""
+        values = self.rows @ c
+        return bool(np.all(values >= self.low) and np.all(values <= self.high))
+
+    def step(self, rest: Array, c: Array) -> float:
+        """Return the largest share, 0 … 1, of the way from ``rest``, which keeps the bounds, to ``c``."""
+        here, way = self.rows @ rest, self.rows @ (c - rest)
+        room = np.where(way > 0, self.high - here, here - self.low)
+        moving = np.abs(way) > _ROUNDING
+        return float(min(1.0, np.min(np.maximum(room[moving], 0.0) / np.abs(way[moving]), initial=1.0)))
+
+
+class DriveBounds:
+    """Limits on the differences of ``x_dm`` and on the change.
+
+    Parameters
+    ----------
+    basis : SplineBasis
+    Ts : float
+        Sampling interval, s.
+    limits : Limits or None
+        The drive's velocity, acceleration and jerk.
+    change_max : float or None
+        Bound on ``|δ|``, m.
+    """
+
+    def __init__(self, basis: SplineBasis, Ts: float, limits: Limits | None, change_max: float | None) -> None:
+        self._scales: list[tuple[int, float]] = []
+        if limits is not None:
+            bounds = limits.velocity * Ts, limits.acceleration * Ts**2, limits.jerk * Ts**3
+            self._scales += list(enumerate(bounds, start=1))
+        if change_max is not None:
+            self._scales.append((0, change_max))
+        extended = np.concatenate((np.zeros((3, basis.values.shape[1])), basis.values))
+        parts = [np.diff(extended, order, axis=0)[3 - order :] / bound for order, bound in self._scales]
+        self._all = np.concatenate(parts) if parts else np.zeros((0, basis.values.shape[1]))
+        self._free = np.ascontiguousarray(self._all[:, N_DECIDED:])
+
+    def bounds(self, x_d: Array, x_d_before: Array, delta_before: Array, rest: Array) -> Bounds:
+        """Return the bounds on the free coefficients of a plan.
+
+        Parameters
+        ----------
+        x_d : (preview,) array, m
+            Commanded positions.
+        x_d_before, delta_before : (3,) arrays, m
+            Their last three values, and those of the change.
+        rest : (3 + n_free,) array, m
+            Coefficients of the rest of the last plan, the decided ones first.
+        """
+        past = np.concatenate((delta_before, np.zeros(len(x_d))))
+        command = np.concatenate((x_d_before, x_d)) + past
+        offsets = [
+            np.diff(past if order == 0 else command, order)[3 - order :] / bound for order, bound in self._scales
+        ]
+        offset = np.concatenate(offsets) if offsets else np.zeros(0)
+        offset = offset + self._all[:, :N_DECIDED] @ rest[:N_DECIDED]
+        at_rest = self._free @ rest[N_DECIDED:]
+        hard, aim = 1.0 - _ROUNDING, 1.0 - _MARGIN
+        return Bounds(
+            rows=self._free,
+            low=np.minimum(-hard - offset, at_rest),
+            high=np.maximum(hard - offset, at_rest),
+            aim_low=np.minimum(-aim - offset, at_rest + _TOLERANCE),
+            aim_high=np.maximum(aim - offset, at_rest - _TOLERANCE),
+        )
+
+
+def solve(cost: PlanCost, bounds: Bounds, rest: Array) -> Array | None:
+    """Return the coefficients that cost least within the bounds.
+
+    The free minimum if it keeps the bounds; otherwise OSQP (Stellato et al., Math. Prog. Comp. 12 (2020)), and its
+    answer is drawn back towards ``rest`` by as much as its tolerance exceeds a bound.
+
+    Parameters
+    ----------
+    cost : PlanCost
+    bounds : Bounds
+    rest : (n,) array, m
+        Coefficients that keep the bounds.
+
+    Returns
+    -------
+    c : (n,) array, m, or None
+        None if there is no finite answer.
+    """
+    try:
+        c = np.asarray(cho_solve(cho_factor(cost.P), cost.v))
+    except (LinAlgError, ValueError):
+        return None
+    if not np.isfinite(c).all():
+        return None
+    if bounds.allow(c):
+        return c
+    # In units of the free answer, so that OSQP's tolerances are relative ones
+    unit = float(np.max(np.abs(c)))
+    scale = 1.0 / float(np.max(np.diag(cost.P)))
+    solver = osqp.OSQP()
+    solver.setup(
+        csc_matrix(np.triu(cost.P * scale)),
+        -cost.v * (scale / unit),
+        csc_matrix(bounds.rows * unit),
+        bounds.aim_low,
+        bounds.aim_high,
+        verbose=False,
+        eps_abs=1e-6,
+        eps_rel=1e-6,
+        max_iter=4000,
+        polishing=True,
+        adaptive_rho_interval=50,  # counted in iterations, never in seconds: the same answer each time
+    )
+    solver.warm_start(x=rest / unit)
+    result = solver.solve(raise_error=False)
+    best = np.asarray(result.x, dtype=np.float64) * unit if result.x is not None else rest
+    if not np.isfinite(best).all():
+        return None
+    share = bounds.step(rest, best)
+    return rest + share * (best - rest) if share > 0 else None

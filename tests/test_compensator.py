@@ -1,0 +1,410 @@
+"""The compensator: its plans against oracles, its limits and fall-backs as properties, its figures in closed loop."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.linalg import toeplitz
+from scipy.optimize import nnls
+from staircase_data import commanded
+
+from hybridsep._bounded import DriveBounds, solve
+from hybridsep._sensor import SensorWatch
+from hybridsep._splines import N_DECIDED, SplineBasis
+from hybridsep._trust import Trust, has_stable_poles
+from hybridsep.closed_loop import ClosedLoop, contour_error, run_closed_loop
+from hybridsep.compensator import RECOMMENDED, SepCompensator, SepState, direct_samples
+from hybridsep.errors import ParameterError, SignalError, StateError
+from hybridsep.machine import load_machine
+from hybridsep.peers import input_shaper, shape, zero_phase_command
+from hybridsep.physics import ModalModel
+from hybridsep.plant import Encoder, FeedDrive, Plant
+from hybridsep.predictor import HybridPredictor
+from hybridsep.signals import Array
+from hybridsep.trajectory import PAPER_LIMITS, Limits, archimedean_spiral, rest_to_rest
+
+MODEL = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
+DRIVE_LIMITS = Limits(0.1, 16.0, 5000.0)
+TS = 1e-3
+
+
+def compensator(
+    best: SepState = SepState.HYBRID, limits: Limits | None = DRIVE_LIMITS, **changes: Any
+) -> SepCompensator:
+    return SepCompensator(HybridPredictor(MODEL, **changes), preview=200, limits=limits, best=best)
+
+
+def plant() -> Plant:
+    return load_machine("spring_mass_damper").new_plant()
+
+
+def move(n: int = 200, end: float = 0.01) -> Array:
+    """Return a move that begins at sample 20."""
+    x_d = rest_to_rest([0.0, end], PAPER_LIMITS, TS, start_times=[0.02])
+    return np.concatenate((x_d, np.full(max(n - len(x_d), 0), end)))[:n]
+
+
+def beyond(x_dm: Array, limits: Limits) -> float:
+    """Return the largest share of a limit that a command takes."""
+    bounds = (limits.velocity, limits.acceleration, limits.jerk)
+    return max(float(np.max(np.abs(np.diff(x_dm, i)))) / (b * TS**i) for i, b in enumerate(bounds, start=1))
+
+
+# Plans against oracles -----------------------------------------------------------------------------------------
+
+
+def tracking_cost(g: Array, x_d: Array, delta: Array, weight: float) -> float:
+    error = x_d - np.asarray(toeplitz(g, np.zeros(len(g)))) @ (x_d + delta)
+    return float(error @ error + weight * np.sum(np.diff(np.concatenate((np.zeros(3), delta)), 3) ** 2))
+
+
+def test_splines_approach_the_direct_samples() -> None:
+    x_d, weight, rest = move(), 1.0, np.zeros(3)
+    predictor = HybridPredictor(MODEL, start=0.0)
+    g, free = predictor.operator(200).g_pb, np.zeros(200)
+    direct = direct_samples(g, free, x_d, rest, weight)
+    least = tracking_cost(g, x_d, direct, weight)
+    excess, distance = [], []
+    for spacing in (10, 5, 2, 1):
+        basis = SplineBasis(200, spacing)
+        cost = basis.cost(g, free, x_d, np.zeros(3), rest, weight)
+        delta = basis.values[:, N_DECIDED:] @ np.linalg.solve(cost.P, cost.v)
+        excess.append(tracking_cost(g, x_d, delta, weight) / least - 1.0)
+        distance.append(float(np.max(np.abs((delta - direct)[:150])) / np.max(np.abs(direct))))
+    assert min(excess) > -1e-6  # nothing is better than every sample free
+    assert excess == sorted(excess, reverse=True)
+    assert distance == sorted(distance, reverse=True)
+    assert distance[-1] < 0.01
+
+
+def test_one_filtered_spline_and_its_shifts_are_all_of_them() -> None:
+    basis = SplineBasis(120, 5)
+    g = HybridPredictor(MODEL, start=0.0).operator(120).g_pb
+    expected = toeplitz(g, np.zeros(120)) @ basis.values[:, N_DECIDED:]
+    np.testing.assert_allclose(basis.filtered(g), expected, rtol=0, atol=1e-13)
+
+
+def test_the_splines_end_so_that_what_follows_is_the_command_itself() -> None:
+    for preview, spacing in ((200, 1), (120, 5), (64, 10)):
+        values = SplineBasis(preview, spacing).values
+        assert not values[-3:].any()
+        assert values[:, N_DECIDED:].any(axis=0).all()
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 2**31), st.floats(0.05, 0.95))
+def test_a_bounded_plan_satisfies_the_optimality_conditions(seed: int, tightness: float) -> None:
+    """Karush-Kuhn-Tucker: the gradient is a non-negative combination of the active bounds' normals."""
+    rng = np.random.default_rng(seed)
+    basis = SplineBasis(80, 4)
+    g = HybridPredictor(MODEL, start=0.0).operator(80).g_pb
+    x_d = move(80, 0.01 * float(rng.uniform(-1, 1)))
+    cost = basis.cost(g, 1e-5 * rng.normal(size=80), x_d, np.zeros(3), np.zeros(3), 1.0)
+    free = np.linalg.solve(cost.P, cost.v)
+    change_max = tightness * float(np.max(np.abs(basis.values[:, N_DECIDED:] @ free)))
+    rest = np.zeros(basis.values.shape[1])
+    bounds = DriveBounds(basis, TS, None, change_max).bounds(x_d, np.zeros(3), np.zeros(3), rest)
+    c = solve(cost, bounds, rest[N_DECIDED:])
+    assert c is not None
+    assert bounds.allow(c)
+    values, gradient = bounds.rows @ c, cost.P @ c - cost.v
+    upper = np.flatnonzero(values > bounds.aim_high - 1e-3)
+    lower = np.flatnonzero(values < bounds.aim_low + 1e-3)
+    normals = np.concatenate((-bounds.rows[upper], bounds.rows[lower]))
+    _, residual = nnls(normals.T, gradient)
+    assert residual <= 2e-3 * np.linalg.norm(cost.v)
+
+
+# Limits, continuity, fall-back ---------------------------------------------------------------------------------
+
+
+@settings(max_examples=12, deadline=None)
+@given(st.integers(0, 2**31), st.sampled_from([1e-6, 1e-4, 1e-2]), st.sampled_from([PAPER_LIMITS, DRIVE_LIMITS]))
+def test_limits_hold_whatever_is_measured(seed: int, spread: float, limits: Limits) -> None:
+    rng = np.random.default_rng(seed)
+    stops = np.cumsum(np.concatenate(([0.0], rng.uniform(-0.01, 0.01, 4))))
+    r = rest_to_rest(stops, PAPER_LIMITS, TS, dwell=0.05)
+    sep = compensator(limits=limits, Np=50, p=10, q=3, t_init=0.0)
+    ahead = np.concatenate((r, np.full(300, r[-1])))
+    commands, changes = [], []
+    for k in range(0, len(r), 50):
+        plan = sep.plan(ahead[k : k + 200])
+        commands.append(plan.x_dm)
+        changes.append(plan.x_dm - ahead[k : k + 50])
+        sep.update(plan.x_pb + spread * rng.normal(size=50))
+    x_dm = np.concatenate((np.full(3, r[0]), *commands))  # from rest
+    assert np.isfinite(x_dm).all()
+    # ruckig's own moves reach their limits exactly: rounding is all that may be added.
+    assert beyond(x_dm, limits) <= 1.0 + 1e-6
+    assert np.max(np.abs(np.concatenate(changes))) <= 1e-3
+
+
+def test_what_is_left_of_a_plan_is_followed_when_there_is_no_other() -> None:
+    sep = compensator()
+    ahead = np.concatenate((commanded()[950:], np.zeros(200)))
+    plans = []
+    for k in range(0, 500, 100):
+        sep.best = SepState.PHYSICS if k < 200 else SepState.OFF
+        plans.append(sep.plan(ahead[k : k + 200]))
+        sep.update(plans[-1].x_pb)
+    states = [plan.state for plan in plans]
+    assert states == [SepState.PHYSICS] * 2 + [SepState.OFF] * 3
+    x_dm = np.concatenate([plan.x_dm for plan in plans])
+    changes = x_dm - ahead[:500]
+    assert np.max(np.abs(changes[200:296])) > 1e-6
+    assert not changes[297:].any()  # back on the command
+    assert beyond(x_dm, DRIVE_LIMITS) <= 1.0
+
+
+def test_the_command_is_continuous_where_the_model_changes() -> None:
+    sep = compensator(limits=None)
+    loop = run_closed_loop(sep, plant(), commanded()[:1500], encoder=Encoder(5e-6, 1))
+    switch = int(np.flatnonzero(np.diff(loop.state) != 0)[0]) + 1
+    third = np.abs(np.diff(loop.x_dm, 3))
+    assert np.max(third[switch - 4 : switch + 4]) < np.max(third)
+
+
+def test_a_refused_solve_falls_back_to_physics_then_to_the_rest(monkeypatch: pytest.MonkeyPatch) -> None:
+    sep = compensator(Np=50, p=10, t_init=0.0)
+    ahead = np.zeros(2000)
+    rng = np.random.default_rng(0)
+    for _ in range(3):
+        state = sep.plan(ahead[:200]).state
+        sep.update(1e-5 + 1e-6 * rng.normal(size=50))
+    assert state is SepState.HYBRID
+    answers: list[Callable[..., Any]] = [lambda *_: None, solve]
+    monkeypatch.setattr("hybridsep.compensator.solve", lambda *a: answers.pop(0)(*a))
+    assert sep.plan(ahead[:200]).state is SepState.PHYSICS
+    monkeypatch.setattr("hybridsep.compensator.solve", lambda *_: None)
+    assert sep.plan(ahead[:200]).state is SepState.OFF
+
+
+# Trust ---------------------------------------------------------------------------------------------------------
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.lists(st.floats(-1.5, 1.5), min_size=1, max_size=6), st.floats(-3, 3), st.floats(-3, 3))
+def test_step_down_recursion_agrees_with_the_roots(real: list[float], a: float, b: float) -> None:
+    polynomial = np.convolve(np.poly(real), np.array([1.0, a, b]))
+    radius = float(np.max(np.abs(np.roots(polynomial))))
+    if abs(radius - 1.0) > 1e-2:  # multiple roots are known to a part of their digits only
+        assert has_stable_poles(-polynomial[1:]) == (radius < 1.0)
+
+
+def test_not_a_number_is_not_stable() -> None:
+    assert not has_stable_poles(np.array([math.nan, 0.1]))
+    assert not has_stable_poles(np.array([0.1, math.inf]))
+
+
+def test_an_unstable_recursion_never_plans() -> None:
+    sep = compensator(Np=50, p=2, q=0, t_init=0.0)
+    sep.plan(np.zeros(200))
+    sep.update(1e-4 * 1.1 ** np.arange(50))  # a residual that grows by 10 % a sample
+    assert not has_stable_poles(sep.predictor.weights[2:])
+    plan = sep.plan(np.zeros(200))
+    assert plan.state is SepState.PHYSICS
+    np.testing.assert_array_equal(plan.x_dm, np.zeros(50))
+
+
+def test_trust_needs_more_than_noise_to_be_lost() -> None:
+    rng = np.random.default_rng(2)
+    trust = Trust()
+    for _ in range(50):
+        noise = rng.normal(0, 5e-6, 100)
+        trust.observe(noise, rng.normal(0, 1e-6, 100), 25e-12)
+    assert trust.hybrid
+    for _ in range(3):
+        trust.observe(noise, rng.normal(0, 20e-6, 100), 25e-12)
+    assert not trust.hybrid
+    trust.new_run()
+    assert trust.hybrid
+    trust.observe(noise, np.full(100, np.inf), 25e-12)
+    assert not trust.hybrid
+    assert math.isfinite(trust.excess)
+
+
+# Sensor --------------------------------------------------------------------------------------------------------
+
+
+def test_a_held_value_is_noticed_once_the_drive_moves() -> None:
+    rng = np.random.default_rng(0)
+    still, moving = np.zeros(50), np.linspace(0, 1e-3, 50)
+    watch = SensorWatch()
+    assert not watch.misses(still + 1e-6 * rng.normal(size=50), still)
+    assert not watch.misses(moving + 1e-6 * rng.normal(size=50), moving)
+    assert watch.misses(np.full(50, 2e-4), moving)
+    assert watch.misses(np.full(50, 2e-4), np.full(50, 1e-3))  # still held, at rest again
+    assert not watch.misses(1e-3 + 1e-6 * rng.normal(size=50), np.full(50, 1e-3))
+
+
+def test_a_coarse_sensor_at_rest_or_creeping_is_not_held() -> None:
+    watch, creep = SensorWatch(), np.linspace(0, 5e-6, 100)
+    assert not watch.misses(np.zeros(100), np.zeros(100))
+    assert not watch.misses(np.round(creep / 1e-6) * 1e-6, creep)
+
+
+def test_no_measurement_is_not_learned() -> None:
+    sep = compensator(Np=50, p=10, t_init=0.0)
+    rng = np.random.default_rng(0)
+    learned = []
+    for k in range(6):
+        plan = sep.plan(np.zeros(200))
+        measured = 1e-6 * rng.normal(size=50)
+        if k == 2:
+            measured[7] = np.nan
+        sep.update(measured)
+        learned.append(sep.predictor.regression.n_samples)
+        assert np.isfinite(plan.x_dm).all()
+    assert learned == [50, 100, 100, 100, 150, 200]
+
+
+# Closed loop ---------------------------------------------------------------------------------------------------
+
+
+def closed(sep: SepCompensator, seed: int = 0, **more: Any) -> ClosedLoop:
+    return run_closed_loop(sep, plant(), commanded(), encoder=Encoder(more.pop("noise", 5e-6), seed), **more)
+
+
+def test_figures_with_the_papers_settings() -> None:
+    assert 1e6 * closed(compensator(SepState.OFF)).rms == pytest.approx(88.5, abs=0.2)
+    assert 1e6 * closed(compensator(SepState.PHYSICS)).rms == pytest.approx(20.2, abs=0.2)
+    sep = compensator()
+    assert 1e6 * closed(sep).rms == pytest.approx(6.34, abs=0.3)
+    warm = closed(sep, 1000, t_init=0.0)
+    assert 1e6 * warm.rms == pytest.approx(4.97, abs=0.3)
+    assert (warm.state == SepState.HYBRID).all()
+
+
+def test_figures_with_the_recommended_settings() -> None:
+    sep = compensator(**RECOMMENDED)
+    cold, warm = closed(sep), closed(sep, 1000, t_init=0.0)
+    assert 1e6 * cold.rms == pytest.approx(4.7, abs=0.3)
+    assert 1e6 * warm.rms == pytest.approx(1.95, abs=0.2)
+    for loop in (cold, warm):
+        assert beyond(loop.x_dm, DRIVE_LIMITS) <= 1.0
+
+
+@pytest.mark.parametrize("settings_", [{}, RECOMMENDED], ids=["paper", "recommended"])
+@pytest.mark.parametrize("trouble", ["changed", "held", "noise", "limits"])
+def test_trouble_never_makes_it_worse_than_physics(settings_: dict[str, Any], trouble: str) -> None:
+    held = [0.0]
+
+    def hold(k: int, x_meas: float) -> float:
+        if not 1050 <= k < 1550:
+            held[0] = x_meas
+        return held[0]
+
+    def change(k: int, drive: Plant) -> None:
+        if k == 3050 and isinstance(drive, FeedDrive):
+            drive.k, drive.c_nl, drive.k_nl = 1.1 * drive.k, 2 * drive.c_nl, 2 * drive.k_nl
+
+    troubles: dict[str, dict[str, Any]] = {
+        "changed": {"disturb": change},
+        "held": {"sensor": hold},
+        "noise": {"noise": 5e-5},
+        "limits": {},
+    }
+    more = troubles[trouble]
+    limits = PAPER_LIMITS if trouble == "limits" else DRIVE_LIMITS
+    physics = closed(compensator(SepState.PHYSICS, limits, **settings_), **more)
+    hybrid = closed(compensator(limits=limits, **settings_), **more)
+    assert hybrid.rms <= 1.05 * physics.rms
+    assert np.isfinite(hybrid.x_dm).all()
+    assert beyond(hybrid.x_dm, limits) <= 1.0 + 1e-9
+    assert np.max(np.abs(hybrid.x_dm - hybrid.x_d)) <= 1e-3
+
+
+# State and parameters ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("planned", [False, True])
+def test_a_saved_state_goes_on_bit_for_bit(planned: bool) -> None:
+    r = np.concatenate((commanded()[900:2600], np.zeros(200)))
+    rng = np.random.default_rng(0)
+    sep = compensator(Np=50, p=20, q=3, t_init=0.1)
+
+    def window(one: SepCompensator, k: int, noise: Array) -> Array:
+        plan = one.plan(r[k : k + 200])
+        one.update(plan.x_pb + 1e-5 * np.sin(r[k : k + 50] * 300) + noise)
+        return plan.x_dm
+
+    for k in range(0, 600, 50):
+        window(sep, k, 5e-6 * rng.normal(size=50))
+    if planned:
+        sep.plan(r[600:800])
+    other = SepCompensator.from_bytes(sep.to_bytes())
+    assert other.to_bytes() == sep.to_bytes()
+    for k in range(600, 1200, 50):
+        noise = 5e-6 * rng.normal(size=50)
+        np.testing.assert_array_equal(window(other, k, noise), window(sep, k, noise))
+    assert other.to_bytes() == sep.to_bytes()
+    with pytest.raises(StateError, match="kind 'compensator' was expected, got one of kind 'predictor'"):
+        SepCompensator.from_bytes(sep.predictor.to_bytes())
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"spacing": 3}, "spacing must be ≥ 1 and divide Np = 100, got 3"),
+        ({"spacing": 0}, "spacing must be ≥ 1"),
+        ({"preview": 110}, r"preview must be ≥ Np \+ 4·spacing \+ 3 = 111, got 110"),
+        ({"jerk_weight": -1.0}, "jerk_weight must be finite and ≥ 0, got -1.0"),
+        ({"change_max": 0.0}, "change_max must be finite and > 0 m, got 0.0"),
+    ],
+)
+def test_parameters_out_of_range_are_named(values: dict[str, Any], message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        SepCompensator(HybridPredictor(MODEL), **values)
+
+
+def test_bad_samples_change_nothing() -> None:
+    sep = compensator()
+    with pytest.raises(SignalError, match="update must follow plan"):
+        sep.update(np.zeros(100))
+    with pytest.raises(SignalError, match="x_d must have 200 samples, got 100"):
+        sep.plan(np.zeros(100))
+    sep.plan(np.zeros(200))
+    before = sep.to_bytes()
+    for bad in (np.zeros(99), np.full(100, np.inf)):
+        with pytest.raises(SignalError, match="x must"):
+            sep.update(bad)
+    assert sep.to_bytes() == before
+
+
+# Peers and the path --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["zv", "zvd"])
+def test_a_shaper_leaves_no_vibration_in_its_model(kind: str) -> None:
+    discrete = MODEL.discretise(TS, "zoh")
+    step = np.concatenate((np.zeros(10), np.full(400, 0.01)))
+    shaper = input_shaper(MODEL, TS, kind)
+    assert np.sum(shaper) == pytest.approx(1.0)
+    plain, _ = discrete.respond(discrete.rest(), step)
+    shaped, _ = discrete.respond(discrete.rest(), shape(step, shaper))
+    assert np.ptp(shaped[100:]) < 0.02 * np.ptp(plain[100:])
+
+
+@pytest.mark.parametrize("name", ["spring_mass_damper", "als25010_x", "als25010_y"])
+def test_zero_phase_error_tracking_follows_on_its_model(name: str) -> None:
+    discrete = load_machine(name).new_predictor().discrete
+    x_d = move(600)
+    reached, _ = discrete.respond(discrete.rest(), zero_phase_command(x_d, discrete))
+    plain, _ = discrete.respond(discrete.rest(), x_d)
+    assert np.std(reached - x_d) < 0.1 * np.std(plain - x_d)
+
+
+def test_contour_error_is_the_distance_to_the_path() -> None:
+    position, derivative, end = archimedean_spiral(0.03, 5.0)
+    u = np.linspace(1.0, end - 1.0, 301)
+    slope = derivative(u)
+    normal = np.column_stack((-slope[:, 1], slope[:, 0])) / np.linalg.norm(slope, axis=1)[:, None]
+    distance = 1e-4 * np.sin(7 * u)
+    found = contour_error(position(u) + distance[:, None] * normal, position, derivative, end)
+    np.testing.assert_allclose(found, np.abs(distance), rtol=0, atol=1e-9)
