@@ -25,7 +25,7 @@ from hybridsep.fmi.native_backend import sources
 from hybridsep.machine import Machine, load_machine
 
 STATES = ("instantiated", "Initialization Mode", "stepping", "terminated")
-FUZZED = {"HybridPredictor": 18, "FeedDrive": 6, "FeedDrive_als25010_x": 6, "ReferenceTrajectory": 6}
+FUZZED = {"HybridPredictor": 16, "FeedDrive": 6, "FeedDrive_als25010_x": 6, "ReferenceTrajectory": 6}
 """How many seconds each model is called at random."""
 
 SANITIZERS = ("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")

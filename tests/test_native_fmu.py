@@ -424,7 +424,14 @@ def test_other_parameters_than_built_with(fmus: Fmus) -> None:
 
 
 @pytest.mark.parametrize("name", ["HybridPredictor", "FeedDrive_als25010_x", "ReferenceTrajectory"])
-def test_the_archive_without_binaries_can_be_compiled(fmus: Fmus, tmp_path: Path, name: str) -> None:
+def test_the_archive_without_binaries_can_be_compiled(
+    fmus: Fmus, tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not shutil.which("make"):
+        monkeypatch.setenv("CMAKE_GENERATOR", "Ninja")
+    if not shutil.which("cc"):
+        for variable, command in (("CC", "cc"), ("CXX", "c++")):
+            monkeypatch.setenv(variable, f"{sys.executable} -m ziglang {command}")
     folder = tmp_path / "unpacked"
     with zipfile.ZipFile(fmus[name]) as archive:
         archive.extractall(folder)
