@@ -18,11 +18,12 @@ import numpy as np
 
 from hybridsep.closed_loop import ClosedLoop, contour_error, run_closed_loop
 from hybridsep.compensator import RECOMMENDED, SepCompensator, SepState
+from hybridsep.limits import Limits
 from hybridsep.machine import Machine, load_machine
 from hybridsep.peers import input_shaper, shape, zero_phase_command
 from hybridsep.plant import Encoder, FeedDrive, Plant, simulate
 from hybridsep.signals import Array
-from hybridsep.trajectory import Limits, archimedean_spiral, spiral, staircase
+from hybridsep.trajectory import archimedean_spiral, spiral, staircase
 
 UM = 1e6
 AFTER_REVERSAL = 100

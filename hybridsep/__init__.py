@@ -25,6 +25,7 @@ from .errors import (
 )
 from .fmi.archive import build_fmu, fmu_names
 from .importer import FmuInstance
+from .limits import Limits
 from .logs import Log, LogReader, open_log, read_log
 from .lookahead import LookAhead
 from .machine import Machine, load_machine, machine_names
@@ -33,7 +34,7 @@ from .plant import Encoder, FeedDrive, StageDrive, simulate
 from .predictor import HybridPredictor, Prediction, WindowOperator
 from .regression import RidgeRegression
 from .sep_lookahead import SepLookAhead
-from .trajectory import PAPER_LIMITS, Limits, along_path, archimedean_spiral, from_file, rest_to_rest, spiral, staircase
+from .trajectory import PAPER_LIMITS, along_path, archimedean_spiral, from_file, rest_to_rest, spiral, staircase
 
 __all__ = [
     "PAPER_LIMITS",

@@ -10,21 +10,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import osqp
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
-from scipy.sparse import csc_matrix
 
+from ._interior import minimise
 from ._splines import N_DECIDED, PlanCost, SplineBasis
+from .limits import Limits
 from .signals import Array
-from .trajectory import Limits
 
 __all__ = ["Bounds", "DriveBounds", "solve"]
-
-_MARGIN = 1e-3
-"""Share of a limit that the solver keeps free, so that its tolerance never exceeds the limit."""
-
-_TOLERANCE = 1e-5
-"""Share of a limit by which the solver is told to stay away from where the rest of the last plan is."""
 
 _ROUNDING = 1e-9
 """Share of a limit that is taken for rounding."""
@@ -39,15 +32,11 @@ class Bounds:
     rows : (m, n) array, 1/m
     low, high : (m,) arrays
         Never to be exceeded.
-    aim_low, aim_high : (m,) arrays
-        What the solver is asked to keep, a little inside of them.
     """
 
     rows: Array
     low: Array
     high: Array
-    aim_low: Array
-    aim_high: Array
 
     def allow(self, c: Array) -> bool:
         """Return whether the coefficients keep the bounds."""
@@ -108,21 +97,15 @@ class DriveBounds:
         offset = np.concatenate(offsets) if offsets else np.zeros(0)
         offset = offset + self._all[:, :N_DECIDED] @ rest[:N_DECIDED]
         at_rest = self._free @ rest[N_DECIDED:]
-        hard, aim = 1.0 - _ROUNDING, 1.0 - _MARGIN
-        return Bounds(
-            rows=self._free,
-            low=np.minimum(-hard - offset, at_rest),
-            high=np.maximum(hard - offset, at_rest),
-            aim_low=np.minimum(-aim - offset, at_rest + _TOLERANCE),
-            aim_high=np.maximum(aim - offset, at_rest - _TOLERANCE),
-        )
+        most = 1.0 - _ROUNDING
+        return Bounds(rows=self._free, low=np.minimum(-most - offset, at_rest), high=np.maximum(most - offset, at_rest))
 
 
-def solve(cost: PlanCost, bounds: Bounds, rest: Array) -> Array | None:
+def solve(cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int) -> Array | None:
     """Return the coefficients that cost least within the bounds.
 
-    The free minimum if it keeps the bounds; otherwise OSQP (Stellato et al., Math. Prog. Comp. 12 (2020)), and its
-    answer is drawn back towards ``rest`` by as much as its tolerance exceeds a bound.
+    The free minimum if it keeps the bounds. Otherwise the first ``n_pinned`` coefficients stay as they are in ``rest``,
+    which gives a real-time implementation the samples that they act in to find the others, step by step.
 
     Parameters
     ----------
@@ -130,6 +113,8 @@ def solve(cost: PlanCost, bounds: Bounds, rest: Array) -> Array | None:
     bounds : Bounds
     rest : (n,) array, m
         Coefficients that keep the bounds.
+    n_pinned : int
+        Coefficients that a bounded plan does not change, < n.
 
     Returns
     -------
@@ -144,27 +129,19 @@ def solve(cost: PlanCost, bounds: Bounds, rest: Array) -> Array | None:
         return None
     if bounds.allow(c):
         return c
-    # In units of the free answer, so that OSQP's tolerances are relative ones
-    unit = float(np.max(np.abs(c)))
-    scale = 1.0 / float(np.max(np.diag(cost.P)))
-    solver = osqp.OSQP()
-    solver.setup(
-        csc_matrix(np.triu(cost.P * scale)),
-        -cost.v * (scale / unit),
-        csc_matrix(bounds.rows * unit),
-        bounds.aim_low,
-        bounds.aim_high,
-        verbose=False,
-        eps_abs=1e-6,
-        eps_rel=1e-6,
-        max_iter=4000,
-        polishing=True,
-        adaptive_rho_interval=50,  # counted in iterations, never in seconds: the same answer each time
+    pinned, left = rest[:n_pinned], rest[n_pinned:]
+    rows, taken = bounds.rows[:, n_pinned:], bounds.rows[:, :n_pinned] @ pinned
+    touched = rows.any(axis=1)
+    found = minimise(
+        cost.P[n_pinned:, n_pinned:],
+        cost.v[n_pinned:] - cost.P[n_pinned:, :n_pinned] @ pinned,
+        rows[touched],
+        (bounds.low - taken)[touched],
+        (bounds.high - taken)[touched],
+        left,
+        float(cost.v @ c + rest @ cost.P @ rest),
     )
-    solver.warm_start(x=rest / unit)
-    result = solver.solve(raise_error=False)
-    best = np.asarray(result.x, dtype=np.float64) * unit if result.x is not None else rest
+    best = np.concatenate((pinned, found))
     if not np.isfinite(best).all():
-        return None
-    share = bounds.step(rest, best)
-    return rest + share * (best - rest) if share > 0 else None
+        return rest
+    return rest + bounds.step(rest, best) * (best - rest)

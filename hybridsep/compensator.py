@@ -25,14 +25,17 @@ from ._sensor import SensorWatch
 from ._splines import N_DECIDED, SplineBasis, direct_samples
 from ._trust import Trust, has_stable_poles
 from .errors import ParameterError, SignalError, StateError
+from .limits import Limits
 from .predictor import HybridPredictor, Prediction
 from .signals import Array, as_samples
 from .state import pack, unpack
-from .trajectory import Limits
 
 __all__ = ["RECOMMENDED", "SepCompensator", "SepPlan", "SepState", "direct_samples"]
 
 _KIND = "compensator"
+
+_PINNED = 8
+"""Samples at the beginning of a window in which a bounded plan follows the last one: the time to solve it."""
 
 RECOMMENDED: dict[str, Any] = {"Np": 50, "p": 50, "q": 40, "lam": 1e-8, "t_init": 0.1}
 """Arguments of HybridPredictor with which compensation was best on the staircase drive, with the defaults below."""
@@ -92,6 +95,7 @@ class SepCompensator:
         self.predictor, self.spacing, self.jerk_weight = predictor, int(spacing), float(jerk_weight)
         self.limits, self.change_max, self.best = limits, change_max, SepState(best)
         self._basis = SplineBasis(self.preview, self.spacing)
+        self._n_pinned = min(_PINNED, Np // 2) // self.spacing
         self._bounds = DriveBounds(self._basis, predictor.Ts, limits, change_max)
         self._trust = Trust()
         self.new_run(predictor.start, t_init=predictor.t_init)
@@ -205,7 +209,7 @@ class SepCompensator:
             if not (np.isfinite(g).all() and np.isfinite(free).all()):
                 continue
             cost = self._basis.cost(g, free, command, rest[:N_DECIDED], self._delta_before, self.jerk_weight)
-            found = solve(cost, bounds, rest[N_DECIDED:])
+            found = solve(cost, bounds, rest[N_DECIDED:], self._n_pinned)
             if found is not None:
                 return state, np.concatenate((rest[:N_DECIDED], found))
         return SepState.OFF, rest

@@ -14,11 +14,11 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 
 from ._data_files import data_folder
 from .errors import MachineError, ParameterError
+from .limits import Limits
 from .parameters import INPUT_HOLDS, PARAMETERS, check, check_lags
 from .physics import ModalModel, Mode
 from .plant import FeedDrive, Plant, StageDrive
 from .predictor import HybridPredictor
-from .trajectory import Limits
 
 if sys.version_info >= (3, 11):
     import tomllib

@@ -7,7 +7,6 @@ ruckig (Berscheid and Kröger, RSS 2021).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
@@ -17,13 +16,13 @@ from ruckig import InputParameter, Result, Ruckig
 from ruckig import Trajectory as RuckigTrajectory
 
 from .errors import ParameterError, SignalError
+from .limits import Limits
 from .logs import read_log
 from .parameters import check, samples_before
 from .signals import Array, as_samples
 
 __all__ = [
     "PAPER_LIMITS",
-    "Limits",
     "along_path",
     "archimedean_spiral",
     "from_file",
@@ -33,32 +32,6 @@ __all__ = [
 ]
 
 Curve = Callable[[Array], Array]
-
-
-@dataclass(frozen=True)
-class Limits:
-    """What a move may demand.
-
-    Parameters
-    ----------
-    velocity, acceleration, jerk : float
-        Limits in m/s, m/s² and m/s³, all > 0.
-
-    Raises
-    ------
-    ParameterError
-        If a limit is not finite and > 0.
-    """
-
-    velocity: float
-    acceleration: float
-    jerk: float
-
-    def __post_init__(self) -> None:
-        for name in ("velocity", "acceleration", "jerk"):
-            limit = getattr(self, name)
-            if not (np.isfinite(limit) and limit > 0):
-                raise ParameterError(f"the {name} limit must be finite and > 0, got {limit!r}")
 
 
 PAPER_LIMITS = Limits(velocity=0.08, acceleration=8.0, jerk=1000.0)

@@ -6,28 +6,31 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+import clarabel
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import toeplitz
 from scipy.optimize import nnls
+from scipy.sparse import csc_matrix
 from staircase_data import commanded
 
-from hybridsep._bounded import DriveBounds, solve
+from hybridsep._bounded import Bounds, DriveBounds, solve
 from hybridsep._sensor import SensorWatch
-from hybridsep._splines import N_DECIDED, SplineBasis
+from hybridsep._splines import N_DECIDED, PlanCost, SplineBasis
 from hybridsep._trust import Trust, has_stable_poles
 from hybridsep.closed_loop import ClosedLoop, contour_error, run_closed_loop
 from hybridsep.compensator import RECOMMENDED, SepCompensator, SepState, direct_samples
 from hybridsep.errors import ParameterError, SignalError, StateError
+from hybridsep.limits import Limits
 from hybridsep.machine import load_machine
 from hybridsep.peers import input_shaper, shape, zero_phase_command
 from hybridsep.physics import ModalModel
 from hybridsep.plant import Encoder, FeedDrive, Plant
 from hybridsep.predictor import HybridPredictor
 from hybridsep.signals import Array
-from hybridsep.trajectory import PAPER_LIMITS, Limits, archimedean_spiral, rest_to_rest
+from hybridsep.trajectory import PAPER_LIMITS, archimedean_spiral, rest_to_rest
 
 MODEL = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
 DRIVE_LIMITS = Limits(0.1, 16.0, 5000.0)
@@ -110,15 +113,66 @@ def test_a_bounded_plan_satisfies_the_optimality_conditions(seed: int, tightness
     change_max = tightness * float(np.max(np.abs(basis.values[:, N_DECIDED:] @ free)))
     rest = np.zeros(basis.values.shape[1])
     bounds = DriveBounds(basis, TS, None, change_max).bounds(x_d, np.zeros(3), np.zeros(3), rest)
-    c = solve(cost, bounds, rest[N_DECIDED:])
+    c = solve(cost, bounds, rest[N_DECIDED:], 0)
     assert c is not None
     assert bounds.allow(c)
     values, gradient = bounds.rows @ c, cost.P @ c - cost.v
-    upper = np.flatnonzero(values > bounds.aim_high - 1e-3)
-    lower = np.flatnonzero(values < bounds.aim_low + 1e-3)
+    upper = np.flatnonzero(values > bounds.high - 1e-3)
+    lower = np.flatnonzero(values < bounds.low + 1e-3)
     normals = np.concatenate((-bounds.rows[upper], bounds.rows[lower]))
     _, residual = nnls(normals.T, gradient)
     assert residual <= 2e-3 * np.linalg.norm(cost.v)
+
+
+def clarabel_minimum(P: Array, v: Array, rows: Array, low: Array, high: Array) -> Array:
+    """Return the minimum of ``½ xᵀPx − vᵀx`` within the bounds by Clarabel (Goulart and Chen, arXiv:2405.12762)."""
+    unit = float(np.max(np.abs(np.linalg.solve(P, v))))
+    scale = 1.0 / float(np.max(np.diag(P)))
+    settings_ = clarabel.DefaultSettings()
+    settings_.verbose = False
+    solver = clarabel.DefaultSolver(
+        csc_matrix(np.triu(P * scale)),
+        -v * (scale / unit),
+        csc_matrix(np.concatenate((rows, -rows)) * unit),
+        np.concatenate((high, -low)),
+        [clarabel.NonnegativeConeT(2 * len(rows))],
+        settings_,
+    )
+    solution = solver.solve()
+    assert str(solution.status) in ("Solved", "AlmostSolved")
+    return np.asarray(solution.x) * unit
+
+
+@pytest.mark.parametrize(("limits", "n_bounded"), [(PAPER_LIMITS, 30), (DRIVE_LIMITS, 3)], ids=["tight", "usual"])
+def test_a_bounded_plan_costs_what_another_solver_finds(
+    monkeypatch: pytest.MonkeyPatch, limits: Limits, n_bounded: int
+) -> None:
+    bounded = []
+
+    def compare(cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int) -> Array | None:
+        c = solve(cost, bounds, rest, n_pinned)
+        assert c is not None
+        assert np.max(np.maximum(bounds.rows @ c - bounds.high, bounds.low - bounds.rows @ c)) <= 1e-12
+        free = np.asarray(np.linalg.solve(cost.P, cost.v), dtype=np.float64)
+        if bounds.allow(free):
+            np.testing.assert_allclose(c, free, rtol=0, atol=1e-9)
+            return c
+        np.testing.assert_allclose(c[:n_pinned], rest[:n_pinned], rtol=0, atol=1e-15)
+        P, rows = cost.P[n_pinned:, n_pinned:], bounds.rows[:, n_pinned:]
+        v = cost.v[n_pinned:] - cost.P[n_pinned:, :n_pinned] @ rest[:n_pinned]
+        taken = bounds.rows[:, :n_pinned] @ rest[:n_pinned]
+        found = clarabel_minimum(P, v, rows, bounds.low - taken, bounds.high - taken)
+
+        def value(x: Array) -> float:
+            return float(0.5 * x @ P @ x - v @ x)
+
+        bounded.append((value(c[n_pinned:]) - value(found)) / float(cost.v @ free))
+        return c
+
+    monkeypatch.setattr("hybridsep.compensator.solve", compare)
+    run_closed_loop(compensator(limits=limits), plant(), commanded()[:4000], encoder=Encoder(5e-6, 0))
+    assert len(bounded) >= n_bounded
+    assert np.max(np.abs(bounded)) <= 1e-5
 
 
 # Limits, continuity, fall-back ---------------------------------------------------------------------------------

@@ -10,11 +10,11 @@ from staircase_data import commanded, measured
 
 from hybridsep.compensator import SepCompensator, SepState
 from hybridsep.errors import SignalError, StateError
+from hybridsep.limits import Limits
 from hybridsep.physics import ModalModel
 from hybridsep.predictor import HybridPredictor
 from hybridsep.sep_lookahead import SepLookAhead
 from hybridsep.signals import Array
-from hybridsep.trajectory import Limits
 
 MODEL = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
 LIMITS = Limits(0.1, 16.0, 5000.0)

@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hybridsep import LogError, ParameterError, SignalError
+from hybridsep.limits import Limits
 from hybridsep.trajectory import (
     PAPER_LIMITS,
-    Limits,
     along_path,
     archimedean_spiral,
     from_file,
