@@ -20,11 +20,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from hybridsep.compensator import SepCompensator, SepState
 from hybridsep.fmi.c_header import c_header
 from hybridsep.fmi.variables import variables_of
+from hybridsep.limits import Limits
 from hybridsep.lookahead import LookAhead
 from hybridsep.physics import ModalModel, Mode
 from hybridsep.predictor import HybridPredictor
+from hybridsep.sep_lookahead import SepLookAhead
 
 Array = NDArray[np.float64]
 
@@ -50,11 +53,25 @@ PREDICTOR = {"Np": 100, "p": 50, "q": 3, "lambda": 1e-12, "T_s": 1e-3, "t_init":
 FEED_DRIVE = {"m": 1.0, "c": 15.7, "k": 24674.0, "c_nl": 100.0, "k_nl": 1000.0, "noise_std": 5e-6, "seed": 0}
 STAGE_DRIVE = {"f": 1.4e-5, "kappa": 0.021, "T_s": 1e-3, "noise_std": 1e-6, "seed": 7}
 
+COMPENSATOR = {
+    **PREDICTOR,
+    "preview": 200,
+    "spacing": 2,
+    "jerk_weight": 1.0,
+    "v_max": 0.1,
+    "a_max": 16.0,
+    "j_max": 5000.0,
+    "change_max": 1e-3,
+    "compensate": 2,
+}
+
 DESCRIPTIONS: dict[str, dict[str, Any]] = {
     "predictor": {"model": "HybridPredictor", "parameters": PREDICTOR, "modes": [SPRING_MASS_DAMPER]},
     "predictor_2": {"model": "HybridPredictor", "parameters": PREDICTOR, "modes": STAGE_MODES},
     "feed_drive": {"model": "FeedDrive", "parameters": FEED_DRIVE, "modes": []},
     "stage_drive": {"model": "FeedDrive", "parameters": STAGE_DRIVE, "modes": STAGE_MODES},
+    "compensator": {"model": "SepCompensator", "parameters": COMPENSATOR, "modes": [SPRING_MASS_DAMPER]},
+    "compensator_2": {"model": "SepCompensator", "parameters": COMPENSATOR, "modes": STAGE_MODES},
     "trajectory": {"model": "ReferenceTrajectory", "parameters": {"trajectory": 3, "T_s": 1e-3}, "modes": []},
 }
 """What is built here: as an FMU's machine.json describes it."""
@@ -284,6 +301,24 @@ def look_ahead(name: str, **parameters: float) -> tuple[LookAhead, CModel]:
     known = {key: value for key, value in values.items() if key != "dead_time"}
     predictor = HybridPredictor.with_parameters(model, known)
     return LookAhead(predictor, start), CModel(name, {**values, "x_d_ahead": start, "x_meas": start}).initialise()
+
+
+def sep_look_ahead(name: str, **parameters: float) -> tuple[SepLookAhead, CModel]:
+    """Return the library's compensating look-ahead and the C model with the same parameters, start included."""
+    start = parameters.pop("start", 0.0)
+    values: dict[str, Any] = {**COMPENSATOR, **parameters}
+    model = ModalModel([Mode(**mode) for mode in DESCRIPTIONS[name]["modes"]], int(values["dead_time"]))
+    predictor = HybridPredictor.with_parameters(
+        model, {key: values[key] for key in PREDICTOR if key != "dead_time"}, start=start
+    )
+    compensator = SepCompensator(
+        predictor,
+        limits=Limits(values["v_max"], values["a_max"], values["j_max"]),
+        best=SepState(values["compensate"]),
+        **{key: values[key] for key in ("preview", "spacing", "jerk_weight", "change_max")},
+    )
+    c_model = CModel(name, {**values, "x_d_ahead": start, "x_meas": start}).initialise()
+    return SepLookAhead(compensator, start), c_model
 
 
 def write_weights(folder: Path, factor: Array, p: int, q: int, n_samples: int) -> None:

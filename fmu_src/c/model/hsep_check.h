@@ -5,6 +5,7 @@
 
 #include "hsep_clock.h"
 #include "hsep_model.h"
+#include "hsep_physics.h"
 
 #define HSEP_NUMBER_SIZE 40 /* bytes of a number as text */
 
@@ -13,6 +14,8 @@
 #define HSEP_AT_LEAST "\xe2\x89\xa5"      /* greater than or equal */
 #define HSEP_AT_MOST "\xe2\x89\xa4"       /* less than or equal */
 #define HSEP_MINUS "\xe2\x88\x92"
+#define HSEP_DOT "\xc2\xb7"
+#define HSEP_PLUS_MINUS "\xc2\xb1"
 
 /* Add a problem, formatted as by printf, to a message; "; " goes between two. */
 void hsep_message_add(char message[], const char *format, ...);
@@ -35,5 +38,11 @@ hsep_status hsep_check_start_time(double t_start, char message[]);
 
 /* Check that the step from t by h, s, comes next; parts is how many such steps make a sample. */
 hsep_status hsep_check_step(const hsep_clock *clock, double t, double h, int64_t *parts, char message[]);
+
+/* Read n modes from the values of mode[i].f_n, .zeta, .alpha and .beta, which have been checked. */
+void hsep_modes_read(const double values[], size_t n, hsep_mode modes[]);
+
+/* Check a position, m, that comes in with the sample that begins: finite, and no further out than any machine is. */
+hsep_status hsep_check_input(const hsep_clock *clock, const char *name, double value, char message[]);
 
 #endif

@@ -1,10 +1,7 @@
 /* HybridPredictor: the look-ahead buffer that predicts the drive's position one window early.
  *
  * Inputs are read at the first sub-step of a sample, outputs change after its last one; the arithmetic is
- * hsep_predictor's. If the resources hold weights.bin, the first window is predicted with what was learned before:
- *   "HSEPWGT1", p, q and the number of learned samples as uint64, then the upper triangle of the factor [R z; 0 rho]
- *   by rows, (n + 1)(n + 2)/2 doubles with n = 2 + q + p, all little-endian.
- * lambda is part of that factor; its parameter has no effect then.
+ * hsep_predictor's. If the resources hold weights (hsep_weights.h), the first window is predicted with them.
  */
 #include "hsep_fmu.h"
 
@@ -14,14 +11,13 @@
 #include "hsep_clock.h"
 #include "hsep_model.h"
 #include "hsep_predictor.h"
-#include "hsep_resource.h"
 #include "hsep_state.h"
+#include "hsep_weights.h"
 
 #include <math.h>
 #include <string.h>
 
 #define PREDICTOR_KIND UINT64_C(0x4453524550594848) /* any number that no other model has */
-#define PREDICTOR_WEIGHTS "weights.bin"
 
 typedef struct {
     hsep_state_header header;
@@ -33,10 +29,7 @@ typedef struct {
 /* Read the parameters; those that are whole numbers must have been checked. modes: (HSEP_N_MODES,). */
 static hsep_predictor_parameters predictor_parameters(const double values[], double n_init, hsep_mode modes[])
 {
-    for (size_t i = 0; i < HSEP_N_MODES; i++) {
-        const double *mode = &values[HSEP_VR_mode + 4 * i];
-        modes[i] = (hsep_mode){.f_n = mode[0], .zeta = mode[1], .alpha = mode[2], .beta = mode[3]};
-    }
+    hsep_modes_read(&values[HSEP_VR_mode], HSEP_N_MODES, modes);
     return (hsep_predictor_parameters){
         .Np = (uint64_t)values[HSEP_VR_Np],
         .p = (uint64_t)values[HSEP_VR_p],
@@ -104,43 +97,6 @@ static void predictor_write_windows(const hsep_predictor *predictor, double valu
     }
 }
 
-/* Take over the factor that the resources hold, if they do; row after row through the regression's own row. */
-static hsep_status predictor_warm_start(
-    const hsep_context *context, const double values[], hsep_regression *regression, char message[])
-{
-    FILE *file = hsep_resource_open(context, PREDICTOR_WEIGHTS);
-    if (file == NULL) {
-        return HSEP_OK;
-    }
-    const double n = (double)regression->n, p = values[HSEP_VR_p], q = values[HSEP_VR_q];
-    uint64_t head[3] = {0, 0, 0}; /* p, q, learned samples */
-    const double bytes = hsep_resource_head(file, "HSEPWGT1", head, 3);
-    int taken = bytes == 0.5 * (n + 1.0) * (n + 2.0) * (double)sizeof(double);
-    if (bytes >= 0.0 && ((double)head[0] != p || (double)head[1] != q)) {
-        hsep_message_add(
-            message,
-            PREDICTOR_WEIGHTS " was learned with p = %.0f, q = %.0f, got p = %.0f, q = %.0f; "
-                              "set p and q as they were learned",
-            (double)head[0], (double)head[1], p, q);
-        taken = 0;
-    }
-    for (uint64_t i = 0; taken && i <= regression->n; i++) {
-        const size_t left = (size_t)(regression->n + 1 - i);
-        taken = fread(hsep_regression_row(regression), sizeof(double), left, file) == left &&
-                hsep_regression_load(regression, i);
-    }
-    fclose(file);
-    if (!taken) {
-        if (message[0] == '\0') {
-            hsep_message_add(
-                message, PREDICTOR_WEIGHTS " must be a factor of learned rows; it is damaged or truncated");
-        }
-        return HSEP_REFUSED;
-    }
-    regression->n_samples = head[2];
-    return HSEP_OK;
-}
-
 hsep_status hsep_model_initialise(
     const hsep_context *context, void *state, double values[], double t_start, char message[])
 {
@@ -165,25 +121,13 @@ hsep_status hsep_model_initialise(
     self->x_d_ahead = start;
     self->x_meas = start;
     hsep_predictor_init(&self->predictor, &parameters, start);
-    if (predictor_warm_start(context, values, hsep_predictor_regression(&self->predictor), message) != HSEP_OK) {
+    if (hsep_weights_load(
+            context, parameters.p, parameters.q, hsep_predictor_regression(&self->predictor), message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     predictor_write_outputs(&self->predictor, values);
     predictor_write_windows(&self->predictor, values);
     return HSEP_OK;
-}
-
-/* Refuse an input that is not finite at the sample that begins. */
-static hsep_status predictor_check_input(const predictor_state *self, const char *name, double value, char message[])
-{
-    char number[HSEP_NUMBER_SIZE];
-    if (isfinite(value)) {
-        return HSEP_OK;
-    }
-    hsep_message_add(
-        message, "%s must be finite, got %s at sample %.0f", name, hsep_number(number, value, HSEP_REAL),
-        (double)self->clock.k);
-    return HSEP_REFUSED;
 }
 
 hsep_status hsep_model_step(
@@ -197,8 +141,8 @@ hsep_status hsep_model_step(
         return HSEP_REFUSED;
     }
     if (self->clock.done == 0) { /* a sample begins: its inputs are read */
-        if (predictor_check_input(self, "x_d_ahead", values[HSEP_VR_x_d_ahead], message) != HSEP_OK ||
-            predictor_check_input(self, "x_meas", values[HSEP_VR_x_meas], message) != HSEP_OK) {
+        if (hsep_check_input(&self->clock, "x_d_ahead", values[HSEP_VR_x_d_ahead], message) != HSEP_OK ||
+            hsep_check_input(&self->clock, "x_meas", values[HSEP_VR_x_meas], message) != HSEP_OK) {
             return HSEP_REFUSED;
         }
         self->x_d_ahead = values[HSEP_VR_x_d_ahead];

@@ -54,10 +54,7 @@ hsep_status hsep_model_initialise(
     }
     hsep_state_mark(&self->header, context, values, STAGE_DRIVE_KIND, size);
     hsep_encoder_init(&self->encoder, values[HSEP_VR_noise_std], (uint64_t)values[HSEP_VR_seed]);
-    for (size_t i = 0; i < HSEP_N_MODES; i++) {
-        const double *mode = &values[HSEP_VR_mode + 4 * i];
-        modes[i] = (hsep_mode){.f_n = mode[0], .zeta = mode[1], .alpha = mode[2], .beta = mode[3]};
-    }
+    hsep_modes_read(&values[HSEP_VR_mode], HSEP_N_MODES, modes);
     hsep_stage_init(
         &self->stage, modes, HSEP_N_MODES, values[HSEP_VR_f], values[HSEP_VR_kappa], values[HSEP_VR_T_s],
         values[HSEP_VR_x_d]);

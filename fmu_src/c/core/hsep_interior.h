@@ -1,0 +1,39 @@
+/* A plan within the drive's limits, by Mehrotra's predictor-corrector interior-point method (Mehrotra 1992), one step a
+ * call:  min 1/2 x' P x - v' x  with  low <= A x <= high, A being hsep_splines_rows.
+ *
+ * Every iterate stays inside the bounds it has reached once, so that what is found after any number of steps keeps
+ * them. Memory is one block: the struct, then its arrays as doubles; no pointers. Reentrant; allocates nothing.
+ */
+#ifndef HSEP_INTERIOR_H
+#define HSEP_INTERIOR_H
+
+#include "hsep_splines.h"
+
+#include <stdint.h>
+
+#define HSEP_INTERIOR_STEPS 24 /* at most, for one plan */
+
+typedef struct {
+    uint64_t first; /* the splines before it are not asked for; x is (n - first,) */
+    uint64_t steps; /* done for this plan */
+    double cost;    /* m2, of the beginning, for each of the bounds */
+    double sides;   /* number of bounds, low and high ones */
+    /* followed by arrays, see hsep_interior.c */
+} hsep_interior;
+
+double hsep_interior_size(uint64_t preview, uint64_t n); /* bytes of the block, counted in double */
+
+/* Where the problem goes before hsep_interior_begin; of v and x the first n - first entries count. */
+double *hsep_interior_v(hsep_interior *self, const hsep_splines *splines);    /* (n,) m */
+double *hsep_interior_x(hsep_interior *self, const hsep_splines *splines);    /* (n,) m, start and result */
+double *hsep_interior_low(hsep_interior *self, const hsep_splines *splines);  /* (4 preview,) rows, in shares */
+double *hsep_interior_high(hsep_interior *self, const hsep_splines *splines); /* (4 preview,) */
+
+/* Begin with x and the bounds as they are. cost: size of the cost, m2, > 0, by which the end is recognised. */
+void hsep_interior_begin(hsep_interior *self, const hsep_splines *splines, uint64_t first, double cost);
+
+/* Do a step; P is the triangle of all n rows. Returns whether it was the last one.
+ * Cost: n^3 / 6 multiply-adds for a factor, about 250 operations and 4 divisions a sample of the plan beside it. */
+int hsep_interior_step(hsep_interior *self, const hsep_splines *splines, const double P[]);
+
+#endif

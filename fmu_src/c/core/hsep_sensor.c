@@ -1,0 +1,32 @@
+#include "hsep_sensor.h"
+
+#include <math.h>
+
+static const double sensor_repeats = 3.0;     /* so many equal values in a row may be held */
+static const double sensor_steps = 5.0;       /* if the drive has moved by so many of the sensor's steps, */
+static const double sensor_first_step = 1e-5; /* m, taken for the step of a sensor that has not changed yet, */
+static const double sensor_still = 1e-8;      /* m, and by more than this */
+
+void hsep_sensor_init(hsep_sensor *self)
+{
+    self->value = NAN;
+    self->repeats = self->low = self->high = 0.0;
+    self->step = HUGE_VAL;
+}
+
+int hsep_sensor_misses(hsep_sensor *self, double x_meas, double x_pb)
+{
+    if (!(x_meas == self->value)) {
+        if (!isnan(self->value)) {
+            self->step = fmin(self->step, fabs(x_meas - self->value));
+        }
+        self->value = x_meas;
+        self->repeats = 0.0;
+        self->low = self->high = x_pb;
+    }
+    self->repeats += 1.0;
+    self->low = fmin(self->low, x_pb);
+    self->high = fmax(self->high, x_pb);
+    const double step = self->step < HUGE_VAL ? self->step : sensor_first_step;
+    return self->repeats >= sensor_repeats && self->high - self->low > fmax(sensor_steps * step, sensor_still);
+}

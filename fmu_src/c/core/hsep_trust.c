@@ -1,0 +1,22 @@
+#include "hsep_trust.h"
+
+static const double trust_forget = 0.9;      /* share of the past windows that is kept with each window */
+static const double trust_noise_share = 0.5; /* at rest both models predict the same noise: it must not decide */
+static const double trust_worst = 2.0;       /* a bad start must not be remembered for ever */
+
+void hsep_trust_observe(
+    hsep_trust *self, const double e_pb[], const double e_h[], uint64_t n, double noise_variance)
+{
+    double physics = 0.0, hybrid = 0.0;
+    for (uint64_t i = 0; i < n; i++) {
+        physics += e_pb[i] * e_pb[i];
+        hybrid += (e_pb[i] - e_h[i]) * (e_pb[i] - e_h[i]);
+    }
+    physics /= (double)n;
+    hybrid /= (double)n;
+    if (!(hybrid <= trust_worst * (physics + noise_variance))) { /* NaN too */
+        hybrid = trust_worst * (physics + noise_variance);
+    }
+    const double worse = hybrid - physics - trust_noise_share * noise_variance;
+    self->excess = trust_forget * self->excess + (1.0 - trust_forget) * worse;
+}

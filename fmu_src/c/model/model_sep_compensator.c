@@ -1,0 +1,206 @@
+/* SepCompensator: the look-ahead buffer that modifies the command so that the drive follows it.
+ *
+ * Inputs are read at the first sub-step of a sample, outputs change after its last one; the arithmetic is
+ * hsep_compensator's. If the resources hold weights (hsep_weights.h), it starts with them.
+ */
+#include "hsep_fmu.h"
+
+#if defined(HSEP_MODEL_SEP_COMPENSATOR)
+
+#include "hsep_check.h"
+#include "hsep_clock.h"
+#include "hsep_compensator.h"
+#include "hsep_model.h"
+#include "hsep_state.h"
+#include "hsep_weights.h"
+
+#include <math.h>
+#include <string.h>
+
+#define COMPENSATOR_KIND UINT64_C(0x4E45504D4F435053) /* any number that no other model has */
+
+typedef struct {
+    hsep_state_header header;
+    hsep_clock clock;
+    double x_d_ahead, x_meas;     /* m, the inputs of the sample in progress */
+    hsep_compensator compensator; /* its arrays follow */
+} compensator_state;
+
+/* Check spacing and preview against Np; return how many are wrong, each added to message. */
+static int compensator_check_plan(const double values[], char message[])
+{
+    const double Np = values[HSEP_VR_Np], spacing = values[HSEP_VR_spacing], preview = values[HSEP_VR_preview];
+    const double least = Np + 4.0 * spacing + 3.0;
+    int problems = 0;
+    if (fmod(Np, spacing) != 0.0) {
+        hsep_message_add(message, "spacing must be " HSEP_AT_LEAST " 1 and divide Np = %.0f, got %.0f", Np, spacing);
+        problems++;
+    }
+    if (preview < least) {
+        hsep_message_add(
+            message, "preview must be " HSEP_AT_LEAST " Np + 4" HSEP_DOT "spacing + 3 = %.0f, got %.0f", least, preview);
+        problems++;
+    }
+    return problems;
+}
+
+/* Check all parameters and read them. modes: (HSEP_N_MODES,). */
+static hsep_status compensator_checked(
+    const hsep_context *context, const double values[], hsep_compensator_parameters *parameters, hsep_mode modes[],
+    char message[])
+{
+    message[0] = '\0';
+    if (hsep_check_parameters(context, values, message) > 0) {
+        return HSEP_REFUSED;
+    }
+    const double T_s = values[HSEP_VR_T_s], t_init = values[HSEP_VR_t_init];
+    int problems = hsep_check_lags(values[HSEP_VR_Np], values[HSEP_VR_p], values[HSEP_VR_q], message);
+    problems += compensator_check_plan(values, message);
+    /* The warm-up counts from the end of the first fill; without one, the first window is planned with what is known. */
+    const double t_plan = t_init > 0.0 ? t_init + values[HSEP_VR_preview] * T_s : 0.0;
+    const double n_init = hsep_warm_up_samples(t_plan, T_s, message);
+    if (problems > 0 || n_init < 0.0) {
+        return HSEP_REFUSED;
+    }
+    hsep_modes_read(&values[HSEP_VR_mode], HSEP_N_MODES, modes);
+    *parameters = (hsep_compensator_parameters){
+        .planner =
+            {.Np = (uint64_t)values[HSEP_VR_Np],
+             .preview = (uint64_t)values[HSEP_VR_preview],
+             .spacing = (uint64_t)values[HSEP_VR_spacing],
+             .jerk_weight = values[HSEP_VR_jerk_weight],
+             .limit =
+                 {values[HSEP_VR_change_max], values[HSEP_VR_v_max] * T_s, values[HSEP_VR_a_max] * (T_s * T_s),
+                  values[HSEP_VR_j_max] * (T_s * T_s * T_s)}},
+        .p = (uint64_t)values[HSEP_VR_p],
+        .q = (uint64_t)values[HSEP_VR_q],
+        .dead_time = (uint64_t)values[HSEP_VR_dead_time],
+        .n_modes = HSEP_N_MODES,
+        .lambda = values[HSEP_VR_lambda],
+        .T_s = T_s,
+        .n_init = n_init,
+        .hold = values[HSEP_VR_input_hold] > 0.0 ? HSEP_FIRST_ORDER_HOLD : HSEP_ZERO_ORDER_HOLD,
+        .best = (hsep_sep_state)values[HSEP_VR_compensate],
+        .modes = modes};
+    return HSEP_OK;
+}
+
+hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[])
+{
+    hsep_mode modes[HSEP_N_MODES];
+    hsep_compensator_parameters parameters;
+    if (compensator_checked(context, values, &parameters, modes, message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
+    const double before = (double)(sizeof(compensator_state) - sizeof(hsep_compensator));
+    return hsep_state_size(before + hsep_compensator_size(&parameters), size, message);
+}
+
+static void compensator_write_outputs(const hsep_compensator *compensator, double values[])
+{
+    hsep_compensator_outputs outputs;
+    hsep_compensator_read(compensator, &outputs);
+    values[HSEP_VR_x_dm] = outputs.x_dm;
+    values[HSEP_VR_x_d] = outputs.x_d;
+    values[HSEP_VR_x_pb] = outputs.x_pb;
+    values[HSEP_VR_x_h] = outputs.x_h;
+    values[HSEP_VR_e_servo] = outputs.x_d - outputs.x_h; /* the predicted servo error that is left */
+    values[HSEP_VR_sep_state] = (double)outputs.state;
+    values[HSEP_VR_rms_e] = outputs.rms_e;
+    values[HSEP_VR_rms_pb] = outputs.rms_pb;
+    values[HSEP_VR_rms_h] = outputs.rms_h;
+    values[HSEP_VR_batch] = (double)outputs.batch;
+}
+
+hsep_status hsep_model_initialise(
+    const hsep_context *context, void *state, double values[], double t_start, char message[])
+{
+    char number[HSEP_NUMBER_SIZE];
+    compensator_state *self = state;
+    hsep_mode modes[HSEP_N_MODES];
+    hsep_compensator_parameters parameters;
+    size_t size = 0;
+    if (hsep_model_size(context, values, &size, message) != HSEP_OK ||
+        compensator_checked(context, values, &parameters, modes, message) != HSEP_OK ||
+        hsep_check_start_time(t_start, message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
+    const double start = values[HSEP_VR_x_d_ahead];
+    if (!isfinite(start)) {
+        hsep_message_add(
+            message, "the start value of x_d_ahead must be finite, got %s", hsep_number(number, start, HSEP_REAL));
+        return HSEP_REFUSED;
+    }
+    hsep_state_mark(&self->header, context, values, COMPENSATOR_KIND, size);
+    hsep_clock_init(&self->clock, t_start, parameters.T_s);
+    self->x_d_ahead = start;
+    self->x_meas = start;
+    hsep_compensator_init(&self->compensator, &parameters, start);
+    if (hsep_weights_load(
+            context, parameters.p, parameters.q, hsep_compensator_regression(&self->compensator), message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
+    hsep_compensator_begin(&self->compensator);
+    compensator_write_outputs(&self->compensator, values);
+    return HSEP_OK;
+}
+
+hsep_status hsep_model_step(
+    const hsep_context *context, void *state, double values[], double t, double h, char message[])
+{
+    (void)context;
+    compensator_state *self = state;
+    int64_t parts = 0;
+    message[0] = '\0';
+    if (hsep_check_step(&self->clock, t, h, &parts, message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
+    if (self->clock.done == 0) { /* a sample begins: its inputs are read */
+        if (hsep_check_input(&self->clock, "x_d_ahead", values[HSEP_VR_x_d_ahead], message) != HSEP_OK ||
+            hsep_check_input(&self->clock, "x_meas", values[HSEP_VR_x_meas], message) != HSEP_OK) {
+            return HSEP_REFUSED;
+        }
+        self->x_d_ahead = values[HSEP_VR_x_d_ahead];
+        self->x_meas = values[HSEP_VR_x_meas];
+    }
+    if (hsep_clock_advance(&self->clock, parts)) {
+        hsep_compensator_sample(&self->compensator, self->x_d_ahead, self->x_meas);
+        compensator_write_outputs(&self->compensator, values);
+    }
+    return HSEP_OK;
+}
+
+void hsep_model_start_values(const hsep_context *context, double values[])
+{
+    (void)context;
+    const double start = values[HSEP_VR_x_d_ahead]; /* the drive rests there */
+    values[HSEP_VR_x_dm] = values[HSEP_VR_x_d] = values[HSEP_VR_x_pb] = values[HSEP_VR_x_h] = start;
+    values[HSEP_VR_e_servo] = values[HSEP_VR_rms_e] = values[HSEP_VR_rms_pb] = values[HSEP_VR_rms_h] = 0.0;
+    values[HSEP_VR_batch] = 0.0;
+    values[HSEP_VR_sep_state] = values[HSEP_VR_compensate] > 0.0 ? 1.0 : 0.0;
+}
+
+hsep_status hsep_model_check_state(
+    const hsep_context *context, const void *state, size_t size, const double values[], char message[])
+{
+    hsep_mode modes[HSEP_N_MODES];
+    hsep_compensator_parameters parameters;
+    compensator_state head;
+    size_t expected = 0;
+    if (hsep_model_size(context, values, &expected, message) != HSEP_OK ||
+        compensator_checked(context, values, &parameters, modes, message) != HSEP_OK ||
+        hsep_state_check(context, values, state, size, COMPENSATOR_KIND, expected, message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
+    memcpy(&head, state, sizeof head);
+    const char *compensator = (const char *)state + (sizeof head - sizeof head.compensator);
+    if (!hsep_state_clock_valid(&head.clock) || head.clock.T_s != parameters.T_s ||
+        head.compensator.k != (uint64_t)head.clock.k || !hsep_compensator_valid(compensator, &parameters)) {
+        return hsep_state_damaged(message);
+    }
+    return HSEP_OK;
+}
+
+#else
+typedef int hsep_no_sep_compensator; /* a translation unit must not be empty */
+#endif
