@@ -56,6 +56,15 @@ def test_everything_compiles_as_one_file(name: str) -> None:
     [
         ("predictor", [[], ["Np=7", "p=7", "q=6"], ["Np=1", "p=1", "q=0"], ["Np=150", "p=2", "q=0", "dead_time=13"]]),
         ("predictor_2", [["input_hold=1", "t_init=0"], ["p=100", "q=99", "lambda=1e-300"]]),
+        (
+            "compensator",
+            [
+                ["v_max=0.08", "a_max=8", "j_max=1000"],
+                ["Np=12", "p=7", "q=5", "spacing=3", "preview=77", "dead_time=13", "t_init=0"],
+                ["Np=1", "p=1", "q=0", "spacing=1", "preview=8", "t_init=0"],
+                ["spacing=50", "preview=303", "compensate=1"],
+            ],
+        ),
         ("feed_drive", [[]]),
         ("stage_drive", [[]]),
         ("trajectory", [[]]),

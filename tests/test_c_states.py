@@ -28,7 +28,7 @@ def steppable(name: str, folder: Path) -> tuple[CModel, Callable[[int], None]]:
     return model, step
 
 
-@pytest.mark.parametrize("name", ["predictor", "predictor_2", "feed_drive", "stage_drive", "trajectory"])
+@pytest.mark.parametrize("name", ["predictor", "predictor_2", "compensator", "feed_drive", "stage_drive", "trajectory"])
 def test_a_run_from_a_saved_state_is_the_same_to_the_last_bit(name: str, tmp_path: Path) -> None:
     model, step = steppable(name, tmp_path)
     other, step_other = steppable(name, tmp_path)
@@ -47,7 +47,7 @@ def test_a_run_from_a_saved_state_is_the_same_to_the_last_bit(name: str, tmp_pat
     assert other.state.tobytes() == model.state.tobytes()
 
 
-@pytest.mark.parametrize("name", ["predictor", "feed_drive", "stage_drive", "trajectory"])
+@pytest.mark.parametrize("name", ["predictor", "compensator", "feed_drive", "stage_drive", "trajectory"])
 def test_foreign_truncated_and_damaged_states_are_refused(name: str, tmp_path: Path) -> None:
     model, step = steppable(name, tmp_path)
     step(0)
@@ -63,7 +63,12 @@ def test_foreign_truncated_and_damaged_states_are_refused(name: str, tmp_path: P
     with pytest.raises(RefusedError, match="saved with other parameters"):
         model.check_state(blob[:24] + struct.pack("<Q", 2) + blob[32:])
     if name != "feed_drive":  # its state has no numbers that must fit together
-        middle = {"predictor": 32 + 40 + 16, "stage_drive": 32 + 24 + 64, "trajectory": 32 + 40}[name]
+        middle = {
+            "predictor": 32 + 40 + 16,
+            "compensator": 32 + 40 + 16,
+            "stage_drive": 32 + 24 + 64,
+            "trajectory": 32 + 40,
+        }[name]
         with pytest.raises(RefusedError, match="does not hold together"):
             model.check_state(blob[:middle] + struct.pack("<Q", 2**60) + blob[middle + 8 :])
 

@@ -1,7 +1,8 @@
-/* How long one step of HybridPredictor takes, step by step, beside a loop of the same length that does nothing.
+/* How long one step of a model takes, step by step, beside a loop of the same length that does nothing: of
+ * HybridPredictor fed with a log, or of SepCompensator in closed loop with the drive of eq. (13).
  *
  * Usage: step_time STEPS LOG TIMES name=value ...
- *   LOG    x_d, then x, doubles, m, as many of each; played over and over
+ *   LOG    x_d, then x, doubles, m, as many of each; played over and over; in closed loop x_d alone is used
  *   TIMES  written: STEPS doubles, ns, the steps; then STEPS doubles, ns, the empty loop; "-" for none
  * Prints one line of JSON. Pinned to the processor it starts on where the system allows it.
  */
@@ -12,7 +13,9 @@
 #define _POSIX_C_SOURCE 200809L
 #endif
 
+#include "hsep_encoder.h"
 #include "hsep_fmu.h"
+#include "hsep_plant.h"
 
 #include <stdint.h>
 #include <stdio.h>
@@ -71,6 +74,30 @@ static void print_summary(const char *name, const double times[], size_t n)
     free(s);
 }
 
+/* The measured position at sample k, m. */
+typedef struct {
+    const double *x; /* (n_log,) m, of the log, delayed by the look-ahead */
+    size_t n_log, delay;
+    hsep_feed_drive drive; /* in closed loop */
+    hsep_encoder encoder;
+} position_source;
+
+static double measured(position_source *source, const double values[], size_t k)
+{
+#if defined(HSEP_MODEL_SEP_COMPENSATOR)
+    const double x_meas = hsep_encoder_measure(&source->encoder, hsep_feed_drive_x(&source->drive));
+    double reached = 0.0;
+    (void)k;
+    if (!hsep_feed_drive_step(&source->drive, values[HSEP_VR_x_dm], values[HSEP_VR_T_s], &reached)) {
+        fail("the drive has left the range of numbers");
+    }
+    return x_meas;
+#else
+    (void)values;
+    return source->x[k < source->delay ? 0 : (k - source->delay) % source->n_log];
+#endif
+}
+
 /* Count to n; the compiler cannot know that this does nothing. */
 static void idle(size_t n)
 {
@@ -125,10 +152,13 @@ int main(int n_arguments, char *arguments[])
     memset(times, 1, 2 * steps * sizeof *times); /* every page is there before the first step */
     const int pinned = pin();
     const double T_s = values[HSEP_VR_T_s];
-    const size_t delay = (size_t)values[HSEP_VR_Np];
+    position_source source = {.x = x, .n_log = n_log, .delay = (size_t)values[HSEP_VR_Np]};
+    source.drive = (hsep_feed_drive){.m = 1.0, .c = 15.7, .k = 24674.0, .c_nl = 100.0, .k_nl = 1000.0};
+    hsep_feed_drive_reset(&source.drive, x_d[0]);
+    hsep_encoder_init(&source.encoder, 5e-6, 0);
     for (size_t k = 0; k < steps; k++) {
         values[HSEP_VR_x_d_ahead] = x_d[k % n_log];
-        values[HSEP_VR_x_meas] = k < delay ? x_d[0] : x[(k - delay) % n_log];
+        values[HSEP_VR_x_meas] = measured(&source, values, k);
         const double t = (double)k * T_s, before = now_ns();
         const hsep_status status = hsep_model_step(&context, state, values, t, T_s, message);
         times[k] = now_ns() - before;
@@ -160,6 +190,9 @@ int main(int n_arguments, char *arguments[])
 
     printf("{\"steps\": %lu, \"pinned\": %s, ", (unsigned long)steps, pinned ? "true" : "false");
     printf("\"state_bytes\": %lu, ", (unsigned long)size);
+#if defined(HSEP_MODEL_SEP_COMPENSATOR)
+    printf("\"rms_e\": %.3e, ", values[HSEP_VR_rms_e]);
+#endif
     print_summary("step", times, steps);
     printf(", ");
     print_summary("empty", empty, steps);

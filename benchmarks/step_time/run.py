@@ -10,38 +10,30 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import re
 import shutil
 import statistics
 import subprocess
 import sys
 import tempfile
 import time
-from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # benchmarks are no part of the package
 
 import numpy as np
-from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from hybridsep.fmi.c_header import c_header
-from hybridsep.fmi.compiler import COMPILE_FLAGS
+from benchmarks.step_time.host import PREDICTOR, Array, Host, build, drive_log, instructions
 from hybridsep.lookahead import LookAhead
 from hybridsep.physics import ModalModel
-from hybridsep.plant import FeedDrive, simulate
 from hybridsep.predictor import HybridPredictor
 from hybridsep.regression import RidgeRegression
-from hybridsep.trajectory import staircase
-
-Array = NDArray[np.float64]
 
 HERE = Path(__file__).parent
-C_SOURCES = HERE.parents[1] / "fmu_src" / "c"
 CASES = ((50, 3), (100, 99))
 """p and q: the paper's, n = 55, and the largest, n = 201."""
 
@@ -51,50 +43,6 @@ MEDIAN_OVER_LAPACK_MAX = 5.0
 """Limit at n = 55; the aim is 3."""
 TAIL_OVER_MEDIAN_MAX = 15.0
 """Limit of p99.9 in time and of the most expensive step in instructions, both over the median step."""
-
-
-@dataclass(frozen=True)
-class Host:
-    """The program that steps the model, and the log it plays."""
-
-    program: Path
-    log: Path
-
-    def command(self, p: int, q: int, steps: int, times: Path | str) -> list[str]:
-        """Return the command that does so many steps and writes their times to a file, or to none with "-"."""
-        return [str(self.program), str(steps), str(self.log), str(times), f"p={p}", f"q={q}"]
-
-
-def drive_log() -> tuple[Array, Array]:
-    """Return commands and measured positions of one staircase, (6000,), m."""
-    x_d = staircase()[:-1]
-    x = simulate(FeedDrive(m=1.0, c=15.7, k=24674.0, c_nl=100.0, k_nl=1000.0), x_d, 1e-3)
-    return x_d, x + np.random.default_rng(0).normal(0.0, 5e-6, len(x))
-
-
-def build(folder: Path) -> Host:
-    """Compile the host with the model of the paper's drive."""
-    mode = ModalModel.spring_mass_damper(m=1.0, c=15.7, k=24674.0).modes[0]
-    parameters = {"Np": NP, "p": 50, "q": 3, "lambda": LAM, "T_s": 1e-3, "t_init": 0.3}
-    description = {
-        "model": "HybridPredictor",
-        "name": "HybridPredictor",
-        "parameters": {**parameters, "input_hold": 0, "dead_time": 0},
-        "modes": [{"f_n": mode.f_n, "zeta": mode.zeta, "alpha": mode.alpha, "beta": mode.beta}],
-    }
-    (folder / "hsep_fmu.h").write_text(c_header(description, "{benchmark}"), encoding="utf-8")
-    compiler = os.environ.get("CC") or shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
-    command = compiler.split() if compiler else [sys.executable, "-m", "ziglang", "cc", "-mcpu=baseline"]
-    sources = sorted((C_SOURCES / "core").glob("*.c")) + sorted((C_SOURCES / "model").glob("*.c"))
-    includes = [f"-I{path}" for path in (folder, C_SOURCES / "core", C_SOURCES / "model")]
-    program = folder / "step_time"
-    subprocess.run(
-        [*command, *COMPILE_FLAGS, *includes, str(HERE / "main.c"), *map(str, sources), "-lm", "-o", str(program)],
-        check=True,
-    )
-    log = folder / "log.bin"
-    log.write_bytes(np.concatenate(drive_log()).astype("<f8").tobytes())
-    return Host(program, log)
 
 
 def lapack_ns_per_sample(n: int) -> float:
@@ -140,36 +88,13 @@ def padasip_ns(n: int) -> Array | None:
     return took
 
 
-def instructions(host: Host, p: int, q: int, folder: Path) -> Array | None:
-    """Return the instructions of each step once learning has begun; None without valgrind."""
-    valgrind = shutil.which("valgrind")
-    if valgrind is None:
-        return None
-    out = folder / f"callgrind_{p}"
-    out.mkdir()
-    options = ["--tool=callgrind", "--toggle-collect=hsep_model_step", "--dump-after=hsep_model_step"]
-    command = [valgrind, *options, f"--callgrind-out-file={out}/out", *host.command(p, q, COUNTED_STEPS, "-")]
-    subprocess.run(command, check=True, capture_output=True)
-    counts = {}
-    for file in out.glob("out.*"):
-        part, total = (
-            re.search(pattern, file.read_text(encoding="utf-8", errors="replace"), re.MULTILINE)
-            for pattern in (r"^part: (\d+)", r"^(?:summary|totals): (\d+)")
-        )
-        if part and total:
-            counts[int(part[1])] = int(total[1])
-    if len(counts) < COUNTED_STEPS:
-        raise SystemExit(f"callgrind wrote {len(counts)} counts for {COUNTED_STEPS} steps")
-    return np.array([counts[k] for k in sorted(counts)][NP:COUNTED_STEPS], dtype=np.float64)
-
-
 def measure(host: Host, p: int, q: int, steps: int, folder: Path) -> dict[str, Any]:
     """Time host and LAPACK by turns; return medians over the turns, and the last turn's single times."""
     n, times = 2 + q + p, folder / "times.bin"
     turns, lapack = [], []
     for _ in range(REPETITIONS):
         lapack.append(lapack_ns_per_sample(n))
-        done = subprocess.run(host.command(p, q, steps, times), check=True, capture_output=True, text=True)
+        done = subprocess.run(host.command({"p": p, "q": q}, steps, times), check=True, capture_output=True, text=True)
         turns.append(json.loads(done.stdout))
     both = np.fromfile(times).reshape(2, steps)
     middle: dict[str, Any] = {
@@ -248,10 +173,12 @@ def main() -> int:
     console, missed, results = Console(width=110), 0, []
     with tempfile.TemporaryDirectory(prefix="hsep_step_time_") as name:
         folder = Path(name)
-        host = build(folder)
+        host = build(folder / "host", "HybridPredictor", PREDICTOR)
         for p, q in CASES:
             result = measure(host, p, q, options.steps, folder)
-            counts = instructions(host, p, q, folder)
+            counts = instructions(host, {"p": p, "q": q}, COUNTED_STEPS, folder / f"callgrind_{p}")
+            if counts is not None:
+                counts = counts[NP:]  # learning has begun
             show(result, counts, console)
             for held, text in limits(result, counts):
                 console.print(f"{'held  ' if held else 'MISSED'} {text}", highlight=False)

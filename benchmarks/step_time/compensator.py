@@ -1,0 +1,112 @@
+"""How long one step of the native SepCompensator takes in closed loop, beside HybridPredictor in the same run.
+
+Builds two C hosts (``main.c``): the compensator with the drive of eq. (13), and the predictor over the drive's log,
+both with the paper's settings. Times every step of both by turns, counts instructions step by step where valgrind is
+installed, and ends with 1 if a limit is missed. The second case has the trajectory's own limits as those of the drive:
+nearly every plan is bounded, which is the most that planning can cost.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import statistics
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # benchmarks are no part of the package
+
+from benchmarks.step_time.host import PREDICTOR, Array, Host, build, instructions
+
+COMPENSATOR = {
+    **PREDICTOR,
+    "preview": 200,
+    "spacing": 2,
+    "jerk_weight": 1.0,
+    "v_max": 0.1,
+    "a_max": 16.0,
+    "j_max": 5000.0,
+    "change_max": 1e-3,
+    "compensate": 2,
+}
+CASES: dict[str, dict[str, Any]] = {
+    "the paper's settings": {},
+    "limits of the drive = those of the trajectory": {"v_max": 0.08, "a_max": 8.0, "j_max": 1000.0},
+}
+REPETITIONS, COUNTED_STEPS = 5, 3500
+TAIL_MAX = 300e3
+"""Limit of p99.9, ns."""
+MEDIAN_OVER_PREDICTOR_MAX = 2.0
+
+
+def summaries(hosts: dict[str, tuple[Host, dict[str, Any]]], steps: int) -> dict[str, dict[str, Any]]:
+    """Run all hosts by turns; return the medians of each one's figures over the turns."""
+    turns: dict[str, list[dict[str, Any]]] = {name: [] for name in hosts}
+    for _ in range(REPETITIONS):
+        for name, (host, values) in hosts.items():
+            done = subprocess.run(host.command(values, steps, "-"), check=True, capture_output=True, text=True)
+            turns[name].append(json.loads(done.stdout))
+    return {
+        name: {
+            **{key: statistics.median(turn["step"][key] for turn in found) for key in found[0]["step"]},
+            "state_bytes": found[0]["state_bytes"],
+            "rms_e": found[0].get("rms_e"),
+            "empty": statistics.median(turn["empty"]["p99.9"] for turn in found),
+        }
+        for name, found in turns.items()
+    }
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--steps", type=int, default=120_000, help="steps of each turn")
+    options = parser.parse_args()
+    console, missed = Console(width=120), 0
+    with tempfile.TemporaryDirectory(prefix="hsep_step_time_") as name:
+        folder = Path(name)
+        predictor = build(folder / "predictor", "HybridPredictor", PREDICTOR)
+        compensator = build(folder / "compensator", "SepCompensator", COMPENSATOR)
+        hosts: dict[str, tuple[Host, dict[str, Any]]] = {"HybridPredictor": (predictor, {})}
+        hosts |= {case: (compensator, values) for case, values in CASES.items()}
+        found = summaries(hosts, options.steps)
+        counts: dict[str, Array] = {}
+        for i, (case, (host, values)) in enumerate(hosts.items()):
+            counted = instructions(host, values, COUNTED_STEPS, folder / f"callgrind_{i}")
+            if counted is not None:
+                counts[case] = counted[int(COMPENSATOR["preview"]) :]
+    table = Table(title="one step: ns, and instructions in thousands (paper's settings)")
+    for heading in ("", "median", "p99", "p99.9", "max", "instr. median", "p99", "p99.9", "most", "state, kB"):
+        table.add_column(heading, justify="right" if heading else "left")
+    for case, figures in found.items():
+        times = [f"{figures[key]:.0f}" for key in ("median", "p99", "p99.9", "max")]
+        shown = ["–"] * 4
+        if case in counts:
+            shown = [f"{level / 1e3:.1f}" for level in np.percentile(counts[case], [50, 99, 99.9, 100])]
+        table.add_row(case, *times, *shown, f"{figures['state_bytes'] / 1e3:.0f}")
+    console.print(table)
+    ours, theirs = found["the paper's settings"], found["HybridPredictor"]
+    ratio = ours["median"] / theirs["median"]
+    checks = [
+        (ours["p99.9"] <= TAIL_MAX, f"p99.9 = {ours['p99.9'] / 1e3:.0f} µs, limit ≤ {TAIL_MAX / 1e3:g} µs"),
+        (
+            ratio <= MEDIAN_OVER_PREDICTOR_MAX,
+            f"median / HybridPredictor's median = {ratio:.2f}, limit ≤ {MEDIAN_OVER_PREDICTOR_MAX:g}",
+        ),
+    ]
+    for held, text in checks:
+        console.print(f"{'held  ' if held else 'MISSED'} {text}", highlight=False)
+        missed += not held
+    if not counts:
+        console.print("instructions are not counted: valgrind is not installed", highlight=False)
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

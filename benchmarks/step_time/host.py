@@ -1,0 +1,105 @@
+"""The C host that times a model step by step: its build, its runs, its instructions."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridsep.fmi.c_header import c_header
+from hybridsep.fmi.compiler import COMPILE_FLAGS
+from hybridsep.physics import ModalModel
+from hybridsep.plant import FeedDrive, simulate
+from hybridsep.trajectory import staircase
+
+__all__ = ["PREDICTOR", "Array", "Host", "build", "drive_log", "instructions"]
+
+Array = NDArray[np.float64]
+
+HERE = Path(__file__).parent
+C_SOURCES = HERE.parents[1] / "fmu_src" / "c"
+
+PREDICTOR = {"Np": 100, "p": 50, "q": 3, "lambda": 1e-12, "T_s": 1e-3, "t_init": 0.3, "input_hold": 0, "dead_time": 0}
+"""The paper's settings."""
+
+
+@dataclass(frozen=True)
+class Host:
+    """The program that steps the model, and the log it plays."""
+
+    program: Path
+    log: Path
+
+    def command(self, values: dict[str, Any], steps: int, times: Path | str) -> list[str]:
+        """Return the command that does so many steps and writes their times to a file, or to none with "-"."""
+        set_values = [f"{name}={value}" for name, value in values.items()]
+        return [str(self.program), str(steps), str(self.log), str(times), *set_values]
+
+
+def drive_log() -> tuple[Array, Array]:
+    """Return commands and measured positions of one staircase, (6000,), m."""
+    x_d = staircase()[:-1]
+    x = simulate(FeedDrive(m=1.0, c=15.7, k=24674.0, c_nl=100.0, k_nl=1000.0), x_d, 1e-3)
+    return x_d, x + np.random.default_rng(0).normal(0.0, 5e-6, len(x))
+
+
+def build(folder: Path, model: str, parameters: dict[str, Any]) -> Host:
+    """Compile the host with a model of the paper's drive."""
+    folder.mkdir()
+    mode = ModalModel.spring_mass_damper(m=1.0, c=15.7, k=24674.0).modes[0]
+    modes = [{"f_n": mode.f_n, "zeta": mode.zeta, "alpha": mode.alpha, "beta": mode.beta}]
+    description = {"model": model, "name": model, "parameters": parameters, "modes": modes}
+    (folder / "hsep_fmu.h").write_text(c_header(description, "{benchmark}"), encoding="utf-8")
+    compiler = os.environ.get("CC") or shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
+    command = compiler.split() if compiler else [sys.executable, "-m", "ziglang", "cc", "-mcpu=baseline"]
+    sources = sorted((C_SOURCES / "core").glob("*.c")) + sorted((C_SOURCES / "model").glob("*.c"))
+    includes = [f"-I{path}" for path in (folder, C_SOURCES / "core", C_SOURCES / "model")]
+    program = folder / "step_time"
+    subprocess.run(
+        [*command, *COMPILE_FLAGS, *includes, str(HERE / "main.c"), *map(str, sources), "-lm", "-o", str(program)],
+        check=True,
+    )
+    log = folder / "log.bin"
+    log.write_bytes(np.concatenate(drive_log()).astype("<f8").tobytes())
+    return Host(program, log)
+
+
+def instructions(host: Host, values: dict[str, Any], steps: int, folder: Path) -> Array | None:
+    """Return the instructions of each step, (steps,); None without valgrind.
+
+    Parameters
+    ----------
+    host : Host
+    values : mapping
+        Parameters that differ from those the host was built with.
+    steps : int
+        Steps to be counted.
+    folder : Path
+        Where valgrind writes; made.
+    """
+    valgrind = shutil.which("valgrind")
+    if valgrind is None:
+        return None
+    folder.mkdir()
+    options = ["--tool=callgrind", "--toggle-collect=hsep_model_step", "--dump-after=hsep_model_step"]
+    command = [valgrind, *options, f"--callgrind-out-file={folder}/out", *host.command(values, steps, "-")]
+    subprocess.run(command, check=True, capture_output=True)
+    counts = {}
+    for file in folder.glob("out.*"):
+        part, total = (
+            re.search(pattern, file.read_text(encoding="utf-8", errors="replace"), re.MULTILINE)
+            for pattern in (r"^part: (\d+)", r"^(?:summary|totals): (\d+)")
+        )
+        if part and total:
+            counts[int(part[1])] = int(total[1])
+    if len(counts) < steps:
+        raise SystemExit(f"callgrind wrote {len(counts)} counts for {steps} steps")
+    return np.array([counts[k] for k in sorted(counts)][:steps], dtype=np.float64)
