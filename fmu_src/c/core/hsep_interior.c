@@ -73,7 +73,24 @@ double *hsep_interior_high(hsep_interior *self, const hsep_splines *splines)
 }
 
 /* B x - b of a row: values - low, or high - values. */
-static inline double interior_distance(int i, double value, double bound) { return i == 0 ? value - bound : bound - value; }
+static inline double interior_distance(int i, double value, double bound)
+{
+    return i == 0 ? value - bound : bound - value;
+}
+
+/* The rows of an order that the splines asked for touch, r = begin ... end - 1. */
+typedef struct {
+    uint64_t begin, end;
+} interior_range;
+
+static void interior_ranges(const hsep_splines *splines, uint64_t first, interior_range ranges[HSEP_ORDERS])
+{
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        hsep_splines_touched(splines, first, order, &ranges[order].begin, &ranges[order].end);
+        ranges[order].begin += order * splines->preview;
+        ranges[order].end += order * splines->preview;
+    }
+}
 
 void hsep_interior_begin(hsep_interior *self, const hsep_splines *splines, uint64_t first, double cost)
 {
@@ -81,17 +98,15 @@ void hsep_interior_begin(hsep_interior *self, const hsep_splines *splines, uint6
     self->steps = 0;
     self->sides = 0.0;
     interior_arrays a = interior_open(self, splines);
+    interior_range ranges[HSEP_ORDERS];
+    interior_ranges(splines, first, ranges);
     hsep_splines_rows(splines, a.x, first, a.values);
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        uint64_t begin, end;
-        hsep_splines_touched(splines, first, order, &begin, &end);
-        self->sides += 2.0 * (double)(end - begin);
+        self->sides += 2.0 * (double)(ranges[order].end - ranges[order].begin);
     }
     self->cost = cost / self->sides;
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        uint64_t begin, end;
-        hsep_splines_touched(splines, first, order, &begin, &end);
-        for (uint64_t r = order * splines->preview + begin; r < order * splines->preview + end; r++) {
+        for (uint64_t r = ranges[order].begin; r < ranges[order].end; r++) {
             for (int i = 0; i < 2; i++) {
                 interior_side *side = &a.side[i];
                 side->s[r] = fmax(interior_distance(i, a.values[r], a.bound[i][r]), interior_first_slack);
@@ -149,20 +164,6 @@ static inline void interior_change(
     *dz = side->aim[r] - side->z[r] * side->inverse[r] * *ds;
 }
 
-/* What goes through the touched rows of an order, r = begin ... end - 1, in each part of a step. */
-typedef struct {
-    uint64_t begin, end;
-} interior_range;
-
-static void interior_ranges(const hsep_splines *splines, uint64_t first, interior_range ranges[HSEP_ORDERS])
-{
-    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        hsep_splines_touched(splines, first, order, &ranges[order].begin, &ranges[order].end);
-        ranges[order].begin += order * splines->preview;
-        ranges[order].end += order * splines->preview;
-    }
-}
-
 /* rows := B' sides of (aim + z - z off / s), the part of the right-hand side that the bounds make. */
 static void interior_push(const interior_arrays *a, const interior_range ranges[HSEP_ORDERS])
 {
@@ -195,30 +196,96 @@ static interior_room interior_rooms(const interior_arrays *a, const interior_ran
     return room;
 }
 
-int hsep_interior_step(hsep_interior *self, const hsep_splines *splines, const double P[])
+/* The values of x, the mean of s z, the largest distance of B x - b from s; the weights of A' W A go to along, and the
+ * predictor's aim is set, as if s z = 0 could be reached at once. */
+static double interior_measure(
+    const interior_arrays *a, const interior_range ranges[HSEP_ORDERS], double sides, double *outside)
 {
-    interior_arrays a = interior_open(self, splines);
-    interior_range ranges[HSEP_ORDERS];
-    interior_ranges(splines, self->first, ranges);
-    P += self->first * splines->n - self->first * (self->first - 1) / 2; /* rows 0 ... first - 1 are left out */
-
-    hsep_splines_rows(splines, a.x, self->first, a.values);
-    double mean = 0.0, outside = 0.0;
+    double sum = 0.0;
+    *outside = 0.0;
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         for (uint64_t r = ranges[order].begin; r < ranges[order].end; r++) {
             double weight = 0.0;
             for (int i = 0; i < 2; i++) {
-                interior_side *side = &a.side[i];
-                const double off = interior_distance(i, a.values[r], a.bound[i][r]) - side->s[r];
-                mean += side->s[r] * side->z[r];
-                outside = fmax(outside, fabs(off));
+                const interior_side *side = &a->side[i];
+                const double off = interior_distance(i, a->values[r], a->bound[i][r]) - side->s[r];
+                sum += side->s[r] * side->z[r];
+                *outside = fmax(*outside, fabs(off));
                 weight += side->z[r] * side->inverse[r];
-                side->aim[r] = -side->z[r]; /* predictor: as if s z = 0 could be reached at once */
+                side->aim[r] = -side->z[r];
             }
-            a.along[r] = weight;
+            a->along[r] = weight;
         }
     }
-    mean /= self->sides;
+    return sum / sides;
+}
+
+/* The mean of s z after the predictor's step. */
+static double interior_reached(
+    const interior_arrays *a, const interior_range ranges[HSEP_ORDERS], double sides)
+{
+    const interior_room room = interior_rooms(a, ranges);
+    double sum = 0.0;
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        for (uint64_t r = ranges[order].begin; r < ranges[order].end; r++) {
+            for (int i = 0; i < 2; i++) {
+                double ds, dz;
+                interior_change(a, i, r, &ds, &dz);
+                sum += (a->side[i].s[r] + room.primal * ds) * (a->side[i].z[r] + room.dual * dz);
+            }
+        }
+    }
+    return sum / sides;
+}
+
+/* The corrector's aim: the centre, with the curvature that the predictor shows. */
+static void interior_correct(const interior_arrays *a, const interior_range ranges[HSEP_ORDERS], double centre)
+{
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        for (uint64_t r = ranges[order].begin; r < ranges[order].end; r++) {
+            for (int i = 0; i < 2; i++) {
+                const interior_side *side = &a->side[i];
+                double ds, dz;
+                interior_change(a, i, r, &ds, &dz);
+                side->aim[r] = (centre - ds * dz) * side->inverse[r] - side->z[r];
+            }
+        }
+    }
+}
+
+/* Go by the corrector's step, as far as s and z stay > 0. */
+static void interior_move(const interior_arrays *a, const interior_range ranges[HSEP_ORDERS])
+{
+    const interior_room room = interior_rooms(a, ranges);
+    const double primal = room.primal >= 1.0 ? 1.0 : interior_way * room.primal;
+    const double dual = room.dual >= 1.0 ? 1.0 : interior_way * room.dual;
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        for (uint64_t r = ranges[order].begin; r < ranges[order].end; r++) {
+            for (int i = 0; i < 2; i++) {
+                const interior_side *side = &a->side[i];
+                double ds, dz;
+                interior_change(a, i, r, &ds, &dz);
+                side->s[r] += primal * ds;
+                side->z[r] += dual * dz;
+                side->inverse[r] = 1.0 / side->s[r];
+            }
+        }
+    }
+    for (uint64_t j = 0; j < a->n; j++) {
+        a->x[j] += primal * a->dx[j];
+    }
+}
+
+int hsep_interior_step(hsep_interior *self, const hsep_splines *splines, const double P[])
+{
+    const interior_arrays a = interior_open(self, splines);
+    interior_range ranges[HSEP_ORDERS];
+    interior_ranges(splines, self->first, ranges);
+    P += self->first * splines->n - self->first * (self->first - 1) / 2; /* rows 0 ... first - 1 are left out */
+
+    double outside;
+    hsep_splines_rows(splines, a.x, self->first, a.values);
+    const double mean = interior_measure(&a, ranges, self->sides, &outside);
     if (self->steps == HSEP_INTERIOR_STEPS ||
         (mean < interior_tolerance * self->cost && outside < interior_outside)) {
         return 1;
@@ -233,48 +300,10 @@ int hsep_interior_step(hsep_interior *self, const hsep_splines *splines, const d
     interior_force(&a, P);
     interior_push(&a, ranges);
     interior_direction(&a, splines, self->first);
-    interior_room room = interior_rooms(&a, ranges);
-    double reached = 0.0;
-    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        for (uint64_t r = ranges[order].begin; r < ranges[order].end; r++) {
-            for (int i = 0; i < 2; i++) {
-                double ds, dz;
-                interior_change(&a, i, r, &ds, &dz);
-                reached += (a.side[i].s[r] + room.primal * ds) * (a.side[i].z[r] + room.dual * dz);
-            }
-        }
-    }
-    const double share = reached / self->sides / mean;
-    const double centre = fmax(mean * share * share * share, 0.1 * interior_tolerance * self->cost);
-    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        for (uint64_t r = ranges[order].begin; r < ranges[order].end; r++) {
-            for (int i = 0; i < 2; i++) { /* corrector: towards the centre, with the predictor's curvature */
-                interior_side *side = &a.side[i];
-                double ds, dz;
-                interior_change(&a, i, r, &ds, &dz);
-                side->aim[r] = (centre - ds * dz) * side->inverse[r] - side->z[r];
-            }
-        }
-    }
+    const double share = interior_reached(&a, ranges, self->sides) / mean;
+    interior_correct(&a, ranges, fmax(mean * share * share * share, 0.1 * interior_tolerance * self->cost));
     interior_push(&a, ranges);
     interior_direction(&a, splines, self->first);
-    room = interior_rooms(&a, ranges);
-    const double primal = room.primal >= 1.0 ? 1.0 : interior_way * room.primal;
-    const double dual = room.dual >= 1.0 ? 1.0 : interior_way * room.dual;
-    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        for (uint64_t r = ranges[order].begin; r < ranges[order].end; r++) {
-            for (int i = 0; i < 2; i++) {
-                interior_side *side = &a.side[i];
-                double ds, dz;
-                interior_change(&a, i, r, &ds, &dz);
-                side->s[r] += primal * ds;
-                side->z[r] += dual * dz;
-                side->inverse[r] = 1.0 / side->s[r];
-            }
-        }
-    }
-    for (uint64_t j = 0; j < a.n; j++) {
-        a.x[j] += primal * a.dx[j];
-    }
+    interior_move(&a, ranges);
     return 0;
 }
