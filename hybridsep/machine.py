@@ -13,9 +13,10 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, ValidationInfo, model_validator
 
 from ._data_files import data_folder
+from .compensator import SepCompensator, SepState
 from .errors import MachineError, ParameterError
 from .limits import Limits
-from .parameters import INPUT_HOLDS, PARAMETERS, check, check_lags
+from .parameters import INPUT_HOLDS, PARAMETERS, check, check_lags, check_preview
 from .physics import ModalModel, Mode
 from .plant import FeedDrive, Plant, StageDrive
 from .predictor import HybridPredictor
@@ -39,6 +40,9 @@ def _checked(value: Any, info: ValidationInfo) -> Any:
 
 Number = Annotated[float, BeforeValidator(_checked)]
 Whole = Annotated[int, BeforeValidator(_checked)]
+OptionalNumber = Annotated[float | None, BeforeValidator(_checked)]
+OptionalWhole = Annotated[int | None, BeforeValidator(_checked)]
+"""Given, or left out; there is no null in TOML."""
 
 
 Line = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]+$")]
@@ -101,6 +105,19 @@ class PredictorSection(_Section):
         return self
 
 
+class CompensatorSection(_Section):
+    """Parameters of the compensator; the predictor's count where ``Np``, ``p``, ``q``, λ or ``t_init`` is left out."""
+
+    Np: OptionalWhole = None
+    p: OptionalWhole = None
+    q: OptionalWhole = None
+    lam: OptionalNumber = Field(default=None, alias="lambda")
+    t_init: OptionalNumber = None
+    preview: OptionalWhole = None
+    spacing: OptionalWhole = None
+    jerk_weight: Number = _default("jerk_weight")
+
+
 class FeedDriveSection(_Section):
     """The drive of eq. (13); its linear part is ``[physics.spring_mass_damper]``."""
 
@@ -152,6 +169,7 @@ class Machine(_Section):
     T_s: Number = _default("T_s")
     physics: Physics
     predictor: PredictorSection = PredictorSection()
+    compensator: CompensatorSection = CompensatorSection()
     plant: Annotated[FeedDriveSection | StageSection, Field(discriminator="kind")] | None = None
     limits: LimitsSection | None = None
     drive_limits: DriveLimitsSection | None = None
@@ -165,6 +183,19 @@ class Machine(_Section):
             raise ValueError("a plant of kind stage needs [[physics.mode]] entries")
         if self.plant is not None and self.physics.dead_time:
             raise ValueError("a machine with a plant must have physics.dead_time = 0: the plants have none")
+        return self
+
+    @model_validator(mode="after")
+    def _compensator_fits(self) -> Machine:
+        if self.drive_limits is None and "compensator" not in self.model_fields_set:
+            return self  # no compensator is meant
+        values = self._compensation()
+        problems = check_lags(**{name: values[name] for name in ("Np", "p", "q")})
+        problems += check_preview(**{name: values[name] for name in ("Np", "preview", "spacing")})
+        if problems:
+            inherited = [name for name in ("Np", "p", "q") if getattr(self.compensator, name) is None]
+            origin = f" ({', '.join(inherited)} of [predictor])" if inherited else ""
+            raise ValueError(f"compensator: {'; '.join(problems)}{origin}")
         return self
 
     @property
@@ -181,6 +212,22 @@ class Machine(_Section):
             self.model,
             **{"Ts": self.T_s, "input_hold": self.physics.input_hold, **self.predictor.model_dump(), **changes},
         )
+
+    def new_compensator(self, best: SepState = SepState.HYBRID, **changes: Any) -> SepCompensator:
+        """Return a compensator for this machine, within its ``[drive_limits]`` if it has some.
+
+        Parameters
+        ----------
+        best : SepState
+            Best model to use.
+        **changes
+            Arguments of :class:`SepCompensator`, or of :class:`HybridPredictor` for its predictor.
+        """
+        limits, change_max = self.command_limits()
+        own = ("preview", "spacing", "jerk_weight", "limits", "change_max")
+        values = {"limits": limits, "change_max": change_max, **self._compensation(**changes)}
+        predictor = self.new_predictor(**{name: value for name, value in values.items() if name not in own})
+        return SepCompensator(predictor, best=best, **{name: values[name] for name in own})
 
     def new_plant(self, **changes: float) -> Plant:
         """Return the nonlinear plant; ``changes`` are values of its own section, such as ``c_nl`` or ``kappa``.
@@ -202,10 +249,38 @@ class Machine(_Section):
 
     def fmi_parameters(self) -> dict[str, float | int]:
         """Return the start values of the predictor FMU's scalar parameters, under their FMI names."""
-        values: dict[str, float | int] = self.predictor.model_dump(by_alias=True)
-        values["T_s"] = self.T_s
-        values["input_hold"] = INPUT_HOLDS.index(self.physics.input_hold)
-        values["dead_time"] = self.physics.dead_time
+        return {**self.predictor.model_dump(by_alias=True), **self._fmi_physics()}
+
+    def fmi_compensator_parameters(self) -> dict[str, float | int]:
+        """Return the start values of the compensator FMU's scalar parameters, under their FMI names.
+
+        Raises
+        ------
+        MachineError
+            If the file has no ``[drive_limits]``: without them there is no such FMU.
+        """
+        limits, change_max = self.command_limits()
+        if limits is None or change_max is None:
+            raise MachineError(f"machine {self.name} has no [drive_limits] section, which a compensator FMU needs")
+        values = self._compensation()
+        values["lambda"] = values.pop("lam")
+        bounds = {"v_max": limits.velocity, "a_max": limits.acceleration, "j_max": limits.jerk}
+        more = {"change_max": change_max, "compensate": _default("compensate")}
+        return {**values, **self._fmi_physics(), **bounds, **more}
+
+    def _fmi_physics(self) -> dict[str, float | int]:
+        hold = INPUT_HOLDS.index(self.physics.input_hold)
+        return {"T_s": self.T_s, "input_hold": hold, "dead_time": self.physics.dead_time}
+
+    def _compensation(self, **changes: Any) -> dict[str, Any]:
+        """Return the predictor's and the compensator's parameters, by the library's names.
+
+        Where they are left out, ``spacing`` and ``preview`` fit ``Np``, if a preview in its range does.
+        """
+        section = self.compensator.model_dump(exclude_none=True)
+        values = {**self.predictor.model_dump(), **section, **changes}
+        values.setdefault("spacing", 1 if values["Np"] % _default("spacing") else _default("spacing"))
+        values.setdefault("preview", min(max(2 * values["Np"], _default("preview")), PARAMETERS["preview"].maximum))
         return values
 
     def trajectory_limits(self) -> Limits:

@@ -20,6 +20,7 @@ __all__ = [
     "Parameter",
     "check",
     "check_lags",
+    "check_preview",
     "check_together",
     "samples_before",
 ]
@@ -96,6 +97,15 @@ PARAMETERS: Mapping[str, Parameter] = _table(
     Parameter("t_init", float, "s", "warm-up: until then x_h = x_pb, while learning goes on", 0.3, 0.0),
     Parameter("input_hold", int, "1", "x_d between samples: 0 zero-order, 1 first-order hold", 0, 0, 1),
     Parameter("dead_time", int, "1", "whole samples of dead time in the physics model", 0, 0, 100_000),
+    # The compensator.
+    Parameter("preview", int, "1", "samples planned ahead, at least Np + 4·spacing + 3", 200, 8, 2000),
+    Parameter("spacing", int, "1", "samples between the knots of the change, a divisor of Np", 2, 1, 1000),
+    Parameter("jerk_weight", float, "1", "weight of the change's jerk against the tracking error", 1.0, 0.0),
+    Parameter("v_max", float, "m/s", "largest velocity of the modified command", 0.1, above=0.0, display_unit="mm/s"),
+    Parameter("a_max", float, "m/s2", "largest acceleration of the modified command", 16.0, above=0.0),
+    Parameter("j_max", float, "m/s3", "largest jerk of the modified command", 5000.0, above=0.0),
+    Parameter("change_max", float, "m", "largest change of the command", 1e-3, above=0.0, display_unit="mm"),
+    Parameter("compensate", int, "1", "best model to compensate with: 0 off, 1 physics, 2 hybrid", 2, 0, 2),
     # One mode of eq. (15).
     Parameter("f_n", float, "Hz", "natural frequency of the mode", above=0.0),
     Parameter("zeta", float, "1", "damping ratio of the mode", above=0.0),
@@ -196,6 +206,17 @@ def check_lags(*, Np: int, p: int, q: int) -> list[str]:
         problems.append(f"p must be 1 … Np = {Np}, got {p}; lower p or raise Np")
     if not 0 <= q < Np:
         problems.append(f"q must be 0 … Np − 1 = {Np - 1}, got {q}; lower q or raise Np")
+    return problems
+
+
+def check_preview(*, Np: int, preview: int, spacing: int) -> list[str]:
+    """Say what is wrong between ``Np``, ``preview`` and ``spacing``; an empty list if nothing is."""
+    problems = []
+    if Np % spacing:
+        problems.append(f"spacing must be ≥ 1 and divide Np = {Np}, got {spacing}")
+    least = Np + 4 * spacing + 3
+    if preview < least:
+        problems.append(f"preview must be ≥ Np + 4·spacing + 3 = {least}, got {preview}")
     return problems
 
 

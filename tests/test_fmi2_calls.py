@@ -25,7 +25,13 @@ from hybridsep.fmi.native_backend import sources
 from hybridsep.machine import Machine, load_machine
 
 STATES = ("instantiated", "Initialization Mode", "stepping", "terminated")
-FUZZED = {"HybridPredictor": 16, "FeedDrive": 6, "FeedDrive_als25010_x": 6, "ReferenceTrajectory": 6}
+FUZZED = {
+    "HybridPredictor": 16,
+    "SepCompensator": 12,
+    "FeedDrive": 6,
+    "FeedDrive_als25010_x": 6,
+    "ReferenceTrajectory": 6,
+}
 """How many seconds each model is called at random."""
 
 SANITIZERS = ("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
@@ -549,14 +555,15 @@ CLANG = pytest.param([sys.executable, "-m", "ziglang", "cc"], id="clang")
 
 
 @pytest.mark.parametrize("compiler", [GCC, CLANG])
-@pytest.mark.parametrize("machine", ["spring_mass_damper", "als25010_x"])
-def test_each_source_compiles_alone_without_warnings(tmp_path: Path, compiler: list[str], machine: str) -> None:
+@pytest.mark.parametrize("model", ["HybridPredictor", "SepCompensator", "FeedDrive"])
+def test_each_source_compiles_alone_without_warnings(tmp_path: Path, compiler: list[str], model: str) -> None:
     parameters: dict[str, object] = dict.fromkeys(("f", "kappa", "noise_std", "seed"), 0) | {"T_s": 1e-3}
     mode = {"f_n": 25.0, "zeta": 0.05, "alpha": 1.0, "beta": 0.0}
     description = {"model": "FeedDrive", "name": "Stage", "parameters": parameters, "modes": [mode]}
-    if machine == "spring_mass_damper":
-        fmi = load_machine(machine).fmi_parameters()
-        description = {"model": "HybridPredictor", "name": "Predictor", "parameters": fmi, "modes": [mode]}
+    if model != "FeedDrive":
+        machine = load_machine("spring_mass_damper")
+        fmi = machine.fmi_parameters() if model == "HybridPredictor" else machine.fmi_compensator_parameters()
+        description = {"model": model, "name": model, "parameters": fmi, "modes": [mode]}
     for file, content in sources(description, "{}").items():
         (tmp_path / file).write_bytes(content)
 

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hybridsep import MachineError, load_machine, machine_names
+from hybridsep import Limits, MachineError, SepState, load_machine, machine_names
+from hybridsep.compensator import RECOMMENDED
 from hybridsep.machine import Machine, Physics, SpringMassDamper
 
 GOOD = """
@@ -112,6 +113,97 @@ def test_bad_entries_are_refused_by_name(tmp_path: Path, old: str, new: str, mes
     assert old in GOOD
     with pytest.raises(MachineError, match=message):
         load_machine(write(tmp_path, GOOD.replace(old, new)))
+
+
+def test_the_compensators_settings_are_the_recommended_ones() -> None:
+    for name in ("spring_mass_damper", "als25010_x", "als25010_y"):
+        machine = load_machine(name)
+        compensator = machine.new_compensator()
+        assert {key: getattr(compensator.predictor, key) for key in RECOMMENDED} == RECOMMENDED
+        assert (compensator.preview, compensator.spacing, compensator.jerk_weight) == (200, 2, 1.0)
+        assert (compensator.limits, compensator.change_max) == (Limits(0.1, 16.0, 5000.0), 1e-3)
+        assert compensator.best is SepState.HYBRID
+        assert machine.new_predictor().Np == 100
+
+
+COMPENSATED = GOOD + "\n[drive_limits]\nvelocity = 0.2\nacceleration = 8.0\njerk = 900.0\n\n[compensator]\n"
+
+
+def test_what_the_compensator_section_leaves_out_is_the_predictors(tmp_path: Path) -> None:
+    assert load_machine(write(tmp_path, COMPENSATED)).fmi_compensator_parameters() == {
+        "Np": 50,
+        "p": 20,
+        "q": 3,
+        "lambda": 1e-12,
+        "T_s": 0.002,
+        "t_init": 0.3,
+        "input_hold": 0,
+        "dead_time": 0,
+        "preview": 200,
+        "spacing": 2,
+        "jerk_weight": 1.0,
+        "v_max": 0.2,
+        "a_max": 8.0,
+        "j_max": 900.0,
+        "change_max": 1e-3,
+        "compensate": 2,
+    }
+    entries = "Np = 30\nq = 9\nlambda = 1e-9\nt_init = 0.1\npreview = 180\nspacing = 3\njerk_weight = 0\n"
+    machine = load_machine(write(tmp_path, COMPENSATED + entries))
+    given = {"Np": 30, "p": 20, "q": 9, "lambda": 1e-9, "t_init": 0.1, "preview": 180, "spacing": 3, "jerk_weight": 0.0}
+    found = machine.fmi_compensator_parameters()
+    assert {name: found[name] for name in given} == given
+    compensator = machine.new_compensator(SepState.PHYSICS, p=10, preview=90, change_max=None)
+    assert (compensator.predictor.p, compensator.predictor.Np, compensator.predictor.lam) == (10, 30, 1e-9)
+    assert (compensator.preview, compensator.spacing, compensator.change_max) == (90, 3, None)
+    assert (compensator.best, compensator.predictor.Ts) == (SepState.PHYSICS, 0.002)
+    assert machine.fmi_parameters()["Np"] == 50
+
+
+@pytest.mark.parametrize(("Np", "preview", "spacing"), [(75, 200, 1), (150, 300, 2), (1500, 2000, 2)])
+def test_a_predictors_section_alone_gives_a_compensator(tmp_path: Path, Np: int, preview: int, spacing: int) -> None:
+    text = COMPENSATED.replace("[compensator]\n", "").replace("Np = 50", f"Np = {Np}")
+    compensator = load_machine(write(tmp_path, text)).new_compensator()
+    assert (compensator.predictor.Np, compensator.preview, compensator.spacing) == (Np, preview, spacing)
+
+
+@pytest.mark.parametrize(
+    ("entries", "message"),
+    [
+        ("preview = 7", r"axis.toml: compensator.preview: preview must be 8 … 2000, got 7"),
+        ("spacing = 0", r"compensator.spacing: spacing must be 1 … 1000, got 0"),
+        ("jerk_weight = -1.0", r"compensator.jerk_weight: jerk_weight must be ≥ 0, got -1.0"),
+        ("jerk_weight = nan", r"compensator.jerk_weight: jerk_weight must be finite, got nan"),
+        ("lambda = 0", r"compensator.lambda: lambda must be > 0 m2, got 0"),
+        ("Np = 2.5", r"compensator.Np: Np must be a whole number, got 2.5"),
+        ('p = "many"', r"compensator.p: p must be a number, got 'many'"),
+        ("change_max = 1e-3", r"compensator.change_max is not an entry"),
+        ("spacing = 3", r"compensator: spacing must be ≥ 1 and divide Np = 50, got 3 \(Np, p, q of \[predictor\]\)"),
+        ("Np = 60\npreview = 70", r"compensator: preview must be ≥ Np \+ 4·spacing \+ 3 = 71, got 70 \(p, q of "),
+        ("Np = 20\np = 5\nq = 20", r"compensator: q must be 0 … Np − 1 = 19, got 20; lower q or raise Np$"),
+        ("Np = 10", r"compensator: p must be 1 … Np = 10, got 20; .* \(p, q of \[predictor\]\)"),
+    ],
+)
+def test_bad_entries_of_the_compensator_are_refused_by_name(tmp_path: Path, entries: str, message: str) -> None:
+    with pytest.raises(MachineError, match=message):
+        load_machine(write(tmp_path, COMPENSATED + entries + "\n"))
+
+
+def test_a_long_window_without_a_compensator_is_allowed(tmp_path: Path) -> None:
+    long = GOOD.replace("Np = 50", "Np = 5000")
+    assert load_machine(write(tmp_path, long)).predictor.Np == 5000
+    expected = r"compensator: preview must be ≥ Np \+ 4·spacing \+ 3 = 5011, got 2000 \(Np, p, q of \[predictor\]\)"
+    for more in ("[compensator]\n", "[drive_limits]\nvelocity = 1\nacceleration = 1\njerk = 1\n"):
+        with pytest.raises(MachineError, match=expected):
+            load_machine(write(tmp_path, f"{long}\n{more}"))
+
+
+def test_without_drive_limits_there_is_a_compensator_but_no_fmu(tmp_path: Path) -> None:
+    machine = load_machine(write(tmp_path, GOOD))
+    compensator = machine.new_compensator()
+    assert (compensator.limits, compensator.change_max) == (None, None)
+    with pytest.raises(MachineError, match=r"machine axis has no \[drive_limits\] section, which a compensator FMU"):
+        machine.fmi_compensator_parameters()
 
 
 def test_a_file_that_is_not_there() -> None:

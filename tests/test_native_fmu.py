@@ -37,8 +37,8 @@ from hybridsep.trajectory import spiral, staircase
 
 etree: Any = import_module("lxml.etree")  # comes with fmpy, has no types
 
-NATIVE = ["HybridPredictor", "FeedDrive", "ReferenceTrajectory"]
-NATIVE += [f"{model}_als25010_{axis}" for axis in "xy" for model in ("HybridPredictor", "FeedDrive")]
+MODELS = ("HybridPredictor", "SepCompensator", "FeedDrive")
+NATIVE = [*MODELS, "ReferenceTrajectory", *(f"{model}_als25010_{axis}" for axis in "xy" for model in MODELS)]
 NATIVE += ["HybridPredictor_emps"]
 TOLERANCE = 1e-11  # m
 
@@ -88,9 +88,11 @@ def test_native_is_the_default_and_names_follow_the_machine() -> None:
         name for machine in map(load_machine, ("spring_mass_damper", "als25010_x")) for name in fmu_names(machine)
     ] == [
         "HybridPredictor",
+        "SepCompensator",
         "FeedDrive",
         "ReferenceTrajectory",
         "HybridPredictor_als25010_x",
+        "SepCompensator_als25010_x",
         "FeedDrive_als25010_x",
     ]
 

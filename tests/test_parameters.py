@@ -8,8 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hybridsep.compensator import SepCompensator
 from hybridsep.errors import HybridSepError, ParameterError, SignalError
-from hybridsep.parameters import PARAMETERS, Parameter, check, check_lags, check_together, samples_before
+from hybridsep.parameters import PARAMETERS, Parameter, check, check_lags, check_preview, check_together, samples_before
+from hybridsep.physics import ModalModel
+from hybridsep.predictor import HybridPredictor
 from hybridsep.signals import as_samples
 
 GOOD: dict[str, Any] = {"Np": 100, "p": 50, "q": 3, "lam": 1e-12, "Ts": 1e-3, "t_init": 0.3}
@@ -131,6 +134,23 @@ def test_both_lags_at_once() -> None:
     assert len(check_lags(Np=4, p=5, q=4)) == 2
     with pytest.raises(ParameterError, match=r"p must be 1 … Np = 4, got 5; .*; q must be 0 … Np − 1 = 3, got 4"):
         check_together(**{**GOOD, "Np": 4, "p": 5, "q": 4})
+
+
+@pytest.mark.parametrize(("Np", "preview", "spacing", "n_problems"), [
+    (50, 61, 2, 0), (50, 60, 2, 1), (50, 200, 3, 1), (50, 200, 100, 2), (1, 8, 1, 0), (75, 98, 5, 0), (75, 97, 5, 1),
+])  # fmt: skip
+def test_a_preview_is_refused_as_the_compensator_refuses_it(
+    Np: int, preview: int, spacing: int, n_problems: int
+) -> None:
+    problems = check_preview(Np=Np, preview=preview, spacing=spacing)
+    assert len(problems) == n_problems
+    predictor = HybridPredictor(ModalModel.spring_mass_damper(1.0, 15.7, 24674.0), Np=Np, p=1, q=0)
+    if not problems:
+        SepCompensator(predictor, preview=preview, spacing=spacing)
+        return
+    with pytest.raises(ParameterError) as caught:
+        SepCompensator(predictor, preview=preview, spacing=spacing)
+    assert str(caught.value) == problems[0]
 
 
 def test_a_warm_up_that_cannot_be_counted() -> None:

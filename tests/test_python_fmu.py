@@ -22,10 +22,13 @@ Fmu = Callable[[str], Path]
 
 NAMES = [
     "HybridPredictorPy",
+    "SepCompensatorPy",
     "FeedDrivePy",
     "HybridPredictorPy_als25010_x",
+    "SepCompensatorPy_als25010_x",
     "FeedDrivePy_als25010_x",
     "HybridPredictorPy_als25010_y",
+    "SepCompensatorPy_als25010_y",
     "FeedDrivePy_als25010_y",
     "HybridPredictorPy_emps",
 ]
@@ -46,7 +49,7 @@ def test_fmpy_finds_nothing_to_object_to(python_fmu: Fmu, name: str) -> None:
     assert validate_fmu(str(python_fmu(name))) == []
 
 
-@pytest.mark.parametrize("name", ["HybridPredictorPy", "FeedDrivePy_als25010_x"])
+@pytest.mark.parametrize("name", ["HybridPredictorPy", "SepCompensatorPy", "FeedDrivePy_als25010_x"])
 def test_same_machine_same_bytes(python_fmu: Fmu, name: str, tmp_path: Path) -> None:
     machine = load_machine("spring_mass_damper" if "als" not in name else "als25010_x")
     again = build_fmu(machine, name, tmp_path, "python")

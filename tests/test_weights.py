@@ -162,7 +162,9 @@ def test_foreign_files_and_empty_states_are_refused(tmp_path: Path, trained: Pat
 
 
 def test_weights_and_samples_have_one_model_each(tmp_path: Path, trained: Path) -> None:
-    with pytest.raises(FmuError, match="weights are for a HybridPredictor, FeedDrive is a FeedDrive"):
+    with pytest.raises(
+        FmuError, match="weights are for a HybridPredictor or a SepCompensator, FeedDrive is a FeedDrive"
+    ):
         build("native", tmp_path, trained, "FeedDrive")
     with pytest.raises(FmuError, match="samples are for a ReferenceTrajectory, FeedDrive is a FeedDrive"):
         build_fmu(MACHINE, "FeedDrive", tmp_path, samples=[0.0])
@@ -229,9 +231,12 @@ def test_build_takes_a_trajectory(monkeypatch: pytest.MonkeyPatch, tmp_path: Pat
     [
         (
             ("--weights", "TRAINED"),
-            "--weights is for one HybridPredictor, this would build HybridPredictor_als25010_x, ",
+            "--weights is for one HybridPredictor or SepCompensator, this would build HybridPredictor_als25010_x, ",
         ),
-        (("FeedDrive", "--weights", "TRAINED"), "--weights is for one HybridPredictor, this would build none"),
+        (
+            ("FeedDrive", "--weights", "TRAINED"),
+            "--weights is for one HybridPredictor or SepCompensator, this would build none",
+        ),
         (("HybridPredictor", "--weights", "no.state"), "cannot read or write no.state: No such file"),
         (("-m", "emps", "--weights", "TRAINED"), "trained.state was not trained for machine emps: it has "),
         (("FeedDrive", "--trajectory", "x.csv"), "--trajectory is for one ReferenceTrajectory, this would build none"),

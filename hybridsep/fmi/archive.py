@@ -33,6 +33,7 @@ _ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 def fmu_names(machine: Machine, backend: str = BACKENDS[0]) -> dict[str, str]:
     """Return the FMUs a machine has: archive stem → model (``HybridPredictor``, ``FeedDrive``, …).
 
+    A ``SepCompensator`` needs the machine's ``[drive_limits]``, a ``FeedDrive`` its ``[plant]``.
     ``ReferenceTrajectory`` plays the paper's trajectories for every machine; it comes with the default one.
 
     Raises
@@ -44,6 +45,8 @@ def fmu_names(machine: Machine, backend: str = BACKENDS[0]) -> dict[str, str]:
         raise FmuError(f"backend must be one of {', '.join(BACKENDS)}, got {backend!r}")
     suffix = "" if machine.name == DEFAULT_MACHINE else f"_{machine.name}"
     models = ["HybridPredictor"]
+    if machine.drive_limits is not None:
+        models.append("SepCompensator")
     if machine.plant is not None:
         models.append("FeedDrive")
     if machine.name == DEFAULT_MACHINE and backend == "native":
@@ -79,7 +82,8 @@ def build_fmu(
     samples : (n,) array_like, m, optional
         Trajectory 3 of ReferenceTrajectory, at the machine's ``T_s``; played unless another one is chosen.
     weights : str or Path, optional
-        What :meth:`HybridPredictor.save` wrote: a HybridPredictor starts with these weights, without a warm-up.
+        What :meth:`HybridPredictor.save` wrote, trained with the settings of this FMU, for a SepCompensator best in
+        closed loop (``compensator.predictor.save(...)``): the FMU starts with these weights, without a warm-up.
 
     Returns
     -------
@@ -93,16 +97,20 @@ def build_fmu(
     SignalError
         If ``samples`` is not finite or empty.
     StateError
-        If ``weights`` is no saved predictor, or one of another machine.
+        If ``weights`` is no saved predictor, or one of another machine or other settings.
     """
     names = fmu_names(machine, backend)
     if name not in names:
         raise FmuError(f"machine {machine.name} has no FMU {name!r}; it has {', '.join(names)}")
     model = names[name]
-    for given, what, user in ((samples, "samples", "ReferenceTrajectory"), (weights, "weights", "HybridPredictor")):
-        if given is not None and model != user:
-            raise FmuError(f"{what} are for a {user}, {name} is a {model}")
-    trained = None if weights is None else load_trained(weights, machine)
+    users = (
+        (samples, "samples", ("ReferenceTrajectory",)),
+        (weights, "weights", ("HybridPredictor", "SepCompensator")),
+    )
+    for given, what, models in users:
+        if given is not None and model not in models:
+            raise FmuError(f"{what} are for a {' or a '.join(models)}, {name} is a {model}")
+    trained = None if weights is None else load_trained(weights, machine, model)
     description = _description(machine, model, name)
     if samples is not None:
         description["parameters"] = {**description["parameters"], "trajectory": _SAMPLES_TRAJECTORY}
@@ -120,9 +128,10 @@ def build_fmu(
 
 def _description(machine: Machine, model: str, name: str) -> dict[str, Any]:
     """Return what an FMU is made from: model, name, start values and modes."""
-    if model == "HybridPredictor":
-        smd = [{"f_n": m.f_n, "zeta": m.zeta, "alpha": m.alpha, "beta": m.beta} for m in machine.model.modes]
-        return {"model": model, "name": name, "parameters": machine.fmi_parameters(), "modes": smd}
+    if model in ("HybridPredictor", "SepCompensator"):
+        physics = [{"f_n": m.f_n, "zeta": m.zeta, "alpha": m.alpha, "beta": m.beta} for m in machine.model.modes]
+        values = machine.fmi_parameters() if model == "HybridPredictor" else machine.fmi_compensator_parameters()
+        return {"model": model, "name": name, "parameters": values, "modes": physics}
     if model == "ReferenceTrajectory":
         return {"model": model, "name": name, "parameters": {"trajectory": 0, "T_s": machine.T_s}, "modes": []}
     assert machine.plant is not None  # by fmu_names

@@ -60,7 +60,12 @@ static const hsep_variable hsep_variables[HSEP_N_VARIABLES] = {{
 def _model_macro(model: str, n_modes: int) -> str:
     if model == "FeedDrive":
         return "STAGE_DRIVE" if n_modes else "FEED_DRIVE"
-    return {"HybridPredictor": "HYBRID_PREDICTOR", "ReferenceTrajectory": "REFERENCE_TRAJECTORY"}[model]
+    macros = {
+        "HybridPredictor": "HYBRID_PREDICTOR",
+        "SepCompensator": "SEP_COMPENSATOR",
+        "ReferenceTrajectory": "REFERENCE_TRAJECTORY",
+    }
+    return macros[model]
 
 
 def _references(table: Sequence[Variable]) -> dict[str, int]:

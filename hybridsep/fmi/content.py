@@ -11,6 +11,7 @@ __all__ = ["MODEL_TITLES", "content_guid"]
 
 MODEL_TITLES = {
     "HybridPredictor": "linear hybrid model: predicts the drive's position one look-ahead window early",
+    "SepCompensator": "servo error pre-compensation: modifies the command so that the drive follows it",
     "FeedDrive": "nonlinear feed drive with encoder noise",
     "ReferenceTrajectory": "source of commands: plays the paper's staircase and spirals, or given samples",
 }

@@ -22,7 +22,7 @@ def icon(model: str) -> bytes:
 
     Parameters
     ----------
-    model : {"HybridPredictor", "FeedDrive", "ReferenceTrajectory"}
+    model : {"HybridPredictor", "SepCompensator", "FeedDrive", "ReferenceTrajectory"}
     """
     pixels = [[_PAPER] * _SIZE for _ in range(_SIZE)]
     for i in range(_SIZE):
@@ -44,9 +44,16 @@ def _ringing(u: float) -> float:
     return _step(u - 0.05) + (0.22 * math.exp(-5 * (u - 0.4)) * math.sin(32 * (u - 0.4)) if u > 0.4 else 0.0)
 
 
+def _modified(u: float) -> float:
+    """Precede the step and counteract the ringing."""
+    return _step(u + 0.06) - (0.16 * math.sin(20.94 * (u - 0.09)) if 0.09 < u < 0.39 else 0.0)
+
+
 def _curves(model: str) -> list[tuple[Curve, Colour]]:
     if model == "FeedDrive":
         return [(_step, _GREY), (_ringing, _INK)]
+    if model == "SepCompensator":
+        return [(_modified, _RED), (_step, _BLACK)]
     if model == "ReferenceTrajectory":
         return [(lambda u: (_step(2.2 * u) + _step(2.2 * u - 0.5) + _step(2.2 * u - 1.0)) / 3, _INK)]
     return [(_step, _GREY), (lambda u: _step(u - 0.05), _BLACK), (_ringing, _RED)]

@@ -55,7 +55,7 @@ def files(
     targets, samples
         As in :func:`hybridsep.fmi.archive.build_fmu`.
     trained : HybridPredictor, optional
-        What a HybridPredictor starts warm with.
+        What a HybridPredictor or SepCompensator starts warm with.
 
     Raises
     ------

@@ -37,6 +37,27 @@ x<sub>h</sub> = x<sub>pb</sub>.</p>
 t<sub>k+1</sub>, and x_d(k) = r(k − Np). No output depends on an input of the same instant. A shorter
 communication step that divides <code>T_s</code> is accepted; inputs are read at t<sub>k</sub> only. During
 the first fill the drive gets the start value of <code>x_d_ahead</code>.</p>""",
+    "SepCompensator": """
+<p>The FMU sits between the interpolator and the drive and is the look-ahead buffer: what enters as
+<code>x_d_ahead</code> is due as <code>x_d</code> <code>preview</code> samples later. What the drive gets then is
+the modified command <code>x_dm</code>, made so that the drive's position follows <code>x_d</code>.</p>
+<p>The drive is predicted as by the HybridPredictor, with a physics-based linear model</p>
+<p><i>G</i><sub>pb</sub>(s) = Σ<sub>i</sub> (α<sub>i</sub> + β<sub>i</sub> s) / (s² + 2 ζ<sub>i</sub>
+ω<sub>i</sub> s + ω<sub>i</sub>²), &nbsp; ω<sub>i</sub> = 2π f<sub>n,i</sub>,</p>
+<p>and with what has been learned of its residuals: x<sub>h</sub>(k) = x<sub>pb</sub>(k) + wᵀφ(k). Over the preview
+this is affine in the command, x<sub>h</sub> = <i>G</i><sub>h</sub> x<sub>dm</sub> + free response. The change
+δ = x<sub>dm</sub> − x<sub>d</sub> is a sum of cubic B-splines, one knot every <code>spacing</code> samples, that
+minimises Σ (x<sub>d</sub> − x<sub>h</sub>)² and <code>jerk_weight</code> times the sum of squares of δ's third
+differences, within <code>v_max</code>, <code>a_max</code>, <code>j_max</code> and <code>change_max</code>. It is
+planned anew every <code>Np</code> samples, from what was measured until then.</p>
+<p><code>sep_state</code> says which model planned the current window. Until <code>t_init</code> after the first fill,
+and whenever the hybrid model is less accurate than the physics model or unstable, it is the physics model;
+<code>compensate</code> limits the choice, and 0 leaves the command as it is.</p>
+<p>Before the step that starts at t<sub>k</sub> = t<sub>start</sub> + k·T<sub>s</sub>, set
+<code>x_d_ahead</code> = r(k) and <code>x_meas</code> = x(k); after it, the outputs are those of
+t<sub>k+1</sub>, and x_d(k) = r(k − preview). No output depends on an input of the same instant. A shorter
+communication step that divides <code>T_s</code> is accepted; inputs are read at t<sub>k</sub> only. During
+the first fill x_d is the start value of <code>x_d_ahead</code>, and nothing is learned.</p>""",
     "FeedDrive": """
 <p>The simulated drive that the predictor is tried on. It starts at rest at the start value of
 <code>x_d</code>, holds <code>x_d</code> over each communication step, and integrates in internal steps of at
@@ -49,28 +70,34 @@ staircase (six 10 mm moves, one at the start of each second, three up and three 
 was built. After its last sample it stays there.</p>""",
 }
 
+_PARTNERS = {"SepCompensator": ("SepCompensator", "x_dm")}
+"""What sits between trajectory and drive, and its output to the drive; otherwise the predictor and its x_d."""
+
 _WIRING = """<svg viewBox="0 0 760 190" xmlns="http://www.w3.org/2000/svg" font-family="sans-serif" font-size="14">
 <defs><marker id="a" viewBox="0 0 10 10" refX="9" refY="5" markerWidth="8" markerHeight="8" orient="auto">
 <path d="M0 0L10 5L0 10z"/></marker></defs>
 <g fill="#eef3f8" stroke="#1f4e79" stroke-width="2"><rect x="10" y="40" width="170" height="70" rx="6"/>
 <rect x="295" y="40" width="170" height="70" rx="6"/><rect x="580" y="40" width="170" height="70" rx="6"/></g>
-<g text-anchor="middle"><text x="95" y="80">ReferenceTrajectory</text><text x="380" y="80">HybridPredictor</text>
+<g text-anchor="middle"><text x="95" y="80">ReferenceTrajectory</text><text x="380" y="80">{partner}</text>
 <text x="665" y="80">FeedDrive</text></g>
 <g stroke="#222" stroke-width="1.5" fill="none" marker-end="url(#a)"><path d="M180 75H295"/><path d="M465 75H580"/>
 <path d="M665 110V160H380V110"/></g>
-<g text-anchor="middle"><text x="237" y="66">r → x_d_ahead</text><text x="522" y="66">x_d → x_d</text>
+<g text-anchor="middle"><text x="237" y="66">r → x_d_ahead</text><text x="522" y="66">{command} → x_d</text>
 <text x="522" y="152">x_meas → x_meas</text></g></svg>"""
 
-_EXAMPLE = """t_k:   HybridPredictor.x_d_ahead = ReferenceTrajectory.r
-       HybridPredictor.x_meas    = FeedDrive.x_meas
-       FeedDrive.x_d             = HybridPredictor.x_d
+_EXAMPLE = """t_k:   {partner}.x_d_ahead = ReferenceTrajectory.r
+       {partner}.x_meas = FeedDrive.x_meas
+       FeedDrive.x_d = {partner}.{command}
        then all three step by T_s"""
 
 
 _REFERENCE = """<h2>Check it</h2>
 <p><a href="reference/{name}_ref.csv">reference/{name}_ref.csv</a> holds the outputs that a run with all start values
 must give{inputs}; <code>{name}_ref.opt</code> its times. They come from hybridsep's library, which computes the same
-independently; the FMU agrees within 10<sup>−11</sup> m.</p>"""
+independently; the FMU agrees within 10<sup>−{digits}</sup> m.</p>"""
+
+_AGREEMENT_DIGITS = {"SepCompensator": 9}
+"""Else 11; a plan under limits comes from an iteration, which passes differences of rounding on."""
 
 
 def index_page(machine: Machine, description: Mapping[str, object], needs: str, *, reference: bool = False) -> bytes:
@@ -94,7 +121,9 @@ def index_page(machine: Machine, description: Mapping[str, object], needs: str, 
     )
     has_inputs = model != "ReferenceTrajectory"
     inputs = f', fed with <a href="reference/{name}_in.csv">reference/{name}_in.csv</a>' if has_inputs else ""
-    check = _REFERENCE.format(name=name, inputs=inputs) if reference else ""
+    digits = _AGREEMENT_DIGITS.get(model, 11)
+    check = _REFERENCE.format(name=name, inputs=inputs, digits=digits) if reference else ""
+    partner, command = _PARTNERS.get(model, ("HybridPredictor", "x_d"))
     sources = "\n".join(f"<li>{html.escape(source)}</li>" for source in machine.sources)
     page = f"""<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>{name}</title>
@@ -105,10 +134,10 @@ def index_page(machine: Machine, description: Mapping[str, object], needs: str, 
 {_COMPUTES[model]}
 <p>After {_CITATION}</p>
 <h2>Wiring</h2>
-{_WIRING}
-<pre>{_EXAMPLE}</pre>
+{_WIRING.format(partner=partner, command=command)}
+<pre>{_EXAMPLE.format(partner=partner, command=command)}</pre>
 <p>All three exchange their values at each communication point and then step (Jacobi). Set the start values of
-<code>HybridPredictor.x_d_ahead</code> and <code>FeedDrive.x_d</code> to the trajectory's first position.</p>
+<code>{partner}.x_d_ahead</code> and <code>FeedDrive.x_d</code> to the trajectory's first position.</p>
 <h2>Interface</h2>
 <table><tr><th>name</th><th>causality</th><th>type, unit</th><th>start</th><th>meaning</th></tr>
 {rows}

@@ -29,24 +29,21 @@ from .weights import WEIGHTS_FILE, weights_file
 __all__ = ["files"]
 
 _PACKAGE = Path(__file__).resolve().parent.parent
-_TRAVELS = (
-    "errors.py",
-    "parameters.py",
-    "signals.py",
-    "state.py",
-    "physics.py",
-    "regression.py",
-    "predictor.py",
-    "lookahead.py",
-    "plant.py",
-    "fmi/variables.py",
-    "fmi/clock.py",
-    "fmi/weights.py",
-    "fmi/slave.py",
-)
-"""The modules an FMU needs; with NumPy and SciPy they need nothing else."""
+_BASE = ("errors.py", "parameters.py", "signals.py", "state.py", "physics.py", "fmi/variables.py", "fmi/slave.py")
+_PREDICTION = ("regression.py", "predictor.py", "fmi/clock.py", "fmi/weights.py")
+_PLANNING = tuple(f"_{module}.py" for module in ("bounded", "interior", "plan", "sensor", "splines", "trust"))
+_TRAVELS = {
+    "HybridPredictor": (*_BASE, *_PREDICTION, "lookahead.py"),
+    "SepCompensator": (*_BASE, *_PREDICTION, *_PLANNING, "limits.py", "compensator.py", "sep_lookahead.py"),
+    "FeedDrive": (*_BASE, "plant.py"),
+}
+"""The modules each FMU needs; with NumPy and SciPy they need nothing else."""
 
-_SLAVES = {"HybridPredictor": "hybrid_predictor.py", "FeedDrive": "feed_drive.py"}
+_SLAVES = {
+    "HybridPredictor": "hybrid_predictor.py",
+    "SepCompensator": "sep_compensator.py",
+    "FeedDrive": "feed_drive.py",
+}
 
 
 def files(
@@ -60,7 +57,7 @@ def files(
     description : mapping
         ``model``, ``name``, ``parameters`` and ``modes``.
     trained : HybridPredictor, optional
-        What a HybridPredictor starts warm with.
+        What a HybridPredictor or SepCompensator starts warm with.
     """
     model, name = str(description["model"]), str(description["name"])
     content = _resources(model)
@@ -91,7 +88,7 @@ def files(
 def _resources(model: str) -> dict[str, bytes]:
     """Return the Python side of an FMU: slave, library and pythonfmu, under names of their content."""
     slave = data_folder("fmu_src") / "python" / _SLAVES[model]
-    library = {module: (_PACKAGE / module).read_bytes() for module in _TRAVELS}
+    library = {module: (_PACKAGE / module).read_bytes() for module in _TRAVELS[model]}
     digest = hashlib.sha256(slave.read_bytes())
     for module, text in library.items():
         digest.update(module.encode() + text)

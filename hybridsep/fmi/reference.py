@@ -17,6 +17,7 @@ from ..lookahead import LookAhead
 from ..machine import Machine
 from ..plant import Encoder
 from ..predictor import HybridPredictor
+from ..sep_lookahead import SepLookAhead
 from ..signals import Array, as_samples
 from ..trajectory import staircase
 from .variables import variables_of
@@ -27,11 +28,14 @@ __all__ = ["REFERENCE_FOLDER", "reference_files"]
 REFERENCE_FOLDER = "documentation/reference"
 
 _SAMPLES = 600
-"""Length of a run; a predictor's is longer if its warm-up is."""
+"""Length of a run; a look-ahead's is longer if its fill and warm-up are."""
+
+_COMPENSATED_SAMPLES = 1500
+"""The same of a compensator: into the second move, when the hybrid model is trusted on all machines."""
 
 _SAMPLES_MAX = 3000
 _WINDOW_MAX = 1000
-"""A predictor with a longer window gets no reference: no short run shows a prediction."""
+"""An FMU with a longer look-ahead gets no reference: no short run shows a prediction."""
 
 _RESOLUTION = 9
 """Decimals of an input, m: what the CSV says is what the result was computed from."""
@@ -60,23 +64,20 @@ def reference_files(
     samples : (n,) array_like, m, optional
         Trajectory 3 of ReferenceTrajectory.
     trained : HybridPredictor, optional
-        What a HybridPredictor starts warm with.
+        What a HybridPredictor or SepCompensator starts warm with.
     """
-    table, T_s = variables_of(description), machine.T_s
-    if description["model"] == "HybridPredictor":
-        if description["parameters"]["Np"] > _WINDOW_MAX:
+    table, T_s, parameters = variables_of(description), machine.T_s, description["parameters"]
+    names = [variable.name for variable in table if variable.causality == "output"]
+    if description["model"] in ("HybridPredictor", "SepCompensator"):
+        if parameters.get("preview", parameters["Np"]) > _WINDOW_MAX:
             return {}
-        predictor = machine.new_predictor(t_init=description["parameters"]["t_init"])
-        if trained is not None:
-            restore_weights(predictor, weights_file(trained))
-        inputs, outputs = _predictor_run(machine, predictor)
+        inputs, outputs = _look_ahead_run(machine, parameters["t_init"], names, trained)
     elif description["model"] == "FeedDrive":
         inputs, outputs = _plant_run(machine)
     else:
         command = staircase(T_s) if samples is None else as_samples(samples, "samples")
         inputs = {}
         outputs = {"r": [float(command[min(k, len(command) - 1)]) for k in range(_SAMPLES + 1)]}
-    names = [variable.name for variable in table if variable.causality == "output"]
     count = len(outputs[names[0]])
     times = [k * T_s for k in range(count)]
     base = f"{REFERENCE_FOLDER}/{description['name']}"
@@ -90,19 +91,30 @@ def reference_files(
     return files
 
 
-def _predictor_run(machine: Machine, predictor: HybridPredictor) -> tuple[Columns, Columns]:
-    """Run the look-ahead over the staircase, with the machine's plant behind it, through two windows of prediction."""
-    look_ahead = LookAhead(predictor, 0.0)
-    n = min(max(_SAMPLES, 3 * predictor.Np + predictor.n_init), _SAMPLES_MAX)
+def _look_ahead_run(
+    machine: Machine, t_init: float, names: Sequence[str], trained: HybridPredictor | None
+) -> tuple[Columns, Columns]:
+    """Run a look-ahead over the staircase, with the machine's plant behind it, through two windows of prediction.
+
+    It is the compensator's if ``names``, the outputs, have a modified command, which then is what the drive gets.
+    """
+    sent = "x_dm" if "x_dm" in names else "x_d"
+    compensator = machine.new_compensator(t_init=t_init) if sent == "x_dm" else None
+    predictor = machine.new_predictor(t_init=t_init) if compensator is None else compensator.predictor
+    if trained is not None:
+        restore_weights(predictor, weights_file(trained))
+    look_ahead = LookAhead(predictor, 0.0) if compensator is None else SepLookAhead(compensator, 0.0)
+    warm_up = max(predictor.n_init, 0 if compensator is None else compensator.preview)
+    least = _SAMPLES if compensator is None else _COMPENSATED_SAMPLES
+    n = min(max(least, 3 * predictor.Np + warm_up), _SAMPLES_MAX)
     command = _command(machine, n + 1)
     measure = _drive(machine, predictor)
     inputs: Columns = {"x_d_ahead": command.tolist(), "x_meas": []}
-    names = ("x_d", "x_pb", "x_h", "e_servo", "hybrid_active", "rms_pb", "rms_h", "batch")
     outputs: Columns = {name: [] for name in names}
     for k in range(n + 1):
         for name in names:
             outputs[name].append(getattr(look_ahead, name))
-        inputs["x_meas"].append(round(measure(look_ahead.x_d), _RESOLUTION))
+        inputs["x_meas"].append(round(measure(getattr(look_ahead, sent)), _RESOLUTION))
         look_ahead.sample(inputs["x_d_ahead"][k], inputs["x_meas"][k])
     return inputs, outputs
 

@@ -13,7 +13,9 @@ from ..parameters import PARAMETERS, check
 
 __all__ = [
     "MODELS",
+    "PLANNING",
     "Variable",
+    "compensator_variables",
     "modes_from",
     "plant_variables",
     "predictor_variables",
@@ -22,6 +24,11 @@ __all__ = [
 ]
 
 Value = float | int | bool
+
+_PREDICTION = ("Np", "p", "q", "lambda", "T_s", "t_init", "input_hold", "dead_time")
+
+PLANNING = ("preview", "spacing", "jerk_weight", "v_max", "a_max", "j_max", "change_max", "compensate")
+"""Parameters that a compensator has besides its predictor's."""
 
 
 @dataclass(frozen=True)
@@ -155,8 +162,7 @@ def predictor_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping
         _position("rms_h", "output", "running RMS of x_meas - x_h since t_init", display_unit="um"),
         Variable("batch", "Integer", "output", "discrete", "number of the batch, floor(k / Np); 0 is the first fill"),
     ]
-    names = ("Np", "p", "q", "lambda", "T_s", "t_init", "input_hold", "dead_time")
-    table += [_parameter(name, parameters[name]) for name in names]
+    table += [_parameter(name, parameters[name]) for name in _PREDICTION]
     table += _modes(modes)
     for name, meaning in (
         ("x_d", "commanded positions"),
@@ -165,6 +171,47 @@ def predictor_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping
     ):
         table += [_position(f"{name}_window[{i}]", "local", f"{meaning} of the current window") for i in window]
     return table
+
+
+def compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping[str, float]]) -> list[Variable]:
+    """Return the table of the SepCompensator.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Start values of the predictor's parameters and of ``preview``, ``spacing``, ``jerk_weight``, ``v_max``,
+        ``a_max``, ``j_max``, ``change_max``, ``compensate``.
+    modes : sequence of mappings
+        ``f_n``, ``zeta``, ``alpha``, ``beta`` of each mode of eq. (15).
+    """
+    ahead = ("x_d_ahead",)
+    # With weights from an earlier run and no warm-up, the hybrid model may plan the first window already.
+    model = ("t_init", "compensate")
+    state = "model that planned the current window: 0 off, 1 physics, 2 hybrid"
+    return [
+        _position("x_d_ahead", "input", "commanded position entering the look-ahead, preview samples early", start=0.0),
+        _position("x_meas", "input", "measured position now", start=0.0),
+        _position("x_dm", "output", "modified command now; wire it to the drive", initially_from=ahead),
+        _position("x_d", "output", "commanded position now: x_d_ahead, preview samples later", initially_from=ahead),
+        _position("x_pb", "output", "physics-based prediction for now under x_dm", initially_from=ahead),
+        _position(
+            "x_h", "output", "prediction for now by the model that planned the window", initially_from=(*ahead, *model)
+        ),
+        _position(
+            "e_servo",
+            "output",
+            "predicted servo error x_d - x_h that is left",
+            display_unit="um",
+            initially_from=(*ahead, *model),
+        ),
+        Variable("sep_state", "Integer", "output", "discrete", state, initially_from=model),
+        _position("rms_e", "output", "running RMS of x_d - x_meas since t_init", display_unit="um"),
+        _position("rms_pb", "output", "running RMS of x_meas - x_pb since t_init", display_unit="um"),
+        _position("rms_h", "output", "running RMS of x_meas - x_h since t_init", display_unit="um"),
+        Variable("batch", "Integer", "output", "discrete", "number of the window, floor(k / Np)"),
+        *(_parameter(name, parameters[name]) for name in (*_PREDICTION, *PLANNING)),
+        *_modes(modes),
+    ]
 
 
 def plant_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping[str, float]]) -> list[Variable]:
@@ -206,7 +253,7 @@ def trajectory_variables(parameters: Mapping[str, Value], modes: Sequence[Mappin
     modes : sequence of mappings
         Empty.
     """
-    meaning = "commanded position at t; wire it to HybridPredictor.x_d_ahead"
+    meaning = "commanded position at t; wire it to x_d_ahead"
     return [
         _position("r", "output", meaning, initially_from=("trajectory",)),
         *_modes(modes),
@@ -216,6 +263,7 @@ def trajectory_variables(parameters: Mapping[str, Value], modes: Sequence[Mappin
 
 MODELS = {
     "HybridPredictor": predictor_variables,
+    "SepCompensator": compensator_variables,
     "FeedDrive": plant_variables,
     "ReferenceTrajectory": trajectory_variables,
 }

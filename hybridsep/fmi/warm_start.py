@@ -1,4 +1,4 @@
-"""Check that a saved predictor belongs to a machine before its weights go into the machine's FMU."""
+"""Check that a saved predictor belongs to a machine before its weights go into one of the machine's FMUs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..predictor import HybridPredictor
 __all__ = ["load_trained"]
 
 
-def load_trained(path: str | Path, machine: Machine) -> HybridPredictor:
+def load_trained(path: str | Path, machine: Machine, model: str) -> HybridPredictor:
     """Return the predictor that :meth:`HybridPredictor.save` wrote.
 
     Parameters
@@ -20,6 +20,8 @@ def load_trained(path: str | Path, machine: Machine) -> HybridPredictor:
     machine : Machine
         What it must have been trained for: its ``Np``, ``p``, ``q``, ``lambda``, ``T_s``, ``input_hold``, ``dead_time``
         and modes.
+    model : {"HybridPredictor", "SepCompensator"}
+        Which of the machine's two sets of ``Np``, ``p``, ``q`` and ``lambda`` is meant.
 
     Raises
     ------
@@ -31,15 +33,18 @@ def load_trained(path: str | Path, machine: Machine) -> HybridPredictor:
         trained = HybridPredictor.load(path)
     except StateError as error:
         raise StateError(f"{path.name}: {error}") from error
-    found, expected = _parameters(trained), _parameters(machine.new_predictor())
+    compensates = model == "SepCompensator"
+    user = machine.new_compensator().predictor if compensates else machine.new_predictor()
+    found, expected = _parameters(trained), _parameters(user)
     differing = [
         f"{name} = {found.get(name, 'none')} instead of {expected.get(name, 'none')}"
         for name in {**expected, **found}
         if found.get(name) != expected.get(name)
     ]
     if differing:
+        subject = "'s compensator" if compensates else ""
         raise StateError(
-            f"{path.name} was not trained for machine {machine.name}: it has {', '.join(differing)}; "
+            f"{path.name} was not trained for machine {machine.name}{subject}: it has {', '.join(differing)}; "
             "train it with that machine, or correct the machine file"
         )
     if trained.regression.n_samples == 0:

@@ -1,0 +1,100 @@
+"""The compensator as a pythonfmu slave: values in, values out, the arithmetic is in the library."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from hybridsep.compensator import SepCompensator, SepState
+from hybridsep.errors import HybridSepError, ParameterError
+from hybridsep.fmi import slave
+from hybridsep.fmi.clock import SampleClock
+from hybridsep.fmi.variables import PLANNING, modes_from
+from hybridsep.fmi.weights import WEIGHTS_FILE, restore_weights
+from hybridsep.limits import Limits
+from hybridsep.parameters import check
+from hybridsep.physics import ModalModel, Mode
+from hybridsep.predictor import HybridPredictor
+from hybridsep.sep_lookahead import SepLookAhead
+
+
+class SepCompensatorPy(slave.TableSlave):
+    """Sits between the interpolator and the drive: delays the command by the preview and modifies it."""
+
+    def initialise(self) -> None:
+        """Make the look-ahead from the parameters as they are now, with what the resources say was learned."""
+        self.look_ahead = self._new_look_ahead()
+        self.clock = SampleClock(self.start_time, self.look_ahead.compensator.predictor.Ts)
+
+    def advance(self, t: float, h: float) -> None:
+        """Read the inputs at the first sub-step of a sample, show the outputs after its last one."""
+        parts = self.clock.check(t, h)
+        if self.clock.done == 0:
+            self.inputs = (self.values["x_d_ahead"], self.values["x_meas"])
+            self.look_ahead.check(*self.inputs)
+        if self.clock.done == parts - 1:
+            self.look_ahead.sample(*self.inputs)
+        self.clock.advance(parts)
+
+    def initial_value(self, name: str) -> float | int | bool:
+        """Return the value at ``t_0``, when the first window has been planned already.
+
+        While the parameters do not fit together yet, the drive rests at ``x_d_ahead`` and nothing compensates; what is
+        wrong with them is said when the initialization ends.
+        """
+        try:
+            return _output(self._new_look_ahead(), name)
+        except HybridSepError:
+            return float(self.values["x_d_ahead"]) if name in ("x_dm", "x_d", "x_pb", "x_h") else 0
+
+    def current_value(self, name: str) -> float | int | bool:
+        """Return an output now."""
+        return _output(self.look_ahead, name)
+
+    def core_state(self) -> tuple[dict[str, Any], bytes]:
+        """Return the clock with the inputs of the sample in progress, and the look-ahead."""
+        return {"clock": self.clock.state(), "inputs": getattr(self, "inputs", None)}, self.look_ahead.to_bytes()
+
+    def restore_core(self, meta: Mapping[str, Any], blob: bytes) -> None:
+        """Take over a clock and a look-ahead."""
+        self.look_ahead = SepLookAhead.from_bytes(blob)
+        self.clock = SampleClock(**meta["clock"])
+        self.inputs = meta["inputs"]
+
+    def _new_look_ahead(self) -> SepLookAhead:
+        values = self.values
+        names = ("Np", "p", "q", "lambda", "T_s", "t_init", "input_hold")
+        model = ModalModel([Mode(**mode) for mode in modes_from(values)], values["dead_time"])
+        predictor = HybridPredictor.with_parameters(model, {name: values[name] for name in names})
+        trained = Path(self.resources) / WEIGHTS_FILE
+        if trained.exists():
+            restore_weights(predictor, trained.read_bytes())
+        planning = self._planning()
+        compensator = SepCompensator(
+            predictor,
+            preview=planning["preview"],
+            spacing=planning["spacing"],
+            jerk_weight=planning["jerk_weight"],
+            limits=Limits(planning["v_max"], planning["a_max"], planning["j_max"]),
+            change_max=planning["change_max"],
+            best=SepState(planning["compensate"]),
+        )
+        return SepLookAhead(compensator, values["x_d_ahead"])
+
+    def _planning(self) -> dict[str, Any]:
+        """Return the compensator's own parameters, each within its range; name all that are not."""
+        planning, problems = {}, []
+        for name in PLANNING:
+            try:
+                planning[name] = check(name, self.values[name])
+            except ParameterError as error:
+                problems.append(str(error))
+        if problems:
+            raise ParameterError("; ".join(problems))
+        return planning
+
+
+def _output(look_ahead: SepLookAhead, name: str) -> float | int:
+    value = getattr(look_ahead, name)
+    return int(value) if name in ("sep_state", "batch") else float(value)
