@@ -31,10 +31,11 @@ from .lookahead import LookAhead
 from .machine import Machine, load_machine, machine_names
 from .physics import DiscreteModel, ModalModel, Mode
 from .plant import Encoder, FeedDrive, StageDrive, simulate
-from .predictor import HybridPredictor, Prediction, WindowOperator
+from .predictor import HybridPredictor
 from .regression import RidgeRegression
 from .sep_lookahead import SepLookAhead
 from .trajectory import PAPER_LIMITS, along_path, archimedean_spiral, from_file, rest_to_rest, spiral, staircase
+from .window import Prediction, WindowOperator
 
 __all__ = [
     "PAPER_LIMITS",

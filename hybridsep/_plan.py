@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
-from .predictor import Prediction
 from .signals import Array
+from .window import Prediction
 
 __all__ = ["PendingPlan", "SepPlan", "SepState"]
 

@@ -26,9 +26,11 @@ from ._splines import N_DECIDED, SplineBasis, direct_samples
 from ._trust import Trust, has_stable_poles
 from .errors import ParameterError, SignalError, StateError
 from .limits import Limits
-from .predictor import HybridPredictor, Prediction
+from .parameters import check_preview
+from .predictor import HybridPredictor
 from .signals import Array, as_samples
 from .state import pack, unpack
+from .window import Prediction
 
 __all__ = ["RECOMMENDED", "SepCompensator", "SepPlan", "SepState", "direct_samples"]
 
@@ -83,11 +85,10 @@ class SepCompensator:
     ) -> None:
         Np = predictor.Np
         self.preview = max(2 * Np, 200) if preview is None else int(preview)
-        if spacing < 1 or Np % spacing:
+        if spacing < 1:
             raise ParameterError(f"spacing must be ≥ 1 and divide Np = {Np}, got {spacing}")
-        least = Np + 4 * int(spacing) + 3
-        if self.preview < least:
-            raise ParameterError(f"preview must be ≥ Np + 4·spacing + 3 = {least}, got {self.preview}")
+        if problems := check_preview(Np=Np, preview=self.preview, spacing=int(spacing)):
+            raise ParameterError("; ".join(problems))
         if not (np.isfinite(jerk_weight) and jerk_weight >= 0):
             raise ParameterError(f"jerk_weight must be finite and ≥ 0, got {jerk_weight}")
         if change_max is not None and not (np.isfinite(change_max) and change_max > 0):

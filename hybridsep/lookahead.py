@@ -12,9 +12,9 @@ import math
 
 import numpy as np
 
-from .errors import SignalError, StateError
+from ._sampled_window import SampledWindow, checked_start
+from .errors import StateError
 from .predictor import HybridPredictor
-from .signals import POSITION_MAX, Array
 from .state import pack, unpack
 
 __all__ = ["LookAhead"]
@@ -22,7 +22,7 @@ __all__ = ["LookAhead"]
 _KIND = "look-ahead"
 
 
-class LookAhead:
+class LookAhead(SampledWindow):
     """Delays commands by ``Np`` samples and predicts the drive's position while they wait.
 
     Parameters
@@ -39,46 +39,19 @@ class LookAhead:
     """
 
     def __init__(self, predictor: HybridPredictor, start: float) -> None:
-        if not math.isfinite(start):
-            raise SignalError(f"the start value of x_d_ahead must be finite, got {start}")
-        predictor.new_run(start, t_init=predictor.t_init)
+        predictor.new_run(checked_start(start), t_init=predictor.t_init)
         self.predictor = predictor
         self.Np = predictor.Np
         self.start = start
         self.k = 0
         rest = np.full(self.Np, start)
         self._ahead, self._measured = rest.copy(), rest.copy()
-        self.x_d_window: Array = rest
-        self.x_pb_window: Array = rest
-        self.x_h_window: Array = rest
+        self.x_d_window = rest
+        self.x_pb_window = rest
+        self.x_h_window = rest
         self._n_warm_up = self.Np
         # Sums of squares over the measured samples since t_init
         self._n, self._sum_pb, self._sum_h = 0, 0.0, 0.0
-
-    @property
-    def batch(self) -> int:
-        """``⌊k/Np⌋``; 0 is the first fill."""
-        return self.k // self.Np
-
-    @property
-    def x_d(self) -> float:
-        """Commanded position now, m."""
-        return float(self.x_d_window[self.k % self.Np])
-
-    @property
-    def x_pb(self) -> float:
-        """Physics-based prediction for now, m."""
-        return float(self.x_pb_window[self.k % self.Np])
-
-    @property
-    def x_h(self) -> float:
-        """Hybrid prediction for now, m."""
-        return float(self.x_h_window[self.k % self.Np])
-
-    @property
-    def e_servo(self) -> float:
-        """Predicted servo error ``x_d − x_h``, m."""
-        return self.x_d - self.x_h
 
     @property
     def hybrid_active(self) -> bool:
@@ -94,14 +67,6 @@ class LookAhead:
     def rms_h(self) -> float:
         """Running RMS of ``x_meas − x_h`` since ``t_init``, m; 0 before."""
         return math.sqrt(self._sum_h / self._n) if self._n else 0.0
-
-    def check(self, x_d_ahead: float, x_meas: float) -> None:
-        """Raise SignalError if a value cannot be taken in; nothing is changed."""
-        for name, value in (("x_d_ahead", x_d_ahead), ("x_meas", x_meas)):
-            if not math.isfinite(value):
-                raise SignalError(f"{name} must be finite, got {value} at sample {self.k}")
-            if abs(value) > POSITION_MAX:
-                raise SignalError(f"{name} must be within ±{POSITION_MAX:g} m, got {value:g} at sample {self.k}")
 
     def sample(self, x_d_ahead: float, x_meas: float) -> None:
         """Take in sample ``k`` and move on to ``k + 1``.

@@ -16,9 +16,9 @@ import math
 
 import numpy as np
 
+from ._sampled_window import SampledWindow, checked_start
 from .compensator import SepCompensator, SepState
-from .errors import SignalError, StateError
-from .signals import POSITION_MAX, Array
+from .errors import StateError
 from .state import pack, unpack
 
 __all__ = ["SepLookAhead"]
@@ -26,7 +26,7 @@ __all__ = ["SepLookAhead"]
 _KIND = "sep-look-ahead"
 
 
-class SepLookAhead:
+class SepLookAhead(SampledWindow):
     """Delays commands by ``preview`` samples and modifies them while they wait.
 
     Parameters
@@ -45,12 +45,10 @@ class SepLookAhead:
     """
 
     def __init__(self, compensator: SepCompensator, start: float, *, t_init: float | None = None) -> None:
-        if not math.isfinite(start):
-            raise SignalError(f"the start value of x_d_ahead must be finite, got {start}")
         predictor = compensator.predictor
         self.compensator = compensator
         self.preview, self.Np = compensator.preview, predictor.Np
-        self.start = start
+        self.start = checked_start(start)
         self.k = 0
         compensator.new_run(start, t_init=predictor.t_init if t_init is None else t_init, lead_in=self.preview)
         # The last preview commands: r(k − preview) … r(k − 1), which is x_d(k) … x_d(k + preview − 1)
@@ -62,34 +60,9 @@ class SepLookAhead:
         self._next_window()
 
     @property
-    def batch(self) -> int:
-        """``⌊k/Np⌋``."""
-        return self.k // self.Np
-
-    @property
-    def x_d(self) -> float:
-        """Commanded position now, m."""
-        return float(self.x_d_window[self.k % self.Np])
-
-    @property
     def x_dm(self) -> float:
         """Modified command now, m: what the drive gets."""
-        return float(self.x_dm_window[self.k % self.Np])
-
-    @property
-    def x_pb(self) -> float:
-        """Physics-based prediction for now under the modified command, m."""
-        return float(self.x_pb_window[self.k % self.Np])
-
-    @property
-    def x_h(self) -> float:
-        """Prediction for now by the model that planned the window, m."""
-        return float(self.x_h_window[self.k % self.Np])
-
-    @property
-    def e_servo(self) -> float:
-        """Predicted servo error ``x_d − x_h`` that is left, m."""
-        return self.x_d - self.x_h
+        return self._now(self.x_dm_window)
 
     @property
     def rms_e(self) -> float:
@@ -105,14 +78,6 @@ class SepLookAhead:
     def rms_h(self) -> float:
         """Running RMS of ``x_meas − x_h`` since ``t_init``, m; 0 before."""
         return self._rms(2)
-
-    def check(self, x_d_ahead: float, x_meas: float) -> None:
-        """Raise SignalError if a value cannot be taken in; nothing is changed."""
-        for name, value in (("x_d_ahead", x_d_ahead), ("x_meas", x_meas)):
-            if not math.isfinite(value):
-                raise SignalError(f"{name} must be finite, got {value} at sample {self.k}")
-            if abs(value) > POSITION_MAX:
-                raise SignalError(f"{name} must be within ±{POSITION_MAX:g} m, got {value:g} at sample {self.k}")
 
     def sample(self, x_d_ahead: float, x_meas: float) -> None:
         """Take in sample ``k`` and move on to ``k + 1``.
@@ -185,7 +150,7 @@ class SepLookAhead:
         x_d = np.roll(self._ahead, -(self.k % self.preview))
         plan = self.compensator.plan(x_d)
         self.sep_state = plan.state
-        self.x_d_window: Array = x_d[: self.Np].copy()
-        self.x_dm_window: Array = plan.x_dm
-        self.x_pb_window: Array = plan.x_pb
-        self.x_h_window: Array = plan.x_h
+        self.x_d_window = x_d[: self.Np].copy()
+        self.x_dm_window = plan.x_dm
+        self.x_pb_window = plan.x_pb
+        self.x_h_window = plan.x_h

@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from hybridsep.errors import ParameterError, SignalError, StateError
 from hybridsep.physics import ModalModel, Mode
-from hybridsep.predictor import HybridPredictor, Prediction
+from hybridsep.predictor import HybridPredictor
+from hybridsep.window import Prediction
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,79 @@
+"""What a look-ahead shows of its window, sample by sample."""
+
+from __future__ import annotations
+
+import math
+
+from .errors import SignalError
+from .signals import POSITION_MAX, Array
+
+__all__ = ["SampledWindow"]
+
+
+class SampledWindow:
+    """The sample ``k`` that comes next, and the window it is part of.
+
+    Attributes
+    ----------
+    k : int
+        Sample that comes next, counted from the beginning of the run.
+    Np : int
+        Samples in a window.
+    x_d_window, x_pb_window, x_h_window : (Np,) arrays, m
+        Commanded positions, and the two predictions of what the drive makes of them.
+    """
+
+    k: int
+    Np: int
+    x_d_window: Array
+    x_pb_window: Array
+    x_h_window: Array
+
+    @property
+    def batch(self) -> int:
+        """``⌊k/Np⌋``."""
+        return self.k // self.Np
+
+    @property
+    def x_d(self) -> float:
+        """Commanded position now, m."""
+        return self._now(self.x_d_window)
+
+    @property
+    def x_pb(self) -> float:
+        """Physics-based prediction for now, m."""
+        return self._now(self.x_pb_window)
+
+    @property
+    def x_h(self) -> float:
+        """Prediction for now by the best model there is, m."""
+        return self._now(self.x_h_window)
+
+    @property
+    def e_servo(self) -> float:
+        """Predicted servo error ``x_d − x_h``, m."""
+        return self.x_d - self.x_h
+
+    def check(self, x_d_ahead: float, x_meas: float) -> None:
+        """Raise SignalError if a value cannot be taken in; nothing is changed."""
+        for name, value in (("x_d_ahead", x_d_ahead), ("x_meas", x_meas)):
+            if not math.isfinite(value):
+                raise SignalError(f"{name} must be finite, got {value} at sample {self.k}")
+            if abs(value) > POSITION_MAX:
+                raise SignalError(f"{name} must be within ±{POSITION_MAX:g} m, got {value:g} at sample {self.k}")
+
+    def _now(self, window: Array) -> float:
+        return float(window[self.k % self.Np])
+
+
+def checked_start(start: float) -> float:
+    """Return the position where a drive rests.
+
+    Raises
+    ------
+    SignalError
+        If it is not finite.
+    """
+    if not math.isfinite(start):
+        raise SignalError(f"the start value of x_d_ahead must be finite, got {start}")
+    return start
