@@ -32,6 +32,7 @@ from hybridsep.importer import FmuInstance
 from hybridsep.lookahead import LookAhead
 from hybridsep.machine import Machine, load_machine, machine_names
 from hybridsep.plant import Encoder
+from hybridsep.sep_cosim import cosimulate_sep
 from hybridsep.signals import Array
 from hybridsep.trajectory import spiral, staircase
 
@@ -248,6 +249,30 @@ def test_every_pairing_agrees_with_the_library_on_the_spiral(fmus: Fmus, predict
     ]
     command = spiral()[axis]
     assert_equal(cosimulate(fmus[names[0]], fmus[names[1]], command), reference(machine, command))
+
+
+PAPER = {"Np": 100, "p": 50, "q": 3, "lambda": 1e-12, "t_init": 0.3}
+TIGHT = {"v_max": 0.08, "a_max": 8.0, "j_max": 1000.0}
+"""Limits of the trajectory itself: most plans are bounded by them."""
+
+
+@pytest.mark.parametrize(
+    ("machine", "values"),
+    [("", {}), ("", PAPER), ("", TIGHT), ("_als25010_x", {}), ("_als25010_x", TIGHT), ("_als25010_y", {})],
+    ids=["staircase", "staircase, paper", "staircase, tight", "spiral X", "spiral X, tight", "spiral Y"],
+)
+def test_both_flavours_of_the_compensator_command_the_same(fmus: Fmus, machine: str, values: dict[str, float]) -> None:
+    command = {"": staircase(), "_als25010_x": spiral()[0], "_als25010_y": spiral()[1]}[machine][:4000]
+    native, python = (
+        cosimulate_sep(
+            fmus[f"SepCompensator{suffix}{machine}"], fmus[f"FeedDrive{machine}"], command, compensator_values=values
+        )
+        for suffix in ("", "Py")
+    )
+    np.testing.assert_allclose(native.x_dm, python.x_dm, rtol=0, atol=1e-9)
+    np.testing.assert_array_equal(native.state, python.state)
+    assert set(native.state) == {1, 2}
+    assert np.max(np.abs(native.change)) > 1e-5
 
 
 def test_another_start_and_start_time(fmus: Fmus) -> None:
