@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,17 +10,16 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 import typer
-from rich import box
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
-from rich.table import Table
 
 from . import __version__
+from ._tables import console, print_compensation, print_json, print_predictions, print_scores, print_tracking
+from ._wiring import RESULT_SUFFIXES
 from .backtest import Batch, Scores, backtest_stream
-from .cosim import cosimulate
-from .demo import PRINTED
+from .compensator import SepState
+from .cosim import CoSimulation, cosimulate
 from .demo import demo as run_demo
 from .errors import HybridSepError, ParameterError
 from .fmi.archive import BACKENDS, build_fmu, fmu_names
@@ -29,6 +27,10 @@ from .fmi.compiler import TARGET_NAMES
 from .logs import open_log
 from .machine import DEFAULT_MACHINE, Machine, load_machine, machine_names
 from .parameters import PARAMETERS, check
+from .plots import prediction_figure
+from .sep_cosim import SepCoSimulation, cosimulate_sep
+from .sep_demo import build_for_host
+from .sep_plots import tracking_figure
 from .signals import Array
 from .trajectory import PAPER_LIMITS, from_file, spiral, staircase
 
@@ -41,9 +43,10 @@ app = typer.Typer(
     rich_markup_mode=None,
     add_completion=False,
 )
-_out, _err = Console(), Console(stderr=True)
+_err = Console(stderr=True)
 
-PAPER_COLUMN = "paper: physics → hybrid, reduction, as printed there"
+COMPENSATIONS = {"none": SepState.OFF, "physics": SepState.PHYSICS, "hybrid": SepState.HYBRID}
+"""What ``--compensate`` takes: the best model to use."""
 
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and nothing else.")]
 MachineOption = Annotated[
@@ -82,34 +85,11 @@ def demo(
     with _progress(as_json) as advance:
         summary = run_demo(out, emps=emps, seeds=seeds, backend=backend, progress=advance)
     if as_json:
-        _print_json(summary)
+        print_json(summary)
         return
-    table = Table(
-        title="Prediction error, RMS in µm against the measured position",
-        caption=PAPER_COLUMN,
-        box=box.SIMPLE,
-        pad_edge=False,
-    )
-    for column in ("case", "physics", "hold", "hybrid", "reduction", "paper"):
-        table.add_column(column, justify="left" if column == "case" else "right", no_wrap=True)
-    for name, case in summary.items():
-        table.add_row(name, *_figures(case), _printed(PRINTED[name]))
-        for part in ("friction_alone", "stiffness_alone"):
-            if part in case:
-                table.add_row(f"  {part.replace('_', ' ')}", *_figures(case[part]))
-    _out.print(table)
-    _out.print(
-        "The stage is tuned to the printed figures (see its machine file): there, their agreement is no evidence."
-    )
-    for name, case in summary.items():
-        n, worse = case["n_batches"], case["batches_hybrid_worse"]
-        text = f"{name}: of {n} batches the hybrid is worse than physics in {len(worse)}"
-        times = ", ".join(f"{batch['t_s']:g}" for batch in worse)
-        _out.print(
-            f"{text}{f' (from {times} s on)' if worse else ''}, worse than hold in {case['n_batches_worse_than_hold']}",
-            highlight=False,
-        )
-    _out.print(f"\nFigures, FMUs, results and summary.json are in {out}")
+    print_predictions(summary)
+    print_compensation(summary)
+    console.print(f"\nFigures, FMUs, results and summary.json are in {out}")
 
 
 @app.command()
@@ -131,7 +111,10 @@ def build(
     ] = None,
     weights: Annotated[
         Path | None,
-        typer.Option(help="A predictor saved with HybridPredictor.save: its machine's HybridPredictor starts warm."),
+        typer.Option(
+            help="A predictor saved with HybridPredictor.save: the one HybridPredictor or SepCompensator that is built "
+            "starts warm; name it where there are more."
+        ),
     ] = None,
     trajectory: Annotated[
         Path | None,
@@ -155,10 +138,10 @@ def build(
         raise ParameterError(f"--target is for native FMUs; with --backend {backend} leave it out")
     extras: dict[str, dict[str, Any]] = {}
     if weights is not None:
-        _one_of(jobs, "HybridPredictor", "--weights")
-        extras["HybridPredictor"] = {"weights": weights}
+        _, model = _one_of(jobs, ("HybridPredictor", "SepCompensator"), "--weights")
+        extras[model] = {"weights": weights}
     if trajectory is not None:
-        axis = _one_of(jobs, "ReferenceTrajectory", "--trajectory")
+        axis, _ = _one_of(jobs, ("ReferenceTrajectory",), "--trajectory")
         samples, found = from_file(trajectory, unit=unit, Ts=Ts)
         _check_interval(trajectory.name, found, axis)
         extras["ReferenceTrajectory"] = {"samples": samples}
@@ -169,10 +152,10 @@ def build(
             paths.append(build_fmu(axis, name, out, backend, targets=target or None, **extras.get(model, {})))
         advance("done", 1.0)
     if as_json:
-        _print_json([str(path) for path in paths])
+        print_json([str(path) for path in paths])
     else:
         for path in paths:
-            _out.print(f"{path}  {path.stat().st_size / 1024:.0f} KiB", highlight=False)
+            console.print(f"{path}  {path.stat().st_size / 1024:.0f} KiB", highlight=False)
 
 
 @app.command()
@@ -183,8 +166,21 @@ def cosim(
     ] = "staircase",
     unit: UnitOption = "m",
     Ts: TsOption = None,
-    predictor: Annotated[Path | None, typer.Option(help="Predictor FMU; built from the machine if left out.")] = None,
+    compensate: Annotated[
+        str | None,
+        typer.Option(
+            help=f"Compensate the servo error with the best model given: {', '.join(COMPENSATIONS)}. The drive gets "
+            "the command that a SepCompensator FMU has modified; if left out, a HybridPredictor only predicts."
+        ),
+    ] = None,
+    predictor: Annotated[
+        Path | None,
+        typer.Option(help="Predictor FMU, or with --compensate a compensator FMU; built from the machine if left out."),
+    ] = None,
     plant: Annotated[Path | None, typer.Option(help="Plant FMU; built from the machine if left out.")] = None,
+    weights: Annotated[
+        Path | None, typer.Option(help="A predictor saved with HybridPredictor.save: the FMU built here starts warm.")
+    ] = None,
     seed: Annotated[int | None, typer.Option(help=_help("seed"))] = None,
     Np: NpOption = None,
     p: POption = None,
@@ -193,36 +189,53 @@ def cosim(
     t_init: InitOption = None,
     backend: BackendOption = BACKENDS[0],
     out: Annotated[Path | None, typer.Option(help="File for all signals, .csv or .npz.")] = None,
+    figure: Annotated[
+        Path | None,
+        typer.Option(help="PNG with the errors over time: of the predictions, or with --compensate of the position."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Co-simulate a predictor FMU with a plant FMU over a trajectory."""
+    """Co-simulate a predictor FMU, or a compensator FMU, with a plant FMU over a trajectory."""
     axis = load_machine(machine)
-    if out is not None:
-        if out.suffix.lower() not in (".csv", ".npz"):
-            raise ParameterError(f"--out must end in .csv or .npz, got {out.name!r}")
-        _make_folder(out)
+    for path, option, endings in ((out, "--out", RESULT_SUFFIXES), (figure, "--figure", (".png",))):
+        if path is not None:
+            if path.suffix.lower() not in endings:
+                raise ParameterError(f"{option} must end in {' or '.join(endings)}, got {path.name!r}")
+            _make_folder(path, option)
+    if compensate is not None and compensate not in COMPENSATIONS:
+        raise ParameterError(f"--compensate must be one of {', '.join(COMPENSATIONS)}, got {compensate!r}")
+    if predictor is not None and weights is not None:
+        raise ParameterError("--weights go into an FMU that is built here; leave out --predictor")
     command = _command(trajectory, axis, unit, Ts)
-    values = {"Np": Np, "p": p, "q": q, "lambda": lam, "t_init": t_init}
+    given = {"Np": Np, "p": p, "q": q, "lambda": lam, "t_init": t_init}
+    values = {name: value for name, value in given.items() if value is not None}
     if predictor is None:  # say what is wrong with them before anything is built
-        axis.new_predictor(**{"lam" if name == "lambda" else name: v for name, v in values.items() if v is not None})
+        values = _fitting(axis, compensate, values)
     if seed is not None:
         check("seed", seed)
+    title = f"{' and '.join(path.name for path in (predictor, plant) if path is not None) or axis.title}, {trajectory}"
     with tempfile.TemporaryDirectory() as folder, _progress(as_json) as advance:
-        names = {model: name for name, model in fmu_names(axis, backend).items()}
-        if plant is None and "FeedDrive" not in names:
-            raise ParameterError(f"machine {axis.name} has no plant; name a plant FMU with --plant")
-        run = cosimulate(
-            predictor or build_fmu(axis, names["HybridPredictor"], folder, backend, targets=("host",)),
-            plant or build_fmu(axis, names["FeedDrive"], folder, backend, targets=("host",)),
-            command,
-            predictor_values={name: value for name, value in values.items() if value is not None},
-            plant_values={} if seed is None else {"seed": seed},
-            progress=lambda k, n: advance("co-simulation", k / n),
-        )
+        ahead, drive = _pair(axis, compensate, predictor, plant, Path(folder), backend, weights)
+        common: dict[str, Any] = {
+            "plant_values": {} if seed is None else {"seed": seed},
+            "progress": lambda k, n: advance("co-simulation", k / n),
+        }
+        run: CoSimulation | SepCoSimulation
+        if compensate is None:
+            run = cosimulate(ahead, drive, command, predictor_values=values, **common)
+        else:
+            values["compensate"] = int(COMPENSATIONS[compensate])
+            run = cosimulate_sep(ahead, drive, command, compensator_values=values, **common)
     if out is not None:
         run.save(out)
-    fmus = [path.name for path in (predictor, plant) if path is not None]
-    _print_scores(run.summary(), as_json, f"{' and '.join(fmus) or axis.title}, {trajectory}")
+    if isinstance(run, CoSimulation):
+        if figure is not None:
+            prediction_figure(run, title, figure)
+        print_scores(run.summary(), as_json, title)
+    else:
+        if figure is not None:
+            tracking_figure({str(compensate): run}, title, figure)
+        print_tracking(run.summary(), as_json, title)
 
 
 @app.command("backtest")
@@ -262,7 +275,7 @@ def backtest_command(
                 advance("replay", batch.k / reader.n_samples)
 
         scores: Scores = backtest_stream(predictor, reader.chunks(), on_batch=on_batch)
-    _print_scores(scores.summary(), as_json, f"{axis.title}, {log.name}")
+    print_scores(scores.summary(), as_json, f"{axis.title}, {log.name}")
 
 
 @app.callback(invoke_without_command=True)
@@ -300,13 +313,51 @@ def _command(trajectory: str, axis: Machine, unit: str, Ts: float | None) -> Arr
     return command
 
 
-def _one_of(jobs: Sequence[tuple[Machine, str, str]], model: str, option: str) -> Machine:
-    """Return the machine of the only FMU of a model that is built, which an option is meant for."""
-    found = [(axis, name) for axis, name, built in jobs if built == model]
+def _fitting(axis: Machine, compensate: str | None, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Check the FMI values of a look-ahead FMU that will be built; return them with what must change with them."""
+    changes = {"lam" if name == "lambda" else name: value for name, value in values.items()}
+    if compensate is None:
+        axis.new_predictor(**changes)
+        return dict(values)
+    compensator = axis.new_compensator(**changes)
+    windows = {"preview": compensator.preview, "spacing": compensator.spacing} if "Np" in values else {}
+    return {**values, **windows}
+
+
+def _pair(
+    axis: Machine,
+    compensate: str | None,
+    predictor: Path | None,
+    plant: Path | None,
+    folder: Path,
+    backend: str,
+    weights: Path | None,
+) -> tuple[Path, Path]:
+    """Return the look-ahead FMU and the plant FMU of a co-simulation; those that are not given are built."""
+    models = fmu_names(axis, backend).values()
+    if plant is None and "FeedDrive" not in models:
+        raise ParameterError(f"machine {axis.name} has no plant; name a plant FMU with --plant")
+    model = "HybridPredictor" if compensate is None else "SepCompensator"
+    if predictor is None and model not in models:
+        raise ParameterError(
+            f"machine {axis.name} has no [drive_limits], which a compensator must keep; add them, or name a "
+            "compensator FMU with --predictor"
+        )
+    return (
+        predictor or build_for_host(axis, model, folder, backend, weights=weights),
+        plant or build_for_host(axis, "FeedDrive", folder, backend),
+    )
+
+
+def _one_of(jobs: Sequence[tuple[Machine, str, str]], models: Sequence[str], option: str) -> tuple[Machine, str]:
+    """Return machine and model of the only FMU of these models that is built, which an option is meant for."""
+    found = [job for job in jobs if job[2] in models]
     if len(found) != 1:
-        names = ", ".join(name for _, name in found) or "none"
-        raise ParameterError(f"{option} is for one {model}, this would build {names}; name one, or its --machine")
-    return found[0][0]
+        names = ", ".join(name for _, name, _ in found) or "none"
+        raise ParameterError(
+            f"{option} is for one {' or '.join(models)}, this would build {names}; name one, or its --machine"
+        )
+    return found[0][0], found[0][2]
 
 
 def _check_interval(name: str, Ts: float, axis: Machine) -> None:
@@ -320,11 +371,11 @@ def _check_interval(name: str, Ts: float, axis: Machine) -> None:
     raise ParameterError(f"{name} is sampled every {Ts:g} s, but machine {axis.name} has T_s = {axis.T_s:g} s; {hint}")
 
 
-def _make_folder(path: Path) -> None:
+def _make_folder(path: Path, option: str = "--out") -> None:
     """Make the folder of a file that will be written, before the work whose result it takes."""
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.is_dir():
-        raise ParameterError(f"--out must be a file, got the folder {path}")
+        raise ParameterError(f"{option} must be a file, got the folder {path}")
 
 
 @contextmanager
@@ -346,57 +397,6 @@ def _batch_writer(path: Path | None, Ts: float) -> Iterator[Any]:
         writer = csv.writer(file)
         writer.writerow(["t", "rms_pb", "rms_hold", "rms_h"])
         yield lambda batch: writer.writerow([round(batch.k * Ts, 9), batch.rms_pb, batch.rms_hold, batch.rms_h])
-
-
-def _figures(case: Mapping[str, Any]) -> list[str]:
-    """Return physics, hold, hybrid and reduction of a case as text, a dash where there is no figure."""
-    figures = [_figure(case.get(name)) for name in ("rms_pb_um", "rms_hold_um", "rms_h_um")]
-    return [*figures, _figure(case.get("reduction_percent"), " %")]
-
-
-def _printed(case: Mapping[str, float]) -> str:
-    """Return what the paper prints of a case."""
-    if not case:
-        return ""
-    physics, hybrid = (f"{case[name]:g}" if name in case else "–" for name in ("rms_pb_um", "rms_h_um"))
-    return f"{physics}→{hybrid}, {case['reduction_percent']:g} %"
-
-
-def _figure(value: float | None, unit: str = "") -> str:
-    if value is None or not np.isfinite(value):
-        return "–"
-    return f"{value:.1f}{unit}" if unit else f"{value:.2f}"
-
-
-def _print_scores(summary: Mapping[str, float | int], as_json: bool, title: str) -> None:
-    if as_json:
-        _print_json(summary)
-        return
-    table = Table(title=f"{title}: prediction error in µm against the measured position")
-    for column in ("", "physics", "hold", "hybrid", "reduction"):
-        table.add_column(column, justify="right")
-    for suffix, label in (("", ""), ("_after_warm_up", " after warm-up")):
-        for quantity in ("rms", "max"):
-            figures = [summary.get(f"{quantity}_{name}_um{suffix}") for name in ("pb", "hold", "h")]
-            if all(figure is not None for figure in figures):
-                reduction = summary[f"reduction_percent{suffix}"] if quantity == "rms" else None
-                shown = _figure(reduction, " %") if quantity == "rms" else ""
-                label_text = f"{quantity.upper() if quantity == 'rms' else quantity}{label}"
-                table.add_row(label_text, *map(_figure, figures), shown)
-    _out.print(table)
-
-
-def _print_json(result: Any) -> None:
-    """Print JSON; figures that do not exist, such as scores over no sample, are null."""
-    typer.echo(json.dumps(_finite(result), indent=2))
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 if __name__ == "__main__":

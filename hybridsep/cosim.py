@@ -1,13 +1,11 @@
 """Co-simulate a predictor FMU with a plant FMU through fmpy.
 
-The Jacobi wiring: at ``t_k``, ``plant.x_d = predictor.x_d``, ``predictor.x_meas = plant.x_meas`` and
-``predictor.x_d_ahead = r(k)``; then both step. The drive gets ``r(k − Np)``, so the trajectory is held at its end for
-``Np`` samples more, and results are reported without the first fill.
+The drive gets ``x_d(k) = r(k − Np)``, so the trajectory is held at its end for ``Np`` samples more, and results are
+reported without the first fill; :mod:`hybridsep._wiring` has the loop.
 """
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,12 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import FmuError
-from .importer import FmuInstance
-from .signals import Array, as_samples
+from ._wiring import Role, run_pair, save_columns
+from .signals import Array
 
 __all__ = ["CoSimulation", "cosimulate"]
 
+_ROLE = Role("predictor", ("x_d", "x_pb", "x_h"), state="hybrid_active", delay="Np")
 _SIGNALS = ("t", "x_d", "x", "x_meas", "x_pb", "x_hold", "x_h")
 
 
@@ -87,19 +85,7 @@ class CoSimulation:
         ValueError
             If the suffix is another one.
         """
-        path = Path(path)
-        columns = {name: getattr(self, name) for name in (*_SIGNALS, "active")}
-        suffix = path.suffix.lower()
-        if suffix == ".npz":
-            np.savez_compressed(path, **columns)
-        elif suffix == ".csv":
-            with path.open("w", newline="", encoding="utf-8") as file:
-                writer = csv.writer(file)
-                writer.writerow(columns)
-                rows = zip(*(column.tolist() for column in columns.values()), strict=True)
-                writer.writerows([*map(repr, numbers), int(active)] for *numbers, active in rows)
-        else:
-            raise ValueError(f"results are written as .csv or .npz, got {path.name!r}")
+        save_columns({name: getattr(self, name) for name in (*_SIGNALS, "active")}, path)
 
 
 def cosimulate(
@@ -138,64 +124,19 @@ def cosimulate(
     SignalError
         If ``r`` is empty or not finite.
     """
-    command = as_samples(r, "r")
-    as_samples(command[:1], "r", 1)
-    with FmuInstance(predictor, "predictor") as predictor_fmu, FmuInstance(plant, "plant") as plant_fmu:
-        _check_role(predictor_fmu, "predictor", ("x_d_ahead", "x_meas"), ("x_d", "x_pb", "x_h", "hybrid_active"))
-        _check_role(plant_fmu, "plant", ("x_d",), ("x", "x_meas"))
-        start = float(command[0])
-        predictor_fmu.initialise(
-            {**(predictor_values or {}), "x_d_ahead": start, "x_meas": start}, start_time=start_time
-        )
-        plant_fmu.initialise({**(plant_values or {}), "x_d": start}, start_time=start_time)
-        Np, h = int(predictor_fmu.get("Np")), float(predictor_fmu.get("T_s"))
-        if "T_s" in plant_fmu.variables and abs(float(plant_fmu.get("T_s")) - h) > 1e-6 * h:
-            raise FmuError(
-                f"{plant_fmu.path.name} has T_s = {plant_fmu.get('T_s'):g} s, but {predictor_fmu.path.name} has "
-                f"{h:g} s; they must agree"
-            )
-        n = len(command) + Np
-        every = max(1, n // 100)
-        get_predictor, get_plant = (
-            predictor_fmu.real_reader(["x_d", "x_pb", "x_h"]),
-            plant_fmu.real_reader(["x", "x_meas"]),
-        )
-        set_predictor, set_plant = predictor_fmu.real_writer(["x_d_ahead", "x_meas"]), plant_fmu.real_writer(["x_d"])
-        signals = np.empty((n, 5))
-        active = np.zeros(n, dtype=np.bool_)
-        for k in range(n):
-            t = start_time + k * h
-            x_d, x_pb, x_h = get_predictor()
-            x, x_meas = get_plant()
-            signals[k] = x_d, x_pb, x_h, x, x_meas
-            active[k] = predictor_fmu.get("hybrid_active")
-            set_plant([x_d])
-            set_predictor([float(command[min(k, len(command) - 1)]), x_meas])
-            plant_fmu.step(t, h)
-            predictor_fmu.step(t, h)
-            if progress is not None and (k % every == 0 or k == n - 1):
-                progress(k + 1, n)
-    x_d, x_pb, x_h, x, x_meas = signals[Np:].T.copy()
-    active = active[Np:]
-    return CoSimulation(
-        t=np.asarray(start_time + np.arange(Np, n) * h, dtype=np.float64),
-        x_d=x_d,
-        x=x,
-        x_meas=x_meas,
-        x_pb=x_pb,
-        x_hold=_hold(x_pb, x_meas, active, Np),
-        x_h=x_h,
-        active=active,
-        Np=Np,
+    record = run_pair(
+        _ROLE,
+        predictor,
+        plant,
+        r,
+        look_ahead_values=predictor_values,
+        plant_values=plant_values,
+        start_time=start_time,
+        progress=progress,
     )
-
-
-def _check_role(fmu: FmuInstance, role: str, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> None:
-    """Say what an FMU lacks to be a predictor or a plant."""
-    for causality, names in (("input", inputs), ("output", outputs)):
-        for name in names:
-            if name not in fmu.variables or fmu.variables[name].causality != causality:
-                raise FmuError(f"{fmu.path.name} is no {role}: it has no {causality} {name}")
+    found, active = record.signals, record.state.astype(np.bool_)
+    x_hold = _hold(found["x_pb"], found["x_meas"], active, record.Np)
+    return CoSimulation(t=record.t, **found, x_hold=x_hold, active=active, Np=record.Np)
 
 
 def _hold(x_pb: Array, x: Array, active: NDArray[np.bool_], Np: int) -> Array:

@@ -5,23 +5,24 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from . import plots
+from . import plots, sep_plots
 from .backtest import Backtest, backtest
 from .cosim import CoSimulation, cosimulate
-from .fmi.archive import build_fmu, fmu_names
 from .fmi.compiler import can_compile
 from .logs import Log, read_log
 from .machine import Machine, load_machine
+from .sep_demo import KINDS, Runs, build_for_host, compensate, contour_errors, mean_summary
 from .signals import Array
 from .trajectory import spiral, staircase
 
-__all__ = ["PRINTED", "RecordedReplay", "demo"]
+__all__ = ["PRINTED", "RecordedReplay", "Summary", "demo"]
 
 PRINTED = {
     "staircase": {"rms_pb_um": 33.7, "rms_h_um": 14.7, "reduction_percent": 56.4},
@@ -99,6 +100,8 @@ def demo(
 ) -> Summary:
     """Build the FMUs, co-simulate the staircase and the spiral, write figures and ``summary.json``.
 
+    First the predictor beside the uncompensated drive, then the compensator in its place.
+
     Parameters
     ----------
     out : str or Path
@@ -116,13 +119,15 @@ def demo(
     -------
     dict
         As written to ``summary.json``: for each case ``rms_pb_um``, ``rms_hold_um``, ``rms_h_um``,
-        ``reduction_percent``, ``printed`` and more; RMS in µm against the measured position.
+        ``reduction_percent``, ``printed`` and more; RMS in µm against the measured position. ``compensation`` says for
+        ``none``, ``physics``, ``hybrid_cold`` and ``hybrid_warm`` what :func:`hybridsep.sep_demo.compensate` found,
+        for the spiral's axes with the contour error of both together, ``contour_rms_um`` and ``contour_max_um``.
     """
     if backend is None:
         backend = "native" if can_compile() else "python"
     out = Path(out)
     out.mkdir(parents=True, exist_ok=True)
-    total = seeds + 6 + (emps is not None)
+    total = seeds + 6 + 3 * len(KINDS) + (emps is not None)
     done = 0
 
     def advance(message: str) -> None:
@@ -130,40 +135,7 @@ def demo(
         progress(message, done / total)
         done += 1
 
-    summary: Summary = {}
-    machine = load_machine("spring_mass_damper")
-    runs = []
-    fmus = _build_pair(machine, out / "fmus", backend)
-    for seed in range(seeds):
-        advance(f"staircase, FMU against FMU, noise seed {seed}")
-        runs.append(cosimulate(*fmus, staircase(machine.T_s), plant_values={"seed": seed}))
-    summary["staircase"] = {
-        **_mean([run.summary() for run in runs]),
-        "n_seeds": seeds,
-        "batches_of_seed": 0,
-        **_worse(runs[0]),
-    }
-    runs[0].save(out / "staircase.csv")
-    plots.prediction_figure(
-        runs[0], "Staircase (cf. the paper's Fig. 4), FMU against FMU, noise seed 0", out / "staircase.png"
-    )
-
-    commands = dict(zip(("x", "y"), spiral(), strict=True))
-    axes: dict[str, CoSimulation] = {}
-    for axis, command in commands.items():
-        machine = load_machine(f"als25010_{axis}")
-        fmus = _build_pair(machine, out / "fmus", backend)
-        advance(f"spiral, {axis.upper()} axis")
-        axes[axis] = run = cosimulate(*fmus, command)
-        case = summary[f"spiral_{axis}"] = {**run.summary(), "tuned_to_printed": True, **_worse(run)}
-        for name, off in (("friction_alone", "kappa"), ("stiffness_alone", "f")):
-            advance(f"spiral, {axis.upper()} axis, {name.replace('_', ' ')}")
-            case[name] = cosimulate(*fmus, command, plant_values={off: 0.0}).summary()
-        run.save(out / f"spiral_{axis}.csv")
-        title = f"Spiral, {axis.upper()} axis (cf. the paper's Fig. 8), FMU against FMU"
-        plots.prediction_figure(run, title, out / f"spiral_{axis}.png")
-    plots.spiral_figure(axes["x"], axes["y"], out / "spiral.png")
-
+    summary: Summary = {"staircase": _staircase(out, seeds, backend, advance), **_spiral(out, backend, advance)}
     if emps is not None:
         advance("EMPS, a recorded axis")
         replay = replay_emps(emps)
@@ -173,6 +145,67 @@ def demo(
         case["printed"] = PRINTED[name]
     (out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     progress("done", 1.0)
+    return summary
+
+
+def _staircase(out: Path, seeds: int, backend: str, advance: Callable[[str], None]) -> dict[str, Any]:
+    """Predict and compensate on the staircase."""
+    machine = load_machine("spring_mass_damper")
+    command = staircase(machine.T_s)
+    fmus = _build_pair(machine, out / "fmus", backend)
+    runs = []
+    for seed in range(seeds):
+        advance(f"staircase, FMU against FMU, noise seed {seed}")
+        runs.append(cosimulate(*fmus, command, plant_values={"seed": seed}))
+    runs[0].save(out / "staircase.csv")
+    title = "Staircase (cf. the paper's Fig. 4), FMU against FMU, noise seed 0"
+    plots.prediction_figure(runs[0], title, out / "staircase.png")
+    compensated, compensation = compensate(
+        machine, fmus[1], command, out, backend, seeds=range(seeds), advance=partial(_say, advance, "staircase")
+    )
+    compensated["hybrid_warm"].save(out / "staircase_compensated.csv")
+    title = "Staircase, compensated: FMU against FMU, noise seed 0"
+    sep_plots.tracking_figure(compensated, title, out / "staircase_compensated.png")
+    return {
+        **mean_summary([run.summary() for run in runs], spread="rms_h_um"),
+        "n_seeds": seeds,
+        "batches_of_seed": 0,
+        **_worse(runs[0]),
+        "compensation": compensation,
+    }
+
+
+def _spiral(out: Path, backend: str, advance: Callable[[str], None]) -> Summary:
+    """Predict and compensate on the spiral, both axes."""
+    summary: Summary = {}
+    axes: dict[str, CoSimulation] = {}
+    compensated: dict[str, Runs] = {}
+    for axis, command in zip(("x", "y"), spiral(), strict=True):
+        machine, label = load_machine(f"als25010_{axis}"), f"spiral, {axis.upper()} axis"
+        fmus = _build_pair(machine, out / "fmus", backend)
+        advance(label)
+        axes[axis] = run = cosimulate(*fmus, command)
+        case = summary[f"spiral_{axis}"] = {**run.summary(), "tuned_to_printed": True, **_worse(run)}
+        for name, off in (("friction_alone", "kappa"), ("stiffness_alone", "f")):
+            advance(f"{label}, {name.replace('_', ' ')}")
+            case[name] = cosimulate(*fmus, command, plant_values={off: 0.0}).summary()
+        run.save(out / f"spiral_{axis}.csv")
+        title = f"Spiral, {axis.upper()} axis (cf. the paper's Fig. 8), FMU against FMU"
+        plots.prediction_figure(run, title, out / f"spiral_{axis}.png")
+        compensated[axis], case["compensation"] = compensate(
+            machine, fmus[1], command, out, backend, advance=partial(_say, advance, label)
+        )
+        compensated[axis]["hybrid_warm"].save(out / f"spiral_{axis}_compensated.csv")
+        title = f"Spiral, {axis.upper()} axis, compensated: FMU against FMU"
+        sep_plots.tracking_figure(compensated[axis], title, out / f"spiral_{axis}_compensated.png")
+    plots.spiral_figure(axes["x"], axes["y"], out / "spiral.png")
+    errors = contour_errors(compensated["x"], compensated["y"])
+    pairs = {kind: (compensated["x"][kind], compensated["y"][kind]) for kind in KINDS}
+    sep_plots.contour_figure(pairs, errors, "Spiral, X and Y compensated: contour error", out / "spiral_contour.png")
+    for case in summary.values():
+        for kind, error in errors.items():
+            figures = {"rms": np.sqrt(np.mean(error**2)), "max": np.max(error)}
+            case["compensation"][kind] |= {f"contour_{key}_um": 1e6 * float(v) for key, v in figures.items()}
     return summary
 
 
@@ -190,20 +223,17 @@ def replay_emps(path: str | Path) -> RecordedReplay:
     return RecordedReplay(log, backtest(predictor, log.x_d, log.x), predictor.Np)
 
 
+def _say(advance: Callable[[str], None], case: str, kind: str) -> None:
+    """Say which kind of compensation of a case is run next."""
+    advance(f"{case}, {kind}")
+
+
 def _build_pair(machine: Machine, out: Path, backend: str) -> tuple[Path, Path]:
     """Build a machine's predictor and plant FMU."""
-    names = {model: name for name, model in fmu_names(machine, backend).items()}
-    host = ("host",)
-    predictor = build_fmu(machine, names["HybridPredictor"], out, backend, targets=host)
-    return predictor, build_fmu(machine, names["FeedDrive"], out, backend, targets=host)
-
-
-def _mean(summaries: list[dict[str, float | int]]) -> dict[str, Any]:
-    """Return the mean of each figure over the runs, and the spread of the hybrid's RMS."""
-    mean: dict[str, Any] = {key: float(np.mean([s[key] for s in summaries])) for key in summaries[0]}
-    mean["n_samples"] = summaries[0]["n_samples"]
-    mean["rms_h_um_std"] = float(np.std([s["rms_h_um"] for s in summaries]))
-    return mean
+    return (
+        build_for_host(machine, "HybridPredictor", out, backend),
+        build_for_host(machine, "FeedDrive", out, backend),
+    )
 
 
 def _worse(replay: plots.Replay) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .signals import Array
 
-__all__ = ["Replay", "prediction_figure", "spiral_figure"]
+__all__ = ["HOLD", "HYBRID", "PHYSICS", "Replay", "prediction_figure", "save_figure", "spiral_figure"]
 
 PHYSICS, HOLD, HYBRID = "#d95f02", "#7f7f7f", "#1b6ca8"
 
@@ -77,7 +77,7 @@ def prediction_figure(replay: Replay, title: str, path: str | Path) -> None:
     for axes in (command, error, batches):
         axes.grid(alpha=0.3)
         axes.spines[["top", "right"]].set_visible(False)
-    _save(figure, path)
+    save_figure(figure, path)
 
 
 def _draw_batches(axes: Axes, replay: Replay) -> None:
@@ -119,9 +119,10 @@ def spiral_figure(x: Replay, y: Replay, path: str | Path) -> None:
         axes.set_xlabel("X [mm]")
     panels[0].set_ylabel("Y [mm]")
     figure.colorbar(points, ax=panels, label="prediction error [µm]")
-    _save(figure, path)
+    save_figure(figure, path)
 
 
-def _save(figure: Figure, path: str | Path) -> None:
+def save_figure(figure: Figure, path: str | Path) -> None:
+    """Write a figure to a PNG."""
     FigureCanvasAgg(figure)
     figure.savefig(path, dpi=130)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import sys
+import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
 from staircase_data import commanded, measured
 
-from hybridsep import __version__, cli
+from hybridsep import Encoder, __version__, cli, load_machine, run_closed_loop, staircase
 from hybridsep.parameters import PARAMETERS
 
 EMPS = Path(__file__).resolve().parents[2] / "shared" / "data" / "emps" / "DATA_EMPS.mat"
@@ -114,6 +115,60 @@ def test_cosim_over_a_file(hybridsep: Run, tmp_path: Path) -> None:
     assert json.loads(again)["rms_h_um"] != json.loads(out)["rms_h_um"]
 
 
+def test_cosim_with_compensation(hybridsep: Run, tmp_path: Path) -> None:
+    options = ("--backend", "python", "--out", tmp_path / "run.csv", "--figure", tmp_path / "run.png")
+    figures = {}
+    for kind in ("none", "physics", "hybrid"):
+        status, out, _ = hybridsep("cosim", "--compensate", kind, *options, "--json")
+        assert status == 0
+        summary = json.loads(out)
+        assert summary[{"none": "share_off"}.get(kind, f"share_{kind}")] > 0.9
+        figures[kind] = summary["tracking_rms_um"]
+    assert 87.0 < figures["none"] < 90.0
+    assert figures["hybrid"] < 6.9 < 19.0 < figures["physics"] < 20.5
+    assert (tmp_path / "run.csv").read_text().startswith("t,x_d,x_dm,x,")
+    assert (tmp_path / "run.png").read_bytes().startswith(b"\x89PNG")
+    fmus = ("--predictor", tmp_path / "SepCompensatorPy.fmu", "--plant", tmp_path / "FeedDrivePy.fmu")
+    assert hybridsep("build", "SepCompensatorPy", "FeedDrivePy", "--backend", "python", "--out", tmp_path)[0] == 0
+    status, out, _ = hybridsep("cosim", "--compensate", "hybrid", *fmus)
+    assert status == 0
+    assert f"{figures['hybrid']:.2f}" in out
+    assert "planned by the hybrid 98.3%" in out
+    # Preview and knots follow a window of another length.
+    sizes = ("--Np", 25, "--p", 20, "--q", 3)
+    assert hybridsep("cosim", "--compensate", "physics", "--backend", "python", *sizes)[0] == 0
+
+
+def test_weights_for_a_compensator(hybridsep: Run, tmp_path: Path) -> None:
+    machine, weights = load_machine("spring_mass_damper"), tmp_path / "trained.state"
+    compensator = machine.new_compensator()
+    run_closed_loop(compensator, machine.new_plant(), staircase(), encoder=Encoder(5e-6, 1))
+    compensator.predictor.save(weights)
+    options = ("--backend", "python", "--weights", weights)
+    status, out, _ = hybridsep("cosim", "--compensate", "hybrid", *options, "--json")
+    assert status == 0
+    assert json.loads(out)["tracking_rms_um"] < 2.5
+    assert json.loads(out)["share_hybrid"] == 1.0
+    status, _, err = hybridsep("cosim", *options)
+    assert status == 2
+    assert "trained.state was not trained for machine spring_mass_damper: it has Np = 50 instead of 100" in err
+    assert hybridsep("build", "SepCompensatorPy", "FeedDrivePy", *options, "--out", tmp_path)[0] == 0
+    with zipfile.ZipFile(tmp_path / "SepCompensatorPy.fmu") as archive:
+        assert "resources/weights.bin" in archive.namelist()
+    status, _, err = hybridsep("build", "-m", "spring_mass_damper", *options, "--out", tmp_path)
+    assert status == 2
+    assert (
+        "--weights is for one HybridPredictor or SepCompensator, this would build HybridPredictorPy, SepCompensatorPy; "
+        "name one" in " ".join(err.split())
+    )
+
+
+def test_figure_of_a_prediction(hybridsep: Run, tmp_path: Path) -> None:
+    figure = tmp_path / "made" / "run.png"
+    assert hybridsep("cosim", "--backend", "python", "--figure", figure)[0] == 0
+    assert figure.read_bytes().startswith(b"\x89PNG")
+
+
 def test_help_shows_units_and_ranges(hybridsep: Run) -> None:
     status, out, _ = hybridsep("backtest", "--help")
     text = " ".join(out.split())
@@ -144,6 +199,18 @@ def test_help_shows_units_and_ranges(hybridsep: Run) -> None:
         (["cosim", "--trajectory", "zigzag"], "zigzag"),
         (["cosim", "--out", "run.xlsx"], "--out must end in .csv or .npz, got 'run.xlsx'"),
         (["cosim", "--Np", "10"], "p must be 1 … Np = 10, got 50"),
+        (["cosim", "--compensate", "magic"], "--compensate must be one of none, physics, hybrid, got 'magic'"),
+        (["cosim", "--compensate", "hybrid", "--p", "51"], "p must be 1 … Np = 50, got 51"),
+        (
+            ["cosim", "--compensate", "hybrid", "-m", "emps", "--plant", "plant.fmu"],
+            "machine emps has no [drive_limits], which a compensator must keep",
+        ),
+        (
+            ["cosim", "--compensate", "hybrid", "--predictor", "none.fmu", "--backend", "python"],
+            "no FMU at none.fmu; build it first",
+        ),
+        (["cosim", "--weights", "w.state", "--predictor", "p.fmu"], "--weights go into an FMU that is built here"),
+        (["cosim", "--figure", "run.pdf"], "--figure must end in .png, got 'run.pdf'"),
         (["cosim", "--seed", "99999999999"], "seed must be 0 … 2147483647, got 99999999999"),
         (["cosim", "--out", "{log}/run.csv"], "cannot read or write"),
         (["backtest", "{log}", "-m", "spring_mass_damper", "--out", "."], "--out must be a file, got the folder ."),

@@ -1,0 +1,196 @@
+"""Closed loops over a trajectory, cold and warm: in the library, or FMU against FMU through fmpy."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from hybridsep.closed_loop import ClosedLoop, run_closed_loop
+from hybridsep.compensator import SepCompensator, SepState
+from hybridsep.fmi.archive import build_fmu, fmu_names
+from hybridsep.limits import Limits
+from hybridsep.machine import Machine
+from hybridsep.plant import Encoder, FeedDrive, Plant
+from hybridsep.sep_cosim import SepCoSimulation, cosimulate_sep
+from hybridsep.signals import Array
+
+__all__ = ["Case", "FmuLoops", "LibraryLoops", "Loops", "noise_seed"]
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is done to the loop: another plant from sample ``at`` on, a held sensor, other limits or noise."""
+
+    change: Callable[[FeedDrive], None] | None = None
+    at: int = 3050
+    held: tuple[int, int] | None = None
+    limits: Limits | None = None
+    noise: float = 1.0
+
+
+class HeldSensor:
+    """Repeats the last value before sample ``first`` until sample ``last``."""
+
+    def __init__(self, first: int, last: int) -> None:
+        self.first, self.last, self.value = first, last, 0.0
+
+    def __call__(self, k: int, x_meas: float) -> float:
+        """Return what arrives of the measurement at sample ``k``."""
+        if not self.first <= k < self.last:
+            self.value = x_meas
+        return self.value
+
+
+class Loops(Protocol):
+    """Runs a machine's drive behind its compensator."""
+
+    def run(
+        self, machine: Machine, r: Array, best: SepState, seed: int, n: int = 1, case: Case | None = None
+    ) -> list[ClosedLoop]:
+        """Return ``n`` runs in a row, each warm after the first.
+
+        Parameters
+        ----------
+        machine : Machine
+            With the settings of its ``[compensator]``.
+        r : (n,) array, m
+            Commanded positions.
+        best : SepState
+            Best model to use.
+        seed : int
+            Noise seed; each run has another one, :func:`noise_seed`.
+        n : int
+            Runs.
+        case : Case, optional
+            What is done to the loop.
+        """
+        ...
+
+
+def noise_seed(seed: int, run: int) -> int:
+    """Return the encoder's seed in the first, second, … run in a row."""
+    return seed + 1000 * run
+
+
+class LibraryLoops:
+    """The library's compensator and plant, with the FMU's timing."""
+
+    def run(
+        self, machine: Machine, r: Array, best: SepState, seed: int, n: int = 1, case: Case | None = None
+    ) -> list[ClosedLoop]:
+        """Return ``n`` runs in a row; see :class:`Loops`."""
+        compensator = self.compensator(machine, best, case or Case())
+        return [self.once(compensator, machine, r, seed, i, case or Case()) for i in range(n)]
+
+    def compensator(self, machine: Machine, best: SepState, case: Case) -> SepCompensator:
+        """Return a compensator that has learned nothing."""
+        changes = {} if case.limits is None else {"limits": case.limits}
+        return machine.new_compensator(best, **changes)
+
+    def once(
+        self, compensator: SepCompensator, machine: Machine, r: Array, seed: int, run: int, case: Case
+    ) -> ClosedLoop:
+        """Return run number ``run`` of a compensator, warm if it is not the first."""
+        assert machine.plant is not None
+
+        def disturb(k: int, moved: Plant) -> None:
+            if case.change is not None and k == case.at and isinstance(moved, FeedDrive):
+                case.change(moved)
+
+        return run_closed_loop(
+            compensator,
+            machine.new_plant(),
+            r,
+            encoder=Encoder(machine.plant.noise_std * case.noise, noise_seed(seed, run)),
+            t_init=None if run == 0 else 0.0,
+            disturb=disturb,
+            sensor=None if case.held is None else HeldSensor(*case.held),
+        )
+
+
+class FmuLoops:
+    """A SepCompensator FMU against a plant FMU; a warm one starts with the weights of the library's run before.
+
+    Use it as a context manager: the FMUs are in a temporary folder.
+
+    Parameters
+    ----------
+    backend : {"native", "python"}
+        Flavour of the FMUs.
+
+    Attributes
+    ----------
+    apart : float, m
+        Largest difference of ``x_dm`` from the library's cold runs so far.
+    """
+
+    def __init__(self, backend: str) -> None:
+        self.backend, self.apart = backend, 0.0
+        self._folder = tempfile.TemporaryDirectory()
+        self._built: dict[tuple[str, ...], Path] = {}
+        self._library = LibraryLoops()
+
+    def __enter__(self) -> FmuLoops:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._folder.cleanup()
+
+    def run(
+        self, machine: Machine, r: Array, best: SepState, seed: int, n: int = 1, case: Case | None = None
+    ) -> list[ClosedLoop]:
+        """Return ``n`` ≤ 2 runs in a row; see :class:`Loops`.
+
+        Raises
+        ------
+        ValueError
+            If the case changes the plant in mid-run: an FMU's parameters are fixed then.
+        """
+        case = case or Case()
+        if case.change is not None or n > 2:
+            raise ValueError("FMUs can be run twice in a row, and their plant cannot change in mid-run")
+        cold = self._once(machine, r, best, seed, 0, case, self._fmu(machine, "SepCompensator"))
+        compensator = self._library.compensator(machine, best, case)
+        same = self._library.once(compensator, machine, r, seed, 0, case)
+        self.apart = max(self.apart, float(np.max(np.abs(cold.x_dm - same.x_dm))))
+        if n == 1:
+            return [cold]
+        weights = Path(self._folder.name) / "trained.state"
+        compensator.predictor.save(weights)
+        return [cold, self._once(machine, r, best, seed, 1, case, self._fmu(machine, "SepCompensator", weights))]
+
+    def _once(
+        self, machine: Machine, r: Array, best: SepState, seed: int, run: int, case: Case, fmu: Path
+    ) -> ClosedLoop:
+        assert machine.plant is not None
+        values: dict[str, Any] = {"compensate": int(best)}
+        if case.limits is not None:
+            limits = case.limits
+            values |= {"v_max": limits.velocity, "a_max": limits.acceleration, "j_max": limits.jerk}
+        plant = {"seed": noise_seed(seed, run), "noise_std": machine.plant.noise_std * case.noise}
+        found: SepCoSimulation = cosimulate_sep(
+            fmu,
+            self._fmu(machine, "FeedDrive"),
+            r,
+            compensator_values=values,
+            plant_values=plant,
+            sensor=None if case.held is None else HeldSensor(*case.held),
+        )
+        return ClosedLoop(found.x_d, found.x_dm, found.x, found.x_meas, found.x_pb, found.x_h, found.state)
+
+    def _fmu(self, machine: Machine, model: str, weights: Path | None = None) -> Path:
+        """Return an FMU of a machine; only those with weights are built anew."""
+        key = (machine.name, model, str(machine.compensator))
+        if weights is not None or key not in self._built:
+            name = next(name for name, built in fmu_names(machine, self.backend).items() if built == model)
+            folder = Path(self._folder.name) / ("warm" if weights else str(len(self._built)))
+            path = build_fmu(machine, name, folder, self.backend, targets=("host",), weights=weights)
+            if weights is not None:
+                return path
+            self._built[key] = path
+        return self._built[key]
