@@ -33,6 +33,7 @@ from .physics import DiscreteModel, ModalModel, Mode
 from .plant import Encoder, FeedDrive, StageDrive, simulate
 from .predictor import HybridPredictor
 from .regression import RidgeRegression
+from .sep_cosim import SepCoSimulation, cosimulate_sep
 from .sep_lookahead import SepLookAhead
 from .trajectory import PAPER_LIMITS, along_path, archimedean_spiral, from_file, rest_to_rest, spiral, staircase
 from .window import Prediction, WindowOperator
@@ -63,6 +64,7 @@ __all__ = [
     "Prediction",
     "RidgeRegression",
     "Scores",
+    "SepCoSimulation",
     "SepCompensator",
     "SepLookAhead",
     "SepPlan",
@@ -78,6 +80,7 @@ __all__ = [
     "build_fmu",
     "contour_error",
     "cosimulate",
+    "cosimulate_sep",
     "fmu_names",
     "from_file",
     "load_machine",
