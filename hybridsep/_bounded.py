@@ -22,6 +22,9 @@ __all__ = ["Bounds", "DriveBounds", "solve"]
 _ROUNDING = 1e-9
 """Share of a limit that is taken for rounding."""
 
+_MOVES = 1e-12
+"""Step of the commanded position, m a sample, that counts as a move."""
+
 
 @dataclass(frozen=True)
 class Bounds:
@@ -63,9 +66,20 @@ class DriveBounds:
         The drive's velocity, acceleration and jerk.
     change_max : float or None
         Bound on ``|δ|``, m.
+    keep_direction : bool
+        Whether the velocity of ``x_dm``, if it is limited, keeps the sign of that of ``x_d`` where that one moves.
     """
 
-    def __init__(self, basis: SplineBasis, Ts: float, limits: Limits | None, change_max: float | None) -> None:
+    def __init__(
+        self,
+        basis: SplineBasis,
+        Ts: float,
+        limits: Limits | None,
+        change_max: float | None,
+        *,
+        keep_direction: bool = False,
+    ) -> None:
+        self._keep_direction = keep_direction
         self._scales: list[tuple[int, float]] = []
         if limits is not None:
             bounds = limits.velocity * Ts, limits.acceleration * Ts**2, limits.jerk * Ts**3
@@ -97,8 +111,16 @@ class DriveBounds:
         offset = np.concatenate(offsets) if offsets else np.zeros(0)
         offset = offset + self._all[:, :N_DECIDED] @ rest[:N_DECIDED]
         at_rest = self._free @ rest[N_DECIDED:]
-        most = 1.0 - _ROUNDING
-        return Bounds(rows=self._free, low=np.minimum(-most - offset, at_rest), high=np.maximum(most - offset, at_rest))
+        most = np.full(len(offset), 1.0 - _ROUNDING)
+        least = -most
+        if self._keep_direction:
+            steps, n = np.diff(x_d, prepend=x_d_before[-1]), len(x_d)
+            for i, (order, _) in enumerate(self._scales):
+                if order == 1:
+                    least[i * n : (i + 1) * n][steps > _MOVES] = 0.0
+                    most[i * n : (i + 1) * n][steps < -_MOVES] = 0.0
+        low, high = np.minimum(least - offset, at_rest), np.maximum(most - offset, at_rest)
+        return Bounds(rows=self._free, low=low, high=high)
 
 
 def solve(cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int) -> Array | None:

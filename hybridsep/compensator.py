@@ -39,7 +39,7 @@ _KIND = "compensator"
 _PINNED = 8
 """Samples at the beginning of a window in which a bounded plan follows the last one: the time to solve it."""
 
-RECOMMENDED: dict[str, Any] = {"Np": 50, "p": 50, "q": 40, "lam": 1e-8, "t_init": 0.1}
+RECOMMENDED: dict[str, Any] = {"Np": 50, "p": 50, "q": 40, "lam": 1e-8, "t_init": 0.1, "v_s": 2e-3}
 """Arguments of HybridPredictor with which compensation was best on the staircase drive, with the defaults below."""
 
 
@@ -63,6 +63,8 @@ class SepCompensator:
         The drive's own limits, which ``x_dm`` keeps in its differences; none if left out.
     change_max : float, optional
         Bound on ``|δ|``, m; none if None.
+    keep_direction : bool
+        Whether ``x_dm``, within its limits, never turns while ``x_d`` moves: friction would turn with it.
     best : SepState
         Best model to use: OFF leaves the command as it is.
 
@@ -81,6 +83,7 @@ class SepCompensator:
         jerk_weight: float = 1.0,
         limits: Limits | None = None,
         change_max: float | None = 1e-3,
+        keep_direction: bool = True,
         best: SepState = SepState.HYBRID,
     ) -> None:
         Np = predictor.Np
@@ -95,9 +98,10 @@ class SepCompensator:
             raise ParameterError(f"change_max must be finite and > 0 m, got {change_max}")
         self.predictor, self.spacing, self.jerk_weight = predictor, int(spacing), float(jerk_weight)
         self.limits, self.change_max, self.best = limits, change_max, SepState(best)
+        self.keep_direction = bool(keep_direction)
         self._basis = SplineBasis(self.preview, self.spacing)
         self._n_pinned = min(_PINNED, Np // 2) // self.spacing
-        self._bounds = DriveBounds(self._basis, predictor.Ts, limits, change_max)
+        self._bounds = DriveBounds(self._basis, predictor.Ts, limits, change_max, keep_direction=self.keep_direction)
         self._trust = Trust()
         self.new_run(predictor.start, t_init=predictor.t_init)
 
@@ -153,7 +157,7 @@ class SepCompensator:
         state, coefficients = self._best_plan(command)
         delta = (self._basis.values @ coefficients)[:Np]
         x_dm = command[:Np] + delta
-        prediction = predictor.predict(x_dm)
+        prediction = predictor.predict(x_dm, reference=command)
         self._pending = PendingPlan(coefficients, delta, command[:Np].copy(), prediction, state)
         x_h = prediction.x_pb + prediction.e_h if state is SepState.HYBRID else prediction.x_pb.copy()
         return SepPlan(x_dm=x_dm, x_pb=prediction.x_pb, x_h=x_h, state=state)
@@ -188,8 +192,10 @@ class SepCompensator:
         else:
             # Some residuals of the window after a gap still have their own predictions as lags.
             learn = self._measured_before and predictor.k >= self.lead_in
+            # What is predicted from a few rows before the warm-up is over moves nothing: it is not judged.
+            judge = learn and predictor.k >= predictor.n_init
             predictor.update(measured, learn=learn)
-            if learn:
+            if judge:
                 regression = predictor.regression
                 self._trust.observe(measured - x_pb, e_h, regression.residual_sum / regression.n_samples)
         self._measured_before = not missing
@@ -206,7 +212,7 @@ class SepCompensator:
         rest = self._rest
         bounds = self._bounds.bounds(command, self._x_d_before, self._delta_before, rest)
         for state in self._candidates():
-            g, free = self._model(state)
+            g, free = self._model(state, command)
             if not (np.isfinite(g).all() and np.isfinite(free).all()):
                 continue
             cost = self._basis.cost(g, free, command, rest[:N_DECIDED], self._delta_before, self.jerk_weight)
@@ -223,15 +229,15 @@ class SepCompensator:
             and predictor.k >= predictor.n_init
             and predictor.regression.n_samples > 0
             and self._trust.hybrid
-            and has_stable_poles(predictor.weights[2 + predictor.q :])
+            and has_stable_poles(predictor.residual_weights)
         )
         candidates = [SepState.HYBRID] if hybrid else []
         return candidates + ([SepState.PHYSICS] if self.best is not SepState.OFF else [])
 
-    def _model(self, state: SepState) -> tuple[Array, Array]:
+    def _model(self, state: SepState, command: Array) -> tuple[Array, Array]:
         """Return the first column of G and the free response over the preview; eq. (3)."""
         with np.errstate(all="ignore"):  # a hybrid model that is not asked for may be unstable
-            operator = self.predictor.operator(self.preview)
+            operator = self.predictor.operator(self.preview, reference=command)
         if state is SepState.HYBRID:
             return operator.g_h, operator.free
         return operator.g_pb, operator.free_pb
@@ -242,6 +248,7 @@ class SepCompensator:
         meta = {
             **{name: getattr(self, name) for name in ("preview", "spacing", "jerk_weight", "change_max", "lead_in")},
             "limits": None if limits is None else [limits.velocity, limits.acceleration, limits.jerk],
+            "keep_direction": self.keep_direction,
             "best": int(self.best),
             "excess": self._trust.excess,
             "measured_before": self._measured_before,
@@ -271,7 +278,7 @@ class SepCompensator:
         try:
             predictor = HybridPredictor.from_bytes(parts["predictor"])
             restored = HybridPredictor.from_bytes(parts["predictor"])
-            names = ("preview", "spacing", "jerk_weight", "change_max")
+            names = ("preview", "spacing", "jerk_weight", "change_max", "keep_direction")
             values: dict[str, Any] = {name: meta[name] for name in names}
             limits = None if meta["limits"] is None else Limits(*meta["limits"])
             compensator = cls(predictor, limits=limits, best=SepState(meta["best"]), **values)

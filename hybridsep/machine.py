@@ -116,6 +116,8 @@ class CompensatorSection(_Section):
     preview: OptionalWhole = None
     spacing: OptionalWhole = None
     jerk_weight: Number = _default("jerk_weight")
+    v_s: Number = _default("v_s")
+    keep_direction: Whole = _default("keep_direction")
 
 
 class FeedDriveSection(_Section):
@@ -224,7 +226,7 @@ class Machine(_Section):
             Arguments of :class:`SepCompensator`, or of :class:`HybridPredictor` for its predictor.
         """
         limits, change_max = self.command_limits()
-        own = ("preview", "spacing", "jerk_weight", "limits", "change_max")
+        own = ("preview", "spacing", "jerk_weight", "limits", "change_max", "keep_direction")
         values = {"limits": limits, "change_max": change_max, **self._compensation(**changes)}
         predictor = self.new_predictor(**{name: value for name, value in values.items() if name not in own})
         return SepCompensator(predictor, best=best, **{name: values[name] for name in own})

@@ -29,6 +29,7 @@ INPUT_HOLDS = ("zoh", "foh")
 """How ``x_d`` runs between samples; the index is the FMU parameter ``input_hold``."""
 
 _INT_MAX = 2**31 - 1
+_V_S = "velocity over which friction changes its sign, for features of the reference; 0: none of them"
 
 
 @dataclass(frozen=True)
@@ -105,6 +106,8 @@ PARAMETERS: Mapping[str, Parameter] = _table(
     Parameter("a_max", float, "m/s2", "largest acceleration of the modified command", 16.0, above=0.0),
     Parameter("j_max", float, "m/s3", "largest jerk of the modified command", 5000.0, above=0.0),
     Parameter("change_max", float, "m", "largest change of the command", 1e-3, above=0.0, display_unit="mm"),
+    Parameter("v_s", float, "m/s", _V_S, 2e-3, 0.0, display_unit="mm/s"),
+    Parameter("keep_direction", int, "1", "1: x_dm never turns while the commanded position moves", 1, 0, 1),
     Parameter("compensate", int, "1", "best model to compensate with: 0 off, 1 physics, 2 hybrid", 2, 0, 2),
     # One mode of eq. (15).
     Parameter("f_n", float, "Hz", "natural frequency of the mode", above=0.0),

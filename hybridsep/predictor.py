@@ -17,6 +17,7 @@ from numpy.lib.stride_tricks import as_strided
 from numpy.typing import ArrayLike
 from scipy.signal import lfilter
 
+from ._schedule import ReferenceSchedule
 from .errors import SignalError, StateError
 from .parameters import INPUT_HOLDS, check, check_together, samples_before
 from .physics import ModalModel, Mode
@@ -37,6 +38,8 @@ class _Pending:
     x_d: Array
     x_pb: Array
     start: float
+    reference: Array
+    signs: Array
 
 
 class HybridPredictor:
@@ -64,6 +67,9 @@ class HybridPredictor:
     start : float, optional
         Position, m, where the drive is at rest before the first sample; the first command if left out. All positions
         are relative to it inside, because ridge regression is not invariant to an offset.
+    v_s : float
+        Velocity over which the drive's friction changes its sign, m/s: φ has further features then, of the reference
+        alone (:mod:`hybridsep._schedule`). 0, as in the paper: none.
 
     Raises
     ------
@@ -83,13 +89,15 @@ class HybridPredictor:
         t_init: float = 0.3,
         input_hold: str = "zoh",
         start: float | None = None,
+        v_s: float = 0.0,
     ) -> None:
         check_together(Np=Np, p=p, q=q, lam=lam, Ts=Ts, t_init=t_init)
         self.Np, self.p, self.q = int(Np), int(p), int(q)
         self.Ts, self.lam, self.t_init = float(Ts), float(lam), float(t_init)
         self.model = model
         self.discrete = model.discretise(self.Ts, input_hold, block=self.Np)
-        self.regression = RidgeRegression(2 + self.q + self.p, self.lam)
+        self._schedule = ReferenceSchedule(check("v_s", v_s), self.Ts)
+        self.regression = RidgeRegression(2 + self.q + self.p + self._schedule.n, self.lam)
         self._allocate()
         self.new_run(start, t_init=t_init)
 
@@ -104,8 +112,18 @@ class HybridPredictor:
 
     @property
     def n_features(self) -> int:
-        """``n = 2 + q + p``."""
+        """``n = 2 + q + p``, and the reference-scheduled ones."""
         return self.regression.n_features
+
+    @property
+    def v_s(self) -> float:
+        """Velocity over which friction changes its sign, m/s; 0 without reference-scheduled features."""
+        return self._schedule.v_s
+
+    @property
+    def residual_weights(self) -> Array:
+        """Weights of the past residuals, ``(p,)``: those of the learned recursion."""
+        return self.weights[2 + self.q : 2 + self.q + self.p]
 
     @property
     def weights(self) -> Array:
@@ -129,9 +147,10 @@ class HybridPredictor:
         self._state = self.discrete.rest()
         # x_pb and e_pb before the first sample are zero in φ.
         self._x[:], self._e[:] = 0.0, 0.0
+        self._schedule.new_run()
         self._pending: _Pending | None = None
 
-    def predict(self, x_d: ArrayLike) -> Prediction:
+    def predict(self, x_d: ArrayLike, *, reference: ArrayLike | None = None) -> Prediction:
         """Predict the next window from its commands and all that was measured before; eqs. (2), (4).
 
         May be called again, with other commands or another length, before :meth:`update`; the last call counts.
@@ -140,6 +159,9 @@ class HybridPredictor:
         ----------
         x_d : (n,) array_like, m
             Commanded positions of the next ``n ≥ 1`` samples; usually ``n = Np``.
+        reference : (m,) array_like, m, optional
+            Commanded positions before a compensator modified them, ``m ≥ n``: of what follows the window too, as far
+            as it is known. ``x_d`` if left out.
 
         Returns
         -------
@@ -148,7 +170,7 @@ class HybridPredictor:
         Raises
         ------
         SignalError
-            If ``x_d`` is empty, not one-dimensional or not finite.
+            If ``x_d`` is empty, not one-dimensional or not finite, or ``reference`` is shorter.
         """
         command = as_samples(x_d, "x_d")
         n = len(command)
@@ -157,8 +179,13 @@ class HybridPredictor:
         start = float(command[0]) if self.start is None else self.start
         command = command - start
         x_pb, _ = self.discrete.respond(self._state, command)  # Eq. (2)
-        self._pending = _Pending(command, x_pb, start)
-        return Prediction(x_pb + start, self._free_run(x_pb), min(max(self.n_init - self.k, 0), n))
+        path = command + start if reference is None else as_samples(reference, "reference")
+        if len(path) < n:
+            raise SignalError(f"reference must have at least the {n} samples of x_d, got {len(path)}")
+        signs = self._schedule.signs(path, start)
+        self._pending = _Pending(command, x_pb, start, path, signs)
+        e_h = self._free_run(x_pb, self._schedule.features(signs, n))
+        return Prediction(x_pb + start, e_h, min(max(self.n_init - self.k, 0), n))
 
     def update(self, x: ArrayLike, *, learn: bool = True) -> None:
         """Learn from the measurement of the predicted window, or of its beginning; eq. (6).
@@ -183,17 +210,21 @@ class HybridPredictor:
             raise SignalError(f"x must have 1 … {len(pending.x_d)} samples, as predicted, got {len(measured)}")
         m = len(measured)
         e_pb = measured - pending.start - pending.x_pb[:m]
+        scheduled = self._schedule.features(pending.signs, m)
         for i in range(0, m, self.Np):
-            self._take_in(pending.x_pb[i : min(i + self.Np, m)], e_pb[i : i + self.Np], learn)
+            stop = min(i + self.Np, m)
+            self._take_in(pending.x_pb[i:stop], e_pb[i:stop], scheduled[i:stop], learn)
+        self._schedule.advance(pending.signs, pending.reference, m)
         _, self._state = self.discrete.respond(self._state, pending.x_d[:m])
         self.start = pending.start
         self.k += m
         self._pending = None
 
-    def operator(self, n: int | None = None) -> WindowOperator:
+    def operator(self, n: int | None = None, *, reference: ArrayLike | None = None) -> WindowOperator:
         """Return the model of the next ``n`` samples (``Np`` if left out) as an affine map of their commands; eq. (3).
 
-        It is the hybrid model whether or not the warm-up is over.
+        It is the hybrid model whether or not the warm-up is over. ``reference``, ``(n,)``, m, is the path that the
+        reference-scheduled features follow from; a path at rest if left out.
 
         Raises
         ------
@@ -206,13 +237,15 @@ class HybridPredictor:
         start = self.start if self.start is not None or self._pending is None else self._pending.start
         if start is None:
             raise SignalError("the start is not known yet: give start= or predict the first window before")
-        w_x, w_e = self.weights[1 : 2 + self.q], self.weights[2 + self.q :]
+        w_x, w_e = self.weights[1 : 2 + self.q], self.residual_weights
         g_pb = self.discrete.impulse_response(length)
         # x_h = x_pb + wᵀφ as filters: G_h = (1 + W_x(z) / (1 − W_e(z))) G_pb
         denominator = np.concatenate(([1.0], -w_e))
         g_h = g_pb + lfilter(w_x, denominator, g_pb)
         free_pb, _ = self.discrete.respond(self._state, np.zeros(length))
-        free = free_pb + self._free_run(free_pb)
+        path = np.full(length, start) if reference is None else as_samples(reference, "reference", length)
+        scheduled = self._schedule.features(self._schedule.signs(path, start), length)
+        free = free_pb + self._free_run(free_pb, scheduled)
         return WindowOperator(
             g_h=g_h,
             free=free + start * (1.0 - np.cumsum(g_h)),
@@ -228,6 +261,7 @@ class HybridPredictor:
         """Return parameters and state, a window that waits for its measurement too, as a versioned blob."""
         meta = {
             **{name: getattr(self, name) for name in ("Ts", "Np", "p", "q", "lam", "t_init", "k", "n_init", "start")},
+            "v_s": self.v_s,
             "input_hold": self.discrete.input_hold,
             "dead_time": self.model.dead_time,
             "n_samples": self.regression.n_samples,
@@ -240,9 +274,12 @@ class HybridPredictor:
             "x_pb": self._x[: self.q],
             "e_pb": self._e[: self.p],
             "factor": self.regression.factor,
+            "signs": self._schedule.before,
+            "reference": np.array([self._schedule.last]),
         }
         if self._pending is not None:
-            arrays |= {"pending_x_d": self._pending.x_d, "pending_x_pb": self._pending.x_pb}
+            names = ("x_d", "x_pb", "reference", "signs")
+            arrays |= {f"pending_{name}": getattr(self._pending, name) for name in names}
         return pack(_KIND, meta, arrays)
 
     @classmethod
@@ -257,16 +294,17 @@ class HybridPredictor:
         meta, arrays, _ = unpack(_KIND, blob)
         try:
             model = ModalModel([Mode(*row) for row in arrays["modes"].tolist()], meta["dead_time"])
-            names = ("Ts", "Np", "p", "q", "lam", "t_init", "input_hold", "start")
+            names = ("Ts", "Np", "p", "q", "lam", "t_init", "input_hold", "start", "v_s")
             predictor = cls(model, **{name: meta[name] for name in names})
             predictor.k, predictor.n_init = meta["k"], meta["n_init"]
             predictor._state[:] = arrays["state"]
             predictor._x[: predictor.q] = arrays["x_pb"]
             predictor._e[: predictor.p] = arrays["e_pb"]
             predictor.regression.restore(arrays["factor"], meta["n_samples"])
+            predictor._schedule.before, predictor._schedule.last = arrays["signs"], float(arrays["reference"][0])
             if meta["pending_start"] is not None:
-                pending = arrays["pending_x_d"], arrays["pending_x_pb"]
-                predictor._pending = _Pending(*pending, start=meta["pending_start"])
+                pending = {name: arrays[f"pending_{name}"] for name in ("x_d", "x_pb", "reference", "signs")}
+                predictor._pending = _Pending(start=meta["pending_start"], **pending)
         except (KeyError, TypeError, ValueError) as error:
             raise StateError(f"the saved predictor does not hold together: {error}") from error
         return predictor
@@ -299,19 +337,21 @@ class HybridPredictor:
         self._e_lags = as_strided(self._e[p - 1 :], (Np, p), (step, -step))  # e_pb(k−1) … e_pb(k−p)
         self._rows = np.empty((Np, self.n_features + 1), order="F")
 
-    def _free_run(self, x_pb: Array) -> Array:
+    def _free_run(self, x_pb: Array, scheduled: Array) -> Array:
         """Return ``wᵀφ`` over a window whose residuals are predicted as it goes, ``(n,)``; eq. (4)."""
         w, q, p = self.weights, self.q, self.p
         # What the command drives: w₀ + Σ_i w_x,i x_pb(k−i)
         drive = w[0] + np.convolve(np.concatenate((self._x[:q], x_pb)), w[1 : 2 + q], "valid")
+        if self._schedule.n:
+            drive += scheduled @ w[2 + q + p :]
         # e(k) = drive(k) + Σ_i w_e,i e(k−i), an all-pole filter started from the measured residuals:
         # its state is z_j = Σ_m w_e,j+m e(−m)
-        w_e = w[2 + q :]
+        w_e = self.residual_weights
         state = np.correlate(w_e, self._e[:p][::-1], "full")[p - 1 :]
         e_h, _ = lfilter([1.0], np.concatenate(([1.0], -w_e)), drive, zi=state)
         return np.asarray(e_h)
 
-    def _take_in(self, x_pb: Array, e_pb: Array, learn: bool) -> None:
+    def _take_in(self, x_pb: Array, e_pb: Array, scheduled: Array, learn: bool) -> None:
         """Fold one stretch of at most ``Np`` samples into the regression, if it is to learn, and into the lags."""
         m, p, q = len(e_pb), self.p, self.q
         self._x[q : q + m], self._e[p : p + m] = x_pb, e_pb
@@ -321,6 +361,7 @@ class HybridPredictor:
             rows[:, 0] = 1.0
             rows[:, 1 : 2 + q] = self._x_lags[:m]
             rows[:, 2 + q : 2 + q + p] = self._e_lags[:m]
+            rows[:, 2 + q + p : -1] = scheduled
             rows[:, -1] = e_pb
             self.regression.update_stacked(rows)
         self._x[:q], self._e[:p] = self._x[m : m + q].copy(), self._e[m : m + p].copy()

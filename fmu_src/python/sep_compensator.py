@@ -66,11 +66,11 @@ class SepCompensatorPy(slave.TableSlave):
         values = self.values
         names = ("Np", "p", "q", "lambda", "T_s", "t_init", "input_hold")
         model = ModalModel([Mode(**mode) for mode in modes_from(values)], values["dead_time"])
-        predictor = HybridPredictor.with_parameters(model, {name: values[name] for name in names})
+        planning = self._planning()
+        predictor = HybridPredictor.with_parameters(model, {name: values[name] for name in names}, v_s=planning["v_s"])
         trained = Path(self.resources) / WEIGHTS_FILE
         if trained.exists():
             restore_weights(predictor, trained.read_bytes())
-        planning = self._planning()
         compensator = SepCompensator(
             predictor,
             preview=planning["preview"],
@@ -78,6 +78,7 @@ class SepCompensatorPy(slave.TableSlave):
             jerk_weight=planning["jerk_weight"],
             limits=Limits(planning["v_max"], planning["a_max"], planning["j_max"]),
             change_max=planning["change_max"],
+            keep_direction=bool(planning["keep_direction"]),
             best=SepState(planning["compensate"]),
         )
         return SepLookAhead(compensator, values["x_d_ahead"])

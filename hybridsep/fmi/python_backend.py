@@ -30,7 +30,15 @@ __all__ = ["files"]
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _BASE = ("errors.py", "parameters.py", "signals.py", "state.py", "physics.py", "fmi/variables.py", "fmi/slave.py")
-_PREDICTION = ("regression.py", "window.py", "predictor.py", "_sampled_window.py", "fmi/clock.py", "fmi/weights.py")
+_PREDICTION = (
+    "regression.py",
+    "_schedule.py",
+    "window.py",
+    "predictor.py",
+    "_sampled_window.py",
+    "fmi/clock.py",
+    "fmi/weights.py",
+)
 _PLANNING = tuple(f"_{module}.py" for module in ("bounded", "interior", "plan", "sensor", "splines", "trust"))
 _TRAVELS = {
     "HybridPredictor": (*_BASE, *_PREDICTION, "lookahead.py"),

@@ -27,8 +27,11 @@ Value = float | int | bool
 
 _PREDICTION = ("Np", "p", "q", "lambda", "T_s", "t_init", "input_hold", "dead_time")
 
-PLANNING = ("preview", "spacing", "jerk_weight", "v_max", "a_max", "j_max", "change_max", "compensate")
-"""Parameters that a compensator has besides its predictor's."""
+PLANNING = (
+    *("preview", "spacing", "jerk_weight", "v_max", "a_max", "j_max", "change_max"),
+    *("v_s", "keep_direction", "compensate"),
+)
+"""Parameters that a compensator has besides those of the HybridPredictor."""
 
 
 @dataclass(frozen=True)

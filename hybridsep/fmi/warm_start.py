@@ -62,6 +62,7 @@ def _parameters(predictor: HybridPredictor) -> dict[str, object]:
         "T_s": predictor.Ts,
         "input_hold": predictor.discrete.input_hold,
         "dead_time": predictor.model.dead_time,
+        "v_s": predictor.v_s,
     }
     for i, mode in enumerate(predictor.model.modes, start=1):
         values |= {f"mode[{i}].{name}": getattr(mode, name) for name in ("f_n", "zeta", "alpha", "beta")}
