@@ -62,6 +62,8 @@ COMPENSATOR = {
     "a_max": 16.0,
     "j_max": 5000.0,
     "change_max": 1e-3,
+    "v_s": 2e-3,
+    "keep_direction": 1,
     "compensate": 2,
 }
 
@@ -309,12 +311,13 @@ def sep_look_ahead(name: str, **parameters: float) -> tuple[SepLookAhead, CModel
     values: dict[str, Any] = {**COMPENSATOR, **parameters}
     model = ModalModel([Mode(**mode) for mode in DESCRIPTIONS[name]["modes"]], int(values["dead_time"]))
     predictor = HybridPredictor.with_parameters(
-        model, {key: values[key] for key in PREDICTOR if key != "dead_time"}, start=start
+        model, {key: values[key] for key in (*PREDICTOR, "v_s") if key != "dead_time"}, start=start
     )
     compensator = SepCompensator(
         predictor,
         limits=Limits(values["v_max"], values["a_max"], values["j_max"]),
         best=SepState(values["compensate"]),
+        keep_direction=bool(values["keep_direction"]),
         **{key: values[key] for key in ("preview", "spacing", "jerk_weight", "change_max")},
     )
     c_model = CModel(name, {**values, "x_d_ahead": start, "x_meas": start}).initialise()

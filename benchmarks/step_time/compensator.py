@@ -2,7 +2,7 @@
 
 Builds two C hosts (``main.c``): the compensator with the drive of eq. (13), and the predictor over the drive's log,
 both with the paper's settings. Times every step of both by turns, counts instructions step by step where valgrind is
-installed, and ends with 1 if a limit is missed. The second case has the trajectory's own limits as those of the drive:
+installed, and ends with 1 if a limit is missed. The last case has the trajectory's own limits as those of the drive:
 nearly every plan is bounded, which is the most that planning can cost.
 """
 
@@ -34,11 +34,15 @@ COMPENSATOR = {
     "a_max": 16.0,
     "j_max": 5000.0,
     "change_max": 1e-3,
+    "v_s": 0.0,
+    "keep_direction": 1,
     "compensate": 2,
 }
+PAPER, SCHEDULED = "the paper's settings", "with features of the reference"
 CASES: dict[str, dict[str, Any]] = {
-    "the paper's settings": {},
-    "limits of the drive = those of the trajectory": {"v_max": 0.08, "a_max": 8.0, "j_max": 1000.0},
+    PAPER: {},
+    SCHEDULED: {"v_s": 2e-3},
+    "limits of the drive = those of the trajectory": {"v_s": 2e-3, "v_max": 0.08, "a_max": 8.0, "j_max": 1000.0},
 }
 REPETITIONS, COUNTED_STEPS = 5, 3500
 TAIL_MAX = 300e3
@@ -81,7 +85,7 @@ def main() -> int:
             counted = instructions(host, values, COUNTED_STEPS, folder / f"callgrind_{i}")
             if counted is not None:
                 counts[case] = counted[int(COMPENSATOR["preview"]) :]
-    table = Table(title="one step: ns, and instructions in thousands (paper's settings)")
+    table = Table(title="one step: ns, and instructions in thousands; p = 50, q = 3, Np = 100")
     for heading in ("", "median", "p99", "p99.9", "max", "instr. median", "p99", "p99.9", "most", "state, kB"):
         table.add_column(heading, justify="right" if heading else "left")
     for case, figures in found.items():
@@ -91,15 +95,13 @@ def main() -> int:
             shown = [f"{level / 1e3:.1f}" for level in np.percentile(counts[case], [50, 99, 99.9, 100])]
         table.add_row(case, *times, *shown, f"{figures['state_bytes'] / 1e3:.0f}")
     console.print(table)
-    ours, theirs = found["the paper's settings"], found["HybridPredictor"]
-    ratio = ours["median"] / theirs["median"]
-    checks = [
-        (ours["p99.9"] <= TAIL_MAX, f"p99.9 = {ours['p99.9'] / 1e3:.0f} µs, limit ≤ {TAIL_MAX / 1e3:g} µs"),
-        (
-            ratio <= MEDIAN_OVER_PREDICTOR_MAX,
-            f"median / HybridPredictor's median = {ratio:.2f}, limit ≤ {MEDIAN_OVER_PREDICTOR_MAX:g}",
-        ),
-    ]
+    checks = []
+    for case in (PAPER, SCHEDULED):
+        ours, ratio = found[case], found[case]["median"] / found["HybridPredictor"]["median"]
+        text = f"{case}: p99.9 = {ours['p99.9'] / 1e3:.0f} µs, limit ≤ {TAIL_MAX / 1e3:g} µs"
+        checks.append((ours["p99.9"] <= TAIL_MAX, text))
+        text = f"{case}: median / HybridPredictor's median = {ratio:.2f}, limit ≤ {MEDIAN_OVER_PREDICTOR_MAX:g}"
+        checks.append((ratio <= MEDIAN_OVER_PREDICTOR_MAX, text))
     for held, text in checks:
         console.print(f"{'held  ' if held else 'MISSED'} {text}", highlight=False)
         missed += not held

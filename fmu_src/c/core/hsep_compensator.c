@@ -27,15 +27,28 @@ hsep_regression *hsep_compensator_regression(hsep_compensator *self)
     return (hsep_regression *)compensator_at(self, self->regression);
 }
 
+static uint64_t compensator_scheduled(const hsep_compensator_parameters *parameters)
+{
+    return parameters->v_s > 0.0 ? HSEP_SCHEDULED : 0;
+}
+
+/* Entries of phi. */
+static uint64_t compensator_features(const hsep_compensator_parameters *parameters)
+{
+    return 2 + parameters->q + parameters->p + compensator_scheduled(parameters);
+}
+
 double hsep_compensator_size(const hsep_compensator_parameters *parameters)
 {
     const double Np = (double)parameters->planner.Np, preview = (double)parameters->planner.preview;
     const double p = (double)parameters->p, q = (double)parameters->q;
-    const double doubles = 2.0 * preview + 3.0 * Np + 2.0 * (Np + p) + (Np + q) + (2.0 + q + p) + (preview + q) +
-                           (preview + p) + 3.0 * preview;
+    const uint64_t features = compensator_features(parameters);
+    const double doubles = 2.0 * preview + 3.0 * Np + 2.0 * (Np + p) + (Np + q) + (double)features +
+                           (preview + 2.0 * HSEP_SCHEDULE_REACH) + preview + (preview + q) + (preview + p) +
+                           3.0 * preview;
     return (double)sizeof(hsep_compensator) + doubles * (double)sizeof(double) +
            2.0 * hsep_physics_size(parameters->n_modes, parameters->dead_time) +
-           2.0 * hsep_regression_size(2 + parameters->q + parameters->p) + hsep_planner_size(&parameters->planner);
+           2.0 * hsep_regression_size(features) + hsep_planner_size(&parameters->planner);
 }
 
 /* Take count doubles behind what is taken already; return their offset. */
@@ -52,11 +65,13 @@ static void compensator_lay_out(hsep_compensator *self, const hsep_compensator_p
     const double Np = (double)parameters->planner.Np, preview = (double)parameters->planner.preview;
     const double p = (double)parameters->p, q = (double)parameters->q;
     const double physics = hsep_physics_size(parameters->n_modes, parameters->dead_time) / (double)sizeof(double);
-    const double regression = hsep_regression_size(2 + parameters->q + parameters->p) / (double)sizeof(double);
+    const double regression = hsep_regression_size(compensator_features(parameters)) / (double)sizeof(double);
     self->Np = parameters->planner.Np;
     self->preview = parameters->planner.preview;
     self->p = parameters->p;
     self->q = parameters->q;
+    self->n_scheduled = compensator_scheduled(parameters);
+    self->sign_step = parameters->v_s * parameters->T_s;
     self->best = (uint64_t)parameters->best;
     self->n_init = parameters->n_init;
     self->size = (uint64_t)hsep_compensator_size(parameters);
@@ -69,7 +84,9 @@ static void compensator_lay_out(hsep_compensator *self, const hsep_compensator_p
     self->e_h = compensator_take(&end, Np + p);
     self->past_x = compensator_take(&end, Np + q);
     self->past_e = compensator_take(&end, Np + p);
-    self->weights = compensator_take(&end, 2.0 + q + p);
+    self->weights = compensator_take(&end, (double)compensator_features(parameters));
+    self->signs = compensator_take(&end, preview + 2.0 * HSEP_SCHEDULE_REACH);
+    self->drive = compensator_take(&end, preview);
     self->trial_x = compensator_take(&end, preview + q);
     self->trial_e = compensator_take(&end, preview + p);
     self->target = compensator_take(&end, preview);
@@ -86,7 +103,7 @@ void hsep_compensator_init(hsep_compensator *self, const hsep_compensator_parame
 {
     memset(self, 0, sizeof *self);
     compensator_lay_out(self, parameters);
-    self->start = start;
+    self->start = self->x_d_last = start;
     hsep_sensor_init(&self->sensor);
     for (uint64_t i = compensator_first; i < self->physics; i++) {
         *compensator_at(self, i) = 0.0;
@@ -101,7 +118,7 @@ void hsep_compensator_init(hsep_compensator *self, const hsep_compensator_parame
             i == 0 ? physics : trial, parameters->modes, parameters->n_modes, parameters->dead_time, parameters->T_s,
             parameters->hold);
     }
-    hsep_regression_init(hsep_compensator_regression(self), 2 + self->q + self->p, parameters->lambda);
+    hsep_regression_init(hsep_compensator_regression(self), compensator_features(parameters), parameters->lambda);
     hsep_planner_init(compensator_planner(self), &parameters->planner, start);
     /* The spline behind the physics model, at rest: it never changes. */
     double *spline = compensator_at(self, self->spline_pb);
@@ -118,7 +135,7 @@ int hsep_compensator_valid(const void *block, const hsep_compensator_parameters 
     memcpy(&got, bytes, sizeof got);
     expected = got; /* what may differ from a fresh block is taken over, the rest must be equal */
     compensator_lay_out(&expected, parameters);
-    const uint64_t n = 2 + parameters->q + parameters->p;
+    const uint64_t n = compensator_features(parameters);
     int sound = memcmp(&expected, &got, sizeof got) == 0 && got.state <= HSEP_SEP_HYBRID && got.solving <= 1 &&
                 got.predicted <= got.Np && got.k % got.Np < (got.solving ? got.predicted : got.Np) &&
                 (got.solving || got.predicted == got.Np) && got.learning <= 1 && got.missing <= 1 &&
@@ -167,7 +184,7 @@ static void compensator_target(const hsep_compensator *self, hsep_sep_state stat
         const hsep_recursion recursion = compensator_recursion(self, 1);
         compensator_past(x, preview, compensator_at(self, self->past_x) + Np, self->q);
         compensator_past(e, preview, compensator_at(self, self->past_e) + Np, self->p);
-        hsep_recursion_run(&recursion, x, e, preview, 0, preview);
+        hsep_recursion_run(&recursion, x, compensator_at(self, self->drive), e, preview, 0, preview);
         for (uint64_t k = 0; k < preview; k++) {
             target[k] -= e[preview - 1 - k];
         }
@@ -187,7 +204,7 @@ static void compensator_filter_spline(const hsep_compensator *self)
     }
     memset(x + preview, 0, (size_t)self->q * sizeof(double));
     memset(e + preview, 0, (size_t)self->p * sizeof(double));
-    hsep_recursion_run(&recursion, x, e, preview, 0, preview);
+    hsep_recursion_run(&recursion, x, NULL, e, preview, 0, preview);
     for (uint64_t k = 0; k < preview; k++) {
         spline_h[k] = spline_pb[k] + e[preview - 1 - k];
     }
@@ -217,7 +234,8 @@ static void compensator_predict(hsep_compensator *self, uint64_t last)
         hsep_physics_respond(compensator_physics(self, self->physics), &command, &past_x[Np - 1 - k], 1);
         x_pb[k] = past_x[Np - 1 - k] + self->start;
     }
-    hsep_recursion_run(&recursion, past_x, e_h, Np, self->predicted, last);
+    hsep_recursion_run(
+        &recursion, past_x, compensator_at(self, self->drive) + (self->preview - Np), e_h, Np, self->predicted, last);
     for (uint64_t k = self->predicted; k < last; k++) {
         x_h[k] = self->state == HSEP_SEP_HYBRID ? x_pb[k] + e_h[Np - 1 - k] : x_pb[k];
     }
@@ -239,6 +257,27 @@ static void compensator_solve(hsep_compensator *self)
     }
 }
 
+/* Take in the reference of the plan that begins: the signs of its velocity, and what they add to the residuals. */
+static void compensator_schedule(const hsep_compensator *self)
+{
+    const double *w = compensator_at(self, self->weights) + 2 + self->q + self->p;
+    double *signs = compensator_at(self, self->signs), *drive = compensator_at(self, self->drive);
+    double features[HSEP_SCHEDULED];
+    if (self->n_scheduled == 0) {
+        return;
+    }
+    hsep_schedule_signs(
+        signs, compensator_at(self, self->x_d), self->preview, self->x_d_last, self->sign_step);
+    for (uint64_t k = 0; k < self->preview; k++) {
+        double sum = 0.0;
+        hsep_schedule_features(signs, k, features);
+        for (int i = 0; i < HSEP_SCHEDULED; i++) {
+            sum += features[i] * w[i];
+        }
+        drive[self->preview - 1 - k] = sum;
+    }
+}
+
 /* Plan the window that begins with the best model there is. */
 static void compensator_plan(hsep_compensator *self)
 {
@@ -249,6 +288,7 @@ static void compensator_plan(hsep_compensator *self)
     memcpy(x_d + (preview - oldest), ahead, (size_t)oldest * sizeof(double));
     hsep_regression_solve(hsep_compensator_regression(self), compensator_at(self, self->weights)); /* Eq. (6) */
     compensator_past(compensator_at(self, self->e_h), Np, compensator_at(self, self->past_e) + Np, self->p);
+    compensator_schedule(self);
 
     hsep_plan_status status = HSEP_PLAN_FAILED;
     self->state = HSEP_SEP_OFF;
@@ -299,11 +339,14 @@ static void compensator_learn(hsep_compensator *self, uint64_t i)
     const uint64_t p = self->p, q = self->q, j = self->Np - 1 - i;
     const double *x = compensator_at(self, self->past_x) + j, *e = compensator_at(self, self->past_e) + j;
     double *row = hsep_regression_row(hsep_compensator_regression(self));
-    /* phi(k) = [1, x_pb(k) ... x_pb(k-q), e_pb(k-1) ... e_pb(k-p)], its target e_pb(k) beside it */
+    /* phi(k) = [1, x_pb(k) ... x_pb(k-q), e_pb(k-1) ... e_pb(k-p)] and the scheduled ones, its target e_pb(k) beside it */
     row[0] = 1.0;
     memcpy(row + 1, x, (size_t)(q + 1) * sizeof(double));
     memcpy(row + 2 + q, e + 1, (size_t)p * sizeof(double));
-    row[2 + q + p] = e[0];
+    if (self->n_scheduled > 0) {
+        hsep_schedule_features(compensator_at(self, self->signs), i, row + 2 + q + p);
+    }
+    row[2 + q + p + self->n_scheduled] = e[0];
     hsep_regression_fold(hsep_compensator_regression(self));
 }
 
@@ -320,11 +363,16 @@ static void compensator_measured(hsep_compensator *self)
         for (uint64_t j = 0; j < Np; j++) {
             past_e[j] = self->state == HSEP_SEP_HYBRID ? e_h[j] : 0.0;
         }
-    } else if (self->learning) {
+    } else if (self->learning && (double)(self->k - Np) >= self->n_init) {
+        /* What is predicted from a few rows before the warm-up is over moves nothing: it is not judged. */
         hsep_trust_observe(
             &self->trust, past_e, e_h, Np, regression->residual_sum / (double)regression->n_samples);
     }
     hsep_planner_next(compensator_planner(self), compensator_at(self, self->x_d));
+    if (self->n_scheduled > 0) {
+        hsep_schedule_next(compensator_at(self, self->signs), Np);
+    }
+    self->x_d_last = compensator_at(self, self->x_d)[Np - 1];
     memcpy(past_x + Np, past_x, (size_t)self->q * sizeof(double)); /* q < Np, p <= Np: they do not overlap */
     memcpy(past_e + Np, past_e, (size_t)self->p * sizeof(double));
 }

@@ -7,7 +7,7 @@
  * solved over the samples that follow, while the command follows the last plan. Over the first fill (k < preview) the
  * commanded position is the start; what is measured then is not learned.
  *
- * Cost of a sample, with n = 2 + q + p and m splines in a plan: that of hsep_regression_fold(n); at the end of a window
+ * Cost of a sample, with n = 2 + q + p + HSEP_SCHEDULED and m splines in a plan: that of hsep_regression_fold(n); at the end of a window
  * on top n^2 / 2 + (2 preview + Np) (p + q) + m^3 / 6 + m preview multiply-adds; in samples that follow it, while a plan
  * is being solved, that of at most 3 hsep_interior_step, or of HSEP_INTERIOR_STEPS over the samples there are.
  *
@@ -21,6 +21,7 @@
 #include "hsep_planner.h"
 #include "hsep_recursion.h"
 #include "hsep_regression.h"
+#include "hsep_schedule.h"
 #include "hsep_sensor.h"
 #include "hsep_trust.h"
 
@@ -37,6 +38,7 @@ typedef struct {
     uint64_t n_modes;   /* >= 1 */
     double lambda;      /* m2, > 0 */
     double T_s;         /* s, > 0 */
+    double v_s;         /* m/s, over which friction changes its sign; 0: no features of the reference */
     double n_init;      /* samples from the beginning in which the physics model plans; whole, >= 0 */
     hsep_hold hold;
     hsep_sep_state best;
@@ -45,9 +47,12 @@ typedef struct {
 
 typedef struct {
     uint64_t Np, preview, p, q;
+    uint64_t n_scheduled; /* features of the reference */
     uint64_t best;
     double n_init;
+    double sign_step;    /* v_s T_s, m */
     double start;        /* position of rest, m */
+    double x_d_last;     /* m, the commanded position before the window */
     uint64_t k;          /* the sample that comes next */
     uint64_t state;      /* hsep_sep_state of the window */
     uint64_t solving;    /* whether its plan is being solved */
@@ -68,7 +73,9 @@ typedef struct {
     uint64_t e_h;     /* (Np + p,) m, e_pb as the hybrid model predicted it, newest first, behind it the measured ones */
     uint64_t past_x;  /* (Np + q,) m, x_pb of this window and of the q samples before it, newest first */
     uint64_t past_e;  /* (Np + p,) m, e_pb likewise, as measured */
-    uint64_t weights; /* (2 + q + p,) w */
+    uint64_t weights; /* (2 + q + p + n_scheduled,) w */
+    uint64_t signs;   /* (preview + 2 HSEP_SCHEDULE_REACH,) of the reference's velocity */
+    uint64_t drive;   /* (preview,) m, what the features of the reference add to the residuals, newest first */
     uint64_t trial_x; /* (preview + q,) m, x_pb of a trial, newest first */
     uint64_t trial_e; /* (preview + p,) m, its residuals */
     uint64_t target;  /* (preview,) m */

@@ -10,6 +10,7 @@
 
 static const double planner_ridge = 1e-12;   /* on the diagonal, relative to its largest entry */
 static const double planner_rounding = 1e-9; /* share of a limit that is taken for rounding */
+static const double planner_moves = 1e-12;   /* m a sample, step of x_d that counts as a move */
 
 static const uint64_t planner_first = sizeof(hsep_planner) / sizeof(double);
 
@@ -32,7 +33,7 @@ double hsep_planner_size(const hsep_planner_parameters *parameters)
     const double preview = (double)parameters->preview;
     const uint64_t count = hsep_splines_count(parameters->preview, parameters->spacing);
     const double n = (double)count;
-    const double doubles = 3.0 + n + (HSEP_ORDERS + 1.0) * preview + 2.0 * planner_triangle(n);
+    const double doubles = 3.0 + n + (HSEP_ORDERS + 2.0) * preview + 2.0 * planner_triangle(n);
     return (double)sizeof(hsep_planner) + doubles * (double)sizeof(double) +
            hsep_splines_size(parameters->spacing) + hsep_interior_size(parameters->preview, count);
 }
@@ -52,10 +53,12 @@ static void planner_lay_out(hsep_planner *self, const hsep_planner_parameters *p
     self->Np = parameters->Np;
     self->n_pinned = (half < PLANNER_PINNED ? half : PLANNER_PINNED) / parameters->spacing;
     self->size = (uint64_t)hsep_planner_size(parameters);
+    self->keep_direction = parameters->keep_direction != 0;
     self->jerk_weight = parameters->jerk_weight;
     uint64_t end = planner_first;
     self->c = planner_take(&end, HSEP_DECIDED + n);
     self->total = planner_take(&end, HSEP_ORDERS * preview);
+    self->moves = planner_take(&end, preview);
     self->third = planner_take(&end, preview);
     self->P = planner_take(&end, planner_triangle(n));
     self->factor = planner_take(&end, planner_triangle(n));
@@ -130,12 +133,13 @@ static void planner_third(const hsep_planner *self)
     }
 }
 
-/* The rows of x_dm, and of delta in order 0, under the rest of the last plan, in shares. */
+/* The rows of x_dm, and of delta in order 0, under the rest of the last plan, in shares; and which way x_d moves. */
 static void planner_total(const hsep_planner *self, const double x_d[])
 {
     const hsep_splines *splines = planner_splines(self);
     const uint64_t preview = splines->preview;
-    double *total = planner_at(self, self->total);
+    double *total = planner_at(self, self->total), *moves = planner_at(self, self->moves);
+    double last = self->x_d_before[2];
     double before[HSEP_ORDERS]; /* differences of orders 0 to 2 at the sample before */
     double y[3];
     for (int i = 0; i < 3; i++) {
@@ -145,8 +149,10 @@ static void planner_total(const hsep_planner *self, const double x_d[])
     before[1] = y[2] - y[1];
     before[2] = (y[2] - y[1]) - (y[1] - y[0]);
     for (uint64_t k = 0; k < preview; k++) {
-        const double delta = hsep_planner_delta(self, k);
+        const double delta = hsep_planner_delta(self, k), step = x_d[k] - last;
         double now[HSEP_ORDERS];
+        last = x_d[k];
+        moves[k] = self->keep_direction ? (double)((step > planner_moves) - (step < -planner_moves)) : 0.0;
         now[0] = x_d[k] + delta;
         total[k] = delta * splines->share[0];
         for (unsigned order = 1; order < HSEP_ORDERS; order++) {
@@ -179,18 +185,34 @@ static void planner_quadratic(const hsep_planner *self, const double filtered[])
     }
 }
 
+/* What a row may be, in shares. What the rest of the last plan demands is always allowed. */
+static void planner_range(const hsep_planner *self, uint64_t r, double *least, double *most)
+{
+    const uint64_t preview = planner_splines(self)->preview;
+    const double total = planner_at(self, self->total)[r];
+    *most = 1.0 - planner_rounding;
+    *least = -*most;
+    if (r >= preview && r < 2 * preview) { /* velocities */
+        const double moves = planner_at(self, self->moves)[r - preview];
+        *least = moves > 0.0 ? 0.0 : *least;
+        *most = moves < 0.0 ? 0.0 : *most;
+    }
+    *least = fmin(*least, total);
+    *most = fmax(*most, total);
+}
+
 /* The largest share, 0 ... 1, of the way from the rest, whose rows are in total, by rows of way, within the limits. */
 static double planner_share(const hsep_planner *self, const double way[])
 {
     const double *total = planner_at(self, self->total);
     const uint64_t rows = HSEP_ORDERS * planner_splines(self)->preview;
-    const double most = 1.0 - planner_rounding;
     double share = 1.0;
     for (uint64_t r = 0; r < rows; r++) {
         const double to = fabs(way[r]);
         if (to > planner_rounding) {
-            /* What the rest demands is always allowed. */
-            const double room = way[r] > 0.0 ? fmax(most, total[r]) - total[r] : total[r] - fmin(-most, total[r]);
+            double least, most;
+            planner_range(self, r, &least, &most);
+            const double room = way[r] > 0.0 ? most - total[r] : total[r] - least;
             if (room < share * to) {
                 share = room / to;
             }
@@ -204,10 +226,11 @@ static int planner_allows(const hsep_planner *self, const double way[])
 {
     const double *total = planner_at(self, self->total);
     const uint64_t rows = HSEP_ORDERS * planner_splines(self)->preview;
-    const double most = 1.0 - planner_rounding;
     for (uint64_t r = 0; r < rows; r++) {
         const double there = total[r] + way[r];
-        if (!(there <= fmax(most, total[r]) && there >= fmin(-most, total[r]))) {
+        double least, most;
+        planner_range(self, r, &least, &most);
+        if (!(there <= most && there >= least)) {
             return 0;
         }
     }
@@ -222,14 +245,15 @@ static void planner_bound(hsep_planner *self, double cost)
     const uint64_t n = splines->n, first = self->n_pinned, preview = splines->preview;
     const double *rest = planner_at(self, self->c) + HSEP_DECIDED, *P = planner_at(self, self->P);
     const double *total = planner_at(self, self->total);
-    const double most = 1.0 - planner_rounding;
     double *x = hsep_interior_x(interior, splines), *v = hsep_interior_v(interior, splines);
     double *low = hsep_interior_low(interior, splines), *high = hsep_interior_high(interior, splines);
     hsep_splines_rows(splines, rest + first, first, low);
     for (uint64_t r = 0; r < HSEP_ORDERS * preview; r++) {
-        const double at_rest = low[r], other = total[r] - at_rest;
-        low[r] = fmin(-most - other, at_rest);
-        high[r] = fmax(most - other, at_rest);
+        const double other = total[r] - low[r];
+        double least, most;
+        planner_range(self, r, &least, &most);
+        low[r] = least - other;
+        high[r] = most - other;
     }
     for (uint64_t i = 0; i < first; i++) { /* v := v_2 - P_21 pinned */
         for (uint64_t j = first; j < n; j++) {

@@ -1,6 +1,7 @@
 #include "hsep_recursion.h"
 
 #include <math.h>
+#include <stddef.h>
 
 /* Four sums side by side: the processor need not wait for one addition before the next. */
 static double recursion_dot(const double a[], const double b[], uint64_t n)
@@ -20,11 +21,13 @@ static double recursion_dot(const double a[], const double b[], uint64_t n)
 }
 
 void hsep_recursion_run(
-    const hsep_recursion *self, const double x[], double e[], uint64_t n, uint64_t first, uint64_t last)
+    const hsep_recursion *self, const double x[], const double drive[], double e[], uint64_t n, uint64_t first,
+    uint64_t last)
 {
     for (uint64_t k = first; k < last; k++) {
         const uint64_t j = n - 1 - k;
-        e[j] = self->bias + recursion_dot(self->w_x, x + j, self->q + 1) + recursion_dot(self->w_e, e + j + 1, self->p);
+        const double bias = drive != NULL ? self->bias + drive[j] : self->bias;
+        e[j] = bias + recursion_dot(self->w_x, x + j, self->q + 1) + recursion_dot(self->w_e, e + j + 1, self->p);
     }
 }
 
