@@ -1,23 +1,11 @@
 #include "hsep_cholesky.h"
 
+#include "hsep_vector.h"
+
 #include <math.h>
 
-/* y -= a x, all (n,); four at a time, which a compiler makes vectors of without knowing n. */
-static void cholesky_take(double *restrict y, double a, const double *restrict x, uint64_t n)
-{
-    uint64_t j = 0;
-    for (; j + 4 <= n; j += 4) {
-        const double y0 = y[j] - a * x[j], y1 = y[j + 1] - a * x[j + 1];
-        const double y2 = y[j + 2] - a * x[j + 2], y3 = y[j + 3] - a * x[j + 3];
-        y[j] = y0, y[j + 1] = y1, y[j + 2] = y2, y[j + 3] = y3;
-    }
-    for (; j < n; j++) {
-        y[j] -= a * x[j];
-    }
-}
-
 /* y -= a_0 x_0 + a_1 x_1 + a_2 x_2 + a_3 x_3: y is loaded and stored once for four rows. */
-static void cholesky_take_four(
+static void cholesky_take(
     double *restrict y, const double a[4], const double *restrict x0, const double *restrict x1,
     const double *restrict x2, const double *restrict x3, uint64_t n)
 {
@@ -55,7 +43,7 @@ int hsep_cholesky_factor(double triangle[], uint64_t n)
         double *x[4] = {row, row + (n - k), row + (2 * (n - k) - 1), row + (3 * (n - k) - 3)};
         for (uint64_t r = 0; r < 4; r++) { /* four rows among themselves */
             for (uint64_t above = 0; above < r; above++) {
-                cholesky_take(x[r], x[above][r - above], x[above] + (r - above), n - k - r);
+                hsep_axpy(x[r], -x[above][r - above], x[above] + (r - above), n - k - r);
             }
             if (!cholesky_pivot(x[r], n - k - r)) {
                 return 0;
@@ -65,7 +53,7 @@ int hsep_cholesky_factor(double triangle[], uint64_t n)
         for (uint64_t i = k + 4; i < n; i++) { /* and what they leave of the rows below */
             const uint64_t at = i - k;
             const double a[4] = {x[0][at], x[1][at - 1], x[2][at - 2], x[3][at - 3]};
-            cholesky_take_four(y, a, x[0] + at, x[1] + at - 1, x[2] + at - 2, x[3] + at - 3, n - i);
+            cholesky_take(y, a, x[0] + at, x[1] + at - 1, x[2] + at - 2, x[3] + at - 3, n - i);
             y += n - i;
         }
         row = x[3] + (n - k - 3);
@@ -76,7 +64,7 @@ int hsep_cholesky_factor(double triangle[], uint64_t n)
         }
         double *y = row + (n - k);
         for (uint64_t i = k + 1; i < n; i++) {
-            cholesky_take(y, row[i - k], row + (i - k), n - i);
+            hsep_axpy(y, -row[i - k], row + (i - k), n - i);
             y += n - i;
         }
         row += n - k;
@@ -89,22 +77,11 @@ void hsep_cholesky_solve(const double triangle[], uint64_t n, double b[])
     const double *row = triangle;
     for (uint64_t i = 0; i < n; i++) { /* R' y = b */
         b[i] /= row[0];
-        cholesky_take(b + i + 1, b[i], row + 1, n - i - 1);
+        hsep_axpy(b + i + 1, -b[i], row + 1, n - i - 1);
         row += n - i;
     }
     for (uint64_t i = n; i-- > 0;) { /* R x = y */
         row -= n - i;
-        double sum[4] = {0.0, 0.0, 0.0, 0.0};
-        const double *x = b + i + 1, *r = row + 1;
-        const uint64_t left = n - i - 1;
-        uint64_t j = 0;
-        for (; j + 4 <= left; j += 4) {
-            sum[0] += r[j] * x[j], sum[1] += r[j + 1] * x[j + 1];
-            sum[2] += r[j + 2] * x[j + 2], sum[3] += r[j + 3] * x[j + 3];
-        }
-        for (; j < left; j++) {
-            sum[0] += r[j] * x[j];
-        }
-        b[i] = (b[i] - ((sum[0] + sum[1]) + (sum[2] + sum[3]))) / row[0];
+        b[i] = (b[i] - hsep_dot(row + 1, b + i + 1, n - i - 1)) / row[0];
     }
 }

@@ -1,5 +1,7 @@
 #include "hsep_predictor.h"
 
+#include "hsep_vector.h"
+
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
@@ -104,23 +106,6 @@ int hsep_predictor_valid(const void *block, const hsep_predictor_parameters *par
            regression.n_tiles == n / 4 + 1;
 }
 
-/* y += a x, all (n,); four at a time, which a compiler makes vectors of without knowing n. */
-static void predictor_axpy(double *restrict y, double a, const double *restrict x, uint64_t n)
-{
-    uint64_t i = 0;
-    for (; i + 4 <= n; i += 4) {
-        const double y0 = y[i] + a * x[i], y1 = y[i + 1] + a * x[i + 1];
-        const double y2 = y[i + 2] + a * x[i + 2], y3 = y[i + 3] + a * x[i + 3];
-        y[i] = y0;
-        y[i + 1] = y1;
-        y[i + 2] = y2;
-        y[i + 3] = y3;
-    }
-    for (; i < n; i++) {
-        y[i] += a * x[i];
-    }
-}
-
 /* Predict the residuals of the window that begins, newest first into past_e; eq. (4):
  *   e_h(k) = w_0 + sum_i w_x,i x_pb(k-i) + sum_i w_e,i e(k-i),  e(k-i) measured or, inside the window, predicted.
  * Sample k of the window is at place j = Np - 1 - k, its lag i at j + i. */
@@ -135,14 +120,14 @@ static void predictor_free_run(hsep_predictor *self)
         e[j] = w[0];
     }
     for (uint64_t i = 0; i <= q; i++) {
-        predictor_axpy(e, w_x[i], x + i, Np);
+        hsep_axpy(e, w_x[i], x + i, Np);
     }
     for (uint64_t i = 1; i <= p; i++) { /* measured residuals reach the first i samples */
-        predictor_axpy(e + Np - i, w_e[i], e + Np, i);
+        hsep_axpy(e + Np - i, w_e[i], e + Np, i);
     }
     for (uint64_t j = Np - 1; j > 0; j--) { /* e(k) is known now: push it into the samples that follow */
         const uint64_t reach = p < j ? p : j;
-        predictor_axpy(e + j - reach, e[j], backward + p - reach, reach);
+        hsep_axpy(e + j - reach, e[j], backward + p - reach, reach);
     }
 }
 

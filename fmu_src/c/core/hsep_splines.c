@@ -1,5 +1,7 @@
 #include "hsep_splines.h"
 
+#include "hsep_vector.h"
+
 static double *splines_table(hsep_splines *self) { return (double *)(self + 1); }
 
 const double *hsep_splines_shape(const hsep_splines *self) { return (const double *)(self + 1); }
@@ -182,19 +184,10 @@ void hsep_splines_project(
     const double unit = weight / self->share[3];
     for (uint64_t j = 0; j < self->n; j++) {
         const double *aim = target + j * self->spacing, *past = third + j * self->spacing;
-        const uint64_t length = self->preview - j * self->spacing;
-        double sum[4] = {0.0, 0.0, 0.0, 0.0}, jerk = 0.0;
-        uint64_t k = 0;
-        for (; k + 4 <= length; k += 4) {
-            sum[0] += filtered[k] * aim[k], sum[1] += filtered[k + 1] * aim[k + 1];
-            sum[2] += filtered[k + 2] * aim[k + 2], sum[3] += filtered[k + 3] * aim[k + 3];
-        }
-        for (; k < length; k++) {
-            sum[0] += filtered[k] * aim[k];
-        }
-        for (k = 1; k < splines_length(self, 3); k++) {
+        double jerk = 0.0;
+        for (uint64_t k = 1; k < splines_length(self, 3); k++) {
             jerk += e[k] * past[k];
         }
-        v[j] = ((sum[0] + sum[1]) + (sum[2] + sum[3])) - unit * jerk;
+        v[j] = hsep_dot(filtered, aim, self->preview - j * self->spacing) - unit * jerk;
     }
 }

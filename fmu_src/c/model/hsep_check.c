@@ -7,7 +7,6 @@
 #include <string.h>
 
 static const double check_warm_up_tolerance = 1e-6; /* samples */
-static const double check_position_max = 1e3;       /* m */
 
 void hsep_message_add(char message[], const char *format, ...)
 {
@@ -165,22 +164,4 @@ void hsep_modes_read(const double values[], size_t n, hsep_mode modes[])
         const double *mode = &values[4 * i];
         modes[i] = (hsep_mode){.f_n = mode[0], .zeta = mode[1], .alpha = mode[2], .beta = mode[3]};
     }
-}
-
-hsep_status hsep_check_input(const hsep_clock *clock, const char *name, double value, char message[])
-{
-    char number[HSEP_NUMBER_SIZE];
-    if (fabs(value) <= check_position_max) {
-        return HSEP_OK;
-    }
-    if (isfinite(value)) {
-        hsep_message_add(
-            message, "%s must be within " HSEP_PLUS_MINUS "%g m, got %g at sample %.0f", name, check_position_max, value,
-            (double)clock->k);
-    } else {
-        hsep_message_add(
-            message, "%s must be finite, got %s at sample %.0f", name, hsep_number(number, value, HSEP_REAL),
-            (double)clock->k);
-    }
-    return HSEP_REFUSED;
 }

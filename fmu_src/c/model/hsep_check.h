@@ -42,7 +42,4 @@ hsep_status hsep_check_step(const hsep_clock *clock, double t, double h, int64_t
 /* Read n modes from the values of mode[i].f_n, .zeta, .alpha and .beta, which have been checked. */
 void hsep_modes_read(const double values[], size_t n, hsep_mode modes[]);
 
-/* Check a position, m, that comes in with the sample that begins: finite, and no further out than any machine is. */
-hsep_status hsep_check_input(const hsep_clock *clock, const char *name, double value, char message[]);
-
 #endif

@@ -8,7 +8,7 @@
 #if defined(HSEP_MODEL_HYBRID_PREDICTOR)
 
 #include "hsep_check.h"
-#include "hsep_clock.h"
+#include "hsep_inputs.h"
 #include "hsep_model.h"
 #include "hsep_predictor.h"
 #include "hsep_state.h"
@@ -21,8 +21,7 @@
 
 typedef struct {
     hsep_state_header header;
-    hsep_clock clock;
-    double x_d_ahead, x_meas; /* m, the inputs of the sample in progress */
+    hsep_inputs inputs;
     hsep_predictor predictor; /* its arrays follow */
 } predictor_state;
 
@@ -100,27 +99,17 @@ static void predictor_write_windows(const hsep_predictor *predictor, double valu
 hsep_status hsep_model_initialise(
     const hsep_context *context, void *state, double values[], double t_start, char message[])
 {
-    char number[HSEP_NUMBER_SIZE];
     predictor_state *self = state;
     hsep_mode modes[HSEP_N_MODES];
     hsep_predictor_parameters parameters;
     size_t size = 0;
     if (hsep_model_size(context, values, &size, message) != HSEP_OK ||
         predictor_checked(context, values, &parameters, modes, message) != HSEP_OK ||
-        hsep_check_start_time(t_start, message) != HSEP_OK) {
-        return HSEP_REFUSED;
-    }
-    const double start = values[HSEP_VR_x_d_ahead];
-    if (!isfinite(start)) {
-        hsep_message_add(
-            message, "the start value of x_d_ahead must be finite, got %s", hsep_number(number, start, HSEP_REAL));
+        hsep_inputs_init(&self->inputs, t_start, parameters.T_s, values[HSEP_VR_x_d_ahead], message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     hsep_state_mark(&self->header, context, values, PREDICTOR_KIND, size);
-    hsep_clock_init(&self->clock, t_start, parameters.T_s);
-    self->x_d_ahead = start;
-    self->x_meas = start;
-    hsep_predictor_init(&self->predictor, &parameters, start);
+    hsep_predictor_init(&self->predictor, &parameters, values[HSEP_VR_x_d_ahead]);
     if (hsep_weights_load(
             context, parameters.p, parameters.q, hsep_predictor_regression(&self->predictor), message) != HSEP_OK) {
         return HSEP_REFUSED;
@@ -135,21 +124,14 @@ hsep_status hsep_model_step(
 {
     (void)context;
     predictor_state *self = state;
-    int64_t parts = 0;
+    int complete = 0;
     message[0] = '\0';
-    if (hsep_check_step(&self->clock, t, h, &parts, message) != HSEP_OK) {
+    if (hsep_inputs_step(
+            &self->inputs, values[HSEP_VR_x_d_ahead], values[HSEP_VR_x_meas], t, h, &complete, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
-    if (self->clock.done == 0) { /* a sample begins: its inputs are read */
-        if (hsep_check_input(&self->clock, "x_d_ahead", values[HSEP_VR_x_d_ahead], message) != HSEP_OK ||
-            hsep_check_input(&self->clock, "x_meas", values[HSEP_VR_x_meas], message) != HSEP_OK) {
-            return HSEP_REFUSED;
-        }
-        self->x_d_ahead = values[HSEP_VR_x_d_ahead];
-        self->x_meas = values[HSEP_VR_x_meas];
-    }
-    if (hsep_clock_advance(&self->clock, parts)) {
-        if (hsep_predictor_sample(&self->predictor, self->x_d_ahead, self->x_meas)) {
+    if (complete) {
+        if (hsep_predictor_sample(&self->predictor, self->inputs.x_d_ahead, self->inputs.x_meas)) {
             predictor_write_windows(&self->predictor, values);
         }
         predictor_write_outputs(&self->predictor, values);
@@ -186,8 +168,8 @@ hsep_status hsep_model_check_state(
     }
     memcpy(&head, state, sizeof head);
     const char *predictor = (const char *)state + (sizeof head - sizeof head.predictor);
-    if (!hsep_state_clock_valid(&head.clock) || head.clock.T_s != parameters.T_s ||
-        head.predictor.k != (uint64_t)head.clock.k || !hsep_predictor_valid(predictor, &parameters)) {
+    if (!hsep_state_clock_valid(&head.inputs.clock) || head.inputs.clock.T_s != parameters.T_s ||
+        head.predictor.k != (uint64_t)head.inputs.clock.k || !hsep_predictor_valid(predictor, &parameters)) {
         return hsep_state_damaged(message);
     }
     return HSEP_OK;
