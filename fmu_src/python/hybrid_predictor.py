@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
-from hybridsep.fmi import slave
-from hybridsep.fmi.clock import SampleClock
+from hybridsep.fmi import look_ahead_slave
 from hybridsep.fmi.variables import modes_from
 from hybridsep.fmi.weights import WEIGHTS_FILE, restore_weights
 from hybridsep.lookahead import LookAhead
@@ -15,10 +12,12 @@ from hybridsep.physics import ModalModel, Mode
 from hybridsep.predictor import HybridPredictor
 
 
-class HybridPredictorPy(slave.TableSlave):
+class HybridPredictorPy(look_ahead_slave.LookAheadSlave):
     """Sits between the interpolator and the drive: delays the command by Np samples and predicts what follows."""
 
-    def initialise(self) -> None:
+    look_ahead_type = LookAhead
+
+    def new_look_ahead(self) -> LookAhead:
         """Make the look-ahead from the parameters as they are now, with what the resources say was learned."""
         names = ("Np", "p", "q", "lambda", "T_s", "t_init", "input_hold")
         model = ModalModel([Mode(**mode) for mode in modes_from(self.values)], self.values["dead_time"])
@@ -26,18 +25,7 @@ class HybridPredictorPy(slave.TableSlave):
         trained = Path(self.resources) / WEIGHTS_FILE
         if trained.exists():
             restore_weights(predictor, trained.read_bytes())
-        self.look_ahead = LookAhead(predictor, self.values["x_d_ahead"])
-        self.clock = SampleClock(self.start_time, predictor.Ts)
-
-    def advance(self, t: float, h: float) -> None:
-        """Read the inputs at the first sub-step of a sample, show the outputs after its last one."""
-        parts = self.clock.check(t, h)
-        if self.clock.done == 0:
-            self.inputs = (self.values["x_d_ahead"], self.values["x_meas"])
-            self.look_ahead.check(*self.inputs)
-        if self.clock.done == parts - 1:
-            self.look_ahead.sample(*self.inputs)
-        self.clock.advance(parts)
+        return LookAhead(predictor, self.values["x_d_ahead"])
 
     def initial_value(self, name: str) -> float | int | bool:
         """Return the value at ``t_0``: the drive rests at the start value of ``x_d_ahead``."""
@@ -58,16 +46,6 @@ class HybridPredictorPy(slave.TableSlave):
         window, i = _window_index(name)
         samples = getattr(self.look_ahead, window)
         return float(samples[i]) if i < len(samples) else 0.0
-
-    def core_state(self) -> tuple[dict[str, Any], bytes]:
-        """Return the clock with the inputs of the sample in progress, and the look-ahead."""
-        return {"clock": self.clock.state(), "inputs": getattr(self, "inputs", None)}, self.look_ahead.to_bytes()
-
-    def restore_core(self, meta: Mapping[str, Any], blob: bytes) -> None:
-        """Take over a clock and a look-ahead."""
-        self.look_ahead = LookAhead.from_bytes(blob)
-        self.clock = SampleClock(**meta["clock"])
-        self.inputs = meta["inputs"]
 
 
 def _window_index(name: str) -> tuple[str, int]:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from hybridsep.compensator import SepCompensator, SepState
 from hybridsep.errors import HybridSepError, ParameterError
-from hybridsep.fmi import slave
-from hybridsep.fmi.clock import SampleClock
+from hybridsep.fmi import look_ahead_slave
 from hybridsep.fmi.variables import PLANNING, modes_from
 from hybridsep.fmi.weights import WEIGHTS_FILE, restore_weights
 from hybridsep.limits import Limits
@@ -19,23 +17,10 @@ from hybridsep.predictor import HybridPredictor
 from hybridsep.sep_lookahead import SepLookAhead
 
 
-class SepCompensatorPy(slave.TableSlave):
+class SepCompensatorPy(look_ahead_slave.LookAheadSlave):
     """Sits between the interpolator and the drive: delays the command by the preview and modifies it."""
 
-    def initialise(self) -> None:
-        """Make the look-ahead from the parameters as they are now, with what the resources say was learned."""
-        self.look_ahead = self._new_look_ahead()
-        self.clock = SampleClock(self.start_time, self.look_ahead.compensator.predictor.Ts)
-
-    def advance(self, t: float, h: float) -> None:
-        """Read the inputs at the first sub-step of a sample, show the outputs after its last one."""
-        parts = self.clock.check(t, h)
-        if self.clock.done == 0:
-            self.inputs = (self.values["x_d_ahead"], self.values["x_meas"])
-            self.look_ahead.check(*self.inputs)
-        if self.clock.done == parts - 1:
-            self.look_ahead.sample(*self.inputs)
-        self.clock.advance(parts)
+    look_ahead_type = SepLookAhead
 
     def initial_value(self, name: str) -> float | int | bool:
         """Return the value at ``t_0``, when the first window has been planned already.
@@ -44,7 +29,7 @@ class SepCompensatorPy(slave.TableSlave):
         wrong with them is said when the initialization ends.
         """
         try:
-            return _output(self._new_look_ahead(), name)
+            return _output(self.new_look_ahead(), name)
         except HybridSepError:
             return float(self.values["x_d_ahead"]) if name in ("x_dm", "x_d", "x_pb", "x_h") else 0
 
@@ -52,17 +37,8 @@ class SepCompensatorPy(slave.TableSlave):
         """Return an output now."""
         return _output(self.look_ahead, name)
 
-    def core_state(self) -> tuple[dict[str, Any], bytes]:
-        """Return the clock with the inputs of the sample in progress, and the look-ahead."""
-        return {"clock": self.clock.state(), "inputs": getattr(self, "inputs", None)}, self.look_ahead.to_bytes()
-
-    def restore_core(self, meta: Mapping[str, Any], blob: bytes) -> None:
-        """Take over a clock and a look-ahead."""
-        self.look_ahead = SepLookAhead.from_bytes(blob)
-        self.clock = SampleClock(**meta["clock"])
-        self.inputs = meta["inputs"]
-
-    def _new_look_ahead(self) -> SepLookAhead:
+    def new_look_ahead(self) -> SepLookAhead:
+        """Make the look-ahead from the parameters as they are now, with what the resources say was learned."""
         values = self.values
         names = ("Np", "p", "q", "lambda", "T_s", "t_init", "input_hold")
         model = ModalModel([Mode(**mode) for mode in modes_from(values)], values["dead_time"])

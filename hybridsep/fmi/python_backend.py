@@ -38,6 +38,7 @@ _PREDICTION = (
     "_sampled_window.py",
     "fmi/clock.py",
     "fmi/weights.py",
+    "fmi/look_ahead_slave.py",
 )
 _PLANNING = tuple(f"_{module}.py" for module in ("bounded", "interior", "plan", "sensor", "splines", "trust"))
 _TRAVELS = {
