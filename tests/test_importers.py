@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import os
-import re
 import subprocess
 import sys
 import zipfile
@@ -14,14 +13,22 @@ from pathlib import Path
 import importers_closed_system as closed_system
 import numpy as np
 import pytest
-from importers_closed_system import N_STEPS, Array, exists_here
+from importers_closed_system import SYSTEMS, Array, ClosedSystem, exists_here
 
-from hybridsep import build_fmu, cosimulate, load_machine, machine_names, staircase
+from hybridsep import (
+    CoSimulation,
+    SepCoSimulation,
+    build_fmu,
+    cosimulate,
+    cosimulate_sep,
+    load_machine,
+    machine_names,
+    staircase,
+)
 from hybridsep.fmi.archive import fmu_names
 
 NATIVE = {name: machine for machine in map(load_machine, machine_names()) for name in fmu_names(machine)}
 TOLERANCE = 1e-12  # m; libcosim's step sizes are rounded differences of times
-FIRST = 99  # row of t_100, where the first fill ends
 FOREIGN = [
     pytest.param(
         name, marks=pytest.mark.skipif(not exists_here(name), reason=f"{name} has no library for this machine")
@@ -43,25 +50,29 @@ def fmus(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def moved(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a closed system whose staircase starts at another place than the FMUs' start values."""
+    """A folder with closed systems whose staircase starts at another place than the FMUs' start values."""
     folder, machine = tmp_path_factory.mktemp("moved"), load_machine("spring_mass_damper")
-    for name in ("HybridPredictor", "FeedDrive"):
+    for name in ("HybridPredictor", "SepCompensator", "FeedDrive"):
         (folder / f"{name}.fmu").write_bytes((fmus / f"{name}.fmu").read_bytes())
     build_fmu(machine, "ReferenceTrajectory", folder, targets=("host",), samples=staircase(machine.T_s) + SHIFT)
     return folder
 
 
+@pytest.fixture(scope="module", params=SYSTEMS)
+def system(request: pytest.FixtureRequest) -> ClosedSystem:
+    return SYSTEMS[request.param]
+
+
 @pytest.fixture(scope="module")
-def expected(fmus: Path) -> Array:
-    return closed_system.run("fmpy", fmus)
+def expected(fmus: Path, system: ClosedSystem) -> Array:
+    return closed_system.run("fmpy", system, fmus)
 
 
-def run_apart(importer: str, folder: Path, out: Path) -> Array:
+def run_apart(importer: str, system: ClosedSystem, folder: Path, out: Path) -> Array:
     """Return what :func:`closed_system.run` does in a process of its own."""
-    program = Path(closed_system.__file__)
-    for model in closed_system.COMPONENTS.values():
+    for model in system.components.values():
         (out / f"{model}.fmu").write_bytes((folder / f"{model}.fmu").read_bytes())
-    python(out, str(program), importer, str(out), str(out / "rows.npy"))
+    python(out, closed_system.__file__, importer, system.look_ahead, str(out), str(out / "rows.npy"))
     rows: Array = np.load(out / "rows.npy")
     return rows
 
@@ -78,54 +89,86 @@ def python(folder: Path, *arguments: str) -> str:
     return result.stdout
 
 
-def figures(rows: Array) -> list[str]:
-    """Return the FMU's own ``rms_pb`` and ``rms_h``, since ``t_init``, and both over all samples, µm, 4 digits."""
-    x_pb, x_h, x_meas = rows[FIRST:, :3].T
-    overall = [float(np.sqrt(np.mean((x_meas - x) ** 2))) for x in (x_pb, x_h)]
-    return [f"{1e6 * figure:#.4g}" for figure in (*rows[-1, 3:], *overall)]
+def columns(system: ClosedSystem, rows: Array) -> dict[str, Array]:
+    """Return the columns by the outputs' names, from the end of the first fill on, m."""
+    return dict(zip((name for _, name in system.observed), rows[system.first :].T, strict=True))
 
 
-def test_the_loop_without_an_importer_is_cosimulate(fmus: Path, expected: Array) -> None:
+def figures(system: ClosedSystem, rows: Array) -> list[str]:
+    """Return the FMU's own figures, since ``t_init``, and RMS errors over the whole trajectory, µm, 4 digits."""
+    of = columns(system, rows)
+    reported = [float(of[name][-1]) for name in system.figures]
+    overall = [float(np.sqrt(np.mean((of[a] - of[b]) ** 2))) for a, b in system.errors]
+    return [f"{1e6 * figure:#.4g}" for figure in (*reported, *overall)]
+
+
+@pytest.mark.parametrize("system", ["predictor"], indirect=True)
+def test_the_loop_without_an_importer_is_cosimulate(fmus: Path, system: ClosedSystem, expected: Array) -> None:
     run = cosimulate(fmus / "HybridPredictor.fmu", fmus / "FeedDrive.fmu", staircase())
-    assert len(run.t) == N_STEPS - FIRST
-    for column, name in enumerate(("x_pb", "x_h", "x_meas")):
-        np.testing.assert_array_equal(expected[FIRST:, column], getattr(run, name), err_msg=name)
+    assert_bit_for_bit(run, system, expected)
     summary = run.summary()
-    assert figures(expected)[2:] == [f"{summary[name]:#.4g}" for name in ("rms_pb_um", "rms_h_um")]
+    assert figures(system, expected)[2:] == [f"{summary[name]:#.4g}" for name in ("rms_pb_um", "rms_h_um")]
     assert summary["reduction_percent"] > 50
 
 
+@pytest.mark.parametrize("system", ["compensator"], indirect=True)
+def test_the_loop_without_an_importer_is_cosimulate_sep(fmus: Path, system: ClosedSystem, expected: Array) -> None:
+    run = cosimulate_sep(fmus / "SepCompensator.fmu", fmus / "FeedDrive.fmu", staircase())
+    assert_bit_for_bit(run, system, expected)
+    summary = run.summary()
+    assert figures(system, expected)[2:] == [f"{summary['tracking_rms_um']:#.4g}"]
+    assert summary["tracking_rms_um"] < 5.5
+    assert summary["share_hybrid"] > 0.9
+
+
+def assert_bit_for_bit(run: CoSimulation | SepCoSimulation, system: ClosedSystem, rows: Array) -> None:
+    of = columns(system, rows)
+    assert len(run.t) == len(staircase())
+    for name in (*system.positions, "x", "x_meas"):
+        np.testing.assert_array_equal(of[name], getattr(run, name), err_msg=name)
+
+
 @pytest.mark.parametrize("importer", FOREIGN)
-def test_importers_come_to_the_same_figures(fmus: Path, expected: Array, tmp_path: Path, importer: str) -> None:
-    rows = run_apart(importer, fmus, tmp_path)
-    print(importer, *figures(rows), "µm;", f"at most {abs(rows - expected).max():.1e} m apart from fmpy")
-    assert figures(rows) == figures(expected)
+def test_importers_come_to_the_same_figures(
+    fmus: Path, system: ClosedSystem, expected: Array, tmp_path: Path, importer: str
+) -> None:
+    rows = run_apart(importer, system, fmus, tmp_path)
+    apart = f"at most {abs(rows - expected).max():.1e} m apart from fmpy"
+    print(importer, system.look_ahead, *figures(system, rows), "µm;", apart)
+    assert figures(system, rows) == figures(system, expected)
     np.testing.assert_allclose(rows, expected, rtol=0, atol=TOLERANCE)
 
 
 @pytest.mark.parametrize("importer", [param for param in FOREIGN if param.values != ("fmpy SSP",)])
 def test_the_start_goes_round_in_initialization_mode(
-    moved: Path, expected: Array, tmp_path: Path, importer: str
+    moved: Path, system: ClosedSystem, expected: Array, tmp_path: Path, importer: str
 ) -> None:
-    """``r`` is right before the first step and reaches the predictor and the drive; fmpy's SSP loop carries nothing."""
-    rows = run_apart(importer, moved, tmp_path)
-    assert figures(rows) == figures(expected)
-    rows[:, :3] -= SHIFT
+    """``r`` is right before the first step and reaches look-ahead and drive; fmpy's SSP loop carries nothing."""
+    rows = run_apart(importer, system, moved, tmp_path)
+    assert figures(system, rows) == figures(system, expected)
+    rows[:, : system.n_positions] -= SHIFT
     np.testing.assert_allclose(rows, expected, rtol=0, atol=1e-11)
 
 
 @pytest.mark.skipif(not exists_here("ecos"), reason="ecos has no library for this machine")
-def test_the_script_of_the_guide(fmus: Path, expected: Array) -> None:
-    (script,) = re.findall(r"^```python\n(.*?)^```$", closed_system.GUIDE.read_text("utf-8"), re.MULTILINE | re.DOTALL)
-    folder = closed_system.system_structure(fmus).parent
+def test_the_script_of_the_guide(fmus: Path, system: ClosedSystem, expected: Array) -> None:
+    (script,) = closed_system.blocks("python")
+    if system.look_ahead == "compensator":  # what the guide says to change
+        for old, new in (("6100", "6200"), ("predictor", "compensator"), ("rms_pb", "rms_e")):
+            assert old in script
+            script = script.replace(old, new)
+    folder = closed_system.system_structure(system, fmus).parent
     printed = python(folder, "-c", f"import importers_closed_system as c; c.load_tbb()\n{script}")
-    assert [f"{1e6 * float(number):#.4g}" for number in printed.split()] == figures(expected)[:2]
+    assert [f"{1e6 * float(number):#.4g}" for number in printed.split()] == figures(system, expected)[:2]
 
 
 @pytest.mark.skipif(not all(map(exists_here, closed_system.IMPORTERS)), reason="not all importers run here")
-def test_the_figures_of_the_guide(expected: Array) -> None:
-    row = " | ".join(figures(expected))
-    assert closed_system.GUIDE.read_text("utf-8").count(f"| {row} |") == len(closed_system.IMPORTERS)
+def test_the_figures_of_the_guide(system: ClosedSystem, expected: Array) -> None:
+    guide, row = closed_system.GUIDE.read_text("utf-8"), " | ".join(figures(system, expected))
+    assert guide.count(f"| {row} |") == len(closed_system.IMPORTERS)
+    if system.look_ahead == "predictor":  # its drive follows x_d itself
+        of = columns(system, expected)
+        assert f"(without compensation: {1e6 * np.sqrt(np.mean((of['x_d'] - of['x']) ** 2)):.1f})" in guide
 
 
 # The fmu-manipulation-toolbox's check ------------------------------------------------------------------------------

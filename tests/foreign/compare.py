@@ -21,7 +21,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridsep import build_fmu, load_machine, simulate, staircase
+from hybridsep import Encoder, build_fmu, load_machine, run_closed_loop, simulate, staircase
 from hybridsep.fmi.compiler import TARGETS
 
 Array = NDArray[np.float64]
@@ -29,11 +29,18 @@ Array = NDArray[np.float64]
 HOST = Path(__file__).with_name("host.c")
 HOST_FLAGS = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Wconversion", "-Werror"]
 SYSROOT = Path(os.environ.get("QEMU_LD_PREFIX", "/usr/aarch64-linux-gnu"))
+NOISE = 5e-6  # m, of the encoder
 TIME_LIMIT = 300  # s, for one run; Wine's first one makes its folders
 
-INPUTS = {"HybridPredictor": ["x_d_ahead", "x_meas"], "FeedDrive": ["x_d"], "ReferenceTrajectory": []}
+INPUTS = {
+    "HybridPredictor": ["x_d_ahead", "x_meas"],
+    "SepCompensator": ["x_d_ahead", "x_meas"],
+    "FeedDrive": ["x_d"],
+    "ReferenceTrajectory": [],
+}
 OUTPUTS = {
     "HybridPredictor": ["x_d", "x_pb", "x_h", "rms_pb", "rms_h"],
+    "SepCompensator": ["x_dm", "x_d", "x_pb", "x_h", "rms_e", "rms_pb", "rms_h"],
     "FeedDrive": ["x", "x_meas"],
     "ReferenceTrajectory": ["r"],
 }
@@ -99,16 +106,22 @@ def _host_name(target: str) -> str:
 def signals() -> dict[str, Array]:
     """Return what each FMU is given, a row a sample: the staircase, and a drive that follows it."""
     machine, r = load_machine("spring_mass_damper"), staircase()
-    Np = machine.new_predictor().Np
-    r = np.concatenate((r, np.full(Np, r[-1])))
-    x_d = np.concatenate((np.full(Np, r[0]), r))[: len(r)]
-    x = simulate(machine.new_plant(), x_d, machine.T_s)
-    x_meas = x + np.random.default_rng(0).normal(0.0, 5e-6, len(x))
+    compensator = machine.new_compensator()
+    compensated = run_closed_loop(compensator, machine.new_plant(), r, encoder=Encoder(NOISE, 0)).x_meas
+    preview, Np = compensator.preview, machine.new_predictor().Np
+    x_d = np.concatenate((np.full(Np, r[0]), r))
+    x_meas = simulate(machine.new_plant(), x_d, machine.T_s)
+    x_meas += np.random.default_rng(0).normal(0.0, NOISE, len(x_meas))
     return {
-        "HybridPredictor": np.column_stack((r, x_meas)),
+        "HybridPredictor": np.column_stack((_held(r, Np), x_meas)),
+        "SepCompensator": np.column_stack((_held(r, preview), np.concatenate((np.full(preview, r[0]), compensated)))),
         "FeedDrive": x_d[:, None],
-        "ReferenceTrajectory": r[:, None],
+        "ReferenceTrajectory": _held(r, Np)[:, None],
     }
+
+
+def _held(r: Array, n: int) -> Array:
+    return np.concatenate((r, np.full(n, r[-1])))
 
 
 def play(out: Path, model: str, platform: Platform, given: Array) -> Array:
@@ -147,6 +160,7 @@ def deviations(out: Path, platform: Platform) -> dict[str, float]:
     for model, given in signals().items():
         here, there = play(out, model, HERE, given), play(out, model, platform, given)
         assert here.shape == there.shape == (len(given), len(OUTPUTS[model]))
+        assert np.ptp(here, axis=0).all()  # every output moves
         largest |= {f"{model}.{name}": d for name, d in zip(OUTPUTS[model], abs(there - here).max(axis=0), strict=True)}
     return largest
 
