@@ -72,8 +72,10 @@ def checked_start(start: float) -> float:
     Raises
     ------
     SignalError
-        If it is not finite.
+        If it is not finite, or further out than any machine is.
     """
     if not math.isfinite(start):
         raise SignalError(f"the start value of x_d_ahead must be finite, got {start}")
+    if abs(start) > POSITION_MAX:
+        raise SignalError(f"the start value of x_d_ahead must be within ±{POSITION_MAX:g} m, got {start:g}")
     return start

@@ -26,7 +26,7 @@ from ._splines import N_DECIDED, SplineBasis, direct_samples
 from ._trust import Trust, has_stable_poles
 from .errors import ParameterError, SignalError, StateError
 from .limits import Limits
-from .parameters import check_preview
+from .parameters import check_limits, check_preview
 from .predictor import HybridPredictor
 from .signals import Array, as_samples
 from .state import pack, unpack
@@ -92,6 +92,10 @@ class SepCompensator:
             raise ParameterError(f"spacing must be ≥ 1 and divide Np = {Np}, got {spacing}")
         if problems := check_preview(Np=Np, preview=self.preview, spacing=int(spacing)):
             raise ParameterError("; ".join(problems))
+        if limits is not None:
+            demands = {"v_max": limits.velocity, "a_max": limits.acceleration, "j_max": limits.jerk}
+            if problems := check_limits(**demands, v_s=predictor.v_s, Ts=predictor.Ts):
+                raise ParameterError("; ".join(problems))
         if not (np.isfinite(jerk_weight) and jerk_weight >= 0):
             raise ParameterError(f"jerk_weight must be finite and ≥ 0, got {jerk_weight}")
         if change_max is not None and not (np.isfinite(change_max) and change_max > 0):

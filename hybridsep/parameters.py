@@ -20,6 +20,7 @@ __all__ = [
     "Parameter",
     "check",
     "check_lags",
+    "check_limits",
     "check_preview",
     "check_together",
     "samples_before",
@@ -221,6 +222,21 @@ def check_preview(*, Np: int, preview: int, spacing: int) -> list[str]:
     if preview < least:
         problems.append(f"preview must be ≥ Np + 4·spacing + 3 = {least}, got {preview}")
     return problems
+
+
+def check_limits(*, v_max: float, a_max: float, j_max: float, v_s: float, Ts: float) -> list[str]:
+    """Say which limits are none at a sampling interval, Ts in s: too small to be divided by, counted in samples."""
+    counted = {
+        "v_max": (v_max, v_max * Ts),
+        "a_max": (a_max, a_max * (Ts * Ts)),
+        "j_max": (j_max, j_max * (Ts * Ts * Ts)),
+        "v_s": (v_s, v_s * Ts if v_s > 0 else 1.0),
+    }
+    return [
+        f"{name} must be larger at T_s = {Ts!r} s, got {value!r}"
+        for name, (value, in_samples) in counted.items()
+        if in_samples == 0 or not math.isfinite(1.0 / in_samples)
+    ]
 
 
 def samples_before(t: float, Ts: float, name: str = "t_init") -> int:

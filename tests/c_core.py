@@ -305,23 +305,27 @@ def look_ahead(name: str, **parameters: float) -> tuple[LookAhead, CModel]:
     return LookAhead(predictor, start), CModel(name, {**values, "x_d_ahead": start, "x_meas": start}).initialise()
 
 
-def sep_look_ahead(name: str, **parameters: float) -> tuple[SepLookAhead, CModel]:
-    """Return the library's compensating look-ahead and the C model with the same parameters, start included."""
-    start = parameters.pop("start", 0.0)
-    values: dict[str, Any] = {**COMPENSATOR, **parameters}
+def library_compensator(values: Mapping[str, Any], name: str, start: float = 0.0) -> SepCompensator:
+    """Return the library's compensator with the parameters of a C model."""
     model = ModalModel([Mode(**mode) for mode in DESCRIPTIONS[name]["modes"]], int(values["dead_time"]))
     predictor = HybridPredictor.with_parameters(
         model, {key: values[key] for key in (*PREDICTOR, "v_s") if key != "dead_time"}, start=start
     )
-    compensator = SepCompensator(
+    return SepCompensator(
         predictor,
         limits=Limits(values["v_max"], values["a_max"], values["j_max"]),
         best=SepState(values["compensate"]),
         keep_direction=bool(values["keep_direction"]),
         **{key: values[key] for key in ("preview", "spacing", "jerk_weight", "change_max")},
     )
+
+
+def sep_look_ahead(name: str, **parameters: float) -> tuple[SepLookAhead, CModel]:
+    """Return the library's compensating look-ahead and the C model with the same parameters, start included."""
+    start = parameters.pop("start", 0.0)
+    values: dict[str, Any] = {**COMPENSATOR, **parameters}
     c_model = CModel(name, {**values, "x_d_ahead": start, "x_meas": start}).initialise()
-    return SepLookAhead(compensator, start), c_model
+    return SepLookAhead(library_compensator(values, name, start), start), c_model
 
 
 def write_weights(folder: Path, factor: Array, p: int, q: int, n_samples: int) -> None:

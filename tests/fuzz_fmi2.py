@@ -302,6 +302,10 @@ class Fuzzer:
             "p": (1, 20),
             "q": (0, 19),
             "dead_time": (0, 10),
+            "preview": (150, 260),
+            "spacing": (1, 2),
+            "keep_direction": (0, 1),
+            "compensate": (0, 2),
             "trajectory": (0, 2),
             "seed": (0, 9),
         }

@@ -72,6 +72,7 @@ def test_the_staircase_is_compensated_as_by_the_library(start: float) -> None:
         {"spacing": 20, "preview": 207, "p": 7, "q": 99},
         {"Np": 12, "p": 7, "q": 5, "spacing": 3, "preview": 77, "t_init": 0.05, "v_s": 0.0},
         {"Np": 20, "p": 10, "q": 5, "preview": 160, "v_s": 5e-3},
+        {"Np": 8, "p": 5, "q": 2, "preview": 160, "lambda": 1e-8},
         {"Np": 1, "p": 1, "q": 0, "spacing": 1, "preview": 60, "t_init": 0.05, "v_s": 0.0},
         {"input_hold": 1, "dead_time": 3, "p": 10},
         {"jerk_weight": 0.0, "t_init": 0.0, "p": 10},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 from c_core import TS, CModel, refusal, write_trajectory, write_weights
 
+from hybridsep._sampled_window import checked_start
 from hybridsep.errors import FmuError, HybridSepError
 from hybridsep.fmi.clock import SampleClock
 from hybridsep.fmi.variables import modes_from
@@ -110,6 +112,39 @@ def test_values_that_are_not_finite_are_refused_and_change_nothing(value: float)
         assert refusal(lambda model=model: model.step(TS)) == message  # type: ignore[misc]
         assert model.state.tobytes() == state
         np.testing.assert_array_equal(model.values, values)
+
+
+@pytest.mark.parametrize("name", ["predictor", "compensator"])
+def test_a_start_further_out_than_any_machine_is_refused(name: str) -> None:
+    with pytest.raises(HybridSepError) as caught:
+        checked_start(-1e6)
+    assert refusal(CModel(name, {"x_d_ahead": -1e6}).initialise) == str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"spacing": 3}, "spacing must be ≥ 1 and divide Np = 100, got 3"),
+        ({"preview": 110}, "preview must be ≥ Np + 4·spacing + 3 = 111, got 110"),
+        ({"j_max": 1e-300}, "j_max must be larger at T_s = 0.001 s, got 1e-300"),
+        ({"v_s": 5e-324}, "v_s must be larger at T_s = 0.001 s, got 5e-324"),
+    ],
+)
+def test_a_plan_that_cannot_be_is_refused_in_the_librarys_words(wrong: dict[str, float], message: str) -> None:
+    assert refusal(CModel("compensator", wrong).size) == message
+    with pytest.raises(HybridSepError, match=re.escape(message)):
+        c_core.library_compensator({**c_core.COMPENSATOR, **wrong}, "compensator")
+
+
+@pytest.mark.parametrize(("learned", "now"), [(2e-3, 0.0), (0.0, 2e-3)])
+def test_weights_of_other_features_are_refused(learned: float, now: float, tmp_path: Path) -> None:
+    n = 2 + 3 + 50 + (13 if learned else 0)
+    write_weights(tmp_path, np.eye(n + 1), 50, 3, 100)
+    signs = {True: "> 0", False: "= 0"}
+    assert refusal(CModel("compensator", {"v_s": now}, tmp_path).initialise) == (
+        f"weights.bin was learned with v_s {signs[learned > 0]}, got v_s {signs[now > 0]}; set v_s as it was learned"
+    )
+    CModel("compensator", {"v_s": learned}, tmp_path).initialise()
 
 
 @pytest.mark.parametrize(

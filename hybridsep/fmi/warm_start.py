@@ -18,8 +18,8 @@ def load_trained(path: str | Path, machine: Machine, model: str) -> HybridPredic
     ----------
     path : str or Path
     machine : Machine
-        What it must have been trained for: its ``Np``, ``p``, ``q``, ``lambda``, ``T_s``, ``input_hold``, ``dead_time``
-        and modes.
+        What it must have been trained for: its ``Np``, ``p``, ``q``, ``lambda``, ``T_s``, ``input_hold``,
+        ``dead_time``, ``v_s`` and modes.
     model : {"HybridPredictor", "SepCompensator"}
         Which of the machine's two sets of ``Np``, ``p``, ``q`` and ``lambda`` is meant.
 

@@ -1,7 +1,8 @@
 """``resources/weights.bin``: what a trained predictor has learned, for an FMU that starts warm.
 
 Layout, little-endian: ``HSEPWGT1``, ``p``, ``q`` and the number of learned samples as u64, then the upper triangle of
-the factor ``[R z; 0 ρ]`` of :class:`~hybridsep.regression.RidgeRegression` by rows, float64. This module travels inside
+the factor ``[R z; 0 ρ]`` of :class:`~hybridsep.regression.RidgeRegression` by rows, float64: of ``2 + q + p`` features,
+and 13 more if it was learned with ``v_s > 0``. This module travels inside
 the pythonfmu FMUs; the C model reads the same file.
 """
 
@@ -11,6 +12,7 @@ import struct
 
 import numpy as np
 
+from .._schedule import N_SCHEDULED
 from ..errors import StateError
 from ..predictor import HybridPredictor
 
@@ -35,7 +37,8 @@ def restore_weights(predictor: HybridPredictor, content: bytes) -> None:
     Raises
     ------
     StateError
-        If it was learned with another ``p`` or ``q``, or is damaged or truncated; the predictor is unchanged then.
+        If it was learned with another ``p`` or ``q``, with ``v_s > 0`` where it is 0 now or the other way round, or is
+        damaged or truncated; the predictor is unchanged then.
     """
     size = predictor.n_features + 1
     known = len(content) >= _HEAD.size and content.startswith(_MAGIC)
@@ -45,6 +48,11 @@ def restore_weights(predictor: HybridPredictor, content: bytes) -> None:
             f"{WEIGHTS_FILE} was learned with p = {p}, q = {q}, got p = {predictor.p}, q = {predictor.q}; "
             "set p and q as they were learned"
         )
+    more = predictor.n_features > 2 + p + q
+    other = size - N_SCHEDULED if more else size + N_SCHEDULED
+    if known and len(content) == _HEAD.size + 4 * other * (other + 1):
+        learned, got = ("= 0", "> 0") if more else ("> 0", "= 0")
+        raise StateError(f"{WEIGHTS_FILE} was learned with v_s {learned}, got v_s {got}; set v_s as it was learned")
     factor = np.zeros((size, size))
     upper = np.triu_indices(size)
     if known and len(content) == _HEAD.size + 8 * len(upper[0]):

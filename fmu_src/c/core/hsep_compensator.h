@@ -7,9 +7,11 @@
  * solved over the samples that follow, while the command follows the last plan. Over the first fill (k < preview) the
  * commanded position is the start; what is measured then is not learned.
  *
- * Cost of a sample, with n = 2 + q + p + HSEP_SCHEDULED and m splines in a plan: that of hsep_regression_fold(n); at the end of a window
- * on top n^2 / 2 + (2 preview + Np) (p + q) + m^3 / 6 + m preview multiply-adds; in samples that follow it, while a plan
- * is being solved, that of at most 3 hsep_interior_step, or of HSEP_INTERIOR_STEPS over the samples there are.
+ * Cost of a sample, with n features and m splines in a plan: that of hsep_regression_fold(n). At the end of a window on
+ * top n^2 / 2 + p^2 / 2 + (2 preview + Np) (p + q) + m^3 / 6 + m preview multiply-adds, the last two twice if the hybrid
+ * plan fails, and copies of the regression and of the dead time. While a plan is being solved that of hsep_interior_step,
+ * three times in each of the 8 samples that follow; where so many are not pinned (Np < 16, or spacing > 8) more often, or
+ * HSEP_INTERIOR_STEPS times at once. All of it is bounded by the parameters; m = 1000 is far from real time.
  *
  * Memory is one block: the struct, then what its offsets tell; no pointers, so a copy of the block is the state.
  * Reentrant; allocates nothing; nothing here can fail once the parameters are in range.

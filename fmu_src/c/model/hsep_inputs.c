@@ -17,6 +17,12 @@ hsep_status hsep_inputs_init(hsep_inputs *self, double t_start, double T_s, doub
             message, "the start value of x_d_ahead must be finite, got %s", hsep_number(number, start, HSEP_REAL));
         return HSEP_REFUSED;
     }
+    if (fabs(start) > inputs_position_max) {
+        hsep_message_add(
+            message, "the start value of x_d_ahead must be within " HSEP_PLUS_MINUS "%g m, got %g", inputs_position_max,
+            start);
+        return HSEP_REFUSED;
+    }
     hsep_clock_init(&self->clock, t_start, T_s);
     self->x_d_ahead = self->x_meas = start;
     return HSEP_OK;

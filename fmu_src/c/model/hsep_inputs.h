@@ -11,7 +11,8 @@ typedef struct {
     double x_d_ahead, x_meas; /* m, of the sample in progress */
 } hsep_inputs;
 
-/* Begin at t_start, s, with the drive at rest at start, m. Fails if one of them is not finite. */
+/* Begin at t_start, s, with the drive at rest at start, m. Fails if one of them is not finite, or the
+ * start is further out than any machine is. */
 hsep_status hsep_inputs_init(hsep_inputs *self, double t_start, double T_s, double start, char message[]);
 
 /* Take in a communication step from t by h, s, with its inputs, m; complete tells whether it was the last one of its

@@ -61,7 +61,9 @@ hsep_status hsep_model_step(
     const hsep_context *context, void *state, double values[], double t, double h, char message[]);
 
 /* Write outputs and locals as they follow from inputs and parameters before hsep_model_initialise.
- * Cannot fail: parameters that are out of range, and resources that are missing, leave start values. */
+ * Cannot fail: parameters that are out of range, and resources that are missing, leave start values. What a model that
+ * starts warm has planned for its first window, x_h, e_servo and sep_state of SepCompensator, follows when the
+ * initialization ends. */
 void hsep_model_start_values(const hsep_context *context, double values[]);
 
 /* Check that a block of bytes is a state of this model for the parameters in values; message says why not. */

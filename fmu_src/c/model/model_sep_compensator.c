@@ -25,6 +25,19 @@ typedef struct {
     hsep_compensator compensator; /* its arrays follow */
 } compensator_state;
 
+/* Check that a limit is one at this sampling interval; return how many problems were added to message, 0 or 1. */
+static int compensator_check_limit(const char *name, double value, double in_samples, double T_s, char message[])
+{
+    char number[HSEP_NUMBER_SIZE], interval[HSEP_NUMBER_SIZE];
+    if (isfinite(1.0 / in_samples)) {
+        return 0;
+    }
+    hsep_message_add(
+        message, "%s must be larger at T_s = %s s, got %s", name, hsep_number(interval, T_s, HSEP_REAL),
+        hsep_number(number, value, HSEP_REAL));
+    return 1;
+}
+
 /* Check spacing and preview against Np; return how many are wrong, each added to message. */
 static int compensator_check_plan(const double values[], char message[])
 {
@@ -55,6 +68,14 @@ static hsep_status compensator_checked(
     const double T_s = values[HSEP_VR_T_s], t_init = values[HSEP_VR_t_init];
     int problems = hsep_check_lags(values[HSEP_VR_Np], values[HSEP_VR_p], values[HSEP_VR_q], message);
     problems += compensator_check_plan(values, message);
+    const double v_max = values[HSEP_VR_v_max] * T_s, a_max = values[HSEP_VR_a_max] * (T_s * T_s);
+    const double j_max = values[HSEP_VR_j_max] * (T_s * T_s * T_s), v_s = values[HSEP_VR_v_s];
+    problems += compensator_check_limit("v_max", values[HSEP_VR_v_max], v_max, T_s, message);
+    problems += compensator_check_limit("a_max", values[HSEP_VR_a_max], a_max, T_s, message);
+    problems += compensator_check_limit("j_max", values[HSEP_VR_j_max], j_max, T_s, message);
+    if (v_s > 0.0) {
+        problems += compensator_check_limit("v_s", v_s, v_s * T_s, T_s, message);
+    }
     /* The warm-up counts from the end of the first fill; without one, the first window is planned with what is known. */
     const double t_plan = t_init > 0.0 ? t_init + values[HSEP_VR_preview] * T_s : 0.0;
     const double n_init = hsep_warm_up_samples(t_plan, T_s, message);
@@ -69,8 +90,7 @@ static hsep_status compensator_checked(
              .spacing = (uint64_t)values[HSEP_VR_spacing],
              .jerk_weight = values[HSEP_VR_jerk_weight],
              .limit =
-                 {values[HSEP_VR_change_max], values[HSEP_VR_v_max] * T_s, values[HSEP_VR_a_max] * (T_s * T_s),
-                  values[HSEP_VR_j_max] * (T_s * T_s * T_s)},
+                 {values[HSEP_VR_change_max], v_max, a_max, j_max},
              .keep_direction = values[HSEP_VR_keep_direction] > 0.0},
         .p = (uint64_t)values[HSEP_VR_p],
         .q = (uint64_t)values[HSEP_VR_q],
@@ -78,7 +98,7 @@ static hsep_status compensator_checked(
         .n_modes = HSEP_N_MODES,
         .lambda = values[HSEP_VR_lambda],
         .T_s = T_s,
-        .v_s = values[HSEP_VR_v_s],
+        .v_s = v_s,
         .n_init = n_init,
         .hold = values[HSEP_VR_input_hold] > 0.0 ? HSEP_FIRST_ORDER_HOLD : HSEP_ZERO_ORDER_HOLD,
         .best = (hsep_sep_state)values[HSEP_VR_compensate],
