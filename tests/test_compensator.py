@@ -9,7 +9,7 @@ from typing import Any
 import clarabel
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.linalg import toeplitz
 from scipy.optimize import nnls
@@ -30,7 +30,7 @@ from hybridsep.physics import ModalModel
 from hybridsep.plant import Encoder, FeedDrive, Plant
 from hybridsep.predictor import HybridPredictor
 from hybridsep.signals import Array
-from hybridsep.trajectory import PAPER_LIMITS, archimedean_spiral, rest_to_rest
+from hybridsep.trajectory import PAPER_LIMITS, archimedean_spiral, rest_to_rest, spiral
 
 MODEL = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
 DRIVE_LIMITS = Limits(0.1, 16.0, 5000.0)
@@ -38,9 +38,14 @@ TS = 1e-3
 
 
 def compensator(
-    best: SepState = SepState.HYBRID, limits: Limits | None = DRIVE_LIMITS, **changes: Any
+    best: SepState = SepState.HYBRID,
+    limits: Limits | None = DRIVE_LIMITS,
+    *,
+    keep_direction: bool = True,
+    **changes: Any,
 ) -> SepCompensator:
-    return SepCompensator(HybridPredictor(MODEL, **changes), preview=200, limits=limits, best=best)
+    predictor = HybridPredictor(MODEL, **changes)
+    return SepCompensator(predictor, preview=200, limits=limits, best=best, keep_direction=keep_direction)
 
 
 def plant() -> Plant:
@@ -57,6 +62,12 @@ def beyond(x_dm: Array, limits: Limits) -> float:
     """Return the largest share of a limit that a command takes."""
     bounds = (limits.velocity, limits.acceleration, limits.jerk)
     return max(float(np.max(np.abs(np.diff(x_dm, i)))) / (b * TS**i) for i, b in enumerate(bounds, start=1))
+
+
+def turned(x_dm: Array, x_d: Array) -> int:
+    """Return in how many samples a command runs against one that moves; m."""
+    against = np.diff(x_dm) * np.sign(np.diff(x_d))
+    return int(np.sum(against[np.abs(np.diff(x_d)) > 1e-12] < -1e-12))
 
 
 # Plans against oracles -----------------------------------------------------------------------------------------
@@ -101,6 +112,7 @@ def test_the_splines_end_so_that_what_follows_is_the_command_itself() -> None:
 
 
 @settings(max_examples=25, deadline=None)
+@example(11777665, 0.734375)  # an active bound is left by 0.2 % of it: the cost is within 4e-6 all the same
 @given(st.integers(0, 2**31), st.floats(0.05, 0.95))
 def test_a_bounded_plan_satisfies_the_optimality_conditions(seed: int, tightness: float) -> None:
     """Karush-Kuhn-Tucker: the gradient is a non-negative combination of the active bounds' normals."""
@@ -117,11 +129,11 @@ def test_a_bounded_plan_satisfies_the_optimality_conditions(seed: int, tightness
     assert c is not None
     assert bounds.allow(c)
     values, gradient = bounds.rows @ c, cost.P @ c - cost.v
-    upper = np.flatnonzero(values > bounds.high - 1e-3)
-    lower = np.flatnonzero(values < bounds.low + 1e-3)
+    upper = np.flatnonzero(values > bounds.high - 3e-3)
+    lower = np.flatnonzero(values < bounds.low + 3e-3)
     normals = np.concatenate((-bounds.rows[upper], bounds.rows[lower]))
     _, residual = nnls(normals.T, gradient)
-    assert residual <= 2e-3 * np.linalg.norm(cost.v)
+    assert residual <= 1e-3 * np.linalg.norm(cost.v)
 
 
 def clarabel_minimum(P: Array, v: Array, rows: Array, low: Array, high: Array) -> Array:
@@ -239,6 +251,74 @@ def test_a_refused_solve_falls_back_to_physics_then_to_the_rest(monkeypatch: pyt
     assert sep.plan(ahead[:200]).state is SepState.OFF
 
 
+# The direction of the path -------------------------------------------------------------------------------------
+
+
+@settings(max_examples=12, deadline=None)
+@given(
+    st.integers(0, 2**31),
+    st.sampled_from([1e-6, 1e-4, 1e-2]),
+    st.sampled_from([PAPER_LIMITS, DRIVE_LIMITS]),
+    st.sampled_from([0.0, 2e-3]),
+)
+def test_a_command_never_turns_where_the_path_moves(seed: int, spread: float, limits: Limits, v_s: float) -> None:
+    """Whatever is measured, from window to window, and within the limits."""
+    rng = np.random.default_rng(seed)
+    stops = np.cumsum(np.concatenate(([0.0], rng.uniform(-0.004, 0.004, 5))))
+    r = rest_to_rest(stops, PAPER_LIMITS, TS, dwell=float(rng.uniform(0.0, 0.03)))
+    x_d, commands = np.concatenate((r, np.full(300, r[-1]))), []
+    sep = compensator(limits=limits, Np=50, p=10, q=3, t_init=0.0, v_s=v_s)
+    for k in range(0, len(r), 50):
+        plan = sep.plan(x_d[k : k + 200])
+        commands.append(plan.x_dm)
+        sep.update(plan.x_pb + spread * rng.normal(size=50))
+    x_dm = np.concatenate((np.full(3, r[0]), *commands))  # from rest
+    assert turned(x_dm[2:], np.concatenate((r[:1], x_d[: len(x_dm) - 3]))) == 0
+    assert beyond(x_dm, limits) <= 1.0 + 1e-6
+    assert np.max(np.abs(x_dm[3:] - x_d[: len(x_dm) - 3])) <= 1e-3
+
+
+def test_only_the_velocity_where_the_path_moves_is_bounded_by_the_direction() -> None:
+    basis, n, step = SplineBasis(80, 4), 80, 1e-5
+    steps = np.concatenate((np.full(30, step), np.zeros(30), np.full(20, -step)))  # it moves from the first sample on
+    x_d, before, rest = 0.01 + np.cumsum(steps), np.full(3, 0.01), np.zeros(basis.values.shape[1])
+    of = {keep: DriveBounds(basis, TS, DRIVE_LIMITS, 1e-3, keep_direction=keep) for keep in (False, True)}
+    free, kept = (of[keep].bounds(x_d, before, np.zeros(3), rest) for keep in (False, True))
+    forward, backward = np.zeros(4 * n, dtype=np.bool_), np.zeros(4 * n, dtype=np.bool_)
+    forward[:30], backward[60:80] = True, True
+    speed = step / (DRIVE_LIMITS.velocity * TS)  # share of the limit that the path takes
+    np.testing.assert_allclose(kept.low[forward], -speed, rtol=1e-9)
+    np.testing.assert_allclose(kept.high[backward], speed, rtol=1e-9)
+    np.testing.assert_array_equal(kept.low[~forward], free.low[~forward])
+    np.testing.assert_array_equal(kept.high[~backward], free.high[~backward])
+    np.testing.assert_array_equal(kept.rows, free.rows)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**31))
+def test_the_rest_of_a_plan_that_turned_is_still_a_plan(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    basis = SplineBasis(80, 4)
+    rest: Array = np.asarray(2e-4 * rng.normal(size=basis.values.shape[1]))
+    bounds = DriveBounds(basis, TS, DRIVE_LIMITS, 1e-3, keep_direction=True)
+    found = bounds.bounds(move(80), np.zeros(3), np.zeros(3), rest)
+    assert found.allow(rest[N_DECIDED:])
+    assert np.min(np.diff(move(80) + basis.values @ rest)) < -1e-6  # it does turn
+
+
+def test_friction_that_follows_the_command_makes_turning_dear() -> None:
+    """The stage's Y axis, physics model: 113 µm where the command keeps its direction, 136 where it need not."""
+    machine, r = load_machine("als25010_y"), spiral()[1]
+    found = {}
+    for keep in (True, False):
+        sep = machine.new_compensator(SepState.PHYSICS, keep_direction=keep)
+        found[keep] = run_closed_loop(sep, machine.new_plant(), r, encoder=Encoder(1e-6, 0))
+    assert 1e6 * found[True].rms == pytest.approx(113.35, abs=0.5)
+    assert 1e6 * found[False].rms == pytest.approx(136.05, abs=0.5)
+    assert turned(found[True].x_dm, found[True].x_d) == 0
+    assert turned(found[False].x_dm, found[False].x_d) > 30
+
+
 # Trust ---------------------------------------------------------------------------------------------------------
 
 
@@ -281,6 +361,23 @@ def test_trust_needs_more_than_noise_to_be_lost() -> None:
     trust.observe(noise, np.full(100, np.inf), 25e-12)
     assert not trust.hybrid
     assert math.isfinite(trust.excess)
+
+
+def test_trust_is_not_judged_before_the_warm_up_is_over() -> None:
+    sep = compensator(Np=50, p=10, t_init=0.2)
+    rng = np.random.default_rng(4)
+    excess = []
+    for _ in range(8):
+        plan = sep.plan(np.zeros(200))
+        sep.update(plan.x_pb + 1e-4 * rng.normal(size=50))
+        excess.append(sep._trust.excess)
+    assert excess[:4] == [0.0] * 4
+    assert all(excess[4:])
+
+
+def test_a_bad_start_is_not_remembered() -> None:
+    """A seed whose few first rows predict badly: 8.0 µm if the warm-up counted."""
+    assert 1e6 * closed(compensator(), 506).rms < 6.6
 
 
 # Sensor --------------------------------------------------------------------------------------------------------
@@ -338,10 +435,18 @@ def test_figures_with_the_papers_settings() -> None:
 def test_figures_with_the_recommended_settings() -> None:
     sep = compensator(**RECOMMENDED)
     cold, warm = closed(sep), closed(sep, 1000, t_init=0.0)
-    assert 1e6 * cold.rms == pytest.approx(4.7, abs=0.3)
-    assert 1e6 * warm.rms == pytest.approx(1.95, abs=0.2)
+    assert 1e6 * cold.rms == pytest.approx(4.4, abs=0.3)
+    assert 1e6 * warm.rms == pytest.approx(1.46, abs=0.15)
     for loop in (cold, warm):
         assert beyond(loop.x_dm, DRIVE_LIMITS) <= 1.0
+        assert turned(loop.x_dm, loop.x_d) == 0
+
+
+def test_what_the_features_of_the_reference_bring() -> None:
+    """Without them the recommended settings are those of before: 4.7 and 1.95 µm."""
+    sep = compensator(**(RECOMMENDED | {"v_s": 0.0}))
+    assert 1e6 * closed(sep).rms == pytest.approx(4.75, abs=0.3)
+    assert 1e6 * closed(sep, 1000, t_init=0.0).rms == pytest.approx(1.95, abs=0.2)
 
 
 @pytest.mark.parametrize("settings_", [{}, RECOMMENDED], ids=["paper", "recommended"])
@@ -377,11 +482,12 @@ def test_trouble_never_makes_it_worse_than_physics(settings_: dict[str, Any], tr
 # State and parameters ------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("v_s", [0.0, 2e-3])
 @pytest.mark.parametrize("planned", [False, True])
-def test_a_saved_state_goes_on_bit_for_bit(planned: bool) -> None:
+def test_a_saved_state_goes_on_bit_for_bit(planned: bool, v_s: float) -> None:
     r = np.concatenate((commanded()[900:2600], np.zeros(200)))
     rng = np.random.default_rng(0)
-    sep = compensator(Np=50, p=20, q=3, t_init=0.1)
+    sep = compensator(Np=50, p=20, q=3, t_init=0.1, v_s=v_s, keep_direction=v_s > 0)
 
     def window(one: SepCompensator, k: int, noise: Array) -> Array:
         plan = one.plan(r[k : k + 200])
@@ -394,6 +500,7 @@ def test_a_saved_state_goes_on_bit_for_bit(planned: bool) -> None:
         sep.plan(r[600:800])
     other = SepCompensator.from_bytes(sep.to_bytes())
     assert other.to_bytes() == sep.to_bytes()
+    assert other.keep_direction is sep.keep_direction is (v_s > 0)
     for k in range(600, 1200, 50):
         noise = 5e-6 * rng.normal(size=50)
         np.testing.assert_array_equal(window(other, k, noise), window(sep, k, noise))

@@ -69,7 +69,10 @@ def test_demo_compensates(shown: Demonstration) -> None:
     assert 87.0 < none < 90.0
     assert physics < 20.5
     assert cold < 5.0
-    assert warm < 2.2
+    assert warm < 1.8
+    x, y = (shown.compensation(case, "tracking_rms_um") for case in ("spiral_x", "spiral_y"))
+    assert x[3] < 0.25 * x[1]
+    assert y[3] < 0.6 * y[1]  # its physics model keeps the direction too
     contour = shown.compensation("spiral_x", "contour_rms_um")
     assert contour == shown.compensation("spiral_y", "contour_rms_um") == sorted(contour, reverse=True)
     assert max(shown.compensation("staircase", "peak_jerk_m_s3")) <= 5000 * (1 + 1e-9)

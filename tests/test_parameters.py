@@ -96,6 +96,7 @@ def test_the_largest_seed_is_in_its_message() -> None:
         ("p", "past residuals e_pb in the features, 1 … 100000"),
         ("alpha", "numerator of the mode, constant term [1/s2], finite"),
         ("k_nl", "quadratic stiffness, force k_nl·x·|x| [N/m2], ≥ 0"),
+        ("keep_direction", "1: x_dm never turns while the commanded position moves, 0 … 1"),
     ],
 )
 def test_help(name: str, text: str) -> None:
@@ -150,7 +151,7 @@ def test_a_preview_is_refused_as_the_compensator_refuses_it(
         return
     with pytest.raises(ParameterError) as caught:
         SepCompensator(predictor, preview=preview, spacing=spacing)
-    assert str(caught.value) == problems[0]
+    assert str(caught.value) == "; ".join(problems)
 
 
 def test_a_warm_up_that_cannot_be_counted() -> None:

@@ -105,6 +105,8 @@ def test_the_interface_is_the_contract(compensator: FmuInstance) -> None:
         ("a_max", "parameter", "Real", "m/s2", "16.0"),
         ("j_max", "parameter", "Real", "m/s3", "5000.0"),
         ("change_max", "parameter", "Real", "m", "0.001"),
+        ("v_s", "parameter", "Real", "m/s", "0.002"),
+        ("keep_direction", "parameter", "Integer", None, "1"),
         ("compensate", "parameter", "Integer", None, "2"),
     ]
     variables = list(compensator.variables.values())
@@ -127,7 +129,7 @@ def test_both_flavours_have_the_table_and_the_page_shows_the_wiring(python_fmu: 
         description = json.loads(archive.read("resources/machine.json"))
         page = archive.read("documentation/index.html").decode()
     header = c_header(description, "{0}")
-    for line in ("HSEP_MODEL_SEP_COMPENSATOR 1", "HSEP_VR_x_dm = 2,", "HSEP_VR_preview = 20,", "HSEP_VR_mode = 28"):
+    for line in ("HSEP_MODEL_SEP_COMPENSATOR 1", "HSEP_VR_x_dm = 2,", "HSEP_VR_preview = 20,", "HSEP_VR_mode = 30"):
         assert line in header
     assert "SepCompensator</text>" in page
     assert "x_dm → x_d" in page
@@ -163,7 +165,7 @@ def test_a_closed_loop_is_the_librarys_bit_for_bit(
 def test_another_axis_with_modes_and_other_parameters(python_fmu: Fmu) -> None:
     machine = load_machine("als25010_y")
     changes: dict[str, Any] = {"Np": 40, "p": 30, "q": 5, "preview": 190, "spacing": 4, "jerk_weight": 0.5}
-    changes["change_max"] = 3e-4
+    changes |= {"change_max": 3e-4, "keep_direction": 0}
     bounds = {"v_max": 0.0805, "a_max": 8.1, "j_max": 2000.0}
     library = machine.new_compensator(SepState.PHYSICS, limits=Limits(*bounds.values()), **changes)
     look_ahead = SepLookAhead(library, 0.1)
@@ -295,6 +297,9 @@ def test_a_state_of_another_axis_is_refused(compensator: FmuInstance, python_fmu
         ({"a_max": -16.0}, "a_max must be > 0 m/s2, got -16.0"),
         ({"j_max": math.inf}, "j_max must be finite, got inf"),
         ({"change_max": 0.0, "j_max": 0.0}, "j_max must be > 0 m/s3, got 0.0; change_max must be > 0 m, got 0.0"),
+        ({"v_s": -1e-3}, "v_s must be ≥ 0 m/s, got -0.001"),
+        ({"v_s": math.nan}, "v_s must be finite, got nan"),
+        ({"keep_direction": 2}, "keep_direction must be 0 … 1, got 2"),
         ({"compensate": 3}, "compensate must be 0 … 2, got 3"),
         ({"compensate": -1}, "compensate must be 0 … 2, got -1"),
         ({"p": 60, "q": 50}, "p must be 1 … Np = 50, got 60; lower p or raise Np; q must be 0 … Np − 1 = 49, got 50"),
@@ -375,6 +380,11 @@ def test_a_warm_run_is_the_librarys_second_run(trained: Path, tmp_path: Path) ->
             assert in_initialization(instance, values)[5] == outputs(instance)[5] == state
     with FmuInstance(path) as instance, pytest.raises(FmuError, match=r"weights.bin was learned with p = 50, q = 40, "):
         instance.initialise({"q": 3})
+    with (
+        FmuInstance(path) as instance,
+        pytest.raises(FmuError, match=r"weights.bin was learned with v_s > 0, got v_s = 0"),
+    ):
+        instance.initialise({"v_s": 0.0})
 
 
 def test_weights_of_other_settings_are_refused(trained: Path, tmp_path: Path) -> None:
@@ -389,6 +399,7 @@ def test_weights_of_other_settings_are_refused(trained: Path, tmp_path: Path) ->
         return str(caught.value)
 
     differing = "Np = 100 instead of 50, q = 3 instead of 40, lambda = 1e-12 instead of 1e-08"
+    differing += ", v_s = 0.0 instead of 0.002"
     assert refused("SepCompensatorPy", tmp_path / "other.state").startswith(
         f"other.state was not trained for machine spring_mass_damper's compensator: it has {differing}; "
     )
@@ -415,6 +426,7 @@ def travelling(path: Path) -> dict[str, str]:
 def test_each_fmu_carries_what_it_needs(python_fmu: Fmu, tmp_path: Path) -> None:
     mine = travelling(python_fmu("SepCompensatorPy"))
     assert {"compensator.py", "sep_lookahead.py", "limits.py", "_interior.py", "fmi/slave.py"} < set(mine)
+    assert "_schedule.py" in mine
     assert not {"closed_loop.py", "trajectory.py", "plant.py", "machine.py"} & set(mine)
     for name in ("HybridPredictorPy", "FeedDrivePy"):
         theirs = travelling(python_fmu(name))

@@ -22,6 +22,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # benchmarks are n
 import numpy as np
 
 from benchmarks.compensation.loops import Case, FmuLoops, LibraryLoops, Loops
+from benchmarks.compensation.path_friction import runs_with_path_friction
 from benchmarks.compensation.report import Report
 from hybridsep.closed_loop import ClosedLoop, contour_error
 from hybridsep.compensator import SepState
@@ -38,6 +39,17 @@ AFTER_REVERSAL = 100
 
 LESS_THAN_5_PERCENT_WORSE = 1.05
 
+STAGE_HYBRIDS: dict[str, dict[str, float]] = {
+    "hybrid": {},
+    "hybrid, v_s = 0,": {"v_s": 0.0},
+    "hybrid, keep_direction = 0,": {"keep_direction": 0},
+    "hybrid, v_s = 0, keep_direction = 0,": {"v_s": 0.0, "keep_direction": 0},
+}
+"""What is left out on the stage."""
+STAGE_KINDS = (
+    *("none", "physics", "physics, keep_direction"),
+    *(f"{name} {run}" for name in STAGE_HYBRIDS for run in ("cold", "warm")),
+)
 
 FMU_BACKEND = "native"
 """Flavour of the FMUs if none is asked for."""
@@ -63,8 +75,18 @@ CASES = {
 
 
 def with_the_papers_settings(machine: Machine) -> Machine:
-    """Return a machine that compensates with the settings of its ``[predictor]``."""
-    return machine.model_copy(update={"compensator": CompensatorSection()})
+    """Return a machine that compensates with the settings of its ``[predictor]`` and the features of eq. (5) alone."""
+    return machine.model_copy(update={"compensator": CompensatorSection(v_s=0.0)})
+
+
+def with_settings(machine: Machine, **changes: float) -> Machine:
+    """Return a machine that compensates with other entries of its ``[compensator]``."""
+    return machine.model_copy(update={"compensator": machine.compensator.model_copy(update=changes)})
+
+
+def as_published(machine: Machine) -> Machine:
+    """Return a machine whose commands may turn where the path does not, as the published methods' may."""
+    return with_settings(machine, keep_direction=0)
 
 
 def excess(loop: ClosedLoop, compensator_limits: tuple[Limits | None, float | None], Ts: float) -> float:
@@ -87,7 +109,7 @@ def staircase_rows(report: Report, loops: Loops, seeds: range) -> tuple[float, f
     """Rows 1 and 2; return the figures of the recommended settings, cold and warm."""
     recommended, r = load_machine("spring_mass_damper"), staircase()
     machine = with_the_papers_settings(recommended)
-    report.title("1  staircase, p = 50, q = 3 (tracking RMS of the true position, µm)")
+    report.title("1  staircase, p = 50, q = 3, the paper's features (tracking RMS of the true position, µm)")
     none = mean_rms([loops.run(machine, r, SepState.OFF, s)[0] for s in seeds])
     report.line("no compensation", none, "87 … 90", 87 <= none <= 90)
     physics = mean_rms([loops.run(machine, r, SepState.PHYSICS, s)[0] for s in seeds])
@@ -106,29 +128,39 @@ def staircase_rows(report: Report, loops: Loops, seeds: range) -> tuple[float, f
 
 def stage_rows(report: Report, loops: Loops, seeds: range) -> None:
     """Row 3: both axes of the spiral, and the contour error of the two together."""
-    report.title("3  stage, spiral, recommended settings")
+    report.title("3  stage, spiral, recommended settings; physics: filtered basis functions as published")
     position, derivative, end = archimedean_spiral(0.030, 5.0)
     machines, commands = [load_machine("als25010_x"), load_machine("als25010_y")], spiral()
-    found: dict[str, list[list[ClosedLoop]]] = {"none": [], "physics": [], "hybrid cold": [], "hybrid warm": []}
+    found: dict[str, list[list[ClosedLoop]]] = {name: [] for name in STAGE_KINDS}
     for machine, r in zip(machines, commands, strict=True):
+        plain = as_published(machine)
         found["none"].append([loops.run(machine, r, SepState.OFF, s)[0] for s in seeds])
-        found["physics"].append([loops.run(machine, r, SepState.PHYSICS, s)[0] for s in seeds])
-        pairs = [loops.run(machine, r, SepState.HYBRID, s, 2) for s in seeds]
-        found["hybrid cold"].append([pair[0] for pair in pairs])
-        found["hybrid warm"].append([pair[1] for pair in pairs])
+        found["physics"].append([loops.run(plain, r, SepState.PHYSICS, s)[0] for s in seeds])
+        found["physics, keep_direction"].append([loops.run(machine, r, SepState.PHYSICS, s)[0] for s in seeds])
+        for name, changes in STAGE_HYBRIDS.items():
+            used = with_settings(machine, **changes)
+            pairs = [loops.run(used, r, SepState.HYBRID, s, 2) for s in seeds]
+            found[f"{name} cold"].append([pair[0] for pair in pairs])
+            found[f"{name} warm"].append([pair[1] for pair in pairs])
     for axis, r in enumerate(commands):
-        label = "XY"[axis]
-        physics = mean_rms(found["physics"][axis])
-        for name in ("none", "physics", "hybrid cold"):
-            report.line(f"{label}  {name}", mean_rms(found[name][axis]))
-        report.most(f"{label}  hybrid warm", mean_rms(found["hybrid warm"][axis]), physics / 2, "half of physics")
+        label, figures = "XY"[axis], {name: mean_rms(found[name][axis]) for name in STAGE_KINDS}
+        physics, keeping = figures["physics"], figures["physics, keep_direction"]
+        for name, figure in figures.items():
+            shares = f"{figure / physics:.0%} of physics, {figure / keeping:.0%} of physics with keep_direction"
+            if name == "hybrid warm":
+                report.most(f"{label}  {name}", figure, physics / 2, f"half of physics; {shares}")
+            else:
+                report.line(f"{label}  {name}", figure, note=shares)
         near = after_reversals(r)
-        for name in ("physics", "hybrid warm"):
+        for name in ("physics", "physics, keep_direction", "hybrid warm"):
             errors = np.array([loop.x_d - loop.x for loop in found[name][axis]])
             outside = UM * float(np.sqrt(np.mean(errors[:, ~near] ** 2)))
             share = float(np.sum(errors[:, near] ** 2) / np.sum(errors**2))
             note = f"{share:.0%} of the mean square is within 0.1 s of a reversal, {np.mean(near):.0%} of the time"
             report.line(f"   {name}, away from reversals", outside, note=note)
+        for name, used in (("", machines[axis]), (", keep_direction = 0", as_published(machines[axis]))):
+            warm = mean_rms([runs_with_path_friction(used, r, s)[1] for s in seeds])
+            report.line(f"   if friction followed the path: hybrid warm{name}", warm, note="library")
     for name, (x, y) in found.items():
         points = [np.column_stack((a.x, b.x)) for a, b in zip(x, y, strict=True)]
         errors = np.array([contour_error(point, position, derivative, end) for point in points])
@@ -154,7 +186,8 @@ def peer_rows(report: Report, cold: float, warm: float) -> None:
         commands[f"input shaping, {kind.upper()}"] = shape(r, shaper)
         commands[f"input shaping, {kind.upper()}, early by its mean delay"] = shape(r, shaper, advance=True)
     commands["zero-phase-error tracking control"] = zero_phase_command(r, discrete)
-    loop = LibraryLoops().run(with_the_papers_settings(machine), r, SepState.PHYSICS, 0)[0]
+    published = as_published(with_the_papers_settings(machine))
+    loop = LibraryLoops().run(published, r, SepState.PHYSICS, 0)[0]
     commands["filtered basis functions, physics model"] = loop.x_dm
     for name, command in commands.items():
         reached = loop.x if command is loop.x_dm else simulate(machine.new_plant(), command, machine.T_s)

@@ -1,0 +1,49 @@
+"""What limits the stage: the same drive if its friction followed the path, not the command that is modified."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybridsep.closed_loop import ClosedLoop, run_closed_loop
+from hybridsep.compensator import SepState
+from hybridsep.machine import Machine, StageSection
+from hybridsep.plant import Encoder, Plant, StageDrive
+from hybridsep.signals import Array
+
+from .loops import noise_seed
+
+__all__ = ["runs_with_path_friction"]
+
+
+class PathFriction(StageDrive):
+    """The stage with friction of the velocity ``path_velocity``, m/s, which is set from outside."""
+
+    path_velocity = 0.0
+
+    def step(self, x_d: float, h: float) -> None:
+        """Move on as :class:`StageDrive` does, with the last command where it makes ``v_d`` the path's velocity."""
+        self._last_x_d = x_d - self._start - self.path_velocity * self._elapsed
+        super().step(x_d, h)
+
+
+def runs_with_path_friction(machine: Machine, r: Array, seed: int) -> list[ClosedLoop]:
+    """Return the library's cold and warm run over ``r``, ``(n,)``, m, with the hybrid model."""
+    assert isinstance(machine.plant, StageSection)
+    compensator = machine.new_compensator(SepState.HYBRID)
+    velocity = np.diff(r, prepend=r[0]) / machine.T_s
+
+    def follow(k: int, plant: Plant) -> None:
+        assert isinstance(plant, PathFriction)
+        plant.path_velocity = float(velocity[k]) if 0 <= k < len(r) else 0.0
+
+    return [
+        run_closed_loop(
+            compensator,
+            PathFriction(machine.model, f=machine.plant.f, kappa=machine.plant.kappa, Ts=machine.T_s),
+            r,
+            encoder=Encoder(machine.plant.noise_std, noise_seed(seed, run)),
+            t_init=None if run == 0 else 0.0,
+            disturb=follow,
+        )
+        for run in range(2)
+    ]
