@@ -64,7 +64,8 @@ class SepCompensator:
     change_max : float, optional
         Bound on ``|δ|``, m; none if None.
     keep_direction : bool
-        Whether ``x_dm``, within its limits, never turns while ``x_d`` moves: friction would turn with it.
+        Whether ``x_dm`` never turns while ``x_d`` moves: friction would turn with it. Needs ``limits``; without them it
+        has no effect, and a predictor with ``v_s > 0`` may then be worse than without.
     best : SepState
         Best model to use: OFF leaves the command as it is.
 
