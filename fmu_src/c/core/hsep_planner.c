@@ -103,21 +103,13 @@ uint64_t hsep_planner_pinned(const hsep_planner *self) { return self->n_pinned *
 
 double hsep_planner_decided(const hsep_planner *self, uint64_t k)
 {
-    const hsep_splines *splines = planner_splines(self);
-    double c[HSEP_DECIDED + 1] = {0.0, 0.0, 0.0, 0.0};
-    const uint64_t place = k / splines->spacing, within = k % splines->spacing;
-    const double *b = hsep_splines_shape(splines);
-    memcpy(c, planner_at(self, self->c), HSEP_DECIDED * sizeof(double));
-    double sum = 0.0;
-    for (uint64_t i = 0; place + i < HSEP_DECIDED; i++) {
-        sum += c[place + i] * b[within + (HSEP_DECIDED - i) * splines->spacing];
-    }
-    return sum;
+    return hsep_splines_sum(planner_splines(self), planner_at(self, self->c), HSEP_DECIDED, k);
 }
 
 double hsep_planner_delta(const hsep_planner *self, uint64_t k)
 {
-    return hsep_splines_sum(planner_splines(self), planner_at(self, self->c), k);
+    const hsep_splines *splines = planner_splines(self);
+    return hsep_splines_sum(splines, planner_at(self, self->c), HSEP_DECIDED + splines->n, k);
 }
 
 /* The third differences of what is decided of delta. */

@@ -1,6 +1,6 @@
 #include "hsep_predictor.h"
 
-#include "hsep_vector.h"
+#include "hsep_recursion.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -29,7 +29,7 @@ const double *hsep_predictor_array(const hsep_predictor *self, uint64_t offset)
 double hsep_predictor_size(const hsep_predictor_parameters *parameters)
 {
     const double Np = (double)parameters->Np, p = (double)parameters->p, q = (double)parameters->q;
-    const double doubles = 5.0 * Np + (Np + q) + (Np + p) + (2.0 + q + p) + p;
+    const double doubles = 5.0 * Np + (Np + q) + (Np + p) + (2.0 + q + p);
     return (double)sizeof(hsep_predictor) + doubles * (double)sizeof(double) +
            hsep_physics_size(parameters->n_modes, parameters->dead_time) +
            hsep_regression_size(2 + parameters->q + parameters->p);
@@ -61,7 +61,6 @@ static void predictor_lay_out(hsep_predictor *self, const hsep_predictor_paramet
     self->past_x = predictor_take(&end, Np + q);
     self->past_e = predictor_take(&end, Np + p);
     self->weights = predictor_take(&end, 2.0 + q + p);
-    self->backward = predictor_take(&end, p);
     self->physics = predictor_take(
         &end, hsep_physics_size(parameters->n_modes, parameters->dead_time) / (double)sizeof(double));
     self->regression = end;
@@ -106,37 +105,12 @@ int hsep_predictor_valid(const void *block, const hsep_predictor_parameters *par
            regression.n_tiles == n / 4 + 1;
 }
 
-/* Predict the residuals of the window that begins, newest first into past_e; eq. (4):
- *   e_h(k) = w_0 + sum_i w_x,i x_pb(k-i) + sum_i w_e,i e(k-i),  e(k-i) measured or, inside the window, predicted.
- * Sample k of the window is at place j = Np - 1 - k, its lag i at j + i. */
-static void predictor_free_run(hsep_predictor *self)
-{
-    const uint64_t Np = self->Np, p = self->p, q = self->q;
-    const double *w = predictor_at(self, self->weights);
-    const double *w_x = w + 1, *w_e = w + 1 + q; /* w_x[i] for lag i = 0 ... q, w_e[i] for lag i = 1 ... p */
-    const double *x = predictor_at(self, self->past_x), *backward = predictor_at(self, self->backward);
-    double *e = predictor_at(self, self->past_e);
-    for (uint64_t j = 0; j < Np; j++) {
-        e[j] = w[0];
-    }
-    for (uint64_t i = 0; i <= q; i++) {
-        hsep_axpy(e, w_x[i], x + i, Np);
-    }
-    for (uint64_t i = 1; i <= p; i++) { /* measured residuals reach the first i samples */
-        hsep_axpy(e + Np - i, w_e[i], e + Np, i);
-    }
-    for (uint64_t j = Np - 1; j > 0; j--) { /* e(k) is known now: push it into the samples that follow */
-        const uint64_t reach = p < j ? p : j;
-        hsep_axpy(e + j - reach, e[j], backward + p - reach, reach);
-    }
-}
-
 /* Solve the weights from all that was learned and predict the window that begins. */
 static void predictor_next_window(hsep_predictor *self)
 {
     const uint64_t Np = self->Np, p = self->p, q = self->q;
     double *past_x = predictor_at(self, self->past_x), *past_e = predictor_at(self, self->past_e);
-    double *w = predictor_at(self, self->weights), *backward = predictor_at(self, self->backward);
+    double *w = predictor_at(self, self->weights);
     const double *ahead = predictor_at(self, self->ahead), *ahead_pb = predictor_at(self, self->ahead_pb);
     double *x_d = predictor_at(self, self->x_d), *x_pb = predictor_at(self, self->x_pb);
     double *x_h = predictor_at(self, self->x_h);
@@ -144,13 +118,11 @@ static void predictor_next_window(hsep_predictor *self)
     memcpy(past_x + Np, past_x, (size_t)q * sizeof(double)); /* q < Np, p <= Np: they do not overlap */
     memcpy(past_e + Np, past_e, (size_t)p * sizeof(double));
     hsep_regression_solve(hsep_predictor_regression(self), w); /* Eq. (6) */
-    for (uint64_t i = 0; i < p; i++) {
-        backward[i] = w[1 + q + p - i];
-    }
     for (uint64_t i = 0; i < Np; i++) {
         past_x[Np - 1 - i] = ahead_pb[i]; /* Eq. (2), answered command by command as they came */
     }
-    predictor_free_run(self);
+    const hsep_recursion recursion = {.w_x = w + 1, .w_e = w + 2 + q, .p = p, .q = q, .bias = w[0]};
+    hsep_recursion_run(&recursion, past_x, NULL, past_e, Np, 0, Np); /* Eq. (4) */
 
     /* The fill is over at k = Np; the warm-up counts from there. */
     const double warm_up = self->n_init - (double)(self->k - Np);

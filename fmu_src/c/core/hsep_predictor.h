@@ -51,7 +51,6 @@ typedef struct {
     uint64_t past_x;   /* (Np + q,) m, x_pb of this window and of the q samples before it, newest first */
     uint64_t past_e;   /* (Np + p,) m, e_pb likewise; predicted ones where nothing is measured yet */
     uint64_t weights;  /* (2 + q + p,) w */
-    uint64_t backward; /* (p,) the weights of e_pb, oldest lag first */
     uint64_t physics, regression;
 } hsep_predictor;
 

@@ -59,12 +59,12 @@ void hsep_splines_init(hsep_splines *self, uint64_t preview, uint64_t spacing, c
     }
 }
 
-double hsep_splines_sum(const hsep_splines *self, const double c[], uint64_t k)
+double hsep_splines_sum(const hsep_splines *self, const double c[], uint64_t count, uint64_t k)
 {
     const double *b = hsep_splines_shape(self);
     const uint64_t place = k / self->spacing, within = k % self->spacing;
     double sum = 0.0;
-    for (uint64_t i = 0; i <= HSEP_DECIDED && place + i < HSEP_DECIDED + self->n; i++) {
+    for (uint64_t i = 0; i <= HSEP_DECIDED && place + i < count; i++) {
         sum += c[place + i] * b[within + (HSEP_DECIDED - i) * self->spacing];
     }
     return sum;

@@ -29,8 +29,9 @@ double hsep_splines_size(uint64_t spacing); /* bytes of the block, counted in do
 /* Fill the block. limit: of the change, m, and of its differences of orders 1 to 3, m a sample to that power. */
 void hsep_splines_init(hsep_splines *self, uint64_t preview, uint64_t spacing, const double limit[HSEP_ORDERS]);
 
-/* delta at sample k from coefficients c, (3 + n,), those of the splines -3, -2, -1 first. 4 multiply-adds. */
-double hsep_splines_sum(const hsep_splines *self, const double c[], uint64_t k);
+/* What the first count splines give at sample k, with coefficients c, (count,), those of the splines -3, -2, -1 first.
+ * 4 multiply-adds. */
+double hsep_splines_sum(const hsep_splines *self, const double c[], uint64_t count, uint64_t k);
 
 /* The rows of the splines first ... n - 1 with coefficients c, (n - first,). Cost: 14 operations a sample. */
 void hsep_splines_rows(const hsep_splines *self, const double c[], uint64_t first, double rows[]);

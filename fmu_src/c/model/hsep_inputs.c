@@ -1,6 +1,7 @@
 #include "hsep_inputs.h"
 
 #include "hsep_check.h"
+#include "hsep_state.h"
 
 #include <math.h>
 
@@ -64,4 +65,9 @@ hsep_status hsep_inputs_step(
     }
     *complete = hsep_clock_advance(&self->clock, parts);
     return HSEP_OK;
+}
+
+int hsep_inputs_valid(const hsep_inputs *self, double T_s, uint64_t k)
+{
+    return hsep_state_clock_valid(&self->clock) && self->clock.T_s == T_s && (uint64_t)self->clock.k == k;
 }

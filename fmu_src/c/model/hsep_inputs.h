@@ -20,4 +20,7 @@ hsep_status hsep_inputs_init(hsep_inputs *self, double t_start, double T_s, doub
 hsep_status hsep_inputs_step(
     hsep_inputs *self, double x_d_ahead, double x_meas, double t, double h, int *complete, char message[]);
 
+/* Whether inputs that were read from a state count samples of T_s, s, within their bounds, and are at sample k. */
+int hsep_inputs_valid(const hsep_inputs *self, double T_s, uint64_t k);
+
 #endif

@@ -168,8 +168,8 @@ hsep_status hsep_model_check_state(
     }
     memcpy(&head, state, sizeof head);
     const char *predictor = (const char *)state + (sizeof head - sizeof head.predictor);
-    if (!hsep_state_clock_valid(&head.inputs.clock) || head.inputs.clock.T_s != parameters.T_s ||
-        head.predictor.k != (uint64_t)head.inputs.clock.k || !hsep_predictor_valid(predictor, &parameters)) {
+    if (!hsep_inputs_valid(&head.inputs, parameters.T_s, head.predictor.k) ||
+        !hsep_predictor_valid(predictor, &parameters)) {
         return hsep_state_damaged(message);
     }
     return HSEP_OK;

@@ -198,8 +198,8 @@ hsep_status hsep_model_check_state(
     }
     memcpy(&head, state, sizeof head);
     const char *compensator = (const char *)state + (sizeof head - sizeof head.compensator);
-    if (!hsep_state_clock_valid(&head.inputs.clock) || head.inputs.clock.T_s != parameters.T_s ||
-        head.compensator.k != (uint64_t)head.inputs.clock.k || !hsep_compensator_valid(compensator, &parameters)) {
+    if (!hsep_inputs_valid(&head.inputs, parameters.T_s, head.compensator.k) ||
+        !hsep_compensator_valid(compensator, &parameters)) {
         return hsep_state_damaged(message);
     }
     return HSEP_OK;
