@@ -60,8 +60,6 @@ class Record:
         The outputs of the role, and the plant's ``x`` and ``x_meas`` as the look-ahead got it.
     state : (n,) array of int
         The role's state.
-    delay : int
-        Samples by which the trajectory was delayed.
     T_s : float
         Sampling interval, s.
     Np : int
@@ -71,7 +69,6 @@ class Record:
     t: Array
     signals: dict[str, Array]
     state: NDArray[np.int64]
-    delay: int
     T_s: float
     Np: int
 
@@ -152,7 +149,6 @@ def run_pair(
         t=np.asarray(start_time + np.arange(delay, n) * h, dtype=np.float64),
         signals=dict(zip((*role.outputs, "x", "x_meas"), signals[delay:].T.copy(), strict=True)),
         state=state[delay:],
-        delay=delay,
         T_s=h,
         Np=Np,
     )

@@ -215,9 +215,15 @@ class SepCompensator:
     def _best_plan(self, command: Array) -> tuple[SepState, Array]:
         """Return the model and the coefficients of the best plan there is, the decided ones first."""
         rest = self._rest
+        candidates = self._candidates()
+        if not candidates:
+            return SepState.OFF, rest
         bounds = self._bounds.bounds(command, self._x_d_before, self._delta_before, rest)
-        for state in self._candidates():
-            g, free = self._model(state, command)
+        with np.errstate(all="ignore"):  # a hybrid model that is not asked for may be unstable
+            operator = self.predictor.operator(self.preview, reference=command)  # Eq. (3)
+        for state in candidates:
+            hybrid = state is SepState.HYBRID
+            g, free = (operator.g_h, operator.free) if hybrid else (operator.g_pb, operator.free_pb)
             if not (np.isfinite(g).all() and np.isfinite(free).all()):
                 continue
             cost = self._basis.cost(g, free, command, rest[:N_DECIDED], self._delta_before, self.jerk_weight)
@@ -238,14 +244,6 @@ class SepCompensator:
         )
         candidates = [SepState.HYBRID] if hybrid else []
         return candidates + ([SepState.PHYSICS] if self.best is not SepState.OFF else [])
-
-    def _model(self, state: SepState, command: Array) -> tuple[Array, Array]:
-        """Return the first column of G and the free response over the preview; eq. (3)."""
-        with np.errstate(all="ignore"):  # a hybrid model that is not asked for may be unstable
-            operator = self.predictor.operator(self.preview, reference=command)
-        if state is SepState.HYBRID:
-            return operator.g_h, operator.free
-        return operator.g_pb, operator.free_pb
 
     def to_bytes(self) -> bytes:
         """Return parameters and state, the predictor's and a planned window included, as a versioned blob."""
