@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .clock import SampleClock, check_step_size
 from .errors import ParameterError, SignalError
 from .parameters import check
 from .physics import ModalModel
@@ -22,9 +23,6 @@ __all__ = ["FRICTION_VELOCITY", "INTERNAL_STEP", "Encoder", "FeedDrive", "Plant"
 
 INTERNAL_STEP = 1e-4
 """Longest internal integration step, s."""
-
-STEP_MAX = 100.0
-"""Longest step, s."""
 
 FRICTION_VELOCITY = 2e-3
 """Velocity over which the stage's friction changes sign, m/s."""
@@ -92,6 +90,7 @@ class FeedDrive:
 
     def step(self, x_d: float, h: float) -> None:
         """Advance by ``h`` seconds with the command ``x_d``, m, held."""
+        check_step_size(h)
         r = x_d - self._start
         a, w2 = self.c / self.m, self.k / self.m
         n = _internal_steps(h, max(math.sqrt(w2), a))
@@ -157,8 +156,8 @@ class StageDrive:
         """Put the stage to rest at ``start``, m."""
         self._start = start
         self._z = [0.0] * (2 * len(self._modes))
-        # v_d is latched when at least T_s has passed since the command was last looked at.
-        self._last_x_d, self._v_d, self._elapsed, self._v = 0.0, 0.0, self.Ts, 0.0
+        self._last_x_d, self._v_d, self._v = 0.0, 0.0, 0.0
+        self._clock = SampleClock.begin(0.0, self.Ts)  # a time of its own
 
     @property
     def x(self) -> float:
@@ -172,33 +171,48 @@ class StageDrive:
 
     def step(self, x_d: float, h: float) -> None:
         """Advance by ``h`` seconds with the command ``x_d``, m, held."""
-        n = _internal_steps(h, self._rate)
-        dt = h / n
-        r = x_d - self._start
-        last_x_d, v_d, elapsed = self._last_x_d, self._v_d, self._elapsed
-        if elapsed >= self.Ts * (1 - 1e-6):
-            last_x_d, v_d, elapsed = r, (r - last_x_d) / elapsed, 0.0
-        pushed = r - self.f * math.tanh(v_d / FRICTION_VELOCITY)
-        z, f = self._z, self._derivative
+        check_step_size(h)
+        step = self._clock.count(self._clock.end, h)
+        r, z = x_d - self._start, self._z
+        last_x_d, v_d, done = self._last_x_d, self._v_d, 0.0
+        # v_d is taken at the instants, in whatever steps they come.
+        for i in range(step.n_latched + 1):
+            end = max(done, step.first + i * self.Ts) if i < step.n_latched else h
+            if end > done:
+                z = self._integrated(z, self._pushed(r, v_d), end - done)
+                done = end
+            if i < step.n_latched:
+                last_x_d, v_d = r, (r - last_x_d) / self.Ts
+        if not all(map(math.isfinite, z)):
+            raise SignalError(f"the stage's state left the range of numbers (command {x_d} m)")
+        self._z, self._v = z, self._position(self._derivative(z, self._pushed(r, v_d)))
+        self._last_x_d, self._v_d, self._clock = last_x_d, v_d, step.after
+
+    def state(self) -> list[float]:
+        """Return ``[start, last x_d, v_d, v, 7 numbers of the clock, z …]``."""
+        return [self._start, self._last_x_d, self._v_d, self._v, *self._clock.state(), *self._z]
+
+    def restore(self, state: list[float]) -> None:
+        """Take over what :meth:`state` returned."""
+        self._start, self._last_x_d, self._v_d, self._v = state[:4]
+        self._clock = SampleClock.from_state(state[4:11])
+        self._z = list(state[11:])
+
+    def _pushed(self, r: float, v_d: float) -> float:
+        """Return the command after the carriage's friction, which follows the commanded velocity."""
+        return r - self.f * math.tanh(v_d / FRICTION_VELOCITY)
+
+    def _integrated(self, z: list[float], pushed: float, time: float) -> list[float]:
+        """Return ``z`` after ``time`` seconds of a held command."""
+        n = _internal_steps(time, self._rate)
+        dt, f = time / n, self._derivative
         for _ in range(n):
             k1 = f(z, pushed)
             k2 = f([s + dt / 2 * k for s, k in zip(z, k1, strict=True)], pushed)
             k3 = f([s + dt / 2 * k for s, k in zip(z, k2, strict=True)], pushed)
             k4 = f([s + dt * k for s, k in zip(z, k3, strict=True)], pushed)
             z = [s + dt / 6 * (a + 2 * b + 2 * c + d) for s, a, b, c, d in zip(z, k1, k2, k3, k4, strict=True)]
-        if not all(map(math.isfinite, z)):
-            raise SignalError(f"the stage's state left the range of numbers (command {x_d} m)")
-        self._z, self._v = z, self._position(f(z, pushed))
-        self._last_x_d, self._v_d, self._elapsed = last_x_d, v_d, elapsed + h
-
-    def state(self) -> list[float]:
-        """Return ``[start, last x_d, v_d, elapsed, v, z …]``."""
-        return [self._start, self._last_x_d, self._v_d, self._elapsed, self._v, *self._z]
-
-    def restore(self, state: list[float]) -> None:
-        """Take over what :meth:`state` returned."""
-        self._start, self._last_x_d, self._v_d, self._elapsed, self._v = state[:5]
-        self._z = list(state[5:])
+        return z
 
     def _position(self, z: list[float]) -> float:
         return sum(alpha * z[2 * i] + beta * z[2 * i + 1] for i, (_, _, alpha, beta) in enumerate(self._modes))
@@ -277,10 +291,6 @@ def simulate(plant: Plant, x_d: ArrayLike, Ts: float, *, start: float | None = N
 
 def _internal_steps(h: float, rate: float) -> int:
     """Return how many internal steps a step of ``h`` seconds takes; ``rate``, 1/s, is that of the fastest mode."""
-    if not (math.isfinite(h) and h > 0):
-        raise ParameterError(f"the step size must be finite and > 0 s, got {h!r}")
-    if h > STEP_MAX:
-        raise ParameterError(f"the step size must be at most {STEP_MAX:g} s, got {h!r}; make several steps")
     n = math.ceil(max(h / INTERNAL_STEP, 16 * h * rate) - 1e-6)
     return min(max(1, n), _STEPS_MAX)
 

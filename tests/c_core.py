@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from hybridsep.compensator import SepCompensator, SepState
 from hybridsep.fmi.c_header import c_header
-from hybridsep.fmi.variables import variables_of
+from hybridsep.fmi.variables import INTERPOLATED, variables_of
 from hybridsep.limits import Limits
 from hybridsep.lookahead import LookAhead
 from hybridsep.physics import ModalModel, Mode
@@ -234,7 +234,9 @@ class CModel:
         self.library = library(name)
         table = variables_of(DESCRIPTIONS[name])
         self.place = {variable.name: i for i, variable in enumerate(table)}
-        self.values: Array = np.array([float(variable.start or 0.0) for variable in table])
+        slopes = INTERPOLATED[DESCRIPTIONS[name]["model"]]
+        self.slope_place = {slope: len(table) + self.place[slope] for slope in slopes}
+        self.values: Array = np.array([float(variable.start or 0.0) for variable in table] + [0.0] * len(slopes))
         self.context = Context(
             self.library.test_variables(), len(table), f"{resources}/".encode() if resources else None
         )
@@ -265,8 +267,9 @@ class CModel:
         return self
 
     def step(self, t: float, h: float = 1e-3) -> None:
-        """Do one communication step."""
+        """Do one communication step, after which the adapter's time derivatives are 0."""
         self._call("step", self._state, self._values, ctypes.c_double(t), ctypes.c_double(h))
+        self.values[list(self.slope_place.values())] = 0.0
 
     def check_state(self, blob: bytes) -> None:
         """Check that a blob is a state of this instance."""
@@ -291,8 +294,9 @@ class CModel:
         message = ctypes.create_string_buffer(b"\xff" * MESSAGE_SIZE + b"unwritten")
         status = getattr(self.library, f"hsep_model_{function}")(ctypes.byref(self.context), *arguments, message)
         assert message.raw[MESSAGE_SIZE:] == b"unwritten\0"
-        if status:
+        if status == 1:
             raise RefusedError(message.value.decode("utf-8"))
+        self.warning = message.value.decode("utf-8") if status else ""
 
 
 def look_ahead(name: str, **parameters: float) -> tuple[LookAhead, CModel]:

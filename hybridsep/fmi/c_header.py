@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from .variables import Variable, variables_of
+from .variables import INTERPOLATED, Variable, variables_of
 
 __all__ = ["c_header"]
 
@@ -27,8 +27,12 @@ def c_header(description: Mapping[str, object], guid: str) -> str:
     n_modes = sum(variable.name.endswith("].f_n") for variable in table)
     window = sum(variable.name.startswith("x_h_window[") for variable in table)
     model, name = _model_macro(str(description["model"]), n_modes), str(description["name"])
+    slopes = INTERPOLATED[str(description["model"])]
+    assert slopes == tuple(variable.name for variable in table[: len(slopes)])  # their places are the inputs' own
     rows = "\n".join(f"    {_row(variable)}," for variable in table)
-    references = ",\n".join(f"    HSEP_VR_{name} = {place}" for name, place in _references(table).items())
+    places = [f"    HSEP_VR_{name} = {place}" for name, place in _references(table).items()]
+    places += [f"    HSEP_SLOPE_{name} = HSEP_N_VARIABLES + HSEP_VR_{name}" for name in slopes]
+    references = ",\n".join(places)
     return f"""/* The interface of {name}: generated from the table that modelDescription.xml comes from. */
 #ifndef HSEP_FMU_H
 #define HSEP_FMU_H
@@ -41,10 +45,12 @@ def c_header(description: Mapping[str, object], guid: str) -> str:
 #define HSEP_GUID {_string(guid)}
 #define HSEP_MODEL_{model} 1
 #define HSEP_N_VARIABLES {len(table)}
+#define HSEP_N_INTERPOLATED {len(slopes)} /* the first variables, inputs with a time derivative */
+#define HSEP_N_VALUES (HSEP_N_VARIABLES + HSEP_N_INTERPOLATED)
 #define HSEP_N_MODES {n_modes}
 #define HSEP_WINDOW {window} /* samples in the window variables, 0 where there are none */
 
-/* Value references; of an array's elements the first one. */
+/* Value references; of an array's elements the first one. Behind them the places of the time derivatives. */
 enum {{
 {references}
 }};

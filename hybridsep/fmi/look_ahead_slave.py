@@ -1,4 +1,4 @@
-"""What the slaves over a look-ahead share: one sample after the other, with inputs that count at its beginning."""
+"""Slave over a look-ahead: communication steps of any size, executed sample by sample."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from abc import abstractmethod
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from .clock import SampleClock
+from ..sampled_inputs import SampledInputs
 from .slave import TableSlave
 
 __all__ = ["LookAheadSlave"]
@@ -29,25 +29,20 @@ class LookAheadSlave(TableSlave):
 
     def initialise(self) -> None:
         """Make the look-ahead and start the clock."""
+        self.inputs = SampledInputs(self.start_time, self.values["T_s"], self.values["x_d_ahead"])
         self.look_ahead = self.new_look_ahead()
-        self.clock = SampleClock(self.start_time, self.values["T_s"])
 
     def advance(self, t: float, h: float) -> None:
-        """Read the inputs at the first sub-step of a sample, show the outputs after its last one."""
-        parts = self.clock.check(t, h)
-        if self.clock.done == 0:
-            self.inputs = (self.values["x_d_ahead"], self.values["x_meas"])
-            self.look_ahead.check(*self.inputs)
-        if self.clock.done == parts - 1:
-            self.look_ahead.sample(*self.inputs)
-        self.clock.advance(parts)
+        """Execute the samples that the step reaches."""
+        warning = self.inputs.advance(self.look_ahead, self.values["x_d_ahead"], self.values["x_meas"], t, h)
+        if warning:
+            self.warn_once(warning)
 
     def core_state(self) -> tuple[dict[str, Any], bytes]:
         """Return the clock with the inputs of the sample in progress, and the look-ahead."""
-        return {"clock": self.clock.state(), "inputs": getattr(self, "inputs", None)}, self.look_ahead.to_bytes()
+        return {"inputs": self.inputs.state()}, self.look_ahead.to_bytes()
 
     def restore_core(self, meta: Mapping[str, Any], blob: bytes) -> None:
         """Take over a clock and a look-ahead."""
         self.look_ahead = self.look_ahead_type.from_bytes(blob)
-        self.clock = SampleClock(**meta["clock"])
-        self.inputs = meta["inputs"]
+        self.inputs = SampledInputs.from_state(meta["inputs"])

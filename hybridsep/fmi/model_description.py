@@ -47,14 +47,14 @@ class FmuInfo:
         Of the default experiment, s.
     stop_time : float
         Of the default experiment, s.
-    variable_step : bool
-        Whether the communication step size may change.
     needs_execution_tool : bool
         Whether the FMU needs more than its own binary, here a Python.
     generation_tool, version : str
     source_files : tuple of str
         What is to be compiled, below ``sources/``; empty if the FMU brings none. An FMU of C sources takes its memory
         from the importer's functions.
+    interpolates : bool
+        Whether inputs may have a time derivative.
     """
 
     name: str
@@ -62,11 +62,11 @@ class FmuInfo:
     guid: str
     step_size: float
     stop_time: float
-    variable_step: bool
     needs_execution_tool: bool
     generation_tool: str
     version: str
     source_files: tuple[str, ...] = ()
+    interpolates: bool = False
 
 
 def model_description(info: FmuInfo, table: Sequence[Variable]) -> bytes:
@@ -95,7 +95,8 @@ def model_description(info: FmuInfo, table: Sequence[Variable]) -> bytes:
         "CoSimulation",
         modelIdentifier=info.name,
         needsExecutionTool=_text(info.needs_execution_tool),
-        canHandleVariableCommunicationStepSize=_text(info.variable_step),
+        canHandleVariableCommunicationStepSize="true",
+        canInterpolateInputs=_text(info.interpolates),
         canNotUseMemoryManagementFunctions=_text(not info.source_files),
         canGetAndSetFMUstate="true",
         canSerializeFMUstate="true",

@@ -23,11 +23,12 @@ from ..trajectory import spiral, staircase
 from .c_header import c_header
 from .compiler import ALL_TARGETS, binaries
 from .content import MODEL_TITLES, content_guid
+from .experiment import stop_time
 from .icon import icon
 from .model_description import FmuInfo, build_description, model_description
 from .pages import index_page
 from .reference import reference_files
-from .variables import variables_of
+from .variables import INTERPOLATED, variables_of
 from .weights import WEIGHTS_FILE, weights_file
 
 __all__ = ["files", "sources"]
@@ -83,12 +84,12 @@ def files(
         description=f"{machine.title}: {MODEL_TITLES[model]}",
         guid=guid,
         step_size=machine.T_s,
-        stop_time=6.0,
-        variable_step=model == "FeedDrive",
+        stop_time=stop_time(machine, description, samples),
         needs_execution_tool=False,
         generation_tool=f"hybridsep {__version__}",
         version=__version__,
         source_files=("all.c",),
+        interpolates=bool(INTERPOLATED[model]),
     )
     content["modelDescription.xml"] = model_description(info, variables_of(description))
     if targets is None:

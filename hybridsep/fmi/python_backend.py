@@ -21,6 +21,7 @@ from .._data_files import data_folder
 from ..machine import Machine
 from ..predictor import HybridPredictor
 from .content import MODEL_TITLES, content_guid
+from .experiment import stop_time
 from .model_description import FmuInfo, model_description
 from .pages import index_page
 from .variables import variables_of
@@ -36,7 +37,8 @@ _PREDICTION = (
     "window.py",
     "predictor.py",
     "_sampled_window.py",
-    "fmi/clock.py",
+    "clock.py",
+    "sampled_inputs.py",
     "fmi/weights.py",
     "fmi/look_ahead_slave.py",
 )
@@ -44,7 +46,7 @@ _PLANNING = tuple(f"_{module}.py" for module in ("bounded", "interior", "plan", 
 _TRAVELS = {
     "HybridPredictor": (*_BASE, *_PREDICTION, "lookahead.py"),
     "SepCompensator": (*_BASE, *_PREDICTION, *_PLANNING, "limits.py", "compensator.py", "sep_lookahead.py"),
-    "FeedDrive": (*_BASE, "plant.py"),
+    "FeedDrive": (*_BASE, "clock.py", "plant.py"),
 }
 """The modules each FMU needs; with NumPy and SciPy they need nothing else."""
 
@@ -84,8 +86,7 @@ def files(
         description=f"{machine.title}: {MODEL_TITLES[model]}",
         guid=guid,
         step_size=machine.T_s,
-        stop_time=6.0,
-        variable_step=model == "FeedDrive",
+        stop_time=stop_time(machine, description),
         needs_execution_tool=True,
         generation_tool=f"hybridsep {__version__} with pythonfmu {metadata.version('pythonfmu')}",
         version=__version__,

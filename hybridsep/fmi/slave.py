@@ -29,6 +29,7 @@ DESCRIPTION_FILE = "machine.json"
 """In the resources: model, start values of the parameters, modes and number of the FMU's content."""
 
 _KIND = "fmu"
+_STOP_TOLERANCE = 1e-6  # of a step: a last step that ended at the stop time but for rounding
 _TYPES = {"Real": Real, "Integer": Integer, "Boolean": Boolean}
 
 
@@ -69,8 +70,9 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
         self.modelName = self.table_description["name"]
         self.table = variables_of(self.table_description)
         self.values: dict[str, Any] = {v.name: v.start for v in self.table if v.causality in ("input", "parameter")}
-        self.running = False
+        self.running = self.terminated = self.warned = False
         self.start_time = 0.0
+        self.stop_time: float | None = None
         for variable in self.table:
             self.register_variable(self._as_pythonfmu(variable), nested=False)
 
@@ -105,8 +107,8 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
     def setup_experiment(
         self, start_time: float, stop_time: float | None = None, tolerance: float | None = None
     ) -> None:
-        """Keep the start time; stop time and tolerance have no meaning here."""
-        self.start_time = start_time
+        """Keep start and stop time; the tolerance has no meaning here."""
+        self.start_time, self.stop_time = start_time, stop_time
 
     def exit_initialization_mode(self) -> None:
         """Check the parameters together and make the core."""
@@ -118,11 +120,27 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
         try:
             if not self.running:
                 raise FmuError("doStep is not allowed before the initialization has ended")
+            if self.terminated:
+                raise FmuError("doStep is not allowed after terminate")
+            if self.stop_time is not None and current_time >= self.stop_time - _STOP_TOLERANCE * step_size:
+                raise FmuError(
+                    f"a step must begin before the stop time {self.stop_time:.9g} s, got one from {current_time:.9g} s"
+                )
             self.advance(current_time, step_size)
         except HybridSepError as error:
             self.log(f"{self.instance_name}: {error}", Fmi2Status.error)
             return False
         return True
+
+    def terminate(self) -> None:
+        """Allow no more steps; values can still be read."""
+        self.terminated = True
+
+    def warn_once(self, message: str) -> None:
+        """Log a warning, the first one of this instance alone."""
+        if not self.warned:
+            self.warned = True
+            self.log(f"{self.instance_name}: {message}", Fmi2Status.warning)
 
     # The whole state, not only the registered variables --------------------------------------------------------
 
@@ -130,7 +148,9 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
         meta: dict[str, Any] = {
             "content": self.table_description["content"],
             "running": self.running,
+            "terminated": self.terminated,
             "start_time": self.start_time,
+            "stop_time": self.stop_time,
             "values": self.values,
         }
         core: dict[str, bytes] = {}
@@ -150,7 +170,8 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
         except Exception:
             self.values = before
             raise
-        self.running, self.start_time = meta["running"], meta["start_time"]
+        self.running, self.terminated = meta["running"], meta["terminated"]
+        self.start_time, self.stop_time = meta["start_time"], meta["stop_time"]
 
     @staticmethod
     def _fmu_state_to_bytes(state: bytes) -> bytes:

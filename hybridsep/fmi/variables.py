@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from ..parameters import PARAMETERS, check
 
 __all__ = [
+    "INTERPOLATED",
     "MODELS",
     "PLANNING",
     "Variable",
@@ -271,6 +272,14 @@ MODELS = {
     "ReferenceTrajectory": trajectory_variables,
 }
 """The table of each model, from its parameters' start values and its modes."""
+
+INTERPOLATED: dict[str, tuple[str, ...]] = {
+    "HybridPredictor": ("x_d_ahead", "x_meas"),
+    "SepCompensator": ("x_d_ahead", "x_meas"),
+    "FeedDrive": (),
+    "ReferenceTrajectory": (),
+}
+"""The first variables of each model: inputs that a native FMU extrapolates by their time derivative."""
 
 
 def variables_of(description: Mapping[str, object]) -> list[Variable]:

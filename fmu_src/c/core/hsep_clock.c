@@ -2,47 +2,73 @@
 
 #include <math.h>
 
-static const double clock_parts_max = 1e9;     /* steps shorter than T_s / 1e9 are refused */
 static const double clock_tolerance = 1e-6;    /* of T_s */
+static const double clock_spacings = 8.0;      /* of doubles at t: a few roundings of the importer's arithmetic */
+static const double clock_split = 134217729.0; /* 2^27 + 1, splits a double into two halves (Veltkamp 1968) */
+static const double clock_samples_max = 9007199254740992.0; /* 2^53: counted exactly in a double */
 
-void hsep_clock_init(hsep_clock *self, double start, double T_s)
+static double clock_resolution(double t)
 {
-    self->start = start;
-    self->T_s = T_s;
-    self->k = 0;
-    self->done = 0;
-    self->parts = 1;
+    return clock_spacings * (nextafter(fabs(t), HUGE_VAL) - fabs(t));
 }
 
-hsep_clock_fit hsep_clock_check(const hsep_clock *self, double t, double h, int64_t *parts)
+/* delta at t, s. Times so long that doubles no longer tell a quarter of T_s are beyond any run. */
+static double clock_delta(const hsep_clock *self, double t)
 {
-    const double count = h > 0.0 ? floor(self->T_s / h + 0.5) : 0.0;
-    if (!(count >= 1.0 && count <= clock_parts_max && fabs(count * h - self->T_s) <= clock_tolerance * self->T_s)) {
-        return HSEP_CLOCK_STEP_SIZE;
-    }
-    *parts = (int64_t)count;
-    if (self->done > 0 && *parts != self->parts) {
-        return HSEP_CLOCK_MIXED_SIZE;
-    }
-    if (!(fabs(t - hsep_clock_expected(self, *parts)) <= 0.5 * h)) {
-        return HSEP_CLOCK_POINT;
-    }
-    return HSEP_CLOCK_FITS;
+    return fmin(fmax(clock_tolerance * self->T_s, clock_resolution(t)), 0.25 * self->T_s);
 }
 
-double hsep_clock_expected(const hsep_clock *self, int64_t parts)
+/* Add to since + carry without losing digits: Knuth's two-sum, then renormalised. */
+static void clock_add(hsep_clock *self, double time)
 {
-    return self->start + ((double)self->k + (double)self->done / (double)parts) * self->T_s;
+    const double sum = self->since + time, part = sum - self->since;
+    const double lost = (self->since - (sum - part)) + (time - part) + self->carry;
+    self->since = sum + lost;
+    self->carry = lost - (self->since - sum);
 }
 
-int hsep_clock_advance(hsep_clock *self, int64_t parts)
+/* Take n instants from since: n T_s in two products that are exact for n below 2^27. */
+static void clock_take(hsep_clock *self, double n)
 {
-    self->parts = parts;
-    self->done++;
-    if (self->done < parts) {
+    const double scaled = clock_split * self->T_s, high = scaled - (scaled - self->T_s);
+    clock_add(self, -n * high);
+    clock_add(self, -n * (self->T_s - high));
+    self->k += (int64_t)n;
+}
+
+int hsep_clock_init(hsep_clock *self, double start, double T_s)
+{
+    *self = (hsep_clock){.start = start, .T_s = T_s, .end = start};
+    return clock_resolution(start) <= 0.25 * T_s;
+}
+
+int hsep_clock_count(const hsep_clock *self, double t, double h, hsep_clock_step *step)
+{
+    *step = (hsep_clock_step){.after = *self};
+    if (!(fabs(t - self->end) <= fmax(0.5 * self->T_s, clock_resolution(t)))) {
         return 0;
     }
-    self->k++;
-    self->done = 0;
+    hsep_clock *after = &step->after;
+    clock_add(after, h);
+    after->end = t + h;
+    const double now = self->start + ((double)self->k * self->T_s + after->since);
+    const double delta = clock_delta(self, now);
+    clock_take(after, floor((after->since + delta) / self->T_s));
+    if (after->since < -delta) { /* the quotient was rounded up to the next instant */
+        clock_take(after, -1.0);
+    }
+    after->latched = after->since > delta; /* an instant within delta of the end belongs to the next step */
+    step->n_samples = after->k - self->k;
+    step->n_latched = step->n_samples + after->latched - self->latched;
+    step->first = (self->latched ? self->T_s : 0.0) - self->since;
+    step->inside = step->n_latched > 1 - self->latched; /* t_k, where it is not read yet, is the step's start */
     return 1;
+}
+
+int hsep_clock_valid(const hsep_clock *self)
+{
+    return isfinite(self->start) && self->T_s > 0.0 && isfinite(self->T_s) && self->k >= 0 &&
+           (double)self->k < clock_samples_max && fabs(self->since) <= self->T_s &&
+           fabs(self->carry) <= fabs(self->since) && isfinite(self->end) &&
+           (self->latched == 0 || self->latched == 1);
 }

@@ -6,7 +6,7 @@ static const double plant_internal_step = 1e-4;      /* s */
 static const double plant_friction_velocity = 2e-3;  /* m/s, over which the stage's friction changes sign */
 static const double plant_steps_per_time = 16.0;     /* internal steps in the fastest time constant */
 static const double plant_steps_max = 1e6;           /* internal steps of one step */
-static const double plant_tolerance = 1e-6;          /* of an internal step, and of T_s */
+static const double plant_tolerance = 1e-6;          /* of an internal step */
 static const double plant_two_pi = 6.283185307179586;
 
 double hsep_plant_internal_steps(double h, double rate)
@@ -69,10 +69,9 @@ void hsep_stage_init(
 {
     self->f = f;
     self->kappa = kappa;
-    self->T_s = T_s;
     self->start = start;
     self->last_x_d = self->v_d = self->v = 0.0;
-    self->elapsed = T_s; /* the first command is looked at */
+    (void)hsep_clock_init(&self->clock, 0.0, T_s);
     self->n_modes = n_modes;
     hsep_stage_mode *stage = (hsep_stage_mode *)(self + 1);
     for (uint64_t i = 0; i < n_modes; i++) {
@@ -109,6 +108,12 @@ static void plant_stage_slope(const hsep_stage *s, const double z[], double push
     }
 }
 
+/* The command after the carriage's friction, which follows the commanded velocity: d = f tanh(v_d / 2 mm/s). */
+static double plant_pushed(const hsep_stage *s, double r, double v_d)
+{
+    return r - s->f * tanh(v_d / plant_friction_velocity);
+}
+
 /* One Runge-Kutta step of z, (size,), with three more vectors of work space behind it. */
 static void plant_stage_internal_step(const hsep_stage *s, double z[], double pushed, double dt)
 {
@@ -132,36 +137,50 @@ static void plant_stage_internal_step(const hsep_stage *s, double z[], double pu
     }
 }
 
+/* Integrate z over time, s, with the command r, m from the start, and the commanded velocity v_d held. */
+static void plant_stage_integrate(const hsep_stage *s, double z[], double r, double v_d, double time)
+{
+    const hsep_stage_mode *mode = (const hsep_stage_mode *)(s + 1);
+    double rate = 0.0;
+    for (uint64_t i = 0; i < s->n_modes; i++) {
+        rate = fmax(rate, fmax(sqrt(mode[i].omega2), mode[i].two_zeta_omega));
+    }
+    const double n = hsep_plant_internal_steps(time, rate), pushed = plant_pushed(s, r, v_d);
+    for (double i = 0.0; i < n; i += 1.0) {
+        plant_stage_internal_step(s, z, pushed, time / n);
+    }
+}
+
 int hsep_stage_step(hsep_stage *self, double x_d, double h, double work[])
 {
     hsep_stage_mode *mode = (hsep_stage_mode *)(self + 1);
-    double rate = 0.0;
-    for (uint64_t i = 0; i < self->n_modes; i++) {
-        rate = fmax(rate, fmax(sqrt(mode[i].omega2), mode[i].two_zeta_omega));
-    }
-    const double n = hsep_plant_internal_steps(h, rate), dt = h / n, r = x_d - self->start;
-    double last_x_d = self->last_x_d, v_d = self->v_d, elapsed = self->elapsed;
-    if (elapsed >= self->T_s * (1.0 - plant_tolerance)) { /* v_d is taken once in T_s, at shorter steps too */
-        v_d = (r - last_x_d) / elapsed;
-        last_x_d = r;
-        elapsed = 0.0;
-    }
-    /* The carriage's friction follows the commanded velocity: d = f tanh(v_d / 2 mm/s) */
-    const double pushed = r - self->f * tanh(v_d / plant_friction_velocity);
+    const double r = x_d - self->start;
+    double last_x_d = self->last_x_d, v_d = self->v_d, done = 0.0;
     double *z = work, *slope = work + 2 * self->n_modes;
+    hsep_clock_step step;
+    (void)hsep_clock_count(&self->clock, self->clock.end, h, &step);
     for (uint64_t i = 0; i < self->n_modes; i++) {
         z[2 * i] = mode[i].z[0];
         z[2 * i + 1] = mode[i].z[1];
     }
-    for (double i = 0.0; i < n; i += 1.0) {
-        plant_stage_internal_step(self, z, pushed, dt);
+    /* v_d is taken at the instants, in whatever steps they come. */
+    for (int64_t i = 0; i <= step.n_latched; i++) {
+        const double next = i < step.n_latched ? fmax(done, step.first + (double)i * self->clock.T_s) : h;
+        if (next > done) {
+            plant_stage_integrate(self, z, r, v_d, next - done);
+            done = next;
+        }
+        if (i < step.n_latched) {
+            v_d = (r - last_x_d) / self->clock.T_s;
+            last_x_d = r;
+        }
     }
     for (uint64_t i = 0; i < 2 * self->n_modes; i++) {
         if (!isfinite(z[i])) {
             return 0;
         }
     }
-    plant_stage_slope(self, z, pushed, slope);
+    plant_stage_slope(self, z, plant_pushed(self, r, v_d), slope);
     self->v = plant_position(self, slope);
     for (uint64_t i = 0; i < self->n_modes; i++) {
         mode[i].z[0] = z[2 * i];
@@ -169,7 +188,7 @@ int hsep_stage_step(hsep_stage *self, double x_d, double h, double work[])
     }
     self->last_x_d = last_x_d;
     self->v_d = v_d;
-    self->elapsed = elapsed + h;
+    self->clock = step.after;
     return 1;
 }
 

@@ -8,6 +8,7 @@
 #ifndef HSEP_PLANT_H
 #define HSEP_PLANT_H
 
+#include "hsep_clock.h"
 #include "hsep_physics.h"
 
 #include <stdint.h>
@@ -44,10 +45,11 @@ typedef struct {
 
 /* x = G_pb (x_d - d) with d = f tanh(v_d / 2 mm/s) + kappa x|x|; v_d is the backward difference of x_d over T_s. */
 typedef struct {
-    double f, kappa, T_s;            /* m, 1/m, s */
-    double start;                    /* position of rest, m */
-    double last_x_d, v_d, elapsed;   /* m from there, m/s, s since the command was looked at */
-    double v;                        /* m/s */
+    double f, kappa;      /* m, 1/m */
+    double start;         /* position of rest, m */
+    hsep_clock clock;     /* of the instants at which the command is looked at, in a time of its own */
+    double last_x_d, v_d; /* m from start, at the last instant; m/s */
+    double v;             /* m/s */
     uint64_t n_modes;
     /* followed by hsep_stage_mode[n_modes] */
 } hsep_stage;
@@ -60,8 +62,8 @@ double hsep_stage_size(uint64_t n_modes); /* bytes of the block, counted in doub
 void hsep_stage_init(
     hsep_stage *self, const hsep_mode modes[], uint64_t n_modes, double f, double kappa, double T_s, double start);
 
-/* Advance by h, s, with the command x_d, m, held. work: (HSEP_STAGE_WORK n_modes,). Fails, and returns 0 with the
- * state unchanged, if the state would leave the range of numbers. */
+/* Advance by h, s, at most HSEP_CLOCK_STEP_MAX, with the command x_d, m, held. work: (HSEP_STAGE_WORK n_modes,). Fails,
+ * and returns 0 with the state unchanged, if the state would leave the range of numbers. */
 int hsep_stage_step(hsep_stage *self, double x_d, double h, double work[]);
 
 double hsep_stage_x(const hsep_stage *self); /* true position, m */

@@ -3,6 +3,8 @@
 
 #include <math.h>
 
+static const double stop_tolerance = 1e-6; /* of a step: a last step that ended at the stop time but for rounding */
+
 const char *fmi2GetTypesPlatform(void)
 {
     return fmi2TypesPlatform;
@@ -90,25 +92,33 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2R
     hsep_instance *instance = hsep_begin(c, HSEP_CALL_DO_STEP);
     const double end = currentCommunicationPoint + communicationStepSize;
     char message[HSEP_MESSAGE_SIZE] = "";
+    hsep_status status;
     (void)noSetFMUStatePriorToCurrentPoint;
     if (instance == NULL) {
         return fmi2Error;
     }
-    /* Rounding of times is far below half a step, a step too many is a whole one. */
-    if (instance->has_stop_time && end > instance->stop_time + 0.5 * communicationStepSize) {
-        return hsep_refuse(instance, "fmi2DoStep: the step from %.9g s to %.9g s goes beyond the stop time %.9g s",
-            currentCommunicationPoint, end, instance->stop_time);
+    if (instance->has_stop_time
+        && currentCommunicationPoint >= instance->stop_time - stop_tolerance * communicationStepSize) {
+        return hsep_refuse(instance, "fmi2DoStep: a step must begin before the stop time %.9g s, got one from %.9g s",
+            instance->stop_time, currentCommunicationPoint);
     }
-    if (hsep_model_step(&instance->context, instance->state, instance->values, currentCommunicationPoint,
-            communicationStepSize, message)
-        != HSEP_OK) {
+    status = hsep_model_step(&instance->context, instance->state, instance->values, currentCommunicationPoint,
+        communicationStepSize, message);
+    if (status == HSEP_REFUSED) {
         return hsep_refuse(instance, "%s", message);
+    }
+    if (status == HSEP_WARNED && !instance->warned) { /* once an instance, not at each of many steps */
+        instance->warned = 1;
+        hsep_log(instance, HSEP_LOG_WARNING, "fmi2DoStep: %s", message);
+    }
+    for (size_t i = HSEP_N_VARIABLES; i < HSEP_N_VALUES; ++i) { /* time derivatives are for one step */
+        instance->values[i] = 0.0;
     }
     instance->time = end;
     return fmi2OK;
 }
 
-/* Steps are never pending and nothing is interpolated or derived: what asks for it is refused. */
+/* Steps are never pending and no output has a derivative: what asks for it is refused. */
 
 fmi2Status fmi2CancelStep(fmi2Component c)
 {
@@ -123,13 +133,6 @@ static fmi2Status hsep_unsupported(fmi2Component c, hsep_call call, const char *
         return fmi2Error;
     }
     return hsep_refuse(instance, "%s is not supported: %s in modelDescription.xml", hsep_calls[call].name, capability);
-}
-
-fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-    const fmi2Integer order[], const fmi2Real value[])
-{
-    (void)vr, (void)nvr, (void)order, (void)value;
-    return hsep_unsupported(c, HSEP_CALL_SET_REAL_INPUT_DERIVATIVES, "canInterpolateInputs is false");
 }
 
 fmi2Status fmi2GetRealOutputDerivatives(

@@ -36,6 +36,7 @@ void hsep_drop_state(hsep_instance *instance)
 static void hsep_begin_again(hsep_instance *instance)
 {
     hsep_drop_state(instance);
+    memset(instance->values, 0, sizeof instance->values);
     for (size_t i = 0; i < HSEP_N_VARIABLES; ++i) {
         instance->values[i] = hsep_variables[i].start;
     }

@@ -37,7 +37,8 @@ typedef struct {
     double time;       /* s, where the last step ended */
     void *state;       /* the model's, NULL before the initialization has ended */
     size_t state_size;
-    double values[HSEP_N_VARIABLES]; /* by value reference */
+    int warned;        /* whether the model has warned of a step */
+    double values[HSEP_N_VALUES]; /* by value reference, then the time derivatives of inputs */
 } hsep_instance;
 
 /* The instance if the call is legal now; otherwise NULL, and why not is logged. */

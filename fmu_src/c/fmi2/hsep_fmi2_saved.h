@@ -1,6 +1,6 @@
 /* The complete state of an instance as one block of bytes: saved, restored, serialised by copying it.
  *
- * header | values, HSEP_N_VARIABLES doubles | the model's state, as hsep_model_size tells
+ * header | values, HSEP_N_VALUES doubles | the model's state, as hsep_model_size tells
  *
  * Numbers are in the machine's own representation; a serialised block of another byte order is refused, as is one of
  * another FMU (GUID), another version, another length or with a single bit changed (FNV-1a).
@@ -12,7 +12,7 @@
 
 #include <stdint.h>
 
-#define HSEP_SAVED_VERSION 1U
+#define HSEP_SAVED_VERSION 2U
 #define HSEP_BYTE_ORDER 0x01020304U
 #define HSEP_SAVED_MAGIC "HSEPFMI2"
 #define HSEP_GUID_SIZE 48 /* a GUID in braces, padded with zeros */
@@ -40,7 +40,7 @@ typedef struct {
     double block[]; /* header, values, state; aligned for double */
 } hsep_saved;
 
-enum { HSEP_VALUES_SIZE = HSEP_N_VARIABLES * sizeof(double), HSEP_FIXED_SIZE = sizeof(hsep_header) + HSEP_VALUES_SIZE };
+enum { HSEP_VALUES_SIZE = HSEP_N_VALUES * sizeof(double), HSEP_FIXED_SIZE = sizeof(hsep_header) + HSEP_VALUES_SIZE };
 
 /* The saved state behind a handle; NULL, with a message, if there is none. */
 hsep_saved *hsep_saved_of(hsep_instance *instance, hsep_call call, fmi2FMUstate state);

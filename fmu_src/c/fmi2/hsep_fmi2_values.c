@@ -2,6 +2,7 @@
 #include "hsep_fmi2_instance.h"
 
 #include <limits.h>
+#include <math.h>
 
 static const char *const hsep_kind_names[] = {"Real", "Integer", "Boolean", "String"};
 static const char *const hsep_causality_names[] = {"an input", "an output", "a parameter", "a local variable"};
@@ -138,4 +139,37 @@ fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t
 fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2String value[])
 {
     return (hsep_writing(c, HSEP_CALL_SET_STRING, HSEP_STRING, vr, nvr, value) == NULL) ? fmi2Error : fmi2OK;
+}
+
+/* The derivatives count for the next step alone. Like the values, none is taken if one is refused. */
+fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+    const fmi2Integer order[], const fmi2Real value[])
+{
+    static const char name[] = "fmi2SetRealInputDerivatives";
+    hsep_instance *instance = hsep_access(c, HSEP_CALL_SET_REAL_INPUT_DERIVATIVES, HSEP_REAL, vr, nvr, value);
+    if (instance == NULL) {
+        return fmi2Error;
+    }
+    if (nvr > 0 && order == NULL) {
+        return hsep_refuse(instance, "%s: order is NULL, but nvr is %lu", name, (unsigned long)nvr);
+    }
+    for (size_t i = 0; i < nvr; ++i) {
+        if (vr[i] + 1 > HSEP_N_INTERPOLATED) {
+            return hsep_refuse(instance, "%s: %s takes no derivative; %s", name, hsep_variables[vr[i]].name,
+                (HSEP_N_INTERPOLATED > 0) ? "x_d_ahead and x_meas do"
+                                          : "canInterpolateInputs is false in modelDescription.xml");
+        }
+        if (order[i] != 1) {
+            return hsep_refuse(
+                instance, "%s: the order of %s must be 1, got %d", name, hsep_variables[vr[i]].name, (int)order[i]);
+        }
+        if (!isfinite(value[i])) {
+            return hsep_refuse(
+                instance, "%s: the derivative of %s must be finite, got %g", name, hsep_variables[vr[i]].name, value[i]);
+        }
+    }
+    for (size_t i = 0; i < nvr; ++i) {
+        instance->values[HSEP_N_VARIABLES + vr[i]] = value[i];
+    }
+    return fmi2OK;
 }

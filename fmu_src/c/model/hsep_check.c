@@ -136,26 +136,44 @@ hsep_status hsep_check_start_time(double t_start, char message[])
     return HSEP_REFUSED;
 }
 
-hsep_status hsep_check_step(const hsep_clock *clock, double t, double h, int64_t *parts, char message[])
+hsep_status hsep_check_clock(hsep_clock *clock, double t_start, double T_s, char message[])
 {
-    switch (hsep_clock_check(clock, t, h, parts)) {
-    case HSEP_CLOCK_FITS:
-        return HSEP_OK;
-    case HSEP_CLOCK_STEP_SIZE:
-        hsep_message_add(
-            message, "the communication step size must divide T_s = %g s, got %g s", clock->T_s, h);
-        break;
-    case HSEP_CLOCK_MIXED_SIZE:
-        hsep_message_add(
-            message, "the communication step size must stay %g s within a sample of T_s = %g s, got %g s",
-            clock->T_s / (double)clock->parts, clock->T_s, h);
-        break;
-    case HSEP_CLOCK_POINT:
-        hsep_message_add(
-            message, "the communication point must be %.9g s, got %.9g s", hsep_clock_expected(clock, *parts), t);
-        break;
+    if (hsep_check_start_time(t_start, message) != HSEP_OK) {
+        return HSEP_REFUSED;
     }
+    if (!hsep_clock_init(clock, t_start, T_s)) {
+        hsep_message_add(
+            message, "the start time must be small enough to count samples of T_s = %g s from, got %g s", T_s, t_start);
+        return HSEP_REFUSED;
+    }
+    return HSEP_OK;
+}
+
+hsep_status hsep_check_step_size(double h, char message[])
+{
+    char number[HSEP_NUMBER_SIZE];
+    if (h > 0.0 && h <= HSEP_CLOCK_STEP_MAX) {
+        return HSEP_OK;
+    }
+    hsep_message_add(
+        message, "the communication step size must be > 0 and " HSEP_AT_MOST " %g s, got %s", HSEP_CLOCK_STEP_MAX,
+        hsep_number(number, h, HSEP_REAL));
     return HSEP_REFUSED;
+}
+
+hsep_status hsep_check_step(const hsep_clock *clock, double t, double h, hsep_clock_step *step, char message[])
+{
+    char number[HSEP_NUMBER_SIZE];
+    if (hsep_check_step_size(h, message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
+    if (!hsep_clock_count(clock, t, h, step)) {
+        hsep_message_add(
+            message, "the communication point must be %.17g s, where the last step ended, got %s s", clock->end,
+            hsep_number(number, t, HSEP_REAL));
+        return HSEP_REFUSED;
+    }
+    return HSEP_OK;
 }
 
 void hsep_modes_read(const double values[], size_t n, hsep_mode modes[])

@@ -36,8 +36,14 @@ double hsep_warm_up_samples(double t_init, double T_s, char message[]);
 /* Check that the simulation starts at a number. */
 hsep_status hsep_check_start_time(double t_start, char message[]);
 
-/* Check that the step from t by h, s, comes next; parts is how many such steps make a sample. */
-hsep_status hsep_check_step(const hsep_clock *clock, double t, double h, int64_t *parts, char message[]);
+/* Check the start time and begin to count samples of T_s, s, from there. */
+hsep_status hsep_check_clock(hsep_clock *clock, double t_start, double T_s, char message[]);
+
+/* Check the size of a communication step, s. */
+hsep_status hsep_check_step_size(double h, char message[]);
+
+/* Check that the step from t by h, s, comes next, and count it. */
+hsep_status hsep_check_step(const hsep_clock *clock, double t, double h, hsep_clock_step *step, char message[]);
 
 /* Read n modes from the values of mode[i].f_n, .zeta, .alpha and .beta, which have been checked. */
 void hsep_modes_read(const double values[], size_t n, hsep_mode modes[]);

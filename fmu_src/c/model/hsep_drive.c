@@ -4,7 +4,6 @@
 
 #include <math.h>
 
-static const double drive_step_max = 100.0; /* s */
 static const double drive_seed_max = 2147483647.0;
 
 hsep_status hsep_drive_check(double x_d, double t, double h, char message[])
@@ -15,15 +14,8 @@ hsep_status hsep_drive_check(double x_d, double t, double h, char message[])
     } else if (!isfinite(t)) {
         hsep_message_add(
             message, "the communication point must be finite, got %s s", hsep_number(number, t, HSEP_REAL));
-    } else if (!(isfinite(h) && h > 0.0)) {
-        hsep_message_add(
-            message, "the step size must be finite and > 0 s, got %s", hsep_number(number, h, HSEP_REAL));
-    } else if (h > drive_step_max) {
-        hsep_message_add(
-            message, "the step size must be at most %g s, got %s; make several steps", drive_step_max,
-            hsep_number(number, h, HSEP_REAL));
     } else {
-        return HSEP_OK;
+        return hsep_check_step_size(h, message);
     }
     return HSEP_REFUSED;
 }

@@ -1,7 +1,6 @@
 #include "hsep_inputs.h"
 
 #include "hsep_check.h"
-#include "hsep_state.h"
 
 #include <math.h>
 
@@ -10,9 +9,6 @@ static const double inputs_position_max = 1e3; /* m */
 hsep_status hsep_inputs_init(hsep_inputs *self, double t_start, double T_s, double start, char message[])
 {
     char number[HSEP_NUMBER_SIZE];
-    if (hsep_check_start_time(t_start, message) != HSEP_OK) {
-        return HSEP_REFUSED;
-    }
     if (!isfinite(start)) {
         hsep_message_add(
             message, "the start value of x_d_ahead must be finite, got %s", hsep_number(number, start, HSEP_REAL));
@@ -24,7 +20,9 @@ hsep_status hsep_inputs_init(hsep_inputs *self, double t_start, double T_s, doub
             start);
         return HSEP_REFUSED;
     }
-    hsep_clock_init(&self->clock, t_start, T_s);
+    if (hsep_check_clock(&self->clock, t_start, T_s, message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
     self->x_d_ahead = self->x_meas = start;
     return HSEP_OK;
 }
@@ -33,41 +31,81 @@ hsep_status hsep_inputs_init(hsep_inputs *self, double t_start, double T_s, doub
 static hsep_status inputs_check(const hsep_clock *clock, const char *name, double value, char message[])
 {
     char number[HSEP_NUMBER_SIZE];
+    const double sample = (double)(clock->k + clock->latched);
     if (fabs(value) <= inputs_position_max) {
         return HSEP_OK;
     }
     if (isfinite(value)) {
         hsep_message_add(
             message, "%s must be within " HSEP_PLUS_MINUS "%g m, got %g at sample %.0f", name, inputs_position_max, value,
-            (double)clock->k);
+            sample);
     } else {
         hsep_message_add(
-            message, "%s must be finite, got %s at sample %.0f", name, hsep_number(number, value, HSEP_REAL),
-            (double)clock->k);
+            message, "%s must be finite, got %s at sample %.0f", name, hsep_number(number, value, HSEP_REAL), sample);
     }
     return HSEP_REFUSED;
 }
 
-hsep_status hsep_inputs_step(
-    hsep_inputs *self, double x_d_ahead, double x_meas, double t, double h, int *complete, char message[])
+/* The input at an instant, s after the step's start. */
+static double inputs_at(hsep_input input, double after)
 {
-    int64_t parts = 0;
-    if (hsep_check_step(&self->clock, t, h, &parts, message) != HSEP_OK) {
+    return input.slope == 0.0 ? input.value : input.value + input.slope * after;
+}
+
+/* When the last of a step's inputs is latched, s after its start. */
+static double inputs_last(const hsep_clock_step *counted)
+{
+    return counted->first + (double)(counted->n_latched - 1) * counted->after.T_s;
+}
+
+hsep_status hsep_inputs_count(
+    const hsep_inputs *self, hsep_input x_d_ahead, hsep_input x_meas, double t, double h, hsep_inputs_step *step,
+    char message[])
+{
+    *step = (hsep_inputs_step){.x_d_ahead = x_d_ahead, .x_meas = x_meas};
+    if (hsep_check_step(&self->clock, t, h, &step->counted, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
-    if (self->clock.done == 0) { /* a sample begins: its inputs are read */
-        if (inputs_check(&self->clock, "x_d_ahead", x_d_ahead, message) != HSEP_OK ||
-            inputs_check(&self->clock, "x_meas", x_meas, message) != HSEP_OK) {
-            return HSEP_REFUSED;
-        }
-        self->x_d_ahead = x_d_ahead;
-        self->x_meas = x_meas;
+    if (step->counted.n_latched == 0) {
+        return HSEP_OK;
     }
-    *complete = hsep_clock_advance(&self->clock, parts);
+    /* Inputs are linear in time, so the first and the last one bound them all. */
+    const double first = step->counted.first, last = inputs_last(&step->counted);
+    if (inputs_check(&self->clock, "x_d_ahead", inputs_at(x_d_ahead, first), message) != HSEP_OK ||
+        inputs_check(&self->clock, "x_meas", inputs_at(x_meas, first), message) != HSEP_OK ||
+        inputs_check(&self->clock, "x_d_ahead", inputs_at(x_d_ahead, last), message) != HSEP_OK ||
+        inputs_check(&self->clock, "x_meas", inputs_at(x_meas, last), message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
+    if (step->counted.inside) {
+        hsep_message_add(
+            message, "the step from %.9g s by %.9g s passes instants of T_s = %g s between its ends: x_meas is read up to "
+            "%g s late, so a closed loop needs steps of T_s",
+            t, h, self->clock.T_s, fmin(last, h));
+        return HSEP_WARNED;
+    }
     return HSEP_OK;
+}
+
+int hsep_inputs_next(hsep_inputs *self, hsep_inputs_step *step)
+{
+    if (self->clock.latched == 0 && step->n_latched < step->counted.n_latched) {
+        const double after = step->counted.first + (double)step->n_latched * self->clock.T_s;
+        self->x_d_ahead = inputs_at(step->x_d_ahead, after);
+        self->x_meas = inputs_at(step->x_meas, after);
+        self->clock.latched = 1;
+        step->n_latched++;
+    }
+    if (step->n_executed < step->counted.n_samples) {
+        self->clock.latched = 0;
+        step->n_executed++;
+        return 1;
+    }
+    self->clock = step->counted.after;
+    return 0;
 }
 
 int hsep_inputs_valid(const hsep_inputs *self, double T_s, uint64_t k)
 {
-    return hsep_state_clock_valid(&self->clock) && self->clock.T_s == T_s && (uint64_t)self->clock.k == k;
+    return hsep_clock_valid(&self->clock) && self->clock.T_s == T_s && (uint64_t)self->clock.k == k;
 }

@@ -1,5 +1,9 @@
-/* The inputs of a look-ahead and when they count: read at the first sub-step of a sample, used after its last one.
- * Plain data; reentrant. */
+/* The inputs of a look-ahead and when they count: latched at the instants that lie in a step, executed in the step that
+ * reaches the next instant. Plain data; reentrant.
+ *
+ *     if (hsep_inputs_count(&inputs, x_d_ahead, x_meas, t, h, &step, message) != HSEP_REFUSED)
+ *         while (hsep_inputs_next(&inputs, &step)) { execute the sample inputs.x_d_ahead, inputs.x_meas }
+ */
 #ifndef HSEP_INPUTS_H
 #define HSEP_INPUTS_H
 
@@ -11,14 +15,31 @@ typedef struct {
     double x_d_ahead, x_meas; /* m, of the sample in progress */
 } hsep_inputs;
 
-/* Begin at t_start, s, with the drive at rest at start, m. Fails if one of them is not finite, or the
- * start is further out than any machine is. */
+/* What the importer has set for a step: an input and its time derivative. */
+typedef struct {
+    double value; /* m */
+    double slope; /* m/s */
+} hsep_input;
+
+/* A step in progress. */
+typedef struct {
+    hsep_clock_step counted;
+    hsep_input x_d_ahead, x_meas;
+    int64_t n_latched, n_executed; /* of those that the step has */
+} hsep_inputs_step;
+
+/* Begin at t_start, s, with the drive at rest at start, m. Fails if one of them is not finite, the time is too large to
+ * count samples from, or the start is further out than any machine is. */
 hsep_status hsep_inputs_init(hsep_inputs *self, double t_start, double T_s, double start, char message[]);
 
-/* Take in a communication step from t by h, s, with its inputs, m; complete tells whether it was the last one of its
- * sample. Fails, with nothing changed, if an input cannot be taken in, or t and h do not fit. */
-hsep_status hsep_inputs_step(
-    hsep_inputs *self, double x_d_ahead, double x_meas, double t, double h, int *complete, char message[]);
+/* Count a step from t by h, s, and check the inputs that it latches; self is unchanged. Fails if one of them cannot be
+ * taken in, or t and h do not fit. HSEP_WARNED: an instant is no communication point. */
+hsep_status hsep_inputs_count(
+    const hsep_inputs *self, hsep_input x_d_ahead, hsep_input x_meas, double t, double h, hsep_inputs_step *step,
+    char message[]);
+
+/* Go on in a counted step: return 1 with the next sample to execute in x_d_ahead and x_meas, 0 when the step is done. */
+int hsep_inputs_next(hsep_inputs *self, hsep_inputs_step *step);
 
 /* Whether inputs that were read from a state count samples of T_s, s, within their bounds, and are at sample k. */
 int hsep_inputs_valid(const hsep_inputs *self, double T_s, uint64_t k);

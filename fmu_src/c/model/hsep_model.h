@@ -1,7 +1,8 @@
 /* What a model is to an adapter: sizes, an initialization, a step and values.
  *
- * An adapter (FMI 2.0 now, another one beside it later) owns one array of values, one place per variable of the
- * generated table (hsep_fmu.h), and one block of memory, the state, whose size the model tells from the parameters.
+ * An adapter (FMI 2.0 now, another one beside it later) owns one array of HSEP_N_VALUES values, one place per variable
+ * of the generated table (hsep_fmu.h), then the time derivatives of the first HSEP_N_INTERPOLATED of them, inputs that
+ * may change within a step, which it sets to 0 after each step; and one block of memory, the state, whose size the model tells from the parameters.
  * The state is plain data without pointers: saving, restoring and serialising it is one copy of its bytes. Outputs
  * change only where their sample does, so what an adapter saves is the state together with the values.
  * Numbers lie in memory and in files as a little-endian machine has them.
@@ -17,7 +18,8 @@
 
 typedef enum {
     HSEP_OK = 0,
-    HSEP_REFUSED = 1 /* the call cannot be done; the state is unchanged and the message says why */
+    HSEP_REFUSED = 1, /* the call cannot be done; the state is unchanged and the message says why */
+    HSEP_WARNED = 2   /* the call is done; the message says what to beware of */
 } hsep_status;
 
 typedef enum { HSEP_REAL, HSEP_INTEGER, HSEP_BOOLEAN, HSEP_STRING } hsep_kind;
@@ -56,7 +58,8 @@ hsep_status hsep_model_initialise(
 
 /* Do one communication step from t by h with the inputs in values; outputs and locals go to values.
  * Fails, with state and values unchanged, if an input is not finite or t and h do not fit.
- * Cost: bounded by the parameters alone, the same at the first and at the 10^9th call; allocates nothing. */
+ * Warns if inputs are read at an instant that is no communication point.
+ * Cost: bounded by the parameters and h/T_s, the same at the first and at the 10^9th call; allocates nothing. */
 hsep_status hsep_model_step(
     const hsep_context *context, void *state, double values[], double t, double h, char message[]);
 

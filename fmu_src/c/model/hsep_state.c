@@ -6,8 +6,6 @@
 #include <stdint.h>
 #include <string.h>
 
-static const double state_samples_max = 9007199254740992.0; /* 2^53: counted exactly in a double */
-
 hsep_status hsep_state_size(double bytes, size_t *size, char message[])
 {
     if (!(bytes < 0.5 * (double)SIZE_MAX)) {
@@ -68,13 +66,6 @@ hsep_status hsep_state_check(
         return HSEP_OK;
     }
     return HSEP_REFUSED;
-}
-
-int hsep_state_clock_valid(const hsep_clock *clock)
-{
-    return isfinite(clock->start) && clock->T_s > 0.0 && isfinite(clock->T_s) && clock->k >= 0 &&
-           (double)clock->k < state_samples_max && clock->parts >= 1 && clock->done >= 0 &&
-           (clock->done == 0 || clock->done < clock->parts);
 }
 
 hsep_status hsep_state_damaged(char message[])

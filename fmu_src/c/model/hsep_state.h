@@ -2,12 +2,11 @@
 #ifndef HSEP_STATE_H
 #define HSEP_STATE_H
 
-#include "hsep_clock.h"
 #include "hsep_model.h"
 
 #include <stdint.h>
 
-#define HSEP_STATE_VERSION 1 /* changes whenever the layout of any state does */
+#define HSEP_STATE_VERSION 2 /* changes whenever the layout of any state does */
 
 typedef struct {
     uint64_t kind;       /* one number for each model */
@@ -27,9 +26,6 @@ void hsep_state_mark(
 hsep_status hsep_state_check(
     const hsep_context *context, const double values[], const void *state, size_t size, uint64_t kind,
     size_t expected, char message[]);
-
-/* Whether a clock that was read from a state counts within its bounds. */
-int hsep_state_clock_valid(const hsep_clock *clock);
 
 /* Refuse a state whose header fits and whose content does not. */
 hsep_status hsep_state_damaged(char message[]);

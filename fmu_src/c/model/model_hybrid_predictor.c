@@ -1,7 +1,7 @@
 /* HybridPredictor: the look-ahead buffer that predicts the drive's position one window early.
  *
- * Inputs are read at the first sub-step of a sample, outputs change after its last one; the arithmetic is
- * hsep_predictor's. If the resources hold weights (hsep_weights.h), the first window is predicted with them.
+ * Inputs are latched at the instants t_k that lie in a step, outputs are those of the last instant that was reached; the
+ * arithmetic is hsep_predictor's. If the resources hold weights (hsep_weights.h), the first window is predicted with them.
  */
 #include "hsep_fmu.h"
 
@@ -124,19 +124,25 @@ hsep_status hsep_model_step(
 {
     (void)context;
     predictor_state *self = state;
-    int complete = 0;
+    int window = 0;
+    hsep_inputs_step step;
     message[0] = '\0';
-    if (hsep_inputs_step(
-            &self->inputs, values[HSEP_VR_x_d_ahead], values[HSEP_VR_x_meas], t, h, &complete, message) != HSEP_OK) {
+    const hsep_status status = hsep_inputs_count(
+        &self->inputs, (hsep_input){values[HSEP_VR_x_d_ahead], values[HSEP_SLOPE_x_d_ahead]},
+        (hsep_input){values[HSEP_VR_x_meas], values[HSEP_SLOPE_x_meas]}, t, h, &step, message);
+    if (status == HSEP_REFUSED) {
         return HSEP_REFUSED;
     }
-    if (complete) {
+    while (hsep_inputs_next(&self->inputs, &step)) {
         if (hsep_predictor_sample(&self->predictor, self->inputs.x_d_ahead, self->inputs.x_meas)) {
-            predictor_write_windows(&self->predictor, values);
+            window = 1;
         }
-        predictor_write_outputs(&self->predictor, values);
     }
-    return HSEP_OK;
+    if (window) {
+        predictor_write_windows(&self->predictor, values);
+    }
+    predictor_write_outputs(&self->predictor, values);
+    return status;
 }
 
 void hsep_model_start_values(const hsep_context *context, double values[])

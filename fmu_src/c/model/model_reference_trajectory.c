@@ -86,7 +86,7 @@ hsep_status hsep_model_initialise(
     size_t size = 0;
     uint64_t count = 0;
     if (hsep_model_size(context, values, &size, message) != HSEP_OK ||
-        hsep_check_start_time(t_start, message) != HSEP_OK) {
+        hsep_check_clock(&self->clock, t_start, values[HSEP_VR_T_s], message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     FILE *file = trajectory_open(context, values, &count, message);
@@ -106,7 +106,6 @@ hsep_status hsep_model_initialise(
         }
     }
     hsep_state_mark(&self->header, context, values, TRAJECTORY_KIND, size);
-    hsep_clock_init(&self->clock, t_start, values[HSEP_VR_T_s]);
     values[HSEP_VR_r] = hsep_trajectory_position(&self->trajectory, 0);
     return HSEP_OK;
 }
@@ -116,14 +115,13 @@ hsep_status hsep_model_step(
 {
     (void)context;
     trajectory_state *self = state;
-    int64_t parts = 0;
+    hsep_clock_step step;
     message[0] = '\0';
-    if (hsep_check_step(&self->clock, t, h, &parts, message) != HSEP_OK) {
+    if (hsep_check_step(&self->clock, t, h, &step, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
-    if (hsep_clock_advance(&self->clock, parts)) {
-        values[HSEP_VR_r] = hsep_trajectory_position(&self->trajectory, self->clock.k);
-    }
+    self->clock = step.after;
+    values[HSEP_VR_r] = hsep_trajectory_position(&self->trajectory, self->clock.k);
     return HSEP_OK;
 }
 
@@ -158,7 +156,7 @@ hsep_status hsep_model_check_state(
     memcpy(&head, state, sizeof head);
     const double before = (double)(sizeof head - sizeof head.trajectory);
     /* The size is that of the file's samples, so it bounds the state's own count. */
-    if (!hsep_state_clock_valid(&head.clock) || head.clock.T_s != values[HSEP_VR_T_s] ||
+    if (!hsep_clock_valid(&head.clock) || head.clock.T_s != values[HSEP_VR_T_s] ||
         before + hsep_trajectory_size(head.trajectory.count) != (double)size) {
         return hsep_state_damaged(message);
     }

@@ -1,7 +1,7 @@
 /* SepCompensator: the look-ahead buffer that modifies the command so that the drive follows it.
  *
- * Inputs are read at the first sub-step of a sample, outputs change after its last one; the arithmetic is
- * hsep_compensator's. If the resources hold weights (hsep_weights.h), it starts with them.
+ * Inputs are latched at the instants t_k that lie in a step, outputs are those of the last instant that was reached; the
+ * arithmetic is hsep_compensator's. If the resources hold weights (hsep_weights.h), it starts with them.
  */
 #include "hsep_fmu.h"
 
@@ -161,17 +161,19 @@ hsep_status hsep_model_step(
 {
     (void)context;
     compensator_state *self = state;
-    int complete = 0;
+    hsep_inputs_step step;
     message[0] = '\0';
-    if (hsep_inputs_step(
-            &self->inputs, values[HSEP_VR_x_d_ahead], values[HSEP_VR_x_meas], t, h, &complete, message) != HSEP_OK) {
+    const hsep_status status = hsep_inputs_count(
+        &self->inputs, (hsep_input){values[HSEP_VR_x_d_ahead], values[HSEP_SLOPE_x_d_ahead]},
+        (hsep_input){values[HSEP_VR_x_meas], values[HSEP_SLOPE_x_meas]}, t, h, &step, message);
+    if (status == HSEP_REFUSED) {
         return HSEP_REFUSED;
     }
-    if (complete) {
+    while (hsep_inputs_next(&self->inputs, &step)) {
         hsep_compensator_sample(&self->compensator, self->inputs.x_d_ahead, self->inputs.x_meas);
-        compensator_write_outputs(&self->compensator, values);
     }
-    return HSEP_OK;
+    compensator_write_outputs(&self->compensator, values);
+    return status;
 }
 
 void hsep_model_start_values(const hsep_context *context, double values[])

@@ -102,7 +102,11 @@ hsep_status hsep_model_check_state(
         return HSEP_REFUSED;
     }
     memcpy(&head, state, sizeof head);
-    return head.stage.n_modes == HSEP_N_MODES ? HSEP_OK : hsep_state_damaged(message);
+    if (head.stage.n_modes != HSEP_N_MODES || !hsep_clock_valid(&head.stage.clock) ||
+        head.stage.clock.T_s != values[HSEP_VR_T_s]) {
+        return hsep_state_damaged(message);
+    }
+    return HSEP_OK;
 }
 
 #else
