@@ -3,6 +3,8 @@
 #ifndef HSEP_CLOCK_H
 #define HSEP_CLOCK_H
 
+#include "hsep_api.h"
+
 #include <stdint.h>
 
 typedef struct {
@@ -20,15 +22,15 @@ typedef enum {
     HSEP_CLOCK_POINT       /* t is not the communication point expected */
 } hsep_clock_fit;
 
-void hsep_clock_init(hsep_clock *self, double start, double T_s);
+HSEP_API void hsep_clock_init(hsep_clock *self, double start, double T_s);
 
 /* Tell whether the step from t by h, s, comes next, and in parts how many such steps make a sample. */
-hsep_clock_fit hsep_clock_check(const hsep_clock *self, double t, double h, int64_t *parts);
+HSEP_API hsep_clock_fit hsep_clock_check(const hsep_clock *self, double t, double h, int64_t *parts);
 
 /* The communication point that comes next if a sample has that many parts, s. */
-double hsep_clock_expected(const hsep_clock *self, int64_t parts);
+HSEP_API double hsep_clock_expected(const hsep_clock *self, int64_t parts);
 
 /* Count one sub-step of parts; return whether it completed the sample. */
-int hsep_clock_advance(hsep_clock *self, int64_t parts);
+HSEP_API int hsep_clock_advance(hsep_clock *self, int64_t parts);
 
 #endif

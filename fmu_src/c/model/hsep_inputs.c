@@ -7,7 +7,7 @@
 
 static const double inputs_position_max = 1e3; /* m */
 
-hsep_status hsep_inputs_init(hsep_inputs *self, double t_start, double T_s, double start, char message[])
+HSEP_API hsep_status hsep_inputs_init(hsep_inputs *self, double t_start, double T_s, double start, char message[])
 {
     char number[HSEP_NUMBER_SIZE];
     if (hsep_check_start_time(t_start, message) != HSEP_OK) {
@@ -48,7 +48,7 @@ static hsep_status inputs_check(const hsep_clock *clock, const char *name, doubl
     return HSEP_REFUSED;
 }
 
-hsep_status hsep_inputs_step(
+HSEP_API hsep_status hsep_inputs_step(
     hsep_inputs *self, double x_d_ahead, double x_meas, double t, double h, int *complete, char message[])
 {
     int64_t parts = 0;
@@ -67,7 +67,7 @@ hsep_status hsep_inputs_step(
     return HSEP_OK;
 }
 
-int hsep_inputs_valid(const hsep_inputs *self, double T_s, uint64_t k)
+HSEP_API int hsep_inputs_valid(const hsep_inputs *self, double T_s, uint64_t k)
 {
     return hsep_state_clock_valid(&self->clock) && self->clock.T_s == T_s && (uint64_t)self->clock.k == k;
 }

@@ -8,7 +8,7 @@
 
 static const double state_samples_max = 9007199254740992.0; /* 2^53: counted exactly in a double */
 
-hsep_status hsep_state_size(double bytes, size_t *size, char message[])
+HSEP_API hsep_status hsep_state_size(double bytes, size_t *size, char message[])
 {
     if (!(bytes < 0.5 * (double)SIZE_MAX)) {
         hsep_message_add(
@@ -36,7 +36,7 @@ static uint64_t state_hash(const hsep_context *context, const double values[])
     return hash;
 }
 
-void hsep_state_mark(
+HSEP_API void hsep_state_mark(
     hsep_state_header *header, const hsep_context *context, const double values[], uint64_t kind, size_t size)
 {
     header->kind = kind;
@@ -45,7 +45,7 @@ void hsep_state_mark(
     header->parameters = state_hash(context, values);
 }
 
-hsep_status hsep_state_check(
+HSEP_API hsep_status hsep_state_check(
     const hsep_context *context, const double values[], const void *state, size_t size, uint64_t kind,
     size_t expected, char message[])
 {
@@ -70,14 +70,14 @@ hsep_status hsep_state_check(
     return HSEP_REFUSED;
 }
 
-int hsep_state_clock_valid(const hsep_clock *clock)
+HSEP_API int hsep_state_clock_valid(const hsep_clock *clock)
 {
     return isfinite(clock->start) && clock->T_s > 0.0 && isfinite(clock->T_s) && clock->k >= 0 &&
            (double)clock->k < state_samples_max && clock->parts >= 1 && clock->done >= 0 &&
            (clock->done == 0 || clock->done < clock->parts);
 }
 
-hsep_status hsep_state_damaged(char message[])
+HSEP_API hsep_status hsep_state_damaged(char message[])
 {
     hsep_message_add(message, "the state does not hold together: it is damaged");
     return HSEP_REFUSED;
