@@ -16,6 +16,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import fmpy
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -35,6 +36,9 @@ TS = 1e-3  # s
 
 ROOT = Path(__file__).parents[1]
 C_SOURCES = ROOT / "fmu_src" / "c"
+FMI_HEADERS = Path(fmpy.__file__).parent / "c-code"
+"""fmpy's, for shared libraries: the names of the FMI functions are the plain ones."""
+
 EXPOSE = ROOT / "tests" / "c" / "expose.c"
 FLAGS = ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", "-ffp-contract=off"]
 MESSAGE_SIZE = 512

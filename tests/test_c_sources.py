@@ -11,6 +11,8 @@ import pytest
 import staircase_data as staircase
 from c_core import write_trajectory
 
+from hybridsep.fmi.native_backend import all_c
+
 
 def test_the_core_needs_libm_alone() -> None:
     # No allocation, no file, no global: nothing but these is undefined in it, and nothing in it is writable.
@@ -45,7 +47,7 @@ def test_everything_compiles_as_one_file(name: str) -> None:
     folder = c_core.build_folder() / f"all_{name}"
     c_core.write_header(name, folder)
     everything = folder / "all.c"
-    everything.write_text("".join(f'#include "{source}"\n' for source in c_core.sources()))
+    everything.write_text(all_c(c_core.sources()))
     for level in ("-O0", "-O3"):
         c_core.run_compiler([level, f"-I{folder}", *c_core.include_flags(), "-c", everything, "-o", folder / "all.o"])
 

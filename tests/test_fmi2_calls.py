@@ -17,7 +17,7 @@ from ctypes import byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from pathlib import Path
 
 import pytest
-from c_core import address_sanitizer, needs_sanitisers, run_compiler, sanitising_compiler
+from c_core import FMI_HEADERS, address_sanitizer, include_flags, needs_sanitisers, run_compiler, sanitising_compiler
 from fuzz_fmi2 import DISCARD, ERROR, OK, Allocate, Callbacks, Library, Logger, repair_checksum
 
 from hybridsep.fmi.archive import build_fmu, fmu_names
@@ -500,7 +500,7 @@ def test_unusable_resources_are_told_and_missing_when_needed(folders: dict[str, 
 def test_uris_of_windows(tmp_path: Path) -> None:
     root = Path(__file__).parent.parent / "fmu_src" / "c" / "fmi2"
     library = tmp_path / "uri.so"
-    run_compiler(["-shared", "-fPIC", "-O1", "-o", library, root / "hsep_uri.c"])
+    run_compiler(["-shared", "-fPIC", "-O1", *include_flags(), "-o", library, root / "hsep_uri.c"])
     convert = ctypes.CDLL(str(library)).hsep_uri_folder
     for uri, windows, expected in (
         ("file:///C:/a%20b/resources", 1, "C:/a b/resources/"),
@@ -538,7 +538,7 @@ def test_random_calls_under_sanitizers(folders: dict[str, Path], tmp_path: Path)
     def findings(name: str) -> str:
         folder = folders[name] / "sources"
         library = tmp_path / f"{name}.so"
-        files: list[str | Path] = [f"-I{folder}", folder / "all.c", "-lm", "-o", library]
+        files: list[str | Path] = [f"-I{folder}", f"-I{FMI_HEADERS}", folder / "all.c", "-lm", "-o", library]
         run_compiler(["-O1", "-g", *SANITIZERS, "-fPIC", "-shared", *files], command=compiler)
         command = [sys.executable, fuzzer, str(library), str(folders[name] / "modelDescription.xml")]
         command += [(folders[name] / "resources").as_uri(), "--seconds", str(FUZZED[name]), "--seed", "1"]
@@ -568,7 +568,7 @@ def test_each_source_compiles_alone_without_warnings(tmp_path: Path, compiler: l
         (tmp_path / file).write_bytes(content)
 
     def compile_alone(path: Path) -> None:
-        run_compiler(["-O2", "-c", path, "-o", path.with_suffix(".o")], command=compiler)
+        run_compiler(["-O2", f"-I{FMI_HEADERS}", "-c", path, "-o", path.with_suffix(".o")], command=compiler)
 
     with ThreadPoolExecutor() as pool:
         list(pool.map(compile_alone, sorted(tmp_path.glob("*.c"))))

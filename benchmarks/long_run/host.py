@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridsep.fmi.native_backend import sources
+from hybridsep.fmi.native_backend import fmi_headers, sources
 from hybridsep.machine import load_machine
 
 Array = NDArray[np.float64]
@@ -47,9 +47,10 @@ class Host:
         description: dict[str, Any] = {"model": "HybridPredictor", "name": "HybridPredictor"}
         description["parameters"] = machine.fmi_parameters()
         description["modes"] = [{name: getattr(mode, name) for name in ("f_n", "zeta", "alpha", "beta")}]
-        for file, content in sources(description, "{long run}").items():
+        for file, content in (sources(description, "{long run}") | fmi_headers()).items():
             (folder / file).write_bytes(content)
-        files = [f"-I{folder}", str(MAIN), str(folder / "all.c"), "-lm", "-o", str(self.program)]
+        (folder / "all.c").unlink()  # what main.c calls has internal linkage there
+        files = [f"-I{folder}", str(MAIN), *map(str, folder.glob("*.c")), "-lm", "-o", str(self.program)]
         command = [*compiler, *flags, *files]
         subprocess.run(command, check=True)
 

@@ -41,6 +41,11 @@ def c_header(description: Mapping[str, object], guid: str) -> str:
 
 #include "hsep_model.h"
 
+/* What fmi2Functions.h may put before the names of the FMI functions. */
+#ifndef FMI2_FUNCTION_PREFIX
+#define FMI2_FUNCTION_PREFIX {name}_
+#endif
+
 #define HSEP_MODEL_IDENTIFIER {_string(name)}
 #define HSEP_GUID {_string(guid)}
 #define HSEP_MODEL_{model} 1

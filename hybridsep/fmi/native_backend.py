@@ -1,6 +1,9 @@
 """The FMUs that run anywhere: C99 sources, compiled for every platform, with nothing else needed.
 
-The archive holds the sources as well: ``sources/all.c`` includes all the others, and compiles without warnings.
+The archive holds the sources as well: ``sources/all.c`` includes all the others, and compiles without warnings. As FMI
+2.0, section 2.3, has it, the three FMI headers come from whoever compiles. Whether the names of the FMI functions begin
+with the model identifier is decided by them: the standard's headers put it there, for several FMUs in one program;
+headers that make shared libraries (fmpy's) do not.
 """
 
 from __future__ import annotations
@@ -31,7 +34,7 @@ from .reference import reference_files
 from .variables import INTERPOLATED, variables_of
 from .weights import WEIGHTS_FILE, weights_file
 
-__all__ = ["files", "sources"]
+__all__ = ["all_c", "files", "fmi_headers", "sources"]
 
 _FOLDERS = ("core", "model", "fmi2")
 _FMI_HEADERS = ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")
@@ -96,13 +99,14 @@ def files(
         targets = ALL_TARGETS if find_spec("ziglang") is not None else ("host",)
     folder = "sources/"
     unit = {file.removeprefix(folder): text for file, text in content.items() if file.startswith(folder)}
+    unit |= fmi_headers()
     for path, binary in binaries(unit, name, targets).items():
         content[f"binaries/{path}"] = binary
     return content
 
 
 def sources(description: Mapping[str, object], guid: str) -> dict[str, bytes]:
-    """Return what is compiled: file name → content, ``all.c`` first, with the generated ``hsep_fmu.h``.
+    """Return what is compiled with :func:`fmi_headers`: file name → content, with the generated ``hsep_fmu.h``.
 
     Parameters
     ----------
@@ -113,24 +117,32 @@ def sources(description: Mapping[str, object], guid: str) -> dict[str, bytes]:
     """
     root = data_folder("fmu_src") / "c"
     ours = {path.name: path.read_bytes() for folder in _FOLDERS for path in sorted((root / folder).glob("*.[ch]"))}
-    includes = "\n".join(f'#include "{file}"' for file in ours if file.endswith(".c"))
-    all_c = f"/* The whole FMU as one translation unit: compile this file alone. */\n{includes}\n"
-    headers = {file: _fmi_header(file) for file in _FMI_HEADERS}
-    return {"all.c": all_c.encode(), **ours, **headers, "hsep_fmu.h": c_header(description, guid).encode()}
+    unit = all_c([file for file in ours if file.endswith(".c")])
+    return {"all.c": unit.encode(), **ours, "hsep_fmu.h": c_header(description, guid).encode()}
 
 
-def _fmi_header(file: str) -> bytes:
-    """Return an official FMI header, as fmpy carries it, with the line ends of a text file."""
-    return (Path(fmpy.__file__).parent / "c-code" / file).read_bytes().replace(b"\r\n", b"\n")
+def all_c(files: Sequence[str]) -> str:
+    """Return the C file that includes all others, in which the FMI functions alone have external linkage."""
+    includes = "".join(f'#include "{file}"\n' for file in files)
+    return f"""/* The whole FMU as one translation unit: compile this file alone, with your FMI 2.0 headers. */
+#define HSEP_API static inline /* see hsep_api.h */
+
+{includes}"""
+
+
+def fmi_headers() -> dict[str, bytes]:
+    """Return the FMI 2.0 headers for shared libraries, as fmpy carries them, with the line ends of a text file."""
+    folder = Path(fmpy.__file__).parent / "c-code"
+    return {file: (folder / file).read_bytes().replace(b"\r\n", b"\n") for file in _FMI_HEADERS}
 
 
 def _licenses() -> dict[str, bytes]:
     """Return our licence and the one of the FMI headers, which they carry in their own comments."""
     root = data_folder("fmu_src").parent
-    comment = _fmi_header("fmi2Functions.h").decode()
+    comment = fmi_headers()["fmi2Functions.h"].decode()
     notice = re.search(r"^ *Copyright \(C\).*?DAMAGE\.$", comment, re.DOTALL | re.MULTILINE)
     assert notice is not None  # the headers have been the same since 2019
-    lines = ["fmi2Functions.h, fmi2FunctionTypes.h and fmi2TypesPlatform.h in sources/:", ""]
+    lines = ["fmi2Functions.h, fmi2FunctionTypes.h and fmi2TypesPlatform.h, with which the binaries were compiled:", ""]
     lines += [line.strip() for line in notice.group().splitlines()]
     fmi = "\n".join(lines) + "\n"
     return {"license.txt": (root / "LICENSE").read_bytes(), "fmi-headers.txt": fmi.encode()}

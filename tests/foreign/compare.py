@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
+import fmpy
 import numpy as np
 from numpy.typing import NDArray
 
@@ -92,7 +93,7 @@ def build(out: Path, platforms: Iterable[Platform]) -> None:
     for model in OUTPUTS:
         with zipfile.ZipFile(build_fmu(machine, model, out, targets=targets)) as archive:
             archive.extractall(out / model)
-    headers = out / "HybridPredictor" / "sources"
+    headers = Path(fmpy.__file__).parent / "c-code"
     for target in targets:
         zig = [sys.executable, "-m", "ziglang", "cc", "-target", TARGETS[target].triple]
         command = [*zig, *HOST_FLAGS, f"-I{headers}", str(HOST), "-o", str(out / _host_name(target))]

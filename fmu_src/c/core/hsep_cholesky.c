@@ -35,7 +35,7 @@ static int cholesky_pivot(double row[], uint64_t length)
     return 1;
 }
 
-int hsep_cholesky_factor(double triangle[], uint64_t n)
+HSEP_API int hsep_cholesky_factor(double triangle[], uint64_t n)
 {
     double *row = triangle;
     uint64_t k = 0;
@@ -72,7 +72,7 @@ int hsep_cholesky_factor(double triangle[], uint64_t n)
     return 1;
 }
 
-void hsep_cholesky_solve(const double triangle[], uint64_t n, double b[])
+HSEP_API void hsep_cholesky_solve(const double triangle[], uint64_t n, double b[])
 {
     const double *row = triangle;
     for (uint64_t i = 0; i < n; i++) { /* R' y = b */

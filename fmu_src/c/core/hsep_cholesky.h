@@ -6,13 +6,15 @@
 #ifndef HSEP_CHOLESKY_H
 #define HSEP_CHOLESKY_H
 
+#include "hsep_api.h"
+
 #include <stdint.h>
 
 /* Turn the upper triangle of P into R, in place. Returns 0 if P is not positive definite or not finite; the triangle
  * is used up then. Cost: n^3 / 6 multiply-adds. */
-int hsep_cholesky_factor(double triangle[], uint64_t n);
+HSEP_API int hsep_cholesky_factor(double triangle[], uint64_t n);
 
 /* Turn b, (n,), into the solution x of R' R x = b. Cost: n^2 multiply-adds. */
-void hsep_cholesky_solve(const double triangle[], uint64_t n, double b[]);
+HSEP_API void hsep_cholesky_solve(const double triangle[], uint64_t n, double b[]);
 
 #endif

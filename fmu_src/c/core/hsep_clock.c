@@ -36,13 +36,13 @@ static void clock_take(hsep_clock *self, double n)
     self->k += (int64_t)n;
 }
 
-int hsep_clock_init(hsep_clock *self, double start, double T_s)
+HSEP_API int hsep_clock_init(hsep_clock *self, double start, double T_s)
 {
     *self = (hsep_clock){.start = start, .T_s = T_s, .end = start};
     return clock_resolution(start) <= 0.25 * T_s;
 }
 
-int hsep_clock_count(const hsep_clock *self, double t, double h, hsep_clock_step *step)
+HSEP_API int hsep_clock_count(const hsep_clock *self, double t, double h, hsep_clock_step *step)
 {
     *step = (hsep_clock_step){.after = *self};
     if (!(fabs(t - self->end) <= fmax(0.5 * self->T_s, clock_resolution(t)))) {
@@ -65,7 +65,7 @@ int hsep_clock_count(const hsep_clock *self, double t, double h, hsep_clock_step
     return 1;
 }
 
-int hsep_clock_valid(const hsep_clock *self)
+HSEP_API int hsep_clock_valid(const hsep_clock *self)
 {
     return isfinite(self->start) && self->T_s > 0.0 && isfinite(self->T_s) && self->k >= 0 &&
            (double)self->k < clock_samples_max && fabs(self->since) <= self->T_s &&

@@ -8,6 +8,8 @@
 #ifndef HSEP_CLOCK_H
 #define HSEP_CLOCK_H
 
+#include "hsep_api.h"
+
 #include <stdint.h>
 
 #define HSEP_CLOCK_STEP_MAX 100.0 /* s */
@@ -32,13 +34,13 @@ typedef struct {
 } hsep_clock_step;
 
 /* Begin at start, s. Fails, and returns 0, if doubles near start cannot tell a quarter of T_s. */
-int hsep_clock_init(hsep_clock *self, double start, double T_s);
+HSEP_API int hsep_clock_init(hsep_clock *self, double start, double T_s);
 
 /* Count the step from t by h, s, with 0 < h <= HSEP_CLOCK_STEP_MAX; self is unchanged until the caller takes over
  * step->after. Fails, and returns 0, if t is not where the last step ended. */
-int hsep_clock_count(const hsep_clock *self, double t, double h, hsep_clock_step *step);
+HSEP_API int hsep_clock_count(const hsep_clock *self, double t, double h, hsep_clock_step *step);
 
 /* Whether a clock that was read from a state counts within its bounds. */
-int hsep_clock_valid(const hsep_clock *self);
+HSEP_API int hsep_clock_valid(const hsep_clock *self);
 
 #endif

@@ -22,7 +22,7 @@ static hsep_planner *compensator_planner(const hsep_compensator *self)
     return (hsep_planner *)compensator_at(self, self->planner);
 }
 
-hsep_regression *hsep_compensator_regression(hsep_compensator *self)
+HSEP_API hsep_regression *hsep_compensator_regression(hsep_compensator *self)
 {
     return (hsep_regression *)compensator_at(self, self->regression);
 }
@@ -38,7 +38,7 @@ static uint64_t compensator_features(const hsep_compensator_parameters *paramete
     return 2 + parameters->q + parameters->p + compensator_scheduled(parameters);
 }
 
-double hsep_compensator_size(const hsep_compensator_parameters *parameters)
+HSEP_API double hsep_compensator_size(const hsep_compensator_parameters *parameters)
 {
     const double Np = (double)parameters->planner.Np, preview = (double)parameters->planner.preview;
     const double p = (double)parameters->p, q = (double)parameters->q;
@@ -99,7 +99,7 @@ static void compensator_lay_out(hsep_compensator *self, const hsep_compensator_p
     self->planner = end;
 }
 
-void hsep_compensator_init(hsep_compensator *self, const hsep_compensator_parameters *parameters, double start)
+HSEP_API void hsep_compensator_init(hsep_compensator *self, const hsep_compensator_parameters *parameters, double start)
 {
     memset(self, 0, sizeof *self);
     compensator_lay_out(self, parameters);
@@ -127,7 +127,7 @@ void hsep_compensator_init(hsep_compensator *self, const hsep_compensator_parame
     hsep_physics_respond(trial, spline, spline, (size_t)self->preview);
 }
 
-int hsep_compensator_valid(const void *block, const hsep_compensator_parameters *parameters)
+HSEP_API int hsep_compensator_valid(const void *block, const hsep_compensator_parameters *parameters)
 {
     const char *bytes = block;
     hsep_compensator expected, got;
@@ -327,7 +327,7 @@ static void compensator_expect(hsep_compensator *self, int measured_before)
         (size_t)(self->saved - self->regression) * sizeof(double));
 }
 
-void hsep_compensator_begin(hsep_compensator *self)
+HSEP_API void hsep_compensator_begin(hsep_compensator *self)
 {
     compensator_plan(self);
     compensator_expect(self, 1);
@@ -377,7 +377,7 @@ static void compensator_measured(hsep_compensator *self)
     memcpy(past_e + Np, past_e, (size_t)self->p * sizeof(double));
 }
 
-void hsep_compensator_sample(hsep_compensator *self, double x_d_ahead, double x_meas)
+HSEP_API void hsep_compensator_sample(hsep_compensator *self, double x_d_ahead, double x_meas)
 {
     const uint64_t i = self->k % self->Np, j = self->Np - 1 - i;
     const double x_pb = compensator_at(self, self->x_pb)[i], x_h = compensator_at(self, self->x_h)[i];
@@ -411,7 +411,7 @@ static double compensator_rms(const hsep_compensator *self, double sum)
     return self->n_measured > 0 ? sqrt(sum / (double)self->n_measured) : 0.0;
 }
 
-void hsep_compensator_read(const hsep_compensator *self, hsep_compensator_outputs *outputs)
+HSEP_API void hsep_compensator_read(const hsep_compensator *self, hsep_compensator_outputs *outputs)
 {
     const uint64_t i = self->k % self->Np;
     outputs->x_d = compensator_at(self, self->x_d)[i];

@@ -19,6 +19,7 @@
 #ifndef HSEP_COMPENSATOR_H
 #define HSEP_COMPENSATOR_H
 
+#include "hsep_api.h"
 #include "hsep_physics.h"
 #include "hsep_planner.h"
 #include "hsep_recursion.h"
@@ -94,25 +95,26 @@ typedef struct {
 } hsep_compensator_outputs;
 
 /* Bytes of the block, counted in double so that no size can overflow. */
-double hsep_compensator_size(const hsep_compensator_parameters *parameters);
+HSEP_API double hsep_compensator_size(const hsep_compensator_parameters *parameters);
 
 /* Fill the block for a drive at rest at start, m. hsep_compensator_begin has to follow. */
-void hsep_compensator_init(hsep_compensator *self, const hsep_compensator_parameters *parameters, double start);
+HSEP_API void hsep_compensator_init(
+    hsep_compensator *self, const hsep_compensator_parameters *parameters, double start);
 
 /* Where the factor is, to start warm by hsep_regression_load between hsep_compensator_init and _begin. */
-hsep_regression *hsep_compensator_regression(hsep_compensator *self);
+HSEP_API hsep_regression *hsep_compensator_regression(hsep_compensator *self);
 
 /* Plan the first window. */
-void hsep_compensator_begin(hsep_compensator *self);
+HSEP_API void hsep_compensator_begin(hsep_compensator *self);
 
 /* Tell whether a block of bytes, in any alignment and hsep_compensator_size(parameters) long, is one that
  * hsep_compensator_init with these parameters began: its layout is the same and every index lies within it. */
-int hsep_compensator_valid(const void *block, const hsep_compensator_parameters *parameters);
+HSEP_API int hsep_compensator_valid(const void *block, const hsep_compensator_parameters *parameters);
 
 /* Take in sample k, both finite, m, and move on to k + 1. */
-void hsep_compensator_sample(hsep_compensator *self, double x_d_ahead, double x_meas);
+HSEP_API void hsep_compensator_sample(hsep_compensator *self, double x_d_ahead, double x_meas);
 
 /* Tell the outputs of the sample that comes next. Constant cost. */
-void hsep_compensator_read(const hsep_compensator *self, hsep_compensator_outputs *outputs);
+HSEP_API void hsep_compensator_read(const hsep_compensator *self, hsep_compensator_outputs *outputs);
 
 #endif

@@ -13,14 +13,14 @@ static uint64_t encoder_split_mix_64(uint64_t seed, uint64_t index)
     return z ^ (z >> 31);
 }
 
-void hsep_encoder_init(hsep_encoder *self, double noise_std, uint64_t seed)
+HSEP_API void hsep_encoder_init(hsep_encoder *self, double noise_std, uint64_t seed)
 {
     self->noise_std = noise_std;
     self->seed = seed;
     self->n_draws = 0;
 }
 
-double hsep_encoder_measure(hsep_encoder *self, double x)
+HSEP_API double hsep_encoder_measure(hsep_encoder *self, double x)
 {
     const uint64_t first = 2 * self->n_draws;
     self->n_draws++;

@@ -3,6 +3,8 @@
 #ifndef HSEP_ENCODER_H
 #define HSEP_ENCODER_H
 
+#include "hsep_api.h"
+
 #include <stdint.h>
 
 typedef struct {
@@ -11,9 +13,9 @@ typedef struct {
     uint64_t n_draws; /* so far */
 } hsep_encoder;
 
-void hsep_encoder_init(hsep_encoder *self, double noise_std, uint64_t seed);
+HSEP_API void hsep_encoder_init(hsep_encoder *self, double noise_std, uint64_t seed);
 
 /* Return one measurement of the position x, m. Constant cost; allocates nothing; cannot fail. */
-double hsep_encoder_measure(hsep_encoder *self, double x);
+HSEP_API double hsep_encoder_measure(hsep_encoder *self, double x);
 
 #endif

@@ -28,7 +28,7 @@ typedef struct {
     double *triangle;
 } interior_arrays;
 
-double hsep_interior_size(uint64_t preview, uint64_t n)
+HSEP_API double hsep_interior_size(uint64_t preview, uint64_t n)
 {
     const double rows = HSEP_ORDERS * (double)preview, x = (double)n;
     return (double)sizeof(hsep_interior) + (4.0 * x + 13.0 * rows + 0.5 * x * (x + 1.0)) * (double)sizeof(double);
@@ -58,16 +58,22 @@ static interior_arrays interior_open(hsep_interior *self, const hsep_splines *sp
     return a;
 }
 
-double *hsep_interior_x(hsep_interior *self, const hsep_splines *splines) { return interior_open(self, splines).x; }
+HSEP_API double *hsep_interior_x(hsep_interior *self, const hsep_splines *splines)
+{
+    return interior_open(self, splines).x;
+}
 
-double *hsep_interior_v(hsep_interior *self, const hsep_splines *splines) { return interior_open(self, splines).v; }
+HSEP_API double *hsep_interior_v(hsep_interior *self, const hsep_splines *splines)
+{
+    return interior_open(self, splines).v;
+}
 
-double *hsep_interior_low(hsep_interior *self, const hsep_splines *splines)
+HSEP_API double *hsep_interior_low(hsep_interior *self, const hsep_splines *splines)
 {
     return interior_open(self, splines).bound[0];
 }
 
-double *hsep_interior_high(hsep_interior *self, const hsep_splines *splines)
+HSEP_API double *hsep_interior_high(hsep_interior *self, const hsep_splines *splines)
 {
     return interior_open(self, splines).bound[1];
 }
@@ -92,7 +98,7 @@ static void interior_ranges(const hsep_splines *splines, uint64_t first, interio
     }
 }
 
-void hsep_interior_begin(hsep_interior *self, const hsep_splines *splines, uint64_t first, double cost)
+HSEP_API void hsep_interior_begin(hsep_interior *self, const hsep_splines *splines, uint64_t first, double cost)
 {
     self->first = first;
     self->steps = 0;
@@ -276,7 +282,7 @@ static void interior_move(const interior_arrays *a, const interior_range ranges[
     }
 }
 
-int hsep_interior_step(hsep_interior *self, const hsep_splines *splines, const double P[])
+HSEP_API int hsep_interior_step(hsep_interior *self, const hsep_splines *splines, const double P[])
 {
     const interior_arrays a = interior_open(self, splines);
     interior_range ranges[HSEP_ORDERS];

@@ -7,6 +7,7 @@
 #ifndef HSEP_INTERIOR_H
 #define HSEP_INTERIOR_H
 
+#include "hsep_api.h"
 #include "hsep_splines.h"
 
 #include <stdint.h>
@@ -21,20 +22,20 @@ typedef struct {
     /* followed by arrays, see hsep_interior.c */
 } hsep_interior;
 
-double hsep_interior_size(uint64_t preview, uint64_t n); /* bytes of the block, counted in double */
+HSEP_API double hsep_interior_size(uint64_t preview, uint64_t n); /* bytes of the block, counted in double */
 
 /* Where the problem goes before hsep_interior_begin; of v and x the first n - first entries count. */
-double *hsep_interior_v(hsep_interior *self, const hsep_splines *splines);    /* (n,) m */
-double *hsep_interior_x(hsep_interior *self, const hsep_splines *splines);    /* (n,) m, start and result */
-double *hsep_interior_low(hsep_interior *self, const hsep_splines *splines);  /* (4 preview,) rows, in shares */
-double *hsep_interior_high(hsep_interior *self, const hsep_splines *splines); /* (4 preview,) */
+HSEP_API double *hsep_interior_v(hsep_interior *self, const hsep_splines *splines);    /* (n,) m */
+HSEP_API double *hsep_interior_x(hsep_interior *self, const hsep_splines *splines);    /* (n,) m, start and result */
+HSEP_API double *hsep_interior_low(hsep_interior *self, const hsep_splines *splines);  /* (4 preview,), in shares */
+HSEP_API double *hsep_interior_high(hsep_interior *self, const hsep_splines *splines); /* (4 preview,) */
 
 /* Begin with x and the bounds as they are. cost: size of the cost, m2, > 0, by which the end is recognised. */
-void hsep_interior_begin(hsep_interior *self, const hsep_splines *splines, uint64_t first, double cost);
+HSEP_API void hsep_interior_begin(hsep_interior *self, const hsep_splines *splines, uint64_t first, double cost);
 
 /* Do a step; P is the triangle of all n rows. Returns whether it was the last one.
  * Cost: n^3 / 6 multiply-adds for a factor and 2 n^2 with it, about 900 operations and 8 divisions a sample of the
  * plan beside it. */
-int hsep_interior_step(hsep_interior *self, const hsep_splines *splines, const double P[]);
+HSEP_API int hsep_interior_step(hsep_interior *self, const hsep_splines *splines, const double P[]);
 
 #endif

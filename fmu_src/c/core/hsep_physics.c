@@ -53,7 +53,7 @@ static void physics_expm1(double E[16], double M[16])
     }
 }
 
-void hsep_discretise(hsep_discrete_mode *mode, const hsep_mode *continuous, double Ts, hsep_hold hold)
+HSEP_API void hsep_discretise(hsep_discrete_mode *mode, const hsep_mode *continuous, double Ts, hsep_hold hold)
 {
     const double omega = physics_two_pi * continuous->f_n; /* rad/s */
     /* States (omega^2 z, omega z') with z'' + 2 zeta omega z' + omega^2 z = u, both in m; then u and its ramp
@@ -86,13 +86,13 @@ void hsep_discretise(hsep_discrete_mode *mode, const hsep_mode *continuous, doub
     mode->s[0] = mode->s[1] = 0.0;
 }
 
-double hsep_physics_size(uint64_t n_modes, uint64_t dead_time)
+HSEP_API double hsep_physics_size(uint64_t n_modes, uint64_t dead_time)
 {
     return (double)sizeof(hsep_physics) + (double)n_modes * (double)sizeof(hsep_discrete_mode) +
            (double)dead_time * (double)sizeof(double);
 }
 
-void hsep_physics_init(
+HSEP_API void hsep_physics_init(
     hsep_physics *self, const hsep_mode modes[], uint64_t n_modes, uint64_t dead_time, double Ts, hsep_hold hold)
 {
     self->n_modes = n_modes;
@@ -108,7 +108,7 @@ void hsep_physics_init(
     }
 }
 
-void hsep_physics_respond(hsep_physics *self, const double x_d[], double x_pb[], size_t n)
+HSEP_API void hsep_physics_respond(hsep_physics *self, const double x_d[], double x_pb[], size_t n)
 {
     hsep_discrete_mode *modes = (hsep_discrete_mode *)(self + 1);
     double *ring = (double *)(modes + self->n_modes);

@@ -6,6 +6,8 @@
 #ifndef HSEP_PHYSICS_H
 #define HSEP_PHYSICS_H
 
+#include "hsep_api.h"
+
 #include <stddef.h>
 #include <stdint.h>
 
@@ -37,17 +39,17 @@ typedef struct {
 
 /* Fill a mode for the sampling interval Ts, s, at rest. Exact up to rounding in every damping regime.
  * Cost: about 2 000 multiply-adds, and 64 for each doubling of the norm of the mode times Ts. */
-void hsep_discretise(hsep_discrete_mode *mode, const hsep_mode *continuous, double Ts, hsep_hold hold);
+HSEP_API void hsep_discretise(hsep_discrete_mode *mode, const hsep_mode *continuous, double Ts, hsep_hold hold);
 
 /* Bytes of the block, counted in double so that no size can overflow. */
-double hsep_physics_size(uint64_t n_modes, uint64_t dead_time);
+HSEP_API double hsep_physics_size(uint64_t n_modes, uint64_t dead_time);
 
 /* Fill the block, at rest at position 0. modes: (n_modes,). */
-void hsep_physics_init(
+HSEP_API void hsep_physics_init(
     hsep_physics *self, const hsep_mode modes[], uint64_t n_modes, uint64_t dead_time, double Ts, hsep_hold hold);
 
 /* Answer n commands x_d, (n,), m, relative to the position of rest, with x_pb, (n,), m; eq. (2).
  * The state is carried from call to call. Cost: 9 multiply-adds a mode and sample. */
-void hsep_physics_respond(hsep_physics *self, const double x_d[], double x_pb[], size_t n);
+HSEP_API void hsep_physics_respond(hsep_physics *self, const double x_d[], double x_pb[], size_t n);
 
 #endif

@@ -28,7 +28,7 @@ static hsep_interior *planner_interior(const hsep_planner *self)
 
 static double planner_triangle(double n) { return 0.5 * n * (n + 1.0); }
 
-double hsep_planner_size(const hsep_planner_parameters *parameters)
+HSEP_API double hsep_planner_size(const hsep_planner_parameters *parameters)
 {
     const double preview = (double)parameters->preview;
     const uint64_t count = hsep_splines_count(parameters->preview, parameters->spacing);
@@ -66,7 +66,7 @@ static void planner_lay_out(hsep_planner *self, const hsep_planner_parameters *p
     self->interior = end;
 }
 
-void hsep_planner_init(hsep_planner *self, const hsep_planner_parameters *parameters, double start)
+HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameters *parameters, double start)
 {
     memset(self, 0, sizeof *self);
     planner_lay_out(self, parameters);
@@ -80,7 +80,7 @@ void hsep_planner_init(hsep_planner *self, const hsep_planner_parameters *parame
     hsep_splines_init(planner_splines(self), parameters->preview, parameters->spacing, parameters->limit);
 }
 
-int hsep_planner_valid(const void *block, const hsep_planner_parameters *parameters)
+HSEP_API int hsep_planner_valid(const void *block, const hsep_planner_parameters *parameters)
 {
     const char *bytes = block;
     hsep_planner expected, got;
@@ -97,16 +97,22 @@ int hsep_planner_valid(const void *block, const hsep_planner_parameters *paramet
            interior.first <= expected.n_pinned && interior.steps <= HSEP_INTERIOR_STEPS;
 }
 
-const double *hsep_planner_spline(const hsep_planner *self) { return hsep_splines_shape(planner_splines(self)); }
+HSEP_API const double *hsep_planner_spline(const hsep_planner *self)
+{
+    return hsep_splines_shape(planner_splines(self));
+}
 
-uint64_t hsep_planner_pinned(const hsep_planner *self) { return self->n_pinned * planner_splines(self)->spacing; }
+HSEP_API uint64_t hsep_planner_pinned(const hsep_planner *self)
+{
+    return self->n_pinned * planner_splines(self)->spacing;
+}
 
-double hsep_planner_decided(const hsep_planner *self, uint64_t k)
+HSEP_API double hsep_planner_decided(const hsep_planner *self, uint64_t k)
 {
     return hsep_splines_sum(planner_splines(self), planner_at(self, self->c), HSEP_DECIDED, k);
 }
 
-double hsep_planner_delta(const hsep_planner *self, uint64_t k)
+HSEP_API double hsep_planner_delta(const hsep_planner *self, uint64_t k)
 {
     const hsep_splines *splines = planner_splines(self);
     return hsep_splines_sum(splines, planner_at(self, self->c), HSEP_DECIDED + splines->n, k);
@@ -260,7 +266,7 @@ static void planner_bound(hsep_planner *self, double cost)
     hsep_interior_begin(interior, splines, first, cost);
 }
 
-hsep_plan_status hsep_planner_begin(
+HSEP_API hsep_plan_status hsep_planner_begin(
     hsep_planner *self, const double filtered[], const double target[], const double x_d[])
 {
     const hsep_splines *splines = planner_splines(self);
@@ -311,7 +317,7 @@ hsep_plan_status hsep_planner_begin(
     return HSEP_PLAN_BOUNDED;
 }
 
-int hsep_planner_step(hsep_planner *self)
+HSEP_API int hsep_planner_step(hsep_planner *self)
 {
     const hsep_splines *splines = planner_splines(self);
     hsep_interior *interior = planner_interior(self);
@@ -336,7 +342,7 @@ int hsep_planner_step(hsep_planner *self)
     return 1;
 }
 
-void hsep_planner_next(hsep_planner *self, const double x_d[])
+HSEP_API void hsep_planner_next(hsep_planner *self, const double x_d[])
 {
     const hsep_splines *splines = planner_splines(self);
     double *c = planner_at(self, self->c);

@@ -11,6 +11,7 @@
 #ifndef HSEP_PLANNER_H
 #define HSEP_PLANNER_H
 
+#include "hsep_api.h"
 #include "hsep_interior.h"
 #include "hsep_splines.h"
 
@@ -48,35 +49,36 @@ typedef struct {
     uint64_t splines, interior;
 } hsep_planner;
 
-double hsep_planner_size(const hsep_planner_parameters *parameters); /* bytes of the block, counted in double */
+/* Bytes of the block, counted in double so that no size can overflow. */
+HSEP_API double hsep_planner_size(const hsep_planner_parameters *parameters);
 
 /* Fill the block for a drive at rest at start, m. */
-void hsep_planner_init(hsep_planner *self, const hsep_planner_parameters *parameters, double start);
+HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameters *parameters, double start);
 
 /* Whether a block, in any alignment, is one that hsep_planner_init with these parameters began. */
-int hsep_planner_valid(const void *block, const hsep_planner_parameters *parameters);
+HSEP_API int hsep_planner_valid(const void *block, const hsep_planner_parameters *parameters);
 
 /* The spline to be filtered, (4 spacing,). */
-const double *hsep_planner_spline(const hsep_planner *self);
+HSEP_API const double *hsep_planner_spline(const hsep_planner *self);
 
 /* How many samples a bounded plan leaves as they are, the time there is for its steps; and the steps it may need. */
-uint64_t hsep_planner_pinned(const hsep_planner *self);
+HSEP_API uint64_t hsep_planner_pinned(const hsep_planner *self);
 
 /* The part of delta at sample k that is decided before a plan is made, m. */
-double hsep_planner_decided(const hsep_planner *self, uint64_t k);
+HSEP_API double hsep_planner_decided(const hsep_planner *self, uint64_t k);
 
 /* Plan. filtered: the spline behind the model, (preview,); target: x_d minus the model's response to x_d with what is
  * decided of delta, m; x_d: commanded positions, m, (preview,) both. Cost: n^3 / 6 + n preview multiply-adds. */
-hsep_plan_status hsep_planner_begin(
+HSEP_API hsep_plan_status hsep_planner_begin(
     hsep_planner *self, const double filtered[], const double target[], const double x_d[]);
 
 /* Do a step of a bounded plan; return whether it was the last one. Cost: that of hsep_interior_step. */
-int hsep_planner_step(hsep_planner *self);
+HSEP_API int hsep_planner_step(hsep_planner *self);
 
 /* delta at sample k of the plan, m; of a bounded one that is not solved yet, at its first hsep_planner_pinned. */
-double hsep_planner_delta(const hsep_planner *self, uint64_t k);
+HSEP_API double hsep_planner_delta(const hsep_planner *self, uint64_t k);
 
 /* Move on by a window with the commanded positions x_d, (Np,), m. */
-void hsep_planner_next(hsep_planner *self, const double x_d[]);
+HSEP_API void hsep_planner_next(hsep_planner *self, const double x_d[]);
 
 #endif

@@ -9,21 +9,21 @@ static const double plant_steps_max = 1e6;           /* internal steps of one st
 static const double plant_tolerance = 1e-6;          /* of an internal step */
 static const double plant_two_pi = 6.283185307179586;
 
-double hsep_plant_internal_steps(double h, double rate)
+HSEP_API double hsep_plant_internal_steps(double h, double rate)
 {
     const double n = fmax(h / plant_internal_step, h * rate * plant_steps_per_time);
     return fmin(fmax(1.0, ceil(n - plant_tolerance)), plant_steps_max);
 }
 
-void hsep_feed_drive_reset(hsep_feed_drive *self, double start)
+HSEP_API void hsep_feed_drive_reset(hsep_feed_drive *self, double start)
 {
     self->start = start;
     self->x = self->u = self->x_d = 0.0;
 }
 
-double hsep_feed_drive_x(const hsep_feed_drive *self) { return self->start + self->x; }
+HSEP_API double hsep_feed_drive_x(const hsep_feed_drive *self) { return self->start + self->x; }
 
-double hsep_feed_drive_v(const hsep_feed_drive *self) { return self->u + self->c / self->m * self->x_d; }
+HSEP_API double hsep_feed_drive_v(const hsep_feed_drive *self) { return self->u + self->c / self->m * self->x_d; }
 
 /* The slopes p = x' and q = u' of eq. (13) under the command r. */
 static void plant_slope(const hsep_feed_drive *d, double x, double u, double r, double *p, double *q)
@@ -35,7 +35,7 @@ static void plant_slope(const hsep_feed_drive *d, double x, double u, double r, 
     *q = -a * v - w2 * (x - r) - c_m * v * fabs(v) - k_m * x * fabs(x);
 }
 
-int hsep_feed_drive_step(hsep_feed_drive *self, double x_d, double h, double *reached)
+HSEP_API int hsep_feed_drive_step(hsep_feed_drive *self, double x_d, double h, double *reached)
 {
     const double rate = fmax(sqrt(self->k / self->m), self->c / self->m);
     const double n = hsep_plant_internal_steps(h, rate), dt = h / n, r = x_d - self->start;
@@ -59,12 +59,12 @@ int hsep_feed_drive_step(hsep_feed_drive *self, double x_d, double h, double *re
     return 1;
 }
 
-double hsep_stage_size(uint64_t n_modes)
+HSEP_API double hsep_stage_size(uint64_t n_modes)
 {
     return (double)sizeof(hsep_stage) + (double)n_modes * (double)sizeof(hsep_stage_mode);
 }
 
-void hsep_stage_init(
+HSEP_API void hsep_stage_init(
     hsep_stage *self, const hsep_mode modes[], uint64_t n_modes, double f, double kappa, double T_s, double start)
 {
     self->f = f;
@@ -151,7 +151,7 @@ static void plant_stage_integrate(const hsep_stage *s, double z[], double r, dou
     }
 }
 
-int hsep_stage_step(hsep_stage *self, double x_d, double h, double work[])
+HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work[])
 {
     hsep_stage_mode *mode = (hsep_stage_mode *)(self + 1);
     const double r = x_d - self->start;
@@ -192,7 +192,7 @@ int hsep_stage_step(hsep_stage *self, double x_d, double h, double work[])
     return 1;
 }
 
-double hsep_stage_x(const hsep_stage *self)
+HSEP_API double hsep_stage_x(const hsep_stage *self)
 {
     const hsep_stage_mode *mode = (const hsep_stage_mode *)(self + 1);
     double x = 0.0;

@@ -8,6 +8,7 @@
 #ifndef HSEP_PLANT_H
 #define HSEP_PLANT_H
 
+#include "hsep_api.h"
 #include "hsep_clock.h"
 #include "hsep_physics.h"
 
@@ -15,7 +16,7 @@
 
 /* Number of internal steps for a step of h seconds, h > 0: the fewest that are at most 0.1 ms and 1/(16 rate) long,
  * rate in 1/s; at most 10^6, which bounds the cost. */
-double hsep_plant_internal_steps(double h, double rate);
+HSEP_API double hsep_plant_internal_steps(double h, double rate);
 
 /* m x'' + c x' + k x + H_NL = c x_d' + k x_d with H_NL = c_nl x'|x'| + k_nl x|x|, eq. (13), in the states x and
  * u = x' - (c/m) x_d. */
@@ -27,14 +28,14 @@ typedef struct {
 } hsep_feed_drive;
 
 /* Put the drive to rest at start, m; its parameters are set by the caller. */
-void hsep_feed_drive_reset(hsep_feed_drive *self, double start);
+HSEP_API void hsep_feed_drive_reset(hsep_feed_drive *self, double start);
 
 /* Advance by h, s, with the command x_d, m, held. Fails, and returns 0 with the state unchanged, if the state would
  * leave the range of numbers; *x then tells the position reached, m. */
-int hsep_feed_drive_step(hsep_feed_drive *self, double x_d, double h, double *x);
+HSEP_API int hsep_feed_drive_step(hsep_feed_drive *self, double x_d, double h, double *x);
 
-double hsep_feed_drive_x(const hsep_feed_drive *self); /* true position, m */
-double hsep_feed_drive_v(const hsep_feed_drive *self); /* true velocity under the last step's command, m/s */
+HSEP_API double hsep_feed_drive_x(const hsep_feed_drive *self); /* true position, m */
+HSEP_API double hsep_feed_drive_v(const hsep_feed_drive *self); /* true velocity under the last step's command, m/s */
 
 /* One mode of the stage: z'' + two_zeta_omega z' + omega2 z = command, eq. (15). */
 typedef struct {
@@ -56,16 +57,16 @@ typedef struct {
 
 #define HSEP_STAGE_WORK 8 /* doubles of work space for each mode */
 
-double hsep_stage_size(uint64_t n_modes); /* bytes of the block, counted in double */
+HSEP_API double hsep_stage_size(uint64_t n_modes); /* bytes of the block, counted in double */
 
 /* Put the stage to rest at start, m. modes: (n_modes,). */
-void hsep_stage_init(
+HSEP_API void hsep_stage_init(
     hsep_stage *self, const hsep_mode modes[], uint64_t n_modes, double f, double kappa, double T_s, double start);
 
 /* Advance by h, s, at most HSEP_CLOCK_STEP_MAX, with the command x_d, m, held. work: (HSEP_STAGE_WORK n_modes,). Fails,
  * and returns 0 with the state unchanged, if the state would leave the range of numbers. */
-int hsep_stage_step(hsep_stage *self, double x_d, double h, double work[]);
+HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work[]);
 
-double hsep_stage_x(const hsep_stage *self); /* true position, m */
+HSEP_API double hsep_stage_x(const hsep_stage *self); /* true position, m */
 
 #endif

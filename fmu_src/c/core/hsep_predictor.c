@@ -16,17 +16,17 @@ static hsep_physics *predictor_physics(hsep_predictor *self)
     return (hsep_physics *)predictor_at(self, self->physics);
 }
 
-hsep_regression *hsep_predictor_regression(hsep_predictor *self)
+HSEP_API hsep_regression *hsep_predictor_regression(hsep_predictor *self)
 {
     return (hsep_regression *)predictor_at(self, self->regression);
 }
 
-const double *hsep_predictor_array(const hsep_predictor *self, uint64_t offset)
+HSEP_API const double *hsep_predictor_array(const hsep_predictor *self, uint64_t offset)
 {
     return (const double *)self + offset;
 }
 
-double hsep_predictor_size(const hsep_predictor_parameters *parameters)
+HSEP_API double hsep_predictor_size(const hsep_predictor_parameters *parameters)
 {
     const double Np = (double)parameters->Np, p = (double)parameters->p, q = (double)parameters->q;
     const double doubles = 5.0 * Np + (Np + q) + (Np + p) + (2.0 + q + p);
@@ -66,7 +66,7 @@ static void predictor_lay_out(hsep_predictor *self, const hsep_predictor_paramet
     self->regression = end;
 }
 
-void hsep_predictor_init(hsep_predictor *self, const hsep_predictor_parameters *parameters, double start)
+HSEP_API void hsep_predictor_init(hsep_predictor *self, const hsep_predictor_parameters *parameters, double start)
 {
     memset(self, 0, sizeof *self);
     predictor_lay_out(self, parameters);
@@ -86,7 +86,7 @@ void hsep_predictor_init(hsep_predictor *self, const hsep_predictor_parameters *
     hsep_regression_init(hsep_predictor_regression(self), 2 + self->q + self->p, parameters->lambda);
 }
 
-int hsep_predictor_valid(const void *block, const hsep_predictor_parameters *parameters)
+HSEP_API int hsep_predictor_valid(const void *block, const hsep_predictor_parameters *parameters)
 {
     const char *bytes = block;
     hsep_predictor expected, got;
@@ -150,7 +150,7 @@ static void predictor_learn(hsep_predictor *self, uint64_t i, double x_meas)
     hsep_regression_fold(hsep_predictor_regression(self));
 }
 
-int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, double x_meas)
+HSEP_API int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, double x_meas)
 {
     const uint64_t i = self->k % self->Np;
     const double relative = x_d_ahead - self->start;
@@ -174,7 +174,7 @@ int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, double x_meas)
     return 1;
 }
 
-void hsep_predictor_read(const hsep_predictor *self, hsep_predictor_outputs *outputs)
+HSEP_API void hsep_predictor_read(const hsep_predictor *self, hsep_predictor_outputs *outputs)
 {
     const uint64_t i = self->k % self->Np;
     outputs->x_d = hsep_predictor_array(self, self->x_d)[i];

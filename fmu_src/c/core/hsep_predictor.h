@@ -15,6 +15,7 @@
 #ifndef HSEP_PREDICTOR_H
 #define HSEP_PREDICTOR_H
 
+#include "hsep_api.h"
 #include "hsep_physics.h"
 #include "hsep_regression.h"
 
@@ -62,25 +63,25 @@ typedef struct {
 } hsep_predictor_outputs;
 
 /* Bytes of the block, counted in double so that no size can overflow. */
-double hsep_predictor_size(const hsep_predictor_parameters *parameters);
+HSEP_API double hsep_predictor_size(const hsep_predictor_parameters *parameters);
 
 /* Fill the block for a drive at rest at start, m. */
-void hsep_predictor_init(hsep_predictor *self, const hsep_predictor_parameters *parameters, double start);
+HSEP_API void hsep_predictor_init(hsep_predictor *self, const hsep_predictor_parameters *parameters, double start);
 
 /* Tell whether a block of bytes, in any alignment and hsep_predictor_size(parameters) long, is one that
  * hsep_predictor_init with these parameters began: its layout is the same and every index lies within it. */
-int hsep_predictor_valid(const void *block, const hsep_predictor_parameters *parameters);
+HSEP_API int hsep_predictor_valid(const void *block, const hsep_predictor_parameters *parameters);
 
 /* Where the factor is, to start warm by hsep_regression_load before the first sample. */
-hsep_regression *hsep_predictor_regression(hsep_predictor *self);
+HSEP_API hsep_regression *hsep_predictor_regression(hsep_predictor *self);
 
 /* Take in sample k, both finite, m, and move on to k + 1; return whether a new window has begun. */
-int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, double x_meas);
+HSEP_API int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, double x_meas);
 
 /* Tell the outputs of the sample that comes next. Constant cost. */
-void hsep_predictor_read(const hsep_predictor *self, hsep_predictor_outputs *outputs);
+HSEP_API void hsep_predictor_read(const hsep_predictor *self, hsep_predictor_outputs *outputs);
 
 /* The array at an offset of the struct, for example hsep_predictor_array(self, self->x_h). */
-const double *hsep_predictor_array(const hsep_predictor *self, uint64_t offset);
+HSEP_API const double *hsep_predictor_array(const hsep_predictor *self, uint64_t offset);
 
 #endif

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <stddef.h>
 
-void hsep_recursion_run(
+HSEP_API void hsep_recursion_run(
     const hsep_recursion *self, const double x[], const double drive[], double e[], uint64_t n, uint64_t first,
     uint64_t last)
 {
@@ -16,7 +16,7 @@ void hsep_recursion_run(
     }
 }
 
-int hsep_recursion_stable(const hsep_recursion *self, double work[])
+HSEP_API int hsep_recursion_stable(const hsep_recursion *self, double work[])
 {
     double *a = work, *next = work + self->p;
     for (uint64_t i = 0; i < self->p; i++) {

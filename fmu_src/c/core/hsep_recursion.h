@@ -6,6 +6,8 @@
 #ifndef HSEP_RECURSION_H
 #define HSEP_RECURSION_H
 
+#include "hsep_api.h"
+
 #include <stdint.h>
 
 typedef struct {
@@ -18,12 +20,12 @@ typedef struct {
 /* Run over the samples first ... last - 1 of n. x: (n + q,), e: (n + p,), m; both hold the past behind the window.
  * drive: (n,), m, what else drives it; NULL for nothing.
  * Cost: p + q + 1 multiply-adds a sample. */
-void hsep_recursion_run(
+HSEP_API void hsep_recursion_run(
     const hsep_recursion *self, const double x[], const double drive[], double e[], uint64_t n, uint64_t first,
     uint64_t last);
 
 /* Whether all roots of z^p - w_e,1 z^(p-1) - ... - w_e,p are inside the unit circle: the Schur-Cohn test by step-down
  * recursion (Jury 1964). work: (2 p,). Cost: p^2 / 2 multiply-adds and p divisions. */
-int hsep_recursion_stable(const hsep_recursion *self, double work[]);
+HSEP_API int hsep_recursion_stable(const hsep_recursion *self, double work[]);
 
 #endif

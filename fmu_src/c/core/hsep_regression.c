@@ -29,14 +29,14 @@ static double *regression_entry(hsep_regression *self, uint64_t i, uint64_t j)
     return regression_tiles(self) + REGRESSION_STRIDE * tile + 4 * (i % REGRESSION_TILE) + j % REGRESSION_TILE;
 }
 
-double hsep_regression_size(uint64_t n)
+HSEP_API double hsep_regression_size(uint64_t n)
 {
     const double n_tiles = floor((double)n / REGRESSION_TILE) + 1.0;
     return (double)sizeof(hsep_regression) +
            (8.0 * n_tiles + 16.0 * n_tiles * (n_tiles + 1.0)) * (double)sizeof(double);
 }
 
-void hsep_regression_init(hsep_regression *self, uint64_t n, double lambda)
+HSEP_API void hsep_regression_init(hsep_regression *self, uint64_t n, double lambda)
 {
     self->n = n;
     self->n_tiles = n / REGRESSION_TILE + 1;
@@ -53,7 +53,7 @@ void hsep_regression_init(hsep_regression *self, uint64_t n, double lambda)
     }
 }
 
-double *hsep_regression_row(hsep_regression *self)
+HSEP_API double *hsep_regression_row(hsep_regression *self)
 {
     return regression_inverse_d(self) + REGRESSION_TILE * self->n_tiles;
 }
@@ -112,7 +112,7 @@ static void regression_rotate(double *tile, int place, double *x, double pivot, 
     }
 }
 
-void hsep_regression_fold(hsep_regression *self)
+HSEP_API void hsep_regression_fold(hsep_regression *self)
 {
     double *inverse_d = regression_inverse_d(self);
     double *x = hsep_regression_row(self);
@@ -161,7 +161,7 @@ void hsep_regression_fold(hsep_regression *self)
     self->n_samples++;
 }
 
-void hsep_regression_solve(const hsep_regression *self, double w[])
+HSEP_API void hsep_regression_solve(const hsep_regression *self, double w[])
 {
     const uint64_t n = self->n, n_tiles = self->n_tiles;
     const double *tile = (const double *)(self + 1) + 2 * REGRESSION_TILE * n_tiles + 16 * n_tiles * (n_tiles + 1);
@@ -191,7 +191,7 @@ void hsep_regression_solve(const hsep_regression *self, double w[])
     }
 }
 
-int hsep_regression_load(hsep_regression *self, uint64_t i)
+HSEP_API int hsep_regression_load(hsep_regression *self, uint64_t i)
 {
     const uint64_t n = self->n;
     const double *row = hsep_regression_row(self);

@@ -13,6 +13,8 @@
 #ifndef HSEP_REGRESSION_H
 #define HSEP_REGRESSION_H
 
+#include "hsep_api.h"
+
 #include <stdint.h>
 
 typedef struct {
@@ -24,26 +26,26 @@ typedef struct {
 } hsep_regression;
 
 /* Bytes of the block, counted in double so that no size can overflow: about 8 n^2. */
-double hsep_regression_size(uint64_t n);
+HSEP_API double hsep_regression_size(uint64_t n);
 
 /* Fill the block for n >= 1 features and lambda > 0, in the unit of a row's entry squared.
  * A lambda below 1e-290 counts as 1e-290, so that its reciprocal is a number. */
-void hsep_regression_init(hsep_regression *self, uint64_t n, double lambda);
+HSEP_API void hsep_regression_init(hsep_regression *self, uint64_t n, double lambda);
 
 /* Where the next row goes, (n + 1,): phi, then its target. */
-double *hsep_regression_row(hsep_regression *self);
+HSEP_API double *hsep_regression_row(hsep_regression *self);
 
 /* Fold that row into the factor; the row's memory is used up. All n + 1 entries must be finite.
  * Cost: n^2 / 2 times 2 multiplications and 5 additions, and 2 n divisions, no matter how many rows were there
  * before; in scalar instead of vector instructions for rows that outweigh all before them, as the first ones do. */
-void hsep_regression_fold(hsep_regression *self);
+HSEP_API void hsep_regression_fold(hsep_regression *self);
 
 /* Solve R w = z for w, (n,). Cost: n^2 / 2 multiply-adds. */
-void hsep_regression_solve(const hsep_regression *self, double w[]);
+HSEP_API void hsep_regression_solve(const hsep_regression *self, double w[]);
 
 /* Take over row i of a factor [R z; 0 rho], its entries i ... n, which the caller has put where
  * hsep_regression_row tells. All n + 1 rows make a factor. Fails, and returns 0 with the factor unchanged, if an entry
  * is not finite or a diagonal entry of R is 0. Cost: n divisions. */
-int hsep_regression_load(hsep_regression *self, uint64_t i);
+HSEP_API int hsep_regression_load(hsep_regression *self, uint64_t i);
 
 #endif

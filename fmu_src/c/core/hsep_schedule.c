@@ -5,7 +5,7 @@
 static const int schedule_shifts[HSEP_SCHEDULED] = {-40, -30, -20, -15, -10, -5, 0, 5, 10, 15, 20, 30, 40};
 static const double schedule_scale = 1e-3; /* m: friction up to this is hardly damped by a usual lambda */
 
-void hsep_schedule_signs(double signs[], const double reference[], uint64_t n, double last, double step)
+HSEP_API void hsep_schedule_signs(double signs[], const double reference[], uint64_t n, double last, double step)
 {
     for (uint64_t k = 0; k < n; k++) {
         signs[HSEP_SCHEDULE_REACH + k] = tanh((reference[k] - last) / step);
@@ -16,7 +16,7 @@ void hsep_schedule_signs(double signs[], const double reference[], uint64_t n, d
     }
 }
 
-void hsep_schedule_features(const double signs[], uint64_t k, double features[HSEP_SCHEDULED])
+HSEP_API void hsep_schedule_features(const double signs[], uint64_t k, double features[HSEP_SCHEDULED])
 {
     const double *now = signs + HSEP_SCHEDULE_REACH + k;
     for (int i = 0; i < HSEP_SCHEDULED; i++) {
@@ -24,7 +24,7 @@ void hsep_schedule_features(const double signs[], uint64_t k, double features[HS
     }
 }
 
-void hsep_schedule_next(double signs[], uint64_t n)
+HSEP_API void hsep_schedule_next(double signs[], uint64_t n)
 {
     for (uint64_t k = 0; k < HSEP_SCHEDULE_REACH; k++) {
         signs[k] = signs[k + n];

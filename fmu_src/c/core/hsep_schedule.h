@@ -7,6 +7,8 @@
 #ifndef HSEP_SCHEDULE_H
 #define HSEP_SCHEDULE_H
 
+#include "hsep_api.h"
+
 #include <stdint.h>
 
 #define HSEP_SCHEDULED 13       /* features */
@@ -14,12 +16,12 @@
 
 /* Fill the signs of n samples of the reference, m, and what follows them, which is at rest. last: the reference one
  * sample before, m; step: v_s T_s, m. Cost: n tanh. */
-void hsep_schedule_signs(double signs[], const double reference[], uint64_t n, double last, double step);
+HSEP_API void hsep_schedule_signs(double signs[], const double reference[], uint64_t n, double last, double step);
 
 /* The features of sample k, m. */
-void hsep_schedule_features(const double signs[], uint64_t k, double features[HSEP_SCHEDULED]);
+HSEP_API void hsep_schedule_features(const double signs[], uint64_t k, double features[HSEP_SCHEDULED]);
 
 /* Move on by n samples. */
-void hsep_schedule_next(double signs[], uint64_t n);
+HSEP_API void hsep_schedule_next(double signs[], uint64_t n);
 
 #endif

@@ -7,14 +7,14 @@ static const double sensor_steps = 5.0;       /* if the drive has moved by so ma
 static const double sensor_first_step = 1e-5; /* m, taken for the step of a sensor that has not changed yet, */
 static const double sensor_still = 1e-8;      /* m, and by more than this */
 
-void hsep_sensor_init(hsep_sensor *self)
+HSEP_API void hsep_sensor_init(hsep_sensor *self)
 {
     self->value = NAN;
     self->repeats = self->low = self->high = 0.0;
     self->step = HUGE_VAL;
 }
 
-int hsep_sensor_misses(hsep_sensor *self, double x_meas, double x_pb)
+HSEP_API int hsep_sensor_misses(hsep_sensor *self, double x_meas, double x_pb)
 {
     if (!(x_meas == self->value)) {
         if (!isnan(self->value)) {

@@ -7,6 +7,8 @@
 #ifndef HSEP_SENSOR_H
 #define HSEP_SENSOR_H
 
+#include "hsep_api.h"
+
 typedef struct {
     double value;     /* m, the last one; NaN before the first */
     double repeats;   /* how often it came in a row */
@@ -14,9 +16,9 @@ typedef struct {
     double step;      /* m, the smallest change ever; infinite before the first */
 } hsep_sensor;
 
-void hsep_sensor_init(hsep_sensor *self);
+HSEP_API void hsep_sensor_init(hsep_sensor *self);
 
 /* Take in a measurement and the prediction of it, m; return whether it is no measurement. */
-int hsep_sensor_misses(hsep_sensor *self, double x_meas, double x_pb);
+HSEP_API int hsep_sensor_misses(hsep_sensor *self, double x_meas, double x_pb);
 
 #endif

@@ -4,7 +4,7 @@
 
 static double *splines_table(hsep_splines *self) { return (double *)(self + 1); }
 
-const double *hsep_splines_shape(const hsep_splines *self) { return (const double *)(self + 1); }
+HSEP_API const double *hsep_splines_shape(const hsep_splines *self) { return (const double *)(self + 1); }
 
 /* The differences of an order of one spline, in shares, (4 spacing + order,); the first one is 0. */
 static const double *splines_differences(const hsep_splines *self, unsigned order)
@@ -14,12 +14,12 @@ static const double *splines_differences(const hsep_splines *self, unsigned orde
 
 static uint64_t splines_length(const hsep_splines *self, unsigned order) { return 4 * self->spacing + order; }
 
-uint64_t hsep_splines_count(uint64_t preview, uint64_t spacing)
+HSEP_API uint64_t hsep_splines_count(uint64_t preview, uint64_t spacing)
 {
     return (preview - 4 * spacing - HSEP_DECIDED) / spacing + 1;
 }
 
-double hsep_splines_size(uint64_t spacing)
+HSEP_API double hsep_splines_size(uint64_t spacing)
 {
     const double width = 4.0 * (double)spacing;
     return (double)sizeof(hsep_splines) + (width + HSEP_ORDERS * (width + 3.0)) * (double)sizeof(double);
@@ -34,7 +34,7 @@ static double splines_b(double u)
     return u < 1.0 ? u * u * u / 6.0 : (((-3.0 * u + 12.0) * u - 12.0) * u + 4.0) / 6.0;
 }
 
-void hsep_splines_init(hsep_splines *self, uint64_t preview, uint64_t spacing, const double limit[HSEP_ORDERS])
+HSEP_API void hsep_splines_init(hsep_splines *self, uint64_t preview, uint64_t spacing, const double limit[HSEP_ORDERS])
 {
     self->preview = preview;
     self->spacing = spacing;
@@ -59,7 +59,7 @@ void hsep_splines_init(hsep_splines *self, uint64_t preview, uint64_t spacing, c
     }
 }
 
-double hsep_splines_sum(const hsep_splines *self, const double c[], uint64_t count, uint64_t k)
+HSEP_API double hsep_splines_sum(const hsep_splines *self, const double c[], uint64_t count, uint64_t k)
 {
     const double *b = hsep_splines_shape(self);
     const uint64_t place = k / self->spacing, within = k % self->spacing;
@@ -70,7 +70,7 @@ double hsep_splines_sum(const hsep_splines *self, const double c[], uint64_t cou
     return sum;
 }
 
-void hsep_splines_rows(const hsep_splines *self, const double c[], uint64_t first, double rows[])
+HSEP_API void hsep_splines_rows(const hsep_splines *self, const double c[], uint64_t first, double rows[])
 {
     const double *b = hsep_splines_shape(self);
     const uint64_t preview = self->preview, spacing = self->spacing, count = self->n - first;
@@ -96,14 +96,14 @@ void hsep_splines_rows(const hsep_splines *self, const double c[], uint64_t firs
     }
 }
 
-void hsep_splines_touched(
+HSEP_API void hsep_splines_touched(
     const hsep_splines *self, uint64_t first, unsigned order, uint64_t *begin, uint64_t *end)
 {
     *begin = first * self->spacing + 1; /* a spline begins with 0 */
     *end = (self->n - 1) * self->spacing + splines_length(self, order);
 }
 
-void hsep_splines_transpose(const hsep_splines *self, const double rows[], uint64_t first, double g[])
+HSEP_API void hsep_splines_transpose(const hsep_splines *self, const double rows[], uint64_t first, double g[])
 {
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         const double *e = splines_differences(self, order);
@@ -119,7 +119,7 @@ void hsep_splines_transpose(const hsep_splines *self, const double rows[], uint6
     }
 }
 
-void hsep_splines_gram(const hsep_splines *self, const double weights[], uint64_t first, double triangle[])
+HSEP_API void hsep_splines_gram(const hsep_splines *self, const double weights[], uint64_t first, double triangle[])
 {
     const uint64_t spacing = self->spacing;
     for (uint64_t i = first; i < self->n; i++) {
@@ -144,7 +144,7 @@ static double *splines_entry(double triangle[], uint64_t n, uint64_t i, uint64_t
     return triangle + i * n - i * (i + 1) / 2 + j; /* rows 0 ... i - 1 have n, n - 1, ... entries */
 }
 
-void hsep_splines_filtered_gram(const hsep_splines *self, const double filtered[], double triangle[])
+HSEP_API void hsep_splines_filtered_gram(const hsep_splines *self, const double filtered[], double triangle[])
 {
     const uint64_t n = self->n, spacing = self->spacing;
     for (uint64_t d = 0; d < n; d++) {
@@ -160,7 +160,7 @@ void hsep_splines_filtered_gram(const hsep_splines *self, const double filtered[
     }
 }
 
-void hsep_splines_jerk_gram(const hsep_splines *self, double weight, double triangle[])
+HSEP_API void hsep_splines_jerk_gram(const hsep_splines *self, double weight, double triangle[])
 {
     const double *e = splines_differences(self, 3);
     const double unit = 1.0 / self->share[3];
@@ -176,7 +176,7 @@ void hsep_splines_jerk_gram(const hsep_splines *self, double weight, double tria
     }
 }
 
-void hsep_splines_project(
+HSEP_API void hsep_splines_project(
     const hsep_splines *self, const double filtered[], const double target[], double weight, const double third[],
     double v[])
 {

@@ -9,6 +9,8 @@
 #ifndef HSEP_SPLINES_H
 #define HSEP_SPLINES_H
 
+#include "hsep_api.h"
+
 #include <stdint.h>
 
 #define HSEP_ORDERS 4  /* orders of difference: 0, the change itself, to 3, its jerk */
@@ -22,43 +24,44 @@ typedef struct {
 } hsep_splines;
 
 /* How many splines begin in a plan: those that end four samples before it does. preview >= 4 spacing + 3. */
-uint64_t hsep_splines_count(uint64_t preview, uint64_t spacing);
+HSEP_API uint64_t hsep_splines_count(uint64_t preview, uint64_t spacing);
 
-double hsep_splines_size(uint64_t spacing); /* bytes of the block, counted in double */
+HSEP_API double hsep_splines_size(uint64_t spacing); /* bytes of the block, counted in double */
 
 /* Fill the block. limit: of the change, m, and of its differences of orders 1 to 3, m a sample to that power. */
-void hsep_splines_init(hsep_splines *self, uint64_t preview, uint64_t spacing, const double limit[HSEP_ORDERS]);
+HSEP_API void hsep_splines_init(
+    hsep_splines *self, uint64_t preview, uint64_t spacing, const double limit[HSEP_ORDERS]);
 
 /* What the first count splines give at sample k, with coefficients c, (count,), those of the splines -3, -2, -1 first.
  * 4 multiply-adds. */
-double hsep_splines_sum(const hsep_splines *self, const double c[], uint64_t count, uint64_t k);
+HSEP_API double hsep_splines_sum(const hsep_splines *self, const double c[], uint64_t count, uint64_t k);
 
 /* The rows of the splines first ... n - 1 with coefficients c, (n - first,). Cost: 14 operations a sample. */
-void hsep_splines_rows(const hsep_splines *self, const double c[], uint64_t first, double rows[]);
+HSEP_API void hsep_splines_rows(const hsep_splines *self, const double c[], uint64_t first, double rows[]);
 
 /* Row samples that the splines first ... n - 1 touch, of an order: *begin ... *end - 1. */
-void hsep_splines_touched(
+HSEP_API void hsep_splines_touched(
     const hsep_splines *self, uint64_t first, unsigned order, uint64_t *begin, uint64_t *end);
 
 /* g, (n - first,), += what rows, weighted, say of each coefficient: the transpose of hsep_splines_rows. */
-void hsep_splines_transpose(const hsep_splines *self, const double rows[], uint64_t first, double g[]);
+HSEP_API void hsep_splines_transpose(const hsep_splines *self, const double rows[], uint64_t first, double g[]);
 
 /* The triangle of n - first rows += A' diag(weights) A, A being the matrix of hsep_splines_rows. */
-void hsep_splines_gram(const hsep_splines *self, const double weights[], uint64_t first, double triangle[]);
+HSEP_API void hsep_splines_gram(const hsep_splines *self, const double weights[], uint64_t first, double triangle[]);
 
 /* The triangle of n rows := W' W of the splines behind a filter, W's columns being shifts of the filtered spline,
  * (preview,), by one spacing. Each diagonal is a running sum: cost n preview / 2 multiply-adds. */
-void hsep_splines_filtered_gram(const hsep_splines *self, const double filtered[], double triangle[]);
+HSEP_API void hsep_splines_filtered_gram(const hsep_splines *self, const double filtered[], double triangle[]);
 
 /* The triangle of n rows += weight D' D with the third differences D of the splines. */
-void hsep_splines_jerk_gram(const hsep_splines *self, double weight, double triangle[]);
+HSEP_API void hsep_splines_jerk_gram(const hsep_splines *self, double weight, double triangle[]);
 
 /* v, (n,), := W' target - weight D' third, target and third (preview,). */
-void hsep_splines_project(
+HSEP_API void hsep_splines_project(
     const hsep_splines *self, const double filtered[], const double target[], double weight, const double third[],
     double v[]);
 
 /* The spline itself, b, (4 spacing,). */
-const double *hsep_splines_shape(const hsep_splines *self);
+HSEP_API const double *hsep_splines_shape(const hsep_splines *self);
 
 #endif

@@ -3,6 +3,8 @@
 #ifndef HSEP_TRAJECTORY_H
 #define HSEP_TRAJECTORY_H
 
+#include "hsep_api.h"
+
 #include <stdint.h>
 
 typedef struct {
@@ -10,11 +12,11 @@ typedef struct {
     /* followed by double[count], m */
 } hsep_trajectory;
 
-double hsep_trajectory_size(uint64_t count); /* bytes of the block, counted in double */
+HSEP_API double hsep_trajectory_size(uint64_t count); /* bytes of the block, counted in double */
 
-double *hsep_trajectory_samples(hsep_trajectory *self); /* (count,), m, to be filled by the caller */
+HSEP_API double *hsep_trajectory_samples(hsep_trajectory *self); /* (count,), m, to be filled by the caller */
 
 /* Return the commanded position at sample k >= 0, m. */
-double hsep_trajectory_position(const hsep_trajectory *self, int64_t k);
+HSEP_API double hsep_trajectory_position(const hsep_trajectory *self, int64_t k);
 
 #endif

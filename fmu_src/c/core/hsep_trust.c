@@ -4,7 +4,7 @@ static const double trust_forget = 0.9;      /* share of the past windows that i
 static const double trust_noise_share = 0.5; /* at rest both models predict the same noise: it must not decide */
 static const double trust_worst = 2.0;       /* a bad start must not be remembered for ever */
 
-void hsep_trust_observe(
+HSEP_API void hsep_trust_observe(
     hsep_trust *self, const double e_pb[], const double e_h[], uint64_t n, double noise_variance)
 {
     double physics = 0.0, hybrid = 0.0;

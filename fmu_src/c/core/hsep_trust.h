@@ -3,6 +3,8 @@
 #ifndef HSEP_TRUST_H
 #define HSEP_TRUST_H
 
+#include "hsep_api.h"
+
 #include <stdint.h>
 
 typedef struct {
@@ -11,7 +13,7 @@ typedef struct {
 
 /* Take in a measured window. e_pb: measured residuals of the physics model, e_h: what the hybrid model predicted of
  * them, both (n,), m; noise_variance: of what no model explains, m2. */
-void hsep_trust_observe(
+HSEP_API void hsep_trust_observe(
     hsep_trust *self, const double e_pb[], const double e_h[], uint64_t n, double noise_variance);
 
 #endif

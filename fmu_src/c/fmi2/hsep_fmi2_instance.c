@@ -12,20 +12,20 @@ enum { HSEP_WINDOWS = 1 };
 enum { HSEP_WINDOWS = 0 };
 #endif
 
-void *hsep_new(const hsep_instance *instance, size_t size)
+HSEP_API void *hsep_new(const hsep_instance *instance, size_t size)
 {
     void *block = instance->allocate(1, size);
     return (block == NULL) ? NULL : memset(block, 0, size);
 }
 
-void hsep_delete(const hsep_instance *instance, void *block)
+HSEP_API void hsep_delete(const hsep_instance *instance, void *block)
 {
     if (block != NULL) {
         instance->release(block);
     }
 }
 
-void hsep_drop_state(hsep_instance *instance)
+HSEP_API void hsep_drop_state(hsep_instance *instance)
 {
     hsep_delete(instance, instance->state);
     instance->state = NULL;

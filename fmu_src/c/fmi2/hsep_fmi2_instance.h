@@ -2,11 +2,13 @@
 #ifndef HSEP_FMI2_INSTANCE_H
 #define HSEP_FMI2_INSTANCE_H
 
-#include <stddef.h>
+#include "hsep_api.h"
+#include "hsep_fmi2_calls.h"
+#include "hsep_fmu.h" /* before the importer's header: it names FMI2_FUNCTION_PREFIX */
 
 #include "fmi2Functions.h"
-#include "hsep_fmi2_calls.h"
-#include "hsep_fmu.h"
+
+#include <stddef.h>
 
 /* The log categories of modelDescription.xml, one bit each. */
 typedef enum {
@@ -42,21 +44,21 @@ typedef struct {
 } hsep_instance;
 
 /* The instance if the call is legal now; otherwise NULL, and why not is logged. */
-hsep_instance *hsep_begin(fmi2Component component, hsep_call call);
+HSEP_API hsep_instance *hsep_begin(fmi2Component component, hsep_call call);
 
 /* Hand a message, formatted as printf does, to the importer's logger if its category is on. */
-void hsep_log(hsep_instance *instance, hsep_category category, const char *format, ...);
+HSEP_API void hsep_log(hsep_instance *instance, hsep_category category, const char *format, ...);
 
 /* Log an error and return fmi2Error. */
-fmi2Status hsep_refuse(hsep_instance *instance, const char *format, ...);
+HSEP_API fmi2Status hsep_refuse(hsep_instance *instance, const char *format, ...);
 
 /* A zeroed block from the importer's memory; NULL if there is none left. */
-void *hsep_new(const hsep_instance *instance, size_t size);
+HSEP_API void *hsep_new(const hsep_instance *instance, size_t size);
 
 /* Give a block back; NULL is fine. */
-void hsep_delete(const hsep_instance *instance, void *block);
+HSEP_API void hsep_delete(const hsep_instance *instance, void *block);
 
 /* Forget the model's state. */
-void hsep_drop_state(hsep_instance *instance);
+HSEP_API void hsep_drop_state(hsep_instance *instance);
 
 #endif

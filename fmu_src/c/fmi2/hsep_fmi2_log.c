@@ -43,7 +43,7 @@ static void hsep_log_list(hsep_instance *instance, hsep_category category, const
         hsep_category_status[place], hsep_category_names[place], escaped);
 }
 
-void hsep_log(hsep_instance *instance, hsep_category category, const char *format, ...)
+HSEP_API void hsep_log(hsep_instance *instance, hsep_category category, const char *format, ...)
 {
     va_list arguments;
     va_start(arguments, format);
@@ -51,7 +51,7 @@ void hsep_log(hsep_instance *instance, hsep_category category, const char *forma
     va_end(arguments);
 }
 
-fmi2Status hsep_refuse(hsep_instance *instance, const char *format, ...)
+HSEP_API fmi2Status hsep_refuse(hsep_instance *instance, const char *format, ...)
 {
     va_list arguments;
     va_start(arguments, format);
@@ -74,7 +74,7 @@ static const char *hsep_phase_name(unsigned phase)
     }
 }
 
-hsep_instance *hsep_begin(fmi2Component component, hsep_call call)
+HSEP_API hsep_instance *hsep_begin(fmi2Component component, hsep_call call)
 {
     hsep_instance *instance = component;
     const hsep_call_row *row = &hsep_calls[call];

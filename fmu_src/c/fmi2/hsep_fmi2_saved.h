@@ -8,6 +8,7 @@
 #ifndef HSEP_FMI2_SAVED_H
 #define HSEP_FMI2_SAVED_H
 
+#include "hsep_api.h"
 #include "hsep_fmi2_instance.h"
 
 #include <stdint.h>
@@ -43,12 +44,12 @@ typedef struct {
 enum { HSEP_VALUES_SIZE = HSEP_N_VALUES * sizeof(double), HSEP_FIXED_SIZE = sizeof(hsep_header) + HSEP_VALUES_SIZE };
 
 /* The saved state behind a handle; NULL, with a message, if there is none. */
-hsep_saved *hsep_saved_of(hsep_instance *instance, hsep_call call, fmi2FMUstate state);
+HSEP_API hsep_saved *hsep_saved_of(hsep_instance *instance, hsep_call call, fmi2FMUstate state);
 
 /* saved if it has room for size bytes, otherwise a new one to take its place; NULL if there is no memory. */
-hsep_saved *hsep_room(hsep_instance *instance, hsep_saved *saved, size_t size);
+HSEP_API hsep_saved *hsep_room(hsep_instance *instance, hsep_saved *saved, size_t size);
 
 /* Give a saved state back. */
-void hsep_free_saved(hsep_saved *saved);
+HSEP_API void hsep_free_saved(hsep_saved *saved);
 
 #endif

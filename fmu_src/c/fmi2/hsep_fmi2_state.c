@@ -21,7 +21,7 @@ static hsep_header hsep_header_of(const hsep_instance *instance)
     return header;
 }
 
-hsep_saved *hsep_saved_of(hsep_instance *instance, hsep_call call, fmi2FMUstate state)
+HSEP_API hsep_saved *hsep_saved_of(hsep_instance *instance, hsep_call call, fmi2FMUstate state)
 {
     hsep_saved *saved = state;
     if (saved == NULL) {
@@ -33,13 +33,13 @@ hsep_saved *hsep_saved_of(hsep_instance *instance, hsep_call call, fmi2FMUstate 
     return saved;
 }
 
-void hsep_free_saved(hsep_saved *saved)
+HSEP_API void hsep_free_saved(hsep_saved *saved)
 {
     memset(saved->magic, 0, sizeof saved->magic);
     saved->release(saved);
 }
 
-hsep_saved *hsep_room(hsep_instance *instance, hsep_saved *saved, size_t size)
+HSEP_API hsep_saved *hsep_room(hsep_instance *instance, hsep_saved *saved, size_t size)
 {
     if (saved != NULL && saved->capacity >= size) {
         return saved;

@@ -48,7 +48,7 @@ static char *hsep_decode(const char *text, char *end)
     return end;
 }
 
-int hsep_uri_folder(const char *uri, int windows, char *folder)
+HSEP_API int hsep_uri_folder(const char *uri, int windows, char *folder)
 {
     char *end = folder;
     if (hsep_begins(uri, "file:")) {

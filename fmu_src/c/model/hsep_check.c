@@ -8,7 +8,7 @@
 
 static const double check_warm_up_tolerance = 1e-6; /* samples */
 
-void hsep_message_add(char message[], const char *format, ...)
+HSEP_API void hsep_message_add(char message[], const char *format, ...)
 {
     size_t used = strlen(message);
     if (used > 0 && used + 2 < HSEP_MESSAGE_SIZE) {
@@ -34,7 +34,7 @@ void hsep_message_add(char message[], const char *format, ...)
     }
 }
 
-const char *hsep_number(char text[HSEP_NUMBER_SIZE], double value, hsep_kind kind)
+HSEP_API const char *hsep_number(char text[HSEP_NUMBER_SIZE], double value, hsep_kind kind)
 {
     if (!isfinite(value)) {
         memcpy(text, isnan(value) ? "nan\0" : value > 0.0 ? "inf\0" : "-inf", 5);
@@ -72,7 +72,7 @@ static void check_range_text(char text[], size_t size, const hsep_variable *v)
     }
 }
 
-int hsep_check_parameters(const hsep_context *context, const double values[], char message[])
+HSEP_API int hsep_check_parameters(const hsep_context *context, const double values[], char message[])
 {
     char number[HSEP_NUMBER_SIZE], range[96];
     int problems = 0;
@@ -98,7 +98,7 @@ int hsep_check_parameters(const hsep_context *context, const double values[], ch
     return problems;
 }
 
-int hsep_check_lags(double Np, double p, double q, char message[])
+HSEP_API int hsep_check_lags(double Np, double p, double q, char message[])
 {
     int problems = 0;
     if (!(p >= 1.0 && p <= Np)) {
@@ -113,7 +113,7 @@ int hsep_check_lags(double Np, double p, double q, char message[])
     return problems;
 }
 
-double hsep_warm_up_samples(double t_init, double T_s, char message[])
+HSEP_API double hsep_warm_up_samples(double t_init, double T_s, char message[])
 {
     char time[HSEP_NUMBER_SIZE], interval[HSEP_NUMBER_SIZE];
     const double count = t_init / T_s;
@@ -126,7 +126,7 @@ double hsep_warm_up_samples(double t_init, double T_s, char message[])
     return fmax(0.0, ceil(count - check_warm_up_tolerance));
 }
 
-hsep_status hsep_check_start_time(double t_start, char message[])
+HSEP_API hsep_status hsep_check_start_time(double t_start, char message[])
 {
     char number[HSEP_NUMBER_SIZE];
     if (isfinite(t_start)) {
@@ -136,7 +136,7 @@ hsep_status hsep_check_start_time(double t_start, char message[])
     return HSEP_REFUSED;
 }
 
-hsep_status hsep_check_clock(hsep_clock *clock, double t_start, double T_s, char message[])
+HSEP_API hsep_status hsep_check_clock(hsep_clock *clock, double t_start, double T_s, char message[])
 {
     if (hsep_check_start_time(t_start, message) != HSEP_OK) {
         return HSEP_REFUSED;
@@ -149,7 +149,7 @@ hsep_status hsep_check_clock(hsep_clock *clock, double t_start, double T_s, char
     return HSEP_OK;
 }
 
-hsep_status hsep_check_step_size(double h, char message[])
+HSEP_API hsep_status hsep_check_step_size(double h, char message[])
 {
     char number[HSEP_NUMBER_SIZE];
     if (h > 0.0 && h <= HSEP_CLOCK_STEP_MAX) {
@@ -161,7 +161,7 @@ hsep_status hsep_check_step_size(double h, char message[])
     return HSEP_REFUSED;
 }
 
-hsep_status hsep_check_step(const hsep_clock *clock, double t, double h, hsep_clock_step *step, char message[])
+HSEP_API hsep_status hsep_check_step(const hsep_clock *clock, double t, double h, hsep_clock_step *step, char message[])
 {
     char number[HSEP_NUMBER_SIZE];
     if (hsep_check_step_size(h, message) != HSEP_OK) {
@@ -176,7 +176,7 @@ hsep_status hsep_check_step(const hsep_clock *clock, double t, double h, hsep_cl
     return HSEP_OK;
 }
 
-void hsep_modes_read(const double values[], size_t n, hsep_mode modes[])
+HSEP_API void hsep_modes_read(const double values[], size_t n, hsep_mode modes[])
 {
     for (size_t i = 0; i < n; i++) {
         const double *mode = &values[4 * i];

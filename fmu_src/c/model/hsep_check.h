@@ -3,6 +3,7 @@
 #ifndef HSEP_CHECK_H
 #define HSEP_CHECK_H
 
+#include "hsep_api.h"
 #include "hsep_clock.h"
 #include "hsep_model.h"
 #include "hsep_physics.h"
@@ -18,34 +19,34 @@
 #define HSEP_PLUS_MINUS "\xc2\xb1"
 
 /* Add a problem, formatted as by printf, to a message; "; " goes between two. */
-void hsep_message_add(char message[], const char *format, ...);
+HSEP_API void hsep_message_add(char message[], const char *format, ...);
 
 /* Write the shortest decimal number that reads back as value, whole ones of a real with ".0"; return text. */
-const char *hsep_number(char text[HSEP_NUMBER_SIZE], double value, hsep_kind kind);
+HSEP_API const char *hsep_number(char text[HSEP_NUMBER_SIZE], double value, hsep_kind kind);
 
 /* Check every parameter alone, the range being the table's; return how many are wrong, each added to message. */
-int hsep_check_parameters(const hsep_context *context, const double values[], char message[]);
+HSEP_API int hsep_check_parameters(const hsep_context *context, const double values[], char message[]);
 
 /* Check 1 <= p <= Np and 0 <= q < Np; return how many are wrong, each added to message. */
-int hsep_check_lags(double Np, double p, double q, char message[]);
+HSEP_API int hsep_check_lags(double Np, double p, double q, char message[]);
 
 /* Return how many samples have t < t_init, counted in samples so that rounding of times cannot tell; whole, >= 0.
  * Fails, and returns a negative number with message set, if they are too many to be counted. */
-double hsep_warm_up_samples(double t_init, double T_s, char message[]);
+HSEP_API double hsep_warm_up_samples(double t_init, double T_s, char message[]);
 
 /* Check that the simulation starts at a number. */
-hsep_status hsep_check_start_time(double t_start, char message[]);
+HSEP_API hsep_status hsep_check_start_time(double t_start, char message[]);
 
 /* Check the start time and begin to count samples of T_s, s, from there. */
-hsep_status hsep_check_clock(hsep_clock *clock, double t_start, double T_s, char message[]);
+HSEP_API hsep_status hsep_check_clock(hsep_clock *clock, double t_start, double T_s, char message[]);
 
 /* Check the size of a communication step, s. */
-hsep_status hsep_check_step_size(double h, char message[]);
+HSEP_API hsep_status hsep_check_step_size(double h, char message[]);
 
 /* Check that the step from t by h, s, comes next, and count it. */
-hsep_status hsep_check_step(const hsep_clock *clock, double t, double h, hsep_clock_step *step, char message[]);
+HSEP_API hsep_status hsep_check_step(const hsep_clock *clock, double t, double h, hsep_clock_step *step, char message[]);
 
 /* Read n modes from the values of mode[i].f_n, .zeta, .alpha and .beta, which have been checked. */
-void hsep_modes_read(const double values[], size_t n, hsep_mode modes[]);
+HSEP_API void hsep_modes_read(const double values[], size_t n, hsep_mode modes[]);
 
 #endif

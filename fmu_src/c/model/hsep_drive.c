@@ -6,7 +6,7 @@
 
 static const double drive_seed_max = 2147483647.0;
 
-hsep_status hsep_drive_check(double x_d, double t, double h, char message[])
+HSEP_API hsep_status hsep_drive_check(double x_d, double t, double h, char message[])
 {
     char number[HSEP_NUMBER_SIZE];
     if (!isfinite(x_d)) {
@@ -20,7 +20,7 @@ hsep_status hsep_drive_check(double x_d, double t, double h, char message[])
     return HSEP_REFUSED;
 }
 
-hsep_status hsep_drive_check_start(double x_d, char message[])
+HSEP_API hsep_status hsep_drive_check_start(double x_d, char message[])
 {
     char number[HSEP_NUMBER_SIZE];
     if (isfinite(x_d)) {
@@ -30,7 +30,7 @@ hsep_status hsep_drive_check_start(double x_d, char message[])
     return HSEP_REFUSED;
 }
 
-double hsep_drive_first_measurement(double noise_std, double seed, double x)
+HSEP_API double hsep_drive_first_measurement(double noise_std, double seed, double x)
 {
     if (!(noise_std >= 0.0 && isfinite(noise_std) && seed >= 0.0 && seed <= drive_seed_max)) {
         return x;
@@ -40,7 +40,7 @@ double hsep_drive_first_measurement(double noise_std, double seed, double x)
     return hsep_encoder_measure(&encoder, x);
 }
 
-hsep_status hsep_drive_lost(double x, double x_d, char message[])
+HSEP_API hsep_status hsep_drive_lost(double x, double x_d, char message[])
 {
     char number[HSEP_NUMBER_SIZE];
     hsep_message_add(

@@ -2,19 +2,20 @@
 #ifndef HSEP_DRIVE_H
 #define HSEP_DRIVE_H
 
+#include "hsep_api.h"
 #include "hsep_encoder.h"
 #include "hsep_model.h"
 
 /* Check the command x_d, m, and the step from t by h, s; a step is at most 100 s long, which bounds its cost. */
-hsep_status hsep_drive_check(double x_d, double t, double h, char message[]);
+HSEP_API hsep_status hsep_drive_check(double x_d, double t, double h, char message[]);
 
 /* Check the start value of the command. */
-hsep_status hsep_drive_check_start(double x_d, char message[]);
+HSEP_API hsep_status hsep_drive_check_start(double x_d, char message[]);
 
 /* The first measurement of a drive at rest at x, m; x itself if noise_std or seed is out of range. */
-double hsep_drive_first_measurement(double noise_std, double seed, double x);
+HSEP_API double hsep_drive_first_measurement(double noise_std, double seed, double x);
 
 /* Refuse a step that led out of the range of numbers, to the position x, m. */
-hsep_status hsep_drive_lost(double x, double x_d, char message[]);
+HSEP_API hsep_status hsep_drive_lost(double x, double x_d, char message[]);
 
 #endif

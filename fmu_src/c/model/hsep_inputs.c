@@ -6,7 +6,7 @@
 
 static const double inputs_position_max = 1e3; /* m */
 
-hsep_status hsep_inputs_init(hsep_inputs *self, double t_start, double T_s, double start, char message[])
+HSEP_API hsep_status hsep_inputs_init(hsep_inputs *self, double t_start, double T_s, double start, char message[])
 {
     char number[HSEP_NUMBER_SIZE];
     if (!isfinite(start)) {
@@ -58,7 +58,7 @@ static double inputs_last(const hsep_clock_step *counted)
     return counted->first + (double)(counted->n_latched - 1) * counted->after.T_s;
 }
 
-hsep_status hsep_inputs_count(
+HSEP_API hsep_status hsep_inputs_count(
     const hsep_inputs *self, hsep_input x_d_ahead, hsep_input x_meas, double t, double h, hsep_inputs_step *step,
     char message[])
 {
@@ -87,7 +87,7 @@ hsep_status hsep_inputs_count(
     return HSEP_OK;
 }
 
-int hsep_inputs_next(hsep_inputs *self, hsep_inputs_step *step)
+HSEP_API int hsep_inputs_next(hsep_inputs *self, hsep_inputs_step *step)
 {
     if (self->clock.latched == 0 && step->n_latched < step->counted.n_latched) {
         const double after = step->counted.first + (double)step->n_latched * self->clock.T_s;
@@ -105,7 +105,7 @@ int hsep_inputs_next(hsep_inputs *self, hsep_inputs_step *step)
     return 0;
 }
 
-int hsep_inputs_valid(const hsep_inputs *self, double T_s, uint64_t k)
+HSEP_API int hsep_inputs_valid(const hsep_inputs *self, double T_s, uint64_t k)
 {
     return hsep_clock_valid(&self->clock) && self->clock.T_s == T_s && (uint64_t)self->clock.k == k;
 }

@@ -7,6 +7,7 @@
 #ifndef HSEP_INPUTS_H
 #define HSEP_INPUTS_H
 
+#include "hsep_api.h"
 #include "hsep_clock.h"
 #include "hsep_model.h"
 
@@ -30,18 +31,18 @@ typedef struct {
 
 /* Begin at t_start, s, with the drive at rest at start, m. Fails if one of them is not finite, the time is too large to
  * count samples from, or the start is further out than any machine is. */
-hsep_status hsep_inputs_init(hsep_inputs *self, double t_start, double T_s, double start, char message[]);
+HSEP_API hsep_status hsep_inputs_init(hsep_inputs *self, double t_start, double T_s, double start, char message[]);
 
 /* Count a step from t by h, s, and check the inputs that it latches; self is unchanged. Fails if one of them cannot be
  * taken in, or t and h do not fit. HSEP_WARNED: an instant is no communication point. */
-hsep_status hsep_inputs_count(
+HSEP_API hsep_status hsep_inputs_count(
     const hsep_inputs *self, hsep_input x_d_ahead, hsep_input x_meas, double t, double h, hsep_inputs_step *step,
     char message[]);
 
 /* Go on in a counted step: return 1 with the next sample to execute in x_d_ahead and x_meas, 0 when the step is done. */
-int hsep_inputs_next(hsep_inputs *self, hsep_inputs_step *step);
+HSEP_API int hsep_inputs_next(hsep_inputs *self, hsep_inputs_step *step);
 
 /* Whether inputs that were read from a state count samples of T_s, s, within their bounds, and are at sample k. */
-int hsep_inputs_valid(const hsep_inputs *self, double T_s, uint64_t k);
+HSEP_API int hsep_inputs_valid(const hsep_inputs *self, double T_s, uint64_t k);
 
 #endif

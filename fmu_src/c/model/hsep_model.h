@@ -12,6 +12,8 @@
 #ifndef HSEP_MODEL_H
 #define HSEP_MODEL_H
 
+#include "hsep_api.h"
+
 #include <stddef.h>
 
 #define HSEP_MESSAGE_SIZE 512 /* bytes of a message buffer, the final 0 included */
@@ -48,29 +50,29 @@ typedef struct {
 /* Check the parameters in values, alone and together, and tell how many bytes of state they need.
  * Fails with a message that names every parameter that is out of its range, the range and what came.
  * ReferenceTrajectory looks up the number of samples in its resource for that. */
-hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[]);
+HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[]);
 
 /* Fill the state (size bytes, zeroed, aligned for double) for t_start; outputs and locals of t_start go to values.
  * Reads the resources, as hsep_model_size and hsep_model_start_values do; no step touches a file.
  * Fails if a start value is not finite or a resource cannot be read. */
-hsep_status hsep_model_initialise(
+HSEP_API hsep_status hsep_model_initialise(
     const hsep_context *context, void *state, double values[], double t_start, char message[]);
 
 /* Do one communication step from t by h with the inputs in values; outputs and locals go to values.
  * Fails, with state and values unchanged, if an input is not finite or t and h do not fit.
  * Warns if inputs are read at an instant that is no communication point.
  * Cost: bounded by the parameters and h/T_s, the same at the first and at the 10^9th call; allocates nothing. */
-hsep_status hsep_model_step(
+HSEP_API hsep_status hsep_model_step(
     const hsep_context *context, void *state, double values[], double t, double h, char message[]);
 
 /* Write outputs and locals as they follow from inputs and parameters before hsep_model_initialise.
  * Cannot fail: parameters that are out of range, and resources that are missing, leave start values. What a model that
  * starts warm has planned for its first window, x_h, e_servo and sep_state of SepCompensator, follows when the
  * initialization ends. */
-void hsep_model_start_values(const hsep_context *context, double values[]);
+HSEP_API void hsep_model_start_values(const hsep_context *context, double values[]);
 
 /* Check that a block of bytes is a state of this model for the parameters in values; message says why not. */
-hsep_status hsep_model_check_state(
+HSEP_API hsep_status hsep_model_check_state(
     const hsep_context *context, const void *state, size_t size, const double values[], char message[]);
 
 #endif

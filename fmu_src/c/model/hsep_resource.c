@@ -8,7 +8,7 @@
 
 #define RESOURCE_PATH_SIZE 4096 /* characters */
 
-FILE *hsep_resource_open(const hsep_context *context, const char *name)
+HSEP_API FILE *hsep_resource_open(const hsep_context *context, const char *name)
 {
     char path[RESOURCE_PATH_SIZE];
     if (context->resources == NULL) {
@@ -29,7 +29,7 @@ FILE *hsep_resource_open(const hsep_context *context, const char *name)
 #endif
 }
 
-double hsep_resource_head(FILE *file, const char magic[8], uint64_t head[], size_t n_head)
+HSEP_API double hsep_resource_head(FILE *file, const char magic[8], uint64_t head[], size_t n_head)
 {
     char found[8];
     if (fread(found, 1, sizeof found, file) != sizeof found || memcmp(found, magic, sizeof found) != 0 ||

@@ -6,7 +6,7 @@
 #include <stdint.h>
 #include <string.h>
 
-hsep_status hsep_state_size(double bytes, size_t *size, char message[])
+HSEP_API hsep_status hsep_state_size(double bytes, size_t *size, char message[])
 {
     if (!(bytes < 0.5 * (double)SIZE_MAX)) {
         hsep_message_add(
@@ -34,7 +34,7 @@ static uint64_t state_hash(const hsep_context *context, const double values[])
     return hash;
 }
 
-void hsep_state_mark(
+HSEP_API void hsep_state_mark(
     hsep_state_header *header, const hsep_context *context, const double values[], uint64_t kind, size_t size)
 {
     header->kind = kind;
@@ -43,7 +43,7 @@ void hsep_state_mark(
     header->parameters = state_hash(context, values);
 }
 
-hsep_status hsep_state_check(
+HSEP_API hsep_status hsep_state_check(
     const hsep_context *context, const double values[], const void *state, size_t size, uint64_t kind,
     size_t expected, char message[])
 {
@@ -68,7 +68,7 @@ hsep_status hsep_state_check(
     return HSEP_REFUSED;
 }
 
-hsep_status hsep_state_damaged(char message[])
+HSEP_API hsep_status hsep_state_damaged(char message[])
 {
     hsep_message_add(message, "the state does not hold together: it is damaged");
     return HSEP_REFUSED;

@@ -2,6 +2,7 @@
 #ifndef HSEP_STATE_H
 #define HSEP_STATE_H
 
+#include "hsep_api.h"
 #include "hsep_model.h"
 
 #include <stdint.h>
@@ -16,18 +17,18 @@ typedef struct {
 } hsep_state_header;
 
 /* Turn a size that was counted in double into bytes. Fails if it is more than memory can be asked for. */
-hsep_status hsep_state_size(double bytes, size_t *size, char message[]);
+HSEP_API hsep_status hsep_state_size(double bytes, size_t *size, char message[]);
 
 /* Fill the header of a state. */
-void hsep_state_mark(
+HSEP_API void hsep_state_mark(
     hsep_state_header *header, const hsep_context *context, const double values[], uint64_t kind, size_t size);
 
 /* Check the first bytes of what may be a state of that kind and size, in any alignment. */
-hsep_status hsep_state_check(
+HSEP_API hsep_status hsep_state_check(
     const hsep_context *context, const double values[], const void *state, size_t size, uint64_t kind,
     size_t expected, char message[]);
 
 /* Refuse a state whose header fits and whose content does not. */
-hsep_status hsep_state_damaged(char message[]);
+HSEP_API hsep_status hsep_state_damaged(char message[]);
 
 #endif

@@ -9,7 +9,7 @@
 /* Bytes of the triangle of a factor with n features. */
 static double weights_bytes(double n) { return 0.5 * (n + 1.0) * (n + 2.0) * (double)sizeof(double); }
 
-hsep_status hsep_weights_load(
+HSEP_API hsep_status hsep_weights_load(
     const hsep_context *context, uint64_t p, uint64_t q, hsep_regression *regression, char message[])
 {
     FILE *file = hsep_resource_open(context, WEIGHTS_FILE);

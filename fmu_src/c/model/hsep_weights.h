@@ -8,12 +8,13 @@
 #ifndef HSEP_WEIGHTS_H
 #define HSEP_WEIGHTS_H
 
+#include "hsep_api.h"
 #include "hsep_model.h"
 #include "hsep_regression.h"
 
 /* Take over the factor that the resources hold, if they do. Fails if it was learned with another p or q, with or
  * without features of the reference where it is the other way now, or is damaged. */
-hsep_status hsep_weights_load(
+HSEP_API hsep_status hsep_weights_load(
     const hsep_context *context, uint64_t p, uint64_t q, hsep_regression *regression, char message[]);
 
 #endif

@@ -24,7 +24,7 @@ typedef struct {
     hsep_feed_drive drive;
 } feed_drive_state;
 
-hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[])
+HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[])
 {
     message[0] = '\0';
     *size = sizeof(feed_drive_state);
@@ -38,7 +38,7 @@ static void feed_drive_write_outputs(const feed_drive_state *self, double values
     values[HSEP_VR_x_meas] = x_meas;
 }
 
-hsep_status hsep_model_initialise(
+HSEP_API hsep_status hsep_model_initialise(
     const hsep_context *context, void *state, double values[], double t_start, char message[])
 {
     feed_drive_state *self = state;
@@ -61,7 +61,7 @@ hsep_status hsep_model_initialise(
     return HSEP_OK;
 }
 
-hsep_status hsep_model_step(
+HSEP_API hsep_status hsep_model_step(
     const hsep_context *context, void *state, double values[], double t, double h, char message[])
 {
     (void)context;
@@ -79,7 +79,7 @@ hsep_status hsep_model_step(
     return HSEP_OK;
 }
 
-void hsep_model_start_values(const hsep_context *context, double values[])
+HSEP_API void hsep_model_start_values(const hsep_context *context, double values[])
 {
     (void)context;
     const double x = values[HSEP_VR_x_d]; /* the drive rests there */
@@ -88,7 +88,7 @@ void hsep_model_start_values(const hsep_context *context, double values[])
     values[HSEP_VR_x_meas] = hsep_drive_first_measurement(values[HSEP_VR_noise_std], values[HSEP_VR_seed], x);
 }
 
-hsep_status hsep_model_check_state(
+HSEP_API hsep_status hsep_model_check_state(
     const hsep_context *context, const void *state, size_t size, const double values[], char message[])
 {
     size_t expected = 0;

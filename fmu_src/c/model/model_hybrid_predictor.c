@@ -60,7 +60,7 @@ static hsep_status predictor_checked(
     return HSEP_OK;
 }
 
-hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[])
+HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[])
 {
     hsep_mode modes[HSEP_N_MODES];
     hsep_predictor_parameters parameters;
@@ -96,7 +96,7 @@ static void predictor_write_windows(const hsep_predictor *predictor, double valu
     }
 }
 
-hsep_status hsep_model_initialise(
+HSEP_API hsep_status hsep_model_initialise(
     const hsep_context *context, void *state, double values[], double t_start, char message[])
 {
     predictor_state *self = state;
@@ -119,7 +119,7 @@ hsep_status hsep_model_initialise(
     return HSEP_OK;
 }
 
-hsep_status hsep_model_step(
+HSEP_API hsep_status hsep_model_step(
     const hsep_context *context, void *state, double values[], double t, double h, char message[])
 {
     (void)context;
@@ -145,7 +145,7 @@ hsep_status hsep_model_step(
     return status;
 }
 
-void hsep_model_start_values(const hsep_context *context, double values[])
+HSEP_API void hsep_model_start_values(const hsep_context *context, double values[])
 {
     (void)context;
     const double start = values[HSEP_VR_x_d_ahead]; /* the drive rests there */
@@ -160,7 +160,7 @@ void hsep_model_start_values(const hsep_context *context, double values[])
     }
 }
 
-hsep_status hsep_model_check_state(
+HSEP_API hsep_status hsep_model_check_state(
     const hsep_context *context, const void *state, size_t size, const double values[], char message[])
 {
     hsep_mode modes[HSEP_N_MODES];

@@ -62,7 +62,7 @@ static FILE *trajectory_open(const hsep_context *context, const double values[],
     return NULL;
 }
 
-hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[])
+HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[])
 {
     uint64_t count = 0;
     message[0] = '\0';
@@ -78,7 +78,7 @@ hsep_status hsep_model_size(const hsep_context *context, const double values[], 
     return hsep_state_size(before + hsep_trajectory_size(count), size, message);
 }
 
-hsep_status hsep_model_initialise(
+HSEP_API hsep_status hsep_model_initialise(
     const hsep_context *context, void *state, double values[], double t_start, char message[])
 {
     char number[HSEP_NUMBER_SIZE];
@@ -110,7 +110,7 @@ hsep_status hsep_model_initialise(
     return HSEP_OK;
 }
 
-hsep_status hsep_model_step(
+HSEP_API hsep_status hsep_model_step(
     const hsep_context *context, void *state, double values[], double t, double h, char message[])
 {
     (void)context;
@@ -125,7 +125,7 @@ hsep_status hsep_model_step(
     return HSEP_OK;
 }
 
-void hsep_model_start_values(const hsep_context *context, double values[])
+HSEP_API void hsep_model_start_values(const hsep_context *context, double values[])
 {
     char message[HSEP_MESSAGE_SIZE] = "";
     uint64_t count = 0;
@@ -144,7 +144,7 @@ void hsep_model_start_values(const hsep_context *context, double values[])
     fclose(file);
 }
 
-hsep_status hsep_model_check_state(
+HSEP_API hsep_status hsep_model_check_state(
     const hsep_context *context, const void *state, size_t size, const double values[], char message[])
 {
     trajectory_state head;

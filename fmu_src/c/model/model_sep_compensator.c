@@ -106,7 +106,7 @@ static hsep_status compensator_checked(
     return HSEP_OK;
 }
 
-hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[])
+HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[])
 {
     hsep_mode modes[HSEP_N_MODES];
     hsep_compensator_parameters parameters;
@@ -133,7 +133,7 @@ static void compensator_write_outputs(const hsep_compensator *compensator, doubl
     values[HSEP_VR_batch] = (double)outputs.batch;
 }
 
-hsep_status hsep_model_initialise(
+HSEP_API hsep_status hsep_model_initialise(
     const hsep_context *context, void *state, double values[], double t_start, char message[])
 {
     compensator_state *self = state;
@@ -156,7 +156,7 @@ hsep_status hsep_model_initialise(
     return HSEP_OK;
 }
 
-hsep_status hsep_model_step(
+HSEP_API hsep_status hsep_model_step(
     const hsep_context *context, void *state, double values[], double t, double h, char message[])
 {
     (void)context;
@@ -176,7 +176,7 @@ hsep_status hsep_model_step(
     return status;
 }
 
-void hsep_model_start_values(const hsep_context *context, double values[])
+HSEP_API void hsep_model_start_values(const hsep_context *context, double values[])
 {
     (void)context;
     const double start = values[HSEP_VR_x_d_ahead]; /* the drive rests there */
@@ -186,7 +186,7 @@ void hsep_model_start_values(const hsep_context *context, double values[])
     values[HSEP_VR_sep_state] = values[HSEP_VR_compensate] > 0.0 ? 1.0 : 0.0;
 }
 
-hsep_status hsep_model_check_state(
+HSEP_API hsep_status hsep_model_check_state(
     const hsep_context *context, const void *state, size_t size, const double values[], char message[])
 {
     hsep_mode modes[HSEP_N_MODES];

@@ -24,7 +24,7 @@ typedef struct {
     hsep_stage stage; /* its modes follow */
 } stage_drive_state;
 
-hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[])
+HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[])
 {
     message[0] = '\0';
     if (hsep_check_parameters(context, values, message) > 0) {
@@ -41,7 +41,7 @@ static void stage_drive_write_outputs(const stage_drive_state *self, double valu
     values[HSEP_VR_x_meas] = x_meas;
 }
 
-hsep_status hsep_model_initialise(
+HSEP_API hsep_status hsep_model_initialise(
     const hsep_context *context, void *state, double values[], double t_start, char message[])
 {
     stage_drive_state *self = state;
@@ -63,12 +63,12 @@ hsep_status hsep_model_initialise(
     return HSEP_OK;
 }
 
-hsep_status hsep_model_step(
+HSEP_API hsep_status hsep_model_step(
     const hsep_context *context, void *state, double values[], double t, double h, char message[])
 {
     (void)context;
     stage_drive_state *self = state;
-    double work[HSEP_STAGE_WORK * HSEP_N_MODES];
+    double work[HSEP_STAGE_WORK * HSEP_N_MODES] = {0.0}; /* zeros, because gcc cannot see that all of it is filled */
     message[0] = '\0';
     if (hsep_drive_check(values[HSEP_VR_x_d], t, h, message) != HSEP_OK) {
         return HSEP_REFUSED;
@@ -83,7 +83,7 @@ hsep_status hsep_model_step(
     return HSEP_OK;
 }
 
-void hsep_model_start_values(const hsep_context *context, double values[])
+HSEP_API void hsep_model_start_values(const hsep_context *context, double values[])
 {
     (void)context;
     const double x = values[HSEP_VR_x_d]; /* the stage rests there */
@@ -92,7 +92,7 @@ void hsep_model_start_values(const hsep_context *context, double values[])
     values[HSEP_VR_x_meas] = hsep_drive_first_measurement(values[HSEP_VR_noise_std], values[HSEP_VR_seed], x);
 }
 
-hsep_status hsep_model_check_state(
+HSEP_API hsep_status hsep_model_check_state(
     const hsep_context *context, const void *state, size_t size, const double values[], char message[])
 {
     stage_drive_state head;
