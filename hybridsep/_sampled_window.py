@@ -54,13 +54,14 @@ class SampledWindow:
         """Predicted servo error ``x_d − x_h``, m."""
         return self.x_d - self.x_h
 
-    def check(self, x_d_ahead: float, x_meas: float) -> None:
-        """Raise SignalError if a value cannot be taken in; nothing is changed."""
+    def check(self, x_d_ahead: float, x_meas: float, k: int | None = None) -> None:
+        """Raise SignalError if a value cannot be taken in as sample ``k``, the next one if left out."""
+        sample = self.k if k is None else k
         for name, value in (("x_d_ahead", x_d_ahead), ("x_meas", x_meas)):
             if not math.isfinite(value):
-                raise SignalError(f"{name} must be finite, got {value} at sample {self.k}")
+                raise SignalError(f"{name} must be finite, got {value} at sample {sample}")
             if abs(value) > POSITION_MAX:
-                raise SignalError(f"{name} must be within ±{POSITION_MAX:g} m, got {value:g} at sample {self.k}")
+                raise SignalError(f"{name} must be within ±{POSITION_MAX:g} m, got {value:g} at sample {sample}")
 
     def _now(self, window: Array) -> float:
         return float(window[self.k % self.Np])

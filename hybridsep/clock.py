@@ -12,7 +12,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from .errors import FmuError, StateError
+from .errors import FmuError, ParameterError, StateError
 
 __all__ = ["STEP_MAX", "ClockStep", "SampleClock", "check_step_size"]
 
@@ -73,14 +73,14 @@ class SampleClock(NamedTuple):
 
         Raises
         ------
+        ParameterError
+            If ``h`` is not in (0, 100] s.
         FmuError
-            If ``h`` is not in (0, 100] s, or ``t`` is not where the last step ended.
+            If ``t`` is not where the last step ended.
         """
         check_step_size(h)
         if not (math.isfinite(t) and abs(t - self.end) <= max(0.5 * self.T_s, _resolution(t))):
-            raise FmuError(
-                f"the communication point must be {self.end:.17g} s, where the last step ended, got {t!r} s"
-            )
+            raise FmuError(f"the communication point must be {self.end!r} s, where the last step ended, got {t!r} s")
         T_s = self.T_s
         since, carry = _add(self.since, self.carry, h)
         now = self.start + (self.k * T_s + since)
@@ -137,9 +137,9 @@ class ClockStep(NamedTuple):
 
 
 def check_step_size(h: float) -> None:
-    """Raise FmuError if ``h`` is no size of a communication step."""
+    """Raise ParameterError if ``h``, s, is no size of a communication step."""
     if not 0 < h <= STEP_MAX:
-        raise FmuError(f"the communication step size must be > 0 and ≤ {STEP_MAX:g} s, got {h!r}")
+        raise ParameterError(f"the communication step size must be > 0 and ≤ {STEP_MAX:g} s, got {float(h)!r}")
 
 
 def _resolution(t: float) -> float:

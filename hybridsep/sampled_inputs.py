@@ -15,7 +15,7 @@ __all__ = ["SampledInputs"]
 
 
 class _LookAhead(Protocol):
-    def check(self, x_d_ahead: float, x_meas: float) -> None: ...
+    def check(self, x_d_ahead: float, x_meas: float, k: int | None = None) -> None: ...
 
     def sample(self, x_d_ahead: float, x_meas: float) -> None: ...
 
@@ -56,12 +56,12 @@ class SampledInputs:
 
         Raises
         ------
-        FmuError, SignalError
+        ParameterError, FmuError, SignalError
             If the step does not fit, or an input that it latches cannot be taken in; nothing is changed then.
         """
         step = self.clock.count(t, h)
         if step.n_latched:
-            look_ahead.check(x_d_ahead, x_meas)
+            look_ahead.check(x_d_ahead, x_meas, self.clock.k + self.clock.latched)
         waiting = self.clock.latched
         for _ in range(step.n_samples):
             if waiting:  # the sample that an earlier step began

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 import staircase_data as staircase
-from c_core import TS, CModel, look_ahead, write_weights
+from c_core import CModel, look_ahead, write_weights
 from numpy.typing import NDArray
 
 from hybridsep.lookahead import LookAhead
@@ -63,24 +62,6 @@ def test_other_parameters_are_predicted_as_by_the_library(parameters: dict[str, 
     n = 1500
     ahead, model = look_ahead("predictor_2", **parameters)
     compare_runs(ahead, model, staircase.commanded()[:n], staircase.measured(1)[:n], 1e-11)
-
-
-def test_sub_steps_give_what_whole_steps_give() -> None:
-    whole, parts = (CModel("predictor", {"p": 10}).initialise(2.5) for _ in range(2))
-    for k in range(400):
-        x_d, x = float(staircase.commanded()[k]), float(staircase.measured(0)[k])
-        whole["x_d_ahead"], whole["x_meas"] = parts["x_d_ahead"], parts["x_meas"] = x_d, x
-        whole.step(2.5 + k * TS)
-        for part in range(4):
-            assert parts["x_h"] == pytest.approx(parts["x_h"])
-            before = parts["x_h"]
-            parts.step(2.5 + k * TS + part * TS / 4, TS / 4)
-            if part < 3:
-                assert parts["x_h"] == before
-            parts["x_d_ahead"], parts["x_meas"] = math.nan, math.nan  # not read before the next sample
-        np.testing.assert_array_equal(
-            [whole[name] for name in OUTPUTS], [parts[name] for name in OUTPUTS], err_msg=str(k)
-        )
 
 
 def test_the_outputs_before_and_right_after_initialization_are_those_of_t_0() -> None:

@@ -13,8 +13,8 @@ import pytest
 from c_core import TS, CModel, refusal, write_trajectory, write_weights
 
 from hybridsep._sampled_window import checked_start
+from hybridsep.clock import SampleClock
 from hybridsep.errors import FmuError, HybridSepError
-from hybridsep.fmi.clock import SampleClock
 from hybridsep.fmi.variables import modes_from
 from hybridsep.parameters import check, check_together
 
@@ -148,30 +148,27 @@ def test_weights_of_other_features_are_refused(learned: float, now: float, tmp_p
 
 
 @pytest.mark.parametrize(
-    ("t", "h"), [(0.001, 0.0), (0.001, -1e-3), (0.001, 2e-3), (0.001, 0.6e-3), (0.001, math.nan), (0.001, math.inf)]
+    ("t", "h"),
+    [(1.501, h) for h in (0.0, -1e-3, 1e-320 * -1, 100.1, math.nan, math.inf)]
+    + [(t, TS) for t in (0.0, 1.5, 1.5004, 1.5016, 1e9, math.nan, -math.inf)],
 )
-def test_other_step_sizes_are_refused_in_the_librarys_words(t: float, h: float) -> None:
-    with pytest.raises(FmuError) as caught:
-        SampleClock(0.0, TS, k=1).check(t, h)
-    model = CModel("predictor").initialise()
-    model.step(0.0)
+def test_other_steps_are_refused_in_the_librarys_words(t: float, h: float) -> None:
+    clock = SampleClock.begin(1.5, TS).count(1.5, TS).after
+    with pytest.raises(HybridSepError) as caught:
+        clock.count(t, h)
+    model = CModel("predictor").initialise(1.5)
+    model.step(1.5)
     state = model.state.tobytes()
     assert refusal(lambda: model.step(t, h)) == str(caught.value)
     assert model.state.tobytes() == state
 
 
-def test_other_communication_points_are_refused_in_the_librarys_words() -> None:
-    clock, model = SampleClock(1.5, TS), CModel("predictor").initialise(1.5)
-    for t in (0.0, 1.501, math.nan):
-        with pytest.raises(FmuError) as caught:
-            clock.check(t, TS)
-        assert refusal(lambda t=t: model.step(t)) == str(caught.value)  # type: ignore[misc]
-    clock.advance(clock.check(1.5, TS / 2))
-    model.step(1.5, TS / 2)
-    for t, h in ((1.5, TS / 2), (1.5005, TS / 4)):
-        with pytest.raises(FmuError) as caught:
-            clock.check(t, h)
-        assert refusal(lambda t=t, h=h: model.step(t, h)) == str(caught.value)  # type: ignore[misc]
+@pytest.mark.parametrize("start", [math.nan, -math.inf, 1e13, -1e300])
+def test_other_start_times_are_refused_in_the_librarys_words(start: float) -> None:
+    with pytest.raises(FmuError) as caught:
+        SampleClock.begin(start, TS)
+    for name in ("predictor", "compensator"):
+        assert refusal(lambda name=name: CModel(name).initialise(start)) == str(caught.value)  # type: ignore[misc]
 
 
 @pytest.mark.parametrize("name", ["feed_drive", "stage_drive"])
@@ -179,10 +176,10 @@ def test_steps_that_a_plant_cannot_do_are_refused(name: str) -> None:
     model = CModel(name, {"x_d": 0.0}).initialise()
     state = model.state.tobytes()
     for t, h, message in (
-        (0.0, 0.0, "the step size must be finite and > 0 s, got 0.0"),
-        (0.0, -1.0, "the step size must be finite and > 0 s, got -1.0"),
-        (0.0, math.nan, "the step size must be finite and > 0 s, got nan"),
-        (0.0, 101.0, "the step size must be at most 100 s, got 101.0; make several steps"),
+        (0.0, 0.0, "the communication step size must be > 0 and ≤ 100 s, got 0.0"),
+        (0.0, -1.0, "the communication step size must be > 0 and ≤ 100 s, got -1.0"),
+        (0.0, math.nan, "the communication step size must be > 0 and ≤ 100 s, got nan"),
+        (0.0, 101.0, "the communication step size must be > 0 and ≤ 100 s, got 101.0"),
         (math.inf, 1e-3, "the communication point must be finite, got inf s"),
     ):
         assert refusal(lambda t=t, h=h: model.step(t, h)) == message  # type: ignore[misc]

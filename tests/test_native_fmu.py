@@ -41,6 +41,7 @@ etree: Any = import_module("lxml.etree")  # comes with fmpy, has no types
 MODELS = ("HybridPredictor", "SepCompensator", "FeedDrive")
 NATIVE = [*MODELS, "ReferenceTrajectory", *(f"{model}_als25010_{axis}" for axis in "xy" for model in MODELS)]
 NATIVE += ["HybridPredictor_emps"]
+PYTHON = [name.replace(model, f"{model}Py") for name in NATIVE for model in MODELS if name.startswith(model)]
 TOLERANCE = 1e-11  # m
 
 Fmus = dict[str, Path]
@@ -336,6 +337,18 @@ def test_a_trajectory_that_is_not_there_is_named(fmus: Fmus) -> None:
         source.initialise({"trajectory": 3})
 
 
+@pytest.mark.parametrize("name", [*NATIVE, *PYTHON])
+def test_a_run_with_the_importers_defaults_reaches_the_end(fmus: Fmus, name: str) -> None:
+    stop = float(fmpy.read_model_description(str(fmus[name])).defaultExperiment.stopTime)
+    end = {"emps": 10.0}.get(name.rpartition("_")[2], 6.0 + (0.2 if "Sep" in name else 0.1))
+    assert stop == pytest.approx(end, abs=0.011)
+    for interval in (None, stop / 500):
+        result = fmpy.simulate_fmu(str(fmus[name]), output_interval=interval)
+        assert result["time"][-1] == pytest.approx(stop, abs=1e-9)
+        assert len(result) >= 500
+        assert all(np.isfinite(result[column].astype(float)).all() for column in result.dtype.names)
+
+
 # One predictor, sample by sample -----------------------------------------------------------------------------------
 
 
@@ -359,12 +372,6 @@ def expected_outputs(fmus: Fmus) -> list[tuple[float, ...]]:
     with FmuInstance(fmus["HybridPredictor"]) as instance:
         instance.initialise()
         return drive(instance, 0, 800)
-
-
-def test_sub_steps_change_nothing(fmus: Fmus, expected_outputs: list[tuple[float, ...]]) -> None:
-    with FmuInstance(fmus["HybridPredictor"]) as instance:
-        instance.initialise(start_time=-2.0)
-        assert drive(instance, 0, 800, parts=4, start=-2.0) == expected_outputs
 
 
 def test_rollback_at_random_times_is_exact(fmus: Fmus, expected_outputs: list[tuple[float, ...]]) -> None:

@@ -197,39 +197,6 @@ def test_start_time_other_than_zero(python_fmu: Fmu) -> None:
     np.testing.assert_array_equal(runs[0], runs[1])
 
 
-def test_substeps_read_inputs_at_the_sample_and_show_outputs_after_it(python_fmu: Fmu) -> None:
-    r, x = delayed(n=600)
-    with FmuInstance(python_fmu("HybridPredictorPy")) as whole, FmuInstance(python_fmu("HybridPredictorPy")) as parts:
-        whole.initialise()
-        parts.initialise()
-        expected = drive(whole, r, x, 0, len(r))
-        write = parts.real_writer(["x_d_ahead", "x_meas"])
-        read = parts.real_reader(["x_d", "x_pb", "x_h", "e_servo", "rms_pb", "rms_h"])
-        for k in range(len(r)):
-            before = read()
-            for i in range(4):
-                write([float(r[k]), float(x[k])] if i == 0 else [9.0, 9.0])
-                parts.step(k * TS + i * TS / 4, TS / 4)
-                assert read() == (list(expected[k]) if i == 3 else before)
-
-
-def test_roll_back_within_a_sample(predictor: FmuInstance) -> None:
-    r, x = delayed(n=300)
-    predictor.initialise()
-    drive(predictor, r, x, 0, 199)
-    predictor.set("x_d_ahead", float(r[199]))
-    predictor.set("x_meas", float(x[199]))
-    predictor.step(199 * TS, TS / 4)
-    blob = predictor.save()
-    for _ in range(2):  # what is set after the sample's first sub-step is not read, before or after rolling back
-        predictor.set("x_d_ahead", 9.0)
-        predictor.set("x_meas", 9.0)
-        for i in range(1, 4):
-            predictor.step((199 + i / 4) * TS, TS / 4)
-        assert predictor.get("x_d_window[100]") == r[199]
-        predictor.restore(blob)
-
-
 @pytest.mark.parametrize("cut", [57, 1234, 1300])
 def test_roll_back_in_mid_run(predictor: FmuInstance, python_fmu: Fmu, cut: int) -> None:
     r, x = delayed(n=1800)

@@ -77,10 +77,8 @@ def test_a_refused_step_is_logged_and_changes_nothing(predictor: FmuInstance) ->
     for name, value, h, at, message in (
         ("x_meas", math.nan, TS, t, "x_meas must be finite, got nan at sample 250"),
         ("x_d_ahead", -math.inf, TS, t, "x_d_ahead must be finite, got -inf at sample 250"),
-        ("x_meas", 0.0, 3e-4, t, "the communication step size must divide T_s = 0.001 s, got 0.0003 s"),
-        ("x_meas", 0.0, 2e-3, t, "the communication step size must divide T_s = 0.001 s, got 0.002 s"),
-        ("x_meas", 0.0, 0.0, t, "the communication step size must divide T_s = 0.001 s, got 0 s"),
-        ("x_meas", 0.0, TS, t + 0.1, "the communication point must be 0.25 s, got 0.35 s"),
+        ("x_meas", 0.0, 0.0, t, "the communication step size must be > 0 and ≤ 100 s, got 0.0"),
+        ("x_meas", 0.0, TS, t + 0.1, "the communication point must be 0.25 s, where the last step ended, got 0.35 s"),
     ):
         predictor.set("x_d_ahead", 0.0)
         predictor.set("x_meas", 0.0)
@@ -96,17 +94,6 @@ def test_a_refused_step_is_logged_and_changes_nothing(predictor: FmuInstance) ->
         np.testing.assert_array_equal(drive(untroubled, r, x, 0, 400)[250:], after)
 
 
-def test_the_step_size_must_stay_within_a_sample(predictor: FmuInstance) -> None:
-    predictor.initialise()
-    predictor.step(0.0, TS / 4)
-    with pytest.raises(FmuError, match=r"must stay 0.00025 s within a sample of T_s = 0.001 s, got 0.0005 s"):
-        predictor.step(TS / 4, TS / 2)
-    with pytest.raises(FmuError, match=r"the communication step size must divide T_s = 0.001 s, got 9.99989e-321 s"):
-        predictor.step(TS / 4, 1e-320)
-    for i in range(1, 4):
-        predictor.step(i * TS / 4, TS / 4)
-
-
 def test_plants_refuse_bad_inputs(python_fmu: Fmu) -> None:
     with FmuInstance(python_fmu("FeedDrivePy")) as plant:
         plant.initialise()
@@ -114,7 +101,7 @@ def test_plants_refuse_bad_inputs(python_fmu: Fmu) -> None:
         with pytest.raises(FmuError, match=r"x_d must be finite, got nan at t = 0 s"):
             plant.step(0.0, TS)
         plant.set("x_d", 1e-3)
-        with pytest.raises(FmuError, match=r"step size must be finite and > 0 s, got -0.001"):
+        with pytest.raises(FmuError, match=r"the communication step size must be > 0 and ≤ 100 s, got -0.001"):
             plant.step(0.0, -TS)
         plant.step(0.0, TS)
 

@@ -107,7 +107,7 @@ static void idle(size_t n)
 
 int main(int n_arguments, char *arguments[])
 {
-    static double values[HSEP_N_VARIABLES];
+    static double values[HSEP_N_VALUES];
     char message[HSEP_MESSAGE_SIZE] = "";
     const hsep_context context = {hsep_variables, HSEP_N_VARIABLES, NULL};
     if (n_arguments < 4) {

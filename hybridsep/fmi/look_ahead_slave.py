@@ -29,8 +29,8 @@ class LookAheadSlave(TableSlave):
 
     def initialise(self) -> None:
         """Make the look-ahead and start the clock."""
-        self.inputs = SampledInputs(self.start_time, self.values["T_s"], self.values["x_d_ahead"])
         self.look_ahead = self.new_look_ahead()
+        self.inputs = SampledInputs(self.start_time, self.values["T_s"], self.values["x_d_ahead"])
 
     def advance(self, t: float, h: float) -> None:
         """Execute the samples that the step reaches."""

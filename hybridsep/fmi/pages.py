@@ -34,8 +34,7 @@ are updated exactly, once a window, in bounded memory. Until <code>t_init</code>
 x<sub>h</sub> = x<sub>pb</sub>.</p>
 <p>Before the step that starts at t<sub>k</sub> = t<sub>start</sub> + k·T<sub>s</sub>, set
 <code>x_d_ahead</code> = r(k) and <code>x_meas</code> = x(k); after it, the outputs are those of
-t<sub>k+1</sub>, and x_d(k) = r(k − Np). No output depends on an input of the same instant. A shorter
-communication step that divides <code>T_s</code> is accepted; inputs are read at t<sub>k</sub> only. During
+t<sub>k+1</sub>, and x_d(k) = r(k − Np). No output depends on an input of the same instant. {steps} During
 the first fill the drive gets the start value of <code>x_d_ahead</code>.</p>""",
     "SepCompensator": """
 <p>The FMU sits between the interpolator and the drive and is the look-ahead buffer: what enters as
@@ -57,8 +56,7 @@ and whenever the hybrid model is less accurate than the physics model or unstabl
 <code>compensate</code> limits the choice, and 0 leaves the command as it is.</p>
 <p>Before the step that starts at t<sub>k</sub> = t<sub>start</sub> + k·T<sub>s</sub>, set
 <code>x_d_ahead</code> = r(k) and <code>x_meas</code> = x(k); after it, the outputs are those of
-t<sub>k+1</sub>, and x_d(k) = r(k − preview). No output depends on an input of the same instant. A shorter
-communication step that divides <code>T_s</code> is accepted; inputs are read at t<sub>k</sub> only. During
+t<sub>k+1</sub>, and x_d(k) = r(k − preview). No output depends on an input of the same instant. {steps} During
 the first fill x_d is the start value of <code>x_d_ahead</code>, and nothing is learned.</p>""",
     "FeedDrive": """
 <p>The simulated drive that the predictor is tried on. It starts at rest at the start value of
@@ -71,6 +69,10 @@ staircase (six 10 mm moves, one at the start of each second, three up and three 
 (five turns, 30 mm, within 80 mm/s, 8 m/s² and 1000 m/s³ along the path), or the samples given when the FMU
 was built. After its last sample it stays there.</p>""",
 }
+
+_STEPS = """Any communication step is accepted: inputs
+are read at the t<sub>k</sub> that lie in it, and outputs are always those of the last t<sub>k</sub> that was reached. A
+closed loop needs steps of <code>T_s</code>, because <code>x_meas</code> is as old as the step's start otherwise."""
 
 _PARTNERS = {"SepCompensator": ("SepCompensator", "x_dm")}
 """What sits between trajectory and drive, and its output to the drive; otherwise the predictor and its x_d."""
@@ -133,7 +135,7 @@ def index_page(machine: Machine, description: Mapping[str, object], needs: str, 
 <h1>{name}</h1>
 <p>{html.escape(machine.title)}: {MODEL_TITLES[model]}. {html.escape(needs)}</p>
 <h2>What it computes</h2>
-{_COMPUTES[model]}
+{_COMPUTES[model].replace("{steps}", _STEPS)}
 <p>After {_CITATION}</p>
 <h2>Wiring</h2>
 {_WIRING.format(partner=partner, command=command)}

@@ -11,7 +11,7 @@
 #define SAVED_AT 230
 #define STEP_SIZE 1e-3 /* s */
 
-static double values[HSEP_N_VARIABLES], saved_values[HSEP_N_VARIABLES], end_values[HSEP_N_VARIABLES];
+static double values[HSEP_N_VALUES], saved_values[HSEP_N_VALUES], end_values[HSEP_N_VALUES];
 static char message[HSEP_MESSAGE_SIZE];
 
 static void expect(int held, const char *what)

@@ -150,14 +150,15 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
     if (instance == NULL) {
         return fmi2Error;
     }
+    if (HSEP_N_INTERPOLATED == 0) {
+        return hsep_refuse(instance, "%s is not supported: canInterpolateInputs is false in modelDescription.xml", name);
+    }
     if (nvr > 0 && order == NULL) {
         return hsep_refuse(instance, "%s: order is NULL, but nvr is %lu", name, (unsigned long)nvr);
     }
     for (size_t i = 0; i < nvr; ++i) {
         if (vr[i] + 1 > HSEP_N_INTERPOLATED) {
-            return hsep_refuse(instance, "%s: %s takes no derivative; %s", name, hsep_variables[vr[i]].name,
-                (HSEP_N_INTERPOLATED > 0) ? "x_d_ahead and x_meas do"
-                                          : "canInterpolateInputs is false in modelDescription.xml");
+            return hsep_refuse(instance, "%s: %s takes no derivative, only inputs do", name, hsep_variables[vr[i]].name);
         }
         if (order[i] != 1) {
             return hsep_refuse(

@@ -163,14 +163,14 @@ HSEP_API hsep_status hsep_check_step_size(double h, char message[])
 
 HSEP_API hsep_status hsep_check_step(const hsep_clock *clock, double t, double h, hsep_clock_step *step, char message[])
 {
-    char number[HSEP_NUMBER_SIZE];
+    char expected[HSEP_NUMBER_SIZE], got[HSEP_NUMBER_SIZE];
     if (hsep_check_step_size(h, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     if (!hsep_clock_count(clock, t, h, step)) {
         hsep_message_add(
-            message, "the communication point must be %.17g s, where the last step ended, got %s s", clock->end,
-            hsep_number(number, t, HSEP_REAL));
+            message, "the communication point must be %s s, where the last step ended, got %s s",
+            hsep_number(expected, clock->end, HSEP_REAL), hsep_number(got, t, HSEP_REAL));
         return HSEP_REFUSED;
     }
     return HSEP_OK;

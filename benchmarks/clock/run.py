@@ -1,0 +1,76 @@
+"""Accumulate a thousand million communication steps in the C core's clock.
+
+The clock's time is compared after each step with the exact sum of the step sizes, in 128-bit integers, and the number
+of instants reached with the rule's. The importer's time is its own rounded sum, which drifts. Ends with 1 if the clock
+is ever off by more than 1e-9 of T_s or a count is another one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from time import perf_counter
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from rich.console import Console
+from rich.table import Table
+
+from hybridsep.fmi.compiler import COMPILE_FLAGS
+
+HERE = Path(__file__).resolve().parent
+CORE = HERE.parents[1] / "fmu_src" / "c" / "core"
+DEVIATION_MAX = 1e-9
+CASES = (
+    (0.0, 1e-3, (1e-3,)),
+    (0.0, 1e-3, (3e-4,)),
+    (1e6, 1e-3, (3.7e-3,)),
+    (1e9, 1e-3, (1e-3,)),
+    (1e9, 1e-3, (12.2e-3, 3e-4, 1e-3, 0.37)),
+    (1e9, 1.25e-4, (3e-4, 1e-3)),
+)
+"""Start s, T_s s, and the step sizes s that take turns."""
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--steps", type=int, default=1_000_000_000, help="steps of each case")
+    options = parser.parse_args()
+    compiler = os.environ.get("CC") or shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
+    command = compiler.split() if compiler else [sys.executable, "-m", "ziglang", "cc"]
+    table = Table(title=f"{options.steps} steps")
+    for heading in ("start s", "T_s s", "steps s", "off by, T_s", "other counts", "importer's drift, T_s", "ns a step"):
+        table.add_column(heading, justify="right")
+    missed = 0
+    with tempfile.TemporaryDirectory() as folder:
+        program = Path(folder) / "clock"
+        flags = [flag for flag in COMPILE_FLAGS if flag != "-fvisibility=hidden"]
+        sources = [HERE / "main.c", CORE / "hsep_clock.c"]
+        subprocess.run([*command, *flags, f"-I{CORE}", *sources, "-lm", "-o", program], check=True)
+        for start, T_s, sizes in CASES:
+            began = perf_counter()
+            done = subprocess.run(
+                [program, str(options.steps), repr(start), repr(T_s), *map(repr, sizes)],
+                capture_output=True,
+                text=True,
+                check=False,
+            )
+            if done.returncode:
+                print(done.stderr, file=sys.stderr)
+                return 1
+            worst, wrong, drift = done.stdout.split()
+            missed += float(worst) > DEVIATION_MAX or int(wrong) > 0
+            time = 1e9 * (perf_counter() - began) / options.steps
+            row = (f"{start:g}", f"{T_s:g}", " ".join(map(str, sizes)), worst, wrong, drift, f"{time:.0f}")
+            table.add_row(*row)
+    Console().print(table)
+    return int(missed > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
