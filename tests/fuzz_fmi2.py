@@ -13,7 +13,7 @@ import random
 import struct
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from ctypes import CFUNCTYPE, POINTER, byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from pathlib import Path
 from typing import Any
@@ -331,13 +331,23 @@ class Fuzzer:
             for name in names:
                 self.library.set(component, name, self._number() if odd else self.random.gauss(0, 1e-2))
             t = self.times[component]
-            h = self.random.choice([1e-3, 5e-4, 0.0, -1e-3, 0.7e-3, self._number()]) if odd else 1e-3
+            usual = self.random.choice([1e-3, 1e-3, 3e-4, 8e-3, self.random.uniform(0.0, 0.05)])
+            h = self.random.choice([1e-7, 0.0, -1e-3, 1.3, self._number()]) if odd else usual
+            if self.random.random() < 0.1:
+                self._slopes(component, names, odd)
             before = self.library.reals(component)
             if self._call("DoStep", component, self._number() if self.random.random() < 0.02 else t, h, 1) == OK:
                 self.times[component] = t + h
                 self.steps += 1
             elif before != self.library.reals(component):
                 raise AssertionError("a refused step changed a value")
+
+    def _slopes(self, component: Any, names: Sequence[str], odd: bool) -> None:
+        n = len(names)
+        references = (c_uint * n)(*(self.library.references[name] for name in names))
+        orders = (c_int * n)(*(self.random.choice([0, 1, 2]) if odd else 1 for _ in names))
+        slopes = (c_double * n)(*(self._number() if odd else self.random.gauss(0, 0.1) for _ in names))
+        self._call("SetRealInputDerivatives", component, references, n, orders, slopes)
 
     def _access(self) -> None:
         component = self._component()
