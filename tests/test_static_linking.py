@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from hybridsep.fmi.archive import build_fmu
-from hybridsep.fmi.compiler import COMPILE_FLAGS
+from hybridsep.fmi.compiler import compile_flags
 from hybridsep.importer import FmuInstance
 from hybridsep.machine import load_machine
 from hybridsep.signals import Array
@@ -56,7 +56,9 @@ def compile_all(fmu: Path, headers: Path, out: Path) -> Path:
     """Return the object file of an FMU's sources."""
     built = out / f"{fmu.stem}.o"
     sources = fmu.with_suffix("") / "sources"
-    c_core.run_compiler([*COMPILE_FLAGS, f"-I{sources}", f"-I{headers}", "-c", sources / "all.c", "-o", built])
+    c_core.run_compiler(
+        [*compile_flags(c_core.compiler()), f"-I{sources}", f"-I{headers}", "-c", sources / "all.c", "-o", built]
+    )
     return built
 
 
