@@ -264,10 +264,11 @@ class CModel:
         """Write outputs and locals as they are before the initialization ends."""
         self.library.hsep_model_start_values(ctypes.byref(self.context), self._values)
 
-    def initialise(self, t_start: float = 0.0) -> CModel:
-        """Make the state."""
-        self.state = np.zeros(-(-self.size() // 8))
-        self._call("initialise", self._state, self._values, ctypes.c_double(t_start))
+    def initialise(self, t_start: float = 0.0, *, size: int | None = None) -> CModel:
+        """Make the state, of the size that the model tells if no other is given."""
+        size = self.size() if size is None else size
+        self.state = np.zeros(-(-size // 8))
+        self._call("initialise", self._state, ctypes.c_size_t(size), self._values, ctypes.c_double(t_start))
         return self
 
     def step(self, t: float, h: float = 1e-3) -> None:

@@ -206,6 +206,18 @@ def test_resources_that_do_not_fit_are_refused(tmp_path: Path) -> None:
         assert "it is damaged or truncated" in refusal(model.size)
 
 
+@pytest.mark.parametrize("name", ["predictor", "compensator", "feed_drive", "stage_drive", "trajectory"])
+def test_memory_of_another_size_is_refused(name: str, tmp_path: Path) -> None:
+    write_trajectory(tmp_path, np.arange(5.0))
+    model = CModel(name, resources=tmp_path)
+    size = model.size()
+    for other in (size - 8, size + 8):
+        assert refusal(lambda other=other: model.initialise(size=other)) == (  # type: ignore[misc]
+            f"the state must have {size} bytes, got memory for {other}; its file in the resources has changed "
+            "meanwhile: initialise again"
+        )
+
+
 def test_weights_that_do_not_fit_are_refused(tmp_path: Path) -> None:
     factor = np.triu(np.ones((13, 13)))
     model = CModel("predictor", {"p": 7}, tmp_path)

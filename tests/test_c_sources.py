@@ -7,6 +7,7 @@ from pathlib import Path
 
 import c_core
 import elf
+import numpy as np
 import pytest
 import staircase_data as staircase
 from c_core import write_trajectory
@@ -87,3 +88,35 @@ def test_the_sanitisers_find_nothing(name: str, arguments: list[list[str]], tmp_
     for pairs in arguments:
         done = subprocess.run([program, f"{tmp_path}/", *pairs], capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
+
+
+@c_core.needs_sanitisers
+@pytest.mark.parametrize(
+    ("n_samples", "said"),
+    [
+        (4100, "has changed meanwhile: initialise again"),  # 32 kB too many for the memory
+        (101, "has changed meanwhile: initialise again"),
+        (99, "has changed meanwhile: initialise again"),
+        (100, "0.2\n"),  # as many others: they are played
+        (0, "it is damaged or truncated"),
+    ],
+)
+def test_a_trajectory_that_changes_while_it_is_read(n_samples: int, said: str, tmp_path: Path) -> None:
+    folder = c_core.build_folder() / "changing_resource"
+    c_core.write_header("trajectory", folder)
+    program = folder / "changing_resource"
+    if not program.exists():
+        driver = c_core.ROOT / "tests" / "c" / "changing_resource.c"
+        flags = ["-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", f"-I{folder}"]
+        c_core.run_compiler(
+            [*flags, *c_core.include_flags(), *c_core.sources(), driver, "-lm", "-o", program],
+            command=c_core.sanitising_compiler(),
+        )
+    write_trajectory(tmp_path, np.full(n_samples, 0.2))
+    file = (tmp_path / "trajectory_3.bin").rename(tmp_path / "other.bin")
+    write_trajectory(tmp_path, np.full(100, 0.1))
+    done = subprocess.run(
+        [program, f"{tmp_path}/", tmp_path / "trajectory_3.bin", file], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert said in done.stdout

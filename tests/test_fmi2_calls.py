@@ -496,6 +496,31 @@ def test_unusable_resources_are_told_and_missing_when_needed(folders: dict[str, 
     fmu.FreeInstance(component)
 
 
+def test_a_resource_that_grows_during_the_initialization_is_refused(folders: dict[str, Path], tmp_path: Path) -> None:
+    """The importer's own allocation is what happens between the two looks at the file."""
+    resources = shutil.copytree(folders["ReferenceTrajectory"] / "resources", tmp_path / "resources")
+    file = resources / "trajectory_0.bin"
+    content = file.read_bytes()
+    count = int.from_bytes(content[8:16], "little")
+    longer = content[:8] + (count + 4000).to_bytes(8, "little") + content[16:] + content[-8:] * 4000
+    fmu = library_of(folders["ReferenceTrajectory"])
+
+    def growing(number: int, size: int) -> int | None:
+        if number * size > 8 * count:  # the state's block
+            file.write_bytes(longer)
+        return fmu.callbacks.allocate(number, size)  # type: ignore[no-any-return]
+
+    callbacks = Callbacks(fmu.callbacks.logger, Allocate(growing), fmu.callbacks.free, None, None)
+    component = fmu.instantiate(resources=resources.as_uri(), callbacks=callbacks)
+    assert component is not None
+    assert fmu.EnterInitializationMode(component) == OK
+    assert fmu.ExitInitializationMode(component) == ERROR
+    assert "has changed meanwhile: initialise again" in fmu.messages[-1][2]
+    assert fmu.ExitInitializationMode(component) == OK  # it has changed for good
+    fmu.FreeInstance(component)
+    assert not fmu.blocks
+
+
 def test_uris_of_windows(tmp_path: Path) -> None:
     root = Path(__file__).parent.parent / "fmu_src" / "c" / "fmi2"
     library = tmp_path / "uri.so"

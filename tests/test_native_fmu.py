@@ -25,7 +25,7 @@ from fmpy.validation import validate_fmu
 from hybridsep.cosim import CoSimulation, cosimulate
 from hybridsep.errors import FmuError, SignalError
 from hybridsep.fmi.archive import BACKENDS, build_fmu, fmu_names
-from hybridsep.fmi.compiler import ALL_TARGETS, TARGETS, host_target
+from hybridsep.fmi.compiler import ALL_TARGETS, TARGETS, compile_flags, host_target
 from hybridsep.fmi.macho import universal
 from hybridsep.fmi.variables import Variable, variables_of
 from hybridsep.importer import FmuInstance
@@ -145,6 +145,30 @@ def test_only_fmi_functions_are_exported(fmus: Fmus, tmp_path: Path) -> None:
     assert all(name.startswith("fmi2") for name in exported)
 
 
+def test_an_overflow_on_the_stack_is_noticed(fmus: Fmus, tmp_path: Path) -> None:
+    with zipfile.ZipFile(fmus["HybridPredictor"]) as archive:
+        library = archive.extract("binaries/linux64/HybridPredictor.so", tmp_path)
+    assert "__stack_chk_fail" in {symbol.name for symbol in symbols(Path(library), dynamic=True)}
+
+
+def test_a_compiler_without_a_stack_protector_will_do() -> None:
+    refusing = [sys.executable, "-c", "import sys; sys.exit('-fstack-protector-strong' in sys.argv)"]
+    assert "-fstack-protector-strong" not in compile_flags(refusing)
+    accepting = [sys.executable, "-c", ""]
+    assert compile_flags(accepting) == [*compile_flags(refusing), "-fstack-protector-strong"]
+
+
+@pytest.mark.parametrize("name", [*NATIVE, "HybridPredictorPy"])
+def test_a_description_names_the_machine_where_the_fmu_depends_on_it(fmus: Fmus, name: str) -> None:
+    description = fmpy.read_model_description(str(fmus[name])).description
+    with zipfile.ZipFile(fmus[name]) as archive:
+        page = archive.read("documentation/index.html").decode()
+    for text in (description, page):
+        named = any(machine in text for machine in ("Spring-mass-damper", "stage, X axis", "stage, Y axis", "EMPS"))
+        assert named != name.startswith("ReferenceTrajectory")
+    assert ("Universal C Runtime" in page) == (not name.endswith("Py"))
+
+
 def test_the_header_says_what_the_model_description_says(fmus: Fmus) -> None:
     with zipfile.ZipFile(fmus["HybridPredictor"]) as archive:
         header = archive.read("sources/hsep_fmu.h").decode()
@@ -196,6 +220,8 @@ def test_all_platforms(tmp_path: Path) -> None:
     versions = {tuple(map(int, v.split(b"."))) for v in re.findall(rb"GLIBC_([\d.]+)", elf["linux64"])}
     assert max(versions) <= (2, 17)
     assert struct.unpack_from(">2I", binaries["darwin64/FeedDrive.dylib"]) == (0xCAFEBABE, 2)
+    for name, content in binaries.items():  # Windows has it from the compiler, under no name
+        assert b"__stack_chk_fail" in content or name.endswith(".dll"), name
     for name in ("win64", "win32"):
         assert binaries[f"{name}/FeedDrive.dll"].startswith(b"MZ")
     for content in binaries.values():

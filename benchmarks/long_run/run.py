@@ -31,7 +31,7 @@ from benchmarks.common import (
     staircase_predictor,
 )
 from benchmarks.long_run.host import Calls, Host
-from hybridsep.fmi.compiler import COMPILE_FLAGS
+from hybridsep.fmi.compiler import compile_flags
 
 P, Q, LAM = 50, 3, 1e-12
 BLOCK = 5000
@@ -66,7 +66,7 @@ def main() -> int:
         table.add_row(f"{samples:.0e}", what, took, error, str(counted.before), str(counted.after))
 
     with tempfile.TemporaryDirectory(prefix="hsep_long_run_") as name:
-        host = Host(Path(name), command, list(COMPILE_FLAGS))
+        host = Host(Path(name), command, compile_flags(command))
         for samples in sorted({min(10**6, options.samples), min(10**7, options.samples), options.samples}):
             begin = perf_counter()
             weights, counted = host.fold(rows, LAM, samples // BLOCK)

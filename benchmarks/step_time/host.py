@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridsep.fmi.c_header import c_header
-from hybridsep.fmi.compiler import COMPILE_FLAGS
+from hybridsep.fmi.compiler import compile_flags
 from hybridsep.physics import ModalModel
 from hybridsep.plant import FeedDrive, simulate
 from hybridsep.trajectory import staircase
@@ -64,7 +64,16 @@ def build(folder: Path, model: str, parameters: dict[str, Any]) -> Host:
     includes = [f"-I{path}" for path in (folder, C_SOURCES / "core", C_SOURCES / "model")]
     program = folder / "step_time"
     subprocess.run(
-        [*command, *COMPILE_FLAGS, *includes, str(HERE / "main.c"), *map(str, sources), "-lm", "-o", str(program)],
+        [
+            *command,
+            *compile_flags(command),
+            *includes,
+            str(HERE / "main.c"),
+            *map(str, sources),
+            "-lm",
+            "-o",
+            str(program),
+        ],
         check=True,
     )
     log = folder / "log.bin"

@@ -146,7 +146,7 @@ int main(int n_arguments, char *arguments[])
         fail("out of memory, or no steps");
     }
     values[HSEP_VR_x_d_ahead] = x_d[0];
-    if (hsep_model_initialise(&context, state, values, 0.0, message) != HSEP_OK) {
+    if (hsep_model_initialise(&context, state, size, values, 0.0, message) != HSEP_OK) {
         fail(message);
     }
     memset(times, 1, 2 * steps * sizeof *times); /* every page is there before the first step */

@@ -20,6 +20,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -29,17 +30,20 @@ from .macho import universal
 
 __all__ = [
     "ALL_TARGETS",
-    "COMPILE_FLAGS",
     "TARGETS",
     "TARGET_NAMES",
     "Target",
     "binaries",
     "can_compile",
+    "compile_flags",
     "host_target",
 ]
 
-COMPILE_FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-fvisibility=hidden")
+_FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-fvisibility=hidden")
 """Never ``-ffast-math``: every platform is to give the same numbers."""
+
+_STACK_PROTECTOR = "-fstack-protector-strong"
+"""An overflow of an array on the stack ends the process before the function returns; gcc 4.9, clang 3.5 and newer."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +58,7 @@ class Target:
         Where importers look for the library, below ``binaries/``.
     suffix : str
     flags : tuple of str
-        What this platform needs besides :data:`COMPILE_FLAGS`.
+        What this platform needs besides :func:`compile_flags`.
     """
 
     triple: str
@@ -150,6 +154,27 @@ def binaries(sources: Mapping[str, bytes], name: str, targets: Sequence[str]) ->
     return placed
 
 
+def compile_flags(command: Sequence[str]) -> list[str]:
+    """Return what the sources are compiled with on every platform by this compiler.
+
+    Parameters
+    ----------
+    command : sequence of str
+        Of a compiler that understands the options of gcc.
+    """
+    return [*_FLAGS, *([_STACK_PROTECTOR] if _understands(tuple(command), _STACK_PROTECTOR) else [])]
+
+
+@cache
+def _understands(command: tuple[str, ...], flag: str) -> bool:
+    """Return whether a compiler knows an option."""
+    with TemporaryDirectory() as place:
+        source = Path(place) / "nothing.c"
+        source.write_text("int nothing;\n")
+        arguments = [*command, "-Werror", flag, "-c", source.name, "-o", "nothing.o"]
+        return subprocess.run(arguments, cwd=place, capture_output=True, check=False).returncode == 0
+
+
 def can_compile() -> bool:
     """Return whether a native FMU can be compiled here, for this machine."""
     try:
@@ -190,7 +215,8 @@ def _compile(command: Sequence[str], target: Target, sources: Mapping[str, bytes
         for file, text in sources.items():
             (folder / file).write_bytes(text)
         library = f"{name}{target.suffix}"
-        arguments = [*command, *COMPILE_FLAGS, "-g0", "-s", "-shared", "-I.", "all.c", "-o", library, *target.flags]
+        flags = [*compile_flags(command), "-g0", "-s", "-shared", "-I."]
+        arguments = [*command, *flags, "all.c", "-o", library, *target.flags]
         result = subprocess.run(arguments, cwd=folder, capture_output=True, text=True, errors="replace", check=False)
         if result.returncode != 0:
             complaint = f"{' '.join(arguments)}\n{result.stderr.strip()}"

@@ -7,14 +7,21 @@ import json
 import uuid
 from collections.abc import Mapping
 
-__all__ = ["MODEL_TITLES", "content_guid"]
+from ..machine import Machine
 
-MODEL_TITLES = {
+__all__ = ["content_guid", "fmu_title"]
+
+_TITLES = {
     "HybridPredictor": "linear hybrid model: predicts the drive's position one look-ahead window early",
     "SepCompensator": "servo error pre-compensation: modifies the command so that the drive follows it",
     "FeedDrive": "nonlinear feed drive with encoder noise",
-    "ReferenceTrajectory": "source of commands: plays the paper's staircase and spirals, or given samples",
+    "ReferenceTrajectory": "Source of commands: plays the paper's staircase and spirals, or given samples",
 }
+
+
+def fmu_title(machine: Machine, model: str) -> str:
+    """Return what an FMU is, in one phrase; ReferenceTrajectory is the same for every machine."""
+    return _TITLES[model] if model == "ReferenceTrajectory" else f"{machine.title}: {_TITLES[model]}"
 
 
 def content_guid(files: Mapping[str, bytes], description: Mapping[str, object]) -> str:

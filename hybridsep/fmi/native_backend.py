@@ -25,7 +25,7 @@ from ..signals import as_samples
 from ..trajectory import spiral, staircase
 from .c_header import c_header
 from .compiler import ALL_TARGETS, binaries
-from .content import MODEL_TITLES, content_guid
+from .content import content_guid, fmu_title
 from .experiment import stop_time
 from .icon import icon
 from .model_description import FmuInfo, build_description, model_description
@@ -71,7 +71,7 @@ def files(
     del content["sources/hsep_fmu.h"]  # names the GUID
     content |= {f"documentation/licenses/{file}": text for file, text in _licenses().items()}
     reference = reference_files(machine, description, samples=samples, trained=trained)
-    needs = "The FMU needs nothing but its own binary."
+    needs = "The FMU needs nothing but its own binary; on Windows before 10 also the Universal C Runtime (KB2999226)."
     content["documentation/index.html"] = index_page(machine, description, needs, reference=bool(reference))
     content["model.png"] = icon(model)
     if model == "ReferenceTrajectory":
@@ -84,7 +84,7 @@ def files(
     content["sources/buildDescription.xml"] = build_description(name, ["all.c"])
     info = FmuInfo(
         name=name,
-        description=f"{machine.title}: {MODEL_TITLES[model]}",
+        description=fmu_title(machine, model),
         guid=guid,
         step_size=machine.T_s,
         stop_time=stop_time(machine, description, samples),

@@ -6,7 +6,7 @@ import html
 from collections.abc import Mapping
 
 from ..machine import Machine
-from .content import MODEL_TITLES
+from .content import fmu_title
 from .tables import interface_table
 from .variables import variables_of
 
@@ -104,6 +104,16 @@ _AGREEMENT_DIGITS = {"SepCompensator": 9}
 """Else 11; a plan under limits comes from an iteration, which passes differences of rounding on."""
 
 
+_SOURCES = {
+    "ReferenceTrajectory": (
+        "C.-H. Chou, M. Duan, C. E. Okwudire: A linear hybrid model for enhanced servo error pre-compensation of feed "
+        "drives with unmodeled nonlinear dynamics; the limits of eq. (14), the moves of its figures",
+        "hybridsep computes the samples, one every T_s; the figures do not print the spiral's size",
+    )
+}
+"""Of what does not come from the machine."""
+
+
 def index_page(machine: Machine, description: Mapping[str, object], needs: str, *, reference: bool = False) -> bytes:
     """Return the page a tool shows for an FMU.
 
@@ -128,12 +138,12 @@ def index_page(machine: Machine, description: Mapping[str, object], needs: str, 
     digits = _AGREEMENT_DIGITS.get(model, 11)
     check = _REFERENCE.format(name=name, inputs=inputs, digits=digits) if reference else ""
     partner, command = _PARTNERS.get(model, ("HybridPredictor", "x_d"))
-    sources = "\n".join(f"<li>{html.escape(source)}</li>" for source in machine.sources)
+    sources = "\n".join(f"<li>{html.escape(source)}</li>" for source in _SOURCES.get(model, machine.sources))
     page = f"""<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>{name}</title>
 <style>{_STYLE}</style></head><body>
 <h1>{name}</h1>
-<p>{html.escape(machine.title)}: {MODEL_TITLES[model]}. {html.escape(needs)}</p>
+<p>{html.escape(fmu_title(machine, model))}. {html.escape(needs)}</p>
 <h2>What it computes</h2>
 {_COMPUTES[model].replace("{steps}", _STEPS)}
 <p>After {_CITATION}</p>

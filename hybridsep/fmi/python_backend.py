@@ -20,7 +20,7 @@ from .. import __version__
 from .._data_files import data_folder
 from ..machine import Machine
 from ..predictor import HybridPredictor
-from .content import MODEL_TITLES, content_guid
+from .content import content_guid, fmu_title
 from .experiment import stop_time
 from .model_description import FmuInfo, model_description
 from .pages import index_page
@@ -83,7 +83,7 @@ def files(
     content["resources/machine.json"] = json.dumps({**description, "content": guid}, indent=1, sort_keys=True).encode()
     info = FmuInfo(
         name=name,
-        description=f"{machine.title}: {MODEL_TITLES[model]}",
+        description=fmu_title(machine, model),
         guid=guid,
         step_size=machine.T_s,
         stop_time=stop_time(machine, description),

@@ -58,7 +58,7 @@ int main(int n_arguments, char *arguments[])
     void *state = calloc(1, size);
     char *saved = malloc(size + 1), *end = malloc(size);
     expect(state != NULL && saved != NULL && end != NULL, "memory");
-    expect(hsep_model_initialise(&context, state, values, 0.0, message) == HSEP_OK, "the initialization");
+    expect(hsep_model_initialise(&context, state, size, values, 0.0, message) == HSEP_OK, "the initialization");
 
     /* On to the end, back to the middle, on to the end again: the same bits. */
     run(&context, state, 0, SAVED_AT);

@@ -65,8 +65,8 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component c)
         return hsep_refuse(instance, "fmi2ExitInitializationMode: no memory for a state of %lu bytes", (unsigned long)size);
     }
     instance->state_size = size;
-    if (hsep_model_initialise(&instance->context, instance->state, instance->values, instance->start_time, message)
-        != HSEP_OK) {
+    if (hsep_model_initialise(
+            &instance->context, instance->state, size, instance->values, instance->start_time, message) != HSEP_OK) {
         hsep_drop_state(instance);
         return hsep_refuse(instance, "%s", message);
     }

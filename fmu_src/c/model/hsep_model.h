@@ -52,11 +52,11 @@ typedef struct {
  * ReferenceTrajectory looks up the number of samples in its resource for that. */
 HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[]);
 
-/* Fill the state (size bytes, zeroed, aligned for double) for t_start; outputs and locals of t_start go to values.
+/* Fill the state (size bytes as hsep_model_size told, zeroed, aligned for double) for t_start; outputs and locals of t_start go to values.
  * Reads the resources, as hsep_model_size and hsep_model_start_values do; no step touches a file.
- * Fails if a start value is not finite or a resource cannot be read. */
+ * Fails if a start value is not finite, a resource cannot be read or has changed so that size does not fit. */
 HSEP_API hsep_status hsep_model_initialise(
-    const hsep_context *context, void *state, double values[], double t_start, char message[]);
+    const hsep_context *context, void *state, size_t size, double values[], double t_start, char message[]);
 
 /* Do one communication step from t by h with the inputs in values; outputs and locals go to values.
  * Fails, with state and values unchanged, if an input is not finite or t and h do not fit.

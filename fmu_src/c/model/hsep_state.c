@@ -17,6 +17,19 @@ HSEP_API hsep_status hsep_state_size(double bytes, size_t *size, char message[])
     return HSEP_OK;
 }
 
+HSEP_API hsep_status hsep_state_fits(size_t needed, size_t size, char message[])
+{
+    if (needed != size) {
+        hsep_message_add(
+            message,
+            "the state must have %.0f bytes, got memory for %.0f; its file in the resources has changed meanwhile: "
+            "initialise again",
+            (double)needed, (double)size);
+        return HSEP_REFUSED;
+    }
+    return HSEP_OK;
+}
+
 /* FNV-1a (Fowler, Noll and Vo 1991) over the bytes of the parameters. */
 static uint64_t state_hash(const hsep_context *context, const double values[])
 {

@@ -19,6 +19,9 @@ typedef struct {
 /* Turn a size that was counted in double into bytes. Fails if it is more than memory can be asked for. */
 HSEP_API hsep_status hsep_state_size(double bytes, size_t *size, char message[]);
 
+/* Check that memory of size bytes is what the state needs: a resource may have changed since the size was told. */
+HSEP_API hsep_status hsep_state_fits(size_t needed, size_t size, char message[]);
+
 /* Fill the header of a state. */
 HSEP_API void hsep_state_mark(
     hsep_state_header *header, const hsep_context *context, const double values[], uint64_t kind, size_t size);

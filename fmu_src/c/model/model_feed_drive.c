@@ -39,11 +39,12 @@ static void feed_drive_write_outputs(const feed_drive_state *self, double values
 }
 
 HSEP_API hsep_status hsep_model_initialise(
-    const hsep_context *context, void *state, double values[], double t_start, char message[])
+    const hsep_context *context, void *state, size_t size, double values[], double t_start, char message[])
 {
     feed_drive_state *self = state;
-    size_t size = 0;
-    if (hsep_model_size(context, values, &size, message) != HSEP_OK ||
+    size_t needed = 0;
+    if (hsep_model_size(context, values, &needed, message) != HSEP_OK ||
+        hsep_state_fits(needed, size, message) != HSEP_OK ||
         hsep_check_start_time(t_start, message) != HSEP_OK ||
         hsep_drive_check_start(values[HSEP_VR_x_d], message) != HSEP_OK) {
         return HSEP_REFUSED;

@@ -97,13 +97,14 @@ static void predictor_write_windows(const hsep_predictor *predictor, double valu
 }
 
 HSEP_API hsep_status hsep_model_initialise(
-    const hsep_context *context, void *state, double values[], double t_start, char message[])
+    const hsep_context *context, void *state, size_t size, double values[], double t_start, char message[])
 {
     predictor_state *self = state;
     hsep_mode modes[HSEP_N_MODES];
     hsep_predictor_parameters parameters;
-    size_t size = 0;
-    if (hsep_model_size(context, values, &size, message) != HSEP_OK ||
+    size_t needed = 0;
+    if (hsep_model_size(context, values, &needed, message) != HSEP_OK ||
+        hsep_state_fits(needed, size, message) != HSEP_OK ||
         predictor_checked(context, values, &parameters, modes, message) != HSEP_OK ||
         hsep_inputs_init(&self->inputs, t_start, parameters.T_s, values[HSEP_VR_x_d_ahead], message) != HSEP_OK) {
         return HSEP_REFUSED;

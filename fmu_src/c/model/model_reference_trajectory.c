@@ -31,13 +31,16 @@ typedef struct {
     hsep_trajectory trajectory; /* its samples follow */
 } trajectory_state;
 
-/* Open the chosen trajectory's file, read up to its first sample, and tell how many samples there are. The caller
- * closes it; NULL with a message if it does not fit. */
+/* Check the parameters, open the chosen trajectory's file, read up to its first sample, and tell how many samples there
+ * are. The caller closes it; NULL with a message if something does not fit. */
 static FILE *trajectory_open(const hsep_context *context, const double values[], uint64_t *count, char message[])
 {
     char name[TRAJECTORY_NAME_SIZE], expected[HSEP_NUMBER_SIZE], got[HSEP_NUMBER_SIZE];
     uint64_t head[2] = {0, 0};
     double T_s = 0.0;
+    if (hsep_check_parameters(context, values, message) > 0) {
+        return NULL;
+    }
     snprintf(name, sizeof name, "trajectory_%.0f.bin", values[HSEP_VR_trajectory]);
     FILE *file = hsep_resource_open(context, name);
     if (file == NULL) {
@@ -62,35 +65,43 @@ static FILE *trajectory_open(const hsep_context *context, const double values[],
     return NULL;
 }
 
+/* Tell the bytes of a state with so many samples. */
+static hsep_status trajectory_bytes(uint64_t count, size_t *size, char message[])
+{
+    const double before = (double)(sizeof(trajectory_state) - sizeof(hsep_trajectory));
+    return hsep_state_size(before + hsep_trajectory_size(count), size, message);
+}
+
 HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[])
 {
     uint64_t count = 0;
     message[0] = '\0';
-    if (hsep_check_parameters(context, values, message) > 0) {
-        return HSEP_REFUSED;
-    }
     FILE *file = trajectory_open(context, values, &count, message);
     if (file == NULL) {
         return HSEP_REFUSED;
     }
     fclose(file);
-    const double before = (double)(sizeof(trajectory_state) - sizeof(hsep_trajectory));
-    return hsep_state_size(before + hsep_trajectory_size(count), size, message);
+    return trajectory_bytes(count, size, message);
 }
 
 HSEP_API hsep_status hsep_model_initialise(
-    const hsep_context *context, void *state, double values[], double t_start, char message[])
+    const hsep_context *context, void *state, size_t size, double values[], double t_start, char message[])
 {
     char number[HSEP_NUMBER_SIZE];
     trajectory_state *self = state;
-    size_t size = 0;
+    size_t needed = 0;
     uint64_t count = 0;
-    if (hsep_model_size(context, values, &size, message) != HSEP_OK ||
-        hsep_check_clock(&self->clock, t_start, values[HSEP_VR_T_s], message) != HSEP_OK) {
+    message[0] = '\0';
+    if (hsep_check_clock(&self->clock, t_start, values[HSEP_VR_T_s], message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     FILE *file = trajectory_open(context, values, &count, message);
     if (file == NULL) {
+        return HSEP_REFUSED;
+    }
+    /* Memory was taken for the samples that were there when hsep_model_size looked. */
+    if (trajectory_bytes(count, &needed, message) != HSEP_OK || hsep_state_fits(needed, size, message) != HSEP_OK) {
+        fclose(file);
         return HSEP_REFUSED;
     }
     self->trajectory.count = count;
@@ -131,9 +142,6 @@ HSEP_API void hsep_model_start_values(const hsep_context *context, double values
     uint64_t count = 0;
     double first = 0.0;
     values[HSEP_VR_r] = 0.0;
-    if (hsep_check_parameters(context, values, message) > 0) {
-        return;
-    }
     FILE *file = trajectory_open(context, values, &count, message);
     if (file == NULL) {
         return;
