@@ -39,7 +39,8 @@ def print_predictions(summary: Summary) -> None:
                 table.add_row(f"  {part.replace('_', ' ')}", *_figures(case[part]))
     console.print(table)
     console.print(
-        "The stage is tuned to the printed figures (see its machine file): there, their agreement is no evidence."
+        "The stage has the paper's Table 1 and a simulated disturbance, scaled to the printed physics figures: these "
+        "agree by construction, the hybrid's do not."
     )
     for name, case in summary.items():
         n, worse = case["n_batches"], case["batches_hybrid_worse"]
@@ -80,8 +81,7 @@ def _printed(case: Mapping[str, float]) -> str:
     """Return what the paper prints of a case."""
     if not case:
         return ""
-    physics, hybrid = (f"{case[name]:g}" if name in case else "–" for name in ("rms_pb_um", "rms_h_um"))
-    return f"{physics}→{hybrid}, {case['reduction_percent']:g} %"
+    return f"{case['rms_pb_um']:g}→{case['rms_h_um']:g}, {case['reduction_percent']:g} %"
 
 
 def _figure(value: float | None, unit: str = "") -> str:
