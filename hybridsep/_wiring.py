@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ._threads import one_blas_thread
 from .errors import FmuError
 from .importer import FmuInstance
 from .signals import Array, as_samples
@@ -73,6 +74,7 @@ class Record:
     Np: int
 
 
+@one_blas_thread
 def run_pair(
     role: Role,
     look_ahead: str | Path,

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ._threads import one_blas_thread
 from .errors import SignalError
 from .predictor import HybridPredictor
 from .signals import Array, as_samples
@@ -195,6 +196,7 @@ def backtest(predictor: HybridPredictor, x_d: ArrayLike, x: ArrayLike, *, on_bat
     )
 
 
+@one_blas_thread
 def backtest_stream(
     predictor: HybridPredictor, chunks: Iterable[tuple[ArrayLike, ArrayLike]], *, on_batch: OnBatch | None = None
 ) -> Scores:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
+from ._threads import one_blas_thread
 from .compensator import SepCompensator
 from .plant import Encoder, Plant
 from .sep_lookahead import SepLookAhead
@@ -50,6 +51,7 @@ class ClosedLoop:
         return float(np.sqrt(np.mean((self.x_d - self.x) ** 2)))
 
 
+@one_blas_thread
 def run_closed_loop(
     compensator: SepCompensator,
     plant: Plant,

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from tempfile import mkdtemp
 from types import TracebackType
 from typing import Any
 
@@ -24,9 +27,31 @@ from .errors import FmuError
 
 __all__ = ["FmuInstance"]
 
+_LOADING = threading.Lock()
+
+
+@contextmanager
+def _working_directory() -> Iterator[Path]:
+    """Give the process's working directory to one thread at a time, and restore it.
+
+    fmpy changes it, for the whole process, while it loads a library, and leaves it changed if that fails.
+    """
+    with _LOADING:
+        try:
+            folder = Path.cwd()
+        except FileNotFoundError as error:
+            raise FmuError("the working directory of this process no longer exists; change to another one") from error
+        try:
+            yield folder
+        finally:
+            os.chdir(folder)
+
 
 class FmuInstance:
     """An instance of a co-simulation FMU; use it as a context manager.
+
+    Instances may live in several threads, each used by one thread at a time: they are loaded one after the other and
+    step in parallel. While one is loaded, the working directory of the process is another for some milliseconds.
 
     Parameters
     ----------
@@ -52,33 +77,63 @@ class FmuInstance:
     def __init__(self, path: str | Path, instance_name: str | None = None) -> None:
         self.path = Path(path)
         self.log: list[tuple[int, str]] = []
-        if not self.path.is_file():
+        self._slave: FMU2Slave | None = None
+        with _working_directory() as folder:
+            archive = folder / self.path
+        if not archive.is_file():
             raise FmuError(f"no FMU at {self.path}; build it first (hybridsep build)")
         try:
-            self.description = fmpy.read_model_description(str(self.path), validate=False)
+            self.description = fmpy.read_model_description(str(archive), validate=False)
         except Exception as error:  # fmpy raises bare Exceptions here
-            raise FmuError(f"{self.path.name} is not a readable FMU: {str(error).splitlines()[0]}") from error
+            raise FmuError(f"{self.path.name} is not a readable FMU: {_first_line(error)}") from error
         if self.description.fmiVersion != "2.0":
             raise FmuError(f"{self.path.name} must be an FMI 2.0 FMU, got FMI {self.description.fmiVersion}")
         if self.description.coSimulation is None:
             raise FmuError(f"{self.path.name} must be a co-simulation FMU, got one for model exchange only")
         self.variables: dict[str, Any] = {v.name: v for v in self.description.modelVariables}
-        self._folder = fmpy.extract(str(self.path))
         self._callbacks = fmi2CallbackFunctions()
         self._callbacks.logger = fmi2CallbackLoggerTYPE(self._on_log)
         self._callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
         self._callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(fmpy.free)
+        self._folder = mkdtemp()
         try:
-            self.slave = FMU2Slave(
-                guid=self.description.guid,
-                unzipDirectory=self._folder,
-                modelIdentifier=self.description.coSimulation.modelIdentifier,
-                instanceName=instance_name or self.path.stem,
-            )
-            self.slave.instantiate(callbacks=self._callbacks, loggingOn=True)
-        except Exception as error:  # fmpy raises bare Exceptions here
+            self._slave = self._instantiate(archive, instance_name or self.path.stem)
+        except BaseException:
             shutil.rmtree(self._folder, ignore_errors=True)
+            raise
+
+    def _instantiate(self, archive: Path, instance_name: str) -> FMU2Slave:
+        """Unpack the archive, load its library and make the instance."""
+        try:
+            fmpy.extract(str(archive), self._folder)
+            with _working_directory():
+                slave = FMU2Slave(
+                    guid=self.description.guid,
+                    unzipDirectory=self._folder,
+                    modelIdentifier=self.description.coSimulation.modelIdentifier,
+                    instanceName=instance_name,
+                )
+        except Exception as error:  # fmpy raises bare Exceptions here
+            raise FmuError(f"{self.path.name} cannot be loaded: {_first_line(error)}") from error
+        try:
+            slave.instantiate(callbacks=self._callbacks, loggingOn=True)
+        except Exception as error:
+            slave.freeLibrary()
             raise FmuError(f"{self.path.name} cannot be instantiated: {error}{self._last_words()}") from error
+        return slave
+
+    @property
+    def slave(self) -> FMU2Slave:
+        """The instance as fmpy's slave, for FMI calls that have no method here.
+
+        Raises
+        ------
+        FmuError
+            If the instance is closed.
+        """
+        if self._slave is None:
+            raise FmuError(f"{self.path.name}: the instance is closed; make a new FmuInstance")
+        return self._slave
 
     def __enter__(self) -> FmuInstance:
         return self
@@ -89,11 +144,16 @@ class FmuInstance:
         self.close()
 
     def close(self) -> None:
-        """Free the instance and its unpacked files."""
-        with suppress(FMICallException):
-            self.slave.terminate()
-        self.slave.freeInstance()
-        shutil.rmtree(self._folder, ignore_errors=True)
+        """Free the instance and its unpacked files; closing again does nothing."""
+        slave, self._slave = self._slave, None
+        if slave is None:
+            return
+        try:
+            with suppress(FMICallException):
+                slave.terminate()
+            slave.freeInstance()
+        finally:
+            shutil.rmtree(self._folder, ignore_errors=True)
 
     def initialise(self, values: Mapping[str, Any] | None = None, *, start_time: float = 0.0) -> None:
         """Set parameters and start values and run through the initialization.
@@ -172,8 +232,10 @@ class FmuInstance:
         except FMICallException as error:
             raise FmuError(f"{self.path.name}: {error}{self._last_words()}") from error
 
-    def _on_log(self, environment: Any, instance: bytes, status: int, category: bytes | None, message: bytes) -> None:
-        self.log.append((status, message.decode("utf-8", "replace")))
+    def _on_log(
+        self, environment: Any, instance: bytes, status: int, category: bytes | None, message: bytes | None
+    ) -> None:
+        self.log.append((status, (message or b"").decode("utf-8", "replace")))
         del self.log[:-1000]
 
     def _last_words(self) -> str:
@@ -183,3 +245,8 @@ class FmuInstance:
         text = self.log[-1][1]
         framed = re.search(r"\w+Error\(([\"'])(.*)\1\)", text, re.DOTALL)
         return f": {framed[2] if framed else text}"
+
+
+def _first_line(error: Exception) -> str:
+    """Return the first line of an error's message, or its type where it has none."""
+    return (str(error).splitlines() or [type(error).__name__])[0]

@@ -8,12 +8,25 @@ import os
 # variable must be set before NumPy is loaded.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 from hybridsep import build_fmu, fmu_names, load_machine, machine_names
+
+
+@pytest.fixture(autouse=True)
+def _working_directory_kept() -> Iterator[None]:
+    """Fail the test that leaves the process in another folder, and spare those after it."""
+    before = Path.cwd()
+    yield
+    try:
+        after: Path | str = Path.cwd()
+    except FileNotFoundError:
+        after = "a removed folder"
+    os.chdir(before)
+    assert after == before
 
 
 @pytest.fixture(scope="session")

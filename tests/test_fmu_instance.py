@@ -1,0 +1,234 @@
+"""The importer's instances: closing, loading in threads, and the working directory of the process."""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+import threading
+import time
+import zipfile
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import fmpy.fmi1
+import pytest
+
+from hybridsep import FmuError, FmuInstance, build_fmu, load_machine
+
+TS = 1e-3
+N_THREADS = 8
+
+
+@pytest.fixture(scope="module")
+def native(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    machine = load_machine("spring_mass_damper")
+    return build_fmu(machine, "FeedDrive", tmp_path_factory.mktemp("native"), targets=("host",))
+
+
+@pytest.fixture(params=["native", "python"])
+def drive(request: pytest.FixtureRequest, native: Path, python_fmu: Callable[[str], Path]) -> Path:
+    """The plant in both flavours."""
+    return native if request.param == "native" else python_fmu("FeedDrivePy")
+
+
+def with_files(archive: Path, target: Path, change: Callable[[str, bytes], bytes | None]) -> Path:
+    """Copy an archive, each file as ``change`` gives it, without those for which it gives None."""
+    with zipfile.ZipFile(archive) as old, zipfile.ZipFile(target, "w") as new:
+        for name in old.namelist():
+            content = change(name, old.read(name))
+            if content is not None:
+                new.writestr(name, content)
+    return target
+
+
+@pytest.fixture(scope="module")
+def unloadable(native: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A FMU whose binaries are none."""
+    target = tmp_path_factory.mktemp("unloadable") / "Unloadable.fmu"
+    return with_files(native, target, lambda name, content: b"none" if name.startswith("binaries/") else content)
+
+
+@pytest.fixture
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder in which temporary files are made."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    return folder
+
+
+@pytest.fixture
+def eager_threads() -> Iterator[None]:
+    """Let threads give way as often as possible."""
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    yield
+    sys.setswitchinterval(before)
+
+
+# Closing -----------------------------------------------------------------------------------------------------------
+
+
+def test_closing_again_does_nothing(drive: Path, temporary: Path) -> None:
+    instance = FmuInstance(drive)
+    instance.initialise()
+    instance.step(0.0, TS)
+    assert list(temporary.iterdir())
+    for _ in range(3):
+        instance.close()
+    with instance:
+        pass
+    assert not list(temporary.iterdir())
+
+
+def test_a_closed_instance_refuses_every_call(drive: Path) -> None:
+    with FmuInstance(drive) as instance:
+        instance.initialise()
+        write, read = instance.real_writer(["x_d"]), instance.real_reader(["x"])
+        state = instance.save()
+    calls: list[Callable[[], Any]] = [
+        instance.initialise,
+        lambda: instance.set("x_d", 0.0),
+        lambda: instance.get("x"),
+        lambda: write([0.0]),
+        read,
+        lambda: instance.step(0.0, TS),
+        instance.reset,
+        instance.save,
+        lambda: instance.restore(state),
+        lambda: instance.slave,
+    ]
+    for call in calls:
+        with pytest.raises(FmuError, match=r"the instance is closed; make a new FmuInstance"):
+            call()
+    assert instance.variables["x"].name == "x"
+
+
+def test_closing_after_refusals(drive: Path) -> None:
+    """After a refused call, which pythonfmu reports as fatal, and before any."""
+    for values in ({"m": -1.0}, None):
+        instance = FmuInstance(drive)
+        if values:
+            with pytest.raises(FmuError, match=r"m must be > 0 kg"):
+                instance.initialise(values)
+        instance.close()
+        instance.close()
+        with pytest.raises(FmuError, match="closed"):
+            instance.get("m")
+
+
+# Failed constructions ----------------------------------------------------------------------------------------------
+
+
+def test_what_cannot_be_loaded_leaves_nothing_behind(
+    native: Path, unloadable: Path, python_fmu: Callable[[str], Path], tmp_path: Path, temporary: Path
+) -> None:
+    directory = Path.cwd()
+    guid = b"{" + b"0" * 36 + b"}"
+    truncated = tmp_path / "Truncated.fmu"
+    # the description can be read, the binary's checksum is wrong
+    content = bytearray(native.read_bytes())
+    with zipfile.ZipFile(native) as archive:
+        largest = max(archive.infolist(), key=lambda info: info.compress_size)
+    content[largest.header_offset + 200 + largest.compress_size // 2] ^= 0xFF
+    truncated.write_bytes(content)
+    bare = with_files(native, tmp_path / "Bare.fmu", lambda n, c: None if n.startswith("binaries/") else c)
+    foreign = with_files(
+        native,
+        tmp_path / "Foreign.fmu",
+        lambda n, c: c.replace(guid_of(native), guid) if n == "modelDescription.xml" else c,
+    )
+    useless = with_files(
+        python_fmu("FeedDrivePy"), tmp_path / "Useless.fmu", lambda n, c: None if n.endswith("machine.json") else c
+    )
+    for path, message in (
+        (unloadable, r"Unloadable\.fmu cannot be loaded: Failed to load shared library"),
+        (truncated, r"Truncated\.fmu cannot be loaded: "),
+        (bare, r"Bare\.fmu cannot be loaded: Cannot find shared library"),
+        (foreign, r"Foreign\.fmu cannot be instantiated: .*(?i:guid)"),
+        (useless, r"Useless\.fmu cannot be instantiated: "),
+    ):
+        with pytest.raises(FmuError, match=message):
+            FmuInstance(path)
+        assert Path.cwd() == directory
+        assert not list(temporary.iterdir()), path
+
+
+def guid_of(path: Path) -> bytes:
+    return str(fmpy.read_model_description(str(path)).guid).encode()
+
+
+def test_a_removed_working_directory_is_named(native: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "gone").mkdir()
+    os.chdir("gone")
+    (tmp_path / "gone").rmdir()
+    with pytest.raises(FmuError, match="the working directory of this process no longer exists"):
+        FmuInstance(native)
+
+
+# Threads -----------------------------------------------------------------------------------------------------------
+
+
+def test_threads_load_without_moving_the_process(
+    native: Path, unloadable: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, eager_threads: None
+) -> None:
+    """Relative paths, libraries that take a while to load, and some that cannot be loaded, in 8 threads at a time."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / native.name).write_bytes(native.read_bytes())
+    (tmp_path / unloadable.name).write_bytes(unloadable.read_bytes())
+    load = fmpy.fmi1.cdll.LoadLibrary
+
+    def load_slowly(path: str) -> Any:
+        time.sleep(1e-3)
+        return load(path)
+
+    monkeypatch.setattr(fmpy.fmi1.cdll, "LoadLibrary", load_slowly)
+    together = threading.Barrier(N_THREADS)
+
+    def run(i: int) -> float:
+        together.wait()
+        if i % 4 == 3:  # in the middle of the others
+            with pytest.raises(FmuError, match="cannot be loaded"):
+                FmuInstance(unloadable.name)
+        with FmuInstance(native.name, f"thread {i}") as plant:
+            plant.initialise()
+            plant.set("x_d", 1e-3)
+            plant.step(0.0, TS)
+            return float(plant.get("x"))
+
+    with ThreadPoolExecutor(N_THREADS) as pool:
+        for _ in range(3):
+            assert len(set(pool.map(run, range(N_THREADS)))) == 1
+            assert Path.cwd() == tmp_path
+
+
+def test_instances_in_threads_run_in_parallel(native: Path) -> None:
+    """While one instance is in the middle of an FMI call, others are loaded, stepped and closed."""
+    inside, go_on = threading.Event(), threading.Event()
+
+    class Waiting(FmuInstance):
+        def _on_log(self, *arguments: Any) -> None:
+            super()._on_log(*arguments)
+            inside.set()
+            go_on.wait()
+
+    def wait_in_a_call() -> None:
+        with Waiting(native) as plant, pytest.raises(FmuError, match="x_d must be finite"):
+            plant.initialise({"x_d": float("nan")})
+
+    thread = threading.Thread(target=wait_in_a_call)
+    thread.start()
+    while not inside.wait(timeout=0.1):
+        assert thread.is_alive()
+    try:
+        with FmuInstance(native) as other:
+            other.initialise()
+            other.step(0.0, TS)
+        assert thread.is_alive()
+    finally:
+        go_on.set()
+        thread.join()
