@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import FmuError
 from .importer import FmuInstance
+from .output import written_text, written_whole
 from .signals import Array, as_samples
 
 __all__ = ["RESULT_SUFFIXES", "Record", "Role", "run_pair", "save_columns"]
@@ -171,13 +172,14 @@ def save_columns(columns: Mapping[str, Any], path: str | Path) -> None:
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix == ".npz":
-        np.savez_compressed(path, **columns)
+        with written_whole(path) as archive:
+            np.savez_compressed(archive, **columns)
     elif suffix == ".csv":
         texts = [
             map(repr, (column.astype(np.int64) if column.dtype == np.bool_ else column).tolist())
             for column in columns.values()
         ]
-        with path.open("w", newline="", encoding="utf-8") as file:
+        with written_text(path) as file:
             writer = csv.writer(file)
             writer.writerow(columns)
             writer.writerows(zip(*texts, strict=True))

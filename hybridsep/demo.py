@@ -18,6 +18,7 @@ from .cosim import CoSimulation, cosimulate
 from .fmi.compiler import can_compile
 from .logs import Log, read_log
 from .machine import Machine, load_machine
+from .output import written_text
 from .sep_demo import KINDS, Runs, build_for_host, compensate, contour_errors, mean_summary
 from .signals import Array
 from .trajectory import spiral, staircase
@@ -143,7 +144,8 @@ def demo(
         plots.prediction_figure(replay, "EMPS, a recorded axis: causal replay", out / "emps.png")
     for name, case in summary.items():
         case["printed"] = PRINTED[name]
-    (out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    with written_text(out / "summary.json") as file:
+        file.write(json.dumps(summary, indent=2) + "\n")
     progress("done", 1.0)
     return summary
 
