@@ -21,8 +21,33 @@ from fmpy.fmi2 import (
 )
 
 from .errors import FmuError
+from .interrupt import uninterrupted
 
-__all__ = ["FmuInstance"]
+__all__ = ["FmuInstance", "read_description"]
+
+
+def read_description(path: str | Path) -> Any:
+    """Return fmpy's model description of an FMI 2.0 co-simulation FMU.
+
+    Raises
+    ------
+    FmuError
+        If there is none at ``path``.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise FmuError(f"no FMU at {path}; build it first (hybridsep build)")
+    try:
+        description = fmpy.read_model_description(str(path), validate=False)
+    except Exception as error:  # fmpy raises bare Exceptions here
+        raise FmuError(
+            f"{path.name} is not a readable FMU: {(str(error) or type(error).__name__).splitlines()[0]}"
+        ) from error
+    if description.fmiVersion != "2.0":
+        raise FmuError(f"{path.name} must be an FMI 2.0 FMU, got FMI {description.fmiVersion}")
+    if description.coSimulation is None:
+        raise FmuError(f"{path.name} must be a co-simulation FMU, got one for model exchange only")
+    return description
 
 
 class FmuInstance:
@@ -52,16 +77,7 @@ class FmuInstance:
     def __init__(self, path: str | Path, instance_name: str | None = None) -> None:
         self.path = Path(path)
         self.log: list[tuple[int, str]] = []
-        if not self.path.is_file():
-            raise FmuError(f"no FMU at {self.path}; build it first (hybridsep build)")
-        try:
-            self.description = fmpy.read_model_description(str(self.path), validate=False)
-        except Exception as error:  # fmpy raises bare Exceptions here
-            raise FmuError(f"{self.path.name} is not a readable FMU: {str(error).splitlines()[0]}") from error
-        if self.description.fmiVersion != "2.0":
-            raise FmuError(f"{self.path.name} must be an FMI 2.0 FMU, got FMI {self.description.fmiVersion}")
-        if self.description.coSimulation is None:
-            raise FmuError(f"{self.path.name} must be a co-simulation FMU, got one for model exchange only")
+        self.description = read_description(self.path)
         self.variables: dict[str, Any] = {v.name: v for v in self.description.modelVariables}
         self._folder = fmpy.extract(str(self.path))
         self._callbacks = fmi2CallbackFunctions()
@@ -69,16 +85,13 @@ class FmuInstance:
         self._callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
         self._callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(fmpy.free)
         try:
-            self.slave = FMU2Slave(
-                guid=self.description.guid,
-                unzipDirectory=self._folder,
-                modelIdentifier=self.description.coSimulation.modelIdentifier,
-                instanceName=instance_name or self.path.stem,
-            )
-            self.slave.instantiate(callbacks=self._callbacks, loggingOn=True)
+            self._instantiate(instance_name or self.path.stem)
         except Exception as error:  # fmpy raises bare Exceptions here
             shutil.rmtree(self._folder, ignore_errors=True)
             raise FmuError(f"{self.path.name} cannot be instantiated: {error}{self._last_words()}") from error
+        except BaseException:
+            self.close()
+            raise
 
     def __enter__(self) -> FmuInstance:
         return self
@@ -88,6 +101,7 @@ class FmuInstance:
     ) -> None:
         self.close()
 
+    @uninterrupted
     def close(self) -> None:
         """Free the instance and its unpacked files."""
         with suppress(FMICallException):
@@ -161,11 +175,22 @@ class FmuInstance:
         finally:
             self._call(self.slave.freeFMUstate, state)
 
+    @uninterrupted
+    def _instantiate(self, name: str) -> None:
+        self.slave = FMU2Slave(
+            guid=self.description.guid,
+            unzipDirectory=self._folder,
+            modelIdentifier=self.description.coSimulation.modelIdentifier,
+            instanceName=name,
+        )
+        self.slave.instantiate(callbacks=self._callbacks, loggingOn=True)
+
     def _variable(self, name: str) -> Any:
         if name not in self.variables:
             raise FmuError(f"{self.path.name} has no variable {name!r}")
         return self.variables[name]
 
+    @uninterrupted
     def _call(self, function: Callable[..., Any], *arguments: Any, **keywords: Any) -> Any:
         try:
             return function(*arguments, **keywords)
