@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 
-from hybridsep.cli import main
+from hybridsep_main import main
 
 if __name__ == "__main__":
     sys.argv.insert(1, "build")

@@ -18,10 +18,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from ._threads import one_blas_thread
 from .errors import FmuError
-from .importer import FmuInstance
+from .importer import FmuInstance, read_description
+from .interrupt import interrupts_between_calls
+from .output import written_text, written_whole
 from .signals import Array, as_samples
 
-__all__ = ["RESULT_SUFFIXES", "Record", "Role", "run_pair", "save_columns"]
+__all__ = ["RESULT_SUFFIXES", "Record", "Role", "check_look_ahead", "check_plant", "run_pair", "save_columns"]
 
 RESULT_SUFFIXES = (".csv", ".npz")
 """Endings of files that :func:`save_columns` can write."""
@@ -115,9 +117,13 @@ def run_pair(
     """
     command = as_samples(r, "r")
     as_samples(command[:1], "r", 1)
-    with FmuInstance(look_ahead, role.name) as ahead_fmu, FmuInstance(plant, "plant") as plant_fmu:
-        _check_role(ahead_fmu, role.name, ("x_d_ahead", "x_meas"), (*role.outputs, role.state))
-        _check_role(plant_fmu, "plant", ("x_d",), ("x", "x_meas"))
+    check_look_ahead(look_ahead, role)
+    check_plant(plant)
+    with (
+        interrupts_between_calls(),
+        FmuInstance(look_ahead, role.name) as ahead_fmu,
+        FmuInstance(plant, "plant") as plant_fmu,
+    ):
         start = float(command[0])
         ahead_fmu.initialise({**(look_ahead_values or {}), "x_d_ahead": start, "x_meas": start}, start_time=start_time)
         plant_fmu.initialise({**(plant_values or {}), "x_d": start}, start_time=start_time)
@@ -173,13 +179,14 @@ def save_columns(columns: Mapping[str, Any], path: str | Path) -> None:
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix == ".npz":
-        np.savez_compressed(path, **columns)
+        with written_whole(path) as archive:
+            np.savez_compressed(archive, **columns)
     elif suffix == ".csv":
         texts = [
             map(repr, (column.astype(np.int64) if column.dtype == np.bool_ else column).tolist())
             for column in columns.values()
         ]
-        with path.open("w", newline="", encoding="utf-8") as file:
+        with written_text(path) as file:
             writer = csv.writer(file)
             writer.writerow(columns)
             writer.writerows(zip(*texts, strict=True))
@@ -187,9 +194,19 @@ def save_columns(columns: Mapping[str, Any], path: str | Path) -> None:
         raise ValueError(f"results are written as {' or '.join(RESULT_SUFFIXES)}, got {path.name!r}")
 
 
-def _check_role(fmu: FmuInstance, role: str, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> None:
-    """Say what an FMU lacks to be what it is used as."""
+def check_look_ahead(path: str | Path, role: Role) -> None:
+    """Raise FmuError if an archive is no FMU, or lacks what the role needs."""
+    _check_role(path, role.name, ("x_d_ahead", "x_meas"), (*role.outputs, role.state))
+
+
+def check_plant(path: str | Path) -> None:
+    """Raise FmuError if an archive is no FMU, or lacks what a plant has."""
+    _check_role(path, "plant", ("x_d",), ("x", "x_meas"))
+
+
+def _check_role(path: str | Path, role: str, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> None:
+    causalities = {variable.name: variable.causality for variable in read_description(path).modelVariables}
     for causality, names in (("input", inputs), ("output", outputs)):
         for name in names:
-            if name not in fmu.variables or fmu.variables[name].causality != causality:
-                raise FmuError(f"{fmu.path.name} is no {role}: it has no {causality} {name}")
+            if causalities.get(name) != causality:
+                raise FmuError(f"{Path(path).name} is no {role}: it has no {causality} {name}")

@@ -17,10 +17,11 @@ from numpy.typing import ArrayLike, NDArray
 from ._wiring import Role, run_pair, save_columns
 from .signals import Array
 
-__all__ = ["CoSimulation", "cosimulate"]
+__all__ = ["COLUMNS", "PREDICTOR", "CoSimulation", "cosimulate"]
 
-_ROLE = Role("predictor", ("x_d", "x_pb", "x_h"), state="hybrid_active", delay="Np")
-_SIGNALS = ("t", "x_d", "x", "x_meas", "x_pb", "x_hold", "x_h")
+PREDICTOR = Role("predictor", ("x_d", "x_pb", "x_h"), state="hybrid_active", delay="Np")
+COLUMNS = ("t", "x_d", "x", "x_meas", "x_pb", "x_hold", "x_h", "active")
+"""What :meth:`CoSimulation.save` writes."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,7 @@ class CoSimulation:
         ValueError
             If the suffix is another one.
         """
-        save_columns({name: getattr(self, name) for name in (*_SIGNALS, "active")}, path)
+        save_columns({name: getattr(self, name) for name in COLUMNS}, path)
 
 
 def cosimulate(
@@ -125,7 +126,7 @@ def cosimulate(
         If ``r`` is empty or not finite.
     """
     record = run_pair(
-        _ROLE,
+        PREDICTOR,
         predictor,
         plant,
         r,

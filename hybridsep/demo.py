@@ -15,14 +15,16 @@ from numpy.typing import NDArray
 from . import plots, sep_plots
 from .backtest import Backtest, backtest
 from .cosim import CoSimulation, cosimulate
+from .fmi.archive import fmu_names
 from .fmi.compiler import can_compile
 from .logs import Log, read_log
 from .machine import Machine, load_machine
+from .output import written_text
 from .sep_demo import KINDS, Runs, build_for_host, compensate, contour_errors, mean_summary
 from .signals import Array
 from .trajectory import spiral, staircase
 
-__all__ = ["PRINTED", "RecordedReplay", "Summary", "demo"]
+__all__ = ["MACHINES", "PRINTED", "RecordedReplay", "Summary", "default_backend", "demo", "demo_files"]
 
 PRINTED = {
     "staircase": {"rms_pb_um": 33.7, "rms_h_um": 14.7, "reduction_percent": 56.4},
@@ -31,6 +33,9 @@ PRINTED = {
     "emps": {},
 }
 """What the paper prints for each case."""
+
+MACHINES = {"staircase": "spring_mass_damper", "spiral_x": "als25010_x", "spiral_y": "als25010_y"}
+"""The machine of each case."""
 
 SEEDS = 10
 
@@ -90,6 +95,28 @@ class RecordedReplay:
         }
 
 
+def default_backend() -> str:
+    """Return the flavour of the demo's FMUs: native where there is a C compiler, Python otherwise."""
+    return "native" if can_compile() else "python"
+
+
+def demo_files(out: str | Path, backend: str, *, emps: bool) -> list[Path]:
+    """Return all files that :func:`demo` writes, with or without the recorded axis."""
+    out = Path(out)
+    files = [
+        out / name for name in ("summary.json", "spiral.png", "spiral_contour.png", *(["emps.png"] if emps else []))
+    ]
+    for case, name in MACHINES.items():
+        files += [out / f"{case}{what}{end}" for what in ("", "_compensated") for end in (".csv", ".png")]
+        files.append(out / f"{name}.state")
+        for fmu, model in fmu_names(load_machine(name), backend).items():
+            if model in ("HybridPredictor", "SepCompensator", "FeedDrive"):
+                files.append(out / "fmus" / f"{fmu}.fmu")
+            if model == "SepCompensator":
+                files.append(out / "fmus" / "warm" / f"{fmu}.fmu")
+    return files
+
+
 def demo(
     out: str | Path,
     *,
@@ -122,12 +149,17 @@ def demo(
         ``reduction_percent``, ``printed`` and more; RMS in µm against the measured position. ``compensation`` says for
         ``none``, ``physics``, ``hybrid_cold`` and ``hybrid_warm`` what :func:`hybridsep.sep_demo.compensate` found,
         for the spiral's axes with the contour error of both together, ``contour_rms_um`` and ``contour_max_um``.
+
+    Raises
+    ------
+    LogError
+        If ``emps`` cannot be read; nothing has been done then.
     """
-    if backend is None:
-        backend = "native" if can_compile() else "python"
+    backend = backend or default_backend()
+    recorded = None if emps is None else read_recorded(emps)  # a file that cannot be read must not end four minutes
     out = Path(out)
     out.mkdir(parents=True, exist_ok=True)
-    total = seeds + 6 + 3 * len(KINDS) + (emps is not None)
+    total = seeds + 6 + 3 * len(KINDS) + (recorded is not None)
     done = 0
 
     def advance(message: str) -> None:
@@ -136,21 +168,22 @@ def demo(
         done += 1
 
     summary: Summary = {"staircase": _staircase(out, seeds, backend, advance), **_spiral(out, backend, advance)}
-    if emps is not None:
+    if recorded is not None:
         advance("EMPS, a recorded axis")
-        replay = replay_emps(emps)
+        replay = replay_recorded(recorded)
         summary["emps"] = {**replay.result.summary(), **_worse(replay)}
         plots.prediction_figure(replay, "EMPS, a recorded axis: causal replay", out / "emps.png")
     for name, case in summary.items():
         case["printed"] = PRINTED[name]
-    (out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    with written_text(out / "summary.json") as file:
+        file.write(json.dumps(summary, indent=2) + "\n")
     progress("done", 1.0)
     return summary
 
 
 def _staircase(out: Path, seeds: int, backend: str, advance: Callable[[str], None]) -> dict[str, Any]:
     """Predict and compensate on the staircase."""
-    machine = load_machine("spring_mass_damper")
+    machine = load_machine(MACHINES["staircase"])
     command = staircase(machine.T_s)
     fmus = _build_pair(machine, out / "fmus", backend)
     runs = []
@@ -181,7 +214,7 @@ def _spiral(out: Path, backend: str, advance: Callable[[str], None]) -> Summary:
     axes: dict[str, CoSimulation] = {}
     compensated: dict[str, Runs] = {}
     for axis, command in zip(("x", "y"), spiral(), strict=True):
-        machine, label = load_machine(f"als25010_{axis}"), f"spiral, {axis.upper()} axis"
+        machine, label = load_machine(MACHINES[f"spiral_{axis}"]), f"spiral, {axis.upper()} axis"
         fmus = _build_pair(machine, out / "fmus", backend)
         advance(label)
         axes[axis] = run = cosimulate(*fmus, command)
@@ -209,17 +242,20 @@ def _spiral(out: Path, backend: str, advance: Callable[[str], None]) -> Summary:
     return summary
 
 
-def replay_emps(path: str | Path) -> RecordedReplay:
-    """Replay the EMPS recording with its published constants.
+def read_recorded(path: str | Path) -> Log:
+    """Read the EMPS recording.
 
     Raises
     ------
     LogError
         If the file cannot be read as a ``DATA_EMPS.mat``.
     """
-    machine = load_machine("emps")
-    log = read_log(path, columns=machine.log.model_dump())
-    predictor = machine.new_predictor()
+    return read_log(path, columns=load_machine("emps").log.model_dump())
+
+
+def replay_recorded(log: Log) -> RecordedReplay:
+    """Replay the EMPS recording with its published constants."""
+    predictor = load_machine("emps").new_predictor()
     return RecordedReplay(log, backtest(predictor, log.x_d, log.x), predictor.Np)
 
 

@@ -24,8 +24,34 @@ from fmpy.fmi2 import (
 )
 
 from .errors import FmuError
+from .interrupt import uninterrupted
 
-__all__ = ["FmuInstance"]
+__all__ = ["FmuInstance", "read_description"]
+
+
+def read_description(path: str | Path) -> Any:
+    """Return fmpy's model description of an FMI 2.0 co-simulation FMU.
+
+    Raises
+    ------
+    FmuError
+        If there is none at ``path``.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise FmuError(f"no FMU at {path}; build it first (hybridsep build)")
+    try:
+        description = fmpy.read_model_description(str(path), validate=False)
+    except Exception as error:  # fmpy raises bare Exceptions here
+        raise FmuError(
+            f"{path.name} is not a readable FMU: {(str(error) or type(error).__name__).splitlines()[0]}"
+        ) from error
+    if description.fmiVersion != "2.0":
+        raise FmuError(f"{path.name} must be an FMI 2.0 FMU, got FMI {description.fmiVersion}")
+    if description.coSimulation is None:
+        raise FmuError(f"{path.name} must be a co-simulation FMU, got one for model exchange only")
+    return description
+
 
 _LOADING = threading.Lock()
 
@@ -80,16 +106,7 @@ class FmuInstance:
         self._slave: FMU2Slave | None = None
         with _working_directory() as folder:
             archive = folder / self.path
-        if not archive.is_file():
-            raise FmuError(f"no FMU at {self.path}; build it first (hybridsep build)")
-        try:
-            self.description = fmpy.read_model_description(str(archive), validate=False)
-        except Exception as error:  # fmpy raises bare Exceptions here
-            raise FmuError(f"{self.path.name} is not a readable FMU: {_first_line(error)}") from error
-        if self.description.fmiVersion != "2.0":
-            raise FmuError(f"{self.path.name} must be an FMI 2.0 FMU, got FMI {self.description.fmiVersion}")
-        if self.description.coSimulation is None:
-            raise FmuError(f"{self.path.name} must be a co-simulation FMU, got one for model exchange only")
+        self.description = read_description(archive)
         self.variables: dict[str, Any] = {v.name: v for v in self.description.modelVariables}
         self._callbacks = fmi2CallbackFunctions()
         self._callbacks.logger = fmi2CallbackLoggerTYPE(self._on_log)
@@ -97,12 +114,13 @@ class FmuInstance:
         self._callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(fmpy.free)
         self._folder = mkdtemp()
         try:
-            self._slave = self._instantiate(archive, instance_name or self.path.stem)
+            self._instantiate(archive, instance_name or self.path.stem)
         except BaseException:
-            shutil.rmtree(self._folder, ignore_errors=True)
+            self.close()
             raise
 
-    def _instantiate(self, archive: Path, instance_name: str) -> FMU2Slave:
+    @uninterrupted
+    def _instantiate(self, archive: Path, instance_name: str) -> None:
         """Unpack the archive, load its library and make the instance."""
         try:
             fmpy.extract(str(archive), self._folder)
@@ -120,7 +138,7 @@ class FmuInstance:
         except Exception as error:
             slave.freeLibrary()
             raise FmuError(f"{self.path.name} cannot be instantiated: {error}{self._last_words()}") from error
-        return slave
+        self._slave = slave
 
     @property
     def slave(self) -> FMU2Slave:
@@ -143,15 +161,15 @@ class FmuInstance:
     ) -> None:
         self.close()
 
+    @uninterrupted
     def close(self) -> None:
         """Free the instance and its unpacked files; closing again does nothing."""
         slave, self._slave = self._slave, None
-        if slave is None:
-            return
         try:
-            with suppress(FMICallException):
-                slave.terminate()
-            slave.freeInstance()
+            if slave is not None:
+                with suppress(FMICallException):
+                    slave.terminate()
+                slave.freeInstance()
         finally:
             shutil.rmtree(self._folder, ignore_errors=True)
 
@@ -221,11 +239,22 @@ class FmuInstance:
         finally:
             self._call(self.slave.freeFMUstate, state)
 
+    @uninterrupted
+    def _instantiate(self, name: str) -> None:
+        self.slave = FMU2Slave(
+            guid=self.description.guid,
+            unzipDirectory=self._folder,
+            modelIdentifier=self.description.coSimulation.modelIdentifier,
+            instanceName=name,
+        )
+        self.slave.instantiate(callbacks=self._callbacks, loggingOn=True)
+
     def _variable(self, name: str) -> Any:
         if name not in self.variables:
             raise FmuError(f"{self.path.name} has no variable {name!r}")
         return self.variables[name]
 
+    @uninterrupted
     def _call(self, function: Callable[..., Any], *arguments: Any, **keywords: Any) -> Any:
         try:
             return function(*arguments, **keywords)

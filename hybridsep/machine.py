@@ -14,7 +14,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 
 from ._data_files import data_folder
 from .compensator import SepCompensator, SepState
-from .errors import MachineError, ParameterError
+from .errors import MachineError, ParameterError, brief
 from .limits import Limits
 from .parameters import INPUT_HOLDS, PARAMETERS, check, check_lags, check_preview
 from .physics import ModalModel, Mode
@@ -26,7 +26,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-__all__ = ["DEFAULT_MACHINE", "Machine", "load_machine", "machine_names"]
+__all__ = ["DEFAULT_MACHINE", "Machine", "load_machine", "machine_names", "machine_path"]
 
 DEFAULT_MACHINE = "spring_mass_damper"
 
@@ -45,8 +45,8 @@ OptionalWhole = Annotated[int | None, BeforeValidator(_checked)]
 """Given, or left out; there is no null in TOML."""
 
 
-Line = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]+$")]
-"""One line of printable text; it goes into XML."""
+Line = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f\x{FFFE}\x{FFFF}]+$")]
+"""One line of printable text, of characters that XML 1.0 allows: the modelDescription and the FMU's page have it."""
 
 
 def _default(name: str) -> Any:
@@ -309,6 +309,22 @@ def machine_names() -> list[str]:
     return sorted(path.stem for path in data_folder("models").glob("*.toml"))
 
 
+def machine_path(machine: str | Path) -> Path:
+    """Return the machine file of a path or of a name that comes with the library.
+
+    Raises
+    ------
+    MachineError
+        If there is none.
+    """
+    path = Path(machine)
+    if path.suffix != ".toml" and not path.is_file():
+        path = data_folder("models") / f"{machine}.toml"
+    if not path.is_file():
+        raise MachineError(f"no machine {str(machine)!r}: expected a .toml file or one of {', '.join(machine_names())}")
+    return path
+
+
 def load_machine(machine: str | Path) -> Machine:
     """Read a machine file.
 
@@ -322,14 +338,10 @@ def load_machine(machine: str | Path) -> Machine:
     MachineError
         If there is no such file, it is not TOML, or an entry is missing, unknown or out of range.
     """
-    path = Path(machine)
-    if path.suffix != ".toml" and not path.is_file():
-        path = data_folder("models") / f"{machine}.toml"
-    if not path.is_file():
-        raise MachineError(f"no machine {str(machine)!r}: expected a .toml file or one of {', '.join(machine_names())}")
+    path = machine_path(machine)
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:  # an integer of 5000 digits is a ValueError, too
         raise MachineError(f"{path.name} is not valid TOML: {error}") from error
     try:
         return Machine(**content)
@@ -352,11 +364,11 @@ def _describe(problem: Any) -> str:
     if kind == "union_tag_not_found":
         return f"{where}.kind is missing: feed_drive or stage"
     if kind == "string_pattern_mismatch" and where != "name":
-        return f"{where} must be one line of printable text, got {problem['input']!r}"
+        return f"{where} must be one line of printable text that XML 1.0 allows, got {brief(problem['input'])}"
     if kind == "missing":
         return f"{where} is missing"
     if kind == "extra_forbidden":
         return f"{where} is not an entry of a machine file; check its spelling"
     if kind == "value_error":
         return f"{where}: {problem['ctx']['error']}" if where else str(problem["ctx"]["error"])
-    return f"{where}: {problem['msg']}, got {problem.get('input')!r}"
+    return f"{where}: {problem['msg']}, got {brief(problem.get('input'))}"

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from .errors import ParameterError
+from .errors import ParameterError, brief
 
 __all__ = [
     "INPUT_HOLDS",
@@ -160,19 +160,21 @@ def check(name: str, value: Any, *, label: str | None = None) -> Any:
         if isinstance(value, (bool, str, bytes)):
             raise TypeError
         number = float(value)
-    except (TypeError, ValueError, OverflowError):
-        raise ParameterError(f"{shown} must be a number, got {value!r}") from None
+    except OverflowError:  # an integer beyond the largest float
+        number = math.inf
+    except (TypeError, ValueError):
+        raise ParameterError(f"{shown} must be a number, got {brief(value)}") from None
     if not math.isfinite(number):
-        raise ParameterError(f"{shown} must be finite, got {value!r}")
+        raise ParameterError(f"{shown} must be finite, got {brief(value)}")
     if parameter.kind is int and number != int(number):
-        raise ParameterError(f"{shown} must be a whole number, got {value!r}")
+        raise ParameterError(f"{shown} must be a whole number, got {brief(value)}")
     outside = (
         (parameter.above is not None and number <= parameter.above)
         or (parameter.minimum is not None and number < parameter.minimum)
         or (parameter.maximum is not None and number > parameter.maximum)
     )
     if outside:
-        raise ParameterError(f"{shown} must be {parameter.range_text}{unit}, got {value!r}")
+        raise ParameterError(f"{shown} must be {parameter.range_text}{unit}, got {brief(value)}")
     return parameter.kind(number)
 
 

@@ -11,6 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from .output import written_whole
 from .signals import Array
 
 __all__ = ["HOLD", "HYBRID", "PHYSICS", "Replay", "prediction_figure", "save_figure", "spiral_figure"]
@@ -122,7 +123,8 @@ def spiral_figure(x: Replay, y: Replay, path: str | Path) -> None:
     save_figure(figure, path)
 
 
-def save_figure(figure: Figure, path: str | Path) -> None:
+def save_figure(figure: Figure, path: str | Path, dpi: int = 130) -> None:
     """Write a figure to a PNG."""
     FigureCanvasAgg(figure)
-    figure.savefig(path, dpi=130)
+    with written_whole(path) as file:
+        figure.savefig(file, dpi=dpi, format="png")

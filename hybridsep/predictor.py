@@ -19,6 +19,7 @@ from scipy.signal import lfilter
 
 from ._schedule import ReferenceSchedule
 from .errors import SignalError, StateError
+from .output import written_whole
 from .parameters import INPUT_HOLDS, check, check_together, samples_before
 from .physics import ModalModel, Mode
 from .regression import RidgeRegression
@@ -315,7 +316,9 @@ class HybridPredictor:
 
     def save(self, path: str | Path) -> None:
         """Write :meth:`to_bytes` to a file."""
-        Path(path).write_bytes(self.to_bytes())
+        blob = self.to_bytes()
+        with written_whole(path) as file:
+            file.write(blob)
 
     @classmethod
     def load(cls, path: str | Path) -> HybridPredictor:

@@ -18,10 +18,11 @@ from ._wiring import Role, run_pair, save_columns
 from .compensator import SepState
 from .signals import Array
 
-__all__ = ["SepCoSimulation", "cosimulate_sep"]
+__all__ = ["COLUMNS", "COMPENSATOR", "SepCoSimulation", "cosimulate_sep"]
 
-_ROLE = Role("compensator", ("x_dm", "x_d", "x_pb", "x_h"), state="sep_state", delay="preview")
-_COLUMNS = ("t", "x_d", "x_dm", "x", "x_meas", "x_pb", "x_h", "state")
+COMPENSATOR = Role("compensator", ("x_dm", "x_d", "x_pb", "x_h"), state="sep_state", delay="preview")
+COLUMNS = ("t", "x_d", "x_dm", "x", "x_meas", "x_pb", "x_h", "state")
+"""What :meth:`SepCoSimulation.save` writes."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,7 @@ class SepCoSimulation:
         ValueError
             If the suffix is another one.
         """
-        save_columns({name: getattr(self, name) for name in _COLUMNS}, path)
+        save_columns({name: getattr(self, name) for name in COLUMNS}, path)
 
 
 def cosimulate_sep(
@@ -143,7 +144,7 @@ def cosimulate_sep(
         If ``r`` is empty or not finite.
     """
     record = run_pair(
-        _ROLE,
+        COMPENSATOR,
         compensator,
         plant,
         r,

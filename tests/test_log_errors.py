@@ -228,8 +228,33 @@ def test_mat_that_is_not_a_plain_matrix(tmp_path: Path) -> None:
     with pytest.raises(LogError, match=r"column 'x' must be a full matrix, got cs[cr]_"):
         read_log(path)
     path.write_bytes(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM" + bytes(500))
-    with pytest.raises(LogError, match=r"v7\.3 \(HDF5\) file; versions up to 7 are read: save it with '-v7'"):
+    message = r"v7\.3 \(HDF5\) file; versions up to 7 are read: save it with '-v7' .*save\('log_v7\.mat', '-v7'\)"
+    with pytest.raises(LogError, match=message):
         read_log(path)
+
+
+@pytest.mark.parametrize(("place", "byte"), [(176, 20), (392, 82), (608, 199)])
+def test_a_mat_that_crashes_scipy_is_an_error(tmp_path: Path, place: int, byte: int) -> None:
+    """With one byte changed, SciPy 1.17's reader dies of a segmentation fault; other versions may find the damage."""
+    path = write(tmp_path / "log.mat", columns(20))
+    content = bytearray(path.read_bytes())
+    content[place] = byte
+    path.write_bytes(content)
+    with pytest.raises(LogError, match=r"log\.mat: is truncated, damaged or not a MATLAB file: "):
+        read_log(path)
+
+
+def test_a_reader_that_crashes_is_told_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = write(tmp_path / "log.mat", columns())
+    for ending, message in (
+        ("os.kill(os.getpid(), 11)", "the process that read it crashed with SIGSEGV"),
+        ("raise MemoryError('too much')", "the process that read it ended with status 1: MemoryError: too much"),
+    ):
+        child = tmp_path / "child.py"
+        child.write_text(f"import os\n{ending}\n")
+        monkeypatch.setattr("hybridsep.logs.mat._CHILD", child)
+        with pytest.raises(LogError, match=message):
+            read_log(path)
 
 
 def test_file_that_changes_while_it_is_read(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from rich.console import Console
 from rich.table import Table
 
-from hybridsep.fmi.compiler import COMPILE_FLAGS
+from hybridsep.fmi.compiler import compile_flags
 
 HERE = Path(__file__).resolve().parent
 CORE = HERE.parents[1] / "fmu_src" / "c" / "core"
@@ -49,9 +49,8 @@ def main() -> int:
     missed = 0
     with tempfile.TemporaryDirectory() as folder:
         program = Path(folder) / "clock"
-        flags = [flag for flag in COMPILE_FLAGS if flag != "-fvisibility=hidden"]
         sources = [HERE / "main.c", CORE / "hsep_clock.c"]
-        subprocess.run([*command, *flags, f"-I{CORE}", *sources, "-lm", "-o", program], check=True)
+        subprocess.run([*command, *compile_flags(command), f"-I{CORE}", *sources, "-lm", "-o", program], check=True)
         for start, T_s, sizes in CASES:
             began = perf_counter()
             done = subprocess.run(

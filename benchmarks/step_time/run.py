@@ -30,6 +30,7 @@ from rich.table import Table
 from benchmarks.step_time.host import PREDICTOR, Array, Host, build, drive_log, instructions
 from hybridsep.lookahead import LookAhead
 from hybridsep.physics import ModalModel
+from hybridsep.plots import save_figure
 from hybridsep.predictor import HybridPredictor
 from hybridsep.regression import RidgeRegression
 
@@ -162,7 +163,7 @@ def draw(results: list[dict[str, Any]], path: Path) -> None:
         axis.set(title=f"n = {result['n']}", xlabel="time t [µs]", ylabel="share of steps that took t or longer")
         axis.legend()
     figure.tight_layout()
-    figure.savefig(path, dpi=150)
+    save_figure(figure, path, dpi=150)
 
 
 def main() -> int:

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import FmuError
 from ..machine import DEFAULT_MACHINE, FeedDriveSection, Machine
+from ..output import written_whole
 from . import native_backend, python_backend
 from .warm_start import load_trained
 
@@ -147,7 +148,7 @@ def _description(machine: Machine, model: str, name: str) -> dict[str, Any]:
 
 def _write_archive(path: Path, files: Mapping[str, bytes]) -> None:
     """Write a zip whose bytes depend on nothing but its content."""
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
+    with written_whole(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
         # modelDescription.xml first, as readers that stream expect
         for arcname in sorted(files, key=lambda key: (key != "modelDescription.xml", key)):
             entry = zipfile.ZipInfo(arcname, _ZIP_TIME)

@@ -27,6 +27,7 @@ from tempfile import TemporaryDirectory
 
 from ..errors import FmuError
 from .macho import universal
+from .processes import Processes
 
 __all__ = [
     "ALL_TARGETS",
@@ -36,6 +37,7 @@ __all__ = [
     "binaries",
     "can_compile",
     "compile_flags",
+    "compilers",
     "host_target",
 ]
 
@@ -132,17 +134,18 @@ def binaries(sources: Mapping[str, bytes], name: str, targets: Sequence[str]) ->
     FmuError
         If a target is unknown, there is no compiler, or it refuses.
     """
-    if unknown := sorted(set(targets) - set(TARGET_NAMES)):
-        raise FmuError(f"no target {', '.join(unknown)}; there are {', '.join(TARGET_NAMES)}")
+    commands, processes = compilers(targets), Processes()
 
     def build(target: str) -> bytes:
-        command = _host_compiler() if target == "host" else _zig(TARGETS[target].triple)
-        return _compile(command, TARGETS[keys[target]], sources, name)
+        return _compile(processes, commands[target], TARGETS[keys[target]], sources, name)
 
-    expanded = dict.fromkeys(key for target in targets for key in _FMI2_PLATFORMS.get(target, (target,)))
-    keys = {target: host_target() if target == "host" else target for target in expanded}
+    keys = {target: host_target() if target == "host" else target for target in commands}
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        built = dict(zip(keys.values(), pool.map(build, keys), strict=True))
+        try:
+            built = dict(zip(keys.values(), pool.map(build, keys), strict=True))
+        except BaseException:
+            processes.stop()
+            raise
     placed = {
         f"{place}/{name}{TARGETS[key].suffix}": library
         for key, library in built.items()
@@ -175,6 +178,20 @@ def _understands(command: tuple[str, ...], flag: str) -> bool:
         return subprocess.run(arguments, cwd=place, capture_output=True, check=False).returncode == 0
 
 
+def compilers(targets: Sequence[str]) -> dict[str, list[str]]:
+    """Return the compiler's command for ``"host"`` and each key of :data:`TARGETS` that is asked for.
+
+    Raises
+    ------
+    FmuError
+        If one of ``targets`` is not among :data:`TARGET_NAMES`, or there is no compiler for it.
+    """
+    if unknown := sorted(set(targets) - set(TARGET_NAMES)):
+        raise FmuError(f"no target {', '.join(unknown)}; there are {', '.join(TARGET_NAMES)}")
+    expanded = dict.fromkeys(key for target in targets for key in _FMI2_PLATFORMS.get(target, (target,)))
+    return {target: _host_compiler() if target == "host" else _zig(TARGETS[target].triple) for target in expanded}
+
+
 def can_compile() -> bool:
     """Return whether a native FMU can be compiled here, for this machine."""
     try:
@@ -195,20 +212,20 @@ def _host_compiler() -> list[str]:
     if find_spec("ziglang") is not None:
         return _zig(TARGETS[host_target()].triple)
     raise FmuError(
-        "no C compiler: none of $CC, cc, gcc, clang; install one, or pip install 'hybridsep[cross]', or build with "
+        "no C compiler: none of $CC, cc, gcc, clang; install one, or pip install ziglang, or build with "
         "--backend python"
     )
 
 
 def _zig(triple: str) -> list[str]:
     if find_spec("ziglang") is None:
-        raise FmuError(
-            "compiling for other platforms needs ziglang: pip install 'hybridsep[cross]', or ask for the target host"
-        )
+        raise FmuError("compiling for other platforms needs ziglang: pip install ziglang, or ask for the target host")
     return [sys.executable, "-m", "ziglang", "cc", "-target", triple, "-fno-sanitize=undefined"]
 
 
-def _compile(command: Sequence[str], target: Target, sources: Mapping[str, bytes], name: str) -> bytes:
+def _compile(
+    processes: Processes, command: Sequence[str], target: Target, sources: Mapping[str, bytes], name: str
+) -> bytes:
     """Compile and link ``all.c`` into a stripped shared library."""
     with TemporaryDirectory() as place:
         folder = Path(place)
@@ -217,8 +234,8 @@ def _compile(command: Sequence[str], target: Target, sources: Mapping[str, bytes
         library = f"{name}{target.suffix}"
         flags = [*compile_flags(command), "-g0", "-s", "-shared", "-I."]
         arguments = [*command, *flags, "all.c", "-o", library, *target.flags]
-        result = subprocess.run(arguments, cwd=folder, capture_output=True, text=True, errors="replace", check=False)
-        if result.returncode != 0:
-            complaint = f"{' '.join(arguments)}\n{result.stderr.strip()}"
-            raise FmuError(f"{name} cannot be compiled for {target.triple}: {complaint}")
+        status, complaint = processes.run(arguments, folder)
+        if status != 0:
+            said = f"{' '.join(arguments)}\n{complaint.strip()}"
+            raise FmuError(f"{name} cannot be compiled for {target.triple}: {said}")
         return (folder / library).read_bytes()

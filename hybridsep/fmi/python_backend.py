@@ -32,6 +32,7 @@ __all__ = ["files"]
 _PACKAGE = Path(__file__).resolve().parent.parent
 _BASE = ("errors.py", "parameters.py", "signals.py", "state.py", "physics.py", "fmi/variables.py", "fmi/slave.py")
 _PREDICTION = (
+    "output.py",
     "regression.py",
     "_schedule.py",
     "window.py",

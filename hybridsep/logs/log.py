@@ -17,7 +17,7 @@ from .source import Block, Source
 from .text import TextSource
 from .time_axis import TimeAxis
 
-__all__ = ["UNITS", "Log", "LogReader", "open_log", "read_log"]
+__all__ = ["UNITS", "Log", "LogReader", "check_reading", "open_log", "read_log"]
 
 UNITS: Mapping[str, float] = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
 """Metres in each unit a log's positions may have."""
@@ -87,10 +87,8 @@ class LogReader:
         Ts: float | None = None,
     ) -> None:
         self.path = Path(path)
-        if unit not in UNITS:
-            raise LogError(f"{self.path}: unit must be one of {', '.join(UNITS)}, got {unit!r}")
+        given = check_reading(unit, Ts)
         self._unit = unit
-        given = None if Ts is None else float(check("T_s", Ts, label="Ts"))
         self._source = _open_source(self.path)
         self._names = _column_names(self._source, columns, time_needed=given is None)
         self.n_samples, found = self._scan()
@@ -160,6 +158,13 @@ class LogReader:
         if not finite.all():
             i = int(np.argmin(finite))
             raise LogError(f"{self.path}, {block.where(i)}: column {name!r} must be finite, got {column[i]}")
+
+
+def check_reading(unit: str, Ts: float | None) -> float | None:
+    """Return the sampling interval that was given, or raise LogError or ParameterError if it or the unit is none."""
+    if unit not in UNITS:
+        raise LogError(f"unit must be one of {', '.join(UNITS)}, got {unit!r}")
+    return None if Ts is None else float(check("T_s", Ts, label="Ts"))
 
 
 def open_log(

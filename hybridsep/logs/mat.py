@@ -1,17 +1,28 @@
-"""MATLAB ``.mat`` files up to version 7, loaded whole by SciPy."""
+"""MATLAB ``.mat`` files up to version 7, loaded whole by SciPy in a process of its own.
+
+A damaged file can crash SciPy's reader (a few in a thousand mutations of an uncompressed one do); read elsewhere, that
+is an error message instead of the end of this process.
+"""
 
 from __future__ import annotations
 
+import json
+import signal
+import subprocess
+import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
-from scipy import io
 
 from ..errors import LogError
 from .source import Block, check_column, check_lengths, sample_number
 
 __all__ = ["MatSource"]
+
+_CHILD = Path(__file__).with_name("_mat_child.py")
 
 
 class MatSource:
@@ -21,26 +32,50 @@ class MatSource:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        try:
-            variables = io.loadmat(path)
-        except NotImplementedError:
-            raise LogError(
-                f"{path}: is a MATLAB v7.3 (HDF5) file; versions up to 7 are read: save it with '-v7' in MATLAB"
-            ) from None
-        except Exception as error:  # a damaged file makes SciPy's reader fail in nearly every way there is
-            raise LogError(f"{path}: is truncated, damaged or not a MATLAB file: {error}") from error
-        self._variables = {name: value for name, value in variables.items() if not name.startswith("__")}
+        with TemporaryDirectory() as folder:
+            self._variables = self._read(folder)
         self.names = list(self._variables)
+
+    def _read(self, folder: str) -> dict[str, Any]:
+        """Return what the child says of each variable, with the array as ``value`` where it holds numbers."""
+        command = [sys.executable, "-I", str(_CHILD), json.dumps(sys.path), str(self.path.absolute()), folder]
+        done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+        if done.returncode:
+            raise LogError(
+                f"{self.path}: is truncated, damaged or not a MATLAB file: the process that read it "
+                f"{_end(done.returncode, done.stderr)}"
+            )
+        answer = json.loads(done.stdout)
+        if answer.get("error") == "hdf5":
+            raise LogError(
+                f"{self.path}: is a MATLAB v7.3 (HDF5) file; versions up to 7 are read: save it with '-v7' in MATLAB, "
+                f"load('{self.path.name}'); save('{self.path.stem}_v7.mat', '-v7')"
+            )
+        if "error" in answer:
+            raise LogError(f"{self.path}: is truncated, damaged or not a MATLAB file: {answer['error']}")
+        variables: dict[str, Any] = answer["variables"]
+        for variable in variables.values():
+            if "i" in variable:
+                variable["value"] = np.load(Path(folder) / f"{variable['i']}.npy", allow_pickle=False)
+        return variables
 
     def blocks(self, names: Sequence[str], n: int) -> Iterator[Block]:
         """Give the columns ``names`` from their beginning, at most ``n`` samples at a time."""
         lengths, columns = {}, []
         for name in names:
-            value = self._variables[name]
-            if not isinstance(value, np.ndarray):
-                raise LogError(f"{self.path}: column {name!r} must be a full matrix, got {type(value).__name__}")
-            lengths[name] = check_column(self.path, name, value.shape, value.dtype)
-            columns.append(value.astype(np.float64).ravel())
+            variable = self._variables[name]
+            if "shape" not in variable:
+                raise LogError(f"{self.path}: column {name!r} must be a full matrix, got {variable['type']}")
+            lengths[name] = check_column(self.path, name, tuple(variable["shape"]), np.dtype(variable["dtype"]))
+            columns.append(variable["value"].astype(np.float64).ravel())
         check_lengths(self.path, lengths)
         for i in range(0, lengths[names[0]], n):
             yield Block([column[i : i + n] for column in columns], sample_number(i))
+
+
+def _end(code: int, complaint: str) -> str:
+    """Say how a process ended that returned no answer."""
+    if code < 0:
+        return f"crashed with {signal.Signals(-code).name}"
+    last = complaint.strip().splitlines()[-1:]
+    return f"ended with status {code}{': ' if last else ''}{''.join(last)}"

@@ -18,7 +18,7 @@ from .source import Block, check_column, check_lengths, sample_number
 
 __all__ = ["NpzSource"]
 
-_DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError, ValueError)
+_DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError, ValueError, MemoryError)
 """What reading a damaged archive raises."""
 
 

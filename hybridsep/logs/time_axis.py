@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -66,8 +67,16 @@ class TimeAxis:
         self._last = float(t[-1])
 
     def interval(self) -> float:
-        """Return the mean interval, s, rounded to the digits that the jitter leaves certain; needs two samples."""
+        """Return the mean interval, s, rounded to the digits that the jitter leaves certain; needs two samples.
+
+        Raises
+        ------
+        LogError
+            If it is too short or too long to be divided by.
+        """
         mean = (self._last - self._first) / (self._n - 1)
+        if not sys.float_info.min <= mean <= 1 / sys.float_info.min:
+            raise LogError(f"{self._path}: time {self._name!r} must be in seconds, got an interval of {mean:g} s")
         tolerance = _ROUNDING + min(1e-4, self._jitter / (self._n - 1))
         # The shortest interval or the shortest rate that is near enough: 0.001 s, or 1/3000 s; ten digits always are.
         candidates = (

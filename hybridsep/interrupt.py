@@ -1,0 +1,74 @@
+"""Ctrl-C that waits for the end of an FMI call, at most one step.
+
+Inside a pythonfmu FMU an exception becomes ``fmi2Fatal``, inside a callback it is lost, and fmpy would leave the
+working directory changed. A second Ctrl-C does not wait.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import wraps
+from types import FrameType
+from typing import ParamSpec, TypeVar
+
+__all__ = ["interrupts_between_calls", "uninterrupted"]
+
+P = ParamSpec("P")
+Result = TypeVar("Result")
+
+
+class _Calls(threading.local):
+    """Of each thread: how deep it is in FMI calls, and what to raise after them.
+
+    Signals are handled in the main thread, so no other thread's calls ever wait for anything.
+    """
+
+    depth = 0
+    pending: type[BaseException] | None = None
+
+
+_calls = _Calls()
+
+
+def uninterrupted(function: Callable[P, Result]) -> Callable[P, Result]:
+    """Return the function so that a Ctrl-C during it is raised at its end, under :func:`interrupts_between_calls`."""
+
+    @wraps(function)
+    def call(*arguments: P.args, **keywords: P.kwargs) -> Result:
+        _calls.depth += 1
+        try:
+            return function(*arguments, **keywords)
+        finally:
+            _calls.depth -= 1
+            if _calls.pending is not None and _calls.depth == 0:
+                stop, _calls.pending = _calls.pending, None
+                raise stop
+
+    return call
+
+
+@contextmanager
+def interrupts_between_calls(stop: type[BaseException] = KeyboardInterrupt) -> Iterator[None]:
+    """Raise ``stop`` on Ctrl-C, but not inside a function that is :func:`uninterrupted`.
+
+    Does nothing outside the main thread, or where Ctrl-C is handled in another way already.
+    """
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    if not in_main_thread or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        if _calls.depth == 0 or _calls.pending is not None:
+            _calls.pending = None
+            raise stop
+        _calls.pending = stop
+
+    signal.signal(signal.SIGINT, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)

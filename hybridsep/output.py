@@ -1,0 +1,88 @@
+"""Files that appear whole: written beside their target, flushed to the disk, and moved over it.
+
+Until the last byte is on the disk the target is what it was before, so that a full disk, an exception, Ctrl-C or the
+end of the process cost the new file only. A process that is killed leaves ``.hybridsep-….tmp`` in the target's folder.
+"""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+import stat
+import sys
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import IO
+
+__all__ = ["written_text", "written_whole"]
+
+
+@contextmanager
+def written_whole(path: str | Path) -> Iterator[IO[bytes]]:
+    """Give a binary file to write; when the block ends without an exception, it takes the place of ``path``.
+
+    A symbolic link stays, the file that it leads to is replaced. The new file takes over the permissions and, where
+    that is allowed, the owner of the old one; other hard links keep the old content. A device or a pipe cannot be
+    replaced and is written directly.
+
+    Raises
+    ------
+    OSError
+        With ``path`` as its file name, if it is a folder or write-protected or cannot be written; an old file is
+        unchanged.
+    """
+    target = Path(os.path.realpath(path))
+    part = target.parent / f".hybridsep-{uuid.uuid4().hex}.tmp"
+    try:
+        before = Path(path).stat() if Path(path).exists() else None
+        if before is not None and not os.access(path, os.W_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        if before is not None and not stat.S_ISREG(before.st_mode):
+            with Path(path).open("wb") as device:
+                yield device
+            return
+        with part.open("xb") as file:
+            yield file
+            file.flush()
+            if before is not None:
+                _take_over(file.fileno(), before)
+            os.fsync(file.fileno())
+        part.replace(target)
+        _sync_folder(target.parent)
+    except BaseException as error:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+        if isinstance(error, OSError) and error.filename in (None, str(part)):
+            raise OSError(error.errno, error.strerror or str(error), str(path)) from error
+        raise
+
+
+@contextmanager
+def written_text(path: str | Path) -> Iterator[IO[str]]:
+    """Give a UTF-8 text file to write, line ends as they come, which appears like that of :func:`written_whole`."""
+    with written_whole(path) as file:
+        text = io.TextIOWrapper(file, encoding="utf-8", newline="")
+        yield text
+        text.detach()  # what is buffered goes to the file, which stays open
+
+
+def _take_over(descriptor: int, before: os.stat_result) -> None:
+    """Give a new file the owner and the permissions of the one that it replaces."""
+    if sys.platform != "win32":
+        with suppress(PermissionError):
+            os.fchown(descriptor, before.st_uid, before.st_gid)
+        os.fchmod(descriptor, stat.S_IMODE(before.st_mode))
+
+
+def _sync_folder(folder: Path) -> None:
+    """Flush a folder's entries; Windows has no such call."""
+    if sys.platform != "win32":
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            with suppress(OSError):  # some network file systems refuse it
+                os.fsync(descriptor)
+        finally:
+            os.close(descriptor)

@@ -1,0 +1,34 @@
+"""Entry point of the command line, outside the package: ready for Ctrl-C before the library is, which takes seconds."""
+
+from __future__ import annotations
+
+import os
+import signal
+
+
+def _leave(*_: object) -> None:
+    """End the process at once; nothing is open while the library is loaded, or after a command."""
+    os.write(2, b"interrupted\n")
+    os._exit(130)
+
+
+def main() -> None:
+    """Load the library and run the command line."""
+    ours = signal.getsignal(signal.SIGINT) is signal.default_int_handler  # otherwise Ctrl-C is somebody else's
+    if ours:
+        signal.signal(signal.SIGINT, _leave)
+    from hybridsep.cli import main as run
+
+    try:
+        if ours:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+        run()
+    except KeyboardInterrupt:
+        _leave()
+    finally:
+        if ours:
+            signal.signal(signal.SIGINT, _leave)
+
+
+if __name__ == "__main__":
+    main()
