@@ -216,7 +216,8 @@ def backtest_stream(
     Raises
     ------
     SignalError
-        If a chunk's samples cannot be used, or there are none at all. What came before it is learned.
+        If a chunk's samples cannot be used, there are none at all, or a prediction diverges. What came before it is
+        learned.
     """
     overall, after = _Sums(), _Sums()
     j = 0
@@ -232,6 +233,11 @@ def backtest_stream(
             predicted[1:, :warm] = prediction.x_pb[:warm]
         error = x - predicted
         squares, peaks = _measure(error)
+        if not math.isfinite(sum(squares)):
+            raise SignalError(
+                f"x_h diverges in the batch from sample {overall.n} on: its error has no finite RMS; "
+                "raise lambda or lower p"
+            )
         if warm == 0:
             after.add(n, squares, peaks)
         elif warm < n:

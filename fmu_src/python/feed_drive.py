@@ -11,6 +11,7 @@ from hybridsep.fmi import slave
 from hybridsep.fmi.variables import modes_from
 from hybridsep.physics import ModalModel, Mode
 from hybridsep.plant import Encoder, FeedDrive, Plant, StageDrive
+from hybridsep.signals import POSITION_MAX
 
 
 class FeedDrivePy(slave.TableSlave):
@@ -18,8 +19,7 @@ class FeedDrivePy(slave.TableSlave):
 
     def initialise(self) -> None:
         """Make the plant, at rest at the start value of x_d, and its encoder."""
-        if not math.isfinite(self.values["x_d"]):
-            raise SignalError(f"the start value of x_d must be finite, got {self.values['x_d']}")
+        _check_position("the start value of x_d", self.values["x_d"])
         self.encoder = Encoder(self.values["noise_std"], self.values["seed"])
         self.plant = self._new_plant()
         self.plant.reset(self.values["x_d"])
@@ -27,8 +27,7 @@ class FeedDrivePy(slave.TableSlave):
 
     def advance(self, t: float, h: float) -> None:
         """Step the plant and measure it."""
-        if not math.isfinite(self.values["x_d"]):
-            raise SignalError(f"x_d must be finite, got {self.values['x_d']} at t = {t:g} s")
+        _check_position("x_d", self.values["x_d"], f" at t = {t:g} s")
         self.plant.step(self.values["x_d"], h)
         self.x_meas = self.encoder.measure(self.plant.x)
 
@@ -60,3 +59,11 @@ class FeedDrivePy(slave.TableSlave):
         if modes:
             return StageDrive(ModalModel([Mode(**mode) for mode in modes]), values["f"], values["kappa"], values["T_s"])
         return FeedDrive(*(values[name] for name in ("m", "c", "k", "c_nl", "k_nl")))
+
+
+def _check_position(name: str, value: float, when: str = "") -> None:
+    """Raise SignalError if a position, m, is not finite, or further out than any machine is."""
+    if not math.isfinite(value):
+        raise SignalError(f"{name} must be finite, got {value}{when}")
+    if abs(value) > POSITION_MAX:
+        raise SignalError(f"{name} must be within ±{POSITION_MAX:g} m, got {value:g}{when}")

@@ -17,7 +17,7 @@
 
 typedef enum {
     HSEP_OK = 0,
-    HSEP_REFUSED = 1 /* the call cannot be done; the state is unchanged and the message says why */
+    HSEP_REFUSED = 1 /* the call cannot be done; the state is unchanged unless said otherwise, the message says why */
 } hsep_status;
 
 typedef enum { HSEP_REAL, HSEP_INTEGER, HSEP_BOOLEAN, HSEP_STRING } hsep_kind;
@@ -33,7 +33,7 @@ typedef struct {
     double start;   /* 0 for what is calculated */
     double minimum; /* -HUGE_VAL if there is none */
     double maximum; /* HUGE_VAL if there is none */
-    int above;      /* the minimum itself is not allowed */
+    double nonzero; /* least value that is not 0; 0 if there is none */
 } hsep_variable;
 
 /* What stays the same for one instance: the generated table and where its resources are. */
@@ -55,7 +55,10 @@ hsep_status hsep_model_initialise(
     const hsep_context *context, void *state, double values[], double t_start, char message[]);
 
 /* Do one communication step from t by h with the inputs in values; outputs and locals go to values.
- * Fails, with state and values unchanged, if an input is not finite or t and h do not fit.
+ * Fails, with state and values unchanged, if an input is not finite or t and h do not fit. Fails, with the values
+ * unchanged, if an output would not be a finite number, because what was learned diverges: the look-ahead cannot go on
+ * then, every later step fails likewise, and only another state or an initialization helps. A drive's step that would
+ * lead out of the range of numbers leaves the state unchanged.
  * Cost: bounded by the parameters alone, the same at the first and at the 10^9th call; allocates nothing. */
 hsep_status hsep_model_step(
     const hsep_context *context, void *state, double values[], double t, double h, char message[]);

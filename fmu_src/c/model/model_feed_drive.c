@@ -28,7 +28,18 @@ hsep_status hsep_model_size(const hsep_context *context, const double values[], 
 {
     message[0] = '\0';
     *size = sizeof(feed_drive_state);
-    return hsep_check_parameters(context, values, message) > 0 ? HSEP_REFUSED : HSEP_OK;
+    if (hsep_check_parameters(context, values, message) > 0) {
+        return HSEP_REFUSED;
+    }
+    const double rate = hsep_feed_drive_rate(&(hsep_feed_drive){
+        .m = values[HSEP_VR_m], .c = values[HSEP_VR_c], .k = values[HSEP_VR_k]});
+    if (rate > HSEP_PLANT_RATE_MAX) {
+        hsep_message_add(
+            message, "sqrt(k/m) and c/m must be at most %g 1/s, got %g; lower k or c, or raise m",
+            HSEP_PLANT_RATE_MAX, rate);
+        return HSEP_REFUSED;
+    }
+    return HSEP_OK;
 }
 
 static void feed_drive_write_outputs(const feed_drive_state *self, double values[], double x_meas)
@@ -68,7 +79,7 @@ hsep_status hsep_model_step(
     feed_drive_state *self = state;
     double x = 0.0;
     message[0] = '\0';
-    if (hsep_drive_check(values[HSEP_VR_x_d], t, h, message) != HSEP_OK) {
+    if (hsep_drive_check(values[HSEP_VR_x_d], t, h, hsep_feed_drive_rate(&self->drive), message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     if (!hsep_feed_drive_step(&self->drive, values[HSEP_VR_x_d], h, &x)) {

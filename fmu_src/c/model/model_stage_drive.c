@@ -30,6 +30,18 @@ hsep_status hsep_model_size(const hsep_context *context, const double values[], 
     if (hsep_check_parameters(context, values, message) > 0) {
         return HSEP_REFUSED;
     }
+    hsep_mode modes[HSEP_N_MODES];
+    hsep_modes_read(&values[HSEP_VR_mode], HSEP_N_MODES, modes);
+    for (int i = 0; i < HSEP_N_MODES; i++) {
+        const double rate = hsep_plant_mode_rate(&modes[i]);
+        if (rate > HSEP_PLANT_RATE_MAX) {
+            hsep_message_add(
+                message,
+                "2 pi f_n and 4 pi f_n zeta of mode[%d] must be at most %g 1/s in a plant, got %g; lower f_n or zeta",
+                i + 1, HSEP_PLANT_RATE_MAX, rate);
+            return HSEP_REFUSED;
+        }
+    }
     const double before = (double)(sizeof(stage_drive_state) - sizeof(hsep_stage));
     return hsep_state_size(before + hsep_stage_size(HSEP_N_MODES), size, message);
 }
@@ -70,7 +82,7 @@ hsep_status hsep_model_step(
     stage_drive_state *self = state;
     double work[HSEP_STAGE_WORK * HSEP_N_MODES];
     message[0] = '\0';
-    if (hsep_drive_check(values[HSEP_VR_x_d], t, h, message) != HSEP_OK) {
+    if (hsep_drive_check(values[HSEP_VR_x_d], t, h, hsep_stage_rate(&self->stage), message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     if (!hsep_stage_step(&self->stage, values[HSEP_VR_x_d], h, work)) {
