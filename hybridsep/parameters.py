@@ -33,6 +33,7 @@ INPUT_HOLDS = ("zoh", "foh")
 """How ``x_d`` runs between samples; the index is the FMU parameter ``input_hold``."""
 
 _INT_MAX = 2**31 - 1
+_SHOWN_MAX = 60  # characters of a wrong value
 _V_S = "velocity over which friction changes its sign, for features of the reference; 0: none of them"
 
 
@@ -163,14 +164,23 @@ def check(name: str, value: Any, *, label: str | None = None) -> Any:
             raise TypeError
         number = float(value)
     except (TypeError, ValueError, OverflowError):
-        raise ParameterError(f"{shown} must be a number, got {value!r}") from None
+        raise ParameterError(f"{shown} must be a number, got {_shown(value)}") from None
     if not math.isfinite(number):
-        raise ParameterError(f"{shown} must be finite, got {value!r}")
+        raise ParameterError(f"{shown} must be finite, got {_shown(value)}")
     if parameter.kind is int and number != int(number):
-        raise ParameterError(f"{shown} must be a whole number, got {value!r}")
+        raise ParameterError(f"{shown} must be a whole number, got {_shown(value)}")
     if not parameter.allows(number):
-        raise ParameterError(f"{shown} must be {parameter.range_text}{unit}, got {value!r}")
+        raise ParameterError(f"{shown} must be {parameter.range_text}{unit}, got {_shown(value)}")
     return parameter.kind(number)
+
+
+def _shown(value: Any) -> str:
+    """Return a value as messages show it; an integer of thousands of digits has no text in Python."""
+    try:
+        text = repr(value)
+    except ValueError:
+        return "an integer of too many digits"
+    return text if len(text) <= _SHOWN_MAX else f"{text[:_SHOWN_MAX]}…"
 
 
 def check_together(*, Np: Any, p: Any, q: Any, lam: Any, Ts: Any, t_init: Any) -> None:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from hybridsep._saved import Saved
 from hybridsep.errors import SignalError
 from hybridsep.fmi import slave
 from hybridsep.fmi.variables import modes_from
@@ -49,9 +50,11 @@ class FeedDrivePy(slave.TableSlave):
 
     def restore_core(self, meta: Mapping[str, Any], blob: bytes) -> None:
         """Take over a plant's state and a place in the noise."""
-        self.plant, self.encoder = self._new_plant(), Encoder(self.values["noise_std"], self.values["seed"])
-        self.plant.restore(meta["plant"])
-        self.encoder.n_draws, self.x_meas = meta["n_draws"], meta["x_meas"]
+        saved = Saved("drive", meta, {}, {})
+        plant, encoder = self._new_plant(), Encoder(self.values["noise_std"], self.values["seed"])
+        plant.restore(saved.numbers("plant", len(plant.state())))
+        encoder.n_draws, x_meas = saved.whole("n_draws"), saved.real("x_meas")
+        self.plant, self.encoder, self.x_meas = plant, encoder, x_meas
 
     def _new_plant(self) -> Plant:
         values = self.values

@@ -6,6 +6,7 @@ from abc import abstractmethod
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
+from .._saved import Saved
 from .clock import SampleClock
 from .slave import TableSlave
 
@@ -48,6 +49,14 @@ class LookAheadSlave(TableSlave):
 
     def restore_core(self, meta: Mapping[str, Any], blob: bytes) -> None:
         """Take over a clock and a look-ahead."""
-        self.look_ahead = self.look_ahead_type.from_bytes(blob)
-        self.clock = SampleClock(**meta["clock"])
-        self.inputs = meta["inputs"]
+        state = Saved("look-ahead", meta, {}, {})
+        clock = Saved("clock", state.table("clock"), {}, {})
+        reals = {name: clock.real(name) for name in ("start", "T_s")}
+        counts = {name: clock.whole(name) for name in ("k", "done", "parts")}
+        inputs = None if state.field("inputs") is None else tuple(state.numbers("inputs", 2))
+        look_ahead = self.look_ahead_type.from_bytes(blob)
+        if not (
+            reals["T_s"] == self.values["T_s"] and counts["k"] == look_ahead.k and counts["done"] < counts["parts"]
+        ):
+            raise clock.error("it must count the samples of this look-ahead")
+        self.look_ahead, self.clock, self.inputs = look_ahead, SampleClock(**reals, **counts), inputs
