@@ -143,8 +143,10 @@ int hsep_compensator_valid(const void *block, const hsep_compensator_parameters 
                 (got.solving || got.predicted == got.Np) && got.learning <= 1 && got.missing <= 1 &&
                 got.divergence <= HSEP_DIVERGES_X_DM &&
                 (got.divergence ||
-                 hsep_within(bytes + expected.x_d * sizeof(double), got.preview + 3 * got.Np, HSEP_PREDICTION_MAX)) &&
-                isfinite(got.sum_e) && isfinite(got.sum_pb) && isfinite(got.sum_h) &&
+                 hsep_within(
+                     bytes + expected.ahead * sizeof(double), 2 * got.preview + 3 * got.Np, HSEP_PREDICTION_MAX)) &&
+                got.sum_e >= 0.0 && isfinite(got.sum_e) && got.sum_pb >= 0.0 && isfinite(got.sum_pb) &&
+                got.sum_h >= 0.0 && isfinite(got.sum_h) &&
                 hsep_planner_valid(bytes + expected.planner * sizeof(double), &parameters->planner);
     const uint64_t physics_at[2] = {expected.physics, expected.trial};
     const uint64_t regression_at[2] = {expected.regression, expected.saved};

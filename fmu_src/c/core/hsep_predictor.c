@@ -102,8 +102,8 @@ int hsep_predictor_valid(const void *block, const hsep_predictor_parameters *par
     const uint64_t n = 2 + parameters->q + parameters->p;
     return memcmp(&expected, &got, sizeof got) == 0 && got.n_warm_up <= got.Np &&
            got.divergence <= HSEP_DIVERGES_X_H &&
-           (got.divergence || hsep_within(bytes + expected.x_d * sizeof(double), 3 * got.Np, HSEP_PREDICTION_MAX)) &&
-           isfinite(got.sum_pb) && isfinite(got.sum_h) &&
+           (got.divergence || hsep_within(bytes + expected.ahead * sizeof(double), 5 * got.Np, HSEP_PREDICTION_MAX)) &&
+           got.sum_pb >= 0.0 && isfinite(got.sum_pb) && got.sum_h >= 0.0 && isfinite(got.sum_h) &&
            physics.n_modes == parameters->n_modes && physics.dead_time == parameters->dead_time &&
            (physics.oldest == 0 || physics.oldest < physics.dead_time) && regression.n == n &&
            regression.n_tiles == n / 4 + 1;

@@ -102,11 +102,16 @@ void hsep_model_start_values(const hsep_context *context, double values[])
 hsep_status hsep_model_check_state(
     const hsep_context *context, const void *state, size_t size, const double values[], char message[])
 {
+    feed_drive_state head;
     size_t expected = 0;
-    if (hsep_model_size(context, values, &expected, message) != HSEP_OK) {
+    if (hsep_model_size(context, values, &expected, message) != HSEP_OK ||
+        hsep_state_check(context, values, state, size, FEED_DRIVE_KIND, expected, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
-    return hsep_state_check(context, values, state, size, FEED_DRIVE_KIND, expected, message);
+    memcpy(&head, state, sizeof head);
+    const int finite = hsep_within(&head.encoder.noise_std, 1, HSEP_PREDICTION_MAX) &&
+                       hsep_within(&head.drive, sizeof head.drive / sizeof(double), HSEP_PREDICTION_MAX);
+    return finite ? HSEP_OK : hsep_state_damaged(message);
 }
 
 #else

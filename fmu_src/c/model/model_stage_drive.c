@@ -114,7 +114,11 @@ hsep_status hsep_model_check_state(
         return HSEP_REFUSED;
     }
     memcpy(&head, state, sizeof head);
-    return head.stage.n_modes == HSEP_N_MODES ? HSEP_OK : hsep_state_damaged(message);
+    const char *modes = (const char *)state + sizeof head;
+    const int finite = hsep_within(&head.encoder.noise_std, 1, HSEP_PREDICTION_MAX) &&
+                       hsep_within(&head.stage, offsetof(hsep_stage, n_modes) / sizeof(double), HSEP_PREDICTION_MAX) &&
+                       hsep_within(modes, (size - sizeof head) / sizeof(double), HSEP_PREDICTION_MAX);
+    return finite && head.stage.n_modes == HSEP_N_MODES ? HSEP_OK : hsep_state_damaged(message);
 }
 
 #else
