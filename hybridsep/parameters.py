@@ -177,7 +177,7 @@ def check(name: str, value: Any, *, label: str | None = None) -> Any:
 def _shown(value: Any) -> str:
     """Return a value as messages show it; an integer of thousands of digits has no text in Python."""
     try:
-        text = repr(value)
+        text = repr(float(value) if isinstance(value, float) else value)  # NumPy's floats name their type
     except ValueError:
         return "an integer of too many digits"
     return text if len(text) <= _SHOWN_MAX else f"{text[:_SHOWN_MAX]}…"

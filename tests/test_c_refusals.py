@@ -17,6 +17,8 @@ from hybridsep.errors import FmuError, HybridSepError
 from hybridsep.fmi.clock import SampleClock
 from hybridsep.fmi.variables import modes_from
 from hybridsep.parameters import check, check_together
+from hybridsep.physics import ModalModel, Mode
+from hybridsep.plant import FeedDrive, StageDrive
 
 
 @pytest.mark.parametrize(
@@ -60,12 +62,35 @@ def test_bad_parameters_are_refused_in_the_librarys_words(wrong: dict[str, float
         ("stage_drive", "kappa", -0.5),
         ("stage_drive", "T_s", 0.0),
         ("trajectory", "trajectory", 4),
+        ("trajectory", "T_s", 1e-6),
+        ("predictor", "T_s", 1e-300),
+        ("predictor", "lambda", 1e-300),
+        ("compensator", "jerk_weight", 1e300),
+        ("compensator", "a_max", 1e308),
+        ("feed_drive", "k", 1e308),
+        ("feed_drive", "noise_std", 1e300),
+        ("stage_drive", "kappa", 1e300),
     ],
 )
 def test_a_parameter_alone_is_refused_in_the_librarys_words(name: str, parameter: str, value: float) -> None:
     with pytest.raises(HybridSepError) as caught:
         check(parameter, value)
     assert refusal(CModel(name, {parameter: value}).size) == str(caught.value)
+
+
+def test_a_drive_that_is_too_fast_is_refused_in_the_librarys_words() -> None:
+    for wrong in ({"k": 1e12}, {"c": 1e6}):
+        with pytest.raises(HybridSepError) as caught:
+            FeedDrive(**{key: {**c_core.FEED_DRIVE, **wrong}[key] for key in ("m", "c", "k")})
+        assert refusal(CModel("feed_drive", wrong).size) == str(caught.value)
+    mode = {**c_core.STAGE_MODES[0], "f_n": 2e4}
+    with pytest.raises(HybridSepError) as caught:
+        StageDrive(ModalModel([Mode(**mode)]))
+    assert refusal(CModel("stage_drive", {"mode[1].f_n": 2e4}).size) == str(caught.value)
+    model = CModel("feed_drive", {"k": 9e9}).initialise()
+    with pytest.raises(HybridSepError) as caught:
+        FeedDrive(1.0, 15.7, 9e9).step(0.0, 50.0)
+    assert refusal(lambda: model.step(0.0, 50.0)) == str(caught.value)
 
 
 @pytest.mark.parametrize("name", ["predictor_2", "stage_drive"])

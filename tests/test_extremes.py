@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+import re
+import time
 from collections.abc import Callable, Mapping
 from datetime import timedelta
+from pathlib import Path
 from typing import Any
 
 import c_core
@@ -14,13 +17,18 @@ from c_core import CModel, RefusedError
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from hybridsep.errors import HybridSepError
+from hybridsep import cli
+from hybridsep.errors import HybridSepError, MachineError, ParameterError
+from hybridsep.fmi.variables import variables_of
+from hybridsep.limits import Limits
 from hybridsep.lookahead import LookAhead
+from hybridsep.machine import load_machine
 from hybridsep.parameters import PARAMETERS
 from hybridsep.physics import ModalModel, Mode
 from hybridsep.plant import Encoder, FeedDrive, Plant, StageDrive
 from hybridsep.predictor import HybridPredictor
 from hybridsep.sep_lookahead import SepLookAhead
+from hybridsep.trajectory import rest_to_rest
 
 SAMPLES = 40
 SMALL = {"Np": 8, "p": 4, "q": 2, "dead_time": 0, "preview": 24, "spacing": 2}
@@ -197,3 +205,79 @@ def test_the_feed_drive_in_c(values: dict[str, float], samples: Any, h: float) -
 def test_the_stage_in_c(values: dict[str, float], modes: dict[str, float], samples: Any, h: float) -> None:
     model = CModel("stage_drive", {**values, **modes})
     refused({**values, **modes}, lambda: check_c_model(model, samples[:10], h))
+
+
+# Machine files and the command line ------------------------------------------------------------------------------
+
+ANY_MODE = "physics.mode[1].{0}: {0} must be "
+
+
+def with_entry(name: str, entry: str, value: str, folder: Path) -> Path:
+    """Write one of the machines that come with the library with another value at the first place of an entry."""
+    text = (c_core.ROOT / "models" / f"{name}.toml").read_text(encoding="utf-8")
+    changed = re.sub(rf"^{entry} = \S+", f"{entry} = {value}", text, count=1, flags=re.MULTILINE)
+    assert changed != text
+    (folder / "axis.toml").write_text(changed, encoding="utf-8")
+    return folder / "axis.toml"
+
+
+REFUSED = [
+    *(("als25010_x", "f_n", value, ANY_MODE.format("f_n")) for value in ("5e-324", "1e-100", "1e308")),
+    *(("als25010_x", "zeta", value, ANY_MODE.format("zeta")) for value in ("5e-324", "1e300")),
+    *(("als25010_x", name, "1e300", ANY_MODE.format(name)) for name in ("alpha", "beta")),
+    (
+        "als25010_x",
+        "f_n",
+        "5e4",
+        "2 pi f_n and 4 pi f_n zeta of mode[1] must be at most 100000 1/s in a plant, got 314159",
+    ),
+    ("als25010_x", "f", "1e300", "plant.f: f must be 0 … 1 m, got 1e+300"),
+    ("als25010_x", "kappa", "1e300", "plant.kappa: kappa must be 0 … 1000000 1/m"),
+    ("spring_mass_damper", "k", "1e308", "physics.spring_mass_damper.k: k must be 1e-06 … 1e+15 N/m, got 1e+308"),
+    ("spring_mass_damper", "m", "5e-324", "physics.spring_mass_damper.m: m must be "),
+    ("spring_mass_damper", "c", "1e308", "physics.spring_mass_damper.c: c must be "),
+    ("spring_mass_damper", "k", "1e15", "sqrt(k/m) and c/m must be at most 100000 1/s, got 3.16228e+07; lower k or c"),
+    ("spring_mass_damper", "k", "1e-6", "make no drive: f_n must be 0.001 … 100000 Hz, got 0.000159"),
+    ("spring_mass_damper", "k_nl", "1e300", "plant.k_nl: k_nl must be 0 … 1e+15 N/m2"),
+    ("spring_mass_damper", "T_s", "1e-300", "T_s must be 1e-05 … 1 s, got 1e-300"),
+    ("spring_mass_damper", "velocity", "1e-300", "limits.velocity: velocity must be 1e-09 … 10000 m/s, got 1e-300"),
+    ("spring_mass_damper", "jerk", "1e308", "limits.jerk: jerk must be 1e-06 … 1e+12 m/s3, got 1e+308"),
+    ("spring_mass_damper", "change_max", "1e308", "drive_limits.change_max: change_max must be 1e-12 … 10 m"),
+]
+
+
+@pytest.mark.parametrize(("name", "entry", "value", "message"), REFUSED)
+def test_a_machine_is_refused_by_name(name: str, entry: str, value: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(MachineError) as caught:
+        load_machine(with_entry(name, entry, value, tmp_path))
+    assert message in str(caught.value)
+
+
+def test_a_build_of_what_cannot_be_ends_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    machine = with_entry("spring_mass_damper", "k", "1e308", tmp_path)
+    monkeypatch.setattr("sys.argv", ["hybridsep", "build", "-m", str(machine), "--out", str(tmp_path)])
+    begin = time.perf_counter()
+    with pytest.raises(SystemExit) as stopped:
+        cli.main()
+    assert stopped.value.code == 2
+    assert time.perf_counter() - begin < 10.0
+    assert "k must be 1e-06 … 1e+15 N/m, got 1e+308" in " ".join(capsys.readouterr().err.split())
+
+
+def test_a_trajectory_of_too_many_samples_is_refused() -> None:
+    with pytest.raises(
+        ParameterError, match=r"fewer than 2000000 samples, got 1e\+07 s at T_s = 0.001 s; raise its limits"
+    ):
+        rest_to_rest([0.0, 0.01], Limits(1e-9, 1.0, 1.0))
+
+
+@pytest.mark.parametrize("name", c_core.DESCRIPTIONS)
+def test_every_parameter_of_an_fmu_has_both_bounds(name: str) -> None:
+    for variable in variables_of(c_core.DESCRIPTIONS[name]):
+        if variable.causality == "parameter":
+            assert variable.minimum is not None
+            assert variable.maximum is not None
+        if variable.name == "T_s":
+            assert (variable.minimum, variable.maximum) == (1e-5, 1.0)

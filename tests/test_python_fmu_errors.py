@@ -33,6 +33,8 @@ def predictor(python_fmu: Fmu) -> Iterator[FmuInstance]:
         ({"input_hold": 2}, "input_hold must be 0 … 1, got 2"),
         ({"dead_time": -1}, "dead_time must be 0 … 100000, got -1"),
         ({"mode[1].zeta": 0.0}, r"mode[1].zeta must be 1e-06 … 10000, got 0.0"),
+        ({"T_s": 1e-300}, "T_s must be 1e-05 … 1 s, got 1e-300"),
+        ({"mode[1].f_n": 1e308}, "mode[1].f_n must be 0.001 … 100000 Hz, got 1e+308"),
         ({"mode[1].f_n": math.nan}, r"mode[1].f_n must be finite, got nan"),
         ({"mode[1].alpha": math.inf}, r"mode[1].alpha must be finite, got inf"),
         ({"x_d_ahead": math.inf}, "the start value of x_d_ahead must be finite, got inf"),
@@ -55,6 +57,7 @@ def test_bad_parameters_are_named_and_others_live_on(python_fmu: Fmu, values: di
     ("name", "values", "message"),
     [
         ("FeedDrivePy", {"m": 0.0}, "m must be 1e-06 … 1000000 kg, got 0.0"),
+        ("FeedDrivePy", {"k": 1e308}, "k must be 1e-06 … 1e+15 N/m, got 1e+308"),
         ("FeedDrivePy", {"k_nl": -1.0}, "k_nl must be 0 … 1e+15 N/m2, got -1.0"),
         ("FeedDrivePy", {"noise_std": math.nan}, "noise_std must be finite, got nan"),
         ("FeedDrivePy", {"seed": -1}, "seed must be"),
