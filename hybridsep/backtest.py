@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from ._threads import one_blas_thread
 from .errors import SignalError
 from .predictor import HybridPredictor
-from .signals import Array, as_samples
+from .signals import PREDICTION_MAX, Array, as_samples
 
 __all__ = ["Backtest", "Batch", "Score", "Scores", "backtest", "backtest_stream"]
 
@@ -218,7 +218,8 @@ def backtest_stream(
     Raises
     ------
     SignalError
-        If a chunk's samples cannot be used, or there are none at all. What came before it is learned.
+        If a chunk's samples cannot be used, there are none at all, or a prediction diverges. What came before it is
+        learned.
     """
     overall, after = _Sums(), _Sums()
     j = 0
@@ -233,11 +234,11 @@ def backtest_stream(
         if warm:
             predicted[1:, :warm] = prediction.x_pb[:warm]
         error = x - predicted
-        squares, peaks = _measure(error)
+        squares, peaks = _measure(error, overall.n)
         if warm == 0:
             after.add(n, squares, peaks)
         elif warm < n:
-            after.add(n - warm, *_measure(error[:, warm:]))
+            after.add(n - warm, *_measure(error[:, warm:], overall.n))
         rms = [math.sqrt(square / n) for square in squares]
         batch = Batch(j, overall.n, warm, x_d, x, *predicted, *rms)
         overall.add(n, squares, peaks)
@@ -270,10 +271,12 @@ class _Sums:
         return Score(self.n, *[math.sqrt(square / self.n) for square in self.squares], *self.peaks)
 
 
-def _measure(error: Array) -> tuple[list[float], list[float]]:
-    """Return the sums of squares and the largest absolute values of three rows of errors."""
-    squares = [float(row.dot(row)) for row in error]
-    return squares, np.abs(error).max(axis=1).tolist()
+def _measure(error: Array, k: int) -> tuple[list[float], list[float]]:
+    """Return the sums of squares and the largest absolute values of the three errors of a batch from sample k on."""
+    peaks: list[float] = np.abs(error).max(axis=1).tolist()
+    if not all(peak <= PREDICTION_MAX for peak in peaks):
+        raise SignalError(f"x_h diverges in the batch from sample {k} on; raise lambda or lower p")
+    return [float(row.dot(row)) for row in error], peaks
 
 
 def _batches(chunks: Iterable[tuple[ArrayLike, ArrayLike]], Np: int) -> Iterator[tuple[Array, Array]]:

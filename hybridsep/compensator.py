@@ -21,14 +21,15 @@ from numpy.typing import ArrayLike
 
 from ._bounded import DriveBounds, solve
 from ._plan import PendingPlan, SepPlan, SepState
+from ._saved import Saved
 from ._sensor import SensorWatch
 from ._splines import N_DECIDED, SplineBasis, direct_samples
 from ._trust import Trust, has_stable_poles
-from .errors import ParameterError, SignalError, StateError
+from .errors import ParameterError, SignalError
 from .limits import Limits
-from .parameters import check_limits, check_preview
+from .parameters import check, check_preview
 from .predictor import HybridPredictor
-from .signals import Array, as_samples
+from .signals import Array, as_published, as_samples
 from .state import pack, unpack
 from .window import Prediction
 
@@ -88,21 +89,13 @@ class SepCompensator:
         best: SepState = SepState.HYBRID,
     ) -> None:
         Np = predictor.Np
-        self.preview = max(2 * Np, 200) if preview is None else int(preview)
-        if spacing < 1:
-            raise ParameterError(f"spacing must be ≥ 1 and divide Np = {Np}, got {spacing}")
-        if problems := check_preview(Np=Np, preview=self.preview, spacing=int(spacing)):
+        self.preview: int = check("preview", max(2 * Np, 200) if preview is None else preview)
+        self.spacing: int = check("spacing", spacing)
+        if problems := check_preview(Np=Np, preview=self.preview, spacing=self.spacing):
             raise ParameterError("; ".join(problems))
-        if limits is not None:
-            demands = {"v_max": limits.velocity, "a_max": limits.acceleration, "j_max": limits.jerk}
-            if problems := check_limits(**demands, v_s=predictor.v_s, Ts=predictor.Ts):
-                raise ParameterError("; ".join(problems))
-        if not (np.isfinite(jerk_weight) and jerk_weight >= 0):
-            raise ParameterError(f"jerk_weight must be finite and ≥ 0, got {jerk_weight}")
-        if change_max is not None and not (np.isfinite(change_max) and change_max > 0):
-            raise ParameterError(f"change_max must be finite and > 0 m, got {change_max}")
-        self.predictor, self.spacing, self.jerk_weight = predictor, int(spacing), float(jerk_weight)
-        self.limits, self.change_max, self.best = limits, change_max, SepState(best)
+        self.jerk_weight: float = check("jerk_weight", jerk_weight)
+        self.change_max: float | None = None if change_max is None else check("change_max", change_max)
+        self.predictor, self.limits, self.best = predictor, limits, SepState(best)
         self.keep_direction = bool(keep_direction)
         self._basis = SplineBasis(self.preview, self.spacing)
         self._n_pinned = min(_PINNED, Np // 2) // self.spacing
@@ -151,7 +144,7 @@ class SepCompensator:
         Raises
         ------
         SignalError
-            If ``x_d`` has another length or is not finite.
+            If ``x_d`` has another length or is not finite, or the window's prediction diverges.
         """
         command = as_samples(x_d, "x_d", self.preview)
         predictor, Np = self.predictor, self.predictor.Np
@@ -164,7 +157,10 @@ class SepCompensator:
         x_dm = command[:Np] + delta
         prediction = predictor.predict(x_dm, reference=command)
         self._pending = PendingPlan(coefficients, delta, command[:Np].copy(), prediction, state)
-        x_h = prediction.x_pb + prediction.e_h if state is SepState.HYBRID else prediction.x_pb.copy()
+        as_published(prediction.x_pb, "x_pb")
+        x_h = prediction.x_pb.copy()
+        if state is SepState.HYBRID:
+            x_h = as_published(prediction.x_pb + prediction.e_h, "x_h")
         return SepPlan(x_dm=x_dm, x_pb=prediction.x_pb, x_h=x_h, state=state)
 
     def update(self, x: ArrayLike) -> None:
@@ -211,6 +207,11 @@ class SepCompensator:
             _last_three(self._x_d_before, pending.x_d),
         )
         self._pending = None
+
+    @property
+    def is_planned(self) -> bool:
+        """Whether a planned window waits for its measurement."""
+        return self._pending is not None
 
     def _best_plan(self, command: Array) -> tuple[SepState, Array]:
         """Return the model and the coefficients of the best plan there is, the decided ones first."""
@@ -277,28 +278,38 @@ class SepCompensator:
         StateError
             If the blob is foreign, truncated or of another version.
         """
-        meta, arrays, parts = unpack(_KIND, blob)
-        try:
-            predictor = HybridPredictor.from_bytes(parts["predictor"])
-            restored = HybridPredictor.from_bytes(parts["predictor"])
-            names = ("preview", "spacing", "jerk_weight", "change_max", "keep_direction")
-            values: dict[str, Any] = {name: meta[name] for name in names}
-            limits = None if meta["limits"] is None else Limits(*meta["limits"])
-            compensator = cls(predictor, limits=limits, best=SepState(meta["best"]), **values)
-            compensator.predictor = restored  # the constructor has begun a new run on the other one
-            compensator.lead_in = meta["lead_in"]
-            compensator._trust.excess, compensator._measured_before = meta["excess"], meta["measured_before"]
-            compensator._rest, compensator._delta_before = arrays["rest"], arrays["delta_before"]
-            compensator._x_d_before = arrays["x_d_before"]
-            compensator._sensor.restore(arrays["sensor"])
-            if meta["pending"] is not None:
-                state, n_warm_up = meta["pending"]
-                prediction = Prediction(arrays["x_pb"], arrays["e_h"], n_warm_up)
-                compensator._pending = PendingPlan(
-                    arrays["coefficients"], arrays["delta"], arrays["x_d"], prediction, SepState(state)
-                )
-        except (KeyError, TypeError, ValueError) as error:
-            raise StateError(f"the saved compensator does not hold together: {error}") from error
+        saved = Saved(_KIND, *unpack(_KIND, blob))
+        predictor = HybridPredictor.from_bytes(saved.part("predictor"))
+        restored = HybridPredictor.from_bytes(saved.part("predictor"))
+        limits = None if saved.field("limits") is None else saved.numbers("limits", 3)
+        with saved.consistent():
+            compensator = cls(
+                predictor,
+                limits=None if limits is None else Limits(*limits),
+                best=SepState(saved.whole("best", max(SepState))),
+                keep_direction=saved.flag("keep_direction"),
+                **{name: saved.field(name) for name in ("preview", "spacing", "jerk_weight", "change_max")},
+            )
+        compensator.predictor = restored  # the constructor has begun a new run on the other one
+        compensator.lead_in = saved.whole("lead_in")
+        compensator._trust.excess, compensator._measured_before = saved.real("excess"), saved.flag("measured_before")
+        n, Np = len(compensator._rest), predictor.Np
+        compensator._rest, compensator._delta_before = saved.array("rest", n), saved.array("delta_before", 3)
+        compensator._x_d_before = saved.array("x_d_before", 3, finite=False)
+        compensator._sensor.restore(saved.array("sensor", 5, finite=False))
+        if saved.field("pending") is not None:
+            state, n_warm_up = saved.numbers("pending", 2)
+            if state not in tuple(SepState) or n_warm_up not in range(Np + 1) or restored.n_pending != Np:
+                raise saved.error("the window that waits must be planned and predicted")
+            # A hybrid prediction that plans nothing may diverge.
+            prediction = Prediction(saved.array("x_pb", Np), saved.array("e_h", Np, finite=False), int(n_warm_up))
+            compensator._pending = PendingPlan(
+                saved.array("coefficients", n),
+                saved.array("delta", Np),
+                saved.array("x_d", Np),
+                prediction,
+                SepState(int(state)),
+            )
         return compensator
 
 

@@ -32,7 +32,7 @@ __all__ = [
 def brief(value: object) -> str:
     """Return ``repr(value)`` for a message, in at most 80 characters whatever the value is."""
     try:
-        text = repr(value)
+        text = repr(float(value) if isinstance(value, float) else value)  # NumPy's floats name their type
     except (ValueError, RecursionError):  # an integer of more than 4300 digits; lists in lists in lists
         return f"something of type {type(value).__name__} that is too long to show"
     return text if len(text) <= 80 else f"{text[:60]}… ({len(text)} characters)"

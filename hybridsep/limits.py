@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
-from .errors import ParameterError
+from .parameters import check
 
 __all__ = ["Limits"]
 
@@ -17,12 +16,12 @@ class Limits:
     Parameters
     ----------
     velocity, acceleration, jerk : float
-        Limits in m/s, m/s² and m/s³, all > 0.
+        Limits in m/s, m/s² and m/s³, in the ranges of the parameters ``v_max``, ``a_max`` and ``j_max``.
 
     Raises
     ------
     ParameterError
-        If a limit is not finite and > 0.
+        If a limit is out of its range.
     """
 
     velocity: float
@@ -30,7 +29,5 @@ class Limits:
     jerk: float
 
     def __post_init__(self) -> None:
-        for name in ("velocity", "acceleration", "jerk"):
-            limit = getattr(self, name)
-            if not (math.isfinite(limit) and limit > 0):
-                raise ParameterError(f"the {name} limit must be finite and > 0, got {limit!r}")
+        for name, parameter in (("velocity", "v_max"), ("acceleration", "a_max"), ("jerk", "j_max")):
+            object.__setattr__(self, name, check(parameter, getattr(self, name), label=f"the {name} limit"))

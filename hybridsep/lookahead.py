@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from ._sampled_window import SampledWindow, checked_start
-from .errors import StateError
+from ._saved import Saved
 from .predictor import HybridPredictor
 from .state import pack, unpack
 
@@ -81,7 +81,8 @@ class LookAhead(SampledWindow):
         Raises
         ------
         SignalError
-            If one of them is not finite; nothing is changed then.
+            If one of them is not finite; nothing is changed then. If the window that begins diverges, all that follows
+            is refused, too.
         """
         self.check(x_d_ahead, x_meas)
         i = self.k % self.Np
@@ -92,7 +93,7 @@ class LookAhead(SampledWindow):
             self._sum_h += (x_meas - self.x_h) ** 2
         self.k += 1
         if self.k % self.Np == 0:
-            self._next_window()
+            self._begin_window()
 
     def to_bytes(self) -> bytes:
         """Return the whole state, the predictor's included, as a versioned blob."""
@@ -103,6 +104,7 @@ class LookAhead(SampledWindow):
             "n": self._n,
             "sum_pb": self._sum_pb,
             "sum_h": self._sum_h,
+            "diverged": self.diverged,
         }
         arrays = {
             "ahead": self._ahead,
@@ -122,25 +124,27 @@ class LookAhead(SampledWindow):
         StateError
             If the blob is foreign, truncated or of another version.
         """
-        meta, arrays, parts = unpack(_KIND, blob)
-        try:
-            look_ahead = cls.__new__(cls)
-            look_ahead.predictor = HybridPredictor.from_bytes(parts["predictor"])
-            look_ahead.Np = look_ahead.predictor.Np
-            look_ahead.start, look_ahead.k, look_ahead._n_warm_up = meta["start"], meta["k"], meta["n_warm_up"]
-            look_ahead._n, look_ahead._sum_pb, look_ahead._sum_h = meta["n"], meta["sum_pb"], meta["sum_h"]
-            look_ahead._ahead, look_ahead._measured = arrays["ahead"], arrays["measured"]
-            look_ahead.x_d_window, look_ahead.x_pb_window = arrays["x_d"], arrays["x_pb"]
-            look_ahead.x_h_window = arrays["x_h"]
-        except KeyError as error:
-            raise StateError(f"the saved look-ahead does not hold together: {error} is missing") from error
+        saved = Saved(_KIND, *unpack(_KIND, blob))
+        look_ahead = cls.__new__(cls)
+        look_ahead.predictor = HybridPredictor.from_bytes(saved.part("predictor"))
+        look_ahead.Np = Np = look_ahead.predictor.Np
+        with saved.consistent():
+            look_ahead.start = checked_start(saved.real("start"))
+        look_ahead.k, look_ahead._n_warm_up = saved.whole("k"), saved.whole("n_warm_up", Np)
+        look_ahead.diverged = saved.text("diverged")
+        look_ahead._n = saved.whole("n")
+        look_ahead._sum_pb, look_ahead._sum_h = (abs(saved.real(name)) for name in ("sum_pb", "sum_h"))
+        look_ahead._ahead, look_ahead._measured = saved.array("ahead", Np), saved.array("measured", Np)
+        look_ahead.x_d_window, look_ahead.x_pb_window = saved.array("x_d", Np), saved.array("x_pb", Np)
+        look_ahead.x_h_window = saved.array("x_h", Np)
+        if look_ahead.predictor.n_pending != (Np if look_ahead.k >= Np else 0) and not look_ahead.diverged:
+            raise saved.error("the window that runs must be predicted")
         return look_ahead
 
     def _next_window(self) -> None:
         if self.k > self.Np:  # the first fill was not predicted and is not learned
             self.predictor.update(self._measured)
         prediction = self.predictor.predict(self._ahead)
+        self.x_h_window, self.x_pb_window = prediction.x_h, prediction.x_pb
         self.x_d_window = self._ahead.copy()
-        self.x_pb_window = prediction.x_pb
-        self.x_h_window = prediction.x_h
         self._n_warm_up = prediction.n_warm_up

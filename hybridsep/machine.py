@@ -38,8 +38,15 @@ def _checked(value: Any, info: ValidationInfo) -> Any:
     return check(names.get(name, name), value)
 
 
+def _checked_limit(value: Any, info: ValidationInfo) -> Any:
+    """Check one of a drive's or a trajectory's limits against the range of the compensator's."""
+    name = str(info.field_name)
+    return check({"velocity": "v_max", "acceleration": "a_max", "jerk": "j_max"}[name], value, label=name)
+
+
 Number = Annotated[float, BeforeValidator(_checked)]
 Whole = Annotated[int, BeforeValidator(_checked)]
+Limit = Annotated[float, BeforeValidator(_checked_limit)]
 OptionalNumber = Annotated[float | None, BeforeValidator(_checked)]
 OptionalWhole = Annotated[int | None, BeforeValidator(_checked)]
 """Given, or left out; there is no null in TOML."""
@@ -143,15 +150,15 @@ class StageSection(_Section):
 class LimitsSection(_Section):
     """Velocity, acceleration and jerk of the reference trajectory, m/s, m/s², m/s³."""
 
-    velocity: float = Field(gt=0, allow_inf_nan=False)
-    acceleration: float = Field(gt=0, allow_inf_nan=False)
-    jerk: float = Field(gt=0, allow_inf_nan=False)
+    velocity: Limit
+    acceleration: Limit
+    jerk: Limit
 
 
 class DriveLimitsSection(LimitsSection):
     """What the drive itself allows of a modified command, wider than the trajectory's limits."""
 
-    change_max: float = Field(default=1e-3, gt=0, allow_inf_nan=False)
+    change_max: Number = _default("change_max")
 
 
 class LogSection(_Section):
@@ -185,6 +192,13 @@ class Machine(_Section):
             raise ValueError("a plant of kind stage needs [[physics.mode]] entries")
         if self.plant is not None and self.physics.dead_time:
             raise ValueError("a machine with a plant must have physics.dead_time = 0: the plants have none")
+        if self.plant is not None:
+            self.new_plant()  # says what is out of range together
+        return self
+
+    @model_validator(mode="after")
+    def _physics_makes_modes(self) -> Machine:
+        _ = self.model  # says which mode of m, c and k is out of range
         return self
 
     @model_validator(mode="after")

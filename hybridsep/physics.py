@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 
 __all__ = ["DiscreteModel", "ModalModel", "Mode"]
 
+MODES_MAX = 100
+"""Modes of one model, at most; its tables grow with their square."""
+
 BLOCK_MAX = 256
 """Longest stretch answered by one pair of lifted matrices; longer windows go block by block."""
 
@@ -35,9 +38,9 @@ class Mode:
     Parameters
     ----------
     f_n : float
-        Natural frequency, Hz, > 0.
+        Natural frequency, Hz.
     zeta : float
-        Damping ratio, > 0; 1 is critical, more is over-damped.
+        Damping ratio; 1 is critical, more is over-damped.
     alpha, beta : float
         Numerator, 1/s² and 1/s.
 
@@ -69,14 +72,14 @@ class ModalModel:
     Parameters
     ----------
     modes : sequence of Mode
-        At least one.
+        1 … :data:`MODES_MAX`.
     dead_time : int
         Whole samples by which the command is delayed before it reaches the modes.
 
     Raises
     ------
     ParameterError
-        If there is no mode, or ``dead_time`` is not a whole number ≥ 0.
+        If there is no mode or too many, or ``dead_time`` is not a whole number ≥ 0.
     """
 
     modes: tuple[Mode, ...]
@@ -85,6 +88,8 @@ class ModalModel:
     def __init__(self, modes: Sequence[Mode], dead_time: int = 0) -> None:
         if not modes:
             raise ParameterError("a modal model needs at least one mode, got none")
+        if len(modes) > MODES_MAX:
+            raise ParameterError(f"a modal model has at most {MODES_MAX} modes, got {len(modes)}")
         object.__setattr__(self, "modes", tuple(modes))
         object.__setattr__(self, "dead_time", check("dead_time", dead_time))
 
@@ -98,11 +103,19 @@ class ModalModel:
             Mass kg, damping N·s/m, stiffness N/m, all > 0.
         dead_time : int
             Whole samples of dead time.
+
+        Raises
+        ------
+        ParameterError
+            If a value, or the mode that they make, is out of its range.
         """
         m, c, k = check("m", m), check("c", c), check("k", k)
         # ω² = k/m, 2ζω = c/m, α = k/m, β = c/m
         omega = np.sqrt(k / m)
-        mode = Mode(f_n=omega / (2 * np.pi), zeta=c / m / (2 * omega), alpha=k / m, beta=c / m)
+        try:
+            mode = Mode(f_n=omega / (2 * np.pi), zeta=c / m / (2 * omega), alpha=k / m, beta=c / m)
+        except ParameterError as error:
+            raise ParameterError(f"m = {m:g} kg, c = {c:g} N.s/m, k = {k:g} N/m make no drive: {error}") from None
         return cls((mode,), dead_time)
 
     @classmethod

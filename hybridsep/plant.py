@@ -16,13 +16,16 @@ from numpy.typing import ArrayLike
 from .clock import SampleClock, check_step_size
 from .errors import ParameterError, SignalError
 from .parameters import check
-from .physics import ModalModel
-from .signals import Array, as_samples
+from .physics import ModalModel, Mode
+from .signals import POSITION_MAX, Array, as_samples
 
 __all__ = ["FRICTION_VELOCITY", "INTERNAL_STEP", "Encoder", "FeedDrive", "Plant", "StageDrive", "simulate"]
 
 INTERNAL_STEP = 1e-4
 """Longest internal integration step, s."""
+
+RATE_MAX = 1e5
+"""Fastest rate of a drive's linear part, 1/s: a time constant of 10 µs takes 1600 internal steps a millisecond."""
 
 FRICTION_VELOCITY = 2e-3
 """Velocity over which the stage's friction changes sign, m/s."""
@@ -72,6 +75,11 @@ class FeedDrive:
         self.k: float = check("k", k)
         self.c_nl: float = check("c_nl", c_nl)
         self.k_nl: float = check("k_nl", k_nl)
+        self._rate = max(math.sqrt(self.k / self.m), self.c / self.m)
+        if self._rate > RATE_MAX:
+            raise ParameterError(
+                f"sqrt(k/m) and c/m must be at most {RATE_MAX:g} 1/s, got {self._rate:g}; lower k or c, or raise m"
+            )
         self.reset()
 
     def reset(self, start: float = 0.0) -> None:
@@ -90,10 +98,11 @@ class FeedDrive:
 
     def step(self, x_d: float, h: float) -> None:
         """Advance by ``h`` seconds with the command ``x_d``, m, held."""
-        check_step_size(h)
+        _check_command(x_d)
+        _check_step(h, self._rate)
         r = x_d - self._start
         a, w2 = self.c / self.m, self.k / self.m
-        n = _internal_steps(h, max(math.sqrt(w2), a))
+        n = _internal_steps(h, self._rate)
         dt = h / n
         c_m, k_m = self.c_nl / self.m, self.k_nl / self.m
 
@@ -110,7 +119,7 @@ class FeedDrive:
             p4, q4 = f(x + dt * p3, u + dt * q3)
             x += dt / 6 * (p1 + 2 * p2 + 2 * p3 + p4)
             u += dt / 6 * (q1 + 2 * q2 + 2 * q3 + q4)
-        if not (math.isfinite(x) and math.isfinite(u)):
+        if not (abs(x) < _STATE_MAX and abs(u) < _STATE_MAX):
             raise SignalError(f"the drive's state left the range of numbers (x = {x}, command {x_d} m)")
         self._x, self._u, self._x_d = x, u, r
 
@@ -149,7 +158,13 @@ class StageDrive:
         self.kappa: float = check("kappa", kappa)
         self.Ts: float = check("T_s", Ts)
         self._modes = [(mode.omega**2, 2 * mode.zeta * mode.omega, mode.alpha, mode.beta) for mode in model.modes]
-        self._rate = max(max(math.sqrt(w2), two_zw) for w2, two_zw, _, _ in self._modes)
+        self._rate = max(map(_mode_rate, model.modes))
+        for i, mode in enumerate(model.modes, start=1):
+            if _mode_rate(mode) > RATE_MAX:
+                raise ParameterError(
+                    f"2 pi f_n and 4 pi f_n zeta of mode[{i}] must be at most {RATE_MAX:g} 1/s in a plant, "
+                    f"got {_mode_rate(mode):g}; lower f_n or zeta"
+                )
         self.reset()
 
     def reset(self, start: float = 0.0) -> None:
@@ -171,7 +186,8 @@ class StageDrive:
 
     def step(self, x_d: float, h: float) -> None:
         """Advance by ``h`` seconds with the command ``x_d``, m, held."""
-        check_step_size(h)
+        _check_command(x_d)
+        _check_step(h, self._rate)
         step = self._clock.count(self._clock.end, h)
         r, z = x_d - self._start, self._z
         last_x_d, v_d, done = self._last_x_d, self._v_d, 0.0
@@ -183,7 +199,7 @@ class StageDrive:
                 done = end
             if i < step.n_latched:
                 last_x_d, v_d = r, (r - last_x_d) / self.Ts
-        if not all(map(math.isfinite, z)):
+        if not all(abs(s) < _STATE_MAX for s in z):
             raise SignalError(f"the stage's state left the range of numbers (command {x_d} m)")
         self._z, self._v = z, self._position(self._derivative(z, self._pushed(r, v_d)))
         self._last_x_d, self._v_d, self._clock = last_x_d, v_d, step.after
@@ -291,11 +307,33 @@ def simulate(plant: Plant, x_d: ArrayLike, Ts: float, *, start: float | None = N
 
 def _internal_steps(h: float, rate: float) -> int:
     """Return how many internal steps a step of ``h`` seconds takes; ``rate``, 1/s, is that of the fastest mode."""
-    n = math.ceil(max(h / INTERNAL_STEP, 16 * h * rate) - 1e-6)
-    return min(max(1, n), _STEPS_MAX)
+    return max(1, math.ceil(max(h / INTERNAL_STEP, 16 * h * rate) - 1e-6))
+
+
+def _check_step(h: float, rate: float) -> None:
+    """Raise ParameterError if a drive whose fastest rate is ``rate``, 1/s, cannot do a step of ``h`` seconds."""
+    check_step_size(h)
+    longest = _STEPS_MAX / 16 / rate
+    if h > longest:
+        raise ParameterError(
+            f"the step size must be at most {longest:g} s for a drive as fast as {rate:g} 1/s, got {h!r}; "
+            "make several steps"
+        )
+
+
+def _mode_rate(mode: Mode) -> float:
+    """Return the fastest rate of a mode, 1/s."""
+    return max(math.sqrt(mode.omega**2), 2 * mode.zeta * mode.omega)
+
+
+def _check_command(x_d: float) -> None:
+    """Raise SignalError if a command is no position, m."""
+    if not abs(x_d) <= POSITION_MAX:  # NaN too
+        raise SignalError(f"x_d must be within ±{POSITION_MAX:g} m, got {x_d:g}")
 
 
 _STEPS_MAX = 1_000_000
+_STATE_MAX = 1e100
 _MASK: int = 0xFFFF_FFFF_FFFF_FFFF
 
 

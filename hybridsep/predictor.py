@@ -17,8 +17,9 @@ from numpy.lib.stride_tricks import as_strided
 from numpy.typing import ArrayLike
 from scipy.signal import lfilter
 
-from ._schedule import ReferenceSchedule
-from .errors import SignalError, StateError
+from ._saved import Saved
+from ._schedule import N_SCHEDULED, ReferenceSchedule
+from .errors import SignalError
 from .output import written_whole
 from .parameters import INPUT_HOLDS, check, check_together, samples_before
 from .physics import ModalModel, Mode
@@ -254,6 +255,11 @@ class HybridPredictor:
             free_pb=free_pb + start * (1.0 - np.cumsum(g_pb)),
         )
 
+    @property
+    def n_pending(self) -> int:
+        """Samples of the predicted window that waits for its measurement; 0 if there is none."""
+        return 0 if self._pending is None else len(self._pending.x_d)
+
     def last_residual(self) -> float:
         """Return the last measured residual ``e_pb``, m; what the hold baseline keeps over a window."""
         return float(self._e[self.p - 1])
@@ -292,22 +298,31 @@ class HybridPredictor:
         StateError
             If the blob is foreign, truncated or of another version.
         """
-        meta, arrays, _ = unpack(_KIND, blob)
-        try:
-            model = ModalModel([Mode(*row) for row in arrays["modes"].tolist()], meta["dead_time"])
-            names = ("Ts", "Np", "p", "q", "lam", "t_init", "input_hold", "start", "v_s")
-            predictor = cls(model, **{name: meta[name] for name in names})
-            predictor.k, predictor.n_init = meta["k"], meta["n_init"]
-            predictor._state[:] = arrays["state"]
-            predictor._x[: predictor.q] = arrays["x_pb"]
-            predictor._e[: predictor.p] = arrays["e_pb"]
-            predictor.regression.restore(arrays["factor"], meta["n_samples"])
-            predictor._schedule.before, predictor._schedule.last = arrays["signs"], float(arrays["reference"][0])
-            if meta["pending_start"] is not None:
-                pending = {name: arrays[f"pending_{name}"] for name in ("x_d", "x_pb", "reference", "signs")}
-                predictor._pending = _Pending(start=meta["pending_start"], **pending)
-        except (KeyError, TypeError, ValueError) as error:
-            raise StateError(f"the saved predictor does not hold together: {error}") from error
+        saved = Saved(_KIND, *unpack(_KIND, blob))
+        names = ("Ts", "Np", "p", "q", "lam", "t_init", "v_s", "input_hold")
+        values = {name: saved.field(name) for name in names}
+        with saved.consistent():
+            # What is allocated follows from numbers that the arrays confirm first.
+            check_together(**{name: values[name] for name in names[:6]})
+            n = 2 + int(values["q"]) + int(values["p"]) + (N_SCHEDULED if check("v_s", values["v_s"]) > 0 else 0)
+            factor = saved.array("factor", n + 1, n + 1)
+            model = ModalModel([Mode(*row) for row in saved.array("modes", None, 4).tolist()], saved.field("dead_time"))
+            predictor = cls(model, **values, start=saved.number_or_none("start"))
+            predictor.regression.restore(factor, saved.whole("n_samples"))
+        predictor.k, predictor.n_init = saved.whole("k"), saved.whole("n_init")
+        predictor._state[:] = saved.array("state", predictor.discrete.n_state)
+        predictor._x[: predictor.q] = saved.array("x_pb", predictor.q)
+        predictor._e[: predictor.p] = saved.array("e_pb", predictor.p)
+        schedule = predictor._schedule
+        schedule.before = saved.array("signs", len(schedule.before))
+        schedule.last = float(saved.array("reference", 1, finite=False)[0])
+        start = saved.number_or_none("pending_start")
+        if start is not None:
+            x_d, reference = saved.array("pending_x_d", None), saved.array("pending_reference", None)
+            if not 0 < len(x_d) <= len(reference):
+                raise saved.error("the window that waits must have samples, and a reference at least as long")
+            signs = saved.array("pending_signs", len(schedule.signs(reference, start)))
+            predictor._pending = _Pending(x_d, saved.array("pending_x_pb", len(x_d)), start, reference, signs)
         return predictor
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -126,10 +126,12 @@ class RidgeRegression:
         Raises
         ------
         SignalError
-            If the factor has another size.
+            If the factor has another size, is not finite or not that of a solvable problem; nothing is changed then.
         """
         if factor.shape != self._factor.shape:
             raise SignalError(f"the factor must have shape {self._factor.shape}, got {factor.shape}")
+        if not (np.isfinite(factor).all() and np.diag(factor)[:-1].all()):
+            raise SignalError("the factor must be finite, with no 0 on its diagonal")
         self._factor = np.array(factor, dtype=np.float64, order="F")
         self.n_samples = int(n_samples)
         self._weights = None

@@ -17,8 +17,8 @@ import math
 import numpy as np
 
 from ._sampled_window import SampledWindow, checked_start
+from ._saved import Saved
 from .compensator import SepCompensator, SepState
-from .errors import StateError
 from .state import pack, unpack
 
 __all__ = ["SepLookAhead"]
@@ -92,7 +92,8 @@ class SepLookAhead(SampledWindow):
         Raises
         ------
         SignalError
-            If one of them is not finite; nothing is changed then.
+            If one of them is not finite; nothing is changed then. If the window that begins diverges, all that follows
+            is refused, too.
         """
         self.check(x_d_ahead, x_meas)
         self._ahead[self.k % self.preview] = x_d_ahead
@@ -103,7 +104,7 @@ class SepLookAhead(SampledWindow):
         self.k += 1
         if self.k % self.Np == 0:
             self.compensator.update(self._measured)
-            self._next_window()
+            self._begin_window()
 
     def to_bytes(self) -> bytes:
         """Return the whole state, the compensator's included, as a versioned blob."""
@@ -117,7 +118,7 @@ class SepLookAhead(SampledWindow):
             "x_pb": self.x_pb_window,
             "x_h": self.x_h_window,
         }
-        return pack(_KIND, meta, arrays, {"compensator": self.compensator.to_bytes()})
+        return pack(_KIND, {**meta, "diverged": self.diverged}, arrays, {"compensator": self.compensator.to_bytes()})
 
     @classmethod
     def from_bytes(cls, blob: bytes) -> SepLookAhead:
@@ -128,19 +129,21 @@ class SepLookAhead(SampledWindow):
         StateError
             If the blob is foreign, truncated or of another version.
         """
-        meta, arrays, parts = unpack(_KIND, blob)
-        try:
-            look_ahead = cls.__new__(cls)
-            look_ahead.compensator = SepCompensator.from_bytes(parts["compensator"])
-            look_ahead.preview, look_ahead.Np = look_ahead.compensator.preview, look_ahead.compensator.predictor.Np
-            look_ahead.start, look_ahead.k = meta["start"], meta["k"]
-            look_ahead._first, look_ahead._n, look_ahead._sums = meta["first"], meta["n"], arrays["sums"]
-            look_ahead._ahead, look_ahead._measured = arrays["ahead"], arrays["measured"]
-            look_ahead.x_d_window, look_ahead.x_dm_window = arrays["x_d"], arrays["x_dm"]
-            look_ahead.x_pb_window, look_ahead.x_h_window = arrays["x_pb"], arrays["x_h"]
-            look_ahead.sep_state = SepState(meta["state"])
-        except KeyError as error:
-            raise StateError(f"the saved look-ahead does not hold together: {error} is missing") from error
+        saved = Saved(_KIND, *unpack(_KIND, blob))
+        look_ahead = cls.__new__(cls)
+        look_ahead.compensator = compensator = SepCompensator.from_bytes(saved.part("compensator"))
+        look_ahead.preview, look_ahead.Np = preview, Np = compensator.preview, compensator.predictor.Np
+        with saved.consistent():
+            look_ahead.start = checked_start(saved.real("start"))
+        look_ahead.k, look_ahead._first, look_ahead._n = (saved.whole(name) for name in ("k", "first", "n"))
+        look_ahead.diverged = saved.text("diverged")
+        look_ahead._sums = np.abs(saved.array("sums", 3, finite=False))
+        look_ahead._ahead, look_ahead._measured = saved.array("ahead", preview), saved.array("measured", Np)
+        look_ahead.x_d_window, look_ahead.x_dm_window = saved.array("x_d", Np), saved.array("x_dm", Np)
+        look_ahead.x_pb_window, look_ahead.x_h_window = saved.array("x_pb", Np), saved.array("x_h", Np)
+        look_ahead.sep_state = SepState(saved.whole("state", max(SepState)))
+        if not np.isfinite(look_ahead._sums).all() or not (compensator.is_planned or look_ahead.diverged):
+            raise saved.error("the window that runs must be planned, and the sums of its errors finite")
         return look_ahead
 
     def _rms(self, i: int) -> float:

@@ -9,12 +9,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import SignalError
 
-__all__ = ["POSITION_MAX", "Array", "as_samples"]
+__all__ = ["POSITION_MAX", "PREDICTION_MAX", "Array", "as_published", "as_samples"]
 
 Array = NDArray[np.float64]
 
 POSITION_MAX = 1e3
 """Largest magnitude taken for a position, m; what is larger is no position of an axis, or is in another unit."""
+
+PREDICTION_MAX = 1e100
+"""Largest magnitude of a published prediction, m: beyond it the learned recursion diverges. Sums of squares of what is
+smaller never overflow."""
 
 
 def as_samples(values: ArrayLike, name: str, length: int | None = None) -> Array:
@@ -38,7 +42,7 @@ def as_samples(values: ArrayLike, name: str, length: int | None = None) -> Array
     if samples.dtype != np.float64 or not samples.flags.c_contiguous:
         try:
             samples = np.ascontiguousarray(samples, dtype=np.float64)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise SignalError(f"{name} must be numbers, got {samples.dtype}") from None
     if samples.ndim != 1:
         raise SignalError(f"{name} must be one-dimensional, got shape {samples.shape}")
@@ -51,3 +55,25 @@ def as_samples(values: ArrayLike, name: str, length: int | None = None) -> Array
         i = int(np.argmax(np.abs(samples)))
         raise SignalError(f"{name} must be within ±{POSITION_MAX:g} m, got {samples[i]:g} at sample {i}")
     return samples  # type: ignore[no-any-return]
+
+
+def as_published(window: Array, name: str) -> Array:
+    """Return a window of predictions, or say that it cannot be published.
+
+    Parameters
+    ----------
+    window : (n,) array, m
+    name : str
+        The output's name.
+
+    Raises
+    ------
+    SignalError
+        If a value is not finite, or beyond :data:`PREDICTION_MAX`.
+    """
+    if not np.abs(window).max() <= PREDICTION_MAX:  # NaN too
+        raise SignalError(
+            f"{name} must stay within ±{PREDICTION_MAX:g} m: what was learned makes it diverge; "
+            "raise lambda, lower p or restart"
+        )
+    return window

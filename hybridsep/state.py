@@ -25,6 +25,8 @@ MAGIC = b"HSEP"
 VERSION = 1
 _PREFIX = struct.Struct("<4sII")
 _CRC = struct.Struct("<I")
+_LENGTH_MAX = 2**31 - 1
+"""Of an array in one direction: more is no length of an array that is empty in another one."""
 
 
 def pack(
@@ -59,19 +61,40 @@ def unpack(kind: str, blob: bytes) -> tuple[dict[str, Any], dict[str, Array], di
         raise StateError(f"the saved state has format version {version}, this library reads version {VERSION}")
     if zlib.crc32(blob[: -_CRC.size]) != _CRC.unpack(blob[-_CRC.size :])[0]:
         raise StateError(f"the saved state is truncated or damaged: its {len(blob)} bytes do not fit its checksum")
+    body = _PREFIX.size + length
     try:
-        header = json.loads(blob[_PREFIX.size : _PREFIX.size + length])
+        header = json.loads(blob[_PREFIX.size : body])
         found, meta = header["kind"], header["meta"]
-        arrays, parts, offset = {}, {}, _PREFIX.size + length
-        for name, shape in header["arrays"]:
-            count = math.prod(shape)
-            arrays[name] = np.frombuffer(blob, "<f8", count, offset).reshape(shape).astype(np.float64)
-            offset += 8 * count
-        for name, count in header["parts"]:
-            parts[name] = blob[offset : offset + count]
-            offset += count
+        if type(meta) is not dict:
+            raise TypeError("meta must be a table")
+        arrays, parts = _cut(memoryview(blob)[body : -_CRC.size], header)
+    except RecursionError:
+        raise StateError("the saved state has a header that cannot be read: it is nested too deeply") from None
     except (KeyError, TypeError, ValueError) as error:
         raise StateError(f"the saved state has a header that cannot be read: {error}") from error
     if found != kind:
-        raise StateError(f"a saved state of kind {kind!r} was expected, got one of kind {found!r}")
+        raise StateError(f"a saved state of kind {kind!r} was expected, got one of kind {found!r:.40}")
     return meta, arrays, parts
+
+
+def _cut(body: memoryview, header: Any) -> tuple[dict[str, Array], dict[str, bytes]]:
+    """Cut what follows the header into arrays and parts, which must be all of it; TypeError or ValueError if not."""
+    arrays, parts, offset = {}, {}, 0
+    for name, shape in header["arrays"]:
+        lengths = [_length(n, _LENGTH_MAX) for n in shape]
+        count = _length(math.prod(lengths), (len(body) - offset) // 8)
+        arrays[str(name)] = np.frombuffer(body, "<f8", count, offset).reshape(lengths).astype(np.float64)
+        offset += 8 * count
+    for name, count in header["parts"]:
+        end = offset + _length(count, len(body) - offset)
+        parts[str(name)], offset = bytes(body[offset:end]), end
+    if offset != len(body):
+        raise ValueError(f"{len(body) - offset} bytes belong to nothing")
+    return arrays, parts
+
+
+def _length(n: Any, most: int) -> int:
+    """Return a length that came from a header."""
+    if type(n) is not int or not 0 <= n <= most:
+        raise ValueError(f"a length must be a whole number, 0 … {most}")
+    return n

@@ -33,6 +33,9 @@ __all__ = [
 
 Curve = Callable[[Array], Array]
 
+SAMPLES_MAX = 2_000_000
+"""Samples of a trajectory that is made here, at most: over half an hour at 1 kHz."""
+
 
 PAPER_LIMITS = Limits(velocity=0.08, acceleration=8.0, jerk=1000.0)
 """Eq. (14): 80 mm/s, 8 m/s², 1000 m/s³."""
@@ -72,7 +75,8 @@ def rest_to_rest(
     Raises
     ------
     ParameterError
-        If a move starts before the one before has ended, or the times do not fit.
+        If a move starts before the one before has ended, the times do not fit, or it would have more than
+        :data:`SAMPLES_MAX` samples.
     SignalError
         If ``positions`` has less than one move or is not finite.
     """
@@ -97,11 +101,16 @@ def rest_to_rest(
     end = begin if duration is None else duration
     if end < begin - 1e-6 * Ts:
         raise ParameterError(f"duration is {end:g} s, but the moves need {begin:g} s")
-    n = samples_before(end, Ts, "duration") + 1
+    if not end / Ts < SAMPLES_MAX:
+        raise ParameterError(
+            f"a trajectory must have fewer than {SAMPLES_MAX} samples, got {end:g} s at T_s = {Ts:g} s; "
+            "raise its limits or T_s"
+        )
+    n = samples_before(end, Ts) + 1
     x_d = np.empty(n)
     x_d[:] = points[0]
     for start, move in moves:
-        first = samples_before(start, Ts, "start_times")
+        first = samples_before(start, Ts)
         for k in range(first, n):
             t = k * Ts - start
             if t >= move.duration:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
-from .signals import Array, as_samples
+from .signals import Array, as_published, as_samples
 
 __all__ = ["Prediction", "WindowOperator"]
 
@@ -34,10 +34,11 @@ class Prediction:
 
     @property
     def x_h(self) -> Array:
-        """``(n,)`` array, m: the published prediction, eq. (4) after the warm-up."""
+        """``(n,)`` array, m: the published prediction, eq. (4) after the warm-up; SignalError if it diverges."""
         x_h: Array = self.x_pb + self.e_h
         x_h[: self.n_warm_up] = self.x_pb[: self.n_warm_up]
-        return x_h
+        as_published(self.x_pb, "x_pb")
+        return as_published(x_h, "x_h")
 
     @property
     def active(self) -> NDArray[np.bool_]:

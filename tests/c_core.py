@@ -10,6 +10,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+import zlib
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from importlib.util import find_spec
@@ -337,11 +338,14 @@ def sep_look_ahead(name: str, **parameters: float) -> tuple[SepLookAhead, CModel
     return SepLookAhead(library_compensator(values, name, start), start), c_model
 
 
-def write_weights(folder: Path, factor: Array, p: int, q: int, n_samples: int) -> None:
-    """Write ``weights.bin``, as the C model describes it, into a resources folder."""
-    triangle = np.concatenate([factor[i, i:] for i in range(len(factor))])
-    head = b"HSEPWGT1" + struct.pack("<3Q", p, q, n_samples)
-    (folder / "weights.bin").write_bytes(head + triangle.astype("<f8").tobytes())
+def write_weights(folder: Path, name: str, factor: Array, n_samples: int, **settings: float) -> None:
+    """Write ``weights.bin``, as the C model describes it, into a resources folder; ``settings`` replace the table's."""
+    values = {"v_s": 0.0, **DESCRIPTIONS[name]["parameters"], **settings}
+    modes = [mode[key] for mode in DESCRIPTIONS[name]["modes"] for key in ("f_n", "zeta", "alpha", "beta")]
+    whole = (*(int(values[key]) for key in ("p", "q", "input_hold", "dead_time")), len(modes) // 4, n_samples)
+    content = b"HSEPWGT2" + struct.pack("<6Q3d", *whole, *(values[key] for key in ("lambda", "T_s", "v_s")))
+    content += np.concatenate([modes, *(factor[i, i:] for i in range(len(factor)))]).astype("<f8").tobytes()
+    (folder / "weights.bin").write_bytes(content + struct.pack("<Q", zlib.crc32(content)))
 
 
 def write_trajectory(folder: Path, samples: Array, T_s: float = TS) -> None:

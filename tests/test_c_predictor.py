@@ -53,7 +53,7 @@ def test_the_staircase_is_predicted_as_by_the_library(p: int, q: int, start: flo
         {"Np": 30, "p": 2, "q": 1, "t_init": 0.0},
         {"p": 10, "q": 2, "t_init": 0.2505, "lambda": 1e-9},
         {"p": 10, "input_hold": 1, "dead_time": 3},
-        {"p": 10, "dead_time": 150, "t_init": 1e9},
+        {"p": 10, "dead_time": 150, "t_init": 1e6},
         {"T_s": 2e-3, "p": 20},
     ],
 )
@@ -80,7 +80,7 @@ def test_learned_weights_from_the_resources_predict_at_once(tmp_path: Path) -> N
     for k in range(len(x_d)):
         ahead.sample(float(x_d[k]), float(x[max(k - 100, 0)]))
     regression = ahead.predictor.regression
-    write_weights(tmp_path, regression.factor, 20, 3, regression.n_samples)
+    write_weights(tmp_path, "predictor", regression.factor, regression.n_samples, p=20)
     second = LookAhead(ahead.predictor, 0.0)
     model = CModel("predictor", {"p": 20, "t_init": 0.0}, tmp_path).initialise()
     assert np.max(np.abs(second.predictor.weights)) > 0.01

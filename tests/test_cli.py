@@ -186,7 +186,7 @@ def test_help_shows_units_and_ranges(hybridsep: Run) -> None:
     [
         (["backtest", "{log}", "-m", "robot"], "MachineError: no machine 'robot'"),
         (["backtest", "{log}", "-m", "spring_mass_damper", "--p", "200"], "p must be 1 … Np = 100, got 200"),
-        (["backtest", "{log}", "-m", "spring_mass_damper", "--lam", "0"], "lambda must be > 0 m2, got 0"),
+        (["backtest", "{log}", "-m", "spring_mass_damper", "--lam", "0"], "lambda must be 1e-40 … 1e+12 m2, got 0"),
         (["backtest", "{log}", "-m", "spring_mass_damper", "--x", "pos"], "column 'pos'"),
         (
             ["backtest", "{log}", "-m", "spring_mass_damper", "--unit", "inch"],

@@ -527,4 +527,4 @@ def test_the_tables_hold_together() -> None:
     table = variables_of({"model": "ReferenceTrajectory", "parameters": parameters, "modes": []})
     assert [variable.name for variable in table] == ["r", "trajectory", "T_s"]
     assert all(isinstance(variable, Variable) and variable.description for variable in table)
-    assert table[2].above
+    assert (table[2].minimum, table[2].maximum) == (1e-5, 1.0)

@@ -318,9 +318,9 @@ def test_systems_that_are_no_sum_of_modes(system: Any, message: str) -> None:
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ((25.0, 0.0, 1.0, 0.0), "zeta must be > 0, got 0.0"),
-        ((25.0, -0.1, 1.0, 0.0), "zeta must be > 0, got -0.1"),
-        ((0.0, 0.1, 1.0, 0.0), "f_n must be > 0 Hz, got 0.0"),
+        ((25.0, 0.0, 1.0, 0.0), "zeta must be 1e-06 … 10000, got 0.0"),
+        ((25.0, -0.1, 1.0, 0.0), "zeta must be 1e-06 … 10000, got -0.1"),
+        ((0.0, 0.1, 1.0, 0.0), "f_n must be 0.001 … 100000 Hz, got 0.0"),
         ((25.0, 0.1, math.nan, 0.0), "alpha must be finite, got nan"),
         ((25.0, 0.1, 1.0, math.inf), "beta must be finite, got inf"),
     ],
@@ -337,11 +337,11 @@ def test_modes_out_of_range(values: tuple[float, float, float, float], message: 
         (lambda: ModalModel([]), "a modal model needs at least one mode, got none"),
         (lambda: ModalModel([UNDER], -1), "dead_time must be 0 … 100000, got -1"),
         (lambda: ModalModel([UNDER], 0.5), "dead_time must be a whole number, got 0.5"),  # type: ignore[arg-type]
-        (lambda: ModalModel.spring_mass_damper(0.0, 1.0, 1.0), "m must be > 0 kg, got 0.0"),
-        (lambda: ModalModel.spring_mass_damper(1.0, 0.0, 1.0), "c must be > 0 N.s/m, got 0.0"),
-        (lambda: ModalModel.spring_mass_damper(1.0, 1.0, -1.0), "k must be > 0 N/m, got -1.0"),
-        (lambda: ModalModel([UNDER]).discretise(0.0), "T_s must be > 0 s, got 0.0"),
-        (lambda: DiscreteModel(ModalModel([UNDER]), -1.0), "T_s must be > 0 s, got -1.0"),
+        (lambda: ModalModel.spring_mass_damper(0.0, 1.0, 1.0), "m must be 1e-06 … 1000000 kg, got 0.0"),
+        (lambda: ModalModel.spring_mass_damper(1.0, 0.0, 1.0), "c must be 1e-09 … 1e+12 N.s/m, got 0.0"),
+        (lambda: ModalModel.spring_mass_damper(1.0, 1.0, -1.0), "k must be 1e-06 … 1e+15 N/m, got -1.0"),
+        (lambda: ModalModel([UNDER]).discretise(0.0), "T_s must be 1e-05 … 1 s, got 0.0"),
+        (lambda: DiscreteModel(ModalModel([UNDER]), -1.0), "T_s must be 1e-05 … 1 s, got -1.0"),
         (lambda: ModalModel([UNDER]).discretise(TS, "soh"), "input_hold must be one of zoh, foh, got 'soh'"),
     ],
 )

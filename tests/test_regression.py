@@ -150,7 +150,7 @@ def test_a_factor_of_another_size_is_refused() -> None:
     ("n", "lam", "message"),
     [
         (0, 1.0, "n_features must be ≥ 1, got 0"),
-        (3, 0.0, "lambda must be > 0 m2, got 0.0"),
+        (3, 0.0, "lambda must be 1e-40 … 1e+12 m2, got 0.0"),
         (3, math.nan, "lambda must be finite, got nan"),
     ],
 )

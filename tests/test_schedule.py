@@ -323,7 +323,7 @@ def test_a_reference_that_does_not_fit_is_refused(use: Callable[[HybridPredictor
 @pytest.mark.parametrize(
     ("v_s", "message"),
     [
-        (-1e-3, "v_s must be ≥ 0 m/s, got -0.001"),
+        (-1e-3, "v_s must be 0 or 1e-09 … 10000 m/s, got -0.001"),
         (math.nan, "v_s must be finite, got nan"),
         (math.inf, "v_s must be finite, got inf"),
     ],

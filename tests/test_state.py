@@ -144,7 +144,7 @@ def test_a_header_that_does_not_hold_together(header: bytes) -> None:
     ],
     ids=str,
 )
-def test_a_predictor_that_does_not_hold_together(change: dict[str, Any]) -> None:
+def test_an_inconsistent_predictor(change: dict[str, Any]) -> None:
     meta, values, _ = unpack("predictor", PREDICTOR)
     for name, value in change.items():
         if name in meta:
@@ -153,7 +153,7 @@ def test_a_predictor_that_does_not_hold_together(change: dict[str, Any]) -> None
             del values[name]
         else:
             values[name] = value
-    with pytest.raises(StateError, match=r"^the saved predictor does not hold together: "):
+    with pytest.raises(StateError, match=r"^the saved predictor is inconsistent: "):
         HybridPredictor.from_bytes(pack("predictor", meta, values))
 
 

@@ -102,9 +102,9 @@ def test_from_file(tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_planned_is_refused() -> None:
-    with pytest.raises(ParameterError, match=r"velocity limit must be finite and > 0, got -1"):
+    with pytest.raises(ParameterError, match=r"velocity limit must be 1e-09 … 10000 m/s, got -1"):
         Limits(-1.0, 1.0, 1.0)
-    with pytest.raises(ParameterError, match="jerk limit must be finite and > 0, got nan"):
+    with pytest.raises(ParameterError, match="jerk limit must be finite, got nan"):
         Limits(1.0, 1.0, float("nan"))
     with pytest.raises(ParameterError, match=r"move 2 starts at 0.1 s, before the one before has ended at 0.143 s"):
         rest_to_rest([0, 0.01, 0.02], PAPER_LIMITS, start_times=[0.0, 0.1])
@@ -118,7 +118,7 @@ def test_what_cannot_be_planned_is_refused() -> None:
         rest_to_rest([0.0, float("nan")], PAPER_LIMITS)
     with pytest.raises(ParameterError, match=r"dwell must be finite and ≥ 0 s, got -0.05"):
         rest_to_rest([0.0, 0.01, 0.02], PAPER_LIMITS, dwell=-0.05)
-    with pytest.raises(ParameterError, match="duration must be a countable number of samples, got inf s"):
+    with pytest.raises(ParameterError, match="a trajectory must have fewer than 2000000 samples, got inf s at"):
         rest_to_rest([0.0, 0.01], PAPER_LIMITS, duration=float("inf"))
     with pytest.raises(ParameterError, match="turns must be finite and > 0, got 0"):
         spiral(turns=0)
@@ -126,5 +126,5 @@ def test_what_cannot_be_planned_is_refused() -> None:
         spiral(radius=-1)
     with pytest.raises(ParameterError, match="move 2 starts at 1 s, before the one before has ended"):
         staircase(limits=Limits(0.005, 1.0, 10.0))
-    with pytest.raises(ParameterError, match=r"T_s must be > 0 s, got 0"):
+    with pytest.raises(ParameterError, match=r"T_s must be 1e-05 … 1 s, got 0"):
         rest_to_rest([0.0, 0.01], PAPER_LIMITS, 0.0)

@@ -3,23 +3,30 @@
 from __future__ import annotations
 
 import json
+import random
+import struct
 import sys
 import zipfile
+import zlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import c_core
 import fmpy
 import numpy as np
 import pytest
+from c_core import CModel, refusal, write_weights
 
 from hybridsep import cli
 from hybridsep.backtest import backtest
 from hybridsep.cosim import cosimulate
 from hybridsep.errors import FmuError, StateError
 from hybridsep.fmi.archive import BACKENDS, build_fmu, fmu_names
-from hybridsep.fmi.weights import restore_weights, weights_file
+from hybridsep.fmi.weights import WEIGHTS_FILE, restore_weights, weights_file
 from hybridsep.importer import FmuInstance
 from hybridsep.machine import load_machine
+from hybridsep.physics import ModalModel, Mode
 from hybridsep.plant import Encoder, simulate
 from hybridsep.predictor import HybridPredictor
 from hybridsep.signals import Array
@@ -104,12 +111,34 @@ def drive(instance: FmuInstance, first: int, last: int) -> list[tuple[float, flo
     return outputs
 
 
-def test_other_lags_than_learned_are_refused_by_the_fmu(warm: Path) -> None:
-    for values, got in (({"p": 40}, "p = 40, q = 3"), ({"p": 49, "q": 4}, "p = 49, q = 4")):
-        with FmuInstance(warm) as instance, pytest.raises(FmuError) as caught:
-            instance.initialise(values)
-        expected = f"weights.bin was learned with p = 50, q = 3, got {got}; set p and q as they were learned"
-        assert expected in str(caught.value)
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        ({"p": 40}, "p must be 50, with which weights.bin was learned, got 40"),
+        (
+            {"p": 49, "q": 4},
+            "p must be 50, with which weights.bin was learned, got 49; "
+            "q must be 3, with which weights.bin was learned, got 4",
+        ),
+        ({"lambda": 1e-9}, "lambda must be 1e-12, with which weights.bin was learned, got 1e-09"),
+        ({"T_s": 0.002}, "T_s must be 0.001, with which weights.bin was learned, got 0.002"),
+        ({"input_hold": 1}, "input_hold must be 0, with which weights.bin was learned, got 1"),
+        ({"dead_time": 3}, "dead_time must be 0, with which weights.bin was learned, got 3"),
+        ({"mode[1].alpha": 24000.0}, "mode[1].alpha must be 24674.0, with which weights.bin was learned, got 24000.0"),
+    ],
+)
+def test_other_settings_than_learned_are_refused_by_the_fmu(
+    warm: Path, values: dict[str, float], expected: str
+) -> None:
+    with FmuInstance(warm) as instance, pytest.raises(FmuError) as caught:
+        instance.initialise(values)
+    assert expected in str(caught.value)
+
+
+def test_what_does_not_shape_the_features_may_be_another(warm: Path) -> None:
+    with FmuInstance(warm) as instance:
+        instance.initialise({"Np": 60, "t_init": 0.1})
+        assert instance.get("p") == 50
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
@@ -173,13 +202,104 @@ def test_weights_and_samples_have_one_model_each(tmp_path: Path, trained: Path) 
 def test_damaged_files_leave_the_predictor_as_it_was(trained: Path) -> None:
     content = weights_file(HybridPredictor.load(trained))
     predictor = MACHINE.new_predictor()
-    zero = content[:32] + bytes(8) + content[40:]
-    for damaged in (b"", content[:-8], b"X" + content[1:], content + bytes(8), zero):
+    first = 8 * (10 + 4)  # of the triangle, behind the head and one mode
+    zero = sealed(content[:first] + bytes(8) + content[first + 8 : -8])
+    infinite = sealed(content[:first] + struct.pack("<d", np.inf) + content[first + 8 : -8])
+    longer = sealed(content[:-8] + bytes(8))
+    for damaged in (b"", content[:-8], b"X" + content[1:], content + bytes(8), zero, infinite, longer):
         with pytest.raises(StateError, match=r"weights\.bin must be a factor of learned rows; it is damaged or trunc"):
             restore_weights(predictor, damaged)
     assert not predictor.weights.any()
     restore_weights(predictor, content)
     assert predictor.weights.any()
+
+
+def sealed(body: bytes) -> bytes:
+    """Append the checksum that makes any content pass for undamaged."""
+    return body + struct.pack("<Q", zlib.crc32(body))
+
+
+def mutations(content: bytes, count: int) -> Iterator[bytes]:
+    """Yield contents with flipped, replaced, lost, doubled or exchanged bytes, all other than the given one."""
+    chance = random.Random(0)
+    while count:
+        changed = bytearray(content)
+        for _ in range(chance.choice([1, 1, 1, 2, 3, 8])):
+            kind, i = chance.randrange(6), chance.randrange(len(changed))
+            j, length = chance.randrange(len(changed)), chance.choice([1, 2, 8, 64])
+            if kind == 0:
+                changed[i] ^= 1 << chance.randrange(8)
+            elif kind == 1:
+                changed[i] = chance.randrange(256)
+            elif kind == 2:
+                del changed[i : i + length]
+            elif kind == 3:
+                changed[i:i] = changed[j : j + length]
+            elif kind == 4:
+                changed[i : i + length] = changed[j : j + length]
+            else:
+                changed[i : i + 8] = struct.pack("<d", chance.choice([0.0, 1.0, np.inf, np.nan, 1e308, 5e-324]))
+            if len(changed) < 8:
+                break
+        if bytes(changed) != content:
+            count -= 1
+            yield bytes(changed)
+
+
+def test_no_mutation_of_the_file_is_accepted(trained: Path) -> None:
+    content = weights_file(HybridPredictor.load(trained))
+    predictor = MACHINE.new_predictor()
+    for changed in mutations(content, 20_000):
+        with pytest.raises(StateError):
+            restore_weights(predictor, changed)
+    assert not predictor.weights.any()
+
+
+def test_no_mutation_of_the_file_is_accepted_in_c(tmp_path: Path) -> None:
+    # A small factor, so that the head is hit as often as the triangle.
+    rows = np.random.default_rng(1).normal(size=(40, 9))
+    write_weights(tmp_path, "predictor_2", np.linalg.qr(rows)[1], 40, p=4, q=2)
+    file, model = tmp_path / WEIGHTS_FILE, CModel("predictor_2", {"p": 4, "q": 2, "Np": 8}, tmp_path)
+    content = file.read_bytes()
+    model.initialise()
+    for changed in mutations(content, 5000):
+        file.write_bytes(changed)
+        assert refusal(model.initialise)
+    file.write_bytes(content)
+    model.initialise()
+
+
+def test_both_flavours_say_the_same_of_other_settings(tmp_path: Path) -> None:
+    description = c_core.DESCRIPTIONS["predictor_2"]
+    for changes in ({"p": 30, "q": 9}, {"lambda": 1e-8}, {"T_s": 1e-3 / 3}, {"input_hold": 1, "dead_time": 7}):
+        learned, now = (
+            HybridPredictor.with_parameters(
+                ModalModel([Mode(**mode) for mode in modes], values.pop("dead_time")),
+                {name: value for name, value in values.items() if name != "v_s"},
+            )
+            for values, modes in (
+                ({**c_core.PREDICTOR, **changes}, description["modes"][::-1]),
+                (dict(c_core.PREDICTOR), description["modes"]),
+            )
+        )
+        content = weights_file(learned)
+        (tmp_path / WEIGHTS_FILE).write_bytes(content)
+        with pytest.raises(StateError) as caught:
+            restore_weights(now, content)
+        said = refusal(CModel("predictor_2", resources=tmp_path).initialise)
+        assert str(caught.value).startswith(said)  # C cuts long messages off
+        assert len(said) > 400
+    (tmp_path / WEIGHTS_FILE).write_bytes(weights_file(learned))
+    assert "the number of modes must be 2, with which weights.bin was learned, got 1" in refusal(
+        CModel(
+            "predictor",
+            {"input_hold": 1, "dead_time": 7, **dict(zip(MODE_1, description["modes"][1].values(), strict=True))},
+            tmp_path,
+        ).initialise
+    )
+
+
+MODE_1 = [f"mode[1].{name}" for name in ("f_n", "zeta", "alpha", "beta")]
 
 
 # The command line --------------------------------------------------------------------------------------------------

@@ -6,11 +6,13 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from hybridsep._saved import Saved
 from hybridsep.errors import SignalError
 from hybridsep.fmi import slave
 from hybridsep.fmi.variables import modes_from
 from hybridsep.physics import ModalModel, Mode
 from hybridsep.plant import Encoder, FeedDrive, Plant, StageDrive
+from hybridsep.signals import POSITION_MAX
 
 
 class FeedDrivePy(slave.TableSlave):
@@ -18,8 +20,7 @@ class FeedDrivePy(slave.TableSlave):
 
     def initialise(self) -> None:
         """Make the plant, at rest at the start value of x_d, and its encoder."""
-        if not math.isfinite(self.values["x_d"]):
-            raise SignalError(f"the start value of x_d must be finite, got {self.values['x_d']}")
+        _check_position("the start value of x_d", self.values["x_d"])
         self.encoder = Encoder(self.values["noise_std"], self.values["seed"])
         self.plant = self._new_plant()
         self.plant.reset(self.values["x_d"])
@@ -27,8 +28,7 @@ class FeedDrivePy(slave.TableSlave):
 
     def advance(self, t: float, h: float) -> None:
         """Step the plant and measure it."""
-        if not math.isfinite(self.values["x_d"]):
-            raise SignalError(f"x_d must be finite, got {self.values['x_d']} at t = {t:g} s")
+        _check_position("x_d", self.values["x_d"], f" at t = {t:g} s")
         self.plant.step(self.values["x_d"], h)
         self.x_meas = self.encoder.measure(self.plant.x)
 
@@ -50,9 +50,11 @@ class FeedDrivePy(slave.TableSlave):
 
     def restore_core(self, meta: Mapping[str, Any], blob: bytes) -> None:
         """Take over a plant's state and a place in the noise."""
-        self.plant, self.encoder = self._new_plant(), Encoder(self.values["noise_std"], self.values["seed"])
-        self.plant.restore(meta["plant"])
-        self.encoder.n_draws, self.x_meas = meta["n_draws"], meta["x_meas"]
+        saved = Saved("drive", meta, {}, {})
+        plant, encoder = self._new_plant(), Encoder(self.values["noise_std"], self.values["seed"])
+        plant.restore(saved.numbers("plant", len(plant.state())))
+        encoder.n_draws, x_meas = saved.whole("n_draws"), saved.real("x_meas")
+        self.plant, self.encoder, self.x_meas = plant, encoder, x_meas
 
     def _new_plant(self) -> Plant:
         values = self.values
@@ -60,3 +62,11 @@ class FeedDrivePy(slave.TableSlave):
         if modes:
             return StageDrive(ModalModel([Mode(**mode) for mode in modes]), values["f"], values["kappa"], values["T_s"])
         return FeedDrive(*(values[name] for name in ("m", "c", "k", "c_nl", "k_nl")))
+
+
+def _check_position(name: str, value: float, when: str = "") -> None:
+    """Raise SignalError if a position, m, is not finite, or further out than any machine is."""
+    if not math.isfinite(value):
+        raise SignalError(f"{name} must be finite, got {value}{when}")
+    if abs(value) > POSITION_MAX:
+        raise SignalError(f"{name} must be within ±{POSITION_MAX:g} m, got {value:g}{when}")

@@ -98,7 +98,7 @@ def _row(variable: Variable) -> str:
         _double(variable.start or 0.0),
         "-HUGE_VAL" if variable.minimum is None else _double(variable.minimum),
         "HUGE_VAL" if variable.maximum is None else _double(variable.maximum),
-        str(int(variable.above)),
+        _double(variable.nonzero),
     ]
     return "{" + ", ".join(fields) + "}"
 

@@ -6,6 +6,7 @@ from abc import abstractmethod
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
+from .._saved import Saved
 from ..sampled_inputs import SampledInputs
 from .slave import TableSlave
 
@@ -44,5 +45,9 @@ class LookAheadSlave(TableSlave):
 
     def restore_core(self, meta: Mapping[str, Any], blob: bytes) -> None:
         """Take over a clock and a look-ahead."""
-        self.look_ahead = self.look_ahead_type.from_bytes(blob)
-        self.inputs = SampledInputs.from_state(meta["inputs"])
+        state = Saved("look-ahead", meta, {}, {})
+        inputs = SampledInputs.from_state(state.numbers("inputs", SampledInputs.STATE_SIZE))
+        look_ahead = self.look_ahead_type.from_bytes(blob)
+        if inputs.clock.T_s != self.values["T_s"] or inputs.clock.k != look_ahead.k:
+            raise state.error("its clock must count the samples of this look-ahead")
+        self.look_ahead, self.inputs = look_ahead, inputs

@@ -30,7 +30,16 @@ from .weights import WEIGHTS_FILE, weights_file
 __all__ = ["files"]
 
 _PACKAGE = Path(__file__).resolve().parent.parent
-_BASE = ("errors.py", "parameters.py", "signals.py", "state.py", "physics.py", "fmi/variables.py", "fmi/slave.py")
+_BASE = (
+    "errors.py",
+    "parameters.py",
+    "signals.py",
+    "state.py",
+    "_saved.py",
+    "physics.py",
+    "fmi/variables.py",
+    "fmi/slave.py",
+)
 _PREDICTION = (
     "output.py",
     "regression.py",

@@ -19,6 +19,7 @@ from typing import Any, TypeVar
 from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real
 from pythonfmu.enums import Fmi2Status
 
+from .._saved import Saved
 from ..errors import FmuError, HybridSepError, StateError
 from ..state import pack, unpack
 from .variables import Variable, variables_of
@@ -159,19 +160,25 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
         return pack(_KIND, meta, {}, core)
 
     def _set_fmu_state(self, state: bytes) -> None:
-        meta, _, core = unpack(_KIND, state)
-        if meta["content"] != self.table_description["content"]:
+        saved = Saved(_KIND, *unpack(_KIND, state))
+        if saved.text("content") != self.table_description["content"]:
             raise StateError(f"the state belongs to another FMU than {self.modelName} as it is here")
+        running, terminated, values = saved.flag("running"), saved.flag("terminated"), saved.table("values")
+        start_time, stop_time = saved.real("start_time"), saved.number_or_none("stop_time")
+        if values.keys() != self.values.keys() or not all(type(value) in (int, float) for value in values.values()):
+            raise saved.error("it must have a number for each input and parameter")
         before = self.values
-        self.values = dict(meta["values"])
+        self.values = values
         try:
-            if meta["running"]:
-                self.restore_core(meta["core"], core["core"])
-        except Exception:
+            if running:
+                self.restore_core(saved.table("core"), saved.part("core"))
+        except StateError:
             self.values = before
             raise
-        self.running, self.terminated = meta["running"], meta["terminated"]
-        self.start_time, self.stop_time = meta["start_time"], meta["stop_time"]
+        except (HybridSepError, ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+            self.values = before
+            raise saved.error(str(error)) from error
+        self.running, self.terminated, self.start_time, self.stop_time = running, terminated, start_time, stop_time
 
     @staticmethod
     def _fmu_state_to_bytes(state: bytes) -> bytes:

@@ -50,9 +50,9 @@ class Variable:
     unit, display_unit : str or None
         Of a Real; ``"1"`` is written without a unit.
     minimum, maximum : float or None
-        Bounds, as ``min``/``max`` show them.
-    above : bool
-        Whether the minimum itself is not allowed; FMI cannot say it, the check does.
+        Closed bounds, as ``min``/``max`` show them.
+    nonzero : float
+        Least value that is not 0; FMI cannot say it, the check does.
     nominal : float or None
     initially_from : tuple of str
         Inputs and parameters an output depends on during initialization; none at any later point.
@@ -68,8 +68,8 @@ class Variable:
     display_unit: str | None = None
     minimum: float | None = None
     maximum: float | None = None
+    nonzero: float = 0.0
     nominal: float | None = None
-    above: bool = False
     initially_from: tuple[str, ...] = ()
 
 
@@ -108,9 +108,9 @@ def _parameter(name: str, start: Value, *, label: str | None = None) -> Variable
         start=start,
         unit=None if parameter.kind is int else parameter.unit,
         display_unit=parameter.display_unit,
-        minimum=parameter.minimum if parameter.above is None else parameter.above,
+        minimum=parameter.minimum,
         maximum=parameter.maximum,
-        above=parameter.above is not None,
+        nonzero=parameter.nonzero,
     )
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from ..errors import StateError
 from ..machine import Machine
 from ..predictor import HybridPredictor
+from .weights import learned_settings
 
 __all__ = ["load_trained"]
 
@@ -53,17 +54,5 @@ def load_trained(path: str | Path, machine: Machine, model: str) -> HybridPredic
 
 
 def _parameters(predictor: HybridPredictor) -> dict[str, object]:
-    """Return all that must agree, under the FMU's names."""
-    values: dict[str, object] = {
-        "Np": predictor.Np,
-        "p": predictor.p,
-        "q": predictor.q,
-        "lambda": predictor.lam,
-        "T_s": predictor.Ts,
-        "input_hold": predictor.discrete.input_hold,
-        "dead_time": predictor.model.dead_time,
-        "v_s": predictor.v_s,
-    }
-    for i, mode in enumerate(predictor.model.modes, start=1):
-        values |= {f"mode[{i}].{name}": getattr(mode, name) for name in ("f_n", "zeta", "alpha", "beta")}
-    return values
+    """Return all that must agree, under the names of the machine file."""
+    return {"Np": predictor.Np, **learned_settings(predictor), "input_hold": predictor.discrete.input_hold}

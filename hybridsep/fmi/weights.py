@@ -1,34 +1,57 @@
 """``resources/weights.bin``: what a trained predictor has learned, for an FMU that starts warm.
 
-Layout, little-endian: ``HSEPWGT1``, ``p``, ``q`` and the number of learned samples as u64, then the upper triangle of
-the factor ``[R z; 0 ρ]`` of :class:`~hybridsep.regression.RidgeRegression` by rows, float64: of ``2 + q + p`` features,
-and 13 more if it was learned with ``v_s > 0``. This module travels inside
-the pythonfmu FMUs; the C model reads the same file.
+Layout, little-endian, 8 bytes each: ``HSEPWGT2``; ``p``, ``q``, ``input_hold``, ``dead_time``, the number of modes and
+that of the learned samples as u64; ``lambda``, ``T_s``, ``v_s``, then the four numbers of each mode as float64; the
+upper triangle of the factor ``[R z; 0 ρ]`` of :class:`~hybridsep.regression.RidgeRegression` by rows; the CRC-32 of all
+before as u64. The settings are all that shape the features and the factor: with others the weights mean something else.
+This module travels inside the pythonfmu FMUs; the C model reads the same file.
 """
 
 from __future__ import annotations
 
 import struct
+import zlib
 
 import numpy as np
 
-from .._schedule import N_SCHEDULED
-from ..errors import StateError
+from ..errors import SignalError, StateError
+from ..parameters import INPUT_HOLDS
 from ..predictor import HybridPredictor
 
-__all__ = ["WEIGHTS_FILE", "restore_weights", "weights_file"]
+__all__ = ["WEIGHTS_FILE", "learned_settings", "restore_weights", "weights_file"]
 
 WEIGHTS_FILE = "weights.bin"
-_MAGIC = b"HSEPWGT1"
-_HEAD = struct.Struct("<8s3Q")
+_MAGIC = b"HSEPWGT2"
+_HEAD = struct.Struct("<8s6Q3d")
+_CHECKSUM = struct.Struct("<Q")
+_MODE = ("f_n", "zeta", "alpha", "beta")
+_DAMAGED = f"{WEIGHTS_FILE} must be a factor of learned rows; it is damaged or truncated"
+
+
+def learned_settings(predictor: HybridPredictor) -> dict[str, float]:
+    """Return all settings that what is learned depends on, by their names in the FMU."""
+    values: dict[str, float] = {
+        "p": predictor.p,
+        "q": predictor.q,
+        "input_hold": INPUT_HOLDS.index(predictor.discrete.input_hold),
+        "dead_time": predictor.model.dead_time,
+        "lambda": predictor.lam,
+        "T_s": predictor.Ts,
+        "v_s": predictor.v_s,
+    }
+    for i, mode in enumerate(predictor.model.modes, start=1):
+        values |= {f"mode[{i}].{name}": getattr(mode, name) for name in _MODE}
+    return values
 
 
 def weights_file(predictor: HybridPredictor) -> bytes:
     """Return the file's content for what a predictor has learned."""
-    regression = predictor.regression
+    regression, values = predictor.regression, list(learned_settings(predictor).values())
+    n_modes = len(predictor.model.modes)
     triangle = regression.factor[np.triu_indices(predictor.n_features + 1)]
-    head = _HEAD.pack(_MAGIC, predictor.p, predictor.q, regression.n_samples)
-    return head + triangle.astype("<f8").tobytes()
+    content = _HEAD.pack(_MAGIC, *values[:4], n_modes, regression.n_samples, *values[4:7])
+    content += np.array([*values[7:], *triangle], dtype="<f8").tobytes()
+    return content + _CHECKSUM.pack(zlib.crc32(content))
 
 
 def restore_weights(predictor: HybridPredictor, content: bytes) -> None:
@@ -37,26 +60,39 @@ def restore_weights(predictor: HybridPredictor, content: bytes) -> None:
     Raises
     ------
     StateError
-        If it was learned with another ``p`` or ``q``, with ``v_s > 0`` where it is 0 now or the other way round, or is
-        damaged or truncated; the predictor is unchanged then.
+        If it is damaged, truncated or of another version, or was learned with other settings, naming all that differ;
+        the predictor is unchanged then.
     """
-    size = predictor.n_features + 1
-    known = len(content) >= _HEAD.size and content.startswith(_MAGIC)
-    _, p, q, n_samples = _HEAD.unpack_from(content) if known else (b"", predictor.p, predictor.q, 0)
-    if (p, q) != (predictor.p, predictor.q):
-        raise StateError(
-            f"{WEIGHTS_FILE} was learned with p = {p}, q = {q}, got p = {predictor.p}, q = {predictor.q}; "
-            "set p and q as they were learned"
+    body = content[: -_CHECKSUM.size]
+    if (
+        len(content) < _HEAD.size + _CHECKSUM.size
+        or not content.startswith(_MAGIC)
+        or _CHECKSUM.pack(zlib.crc32(body)) != content[-_CHECKSUM.size :]
+    ):
+        raise StateError(_DAMAGED)
+    _, p, q, input_hold, dead_time, n_modes, n_samples, lam, T_s, v_s = _HEAD.unpack_from(body)
+    numbers = np.frombuffer(body, "<f8", offset=_HEAD.size)
+    settings = learned_settings(predictor)
+    learned = [p, q, input_hold, dead_time, lam, T_s, v_s, *numbers[: 4 * n_modes].tolist()]
+    problems = [
+        f"{name} must be {then!r}, with which {WEIGHTS_FILE} was learned, got {now!r}"
+        for (name, now), then in zip(settings.items(), learned, strict=False)
+        if now != then
+    ]
+    if n_modes != len(predictor.model.modes):
+        problems.append(
+            f"the number of modes must be {n_modes}, with which {WEIGHTS_FILE} was learned, "
+            f"got {len(predictor.model.modes)}"
         )
-    more = predictor.n_features > 2 + p + q
-    other = size - N_SCHEDULED if more else size + N_SCHEDULED
-    if known and len(content) == _HEAD.size + 4 * other * (other + 1):
-        learned, got = ("= 0", "> 0") if more else ("> 0", "= 0")
-        raise StateError(f"{WEIGHTS_FILE} was learned with v_s {learned}, got v_s {got}; set v_s as it was learned")
-    factor = np.zeros((size, size))
+    if problems:
+        raise StateError("; ".join(problems))
+    size = predictor.n_features + 1
     upper = np.triu_indices(size)
-    if known and len(content) == _HEAD.size + 8 * len(upper[0]):
-        factor[upper] = np.frombuffer(content, "<f8", offset=_HEAD.size)
-    if not (np.isfinite(factor).all() and np.diag(factor)[:-1].all()):
-        raise StateError(f"{WEIGHTS_FILE} must be a factor of learned rows; it is damaged or truncated")
-    predictor.regression.restore(factor, n_samples)
+    if len(numbers) != 4 * n_modes + len(upper[0]):
+        raise StateError(_DAMAGED)
+    factor = np.zeros((size, size))
+    factor[upper] = numbers[4 * n_modes :]
+    try:
+        predictor.regression.restore(factor, n_samples)
+    except SignalError:
+        raise StateError(_DAMAGED) from None

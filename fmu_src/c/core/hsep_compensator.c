@@ -1,5 +1,7 @@
 #include "hsep_compensator.h"
 
+#include "hsep_vector.h"
+
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
@@ -139,6 +141,12 @@ HSEP_API int hsep_compensator_valid(const void *block, const hsep_compensator_pa
     int sound = memcmp(&expected, &got, sizeof got) == 0 && got.state <= HSEP_SEP_HYBRID && got.solving <= 1 &&
                 got.predicted <= got.Np && got.k % got.Np < (got.solving ? got.predicted : got.Np) &&
                 (got.solving || got.predicted == got.Np) && got.learning <= 1 && got.missing <= 1 &&
+                got.divergence <= HSEP_DIVERGES_X_DM &&
+                (got.divergence ||
+                 hsep_within(
+                     bytes + expected.ahead * sizeof(double), 2 * got.preview + 3 * got.Np, HSEP_PREDICTION_MAX)) &&
+                got.sum_e >= 0.0 && isfinite(got.sum_e) && got.sum_pb >= 0.0 && isfinite(got.sum_pb) &&
+                got.sum_h >= 0.0 && isfinite(got.sum_h) &&
                 hsep_planner_valid(bytes + expected.planner * sizeof(double), &parameters->planner);
     const uint64_t physics_at[2] = {expected.physics, expected.trial};
     const uint64_t regression_at[2] = {expected.regression, expected.saved};
@@ -238,6 +246,14 @@ static void compensator_predict(hsep_compensator *self, uint64_t last)
         &recursion, past_x, compensator_at(self, self->drive) + (self->preview - Np), e_h, Np, self->predicted, last);
     for (uint64_t k = self->predicted; k < last; k++) {
         x_h[k] = self->state == HSEP_SEP_HYBRID ? x_pb[k] + e_h[Np - 1 - k] : x_pb[k];
+    }
+    const uint64_t first = self->predicted, n = last - first;
+    if (!hsep_within(x_dm + first, n, HSEP_PREDICTION_MAX)) {
+        self->divergence = HSEP_DIVERGES_X_DM;
+    } else if (!hsep_within(x_pb + first, n, HSEP_PREDICTION_MAX)) {
+        self->divergence = HSEP_DIVERGES_X_PB;
+    } else if (!hsep_within(x_h + first, n, HSEP_PREDICTION_MAX)) {
+        self->divergence = HSEP_DIVERGES_X_H;
     }
     self->predicted = last;
 }

@@ -14,7 +14,8 @@
  * HSEP_INTERIOR_STEPS times at once. All of it is bounded by the parameters; m = 1000 is far from real time.
  *
  * Memory is one block: the struct, then what its offsets tell; no pointers, so a copy of the block is the state.
- * Reentrant; allocates nothing; nothing here can fail once the parameters are in range.
+ * Reentrant; allocates nothing. Once the parameters are in range nothing here fails but the prediction of a window:
+ * what was learned may diverge, then the outputs are of no use from then on, and divergence says so.
  */
 #ifndef HSEP_COMPENSATOR_H
 #define HSEP_COMPENSATOR_H
@@ -64,6 +65,7 @@ typedef struct {
     uint64_t missing;    /* whether a sample of it was not measured */
     uint64_t n_measured; /* samples since t_init */
     double sum_e, sum_pb, sum_h; /* m2, sums of squared errors over them */
+    uint64_t divergence; /* hsep_divergence of the first window that could not be predicted; stays */
     hsep_trust trust;
     hsep_sensor sensor;
     uint64_t size;       /* of the block, bytes */

@@ -6,14 +6,28 @@ static const double plant_internal_step = 1e-4;      /* s */
 static const double plant_friction_velocity = 2e-3;  /* m/s, over which the stage's friction changes sign */
 static const double plant_steps_per_time = 16.0;     /* internal steps in the fastest time constant */
 static const double plant_steps_max = 1e6;           /* internal steps of one step */
+static const double plant_state_max = 1e100;         /* of a drive's state: outputs and their squares stay finite */
 static const double plant_tolerance = 1e-6;          /* of an internal step */
 static const double plant_two_pi = 6.283185307179586;
 
-HSEP_API double hsep_plant_internal_steps(double h, double rate)
+/* Number of internal steps for a step of h seconds: the fewest that are at most 0.1 ms and 1/(16 rate) long. */
+static double plant_internal_steps(double h, double rate)
 {
-    const double n = fmax(h / plant_internal_step, h * rate * plant_steps_per_time);
-    return fmin(fmax(1.0, ceil(n - plant_tolerance)), plant_steps_max);
+    return fmax(1.0, ceil(fmax(h / plant_internal_step, h * rate * plant_steps_per_time) - plant_tolerance));
 }
+
+HSEP_API double hsep_plant_step_max(double rate)
+{
+    return fmin(plant_steps_max * plant_internal_step, plant_steps_max / plant_steps_per_time / rate);
+}
+
+HSEP_API double hsep_plant_mode_rate(const hsep_mode *mode)
+{
+    const double omega = plant_two_pi * mode->f_n;
+    return fmax(sqrt(omega * omega), 2.0 * mode->zeta * omega);
+}
+
+HSEP_API double hsep_feed_drive_rate(const hsep_feed_drive *self) { return fmax(sqrt(self->k / self->m), self->c / self->m); }
 
 HSEP_API void hsep_feed_drive_reset(hsep_feed_drive *self, double start)
 {
@@ -37,8 +51,7 @@ static void plant_slope(const hsep_feed_drive *d, double x, double u, double r, 
 
 HSEP_API int hsep_feed_drive_step(hsep_feed_drive *self, double x_d, double h, double *reached)
 {
-    const double rate = fmax(sqrt(self->k / self->m), self->c / self->m);
-    const double n = hsep_plant_internal_steps(h, rate), dt = h / n, r = x_d - self->start;
+    const double n = plant_internal_steps(h, hsep_feed_drive_rate(self)), dt = h / n, r = x_d - self->start;
     double x = self->x, u = self->u;
     for (double i = 0.0; i < n; i += 1.0) {
         double p1, p2, p3, p4, q1, q2, q3, q4;
@@ -50,7 +63,7 @@ HSEP_API int hsep_feed_drive_step(hsep_feed_drive *self, double x_d, double h, d
         u += dt / 6.0 * (q1 + 2.0 * q2 + 2.0 * q3 + q4);
     }
     *reached = x;
-    if (!isfinite(x) || !isfinite(u)) {
+    if (!(fabs(x) < plant_state_max && fabs(u) < plant_state_max)) { /* NaN too */
         return 0;
     }
     self->x = x;
@@ -137,15 +150,20 @@ static void plant_stage_internal_step(const hsep_stage *s, double z[], double pu
     }
 }
 
+HSEP_API double hsep_stage_rate(const hsep_stage *self)
+{
+    const hsep_stage_mode *mode = (const hsep_stage_mode *)(self + 1);
+    double rate = 0.0;
+    for (uint64_t i = 0; i < self->n_modes; i++) {
+        rate = fmax(rate, fmax(sqrt(mode[i].omega2), mode[i].two_zeta_omega));
+    }
+    return rate;
+}
+
 /* Integrate z over time, s, with the command r, m from the start, and the commanded velocity v_d held. */
 static void plant_stage_integrate(const hsep_stage *s, double z[], double r, double v_d, double time)
 {
-    const hsep_stage_mode *mode = (const hsep_stage_mode *)(s + 1);
-    double rate = 0.0;
-    for (uint64_t i = 0; i < s->n_modes; i++) {
-        rate = fmax(rate, fmax(sqrt(mode[i].omega2), mode[i].two_zeta_omega));
-    }
-    const double n = hsep_plant_internal_steps(time, rate), pushed = plant_pushed(s, r, v_d);
+    const double n = plant_internal_steps(time, hsep_stage_rate(s)), pushed = plant_pushed(s, r, v_d);
     for (double i = 0.0; i < n; i += 1.0) {
         plant_stage_internal_step(s, z, pushed, time / n);
     }
@@ -176,7 +194,7 @@ HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work
         }
     }
     for (uint64_t i = 0; i < 2 * self->n_modes; i++) {
-        if (!isfinite(z[i])) {
+        if (!(fabs(z[i]) < plant_state_max)) { /* NaN too */
             return 0;
         }
     }

@@ -14,9 +14,13 @@
 
 #include <stdint.h>
 
-/* Number of internal steps for a step of h seconds, h > 0: the fewest that are at most 0.1 ms and 1/(16 rate) long,
- * rate in 1/s; at most 10^6, which bounds the cost. */
-HSEP_API double hsep_plant_internal_steps(double h, double rate);
+#define HSEP_PLANT_RATE_MAX 1e5 /* 1/s, of a drive's linear part */
+
+/* Longest step, s, of a drive whose fastest rate is that, 1/s: 10^6 internal steps, which bounds its cost. */
+HSEP_API double hsep_plant_step_max(double rate);
+
+/* The fastest rate of a mode, 1/s. */
+HSEP_API double hsep_plant_mode_rate(const hsep_mode *mode);
 
 /* m x'' + c x' + k x + H_NL = c x_d' + k x_d with H_NL = c_nl x'|x'| + k_nl x|x|, eq. (13), in the states x and
  * u = x' - (c/m) x_d. */
@@ -30,10 +34,11 @@ typedef struct {
 /* Put the drive to rest at start, m; its parameters are set by the caller. */
 HSEP_API void hsep_feed_drive_reset(hsep_feed_drive *self, double start);
 
-/* Advance by h, s, with the command x_d, m, held. Fails, and returns 0 with the state unchanged, if the state would
- * leave the range of numbers; *x then tells the position reached, m. */
+/* Advance by h, s, at most hsep_plant_step_max, with the command x_d, m, held. Fails, and returns 0 with the state
+ * unchanged, if the state would leave the range of numbers; *x then tells the position reached, m. */
 HSEP_API int hsep_feed_drive_step(hsep_feed_drive *self, double x_d, double h, double *x);
 
+HSEP_API double hsep_feed_drive_rate(const hsep_feed_drive *self); /* of the linear part, 1/s */
 HSEP_API double hsep_feed_drive_x(const hsep_feed_drive *self); /* true position, m */
 HSEP_API double hsep_feed_drive_v(const hsep_feed_drive *self); /* true velocity under the last step's command, m/s */
 
@@ -63,10 +68,11 @@ HSEP_API double hsep_stage_size(uint64_t n_modes); /* bytes of the block, counte
 HSEP_API void hsep_stage_init(
     hsep_stage *self, const hsep_mode modes[], uint64_t n_modes, double f, double kappa, double T_s, double start);
 
-/* Advance by h, s, at most HSEP_CLOCK_STEP_MAX, with the command x_d, m, held. work: (HSEP_STAGE_WORK n_modes,). Fails,
- * and returns 0 with the state unchanged, if the state would leave the range of numbers. */
+/* Advance by h, s, at most hsep_plant_step_max, with the command x_d, m, held. work: (HSEP_STAGE_WORK n_modes,).
+ * Fails, and returns 0 with the state unchanged, if the state would leave the range of numbers. */
 HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work[]);
 
+HSEP_API double hsep_stage_rate(const hsep_stage *self); /* of the fastest mode, 1/s */
 HSEP_API double hsep_stage_x(const hsep_stage *self); /* true position, m */
 
 #endif

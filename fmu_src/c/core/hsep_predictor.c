@@ -1,6 +1,7 @@
 #include "hsep_predictor.h"
 
 #include "hsep_recursion.h"
+#include "hsep_vector.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -100,6 +101,9 @@ HSEP_API int hsep_predictor_valid(const void *block, const hsep_predictor_parame
     memcpy(&regression, bytes + expected.regression * sizeof(double), sizeof regression);
     const uint64_t n = 2 + parameters->q + parameters->p;
     return memcmp(&expected, &got, sizeof got) == 0 && got.n_warm_up <= got.Np &&
+           got.divergence <= HSEP_DIVERGES_X_H &&
+           (got.divergence || hsep_within(bytes + expected.ahead * sizeof(double), 5 * got.Np, HSEP_PREDICTION_MAX)) &&
+           got.sum_pb >= 0.0 && isfinite(got.sum_pb) && got.sum_h >= 0.0 && isfinite(got.sum_h) &&
            physics.n_modes == parameters->n_modes && physics.dead_time == parameters->dead_time &&
            (physics.oldest == 0 || physics.oldest < physics.dead_time) && regression.n == n &&
            regression.n_tiles == n / 4 + 1;
@@ -131,6 +135,11 @@ static void predictor_next_window(hsep_predictor *self)
         x_d[i] = ahead[i];
         x_pb[i] = ahead_pb[i] + self->start;
         x_h[i] = i < self->n_warm_up ? x_pb[i] : x_pb[i] + past_e[Np - 1 - i]; /* Eq. (4) */
+    }
+    if (!hsep_within(x_pb, Np, HSEP_PREDICTION_MAX)) {
+        self->divergence = HSEP_DIVERGES_X_PB;
+    } else if (!hsep_within(x_h, Np, HSEP_PREDICTION_MAX)) {
+        self->divergence = HSEP_DIVERGES_X_H;
     }
 }
 

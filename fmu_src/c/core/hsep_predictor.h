@@ -42,6 +42,7 @@ typedef struct {
     uint64_t n_warm_up;  /* leading samples of this window where x_h = x_pb */
     uint64_t n_measured; /* samples since t_init */
     double sum_pb, sum_h; /* m2, sums of squared prediction errors over them */
+    uint64_t divergence; /* hsep_divergence of the first window that could not be predicted; stays */
     uint64_t size;       /* of the block, bytes */
     /* Offsets in doubles from the beginning of the struct */
     uint64_t ahead;    /* (Np,) m, commands that came during this window */
@@ -75,7 +76,8 @@ HSEP_API int hsep_predictor_valid(const void *block, const hsep_predictor_parame
 /* Where the factor is, to start warm by hsep_regression_load before the first sample. */
 HSEP_API hsep_regression *hsep_predictor_regression(hsep_predictor *self);
 
-/* Take in sample k, both finite, m, and move on to k + 1; return whether a new window has begun. */
+/* Take in sample k, both finite, m, and move on to k + 1; return whether a new window has begun. If it diverges, the
+ * outputs are of no use from then on, and divergence says so. */
 HSEP_API int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, double x_meas);
 
 /* Tell the outputs of the sample that comes next. Constant cost. */

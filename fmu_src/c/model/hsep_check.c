@@ -58,18 +58,10 @@ static void check_range_text(char text[], size_t size, const hsep_variable *v)
 {
     const int has_unit = v->unit[0] != '\0' && strcmp(v->unit, "1") != 0;
     const char *space = has_unit ? " " : "", *unit = has_unit ? v->unit : "";
-    const int bounded = v->maximum < HUGE_VAL;
-    if (v->above && bounded) {
-        snprintf(text, size, "> %g and " HSEP_AT_MOST " %g%s%s", v->minimum, v->maximum, space, unit);
-    } else if (v->above) {
-        snprintf(text, size, "> %g%s%s", v->minimum, space, unit);
-    } else if (v->minimum > -HUGE_VAL && bounded) {
-        snprintf(text, size, "%g " HSEP_TO " %.10g%s%s", v->minimum, v->maximum, space, unit);
-    } else if (v->minimum > -HUGE_VAL) {
-        snprintf(text, size, HSEP_AT_LEAST " %g%s%s", v->minimum, space, unit);
-    } else {
-        snprintf(text, size, "finite%s%s", space, unit);
-    }
+    const char *zero = v->nonzero > 0.0 ? "0 or " : "";
+    snprintf(
+        text, size, "%s%g " HSEP_TO " %.10g%s%s", zero, v->nonzero > 0.0 ? v->nonzero : v->minimum, v->maximum, space,
+        unit);
 }
 
 HSEP_API int hsep_check_parameters(const hsep_context *context, const double values[], char message[])
@@ -87,7 +79,7 @@ HSEP_API int hsep_check_parameters(const hsep_context *context, const double val
             hsep_message_add(message, "%s must be finite, got %s", v->name, number);
         } else if (v->kind == HSEP_INTEGER && value != floor(value)) {
             hsep_message_add(message, "%s must be a whole number, got %s", v->name, number);
-        } else if (value < v->minimum || (v->above && value <= v->minimum) || value > v->maximum) {
+        } else if (value < v->minimum || value > v->maximum || (value != 0.0 && fabs(value) < v->nonzero)) {
             check_range_text(range, sizeof range, v);
             hsep_message_add(message, "%s must be %s, got %s", v->name, range, number);
         } else {
@@ -113,17 +105,24 @@ HSEP_API int hsep_check_lags(double Np, double p, double q, char message[])
     return problems;
 }
 
-HSEP_API double hsep_warm_up_samples(double t_init, double T_s, char message[])
+HSEP_API double hsep_warm_up_samples(double t_init, double T_s)
 {
-    char time[HSEP_NUMBER_SIZE], interval[HSEP_NUMBER_SIZE];
-    const double count = t_init / T_s;
-    if (!isfinite(count)) {
-        hsep_message_add(
-            message, "t_init must be a countable number of samples, got %s s at T_s = %s s",
-            hsep_number(time, t_init, HSEP_REAL), hsep_number(interval, T_s, HSEP_REAL));
-        return -1.0;
+    return fmax(0.0, ceil(t_init / T_s - check_warm_up_tolerance));
+}
+
+HSEP_API hsep_status hsep_check_divergence(hsep_divergence divergence, char message[])
+{
+    static const char *const names[] = {"", "x_pb", "x_h", "x_dm"};
+    if (divergence == HSEP_CONVERGES) {
+        return HSEP_OK;
     }
-    return fmax(0.0, ceil(count - check_warm_up_tolerance));
+    message[0] = '\0'; /* a warning of the step no longer matters */
+    hsep_message_add(
+        message,
+        "%s must stay within " HSEP_PLUS_MINUS "%g m: what was learned makes it diverge; raise lambda, lower p or "
+        "restart",
+        names[divergence], HSEP_PREDICTION_MAX);
+    return HSEP_REFUSED;
 }
 
 HSEP_API hsep_status hsep_check_start_time(double t_start, char message[])

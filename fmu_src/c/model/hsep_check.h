@@ -7,6 +7,7 @@
 #include "hsep_clock.h"
 #include "hsep_model.h"
 #include "hsep_physics.h"
+#include "hsep_vector.h"
 
 #define HSEP_NUMBER_SIZE 40 /* bytes of a number as text */
 
@@ -30,9 +31,11 @@ HSEP_API int hsep_check_parameters(const hsep_context *context, const double val
 /* Check 1 <= p <= Np and 0 <= q < Np; return how many are wrong, each added to message. */
 HSEP_API int hsep_check_lags(double Np, double p, double q, char message[]);
 
-/* Return how many samples have t < t_init, counted in samples so that rounding of times cannot tell; whole, >= 0.
- * Fails, and returns a negative number with message set, if they are too many to be counted. */
-HSEP_API double hsep_warm_up_samples(double t_init, double T_s, char message[]);
+/* Return how many samples have t < t_init, counted in samples so that rounding of times cannot tell; whole, >= 0. */
+HSEP_API double hsep_warm_up_samples(double t_init, double T_s);
+
+/* Refuse outputs of a window that diverges. */
+HSEP_API hsep_status hsep_check_divergence(hsep_divergence divergence, char message[]);
 
 /* Check that the simulation starts at a number. */
 HSEP_API hsep_status hsep_check_start_time(double t_start, char message[]);

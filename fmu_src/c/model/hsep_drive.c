@@ -1,21 +1,32 @@
 #include "hsep_drive.h"
 
 #include "hsep_check.h"
+#include "hsep_plant.h"
 
 #include <math.h>
 
 static const double drive_seed_max = 2147483647.0;
+static const double drive_position_max = 1e3; /* m */
 
-HSEP_API hsep_status hsep_drive_check(double x_d, double t, double h, char message[])
+HSEP_API hsep_status hsep_drive_check(double x_d, double t, double h, double rate, char message[])
 {
     char number[HSEP_NUMBER_SIZE];
     if (!isfinite(x_d)) {
         hsep_message_add(message, "x_d must be finite, got %s at t = %g s", hsep_number(number, x_d, HSEP_REAL), t);
+    } else if (fabs(x_d) > drive_position_max) {
+        hsep_message_add(
+            message, "x_d must be within " HSEP_PLUS_MINUS "%g m, got %g at t = %g s", drive_position_max, x_d, t);
     } else if (!isfinite(t)) {
         hsep_message_add(
             message, "the communication point must be finite, got %s s", hsep_number(number, t, HSEP_REAL));
+    } else if (hsep_check_step_size(h, message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    } else if (h > hsep_plant_step_max(rate)) {
+        hsep_message_add(
+            message, "the step size must be at most %g s for a drive as fast as %g 1/s, got %s; make several steps",
+            hsep_plant_step_max(rate), rate, hsep_number(number, h, HSEP_REAL));
     } else {
-        return hsep_check_step_size(h, message);
+        return HSEP_OK;
     }
     return HSEP_REFUSED;
 }
@@ -23,10 +34,15 @@ HSEP_API hsep_status hsep_drive_check(double x_d, double t, double h, char messa
 HSEP_API hsep_status hsep_drive_check_start(double x_d, char message[])
 {
     char number[HSEP_NUMBER_SIZE];
-    if (isfinite(x_d)) {
+    if (!isfinite(x_d)) {
+        hsep_message_add(
+            message, "the start value of x_d must be finite, got %s", hsep_number(number, x_d, HSEP_REAL));
+    } else if (fabs(x_d) > drive_position_max) {
+        hsep_message_add(
+            message, "the start value of x_d must be within " HSEP_PLUS_MINUS "%g m, got %g", drive_position_max, x_d);
+    } else {
         return HSEP_OK;
     }
-    hsep_message_add(message, "the start value of x_d must be finite, got %s", hsep_number(number, x_d, HSEP_REAL));
     return HSEP_REFUSED;
 }
 
@@ -37,7 +53,8 @@ HSEP_API double hsep_drive_first_measurement(double noise_std, double seed, doub
     }
     hsep_encoder encoder;
     hsep_encoder_init(&encoder, noise_std, (uint64_t)seed);
-    return hsep_encoder_measure(&encoder, x);
+    const double measured = hsep_encoder_measure(&encoder, x);
+    return isfinite(measured) ? measured : x;
 }
 
 HSEP_API hsep_status hsep_drive_lost(double x, double x_d, char message[])

@@ -6,8 +6,9 @@
 #include "hsep_encoder.h"
 #include "hsep_model.h"
 
-/* Check the command x_d, m, and the step from t by h, s; a step is at most 100 s long, which bounds its cost. */
-HSEP_API hsep_status hsep_drive_check(double x_d, double t, double h, char message[]);
+/* Check the command x_d, m, and the step from t by h, s, of a drive whose fastest rate is that, 1/s; a step is at most
+ * 100 s and hsep_plant_step_max long, which bounds its cost. */
+HSEP_API hsep_status hsep_drive_check(double x_d, double t, double h, double rate, char message[]);
 
 /* Check the start value of the command. */
 HSEP_API hsep_status hsep_drive_check_start(double x_d, char message[]);

@@ -98,6 +98,7 @@ HSEP_API int hsep_inputs_next(hsep_inputs *self, hsep_inputs_step *step)
     }
     if (step->n_executed < step->counted.n_samples) {
         self->clock.latched = 0;
+        self->clock.k++;
         step->n_executed++;
         return 1;
     }

@@ -20,7 +20,7 @@
 
 typedef enum {
     HSEP_OK = 0,
-    HSEP_REFUSED = 1, /* the call cannot be done; the state is unchanged and the message says why */
+    HSEP_REFUSED = 1, /* the call cannot be done; the state is unchanged unless said otherwise, the message says why */
     HSEP_WARNED = 2   /* the call is done; the message says what to beware of */
 } hsep_status;
 
@@ -37,7 +37,7 @@ typedef struct {
     double start;   /* 0 for what is calculated */
     double minimum; /* -HUGE_VAL if there is none */
     double maximum; /* HUGE_VAL if there is none */
-    int above;      /* the minimum itself is not allowed */
+    double nonzero; /* least value that is not 0; 0 if there is none */
 } hsep_variable;
 
 /* What stays the same for one instance: the generated table and where its resources are. */
@@ -59,7 +59,10 @@ HSEP_API hsep_status hsep_model_initialise(
     const hsep_context *context, void *state, size_t size, double values[], double t_start, char message[]);
 
 /* Do one communication step from t by h with the inputs in values; outputs and locals go to values.
- * Fails, with state and values unchanged, if an input is not finite or t and h do not fit.
+ * Fails, with state and values unchanged, if an input is not finite or t and h do not fit. Fails, with the values
+ * unchanged, if an output would not be a finite number, because what was learned diverges: the look-ahead cannot go on
+ * then, every later step fails likewise, and only another state or an initialization helps. A drive's step that would
+ * lead out of the range of numbers leaves the state unchanged.
  * Warns if inputs are read at an instant that is no communication point.
  * Cost: bounded by the parameters and h/T_s, the same at the first and at the 10^9th call; allocates nothing. */
 HSEP_API hsep_status hsep_model_step(

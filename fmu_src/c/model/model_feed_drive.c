@@ -28,7 +28,18 @@ HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double v
 {
     message[0] = '\0';
     *size = sizeof(feed_drive_state);
-    return hsep_check_parameters(context, values, message) > 0 ? HSEP_REFUSED : HSEP_OK;
+    if (hsep_check_parameters(context, values, message) > 0) {
+        return HSEP_REFUSED;
+    }
+    const double rate = hsep_feed_drive_rate(&(hsep_feed_drive){
+        .m = values[HSEP_VR_m], .c = values[HSEP_VR_c], .k = values[HSEP_VR_k]});
+    if (rate > HSEP_PLANT_RATE_MAX) {
+        hsep_message_add(
+            message, "sqrt(k/m) and c/m must be at most %g 1/s, got %g; lower k or c, or raise m",
+            HSEP_PLANT_RATE_MAX, rate);
+        return HSEP_REFUSED;
+    }
+    return HSEP_OK;
 }
 
 static void feed_drive_write_outputs(const feed_drive_state *self, double values[], double x_meas)
@@ -69,7 +80,7 @@ HSEP_API hsep_status hsep_model_step(
     feed_drive_state *self = state;
     double x = 0.0;
     message[0] = '\0';
-    if (hsep_drive_check(values[HSEP_VR_x_d], t, h, message) != HSEP_OK) {
+    if (hsep_drive_check(values[HSEP_VR_x_d], t, h, hsep_feed_drive_rate(&self->drive), message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     if (!hsep_feed_drive_step(&self->drive, values[HSEP_VR_x_d], h, &x)) {
@@ -92,11 +103,16 @@ HSEP_API void hsep_model_start_values(const hsep_context *context, double values
 HSEP_API hsep_status hsep_model_check_state(
     const hsep_context *context, const void *state, size_t size, const double values[], char message[])
 {
+    feed_drive_state head;
     size_t expected = 0;
-    if (hsep_model_size(context, values, &expected, message) != HSEP_OK) {
+    if (hsep_model_size(context, values, &expected, message) != HSEP_OK ||
+        hsep_state_check(context, values, state, size, FEED_DRIVE_KIND, expected, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
-    return hsep_state_check(context, values, state, size, FEED_DRIVE_KIND, expected, message);
+    memcpy(&head, state, sizeof head);
+    const int finite = hsep_within(&head.encoder.noise_std, 1, HSEP_PREDICTION_MAX) &&
+                       hsep_within(&head.drive, sizeof head.drive / sizeof(double), HSEP_PREDICTION_MAX);
+    return finite ? HSEP_OK : hsep_state_damaged(message);
 }
 
 #else

@@ -52,8 +52,8 @@ static hsep_status predictor_checked(
         return HSEP_REFUSED;
     }
     const int lags = hsep_check_lags(values[HSEP_VR_Np], values[HSEP_VR_p], values[HSEP_VR_q], message);
-    const double n_init = hsep_warm_up_samples(values[HSEP_VR_t_init], values[HSEP_VR_T_s], message);
-    if (lags > 0 || n_init < 0.0) {
+    const double n_init = hsep_warm_up_samples(values[HSEP_VR_t_init], values[HSEP_VR_T_s]);
+    if (lags > 0) {
         return HSEP_REFUSED;
     }
     *parameters = predictor_parameters(values, n_init, modes);
@@ -111,8 +111,17 @@ HSEP_API hsep_status hsep_model_initialise(
     }
     hsep_state_mark(&self->header, context, values, PREDICTOR_KIND, size);
     hsep_predictor_init(&self->predictor, &parameters, values[HSEP_VR_x_d_ahead]);
-    if (hsep_weights_load(
-            context, parameters.p, parameters.q, hsep_predictor_regression(&self->predictor), message) != HSEP_OK) {
+    const hsep_weights_settings learned = {
+        .p = parameters.p,
+        .q = parameters.q,
+        .input_hold = (uint64_t)parameters.hold,
+        .dead_time = parameters.dead_time,
+        .n_modes = HSEP_N_MODES,
+        .lambda = parameters.lambda,
+        .T_s = parameters.T_s,
+        .v_s = 0.0,
+        .modes = modes};
+    if (hsep_weights_load(context, &learned, hsep_predictor_regression(&self->predictor), message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     predictor_write_outputs(&self->predictor, values);
@@ -137,6 +146,9 @@ HSEP_API hsep_status hsep_model_step(
     while (hsep_inputs_next(&self->inputs, &step)) {
         if (hsep_predictor_sample(&self->predictor, self->inputs.x_d_ahead, self->inputs.x_meas)) {
             window = 1;
+        }
+        if (hsep_check_divergence((hsep_divergence)self->predictor.divergence, message) != HSEP_OK) {
+            return HSEP_REFUSED;
         }
     }
     if (window) {

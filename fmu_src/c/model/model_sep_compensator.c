@@ -25,19 +25,6 @@ typedef struct {
     hsep_compensator compensator; /* its arrays follow */
 } compensator_state;
 
-/* Check that a limit is one at this sampling interval; return how many problems were added to message, 0 or 1. */
-static int compensator_check_limit(const char *name, double value, double in_samples, double T_s, char message[])
-{
-    char number[HSEP_NUMBER_SIZE], interval[HSEP_NUMBER_SIZE];
-    if (isfinite(1.0 / in_samples)) {
-        return 0;
-    }
-    hsep_message_add(
-        message, "%s must be larger at T_s = %s s, got %s", name, hsep_number(interval, T_s, HSEP_REAL),
-        hsep_number(number, value, HSEP_REAL));
-    return 1;
-}
-
 /* Check spacing and preview against Np; return how many are wrong, each added to message. */
 static int compensator_check_plan(const double values[], char message[])
 {
@@ -70,16 +57,10 @@ static hsep_status compensator_checked(
     problems += compensator_check_plan(values, message);
     const double v_max = values[HSEP_VR_v_max] * T_s, a_max = values[HSEP_VR_a_max] * (T_s * T_s);
     const double j_max = values[HSEP_VR_j_max] * (T_s * T_s * T_s), v_s = values[HSEP_VR_v_s];
-    problems += compensator_check_limit("v_max", values[HSEP_VR_v_max], v_max, T_s, message);
-    problems += compensator_check_limit("a_max", values[HSEP_VR_a_max], a_max, T_s, message);
-    problems += compensator_check_limit("j_max", values[HSEP_VR_j_max], j_max, T_s, message);
-    if (v_s > 0.0) {
-        problems += compensator_check_limit("v_s", v_s, v_s * T_s, T_s, message);
-    }
     /* The warm-up counts from the end of the first fill; without one, the first window is planned with what is known. */
     const double t_plan = t_init > 0.0 ? t_init + values[HSEP_VR_preview] * T_s : 0.0;
-    const double n_init = hsep_warm_up_samples(t_plan, T_s, message);
-    if (problems > 0 || n_init < 0.0) {
+    const double n_init = hsep_warm_up_samples(t_plan, T_s);
+    if (problems > 0) {
         return HSEP_REFUSED;
     }
     hsep_modes_read(&values[HSEP_VR_mode], HSEP_N_MODES, modes);
@@ -148,11 +129,23 @@ HSEP_API hsep_status hsep_model_initialise(
     }
     hsep_state_mark(&self->header, context, values, COMPENSATOR_KIND, size);
     hsep_compensator_init(&self->compensator, &parameters, values[HSEP_VR_x_d_ahead]);
-    if (hsep_weights_load(
-            context, parameters.p, parameters.q, hsep_compensator_regression(&self->compensator), message) != HSEP_OK) {
+    const hsep_weights_settings learned = {
+        .p = parameters.p,
+        .q = parameters.q,
+        .input_hold = (uint64_t)parameters.hold,
+        .dead_time = parameters.dead_time,
+        .n_modes = HSEP_N_MODES,
+        .lambda = parameters.lambda,
+        .T_s = parameters.T_s,
+        .v_s = parameters.v_s,
+        .modes = modes};
+    if (hsep_weights_load(context, &learned, hsep_compensator_regression(&self->compensator), message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     hsep_compensator_begin(&self->compensator);
+    if (hsep_check_divergence((hsep_divergence)self->compensator.divergence, message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
     compensator_write_outputs(&self->compensator, values);
     return HSEP_OK;
 }
@@ -172,6 +165,9 @@ HSEP_API hsep_status hsep_model_step(
     }
     while (hsep_inputs_next(&self->inputs, &step)) {
         hsep_compensator_sample(&self->compensator, self->inputs.x_d_ahead, self->inputs.x_meas);
+        if (hsep_check_divergence((hsep_divergence)self->compensator.divergence, message) != HSEP_OK) {
+            return HSEP_REFUSED;
+        }
     }
     compensator_write_outputs(&self->compensator, values);
     return status;

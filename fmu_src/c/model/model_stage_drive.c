@@ -30,6 +30,18 @@ HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double v
     if (hsep_check_parameters(context, values, message) > 0) {
         return HSEP_REFUSED;
     }
+    hsep_mode modes[HSEP_N_MODES];
+    hsep_modes_read(&values[HSEP_VR_mode], HSEP_N_MODES, modes);
+    for (int i = 0; i < HSEP_N_MODES; i++) {
+        const double rate = hsep_plant_mode_rate(&modes[i]);
+        if (rate > HSEP_PLANT_RATE_MAX) {
+            hsep_message_add(
+                message,
+                "2 pi f_n and 4 pi f_n zeta of mode[%d] must be at most %g 1/s in a plant, got %g; lower f_n or zeta",
+                i + 1, HSEP_PLANT_RATE_MAX, rate);
+            return HSEP_REFUSED;
+        }
+    }
     const double before = (double)(sizeof(stage_drive_state) - sizeof(hsep_stage));
     return hsep_state_size(before + hsep_stage_size(HSEP_N_MODES), size, message);
 }
@@ -71,7 +83,7 @@ HSEP_API hsep_status hsep_model_step(
     stage_drive_state *self = state;
     double work[HSEP_STAGE_WORK * HSEP_N_MODES] = {0.0}; /* zeros, because gcc cannot see that all of it is filled */
     message[0] = '\0';
-    if (hsep_drive_check(values[HSEP_VR_x_d], t, h, message) != HSEP_OK) {
+    if (hsep_drive_check(values[HSEP_VR_x_d], t, h, hsep_stage_rate(&self->stage), message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     if (!hsep_stage_step(&self->stage, values[HSEP_VR_x_d], h, work)) {
@@ -103,7 +115,12 @@ HSEP_API hsep_status hsep_model_check_state(
         return HSEP_REFUSED;
     }
     memcpy(&head, state, sizeof head);
-    if (head.stage.n_modes != HSEP_N_MODES || !hsep_clock_valid(&head.stage.clock) ||
+    const char *modes = (const char *)state + sizeof head;
+    const double numbers[] = {head.encoder.noise_std, head.stage.f,   head.stage.kappa, head.stage.start,
+                              head.stage.last_x_d,    head.stage.v_d, head.stage.v};
+    const int finite = hsep_within(numbers, sizeof numbers / sizeof *numbers, HSEP_PREDICTION_MAX) &&
+                       hsep_within(modes, (size - sizeof head) / sizeof(double), HSEP_PREDICTION_MAX);
+    if (!finite || head.stage.n_modes != HSEP_N_MODES || !hsep_clock_valid(&head.stage.clock) ||
         head.stage.clock.T_s != values[HSEP_VR_T_s]) {
         return hsep_state_damaged(message);
     }
