@@ -72,6 +72,19 @@ class SampledWindow(ABC):
             if abs(value) > POSITION_MAX:
                 raise SignalError(f"{name} must be within ±{POSITION_MAX:g} m, got {value:g} at sample {sample}")
 
+    @abstractmethod
+    def sample(self, x_d_ahead: float, x_meas: float) -> None:
+        """Take in sample ``k``, m, and move on to ``k + 1``."""
+
+    @abstractmethod
+    def to_bytes(self) -> bytes:
+        """Return the whole state."""
+
+    @classmethod
+    @abstractmethod
+    def from_bytes(cls, blob: bytes) -> SampledWindow:
+        """Return what :meth:`to_bytes` described."""
+
     def _begin_window(self) -> None:
         """Go on to the next window; if it diverges, none is shown and no sample is taken in any more."""
         try:

@@ -68,7 +68,7 @@ class SampleClock(NamedTuple):
             )
         return cls(start, T_s, 0, 0.0, 0.0, start, False)
 
-    def count(self, t: float, h: float) -> ClockStep:
+    def stepped(self, t: float, h: float) -> ClockStep:
         """Return the communication step from ``t`` by ``h``, s, in samples.
 
         Raises

@@ -239,16 +239,6 @@ class FmuInstance:
         finally:
             self._call(self.slave.freeFMUstate, state)
 
-    @uninterrupted
-    def _instantiate(self, name: str) -> None:
-        self.slave = FMU2Slave(
-            guid=self.description.guid,
-            unzipDirectory=self._folder,
-            modelIdentifier=self.description.coSimulation.modelIdentifier,
-            instanceName=name,
-        )
-        self.slave.instantiate(callbacks=self._callbacks, loggingOn=True)
-
     def _variable(self, name: str) -> Any:
         if name not in self.variables:
             raise FmuError(f"{self.path.name} has no variable {name!r}")

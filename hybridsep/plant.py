@@ -188,7 +188,7 @@ class StageDrive:
         """Advance by ``h`` seconds with the command ``x_d``, m, held."""
         _check_command(x_d)
         _check_step(h, self._rate)
-        step = self._clock.count(self._clock.end, h)
+        step = self._clock.stepped(self._clock.end, h)
         r, z = x_d - self._start, self._z
         last_x_d, v_d, done = self._last_x_d, self._v_d, 0.0
         # v_d is taken at the instants, in whatever steps they come.

@@ -7,17 +7,11 @@ change at instants only and never tell the future. ``hsep_inputs.c`` is the same
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
 
+from ._sampled_window import SampledWindow
 from .clock import SampleClock
 
 __all__ = ["SampledInputs"]
-
-
-class _LookAhead(Protocol):
-    def check(self, x_d_ahead: float, x_meas: float, k: int | None = None) -> None: ...
-
-    def sample(self, x_d_ahead: float, x_meas: float) -> None: ...
 
 
 class SampledInputs:
@@ -42,7 +36,7 @@ class SampledInputs:
         self.clock = SampleClock.begin(t_start, T_s)
         self._latched = (start, start)
 
-    def advance(self, look_ahead: _LookAhead, x_d_ahead: float, x_meas: float, t: float, h: float) -> str:
+    def advance(self, look_ahead: SampledWindow, x_d_ahead: float, x_meas: float, t: float, h: float) -> str:
         """Execute the samples that the communication step from ``t`` by ``h``, s, reaches.
 
         Parameters
@@ -61,7 +55,7 @@ class SampledInputs:
         ParameterError, FmuError, SignalError
             If the step does not fit, or an input that it latches cannot be taken in; nothing is changed then.
         """
-        step = self.clock.count(t, h)
+        step = self.clock.stepped(t, h)
         if step.n_latched:
             look_ahead.check(x_d_ahead, x_meas, self.clock.k + self.clock.latched)
         waiting = self.clock.latched

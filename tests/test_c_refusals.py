@@ -177,9 +177,9 @@ def test_weights_of_other_features_are_refused(learned: float, now: float, tmp_p
     + [(t, TS) for t in (0.0, 1.5, 1.5004, 1.5016, 1e9, math.nan, -math.inf)],
 )
 def test_other_steps_are_refused_in_the_librarys_words(t: float, h: float) -> None:
-    clock = SampleClock.begin(1.5, TS).count(1.5, TS).after
+    clock = SampleClock.begin(1.5, TS).stepped(1.5, TS).after
     with pytest.raises(HybridSepError) as caught:
-        clock.count(t, h)
+        clock.stepped(t, h)
     model = CModel("predictor").initialise(1.5)
     model.step(1.5)
     state = model.state.tobytes()

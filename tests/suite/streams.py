@@ -15,6 +15,7 @@ import pytest
 from c_core import CModel, RefusedError, write_trajectory
 
 from hybridsep import FmuError, FmuInstance, HybridSepError, build_fmu, load_machine
+from hybridsep._sampled_window import SampledWindow
 from hybridsep.compensator import SepCompensator, SepState
 from hybridsep.limits import Limits
 from hybridsep.lookahead import LookAhead
@@ -275,9 +276,9 @@ class LookAheadStream(LibraryStream):
         machine = machine_of(self._name)
         position = float(values.get("x_d_ahead", 0.0))
         self._inputs = {"x_d_ahead": position, "x_meas": float(values.get("x_meas", 0.0))}
-        look_aheads = {PREDICTOR: _predictor, COMPENSATOR: _compensator}
+        new = _predictor if self._name == PREDICTOR else _compensator
         try:
-            self._look_ahead = look_aheads[self._name](machine, values, position)
+            self._look_ahead: SampledWindow = new(machine, values, position)
             self._clock = SampledInputs(start, machine.T_s, position)
         except HybridSepError as error:
             raise RefusedStreamError(str(error)) from error
@@ -329,7 +330,7 @@ class PlantStream(LibraryStream):
         self._plant.restore(unpack("stream", blob)[0]["plant"])
 
 
-_LIBRARY = {
+_LIBRARY: dict[str, type[LookAheadStream] | type[PlantStream]] = {
     PREDICTOR: LookAheadStream,
     COMPENSATOR: LookAheadStream,
     DRIVE: PlantStream,

@@ -31,7 +31,7 @@ from suite.streams import (
 
 T_S = 1e-3  # s
 N_SAMPLES = 420
-SHORT = {
+SHORT: dict[str, dict[str, float | int | bool]] = {
     "HybridPredictor": {"Np": 20, "p": 6, "q": 2, "t_init": 0.05},
     "SepCompensator": {"Np": 20, "p": 6, "q": 2, "t_init": 0.05, "preview": 60},
     TRAJECTORY: {"trajectory": 0},
