@@ -21,7 +21,7 @@ class PathFriction(StageDrive):
     path_velocity = 0.0
 
     def step(self, x_d: float, h: float) -> None:
-        """Move on by ``T_s`` as :class:`StageDrive` does, with the last command where ``v_d`` is the path's velocity."""
+        """Step by ``T_s`` as :class:`StageDrive` does, with the last command where ``v_d`` is the path's velocity."""
         self._last_x_d = x_d - self._start - self.path_velocity * self.Ts
         super().step(x_d, h)
 
