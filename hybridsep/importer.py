@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import sys
 import threading
+import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -24,6 +26,7 @@ from fmpy.fmi2 import (
 )
 
 from .errors import FmuError
+from .fmi.pythonfmu_limits import check_unpacked
 
 __all__ = ["FmuInstance"]
 
@@ -48,7 +51,7 @@ def _working_directory() -> Iterator[Path]:
 
 
 class FmuInstance:
-    """An instance of a co-simulation FMU; use it as a context manager.
+    """An instance of a co-simulation FMU; use it as a context manager, or close it.
 
     Instances may live in several threads, each used by one thread at a time: they are loaded one after the other and
     step in parallel. While one is loaded, the working directory of the process is another for some milliseconds.
@@ -77,7 +80,6 @@ class FmuInstance:
     def __init__(self, path: str | Path, instance_name: str | None = None) -> None:
         self.path = Path(path)
         self.log: list[tuple[int, str]] = []
-        self._slave: FMU2Slave | None = None
         with _working_directory() as folder:
             archive = folder / self.path
         if not archive.is_file():
@@ -91,32 +93,31 @@ class FmuInstance:
         if self.description.coSimulation is None:
             raise FmuError(f"{self.path.name} must be a co-simulation FMU, got one for model exchange only")
         self.variables: dict[str, Any] = {v.name: v for v in self.description.modelVariables}
-        self._callbacks = fmi2CallbackFunctions()
-        self._callbacks.logger = fmi2CallbackLoggerTYPE(self._on_log)
-        self._callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
-        self._callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(fmpy.free)
-        self._folder = mkdtemp()
+        folder = Path(mkdtemp())
         try:
-            self._slave = self._instantiate(archive, instance_name or self.path.stem)
+            self._slave = self._instantiate(archive, folder, instance_name or self.path.stem)
         except BaseException:
-            shutil.rmtree(self._folder, ignore_errors=True)
+            _remove(folder)
             raise
+        # Also for an instance that nobody closes: pythonfmu 0.7 corrupts the heap where the process exits before
+        self._release = weakref.finalize(self, _release, self._slave, folder)
 
-    def _instantiate(self, archive: Path, instance_name: str) -> FMU2Slave:
+    def _instantiate(self, archive: Path, folder: Path, instance_name: str) -> FMU2Slave:
         """Unpack the archive, load its library and make the instance."""
         try:
-            fmpy.extract(str(archive), self._folder)
+            fmpy.extract(str(archive), folder)
+            check_unpacked(folder, self.description.generationTool or "")
             with _working_directory():
                 slave = FMU2Slave(
                     guid=self.description.guid,
-                    unzipDirectory=self._folder,
+                    unzipDirectory=str(folder),
                     modelIdentifier=self.description.coSimulation.modelIdentifier,
                     instanceName=instance_name,
                 )
         except Exception as error:  # fmpy raises bare Exceptions here
             raise FmuError(f"{self.path.name} cannot be loaded: {_first_line(error)}") from error
         try:
-            slave.instantiate(callbacks=self._callbacks, loggingOn=True)
+            slave.instantiate(callbacks=_callbacks(self.log), loggingOn=True)
         except Exception as error:
             slave.freeLibrary()
             raise FmuError(f"{self.path.name} cannot be instantiated: {error}{self._last_words()}") from error
@@ -131,7 +132,7 @@ class FmuInstance:
         FmuError
             If the instance is closed.
         """
-        if self._slave is None:
+        if not self._release.alive:
             raise FmuError(f"{self.path.name}: the instance is closed; make a new FmuInstance")
         return self._slave
 
@@ -145,15 +146,7 @@ class FmuInstance:
 
     def close(self) -> None:
         """Free the instance and its unpacked files; closing again does nothing."""
-        slave, self._slave = self._slave, None
-        if slave is None:
-            return
-        try:
-            with suppress(FMICallException):
-                slave.terminate()
-            slave.freeInstance()
-        finally:
-            shutil.rmtree(self._folder, ignore_errors=True)
+        self._release()
 
     def initialise(self, values: Mapping[str, Any] | None = None, *, start_time: float = 0.0) -> None:
         """Set parameters and start values and run through the initialization.
@@ -232,12 +225,6 @@ class FmuInstance:
         except FMICallException as error:
             raise FmuError(f"{self.path.name}: {error}{self._last_words()}") from error
 
-    def _on_log(
-        self, environment: Any, instance: bytes, status: int, category: bytes | None, message: bytes | None
-    ) -> None:
-        self.log.append((status, (message or b"").decode("utf-8", "replace")))
-        del self.log[:-1000]
-
     def _last_words(self) -> str:
         """Return the last message, without pythonfmu's frame around an exception."""
         if not self.log:
@@ -250,3 +237,34 @@ class FmuInstance:
 def _first_line(error: Exception) -> str:
     """Return the first line of an error's message, or its type where it has none."""
     return (str(error).splitlines() or [type(error).__name__])[0]
+
+
+def _callbacks(log: list[tuple[int, str]]) -> fmi2CallbackFunctions:
+    """Return what an FMU may call; its messages go into ``log``."""
+
+    def keep(environment: Any, instance: bytes, status: int, category: bytes | None, message: bytes | None) -> None:
+        log.append((status, (message or b"").decode("utf-8", "replace")))
+        del log[:-1000]
+
+    functions = fmi2CallbackFunctions()
+    functions.logger = fmi2CallbackLoggerTYPE(keep)
+    functions.allocateMemory = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
+    functions.freeMemory = fmi2CallbackFreeMemoryTYPE(fmpy.free)
+    return functions
+
+
+def _release(slave: FMU2Slave, folder: Path) -> None:
+    """Free an instance, its library and its unpacked files."""
+    try:
+        with suppress(FMICallException):
+            slave.terminate()
+        slave.freeInstance()
+    finally:
+        _remove(folder)
+
+
+def _remove(folder: Path) -> None:
+    """Remove the unpacked files, from ``sys.path`` too, where pythonfmu puts the resources and leaves them."""
+    shutil.rmtree(folder, ignore_errors=True)
+    with suppress(ValueError):
+        sys.path.remove((folder / "resources").as_posix())

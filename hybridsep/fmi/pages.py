@@ -102,7 +102,9 @@ _AGREEMENT_DIGITS = {"SepCompensator": 9}
 """Else 11; a plan under limits comes from an iteration, which passes differences of rounding on."""
 
 
-def index_page(machine: Machine, description: Mapping[str, object], needs: str, *, reference: bool = False) -> bytes:
+def index_page(
+    machine: Machine, description: Mapping[str, object], needs: str, *, reference: bool = False, limits: str = ""
+) -> bytes:
     """Return the page a tool shows for an FMU.
 
     Parameters
@@ -115,6 +117,8 @@ def index_page(machine: Machine, description: Mapping[str, object], needs: str, 
         One sentence: what the FMU needs to run.
     reference : bool
         Whether the archive has a reference result.
+    limits : str
+        A section on what the FMU's flavour cannot do, HTML.
     """
     model, name = str(description["model"]), str(description["name"])
     rows = "\n".join(
@@ -145,6 +149,7 @@ def index_page(machine: Machine, description: Mapping[str, object], needs: str, 
 {rows}
 </table>
 {check}
+{limits}
 <h2>Where the numbers come from</h2>
 <ul>
 {sources}

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ctypes
 import json
+import math
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from functools import wraps
@@ -27,6 +28,9 @@ __all__ = ["DESCRIPTION_FILE", "TableSlave"]
 
 DESCRIPTION_FILE = "machine.json"
 """In the resources: model, start values of the parameters, modes and number of the FMU's content."""
+
+_LAST_READ: dict[str, dict[str, Any]] = {}
+"""Descriptions by their resources' folder, for a reset: pythonfmu 0.7 does not survive a slave that fails then."""
 
 _KIND = "fmu"
 _TYPES = {"Real": Real, "Integer": Integer, "Boolean": Boolean}
@@ -46,12 +50,23 @@ def _surviving(method: _Method) -> _Method:
     def survive(self: TableSlave, *arguments: Any) -> Any:
         try:
             return method(self, *arguments)
-        except Exception:
+        except BaseException:  # KeyboardInterrupt, too
             for thing in (self, type(self), self.log_queue):
                 ctypes.pythonapi.Py_IncRef(ctypes.py_object(thing))
             raise
 
     return survive  # type: ignore[return-value]
+
+
+def _read_description(resources: str) -> dict[str, Any]:
+    """Return what the archive says the FMU is."""
+    path = Path(resources) / DESCRIPTION_FILE
+    try:
+        _LAST_READ[resources] = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        if resources not in _LAST_READ:
+            raise FmuError(f"{path} cannot be read, unpack the whole archive again: {error}") from error
+    return _LAST_READ[resources]
 
 
 class TableSlave(Fmi2Slave):  # type: ignore[misc]
@@ -63,14 +78,13 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
-        self.table_description: dict[str, Any] = json.loads(
-            (Path(self.resources) / DESCRIPTION_FILE).read_text(encoding="utf-8")
-        )
+        self.table_description = _read_description(self.resources)
         self.modelName = self.table_description["name"]
         self.table = variables_of(self.table_description)
         self.values: dict[str, Any] = {v.name: v.start for v in self.table if v.causality in ("input", "parameter")}
         self.running = False
         self.start_time = 0.0
+        self.stop_time: float | None = None
         for variable in self.table:
             self.register_variable(self._as_pythonfmu(variable), nested=False)
 
@@ -105,8 +119,12 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
     def setup_experiment(
         self, start_time: float, stop_time: float | None = None, tolerance: float | None = None
     ) -> None:
-        """Keep the start time; stop time and tolerance have no meaning here."""
-        self.start_time = start_time
+        """Keep start and stop time; the tolerance has no meaning here."""
+        if not math.isfinite(start_time):
+            raise FmuError(f"the start time must be finite, got {start_time} s")
+        if stop_time is not None and not stop_time >= start_time:
+            raise FmuError(f"the stop time must be ≥ the start time {start_time:.9g} s, got {stop_time:.9g} s")
+        self.start_time, self.stop_time = start_time, stop_time
 
     def exit_initialization_mode(self) -> None:
         """Check the parameters together and make the core."""
