@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import sys
 import threading
+import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -24,6 +26,7 @@ from fmpy.fmi2 import (
 )
 
 from .errors import FmuError
+from .fmi.pythonfmu_limits import check_unpacked
 from .interrupt import uninterrupted
 
 __all__ = ["FmuInstance", "read_description"]
@@ -43,9 +46,7 @@ def read_description(path: str | Path) -> Any:
     try:
         description = fmpy.read_model_description(str(path), validate=False)
     except Exception as error:  # fmpy raises bare Exceptions here
-        raise FmuError(
-            f"{path.name} is not a readable FMU: {(str(error) or type(error).__name__).splitlines()[0]}"
-        ) from error
+        raise FmuError(f"{path.name} is not a readable FMU: {_first_line(error)}") from error
     if description.fmiVersion != "2.0":
         raise FmuError(f"{path.name} must be an FMI 2.0 FMU, got FMI {description.fmiVersion}")
     if description.coSimulation is None:
@@ -74,7 +75,7 @@ def _working_directory() -> Iterator[Path]:
 
 
 class FmuInstance:
-    """An instance of a co-simulation FMU; use it as a context manager.
+    """An instance of a co-simulation FMU; use it as a context manager, or close it.
 
     Instances may live in several threads, each used by one thread at a time: they are loaded one after the other and
     step in parallel. While one is loaded, the working directory of the process is another for some milliseconds.
@@ -103,42 +104,42 @@ class FmuInstance:
     def __init__(self, path: str | Path, instance_name: str | None = None) -> None:
         self.path = Path(path)
         self.log: list[tuple[int, str]] = []
-        self._slave: FMU2Slave | None = None
         with _working_directory() as folder:
             archive = folder / self.path
         self.description = read_description(archive)
         self.variables: dict[str, Any] = {v.name: v for v in self.description.modelVariables}
-        self._callbacks = fmi2CallbackFunctions()
-        self._callbacks.logger = fmi2CallbackLoggerTYPE(self._on_log)
-        self._callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
-        self._callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(fmpy.free)
-        self._folder = mkdtemp()
+        self._release: weakref.finalize[..., FmuInstance] | None = None
+        folder = Path(mkdtemp())
         try:
-            self._instantiate(archive, instance_name or self.path.stem)
+            self._instantiate(archive, folder, instance_name or self.path.stem)
         except BaseException:
             self.close()
+            _remove(folder)
             raise
 
     @uninterrupted
-    def _instantiate(self, archive: Path, instance_name: str) -> None:
+    def _instantiate(self, archive: Path, folder: Path, instance_name: str) -> None:
         """Unpack the archive, load its library and make the instance."""
         try:
-            fmpy.extract(str(archive), self._folder)
+            fmpy.extract(str(archive), folder)
+            check_unpacked(folder, self.description.generationTool or "")
             with _working_directory():
                 slave = FMU2Slave(
                     guid=self.description.guid,
-                    unzipDirectory=self._folder,
+                    unzipDirectory=str(folder),
                     modelIdentifier=self.description.coSimulation.modelIdentifier,
                     instanceName=instance_name,
                 )
         except Exception as error:  # fmpy raises bare Exceptions here
             raise FmuError(f"{self.path.name} cannot be loaded: {_first_line(error)}") from error
         try:
-            slave.instantiate(callbacks=self._callbacks, loggingOn=True)
+            slave.instantiate(callbacks=_callbacks(self.log), loggingOn=True)
         except Exception as error:
             slave.freeLibrary()
             raise FmuError(f"{self.path.name} cannot be instantiated: {error}{self._last_words()}") from error
         self._slave = slave
+        # Also for an instance that nobody closes: pythonfmu 0.7 corrupts the heap where the process exits before
+        self._release = weakref.finalize(self, _release, slave, folder)
 
     @property
     def slave(self) -> FMU2Slave:
@@ -149,7 +150,7 @@ class FmuInstance:
         FmuError
             If the instance is closed.
         """
-        if self._slave is None:
+        if self._release is None or not self._release.alive:
             raise FmuError(f"{self.path.name}: the instance is closed; make a new FmuInstance")
         return self._slave
 
@@ -164,14 +165,8 @@ class FmuInstance:
     @uninterrupted
     def close(self) -> None:
         """Free the instance and its unpacked files; closing again does nothing."""
-        slave, self._slave = self._slave, None
-        try:
-            if slave is not None:
-                with suppress(FMICallException):
-                    slave.terminate()
-                slave.freeInstance()
-        finally:
-            shutil.rmtree(self._folder, ignore_errors=True)
+        if self._release is not None:
+            self._release()
 
     def initialise(self, values: Mapping[str, Any] | None = None, *, start_time: float = 0.0) -> None:
         """Set parameters and start values and run through the initialization.
@@ -251,12 +246,6 @@ class FmuInstance:
         except FMICallException as error:
             raise FmuError(f"{self.path.name}: {error}{self._last_words()}") from error
 
-    def _on_log(
-        self, environment: Any, instance: bytes, status: int, category: bytes | None, message: bytes | None
-    ) -> None:
-        self.log.append((status, (message or b"").decode("utf-8", "replace")))
-        del self.log[:-1000]
-
     def _last_words(self) -> str:
         """Return the last message, without pythonfmu's frame around an exception."""
         if not self.log:
@@ -269,3 +258,34 @@ class FmuInstance:
 def _first_line(error: Exception) -> str:
     """Return the first line of an error's message, or its type where it has none."""
     return (str(error).splitlines() or [type(error).__name__])[0]
+
+
+def _callbacks(log: list[tuple[int, str]]) -> fmi2CallbackFunctions:
+    """Return what an FMU may call; its messages go into ``log``."""
+
+    def keep(environment: Any, instance: bytes, status: int, category: bytes | None, message: bytes | None) -> None:
+        log.append((status, (message or b"").decode("utf-8", "replace")))
+        del log[:-1000]
+
+    functions = fmi2CallbackFunctions()
+    functions.logger = fmi2CallbackLoggerTYPE(keep)
+    functions.allocateMemory = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
+    functions.freeMemory = fmi2CallbackFreeMemoryTYPE(fmpy.free)
+    return functions
+
+
+def _release(slave: FMU2Slave, folder: Path) -> None:
+    """Free an instance, its library and its unpacked files."""
+    try:
+        with suppress(FMICallException):
+            slave.terminate()
+        slave.freeInstance()
+    finally:
+        _remove(folder)
+
+
+def _remove(folder: Path) -> None:
+    """Remove the unpacked files, from ``sys.path`` too, where pythonfmu puts the resources and leaves them."""
+    shutil.rmtree(folder, ignore_errors=True)
+    with suppress(ValueError):
+        sys.path.remove((folder / "resources").as_posix())

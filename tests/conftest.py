@@ -7,13 +7,20 @@ import os
 # Threads make the small factorisations of these tests slower by two orders of magnitude on a busy machine. The
 # variable must be set before NumPy is loaded.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# A process that a test starts says where it crashed, as pytest's own does.
+os.environ.setdefault("PYTHONFAULTHANDLER", "1")
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from hybridsep import build_fmu, fmu_names, load_machine, machine_names
+
+# No test fails because something else keeps the cores busy.
+settings.register_profile("patient", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("patient")
 
 
 @pytest.fixture(autouse=True)

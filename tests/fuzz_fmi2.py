@@ -102,8 +102,8 @@ class Library:
         libc.calloc.argtypes, libc.calloc.restype = [c_size_t, c_size_t], c_void_p
         libc.free.argtypes, libc.free.restype = [c_void_p], None
 
-        def log(environment: Any, name: bytes, status: int, category: bytes, message: bytes) -> None:
-            self.messages.append((status, category.decode(), message.decode()))
+        def log(environment: Any, name: bytes, status: int, category: bytes | None, message: bytes) -> None:
+            self.messages.append((status, (category or b"").decode(), message.decode()))
 
         def allocate(count: int, size: int) -> int | None:
             if count * size > largest:

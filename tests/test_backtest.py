@@ -130,7 +130,7 @@ def test_perfect_physics_leaves_nothing_to_reduce() -> None:
 
 
 @given(k=st.integers(60, 1009), step=st.floats(-1e-3, 1e-3))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_no_prediction_depends_on_what_is_measured_in_its_batch_or_later(k: int, step: float) -> None:
     x_d, x = log()
     x_other = x.copy()
@@ -142,7 +142,7 @@ def test_no_prediction_depends_on_what_is_measured_in_its_batch_or_later(k: int,
 
 
 @given(cuts=st.lists(st.integers(0, 1010), max_size=30), Np=st.integers(5, 130))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_stream_equals_arrays_whatever_the_chunks(cuts: list[int], Np: int) -> None:
     x_d, x = log()
     edges = [0, *sorted(cuts), 1010]

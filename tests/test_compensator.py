@@ -111,7 +111,7 @@ def test_the_splines_end_so_that_what_follows_is_the_command_itself() -> None:
         assert values[:, N_DECIDED:].any(axis=0).all()
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @example(11777665, 0.734375)  # an active bound is left by 0.2 % of it: the cost is within 4e-6 all the same
 @given(st.integers(0, 2**31), st.floats(0.05, 0.95))
 def test_a_bounded_plan_satisfies_the_optimality_conditions(seed: int, tightness: float) -> None:
@@ -190,7 +190,7 @@ def test_a_bounded_plan_costs_what_another_solver_finds(
 # Limits, continuity, fall-back ---------------------------------------------------------------------------------
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(st.integers(0, 2**31), st.sampled_from([1e-6, 1e-4, 1e-2]), st.sampled_from([PAPER_LIMITS, DRIVE_LIMITS]))
 def test_limits_hold_whatever_is_measured(seed: int, spread: float, limits: Limits) -> None:
     rng = np.random.default_rng(seed)
@@ -254,7 +254,7 @@ def test_a_refused_solve_falls_back_to_physics_then_to_the_rest(monkeypatch: pyt
 # The direction of the path -------------------------------------------------------------------------------------
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(
     st.integers(0, 2**31),
     st.sampled_from([1e-6, 1e-4, 1e-2]),
@@ -294,7 +294,7 @@ def test_only_the_velocity_where_the_path_moves_is_bounded_by_the_direction() ->
     np.testing.assert_array_equal(kept.rows, free.rows)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 2**31))
 def test_the_rest_of_a_plan_that_turned_is_still_a_plan(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -322,7 +322,7 @@ def test_friction_that_follows_the_command_makes_turning_dear() -> None:
 # Trust ---------------------------------------------------------------------------------------------------------
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.lists(st.floats(-1.5, 1.5), min_size=1, max_size=6), st.floats(-3, 3), st.floats(-3, 3))
 def test_step_down_recursion_agrees_with_the_roots(real: list[float], a: float, b: float) -> None:
     polynomial = np.convolve(np.poly(real), np.array([1.0, a, b]))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import os
+import subprocess
 import sys
 import tempfile
 import threading
@@ -120,6 +122,28 @@ def test_closing_after_refusals(drive: Path) -> None:
             instance.get("m")
 
 
+def test_a_forgotten_instance_is_closed(drive: Path, temporary: Path) -> None:
+    instance = FmuInstance(drive)
+    instance.initialise()
+    del instance
+    gc.collect()
+    assert not list(temporary.iterdir())
+
+
+def test_an_instance_may_be_open_when_python_exits(drive: Path, temporary: Path) -> None:
+    """pythonfmu 0.7 releases its interpreter twice where its library is loaded at that time: the heap was corrupt."""
+    script = f"""
+from hybridsep import FmuInstance
+instances = [FmuInstance({str(drive)!r}) for _ in range(3)]
+for instance in instances:
+    instance.initialise()
+"""
+    environment = os.environ | {"TMPDIR": str(temporary)}
+    done = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert not list(temporary.iterdir())
+
+
 # Failed constructions ----------------------------------------------------------------------------------------------
 
 
@@ -206,25 +230,23 @@ def test_threads_load_without_moving_the_process(
             assert Path.cwd() == tmp_path
 
 
-def test_instances_in_threads_run_in_parallel(native: Path) -> None:
+def test_instances_in_threads_run_in_parallel(native: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """While one instance is in the middle of an FMI call, others are loaded, stepped and closed."""
     inside, go_on = threading.Event(), threading.Event()
+    calloc = fmpy.calloc
 
-    class Waiting(FmuInstance):
-        def _on_log(self, *arguments: Any) -> None:
-            super()._on_log(*arguments)
+    def wait_once(count: int, size: int) -> Any:
+        if threading.current_thread() is thread and not inside.is_set():
             inside.set()
             go_on.wait()
+        return calloc(count, size)
 
-    def wait_in_a_call() -> None:
-        with Waiting(native) as plant, pytest.raises(FmuError, match="x_d must be finite"):
-            plant.initialise({"x_d": float("nan")})
-
-    thread = threading.Thread(target=wait_in_a_call)
+    monkeypatch.setattr(fmpy, "calloc", wait_once)
+    thread = threading.Thread(target=lambda: FmuInstance(native).close())
     thread.start()
-    while not inside.wait(timeout=0.1):
-        assert thread.is_alive()
     try:
+        while not inside.wait(timeout=0.1):
+            assert thread.is_alive()
         with FmuInstance(native) as other:
             other.initialise()
             other.step(0.0, TS)

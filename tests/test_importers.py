@@ -83,7 +83,7 @@ def python(folder: Path, *arguments: str) -> str:
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(tests.parent), str(tests)])}
     command = [sys.executable, "-W", "error", *arguments]
     result = subprocess.run(
-        command, capture_output=True, text=True, cwd=folder, env=environment, timeout=120, check=False
+        command, capture_output=True, text=True, cwd=folder, env=environment, timeout=600, check=False
     )
     assert result.returncode == 0, result.stderr
     return result.stdout

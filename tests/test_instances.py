@@ -130,7 +130,8 @@ def test_memory_is_that_of_the_arrays_and_cycles_leave_none(
 ) -> None:
     script = f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
     script += f"import test_instances; test_instances.measure({str(folder)!r})"
-    result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
     measured = json.loads(result.stdout)
     print(f"{measured['per_instance']:.0f} bytes resident per instance, {array_bytes()} of them arrays")
     record_property("bytes_per_instance", measured["per_instance"])

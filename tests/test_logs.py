@@ -101,7 +101,7 @@ def test_interval_is_the_mean_rounded_sensibly(tmp_path: Path, Ts: float) -> Non
 
 
 @given(seed=st.integers(0, 2**32 - 1), n=st.integers(1000, 30_000))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_jitter_of_a_clock_does_not_move_the_interval(
     seed: int, n: int, tmp_path_factory: pytest.TempPathFactory
 ) -> None:

@@ -136,7 +136,7 @@ class TestDiscretisation:
         np.testing.assert_array_equal(x_d, kept[1])
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     lengths=st.lists(st.integers(1, 2 * BLOCK_MAX + 3), min_size=1, max_size=6),
     dead_time=st.sampled_from([0, 1, 5, 300]),

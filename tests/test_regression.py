@@ -45,7 +45,7 @@ def test_the_oracles_agree_with_sixty_digits(lam: float) -> None:
         assert relative_error(extended.astype(np.float64), exact) < max(1e-8 * digits, 4e-16)
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(
     n=st.integers(1, 12),
     batches=st.lists(st.integers(1, 30), min_size=1, max_size=8),
@@ -68,7 +68,7 @@ def test_batches_of_any_size_give_the_direct_solution(n: int, batches: list[int]
     assert regression.residual_sum == pytest.approx(minimum, rel=1e-9, abs=1e-12)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(order=st.permutations(range(40)))
 def test_the_order_of_rows_does_not_matter(order: list[int]) -> None:
     rows, target = problem(40, 6)

@@ -82,7 +82,7 @@ def test_features_are_those_of_the_formula_from_window_to_window(start: float, a
     assert np.abs(features).max() > 0.5 * SCALE
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(cuts=st.lists(st.integers(1, 90), min_size=1, max_size=9), seed=st.integers(0, 2**31))
 def test_how_windows_are_cut_changes_nothing_where_the_same_is_known(cuts: list[int], seed: int) -> None:
     n = sum(cuts)
@@ -179,7 +179,7 @@ def test_a_batch_equals_its_rows_one_by_one(ahead: int) -> None:
     np.testing.assert_allclose(predicted.e_h, guessed[300:], rtol=0, atol=1e-12)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(n=st.integers(1, 60), learned=st.integers(0, 300), more=st.integers(0, 80), seed=st.integers(0, 2**31))
 def test_operator_equals_predict(n: int, learned: int, more: int, seed: int) -> None:
     """The path is a part of the free response: whatever the commands, the same one."""

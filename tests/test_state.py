@@ -43,7 +43,6 @@ def with_header(header: bytes) -> bytes:
     return sealed(struct.pack("<4sII", b"HSEP", VERSION, len(header)) + header)
 
 
-@settings(deadline=None)
 @given(
     values=st.dictionaries(
         st.text(max_size=5),
@@ -74,7 +73,7 @@ def test_truncated_at_any_byte() -> None:
             HybridPredictor.from_bytes(PREDICTOR[:end])
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=400)
 @given(position=st.integers(0, len(PREDICTOR) - 1), flip=st.integers(1, 255))
 def test_a_flipped_byte(position: int, flip: int) -> None:
     damaged = bytearray(PREDICTOR)
@@ -83,7 +82,6 @@ def test_a_flipped_byte(position: int, flip: int) -> None:
         HybridPredictor.from_bytes(bytes(damaged))
 
 
-@settings(deadline=None)
 @given(st.binary(max_size=200))
 def test_foreign_bytes(blob: bytes) -> None:
     with pytest.raises(StateError, match=f"^a saved state of kind 'test' was expected, got {len(blob)} bytes of"):

@@ -114,7 +114,9 @@ _SOURCES = {
 """Of what does not come from the machine."""
 
 
-def index_page(machine: Machine, description: Mapping[str, object], needs: str, *, reference: bool = False) -> bytes:
+def index_page(
+    machine: Machine, description: Mapping[str, object], needs: str, *, reference: bool = False, limits: str = ""
+) -> bytes:
     """Return the page a tool shows for an FMU.
 
     Parameters
@@ -127,6 +129,8 @@ def index_page(machine: Machine, description: Mapping[str, object], needs: str, 
         One sentence: what the FMU needs to run.
     reference : bool
         Whether the archive has a reference result.
+    limits : str
+        A section on what the FMU's flavour cannot do, HTML.
     """
     model, name = str(description["model"]), str(description["name"])
     rows = "\n".join(
@@ -157,6 +161,7 @@ def index_page(machine: Machine, description: Mapping[str, object], needs: str, 
 {rows}
 </table>
 {check}
+{limits}
 <h2>Where the numbers come from</h2>
 <ul>
 {sources}

@@ -11,7 +11,6 @@ import hashlib
 import json
 import re
 from collections.abc import Mapping
-from importlib import metadata
 from pathlib import Path
 
 import pythonfmu
@@ -24,6 +23,7 @@ from .content import content_guid, fmu_title
 from .experiment import stop_time
 from .model_description import FmuInfo, model_description
 from .pages import index_page
+from .pythonfmu_limits import checked_version, limits_section
 from .variables import variables_of
 from .weights import WEIGHTS_FILE, weights_file
 
@@ -79,13 +79,19 @@ def files(
         ``model``, ``name``, ``parameters`` and ``modes``.
     trained : HybridPredictor, optional
         What a HybridPredictor or SepCompensator starts warm with.
+
+    Raises
+    ------
+    FmuError
+        If the pythonfmu that is installed is of another series than 0.7.
     """
     model, name = str(description["model"]), str(description["name"])
+    version = checked_version()
     content = _resources(model)
     if trained is not None:
         content[f"resources/{WEIGHTS_FILE}"] = weights_file(trained)
     needs = "The FMU needs a Python 3 with NumPy and SciPy in the importing tool's process."
-    content["documentation/index.html"] = index_page(machine, description, needs)
+    content["documentation/index.html"] = index_page(machine, description, needs, limits=limits_section(version))
     for source in ("linux64/libpythonfmu-export.so", "win64/pythonfmu-export.dll"):
         binary = Path(pythonfmu.__file__).parent / "resources" / "binaries" / source
         content[f"binaries/{Path(source).parent}/{name}{binary.suffix}"] = binary.read_bytes()
@@ -98,7 +104,7 @@ def files(
         step_size=machine.T_s,
         stop_time=stop_time(machine, description),
         needs_execution_tool=True,
-        generation_tool=f"hybridsep {__version__} with pythonfmu {metadata.version('pythonfmu')}",
+        generation_tool=f"hybridsep {__version__} with pythonfmu {version}",
         version=__version__,
     )
     content["modelDescription.xml"] = model_description(info, variables_of(description))

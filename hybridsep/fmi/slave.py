@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ctypes
 import json
+import math
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from functools import wraps
@@ -28,6 +29,9 @@ __all__ = ["DESCRIPTION_FILE", "TableSlave"]
 
 DESCRIPTION_FILE = "machine.json"
 """In the resources: model, start values of the parameters, modes and number of the FMU's content."""
+
+_LAST_READ: dict[str, dict[str, Any]] = {}
+"""Descriptions by their resources' folder, for a reset: pythonfmu 0.7 does not survive a slave that fails then."""
 
 _KIND = "fmu"
 _STOP_TOLERANCE = 1e-6  # of a step: a last step that ended at the stop time but for rounding
@@ -48,12 +52,23 @@ def _surviving(method: _Method) -> _Method:
     def survive(self: TableSlave, *arguments: Any) -> Any:
         try:
             return method(self, *arguments)
-        except Exception:
+        except BaseException:  # KeyboardInterrupt, too
             for thing in (self, type(self), self.log_queue):
                 ctypes.pythonapi.Py_IncRef(ctypes.py_object(thing))
             raise
 
     return survive  # type: ignore[return-value]
+
+
+def _read_description(resources: str) -> dict[str, Any]:
+    """Return what the archive says the FMU is."""
+    path = Path(resources) / DESCRIPTION_FILE
+    try:
+        _LAST_READ[resources] = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        if resources not in _LAST_READ:
+            raise FmuError(f"{path} cannot be read, unpack the whole archive again: {error}") from error
+    return _LAST_READ[resources]
 
 
 class TableSlave(Fmi2Slave):  # type: ignore[misc]
@@ -65,9 +80,7 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
-        self.table_description: dict[str, Any] = json.loads(
-            (Path(self.resources) / DESCRIPTION_FILE).read_text(encoding="utf-8")
-        )
+        self.table_description = _read_description(self.resources)
         self.modelName = self.table_description["name"]
         self.table = variables_of(self.table_description)
         self.values: dict[str, Any] = {v.name: v.start for v in self.table if v.causality in ("input", "parameter")}
@@ -109,6 +122,10 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
         self, start_time: float, stop_time: float | None = None, tolerance: float | None = None
     ) -> None:
         """Keep start and stop time; the tolerance has no meaning here."""
+        if not math.isfinite(start_time):
+            raise FmuError(f"the start time must be finite, got {start_time} s")
+        if stop_time is not None and not stop_time >= start_time:
+            raise FmuError(f"the stop time must be ≥ the start time {start_time:.9g} s, got {stop_time:.9g} s")
         self.start_time, self.stop_time = start_time, stop_time
 
     def exit_initialization_mode(self) -> None:

@@ -31,7 +31,7 @@ HOST = Path(__file__).with_name("host.c")
 HOST_FLAGS = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Wconversion", "-Werror"]
 SYSROOT = Path(os.environ.get("QEMU_LD_PREFIX", "/usr/aarch64-linux-gnu"))
 NOISE = 5e-6  # m, of the encoder
-TIME_LIMIT = 300  # s, for one run; Wine's first one makes its folders
+TIME_LIMIT = 900  # s, for one run; Wine's first one makes its folders
 
 INPUTS = {
     "HybridPredictor": ["x_d_ahead", "x_meas"],

@@ -1,0 +1,103 @@
+"""Calls that pythonfmu's binary does not expect: what our slave catches, and what the FMU's page owns up to."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import pythonfmu_calls
+from pythonfmu_calls import CAUGHT, KILLING
+
+from hybridsep import FmuError, FmuInstance, build_fmu, load_machine
+from hybridsep.fmi import pythonfmu_limits
+
+Fmu = Callable[[str], Path]
+
+
+@pytest.fixture
+def folder(python_fmu: Fmu, tmp_path: Path) -> Path:
+    with zipfile.ZipFile(python_fmu("FeedDrivePy")) as archive:
+        archive.extractall(tmp_path / "unpacked")
+    return tmp_path / "unpacked"
+
+
+def outcome(folder: Path, case: str) -> subprocess.CompletedProcess[str]:
+    """Make one of the calls in a process of its own."""
+    command = [sys.executable, pythonfmu_calls.__file__, str(folder), case]
+    return subprocess.run(command, capture_output=True, text=True)
+
+
+needs_linux = pytest.mark.skipif(sys.platform != "linux", reason="the calls are made to pythonfmu's binary for Linux")
+
+
+@needs_linux
+@pytest.mark.parametrize("case", CAUGHT)
+def test_what_the_slave_catches(folder: Path, case: str) -> None:
+    done = outcome(folder, case)
+    assert (done.returncode, done.stdout.strip()) == (0, "survived"), done.stderr
+
+
+@needs_linux
+@pytest.mark.parametrize("case", KILLING)
+def test_what_ends_the_process_is_on_the_page(folder: Path, case: str) -> None:
+    """A test that fails here may mean that pythonfmu has been mended: then the page needs less."""
+    page = (folder / "documentation" / "index.html").read_text(encoding="utf-8")
+    assert KILLING[case][0] in page
+    done = outcome(folder, case)
+    assert done.returncode < 0, done.stdout + done.stderr
+    assert "survived" not in done.stdout
+
+
+def test_the_page_names_the_version(folder: Path) -> None:
+    page = (folder / "documentation" / "index.html").read_text(encoding="utf-8")
+    assert f"Limits of pythonfmu {pythonfmu_limits.checked_version()}" in page
+    assert "an exit while the library is loaded" in page
+    assert "the GUID and the type" in page
+    assert "whether a state has been freed already" in page
+
+
+def test_only_the_pythonfmu_that_the_slave_was_made_for_is_packed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("importlib.metadata.version", lambda name: "0.8.0")
+    with pytest.raises(FmuError, match=r"pythonfmu must be 0\.7\.x, .*, got 0\.8\.0; pip install 'pythonfmu~=0\.7\.0'"):
+        build_fmu(load_machine("spring_mass_damper"), "FeedDrivePy", tmp_path, "python")
+    assert not list(tmp_path.iterdir())
+
+
+# Our own importer --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("missing", [r"slavemodule\.txt", r"feed_drive_\w+\.py"])
+def test_our_importer_refuses_what_would_end_it(python_fmu: Fmu, tmp_path: Path, missing: str) -> None:
+    damaged = tmp_path / "Damaged.fmu"
+    with zipfile.ZipFile(python_fmu("FeedDrivePy")) as old, zipfile.ZipFile(damaged, "w") as new:
+        for name in old.namelist():
+            if not re.fullmatch(f"resources/{missing}", name):
+                new.writestr(name, old.read(name))
+    with pytest.raises(FmuError, match=rf"Damaged\.fmu cannot be loaded: resources/{missing} is missing"):
+        FmuInstance(damaged)
+
+
+def test_our_importer_refuses_a_folder_that_pythonfmu_cannot_read(
+    python_fmu: Fmu, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "größer"
+    folder.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(folder))
+    with pytest.raises(FmuError, match=r"got .*größer.*; set TMPDIR to another one"):
+        FmuInstance(python_fmu("FeedDrivePy"))
+
+
+def test_our_importer_leaves_no_removed_folder_in_the_path(python_fmu: Fmu) -> None:
+    before = list(sys.path)
+    for _ in range(2):
+        with FmuInstance(python_fmu("FeedDrivePy")) as instance:
+            instance.initialise()
+            assert sys.path != before
+        assert sys.path == before
