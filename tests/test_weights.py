@@ -274,7 +274,7 @@ def test_both_flavours_say_the_same_of_other_settings(tmp_path: Path) -> None:
     for changes in ({"p": 30, "q": 9}, {"lambda": 1e-8}, {"T_s": 1e-3 / 3}, {"input_hold": 1, "dead_time": 7}):
         learned, now = (
             HybridPredictor.with_parameters(
-                ModalModel([Mode(**mode) for mode in modes], values.pop("dead_time")),
+                ModalModel([Mode(**mode) for mode in modes], int(values.pop("dead_time"))),
                 {name: value for name, value in values.items() if name != "v_s"},
             )
             for values, modes in (

@@ -50,13 +50,13 @@ class LookAheadSlave(TableSlave):
     def restore_core(self, meta: Mapping[str, Any], blob: bytes) -> None:
         """Take over a clock and a look-ahead."""
         state = Saved("look-ahead", meta, {}, {})
-        clock = Saved("clock", state.table("clock"), {}, {})
-        reals = {name: clock.real(name) for name in ("start", "T_s")}
-        counts = {name: clock.whole(name) for name in ("k", "done", "parts")}
-        inputs = None if state.field("inputs") is None else tuple(state.numbers("inputs", 2))
+        saved = Saved("clock", state.table("clock"), {}, {})
+        k, done, parts = (saved.whole(name) for name in ("k", "done", "parts"))
+        clock = SampleClock(saved.real("start"), saved.real("T_s"), k, done, parts)
+        inputs: Any = None  # as long as no sample has begun
+        if state.field("inputs") is not None:
+            inputs = tuple(state.numbers("inputs", 2))
         look_ahead = self.look_ahead_type.from_bytes(blob)
-        if not (
-            reals["T_s"] == self.values["T_s"] and counts["k"] == look_ahead.k and counts["done"] < counts["parts"]
-        ):
-            raise clock.error("it must count the samples of this look-ahead")
-        self.look_ahead, self.clock, self.inputs = look_ahead, SampleClock(**reals, **counts), inputs
+        if not (clock.T_s == self.values["T_s"] and k == look_ahead.k and done < parts):
+            raise saved.error("it must count the samples of this look-ahead")
+        self.look_ahead, self.clock, self.inputs = look_ahead, clock, inputs
