@@ -55,8 +55,7 @@ def extreme(draw: st.DrawFn, name: str) -> float:
     choices = [magnitude, parameter.maximum, parameter.minimum]
     if parameter.minimum < 0:
         choices.append(-magnitude)
-    value: float = draw(st.sampled_from(choices))
-    return min(max(value, parameter.minimum), parameter.maximum)
+    return float(np.clip(draw(st.sampled_from(choices)), parameter.minimum, parameter.maximum))
 
 
 def values_of(*names: str) -> st.SearchStrategy[dict[str, float]]:

@@ -33,10 +33,10 @@ def learned_settings(predictor: HybridPredictor) -> dict[str, float]:
     values: dict[str, float] = {
         "p": predictor.p,
         "q": predictor.q,
-        "input_hold": INPUT_HOLDS.index(predictor.discrete.input_hold),
-        "dead_time": predictor.model.dead_time,
         "lambda": predictor.lam,
         "T_s": predictor.Ts,
+        "input_hold": INPUT_HOLDS.index(predictor.discrete.input_hold),
+        "dead_time": predictor.model.dead_time,
         "v_s": predictor.v_s,
     }
     for i, mode in enumerate(predictor.model.modes, start=1):
@@ -46,11 +46,11 @@ def learned_settings(predictor: HybridPredictor) -> dict[str, float]:
 
 def weights_file(predictor: HybridPredictor) -> bytes:
     """Return the file's content for what a predictor has learned."""
-    regression, values = predictor.regression, list(learned_settings(predictor).values())
-    n_modes = len(predictor.model.modes)
+    regression, n_modes = predictor.regression, len(predictor.model.modes)
+    p, q, lam, T_s, input_hold, dead_time, v_s, *modes = learned_settings(predictor).values()
     triangle = regression.factor[np.triu_indices(predictor.n_features + 1)]
-    content = _HEAD.pack(_MAGIC, *values[:4], n_modes, regression.n_samples, *values[4:7])
-    content += np.array([*values[7:], *triangle], dtype="<f8").tobytes()
+    content = _HEAD.pack(_MAGIC, p, q, input_hold, dead_time, n_modes, regression.n_samples, lam, T_s, v_s)
+    content += np.array([*modes, *triangle], dtype="<f8").tobytes()
     return content + _CHECKSUM.pack(zlib.crc32(content))
 
 
@@ -73,7 +73,7 @@ def restore_weights(predictor: HybridPredictor, content: bytes) -> None:
     _, p, q, input_hold, dead_time, n_modes, n_samples, lam, T_s, v_s = _HEAD.unpack_from(body)
     numbers = np.frombuffer(body, "<f8", offset=_HEAD.size)
     settings = learned_settings(predictor)
-    learned = [p, q, input_hold, dead_time, lam, T_s, v_s, *numbers[: 4 * n_modes].tolist()]
+    learned = [p, q, lam, T_s, input_hold, dead_time, v_s, *numbers[: 4 * n_modes].tolist()]
     problems = [
         f"{name} must be {then!r}, with which {WEIGHTS_FILE} was learned, got {now!r}"
         for (name, now), then in zip(settings.items(), learned, strict=False)

@@ -102,10 +102,10 @@ static int weights_take(
     }
     weights_compare("p", (double)head.p, (double)settings->p, HSEP_INTEGER, message);
     weights_compare("q", (double)head.q, (double)settings->q, HSEP_INTEGER, message);
-    weights_compare("input_hold", (double)head.input_hold, (double)settings->input_hold, HSEP_INTEGER, message);
-    weights_compare("dead_time", (double)head.dead_time, (double)settings->dead_time, HSEP_INTEGER, message);
     weights_compare("lambda", head.lambda, settings->lambda, HSEP_REAL, message);
     weights_compare("T_s", head.T_s, settings->T_s, HSEP_REAL, message);
+    weights_compare("input_hold", (double)head.input_hold, (double)settings->input_hold, HSEP_INTEGER, message);
+    weights_compare("dead_time", (double)head.dead_time, (double)settings->dead_time, HSEP_INTEGER, message);
     weights_compare("v_s", head.v_s, settings->v_s, HSEP_REAL, message);
     if (!weights_compare_modes(file, head.n_modes, settings, message) || message[0] != '\0') {
         return 0;
