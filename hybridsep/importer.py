@@ -7,6 +7,7 @@ import shutil
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
+from tempfile import gettempdir
 from types import TracebackType
 from typing import Any
 
@@ -22,6 +23,7 @@ from fmpy.fmi2 import (
 
 from .errors import FmuError
 from .interrupt import uninterrupted
+from .output import named_errors
 
 __all__ = ["FmuInstance", "read_description"]
 
@@ -79,7 +81,8 @@ class FmuInstance:
         self.log: list[tuple[int, str]] = []
         self.description = read_description(self.path)
         self.variables: dict[str, Any] = {v.name: v for v in self.description.modelVariables}
-        self._folder = fmpy.extract(str(self.path))
+        with named_errors(gettempdir()):
+            self._folder = fmpy.extract(str(self.path))
         self._callbacks = fmi2CallbackFunctions()
         self._callbacks.logger = fmi2CallbackLoggerTYPE(self._on_log)
         self._callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)

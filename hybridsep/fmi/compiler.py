@@ -24,6 +24,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from ..errors import FmuError
+from ..output import named_errors
 from .macho import universal
 from .processes import Processes
 
@@ -203,8 +204,9 @@ def _compile(
     """Compile and link ``all.c`` into a stripped shared library."""
     with TemporaryDirectory() as place:
         folder = Path(place)
-        for file, text in sources.items():
-            (folder / file).write_bytes(text)
+        with named_errors(folder):
+            for file, text in sources.items():
+                (folder / file).write_bytes(text)
         library = f"{name}{target.suffix}"
         arguments = [*command, *COMPILE_FLAGS, "-g0", "-s", "-shared", "-I.", "all.c", "-o", library, *target.flags]
         status, complaint = processes.run(arguments, folder)
