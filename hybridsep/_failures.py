@@ -10,7 +10,6 @@ import os
 import sys
 from collections.abc import Callable
 from contextlib import suppress
-from tempfile import gettempdir
 
 from rich.console import Console
 
@@ -54,7 +53,9 @@ def run(app: Callable[[], object]) -> int:
     except HybridSepError as error:
         return _fail(f"{type(error).__name__}: {error}")
     except OSError as error:
-        return _fail(_describe(error))
+        if error.filename is None:  # files name theirs
+            _abandon_stdout()
+        return _fail(f"cannot read or write {error.filename or 'standard output'}: {error.strerror or error}")
     except MemoryError as error:
         return _fail(f"out of memory: {error}; use a smaller Np, p or q, or a shorter log".replace(": ;", ";"))
     except Exception as error:
@@ -79,19 +80,6 @@ def _fail(message: str) -> int:
     errors_console.print("[bold red]error:[/] ", end="")
     errors_console.print(message, markup=False, highlight=False, soft_wrap=True)
     return 2
-
-
-def _describe(error: OSError) -> str:
-    """Name the file that could not be read or written; errors of standard output and temporary files have no name."""
-    reason = error.strerror or str(error)
-    if error.filename is not None:
-        return f"cannot read or write {error.filename}: {reason}"
-    try:
-        sys.stdout.flush()
-    except OSError:
-        _abandon_stdout()
-        return f"cannot write to standard output: {reason}"
-    return f"cannot read or write a temporary file in {gettempdir()}: {reason}"
 
 
 def _abandon_stdout() -> None:

@@ -11,7 +11,7 @@ import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from tempfile import mkdtemp
+from tempfile import gettempdir, mkdtemp
 from types import TracebackType
 from typing import Any
 
@@ -28,6 +28,7 @@ from fmpy.fmi2 import (
 from .errors import FmuError
 from .fmi.pythonfmu_limits import check_unpacked
 from .interrupt import uninterrupted
+from .output import named_errors
 
 __all__ = ["FmuInstance", "read_description"]
 
@@ -121,7 +122,13 @@ class FmuInstance:
     def _instantiate(self, archive: Path, folder: Path, instance_name: str) -> None:
         """Unpack the archive, load its library and make the instance."""
         try:
-            fmpy.extract(str(archive), folder)
+            with named_errors(gettempdir()):
+                fmpy.extract(str(archive), folder)
+        except OSError:  # the disk's, with a name
+            raise
+        except Exception as error:  # fmpy raises bare Exceptions here
+            raise FmuError(f"{self.path.name} cannot be unpacked: {_first_line(error)}") from error
+        try:
             check_unpacked(folder, self.description.generationTool or "")
             with _working_directory():
                 slave = FMU2Slave(

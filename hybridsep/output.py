@@ -17,7 +17,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
-__all__ = ["written_text", "written_whole"]
+__all__ = ["named_errors", "written_text", "written_whole"]
 
 
 @contextmanager
@@ -58,6 +58,17 @@ def written_whole(path: str | Path) -> Iterator[IO[bytes]]:
         if isinstance(error, OSError) and error.filename in (None, str(part)):
             raise OSError(error.errno, error.strerror or str(error), str(path)) from error
         raise
+
+
+@contextmanager
+def named_errors(path: str | Path) -> Iterator[None]:
+    """Give an OSError that has no file name, such as a write on a full disk has none, this one."""
+    try:
+        yield
+    except OSError as error:
+        if error.filename is not None:
+            raise
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from error
 
 
 @contextmanager

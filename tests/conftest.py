@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from command_line import Run
 from hypothesis import HealthCheck, settings
 
 from hybridsep import build_fmu, fmu_names, load_machine, machine_names
@@ -49,3 +50,8 @@ def python_fmu(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path
         return archive if archive.exists() else build_fmu(machines[name], name, folder, "python")
 
     return path
+
+
+@pytest.fixture
+def hybridsep(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
+    return Run(monkeypatch, capsys)

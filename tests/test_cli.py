@@ -3,48 +3,18 @@
 from __future__ import annotations
 
 import json
-import sys
 import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
-from staircase_data import commanded, measured
+from command_line import Run, write_log
+from staircase_data import commanded
 
-from hybridsep import Encoder, __version__, cli, load_machine, run_closed_loop, staircase
+from hybridsep import Encoder, __version__, load_machine, run_closed_loop, staircase
 from hybridsep.parameters import PARAMETERS
 
 EMPS = Path(__file__).resolve().parents[2] / "shared" / "data" / "emps" / "DATA_EMPS.mat"
-
-
-@pytest.fixture
-def hybridsep(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
-    return Run(monkeypatch, capsys)
-
-
-class Run:
-    """Runs ``hybridsep`` with arguments in this process; returns exit status, stdout and stderr."""
-
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-        self.monkeypatch, self.capsys = monkeypatch, capsys
-
-    def __call__(self, *arguments: object) -> tuple[int, str, str]:
-        self.monkeypatch.setattr(sys, "argv", ["hybridsep", *map(str, arguments)])
-        self.monkeypatch.setenv("COLUMNS", "200")
-        status = 0
-        try:
-            cli.main()
-        except SystemExit as stop:
-            status = int(stop.code or 0)
-        out, err = self.capsys.readouterr()
-        return status, out, err
-
-
-def write_log(path: Path, *, n: int = 2500, header: str = "t,x_d,x", scale: float = 1.0) -> Path:
-    t = np.arange(n) * 1e-3
-    columns = np.column_stack((t, commanded()[:n] * scale, measured(0)[:n] * scale))
-    np.savetxt(path, columns, delimiter=",", header=header, comments="", fmt="%.17g")
-    return path
 
 
 def test_backtest_of_a_csv(hybridsep: Run, tmp_path: Path) -> None:

@@ -12,7 +12,8 @@ from typing import Any
 
 import pytest
 
-from hybridsep.demo import demo
+from hybridsep._overwrite import BY_ENDING
+from hybridsep.demo import demo, demo_files
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -53,6 +54,9 @@ def test_demo_writes_all_it_promises(shown: Demonstration) -> None:
         assert (shown.out / f"{name}.png").read_bytes().startswith(PNG)
     for name in CASES:
         assert (shown.out / f"{name}_compensated.csv").read_text().startswith("t,x_d,x_dm,")
+    written = {path for path in shown.out.rglob("*") if path.is_file()}
+    assert written == set(demo_files(shown.out, "python", emps=EMPS.exists()))
+    assert all(BY_ENDING[path.suffix].recognises(path) for path in written)
     assert len(list((shown.out / "fmus").glob("*.fmu"))) == 9
     assert len(list((shown.out / "fmus" / "warm").glob("SepCompensator*.fmu"))) == 3
     assert shown.fractions == sorted(shown.fractions)

@@ -247,8 +247,8 @@ def test_a_mat_that_crashes_scipy_is_an_error(tmp_path: Path, place: int, byte: 
 def test_a_reader_that_crashes_is_told_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write(tmp_path / "log.mat", columns())
     for ending, message in (
-        ("os.kill(os.getpid(), 11)", "the process that read it crashed with SIGSEGV"),
-        ("raise MemoryError('too much')", "the process that read it ended with status 1: MemoryError: too much"),
+        ("os.kill(os.getpid(), 11)", "not a MATLAB file: SciPy crashed on it with SIGSEGV"),
+        ("raise MemoryError('too much')", "the process that reads it ended with status 1: MemoryError: too much"),
     ):
         child = tmp_path / "child.py"
         child.write_text(f"import os\n{ending}\n")

@@ -26,6 +26,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from ..errors import FmuError
+from ..output import named_errors
 from .macho import universal
 from .processes import Processes
 
@@ -229,8 +230,9 @@ def _compile(
     """Compile and link ``all.c`` into a stripped shared library."""
     with TemporaryDirectory() as place:
         folder = Path(place)
-        for file, text in sources.items():
-            (folder / file).write_bytes(text)
+        with named_errors(folder):
+            for file, text in sources.items():
+                (folder / file).write_bytes(text)
         library = f"{name}{target.suffix}"
         flags = [*compile_flags(command), "-g0", "-s", "-shared", "-I."]
         arguments = [*command, *flags, "all.c", "-o", library, *target.flags]

@@ -1,8 +1,9 @@
 """The process that reads a ``.mat`` file for :mod:`hybridsep.logs.mat`: a crash of SciPy's reader ends this one only.
 
 Run as ``python -I _mat_child.py PATHS FILE FOLDER``: PATHS is the parent's ``sys.path`` as JSON. Arrays of numbers go
-to ``FOLDER/<i>.npy``, and a JSON object to standard output: either ``error``, or ``variables``, name → type and, where
-it is an array, dtype, shape and, where it is saved, the number ``i``.
+to ``FOLDER/<i>.npy``, and a JSON object to standard output: ``hdf5``, true for a file of version 7.3; or ``damage``,
+what SciPy says of it; or ``variables``, name → type and, where it is an array, dtype, shape and, where it is saved, the
+number ``i``.
 """
 
 from __future__ import annotations
@@ -22,9 +23,9 @@ def main(paths: str, file: str, folder: str) -> dict[str, Any]:
     try:
         content = io.loadmat(file)
     except NotImplementedError:
-        return {"error": "hdf5"}
+        return {"hdf5": True}
     except Exception as error:  # a damaged file makes SciPy's reader fail in nearly every way there is
-        return {"error": f"{type(error).__name__}: {error}"}
+        return {"damage": f"{type(error).__name__}: {error}"}
     variables: dict[str, dict[str, Any]] = {}
     for i, (name, value) in enumerate(content.items()):
         if name.startswith("__"):

@@ -40,19 +40,20 @@ class MatSource:
         """Return what the child says of each variable, with the array as ``value`` where it holds numbers."""
         command = [sys.executable, "-I", str(_CHILD), json.dumps(sys.path), str(self.path.absolute()), folder]
         done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+        if done.returncode < 0:
+            end = signal.Signals(-done.returncode).name
+            raise LogError(f"{self.path}: is truncated, damaged or not a MATLAB file: SciPy crashed on it with {end}")
         if done.returncode:
-            raise LogError(
-                f"{self.path}: is truncated, damaged or not a MATLAB file: the process that read it "
-                f"{_end(done.returncode, done.stderr)}"
-            )
+            reason = "".join(done.stderr.strip().splitlines()[-1:])
+            raise LogError(f"{self.path}: the process that reads it ended with status {done.returncode}: {reason}")
         answer = json.loads(done.stdout)
-        if answer.get("error") == "hdf5":
+        if "hdf5" in answer:
             raise LogError(
                 f"{self.path}: is a MATLAB v7.3 (HDF5) file; versions up to 7 are read: save it with '-v7' in MATLAB, "
                 f"load('{self.path.name}'); save('{self.path.stem}_v7.mat', '-v7')"
             )
-        if "error" in answer:
-            raise LogError(f"{self.path}: is truncated, damaged or not a MATLAB file: {answer['error']}")
+        if "damage" in answer:
+            raise LogError(f"{self.path}: is truncated, damaged or not a MATLAB file: {answer['damage']}")
         variables: dict[str, Any] = answer["variables"]
         for variable in variables.values():
             if "i" in variable:
@@ -71,11 +72,3 @@ class MatSource:
         check_lengths(self.path, lengths)
         for i in range(0, lengths[names[0]], n):
             yield Block([column[i : i + n] for column in columns], sample_number(i))
-
-
-def _end(code: int, complaint: str) -> str:
-    """Say how a process ended that returned no answer."""
-    if code < 0:
-        return f"crashed with {signal.Signals(-code).name}"
-    last = complaint.strip().splitlines()[-1:]
-    return f"ended with status {code}{': ' if last else ''}{''.join(last)}"

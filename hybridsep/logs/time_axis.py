@@ -50,6 +50,10 @@ class TimeAxis:
         LogError
             If a time does not follow the one before it by the median interval.
         """
+        with np.errstate(over="ignore", invalid="ignore"):  # what overflows is no interval, which is said at the end
+            self._extend(block)
+
+    def _extend(self, block: Block) -> None:
         t = block.columns[0]
         if self._n == 0:
             self._first = self._last = float(t[0])
