@@ -18,8 +18,11 @@ from .signals import Array, as_samples
 
 __all__ = ["input_shaper", "shape", "zero_phase_command"]
 
-_RINGING = 0.99
-"""Magnitude from which on a zero is not inverted: its inverse would ring for seconds or diverge."""
+_RINGING = 0.999
+"""Magnitude from which on a zero is not inverted: its inverse would ring for a thousand samples or diverge.
+
+Modes in antiphase have zeros at 0.99 … 0.998 on the paper's stage; left in ``B⁻`` they would make ``B⁻(1)²`` nearly 0.
+"""
 
 
 def input_shaper(model: ModalModel, Ts: float, kind: str = "zv") -> Array:

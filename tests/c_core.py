@@ -12,6 +12,7 @@ import sys
 import tempfile
 import zlib
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -27,6 +28,7 @@ from hybridsep.fmi.c_header import c_header
 from hybridsep.fmi.variables import INTERPOLATED, variables_of
 from hybridsep.limits import Limits
 from hybridsep.lookahead import LookAhead
+from hybridsep.machine import load_machine
 from hybridsep.physics import ModalModel, Mode
 from hybridsep.predictor import HybridPredictor
 from hybridsep.sep_lookahead import SepLookAhead
@@ -50,13 +52,11 @@ SPRING_MASS_DAMPER = {"f_n": np.sqrt(24674.0) / (2 * np.pi), "zeta": 15.7 / (2 *
 }
 """The staircase drive's linear part, as one mode of eq. (15)."""
 
-STAGE_MODES = [
-    {"f_n": 37.0, "zeta": 0.01, "alpha": 102687.3, "beta": 8.83},
-    {"f_n": 98.0, "zeta": 0.05, "alpha": -341235.7, "beta": 0.0},
-]
+STAGE_MODES = [asdict(mode) for mode in load_machine("als25010_x").model.modes]
+"""The stage's X axis, Table 1."""
 PREDICTOR = {"Np": 100, "p": 50, "q": 3, "lambda": 1e-12, "T_s": 1e-3, "t_init": 0.3, "input_hold": 0, "dead_time": 0}
 FEED_DRIVE = {"m": 1.0, "c": 15.7, "k": 24674.0, "c_nl": 100.0, "k_nl": 1000.0, "noise_std": 5e-6, "seed": 0}
-STAGE_DRIVE = {"f": 1.4e-5, "kappa": 0.021, "T_s": 1e-3, "noise_std": 1e-6, "seed": 7}
+STAGE_DRIVE = {"f": 1.4211e-5, "kappa": 0.0213165, "T_s": 1e-3, "noise_std": 1e-6, "seed": 7}
 
 COMPENSATOR = {
     **PREDICTOR,

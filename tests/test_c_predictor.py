@@ -58,7 +58,7 @@ def test_the_staircase_is_predicted_as_by_the_library(p: int, q: int, start: flo
     ],
 )
 def test_other_parameters_are_predicted_as_by_the_library(parameters: dict[str, float]) -> None:
-    # 1e-11 m at every sample, of a stage with two modes.
+    # 1e-11 m at every sample, of the stage's X axis.
     n = 1500
     ahead, model = look_ahead("predictor_2", **parameters)
     compare_runs(ahead, model, staircase.commanded()[:n], staircase.measured(1)[:n], 1e-11)

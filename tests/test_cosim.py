@@ -39,13 +39,14 @@ def test_staircase_error_reduction(pair: tuple[Path, Path]) -> None:
     assert mean["servo_error_rms_um"] == pytest.approx(88.5, abs=0.1)
 
 
-@pytest.mark.parametrize(("axis", "printed", "tolerance"), [("x", 22.0, 0.1), ("y", 130.2, 0.5)])
-def test_spiral_error_reduction(python_fmu: Fmu, axis: str, printed: float, tolerance: float) -> None:
+@pytest.mark.parametrize(("axis", "printed", "tolerance", "most"), [("x", 22.0, 0.1, 13.3), ("y", 130.2, 0.5, 98.5)])
+def test_spiral_error_reduction(python_fmu: Fmu, axis: str, printed: float, tolerance: float, most: float) -> None:
+    """Printed: X 22 → 13.7 µm, 38 %; Y 130.2 → 94.5 µm, 27 %; with Table 1 and friction scaled to the first figures."""
     r = dict(zip("xy", spiral(), strict=True))[axis]
     fmus = python_fmu(f"HybridPredictorPy_als25010_{axis}"), python_fmu(f"FeedDrivePy_als25010_{axis}")
     both = cosimulate(*fmus, r).summary()
     assert both["rms_pb_um"] == pytest.approx(printed, abs=tolerance)
-    assert both["rms_h_um"] < 0.8 * both["rms_pb_um"]
+    assert 0.9 * most < both["rms_h_um"] <= most
     # What one cause alone leaves to learn: the cable's stiffness is smooth, the friction jumps.
     friction = cosimulate(*fmus, r, plant_values={"kappa": 0.0}).summary()
     stiffness = cosimulate(*fmus, r, plant_values={"f": 0.0}).summary()

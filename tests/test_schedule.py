@@ -275,10 +275,10 @@ def test_elsewhere_on_the_axis_the_features_are_the_same() -> None:
         there.update(x[k : k + 20] + 0.25)
 
 
-@pytest.mark.parametrize(("v_s", "most"), [(1e-3, 75.0), (V_S, 72.0), (5e-3, 83.0)])
+@pytest.mark.parametrize(("v_s", "most"), [(1e-3, 63.0), (V_S, 60.0), (5e-3, 69.0)])
 def test_friction_is_predicted_better(v_s: float, most: float) -> None:
     """The stage's Y axis over the spiral: RMS against the measured position, µm; its own friction has 2 mm/s."""
-    assert 98.0 < stage_y_prediction_error(0.0) < 101.0
+    assert 97.0 < stage_y_prediction_error(0.0) < 98.5
     assert stage_y_prediction_error(v_s) < most
 
 

@@ -1,6 +1,6 @@
 """What compensation is worth: tracking errors in closed loop, with and without it, beside what users have today.
 
-    python benchmarks/compensation/run.py [--seeds 5] [--fmu native|python|none]
+    python benchmarks/compensation/run.py [--seeds 5] [--first-seed 0] [--fmu native|python|none]
 
 SepCompensator FMU against FeedDrive FMU, or with ``--fmu none`` the library's compensator and plant with the same
 timing. Tracking RMS of the true position in µm, mean over the seeds; a warm run is the second one, with the weights
@@ -50,6 +50,9 @@ STAGE_KINDS = (
     *("none", "physics", "physics, keep_direction"),
     *(f"{name} {run}" for name in STAGE_HYBRIDS for run in ("cold", "warm")),
 )
+
+OTHER_V_S = (1e-3, 5e-3)
+"""m/s; how well the friction must be known."""
 
 FMU_BACKEND = "native"
 """Flavour of the FMUs if none is asked for."""
@@ -158,6 +161,10 @@ def stage_rows(report: Report, loops: Loops, seeds: range) -> None:
             share = float(np.sum(errors[:, near] ** 2) / np.sum(errors**2))
             note = f"{share:.0%} of the mean square is within 0.1 s of a reversal, {np.mean(near):.0%} of the time"
             report.line(f"   {name}, away from reversals", outside, note=note)
+        for v_s in OTHER_V_S:
+            used = with_settings(machines[axis], v_s=v_s)
+            warm = mean_rms([LibraryLoops().run(used, r, SepState.HYBRID, s, 2)[1] for s in seeds])
+            report.line(f"   v_s = {1e3 * v_s:g} mm/s, the friction's is 2: hybrid warm", warm, note="library")
         for name, used in (("", machines[axis]), (", keep_direction = 0", as_published(machines[axis]))):
             warm = mean_rms([runs_with_path_friction(used, r, s)[1] for s in seeds])
             report.line(f"   if friction followed the path: hybrid warm{name}", warm, note="library")
@@ -228,8 +235,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=5, help="noise seeds to average over")
     parser.add_argument("--fmu", choices=("native", "python", "none"), default=FMU_BACKEND, help="flavour of the FMUs")
+    parser.add_argument("--first-seed", type=int, default=0, help="the first of them")
     options = parser.parse_args()
-    seeds, report = range(options.seeds), Report()
+    seeds, report = range(options.first_seed, options.first_seed + options.seeds), Report()
     with ExitStack() as stack:
         if options.fmu == "none":
             loops: Loops = LibraryLoops()
