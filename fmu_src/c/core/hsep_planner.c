@@ -257,7 +257,7 @@ static void planner_bound(hsep_planner *self, double cost)
         v[j - first] = v[j];
         x[j - first] = rest[j];
     }
-    hsep_interior_begin(interior, splines, first, cost);
+    hsep_interior_begin(interior, splines, planner_at(self, self->P), first, cost);
 }
 
 hsep_plan_status hsep_planner_begin(
