@@ -16,7 +16,7 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from .signals import Array
 
-__all__ = ["STEPS_MAX", "minimise"]
+__all__ = ["PRIMAL_RESIDUAL", "STEPS_MAX", "minimise"]
 
 STEPS_MAX = 24
 """Steps at most; 8 to 15 are usual, 24 were the most of 4 500 plans with random parameters."""
@@ -24,8 +24,8 @@ STEPS_MAX = 24
 _GAP = 1e-13
 """Complementarity μ at the end, as a share of the cost for each bound."""
 
-_PRIMAL = 1e-10
-"""Primal residual at the end, in the bounds' unit."""
+PRIMAL_RESIDUAL = 1e-10
+"""Primal residual at the end, in the bounds' unit: a bound is exceeded by no more."""
 
 _DUAL = 1e-9
 """Dual residual at the end, as a share of the largest of its terms; rounding leaves up to 1e-9 of it."""
@@ -78,7 +78,7 @@ def minimise(P: Array, v: Array, rows: Array, low: Array, high: Array, start: Ar
         Px, Bz = P @ x, B.T @ z
         dual = v - Px + Bz
         largest = max(float(np.max(np.abs(term))) for term in (v, Px, Bz))
-        if mu < _GAP * share and np.max(np.abs(primal)) < _PRIMAL and np.max(np.abs(dual)) < _DUAL * largest:
+        if mu < _GAP * share and np.max(np.abs(primal)) < PRIMAL_RESIDUAL and np.max(np.abs(dual)) < _DUAL * largest:
             break
         # Newton: P dx − Bᵀ dz = dual,  ds = B dx + primal + ρ dz,  z ds + s dz = wanted
         inverse = 1.0 / (s + rho * z)

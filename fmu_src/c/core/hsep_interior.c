@@ -6,7 +6,6 @@
 #include <string.h>
 
 static const double interior_gap = 1e-13;            /* complementarity mu at the end, as a share of the cost */
-static const double interior_primal = 1e-10;         /* primal residual at the end, in shares of a bound */
 static const double interior_dual = 1e-9;            /* dual residual at the end, as a share of its largest term */
 static const double interior_first_slack = 0.3;      /* least distance from a bound to begin with */
 static const double interior_first_gap = 10.0;       /* mu to begin with, as a share of the cost */
@@ -330,7 +329,7 @@ int hsep_interior_step(hsep_interior *self, const hsep_splines *splines, const d
     const double mu = interior_measure(&a, ranges, self->sides, &primal);
     const double dual = interior_dual_residual(&a, splines, self->first, P);
     if (self->steps == HSEP_INTERIOR_STEPS ||
-        (mu < interior_gap * self->cost && primal < interior_primal && dual < interior_dual)) {
+        (mu < interior_gap * self->cost && primal < HSEP_INTERIOR_PRIMAL && dual < interior_dual)) {
         return 1;
     }
     self->steps++;
