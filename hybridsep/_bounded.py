@@ -20,7 +20,7 @@ from .signals import Array
 __all__ = ["Bounds", "DriveBounds", "solve"]
 
 _ROUNDING = 1e-9
-"""Share of a limit that is kept free, for rounding and for the primal residuals of plans that follow each other."""
+"""Share of a limit that is taken for rounding."""
 
 _MOVES = 1e-12
 """Step of the commanded position, m a sample, that counts as a move."""
@@ -49,9 +49,9 @@ class Bounds:
     def step(self, rest: Array, c: Array) -> float:
         """Return the largest share, 0 … 1, of the way from ``rest``, which keeps the bounds, to ``c``."""
         here, way = self.rows @ rest, self.rows @ (c - rest)
-        room = np.maximum(np.where(way > 0, self.high - here, here - self.low), 0.0)
-        beyond = np.abs(way) > room + PRIMAL_RESIDUAL
-        return float(np.min((room[beyond] + PRIMAL_RESIDUAL) / np.abs(way[beyond]), initial=1.0))
+        room = np.maximum(np.where(way > 0, self.high - here, here - self.low), 0.0) + PRIMAL_RESIDUAL
+        beyond = np.abs(way) > np.maximum(room, _ROUNDING)
+        return float(np.min(room[beyond] / np.abs(way[beyond]), initial=1.0))
 
 
 class DriveBounds:

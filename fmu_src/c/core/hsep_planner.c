@@ -9,7 +9,7 @@
 #define PLANNER_PINNED 8 /* samples at the beginning of a window in which a bounded plan follows the last one */
 
 static const double planner_ridge = 1e-12;   /* on the diagonal, relative to its largest entry */
-static const double planner_rounding = 1e-9; /* share of a limit that is kept free, for rounding and primal residuals */
+static const double planner_rounding = 1e-9; /* share of a limit that is taken for rounding */
 static const double planner_moves = 1e-12;   /* m a sample, step of x_d that counts as a move */
 
 static const uint64_t planner_first = sizeof(hsep_planner) / sizeof(double);
@@ -200,11 +200,14 @@ static double planner_share(const hsep_planner *self, const double way[])
     const uint64_t rows = HSEP_ORDERS * planner_splines(self)->preview;
     double share = 1.0;
     for (uint64_t r = 0; r < rows; r++) {
-        double least, most;
-        planner_range(self, r, &least, &most);
-        const double room = (way[r] > 0.0 ? most - total[r] : total[r] - least) + HSEP_INTERIOR_PRIMAL;
-        if (room < share * fabs(way[r])) {
-            share = room / fabs(way[r]);
+        const double to = fabs(way[r]);
+        if (to > planner_rounding) {
+            double least, most;
+            planner_range(self, r, &least, &most);
+            const double room = (way[r] > 0.0 ? most - total[r] : total[r] - least) + HSEP_INTERIOR_PRIMAL;
+            if (room < share * to) {
+                share = room / to;
+            }
         }
     }
     return share;
