@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
-from ._interior import minimise
+from ._interior import PRIMAL_RESIDUAL, minimise
 from ._splines import N_DECIDED, PlanCost, SplineBasis
 from .limits import Limits
 from .signals import Array
@@ -49,9 +49,9 @@ class Bounds:
     def step(self, rest: Array, c: Array) -> float:
         """Return the largest share, 0 … 1, of the way from ``rest``, which keeps the bounds, to ``c``."""
         here, way = self.rows @ rest, self.rows @ (c - rest)
-        room = np.where(way > 0, self.high - here, here - self.low)
-        moving = np.abs(way) > _ROUNDING
-        return float(min(1.0, np.min(np.maximum(room[moving], 0.0) / np.abs(way[moving]), initial=1.0)))
+        room = np.maximum(np.where(way > 0, self.high - here, here - self.low), 0.0) + PRIMAL_RESIDUAL
+        beyond = np.abs(way) > np.maximum(room, _ROUNDING)
+        return float(np.min(room[beyond] / np.abs(way[beyond]), initial=1.0))
 
 
 class DriveBounds:

@@ -1,9 +1,12 @@
-"""A bounded quadratic programme by an interior-point method with a bounded number of steps.
+"""Interior-point solver for a bounded quadratic programme, with a bounded number of steps.
 
 ``min ½ xᵀPx − vᵀx`` subject to ``low ≤ A x ≤ high``, by Mehrotra's predictor-corrector method (S. Mehrotra, SIAM J.
-Optim. 2 (1992); J. Nocedal and S. J. Wright, *Numerical Optimization*, 2nd ed., section 16.6): every iterate stays
-inside the bounds it has reached once, so that what is found after any number of steps keeps them, and the number of
-steps hardly grows with the number of active bounds. The C core has the same method, spread over samples.
+Optim. 2 (1992); J. Nocedal and S. J. Wright, *Numerical Optimization*, 2nd ed., section 16.6) with a proximal
+regularisation of the multipliers (M. P. Friedlander and D. Orban, Math. Prog. Comp. 4 (2012)). The number of steps
+hardly grows with the number of active bounds. The C core has the same method, spread over samples.
+
+A plan is the start of the next one, so the minimum is found to nearly all its digits: it depends on the problem a
+thousand times less steeply than an iterate on the way to it, and so do two implementations' roundings.
 """
 
 from __future__ import annotations
@@ -13,22 +16,31 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from .signals import Array
 
-__all__ = ["STEPS_MAX", "minimise"]
+__all__ = ["PRIMAL_RESIDUAL", "STEPS_MAX", "minimise"]
 
 STEPS_MAX = 24
-"""Steps at most; 4 to 10 are usual, 23 were the most in any run where the limits are those of the trajectory."""
+"""Steps at most; 8 to 15 are usual, 24 were the most of 4 500 plans with random parameters."""
 
-_TOLERANCE = 1e-5
-"""Complementarity at the end, as a share of the cost at the beginning."""
+_GAP = 1e-13
+"""Complementarity μ at the end, as a share of the cost for each bound."""
 
-_OUTSIDE = 1e-9
-"""Distance from the bounds, in their unit, that is taken for none."""
+PRIMAL_RESIDUAL = 5e-13
+"""Primal residual at the end, in the bounds' unit: a bound is exceeded by no more."""
 
-_FIRST_SLACK = 1e-2
-"""Least distance from a bound to begin with, in the bounds' unit."""
+_DUAL = 1e-9
+"""Dual residual at the end, as a share of the largest of its terms; rounding leaves up to 1e-9 of it."""
+
+_FIRST_SLACK = 0.3
+"""Least distance from a bound to begin with, in the bounds' unit: with 0.01 there are half as many steps more."""
+
+_FIRST_GAP = 10.0
+"""Complementarity μ to begin with, likewise as a share: with 1 some plans take 30 steps."""
+
+_REGULARISATION = 3e-15
+"""Proximal term of the multipliers, relative to rows and P: with less the factor fails, with more steps are lost."""
 
 _STEP = 0.995
-"""Share of the way to the nearest bound that a step goes."""
+"""Share τ of the way to the nearest bound that a step goes."""
 
 
 def minimise(P: Array, v: Array, rows: Array, low: Array, high: Array, start: Array, cost: float) -> Array:
@@ -57,32 +69,37 @@ def minimise(P: Array, v: Array, rows: Array, low: Array, high: Array, start: Ar
     B, b = np.concatenate((rows, -rows)), np.concatenate((low, -high))
     x, m = start.copy(), len(rows)
     s = np.maximum(B @ x - b, _FIRST_SLACK)
-    first = cost / len(s)
-    z = first / s
+    share = cost / len(s)
+    z = _FIRST_GAP * share / s
+    rho = _REGULARISATION * float(np.max(np.sum(rows**2, axis=0)) / np.max(np.diag(P)))
     for _ in range(STEPS_MAX):
-        outside = B @ x - b - s
-        mean = float(s @ z) / len(s)
-        if mean < _TOLERANCE * first and np.max(np.abs(outside)) < _OUTSIDE:
+        mu = float(s @ z) / len(s)
+        primal = B @ x - b - s
+        curvature, force = P @ x, B.T @ z
+        dual = v - curvature + force
+        largest = max(float(np.max(np.abs(term))) for term in (v, curvature, force))
+        if mu < _GAP * share and np.max(np.abs(primal)) < PRIMAL_RESIDUAL and np.max(np.abs(dual)) < _DUAL * largest:
             break
-        weight = z / s
+        # Newton: P dx − Bᵀ dz = dual,  ds = B dx + primal + ρ dz,  z ds + s dz = wanted
+        inverse = 1.0 / (s + rho * z)
+        weight = z * inverse
         try:
             factor = cho_factor(P + rows.T @ ((weight[:m] + weight[m:])[:, None] * rows))
         except (LinAlgError, ValueError):
             break
-        # Newton: P dx − Bᵀ dz = v − P x + Bᵀ z,  ds = B dx + outside,  z ds + s dz = wanted
-        force = v - P @ x + B.T @ (z - weight * outside)
-        wanted = -s * z  # predictor: as if s z = 0 could be reached at once
-        dx = cho_solve(factor, force + B.T @ (wanted / s))
-        ds = B @ dx + outside
-        dz = (wanted - z * ds) / s
+
+        def direction(wanted: Array) -> tuple[Array, Array, Array]:
+            dx = np.asarray(cho_solve(factor, dual + B.T @ ((wanted - z * primal) * inverse)))  # noqa: B023
+            off = B @ dx + primal  # noqa: B023
+            dz = (wanted - z * off) * inverse  # noqa: B023
+            return dx, off + rho * dz, dz
+
+        _, ds, dz = direction(-s * z)  # predictor: as if s z = 0 could be reached at once
         reached = float((s + _room(s, ds) * ds) @ (z + _room(z, dz) * dz)) / len(s)
-        centre = max(mean * (reached / mean) ** 3, 0.1 * _TOLERANCE * first)
-        wanted = centre - s * z - ds * dz  # corrector: towards the centre, with the predictor's curvature
-        dx = cho_solve(factor, force + B.T @ (wanted / s))
-        ds = B @ dx + outside
-        dz = (wanted - z * ds) / s
-        primal, dual = (1.0 if room >= 1.0 else _STEP * room for room in (_room(s, ds), _room(z, dz)))
-        x, s, z = x + primal * dx, s + primal * ds, z + dual * dz
+        centre = max(mu * (reached / mu) ** 3, 0.1 * _GAP * share)  # σ μ
+        dx, ds, dz = direction(centre - s * z - ds * dz)  # corrector: to the centre, with the predictor's curvature
+        along_s, along_z = (1.0 if room >= 1.0 else _STEP * room for room in (_room(s, ds), _room(z, dz)))
+        x, s, z = x + along_s * dx, s + along_s * ds, z + along_z * dz
     return np.asarray(x)
 
 

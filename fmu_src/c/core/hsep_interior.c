@@ -5,21 +5,24 @@
 #include <math.h>
 #include <string.h>
 
-static const double interior_tolerance = 1e-5;   /* complementarity at the end, as a share of that at the beginning */
-static const double interior_outside = 1e-9;     /* distance from a bound that is taken for none, in shares */
-static const double interior_first_slack = 1e-2; /* least distance from a bound to begin with */
-static const double interior_way = 0.995;        /* share of the way to the nearest bound that a step goes */
+static const double interior_gap = 1e-13;            /* complementarity mu at the end, as a share of the cost */
+static const double interior_dual = 1e-9;            /* dual residual at the end, as a share of its largest term */
+static const double interior_first_slack = 0.3;      /* least distance from a bound to begin with */
+static const double interior_first_gap = 10.0;       /* mu to begin with, as a share of the cost */
+static const double interior_regularisation = 3e-15; /* proximal term of z, relative to rows and P */
+static const double interior_way = 0.995;            /* share tau of the way to the nearest bound that a step goes */
 
 /* One side of the bounds, B x >= b: slack s = B x - b, multiplier z, both > 0. */
 typedef struct {
     double *s, *z;
-    double *inverse; /* 1 / s */
-    double *aim;     /* z ds + s dz of the step, divided by s */
+    double *inverse; /* 1 / (s + rho z) */
+    double *aim;     /* z ds + s dz of the step, times inverse */
 } interior_side;
 
 /* The arrays behind the struct. */
 typedef struct {
     uint64_t n; /* entries of x */
+    double rho;
     double *x, *v, *force, *dx;
     double *bound[2];          /* low and high */
     double *values, *along;    /* A x and A dx */
@@ -40,6 +43,7 @@ static interior_arrays interior_open(hsep_interior *self, const hsep_splines *sp
     interior_arrays a;
     double *at = (double *)(self + 1);
     a.n = n - self->first;
+    a.rho = self->rho;
     a.x = at, at += n;
     a.v = at, at += n;
     a.force = at, at += n;
@@ -98,7 +102,25 @@ static void interior_ranges(const hsep_splines *splines, uint64_t first, interio
     }
 }
 
-HSEP_API void hsep_interior_begin(hsep_interior *self, const hsep_splines *splines, uint64_t first, double cost)
+/* The rows of P, a triangle, from the first one asked for. */
+static const double *interior_asked(const hsep_interior *self, const hsep_splines *splines, const double P[])
+{
+    return P + (self->first * splines->n - self->first * (self->first - 1) / 2);
+}
+
+/* The regularisation of the multipliers: A' W A stays below P / interior_regularisation. */
+static double interior_proximal(const hsep_splines *splines, const double *P, uint64_t n)
+{
+    double largest = 0.0;
+    for (uint64_t i = 0; i < n; i++) {
+        largest = fmax(largest, P[0]);
+        P += n - i;
+    }
+    return interior_regularisation * hsep_splines_energy(splines) / largest;
+}
+
+HSEP_API void hsep_interior_begin(
+    hsep_interior *self, const hsep_splines *splines, const double P[], uint64_t first, double cost)
 {
     self->first = first;
     self->steps = 0;
@@ -106,6 +128,7 @@ HSEP_API void hsep_interior_begin(hsep_interior *self, const hsep_splines *splin
     interior_arrays a = interior_open(self, splines);
     interior_range ranges[HSEP_ORDERS];
     interior_ranges(splines, first, ranges);
+    self->rho = interior_proximal(splines, interior_asked(self, splines, P), a.n);
     hsep_splines_rows(splines, a.x, first, a.values);
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         self->sides += 2.0 * (double)(ranges[order].end - ranges[order].begin);
@@ -116,8 +139,8 @@ HSEP_API void hsep_interior_begin(hsep_interior *self, const hsep_splines *splin
             for (int i = 0; i < 2; i++) {
                 interior_side *side = &a.side[i];
                 side->s[r] = fmax(interior_distance(i, a.values[r], a.bound[i][r]), interior_first_slack);
-                side->inverse[r] = 1.0 / side->s[r];
-                side->z[r] = self->cost * side->inverse[r];
+                side->z[r] = interior_first_gap * self->cost / side->s[r];
+                side->inverse[r] = 1.0 / (side->s[r] + self->rho * side->z[r]);
             }
         }
     }
@@ -137,6 +160,23 @@ static void interior_force(const interior_arrays *a, const double *P)
         a->force[i] -= sum;
         P += a->n - i;
     }
+}
+
+/* force := the dual residual v - P x + B' z, B' z's rows being in rows; return its largest entry as a share of the
+ * largest one of its terms. */
+static double interior_dual_residual(
+    const interior_arrays *a, const hsep_splines *splines, uint64_t first, const double *P)
+{
+    double residual = 0.0, largest = 0.0;
+    interior_force(a, P);
+    memset(a->dx, 0, (size_t)a->n * sizeof(double));
+    hsep_splines_transpose(splines, a->rows, first, a->dx);
+    for (uint64_t j = 0; j < a->n; j++) {
+        largest = fmax(fmax(largest, fabs(a->v[j])), fmax(fabs(a->v[j] - a->force[j]), fabs(a->dx[j])));
+        a->force[j] += a->dx[j];
+        residual = fmax(residual, fabs(a->force[j]));
+    }
+    return residual / largest;
 }
 
 /* dx := (P + A' W A)^-1 (force + A' rows), and what it does to the rows. */
@@ -160,17 +200,17 @@ static inline void interior_limit(double *room, double value, double change)
     }
 }
 
-/* ds = B dx + what B x - b - s is off, dz = aim - z ds / s. */
-static inline void interior_change(
-    const interior_arrays *a, int i, uint64_t r, double *ds, double *dz)
+/* off = the primal residual B x - b - s, ds = B dx + off + rho dz, dz = aim - z (B dx + off) / (s + rho z). */
+static inline void interior_change(const interior_arrays *a, int i, uint64_t r, double *ds, double *dz)
 {
     const interior_side *side = &a->side[i];
     const double off = interior_distance(i, a->values[r], a->bound[i][r]) - side->s[r];
-    *ds = (i == 0 ? a->along[r] : -a->along[r]) + off;
-    *dz = side->aim[r] - side->z[r] * side->inverse[r] * *ds;
+    const double to = (i == 0 ? a->along[r] : -a->along[r]) + off;
+    *dz = side->aim[r] - side->z[r] * side->inverse[r] * to;
+    *ds = to + a->rho * *dz;
 }
 
-/* rows := B' sides of (aim + z - z off / s), the part of the right-hand side that the bounds make. */
+/* rows := B' sides of aim - z off / (s + rho z), what the bounds add to the dual residual on the right-hand side. */
 static void interior_push(const interior_arrays *a, const interior_range ranges[HSEP_ORDERS])
 {
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
@@ -179,7 +219,7 @@ static void interior_push(const interior_arrays *a, const interior_range ranges[
             for (int i = 0; i < 2; i++) {
                 const interior_side *side = &a->side[i];
                 const double off = interior_distance(i, a->values[r], a->bound[i][r]) - side->s[r];
-                push[i] = side->aim[r] + side->z[r] - side->z[r] * side->inverse[r] * off;
+                push[i] = side->aim[r] - side->z[r] * side->inverse[r] * off;
             }
             a->rows[r] = push[0] - push[1];
         }
@@ -202,13 +242,13 @@ static interior_room interior_rooms(const interior_arrays *a, const interior_ran
     return room;
 }
 
-/* The values of x, the mean of s z, the largest distance of B x - b from s; the weights of A' W A go to along, and the
- * predictor's aim is set, as if s z = 0 could be reached at once. */
+/* mu, the mean of s z, and the largest primal residual; the weights of A' W A go to along, z's difference of the sides
+ * to rows, and the predictor's aim is set, as if s z = 0 could be reached at once. */
 static double interior_measure(
-    const interior_arrays *a, const interior_range ranges[HSEP_ORDERS], double sides, double *outside)
+    const interior_arrays *a, const interior_range ranges[HSEP_ORDERS], double sides, double *primal)
 {
     double sum = 0.0;
-    *outside = 0.0;
+    *primal = 0.0;
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         for (uint64_t r = ranges[order].begin; r < ranges[order].end; r++) {
             double weight = 0.0;
@@ -216,11 +256,12 @@ static double interior_measure(
                 const interior_side *side = &a->side[i];
                 const double off = interior_distance(i, a->values[r], a->bound[i][r]) - side->s[r];
                 sum += side->s[r] * side->z[r];
-                *outside = fmax(*outside, fabs(off));
+                *primal = fmax(*primal, fabs(off));
                 weight += side->z[r] * side->inverse[r];
-                side->aim[r] = -side->z[r];
+                side->aim[r] = -side->s[r] * side->z[r] * side->inverse[r];
             }
             a->along[r] = weight;
+            a->rows[r] = a->side[0].z[r] - a->side[1].z[r];
         }
     }
     return sum / sides;
@@ -253,7 +294,7 @@ static void interior_correct(const interior_arrays *a, const interior_range rang
                 const interior_side *side = &a->side[i];
                 double ds, dz;
                 interior_change(a, i, r, &ds, &dz);
-                side->aim[r] = (centre - ds * dz) * side->inverse[r] - side->z[r];
+                side->aim[r] = (centre - side->s[r] * side->z[r] - ds * dz) * side->inverse[r];
             }
         }
     }
@@ -273,7 +314,7 @@ static void interior_move(const interior_arrays *a, const interior_range ranges[
                 interior_change(a, i, r, &ds, &dz);
                 side->s[r] += primal * ds;
                 side->z[r] += dual * dz;
-                side->inverse[r] = 1.0 / side->s[r];
+                side->inverse[r] = 1.0 / (side->s[r] + a->rho * side->z[r]);
             }
         }
     }
@@ -287,13 +328,14 @@ HSEP_API int hsep_interior_step(hsep_interior *self, const hsep_splines *splines
     const interior_arrays a = interior_open(self, splines);
     interior_range ranges[HSEP_ORDERS];
     interior_ranges(splines, self->first, ranges);
-    P += self->first * splines->n - self->first * (self->first - 1) / 2; /* rows 0 ... first - 1 are left out */
+    P = interior_asked(self, splines, P);
 
-    double outside;
+    double primal;
     hsep_splines_rows(splines, a.x, self->first, a.values);
-    const double mean = interior_measure(&a, ranges, self->sides, &outside);
+    const double mu = interior_measure(&a, ranges, self->sides, &primal);
+    const double dual = interior_dual_residual(&a, splines, self->first, P);
     if (self->steps == HSEP_INTERIOR_STEPS ||
-        (mean < interior_tolerance * self->cost && outside < interior_outside)) {
+        (mu < interior_gap * self->cost && primal < HSEP_INTERIOR_PRIMAL && dual < interior_dual)) {
         return 1;
     }
     self->steps++;
@@ -302,12 +344,11 @@ HSEP_API int hsep_interior_step(hsep_interior *self, const hsep_splines *splines
     if (!hsep_cholesky_factor(a.triangle, a.n)) {
         return 1;
     }
-    /* Newton: P dx - B' dz = v - P x + B' z,  ds = B dx + off,  z ds + s dz = s aim */
-    interior_force(&a, P);
+    /* Newton: P dx - B' dz = dual residual,  ds = B dx + off + rho dz,  z ds + s dz = aim (s + rho z) */
     interior_push(&a, ranges);
     interior_direction(&a, splines, self->first);
-    const double share = interior_reached(&a, ranges, self->sides) / mean;
-    interior_correct(&a, ranges, fmax(mean * share * share * share, 0.1 * interior_tolerance * self->cost));
+    const double share = interior_reached(&a, ranges, self->sides) / mu;
+    interior_correct(&a, ranges, fmax(mu * share * share * share, 0.1 * interior_gap * self->cost));
     interior_push(&a, ranges);
     interior_direction(&a, splines, self->first);
     interior_move(&a, ranges);

@@ -210,7 +210,7 @@ static double planner_share(const hsep_planner *self, const double way[])
         if (to > planner_rounding) {
             double least, most;
             planner_range(self, r, &least, &most);
-            const double room = way[r] > 0.0 ? most - total[r] : total[r] - least;
+            const double room = (way[r] > 0.0 ? most - total[r] : total[r] - least) + HSEP_INTERIOR_PRIMAL;
             if (room < share * to) {
                 share = room / to;
             }
@@ -263,7 +263,7 @@ static void planner_bound(hsep_planner *self, double cost)
         v[j - first] = v[j];
         x[j - first] = rest[j];
     }
-    hsep_interior_begin(interior, splines, first, cost);
+    hsep_interior_begin(interior, splines, planner_at(self, self->P), first, cost);
 }
 
 HSEP_API hsep_plan_status hsep_planner_begin(

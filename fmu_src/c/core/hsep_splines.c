@@ -138,6 +138,16 @@ HSEP_API void hsep_splines_gram(const hsep_splines *self, const double weights[]
     }
 }
 
+double hsep_splines_energy(const hsep_splines *self)
+{
+    double sum = 0.0;
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        const double *e = splines_differences(self, order);
+        sum += hsep_dot(e, e, splines_length(self, order));
+    }
+    return sum;
+}
+
 /* Entry (i, j), i <= j, of a triangle of n rows. */
 static double *splines_entry(double triangle[], uint64_t n, uint64_t i, uint64_t j)
 {
