@@ -138,7 +138,7 @@ HSEP_API void hsep_splines_gram(const hsep_splines *self, const double weights[]
     }
 }
 
-double hsep_splines_energy(const hsep_splines *self)
+HSEP_API double hsep_splines_energy(const hsep_splines *self)
 {
     double sum = 0.0;
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {

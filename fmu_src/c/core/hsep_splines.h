@@ -50,7 +50,7 @@ HSEP_API void hsep_splines_transpose(const hsep_splines *self, const double rows
 HSEP_API void hsep_splines_gram(const hsep_splines *self, const double weights[], uint64_t first, double triangle[]);
 
 /* The sum of squares of a spline's rows: the largest entry on the diagonal of A' A. */
-double hsep_splines_energy(const hsep_splines *self);
+HSEP_API double hsep_splines_energy(const hsep_splines *self);
 
 /* The triangle of n rows := W' W of the splines behind a filter, W's columns being shifts of the filtered spline,
  * (preview,), by one spacing. Each diagonal is a running sum: cost n preview / 2 multiply-adds. */
