@@ -58,7 +58,7 @@ def main() -> None:
     ):
         e_pb = residual(force, x_d)
         measured, true = (1e6 * float(np.sqrt(np.mean(e**2))) for e in (e_pb + noise, e_pb))
-        print(f"  {name:<52}{measured:9.2f}{true:9.2f}")
+        print(f"  {name:<52}{measured:9.2f}{true:10.3f}")
     machine = load_machine("spring_mass_damper")
     discrete = machine.model.discretise(machine.T_s)
     x = discrete.respond(discrete.rest(), x_d)[0] + residual(in_mm(eq_12), x_d) + noise
