@@ -28,14 +28,15 @@ from hybridsep.trajectory import staircase
 
 COMMANDS = {
     "demo": ["demo", "--seeds", "1", "--out", "."],
-    "build": ["build", "-m", "spring_mass_damper", "--out", "."],
+    "build": ["build", "-m", "spring_mass_damper", "--target", "host", "--out", "."],
     "backtest": ["backtest", "../log.csv", "-m", "spring_mass_damper", "--out", "batches.csv"],
     "cosim": ["cosim", "--backend", "python", "--out", "run.csv", "--figure", "run.png"],
 }
 """Run in the folder of their results."""
 
 WAYS = ("ctrl-c", "kill -9", "full disk")
-MAIN = [sys.executable, "-c", "import sys; from hybridsep_main import main; sys.exit(main())"]
+MAIN = [sys.executable, "-c", "import os; os.write(1, b'x'); from hybridsep_main import main; main()"]
+"""The command line, which says that Python itself has started: before, Ctrl-C is Python's."""
 OLD_END = b"\nthis is the older file\n"
 """What an older file has after the content of a newer one, by which it is still known as one of its kind."""
 
@@ -81,12 +82,14 @@ class Case:
         process = subprocess.Popen(
             self.arguments,
             cwd=self.folder,
-            stdout=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
             # A background job of a shell ignores Ctrl-C, and so would its children.
             preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
         )
+        assert process.stdout is not None
+        process.stdout.read(1)
         time.sleep(moment)
         sent = time.monotonic()
         process.send_signal(number)

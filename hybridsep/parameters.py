@@ -162,9 +162,7 @@ def check(name: str, value: Any, *, label: str | None = None) -> Any:
         if isinstance(value, (bool, str, bytes)):
             raise TypeError
         number = float(value)
-    except OverflowError:  # an integer beyond the largest float
-        number = math.inf
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ParameterError(f"{shown} must be a number, got {brief(value)}") from None
     if not math.isfinite(number):
         raise ParameterError(f"{shown} must be finite, got {brief(value)}")
