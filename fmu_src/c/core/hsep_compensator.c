@@ -76,7 +76,6 @@ static void compensator_lay_out(hsep_compensator *self, const hsep_compensator_p
     self->sign_step = parameters->v_s * parameters->T_s;
     self->best = (uint64_t)parameters->best;
     self->n_init = parameters->n_init;
-    self->size = (uint64_t)hsep_compensator_size(parameters);
     uint64_t end = compensator_first;
     self->ahead = compensator_take(&end, preview);
     self->x_d = compensator_take(&end, preview);

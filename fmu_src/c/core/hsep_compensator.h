@@ -68,7 +68,6 @@ typedef struct {
     uint64_t divergence; /* hsep_divergence of the first window that could not be predicted; stays */
     hsep_trust trust;
     hsep_sensor sensor;
-    uint64_t size;       /* of the block, bytes */
     /* Offsets in doubles from the beginning of the struct */
     uint64_t ahead;   /* (preview,) m, ring of the commands that came last */
     uint64_t x_d;     /* (preview,) m, commands of the window and what follows it */

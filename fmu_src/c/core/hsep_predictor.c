@@ -52,7 +52,6 @@ static void predictor_lay_out(hsep_predictor *self, const hsep_predictor_paramet
     self->p = parameters->p;
     self->q = parameters->q;
     self->n_init = parameters->n_init;
-    self->size = (uint64_t)hsep_predictor_size(parameters);
     uint64_t end = predictor_first;
     self->ahead = predictor_take(&end, Np);
     self->ahead_pb = predictor_take(&end, Np);

@@ -43,7 +43,6 @@ typedef struct {
     uint64_t n_measured; /* samples since t_init */
     double sum_pb, sum_h; /* m2, sums of squared prediction errors over them */
     uint64_t divergence; /* hsep_divergence of the first window that could not be predicted; stays */
-    uint64_t size;       /* of the block, bytes */
     /* Offsets in doubles from the beginning of the struct */
     uint64_t ahead;    /* (Np,) m, commands that came during this window */
     uint64_t ahead_pb; /* (Np,) m, what the physics model answers to them, relative to start */
