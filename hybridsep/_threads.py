@@ -1,7 +1,7 @@
 """One BLAS thread while many small matrices are multiplied and factorised.
 
-Threads make them slower, by two orders of magnitude where the cores are busy, and change the order of summation, so
-that results depended on the machine; ``benchmarks/blas_threads.py`` measures both.
+Threads make them slower, most of all where the cores are busy, and change the order of summation, so that results
+depended on the number of cores; ``benchmarks/blas_threads.py`` measures both.
 """
 
 from __future__ import annotations
