@@ -52,12 +52,21 @@ def headers(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def compile_all(fmu: Path, headers: Path, out: Path) -> Path:
+def compile_all(fmu: Path, headers: Path, out: Path, *flags: str) -> Path:
     """Return the object file of an FMU's sources."""
     built = out / f"{fmu.stem}.o"
     sources = fmu.with_suffix("") / "sources"
     c_core.run_compiler(
-        [*compile_flags(c_core.compiler()), f"-I{sources}", f"-I{headers}", "-c", sources / "all.c", "-o", built]
+        [
+            *compile_flags(c_core.compiler()),
+            *flags,
+            f"-I{sources}",
+            f"-I{headers}",
+            "-c",
+            sources / "all.c",
+            "-o",
+            built,
+        ]
     )
     return built
 
@@ -102,6 +111,13 @@ def test_nothing_but_the_fmi_functions_has_external_linkage(
     shown = [symbol.name for symbol in symbols if symbol.defined and symbol.exported]
     assert len(shown) == 34
     assert all(name.startswith(f"{model}_fmi2") for name in shown), shown
+
+
+def test_an_importer_may_choose_the_prefix(fmus: dict[str, Path], headers: Path, tmp_path: Path) -> None:
+    built = compile_all(fmus["ReferenceTrajectory"], headers, tmp_path, "-DFMI2_FUNCTION_PREFIX=")
+    shown = [symbol.name for symbol in elf.symbols(built) if symbol.defined and symbol.exported]
+    assert len(shown) == 34
+    assert all(name.startswith("fmi2") for name in shown)
 
 
 def test_three_fmus_run_in_one_program(fmus: dict[str, Path], headers: Path, tmp_path: Path) -> None:
