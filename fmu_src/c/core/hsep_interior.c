@@ -17,6 +17,7 @@ typedef struct {
     double *s, *z;
     double *inverse; /* 1 / (s + rho z) */
     double *aim;     /* z ds + s dz of the step, times inverse */
+    double *off;     /* primal residual B x - b - s */
 } interior_side;
 
 /* The arrays behind the struct. */
@@ -34,7 +35,7 @@ typedef struct {
 HSEP_API double hsep_interior_size(uint64_t preview, uint64_t n)
 {
     const double rows = HSEP_ORDERS * (double)preview, x = (double)n;
-    return (double)sizeof(hsep_interior) + (4.0 * x + 13.0 * rows + 0.5 * x * (x + 1.0)) * (double)sizeof(double);
+    return (double)sizeof(hsep_interior) + (4.0 * x + 15.0 * rows + 0.5 * x * (x + 1.0)) * (double)sizeof(double);
 }
 
 static interior_arrays interior_open(hsep_interior *self, const hsep_splines *splines)
@@ -57,6 +58,7 @@ static interior_arrays interior_open(hsep_interior *self, const hsep_splines *sp
         a.side[i].z = at, at += rows;
         a.side[i].inverse = at, at += rows;
         a.side[i].aim = at, at += rows;
+        a.side[i].off = at, at += rows;
     }
     a.triangle = at;
     return a;
@@ -200,12 +202,11 @@ static inline void interior_limit(double *room, double value, double change)
     }
 }
 
-/* off = the primal residual B x - b - s, ds = B dx + off + rho dz, dz = aim - z (B dx + off) / (s + rho z). */
+/* ds = B dx + off + rho dz, dz = aim - z (B dx + off) / (s + rho z). */
 static inline void interior_change(const interior_arrays *a, int i, uint64_t r, double *ds, double *dz)
 {
     const interior_side *side = &a->side[i];
-    const double off = interior_distance(i, a->values[r], a->bound[i][r]) - side->s[r];
-    const double to = (i == 0 ? a->along[r] : -a->along[r]) + off;
+    const double to = (i == 0 ? a->along[r] : -a->along[r]) + side->off[r];
     *dz = side->aim[r] - side->z[r] * side->inverse[r] * to;
     *ds = to + a->rho * *dz;
 }
@@ -218,8 +219,7 @@ static void interior_push(const interior_arrays *a, const interior_range ranges[
             double push[2];
             for (int i = 0; i < 2; i++) {
                 const interior_side *side = &a->side[i];
-                const double off = interior_distance(i, a->values[r], a->bound[i][r]) - side->s[r];
-                push[i] = side->aim[r] - side->z[r] * side->inverse[r] * off;
+                push[i] = side->aim[r] - side->z[r] * side->inverse[r] * side->off[r];
             }
             a->rows[r] = push[0] - push[1];
         }
@@ -254,9 +254,9 @@ static double interior_measure(
             double weight = 0.0;
             for (int i = 0; i < 2; i++) {
                 const interior_side *side = &a->side[i];
-                const double off = interior_distance(i, a->values[r], a->bound[i][r]) - side->s[r];
+                side->off[r] = interior_distance(i, a->values[r], a->bound[i][r]) - side->s[r];
                 sum += side->s[r] * side->z[r];
-                *primal = fmax(*primal, fabs(off));
+                *primal = fmax(*primal, fabs(side->off[r]));
                 weight += side->z[r] * side->inverse[r];
                 side->aim[r] = -side->s[r] * side->z[r] * side->inverse[r];
             }
