@@ -4,7 +4,8 @@ Each command first runs undisturbed, for its duration and its files, whose bytes
 again and again over older files of the same names. Ctrl-C and kill -9 come at uniformly random moments; the disk, a
 tmpfs in a user namespace, has room for a uniformly random part of the new files.
 
-``python benchmarks/interruptions.py --moments 50`` (an hour); ``--commands backtest cosim`` for some of them.
+``python benchmarks/interruptions.py --moments 50`` takes two hours on an idle machine, ``--commands backtest cosim``
+some minutes.
 """
 
 from __future__ import annotations
@@ -184,6 +185,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 row = (way, f"{outcome.undisturbed} of {outcome.runs}", slowest, str(len(outcome.faults)))
                 table.add_row(name, f"{case.duration:.1f}", *row)
                 failed |= bool(outcome.faults)
+                console.print(name, *row, sep=", ", highlight=False)
     console.print(table)
     return int(failed)
 
