@@ -21,7 +21,7 @@ __all__ = ["PRIMAL_RESIDUAL", "STEPS_MAX", "minimise"]
 STEPS_MAX = 24
 """Steps at most; 8 to 15 are usual, 24 were the most of 4 500 plans with random parameters."""
 
-_GAP = 1e-13
+_GAP = 1e-15
 """Complementarity μ at the end, as a share of the cost for each bound."""
 
 PRIMAL_RESIDUAL = 5e-13
@@ -36,7 +36,7 @@ _FIRST_SLACK = 0.3
 _FIRST_GAP = 10.0
 """Complementarity μ to begin with, likewise as a share: with 1 some plans take 30 steps."""
 
-_REGULARISATION = 3e-15
+_REGULARISATION = 5e-15
 """Proximal term of the multipliers, relative to rows and P: with less the factor fails, with more steps are lost."""
 
 _STEP = 0.995

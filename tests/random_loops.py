@@ -66,7 +66,7 @@ class Loop:
         return plant, Encoder(machine.plant.noise_std, self.noise_seed)
 
 
-def random_loop(seed: int, n: int = 2500, **fixed: float) -> Loop:
+def random_loop(seed: int, n: int = 2500, machine: str | None = None, **fixed: float) -> Loop:
     """Return a loop whose parameters follow from a seed, ``n`` samples long.
 
     Parameters
@@ -74,11 +74,13 @@ def random_loop(seed: int, n: int = 2500, **fixed: float) -> Loop:
     seed : int
     n : int
         Samples.
+    machine : str, optional
+        Random too if left out.
     **fixed
         Parameters that are not random.
     """
     rng = np.random.default_rng(seed)
-    machine = MACHINES[rng.integers(3)]
+    drawn = MACHINES[rng.integers(3)]
     Np = int(rng.choice([20, 24, 30, 40, 50, 60, 80, 100]))
     spacing = int(rng.choice([s for s in (1, 2, 3, 4, 5, 8, 10) if Np % s == 0]))
     least = Np + 4 * spacing + 3
@@ -105,7 +107,7 @@ def random_loop(seed: int, n: int = 2500, **fixed: float) -> Loop:
     stops = np.cumsum(np.concatenate(([0.0], rng.uniform(-0.01, 0.01, 30))))
     r = rest_to_rest(stops, PAPER_LIMITS, TS, dwell=float(rng.uniform(0, 0.3)))[:n]
     start = float(rng.choice([0.0, 0.1]))
-    return Loop(machine, {**COMPENSATOR, **values, **fixed}, r + start, int(rng.integers(1000)))
+    return Loop(machine or drawn, {**COMPENSATOR, **values, **fixed}, r + start, int(rng.integers(1000)))
 
 
 def run_library(loop: Loop) -> tuple[Array, NDArray[np.int64]]:

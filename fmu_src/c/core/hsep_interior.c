@@ -5,11 +5,11 @@
 #include <math.h>
 #include <string.h>
 
-static const double interior_gap = 1e-13;            /* complementarity mu at the end, as a share of the cost */
+static const double interior_gap = 1e-15;            /* complementarity mu at the end, as a share of the cost */
 static const double interior_dual = 1e-9;            /* dual residual at the end, as a share of its largest term */
 static const double interior_first_slack = 0.3;      /* least distance from a bound to begin with */
 static const double interior_first_gap = 10.0;       /* mu to begin with, as a share of the cost */
-static const double interior_regularisation = 3e-15; /* proximal term of z, relative to rows and P */
+static const double interior_regularisation = 5e-15; /* proximal term of z, relative to rows and P */
 static const double interior_way = 0.995;            /* share tau of the way to the nearest bound that a step goes */
 
 /* One side of the bounds, B x >= b: slack s = B x - b, multiplier z, both > 0. */
