@@ -56,7 +56,7 @@ def test_given_ts_must_agree_with_the_time(tmp_path: Path) -> None:
     assert open_log(path, Ts=1.005e-3).Ts == 1.005e-3
     with pytest.raises(LogError, match=r"Ts = 0.002 s was given, but column 't' has an interval of 0.001 s"):
         open_log(path, Ts=2e-3)
-    with pytest.raises(ParameterError, match="Ts must be > 0 s, got -1"):
+    with pytest.raises(ParameterError, match="Ts must be 1e-05 … 1 s, got -1"):
         open_log(path, Ts=-1.0)
 
 
