@@ -127,7 +127,7 @@ class FmuInstance:
         except OSError:  # the disk's, with a name
             raise
         except Exception as error:  # fmpy raises bare Exceptions here
-            raise FmuError(f"{self.path.name} cannot be unpacked: {_first_line(error)}") from error
+            raise FmuError(f"{self.path.name} cannot be loaded: {_first_line(error)}") from error
         try:
             check_unpacked(folder, self.description.generationTool or "")
             with _working_directory():

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 from ._sampled_window import SampledWindow
 from .clock import SampleClock
+from .errors import SignalError
 
 __all__ = ["SampledInputs"]
 
@@ -55,6 +56,8 @@ class SampledInputs:
         ParameterError, FmuError, SignalError
             If the step does not fit, or an input that it latches cannot be taken in; nothing is changed then.
         """
+        if look_ahead.diverged:
+            raise SignalError(look_ahead.diverged)
         step = self.clock.stepped(t, h)
         if step.n_latched:
             look_ahead.check(x_d_ahead, x_meas, self.clock.k + self.clock.latched)

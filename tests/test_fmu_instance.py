@@ -114,7 +114,7 @@ def test_closing_after_refusals(drive: Path) -> None:
     for values in ({"m": -1.0}, None):
         instance = FmuInstance(drive)
         if values:
-            with pytest.raises(FmuError, match=r"m must be > 0 kg"):
+            with pytest.raises(FmuError, match=r"m must be 1e-06 … 1000000 kg, got -1.0"):
                 instance.initialise(values)
         instance.close()
         instance.close()

@@ -157,6 +157,9 @@ HSEP_API hsep_status hsep_model_step(
     compensator_state *self = state;
     hsep_inputs_step step;
     message[0] = '\0';
+    if (hsep_check_divergence((hsep_divergence)self->compensator.divergence, message) != HSEP_OK) { /* of an earlier step */
+        return HSEP_REFUSED;
+    }
     const hsep_status status = hsep_inputs_count(
         &self->inputs, (hsep_input){values[HSEP_VR_x_d_ahead], values[HSEP_SLOPE_x_d_ahead]},
         (hsep_input){values[HSEP_VR_x_meas], values[HSEP_SLOPE_x_meas]}, t, h, &step, message);
