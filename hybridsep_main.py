@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
+
+INTERRUPTED = 130
+"""Exit status after Ctrl-C."""
 
 
 def _leave(*_: object) -> None:
     """End the process at once: nothing is open while the library is loaded."""
     os.write(2, b"interrupted\n")
-    os._exit(130)
+    os._exit(INTERRUPTED)
 
 
 def main() -> None:
@@ -25,6 +29,11 @@ def main() -> None:
         run()
     except KeyboardInterrupt:
         _leave()
+    except SystemExit as stop:
+        if stop.code == INTERRUPTED:  # all is said and cleaned up; taking the library down would take Python long
+            sys.stderr.flush()
+            os._exit(INTERRUPTED)
+        raise
     finally:
         if ours:
             signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is done; ending takes Python a moment

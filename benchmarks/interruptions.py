@@ -36,8 +36,8 @@ COMMANDS = {
 """Run in the folder of their results."""
 
 WAYS = ("ctrl-c", "kill -9", "full disk")
-MAIN = [sys.executable, "-c", "import os; os.write(1, b'x'); from hybridsep_main import main; main()"]
-"""The command line, which says that Python itself has started: before, Ctrl-C is Python's."""
+MAIN = [sys.executable, "-c", "import hybridsep_main, os; os.write(1, b'x'); hybridsep_main.main()"]
+"""The command line, which says that Python has started and loaded the entry point: before, Ctrl-C is Python's."""
 OLD_END = b"\nthis is the older file\n"
 """What an older file has after the content of a newer one, by which it is still known as one of its kind."""
 
