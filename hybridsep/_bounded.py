@@ -152,14 +152,16 @@ def solve(cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int) -> Array |
     if bounds.allow(c):
         return c
     pinned, left = rest[:n_pinned], rest[n_pinned:]
-    rows, taken = bounds.rows[:, n_pinned:], bounds.rows[:, :n_pinned] @ pinned
+    rows, taken, at_rest = bounds.rows[:, n_pinned:], bounds.rows[:, :n_pinned] @ pinned, bounds.rows @ rest
+    # Within the bounds by what the method leaves, where the rest is
+    low, high = np.minimum(bounds.low + PRIMAL_RESIDUAL, at_rest), np.maximum(bounds.high - PRIMAL_RESIDUAL, at_rest)
     touched = rows.any(axis=1)
     found = minimise(
         cost.P[n_pinned:, n_pinned:],
         cost.v[n_pinned:] - cost.P[n_pinned:, :n_pinned] @ pinned,
         rows[touched],
-        (bounds.low - taken)[touched],
-        (bounds.high - taken)[touched],
+        (low - taken)[touched],
+        (high - taken)[touched],
         left,
         float(cost.v @ c + rest @ cost.P @ rest),
     )

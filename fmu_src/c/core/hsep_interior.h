@@ -19,7 +19,7 @@ typedef struct {
     uint64_t steps; /* done for this plan */
     double cost;    /* m2, of the beginning, for each of the bounds */
     double sides;   /* number of bounds, low and high ones */
-    double rho;     /* 1/m2, proximal regularisation of the multipliers */
+    double rho;     /* 1/m2, proximal regularisation of the multipliers; 0 until a factor fails */
     /* followed by arrays, see hsep_interior.c */
 } hsep_interior;
 
@@ -31,12 +31,10 @@ double *hsep_interior_x(hsep_interior *self, const hsep_splines *splines);    /*
 double *hsep_interior_low(hsep_interior *self, const hsep_splines *splines);  /* (4 preview,) rows, in shares */
 double *hsep_interior_high(hsep_interior *self, const hsep_splines *splines); /* (4 preview,) */
 
-/* Begin with x and the bounds as they are. P: the triangle of all n rows; cost: size of the cost, m2, > 0, by which the
- * end is recognised. */
-void hsep_interior_begin(
-    hsep_interior *self, const hsep_splines *splines, const double P[], uint64_t first, double cost);
+/* Begin with x and the bounds as they are. cost: size of the cost, m2, > 0, by which the end is recognised. */
+void hsep_interior_begin(hsep_interior *self, const hsep_splines *splines, uint64_t first, double cost);
 
-/* Do a step; P as in hsep_interior_begin. Returns whether it was the last one.
+/* Do a step; P is the triangle of all n rows. Returns whether it was the last one.
  * Cost: n^3 / 6 multiply-adds for a factor and 2 n^2 with it, about 900 operations and 8 divisions a sample of the
  * plan beside it. */
 int hsep_interior_step(hsep_interior *self, const hsep_splines *splines, const double P[]);

@@ -243,9 +243,9 @@ static void planner_bound(hsep_planner *self, double cost)
     for (uint64_t r = 0; r < HSEP_ORDERS * preview; r++) {
         const double other = total[r] - low[r];
         double least, most;
-        planner_range(self, r, &least, &most);
-        low[r] = least - other;
-        high[r] = most - other;
+        planner_range(self, r, &least, &most); /* kept by what the method leaves, where the rest keeps it */
+        low[r] = fmin(least + HSEP_INTERIOR_PRIMAL, total[r]) - other;
+        high[r] = fmax(most - HSEP_INTERIOR_PRIMAL, total[r]) - other;
     }
     for (uint64_t i = 0; i < first; i++) { /* v := v_2 - P_21 pinned */
         for (uint64_t j = first; j < n; j++) {
@@ -257,7 +257,7 @@ static void planner_bound(hsep_planner *self, double cost)
         v[j - first] = v[j];
         x[j - first] = rest[j];
     }
-    hsep_interior_begin(interior, splines, planner_at(self, self->P), first, cost);
+    hsep_interior_begin(interior, splines, first, cost);
 }
 
 hsep_plan_status hsep_planner_begin(
