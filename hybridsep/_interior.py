@@ -26,7 +26,7 @@ STEPS_MAX = 24
 _GAP = 1e-15
 """Complementarity μ at the end, as a share of the cost for each bound."""
 
-PRIMAL_RESIDUAL = 5e-13
+PRIMAL_RESIDUAL = 1e-11
 """Primal residual at the end, in the bounds' unit: a bound is exceeded by no more."""
 
 _DUAL = 1e-9
@@ -38,8 +38,8 @@ _FIRST_SLACK = 0.3
 _FIRST_GAP = 10.0
 """Complementarity μ to begin with, likewise as a share: with 1 some plans take 30 steps."""
 
-_REGULARISATION = 5e-14
-"""Proximal term of the multipliers, relative to rows and P, once a factor has failed: more takes more steps."""
+_REGULARISATION = 1e-14
+"""Proximal term of the multipliers, relative to rows and P: with less a factor may fail, more takes more steps."""
 
 _STEP = 0.995
 """Share τ of the way to the nearest bound that a step goes."""
@@ -73,7 +73,8 @@ def minimise(P: Array, v: Array, rows: Array, low: Array, high: Array, start: Ar
     s = np.maximum(B @ x - b, _FIRST_SLACK)
     share = cost / len(s)
     z = _FIRST_GAP * share / s
-    rho = 0.0
+    # Where active bounds hardly differ, rounding in rowsᵀ W rows would outgrow P
+    rho = _REGULARISATION * float(np.max(np.sum(rows**2, axis=0)) / np.max(np.diag(P)))
     for _ in range(STEPS_MAX):
         mu = float(s @ z) / len(s)
         primal = B @ x - b - s
@@ -87,11 +88,7 @@ def minimise(P: Array, v: Array, rows: Array, low: Array, high: Array, start: Ar
         try:
             factor = cho_factor(P + rows.T @ ((weight[:m] + weight[m:])[:, None] * rows))
         except (LinAlgError, ValueError):
-            if rho > 0:
-                break
-            # Active bounds that hardly differ: rounding in rowsᵀ W rows has outgrown P
-            rho = _REGULARISATION * float(np.max(np.sum(rows**2, axis=0)) / np.max(np.diag(P)))
-            continue
+            break
         newton = _Newton(factor, B, z, inverse, primal, dual, rho)
         _, ds, dz = newton.direction(-s * z)  # predictor: as if s z = 0 could be reached at once
         reached = float((s + _room(s, ds) * ds) @ (z + _room(z, dz) * dz)) / len(s)

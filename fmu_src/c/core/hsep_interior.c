@@ -9,7 +9,7 @@ static const double interior_gap = 1e-15;            /* complementarity mu at th
 static const double interior_dual = 1e-9;            /* dual residual at the end, as a share of its largest term */
 static const double interior_first_slack = 0.3;      /* least distance from a bound to begin with */
 static const double interior_first_gap = 10.0;       /* mu to begin with, as a share of the cost */
-static const double interior_regularisation = 5e-14; /* proximal term of z, relative to rows and P, if a factor fails */
+static const double interior_regularisation = 1e-14; /* proximal term of z, relative to rows and P */
 static const double interior_way = 0.995;            /* share tau of the way to the nearest bound that a step goes */
 
 /* One side of the bounds, B x >= b: slack s = B x - b, multiplier z, both > 0. */
@@ -98,7 +98,26 @@ static void interior_ranges(const hsep_splines *splines, uint64_t first, interio
     }
 }
 
-void hsep_interior_begin(hsep_interior *self, const hsep_splines *splines, uint64_t first, double cost)
+/* The rows of P, a triangle, from the first one asked for. */
+static const double *interior_asked(const hsep_interior *self, const hsep_splines *splines, const double P[])
+{
+    return P + (self->first * splines->n - self->first * (self->first - 1) / 2);
+}
+
+/* The proximal term that bounds A' W A by P / interior_regularisation: where active bounds hardly differ, its rounding
+ * would outgrow P. */
+static double interior_proximal(const hsep_splines *splines, const double *P, uint64_t n)
+{
+    double largest = 0.0;
+    for (uint64_t i = 0; i < n; i++) {
+        largest = fmax(largest, P[0]);
+        P += n - i;
+    }
+    return interior_regularisation * hsep_splines_energy(splines) / largest;
+}
+
+void hsep_interior_begin(
+    hsep_interior *self, const hsep_splines *splines, const double P[], uint64_t first, double cost)
 {
     self->first = first;
     self->steps = 0;
@@ -106,7 +125,7 @@ void hsep_interior_begin(hsep_interior *self, const hsep_splines *splines, uint6
     interior_arrays a = interior_open(self, splines);
     interior_range ranges[HSEP_ORDERS];
     interior_ranges(splines, first, ranges);
-    self->rho = 0.0;
+    self->rho = interior_proximal(splines, interior_asked(self, splines, P), a.n);
     hsep_splines_rows(splines, a.x, first, a.values);
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         self->sides += 2.0 * (double)(ranges[order].end - ranges[order].begin);
@@ -118,27 +137,7 @@ void hsep_interior_begin(hsep_interior *self, const hsep_splines *splines, uint6
                 interior_side *side = &a.side[i];
                 side->s[r] = fmax(interior_distance(i, a.values[r], a.bound[i][r]), interior_first_slack);
                 side->z[r] = interior_first_gap * self->cost / side->s[r];
-                side->inverse[r] = 1.0 / side->s[r];
-            }
-        }
-    }
-}
-
-/* Bound A' W A by P / interior_regularisation: active bounds hardly differ, and its rounding has outgrown P. */
-static void interior_regularise(
-    hsep_interior *self, const hsep_splines *splines, const double *P, const interior_range ranges[HSEP_ORDERS])
-{
-    const interior_arrays a = interior_open(self, splines);
-    double largest = 0.0;
-    for (uint64_t i = 0; i < a.n; i++) {
-        largest = fmax(largest, P[0]);
-        P += a.n - i;
-    }
-    self->rho = interior_regularisation * hsep_splines_energy(splines) / largest;
-    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        for (uint64_t r = ranges[order].begin; r < ranges[order].end; r++) {
-            for (int i = 0; i < 2; i++) {
-                a.side[i].inverse[r] = 1.0 / (a.side[i].s[r] + self->rho * a.side[i].z[r]);
+                side->inverse[r] = 1.0 / (side->s[r] + self->rho * side->z[r]);
             }
         }
     }
@@ -324,7 +323,7 @@ int hsep_interior_step(hsep_interior *self, const hsep_splines *splines, const d
     const interior_arrays a = interior_open(self, splines);
     interior_range ranges[HSEP_ORDERS];
     interior_ranges(splines, self->first, ranges);
-    P += self->first * splines->n - self->first * (self->first - 1) / 2; /* rows 0 ... first - 1 are left out */
+    P = interior_asked(self, splines, P);
 
     double primal;
     hsep_splines_rows(splines, a.x, self->first, a.values);
@@ -338,11 +337,7 @@ int hsep_interior_step(hsep_interior *self, const hsep_splines *splines, const d
     memcpy(a.triangle, P, (size_t)(a.n * (a.n + 1) / 2) * sizeof(double));
     hsep_splines_gram(splines, a.along, self->first, a.triangle);
     if (!hsep_cholesky_factor(a.triangle, a.n)) {
-        if (self->rho > 0.0) {
-            return 1;
-        }
-        interior_regularise(self, splines, P, ranges);
-        return 0;
+        return 1;
     }
     /* Newton: P dx - B' dz = dual residual,  ds = B dx + off + rho dz,  z ds + s dz = aim (s + rho z) */
     interior_push(&a, ranges);

@@ -12,14 +12,14 @@
 #include <stdint.h>
 
 #define HSEP_INTERIOR_STEPS 24     /* at most, for one plan */
-#define HSEP_INTERIOR_PRIMAL 5e-13 /* share of a bound by which it may be exceeded at the end */
+#define HSEP_INTERIOR_PRIMAL 1e-11 /* share of a bound by which it may be exceeded at the end */
 
 typedef struct {
     uint64_t first; /* the splines before it are not asked for; x is (n - first,) */
     uint64_t steps; /* done for this plan */
     double cost;    /* m2, of the beginning, for each of the bounds */
     double sides;   /* number of bounds, low and high ones */
-    double rho;     /* 1/m2, proximal regularisation of the multipliers; 0 until a factor fails */
+    double rho;     /* 1/m2, proximal regularisation of the multipliers */
     /* followed by arrays, see hsep_interior.c */
 } hsep_interior;
 
@@ -31,10 +31,12 @@ double *hsep_interior_x(hsep_interior *self, const hsep_splines *splines);    /*
 double *hsep_interior_low(hsep_interior *self, const hsep_splines *splines);  /* (4 preview,) rows, in shares */
 double *hsep_interior_high(hsep_interior *self, const hsep_splines *splines); /* (4 preview,) */
 
-/* Begin with x and the bounds as they are. cost: size of the cost, m2, > 0, by which the end is recognised. */
-void hsep_interior_begin(hsep_interior *self, const hsep_splines *splines, uint64_t first, double cost);
+/* Begin with x and the bounds as they are. P: the triangle of all n rows; cost: size of the cost, m2, > 0, by which the
+ * end is recognised. */
+void hsep_interior_begin(
+    hsep_interior *self, const hsep_splines *splines, const double P[], uint64_t first, double cost);
 
-/* Do a step; P is the triangle of all n rows. Returns whether it was the last one.
+/* Do a step; P as in hsep_interior_begin. Returns whether it was the last one.
  * Cost: n^3 / 6 multiply-adds for a factor and 2 n^2 with it, about 900 operations and 8 divisions a sample of the
  * plan beside it. */
 int hsep_interior_step(hsep_interior *self, const hsep_splines *splines, const double P[]);
