@@ -22,6 +22,9 @@ __all__ = ["Bounds", "DriveBounds", "solve"]
 _ROUNDING = 1e-9
 """Share of a limit that is taken for rounding."""
 
+_INTERIOR = 1e-10
+"""Share of a limit by which a plan may differ where the last one is at its bound: bounds need an interior."""
+
 _MOVES = 1e-12
 """Step of the commanded position, m a sample, that counts as a move."""
 
@@ -49,7 +52,7 @@ class Bounds:
     def step(self, rest: Array, c: Array) -> float:
         """Return the largest share, 0 … 1, of the way from ``rest``, which keeps the bounds, to ``c``."""
         here, way = self.rows @ rest, self.rows @ (c - rest)
-        room = np.maximum(np.where(way > 0, self.high - here, here - self.low), 0.0) + PRIMAL_RESIDUAL
+        room = np.where(way > 0, self.high - here, here - self.low)
         beyond = np.abs(way) > np.maximum(room, _ROUNDING)
         return float(np.min(room[beyond] / np.abs(way[beyond]), initial=1.0))
 
@@ -119,7 +122,7 @@ class DriveBounds:
                 if order == 1:
                     least[i * n : (i + 1) * n][steps > _MOVES] = 0.0
                     most[i * n : (i + 1) * n][steps < -_MOVES] = 0.0
-        low, high = np.minimum(least - offset, at_rest), np.maximum(most - offset, at_rest)
+        low, high = np.minimum(least - offset, at_rest - _INTERIOR), np.maximum(most - offset, at_rest + _INTERIOR)
         return Bounds(rows=self._free, low=low, high=high)
 
 
@@ -158,8 +161,8 @@ def solve(cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int) -> Array |
         cost.P[n_pinned:, n_pinned:],
         cost.v[n_pinned:] - cost.P[n_pinned:, :n_pinned] @ pinned,
         rows[touched],
-        (bounds.low - taken)[touched],
-        (bounds.high - taken)[touched],
+        (bounds.low - taken)[touched] + PRIMAL_RESIDUAL,
+        (bounds.high - taken)[touched] - PRIMAL_RESIDUAL,
         left,
         float(cost.v @ c + rest @ cost.P @ rest),
     )

@@ -11,6 +11,8 @@ thousand times less steeply than an iterate on the way to it, and so do two impl
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
@@ -24,7 +26,7 @@ STEPS_MAX = 24
 _GAP = 1e-15
 """Complementarity μ at the end, as a share of the cost for each bound."""
 
-PRIMAL_RESIDUAL = 5e-13
+PRIMAL_RESIDUAL = 1e-11
 """Primal residual at the end, in the bounds' unit: a bound is exceeded by no more."""
 
 _DUAL = 1e-9
@@ -36,8 +38,8 @@ _FIRST_SLACK = 0.3
 _FIRST_GAP = 10.0
 """Complementarity μ to begin with, likewise as a share: with 1 some plans take 30 steps."""
 
-_REGULARISATION = 5e-15
-"""Proximal term of the multipliers, relative to rows and P: with less the factor fails, with more steps are lost."""
+_REGULARISATION = 1e-14
+"""Proximal term of the multipliers, relative to rows and P: with less a factor may fail, more takes more steps."""
 
 _STEP = 0.995
 """Share τ of the way to the nearest bound that a step goes."""
@@ -71,6 +73,7 @@ def minimise(P: Array, v: Array, rows: Array, low: Array, high: Array, start: Ar
     s = np.maximum(B @ x - b, _FIRST_SLACK)
     share = cost / len(s)
     z = _FIRST_GAP * share / s
+    # Where active bounds hardly differ, rounding in rowsᵀ W rows would outgrow P
     rho = _REGULARISATION * float(np.max(np.sum(rows**2, axis=0)) / np.max(np.diag(P)))
     for _ in range(STEPS_MAX):
         mu = float(s @ z) / len(s)
@@ -80,27 +83,48 @@ def minimise(P: Array, v: Array, rows: Array, low: Array, high: Array, start: Ar
         largest = max(float(np.max(np.abs(term))) for term in (v, curvature, force))
         if mu < _GAP * share and np.max(np.abs(primal)) < PRIMAL_RESIDUAL and np.max(np.abs(dual)) < _DUAL * largest:
             break
-        # Newton: P dx − Bᵀ dz = dual,  ds = B dx + primal + ρ dz,  z ds + s dz = wanted
         inverse = 1.0 / (s + rho * z)
         weight = z * inverse
         try:
             factor = cho_factor(P + rows.T @ ((weight[:m] + weight[m:])[:, None] * rows))
         except (LinAlgError, ValueError):
             break
-
-        def direction(wanted: Array) -> tuple[Array, Array, Array]:
-            dx = np.asarray(cho_solve(factor, dual + B.T @ ((wanted - z * primal) * inverse)))  # noqa: B023
-            off = B @ dx + primal  # noqa: B023
-            dz = (wanted - z * off) * inverse  # noqa: B023
-            return dx, off + rho * dz, dz
-
-        _, ds, dz = direction(-s * z)  # predictor: as if s z = 0 could be reached at once
+        newton = _Newton(factor, B, z, inverse, primal, dual, rho)
+        _, ds, dz = newton.direction(-s * z)  # predictor: as if s z = 0 could be reached at once
         reached = float((s + _room(s, ds) * ds) @ (z + _room(z, dz) * dz)) / len(s)
         centre = max(mu * (reached / mu) ** 3, 0.1 * _GAP * share)  # σ μ
-        dx, ds, dz = direction(centre - s * z - ds * dz)  # corrector: to the centre, with the predictor's curvature
+        dx, ds, dz = newton.direction(centre - s * z - ds * dz)  # corrector, with the predictor's curvature
         along_s, along_z = (1.0 if room >= 1.0 else _STEP * room for room in (_room(s, ds), _room(z, dz)))
         x, s, z = x + along_s * dx, s + along_s * ds, z + along_z * dz
     return np.asarray(x)
+
+
+@dataclass(frozen=True)
+class _Newton:
+    """Newton's equations of a step: ``P dx − Bᵀ dz = dual``, ``ds = B dx + primal + ρ dz``, ``z ds + s dz = wanted``.
+
+    Attributes
+    ----------
+    factor : tuple
+        Of ``P + Bᵀ diag(z · inverse) B``, from :func:`scipy.linalg.cho_factor`.
+    inverse : (2m,) array
+        ``1 / (s + ρ z)``.
+    """
+
+    factor: tuple[Array, bool]
+    B: Array
+    z: Array
+    inverse: Array
+    primal: Array
+    dual: Array
+    rho: float
+
+    def direction(self, wanted: Array) -> tuple[Array, Array, Array]:
+        """Return ``dx, ds, dz``."""
+        dx = np.asarray(cho_solve(self.factor, self.dual + self.B.T @ ((wanted - self.z * self.primal) * self.inverse)))
+        off = self.B @ dx + self.primal
+        dz = (wanted - self.z * off) * self.inverse
+        return dx, off + self.rho * dz, dz
 
 
 def _room(s: Array, ds: Array) -> float:

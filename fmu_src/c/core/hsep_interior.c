@@ -9,7 +9,7 @@ static const double interior_gap = 1e-15;            /* complementarity mu at th
 static const double interior_dual = 1e-9;            /* dual residual at the end, as a share of its largest term */
 static const double interior_first_slack = 0.3;      /* least distance from a bound to begin with */
 static const double interior_first_gap = 10.0;       /* mu to begin with, as a share of the cost */
-static const double interior_regularisation = 5e-15; /* proximal term of z, relative to rows and P */
+static const double interior_regularisation = 1e-14; /* proximal term of z, relative to rows and P */
 static const double interior_way = 0.995;            /* share tau of the way to the nearest bound that a step goes */
 
 /* One side of the bounds, B x >= b: slack s = B x - b, multiplier z, both > 0. */
@@ -110,7 +110,8 @@ static const double *interior_asked(const hsep_interior *self, const hsep_spline
     return P + (self->first * splines->n - self->first * (self->first - 1) / 2);
 }
 
-/* The regularisation of the multipliers: A' W A stays below P / interior_regularisation. */
+/* The proximal term that bounds A' W A by P / interior_regularisation: where active bounds hardly differ, its rounding
+ * would outgrow P. */
 static double interior_proximal(const hsep_splines *splines, const double *P, uint64_t n)
 {
     double largest = 0.0;

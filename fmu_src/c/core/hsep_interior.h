@@ -13,7 +13,7 @@
 #include <stdint.h>
 
 #define HSEP_INTERIOR_STEPS 24     /* at most, for one plan */
-#define HSEP_INTERIOR_PRIMAL 5e-13 /* share of a bound by which it may be exceeded at the end */
+#define HSEP_INTERIOR_PRIMAL 1e-11 /* share of a bound by which it may be exceeded at the end */
 
 typedef struct {
     uint64_t first; /* the splines before it are not asked for; x is (n - first,) */

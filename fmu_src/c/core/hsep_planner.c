@@ -10,6 +10,7 @@
 
 static const double planner_ridge = 1e-12;   /* on the diagonal, relative to its largest entry */
 static const double planner_rounding = 1e-9; /* share of a limit that is taken for rounding */
+static const double planner_interior_share = 1e-10; /* by which a row at its bound may differ from the last plan */
 static const double planner_moves = 1e-12;   /* m a sample, step of x_d that counts as a move */
 
 static const uint64_t planner_first = sizeof(hsep_planner) / sizeof(double);
@@ -183,7 +184,8 @@ static void planner_quadratic(const hsep_planner *self, const double filtered[])
     }
 }
 
-/* What a row may be, in shares. What the rest of the last plan demands is always allowed. */
+/* What a row may be, in shares. What the rest of the last plan demands is always allowed, and a little more: bounds
+ * without an interior are none for an interior-point method. */
 static void planner_range(const hsep_planner *self, uint64_t r, double *least, double *most)
 {
     const uint64_t preview = planner_splines(self)->preview;
@@ -195,8 +197,8 @@ static void planner_range(const hsep_planner *self, uint64_t r, double *least, d
         *least = moves > 0.0 ? 0.0 : *least;
         *most = moves < 0.0 ? 0.0 : *most;
     }
-    *least = fmin(*least, total);
-    *most = fmax(*most, total);
+    *least = fmin(*least, total - planner_interior_share);
+    *most = fmax(*most, total + planner_interior_share);
 }
 
 /* The largest share, 0 ... 1, of the way from the rest, whose rows are in total, by rows of way, within the limits. */
@@ -206,14 +208,11 @@ static double planner_share(const hsep_planner *self, const double way[])
     const uint64_t rows = HSEP_ORDERS * planner_splines(self)->preview;
     double share = 1.0;
     for (uint64_t r = 0; r < rows; r++) {
-        const double to = fabs(way[r]);
-        if (to > planner_rounding) {
-            double least, most;
-            planner_range(self, r, &least, &most);
-            const double room = (way[r] > 0.0 ? most - total[r] : total[r] - least) + HSEP_INTERIOR_PRIMAL;
-            if (room < share * to) {
-                share = room / to;
-            }
+        double least, most;
+        planner_range(self, r, &least, &most);
+        const double to = fabs(way[r]), room = way[r] > 0.0 ? most - total[r] : total[r] - least;
+        if (to > planner_rounding && room < share * to) {
+            share = room / to;
         }
     }
     return share;
@@ -250,8 +249,8 @@ static void planner_bound(hsep_planner *self, double cost)
         const double other = total[r] - low[r];
         double least, most;
         planner_range(self, r, &least, &most);
-        low[r] = least - other;
-        high[r] = most - other;
+        low[r] = least - other + HSEP_INTERIOR_PRIMAL;
+        high[r] = most - other - HSEP_INTERIOR_PRIMAL;
     }
     for (uint64_t i = 0; i < first; i++) { /* v := v_2 - P_21 pinned */
         for (uint64_t j = first; j < n; j++) {
