@@ -121,7 +121,8 @@ class _Newton:
 
     def direction(self, wanted: Array) -> tuple[Array, Array, Array]:
         """Return ``dx, ds, dz``."""
-        dx = np.asarray(cho_solve(self.factor, self.dual + self.B.T @ ((wanted - self.z * self.primal) * self.inverse)))
+        right = self.dual + self.B.T @ ((wanted - self.z * self.primal) * self.inverse)
+        dx = np.asarray(cho_solve(self.factor, right, check_finite=False))  # the caller looks at the result
         off = self.B @ dx + self.primal
         dz = (wanted - self.z * off) * self.inverse
         return dx, off + self.rho * dz, dz
