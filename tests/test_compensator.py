@@ -6,14 +6,13 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-import clarabel
 import numpy as np
 import pytest
+from bounded_oracle import clarabel_minimum
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.linalg import toeplitz
 from scipy.optimize import nnls
-from scipy.sparse import csc_matrix
 from staircase_data import commanded
 
 from hybridsep._bounded import Bounds, DriveBounds, solve
@@ -134,25 +133,6 @@ def test_a_bounded_plan_satisfies_the_optimality_conditions(seed: int, tightness
     normals = np.concatenate((-bounds.rows[upper], bounds.rows[lower]))
     _, residual = nnls(normals.T, gradient)
     assert residual <= 1e-3 * np.linalg.norm(cost.v)
-
-
-def clarabel_minimum(P: Array, v: Array, rows: Array, low: Array, high: Array) -> Array:
-    """Return the minimum of ``½ xᵀPx − vᵀx`` within the bounds by Clarabel (Goulart and Chen, arXiv:2405.12762)."""
-    unit = float(np.max(np.abs(np.linalg.solve(P, v))))
-    scale = 1.0 / float(np.max(np.diag(P)))
-    settings_ = clarabel.DefaultSettings()
-    settings_.verbose = False
-    solver = clarabel.DefaultSolver(
-        csc_matrix(np.triu(P * scale)),
-        -v * (scale / unit),
-        csc_matrix(np.concatenate((rows, -rows)) * unit),
-        np.concatenate((high, -low)),
-        [clarabel.NonnegativeConeT(2 * len(rows))],
-        settings_,
-    )
-    solution = solver.solve()
-    assert str(solution.status) in ("Solved", "AlmostSolved")
-    return np.asarray(solution.x) * unit
 
 
 @pytest.mark.parametrize(("limits", "n_bounded"), [(PAPER_LIMITS, 30), (DRIVE_LIMITS, 3)], ids=["tight", "usual"])
