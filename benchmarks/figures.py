@@ -1,7 +1,7 @@
 """Every figure of README and docs/ that does not depend on the machine's speed, in one JSON file, or compared with one.
 
-    python benchmarks/figures.py --out figures.json [--emps PATH]      (some ten minutes)
-    python benchmarks/figures.py --compare figures.json [--emps PATH]
+    python benchmarks/figures.py --out benchmarks/figures.json [--emps PATH]      (some ten minutes)
+    python benchmarks/figures.py --compare benchmarks/figures.json [--emps PATH]
 
 A change of structure changes no figure: written before it and compared after it, to the printed digits. The exit code
 is 1 if one differs. Times and instruction counts stay with the benchmarks that measure them.

@@ -5,8 +5,8 @@ Optim. 2 (1992); J. Nocedal and S. J. Wright, *Numerical Optimization*, 2nd ed.,
 regularisation of the multipliers (M. P. Friedlander and D. Orban, Math. Prog. Comp. 4 (2012)). The number of steps
 hardly grows with the number of active bounds. The C core has the same method, spread over samples.
 
-A plan is the start of the next one, so the minimum is found to nearly all its digits: it depends on the problem a
-thousand times less steeply than an iterate on the way to it, and so do two implementations' roundings.
+A plan is the start of the next one, so the minimum is found to nearly all its digits: it depends on the problem far
+less steeply than an iterate on the way to it, and so two implementations' roundings stay small.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .signals import Array
 __all__ = ["PRIMAL_RESIDUAL", "STEPS_MAX", "minimise"]
 
 STEPS_MAX = 24
-"""Steps at most; 8 to 15 are usual, 24 were the most of 4 500 plans with random parameters."""
+"""Steps at most; 12 on average, and 34 of 1 399 bounded plans with random parameters ended here."""
 
 _GAP = 1e-15
 """Complementarity μ at the end, as a share of the cost for each bound."""
@@ -36,7 +36,7 @@ _FIRST_SLACK = 0.3
 """Least distance from a bound to begin with, in the bounds' unit: with 0.01 there are half as many steps more."""
 
 _FIRST_GAP = 10.0
-"""Complementarity μ to begin with, likewise as a share: with 1 some plans take 30 steps."""
+"""Complementarity μ to begin with, likewise as a share: with 1 the longest plans take 4 to 8 steps more."""
 
 _REGULARISATION = 1e-14
 """Proximal term of the multipliers, relative to rows and P: with less a factor may fail, more takes more steps."""

@@ -3,8 +3,8 @@
     python benchmarks/compensation/agreement.py [--sets 100] [--first 0]
 
 Each set has a machine, parameters, moves and noise of its own; two drives are run, one behind each implementation.
-Where ``x_dm`` differs by more than 1 nm, the C core is run again with its measurements changed by 1e-15 of themselves,
-at random: if it then differs as much from itself, the loop amplifies rounding, and no two implementations could agree.
+Where ``x_dm`` differs by more than 1 nm, the C core is run again with its two inputs changed by 1e-15 of themselves, at
+random: if it then differs by more than 1 nm from itself, the loop amplifies rounding.
 The exit code is 1 if a set differs that does not amplify, or two models plan a window.
 """
 
@@ -29,7 +29,7 @@ AGREED = 1e-9
 """Largest difference of x_dm, m."""
 
 PERTURBATION = 1e-15
-"""Largest relative change of a measurement in the repeated run."""
+"""Largest relative change of an input in the repeated run."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Comparison:
     apart : float
         Of the library and the C core.
     own : float
-        Of the C core and itself with perturbed measurements; 0 if that was not run.
+        Of the C core and itself with perturbed inputs; 0 if that was not run.
     growth : float
         Mean factor of the latter from one window to the next.
     states_differ : bool
