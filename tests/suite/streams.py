@@ -149,11 +149,8 @@ class FmuStream:
         self._fmu = FmuInstance(archive)
 
     def initialise(self, values: Mapping[str, Value], *, start: float = 0.0, stop: float | None = None) -> None:
-        def begin() -> None:
-            self._fmu.slave.setupExperiment(startTime=start, stopTime=stop)
-            self._fmu.slave.enterInitializationMode()
-
-        begin()
+        self._fmu.slave.setupExperiment(startTime=start, stopTime=stop)
+        self._fmu.slave.enterInitializationMode()
         for name, value in values.items():
             self._fmu.set(name, value)
         self._refusing(self._fmu._call, self._fmu.slave.exitInitializationMode)

@@ -52,7 +52,8 @@ typedef struct {
  * ReferenceTrajectory looks up the number of samples in its resource for that. */
 HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[]);
 
-/* Fill the state (size bytes as hsep_model_size told, zeroed, aligned for double) for t_start; outputs and locals of t_start go to values.
+/* Fill the state (size bytes as hsep_model_size told, zeroed, aligned for double) for t_start; outputs and locals of
+ * t_start go to values.
  * Reads the resources, as hsep_model_size and hsep_model_start_values do; no step touches a file.
  * Fails if a start value is not finite, a resource cannot be read or has changed so that size does not fit. */
 HSEP_API hsep_status hsep_model_initialise(
