@@ -21,7 +21,7 @@ def main() -> None:
     ours = signal.getsignal(signal.SIGINT) is signal.default_int_handler  # otherwise Ctrl-C is somebody else's
     if ours:
         signal.signal(signal.SIGINT, _leave)
-    from hybridsep.cli import main as run
+    from hybridsep.app.cli import main as run
 
     try:
         if ours:

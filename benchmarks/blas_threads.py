@@ -25,7 +25,7 @@ from rich.table import Table
 from threadpoolctl import threadpool_limits
 
 from benchmarks.common import Array, staircase_log, staircase_predictor
-from hybridsep.compensator import SepCompensator
+from hybridsep.compensate.compensator import SepCompensator
 from hybridsep.machine import load_machine
 
 N_WINDOWS = 40

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridsep.physics import ModalModel
-from hybridsep.plant import FeedDrive, simulate
-from hybridsep.predictor import HybridPredictor
-from hybridsep.signals import Array
-from hybridsep.trajectory import staircase
+from hybridsep.base.signals import Array
+from hybridsep.model.physics import ModalModel
+from hybridsep.plants.plant import FeedDrive, simulate
+from hybridsep.plants.trajectory import staircase
+from hybridsep.predict.predictor import HybridPredictor
 
 __all__ = [
     "Array",

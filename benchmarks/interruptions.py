@@ -25,7 +25,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from hybridsep.trajectory import staircase
+from hybridsep.plants.trajectory import staircase
 
 COMMANDS = {
     "demo": ["demo", "--seeds", "1", "--out", "."],

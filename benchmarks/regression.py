@@ -41,7 +41,7 @@ from benchmarks.common import (
     staircase_log,
     staircase_predictor,
 )
-from hybridsep.backtest import backtest
+from hybridsep.evaluate.backtest import backtest
 
 LAM = 1e-12
 NP = 100

@@ -33,10 +33,10 @@ from benchmarks.common import (
     relative_error,
     require_extended_precision,
 )
-from hybridsep.backtest import Batch, backtest_stream
+from hybridsep.evaluate.backtest import Batch, backtest_stream
 from hybridsep.logs import open_log
-from hybridsep.physics import ModalModel, Mode
-from hybridsep.predictor import HybridPredictor
+from hybridsep.model.physics import ModalModel, Mode
+from hybridsep.predict.predictor import HybridPredictor
 
 TS = 1e-3
 BLOCK = 10_000

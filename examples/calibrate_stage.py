@@ -14,9 +14,9 @@ import numpy as np
 from scipy.optimize import brentq
 
 from hybridsep import Encoder, Machine, backtest, load_machine, simulate, spiral
-from hybridsep.demo import PRINTED
+from hybridsep.app.demo import PRINTED
+from hybridsep.base.signals import Array
 from hybridsep.machine import StageSection
-from hybridsep.signals import Array
 
 KAPPA_OVER_F = 1.5e3  # 1/m²
 ASSUMPTIONS = {

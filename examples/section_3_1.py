@@ -6,11 +6,10 @@ Run it with ``python examples/section_3_1.py``.
 from __future__ import annotations
 
 import numpy as np
+from mechanism import Drive, decay, demonstrate
 from rich import box
 from rich.console import Console
 from rich.table import Table
-
-from hybridsep.mechanism import Drive, decay, demonstrate
 
 
 def main() -> None:

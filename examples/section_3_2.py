@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from mechanism import Drive, simulate
 
 from hybridsep import Encoder, backtest, load_machine, staircase
-from hybridsep.mechanism import Drive, simulate
-from hybridsep.signals import Array
+from hybridsep.base.signals import Array
 
 FINER = 10
 """Steps of the simulation in a sampling interval."""

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridsep import PAPER_LIMITS, Encoder, Machine, backtest, load_machine, rest_to_rest, simulate, spiral
-from hybridsep.backtest import Backtest, Batch
-from hybridsep.signals import Array
+from hybridsep.base.signals import Array
+from hybridsep.evaluate.backtest import Backtest, Batch
 
 NEAR = 100
 """Samples after a reversal of the command that count as near it."""

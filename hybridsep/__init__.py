@@ -9,11 +9,7 @@ from __future__ import annotations
 
 __version__ = "0.1.0"
 
-from .backtest import Backtest, Scores, backtest, backtest_stream
-from .closed_loop import ClosedLoop, contour_error, run_closed_loop
-from .compensator import SepCompensator, SepPlan, SepState
-from .cosim import CoSimulation, cosimulate
-from .errors import (
+from .base.errors import (
     FmuError,
     HybridSepError,
     LogError,
@@ -23,20 +19,24 @@ from .errors import (
     SignalError,
     StateError,
 )
+from .base.limits import Limits
+from .compensate.compensator import SepCompensator, SepPlan, SepState
+from .compensate.sep_lookahead import SepLookAhead
+from .cosim.compensator_run import SepCoSimulation, cosimulate_sep
+from .cosim.importer import FmuInstance
+from .cosim.predictor_run import CoSimulation, cosimulate
+from .evaluate.backtest import Backtest, Scores, backtest, backtest_stream
+from .evaluate.closed_loop import ClosedLoop, contour_error, run_closed_loop
 from .fmi.archive import build_fmu, fmu_names
-from .importer import FmuInstance
-from .limits import Limits
 from .logs import Log, LogReader, open_log, read_log
-from .lookahead import LookAhead
 from .machine import Machine, load_machine, machine_names
-from .physics import DiscreteModel, ModalModel, Mode
-from .plant import Encoder, FeedDrive, StageDrive, simulate
-from .predictor import HybridPredictor
-from .regression import RidgeRegression
-from .sep_cosim import SepCoSimulation, cosimulate_sep
-from .sep_lookahead import SepLookAhead
-from .trajectory import PAPER_LIMITS, along_path, archimedean_spiral, from_file, rest_to_rest, spiral, staircase
-from .window import Prediction, WindowOperator
+from .model.physics import DiscreteModel, ModalModel, Mode
+from .plants.plant import Encoder, FeedDrive, StageDrive, simulate
+from .plants.trajectory import PAPER_LIMITS, along_path, archimedean_spiral, from_file, rest_to_rest, spiral, staircase
+from .predict.lookahead import LookAhead
+from .predict.predictor import HybridPredictor
+from .predict.regression import RidgeRegression
+from .predict.window import Prediction, WindowOperator
 
 __all__ = [
     "PAPER_LIMITS",

@@ -12,14 +12,14 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, ValidationInfo, model_validator
 
-from ._data_files import data_folder
-from .compensator import SepCompensator, SepState
-from .errors import MachineError, ParameterError, brief
-from .limits import Limits
-from .parameters import INPUT_HOLDS, PARAMETERS, check, check_lags, check_preview
-from .physics import ModalModel, Mode
-from .plant import FeedDrive, Plant, StageDrive
-from .predictor import HybridPredictor
+from .base.data_files import data_folder
+from .base.errors import MachineError, ParameterError, brief
+from .base.limits import Limits
+from .base.parameters import INPUT_HOLDS, PARAMETERS, check, check_lags, check_preview
+from .compensate.compensator import SepCompensator, SepState
+from .model.physics import ModalModel, Mode
+from .plants.plant import FeedDrive, Plant, StageDrive
+from .predict.predictor import HybridPredictor
 
 if sys.version_info >= (3, 11):
     import tomllib

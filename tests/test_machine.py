@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hybridsep import Encoder, Limits, MachineError, SepState, load_machine, machine_names, simulate, spiral
-from hybridsep.compensator import RECOMMENDED
+from hybridsep.compensate.compensator import RECOMMENDED
 from hybridsep.machine import Machine, Physics, SpringMassDamper, StageSection
 
 GOOD = """

@@ -18,7 +18,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))  # the C core is built and driven as in the tests
+# the C core is built and driven as in the tests
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests" / "support"))
 
 import numpy as np
 from c_core import library

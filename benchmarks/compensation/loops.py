@@ -10,14 +10,14 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from hybridsep.closed_loop import ClosedLoop, run_closed_loop
-from hybridsep.compensator import SepCompensator, SepState
+from hybridsep.base.limits import Limits
+from hybridsep.base.signals import Array
+from hybridsep.compensate.compensator import SepCompensator, SepState
+from hybridsep.cosim.compensator_run import SepCoSimulation, cosimulate_sep
+from hybridsep.evaluate.closed_loop import ClosedLoop, run_closed_loop
 from hybridsep.fmi.archive import build_fmu, fmu_names
-from hybridsep.limits import Limits
 from hybridsep.machine import Machine
-from hybridsep.plant import Encoder, FeedDrive, Plant
-from hybridsep.sep_cosim import SepCoSimulation, cosimulate_sep
-from hybridsep.signals import Array
+from hybridsep.plants.plant import Encoder, FeedDrive, Plant
 
 __all__ = ["Case", "FmuLoops", "LibraryLoops", "Loops", "noise_seed"]
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridsep.closed_loop import ClosedLoop, run_closed_loop
-from hybridsep.compensator import SepState
+from hybridsep.base.signals import Array
+from hybridsep.compensate.compensator import SepState
+from hybridsep.evaluate.closed_loop import ClosedLoop, run_closed_loop
 from hybridsep.machine import Machine, StageSection
-from hybridsep.plant import Encoder, Plant, StageDrive
-from hybridsep.signals import Array
+from hybridsep.plants.plant import Encoder, Plant, StageDrive
 
 from .loops import noise_seed
 

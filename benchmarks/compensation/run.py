@@ -23,15 +23,15 @@ import numpy as np
 
 from benchmarks.compensation.loops import Case, FmuLoops, LibraryLoops, Loops
 from benchmarks.compensation.path_friction import runs_with_path_friction
+from benchmarks.compensation.peers import input_shaper, shape, zero_phase_command
 from benchmarks.compensation.report import Report
-from hybridsep.closed_loop import ClosedLoop, contour_error
-from hybridsep.compensator import SepState
-from hybridsep.limits import Limits
+from hybridsep.base.limits import Limits
+from hybridsep.base.signals import Array
+from hybridsep.compensate.compensator import SepState
+from hybridsep.evaluate.closed_loop import ClosedLoop, contour_error
 from hybridsep.machine import CompensatorSection, Machine, load_machine
-from hybridsep.peers import input_shaper, shape, zero_phase_command
-from hybridsep.plant import FeedDrive, simulate
-from hybridsep.signals import Array
-from hybridsep.trajectory import archimedean_spiral, spiral, staircase
+from hybridsep.plants.plant import FeedDrive, simulate
+from hybridsep.plants.trajectory import archimedean_spiral, spiral, staircase
 
 UM = 1e6
 AFTER_REVERSAL = 100

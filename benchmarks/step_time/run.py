@@ -28,11 +28,11 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.step_time.host import PREDICTOR, Array, Host, build, drive_log, instructions
-from hybridsep.lookahead import LookAhead
-from hybridsep.physics import ModalModel
-from hybridsep.plots import save_figure
-from hybridsep.predictor import HybridPredictor
-from hybridsep.regression import RidgeRegression
+from hybridsep.evaluate.plots import save_figure
+from hybridsep.model.physics import ModalModel
+from hybridsep.predict.lookahead import LookAhead
+from hybridsep.predict.predictor import HybridPredictor
+from hybridsep.predict.regression import RidgeRegression
 
 HERE = Path(__file__).parent
 CASES = ((50, 3), (100, 99))

@@ -6,13 +6,13 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from hybridsep._saved import Saved
-from hybridsep.errors import SignalError
+from hybridsep.base.errors import SignalError
+from hybridsep.base.saved import Saved
+from hybridsep.base.signals import POSITION_MAX
 from hybridsep.fmi import slave
 from hybridsep.fmi.variables import modes_from
-from hybridsep.physics import ModalModel, Mode
-from hybridsep.plant import Encoder, FeedDrive, Plant, StageDrive
-from hybridsep.signals import POSITION_MAX
+from hybridsep.model.physics import ModalModel, Mode
+from hybridsep.plants.plant import Encoder, FeedDrive, Plant, StageDrive
 
 
 class FeedDrivePy(slave.TableSlave):

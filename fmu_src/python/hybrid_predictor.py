@@ -7,9 +7,9 @@ from pathlib import Path
 from hybridsep.fmi import look_ahead_slave
 from hybridsep.fmi.variables import modes_from
 from hybridsep.fmi.weights import WEIGHTS_FILE, restore_weights
-from hybridsep.lookahead import LookAhead
-from hybridsep.physics import ModalModel, Mode
-from hybridsep.predictor import HybridPredictor
+from hybridsep.model.physics import ModalModel, Mode
+from hybridsep.predict.lookahead import LookAhead
+from hybridsep.predict.predictor import HybridPredictor
 
 
 class HybridPredictorPy(look_ahead_slave.LookAheadSlave):

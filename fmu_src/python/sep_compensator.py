@@ -5,16 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from hybridsep.compensator import SepCompensator, SepState
-from hybridsep.errors import HybridSepError, ParameterError
+from hybridsep.base.errors import HybridSepError, ParameterError
+from hybridsep.base.limits import Limits
+from hybridsep.base.parameters import check
+from hybridsep.compensate.compensator import SepCompensator, SepState
+from hybridsep.compensate.sep_lookahead import SepLookAhead
 from hybridsep.fmi import look_ahead_slave
 from hybridsep.fmi.variables import PLANNING, modes_from
 from hybridsep.fmi.weights import WEIGHTS_FILE, restore_weights
-from hybridsep.limits import Limits
-from hybridsep.parameters import check
-from hybridsep.physics import ModalModel, Mode
-from hybridsep.predictor import HybridPredictor
-from hybridsep.sep_lookahead import SepLookAhead
+from hybridsep.model.physics import ModalModel, Mode
+from hybridsep.predict.predictor import HybridPredictor
 
 
 class SepCompensatorPy(look_ahead_slave.LookAheadSlave):

@@ -13,9 +13,9 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from ..errors import FmuError
+from ..base.errors import FmuError
+from ..base.output import written_whole
 from ..machine import DEFAULT_MACHINE, FeedDriveSection, Machine
-from ..output import written_whole
 from . import native_backend, python_backend
 from .warm_start import load_trained
 

@@ -25,8 +25,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from ..errors import FmuError
-from ..output import named_errors
+from ..base.errors import FmuError
+from ..base.output import named_errors
 from .macho import universal
 from .processes import Processes
 

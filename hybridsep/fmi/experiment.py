@@ -7,9 +7,9 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
+from ..base.signals import as_samples
 from ..machine import Machine
-from ..signals import as_samples
-from ..trajectory import staircase
+from ..plants.trajectory import staircase
 
 __all__ = ["stop_time"]
 

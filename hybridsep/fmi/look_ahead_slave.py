@@ -6,8 +6,8 @@ from abc import abstractmethod
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from .._saved import Saved
-from ..sampled_inputs import SampledInputs
+from ..base.saved import Saved
+from ..predict.sampled_inputs import SampledInputs
 from .slave import TableSlave
 
 __all__ = ["LookAheadSlave"]

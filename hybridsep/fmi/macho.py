@@ -10,7 +10,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 
-from ..errors import FmuError
+from ..base.errors import FmuError
 
 __all__ = ["universal"]
 

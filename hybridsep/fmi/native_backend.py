@@ -18,11 +18,11 @@ import fmpy
 from numpy.typing import ArrayLike
 
 from .. import __version__
-from .._data_files import data_folder
+from ..base.data_files import data_folder
+from ..base.signals import as_samples
 from ..machine import Machine
-from ..predictor import HybridPredictor
-from ..signals import as_samples
-from ..trajectory import spiral, staircase
+from ..plants.trajectory import spiral, staircase
+from ..predict.predictor import HybridPredictor
 from .c_header import c_header
 from .compiler import ALL_TARGETS, binaries
 from .content import content_guid, fmu_title

@@ -16,11 +16,12 @@ from pathlib import Path
 import pythonfmu
 
 from .. import __version__
-from .._data_files import data_folder
+from ..base.data_files import data_folder
 from ..machine import Machine
-from ..predictor import HybridPredictor
+from ..predict.predictor import HybridPredictor
 from .content import content_guid, fmu_title
 from .experiment import stop_time
+from .imported import imported_modules
 from .model_description import FmuInfo, model_description
 from .pages import index_page
 from .pythonfmu_limits import checked_version, limits_section
@@ -28,37 +29,6 @@ from .variables import variables_of
 from .weights import WEIGHTS_FILE, weights_file
 
 __all__ = ["files"]
-
-_PACKAGE = Path(__file__).resolve().parent.parent
-_BASE = (
-    "errors.py",
-    "parameters.py",
-    "signals.py",
-    "state.py",
-    "_saved.py",
-    "physics.py",
-    "fmi/variables.py",
-    "fmi/slave.py",
-)
-_PREDICTION = (
-    "output.py",
-    "regression.py",
-    "_schedule.py",
-    "window.py",
-    "predictor.py",
-    "_sampled_window.py",
-    "clock.py",
-    "sampled_inputs.py",
-    "fmi/weights.py",
-    "fmi/look_ahead_slave.py",
-)
-_PLANNING = tuple(f"_{module}.py" for module in ("bounded", "interior", "plan", "sensor", "splines", "trust"))
-_TRAVELS = {
-    "HybridPredictor": (*_BASE, *_PREDICTION, "lookahead.py"),
-    "SepCompensator": (*_BASE, *_PREDICTION, *_PLANNING, "limits.py", "compensator.py", "sep_lookahead.py"),
-    "FeedDrive": (*_BASE, "clock.py", "plant.py"),
-}
-"""The modules each FMU needs; with NumPy and SciPy they need nothing else."""
 
 _SLAVES = {
     "HybridPredictor": "hybrid_predictor.py",
@@ -114,7 +84,7 @@ def files(
 def _resources(model: str) -> dict[str, bytes]:
     """Return the Python side of an FMU: slave, library and pythonfmu, under names of their content."""
     slave = data_folder("fmu_src") / "python" / _SLAVES[model]
-    library = {module: (_PACKAGE / module).read_bytes() for module in _TRAVELS[model]}
+    library = imported_modules(slave)
     digest = hashlib.sha256(slave.read_bytes())
     for module, text in library.items():
         digest.update(module.encode() + text)
@@ -124,8 +94,6 @@ def _resources(model: str) -> dict[str, bytes]:
     content = {
         "resources/slavemodule.txt": module_name.encode(),
         f"resources/{module_name}.py": source.encode(),
-        f"resources/{package}/__init__.py": b"",
-        f"resources/{package}/fmi/__init__.py": b"",
     }
     content |= {f"resources/{package}/{module}": text for module, text in library.items()}
     for path in sorted(Path(pythonfmu.__file__).parent.glob("*.py")):

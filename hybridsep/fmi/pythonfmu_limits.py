@@ -9,7 +9,7 @@ from importlib import metadata
 from pathlib import Path
 from urllib.parse import quote
 
-from ..errors import FmuError
+from ..base.errors import FmuError
 
 __all__ = ["check_unpacked", "checked_version", "limits_section"]
 

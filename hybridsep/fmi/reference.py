@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..lookahead import LookAhead
+from ..base.signals import Array, as_samples
+from ..compensate.sep_lookahead import SepLookAhead
 from ..machine import Machine
-from ..plant import Encoder
-from ..predictor import HybridPredictor
-from ..sep_lookahead import SepLookAhead
-from ..signals import Array, as_samples
-from ..trajectory import staircase
+from ..plants.plant import Encoder
+from ..plants.trajectory import staircase
+from ..predict.lookahead import LookAhead
+from ..predict.predictor import HybridPredictor
 from .variables import variables_of
 from .weights import restore_weights, weights_file
 

@@ -20,9 +20,9 @@ from typing import Any, TypeVar
 from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real
 from pythonfmu.enums import Fmi2Status
 
-from .._saved import Saved
-from ..errors import FmuError, HybridSepError, StateError
-from ..state import pack, unpack
+from ..base.errors import FmuError, HybridSepError, StateError
+from ..base.saved import Saved
+from ..base.state import pack, unpack
 from .variables import Variable, variables_of
 
 __all__ = ["DESCRIPTION_FILE", "TableSlave"]

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from ..parameters import PARAMETERS, check
+from ..base.parameters import PARAMETERS, check
 
 __all__ = [
     "INTERPOLATED",

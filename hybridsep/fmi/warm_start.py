@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..errors import StateError
+from ..base.errors import StateError
 from ..machine import Machine
-from ..predictor import HybridPredictor
+from ..predict.predictor import HybridPredictor
 from .weights import learned_settings
 
 __all__ = ["load_trained"]

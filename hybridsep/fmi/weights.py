@@ -14,9 +14,9 @@ import zlib
 
 import numpy as np
 
-from ..errors import SignalError, StateError
-from ..parameters import INPUT_HOLDS
-from ..predictor import HybridPredictor
+from ..base.errors import SignalError, StateError
+from ..base.parameters import INPUT_HOLDS
+from ..predict.predictor import HybridPredictor
 
 __all__ = ["WEIGHTS_FILE", "learned_settings", "restore_weights", "weights_file"]
 

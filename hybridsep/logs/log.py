@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import LogError
-from ..parameters import check
-from ..signals import Array
+from ..base.errors import LogError
+from ..base.parameters import check
+from ..base.signals import Array
 from .mat import MatSource
 from .npz import NpzSource
 from .source import Block, Source

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import LogError
+from ..base.errors import LogError
 from .source import Block, check_column, check_lengths, sample_number
 
 __all__ = ["MatSource"]

@@ -12,8 +12,8 @@ from typing import IO, Any
 import numpy as np
 from numpy.lib import format as npy
 
-from ..errors import LogError
-from ..signals import Array
+from ..base.errors import LogError
+from ..base.signals import Array
 from .source import Block, check_column, check_lengths, sample_number
 
 __all__ = ["NpzSource"]

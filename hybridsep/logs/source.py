@@ -9,8 +9,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..errors import LogError
-from ..signals import Array
+from ..base.errors import LogError
+from ..base.signals import Array
 
 __all__ = ["Block", "Source", "check_column", "check_lengths", "sample_number"]
 

@@ -9,8 +9,8 @@ from typing import IO
 
 import numpy as np
 
-from ..errors import LogError
-from ..signals import Array
+from ..base.errors import LogError
+from ..base.signals import Array
 from .source import Block
 
 __all__ = ["TextSource"]

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import LogError
-from ..signals import Array
+from ..base.errors import LogError
+from ..base.signals import Array
 from .source import Block
 
 __all__ = ["TOLERANCE", "TimeAxis"]

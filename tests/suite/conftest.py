@@ -7,8 +7,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-
-from suite.streams import StreamMaker, archive_of, write_resources
+from streams import StreamMaker, archive_of, write_resources
 
 
 @pytest.fixture(scope="session")

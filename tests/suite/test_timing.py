@@ -14,8 +14,7 @@ from itertools import accumulate
 import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
-
-from suite.streams import (
+from streams import (
     DRIVE,
     LOOK_AHEADS,
     PLANTS,

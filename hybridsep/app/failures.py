@@ -1,0 +1,102 @@
+"""What ends a command: every failure as one line on standard error, and an exit status.
+
+Status 2 for an error, 130 after Ctrl-C, 1 where the reader of standard output has gone.
+"""
+
+from __future__ import annotations
+
+import codecs
+import os
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+
+from rich.console import Console
+
+from .. import __version__
+from ..base.errors import HybridSepError
+from ..base.interrupt import interrupts_between_calls
+
+__all__ = ["DEBUG_VARIABLE", "errors_console", "run"]
+
+DEBUG_VARIABLE = "HYBRIDSEP_DEBUG"
+"""Environment variable: if it is set, an unexpected error shows its traceback."""
+
+errors_console = Console(stderr=True)
+
+_PLAIN = str.maketrans(
+    {"µ": "u", "→": "->", "–": "-", "−": "-", "…": "...", "²": "2", "³": "3", "·": "*", "λ": "lambda"}
+)
+"""Characters of our texts, for a terminal that does not know them."""
+
+
+class _Interrupted(BaseException):
+    """Ctrl-C; no KeyboardInterrupt, which typer would turn into an exit without a word."""
+
+
+def run(app: Callable[[], object]) -> int:
+    """Run a command line; return its exit status."""
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(AttributeError):  # a stream in a program that has its own
+            stream.reconfigure(errors=_PLAIN_ERRORS)  # type: ignore[union-attr]
+    try:
+        with interrupts_between_calls(_Interrupted):
+            status = _status(app)
+            sys.stdout.flush()
+            return status
+    except _Interrupted:
+        errors_console.print("interrupted: nothing is half written, files are either as they were or complete")
+        return 130
+    except BrokenPipeError:
+        _abandon_stdout()
+        return 1
+    except HybridSepError as error:
+        return _fail(f"{type(error).__name__}: {error}")
+    except OSError as error:
+        if error.filename is None:  # files name theirs
+            _abandon_stdout()
+        return _fail(f"cannot read or write {error.filename or 'standard output'}: {error.strerror or error}")
+    except MemoryError as error:
+        return _fail(f"out of memory: {error}; use a smaller Np, p or q, or a shorter log".replace(": ;", ";"))
+    except Exception as error:
+        if os.environ.get(DEBUG_VARIABLE):
+            raise
+        what = " ".join(f"{type(error).__name__}: {error}".split())
+        return _fail(
+            f"unexpected {what if len(what) <= 300 else what[:300] + '…'}; this is a fault of hybridsep {__version__}: "
+            f"please report it with the command and its files ({DEBUG_VARIABLE}=1 shows where it is)"
+        )
+
+
+def _status(app: Callable[[], object]) -> int:
+    try:
+        app()
+    except SystemExit as stop:
+        return stop.code if isinstance(stop.code, int) else int(stop.code is not None)
+    return 0
+
+
+def _fail(message: str) -> int:
+    errors_console.print("[bold red]error:[/] ", end="")
+    errors_console.print(message, markup=False, highlight=False, soft_wrap=True)
+    return 2
+
+
+def _abandon_stdout() -> None:
+    """Let what is still buffered go nowhere, so that the end of the process does not fail as well."""
+    with suppress(OSError, ValueError):  # a stream without a descriptor has no such end
+        descriptor = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(descriptor, sys.stdout.fileno())
+        os.close(descriptor)
+
+
+def _spell_plainly(error: UnicodeError) -> tuple[str, int]:
+    """Replace what a terminal's encoding lacks: µ by u, another character by a question mark."""
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    text = error.object[error.start : error.end].translate(_PLAIN)
+    return "".join(character if character.isascii() else "?" for character in text), error.end
+
+
+_PLAIN_ERRORS = "hybridsep-plain"
+codecs.register_error(_PLAIN_ERRORS, _spell_plainly)

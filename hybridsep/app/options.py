@@ -1,0 +1,58 @@
+"""Options that several commands of the command line share; ranges and units come from the table of parameters."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..base.parameters import PARAMETERS
+from ..fmi.archive import BACKENDS
+
+__all__ = [
+    "BackendOption",
+    "ForceOption",
+    "InitOption",
+    "JsonOption",
+    "LamOption",
+    "MachineOption",
+    "NpOption",
+    "POption",
+    "QOption",
+    "TsOption",
+    "UnitOption",
+    "WeightsOption",
+    "parameter_help",
+]
+
+
+def parameter_help(name: str) -> str:
+    """Return the help of an option that changes a parameter of the machine."""
+    return PARAMETERS[name].help + "; the machine's own if left out"
+
+
+JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and nothing else.")]
+ForceOption = Annotated[
+    bool, typer.Option("--force", help="Overwrite an existing file even if it is not of the kind that is written.")
+]
+MachineOption = Annotated[
+    str, typer.Option("--machine", "-m", help="Machine file (.toml), or the name of one that comes with the library.")
+]
+BackendOption = Annotated[str, typer.Option(help=f"Flavour of the FMUs: {', '.join(BACKENDS)}.")]
+TsOption = Annotated[
+    float | None, typer.Option("--Ts", help="Sampling interval [s], for a file without a time column.")
+]
+UnitOption = Annotated[str, typer.Option(help="Unit of the positions in the file: m, mm or um.")]
+WeightsOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="A predictor saved with HybridPredictor.save: the one HybridPredictor or SepCompensator that is built "
+        "here starts warm; name it where there are more."
+    ),
+]
+NpOption = Annotated[int | None, typer.Option("--Np", help=parameter_help("Np"))]
+POption = Annotated[int | None, typer.Option("--p", help=parameter_help("p"))]
+QOption = Annotated[int | None, typer.Option("--q", help=parameter_help("q"))]
+LamOption = Annotated[float | None, typer.Option("--lam", help=parameter_help("lambda"))]
+InitOption = Annotated[float | None, typer.Option("--t-init", help=parameter_help("t_init"))]

@@ -1,0 +1,150 @@
+"""What a file that is written may replace: nothing that is read, and only a file of its own kind unless forced."""
+
+from __future__ import annotations
+
+import os
+import zipfile
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..base.errors import ParameterError
+from ..cosim import compensator_run as sep_cosim
+from ..cosim import predictor_run as cosim
+
+__all__ = ["BATCHES", "BATCH_COLUMNS", "BY_ENDING", "FIGURE", "FMU", "RUN", "Kind", "Output", "check_outputs"]
+
+BATCH_COLUMNS = ("t", "rms_pb", "rms_hold", "rms_h")
+"""The CSV of ``hybridsep backtest``."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of files that the command line writes.
+
+    Attributes
+    ----------
+    name : str
+        As messages call it.
+    recognises : callable
+        Whether an existing file is of that kind.
+    """
+
+    name: str
+    recognises: Callable[[Path], bool]
+
+
+@dataclass(frozen=True)
+class Output:
+    """A file that will be written.
+
+    Attributes
+    ----------
+    option : str
+        What the user named it with.
+    path : Path
+    kind : Kind
+    """
+
+    option: str
+    path: Path
+    kind: Kind
+
+
+def _begins_with(start: bytes) -> Callable[[Path], bool]:
+    def recognises(path: Path) -> bool:
+        with path.open("rb") as file:
+            return file.read(len(start)) == start
+
+    return recognises
+
+
+def _has_columns(*tables: tuple[str, ...]) -> Callable[[Path], bool]:
+    """Return what recognises a CSV or an ``.npz`` with the columns of one of the tables."""
+    headers = [",".join(columns).encode() for columns in tables]
+    members = [[f"{name}.npy" for name in columns] for columns in tables]
+
+    def recognises(path: Path) -> bool:
+        with path.open("rb") as file:
+            if file.readline(1000).rstrip(b"\r\n") in headers:
+                return True
+        return zipfile.is_zipfile(path) and _members(path) in members
+
+    return recognises
+
+
+def _is_our_fmu(path: Path) -> bool:
+    if not zipfile.is_zipfile(path) or "modelDescription.xml" not in _members(path):
+        return False
+    with zipfile.ZipFile(path) as archive:
+        return b'generationTool="hybridsep ' in archive.read("modelDescription.xml")
+
+
+def _members(path: Path) -> list[str]:
+    with zipfile.ZipFile(path) as archive:
+        return archive.namelist()
+
+
+BATCHES = Kind("CSV of hybridsep backtest", _has_columns(BATCH_COLUMNS))
+RUN = Kind("result of hybridsep cosim", _has_columns(cosim.COLUMNS, sep_cosim.COLUMNS))
+FIGURE = Kind("PNG", _begins_with(b"\x89PNG\r\n\x1a\n"))
+FMU = Kind("FMU of hybridsep", _is_our_fmu)
+STATE = Kind("saved predictor", _begins_with(b"HSEP"))
+SUMMARY = Kind("summary of hybridsep demo", _begins_with(b'{\n  "staircase": {'))
+
+BY_ENDING = {".csv": RUN, ".npz": RUN, ".png": FIGURE, ".fmu": FMU, ".state": STATE, ".json": SUMMARY}
+"""The kinds of files that have names of the library's own."""
+
+
+def check_outputs(outputs: Iterable[Output], inputs: Mapping[str, str | Path | None], *, force: bool = False) -> None:
+    """Make the folders of files that will be written, or say why one of them may not be.
+
+    Parameters
+    ----------
+    outputs : iterable of Output
+    inputs : mapping
+        What the user calls a file that is read → its path; None if it is not given.
+    force : bool
+        Whether an existing file of another kind may be overwritten; an input never is.
+
+    Raises
+    ------
+    ParameterError
+        If an output is an input, by whatever name, or another output; a folder; an existing file of another kind; or in
+        a folder that cannot be written to.
+    """
+    taken = [(f"the {what} {path}", Path(path)) for what, path in inputs.items() if path is not None]
+    known = list(outputs)
+    for output in known:
+        path = output.path
+        for what, other in taken:
+            if _same_file(path, other):
+                raise ParameterError(f"{output.option} {path} is the same file as {what}; choose another name")
+        taken.append((f"{output.option} {path}", path))
+        if path.is_dir():
+            raise ParameterError(f"{output.option} must be a file, got the folder {path}")
+        if path.is_file() and path.stat().st_size and not force and not _recognised(output):
+            raise ParameterError(
+                f"{output.option} {path} exists and is no {output.kind.name}; choose another name, or overwrite it "
+                "with --force"
+            )
+    for output in known:
+        output.path.parent.mkdir(parents=True, exist_ok=True)
+        folder = Path(os.path.realpath(output.path)).parent
+        if not os.access(folder, os.W_OK):
+            raise ParameterError(f"{output.option} {output.path}: no file can be written in {folder}")
+
+
+def _same_file(one: Path, other: Path) -> bool:
+    """Return whether two names lead to one file, by symbolic and hard links too, whether it exists yet or not."""
+    try:
+        return one.samefile(other)
+    except OSError:
+        return os.path.realpath(one) == os.path.realpath(other)
+
+
+def _recognised(output: Output) -> bool:
+    try:
+        return output.kind.recognises(output.path)
+    except (zipfile.BadZipFile, OSError, ValueError, KeyError, RuntimeError, NotImplementedError):
+        return False  # damaged, or not readable: whatever it is, it is not known to be ours

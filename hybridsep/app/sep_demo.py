@@ -1,0 +1,118 @@
+"""The demo's second half: the same cases with a compensator FMU in place of the predictor FMU."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..base.signals import Array
+from ..compensate.compensator import SepState
+from ..cosim.compensator_run import SepCoSimulation, cosimulate_sep
+from ..evaluate.closed_loop import contour_error, run_closed_loop
+from ..fmi.archive import build_fmu, fmu_names
+from ..machine import Machine
+from ..plants.plant import Encoder
+from ..plants.trajectory import archimedean_spiral
+
+__all__ = ["KINDS", "Runs", "build_for_host", "compensate", "contour_errors", "mean_summary", "train"]
+
+TRAINING_SEED = 1000
+"""Noise seed of the run that a warm compensator has learned from; no case is run with it."""
+
+KINDS = {
+    "none": SepState.OFF,
+    "physics": SepState.PHYSICS,
+    "hybrid_cold": SepState.HYBRID,
+    "hybrid_warm": SepState.HYBRID,
+}
+"""Kinds of compensation, under the keys of :data:`hybridsep.sep_plots.CASES`, and the best model of each."""
+
+Runs = dict[str, SepCoSimulation]
+
+
+def compensate(
+    machine: Machine,
+    plant: Path,
+    command: Array,
+    out: Path,
+    backend: str,
+    *,
+    seeds: Sequence[int] = (0,),
+    advance: Callable[[str], object] = lambda message: None,
+) -> tuple[Runs, dict[str, Any]]:
+    """Run a machine's compensator FMU against a plant FMU: none, physics, hybrid cold and warm.
+
+    Parameters
+    ----------
+    machine : Machine
+    plant : Path
+        Its plant FMU.
+    command : (n,) array, m
+        Commanded positions.
+    out : Path
+        Folder: the FMU goes to ``fmus``, the trained one to ``fmus/warm``, what it learned from to ``<machine>.state``.
+    backend : {"native", "python"}
+        Flavour of the FMU.
+    seeds : sequence of int
+        Noise seeds.
+    advance : callable
+        Called with the name of each kind of compensation before it is run.
+
+    Returns
+    -------
+    runs : dict
+        The first seed's, by the keys of :data:`KINDS`.
+    summary : dict
+        The same keys → means over the seeds of :meth:`SepCoSimulation.summary`, with the spread
+        ``tracking_rms_um_std``.
+    """
+    cold = build_for_host(machine, "SepCompensator", out / "fmus", backend)
+    weights = out / f"{machine.name}.state"
+    train(machine, command, weights)
+    warm = build_for_host(machine, "SepCompensator", out / "fmus" / "warm", backend, weights=weights)
+    runs: Runs = {}
+    summary: dict[str, Any] = {}
+    for key, best in KINDS.items():
+        advance(key.replace("_", " "))
+        fmu = warm if key == "hybrid_warm" else cold
+        of_seeds = [
+            cosimulate_sep(
+                fmu, plant, command, compensator_values={"compensate": int(best)}, plant_values={"seed": seed}
+            )
+            for seed in seeds
+        ]
+        runs[key] = of_seeds[0]
+        summary[key] = mean_summary([run.summary() for run in of_seeds], spread="tracking_rms_um")
+    return runs, summary
+
+
+def train(machine: Machine, command: Array, path: Path) -> None:
+    """Save what a machine's compensator learns in one run of the library over ``command``, ``(n,)``, m."""
+    assert machine.plant is not None
+    compensator = machine.new_compensator()
+    encoder = Encoder(machine.plant.noise_std, TRAINING_SEED)
+    run_closed_loop(compensator, machine.new_plant(), command, encoder=encoder)
+    compensator.predictor.save(path)
+
+
+def contour_errors(x: Runs, y: Runs) -> dict[str, Array]:
+    """Return how far the paper's spiral is missed, ``(n,)``, m, of the runs of X and Y with the same key."""
+    path = archimedean_spiral(0.030, 5.0)
+    return {key: contour_error(np.column_stack((x[key].x, y[key].x)), *path) for key in x}
+
+
+def build_for_host(machine: Machine, model: str, out: Path, backend: str, *, weights: Path | None = None) -> Path:
+    """Build one of a machine's FMUs for this computer."""
+    names = {built: name for name, built in fmu_names(machine, backend).items()}
+    return build_fmu(machine, names[model], out, backend, targets=("host",), weights=weights)
+
+
+def mean_summary(summaries: list[dict[str, float | int]], *, spread: str) -> dict[str, Any]:
+    """Return the mean of each figure over several runs, and the standard deviation of one of them."""
+    mean: dict[str, Any] = {key: float(np.mean([s[key] for s in summaries])) for key in summaries[0]}
+    mean["n_samples"] = summaries[0]["n_samples"]
+    mean[f"{spread}_std"] = float(np.std([s[spread] for s in summaries]))
+    return mean

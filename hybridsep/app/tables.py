@@ -1,0 +1,146 @@
+"""What the command line prints: tables for people, JSON for programs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import typer
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from .demo import PRINTED, Summary
+from .sep_demo import KINDS
+
+__all__ = ["console", "print_compensation", "print_json", "print_predictions", "print_scores", "print_tracking"]
+
+console = Console()
+
+PAPER_COLUMN = "paper: physics → hybrid, reduction, as printed there"
+
+
+def print_predictions(summary: Summary) -> None:
+    """Print what the demo's predictors came to."""
+    table = Table(
+        title="Prediction error, RMS in µm against the measured position",
+        caption=PAPER_COLUMN,
+        box=box.SIMPLE,
+        pad_edge=False,
+    )
+    for column in ("case", "physics", "hold", "hybrid", "reduction", "paper"):
+        table.add_column(column, justify="left" if column == "case" else "right", no_wrap=True)
+    for name, case in summary.items():
+        table.add_row(name, *_figures(case), _printed(PRINTED[name]))
+        for part in ("friction_alone", "stiffness_alone"):
+            if part in case:
+                table.add_row(f"  {part.replace('_', ' ')}", *_figures(case[part]))
+    console.print(table)
+    console.print(
+        "The stage has the paper's Table 1 and a simulated disturbance, scaled to the printed physics figures: these "
+        "agree by construction, the hybrid's do not."
+    )
+    for name, case in summary.items():
+        n, worse = case["n_batches"], case["batches_hybrid_worse"]
+        text = f"{name}: of {n} batches the hybrid is worse than physics in {len(worse)}"
+        times = ", ".join(f"{batch['t_s']:g}" for batch in worse)
+        console.print(
+            f"{text}{f' (from {times} s on)' if worse else ''}, worse than hold in {case['n_batches_worse_than_hold']}",
+            highlight=False,
+        )
+
+
+def print_compensation(summary: Summary) -> None:
+    """Print what the demo's compensators came to."""
+    labels = {kind: kind.replace("_", " ") for kind in KINDS}
+    table = Table(
+        title="\nTracking error with compensation, RMS in µm of the true position",
+        caption="warm: weights of an earlier run; contour: X and Y",
+        box=box.SIMPLE,
+        pad_edge=False,
+    )
+    for column in ("case", *labels.values()):
+        table.add_column(column, justify="left" if column == "case" else "right", no_wrap=True)
+    rows = {name: (name, "tracking_rms_um") for name, case in summary.items() if "compensation" in case}
+    rows["spiral, contour"] = ("spiral_x", "contour_rms_um")
+    for label, (name, figure) in rows.items():
+        compensation = summary[name]["compensation"]
+        table.add_row(label, *(_figure(compensation[kind][figure]) for kind in KINDS))
+    console.print(table)
+
+
+def _figures(case: Mapping[str, Any]) -> list[str]:
+    """Return physics, hold, hybrid and reduction of a case as text, a dash where there is no figure."""
+    figures = [_figure(case.get(name)) for name in ("rms_pb_um", "rms_hold_um", "rms_h_um")]
+    return [*figures, _figure(case.get("reduction_percent"), " %")]
+
+
+def _printed(case: Mapping[str, float]) -> str:
+    """Return what the paper prints of a case."""
+    if not case:
+        return ""
+    return f"{case['rms_pb_um']:g}→{case['rms_h_um']:g}, {case['reduction_percent']:g} %"
+
+
+def _figure(value: float | None, unit: str = "") -> str:
+    if value is None or not np.isfinite(value):
+        return "–"
+    return f"{value:.1f}{unit}" if unit else f"{value:.2f}"
+
+
+def print_scores(summary: Mapping[str, float | int], as_json: bool, title: str) -> None:
+    """Print the scores of a backtest."""
+    if as_json:
+        print_json(summary)
+        return
+    table = Table(title=f"{title}: prediction error in µm against the measured position")
+    for column in ("", "physics", "hold", "hybrid", "reduction"):
+        table.add_column(column, justify="right")
+    for suffix, label in (("", ""), ("_after_warm_up", " after warm-up")):
+        for quantity in ("rms", "max"):
+            figures = [summary.get(f"{quantity}_{name}_um{suffix}") for name in ("pb", "hold", "h")]
+            if all(figure is not None for figure in figures):
+                reduction = summary[f"reduction_percent{suffix}"] if quantity == "rms" else None
+                shown = _figure(reduction, " %") if quantity == "rms" else ""
+                label_text = f"{quantity.upper() if quantity == 'rms' else quantity}{label}"
+                table.add_row(label_text, *map(_figure, figures), shown)
+    console.print(table)
+
+
+def print_tracking(summary: Mapping[str, float | int], as_json: bool, title: str) -> None:
+    """Print what a compensated co-simulation came to."""
+    if as_json:
+        print_json(summary)
+        return
+    table = Table(title=title)
+    for column in ("", "RMS [µm]", "max [µm]"):
+        table.add_column(column, justify="right" if column else "left")
+    for name, label in (
+        ("tracking", "tracking error, true position"),
+        ("tracking_measured", "tracking error, measured position"),
+        ("change", "change of the command"),
+    ):
+        table.add_row(label, *(_figure(summary[f"{name}_{quantity}_um"]) for quantity in ("rms", "max")))
+    console.print(table)
+    peaks = [summary[f"peak_{name}"] for name in ("velocity_m_s", "acceleration_m_s2", "jerk_m_s3")]
+    console.print(
+        f"command to the drive: at most {1e3 * peaks[0]:.1f} mm/s, {peaks[1]:.2f} m/s², {peaks[2]:.0f} m/s³\n"
+        f"planned by the hybrid {summary['share_hybrid']:.1%}, by the physics model {summary['share_physics']:.1%}, "
+        f"not compensated {summary['share_off']:.1%} of the samples",
+        highlight=False,
+    )
+
+
+def print_json(result: Any) -> None:
+    """Print JSON; figures that do not exist, such as scores over no sample, are null."""
+    typer.echo(json.dumps(_finite(result), indent=2))
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value

@@ -1,0 +1,1 @@
+"""Foundations without control engineering: errors, parameters, signals, files, states, time."""

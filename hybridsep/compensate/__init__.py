@@ -1,0 +1,1 @@
+"""Servo error pre-compensation: commands planned on the hybrid prediction."""

@@ -1,0 +1,172 @@
+"""The drive's limits on a plan: linear bounds on its coefficients, and the quadratic programme under them.
+
+Everything is measured in shares of a limit. What the rest of the last plan demands is always allowed: it was within
+the limits when it was made, so a plan that keeps the limits exists at any time, unless ``x_d`` itself exceeds them,
+and then the change does not make it worse.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
+
+from ..base.limits import Limits
+from ..base.signals import Array
+from .interior import PRIMAL_RESIDUAL, minimise
+from .splines import N_DECIDED, PlanCost, SplineBasis
+
+__all__ = ["Bounds", "DriveBounds", "solve"]
+
+_ROUNDING = 1e-9
+"""Share of a limit that is taken for rounding."""
+
+_INTERIOR = 1e-10
+"""Share of a limit by which a plan may differ where the last one is at its bound: bounds need an interior."""
+
+_MOVES = 1e-12
+"""Step of the commanded position, m a sample, that counts as a move."""
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """``low ≤ rows @ c ≤ high`` in shares of the limits, ``(m,)``.
+
+    Attributes
+    ----------
+    rows : (m, n) array, 1/m
+    low, high : (m,) arrays
+        Never to be exceeded.
+    """
+
+    rows: Array
+    low: Array
+    high: Array
+
+    def allow(self, c: Array) -> bool:
+        """Return whether the coefficients keep the bounds."""
+        values = self.rows @ c
+        return bool(np.all(values >= self.low) and np.all(values <= self.high))
+
+    def step(self, rest: Array, c: Array) -> float:
+        """Return the largest share, 0 … 1, of the way from ``rest``, which keeps the bounds, to ``c``."""
+        here, way = self.rows @ rest, self.rows @ (c - rest)
+        room = np.where(way > 0, self.high - here, here - self.low)
+        beyond = np.abs(way) > np.maximum(room, _ROUNDING)
+        return float(np.min(room[beyond] / np.abs(way[beyond]), initial=1.0))
+
+
+class DriveBounds:
+    """Limits on the differences of ``x_dm`` and on the change.
+
+    Parameters
+    ----------
+    basis : SplineBasis
+    Ts : float
+        Sampling interval, s.
+    limits : Limits or None
+        The drive's velocity, acceleration and jerk.
+    change_max : float or None
+        Bound on ``|δ|``, m.
+    keep_direction : bool
+        Whether the velocity of ``x_dm``, if it is limited, keeps the sign of that of ``x_d`` where that one moves.
+    """
+
+    def __init__(
+        self,
+        basis: SplineBasis,
+        Ts: float,
+        limits: Limits | None,
+        change_max: float | None,
+        *,
+        keep_direction: bool = False,
+    ) -> None:
+        self._keep_direction = keep_direction
+        self._scales: list[tuple[int, float]] = []
+        if limits is not None:
+            bounds = limits.velocity * Ts, limits.acceleration * Ts**2, limits.jerk * Ts**3
+            self._scales += list(enumerate(bounds, start=1))
+        if change_max is not None:
+            self._scales.append((0, change_max))
+        extended = np.concatenate((np.zeros((3, basis.values.shape[1])), basis.values))
+        parts = [np.diff(extended, order, axis=0)[3 - order :] / bound for order, bound in self._scales]
+        self._all = np.concatenate(parts) if parts else np.zeros((0, basis.values.shape[1]))
+        self._free = np.ascontiguousarray(self._all[:, N_DECIDED:])
+
+    def bounds(self, x_d: Array, x_d_before: Array, delta_before: Array, rest: Array) -> Bounds:
+        """Return the bounds on the free coefficients of a plan.
+
+        Parameters
+        ----------
+        x_d : (preview,) array, m
+            Commanded positions.
+        x_d_before, delta_before : (3,) arrays, m
+            Their last three values, and those of the change.
+        rest : (3 + n_free,) array, m
+            Coefficients of the rest of the last plan, the decided ones first.
+        """
+        past = np.concatenate((delta_before, np.zeros(len(x_d))))
+        command = np.concatenate((x_d_before, x_d)) + past
+        offsets = [
+            np.diff(past if order == 0 else command, order)[3 - order :] / bound for order, bound in self._scales
+        ]
+        offset = np.concatenate(offsets) if offsets else np.zeros(0)
+        offset = offset + self._all[:, :N_DECIDED] @ rest[:N_DECIDED]
+        at_rest = self._free @ rest[N_DECIDED:]
+        most = np.full(len(offset), 1.0 - _ROUNDING)
+        least = -most
+        if self._keep_direction:
+            steps, n = np.diff(x_d, prepend=x_d_before[-1]), len(x_d)
+            for i, (order, _) in enumerate(self._scales):
+                if order == 1:
+                    least[i * n : (i + 1) * n][steps > _MOVES] = 0.0
+                    most[i * n : (i + 1) * n][steps < -_MOVES] = 0.0
+        low, high = np.minimum(least - offset, at_rest - _INTERIOR), np.maximum(most - offset, at_rest + _INTERIOR)
+        return Bounds(rows=self._free, low=low, high=high)
+
+
+def solve(cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int) -> Array | None:
+    """Return the coefficients that cost least within the bounds.
+
+    The free minimum if it keeps the bounds. Otherwise the first ``n_pinned`` coefficients stay as they are in ``rest``,
+    which gives a real-time implementation the samples that they act in to find the others, step by step.
+
+    Parameters
+    ----------
+    cost : PlanCost
+    bounds : Bounds
+    rest : (n,) array, m
+        Coefficients that keep the bounds.
+    n_pinned : int
+        Coefficients that a bounded plan does not change, < n.
+
+    Returns
+    -------
+    c : (n,) array, m, or None
+        None if there is no finite answer.
+    """
+    try:
+        c = np.asarray(cho_solve(cho_factor(cost.P), cost.v))
+    except (LinAlgError, ValueError):
+        return None
+    if not np.isfinite(c).all():
+        return None
+    if bounds.allow(c):
+        return c
+    pinned, left = rest[:n_pinned], rest[n_pinned:]
+    rows, taken = bounds.rows[:, n_pinned:], bounds.rows[:, :n_pinned] @ pinned
+    touched = rows.any(axis=1)
+    found = minimise(
+        cost.P[n_pinned:, n_pinned:],
+        cost.v[n_pinned:] - cost.P[n_pinned:, :n_pinned] @ pinned,
+        rows[touched],
+        (bounds.low - taken)[touched] + PRIMAL_RESIDUAL,
+        (bounds.high - taken)[touched] - PRIMAL_RESIDUAL,
+        left,
+        float(cost.v @ c + rest @ cost.P @ rest),
+    )
+    best = np.concatenate((pinned, found))
+    if not np.isfinite(best).all():
+        return rest
+    return rest + bounds.step(rest, best) * (best - rest)

@@ -1,0 +1,317 @@
+"""Servo error pre-compensation (SEP) on the predictor's lifted model.
+
+Over a preview window the predicted position is affine in the command, ``x_h = G_h x_dm + free`` (eq. (3)), so the
+modified command ``x_dm = x_d + δ`` that makes ``x_h`` follow ``x_d`` is a least-squares problem. ``δ`` is a sum of
+cubic B-splines, each filtered through the current model (the filtered-basis-functions method: Ramani, Duan, Okwudire
+and Ulsoy, J. Dyn. Sys. Meas. Control 139 (2017)), with limited preview: of a plan over ``preview`` samples only the
+splines that begin in the first window are decided, then the next plan is made from what has been measured.
+
+Position, velocity and acceleration of ``δ`` are continuous by construction, also from window to window and from model
+to model. Every spline ends within its plan, so a plan always leads back to ``x_d`` and its rest keeps the limits. It
+is where the next plan starts from: there is always a plan within the limits, and where none can be computed the rest
+of the last one is followed to its end.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..base.errors import ParameterError, SignalError
+from ..base.limits import Limits
+from ..base.parameters import check, check_preview
+from ..base.saved import Saved
+from ..base.signals import Array, as_published, as_samples
+from ..base.state import pack, unpack
+from ..predict.predictor import HybridPredictor
+from ..predict.window import Prediction
+from .bounded import DriveBounds, solve
+from .plan import PendingPlan, SepPlan, SepState
+from .sensor import SensorWatch
+from .splines import N_DECIDED, SplineBasis, direct_samples
+from .trust import Trust, has_stable_poles
+
+__all__ = ["RECOMMENDED", "SepCompensator", "SepPlan", "SepState", "direct_samples"]
+
+_KIND = "compensator"
+
+_PINNED = 8
+"""Samples at the beginning of a window in which a bounded plan follows the last one: the time to solve it."""
+
+RECOMMENDED: dict[str, Any] = {"Np": 50, "p": 50, "q": 40, "lam": 1e-8, "t_init": 0.1, "v_s": 2e-3}
+"""Arguments of HybridPredictor with which compensation was best on the staircase drive, with the defaults below."""
+
+
+class SepCompensator:
+    """Plans modified commands window by window and goes on learning in closed loop.
+
+    Call :meth:`plan` with the commanded positions ahead, send its ``x_dm`` to the drive, call :meth:`update` with what
+    was measured, window after window.
+
+    Parameters
+    ----------
+    predictor : HybridPredictor
+        At the beginning of a run; it learns from the commands that the drive really gets.
+    preview : int, optional
+        Samples planned ahead, at least ``Np + 4·spacing + 3``; ``2·Np`` or 200, whichever is more, if left out.
+    spacing : int
+        Samples between knots, ≥ 1, a divisor of ``Np``: the finer, the faster ``δ`` may change.
+    jerk_weight : float
+        Weight, ≥ 0, of the sum of squares of δ's third differences, against that of the tracking error.
+    limits : Limits, optional
+        The drive's own limits, which ``x_dm`` keeps in its differences; none if left out.
+    change_max : float, optional
+        Bound on ``|δ|``, m; none if None.
+    keep_direction : bool
+        Whether ``x_dm`` never turns while ``x_d`` moves: friction would turn with it. Needs ``limits``; without them it
+        has no effect, and a predictor with ``v_s > 0`` may then be worse than without.
+    best : SepState
+        Best model to use: OFF leaves the command as it is.
+
+    Raises
+    ------
+    ParameterError
+        If a parameter is out of its range.
+    """
+
+    def __init__(
+        self,
+        predictor: HybridPredictor,
+        *,
+        preview: int | None = None,
+        spacing: int = 2,
+        jerk_weight: float = 1.0,
+        limits: Limits | None = None,
+        change_max: float | None = 1e-3,
+        keep_direction: bool = True,
+        best: SepState = SepState.HYBRID,
+    ) -> None:
+        Np = predictor.Np
+        self.preview: int = check("preview", max(2 * Np, 200) if preview is None else preview)
+        self.spacing: int = check("spacing", spacing)
+        if problems := check_preview(Np=Np, preview=self.preview, spacing=self.spacing):
+            raise ParameterError("; ".join(problems))
+        self.jerk_weight: float = check("jerk_weight", jerk_weight)
+        self.change_max: float | None = None if change_max is None else check("change_max", change_max)
+        self.predictor, self.limits, self.best = predictor, limits, SepState(best)
+        self.keep_direction = bool(keep_direction)
+        self._basis = SplineBasis(self.preview, self.spacing)
+        self._n_pinned = min(_PINNED, Np // 2) // self.spacing
+        self._bounds = DriveBounds(self._basis, predictor.Ts, limits, change_max, keep_direction=self.keep_direction)
+        self._trust = Trust()
+        self.new_run(predictor.start, t_init=predictor.t_init)
+
+    def new_run(self, start: float | None = None, *, t_init: float = 0.0, lead_in: int = 0) -> None:
+        """Begin another run, at rest at ``start``, with what is learned kept (a warm start).
+
+        Parameters
+        ----------
+        start : float, optional
+            Where the drive rests, m; the first command if left out.
+        t_init : float
+            Warm-up, s, counted from the end of the lead-in, in which the physics model plans.
+        lead_in : int
+            Samples at rest before the trajectory, which are not learned.
+        """
+        predictor = self.predictor
+        predictor.new_run(start, t_init=t_init + lead_in * predictor.Ts if t_init > 0 else 0.0)
+        self.lead_in = int(lead_in)
+        self._trust.new_run()
+        self._sensor = SensorWatch()
+        self._measured_before = True
+        # Coefficients of the rest of the last plan; the last three values of δ and of x_d
+        self._rest = np.zeros(N_DECIDED + self._basis.n_free)
+        self._delta_before = np.zeros(3)
+        self._x_d_before = np.full(3, np.nan)
+        self._pending: PendingPlan | None = None
+
+    def plan(self, x_d: ArrayLike) -> SepPlan:
+        """Plan the next window.
+
+        May be called again, with other commands, before :meth:`update`; the last call counts.
+
+        Parameters
+        ----------
+        x_d : (preview,) array_like, m
+            Commanded positions of the next ``preview`` samples.
+
+        Returns
+        -------
+        SepPlan
+
+        Raises
+        ------
+        SignalError
+            If ``x_d`` has another length or is not finite, or the window's prediction diverges.
+        """
+        command = as_samples(x_d, "x_d", self.preview)
+        predictor, Np = self.predictor, self.predictor.Np
+        if predictor.start is None:  # at rest where the first command is
+            predictor.start = float(command[0])
+        if np.isnan(self._x_d_before[0]):
+            self._x_d_before[:] = predictor.start
+        state, coefficients = self._best_plan(command)
+        delta = (self._basis.values @ coefficients)[:Np]
+        x_dm = command[:Np] + delta
+        prediction = predictor.predict(x_dm, reference=command)
+        self._pending = PendingPlan(coefficients, delta, command[:Np].copy(), prediction, state)
+        as_published(prediction.x_pb, "x_pb")
+        x_h = prediction.x_pb.copy()
+        if state is SepState.HYBRID:
+            x_h = as_published(prediction.x_pb + prediction.e_h, "x_h")
+        return SepPlan(x_dm=x_dm, x_pb=prediction.x_pb, x_h=x_h, state=state)
+
+    def update(self, x: ArrayLike) -> None:
+        """Learn from the measurement of the planned window.
+
+        A window without measurement (NaN, or a value that is held while the drive moves) is not learned: the residuals
+        are what was predicted of them, and learning starts again when a whole window has been measured.
+
+        Parameters
+        ----------
+        x : (Np,) array_like, m
+            Measured positions; NaN where there is none.
+
+        Raises
+        ------
+        SignalError
+            If nothing is planned, the length is another one or a value is infinite. Nothing is changed.
+        """
+        pending = self._pending
+        if pending is None:
+            raise SignalError("update must follow plan: there is no planned window to measure")
+        predictor, Np = self.predictor, self.predictor.Np
+        measured = np.asarray(x, dtype=np.float64)
+        as_samples(np.nan_to_num(measured, nan=0.0, posinf=np.inf, neginf=-np.inf), "x", Np)
+        x_pb, e_h = pending.prediction.x_pb, pending.prediction.e_h
+        missing = self._sensor.misses(measured, x_pb)
+        if missing:
+            own = x_pb + e_h if pending.state is SepState.HYBRID else x_pb
+            predictor.update(own, learn=False)
+        else:
+            # Some residuals of the window after a gap still have their own predictions as lags.
+            learn = self._measured_before and predictor.k >= self.lead_in
+            # What is predicted from a few rows before the warm-up is over moves nothing: it is not judged.
+            judge = learn and predictor.k >= predictor.n_init
+            predictor.update(measured, learn=learn)
+            if judge:
+                regression = predictor.regression
+                self._trust.observe(measured - x_pb, e_h, regression.residual_sum / regression.n_samples)
+        self._measured_before = not missing
+        kept = Np // self.spacing
+        self._rest = np.concatenate((pending.coefficients[kept:], np.zeros(kept)))
+        self._delta_before, self._x_d_before = (
+            _last_three(self._delta_before, pending.delta),
+            _last_three(self._x_d_before, pending.x_d),
+        )
+        self._pending = None
+
+    @property
+    def is_planned(self) -> bool:
+        """Whether a planned window waits for its measurement."""
+        return self._pending is not None
+
+    def _best_plan(self, command: Array) -> tuple[SepState, Array]:
+        """Return the model and the coefficients of the best plan there is, the decided ones first."""
+        rest = self._rest
+        candidates = self._candidates()
+        if not candidates:
+            return SepState.OFF, rest
+        bounds = self._bounds.bounds(command, self._x_d_before, self._delta_before, rest)
+        with np.errstate(all="ignore"):  # a hybrid model that is not asked for may be unstable
+            operator = self.predictor.operator(self.preview, reference=command)  # Eq. (3)
+        for state in candidates:
+            hybrid = state is SepState.HYBRID
+            g, free = (operator.g_h, operator.free) if hybrid else (operator.g_pb, operator.free_pb)
+            if not (np.isfinite(g).all() and np.isfinite(free).all()):
+                continue
+            cost = self._basis.cost(g, free, command, rest[:N_DECIDED], self._delta_before, self.jerk_weight)
+            found = solve(cost, bounds, rest[N_DECIDED:], self._n_pinned)
+            if found is not None:
+                return state, np.concatenate((rest[:N_DECIDED], found))
+        return SepState.OFF, rest
+
+    def _candidates(self) -> list[SepState]:
+        """Return the models to try, best first."""
+        predictor = self.predictor
+        hybrid = (
+            self.best is SepState.HYBRID
+            and predictor.k >= predictor.n_init
+            and predictor.regression.n_samples > 0
+            and self._trust.hybrid
+            and has_stable_poles(predictor.residual_weights)
+        )
+        candidates = [SepState.HYBRID] if hybrid else []
+        return candidates + ([SepState.PHYSICS] if self.best is not SepState.OFF else [])
+
+    def to_bytes(self) -> bytes:
+        """Return parameters and state, the predictor's and a planned window included, as a versioned blob."""
+        limits, pending = self.limits, self._pending
+        meta = {
+            **{name: getattr(self, name) for name in ("preview", "spacing", "jerk_weight", "change_max", "lead_in")},
+            "limits": None if limits is None else [limits.velocity, limits.acceleration, limits.jerk],
+            "keep_direction": self.keep_direction,
+            "best": int(self.best),
+            "excess": self._trust.excess,
+            "measured_before": self._measured_before,
+            "pending": None if pending is None else [int(pending.state), pending.prediction.n_warm_up],
+        }
+        arrays = {
+            "rest": self._rest,
+            "delta_before": self._delta_before,
+            "x_d_before": self._x_d_before,
+            "sensor": np.array(self._sensor.state()),
+        }
+        if pending is not None:
+            arrays |= {"coefficients": pending.coefficients, "delta": pending.delta, "x_d": pending.x_d}
+            arrays |= {"x_pb": pending.prediction.x_pb, "e_h": pending.prediction.e_h}
+        return pack(_KIND, meta, arrays, {"predictor": self.predictor.to_bytes()})
+
+    @classmethod
+    def from_bytes(cls, blob: bytes) -> SepCompensator:
+        """Return the compensator that :meth:`to_bytes` described.
+
+        Raises
+        ------
+        StateError
+            If the blob is foreign, truncated or of another version.
+        """
+        saved = Saved(_KIND, *unpack(_KIND, blob))
+        predictor = HybridPredictor.from_bytes(saved.part("predictor"))
+        restored = HybridPredictor.from_bytes(saved.part("predictor"))
+        limits = None if saved.field("limits") is None else saved.numbers("limits", 3)
+        with saved.consistent():
+            compensator = cls(
+                predictor,
+                limits=None if limits is None else Limits(*limits),
+                best=SepState(saved.whole("best", max(SepState))),
+                keep_direction=saved.flag("keep_direction"),
+                **{name: saved.field(name) for name in ("preview", "spacing", "jerk_weight", "change_max")},
+            )
+        compensator.predictor = restored  # the constructor has begun a new run on the other one
+        compensator.lead_in = saved.whole("lead_in")
+        compensator._trust.excess, compensator._measured_before = saved.real("excess"), saved.flag("measured_before")
+        n, Np = len(compensator._rest), predictor.Np
+        compensator._rest, compensator._delta_before = saved.array("rest", n), saved.array("delta_before", 3)
+        compensator._x_d_before = saved.array("x_d_before", 3, finite=False)
+        compensator._sensor.restore(saved.array("sensor", 5, finite=False))
+        if saved.field("pending") is not None:
+            state, n_warm_up = saved.numbers("pending", 2)
+            if state not in tuple(SepState) or n_warm_up not in range(Np + 1) or restored.n_pending != Np:
+                raise saved.error("the window that waits must be planned and predicted")
+            # A hybrid prediction that plans nothing may diverge.
+            prediction = Prediction(saved.array("x_pb", Np), saved.array("e_h", Np, finite=False), int(n_warm_up))
+            compensator._pending = PendingPlan(
+                saved.array("coefficients", n),
+                saved.array("delta", Np),
+                saved.array("x_d", Np),
+                prediction,
+                SepState(int(state)),
+            )
+        return compensator
+
+
+def _last_three(before: Array, window: Array) -> Array:
+    return np.concatenate((before, window))[-3:]

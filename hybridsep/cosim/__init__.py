@@ -1,0 +1,1 @@
+"""FMUs loaded with fmpy and stepped together."""

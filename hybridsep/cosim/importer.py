@@ -1,0 +1,298 @@
+"""One instance of an FMI 2.0 co-simulation FMU, by variable names; a thin layer over fmpy."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import sys
+import threading
+import weakref
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from tempfile import gettempdir, mkdtemp
+from types import TracebackType
+from typing import Any
+
+import fmpy
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import (
+    FMU2Slave,
+    fmi2CallbackAllocateMemoryTYPE,
+    fmi2CallbackFreeMemoryTYPE,
+    fmi2CallbackFunctions,
+    fmi2CallbackLoggerTYPE,
+)
+
+from ..base.errors import FmuError
+from ..base.interrupt import uninterrupted
+from ..base.output import named_errors
+from ..fmi.pythonfmu_limits import check_unpacked
+
+__all__ = ["FmuInstance", "read_description"]
+
+
+def read_description(path: str | Path) -> Any:
+    """Return fmpy's model description of an FMI 2.0 co-simulation FMU.
+
+    Raises
+    ------
+    FmuError
+        If there is none at ``path``.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise FmuError(f"no FMU at {path}; build it first (hybridsep build)")
+    try:
+        description = fmpy.read_model_description(str(path), validate=False)
+    except Exception as error:  # fmpy raises bare Exceptions here
+        raise FmuError(f"{path.name} is not a readable FMU: {_first_line(error)}") from error
+    if description.fmiVersion != "2.0":
+        raise FmuError(f"{path.name} must be an FMI 2.0 FMU, got FMI {description.fmiVersion}")
+    if description.coSimulation is None:
+        raise FmuError(f"{path.name} must be a co-simulation FMU, got one for model exchange only")
+    return description
+
+
+_LOADING = threading.Lock()
+
+
+@contextmanager
+def _working_directory() -> Iterator[Path]:
+    """Give the process's working directory to one thread at a time, and restore it.
+
+    fmpy changes it, for the whole process, while it loads a library, and leaves it changed if that fails.
+    """
+    with _LOADING:
+        try:
+            folder = Path.cwd()
+        except FileNotFoundError as error:
+            raise FmuError("the working directory of this process no longer exists; change to another one") from error
+        try:
+            yield folder
+        finally:
+            os.chdir(folder)
+
+
+class FmuInstance:
+    """An instance of a co-simulation FMU; use it as a context manager, or close it.
+
+    Instances may live in several threads, each used by one thread at a time: they are loaded one after the other and
+    step in parallel. While one is loaded, the working directory of the process is another for some milliseconds.
+
+    Parameters
+    ----------
+    path : str or Path
+        The archive.
+    instance_name : str, optional
+        Shown in log messages; the archive's stem if left out.
+
+    Attributes
+    ----------
+    description : fmpy's model description
+    variables : dict
+        fmpy's scalar variables by name.
+    log : list of (status, message)
+        What the FMU said through its logger; at most the last 1000 messages.
+
+    Raises
+    ------
+    FmuError
+        If the archive cannot be read, is no FMI 2.0 co-simulation FMU, or refuses to be instantiated.
+    """
+
+    def __init__(self, path: str | Path, instance_name: str | None = None) -> None:
+        self.path = Path(path)
+        self.log: list[tuple[int, str]] = []
+        with _working_directory() as folder:
+            archive = folder / self.path
+        self.description = read_description(archive)
+        self.variables: dict[str, Any] = {v.name: v for v in self.description.modelVariables}
+        self._release: weakref.finalize[..., FmuInstance] | None = None
+        folder = Path(mkdtemp())
+        try:
+            self._instantiate(archive, folder, instance_name or self.path.stem)
+        except BaseException:
+            self.close()
+            _remove(folder)
+            raise
+
+    @uninterrupted
+    def _instantiate(self, archive: Path, folder: Path, instance_name: str) -> None:
+        """Unpack the archive, load its library and make the instance."""
+        try:
+            with named_errors(gettempdir()):
+                fmpy.extract(str(archive), folder)
+        except OSError:  # the disk's, with a name
+            raise
+        except Exception as error:  # fmpy raises bare Exceptions here
+            raise FmuError(f"{self.path.name} cannot be loaded: {_first_line(error)}") from error
+        try:
+            check_unpacked(folder, self.description.generationTool or "")
+            with _working_directory():
+                slave = FMU2Slave(
+                    guid=self.description.guid,
+                    unzipDirectory=str(folder),
+                    modelIdentifier=self.description.coSimulation.modelIdentifier,
+                    instanceName=instance_name,
+                )
+        except Exception as error:  # fmpy raises bare Exceptions here
+            raise FmuError(f"{self.path.name} cannot be loaded: {_first_line(error)}") from error
+        try:
+            slave.instantiate(callbacks=_callbacks(self.log), loggingOn=True)
+        except Exception as error:
+            slave.freeLibrary()
+            raise FmuError(f"{self.path.name} cannot be instantiated: {error}{self._last_words()}") from error
+        self._slave = slave
+        # Also for an instance that nobody closes: pythonfmu 0.7 corrupts the heap where the process exits before
+        self._release = weakref.finalize(self, _release, slave, folder)
+
+    @property
+    def slave(self) -> FMU2Slave:
+        """The instance as fmpy's slave, for FMI calls that have no method here.
+
+        Raises
+        ------
+        FmuError
+            If the instance is closed.
+        """
+        if self._release is None or not self._release.alive:
+            raise FmuError(f"{self.path.name}: the instance is closed; make a new FmuInstance")
+        return self._slave
+
+    def __enter__(self) -> FmuInstance:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    @uninterrupted
+    def close(self) -> None:
+        """Free the instance and its unpacked files; closing again does nothing."""
+        if self._release is not None:
+            self._release()
+
+    def initialise(self, values: Mapping[str, Any] | None = None, *, start_time: float = 0.0) -> None:
+        """Set parameters and start values and run through the initialization.
+
+        Raises
+        ------
+        FmuError
+            If the FMU refuses; its own message is part of the error.
+        """
+        self._call(self.slave.setupExperiment, startTime=start_time)
+        self._call(self.slave.enterInitializationMode)
+        for name, value in (values or {}).items():
+            self.set(name, value)
+        self._call(self.slave.exitInitializationMode)
+
+    def set(self, name: str, value: Any) -> None:
+        """Set one variable."""
+        variable = self._variable(name)
+        if variable.type == "Integer" and not (isinstance(value, int) and abs(value) < 2**31):
+            raise FmuError(f"{self.path.name}: {name} must be a whole number within ±{2**31 - 1}, got {value!r}")
+        if variable.type == "Real" and not isinstance(value, (int, float)):
+            raise FmuError(f"{self.path.name}: {name} must be a number, got {value!r}")
+        if variable.type not in ("Real", "Integer", "Boolean"):
+            raise FmuError(f"{self.path.name}: {name} is a {variable.type}, which is not supported here")
+        setter = {"Real": self.slave.setReal, "Integer": self.slave.setInteger, "Boolean": self.slave.setBoolean}
+        self._call(setter[variable.type], [variable.valueReference], [value])
+
+    def get(self, name: str) -> Any:
+        """Return one variable."""
+        variable = self._variable(name)
+        getter = {"Real": self.slave.getReal, "Integer": self.slave.getInteger, "Boolean": self.slave.getBoolean}
+        return self._call(getter[variable.type], [variable.valueReference])[0]
+
+    def real_writer(self, names: Sequence[str]) -> Callable[[Sequence[float]], None]:
+        """Return a function that sets these Reals in one FMI call."""
+        references = [self._variable(name).valueReference for name in names]
+        return lambda values: self._call(self.slave.setReal, references, values)
+
+    def real_reader(self, names: Sequence[str]) -> Callable[[], list[float]]:
+        """Return a function that gets these Reals in one FMI call."""
+        references = [self._variable(name).valueReference for name in names]
+        return lambda: list(self._call(self.slave.getReal, references))
+
+    def step(self, t: float, h: float) -> None:
+        """Do one communication step from ``t`` by ``h`` seconds."""
+        self._call(self.slave.doStep, t, h)
+
+    def reset(self) -> None:
+        """Return to the state after instantiation."""
+        self._call(self.slave.reset)
+
+    def save(self) -> bytes:
+        """Return the whole state, serialised."""
+        state = self._call(self.slave.getFMUstate)
+        try:
+            return bytes(self._call(self.slave.serializeFMUstate, state))
+        finally:
+            self._call(self.slave.freeFMUstate, state)
+
+    def restore(self, blob: bytes) -> None:
+        """Take over a state that :meth:`save` returned, of this or another instance."""
+        state = self._call(self.slave.deSerializeFMUstate, blob)
+        try:
+            self._call(self.slave.setFMUstate, state)
+        finally:
+            self._call(self.slave.freeFMUstate, state)
+
+    def _variable(self, name: str) -> Any:
+        if name not in self.variables:
+            raise FmuError(f"{self.path.name} has no variable {name!r}")
+        return self.variables[name]
+
+    @uninterrupted
+    def _call(self, function: Callable[..., Any], *arguments: Any, **keywords: Any) -> Any:
+        try:
+            return function(*arguments, **keywords)
+        except FMICallException as error:
+            raise FmuError(f"{self.path.name}: {error}{self._last_words()}") from error
+
+    def _last_words(self) -> str:
+        """Return the last message, without pythonfmu's frame around an exception."""
+        if not self.log:
+            return ""
+        text = self.log[-1][1]
+        framed = re.search(r"\w+Error\(([\"'])(.*)\1\)", text, re.DOTALL)
+        return f": {framed[2] if framed else text}"
+
+
+def _first_line(error: Exception) -> str:
+    """Return the first line of an error's message, or its type where it has none."""
+    return (str(error).splitlines() or [type(error).__name__])[0]
+
+
+def _callbacks(log: list[tuple[int, str]]) -> fmi2CallbackFunctions:
+    """Return what an FMU may call; its messages go into ``log``."""
+
+    def keep(environment: Any, instance: bytes, status: int, category: bytes | None, message: bytes | None) -> None:
+        log.append((status, (message or b"").decode("utf-8", "replace")))
+        del log[:-1000]
+
+    functions = fmi2CallbackFunctions()
+    functions.logger = fmi2CallbackLoggerTYPE(keep)
+    functions.allocateMemory = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
+    functions.freeMemory = fmi2CallbackFreeMemoryTYPE(fmpy.free)
+    return functions
+
+
+def _release(slave: FMU2Slave, folder: Path) -> None:
+    """Free an instance, its library and its unpacked files."""
+    try:
+        with suppress(FMICallException):
+            slave.terminate()
+        slave.freeInstance()
+    finally:
+        _remove(folder)
+
+
+def _remove(folder: Path) -> None:
+    """Remove the unpacked files, from ``sys.path`` too, where pythonfmu puts the resources and leaves them."""
+    shutil.rmtree(folder, ignore_errors=True)
+    with suppress(ValueError):
+        sys.path.remove((folder / "resources").as_posix())

@@ -1,0 +1,1 @@
+"""What predictors and compensators are worth: backtests, closed loops, figures."""

@@ -1,0 +1,314 @@
+"""Causal replay over a recorded log: each batch is predicted first, then revealed and learned.
+
+Three predictors are scored against the measured position: the physics model ``x_pb``, the hold baseline ``x_hold``
+(``x_pb`` plus the last measured residual, held over the batch) and the hybrid ``x_h`` of eq. (4). During the warm-up
+all three publish ``x_pb``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..base.errors import SignalError
+from ..base.signals import PREDICTION_MAX, Array, as_samples
+from ..base.threads import one_blas_thread
+from ..predict.predictor import HybridPredictor
+
+__all__ = ["Backtest", "Batch", "Score", "Scores", "backtest", "backtest_stream"]
+
+
+class Batch(NamedTuple):
+    """One batch of a replay, after it was revealed.
+
+    Attributes
+    ----------
+    j : int
+        Number of the batch in this replay, from 0.
+    k : int
+        Number of its first sample in this replay, from 0.
+    n_warm_up : int
+        Its leading samples that belong to the warm-up.
+    x_d, x : (n,) array, m
+        Commanded and measured positions.
+    x_pb, x_hold, x_h : (n,) array, m
+        What was predicted before any of ``x`` was known.
+    rms_pb, rms_hold, rms_h : float
+        RMS of ``x`` minus each prediction over the batch, m.
+    """
+
+    j: int
+    k: int
+    n_warm_up: int
+    x_d: Array
+    x: Array
+    x_pb: Array
+    x_hold: Array
+    x_h: Array
+    rms_pb: float
+    rms_hold: float
+    rms_h: float
+
+
+@dataclass(frozen=True)
+class Score:
+    """Prediction errors against the measured position; NaN where there are no samples.
+
+    Attributes
+    ----------
+    n_samples : int
+        Samples they were taken over.
+    rms_pb, rms_hold, rms_h : float
+        RMS of physics model, hold baseline and hybrid, m.
+    max_pb, max_hold, max_h : float
+        Largest absolute error of each, m.
+    """
+
+    n_samples: int
+    rms_pb: float
+    rms_hold: float
+    rms_h: float
+    max_pb: float
+    max_hold: float
+    max_h: float
+
+    @property
+    def reduction_percent(self) -> float:
+        """By how much the hybrid's RMS is below the physics model's, percent of the latter."""
+        if self.rms_pb == 0.0:
+            return 0.0 if self.rms_h == 0.0 else -math.inf
+        return 100.0 * (1.0 - self.rms_h / self.rms_pb)
+
+
+@dataclass(frozen=True)
+class Scores:
+    """What a replay came to.
+
+    Attributes
+    ----------
+    overall, after_warm_up : Score
+        Over all samples, and over those after the warm-up.
+    n_batches : int
+        Batches replayed, the last one may be incomplete.
+    """
+
+    overall: Score
+    after_warm_up: Score
+    n_batches: int
+
+    def summary(self) -> dict[str, float | int]:
+        """Return all scores by name: ``rms_pb_um``, ``max_h_um``, ``reduction_percent``, ….
+
+        Errors are in micrometres against the measured position; the names with ``_after_warm_up`` leave the warm-up
+        out and are NaN if nothing is left.
+        """
+        result: dict[str, float | int] = {"n_batches": self.n_batches}
+        for score, suffix in ((self.overall, ""), (self.after_warm_up, "_after_warm_up")):
+            for quantity in ("rms", "max"):
+                for name in ("pb", "hold", "h"):
+                    result[f"{quantity}_{name}_um{suffix}"] = 1e6 * float(getattr(score, f"{quantity}_{name}"))
+            result[f"reduction_percent{suffix}"] = score.reduction_percent
+            result[f"n_samples{suffix}"] = score.n_samples
+        return result
+
+
+@dataclass(frozen=True)
+class Backtest(Scores):
+    """What a replay over arrays came to, with all that was predicted.
+
+    Attributes
+    ----------
+    x_pb, x_hold, x_h : (n,) array, m
+        Predictions, each made before its batch was revealed.
+    active : (n,) array of bool
+        Whether the hybrid is published, that is, after the warm-up.
+    batch_rms_pb, batch_rms_hold, batch_rms_h : (n_batches,) array, m
+        RMS errors batch by batch.
+    """
+
+    x_pb: Array
+    x_hold: Array
+    x_h: Array
+    active: NDArray[np.bool_]
+    batch_rms_pb: Array
+    batch_rms_hold: Array
+    batch_rms_h: Array
+
+
+OnBatch = Callable[[Batch], object]
+
+
+def backtest(predictor: HybridPredictor, x_d: ArrayLike, x: ArrayLike, *, on_batch: OnBatch | None = None) -> Backtest:
+    """Replay a log that is in memory.
+
+    The predictor goes on from where it is; a second run with the weights kept is asked for by its ``new_run``.
+
+    Parameters
+    ----------
+    predictor : HybridPredictor
+        It learns the log on the way.
+    x_d, x : (n,) array_like, m
+        Commanded and measured positions, ``n ≥ 1``.
+    on_batch : callable, optional
+        Given each :class:`Batch` when it is finished.
+
+    Returns
+    -------
+    Backtest
+
+    Raises
+    ------
+    SignalError
+        If the samples are empty, of different lengths or not finite; the predictor is unchanged then.
+    """
+    command = as_samples(x_d, "x_d")
+    measured = as_samples(x, "x", len(command))
+    n = len(command)
+    predicted = np.empty((3, n))
+    active = np.zeros(n, dtype=np.bool_)
+    batch_rms = np.empty((3, -(-n // predictor.Np)))
+
+    def keep(batch: Batch) -> None:
+        k, end = batch.k, batch.k + len(batch.x)
+        predicted[0, k:end], predicted[1, k:end], predicted[2, k:end] = batch.x_pb, batch.x_hold, batch.x_h
+        active[k + batch.n_warm_up : end] = True
+        batch_rms[:, batch.j] = batch.rms_pb, batch.rms_hold, batch.rms_h
+        if on_batch is not None:
+            on_batch(batch)
+
+    scores = backtest_stream(predictor, [(command, measured)], on_batch=keep)
+    return Backtest(
+        scores.overall,
+        scores.after_warm_up,
+        scores.n_batches,
+        x_pb=predicted[0],
+        x_hold=predicted[1],
+        x_h=predicted[2],
+        active=active,
+        batch_rms_pb=batch_rms[0],
+        batch_rms_hold=batch_rms[1],
+        batch_rms_h=batch_rms[2],
+    )
+
+
+@one_blas_thread
+def backtest_stream(
+    predictor: HybridPredictor, chunks: Iterable[tuple[ArrayLike, ArrayLike]], *, on_batch: OnBatch | None = None
+) -> Scores:
+    """Replay a log that arrives in chunks; nothing that is kept grows with the length of the log.
+
+    Parameters
+    ----------
+    predictor : HybridPredictor
+        It learns the log on the way.
+    chunks : iterable of pairs ``(x_d, x)`` of (m,) array_like, m
+        Commanded and measured positions in chunks of any sizes; they are predicted ``Np`` samples at a time.
+    on_batch : callable, optional
+        Given each :class:`Batch` when it is finished.
+
+    Returns
+    -------
+    Scores
+
+    Raises
+    ------
+    SignalError
+        If a chunk's samples cannot be used, there are none at all, or a prediction diverges. What came before it is
+        learned.
+    """
+    overall, after = _Sums(), _Sums()
+    j = 0
+    for x_d, x in _batches(chunks, predictor.Np):
+        residual = predictor.last_residual()
+        prediction = predictor.predict(x_d)
+        n, warm = len(x), prediction.n_warm_up
+        predicted = np.empty((3, n))
+        predicted[0] = prediction.x_pb
+        np.add(prediction.x_pb, residual, out=predicted[1])
+        np.add(prediction.x_pb, prediction.e_h, out=predicted[2])  # Eq. (4)
+        if warm:
+            predicted[1:, :warm] = prediction.x_pb[:warm]
+        error = x - predicted
+        squares, peaks = _measure(error, overall.n)
+        if warm == 0:
+            after.add(n, squares, peaks)
+        elif warm < n:
+            after.add(n - warm, *_measure(error[:, warm:], overall.n))
+        rms = [math.sqrt(square / n) for square in squares]
+        batch = Batch(j, overall.n, warm, x_d, x, *predicted, *rms)
+        overall.add(n, squares, peaks)
+        predictor.update(x)
+        j += 1
+        if on_batch is not None:
+            on_batch(batch)
+    if j == 0:
+        raise SignalError("a log must have at least one sample, got none")
+    return Scores(overall.score(), after.score(), j)
+
+
+class _Sums:
+    """Running sums of squares and largest absolute errors of the three predictors."""
+
+    def __init__(self) -> None:
+        self.n = 0
+        self.squares, self.peaks = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
+
+    def add(self, n: int, squares: list[float], peaks: list[float]) -> None:
+        self.n += n
+        for i in range(3):
+            self.squares[i] += squares[i]
+            if peaks[i] > self.peaks[i]:
+                self.peaks[i] = peaks[i]
+
+    def score(self) -> Score:
+        if self.n == 0:
+            return Score(0, *[math.nan] * 6)
+        return Score(self.n, *[math.sqrt(square / self.n) for square in self.squares], *self.peaks)
+
+
+def _measure(error: Array, k: int) -> tuple[list[float], list[float]]:
+    """Return the sums of squares and the largest absolute values of the three errors of a batch from sample k on."""
+    peaks: list[float] = np.abs(error).max(axis=1).tolist()
+    if not all(peak <= PREDICTION_MAX for peak in peaks):
+        raise SignalError(f"x_h diverges in the batch from sample {k} on; raise lambda or lower p")
+    return [float(row.dot(row)) for row in error], peaks
+
+
+def _batches(chunks: Iterable[tuple[ArrayLike, ArrayLike]], Np: int) -> Iterator[tuple[Array, Array]]:
+    """Cut chunks of any sizes into batches of ``Np`` samples; the last one may be shorter."""
+    waiting, filled, k = np.empty((2, Np)), 0, 0
+    for chunk in chunks:
+        x_d, x = _checked(chunk, k)
+        n, i = len(x), 0
+        if filled:
+            i = min(Np - filled, n)
+            waiting[0, filled : filled + i], waiting[1, filled : filled + i] = x_d[:i], x[:i]
+            filled += i
+            if filled == Np:
+                yield waiting[0], waiting[1]
+                waiting, filled = np.empty((2, Np)), 0
+        while n - i >= Np:
+            yield x_d[i : i + Np], x[i : i + Np]
+            i += Np
+        if i < n:
+            filled = n - i
+            waiting[0, :filled], waiting[1, :filled] = x_d[i:], x[i:]
+        k += n
+    if filled:
+        yield waiting[0, :filled], waiting[1, :filled]
+
+
+def _checked(chunk: tuple[ArrayLike, ArrayLike], k: int) -> tuple[Array, Array]:
+    """Return a chunk's samples, or say what is wrong with the chunk that begins at sample ``k``."""
+    place = f" of the chunk from sample {k} on" if k else ""
+    try:
+        first, second = chunk
+    except (TypeError, ValueError):
+        raise SignalError(f"each chunk must be a pair (x_d, x), got {type(chunk).__name__}{place}") from None
+    x_d = as_samples(first, f"x_d{place}")
+    return x_d, as_samples(second, f"x{place}", len(x_d))

@@ -1,0 +1,347 @@
+"""The physics-based linear model ``G_pb`` of a feed drive, as a sum of modes, eq. (15).
+
+``G_pb(s) = Σ_i (α_i + β_i s) / (s² + 2 ζ_i ω_i s + ω_i²)``; the spring-mass-damper of eq. (11) is one such mode.
+:class:`ModalModel` is the continuous model, :class:`DiscreteModel` what it is between two samples of a command
+that is held (zero-order) or interpolated (first-order); both are exact at the samples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import block_diag, expm, toeplitz
+
+from ..base.errors import ModelError, ParameterError
+from ..base.parameters import INPUT_HOLDS, check
+from ..base.signals import Array
+
+if TYPE_CHECKING:
+    import control
+
+__all__ = ["DiscreteModel", "ModalModel", "Mode"]
+
+MODES_MAX = 100
+"""Modes of one model, at most; its tables grow with their square."""
+
+BLOCK_MAX = 256
+"""Longest stretch answered by one pair of lifted matrices; longer windows go block by block."""
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One mode of eq. (15), ``(α + β s) / (s² + 2 ζ ω s + ω²)`` with ``ω = 2π f_n``.
+
+    Parameters
+    ----------
+    f_n : float
+        Natural frequency, Hz.
+    zeta : float
+        Damping ratio; 1 is critical, more is over-damped.
+    alpha, beta : float
+        Numerator, 1/s² and 1/s.
+
+    Raises
+    ------
+    ParameterError
+        If a value is not finite or out of range; ``zeta ≤ 0`` would be an unstable model.
+    """
+
+    f_n: float
+    zeta: float
+    alpha: float
+    beta: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("f_n", "zeta", "alpha", "beta"):
+            object.__setattr__(self, name, check(name, getattr(self, name)))
+
+    @property
+    def omega(self) -> float:
+        """Natural frequency, rad/s."""
+        return 2 * np.pi * self.f_n
+
+
+@dataclass(frozen=True)
+class ModalModel:
+    """A linear, causal, stable drive model: a sum of modes behind a dead time, eq. (15).
+
+    Parameters
+    ----------
+    modes : sequence of Mode
+        1 … :data:`MODES_MAX`.
+    dead_time : int
+        Whole samples by which the command is delayed before it reaches the modes.
+
+    Raises
+    ------
+    ParameterError
+        If there is no mode or too many, or ``dead_time`` is not a whole number ≥ 0.
+    """
+
+    modes: tuple[Mode, ...]
+    dead_time: int = 0
+
+    def __init__(self, modes: Sequence[Mode], dead_time: int = 0) -> None:
+        if not modes:
+            raise ParameterError("a modal model needs at least one mode, got none")
+        if len(modes) > MODES_MAX:
+            raise ParameterError(f"a modal model has at most {MODES_MAX} modes, got {len(modes)}")
+        object.__setattr__(self, "modes", tuple(modes))
+        object.__setattr__(self, "dead_time", check("dead_time", dead_time))
+
+    @classmethod
+    def spring_mass_damper(cls, m: float, c: float, k: float, dead_time: int = 0) -> ModalModel:
+        """Return eq. (11), ``G_pb(s) = (c s + k) / (m s² + c s + k)``, as one mode.
+
+        Parameters
+        ----------
+        m, c, k : float
+            Mass kg, damping N·s/m, stiffness N/m, all > 0.
+        dead_time : int
+            Whole samples of dead time.
+
+        Raises
+        ------
+        ParameterError
+            If a value, or the mode that they make, is out of its range.
+        """
+        m, c, k = check("m", m), check("c", c), check("k", k)
+        # ω² = k/m, 2ζω = c/m, α = k/m, β = c/m
+        omega = np.sqrt(k / m)
+        try:
+            mode = Mode(f_n=omega / (2 * np.pi), zeta=c / m / (2 * omega), alpha=k / m, beta=c / m)
+        except ParameterError as error:
+            raise ParameterError(f"m = {m:g} kg, c = {c:g} N.s/m, k = {k:g} N/m make no drive: {error}") from None
+        return cls((mode,), dead_time)
+
+    @classmethod
+    def from_control(cls, system: control.TransferFunction | control.StateSpace, dead_time: int = 0) -> ModalModel:
+        """Return the modal form of a python-control system.
+
+        Complex pole pairs become under-damped modes, real poles are paired into over-damped ones.
+
+        Parameters
+        ----------
+        system : control.TransferFunction or control.StateSpace
+            Continuous, one input, one output, strictly proper, stable, no repeated mode.
+        dead_time : int
+            Whole samples of dead time to add.
+
+        Raises
+        ------
+        ModelError
+            If the system is of another kind, discrete, zero, not finite, improper or unstable, has several channels,
+            or has repeated modes.
+        """
+        from .modal_form import modes_of
+
+        return cls([Mode(*numbers) for numbers in modes_of(system)], dead_time)
+
+    @property
+    def dc_gain(self) -> float:
+        """``G_pb(0)``: where the drive settles per metre of command, 1 for a drive without offset."""
+        return float(sum(mode.alpha / mode.omega**2 for mode in self.modes))
+
+    def state_space(self) -> tuple[Array, Array, Array]:
+        """Return ``(A, b, c)`` of the modes, block diagonal, without the dead time.
+
+        Each mode has the states ``(ω² z, ω ż)`` with ``z̈ + 2ζω ż + ω² z = x_d``, both in metres.
+
+        Returns
+        -------
+        A : (2m, 2m) array, 1/s
+        b : (2m,) array, 1/s
+        c : (2m,) array, 1
+        """
+        blocks, b, c = [], [], []
+        for mode in self.modes:
+            w = mode.omega
+            blocks.append(np.array([[0.0, w], [-w, -2 * mode.zeta * w]]))
+            b += [0.0, w]
+            c += [mode.alpha / w**2, mode.beta / w]
+        return block_diag(*blocks), np.array(b), np.array(c)
+
+    def discretise(self, Ts: float, input_hold: str = "zoh", block: int = BLOCK_MAX) -> DiscreteModel:
+        """Return the model at the samples ``k·Ts``, exact for a command held or interpolated in between.
+
+        Parameters
+        ----------
+        Ts : float
+            Sampling interval, s.
+        input_hold : {"zoh", "foh"}
+            How ``x_d`` runs between samples.
+        block : int
+            Longest window answered in one piece; tables of this length are kept.
+
+        Raises
+        ------
+        ParameterError
+            If ``Ts ≤ 0`` or the hold is unknown.
+        """
+        return DiscreteModel(self, Ts, input_hold, block)
+
+    def frequency_response(self, f: ArrayLike, Ts: float | None = None) -> NDArray[np.complex128]:
+        """Return ``G_pb(j 2π f)``.
+
+        Parameters
+        ----------
+        f : array_like, Hz
+            Frequencies, any shape.
+        Ts : float, optional
+            Sampling interval, s; needed when there is a dead time, which is counted in samples.
+
+        Returns
+        -------
+        array of complex, shape of ``f``, m/m
+
+        Raises
+        ------
+        ParameterError
+            If there is a dead time and no ``Ts``.
+        """
+        if self.dead_time and Ts is None:
+            raise ParameterError(f"T_s is needed: dead_time = {self.dead_time} is counted in samples")
+        s = 2j * np.pi * np.asarray(f, dtype=np.float64)
+        # Eq. (15)
+        G = sum(
+            (mode.alpha + mode.beta * s) / (s**2 + 2 * mode.zeta * mode.omega * s + mode.omega**2)
+            for mode in self.modes
+        )
+        return np.asarray(G * np.exp(-s * self.dead_time * (Ts or 0.0)), dtype=np.complex128)
+
+    def to_control(self, Ts: float | None = None, input_hold: str = "zoh") -> control.StateSpace:
+        """Return a python-control system: continuous without ``Ts``, otherwise discrete with the dead time in it.
+
+        Raises
+        ------
+        ModelError
+            If a continuous system is asked for and there is a dead time, which has no rational form.
+        """
+        import control
+
+        if Ts is None:
+            if self.dead_time:
+                raise ModelError(
+                    f"a dead time of {self.dead_time} samples has no continuous rational form; "
+                    "give Ts for a discrete one"
+                )
+            A, b, c = self.state_space()
+            return control.ss(A, b[:, None], c[None, :], [[0.0]])
+        discrete = self.discretise(Ts, input_hold, block=1)
+        system = control.ss(discrete.A, discrete.b[:, None], discrete.c[None, :], [[discrete.d]], Ts)
+        if self.dead_time:
+            # x_d delayed by d samples: a shift register in front.
+            d = self.dead_time
+            register = control.ss(np.eye(d, k=-1), np.eye(d, 1), np.eye(1, d, k=d - 1), [[0.0]], Ts)
+            system = control.series(register, system)
+        return system
+
+
+class DiscreteModel:
+    """``x_pb = G_pb x_d`` at the samples, eq. (2), with a state that is carried from window to window.
+
+    ``s(k+1) = A s(k) + b u(k)``, ``x_pb(k) = c s(k) + d u(k)``, ``u`` being ``x_d`` after the dead time. Windows are
+    answered by the lifted form of that recursion, ``x_pb = O s + T u`` with ``T`` lower-triangular Toeplitz.
+
+    Positions are relative to the point where the drive was at rest; the state is plain data, ``(n_state,)``.
+    """
+
+    def __init__(self, model: ModalModel, Ts: float, input_hold: str = "zoh", block: int = BLOCK_MAX) -> None:
+        if input_hold not in INPUT_HOLDS:
+            raise ParameterError(f"input_hold must be one of {', '.join(INPUT_HOLDS)}, got {input_hold!r}")
+        self.model = model
+        self.Ts: float = check("T_s", Ts)
+        self.input_hold = input_hold
+        self.dead_time = model.dead_time
+        self.A, self.b, self.c, self.d = _discrete(model, self.Ts, input_hold)
+        self._n = len(self.b)
+        self._block = max(1, min(block, BLOCK_MAX))
+        self._tabulate()
+
+    @property
+    def n_state(self) -> int:
+        """Length of the state: two for each mode, and the commands still in the dead time."""
+        return self._n + self.dead_time
+
+    def rest(self) -> Array:
+        """Return the state of a drive at rest at position 0, ``(n_state,)``."""
+        return np.zeros(self.n_state)
+
+    def respond(self, state: Array, x_d: Array) -> tuple[Array, Array]:
+        """Return the model's positions over a window and the state at its end; eq. (2).
+
+        Parameters
+        ----------
+        state : (n_state,) array, m
+            From :meth:`rest` or an earlier call; not changed.
+        x_d : (n,) array, m
+            Commanded positions, any length.
+
+        Returns
+        -------
+        x_pb : (n,) array, m
+        state : (n_state,) array, m
+            To be given to the next window.
+        """
+        n = len(x_d)
+        s, u, register = state, x_d, state[:0]
+        if self.dead_time:
+            line = np.concatenate((state[self._n :], x_d))
+            s, u, register = state[: self._n], line[:n], line[n:]
+        if n <= self._block:
+            x_pb, s = self._respond_block(s, u)
+        else:
+            x_pb = np.empty(n)
+            for i in range(0, n, self._block):
+                stop = min(i + self._block, n)
+                x_pb[i:stop], s = self._respond_block(s, u[i:stop])
+        return x_pb, (np.concatenate((s, register)) if self.dead_time else s)
+
+    def impulse_response(self, n: int) -> Array:
+        """Return the first column of the lower-triangular Toeplitz ``G_pb`` of a window, ``(n,)``, m/m."""
+        impulse = np.zeros(n)
+        impulse[0] = 1.0
+        return self.respond(self.rest(), impulse)[0]
+
+    def _respond_block(self, s: Array, u: Array) -> tuple[Array, Array]:
+        n = len(u)
+        x_pb = self._O[:n] @ s + self._T[:n, :n] @ u
+        return x_pb, self._powers[n] @ s + self._K[:, self._block - n :] @ u
+
+    def _tabulate(self) -> None:
+        """Tabulate, for windows of up to ``block`` samples, what ``x_pb`` and the end state are made of."""
+        m, n = self._block, self._n
+        self._powers = np.empty((m + 1, n, n))  # A⁰ … Aᵐ
+        self._powers[0] = np.eye(n)
+        for i in range(m):
+            self._powers[i + 1] = self.A @ self._powers[i]
+        self._O = np.ascontiguousarray(self.c @ self._powers[:m])  # row i: c Aⁱ
+        self._K = np.ascontiguousarray((self._powers[:m] @ self.b)[::-1].T)  # [Aᵐ⁻¹b … A b, b]
+        markov = np.concatenate(([self.d], self._O[: m - 1] @ self.b))  # d, c b, c A b, …
+        self._T = toeplitz(markov, np.zeros(m))
+
+
+def _discrete(model: ModalModel, Ts: float, input_hold: str) -> tuple[Array, Array, Array, float]:
+    """Discretise each mode by the matrix exponential of its augmented system (Van Loan)."""
+    A, b, c = model.state_space()
+    A_d, b_d, d = np.zeros_like(A), np.zeros_like(b), 0.0
+    for i in range(0, len(b), 2):
+        block = slice(i, i + 2)
+        augmented = np.zeros((4, 4))
+        augmented[:2, :2] = A[block, block] * Ts
+        augmented[:2, 2] = b[block] * Ts
+        augmented[2, 3] = 1.0  # the ramp from u(k) to u(k+1)
+        exponential = expm(augmented)
+        phi, gamma_1, gamma_2 = exponential[:2, :2], exponential[:2, 2], exponential[:2, 3]
+        A_d[block, block] = phi
+        if input_hold == "zoh":
+            b_d[block] = gamma_1
+        else:
+            # ξ(k+1) = Φ ξ + Γ₁ u(k) + Γ₂ (u(k+1) − u(k)); with s = ξ − Γ₂ u it needs no future command.
+            b_d[block] = phi @ gamma_2 + gamma_1 - gamma_2
+            d += float(c[block] @ gamma_2)
+    return A_d, b_d, c, d

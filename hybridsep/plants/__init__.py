@@ -1,0 +1,1 @@
+"""Simulated drives, their encoders and the trajectories that they follow."""

@@ -1,0 +1,262 @@
+"""Commanded positions: rest-to-rest moves, planar paths and the paper's two test trajectories.
+
+Every function returns positions in metres, sampled exactly at ``k·Ts``; jerk-limited, time-optimal moves come from
+ruckig (Berscheid and Kröger, RSS 2021).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+from ruckig import InputParameter, Result, Ruckig
+from ruckig import Trajectory as RuckigTrajectory
+
+from ..base.errors import ParameterError, SignalError
+from ..base.limits import Limits
+from ..base.parameters import check, samples_before
+from ..base.signals import Array, as_samples
+from ..logs import read_log
+
+__all__ = [
+    "PAPER_LIMITS",
+    "along_path",
+    "archimedean_spiral",
+    "from_file",
+    "rest_to_rest",
+    "spiral",
+    "staircase",
+]
+
+Curve = Callable[[Array], Array]
+
+SAMPLES_MAX = 2_000_000
+"""Samples of a trajectory that is made here, at most: over half an hour at 1 kHz."""
+
+
+PAPER_LIMITS = Limits(velocity=0.08, acceleration=8.0, jerk=1000.0)
+"""Eq. (14): 80 mm/s, 8 m/s², 1000 m/s³."""
+
+
+def rest_to_rest(
+    positions: ArrayLike,
+    limits: Limits,
+    Ts: float = 1e-3,
+    *,
+    start_times: Sequence[float] | None = None,
+    dwell: float = 0.0,
+    duration: float | None = None,
+) -> Array:
+    """Return a chain of time-optimal, jerk-limited moves, each from rest to rest.
+
+    Parameters
+    ----------
+    positions : (m + 1,) array_like, m
+        Where the axis starts, then where each of the ``m`` moves ends.
+    limits : Limits
+        Velocity, acceleration and jerk limits.
+    Ts : float
+        Sampling interval, s.
+    start_times : sequence of m floats, optional
+        When each move starts, s; otherwise each starts ``dwell`` after the one before has ended.
+    dwell : float
+        Rest between moves, s, when no start times are given.
+    duration : float, optional
+        Length of the result, s; it ends with the last move (and its dwell) if left out.
+
+    Returns
+    -------
+    x_d : (n,) array, m
+        Samples at ``0, Ts, …``, the last one at or after the end.
+
+    Raises
+    ------
+    ParameterError
+        If a move starts before the one before has ended, the times do not fit, or it would have more than
+        :data:`SAMPLES_MAX` samples.
+    SignalError
+        If ``positions`` has less than one move or is not finite.
+    """
+    Ts = check("T_s", Ts)
+    points = as_samples(positions, "positions")
+    if len(points) < 2:
+        raise SignalError(f"positions must hold the start and at least one target, got {len(points)} values")
+    if start_times is not None and len(start_times) != len(points) - 1:
+        raise ParameterError(
+            f"start_times must have one time for each of {len(points) - 1} moves, got {len(start_times)}"
+        )
+    if not (np.isfinite(dwell) and dwell >= 0):
+        raise ParameterError(f"dwell must be finite and ≥ 0 s, got {dwell!r}")
+    moves, begin = [], 0.0
+    for i, (here, there) in enumerate(pairwise(points.tolist())):
+        start = begin if start_times is None else float(start_times[i])
+        if start < begin - 1e-6 * Ts:
+            raise ParameterError(f"move {i + 1} starts at {start:g} s, before the one before has ended at {begin:g} s")
+        move = _plan(here, there, limits)
+        moves.append((start, move))
+        begin = start + move.duration + (dwell if start_times is None else 0.0)
+    end = begin if duration is None else duration
+    if end < begin - 1e-6 * Ts:
+        raise ParameterError(f"duration is {end:g} s, but the moves need {begin:g} s")
+    if not end / Ts < SAMPLES_MAX:
+        raise ParameterError(
+            f"a trajectory must have fewer than {SAMPLES_MAX} samples, got {end:g} s at T_s = {Ts:g} s; "
+            "raise its limits or T_s"
+        )
+    n = samples_before(end, Ts) + 1
+    x_d = np.empty(n)
+    x_d[:] = points[0]
+    for start, move in moves:
+        first = samples_before(start, Ts)
+        for k in range(first, n):
+            t = k * Ts - start
+            if t >= move.duration:
+                x_d[k:] = move.at_time(move.duration)[0][0]
+                break
+            x_d[k] = move.at_time(max(t, 0.0))[0][0]
+    return x_d
+
+
+def staircase(Ts: float = 1e-3, *, limits: Limits = PAPER_LIMITS) -> Array:
+    """Return the paper's staircase: a 10 mm move at the start of every second, three up, three down, 6 s.
+
+    Returns
+    -------
+    x_d : (6 / Ts + 1,) array, m
+        6001 samples at 1 ms; each move takes 0.143 s under eq. (14).
+
+    Raises
+    ------
+    ParameterError
+        If a move would take more than a second under other limits.
+    """
+    steps = np.array([0.0, 1, 2, 3, 2, 1, 0]) * 0.010
+    return rest_to_rest(steps, limits, Ts, start_times=range(6), duration=6.0)
+
+
+def spiral(
+    Ts: float = 1e-3, *, radius: float = 0.030, turns: float = 5.0, limits: Limits = PAPER_LIMITS
+) -> tuple[Array, Array]:
+    """Return the commands of X and Y for the paper's spiral from the centre, 5 turns, 30 mm, eq. (14) along the path.
+
+    Returns
+    -------
+    x_d, y_d : (n,) arrays, m
+        5.9 s at the default values.
+    """
+    position, derivative, end = archimedean_spiral(radius, turns)
+    points = along_path(position, derivative, end, limits, Ts)
+    return np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1])
+
+
+def from_file(
+    path: str | Path, *, column: str = "x_d", unit: str = "m", Ts: float | None = None
+) -> tuple[Array, float]:
+    """Read a commanded position from a CSV, ``.npz`` or ``.mat`` file.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file with a time column ``t`` and the command; see :func:`hybridsep.logs.read_log`.
+    column : str
+        The command's name in the file.
+    unit : {"m", "mm", "um"}
+        Unit of the command.
+    Ts : float, optional
+        Sampling interval, s, for a file without a time column.
+
+    Returns
+    -------
+    x_d : (n,) array, m
+    Ts : float, s
+
+    Raises
+    ------
+    LogError
+        If the file, the column or the time axis cannot be used.
+    """
+    log = read_log(path, columns={"x_d": column, "x": column}, unit=unit, Ts=Ts)
+    return log.x_d, log.Ts
+
+
+def archimedean_spiral(radius: float, turns: float) -> tuple[Curve, Curve, float]:
+    """Return ``r = radius · θ / θ_end`` as position, derivative and end parameter for :func:`along_path`."""
+    for name, value in (("radius", radius), ("turns", turns)):
+        if not (np.isfinite(value) and value > 0):
+            raise ParameterError(f"{name} must be finite and > 0, got {value!r}")
+    end = 2 * np.pi * turns
+    pitch = radius / end
+
+    def position(theta: Array) -> Array:
+        return pitch * np.stack((theta * np.cos(theta), theta * np.sin(theta)), axis=-1)
+
+    def derivative(theta: Array) -> Array:
+        return pitch * np.stack((np.cos(theta) - theta * np.sin(theta), np.sin(theta) + theta * np.cos(theta)), axis=-1)
+
+    return position, derivative, end
+
+
+def along_path(position: Curve, derivative: Curve, end: float, limits: Limits, Ts: float = 1e-3) -> Array:
+    """Run along a planar path from rest to rest, with the limits along the arc.
+
+    Parameters
+    ----------
+    position, derivative : callable, (n,) → (n, d)
+        The path and its derivative, m, over a parameter ``u`` from 0 to ``end``; the derivative is never zero inside.
+    end : float
+        Last value of ``u``, > 0.
+    limits : Limits
+        Velocity, acceleration and jerk along the arc.
+    Ts : float
+        Sampling interval, s.
+
+    Returns
+    -------
+    (n, d) array, m
+        Positions at ``k·Ts``; the arc length is inverted to 1e-12 of its whole.
+    """
+    nodes, arc = _arc_length(derivative, end)
+    s = rest_to_rest([0.0, arc[-1]], limits, Ts)
+    u = np.interp(s, arc, nodes)
+    # Newton on s(u) = s_k, the integral taken by Gauss-Legendre from the panel's left end.
+    panel = np.clip(np.searchsorted(arc, s, "right") - 1, 0, len(nodes) - 2)
+    for _ in range(8):
+        miss = arc[panel] + _panel_lengths(derivative, nodes[panel], u) - s
+        u = np.clip(u - miss / np.maximum(_speed(derivative, u), 1e-300), 0.0, end)
+        if np.max(np.abs(miss)) <= 1e-13 * arc[-1]:
+            break
+    return position(u)
+
+
+def _plan(here: float, there: float, limits: Limits) -> RuckigTrajectory:
+    """Return ruckig's time-optimal move between two points at rest."""
+    request = InputParameter(1)
+    request.current_position, request.target_position = [here], [there]
+    request.max_velocity, request.max_acceleration = [limits.velocity], [limits.acceleration]
+    request.max_jerk = [limits.jerk]
+    move = RuckigTrajectory(1)
+    result = Ruckig(1).calculate(request, move)
+    if result not in (Result.Working, Result.Finished):
+        raise ParameterError(f"no move from {here:g} m to {there:g} m under {limits}: {result}")
+    return move
+
+
+def _speed(derivative: Curve, u: Array) -> Array:
+    return np.asarray(np.linalg.norm(derivative(u), axis=-1))
+
+
+def _panel_lengths(derivative: Curve, left: Array, right: Array, order: int = 8) -> Array:
+    """Return ``∫ |dr/du| du`` over each panel ``[left, right]``, Gauss-Legendre."""
+    x, w = np.polynomial.legendre.leggauss(order)
+    half = (right - left) / 2
+    u = ((left + right) / 2)[:, None] + half[:, None] * x
+    return np.asarray(half * (_speed(derivative, u.ravel()).reshape(u.shape) @ w))
+
+
+def _arc_length(derivative: Curve, end: float, panels: int = 2000) -> tuple[Array, Array]:
+    """Return the panels' nodes and the arc length up to each."""
+    nodes = np.linspace(0.0, end, panels + 1)
+    return nodes, np.concatenate(([0.0], np.cumsum(_panel_lengths(derivative, nodes[:-1], nodes[1:]))))

@@ -1,0 +1,93 @@
+"""Inputs of a look-ahead at the instants that lie in communication steps of any size.
+
+They are latched at each instant ``t_k`` of a step and executed in the step that reaches ``t_{k+1}``, so that outputs
+change at instants only and never tell the future. ``hsep_inputs.c`` is the same for the native FMUs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..base.clock import SampleClock
+from ..base.errors import SignalError
+from .sampled_window import SampledWindow
+
+__all__ = ["SampledInputs"]
+
+
+class SampledInputs:
+    """The clock of a look-ahead, and the inputs of its sample in progress.
+
+    Parameters
+    ----------
+    t_start, T_s : float
+        Start time and sampling interval, s.
+    start : float
+        Position where the drive rests, m.
+
+    Raises
+    ------
+    FmuError
+        If samples cannot be counted from ``t_start``.
+    """
+
+    STATE_SIZE = len(SampleClock._fields) + 2
+
+    def __init__(self, t_start: float, T_s: float, start: float) -> None:
+        self.clock = SampleClock.begin(t_start, T_s)
+        self._latched = (start, start)
+
+    def advance(self, look_ahead: SampledWindow, x_d_ahead: float, x_meas: float, t: float, h: float) -> str:
+        """Execute the samples that the communication step from ``t`` by ``h``, s, reaches.
+
+        Parameters
+        ----------
+        look_ahead : LookAhead or SepLookAhead
+        x_d_ahead, x_meas : float
+            Inputs, m, constant over the step.
+
+        Returns
+        -------
+        warning : str
+            Empty, or what to beware of: an instant is no communication point.
+
+        Raises
+        ------
+        ParameterError, FmuError, SignalError
+            If the step does not fit, or an input that it latches cannot be taken in; nothing is changed then.
+        """
+        if look_ahead.diverged:
+            raise SignalError(look_ahead.diverged)
+        step = self.clock.stepped(t, h)
+        if step.n_latched:
+            look_ahead.check(x_d_ahead, x_meas, self.clock.k + self.clock.latched)
+        waiting = self.clock.latched
+        for _ in range(step.n_samples):
+            if waiting:  # the sample that an earlier step began
+                waiting = False
+            else:
+                self._latched = (x_d_ahead, x_meas)
+            look_ahead.sample(*self._latched)
+        if step.after.latched and not waiting:
+            self._latched = (x_d_ahead, x_meas)
+        inside = step.n_latched > 1 - self.clock.latched  # t_k, where it is not read yet, is the step's start
+        self.clock = step.after
+        if not inside:
+            return ""
+        late = min(step.first + (step.n_latched - 1) * self.clock.T_s, h)
+        return (
+            f"the step from {t:.9g} s by {h:.9g} s passes instants of T_s = {self.clock.T_s:g} s between its ends: "
+            f"x_meas is read up to {late:g} s late, so a closed loop needs steps of T_s"
+        )
+
+    def state(self) -> list[float]:
+        """Return the numbers of the clock, then the inputs."""
+        return [*self.clock.state(), *self._latched]
+
+    @classmethod
+    def from_state(cls, state: Sequence[float]) -> SampledInputs:
+        """Return what :meth:`state` described."""
+        *clock, x_d_ahead, x_meas = state
+        inputs = cls.__new__(cls)
+        inputs.clock, inputs._latched = SampleClock.from_state(clock), (x_d_ahead, x_meas)
+        return inputs

@@ -1,0 +1,81 @@
+"""What is known of a window before it is measured: its prediction, and the affine map of its commands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import toeplitz
+from scipy.signal import lfilter
+
+from ..base.signals import Array, as_published, as_samples
+
+__all__ = ["Prediction", "WindowOperator"]
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What is predicted for one window, before any of it is measured.
+
+    Attributes
+    ----------
+    x_pb : (n,) array, m
+        Physics-based prediction, eq. (2).
+    e_h : (n,) array, m
+        Predicted residual ``wᵀφ``, also while it is not published yet.
+    n_warm_up : int
+        Leading samples that still belong to the warm-up, where ``x_h = x_pb``.
+    """
+
+    x_pb: Array
+    e_h: Array
+    n_warm_up: int
+
+    @property
+    def x_h(self) -> Array:
+        """``(n,)`` array, m: the published prediction, eq. (4) after the warm-up; SignalError if it diverges."""
+        x_h: Array = self.x_pb + self.e_h
+        x_h[: self.n_warm_up] = self.x_pb[: self.n_warm_up]
+        as_published(self.x_pb, "x_pb")
+        return as_published(x_h, "x_h")
+
+    @property
+    def active(self) -> NDArray[np.bool_]:
+        """``(n,)`` array of bool: whether ``x_h`` is the hybrid prediction there."""
+        return np.asarray(np.arange(len(self.x_pb)) >= self.n_warm_up)
+
+
+@dataclass(frozen=True)
+class WindowOperator:
+    """The hybrid model over one window, affine in its commands; eq. (3).
+
+    ``x_h = G_h x_d + free`` with ``G_h`` lower-triangular Toeplitz, and the same for the physics model alone.
+
+    Attributes
+    ----------
+    g_h, g_pb : (n,) array, m/m
+        First columns of ``G_h`` and ``G_pb``.
+    free, free_pb : (n,) array, m
+        Responses to the past: what follows if every command of the window were 0.
+    """
+
+    g_h: Array
+    free: Array
+    g_pb: Array
+    free_pb: Array
+
+    @property
+    def G_h(self) -> Array:
+        """``(n, n)`` array, lower-triangular Toeplitz."""
+        return np.asarray(toeplitz(self.g_h, np.zeros(len(self.g_h))))
+
+    @property
+    def G_pb(self) -> Array:
+        """``(n, n)`` array, lower-triangular Toeplitz."""
+        return np.asarray(toeplitz(self.g_pb, np.zeros(len(self.g_pb))))
+
+    def __call__(self, x_d: ArrayLike) -> Array:
+        """Return ``G_h x_d + free`` for commands ``x_d``, ``(n,)``, m."""
+        command = as_samples(x_d, "x_d", len(self.g_h))
+        return np.asarray(lfilter(self.g_h, [1.0], command)) + self.free

@@ -1,0 +1,220 @@
+"""The command line as a user meets it: results, JSON, help and errors."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import Run, write_log
+from places import EMPS
+from staircase_data import commanded
+
+from hybridsep import Encoder, __version__, load_machine, run_closed_loop, staircase
+from hybridsep.base.parameters import PARAMETERS
+
+
+def test_backtest_of_a_csv(hybridsep: Run, tmp_path: Path) -> None:
+    log = write_log(tmp_path / "log.csv", n=6001)
+    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--json", "--out", tmp_path / "batches.csv")
+    summary = json.loads(out)
+    assert status == 0
+    assert summary["rms_pb_um"] == pytest.approx(33.94, abs=0.1)
+    assert summary["rms_h_um"] == pytest.approx(14.9, abs=0.4)
+    assert (summary["n_samples"], summary["n_batches"]) == (6001, 61)
+    rows = (tmp_path / "batches.csv").read_text().splitlines()
+    assert (rows[0], len(rows)) == ("t,rms_pb,rms_hold,rms_h", 62)
+    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper")
+    assert status == 0
+    assert f"{summary['rms_h_um']:.2f}" in out
+    assert "after warm-up" in out
+
+
+def test_backtest_takes_units_columns_and_parameters(hybridsep: Run, tmp_path: Path) -> None:
+    log = write_log(tmp_path / "log.csv", header="time,command,position", scale=1e3)
+    names = ("--t", "time", "--x-d", "command", "--x", "position", "--unit", "mm")
+    sizes = ("--Np", 50, "--p", 20, "--q", 1, "--lam", 1e-11, "--t-init", 0.2)
+    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--json", *names, *sizes)
+    assert status == 0
+    assert json.loads(out)["n_batches"] == 50
+
+
+@pytest.mark.skipif(not EMPS.exists(), reason="needs ../shared/data/emps beside the repository")
+def test_backtest_of_a_recorded_axis(hybridsep: Run) -> None:
+    """Published constants, paper's settings: physics 15.45 µm, hold 5.93 µm, hybrid at most 5.55 µm."""
+    status, out, _ = hybridsep("backtest", EMPS, "-m", "emps", "--json")
+    summary = json.loads(out)
+    assert status == 0
+    assert summary["rms_pb_um"] == pytest.approx(15.45, abs=0.05)
+    assert summary["rms_hold_um"] == pytest.approx(5.93, abs=0.05)
+    assert summary["rms_h_um"] <= 5.55
+
+
+def test_json_has_null_where_there_is_no_figure(hybridsep: Run, tmp_path: Path) -> None:
+    log = write_log(tmp_path / "short.csv", n=150)
+    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--json")
+    assert status == 0
+    assert json.loads(out)["rms_h_um_after_warm_up"] is None
+
+
+def test_build(hybridsep: Run, tmp_path: Path) -> None:
+    status, out, _ = hybridsep("build", "FeedDrivePy", "--backend", "python", "--out", tmp_path, "--json")
+    assert status == 0
+    assert json.loads(out) == [str(tmp_path / "FeedDrivePy.fmu")]
+    status, out, _ = hybridsep("build", "-m", "emps", "--backend", "python", "--out", tmp_path)
+    assert status == 0
+    assert "HybridPredictorPy_emps.fmu" in out
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["FeedDrivePy.fmu", "HybridPredictorPy_emps.fmu"]
+
+
+def test_cosim_over_a_file(hybridsep: Run, tmp_path: Path) -> None:
+    path = tmp_path / "command.csv"
+    np.savetxt(
+        path, np.column_stack((np.arange(1500) * 1e-3, commanded()[:1500])), delimiter=",", header="t,x_d", comments=""
+    )
+    options = ("--backend", "python", "--seed", 2, "--out", tmp_path / "run.npz")
+    status, out, _ = hybridsep("cosim", "--trajectory", path, *options, "--json")
+    assert status == 0
+    assert json.loads(out)["n_samples"] == 1500
+    with np.load(tmp_path / "run.npz") as arrays:
+        assert len(arrays["x_h"]) == 1500
+    status, again, _ = hybridsep("cosim", "--trajectory", path, *options, "--p", 30, "--json")
+    assert json.loads(again)["rms_h_um"] != json.loads(out)["rms_h_um"]
+
+
+def test_cosim_with_compensation(hybridsep: Run, tmp_path: Path) -> None:
+    options = ("--backend", "python", "--out", tmp_path / "run.csv", "--figure", tmp_path / "run.png")
+    figures = {}
+    for kind in ("none", "physics", "hybrid"):
+        status, out, _ = hybridsep("cosim", "--compensate", kind, *options, "--json")
+        assert status == 0
+        summary = json.loads(out)
+        assert summary[{"none": "share_off"}.get(kind, f"share_{kind}")] > 0.9
+        figures[kind] = summary["tracking_rms_um"]
+    assert 87.0 < figures["none"] < 90.0
+    assert figures["hybrid"] < 6.9 < 19.0 < figures["physics"] < 20.5
+    assert (tmp_path / "run.csv").read_text().startswith("t,x_d,x_dm,x,")
+    assert (tmp_path / "run.png").read_bytes().startswith(b"\x89PNG")
+    fmus = ("--predictor", tmp_path / "SepCompensatorPy.fmu", "--plant", tmp_path / "FeedDrivePy.fmu")
+    assert hybridsep("build", "SepCompensatorPy", "FeedDrivePy", "--backend", "python", "--out", tmp_path)[0] == 0
+    status, out, _ = hybridsep("cosim", "--compensate", "hybrid", *fmus)
+    assert status == 0
+    assert f"{figures['hybrid']:.2f}" in out
+    assert "planned by the hybrid 98.3%" in out
+    # Preview and knots follow a window of another length.
+    sizes = ("--Np", 25, "--p", 20, "--q", 3)
+    assert hybridsep("cosim", "--compensate", "physics", "--backend", "python", *sizes)[0] == 0
+
+
+def test_weights_for_a_compensator(hybridsep: Run, tmp_path: Path) -> None:
+    machine, weights = load_machine("spring_mass_damper"), tmp_path / "trained.state"
+    compensator = machine.new_compensator()
+    run_closed_loop(compensator, machine.new_plant(), staircase(), encoder=Encoder(5e-6, 1))
+    compensator.predictor.save(weights)
+    options = ("--backend", "python", "--weights", weights)
+    status, out, _ = hybridsep("cosim", "--compensate", "hybrid", *options, "--json")
+    assert status == 0
+    assert json.loads(out)["tracking_rms_um"] < 2.5
+    assert json.loads(out)["share_hybrid"] == 1.0
+    status, _, err = hybridsep("cosim", *options)
+    assert status == 2
+    assert "trained.state was not trained for machine spring_mass_damper: it has Np = 50 instead of 100" in err
+    assert hybridsep("build", "SepCompensatorPy", "FeedDrivePy", *options, "--out", tmp_path)[0] == 0
+    with zipfile.ZipFile(tmp_path / "SepCompensatorPy.fmu") as archive:
+        assert "resources/weights.bin" in archive.namelist()
+    status, _, err = hybridsep("build", "-m", "spring_mass_damper", *options, "--out", tmp_path)
+    assert status == 2
+    assert (
+        "--weights is for one HybridPredictor or SepCompensator, this would build HybridPredictorPy, SepCompensatorPy; "
+        "name one" in " ".join(err.split())
+    )
+
+
+def test_figure_of_a_prediction(hybridsep: Run, tmp_path: Path) -> None:
+    figure = tmp_path / "made" / "run.png"
+    assert hybridsep("cosim", "--backend", "python", "--figure", figure)[0] == 0
+    assert figure.read_bytes().startswith(b"\x89PNG")
+
+
+def test_help_shows_units_and_ranges(hybridsep: Run) -> None:
+    status, out, _ = hybridsep("backtest", "--help")
+    text = " ".join(out.split())
+    assert status == 0
+    for name in ("Np", "p", "q", "lambda", "t_init"):
+        assert PARAMETERS[name].range_text in text
+    assert "[m2]" in text
+    status, out, _ = hybridsep("--help")
+    assert all(command in out for command in ("demo", "build", "cosim", "backtest"))
+    assert hybridsep("--version")[1].strip() == __version__
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["backtest", "{log}", "-m", "robot"], "MachineError: no machine 'robot'"),
+        (["backtest", "{log}", "-m", "spring_mass_damper", "--p", "200"], "p must be 1 … Np = 100, got 200"),
+        (["backtest", "{log}", "-m", "spring_mass_damper", "--lam", "0"], "lambda must be 1e-40 … 1e+12 m2, got 0"),
+        (["backtest", "{log}", "-m", "spring_mass_damper", "--x", "pos"], "column 'pos'"),
+        (
+            ["backtest", "{log}", "-m", "spring_mass_damper", "--unit", "inch"],
+            "unit must be one of m, mm, um, got 'inch'",
+        ),
+        (["backtest", "nothing.csv", "-m", "spring_mass_damper"], "nothing.csv"),
+        (["build", "Robot", "--backend", "python"], "no FMU Robot; there are HybridPredictorPy_als25010_x"),
+        (["build", "--backend", "cobol"], "backend must be one of"),
+        (["cosim", "-m", "emps", "--backend", "python"], "machine emps has no plant; name a plant FMU with --plant"),
+        (["cosim", "--trajectory", "zigzag"], "zigzag"),
+        (["cosim", "--out", "run.xlsx"], "--out must end in .csv or .npz, got 'run.xlsx'"),
+        (["cosim", "--Np", "10"], "p must be 1 … Np = 10, got 50"),
+        (["cosim", "--compensate", "magic"], "--compensate must be one of none, physics, hybrid, got 'magic'"),
+        (["cosim", "--compensate", "hybrid", "--p", "51"], "p must be 1 … Np = 50, got 51"),
+        (
+            ["cosim", "--compensate", "hybrid", "-m", "emps", "--plant", "plant.fmu"],
+            "machine emps has no [drive_limits], which a compensator must keep",
+        ),
+        (
+            ["cosim", "--compensate", "hybrid", "--predictor", "none.fmu", "--backend", "python"],
+            "no FMU at none.fmu; build it first",
+        ),
+        (["cosim", "--weights", "w.state", "--predictor", "p.fmu"], "--weights go into an FMU that is built here"),
+        (["cosim", "--figure", "run.pdf"], "--figure must end in .png, got 'run.pdf'"),
+        (["cosim", "--seed", "99999999999"], "seed must be 0 … 2147483647, got 99999999999"),
+        (["cosim", "--out", "{log}/run.csv"], "cannot read or write"),
+        (["backtest", "{log}", "-m", "spring_mass_damper", "--out", "."], "--out must be a file, got the folder ."),
+        (["build", "FeedDrivePy", "--backend", "python", "--out", "{log}"], "cannot read or write"),
+    ],
+)
+def test_errors_are_one_line_and_status_2(hybridsep: Run, tmp_path: Path, arguments: list[str], message: str) -> None:
+    log = write_log(tmp_path / "log.csv", n=300)
+    status, out, err = hybridsep(*(argument.format(log=log) for argument in arguments))
+    assert (status, out) == (2, "")
+    assert err.startswith("error: ")
+    assert message.replace(" ", "") in "".join(err.split())
+    assert "Traceback" not in err
+    assert len(err.strip().splitlines()) == 1
+
+
+def test_a_log_in_milliseconds_gets_a_hint(hybridsep: Run, tmp_path: Path) -> None:
+    log = tmp_path / "ms.csv"
+    log.write_text("t,x_d,x\n" + "".join(f"{k},0,0\n" for k in range(10)))
+    status, _, err = hybridsep("backtest", log, "-m", "spring_mass_damper")
+    assert status == 2
+    assert "is its time in ms? It must be in seconds" in " ".join(err.split())
+
+
+def test_a_log_without_times(hybridsep: Run, tmp_path: Path) -> None:
+    log = tmp_path / "untimed.csv"
+    log.write_text("x_d,x\n" + "0,0\n" * 200)
+    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--Ts", 0.001, "--json")
+    assert status == 0
+    assert json.loads(out)["n_samples"] == 200
+
+
+def test_a_log_at_another_sampling_interval_is_refused(hybridsep: Run, tmp_path: Path) -> None:
+    log = tmp_path / "slow.csv"
+    log.write_text("t,x_d,x\n" + "".join(f"{k * 0.004},0,0\n" for k in range(10)))
+    status, _, err = hybridsep("backtest", log, "-m", "spring_mass_damper")
+    assert status == 2
+    assert "sampled every 0.004 s, but machine spring_mass_damper has T_s = 0.001 s" in " ".join(err.split())

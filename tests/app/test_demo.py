@@ -1,0 +1,126 @@
+"""The main job: FMUs, figures, summary, and that the README's results are what it makes."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from places import EMPS, ROOT
+
+from hybridsep.app.demo import demo, demo_files
+from hybridsep.app.overwrite import BY_ENDING
+
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+PNG = b"\x89PNG\r\n\x1a\n"
+CASES = ("staircase", "spiral_x", "spiral_y")
+KINDS = ("none", "physics", "hybrid_cold", "hybrid_warm")
+
+
+@dataclass(frozen=True)
+class Demonstration:
+    out: Path
+    summary: dict[str, dict[str, Any]]
+    fractions: list[float]
+
+    def compensation(self, case: str, figure: str) -> list[float]:
+        return [self.summary[case]["compensation"][kind][figure] for kind in KINDS]
+
+
+@pytest.fixture(scope="module")
+def shown(tmp_path_factory: pytest.TempPathFactory) -> Demonstration:
+    out = tmp_path_factory.mktemp("demo")
+    fractions: list[float] = []
+    emps = EMPS if EMPS.exists() else None
+    summary = demo(out, backend="python", emps=emps, progress=lambda message, fraction: fractions.append(fraction))
+    return Demonstration(out, summary, fractions)
+
+
+def test_demo_writes_all_it_promises(shown: Demonstration) -> None:
+    assert json.loads((shown.out / "summary.json").read_text()) == shown.summary
+    assert set(shown.summary) - {"emps"} == set(CASES)
+    for case in shown.summary.values():
+        assert {"rms_pb_um", "rms_hold_um", "rms_h_um", "reduction_percent", "printed"} <= set(case)
+        assert case["rms_h_um"] < case["rms_pb_um"]
+        assert 0 < len(case["batches_hybrid_worse"]) < case["n_batches"] / 4  # the paper's honest part
+    figures = [*CASES, "spiral", "spiral_contour", *(f"{case}_compensated" for case in CASES)]
+    for name in figures:
+        assert (shown.out / f"{name}.png").read_bytes().startswith(PNG)
+    for name in CASES:
+        assert (shown.out / f"{name}_compensated.csv").read_text().startswith("t,x_d,x_dm,")
+    written = {path for path in shown.out.rglob("*") if path.is_file()}
+    assert written == set(demo_files(shown.out, "python", emps=EMPS.exists()))
+    assert all(BY_ENDING[path.suffix].recognises(path) for path in written)
+    assert len(list((shown.out / "fmus").glob("*.fmu"))) == 9
+    assert len(list((shown.out / "fmus" / "warm").glob("SepCompensator*.fmu"))) == 3
+    assert shown.fractions == sorted(shown.fractions)
+    assert shown.fractions[-1] == 1.0
+    assert len(set(shown.fractions)) == len(shown.fractions)
+
+
+def test_demo_compensates(shown: Demonstration) -> None:
+    """Tracking RMS of the true position, µm: less from kind to kind."""
+    for case in CASES:
+        figures = shown.compensation(case, "tracking_rms_um")
+        assert figures == sorted(figures, reverse=True)
+    none, physics, cold, warm = shown.compensation("staircase", "tracking_rms_um")
+    assert 87.0 < none < 90.0
+    assert physics < 20.5
+    assert cold < 5.0
+    assert warm < 1.8
+    x, y = (shown.compensation(case, "tracking_rms_um") for case in ("spiral_x", "spiral_y"))
+    assert x[3] < 0.25 * x[1]
+    assert y[3] < 0.6 * y[1]  # its physics model keeps the direction too
+    contour = shown.compensation("spiral_x", "contour_rms_um")
+    assert contour == shown.compensation("spiral_y", "contour_rms_um") == sorted(contour, reverse=True)
+    assert max(shown.compensation("staircase", "peak_jerk_m_s3")) <= 5000 * (1 + 1e-9)
+
+
+@pytest.mark.skipif(not EMPS.exists(), reason="needs ../shared/data/emps beside the repository")
+def test_demo_with_the_recorded_axis(shown: Demonstration) -> None:
+    assert shown.summary["emps"]["rms_h_um"] <= 5.55
+    assert (shown.out / "emps.png").read_bytes().startswith(PNG)
+
+
+def readme_row(label: str) -> list[float]:
+    """Return the figures of the README's only row that begins with a label."""
+    (row,) = re.findall(rf"^\| {label}[^|]*\|(.*)\|$", README, re.MULTILINE)
+    return [float(figure) for figure in re.findall(r"(?<=\| )[\d.]+(?= (?:% )?\|)", f"|{row}|")]
+
+
+@pytest.mark.parametrize(
+    ("case", "label"),
+    [("staircase", "staircase, FMU"), ("spiral_x", "spiral, stage X"), ("spiral_y", "spiral, stage Y")],
+)
+def test_predictions_in_the_readme(shown: Demonstration, case: str, label: str) -> None:
+    figures = [shown.summary[case][key] for key in ("rms_pb_um", "rms_hold_um", "rms_h_um", "reduction_percent")]
+    assert readme_row(label)[:4] == pytest.approx(figures, abs=0.06)
+
+
+@pytest.mark.parametrize(
+    ("case", "figure", "label"),
+    [
+        ("staircase", "tracking_rms_um", "staircase, compensated"),
+        ("spiral_x", "tracking_rms_um", "spiral X, compensated"),
+        ("spiral_y", "tracking_rms_um", "spiral Y, compensated"),
+        ("spiral_x", "contour_rms_um", "spiral, contour error"),
+    ],
+)
+def test_compensation_in_the_readme(shown: Demonstration, case: str, figure: str, label: str) -> None:
+    # What has been learned differs a little from one LAPACK to another.
+    assert readme_row(label) == pytest.approx(shown.compensation(case, figure), rel=0.02, abs=0.06)
+
+
+def test_build_fmu_is_a_front_of_the_command_line(tmp_path: Path) -> None:
+    command = [sys.executable, str(ROOT / "build_fmu.py"), "--machine", str(ROOT / "models" / "als25010_x.toml")]
+    subprocess.run([*command, "--backend", "python", "--out", str(tmp_path)], check=True, stdout=subprocess.DEVNULL)
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "FeedDrivePy_als25010_x.fmu",
+        "HybridPredictorPy_als25010_x.fmu",
+        "SepCompensatorPy_als25010_x.fmu",
+    ]

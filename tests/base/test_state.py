@@ -1,0 +1,159 @@
+"""A saved state is read back exactly, or refused: damaged, truncated, foreign, of another kind or version."""
+
+from __future__ import annotations
+
+import json
+import struct
+import zlib
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import array_shapes, arrays
+
+from hybridsep.base.errors import HybridSepError, StateError
+from hybridsep.base.state import VERSION, pack, unpack
+from hybridsep.model.physics import ModalModel
+from hybridsep.predict.predictor import HybridPredictor
+
+META: dict[str, Any] = {"k": 7, "Ts": 1e-3, "start": None, "input_hold": "zoh"}
+PARTS = {"inner": b"\x00HSEP\xff", "nothing": b""}
+BLOB = pack("test", META, {"a": np.arange(6.0).reshape(2, 3), "empty": np.empty(0)}, PARTS)
+
+
+def predictor_blob() -> bytes:
+    predictor = HybridPredictor(ModalModel.spring_mass_damper(1.0, 15.7, 24674.0), Np=5, p=2, q=1)
+    predictor.predict(np.linspace(0.1, 0.2, 5))
+    predictor.update(np.linspace(0.1, 0.21, 5))
+    predictor.predict(np.linspace(0.2, 0.3, 5))
+    return predictor.to_bytes()
+
+
+PREDICTOR = predictor_blob()
+
+
+def sealed(content: bytes) -> bytes:
+    """Append the checksum that makes any content pass for undamaged."""
+    return content + struct.pack("<I", zlib.crc32(content))
+
+
+def with_header(header: bytes) -> bytes:
+    return sealed(struct.pack("<4sII", b"HSEP", VERSION, len(header)) + header)
+
+
+@given(
+    values=st.dictionaries(
+        st.text(max_size=5),
+        arrays(np.float64, array_shapes(min_dims=0, max_dims=3, min_side=0, max_side=4)),
+        max_size=3,
+    )
+)
+def test_arrays_come_back_bit_for_bit(values: dict[str, Any]) -> None:
+    meta, back, parts = unpack("test", pack("test", META, values))
+    assert parts == {}
+    assert meta == META
+    assert list(back) == list(values)
+    for name, array in values.items():
+        assert back[name].shape == array.shape
+        assert back[name].tobytes() == array.tobytes()
+        assert back[name].flags.writeable
+
+
+def test_the_same_state_gives_the_same_bytes() -> None:
+    meta, values, parts = unpack("test", BLOB)
+    assert parts == PARTS
+    assert pack("test", dict(reversed(meta.items())), values, parts) == BLOB
+
+
+def test_truncated_at_any_byte() -> None:
+    for end in range(len(PREDICTOR)):
+        with pytest.raises(StateError):
+            HybridPredictor.from_bytes(PREDICTOR[:end])
+
+
+@settings(max_examples=400)
+@given(position=st.integers(0, len(PREDICTOR) - 1), flip=st.integers(1, 255))
+def test_a_flipped_byte(position: int, flip: int) -> None:
+    damaged = bytearray(PREDICTOR)
+    damaged[position] ^= flip
+    with pytest.raises(StateError):
+        HybridPredictor.from_bytes(bytes(damaged))
+
+
+@given(st.binary(max_size=200))
+def test_foreign_bytes(blob: bytes) -> None:
+    with pytest.raises(StateError, match=f"^a saved state of kind 'test' was expected, got {len(blob)} bytes of"):
+        unpack("test", blob)
+
+
+@given(st.binary(min_size=1, max_size=20))
+def test_trailing_bytes(extra: bytes) -> None:
+    with pytest.raises(StateError, match="is truncated or damaged"):
+        unpack("test", BLOB + extra)
+
+
+def test_another_kind() -> None:
+    with pytest.raises(StateError, match=r"^a saved state of kind 'predictor' was expected, got one of kind 'test'$"):
+        HybridPredictor.from_bytes(BLOB)
+
+
+@pytest.mark.parametrize("version", [0, VERSION + 1, 2**32 - 1])
+def test_another_version(version: int) -> None:
+    other = sealed(BLOB[:4] + struct.pack("<I", version) + BLOB[8:-4])
+    with pytest.raises(StateError, match=f"has format version {version}, this library reads version {VERSION}"):
+        unpack("test", other)
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        b"",
+        b"{",
+        b"\xff\xfe",
+        b"[]",
+        b'{"kind": "test"}',
+        json.dumps({"kind": "test", "meta": {}, "arrays": [["a", [3]]]}).encode(),
+        json.dumps({"kind": "test", "meta": {}, "arrays": [["a"]]}).encode(),
+        json.dumps({"kind": "test", "meta": {}, "arrays": [], "parts": [["a", "x"]]}).encode(),
+        json.dumps({"kind": "test", "meta": {}, "arrays": [["a", ["x"]]]}).encode(),
+    ],
+)
+def test_a_header_that_does_not_hold_together(header: bytes) -> None:
+    with pytest.raises(StateError, match=r"^the saved state has a header that cannot be read: "):
+        unpack("test", with_header(header))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"Np": 0},
+        {"p": 99},
+        {"p": 3},
+        {"dead_time": []},
+        {"dead_time": 2},
+        {"input_hold": "soh"},
+        {"modes": np.ones((1, 7))},
+        {"modes": -np.ones((1, 4))},
+        {"factor": np.eye(2)},
+        {"e_pb": None},
+        {"n_samples": "many"},
+    ],
+    ids=str,
+)
+def test_an_inconsistent_predictor(change: dict[str, Any]) -> None:
+    meta, values, _ = unpack("predictor", PREDICTOR)
+    for name, value in change.items():
+        if name in meta:
+            meta[name] = value
+        elif value is None:
+            del values[name]
+        else:
+            values[name] = value
+    with pytest.raises(StateError, match=r"^the saved predictor is inconsistent: "):
+        HybridPredictor.from_bytes(pack("predictor", meta, values))
+
+
+def test_it_is_an_error_of_this_library() -> None:
+    assert issubclass(StateError, HybridSepError)

@@ -1,0 +1,113 @@
+"""BLAS threads: the same bits for any number, one inside replays and loops, the user's setting afterwards."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from places import SUPPORT
+from threadpoolctl import threadpool_info, threadpool_limits
+
+from hybridsep import (
+    Encoder,
+    HybridPredictor,
+    backtest,
+    backtest_stream,
+    cosimulate,
+    load_machine,
+    run_closed_loop,
+    simulate,
+    staircase,
+)
+from hybridsep.base.threads import one_blas_thread
+
+N = 2500
+
+
+def blas_threads() -> set[int]:
+    """Return how many threads the BLAS libraries of this process use."""
+    return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+
+
+@pytest.fixture
+def two_threads() -> Iterator[None]:
+    """Two BLAS threads, as a user might have set them."""
+    with threadpool_limits(2, user_api="blas"):
+        if blas_threads() != {2}:
+            pytest.skip("the number of BLAS threads cannot be set here")
+        yield
+
+
+def results() -> dict[str, str]:
+    """Return checksums of a replay and a closed loop that are large enough for OpenBLAS to use threads."""
+    machine = load_machine("spring_mass_damper")
+    x_d = staircase()[:N]
+    noise = Encoder(5e-6, 0)
+    x = simulate(machine.new_plant(), x_d, machine.T_s) + noise.measure_all(np.zeros(N))
+    replay = backtest(HybridPredictor(machine.model, Np=500, p=400, q=3), x_d, x)
+    loop = run_closed_loop(machine.new_compensator(), machine.new_plant(), x_d, encoder=noise)
+    signals = {"replay": replay.x_h, "closed loop": loop.x_dm}
+    return {name: hashlib.sha256(signal.tobytes()).hexdigest() for name, signal in signals.items()}
+
+
+def test_results_do_not_depend_on_the_number_of_threads() -> None:
+    script = f"import sys; sys.path[:0] = {[str(Path(__file__).parent), str(SUPPORT)]!r}\n"
+    script += "import json, test_threads; print(json.dumps(test_threads.results()))"
+
+    def with_threads(n: int) -> Any:
+        environment = os.environ | {"OPENBLAS_NUM_THREADS": str(n)}
+        done = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        return json.loads(done.stdout)
+
+    assert with_threads(1) == with_threads(2)
+
+
+def test_replays_and_loops_use_one_thread(two_threads: None, python_fmu: Callable[[str], Path]) -> None:
+    machine = load_machine("spring_mass_damper")
+    x_d = staircase()[:300]
+    seen: list[set[int]] = []
+
+    def look(*_: object) -> None:
+        seen.append(blas_threads())
+
+    def look_and_pass(k: int, x_meas: float) -> float:
+        seen.append(blas_threads())
+        return x_meas
+
+    backtest(machine.new_predictor(), x_d, x_d, on_batch=look)
+    backtest_stream(machine.new_predictor(), iter([(x_d, x_d)]), on_batch=look)
+    run_closed_loop(machine.new_compensator(), machine.new_plant(), x_d[:3], sensor=look_and_pass)
+    cosimulate(python_fmu("HybridPredictorPy"), python_fmu("FeedDrivePy"), x_d[:3], progress=look)
+    assert len(seen) > 100
+    assert set.union(*seen) == {1}
+    assert blas_threads() == {2}
+
+
+def test_the_users_setting_returns_after_an_error(two_threads: None) -> None:
+    machine = load_machine("spring_mass_damper")
+
+    def fail(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        backtest(machine.new_predictor(), staircase()[:300], staircase()[:300], on_batch=fail)
+    assert blas_threads() == {2}
+
+
+def test_runs_that_overlap_restore_once(two_threads: None) -> None:
+    """As in two threads: the first one to begin ends before the second."""
+    with ExitStack() as second:
+        with one_blas_thread:
+            second.enter_context(one_blas_thread)
+        assert blas_threads() == {1}
+    assert blas_threads() == {2}

@@ -1,0 +1,137 @@
+"""The C core's regression against the direct solution in extended precision. Each test states its tolerance."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from typing import Any
+
+import c_core
+import numpy as np
+import oracle
+import pytest
+import staircase_data as staircase
+from c_core import TS
+from numpy.typing import NDArray
+
+from hybridsep.model.physics import ModalModel
+from hybridsep.predict.regression import RidgeRegression
+
+Array = NDArray[np.float64]
+
+
+class CRegression:
+    """hsep_regression."""
+
+    def __init__(self, n: int, lam: float) -> None:
+        self.library, self.n = c_core.library("predictor"), n
+        self.block = np.zeros(int(self.library.hsep_regression_size(ctypes.c_uint64(n))) // 8)
+        self.library.hsep_regression_init(self._block, ctypes.c_uint64(n), ctypes.c_double(lam))
+
+    @property
+    def _block(self) -> Any:
+        return self.block.ctypes.data_as(ctypes.c_void_p)
+
+    def fold(self, rows: Array, target: Array, repetitions: int = 1) -> None:
+        stacked = np.ascontiguousarray(np.column_stack((rows, target)))
+        pointer = stacked.ctypes.data_as(ctypes.c_void_p)
+        self.library.test_fold(self._block, pointer, ctypes.c_size_t(len(rows)), ctypes.c_size_t(repetitions))
+
+    def load(self, i: int, row: Array) -> int:
+        place = self.library.hsep_regression_row(self._block)
+        for j, value in enumerate(row.tolist()):
+            place[j] = value
+        done: int = self.library.hsep_regression_load(self._block, ctypes.c_uint64(i))
+        return done
+
+    @property
+    def weights(self) -> Array:
+        w = np.empty(self.n)
+        self.library.hsep_regression_solve(self._block, w.ctypes.data_as(ctypes.c_void_p))
+        return w
+
+    @property
+    def residual_sum(self) -> float:
+        return float(self.block[3])
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 7, 8, 9, 16, 23])
+@pytest.mark.parametrize("lam", [1e-12, 1e-3, 10.0])
+def test_weights_of_random_rows_are_those_of_the_direct_solution(n: int, lam: float) -> None:
+    # 1e-11 relative against long double; from one row, less than features, to many.
+    rng = np.random.default_rng(n)
+    rows = rng.normal(size=(200, n))
+    target = rows @ rng.normal(size=n) + 0.1 * rng.normal(size=200)
+    regression, library = CRegression(n, lam), RidgeRegression(n, lam)
+    done = 0
+    for m in (0, 1, 2, 30, 200):
+        regression.fold(rows[done:m], target[done:m])
+        library.update(rows[done:m], target[done:m])
+        done = m
+        exact = oracle.ridge_extended(rows[:m], target[:m], lam).astype(float)
+        scale = 1e-11 * max(float(np.linalg.norm(exact)), 1e-300)
+        np.testing.assert_allclose(regression.weights, exact, rtol=0, atol=max(scale, 1e-14 / math.sqrt(lam) * (m < n)))
+        assert regression.residual_sum == pytest.approx(library.residual_sum, rel=1e-9, abs=1e-11 * max(lam, 1e-3))
+
+
+def test_rows_that_outweigh_all_before_them_lose_nothing() -> None:
+    # Each row a million times the one before and nearly parallel to it: rotations with a cosine near 0, where the
+    # cheap form of the update would be wrong. 1e-9 relative.
+    rng = np.random.default_rng(1)
+    n, m = 6, 60
+    base = rng.normal(size=n)
+    rows = (base + 1e-3 * rng.normal(size=(m, n))) * (10.0 ** np.tile([-6.0, 0.0, 6.0], m // 3))[:, None]
+    target = rows @ rng.normal(size=n) * (1 + 1e-2 * rng.normal(size=m))
+    regression = CRegression(n, 1e-6)
+    regression.fold(rows, target)
+    exact = oracle.ridge_extended(rows, target, 1e-6).astype(float)
+    assert np.linalg.norm(regression.weights - exact) <= 1e-9 * np.linalg.norm(exact)
+
+
+def staircase_rows(p: int, q: int, n: int) -> tuple[Array, Array]:
+    """Return rows of features, (n, 2 + q + p), and their targets, (n,), of the measured staircase; eq. (5)."""
+    discrete = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0).discretise(TS)
+    x_pb, _ = discrete.respond(discrete.rest(), staircase.commanded())
+    e_pb = staircase.measured(0) - x_pb
+    first = 200  # the lags before it are there
+    columns = [np.ones(n)] + [x_pb[first - i : first - i + n] for i in range(q + 1)]
+    columns += [e_pb[first - i : first - i + n] for i in range(1, p + 1)]
+    return np.column_stack(columns), e_pb[first : first + n]
+
+
+def test_the_weights_keep_their_digits_over_a_million_samples() -> None:
+    # n = 55: 1e-9 relative against extended precision. m times the same rows are the rows times sqrt(m).
+    rows, target = staircase_rows(50, 3, 5000)
+    regression = CRegression(55, 1e-12)
+    regression.fold(rows, target, repetitions=200)
+    scale = np.sqrt(np.longdouble(200))
+    exact = oracle.ridge_extended(
+        (rows * scale).astype(np.longdouble),
+        (target * scale).astype(np.longdouble),
+        1e-12,
+    )
+    error = np.linalg.norm((regression.weights - exact).astype(float)) / np.linalg.norm(exact.astype(float))
+    assert error <= 1e-9
+
+
+def test_a_loaded_factor_is_the_one_it_was() -> None:
+    # 1e-9 relative between weights before and after, and after more rows.
+    rows, target = staircase_rows(5, 2, 400)
+    library, regression = RidgeRegression(9, 1e-9), CRegression(9, 1.0)
+    library.update(rows[:300], target[:300])
+    for i in range(10):
+        assert regression.load(i, library.factor[i, i:]) == 1
+    np.testing.assert_allclose(regression.weights, library.weights, rtol=1e-9)
+    library.update(rows[300:], target[300:])
+    regression.fold(rows[300:], target[300:])
+    np.testing.assert_allclose(regression.weights, library.weights, rtol=1e-9)
+    assert regression.residual_sum == pytest.approx(library.residual_sum, rel=1e-12)
+
+
+def test_a_factor_that_is_none_is_refused_unchanged() -> None:
+    regression = CRegression(3, 1.0)
+    regression.fold(np.eye(3), np.arange(3.0))
+    before = regression.weights
+    assert regression.load(1, np.array([0.0, 1.0, 1.0])) == 0
+    assert regression.load(1, np.array([1.0, math.nan, 1.0])) == 0
+    np.testing.assert_array_equal(regression.weights, before)

@@ -1,0 +1,123 @@
+"""The C sources themselves: what they need, that they compile, what the sanitisers say."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import c_core
+import elf
+import numpy as np
+import pytest
+import staircase_data as staircase
+from c_core import write_trajectory
+from places import ROOT
+
+from hybridsep.fmi.native_backend import all_c
+
+
+def test_the_core_needs_libm_alone() -> None:
+    # No allocation, no file, no global: nothing but these is undefined in it, and nothing in it is writable.
+    allowed = {
+        "memcpy",
+        "memset",
+        "memcmp",
+        "bcmp",  # what a compiler makes of memcmp where only equality counts
+        "sqrt",
+        "log",
+        "cos",
+        "tanh",
+        "ldexp",
+        "frexp",
+        "floor",
+        "nextafter",
+        "ceil",
+        "fmax",
+        "fmin",
+    }
+    core = {path.stem for path in (c_core.C_SOURCES / "core").glob("*.c")}
+    for built in c_core.object_files():
+        if Path(built).stem not in core:
+            continue
+        for symbol in elf.symbols(Path(built)):
+            known = symbol.name in allowed or symbol.name.startswith(("hsep_", "_GLOBAL_OFFSET_TABLE_", "__stack_chk"))
+            assert symbol.defined or known, f"{built} uses {symbol.name}"
+            assert not symbol.writable, f"{built} has the writable {symbol.name}"
+
+
+@pytest.mark.parametrize("name", list(c_core.DESCRIPTIONS))
+def test_everything_compiles_as_one_file(name: str) -> None:
+    folder = c_core.build_folder() / f"all_{name}"
+    c_core.write_header(name, folder)
+    everything = folder / "all.c"
+    everything.write_text(all_c(c_core.sources()))
+    for level in ("-O0", "-O3"):
+        c_core.run_compiler([level, f"-I{folder}", *c_core.include_flags(), "-c", everything, "-o", folder / "all.o"])
+
+
+@c_core.needs_sanitisers
+@pytest.mark.parametrize(
+    ("name", "arguments"),
+    [
+        ("predictor", [[], ["Np=7", "p=7", "q=6"], ["Np=1", "p=1", "q=0"], ["Np=150", "p=2", "q=0", "dead_time=13"]]),
+        ("predictor_2", [["input_hold=1", "t_init=0"], ["p=100", "q=99", "lambda=1e-20"]]),
+        (
+            "compensator",
+            [
+                ["v_max=0.08", "a_max=8", "j_max=1000"],
+                ["Np=12", "p=7", "q=5", "spacing=3", "preview=77", "dead_time=13", "t_init=0"],
+                ["Np=1", "p=1", "q=0", "spacing=1", "preview=8", "t_init=0"],
+                ["spacing=50", "preview=303", "compensate=1"],
+            ],
+        ),
+        ("feed_drive", [[]]),
+        ("stage_drive", [[]]),
+        ("trajectory", [[]]),
+    ],
+)
+def test_the_sanitisers_find_nothing(name: str, arguments: list[list[str]], tmp_path: Path) -> None:
+    folder = c_core.build_folder() / f"sanitise_{name}"
+    c_core.write_header(name, folder)
+    flags = ["-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer"]
+    driver = ROOT / "tests" / "c" / "sanitise.c"
+    program = folder / "sanitise"
+    c_core.run_compiler(
+        [*flags, f"-I{folder}", *c_core.include_flags(), *c_core.sources(), driver, "-lm", "-o", program],
+        command=c_core.sanitising_compiler(),
+    )
+    write_trajectory(tmp_path, staircase.commanded()[:600])
+    for pairs in arguments:
+        done = subprocess.run([program, f"{tmp_path}/", *pairs], capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+
+
+@c_core.needs_sanitisers
+@pytest.mark.parametrize(
+    ("n_samples", "said"),
+    [
+        (4100, "has changed meanwhile: initialise again"),  # 32 kB too many for the memory
+        (101, "has changed meanwhile: initialise again"),
+        (99, "has changed meanwhile: initialise again"),
+        (100, "0.2\n"),  # as many others: they are played
+        (0, "it is damaged or truncated"),
+    ],
+)
+def test_a_trajectory_that_changes_while_it_is_read(n_samples: int, said: str, tmp_path: Path) -> None:
+    folder = c_core.build_folder() / "changing_resource"
+    c_core.write_header("trajectory", folder)
+    program = folder / "changing_resource"
+    if not program.exists():
+        driver = ROOT / "tests" / "c" / "changing_resource.c"
+        flags = ["-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", f"-I{folder}"]
+        c_core.run_compiler(
+            [*flags, *c_core.include_flags(), *c_core.sources(), driver, "-lm", "-o", program],
+            command=c_core.sanitising_compiler(),
+        )
+    write_trajectory(tmp_path, np.full(n_samples, 0.2))
+    file = (tmp_path / "trajectory_3.bin").rename(tmp_path / "other.bin")
+    write_trajectory(tmp_path, np.full(100, 0.1))
+    done = subprocess.run(
+        [program, f"{tmp_path}/", tmp_path / "trajectory_3.bin", file], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert said in done.stdout

@@ -1,0 +1,136 @@
+"""Several source FMUs linked into one program: the FMI functions' names begin with the model identifier (FMI 2.0)."""
+
+from __future__ import annotations
+
+import subprocess
+import zipfile
+from pathlib import Path
+
+import c_core
+import elf
+import fmpy
+import numpy as np
+import pytest
+from places import ROOT
+
+from hybridsep.base.signals import Array
+from hybridsep.cosim.importer import FmuInstance
+from hybridsep.fmi.archive import build_fmu
+from hybridsep.fmi.compiler import compile_flags
+from hybridsep.machine import load_machine
+
+ROLES = {"REFERENCE": "ReferenceTrajectory", "PREDICTOR": "HybridPredictor", "PLANT": "FeedDrive"}
+MODELS = (*ROLES.values(), "SepCompensator")
+STEPS = 800
+WITHOUT_PREFIX = "#define fmi2FullName(name) name\n"
+WITH_PREFIX = """#define fmi2Paste(a, b) a##b
+#define fmi2PasteB(a, b) fmi2Paste(a, b)
+#define fmi2FullName(name) fmi2PasteB(FMI2_FUNCTION_PREFIX, name)
+"""
+
+
+@pytest.fixture(scope="module")
+def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """The FMUs of one machine, each with its unpacked archive beside it."""
+    out, machine = tmp_path_factory.mktemp("static"), load_machine("spring_mass_damper")
+    built = {model: build_fmu(machine, model, out, targets=("host",)) for model in MODELS}
+    for model, path in built.items():
+        with zipfile.ZipFile(path) as archive:
+            archive.extractall(out / model)
+    return built
+
+
+@pytest.fixture(scope="module")
+def headers(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The standard's headers: fmpy's, with the prefix that fmpy took out of them."""
+    folder = tmp_path_factory.mktemp("headers")
+    for name in ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"):
+        text = (c_core.FMI_HEADERS / name).read_text()
+        if name == "fmi2Functions.h":
+            assert WITHOUT_PREFIX in text
+            text = text.replace(WITHOUT_PREFIX, WITH_PREFIX)
+        (folder / name).write_text(text)
+    return folder
+
+
+def compile_all(fmu: Path, headers: Path, out: Path, *flags: str) -> Path:
+    """Return the object file of an FMU's sources."""
+    built = out / f"{fmu.stem}.o"
+    sources = fmu.with_suffix("") / "sources"
+    c_core.run_compiler(
+        [
+            *compile_flags(c_core.compiler()),
+            *flags,
+            f"-I{sources}",
+            f"-I{headers}",
+            "-c",
+            sources / "all.c",
+            "-o",
+            built,
+        ]
+    )
+    return built
+
+
+def wiring(fmus: dict[str, Path]) -> str:
+    """Return wiring.h: GUIDs and value references."""
+    lines = []
+    for role, model in ROLES.items():
+        description = fmpy.read_model_description(str(fmus[model]))
+        lines.append(f'#define {role}_GUID "{description.guid}"')
+        ports = [v for v in description.modelVariables if v.causality in ("input", "output")]
+        lines += [f"#define {role}_{port.name} {port.valueReference}" for port in ports]
+    return "\n".join(lines) + "\n"
+
+
+def run_shared(fmus: dict[str, Path]) -> Array:
+    """Return what three_fmus.c prints, ``(STEPS, 4)``, from the shared libraries."""
+    rows, h = [], 1e-3
+    with (
+        FmuInstance(fmus["ReferenceTrajectory"]) as reference,
+        FmuInstance(fmus["HybridPredictor"]) as predictor,
+        FmuInstance(fmus["FeedDrive"]) as plant,
+    ):
+        for instance in (reference, predictor, plant):
+            instance.initialise()
+        for k in range(STEPS):
+            r, x_d, x_meas = reference.get("r"), predictor.get("x_d"), plant.get("x_meas")
+            rows.append((r, x_d, predictor.get("x_h"), x_meas))
+            predictor.set("x_d_ahead", r)
+            predictor.set("x_meas", x_meas)
+            plant.set("x_d", x_d)
+            for instance in (reference, predictor, plant):
+                instance.step(k * h, h)
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_nothing_but_the_fmi_functions_has_external_linkage(
+    fmus: dict[str, Path], headers: Path, tmp_path: Path, model: str
+) -> None:
+    symbols = elf.symbols(compile_all(fmus[model], headers, tmp_path))
+    shown = [symbol.name for symbol in symbols if symbol.defined and symbol.exported]
+    assert len(shown) == 34
+    assert all(name.startswith(f"{model}_fmi2") for name in shown), shown
+
+
+def test_an_importer_may_choose_the_prefix(fmus: dict[str, Path], headers: Path, tmp_path: Path) -> None:
+    built = compile_all(fmus["ReferenceTrajectory"], headers, tmp_path, "-DFMI2_FUNCTION_PREFIX=")
+    shown = [symbol.name for symbol in elf.symbols(built) if symbol.defined and symbol.exported]
+    assert len(shown) == 34
+    assert all(name.startswith("fmi2") for name in shown)
+
+
+def test_three_fmus_run_in_one_program(fmus: dict[str, Path], headers: Path, tmp_path: Path) -> None:
+    objects = [compile_all(fmus[model], headers, tmp_path) for model in MODELS]
+    (tmp_path / "wiring.h").write_text(wiring(fmus))
+    program = tmp_path / "three_fmus"
+    host = ROOT / "tests" / "c" / "three_fmus.c"
+    c_core.run_compiler([f"-I{tmp_path}", f"-I{headers}", host, *objects, "-lm", "-o", program])
+    resources = (fmus["ReferenceTrajectory"].with_suffix("") / "resources").as_uri()
+    done = subprocess.run([program, str(STEPS), resources], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    printed = [[float.fromhex(number) for number in line.split()] for line in done.stdout.splitlines()]
+    shared = run_shared(fmus)
+    assert np.ptp(shared, axis=0).min() > 1e-3  # m: the trajectory, and the plant behind it, have moved
+    np.testing.assert_array_equal(np.array(printed), shared)

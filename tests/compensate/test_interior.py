@@ -1,0 +1,72 @@
+"""The interior-point solver against Clarabel, in plans in which an iterate short of the minimum is not good enough."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from bounded_oracle import clarabel_minimum
+from numpy.typing import NDArray
+from random_loops import random_loop, run_library
+
+from hybridsep.compensate import bounded as _bounded
+from hybridsep.compensate.interior import PRIMAL_RESIDUAL, minimise
+
+Array = NDArray[np.float64]
+
+Problem = tuple[Array, Array, Array, Array, Array, Array, float]
+
+
+def problems_of(monkeypatch: pytest.MonkeyPatch, seed: int, n: int, **fixed: float) -> list[tuple[Problem, Array]]:
+    """Return the bounded problems of a closed loop on the staircase drive, and what was found of them."""
+    found = []
+
+    def spy(*problem: object) -> Array:
+        x = minimise(*problem)  # type: ignore[arg-type]
+        found.append((problem, x))
+        return x
+
+    monkeypatch.setattr(_bounded, "minimise", spy)
+    run_library(random_loop(seed, n, "spring_mass_damper", **fixed))
+    return found  # type: ignore[return-value]
+
+
+@pytest.mark.parametrize(
+    ("seed", "n", "fixed"),
+    [(34, 1100, {}), (38, 800, {}), (233, 800, {"change_max": 1e-4})],
+    ids=["jerk bounds side by side", "limits of the trajectory", "change of 0.1 mm"],
+)
+def test_the_minimum_is_that_of_another_solver(
+    monkeypatch: pytest.MonkeyPatch, seed: int, n: int, fixed: dict[str, float]
+) -> None:
+    """To 2 nm in every coefficient; a stop at 1e-5 of the cost left 0.3 to 3 µm, and roundings grew with it."""
+    problems = problems_of(monkeypatch, seed, n, **fixed)
+    assert len(problems) >= 20
+    for (P, v, rows, low, high, _, cost), x in problems:
+        values = rows @ x
+        assert np.max(np.maximum(values - high, low - values)) <= 10 * PRIMAL_RESIDUAL
+        expected = clarabel_minimum(P, v, rows, low, high, 1e-11)
+        np.testing.assert_allclose(x, expected, rtol=0, atol=2e-9)
+        assert abs(0.5 * (x @ P @ x - expected @ P @ expected) - v @ (x - expected)) <= 1e-10 * cost
+
+
+def test_bounds_that_are_equal_or_nearly_so() -> None:
+    """The rows' Gram matrix alone is singular, and with multipliers in it P is lost in its rounding."""
+    rng = np.random.default_rng(0)
+    n = 30
+    root = rng.normal(size=(n, n))
+    P = root @ root.T / n + 1e-3 * np.eye(n)
+    v = rng.normal(size=n)
+    some = 1e3 * rng.normal(size=(20, n))
+    rows = np.concatenate((some, some, some * (1 + 1e-12), some + 1e-6 * rng.normal(size=some.shape)))
+    bound = 0.1 + rng.uniform(size=20)
+    low, high = np.tile(-bound, 4), np.tile(bound, 4)
+    x = minimise(P, v, rows, low, high, np.zeros(n), float(v @ np.linalg.solve(P, v)))
+    expected = clarabel_minimum(P, v, rows, low, high, 1e-11)
+    assert np.max(np.abs(rows @ x) - high) <= 10 * PRIMAL_RESIDUAL
+    np.testing.assert_allclose(x, expected, rtol=0, atol=1e-7 * float(np.max(np.abs(expected))))
+
+
+def test_a_problem_without_active_bounds() -> None:
+    P, v = np.diag([1.0, 4.0]), np.array([1.0, 2.0])
+    x = minimise(P, v, np.eye(2), np.full(2, -9.0), np.full(2, 9.0), np.zeros(2), 2.0)
+    np.testing.assert_allclose(x, [1.0, 0.5], rtol=1e-9)

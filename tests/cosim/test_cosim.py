@@ -1,0 +1,131 @@
+"""FMU against FMU: the error reduction the project is for, the wiring, and the files it writes."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hybridsep import CoSimulation, Encoder, FmuError, SignalError, backtest, cosimulate, load_machine, simulate
+from hybridsep.plants.trajectory import spiral, staircase
+
+Fmu = Callable[[str], Path]
+
+
+@pytest.fixture(scope="module")
+def pair(python_fmu: Fmu) -> tuple[Path, Path]:
+    return python_fmu("HybridPredictorPy"), python_fmu("FeedDrivePy")
+
+
+@pytest.fixture(scope="module")
+def run(pair: tuple[Path, Path]) -> CoSimulation:
+    return cosimulate(*pair, staircase())
+
+
+def test_staircase_error_reduction(pair: tuple[Path, Path]) -> None:
+    """Printed: physics 33.7 µm, hybrid 14.7 µm, reduction 56.4 %."""
+    runs = [cosimulate(*pair, staircase(), plant_values={"seed": seed}).summary() for seed in range(10)]
+    mean = {key: float(np.mean([summary[key] for summary in runs])) for key in runs[0]}
+    assert 33.6 < mean["rms_pb_um"] < 34.3
+    assert 14.5 < mean["rms_h_um"] < 15.2
+    assert 55.0 < mean["reduction_percent"] < 58.0
+    assert mean["rms_hold_um"] == pytest.approx(42.5, abs=0.6)
+    # against the true position; without compensation the servo error is 88.5 µm
+    assert mean["rms_pb_true_um"] == pytest.approx(33.55, abs=0.01)
+    assert mean["rms_h_true_um"] == pytest.approx(14.0, abs=0.2)
+    assert mean["servo_error_rms_um"] == pytest.approx(88.5, abs=0.1)
+
+
+@pytest.mark.parametrize(("axis", "printed", "tolerance", "most"), [("x", 22.0, 0.1, 13.3), ("y", 130.2, 0.5, 98.5)])
+def test_spiral_error_reduction(python_fmu: Fmu, axis: str, printed: float, tolerance: float, most: float) -> None:
+    """Printed: X 22 → 13.7 µm, 38 %; Y 130.2 → 94.5 µm, 27 %; with Table 1 and friction scaled to the first figures."""
+    r = dict(zip("xy", spiral(), strict=True))[axis]
+    fmus = python_fmu(f"HybridPredictorPy_als25010_{axis}"), python_fmu(f"FeedDrivePy_als25010_{axis}")
+    both = cosimulate(*fmus, r).summary()
+    assert both["rms_pb_um"] == pytest.approx(printed, abs=tolerance)
+    assert 0.9 * most < both["rms_h_um"] <= most
+    # What one cause alone leaves to learn: the cable's stiffness is smooth, the friction jumps.
+    friction = cosimulate(*fmus, r, plant_values={"kappa": 0.0}).summary()
+    stiffness = cosimulate(*fmus, r, plant_values={"f": 0.0}).summary()
+    assert stiffness["reduction_percent"] > 70.0 > both["reduction_percent"] > friction["reduction_percent"] > 15.0
+
+
+def test_fmus_equal_the_library(run: CoSimulation) -> None:
+    machine = load_machine("spring_mass_damper")
+    x = simulate(machine.new_plant(), staircase(), machine.T_s)
+    np.testing.assert_allclose(run.x, x, atol=1e-15)
+    np.testing.assert_array_equal(run.x_d, staircase())
+    # One draw right after the initialization, then one each communication step; the fill took the first 100.
+    noise = Encoder(5e-6, 0).measure_all(np.zeros(len(x) + 100))[100:]
+    np.testing.assert_allclose(run.x_meas, x + noise, atol=1e-15)
+    result = backtest(machine.new_predictor(), staircase(), run.x_meas)
+    np.testing.assert_allclose(run.x_pb, result.x_pb, atol=1e-15)
+    np.testing.assert_allclose(run.x_h, result.x_h, atol=1e-12)
+    np.testing.assert_allclose(run.x_hold, result.x_hold, atol=1e-15)
+    np.testing.assert_array_equal(run.active, result.active)
+    assert run.summary()["rms_h_um"] == pytest.approx(result.summary()["rms_h_um"], rel=1e-9)
+    np.testing.assert_allclose(run.batch_rms()["x_h"], result.batch_rms_h, rtol=1e-9)
+
+
+def test_a_shifted_start_gives_the_same_errors(pair: tuple[Path, Path], run: CoSimulation) -> None:
+    shifted = cosimulate(*pair, staircase() + 0.1)
+    np.testing.assert_allclose(shifted.x_h - 0.1, run.x_h, rtol=0, atol=1e-10)
+
+
+def test_start_time_and_parameters(pair: tuple[Path, Path]) -> None:
+    r = staircase()[:1200]
+    at_zero = cosimulate(*pair, r, predictor_values={"Np": 50, "p": 20})
+    later = cosimulate(*pair, r, predictor_values={"Np": 50, "p": 20}, start_time=100.0)
+    np.testing.assert_array_equal(at_zero.x_h, later.x_h)
+    assert later.t[0] == pytest.approx(100.05)
+    assert (later.Np, len(later.t)) == (50, len(r))
+
+
+def test_results_as_csv_and_npz(run: CoSimulation, tmp_path: Path) -> None:
+    run.save(tmp_path / "run.csv")
+    run.save(tmp_path / "run.npz")
+    with (tmp_path / "run.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    with np.load(tmp_path / "run.npz") as arrays:
+        assert set(arrays) == set(rows[0]) == {"t", "x_d", "x", "x_meas", "x_pb", "x_hold", "x_h", "active"}
+        for name in ("t", "x_meas", "x_h"):
+            np.testing.assert_array_equal(arrays[name], [float(row[name]) for row in rows])
+            np.testing.assert_array_equal(arrays[name], getattr(run, name))
+    with pytest.raises(ValueError, match=r"written as .csv or .npz, got 'run.xlsx'"):
+        run.save(tmp_path / "run.xlsx")
+
+
+def test_progress_is_reported_to_the_end(pair: tuple[Path, Path]) -> None:
+    calls: list[tuple[int, int]] = []
+    cosimulate(*pair, staircase()[:300], progress=lambda k, n: calls.append((k, n)))
+    assert calls[-1] == (400, 400)
+    assert 50 < len(calls) < 150
+
+
+def test_what_is_refused(pair: tuple[Path, Path]) -> None:
+    with pytest.raises(SignalError, match="r must be finite, got nan at sample 1"):
+        cosimulate(*pair, [0.0, float("nan")])
+    with pytest.raises(SignalError, match="r must have 1 samples, got 0"):
+        cosimulate(*pair, [])
+    with pytest.raises(FmuError, match="p must be 1 … Np = 100, got 101"):
+        cosimulate(*pair, [0.0, 0.0], predictor_values={"p": 101})
+    with pytest.raises(FmuError, match="has no variable 'stiffness'"):
+        cosimulate(*pair, [0.0, 0.0], plant_values={"stiffness": 1.0})
+    with pytest.raises(FmuError, match=r"FeedDrivePy.fmu is no predictor: it has no input x_d_ahead"):
+        cosimulate(pair[1], pair[0], [0.0, 0.0])
+    with pytest.raises(FmuError, match=r"HybridPredictorPy.fmu is no plant: it has no input x_d$"):
+        cosimulate(pair[0], pair[0], [0.0, 0.0])
+    for value in (99_999_999_999, 1.5, "one"):
+        with pytest.raises(FmuError, match=rf"seed must be a whole number within ±2147483647, got {value!r}"):
+            cosimulate(*pair, [0.0, 0.0], plant_values={"seed": value})
+
+
+def test_sampling_intervals_must_agree(python_fmu: Fmu) -> None:
+    fmus = python_fmu("HybridPredictorPy"), python_fmu("FeedDrivePy_als25010_x")
+    with pytest.raises(
+        FmuError, match=r"FeedDrivePy_als25010_x.fmu has T_s = 0.002 s, but HybridPredictorPy.fmu has 0.001 s"
+    ):
+        cosimulate(*fmus, [0.0, 0.0], plant_values={"T_s": 0.002})

@@ -1,0 +1,202 @@
+"""Importers of other projects run the closed system of native FMUs, and another project's checker finds nothing."""
+
+from __future__ import annotations
+
+import logging
+import os
+import subprocess
+import sys
+import zipfile
+from importlib import import_module
+from pathlib import Path
+
+import importers_closed_system as closed_system
+import numpy as np
+import pytest
+from importers_closed_system import SYSTEMS, Array, ClosedSystem, exists_here
+from places import SUPPORT
+
+from hybridsep import (
+    CoSimulation,
+    SepCoSimulation,
+    build_fmu,
+    cosimulate,
+    cosimulate_sep,
+    load_machine,
+    machine_names,
+    staircase,
+)
+from hybridsep.fmi.archive import fmu_names
+
+NATIVE = {name: machine for machine in map(load_machine, machine_names()) for name in fmu_names(machine)}
+TOLERANCE = 1e-12  # m; libcosim's step sizes are rounded differences of times
+FOREIGN = [
+    pytest.param(
+        name, marks=pytest.mark.skipif(not exists_here(name), reason=f"{name} has no library for this machine")
+    )
+    for name in closed_system.IMPORTERS
+    if name != "fmpy"
+]
+SHIFT = 0.1  # m
+
+
+@pytest.fixture(scope="module")
+def fmus(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with all native FMUs of all machines, built for this machine."""
+    folder = tmp_path_factory.mktemp("importers")
+    for name, machine in NATIVE.items():
+        build_fmu(machine, name, folder, targets=("host",))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def moved(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with closed systems whose staircase starts at another place than the FMUs' start values."""
+    folder, machine = tmp_path_factory.mktemp("moved"), load_machine("spring_mass_damper")
+    for name in ("HybridPredictor", "SepCompensator", "FeedDrive"):
+        (folder / f"{name}.fmu").write_bytes((fmus / f"{name}.fmu").read_bytes())
+    build_fmu(machine, "ReferenceTrajectory", folder, targets=("host",), samples=staircase(machine.T_s) + SHIFT)
+    return folder
+
+
+@pytest.fixture(scope="module", params=SYSTEMS)
+def system(request: pytest.FixtureRequest) -> ClosedSystem:
+    return SYSTEMS[request.param]
+
+
+@pytest.fixture(scope="module")
+def expected(fmus: Path, system: ClosedSystem) -> Array:
+    return closed_system.run("fmpy", system, fmus)
+
+
+def run_apart(importer: str, system: ClosedSystem, folder: Path, out: Path) -> Array:
+    """Return what :func:`closed_system.run` does in a process of its own."""
+    for model in system.components.values():
+        (out / f"{model}.fmu").write_bytes((folder / f"{model}.fmu").read_bytes())
+    python(out, closed_system.__file__, importer, system.look_ahead, str(out), str(out / "rows.npy"))
+    rows: Array = np.load(out / "rows.npy")
+    return rows
+
+
+def python(folder: Path, *arguments: str) -> str:
+    """Return what Python prints with these arguments, run in a folder; the tests' modules can be imported."""
+    environment = os.environ | {"PYTHONPATH": str(SUPPORT)}
+    command = [sys.executable, "-W", "error", *arguments]
+    result = subprocess.run(
+        command, capture_output=True, text=True, cwd=folder, env=environment, timeout=600, check=False
+    )
+    assert result.returncode == 0, result.stderr
+    return result.stdout
+
+
+def columns(system: ClosedSystem, rows: Array) -> dict[str, Array]:
+    """Return the columns by the outputs' names, from the end of the first fill on, m."""
+    return dict(zip((name for _, name in system.observed), rows[system.first :].T, strict=True))
+
+
+def figures(system: ClosedSystem, rows: Array) -> list[str]:
+    """Return the FMU's own figures, since ``t_init``, and RMS errors over the whole trajectory, µm, 4 digits."""
+    of = columns(system, rows)
+    reported = [float(of[name][-1]) for name in system.figures]
+    overall = [float(np.sqrt(np.mean((of[a] - of[b]) ** 2))) for a, b in system.errors]
+    return [f"{1e6 * figure:#.4g}" for figure in (*reported, *overall)]
+
+
+@pytest.mark.parametrize("system", ["predictor"], indirect=True)
+def test_the_loop_without_an_importer_is_cosimulate(fmus: Path, system: ClosedSystem, expected: Array) -> None:
+    run = cosimulate(fmus / "HybridPredictor.fmu", fmus / "FeedDrive.fmu", staircase())
+    assert_bit_for_bit(run, system, expected)
+    summary = run.summary()
+    assert figures(system, expected)[2:] == [f"{summary[name]:#.4g}" for name in ("rms_pb_um", "rms_h_um")]
+    assert summary["reduction_percent"] > 50
+
+
+@pytest.mark.parametrize("system", ["compensator"], indirect=True)
+def test_the_loop_without_an_importer_is_cosimulate_sep(fmus: Path, system: ClosedSystem, expected: Array) -> None:
+    run = cosimulate_sep(fmus / "SepCompensator.fmu", fmus / "FeedDrive.fmu", staircase())
+    assert_bit_for_bit(run, system, expected)
+    summary = run.summary()
+    assert figures(system, expected)[2:] == [f"{summary['tracking_rms_um']:#.4g}"]
+    assert summary["tracking_rms_um"] < 5.5
+    assert summary["share_hybrid"] > 0.9
+
+
+def assert_bit_for_bit(run: CoSimulation | SepCoSimulation, system: ClosedSystem, rows: Array) -> None:
+    of = columns(system, rows)
+    assert len(run.t) == len(staircase())
+    for name in (*system.positions, "x", "x_meas"):
+        np.testing.assert_array_equal(of[name], getattr(run, name), err_msg=name)
+
+
+@pytest.mark.parametrize("importer", FOREIGN)
+def test_importers_come_to_the_same_figures(
+    fmus: Path, system: ClosedSystem, expected: Array, tmp_path: Path, importer: str
+) -> None:
+    rows = run_apart(importer, system, fmus, tmp_path)
+    apart = f"at most {abs(rows - expected).max():.1e} m apart from fmpy"
+    print(importer, system.look_ahead, *figures(system, rows), "µm;", apart)
+    assert figures(system, rows) == figures(system, expected)
+    np.testing.assert_allclose(rows, expected, rtol=0, atol=TOLERANCE)
+
+
+@pytest.mark.parametrize("importer", [param for param in FOREIGN if param.values != ("fmpy SSP",)])
+def test_the_start_goes_round_in_initialization_mode(
+    moved: Path, system: ClosedSystem, expected: Array, tmp_path: Path, importer: str
+) -> None:
+    """``r`` is right before the first step and reaches look-ahead and drive; fmpy's SSP loop carries nothing."""
+    rows = run_apart(importer, system, moved, tmp_path)
+    assert figures(system, rows) == figures(system, expected)
+    rows[:, : system.n_positions] -= SHIFT
+    np.testing.assert_allclose(rows, expected, rtol=0, atol=1e-11)
+
+
+@pytest.mark.skipif(not exists_here("ecos"), reason="ecos has no library for this machine")
+def test_the_script_of_the_guide(fmus: Path, system: ClosedSystem, expected: Array) -> None:
+    (script,) = closed_system.blocks("python")
+    if system.look_ahead == "compensator":  # what the guide says to change
+        for old, new in (("6100", "6200"), ("predictor", "compensator"), ("rms_pb", "rms_e")):
+            assert old in script
+            script = script.replace(old, new)
+    folder = closed_system.system_structure(system, fmus).parent
+    printed = python(folder, "-c", f"import importers_closed_system as c; c.load_tbb()\n{script}")
+    assert [f"{1e6 * float(number):#.4g}" for number in printed.split()] == figures(system, expected)[:2]
+
+
+@pytest.mark.skipif(not all(map(exists_here, closed_system.IMPORTERS)), reason="not all importers run here")
+def test_the_figures_of_the_guide(system: ClosedSystem, expected: Array) -> None:
+    guide, row = closed_system.GUIDE.read_text("utf-8"), " | ".join(figures(system, expected))
+    assert guide.count(f"| {row} |") == len(closed_system.IMPORTERS)
+    if system.look_ahead == "predictor":  # its drive follows x_d itself
+        of = columns(system, expected)
+        assert f"(without compensation: {1e6 * np.sqrt(np.mean((of['x_d'] - of['x']) ** 2)):.1f})" in guide
+
+
+# The fmu-manipulation-toolbox's check ------------------------------------------------------------------------------
+
+
+def findings(path: Path, caplog: pytest.LogCaptureFixture) -> list[str]:
+    """Return what the toolbox's checkers complain about."""
+    checkers = import_module("fmu_manipulation_toolbox.checker").get_checkers()
+    assert {"OperationGenericCheck", "OperationSemanticCheck"} <= {checker.__name__ for checker in checkers}
+    caplog.clear()
+    with (
+        caplog.at_level(logging.INFO, "fmu_manipulation_toolbox"),
+        import_module("fmu_manipulation_toolbox.operations").FMU(str(path)) as fmu,
+    ):
+        for checker in checkers:
+            fmu.apply_operation(checker())
+    assert caplog.records
+    return [record.getMessage() for record in caplog.records if record.levelno > logging.INFO]
+
+
+@pytest.mark.parametrize("name", NATIVE)
+def test_the_toolbox_has_no_finding(fmus: Path, caplog: pytest.LogCaptureFixture, name: str) -> None:
+    assert findings(fmus / f"{name}.fmu", caplog) == []
+
+
+def test_the_toolbox_would_find_something(fmus: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    broken = tmp_path / "broken.fmu"
+    with zipfile.ZipFile(fmus / "FeedDrive.fmu") as archive, zipfile.ZipFile(broken, "w") as copy:
+        description = archive.read("modelDescription.xml").decode()
+        copy.writestr("modelDescription.xml", description.replace('name="v"', 'name="x"'))
+    assert any("'x' is used by several variables" in finding for finding in findings(broken, caplog))

@@ -1,0 +1,229 @@
+"""Compensator FMU against plant FMU: what it gains, the drive's limits, the library's numbers, files and figures."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hybridsep import FmuError, SignalError, build_fmu, fmu_names, load_machine
+from hybridsep.compensate.compensator import SepState
+from hybridsep.cosim.compensator_run import SepCoSimulation, cosimulate_sep
+from hybridsep.evaluate.closed_loop import ClosedLoop, run_closed_loop
+from hybridsep.evaluate.sep_plots import contour_figure, tracking_figure
+from hybridsep.fmi.archive import BACKENDS
+from hybridsep.machine import Machine
+from hybridsep.plants.plant import Encoder
+from hybridsep.plants.trajectory import spiral, staircase
+
+MACHINE = load_machine("spring_mass_damper")
+PAPER = {"Np": 100, "p": 50, "q": 3, "lambda": 1e-12, "t_init": 0.3, "v_s": 0.0}
+KINDS = {"none": SepState.OFF, "physics": SepState.PHYSICS, "hybrid": SepState.HYBRID}
+TOLERANCE = 1e-9  # m, between library and FMU
+PNG = b"\x89PNG\r\n\x1a\n"
+
+Fmu = Callable[[str], Path]
+Pair = tuple[Path, Path]
+
+
+def build(machine: Machine, backend: str, model: str, out: Path, weights: Path | None = None) -> Path:
+    name = next(name for name, built in fmu_names(machine, backend).items() if built == model)
+    return build_fmu(machine, name, out, backend, targets=("host",), weights=weights)
+
+
+@pytest.fixture(scope="module", params=BACKENDS)
+def flavour(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture(scope="module")
+def pair(flavour: str, tmp_path_factory: pytest.TempPathFactory) -> Pair:
+    out = tmp_path_factory.mktemp(flavour)
+    return build(MACHINE, flavour, "SepCompensator", out), build(MACHINE, flavour, "FeedDrive", out)
+
+
+@pytest.fixture(scope="module")
+def runs(pair: Pair) -> dict[str, SepCoSimulation]:
+    """The staircase with the paper's settings."""
+    return {
+        kind: cosimulate_sep(*pair, staircase(), compensator_values={**PAPER, "compensate": int(best)})
+        for kind, best in KINDS.items()
+    }
+
+
+@pytest.fixture(scope="module")
+def python_pair(python_fmu: Fmu) -> Pair:
+    return python_fmu("SepCompensatorPy"), python_fmu("FeedDrivePy")
+
+
+@pytest.fixture(scope="module")
+def short(python_pair: Pair) -> SepCoSimulation:
+    return cosimulate_sep(*python_pair, staircase()[:600])
+
+
+def assert_same(run: SepCoSimulation, loop: ClosedLoop) -> None:
+    for name in ("x_d", "x_dm", "x", "x_meas", "x_pb", "x_h"):
+        np.testing.assert_allclose(getattr(run, name), getattr(loop, name), rtol=0, atol=TOLERANCE, err_msg=name)
+    np.testing.assert_array_equal(run.state, loop.state)
+
+
+@pytest.mark.parametrize(
+    ("kind", "least", "most"), [("none", 87.0, 90.0), ("physics", 0.0, 20.5), ("hybrid", 0.0, 6.6)]
+)
+def test_staircase_tracking_error(runs: dict[str, SepCoSimulation], kind: str, least: float, most: float) -> None:
+    """µm of the true position, p = 50, q = 3, one noise seed."""
+    assert least <= runs[kind].summary()["tracking_rms_um"] <= most
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_drives_limits_are_kept(runs: dict[str, SepCoSimulation], kind: str) -> None:
+    limits, change_max = MACHINE.command_limits()
+    assert limits is not None
+    assert change_max is not None
+    run = runs[kind]
+    for order, limit in enumerate((limits.velocity, limits.acceleration, limits.jerk), start=1):
+        assert np.abs(np.diff(run.x_dm, order)).max() <= limit * MACHINE.T_s**order * (1 + 1e-9)
+    assert np.abs(run.change).max() <= change_max
+    assert run.summary()["change_max_um"] > 100.0 or kind == "none"
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_fmus_equal_the_library(runs: dict[str, SepCoSimulation], kind: str) -> None:
+    changes = {"lam" if name == "lambda" else name: value for name, value in PAPER.items()}
+    compensator = MACHINE.new_compensator(KINDS[kind], **changes)
+    loop = run_closed_loop(compensator, MACHINE.new_plant(), staircase(), encoder=Encoder(5e-6, 0))
+    assert_same(runs[kind], loop)
+    np.testing.assert_array_equal(runs[kind].x_d, staircase())
+    assert runs[kind].t[0] == pytest.approx(0.2)
+
+
+def test_recommended_settings_cold_and_warm(flavour: str, pair: Pair, tmp_path: Path) -> None:
+    compensator = MACHINE.new_compensator()
+    first = run_closed_loop(compensator, MACHINE.new_plant(), staircase(), encoder=Encoder(5e-6, 1))
+    compensator.predictor.save(tmp_path / "trained.state")
+    cold = cosimulate_sep(*pair, staircase(), plant_values={"seed": 1})
+    assert_same(cold, first)
+    assert cold.summary()["tracking_rms_um"] < 5.0
+    trained = build(MACHINE, flavour, "SepCompensator", tmp_path, tmp_path / "trained.state")
+    warm = cosimulate_sep(trained, pair[1], staircase(), plant_values={"seed": 2})
+    second = run_closed_loop(compensator, MACHINE.new_plant(), staircase(), encoder=Encoder(5e-6, 2), t_init=0.0)
+    assert_same(warm, second)
+    assert warm.summary()["tracking_rms_um"] < 1.8
+    assert warm.summary()["share_hybrid"] == 1.0
+
+
+def test_a_held_sensor_is_the_librarys(python_pair: Pair) -> None:
+    class Held:
+        def __init__(self) -> None:
+            self.value = 0.0
+
+        def __call__(self, k: int, x_meas: float) -> float:
+            if not 1050 <= k < 1250:
+                self.value = x_meas
+            return self.value
+
+    r = staircase()[:1500]
+    run = cosimulate_sep(*python_pair, r, sensor=Held())
+    loop = run_closed_loop(MACHINE.new_compensator(), MACHINE.new_plant(), r, encoder=Encoder(5e-6, 0), sensor=Held())
+    assert_same(run, loop)
+    assert np.ptp(run.x_meas[1050:1250]) == 0.0
+
+
+def test_summary_is_what_the_signals_say(short: SepCoSimulation) -> None:
+    summary = short.summary()
+    error = 1e6 * (short.x_d - short.x)
+    assert summary["tracking_rms_um"] == pytest.approx(np.sqrt(np.mean(error**2)))
+    assert summary["tracking_max_um"] == pytest.approx(np.max(np.abs(error)))
+    measured = 1e6 * (short.x_d - short.x_meas)
+    assert summary["tracking_measured_rms_um"] == pytest.approx(np.sqrt(np.mean(measured**2)))
+    assert summary["tracking_measured_max_um"] == pytest.approx(np.max(np.abs(measured)))
+    change = 1e6 * (short.x_dm - short.x_d)
+    assert summary["change_rms_um"] == pytest.approx(np.sqrt(np.mean(change**2)))
+    assert summary["change_max_um"] == pytest.approx(np.max(np.abs(change)))
+    assert summary["peak_jerk_m_s3"] == pytest.approx(np.max(np.abs(np.diff(short.x_dm, 3))) * 1e9)
+    assert summary["peak_acceleration_m_s2"] == pytest.approx(np.max(np.abs(np.diff(short.x_dm, 2))) * 1e6)
+    # 0.1 s of warm-up, in windows of 50 samples
+    assert summary["share_physics"] == pytest.approx(100 / 600)
+    assert summary["share_off"] + summary["share_physics"] + summary["share_hybrid"] == pytest.approx(1.0)
+    assert summary["n_samples"] == 600
+
+
+def test_start_time_and_a_shifted_start(python_pair: Pair, short: SepCoSimulation) -> None:
+    moved = cosimulate_sep(*python_pair, staircase()[:600] + 0.1, start_time=50.0)
+    np.testing.assert_allclose(moved.x_dm - 0.1, short.x_dm, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(moved.t - 50.0, short.t, rtol=0, atol=1e-12)
+    assert (moved.Np, moved.T_s) == (50, 1e-3)
+
+
+def test_results_as_csv_and_npz(short: SepCoSimulation, tmp_path: Path) -> None:
+    short.save(tmp_path / "run.csv")
+    short.save(tmp_path / "run.npz")
+    with (tmp_path / "run.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    with np.load(tmp_path / "run.npz") as arrays:
+        assert list(arrays) == list(rows[0]) == ["t", "x_d", "x_dm", "x", "x_meas", "x_pb", "x_h", "state"]
+        for name in arrays:
+            np.testing.assert_array_equal(arrays[name], [float(row[name]) for row in rows])
+            np.testing.assert_array_equal(arrays[name], getattr(short, name))
+    assert {row["state"] for row in rows} == {"1", "2"}
+    with pytest.raises(ValueError, match=r"written as .csv or .npz, got 'run.txt'"):
+        short.save(tmp_path / "run.txt")
+
+
+def test_progress_is_reported_to_the_end(python_pair: Pair) -> None:
+    calls: list[tuple[int, int]] = []
+    cosimulate_sep(*python_pair, staircase()[:100], progress=lambda k, n: calls.append((k, n)))
+    assert calls[-1] == (300, 300)
+
+
+def test_what_is_refused(python_pair: Pair, python_fmu: Fmu) -> None:
+    compensator, plant = python_pair
+    with pytest.raises(SignalError, match="r must be finite, got nan at sample 1"):
+        cosimulate_sep(compensator, plant, [0.0, float("nan")])
+    with pytest.raises(SignalError, match="r must have 1 samples, got 0"):
+        cosimulate_sep(compensator, plant, [])
+    with pytest.raises(FmuError, match=r"HybridPredictorPy.fmu is no compensator: it has no output x_dm"):
+        cosimulate_sep(python_fmu("HybridPredictorPy"), plant, [0.0, 0.0])
+    with pytest.raises(FmuError, match=r"SepCompensatorPy.fmu is no plant: it has no input x_d$"):
+        cosimulate_sep(compensator, compensator, [0.0, 0.0])
+    with pytest.raises(FmuError, match="preview must be ≥ Np"):
+        cosimulate_sep(compensator, plant, [0.0, 0.0], compensator_values={"preview": 60})
+
+
+def test_figures(short: SepCoSimulation, tmp_path: Path) -> None:
+    several = {"none": short, "physics": short, "hybrid_cold": short, "hybrid_warm": short}
+    tracking_figure(several, "several", tmp_path / "several.png")
+    for kind in ("none", "physics", "hybrid"):
+        tracking_figure({kind: short}, kind, tmp_path / f"{kind}.png")
+    pairs = {kind: (run, run) for kind, run in several.items()}
+    errors = {kind: np.abs(run.error) for kind, run in several.items()}
+    contour_figure(pairs, errors, "contour", tmp_path / "contour.png")
+    for path in tmp_path.iterdir():
+        assert path.read_bytes().startswith(PNG)
+
+
+def test_the_direction_and_the_features_of_the_reference_can_be_turned_off(flavour: str, tmp_path: Path) -> None:
+    """Fixed parameters of the FMU, without a rebuild; the library with the same settings commands the same."""
+    machine, r = load_machine("als25010_y"), spiral()[1][:1500]
+    pair = build(machine, flavour, "SepCompensator", tmp_path), build(machine, flavour, "FeedDrive", tmp_path)
+    settings: tuple[dict[str, Any], ...] = (
+        {},
+        {"v_s": 0.0},
+        {"keep_direction": 0},
+        {"v_s": 0.0, "keep_direction": 0},
+    )
+    commands = []
+    for values in settings:
+        run = cosimulate_sep(*pair, r, compensator_values=values)
+        loop = run_closed_loop(machine.new_compensator(**values), machine.new_plant(), r, encoder=Encoder(1e-6, 0))
+        assert_same(run, loop)
+        against = np.diff(run.x_dm) * np.sign(np.diff(run.x_d))
+        assert (np.min(against) < -1e-6) == ("keep_direction" in values)
+        commands.append(run.x_dm)
+    for i in range(4):
+        for j in range(i):
+            assert np.max(np.abs(commands[i] - commands[j])) > 1e-6

@@ -1,0 +1,237 @@
+"""Section 3.1 of the paper: what past residuals determine, and what they cannot."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mechanism import (
+    Drive,
+    characteristic,
+    coulomb,
+    decay,
+    demonstrate,
+    innovation,
+    lifted,
+    linear_mode,
+    markov,
+    moving_average,
+    polynomial,
+    quadratic,
+    recursion_with_mode,
+    response,
+    simulate,
+    sinusoid,
+    split,
+    squared_command,
+)
+from numpy.typing import NDArray
+
+from hybridsep.model.physics import ModalModel, Mode
+
+Array = NDArray[np.float64]
+
+M, C, K, TS = 1.0, 15.7, 24674.0, 1e-3
+N = 1500
+DRIVE = Drive.spring_mass_damper(M, C, K, TS)
+SQUARING = replace(DRIVE, Gamma=-1000.0 * DRIVE.Gamma)
+T = np.asarray(TS * np.arange(N), dtype=np.float64)
+X_D = np.asarray(0.005 * (1 - np.cos(4 * np.pi * T)), dtype=np.float64)
+CHI = characteristic(DRIVE.A)
+MODE = ModalModel([Mode(60.0, 0.02, 300.0 * (120 * np.pi) ** 2)]).discretise(TS)
+
+
+def test_the_model_beside_the_disturbance_is_the_librarys() -> None:
+    discrete = ModalModel.spring_mass_damper(M, C, K).discretise(TS)
+    x_pb, _ = discrete.respond(discrete.rest(), X_D)
+    run = simulate(DRIVE, X_D, lambda *_: 0.0)
+    np.testing.assert_allclose(run.x_pb, x_pb, rtol=0, atol=1e-16)
+    np.testing.assert_array_equal(run.e_pb, 0.0)
+
+
+def test_a_force_moves_the_drive_as_a_force_does() -> None:
+    # A constant force F from rest: m ẍ + c ẋ + k x = F.
+    force, wn = 50.0, np.sqrt(K / M)
+    zeta = C / (2 * np.sqrt(K * M))
+    wd = wn * np.sqrt(1 - zeta**2)
+    decay = np.exp(-zeta * wn * T)
+    expected = force / K * (1 - decay * (np.cos(wd * T) + zeta * wn / wd * np.sin(wd * T)))
+    run = simulate(DRIVE, np.zeros(N), lambda *_: force)
+    np.testing.assert_allclose(run.x, expected, rtol=0, atol=1e-15)
+
+
+def test_velocity_is_that_of_the_drive() -> None:
+    seen: list[float] = []
+    command = np.full(60, 0.01)
+
+    def record(k: int, xi: Array, x_d: float) -> float:
+        seen.append(float(DRIVE.V @ xi) + DRIVE.V_d * x_d)
+        return 0.0
+
+    simulate(DRIVE, command, record)
+    # The step response of (11) starts with velocity c/m times the step; elsewhere a central difference at 10 µs.
+    assert seen[0] == pytest.approx(C / M * 0.01, rel=1e-12)
+    fine = ModalModel.spring_mass_damper(M, C, K).discretise(1e-5)
+    x, _ = fine.respond(fine.rest(), np.full(6000, 0.01))
+    slope = (x[101:5902:100] - x[99:5900:100]) / 2e-5
+    np.testing.assert_allclose(seen[1:60], slope, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "disturbance",
+    [
+        squared_command,
+        coulomb(3.0, X_D),
+        quadratic(DRIVE, 100.0, 1000.0),
+        linear_mode(DRIVE, MODE),
+        lambda k, *_: float(np.cos(k)),
+    ],
+    ids=["squared", "coulomb", "quadratic", "mode", "time"],
+)
+def test_response_is_eqs_8_to_10(disturbance: object) -> None:
+    assert callable(disturbance)
+    drive = SQUARING if disturbance is squared_command else DRIVE
+    run = simulate(drive, X_D, disturbance)
+    size = float(np.max(np.abs(run.e_pb)))
+    assert size > 1e-6
+    x_pb, e_pb = split(drive, X_D, run.h)
+    np.testing.assert_allclose(x_pb, run.x_pb, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(e_pb, run.e_pb, rtol=0, atol=1e-11 * size)
+    for k in (0, 1, 2, 3, 400):
+        assert response(drive, X_D, run.h, k) == pytest.approx(run.x[k], rel=0, abs=1e-15)
+
+
+def test_the_papers_example_written_out() -> None:
+    """Eqs. (7) to (10) for three samples, with ``Γ x_d²`` as printed."""
+    A, B, C, gamma = DRIVE.A, DRIVE.B, DRIVE.C, SQUARING.Gamma
+    x_d = np.array([3e-3, -1e-3, 2e-3, 5e-3])
+    run = simulate(SQUARING, x_d, squared_command)
+    np.testing.assert_array_equal(run.h, x_d**2)
+    x_pb = [C @ B * x_d[0], C @ A @ B * x_d[0] + C @ B * x_d[1]]
+    x_pb.append(C @ A @ A @ B * x_d[0] + C @ A @ B * x_d[1] + C @ B * x_d[2])
+    e_pb = [C @ gamma * x_d[0] ** 2, C @ A @ gamma * x_d[0] ** 2 + C @ gamma * x_d[1] ** 2]
+    e_pb.append(C @ A @ A @ gamma * x_d[0] ** 2 + C @ A @ gamma * x_d[1] ** 2 + C @ gamma * x_d[2] ** 2)
+    np.testing.assert_allclose(run.x_pb[1:], x_pb, rtol=1e-12)
+    np.testing.assert_allclose(run.x[1:], np.add(x_pb, e_pb), rtol=1e-12)
+    np.testing.assert_allclose(run.e_pb[1:], e_pb, rtol=1e-9)
+    np.testing.assert_allclose(lifted(A, gamma, C, 3)[2], [C @ A @ A @ gamma, C @ A @ gamma, C @ gamma], rtol=1e-12)
+    assert np.all(np.triu(lifted(A, gamma, C, 3), 1) == 0.0)
+
+
+def test_the_papers_argument_needs_the_response_to_have_decayed() -> None:
+    """``η(D) x_d² = 0`` makes ``η(D) e_pb`` vanish as ``C Aⁿ Γ`` does, ``χ η e_pb`` at once."""
+    run = simulate(SQUARING, X_D, squared_command)
+    eta = np.convolve(polynomial(0), np.convolve(sinusoid(2.0, TS), sinusoid(4.0, TS)))
+    size = float(np.max(np.abs(run.e_pb)))
+    np.testing.assert_allclose(innovation(run.h, eta)[5:], 0.0, atol=1e-13 * np.max(run.h))
+    alone, exact = (np.abs(innovation(run.e_pb, r)) for r in (eta, np.convolve(CHI, eta)))
+    assert np.max(exact[7:]) < 1e-9 * size
+    assert np.max(alone[7:80]) > 5e-9 * size
+    assert np.max(alone[600:]) < 0.02 * np.max(alone)  # exp(−600 Ts c/2m) = 0.009
+
+
+def test_decay_is_that_of_the_mode() -> None:
+    left = decay(DRIVE.A, DRIVE.Gamma, DRIVE.C, 3000)
+    assert left[0] == 1.0
+    assert np.all(np.diff(left) <= 0)
+    assert left[50] > 0.7  # at the paper's p the response is far from gone
+    period = 2 * np.pi / np.sqrt(K / M - (C / (2 * M)) ** 2)
+    assert 0 <= np.argmax(left < 1e-3) * TS - (np.log(1e3) / (C / (2 * M)) - period) < period
+
+
+def test_cayley_and_hamilton() -> None:
+    assert len(CHI) == len(DRIVE.B) + 1
+    power = sum(a * np.linalg.matrix_power(DRIVE.A, len(CHI) - 1 - i) for i, a in enumerate(CHI))
+    np.testing.assert_allclose(power, 0.0, atol=1e-14)
+    run = simulate(DRIVE, X_D, lambda k, *_: float(np.cos(k * k)))
+    driven = np.convolve(moving_average(DRIVE.A, DRIVE.Gamma, DRIVE.C), run.h)[:N]
+    np.testing.assert_allclose(innovation(run.e_pb, CHI, driven), 0.0, atol=1e-17)
+
+
+def test_friction_is_news_at_a_reversal_alone() -> None:
+    force = 2.0
+    run = simulate(DRIVE, X_D, coulomb(force, X_D))
+    news = innovation(run.e_pb, np.convolve(CHI, polynomial(0)))
+    jumps = np.concatenate(([run.h[0]], np.diff(run.h)))
+    reversals = np.flatnonzero(jumps)
+    np.testing.assert_array_equal(reversals, np.arange(0, N, 250))
+    np.testing.assert_allclose(np.abs(jumps[reversals[1:]]), 2 * force)
+    # The first residual after the jump holds C Γ Δh, the second one more spike, then all is known again.
+    n_1, n_2 = moving_average(DRIVE.A, DRIVE.Gamma, DRIVE.C)[1:]
+    assert n_1 == pytest.approx(DRIVE.C @ DRIVE.Gamma, rel=1e-14)
+    np.testing.assert_allclose(news[reversals + 1], n_1 * jumps[reversals], rtol=1e-9)
+    np.testing.assert_allclose(news[reversals + 2], n_2 * jumps[reversals], rtol=1e-9)
+    quiet = np.setdiff1d(np.arange(N), np.concatenate((reversals + 1, reversals + 2)))
+    np.testing.assert_allclose(news[quiet], 0.0, atol=1e-13 * np.max(np.abs(run.e_pb)))
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2, 3])
+def test_polynomials_of_time_are_known_after_the_start(degree: int) -> None:
+    run = simulate(DRIVE, X_D, lambda k, *_: float((1 + T[k]) ** degree))
+    exact = innovation(run.e_pb, np.convolve(CHI, polynomial(degree)))
+    np.testing.assert_allclose(exact[degree + 3 :], 0.0, atol=1e-15)
+    if degree:
+        fewer = innovation(run.e_pb, np.convolve(CHI, polynomial(degree - 1)))
+        assert np.all(np.abs(fewer[degree + 2 :]) > 10 * np.max(np.abs(exact[degree + 3 :])))
+
+
+def test_sinusoids_of_time_are_known_after_the_start() -> None:
+    run = simulate(DRIVE, X_D, lambda k, *_: float(np.sin(40 * T[k] + 1)))
+    right = innovation(run.e_pb, np.convolve(CHI, sinusoid(40 / (2 * np.pi), TS)))
+    wrong = innovation(run.e_pb, np.convolve(CHI, sinusoid(50 / (2 * np.pi), TS)))
+    np.testing.assert_allclose(right[4:], 0.0, atol=1e-15)
+    assert np.max(np.abs(wrong[4:])) > 1e-11
+
+
+def test_an_unmodelled_mode_is_known_with_its_order_and_past_x_pb() -> None:
+    run = simulate(DRIVE, X_D, linear_mode(DRIVE, MODE))
+    r, s = recursion_with_mode(DRIVE, MODE)
+    assert len(r) == len(s) == 5
+    assert np.max(np.abs(np.roots(r))) < 1  # the coupled drive is stable
+    size = float(np.max(np.abs(run.e_pb)))
+    known = np.convolve(s, run.x_pb)[:N]
+    np.testing.assert_allclose(innovation(run.e_pb, r, known), 0.0, atol=1e-12 * size)
+    assert np.max(np.abs(innovation(run.e_pb, CHI))) > 1e-3 * size
+    assert np.max(np.abs(innovation(run.e_pb, r))) > 1e-6 * size
+
+
+def test_a_mode_starts_each_run_at_rest() -> None:
+    disturbance = linear_mode(DRIVE, MODE)
+    first, second = (simulate(DRIVE, X_D[:200], disturbance) for _ in range(2))
+    np.testing.assert_array_equal(first.x, second.x)
+
+
+def test_a_smooth_nonlinearity_leaves_little_and_less_with_each_order() -> None:
+    run = simulate(DRIVE, X_D, quadratic(DRIVE, 100.0, 1000.0))
+    left = []
+    for degree in range(3):
+        news = innovation(run.e_pb, np.convolve(CHI, polynomial(degree)))
+        left.append(np.sqrt(np.mean(news**2) / np.mean(run.e_pb**2)))
+    assert left[0] < 1e-3
+    assert left[1] < left[0] / 10
+    assert left[2] < left[1] / 3
+    assert left[2] > 1e-8  # little, but not nothing: rounding is at 1e-13
+
+
+def test_markov_parameters_are_the_impulse_response() -> None:
+    run = simulate(DRIVE, np.zeros(20), lambda k, *_: float(k == 0))
+    np.testing.assert_allclose(markov(DRIVE.A, DRIVE.Gamma, DRIVE.C, 19), run.e_pb[1:], rtol=1e-12)
+
+
+def test_demonstration() -> None:
+    cases = demonstrate()
+    alone, exact, stairs, friction, ripple, left_out, with_mode, *curves = cases
+    for case in cases:
+        assert case.closed_form_error < 1e-11 * case.residual_rms
+        assert case.residual_rms > 1e-6
+    assert exact.n_spikes == 0 < alone.n_spikes
+    assert 20 < stairs.n_spikes < 200  # where the jerk of two moves switches
+    assert friction.n_spikes == 16  # two after each of 8 changes of direction in 2 s, the start included
+    assert ripple.n_spikes == 2  # at the start
+    assert with_mode.n_spikes == 0
+    assert left_out.n_spikes > 1900
+    assert left_out.innovation_rms > 1e-2 * left_out.residual_rms
+    assert [case.order for case in curves] == [3, 4, 5]
+    for case, limit in zip(curves, (1e-3, 1e-4, 1e-5), strict=True):
+        assert case.innovation_rms < limit * case.residual_rms

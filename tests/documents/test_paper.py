@@ -1,0 +1,70 @@
+"""What docs/paper.md says of the paper: readings of its equations, where the hybrid is worse, commands that exist."""
+
+from __future__ import annotations
+
+import re
+import runpy
+from typing import Any
+
+import numpy as np
+import pytest
+from places import ROOT
+
+from hybridsep import PAPER_LIMITS, load_machine, rest_to_rest, spiral, staircase
+
+PAGE = (ROOT / "docs" / "paper.md").read_text(encoding="utf-8")
+
+
+def example(name: str) -> dict[str, Any]:
+    return runpy.run_path(str(ROOT / "examples" / f"{name}.py"))
+
+
+def rms(error: np.ndarray) -> float:
+    """Return an RMS in µm."""
+    return 1e6 * float(np.sqrt(np.mean(error**2)))
+
+
+def test_readings_of_eqs_12_and_13() -> None:
+    section = example("section_3_2")
+    residual, in_mm = section["residual"], section["in_mm"]
+    assert rms(residual(section["eq_12"], staircase())) == pytest.approx(0.045, abs=5e-4)
+    # The force is held for 0.1 ms; FeedDrive, which integrates it, gives 33.55.
+    assert rms(residual(in_mm(section["eq_12"]), staircase())) == pytest.approx(33.55, abs=0.05)
+    assert rms(residual(in_mm(section["eq_13"]), staircase())) == pytest.approx(437.0, abs=1.0)
+
+
+@pytest.mark.parametrize(("length", "ratio"), [(0.030, 1.1), (0.013, 1.02)])
+def test_the_hybrid_can_be_worse_on_the_whole(length: float, ratio: float) -> None:
+    x_d = rest_to_rest(np.resize([0.0, length], 8), PAPER_LIMITS, dwell=0.3)
+    x, result, poles = example("section_4_2")["replay"](load_machine("als25010_y"), x_d)
+    assert rms(x - result.x_h) > ratio * rms(x - result.x_pb)
+    assert poles[int(np.argmax(result.batch_rms_h))] > 1.0
+
+
+def test_where_on_the_spiral_the_hybrid_errs() -> None:
+    section, x_d = example("section_4_2"), spiral()[1]
+    x, result, _ = section["replay"](load_machine("als25010_y"), x_d)
+    physics, hybrid = x - result.x_pb, x - result.x_h
+    near = section["near_reversals"](x_d) & result.active
+    elsewhere = ~near & result.active
+    assert 0.9 * rms(physics[near]) < rms(hybrid[near]) < rms(physics[near])  # the spikes
+    assert rms(hybrid[elsewhere]) < 0.55 * rms(physics[elsewhere])
+    assert rms(hybrid[-section["SLOWING"] :]) < 0.5 * rms(physics[-section["SLOWING"] :])  # the end
+
+
+def test_hz_read_as_rad_per_second_is_no_drive() -> None:
+    model = load_machine("als25010_x").model
+    assert sum(mode.alpha / mode.f_n**2 for mode in model.modes) == pytest.approx((2 * np.pi) ** 2, rel=1e-4)
+
+
+def test_commands_and_tests_on_the_page_exist() -> None:
+    commands = re.findall(r"`((?:python|pytest) [^`]+)`", PAGE)
+    assert len(commands) > 8
+    for command in commands:
+        _, path, *options = command.split()
+        text = (ROOT / path).read_text(encoding="utf-8")
+        for option in options:
+            if options[0] == "-k" and option != "-k":
+                assert re.search(rf"def test_\w*{option}", text), command
+            elif option.startswith("--"):
+                assert f'"{option}"' in text, command

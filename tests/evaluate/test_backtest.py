@@ -1,0 +1,230 @@
+"""The causal replay: its scores, its batches, and that it never looks ahead."""
+
+from __future__ import annotations
+
+import math
+import tracemalloc
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from places import EMPS
+
+from hybridsep.base.errors import SignalError
+from hybridsep.base.signals import Array
+from hybridsep.evaluate.backtest import Backtest, Batch, backtest, backtest_stream
+from hybridsep.logs import Log, open_log, read_log
+from hybridsep.model.physics import ModalModel, Mode
+from hybridsep.predict.predictor import HybridPredictor
+
+EMPS_COLUMNS = {"t": "t", "x_d": "qg", "x": "qm"}
+
+
+def predictor(Np: int = 20, p: int = 5, q: int = 2, t_init: float = 0.05) -> HybridPredictor:
+    return HybridPredictor(ModalModel([Mode(25.0, 0.7, (50 * np.pi) ** 2)]), Np=Np, p=p, q=q, t_init=t_init)
+
+
+def log(n: int = 1010) -> tuple[Array, Array]:
+    """Return a command and a position that lags behind it, offset and curved as no linear model has it."""
+    t = np.arange(n) * 1e-3
+    x_d = 0.1 + 0.01 * np.sin(9 * t) ** 3
+    x = 0.1 + 0.0098 * np.sin(9 * (t - 0.004)) ** 3 + 1e-5 * np.tanh(50 * np.cos(9 * t))
+    return x_d, x
+
+
+def emps_predictor() -> HybridPredictor:
+    """Return the published model of the recorded axis: position and velocity loop around a mass with friction."""
+    kp, kv, gtau, M, Fv = 160.18, 243.45, 35.15065188, 95.1089, 203.5034
+    omega = math.sqrt(gtau * kv * kp / M)
+    mode = Mode(f_n=omega / (2 * np.pi), zeta=(Fv + gtau * kv) / M / (2 * omega), alpha=omega**2)
+    return HybridPredictor(ModalModel([mode]), Np=100, p=50, q=3, lam=1e-12, input_hold="foh", t_init=1.242)
+
+
+@pytest.fixture(scope="module")
+def emps() -> Log:
+    if not EMPS.is_file():
+        pytest.skip("the recorded axis is not here: ../shared/data/emps/DATA_EMPS.mat, beside the repository")
+    return read_log(EMPS, columns=EMPS_COLUMNS)
+
+
+def rms(error: Array) -> float:
+    return float(np.sqrt(np.mean(error**2)))
+
+
+def test_recorded_axis(emps: Log) -> None:
+    summary = backtest(emps_predictor(), emps.x_d, emps.x).summary()
+    assert summary["rms_pb_um"] == pytest.approx(15.45, abs=0.05)
+    assert summary["rms_hold_um"] == pytest.approx(5.93, abs=0.05)
+    assert summary["rms_h_um"] <= 5.55
+    assert summary["reduction_percent"] > 60
+    assert (summary["n_samples"], summary["n_batches"]) == (24_841, 249)
+    assert summary["n_samples_after_warm_up"] == 24_841 - 1242
+
+
+def test_recorded_axis_from_the_file_in_chunks(emps: Log) -> None:
+    whole = backtest(emps_predictor(), emps.x_d, emps.x)
+    streamed = backtest_stream(emps_predictor(), open_log(EMPS, columns=EMPS_COLUMNS).chunks(777))
+    assert streamed.summary() == whole.summary()
+
+
+def test_scores_are_those_of_the_predictions() -> None:
+    x_d, x = log()
+    result = backtest(predictor(), x_d, x)
+    assert (result.n_batches, result.overall.n_samples, result.after_warm_up.n_samples) == (51, 1010, 960)
+    np.testing.assert_array_equal(result.active, np.arange(1010) >= 50)
+    for name in ("pb", "hold", "h"):
+        error = x - getattr(result, f"x_{name}")
+        batches = [rms(error[i : i + 20]) for i in range(0, 1010, 20)]
+        for score, part in ((result.overall, error), (result.after_warm_up, error[50:])):
+            assert getattr(score, f"rms_{name}") == pytest.approx(rms(part), rel=1e-12)
+            assert getattr(score, f"max_{name}") == np.abs(part).max()
+        np.testing.assert_allclose(getattr(result, f"batch_rms_{name}"), batches, rtol=1e-12)
+        assert result.summary()[f"rms_{name}_um"] == pytest.approx(1e6 * rms(error), rel=1e-12)
+        assert result.summary()[f"max_{name}_um_after_warm_up"] == 1e6 * np.abs(error[50:]).max()
+    expected = 100 * (1 - result.overall.rms_h / result.overall.rms_pb)
+    assert result.overall.reduction_percent == pytest.approx(expected)
+
+
+def test_predictions_are_the_predictor_s_own_and_the_hold_its_last_residual() -> None:
+    x_d, x = log()
+    result = backtest(predictor(), x_d, x)
+    replayed, residual = predictor(), 0.0
+    for i in range(0, 1010, 20):
+        window = slice(i, min(i + 20, 1010))
+        prediction = replayed.predict(x_d[window])
+        np.testing.assert_array_equal(result.x_pb[window], prediction.x_pb)
+        np.testing.assert_array_equal(result.x_h[window], prediction.x_h)
+        hold = np.where(prediction.active, prediction.x_pb + residual, prediction.x_pb)
+        np.testing.assert_allclose(result.x_hold[window], hold, rtol=1e-15)
+        replayed.update(x[window])
+        residual = float(x[window][-1] - prediction.x_pb[-1])
+
+
+def test_warm_up_publishes_the_physics_model() -> None:
+    result = backtest(predictor(t_init=0.25), *log())
+    np.testing.assert_array_equal(result.x_h[:250], result.x_pb[:250])
+    np.testing.assert_array_equal(result.x_hold[:250], result.x_pb[:250])
+    assert (result.x_h[250:] != result.x_pb[250:]).all()
+
+
+def test_log_shorter_than_the_warm_up() -> None:
+    result = backtest(predictor(), *log(30))
+    assert result.after_warm_up.n_samples == 0
+    assert math.isnan(result.after_warm_up.rms_pb)
+    assert math.isnan(result.summary()["reduction_percent_after_warm_up"])
+    assert result.overall.reduction_percent == 0.0
+
+
+def test_perfect_physics_leaves_nothing_to_reduce() -> None:
+    x_d = np.zeros(100)
+    assert backtest(predictor(), x_d, x_d).overall.reduction_percent == 0.0
+    warm = predictor()
+    backtest(warm, *log())
+    warm.new_run()
+    score = backtest(warm, x_d, x_d).overall
+    assert (score.rms_pb, score.reduction_percent) == (0.0, -math.inf)
+
+
+@given(k=st.integers(60, 1009), step=st.floats(-1e-3, 1e-3))
+@settings(max_examples=25)
+def test_no_prediction_depends_on_what_is_measured_in_its_batch_or_later(k: int, step: float) -> None:
+    x_d, x = log()
+    x_other = x.copy()
+    x_other[k:] += step
+    first, other = backtest(predictor(), x_d, x), backtest(predictor(), x_d, x_other)
+    end = 20 * (k // 20 + 1)
+    np.testing.assert_array_equal(first.x_h[:end], other.x_h[:end])
+    np.testing.assert_array_equal(first.x_hold[:end], other.x_hold[:end])
+
+
+@given(cuts=st.lists(st.integers(0, 1010), max_size=30), Np=st.integers(5, 130))
+@settings(max_examples=40)
+def test_stream_equals_arrays_whatever_the_chunks(cuts: list[int], Np: int) -> None:
+    x_d, x = log()
+    edges = [0, *sorted(cuts), 1010]
+    chunks = [(x_d[a:b], x[a:b]) for a, b in pairwise(edges)]
+    batches: list[Batch] = []
+    whole, learned = predictor(Np), predictor(Np)
+    result = backtest(whole, x_d, x)
+    streamed = backtest_stream(learned, chunks, on_batch=batches.append)
+    assert streamed.summary() == result.summary()
+    assert learned.to_bytes() == whole.to_bytes()
+    for name in ("x_pb", "x_hold", "x_h"):
+        joined = np.concatenate([getattr(batch, name) for batch in batches])
+        np.testing.assert_array_equal(joined, getattr(result, name))
+    np.testing.assert_array_equal(np.concatenate([batch.x_d for batch in batches]), x_d)
+    np.testing.assert_array_equal(np.concatenate([batch.x for batch in batches]), x)
+    np.testing.assert_array_equal([batch.rms_h for batch in batches], result.batch_rms_h)
+    assert [batch.j for batch in batches] == list(range(result.n_batches))
+    assert [batch.k for batch in batches] == list(range(0, 1010, Np))
+    assert all(len(batch.x) == Np for batch in batches[:-1])
+
+
+def test_on_batch_over_arrays() -> None:
+    numbers: list[int] = []
+    result = backtest(predictor(), *log(), on_batch=lambda batch: numbers.append(len(batch.x)))
+    assert isinstance(result, Backtest)
+    assert numbers == [20] * 50 + [10]
+
+
+def test_second_run_starts_warm() -> None:
+    x_d, x = log()
+    learning = predictor()
+    cold = backtest(learning, x_d, x)
+    learning.new_run()
+    warm = backtest(learning, x_d, x)
+    assert warm.active.all()
+    assert warm.overall.rms_h < cold.overall.rms_h
+
+
+def test_memory_does_not_grow_with_the_stream() -> None:
+    x_d, x = log(1000)
+
+    def peak(repetitions: int) -> int:
+        def chunks() -> Iterator[tuple[Array, Array]]:
+            for _ in range(repetitions):
+                yield x_d, x
+
+        replaying = predictor()
+        tracemalloc.start()
+        assert backtest_stream(replaying, chunks()).overall.n_samples == 1000 * repetitions
+        _, highest = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        return highest
+
+    peak(1)  # what is imported or cached on first use
+    assert peak(100) < peak(10) + 2000
+
+
+@pytest.mark.parametrize(
+    ("x_d", "x", "message"),
+    [
+        ([], [], "a log must have at least one sample, got none"),
+        ([0.0, 1.0], [0.0], "x must have 2 samples, got 1"),
+        ([[0.0]], [[0.0]], r"x_d must be one-dimensional, got shape \(1, 1\)"),
+        ([0.0, math.nan], [0.0, 0.0], "x_d must be finite, got nan at sample 1"),
+        ([0.0, 0.0], [0.0, math.inf], "x must be finite, got inf at sample 1"),
+        (["a"], [0.0], "x_d must be numbers"),
+    ],
+)
+def test_bad_arrays(x_d: list[float], x: list[float], message: str) -> None:
+    replaying = predictor()
+    before = replaying.to_bytes()
+    with pytest.raises(SignalError, match=message):
+        backtest(replaying, x_d, x)
+    assert replaying.to_bytes() == before
+
+
+def test_bad_chunks() -> None:
+    good = np.zeros(70)
+    with pytest.raises(SignalError, match="x of the chunk from sample 70 on must be finite, got nan at sample 1"):
+        backtest_stream(predictor(), [(good, good), (good[:2], np.array([0.0, math.nan]))])
+    with pytest.raises(SignalError, match="x of the chunk from sample 70 on must have 70 samples, got 69"):
+        backtest_stream(predictor(), [(good, good), (good, good[1:])])
+    with pytest.raises(SignalError, match=r"each chunk must be a pair \(x_d, x\), got ndarray"):
+        backtest_stream(predictor(), [good])  # type: ignore[list-item]
+    with pytest.raises(SignalError, match="at least one sample, got none"):
+        backtest_stream(predictor(), [])

@@ -1,0 +1,390 @@
+"""FMUs that start warm: a trained predictor built into the resources, in both flavours."""
+
+from __future__ import annotations
+
+import json
+import random
+import struct
+import sys
+import zipfile
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import c_core
+import fmpy
+import numpy as np
+import pytest
+from c_core import CModel, refusal, write_weights
+
+from hybridsep.app import cli
+from hybridsep.base.errors import FmuError, StateError
+from hybridsep.base.signals import Array
+from hybridsep.cosim.importer import FmuInstance
+from hybridsep.cosim.predictor_run import cosimulate
+from hybridsep.evaluate.backtest import backtest
+from hybridsep.fmi.archive import BACKENDS, build_fmu, fmu_names
+from hybridsep.fmi.weights import WEIGHTS_FILE, restore_weights, weights_file
+from hybridsep.machine import load_machine
+from hybridsep.model.physics import ModalModel, Mode
+from hybridsep.plants.plant import Encoder, simulate
+from hybridsep.plants.trajectory import staircase
+from hybridsep.predict.predictor import HybridPredictor
+
+MACHINE = load_machine("spring_mass_damper")
+TOLERANCE = 1e-11  # m
+
+
+def measured(seed: int) -> Array:
+    encoder = Encoder(5e-6, seed)
+    positions = simulate(MACHINE.new_plant(), staircase(), MACHINE.T_s)
+    return np.array([encoder.measure(x) for x in positions.tolist()])
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The state of a predictor that has seen one staircase."""
+    predictor = MACHINE.new_predictor()
+    backtest(predictor, staircase(), measured(7))
+    path = tmp_path_factory.mktemp("trained") / "trained.state"
+    predictor.save(path)
+    return path
+
+
+@pytest.fixture(scope="module", params=BACKENDS)
+def warm(request: pytest.FixtureRequest, trained: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The HybridPredictor FMU of each flavour with that state in it."""
+    return build(request.param, tmp_path_factory.mktemp(request.param), trained)
+
+
+def build(backend: str, out: Path, weights: Path | None = None, model: str = "HybridPredictor") -> Path:
+    name = next(name for name, built in fmu_names(MACHINE, backend).items() if built == model)
+    return build_fmu(MACHINE, name, out, backend, targets=("host",), weights=weights)
+
+
+def test_a_warm_run_is_the_librarys_second_run(warm: Path, trained: Path, tmp_path: Path) -> None:
+    run = cosimulate(warm, build("native", tmp_path, model="FeedDrive"), staircase())
+    assert run.active.all()
+    predictor = HybridPredictor.load(trained)
+    predictor.new_run()
+    expected = backtest(predictor, run.x_d, run.x_meas)
+    np.testing.assert_allclose(run.x_pb, expected.x_pb, rtol=0, atol=TOLERANCE)
+    np.testing.assert_allclose(run.x_h, expected.x_h, rtol=0, atol=TOLERANCE)
+    assert run.summary()["rms_h_um"] == pytest.approx(8.9, abs=0.2)
+    cold = cosimulate(build("native", tmp_path), tmp_path / "FeedDrive.fmu", staircase())
+    assert cold.summary()["rms_h_um"] == pytest.approx(14.8, abs=0.3)
+
+
+def test_the_warm_up_is_over_at_once_unless_asked_for(warm: Path) -> None:
+    for values, active in (({}, True), ({"t_init": 0.05}, False)):
+        with FmuInstance(warm) as instance:
+            assert instance.get("t_init") == 0.0
+            instance.initialise(values)
+            for k in range(100):
+                instance.step(k * 1e-3, 1e-3)
+            assert instance.get("hybrid_active") == active
+
+
+def test_a_warm_state_can_be_saved_and_the_instance_reset(warm: Path) -> None:
+    with FmuInstance(warm) as instance:
+        for _ in range(2):
+            instance.initialise()
+            seen = drive(instance, 0, 250)
+            blob = instance.save()
+            ahead = drive(instance, 250, 420)
+            instance.restore(blob)
+            assert drive(instance, 250, 420) == ahead
+            if warm.stem.endswith("Py"):  # pythonfmu has no reset
+                break
+            instance.reset()
+    assert any(x_h != x_pb for x_h, x_pb in seen[100:])
+
+
+def drive(instance: FmuInstance, first: int, last: int) -> list[tuple[float, float]]:
+    outputs = []
+    for k in range(first, last):
+        instance.set("x_d_ahead", 1e-3 * np.sin(0.02 * k))
+        instance.set("x_meas", 1e-3 * np.sin(0.02 * (k - 105)))
+        instance.step(k * 1e-3, 1e-3)
+        outputs.append((instance.get("x_h"), instance.get("x_pb")))
+    return outputs
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        ({"p": 40}, "p must be 50, with which weights.bin was learned, got 40"),
+        (
+            {"p": 49, "q": 4},
+            "p must be 50, with which weights.bin was learned, got 49; "
+            "q must be 3, with which weights.bin was learned, got 4",
+        ),
+        ({"lambda": 1e-9}, "lambda must be 1e-12, with which weights.bin was learned, got 1e-09"),
+        ({"T_s": 0.002}, "T_s must be 0.001, with which weights.bin was learned, got 0.002"),
+        ({"input_hold": 1}, "input_hold must be 0, with which weights.bin was learned, got 1"),
+        ({"dead_time": 3}, "dead_time must be 0, with which weights.bin was learned, got 3"),
+        ({"mode[1].alpha": 24000.0}, "mode[1].alpha must be 24674.0, with which weights.bin was learned, got 24000.0"),
+    ],
+)
+def test_other_settings_than_learned_are_refused_by_the_fmu(
+    warm: Path, values: dict[str, float], expected: str
+) -> None:
+    with FmuInstance(warm) as instance, pytest.raises(FmuError) as caught:
+        instance.initialise(values)
+    assert expected in str(caught.value)
+
+
+def test_what_does_not_shape_the_features_may_be_another(warm: Path) -> None:
+    with FmuInstance(warm) as instance:
+        instance.initialise({"Np": 60, "t_init": 0.1})
+        assert instance.get("p") == 50
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_the_weights_are_in_the_resources_and_in_the_guid(backend: str, tmp_path: Path, trained: Path) -> None:
+    paths = [build(backend, tmp_path / str(i), weights) for i, weights in enumerate((trained, trained, None))]
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+    with zipfile.ZipFile(paths[0]) as archive:
+        assert archive.read("resources/weights.bin") == weights_file(HybridPredictor.load(trained))
+    guids = [fmpy.read_model_description(str(path)).guid for path in paths]
+    assert guids[0] == guids[1] != guids[2]
+
+
+@pytest.mark.parametrize(
+    ("changes", "differing"),
+    [
+        ({"p": 40}, "p = 40 instead of 50"),
+        ({"q": 5, "lam": 1e-9}, "q = 5 instead of 3, lambda = 1e-09 instead of 1e-12"),
+        ({"Np": 60}, "Np = 60 instead of 100"),
+        ({"Ts": 2e-3, "input_hold": "foh"}, "T_s = 0.002 instead of 0.001, input_hold = foh instead of zoh"),
+    ],
+)
+def test_a_state_of_other_parameters_is_refused_by_name(
+    changes: dict[str, Any], differing: str, tmp_path: Path
+) -> None:
+    predictor = MACHINE.new_predictor(**changes)
+    predictor.predict(np.linspace(0, 1e-3, 50))
+    predictor.update(np.linspace(0, 1e-3, 50))
+    predictor.save(tmp_path / "other.state")
+    with pytest.raises(StateError) as caught:
+        build("native", tmp_path, tmp_path / "other.state")
+    assert f"other.state was not trained for machine spring_mass_damper: it has {differing}; " in str(caught.value)
+
+
+def test_a_state_of_another_machine_is_refused_by_name(trained: Path, tmp_path: Path) -> None:
+    with pytest.raises(StateError, match=r"mode\[1\].f_n = .* instead of .*mode\[2\].f_n = none instead of "):
+        build_fmu(load_machine("als25010_x"), "HybridPredictor_als25010_x", tmp_path, weights=trained)
+
+
+def test_foreign_files_and_empty_states_are_refused(tmp_path: Path, trained: Path) -> None:
+    foreign = tmp_path / "foreign.state"
+    foreign.write_bytes(b"PK\x03\x04 something else")
+    with pytest.raises(StateError, match=r"foreign\.state: a saved state of kind 'predictor' was expected"):
+        build("native", tmp_path, foreign)
+    foreign.write_bytes(trained.read_bytes()[:-20])
+    with pytest.raises(StateError, match="truncated or damaged"):
+        build("python", tmp_path, foreign)
+    MACHINE.new_predictor().save(foreign)
+    with pytest.raises(StateError, match=r"foreign\.state has learned no sample"):
+        build("native", tmp_path, foreign)
+
+
+def test_weights_and_samples_have_one_model_each(tmp_path: Path, trained: Path) -> None:
+    with pytest.raises(
+        FmuError, match="weights are for a HybridPredictor or a SepCompensator, FeedDrive is a FeedDrive"
+    ):
+        build("native", tmp_path, trained, "FeedDrive")
+    with pytest.raises(FmuError, match="samples are for a ReferenceTrajectory, FeedDrive is a FeedDrive"):
+        build_fmu(MACHINE, "FeedDrive", tmp_path, samples=[0.0])
+
+
+def test_damaged_files_leave_the_predictor_as_it_was(trained: Path) -> None:
+    content = weights_file(HybridPredictor.load(trained))
+    predictor = MACHINE.new_predictor()
+    first = 8 * (10 + 4)  # of the triangle, behind the head and one mode
+    zero = sealed(content[:first] + bytes(8) + content[first + 8 : -8])
+    infinite = sealed(content[:first] + struct.pack("<d", np.inf) + content[first + 8 : -8])
+    longer = sealed(content[:-8] + bytes(8))
+    for damaged in (b"", content[:-8], b"X" + content[1:], content + bytes(8), zero, infinite, longer):
+        with pytest.raises(StateError, match=r"weights\.bin must be a factor of learned rows; it is damaged or trunc"):
+            restore_weights(predictor, damaged)
+    assert not predictor.weights.any()
+    restore_weights(predictor, content)
+    assert predictor.weights.any()
+
+
+def sealed(body: bytes) -> bytes:
+    """Append the checksum that makes any content pass for undamaged."""
+    return body + struct.pack("<Q", zlib.crc32(body))
+
+
+def mutations(content: bytes, count: int) -> Iterator[bytes]:
+    """Yield contents with flipped, replaced, lost, doubled or exchanged bytes, all other than the given one."""
+    chance = random.Random(0)
+    while count:
+        changed = bytearray(content)
+        for _ in range(chance.choice([1, 1, 1, 2, 3, 8])):
+            kind, i = chance.randrange(6), chance.randrange(len(changed))
+            j, length = chance.randrange(len(changed)), chance.choice([1, 2, 8, 64])
+            if kind == 0:
+                changed[i] ^= 1 << chance.randrange(8)
+            elif kind == 1:
+                changed[i] = chance.randrange(256)
+            elif kind == 2:
+                del changed[i : i + length]
+            elif kind == 3:
+                changed[i:i] = changed[j : j + length]
+            elif kind == 4:
+                changed[i : i + length] = changed[j : j + length]
+            else:
+                changed[i : i + 8] = struct.pack("<d", chance.choice([0.0, 1.0, np.inf, np.nan, 1e308, 5e-324]))
+            if len(changed) < 8:
+                break
+        if bytes(changed) != content:
+            count -= 1
+            yield bytes(changed)
+
+
+def test_no_mutation_of_the_file_is_accepted(trained: Path) -> None:
+    content = weights_file(HybridPredictor.load(trained))
+    predictor = MACHINE.new_predictor()
+    for changed in mutations(content, 20_000):
+        with pytest.raises(StateError):
+            restore_weights(predictor, changed)
+    assert not predictor.weights.any()
+
+
+def test_no_mutation_of_the_file_is_accepted_in_c(tmp_path: Path) -> None:
+    # A small factor, so that the head is hit as often as the triangle.
+    rows = np.random.default_rng(1).normal(size=(40, 9))
+    write_weights(tmp_path, "predictor_2", np.linalg.qr(rows)[1], 40, p=4, q=2)
+    file, model = tmp_path / WEIGHTS_FILE, CModel("predictor_2", {"p": 4, "q": 2, "Np": 8}, tmp_path)
+    content = file.read_bytes()
+    model.initialise()
+    for changed in mutations(content, 5000):
+        file.write_bytes(changed)
+        assert refusal(model.initialise)
+    file.write_bytes(content)
+    model.initialise()
+
+
+def test_both_flavours_say_the_same_of_other_settings(tmp_path: Path) -> None:
+    description = c_core.DESCRIPTIONS["predictor_2"]
+    for changes in ({"p": 30, "q": 9}, {"lambda": 1e-8}, {"T_s": 1e-3 / 3}, {"input_hold": 1, "dead_time": 7}):
+        learned, now = (
+            HybridPredictor.with_parameters(
+                ModalModel([Mode(**mode) for mode in modes], int(values.pop("dead_time"))),
+                {name: value for name, value in values.items() if name != "v_s"},
+            )
+            for values, modes in (
+                ({**c_core.PREDICTOR, **changes}, description["modes"][::-1]),
+                (dict(c_core.PREDICTOR), description["modes"]),
+            )
+        )
+        content = weights_file(learned)
+        (tmp_path / WEIGHTS_FILE).write_bytes(content)
+        with pytest.raises(StateError) as caught:
+            restore_weights(now, content)
+        said = refusal(CModel("predictor_2", resources=tmp_path).initialise)
+        assert str(caught.value).startswith(said)  # C cuts long messages off
+        assert len(said) > 400
+    (tmp_path / WEIGHTS_FILE).write_bytes(weights_file(learned))
+    assert "the number of modes must be 4, with which weights.bin was learned, got 1" in refusal(
+        CModel(
+            "predictor",
+            {"input_hold": 1, "dead_time": 7, **dict(zip(MODE_1, description["modes"][-1].values(), strict=True))},
+            tmp_path,
+        ).initialise
+    )
+
+
+MODE_1 = [f"mode[1].{name}" for name in ("f_n", "zeta", "alpha", "beta")]
+
+
+# The command line --------------------------------------------------------------------------------------------------
+
+
+def hybridsep(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
+    monkeypatch.setattr(sys, "argv", ["hybridsep", *map(str, arguments)])
+    monkeypatch.setenv("COLUMNS", "300")
+    try:
+        cli.main()
+    except SystemExit as stop:
+        return int(stop.code or 0)
+    return 0
+
+
+def test_build_takes_weights_and_targets(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, trained: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ("--weights", trained, "--target", "host", "--target", "win64", "--out", tmp_path, "--json")
+    assert hybridsep(monkeypatch, "build", "HybridPredictor", "FeedDrive", *options) == 0
+    paths = json.loads(capsys.readouterr().out)
+    with zipfile.ZipFile(paths[0]) as archive:
+        names = archive.namelist()
+    assert "resources/weights.bin" in names
+    platforms = {name.split("/")[1] for name in names if name.startswith("binaries/")}
+    assert {"win64", "x86_64-windows"} < platforms
+    assert "win32" not in platforms
+    with zipfile.ZipFile(paths[1]) as archive:
+        assert "resources/weights.bin" not in archive.namelist()
+
+
+def test_build_takes_a_trajectory(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    command = 0.02 + 1e-4 * np.arange(20)
+    rows = np.column_stack((1e-3 * np.arange(20), 1e3 * command))
+    np.savetxt(tmp_path / "path.csv", rows, delimiter=",", header="t,x_d", comments="", fmt="%.12g")
+    options = ("--trajectory", tmp_path / "path.csv", "--unit", "mm", "--target", "host", "--out", tmp_path)
+    assert hybridsep(monkeypatch, "build", "ReferenceTrajectory", *options) == 0
+    with FmuInstance(tmp_path / "ReferenceTrajectory.fmu") as source:
+        source.initialise()
+        played = [source.get("r")]
+        for k in range(25):
+            source.step(k * 1e-3, 1e-3)
+            played.append(source.get("r"))
+    np.testing.assert_allclose(played, [*command, *[command[-1]] * 6], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            ("--weights", "TRAINED"),
+            "--weights is for one HybridPredictor or SepCompensator, this would build HybridPredictor_als25010_x, ",
+        ),
+        (
+            ("FeedDrive", "--weights", "TRAINED"),
+            "--weights is for one HybridPredictor or SepCompensator, this would build none",
+        ),
+        (("HybridPredictor", "--weights", "no.state"), "cannot read or write no.state: No such file"),
+        (("-m", "emps", "--weights", "TRAINED"), "trained.state was not trained for machine emps: it has "),
+        (("FeedDrive", "--trajectory", "x.csv"), "--trajectory is for one ReferenceTrajectory, this would build none"),
+        (("FeedDrive", "--target", "sparc"), "no target sparc; there are host, x86_64-linux, "),
+        (("--backend", "python", "--target", "host"), "--target is for native FMUs; with --backend python leave it"),
+    ],
+)
+def test_build_says_what_it_cannot_use(
+    arguments: tuple[str, ...],
+    message: str,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    trained: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    given = [str(trained) if argument == "TRAINED" else argument for argument in arguments]
+    assert hybridsep(monkeypatch, "build", *given, "--out", tmp_path) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_without_a_compiler_build_says_what_to_do(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("hybridsep.fmi.compiler.find_spec", lambda name: None)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.delenv("CC", raising=False)
+    assert hybridsep(monkeypatch, "build", "FeedDrive", "--target", "host", "--out", tmp_path) == 2
+    error = capsys.readouterr().err
+    assert "install one, or pip install ziglang, or build with --backend python" in error
+    assert hybridsep(monkeypatch, "build", "FeedDrive", "--target", "win64", "--out", tmp_path) == 2
+    assert "pip install ziglang, or ask for the target host" in capsys.readouterr().err

@@ -1,0 +1,267 @@
+"""Recorded logs that cannot be used, and what every problem is called."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from log_files import FORMATS, Columns, columns, write, write_csv
+from scipy import sparse
+
+from hybridsep.base.errors import HybridSepError, LogError, ParameterError
+from hybridsep.base.signals import Array
+from hybridsep.logs import open_log, read_log
+
+
+def time_at(i: int, value: float, n: int = 25_000) -> Array:
+    t = np.arange(n, dtype=np.float64) * 1e-3
+    t[i] = value
+    return t
+
+
+@pytest.mark.parametrize(
+    ("t", "message"),
+    [
+        (time_at(3, 0.002), r"sample 4 \(the first is 1\): time 't' repeats: a value above 0.002 s .* got 0.002 s"),
+        (time_at(3, 0.0005), r"sample 4 .*: time 't' runs backwards: a value above 0.002 s .* got 0.0005 s"),
+        (time_at(0, 0.001), r"sample 2 .*: time 't' repeats"),
+        (time_at(10_000, 9.999), r"sample 10001 .* repeats"),
+        (
+            np.delete(np.arange(50) * 1e-3, 20),
+            r"sample 21 .*uniform.*0.001 s ± 5 % .*got 0.002 s; 1 sample may be lost",
+        ),
+        (np.delete(np.arange(50) * 1e-3, [20, 21]), r"got 0.003 s; 2 samples may be lost; resample the log, or remove"),
+        (np.delete(np.arange(25_000) * 1e-3, 10_000), r"sample 10001 .*uniform"),
+        (np.delete(np.arange(25_000) * 1e-3, 24_000), r"sample 24001 .*uniform"),
+        (time_at(5, 0.0051), r"sample 6 .*got 0.0011 s; resample"),
+        (time_at(7, np.nan), r"sample 8 .*: column 't' must be finite, got nan"),
+    ],
+)
+def test_bad_time(tmp_path: Path, t: Array, message: str) -> None:
+    path = write(tmp_path / "log.npz", {"t": t, "x_d": t * 0, "x": t * 0})
+    with pytest.raises(LogError, match=message):
+        open_log(path)
+
+
+def test_bad_time_names_the_line(tmp_path: Path) -> None:
+    path = write_csv(tmp_path / "log.csv", "t,x_d,x\n0,0,0\n\n1,0,0\n1,0,0\n")
+    with pytest.raises(LogError, match=r"log\.csv, line 5: time 't' repeats"):
+        open_log(path)
+
+
+def test_given_ts_must_agree_with_the_time(tmp_path: Path) -> None:
+    path = write(tmp_path / "log.csv", columns())
+    assert open_log(path, Ts=1.005e-3).Ts == 1.005e-3
+    with pytest.raises(LogError, match=r"Ts = 0.002 s was given, but column 't' has an interval of 0.001 s"):
+        open_log(path, Ts=2e-3)
+    with pytest.raises(ParameterError, match="Ts must be 1e-05 … 1 s, got -1"):
+        open_log(path, Ts=-1.0)
+
+
+# Columns and values
+
+
+@FORMATS
+def test_missing_columns(tmp_path: Path, suffix: str) -> None:
+    data = columns()
+    path = write(tmp_path / f"log{suffix}", {"x_d": data["x_d"], "qm": data["x"]})
+    with pytest.raises(LogError, match=r"column 't' is missing, the file has 'x_d', 'qm'; .*columns, or Ts"):
+        open_log(path)
+    with pytest.raises(LogError, match=r"column 'x' is missing, the file has 'x_d', 'qm'; give its name in columns"):
+        open_log(path, Ts=1e-3)
+    with pytest.raises(LogError, match=r"column 'time' \(t\) is missing"):
+        open_log(path, columns={"t": "time", "x": "qm"}, Ts=1e-3)
+    with pytest.raises(LogError, match=r"columns may name t, x_d, x, got 'y'"):
+        open_log(path, columns={"y": "qm"})
+
+
+def test_csv_without_names(tmp_path: Path) -> None:
+    path = write_csv(tmp_path / "log.csv", "0,1,2\n1,2,3\n")
+    with pytest.raises(LogError, match=r"has '0', '1', '2'.*line 1 must hold the column names, it holds numbers"):
+        open_log(path)
+
+
+def test_column_named_twice(tmp_path: Path) -> None:
+    path = write_csv(tmp_path / "log.csv", "t,x_d,x,x\n0,1,2,3\n1,1,2,3\n")
+    with pytest.raises(LogError, match="column 'x' must occur once, got it 2 times"):
+        open_log(path)
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        ("0,0,0\n1,0,nan\n", r"log\.csv, line 3: column 'x' must be finite, got nan"),
+        ("0,0,0\n1,-inf,0\n", r"line 3: column 'x_d' must be finite, got -inf"),
+        ("0,0,0\n1,abc,0\n", r"line 3: column 'x_d' must be a number, got 'abc'"),
+        ("0,0,0\n1,,0\n", r"line 3: column 'x_d' must be a number, got nothing"),
+        ("0,0,0\n1,1_0,0\n", r"line 3: column 'x_d' must be a number, got '1_0'"),
+        ("0,0,0\n\n1,0\n", r"line 4: 3 columns were expected as in line 1, got 2"),
+        ("0,0,0\n1,0,0,0\n", r"line 3: 3 columns were expected as in line 1, got 4"),
+        ("0;0;0\n", r"line 2: column 't' must be a number, got '0;0;0'"),
+    ],
+)
+def test_bad_csv_rows(tmp_path: Path, rows: str, message: str) -> None:
+    path = write_csv(tmp_path / "log.csv", "t,x_d,x\n" + rows)
+    with pytest.raises(LogError, match=message):
+        read_log(path)
+
+
+def test_decimal_comma(tmp_path: Path) -> None:
+    path = write_csv(tmp_path / "log.csv", "t;x_d;x\n0;1;2\n1;0,5;2\n")
+    with pytest.raises(LogError, match=r"line 3: column 'x_d' must be a number, got '0,5'; write decimal points"):
+        read_log(path)
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".mat"])
+@pytest.mark.parametrize(
+    ("bad", "message"),
+    [
+        ({"x": np.full(50, np.nan)}, r"sample 1 \(the first is 1\): column 'x' must be finite, got nan"),
+        ({"x": np.zeros(49)}, r"same number of samples, got: 'x_d' has 50, 'x' has 49"),
+        ({"x": np.zeros(50) * 1j}, r"column 'x' must be real, got complex numbers \(complex128\)"),
+        ({"x": np.zeros((25, 2))}, r"column 'x' must have shape \(n,\), \(n, 1\) or \(1, n\), got \(25, 2\)"),
+        ({"x": np.zeros((5, 5, 2))}, r"column 'x' must have shape .* got \(5, 5, 2\)"),
+        ({"x": np.array(["a"] * 50)}, r"column 'x' must be numbers, got <U1"),
+    ],
+)
+def test_bad_arrays(tmp_path: Path, suffix: str, bad: Columns, message: str) -> None:
+    path = write(tmp_path / f"log{suffix}", columns() | bad)
+    with pytest.raises(LogError, match=message):
+        read_log(path)
+
+
+@FORMATS
+@pytest.mark.parametrize(("n", "came"), [(0, "none"), (1, "1")])
+@pytest.mark.parametrize("Ts", [None, 1e-3])
+def test_too_short(tmp_path: Path, suffix: str, n: int, came: str, Ts: float | None) -> None:
+    data = columns(n)
+    if Ts is not None:
+        del data["t"]
+    path = write(tmp_path / f"log{suffix}", data)
+    with pytest.raises(LogError, match=f"a log needs at least 2 samples, got {came}"):
+        open_log(path, Ts=Ts)
+
+
+@FORMATS
+def test_millimetres_taken_for_metres(tmp_path: Path, suffix: str) -> None:
+    data = columns()
+    data["x_d"], data["x"] = np.linspace(-60, 60, 50), np.linspace(-60, 60, 50)
+    path = write(tmp_path / f"log{suffix}", data)
+    with pytest.raises(LogError, match=r"'x_d' read in m spans 120 m, .*unit='mm' \(--unit mm\)"):
+        read_log(path)
+    with pytest.raises(LogError, match=r"'x_d' read in m spans 10\d.* m, .*--unit mm"):
+        list(open_log(path).chunks(1))
+    assert read_log(path, unit="mm").x_d[-1] == pytest.approx(0.06)
+    with pytest.raises(LogError, match=r"unit must be one of m, mm, um, got 'cm'"):
+        read_log(path, unit="cm")
+    data["x_d"] = data["x_d"] * 1e3
+    with pytest.raises(LogError, match=r"read in mm spans 120 m, .*--unit um"):
+        read_log(write(path, data), unit="mm")
+
+
+# Files
+
+
+def test_files_that_cannot_be_read(tmp_path: Path) -> None:
+    assert issubclass(LogError, HybridSepError)
+    with pytest.raises(LogError, match=r"none\.csv: there is no such file"):
+        open_log(tmp_path / "none.csv")
+    (tmp_path / "folder.csv").mkdir()
+    with pytest.raises(LogError, match=r"folder\.csv: is not a file"):
+        open_log(tmp_path / "folder.csv")
+    with pytest.raises(LogError, match=r"must be one of \.csv, .*\.npz, \.mat, got '\.xlsx'"):
+        open_log(tmp_path / "log.xlsx")
+    with pytest.raises(LogError, match="got 'no extension'"):
+        open_log(tmp_path / "log")
+    for suffix in (".csv", ".npz", ".mat"):
+        path = tmp_path / f"empty{suffix}"
+        path.touch()
+        with pytest.raises(LogError, match="the file is empty"):
+            open_log(path)
+    with pytest.raises(LogError, match=r"\.csv: (cannot be read: File name too long|there is no such file)"):
+        open_log(tmp_path / ("long" * 100 + ".csv"))
+    with pytest.raises(LogError, match="the file is empty, a line of column names was expected"):
+        open_log(write_csv(tmp_path / "blank.csv", "\n\n"))
+
+
+def test_text_in_another_encoding(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_bytes(b"\xff\xfet\x00")
+    with pytest.raises(LogError, match="must be text in UTF-8, got byte 0xff"):
+        open_log(path)
+    path.write_bytes(b"t,x_d,x\n" + b"".join(b"%d,0,0\n" % i for i in range(20_000)) + b"\xe9")
+    with pytest.raises(LogError, match="must be text in UTF-8, got byte 0xe9 after line 20001"):
+        open_log(path)
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".mat"])
+@pytest.mark.parametrize("kept", [0.01, 0.3, 0.7, 0.99])
+def test_truncated_files(tmp_path: Path, suffix: str, kept: float) -> None:
+    path = write(tmp_path / f"log{suffix}", columns(500))
+    data = path.read_bytes()
+    path.write_bytes(data[: max(1, int(kept * len(data)))])
+    with pytest.raises(LogError, match=rf"log\{suffix}: is truncated, damaged or not"):
+        open_log(path)
+
+
+def test_damaged_members_of_an_npz(tmp_path: Path) -> None:
+    path = write(tmp_path / "log.npz", columns(500))
+    data = bytearray(path.read_bytes())
+    data[data.rindex(columns(500)["x"][400:].tobytes())] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(LogError, match="column 'x' is truncated or damaged: Bad CRC-32"):
+        read_log(path)
+    with zipfile.ZipFile(path) as archive:
+        members = {name: archive.read(name) for name in ("t.npy", "x_d.npy")}
+    for wrong, message in ((members["t.npy"][:-8], "truncated: 4000 more bytes .* got 3992"), (b"no", "truncated or")):
+        with zipfile.ZipFile(path, "w") as archive:
+            for name, member in (members | {"x.npy": wrong}).items():
+                archive.writestr(name, member)
+        with pytest.raises(LogError, match=f"column 'x' is {message}"):
+            read_log(path)
+
+
+def test_mat_that_is_not_a_plain_matrix(tmp_path: Path) -> None:
+    path = write(tmp_path / "log.mat", columns() | {"x": sparse.eye(5, format="csc")})
+    with pytest.raises(LogError, match=r"column 'x' must be a full matrix, got cs[cr]_"):
+        read_log(path)
+    path.write_bytes(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM" + bytes(500))
+    message = r"v7\.3 \(HDF5\) file; versions up to 7 are read: save it with '-v7' .*save\('log_v7\.mat', '-v7'\)"
+    with pytest.raises(LogError, match=message):
+        read_log(path)
+
+
+@pytest.mark.parametrize(("place", "byte"), [(176, 20), (392, 82), (608, 199)])
+def test_a_mat_that_crashes_scipy_is_an_error(tmp_path: Path, place: int, byte: int) -> None:
+    """With one byte changed, SciPy 1.17's reader dies of a segmentation fault; other versions may find the damage."""
+    path = write(tmp_path / "log.mat", columns(20))
+    content = bytearray(path.read_bytes())
+    content[place] = byte
+    path.write_bytes(content)
+    with pytest.raises(LogError, match=r"log\.mat: is truncated, damaged or not a MATLAB file: "):
+        read_log(path)
+
+
+def test_a_reader_that_crashes_is_told_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = write(tmp_path / "log.mat", columns())
+    for ending, message in (
+        ("os.kill(os.getpid(), 11)", "not a MATLAB file: SciPy crashed on it with SIGSEGV"),
+        ("raise MemoryError('too much')", "the process that reads it ended with status 1: MemoryError: too much"),
+    ):
+        child = tmp_path / "child.py"
+        child.write_text(f"import os\n{ending}\n")
+        monkeypatch.setattr("hybridsep.logs.mat._CHILD", child)
+        with pytest.raises(LogError, match=message):
+            read_log(path)
+
+
+def test_file_that_changes_while_it_is_read(tmp_path: Path) -> None:
+    path = write(tmp_path / "log.npz", columns())
+    reader = open_log(path)
+    write(path, columns(40))
+    with pytest.raises(LogError, match="had 50 samples when opened, now it has 40"):
+        list(reader.chunks())
+    with pytest.raises(LogError, match="a chunk must have n ≥ 1 samples, got 0"):
+        reader.chunks(0)

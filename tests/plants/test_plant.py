@@ -1,0 +1,186 @@
+"""Plants: against a tight solve_ivp run, against the linear model, and the noise against its definition."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from hybridsep import (
+    Encoder,
+    FeedDrive,
+    ModalModel,
+    Mode,
+    ParameterError,
+    SignalError,
+    StageDrive,
+    load_machine,
+    simulate,
+)
+from hybridsep.plants.plant import FRICTION_VELOCITY
+from hybridsep.plants.trajectory import spiral, staircase
+
+Array = NDArray[np.float64]
+TS = 1e-3
+
+
+def tight(slope: object, z: Array, commands: Array, position: object) -> Array:
+    """Integrate sample by sample with DOP853 at 1e-13 and return the positions at the samples."""
+    x = np.empty(len(commands))
+    for k, r in enumerate(commands):
+        x[k] = position(z)  # type: ignore[operator]
+        z = solve_ivp(slope, (0, TS), z, "DOP853", args=(k, r), rtol=1e-13, atol=1e-16).y[:, -1]
+    return x
+
+
+def test_the_drive_is_integrated_to_less_than_a_nanometre() -> None:
+    m, c, k, c_nl, k_nl = 1.0, 15.7, 24674.0, 100.0, 1000.0
+    x_d = staircase()[2000:3400] + 0.02  # the largest deflection and a way back
+
+    def slope(t: float, z: Array, i: int, r: float) -> list[float]:
+        x, u = z
+        v = u + c / m * (r - x_d[0])
+        return [v, -c / m * v - k / m * (x - (r - x_d[0])) - (c_nl * v * abs(v) + k_nl * x * abs(x)) / m]
+
+    truth = x_d[0] + tight(slope, np.zeros(2), x_d, lambda z: z[0])
+    x = simulate(FeedDrive(m, c, k, c_nl, k_nl), x_d, TS)
+    assert np.max(np.abs(x - truth)) < 1e-9
+
+
+@pytest.mark.parametrize("axis", ["x", "y"])
+def test_the_stage_is_integrated_to_less_than_a_nanometre(axis: str) -> None:
+    machine = load_machine(f"als25010_{axis}")
+    stage = machine.new_plant()
+    assert isinstance(stage, StageDrive)
+    x_d = dict(zip("xy", spiral(), strict=True))[axis][:700]
+    v_d = np.diff(x_d, prepend=x_d[0]) / TS
+    modes = machine.model.modes
+
+    def position(z: Array) -> float:
+        return float(sum(mode.alpha * z[2 * i] + mode.beta * z[2 * i + 1] for i, mode in enumerate(modes)))
+
+    def slope(t: float, z: Array, k: int, r: float) -> list[float]:
+        x = position(z)
+        # x = G_pb (x_d − d), d = f tanh(v_d / 2 mm/s) + κ x |x|
+        u = r - stage.f * math.tanh(v_d[k] / FRICTION_VELOCITY) - stage.kappa * x * abs(x)
+        out: list[float] = []
+        for i, mode in enumerate(modes):
+            out += [z[2 * i + 1], u - 2 * mode.zeta * mode.omega * z[2 * i + 1] - mode.omega**2 * z[2 * i]]
+        return out
+
+    truth = tight(slope, np.zeros(2 * len(modes)), x_d, position)
+    assert np.max(np.abs(simulate(stage, x_d, TS) - truth)) < 1e-9
+
+
+def test_without_nonlinearity_the_plants_are_their_models() -> None:
+    x_d = staircase()[:1500]
+    model = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
+    discrete = model.discretise(TS)
+    x_pb, _ = discrete.respond(discrete.rest(), x_d)
+    np.testing.assert_allclose(simulate(FeedDrive(1.0, 15.7, 24674.0), x_d, TS), x_pb, atol=1e-10)
+    modal = ModalModel([Mode(40.0, 0.3, 9e4, 5.0), Mode(90.0, 0.05, -2e4, 1.0)])
+    discrete = modal.discretise(TS)
+    x_pb, _ = discrete.respond(discrete.rest(), x_d)
+    np.testing.assert_allclose(simulate(StageDrive(modal), x_d, TS), x_pb, atol=1e-10)
+
+
+@pytest.mark.parametrize("f_n", [25.0, 500.0, 2000.0, 5000.0])
+def test_fast_modes_are_resolved(f_n: float) -> None:
+    x_d = staircase()[:300]
+    mode = Mode(f_n, 0.05, (2 * math.pi * f_n) ** 2)
+    discrete = ModalModel([mode]).discretise(TS)
+    x_pb, _ = discrete.respond(discrete.rest(), x_d)
+    assert np.max(np.abs(simulate(StageDrive(ModalModel([mode])), x_d, TS) - x_pb)) < 1e-9
+
+
+def test_velocity_is_the_derivative_of_the_position() -> None:
+    for plant in (load_machine("spring_mass_damper").new_plant(), load_machine("als25010_x").new_plant()):
+        plant.reset(0.0)
+        for k in range(50):
+            plant.step(1e-6 * k**2, TS)
+        plant.step(1e-6 * 50**2, TS / 2)
+        before, v = plant.x, plant.v
+        plant.step(1e-6 * 50**2, 1e-6)
+        assert (plant.x - before) / 1e-6 == pytest.approx(v, rel=1e-3)
+
+
+def test_positions_count_from_the_start() -> None:
+    x_d = staircase()[:400]
+    for name in ("spring_mass_damper", "als25010_y"):
+        plant = load_machine(name).new_plant()
+        np.testing.assert_allclose(simulate(plant, x_d + 0.1, TS) - 0.1, simulate(plant, x_d, TS), atol=1e-14)
+
+
+def test_any_step_gives_the_same_motion() -> None:
+    x_d = staircase()[:300]
+    for name in ("spring_mass_damper", "als25010_x"):
+        plant = load_machine(name).new_plant()
+        whole = simulate(plant, x_d, TS)
+        plant.reset(0.0)
+        for k, r in enumerate(x_d):
+            assert plant.x == pytest.approx(whole[k], abs=1e-9)
+            for _ in range(4):  # the friction's v_d is taken once a sampling interval, not once a step
+                plant.step(r, TS / 4)
+
+
+def test_state_can_be_saved_and_restored() -> None:
+    for name in ("spring_mass_damper", "als25010_x"):
+        machine = load_machine(name)
+        plant, other = machine.new_plant(), machine.new_plant()
+        for k in range(30):
+            plant.step(1e-4 * k, TS)
+        other.restore(plant.state())
+        for k in range(30, 60):
+            plant.step(1e-4 * k, TS)
+            other.step(1e-4 * k, TS)
+            assert (plant.x, plant.v) == (other.x, other.v)
+
+
+def test_encoder_draws_split_mix_64_and_box_muller() -> None:
+    # The first numbers of SplitMix64 from seed 0, as published with the generator
+    first, second = 0xE220A8397B1DCDAF, 0x6E789E6AA1B965F4
+    u1, u2 = ((first >> 11) + 1) * 2.0**-53, (second >> 11) * 2.0**-53
+    expected = 5e-6 * math.sqrt(-2 * math.log(u1)) * math.cos(2 * math.pi * u2)
+    assert Encoder(5e-6, 0).measure(1.0) - 1.0 == pytest.approx(expected, abs=1e-15)
+
+
+def test_encoder_noise_is_normal_and_seeded() -> None:
+    noise = Encoder(1.0, 7).measure_all(np.zeros(20_000))
+    assert abs(np.mean(noise)) < 4 / math.sqrt(20_000)
+    assert np.std(noise) == pytest.approx(1.0, abs=0.02)
+    assert np.mean(np.abs(noise) > 1.959964) == pytest.approx(0.05, abs=0.006)
+    assert abs(np.corrcoef(noise[:-1], noise[1:])[0, 1]) < 0.03
+    assert not np.array_equal(noise, Encoder(1.0, 8).measure_all(np.zeros(20_000)))
+    assert np.array_equal(noise, Encoder(1.0, 7).measure_all(np.zeros(20_000)))
+
+
+def test_what_cannot_be_is_refused() -> None:
+    with pytest.raises(ParameterError, match=r"k must be 1e-06 … 1e\+15 N/m, got -1"):
+        FeedDrive(1.0, 1.0, -1.0)
+    with pytest.raises(ParameterError, match=r"kappa must be 0 … 1000000 1/m, got -0.1"):
+        StageDrive(ModalModel([Mode(10, 0.5, 1.0)]), kappa=-0.1)
+    with pytest.raises(ParameterError, match="must have no dead time, got 2 samples"):
+        StageDrive(ModalModel([Mode(10, 0.5, 1.0)], dead_time=2))
+    with pytest.raises(ParameterError, match=r"step size must be > 0 and ≤ 100 s, got 0.0"):
+        FeedDrive(1.0, 1.0, 1.0).step(0.0, 0.0)
+    with pytest.raises(ParameterError, match=r"step size must be > 0 and ≤ 100 s, got 1000000000.0"):
+        FeedDrive(1.0, 1.0, 1.0).step(0.0, 1e9)
+    with pytest.raises(SignalError, match="x_d must have at least one sample, got none"):
+        simulate(FeedDrive(1.0, 1.0, 1.0), [], TS)
+    with pytest.raises(ParameterError, match=r"noise_std must be 0 … 1 m, got -1"):
+        Encoder(-1.0)
+    with pytest.raises(ParameterError, match=r"seed must be a whole number, got 0.5"):
+        Encoder(1.0, seed=0.5)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("name", "changes"), [("spring_mass_damper", {"c_nl": 1e4}), ("als25010_x", {"kappa": 1e2})])
+def test_a_step_that_overflows_changes_nothing(name: str, changes: dict[str, float]) -> None:
+    plant = load_machine(name).new_plant(**changes)
+    plant.step(1e-3, TS)
+    before = plant.state()
+    with pytest.raises(SignalError, match="left the range of numbers"):
+        plant.step(1e3, 0.5)
+    assert plant.state() == before

@@ -1,0 +1,176 @@
+"""The recursive regression against the ridge problem solved directly, also in extended precision."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import oracle
+import pytest
+import staircase_data as staircase
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from hybridsep.base.errors import ParameterError, SignalError
+from hybridsep.model.physics import ModalModel
+from hybridsep.predict.predictor import HybridPredictor
+from hybridsep.predict.regression import RidgeRegression
+
+Array = NDArray[np.float64]
+
+
+def problem(m: int, n: int, seed: int = 0) -> tuple[Array, Array]:
+    """Return m random rows of n features and their targets."""
+    rng = np.random.default_rng(seed)
+    rows = rng.normal(size=(m, n))
+    return rows, rows @ rng.normal(size=n) + 0.1 * rng.normal(size=m)
+
+
+def relative_error(w: Array, exact: Any) -> float:
+    return float(np.linalg.norm((w - exact).astype(float)) / np.linalg.norm(exact.astype(float)))
+
+
+@pytest.mark.parametrize("lam", [1e-12, 1e-3, 10.0])
+def test_the_oracles_agree_with_sixty_digits(lam: float) -> None:
+    # Neighbouring columns nearly equal, as lags of a smooth position are; fewer rows than features in the second.
+    for m, n in ((30, 8), (5, 8)):
+        rows, target = problem(m, n)
+        rows = rows[:, :1] + 1e-3 * rows
+        exact = oracle.ridge_exact(rows, target, lam)
+        assert relative_error(oracle.ridge(rows, target, lam), exact) < 1e-8
+        extended = oracle.ridge_extended(rows, target, lam)
+        digits = np.finfo(np.longdouble).eps / np.finfo(np.float64).eps
+        assert relative_error(extended.astype(np.float64), exact) < max(1e-8 * digits, 4e-16)
+
+
+@settings(max_examples=80)
+@given(
+    n=st.integers(1, 12),
+    batches=st.lists(st.integers(1, 30), min_size=1, max_size=8),
+    lam=st.sampled_from([1e-6, 1e-2, 1.0, 100.0]),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_batches_of_any_size_give_the_direct_solution(n: int, batches: list[int], lam: float, seed: int) -> None:
+    rows, target = problem(sum(batches), n, seed)
+    regression = RidgeRegression(n, lam)
+    first = 0
+    for m in batches:
+        regression.update(rows[first : first + m], target[first : first + m])
+        first += m
+        exact = oracle.ridge_extended(rows[:first], target[:first], lam)
+        np.testing.assert_allclose(regression.weights, exact.astype(float), rtol=1e-9, atol=1e-11)
+    assert regression.n_samples == first
+    # Eq. (6): what is minimised, at its minimum
+    w = exact.astype(float)
+    minimum = np.sum((target - rows @ w) ** 2) + lam * np.sum(w**2)
+    assert regression.residual_sum == pytest.approx(minimum, rel=1e-9, abs=1e-12)
+
+
+@settings(max_examples=40)
+@given(order=st.permutations(range(40)))
+def test_the_order_of_rows_does_not_matter(order: list[int]) -> None:
+    rows, target = problem(40, 6)
+    forward, shuffled = RidgeRegression(6, 1e-3), RidgeRegression(6, 1e-3)
+    forward.update(rows, target)
+    for i in order:
+        shuffled.update(rows[i : i + 1], target[i : i + 1])
+    np.testing.assert_allclose(shuffled.weights, forward.weights, rtol=1e-12, atol=1e-14)
+
+
+def test_the_factor_is_triangular_and_squares_to_the_normal_equations() -> None:
+    rows, target = problem(25, 4)
+    regression = RidgeRegression(4, 0.5)
+    regression.update(rows, target)
+    factor = regression.factor
+    np.testing.assert_array_equal(factor, np.triu(factor))
+    stacked = np.column_stack((rows, target))
+    expected = stacked.T @ stacked + 0.5 * np.diag([1.0, 1, 1, 1, 0])
+    np.testing.assert_allclose(factor.T @ factor, expected, rtol=1e-12, atol=1e-12)
+
+
+def test_nothing_learned_means_zero() -> None:
+    regression = RidgeRegression(3, 1e-3)
+    np.testing.assert_array_equal(regression.weights, 0.0)
+    assert regression.residual_sum == 0.0
+    regression.update(np.empty((0, 3)), [])
+    np.testing.assert_array_equal(regression.weights, 0.0)
+    assert regression.n_samples == 0
+
+
+def test_weights_cannot_be_written() -> None:
+    regression = RidgeRegression(3, 1e-3)
+    for _ in range(2):
+        with pytest.raises(ValueError, match="read-only"):
+            regression.weights[0] = 1.0
+        regression.update(*problem(5, 3))
+
+
+def test_state_restores_bit_for_bit() -> None:
+    rows, target = problem(60, 7)
+    regression, copy = RidgeRegression(7, 1e-4), RidgeRegression(7, 1e-4)
+    regression.update(rows[:30], target[:30])
+    copy.restore(regression.factor, regression.n_samples)
+    for one in (regression, copy):
+        one.update(rows[30:], target[30:])
+    np.testing.assert_array_equal(copy.weights, regression.weights)
+    np.testing.assert_array_equal(copy.factor, regression.factor)
+    assert copy.n_samples == 60
+
+
+@pytest.mark.parametrize(
+    ("rows", "target", "message"),
+    [
+        ([[1.0, math.nan, 0.0]], [1.0], "rows must be finite"),
+        ([[1.0, math.inf, 0.0]], [1.0], "rows must be finite"),
+        ([[1.0, 2.0, 3.0]], [math.nan], "target must be finite, got nan at sample 0"),
+        ([[1.0, 2.0, 3.0]], [1.0, 2.0], "target must have 1 samples, got 2"),
+        ([[1.0, 2.0]], [1.0], "rows must have shape (m, 3), got (1, 2)"),
+        ([1.0, 2.0, 3.0], [1.0], "rows must have shape (m, 3), got (3,)"),
+    ],
+)
+def test_bad_rows_are_refused_and_change_nothing(rows: Any, target: Any, message: str) -> None:
+    regression = RidgeRegression(3, 1e-3)
+    regression.update(*problem(10, 3))
+    before, n_before = regression.factor, regression.n_samples
+    with pytest.raises(SignalError) as caught:
+        regression.update(rows, target)
+    assert str(caught.value) == message
+    np.testing.assert_array_equal(regression.factor, before)
+    assert regression.n_samples == n_before == 10
+
+
+def test_a_factor_of_another_size_is_refused() -> None:
+    with pytest.raises(SignalError, match=r"^the factor must have shape \(4, 4\), got \(6, 6\)$"):
+        RidgeRegression(3, 1e-3).restore(RidgeRegression(5, 1e-3).factor, 0)
+
+
+@pytest.mark.parametrize(
+    ("n", "lam", "message"),
+    [
+        (0, 1.0, "n_features must be ≥ 1, got 0"),
+        (3, 0.0, "lambda must be 1e-40 … 1e+12 m2, got 0.0"),
+        (3, math.nan, "lambda must be finite, got nan"),
+    ],
+)
+def test_parameters_out_of_range(n: int, lam: float, message: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        RidgeRegression(n, lam)
+    assert str(caught.value) == message
+
+
+@pytest.mark.parametrize(("p", "q", "tolerance"), [(50, 3, 1e-9), (100, 99, 1e-7)])
+def test_weights_after_the_staircase_against_extended_precision(p: int, q: int, tolerance: float) -> None:
+    n, lam = 6000, 1e-12
+    x_d, x = staircase.commanded()[:n], staircase.measured(0)[:n]
+    predictor = HybridPredictor(ModalModel.spring_mass_damper(staircase.M, staircase.C, staircase.K), p=p, q=q, lam=lam)
+    x_pb: list[float] = []
+    for first in range(0, n, predictor.Np):
+        x_pb += predictor.predict(x_d[first : first + predictor.Np]).x_pb.tolist()
+        predictor.update(x[first : first + predictor.Np])
+    e_pb = x - np.array(x_pb)
+    rows = np.array([oracle.features(x_pb, e_pb.tolist(), k, p, q) for k in range(n)])
+    exact = oracle.ridge_extended(rows, e_pb, lam)
+    assert predictor.n_features == rows.shape[1] == 2 + q + p
+    assert relative_error(predictor.weights, exact) < tolerance

@@ -1,0 +1,39 @@
+"""The command line in this process, and a log to give to it."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from staircase_data import commanded, measured
+
+from hybridsep.app import cli
+
+__all__ = ["Run", "write_log"]
+
+
+class Run:
+    """Runs ``hybridsep`` with arguments in this process; returns exit status, stdout and stderr."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+        self.monkeypatch, self.capsys = monkeypatch, capsys
+
+    def __call__(self, *arguments: object) -> tuple[int, str, str]:
+        self.monkeypatch.setattr(sys, "argv", ["hybridsep", *map(str, arguments)])
+        self.monkeypatch.setenv("COLUMNS", "200")
+        status = 0
+        try:
+            cli.main()
+        except SystemExit as stop:
+            status = int(stop.code or 0)
+        out, err = self.capsys.readouterr()
+        return status, out, err
+
+
+def write_log(path: Path, *, n: int = 2500, header: str = "t,x_d,x", scale: float = 1.0) -> Path:
+    t = np.arange(n) * 1e-3
+    columns = np.column_stack((t, commanded()[:n] * scale, measured(0)[:n] * scale))
+    np.savetxt(path, columns, delimiter=",", header=header, comments="", fmt="%.17g")
+    return path

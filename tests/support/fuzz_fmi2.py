@@ -1,0 +1,482 @@
+"""FMI 2.0 functions of a shared library through ctypes, and a fuzzer that calls them at random.
+
+Run as a program: ``python tests/support/fuzz_fmi2.py LIBRARY MODEL_DESCRIPTION RESOURCES_URI --seconds 600 --seed 1``.
+A finding is a crash, a sanitizer's report, or one of the checks here: a refusal without a message, a refused step that
+changed a value, a block of memory that was not given back.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ctypes
+import random
+import struct
+import sys
+import time
+from collections.abc import Callable, Sequence
+from ctypes import CFUNCTYPE, POINTER, byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+OK, WARNING, DISCARD, ERROR, FATAL = range(5)
+
+Logger = CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
+Allocate = CFUNCTYPE(c_void_p, c_size_t, c_size_t)
+Free = CFUNCTYPE(None, c_void_p)
+
+
+class Callbacks(ctypes.Structure):
+    """``fmi2CallbackFunctions``."""
+
+    _fields_ = [
+        ("logger", Logger),
+        ("allocate", Allocate),
+        ("free", Free),
+        ("step_finished", c_void_p),
+        ("environment", c_void_p),
+    ]
+
+
+_VALUES: dict[str, Any] = {"Real": c_double, "Integer": c_int, "Boolean": c_int, "String": c_char_p}
+_SIGNATURES: dict[str, list[Any]] = {
+    "SetDebugLogging": [c_void_p, c_int, c_size_t, POINTER(c_char_p)],
+    "SetupExperiment": [c_void_p, c_int, c_double, c_double, c_int, c_double],
+    "EnterInitializationMode": [c_void_p],
+    "ExitInitializationMode": [c_void_p],
+    "Terminate": [c_void_p],
+    "Reset": [c_void_p],
+    "GetFMUstate": [c_void_p, POINTER(c_void_p)],
+    "SetFMUstate": [c_void_p, c_void_p],
+    "FreeFMUstate": [c_void_p, POINTER(c_void_p)],
+    "SerializedFMUstateSize": [c_void_p, c_void_p, POINTER(c_size_t)],
+    "SerializeFMUstate": [c_void_p, c_void_p, c_char_p, c_size_t],
+    "DeSerializeFMUstate": [c_void_p, c_char_p, c_size_t, POINTER(c_void_p)],
+    "GetDirectionalDerivative": [c_void_p, c_void_p, c_size_t, c_void_p, c_size_t, c_void_p, c_void_p],
+    "SetRealInputDerivatives": [c_void_p, c_void_p, c_size_t, c_void_p, c_void_p],
+    "GetRealOutputDerivatives": [c_void_p, c_void_p, c_size_t, c_void_p, c_void_p],
+    "DoStep": [c_void_p, c_double, c_double, c_int],
+    "CancelStep": [c_void_p],
+    "GetStatus": [c_void_p, c_int, POINTER(c_int)],
+    "GetRealStatus": [c_void_p, c_int, POINTER(c_double)],
+    "GetIntegerStatus": [c_void_p, c_int, POINTER(c_int)],
+    "GetBooleanStatus": [c_void_p, c_int, POINTER(c_int)],
+    "GetStringStatus": [c_void_p, c_int, POINTER(c_char_p)],
+}
+for _kind, _type in _VALUES.items():
+    _SIGNATURES[f"Get{_kind}"] = _SIGNATURES[f"Set{_kind}"] = [c_void_p, POINTER(c_uint), c_size_t, POINTER(_type)]
+
+
+class Library:
+    """The FMI functions of one shared library, ``fmi2`` left out of their names, and what passed its callbacks.
+
+    Parameters
+    ----------
+    path : Path
+        The shared library.
+    description : Path
+        The FMU's modelDescription.xml.
+    largest : int
+        Bytes beyond which the importer has no memory for a block.
+    """
+
+    def __init__(self, path: Path, description: Path, largest: int = 1 << 26) -> None:
+        self._dll = ctypes.CDLL(str(path.resolve()))
+        for name, arguments in _SIGNATURES.items():
+            function = getattr(self._dll, f"fmi2{name}")
+            function.argtypes, function.restype = arguments, c_int
+        self._dll.fmi2Instantiate.argtypes = [c_char_p, c_int, c_char_p, c_char_p, c_void_p, c_int, c_int]
+        self._dll.fmi2Instantiate.restype = c_void_p
+        self._dll.fmi2FreeInstance.argtypes = [c_void_p]
+        self._dll.fmi2FreeInstance.restype = None
+        root = ET.parse(description).getroot()
+        self.guid = str(root.get("guid"))
+        variables = root.findall("ModelVariables/ScalarVariable")
+        self.references = {str(v.get("name")): int(str(v.get("valueReference"))) for v in variables}
+        self.kinds = {str(v.get("name")): v[0].tag for v in variables}
+        self.causalities = {str(v.get("name")): str(v.get("causality")) for v in variables}
+        self.messages: list[tuple[int, str, str]] = []
+        self.blocks: dict[int, int] = {}
+        self.allocations = 0
+        libc = ctypes.CDLL(None)
+        libc.calloc.argtypes, libc.calloc.restype = [c_size_t, c_size_t], c_void_p
+        libc.free.argtypes, libc.free.restype = [c_void_p], None
+
+        def log(environment: Any, name: bytes, status: int, category: bytes | None, message: bytes) -> None:
+            self.messages.append((status, (category or b"").decode(), message.decode()))
+
+        def allocate(count: int, size: int) -> int | None:
+            if count * size > largest:
+                return None
+            block = libc.calloc(count, size)
+            self.allocations += 1
+            self.blocks[block] = count * size
+            return int(block)
+
+        def free(block: int) -> None:
+            del self.blocks[block]
+            libc.free(block)
+
+        self.callbacks = Callbacks(Logger(log), Allocate(allocate), Free(free), None, None)
+
+    def __getattr__(self, name: str) -> Callable[..., int]:
+        function: Callable[..., int] = getattr(self._dll, f"fmi2{name}")
+        return function
+
+    def instantiate(
+        self,
+        name: bytes | None = b"one",
+        *,
+        kind: int = 1,
+        guid: str | None = None,
+        resources: str | None = None,
+        callbacks: Callbacks | None = None,
+        logging_on: bool = False,
+    ) -> int | None:
+        """Return a component, or None if it was refused; without callbacks those that log and count."""
+        instance: int | None = self._dll.fmi2Instantiate(
+            name,
+            kind,
+            (self.guid if guid is None else guid).encode(),
+            None if resources is None else resources.encode(),
+            ctypes.addressof(self.callbacks if callbacks is None else callbacks),
+            0,
+            int(logging_on),
+        )
+        return instance
+
+    def instantiate_bare(self) -> int | None:
+        """Return a component that was given no callbacks at all."""
+        instance: int | None = self._dll.fmi2Instantiate(b"bare", 1, self.guid.encode(), None, None, 0, 0)
+        return instance
+
+    def get(self, component: int | None, name: str) -> Any:
+        """Return one variable; raise RuntimeError if that is refused."""
+        kind = self.kinds[name]
+        value = _VALUES[kind]()
+        reference = c_uint(self.references[name])
+        status: int = getattr(self, f"Get{kind}")(component, byref(reference), 1, byref(value))
+        if status != OK:
+            raise RuntimeError(self.messages[-1][2])
+        return value.value
+
+    def set(self, component: int | None, name: str, value: Any) -> int:
+        """Set one variable and return the status."""
+        kind = self.kinds[name]
+        reference = c_uint(self.references[name])
+        status: int = getattr(self, f"Set{kind}")(component, byref(reference), 1, byref(_VALUES[kind](value)))
+        return status
+
+    def reals(self, component: int) -> bytes:
+        """Return all Reals, bit by bit."""
+        places = [self.references[name] for name, kind in self.kinds.items() if kind == "Real"]
+        values = (c_double * len(places))()
+        status = self.GetReal(component, (c_uint * len(places))(*places), len(places), values)
+        if status != OK:
+            raise RuntimeError(self.messages[-1][2])
+        return bytes(values)
+
+    def save(self, component: int | None) -> bytes:
+        """Return the serialised state."""
+        state, size = c_void_p(), c_size_t()
+        assert self.GetFMUstate(component, byref(state)) == OK
+        assert self.SerializedFMUstateSize(component, state, byref(size)) == OK
+        block = ctypes.create_string_buffer(size.value)
+        assert self.SerializeFMUstate(component, state, block, size.value) == OK
+        assert self.FreeFMUstate(component, byref(state)) == OK
+        return block.raw
+
+    def restore(self, component: int | None, block: bytes) -> int:
+        """Take over a serialised state and return the first status that is not OK."""
+        state = c_void_p()
+        status = self.DeSerializeFMUstate(component, block, len(block), byref(state))
+        if status == OK:
+            status = self.SetFMUstate(component, state)
+            assert self.FreeFMUstate(component, byref(state)) == OK
+        return status
+
+
+class Fuzzer:
+    """Calls at random, on up to three instances, of which about half are what an importer would do."""
+
+    def __init__(self, library: Library, resources: str, seed: int) -> None:
+        self.library, self.resources = library, resources
+        self.random = random.Random(seed)
+        self.instances: list[int] = []
+        self.states: list[c_void_p] = []
+        self.blocks: list[bytes] = [b""]
+        self.times: dict[int, float] = {}
+        self.calls = self.refused = self.steps = 0
+
+    def run(self, seconds: float) -> None:
+        """Call until the time is over, then free everything and look for lost blocks."""
+        end = time.monotonic() + seconds
+        actions = [
+            (6, self._instantiate),
+            (2, self._free),
+            (8, self._initialise),
+            (40, self._steps),
+            (20, self._access),
+            (12, self._state),
+            (10, self._plain),
+            (2, self._status),
+        ]
+        weights, functions = zip(*actions, strict=True)
+        while time.monotonic() < end:
+            self.random.choices(functions, weights)[0]()
+            self.library.messages.clear()
+        while self.instances:
+            self._free()
+        if self.library.blocks:
+            raise AssertionError(f"{len(self.library.blocks)} blocks of memory were not given back")
+
+    def _call(self, name: str, component: int | None, *arguments: Any) -> int:
+        self.library.messages.clear()
+        status: int = getattr(self.library, name)(component, *arguments)
+        self.calls += 1
+        self.refused += status == ERROR
+        if status not in (OK, DISCARD, ERROR):
+            raise AssertionError(f"fmi2{name} returned {status}")
+        if status == ERROR and component is not None and not self.library.messages:
+            raise AssertionError(f"fmi2{name} was refused without a message")
+        return status
+
+    def _component(self) -> int | None:
+        return self.random.choice(self.instances) if self.instances and self.random.random() < 0.98 else None
+
+    def _number(self) -> float:
+        return self.random.choice(
+            [
+                0.0,
+                1e-3,
+                -1e-3,
+                1.0,
+                1e300,
+                -1e300,
+                5e-324,
+                float("nan"),
+                float("inf"),
+                -float("inf"),
+                self.random.gauss(0, 1),
+            ]
+        )
+
+    def _instantiate(self) -> None:
+        if len(self.instances) == 3:
+            return self._free()
+        odd = self.random.random() < 0.2
+        instance = self.library.instantiate(
+            self.random.choice([None, b""]) if odd else b"i%d" % len(self.instances),
+            kind=self.random.choice([0, 1, 7]) if odd else 1,
+            guid="{}" if odd and self.random.random() < 0.5 else None,
+            resources=self.random.choice([None, "file://%00", "http://x/y", "file:", "%", *7 * [self.resources]]),
+            logging_on=self.random.random() < 0.5,
+        )
+        if instance is not None:
+            self.instances.append(instance)
+            self.times[instance] = 0.0
+        return None
+
+    def _free(self) -> None:
+        if not self.instances:
+            return
+        if len(self.instances) == 1:
+            for state in self.states:
+                self._call("FreeFMUstate", self.instances[0], byref(state))
+            self.states.clear()
+        instance = self.instances.pop(self.random.randrange(len(self.instances)))
+        self.library.FreeInstance(instance)
+
+    def _initialise(self) -> None:
+        component = self._component()
+        if self.random.random() < 0.7:
+            self._call("Reset", component)
+        start = self.random.choice([0.0, 0.0, 12.5, self._number()])
+        self._call("SetupExperiment", component, 0, 0.0, start, self.random.random() < 0.1, self._number())
+        if self.random.random() < 0.9:
+            self._call("EnterInitializationMode", component)
+        if component is None:
+            return
+        ranges = {
+            "Np": (20, 130),
+            "p": (1, 20),
+            "q": (0, 19),
+            "dead_time": (0, 10),
+            "preview": (150, 260),
+            "spacing": (1, 2),
+            "keep_direction": (0, 1),
+            "compensate": (0, 2),
+            "trajectory": (0, 2),
+            "seed": (0, 9),
+        }
+        for name, (low, high) in ranges.items():
+            if name in self.library.references and (name == "p" or self.random.random() < 0.5):
+                odd = [0, -1, 100_000, 2**31 - 1, -(2**31)]
+                value = self.random.randint(low, high) if self.random.random() < 0.97 else self.random.choice(odd)
+                self.library.set(component, name, value)
+        for name in ("x_d_ahead", "x_d"):
+            if self.library.causalities.get(name) == "input":
+                self.library.set(component, name, self.random.choice([0.0, 0.1, self._number()]))
+        if self._call("ExitInitializationMode", component) == OK:
+            self.times[component] = start
+
+    def _steps(self) -> None:
+        component = self._component()
+        if component is None:
+            self._call("DoStep", None, 0.0, 1e-3, 1)
+            return
+        names = [name for name, causality in self.library.causalities.items() if causality == "input"]
+        for _ in range(self.random.randint(1, 100)):
+            odd = self.random.random() < 0.05
+            for name in names:
+                self.library.set(component, name, self._number() if odd else self.random.gauss(0, 1e-2))
+            t = self.times[component]
+            usual = self.random.choice([1e-3, 1e-3, 3e-4, 8e-3, self.random.uniform(0.0, 0.05)])
+            h = self.random.choice([1e-7, 0.0, -1e-3, 1.3, self._number()]) if odd else usual
+            if self.random.random() < 0.1:
+                self._slopes(component, names, odd)
+            before = self.library.reals(component)
+            if self._call("DoStep", component, self._number() if self.random.random() < 0.02 else t, h, 1) == OK:
+                self.times[component] = t + h
+                self.steps += 1
+            elif before != self.library.reals(component):
+                raise AssertionError("a refused step changed a value")
+
+    def _slopes(self, component: Any, names: Sequence[str], odd: bool) -> None:
+        n = len(names)
+        references = (c_uint * n)(*(self.library.references[name] for name in names))
+        orders = (c_int * n)(*(self.random.choice([0, 1, 2]) if odd else 1 for _ in names))
+        slopes = (c_double * n)(*(self._number() if odd else self.random.gauss(0, 0.1) for _ in names))
+        self._call("SetRealInputDerivatives", component, references, n, orders, slopes)
+
+    def _access(self) -> None:
+        component = self._component()
+        kind = self.random.choice(["Real", "Real", "Integer", "Boolean", "String"])
+        count = self.random.randint(0, 8)
+        n = len(self.library.references)
+        places = [
+            self.random.choice([self.random.randrange(n), self.random.randrange(30), n, 2**32 - 1])
+            for _ in range(count)
+        ]
+        references = (c_uint * count)(*places)
+        values = (_VALUES[kind] * count)()
+        for i in range(count):
+            if kind == "Real":
+                values[i] = self._number()
+            elif kind != "String":
+                values[i] = self.random.choice([0, 1, -1, 50, 2**31 - 1, -(2**31)])
+        null = self.random.random()
+        self._call(
+            self.random.choice(["Get", "Set"]) + kind,
+            component,
+            None if null < 0.03 else references,
+            count,
+            None if null > 0.97 else values,
+        )
+
+    def _state(self) -> None:
+        component = self._component()
+        action = self.random.randrange(6)
+        if action == 0 and len(self.states) < 10:
+            state = c_void_p()
+            if self._call("GetFMUstate", component, byref(state)) == OK:
+                self.states.append(state)
+        elif action == 1:
+            self._call("GetFMUstate", component, byref(self.random.choice(self.states)) if self.states else None)
+        elif action == 2:
+            if self._call("SetFMUstate", component, self.random.choice(self.states) if self.states else None) == OK:
+                reached = c_double()
+                if self.library.GetRealStatus(component, 2, byref(reached)) == OK:
+                    assert component is not None
+                    self.times[component] = reached.value
+        elif action == 3 and self.states:
+            state = self.states.pop()
+            if self._call("FreeFMUstate", component, byref(state)) != OK:
+                self.states.append(state)
+        elif action == 4:
+            self._serialise(component)
+        elif len(self.states) < 10:
+            self._deserialise(component)
+
+    def _serialise(self, component: int | None) -> None:
+        state = self.random.choice(self.states) if self.states else None
+        size = c_size_t()
+        if self._call("SerializedFMUstateSize", component, state, byref(size)) == OK:
+            block = ctypes.create_string_buffer(size.value)
+            room = size.value if self.random.random() < 0.8 else self.random.randrange(size.value)
+            if self._call("SerializeFMUstate", component, state, block, room) == OK:
+                self.blocks = [*self.blocks[-5:], block.raw]
+
+    def _deserialise(self, component: int | None) -> None:
+        block = bytearray(self.random.choice(self.blocks))
+        odd = self.random.random()
+        if odd < 0.2:
+            del block[self.random.randrange(len(block) + 1) :]
+        elif odd < 0.7 and block:
+            for _ in range(self.random.choice([1, 1, 8])):
+                block[self.random.randrange(len(block))] ^= 1 << self.random.randrange(8)
+            if self.random.random() < 0.7:
+                repair_checksum(block)
+        state = c_void_p()
+        if self._call("DeSerializeFMUstate", component, bytes(block), len(block), byref(state)) == OK:
+            self.states.append(state)
+
+    def _plain(self) -> None:
+        name = self.random.choice(
+            ["EnterInitializationMode", "ExitInitializationMode", "Terminate", "Reset", "CancelStep", "SetDebugLogging"]
+        )
+        component = self._component()
+        if name != "SetDebugLogging":
+            self._call(name, component)
+            return
+        names = [b"logAll", b"logStatusError", b"other", None]
+        self._call(name, component, self.random.randint(0, 1), 4, self.random.choice([None, (c_char_p * 4)(*names)]))
+        self._call(name, component, 1, 0, None)
+
+    def _status(self) -> None:
+        kind = self.random.randint(-1, 5)
+        for name, value in (("", c_int()), ("Real", c_double()), ("Integer", c_int()), ("Boolean", c_int())):
+            self._call(f"Get{name}Status", self._component(), kind, self.random.choice([None, byref(value)]))
+        self._call("GetStringStatus", self._component(), kind, byref(c_char_p()))
+        self._call("SetRealInputDerivatives", self._component(), None, 1, None, None)
+        self._call("GetRealOutputDerivatives", self._component(), None, 1, None, None)
+        self._call("GetDirectionalDerivative", self._component(), None, 1, None, 1, None, None)
+
+
+HEADER_SIZE, CHECKSUM_PLACE = 120, 72
+
+
+def repair_checksum(block: bytearray) -> None:
+    """Give a changed block the checksum that fits, so that what lies behind it is tested too."""
+    if len(block) < HEADER_SIZE:
+        return
+    block[CHECKSUM_PLACE : CHECKSUM_PLACE + 8] = bytes(8)
+    block[CHECKSUM_PLACE : CHECKSUM_PLACE + 8] = struct.pack(
+        "<Q", _fnv(block[:HEADER_SIZE]) ^ _fnv(block[HEADER_SIZE:])
+    )
+
+
+def _fnv(content: bytes | bytearray) -> int:
+    result = 14695981039346656037
+    for byte in content:
+        result = (result ^ byte) * 1099511628211 & 0xFFFFFFFFFFFFFFFF
+    return result
+
+
+def main() -> None:
+    """Run the fuzzer from the command line."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("library", type=Path)
+    parser.add_argument("description", type=Path)
+    parser.add_argument("resources")
+    parser.add_argument("--seconds", type=float, default=30.0)
+    parser.add_argument("--seed", type=int, default=0)
+    arguments = parser.parse_args()
+    fuzzer = Fuzzer(Library(arguments.library, arguments.description), arguments.resources, arguments.seed)
+    fuzzer.run(arguments.seconds)
+    counts = f"{fuzzer.calls} calls, {fuzzer.refused} refused, {fuzzer.steps} steps"
+    sys.stdout.write(f"{counts}, no finding (seed {arguments.seed})\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,288 @@
+"""ReferenceTrajectory → a look-ahead FMU → FeedDrive over the staircase, in one importer after the other.
+
+Run as a program, so that an importer's threads and libraries live in a process of their own:
+``python tests/support/importers_closed_system.py IMPORTER SYSTEM FOLDER OUT.npy``. FOLDER holds the three FMUs; OUT.npy
+gets what :func:`run` returns.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import platform
+import re
+import sys
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, files
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+from numpy.typing import NDArray
+from places import ROOT
+
+from hybridsep import FmuInstance
+
+Array = NDArray[np.float64]
+
+N_SAMPLES = 6001  # of the staircase
+STEP = 1e-3  # s
+GUIDE = ROOT / "docs" / "importers.md"
+
+
+@dataclass(frozen=True)
+class ClosedSystem:
+    """A closed system of three FMUs: ``reference``, the look-ahead and ``drive``.
+
+    Attributes
+    ----------
+    look_ahead : str
+        The look-ahead's name in the system.
+    model : str
+        Its FMU.
+    command : str
+        Its output that goes to the drive.
+    delay : int
+        By how many samples it delays the trajectory; the trajectory is held at its end for as many more.
+    positions : tuple of str
+        Its outputs that move with the trajectory.
+    reported : tuple of str
+        Its own figures, errors since ``t_init``.
+    figures : tuple of str
+        Those of ``reported`` that the guide states.
+    errors : tuple of (str, str)
+        Minuend and subtrahend of the errors whose RMS values over the whole trajectory the guide states.
+    """
+
+    look_ahead: str
+    model: str
+    command: str
+    delay: int
+    positions: tuple[str, ...]
+    reported: tuple[str, ...]
+    figures: tuple[str, ...]
+    errors: tuple[tuple[str, str], ...]
+
+    @property
+    def components(self) -> dict[str, str]:
+        """Name → FMU, in the order of the signals."""
+        return {"reference": "ReferenceTrajectory", self.look_ahead: self.model, "drive": "FeedDrive"}
+
+    @property
+    def connections(self) -> tuple[tuple[str, str, str, str], ...]:
+        """Component and output, component and input."""
+        return (
+            ("reference", "r", self.look_ahead, "x_d_ahead"),
+            (self.look_ahead, self.command, "drive", "x_d"),
+            ("drive", "x_meas", self.look_ahead, "x_meas"),
+        )
+
+    @property
+    def observed(self) -> tuple[tuple[str, str], ...]:
+        """Component and output of each column of what the runs return; the positions first."""
+        return (
+            *((self.look_ahead, name) for name in self.positions),
+            ("drive", "x"),
+            ("drive", "x_meas"),
+            *((self.look_ahead, name) for name in self.reported),
+        )
+
+    @property
+    def n_positions(self) -> int:
+        """How many of the columns move with the trajectory."""
+        return len(self.observed) - len(self.reported)
+
+    @property
+    def first(self) -> int:
+        """Row where the first fill ends."""
+        return self.delay - 1
+
+    @property
+    def n_steps(self) -> int:
+        """Steps to the trajectory's last sample."""
+        return N_SAMPLES - 1 + self.delay
+
+
+SYSTEMS = {
+    system.look_ahead: system
+    for system in (
+        ClosedSystem(
+            look_ahead="predictor",
+            model="HybridPredictor",
+            command="x_d",
+            delay=100,
+            positions=("x_d", "x_pb", "x_h"),
+            reported=("rms_pb", "rms_h"),
+            figures=("rms_pb", "rms_h"),
+            errors=(("x_meas", "x_pb"), ("x_meas", "x_h")),
+        ),
+        ClosedSystem(
+            look_ahead="compensator",
+            model="SepCompensator",
+            command="x_dm",
+            delay=200,
+            positions=("x_dm", "x_d", "x_pb", "x_h"),
+            reported=("rms_e", "rms_pb", "rms_h"),
+            figures=("rms_e", "rms_h"),
+            errors=(("x_d", "x"),),
+        ),
+    )
+}
+
+
+def blocks(language: str) -> list[str]:
+    """Return the guide's code blocks in a language."""
+    text = GUIDE.read_text(encoding="utf-8")
+    return re.findall(rf"^```{language}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+
+
+def system_structure(system: ClosedSystem, folder: Path) -> Path:
+    """Write the SSP that the guide describes, with the FMUs of the folder, and return its path."""
+    description, replacements = blocks("xml")
+    if system.look_ahead == "compensator":
+        description = replaced(description, replacements)
+    path = folder / "staircase.ssp"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("SystemStructure.ssd", description)
+        for model in system.components.values():
+            archive.write(folder / f"{model}.fmu", f"resources/{model}.fmu")
+    return path
+
+
+def replaced(description: str, replacements: str) -> str:
+    """Put the guide's second block in place of the predictor's component, the connections and the experiment."""
+    for pattern in (
+        r'<ssd:Component name="(?:predictor|compensator)".*?</ssd:Component>',
+        r"<ssd:Connections>.*?</ssd:Connections>",
+        r"<ssd:DefaultExperiment [^>]*/>",
+    ):
+        (old,), (new,) = (re.findall(pattern, text, re.DOTALL) for text in (description, replacements))
+        description, replacements = description.replace(old, new), replacements.replace(new, "")
+    assert not replacements.strip()
+    assert "predictor" not in description
+    return description
+
+
+def with_fmpy(system: ClosedSystem, folder: Path) -> Array:
+    """Jacobi: all outputs are read, all inputs set, all FMUs stepped; initialized in the order of the signals."""
+    fmus = {name: FmuInstance(folder / f"{model}.fmu") for name, model in system.components.items()}
+    rows = []
+    fmus["reference"].initialise()
+    fmus[system.look_ahead].initialise({"x_d_ahead": fmus["reference"].get("r")})
+    fmus["drive"].initialise({"x_d": fmus[system.look_ahead].get(system.command)})
+    for k in range(system.n_steps):
+        carried = [fmus[source].get(output) for source, output, _, _ in system.connections]
+        for (_, _, sink, name), position in zip(system.connections, carried, strict=True):
+            fmus[sink].set(name, position)
+        for fmu in fmus.values():
+            fmu.step(k * STEP, STEP)
+        rows.append([fmus[component].get(name) for component, name in system.observed])
+    for fmu in fmus.values():
+        fmu.close()
+    return np.array(rows)
+
+
+def with_fmpy_ssp(system: ClosedSystem, folder: Path) -> Array:
+    """fmpy's own SSP loop: Jacobi as well, but what is wired starts at 0 and is carried after a step only."""
+    simulate_ssp = import_module("fmpy.ssp.simulation").simulate_ssp
+    result = simulate_ssp(
+        str(system_structure(system, folder)), stop_time=(system.n_steps - 0.5) * STEP, step_size=STEP
+    )
+    return np.column_stack([result[f"{component}.{name}"] for component, name in system.observed])
+
+
+def with_libcosim(system: ClosedSystem, folder: Path) -> Array:
+    """libcosim's fixed-step algorithm."""
+    execution_of = import_module("libcosimpy.CosimExecution").CosimExecution
+    observer_of = import_module("libcosimpy.CosimObserver").CosimObserver
+    real = import_module("libcosimpy.CosimEnums").CosimVariableType.REAL
+    logging = import_module("libcosimpy.CosimLogging")
+    logging.log_output_level(logging.CosimLogLevel.WARNING)
+    execution = execution_of.from_ssp_file(str(system_structure(system, folder)), round(STEP * 1e9))
+    observer = observer_of.create_time_series(system.n_steps + 1)
+    execution.add_observer(observer)
+    places = []
+    for component, name in system.observed:
+        slave = execution.slave_index_from_instance_name(component)
+        references = {v.name.decode(): v.reference for v in execution.slave_variables(slave)}
+        places.append((slave, references[name]))
+        observer.start_time_series(slave, references[name], real)
+    execution.step(system.n_steps)  # the last version for Python 3.10 returns False whatever happens; the rows tell
+    return np.column_stack([observer.time_series_real_samples(*place, 1, system.n_steps)[2] for place in places])
+
+
+def with_ecos(system: ClosedSystem, folder: Path) -> Array:
+    """ecos's fixed-step algorithm."""
+    load_tbb()
+    simulation = import_module("ecospy").EcosSimulation(ssp_path=str(system_structure(system, folder)), step_size=STEP)
+    rows = []
+    assert simulation.init()
+    for _ in range(system.n_steps):
+        simulation.step()
+        rows.append([simulation.get_real(f"{component}::{name}") for component, name in system.observed])
+    simulation.terminate()
+    simulation.free()
+    return np.array(rows)
+
+
+def load_tbb() -> None:
+    """Load the wheel's libtbb, which ecos links to and which is beside no library search path."""
+    try:
+        libraries = files("tbb") or []
+    except PackageNotFoundError:  # the system may have it
+        return
+    for library in libraries:
+        if library.name == "libtbb.so.12":
+            ctypes.CDLL(str(library.locate()))
+
+
+def with_fmucontainer(system: ClosedSystem, folder: Path) -> Array:
+    """The fmu-manipulation-toolbox's container, an importer in C that is an FMU itself."""
+    fmu_of = {name: f"{model}.fmu" for name, model in system.components.items()}
+    description = {
+        "name": "container.fmu",
+        "fmu": list(fmu_of.values()),
+        "link": [[fmu_of[a], output, fmu_of[b], name] for a, output, b, name in system.connections],
+        "output": [[fmu_of[component], name, name] for component, name in system.observed],
+        "step_size": STEP,
+    }
+    (folder / "container.json").write_text(json.dumps(description))
+    assembly = import_module("fmu_manipulation_toolbox.assembly").Assembly
+    assembly("container.json", fmu_directory=folder).make_fmu(fmi_version=2)
+    names = [name for _, name in system.observed]
+    container, stop_time = str(folder / "container.fmu"), system.n_steps * STEP
+    result = fmpy.simulate_fmu(container, stop_time=stop_time, step_size=STEP, output_interval=STEP, output=names)
+    return np.column_stack([result[name][1:] for name in names])
+
+
+_DESKTOP = {("Linux", "x86_64"), ("Windows", "AMD64")}
+
+IMPORTERS: dict[str, tuple[Callable[[ClosedSystem, Path], Array], set[tuple[str, str]] | None]] = {
+    "fmpy": (with_fmpy, None),
+    "fmpy SSP": (with_fmpy_ssp, None),
+    "libcosim": (with_libcosim, _DESKTOP),  # libcosimpy 0.0.6 has wheels for these
+    "ecos": (with_ecos, _DESKTOP),  # ecospy 0.7.2's wheel is for any platform, its libraries are for these
+    "fmucontainer": (with_fmucontainer, _DESKTOP | {("Darwin", "arm64")}),  # likewise fmu-manipulation-toolbox 2.0's
+}
+"""How each importer runs the system, and the platforms it has a library for; None for all."""
+
+
+def exists_here(importer: str) -> bool:
+    """Whether the importer's package has a library for this platform; it must then be installed."""
+    platforms = IMPORTERS[importer][1]
+    return platforms is None or (platform.system(), platform.machine()) in platforms
+
+
+def run(importer: str, system: ClosedSystem, folder: Path) -> Array:
+    """Return what is observed at ``t_1 … t_n``, ``(n_steps, n_observed)``, m."""
+    rows: Any = IMPORTERS[importer][0](system, folder)
+    assert rows.shape == (system.n_steps, len(system.observed))
+    return np.asarray(rows, dtype=np.float64)
+
+
+if __name__ == "__main__":
+    np.save(sys.argv[4], run(sys.argv[1], SYSTEMS[sys.argv[2]], Path(sys.argv[3])))

@@ -1,0 +1,166 @@
+"""Calls that no FMU expects, made to pythonfmu's binary.
+
+Run as a program: ``python tests/support/pythonfmu_calls.py FOLDER CASE``, the folder of an unpacked FeedDrivePy.
+
+Some of them end the process, so each has one of its own; nothing is imported here that the FMU does not need.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from collections.abc import Callable
+from ctypes import byref, c_double, c_uint, c_void_p
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from fuzz_fmi2 import DISCARD, FATAL, OK, Callbacks, Library, Logger
+
+
+class Importer:
+    """An importer that may do anything, with one unpacked FMU."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.resources = folder / "resources"
+        (binary,) = (folder / "binaries" / "linux64").iterdir()
+        self.library = Library(binary, folder / "modelDescription.xml")
+
+    def instantiate(self, **changes: Any) -> int:
+        arguments: dict[str, Any] = {"resources": f"file://{self.resources}", "logging_on": True} | changes
+        component = self.library.instantiate(**arguments)
+        assert component is not None, self.library.messages
+        return component
+
+    def initialised(self, **changes: Any) -> int:
+        component = self.instantiate(**changes)
+        assert self.library.SetupExperiment(component, 0, 0.0, 0.0, 0, 0.0) == OK
+        assert self.library.EnterInitializationMode(component) == OK
+        assert self.library.ExitInitializationMode(component) == OK
+        return component
+
+
+def without_logger(importer: Importer) -> None:
+    callbacks = Callbacks()
+    callbacks.logger = Logger(0)
+    importer.library.DoStep(importer.initialised(callbacks=callbacks), 0.0, float("nan"), 1)
+
+
+def with_umlaut(importer: Importer) -> None:
+    folder = importer.folder / "größer"
+    shutil.copytree(importer.resources, folder)
+    importer.instantiate(resources=f"file://{quote(str(folder))}")
+
+
+def without_slave(importer: Importer) -> None:
+    (importer.resources / "slavemodule.txt").unlink()
+    importer.instantiate()
+
+
+def without_value(importer: Importer) -> None:
+    importer.library.GetReal(importer.initialised(), (c_uint * 1)(0), 1, None)
+
+
+KILLING: dict[str, tuple[str, Callable[[Importer], object]]] = {
+    "no name": ("instance name that is NULL", lambda it: it.instantiate(name=None)),
+    "name not UTF-8": ("not UTF-8", lambda it: it.instantiate(name=b"\xff")),
+    "no location": ("resource location that is NULL", lambda it: it.instantiate(resources=None)),
+    "other location": ("no <code>file:///</code> path", lambda it: it.instantiate(resources=f"file:{it.resources}")),
+    "percent code": ("percent codes", with_umlaut),
+    "no slave": ("slavemodule.txt", without_slave),
+    "no logger": ("logger are NULL", without_logger),
+    "no component": ("NULL component", lambda it: it.library.Reset(None)),
+    "no references": ("NULL array", lambda it: it.library.SetReal(it.instantiate(), None, 1, byref(c_double()))),
+    "no values": ("NULL array", without_value),
+    "no place for a state": ("place for a state", lambda it: it.library.GetFMUstate(it.initialised(), None)),
+    "no categories": ("log categories", lambda it: it.library.SetDebugLogging(it.instantiate(), 1, 1, None)),
+}
+"""What the page says of it, and the call."""
+
+
+def foreign_guid(importer: Importer) -> None:
+    assert importer.instantiate(guid="{nonsense}")
+    assert importer.instantiate(kind=0)
+
+
+def freed_state(importer: Importer) -> None:
+    component, state = importer.initialised(), c_void_p()
+    assert importer.library.GetFMUstate(component, byref(state)) == OK
+    assert importer.library.FreeFMUstate(component, byref(state)) == OK
+    assert state.value
+
+
+def refused_experiments(importer: Importer) -> None:
+    component = importer.instantiate()
+    for start, stop, message in (
+        (float("nan"), None, "the start time must be finite, got nan s"),
+        (float("-inf"), None, "the start time must be finite, got -inf s"),
+        (1.0, 0.5, "the stop time must be ≥ the start time 1 s, got 0.5 s"),
+        (0.0, float("nan"), "the stop time must be ≥ the start time 0 s, got nan s"),
+    ):
+        status = importer.library.SetupExperiment(component, 0, 0.0, start, stop is not None, stop or 0.0)
+        assert status == FATAL
+        assert message in importer.library.messages[-1][2]
+    assert importer.library.SetupExperiment(component, 0, 0.0, 2.0, 1, 3.0) == OK
+    importer.library.EnterInitializationMode(component)
+    importer.library.ExitInitializationMode(component)
+    assert importer.library.DoStep(component, 2.0, 1e-3, 1) == OK
+    importer.library.FreeInstance(component)
+
+
+def lost_description(importer: Importer) -> None:
+    """Before the instance is made, and before it is made again at a reset."""
+    component = importer.initialised()
+    file = importer.resources / "machine.json"
+    file.unlink()
+    for _ in range(3):
+        assert importer.library.Reset(component) == OK
+        assert importer.library.SetupExperiment(component, 0, 0.0, 0.0, 0, 0.0) == OK
+        assert importer.library.EnterInitializationMode(component) == OK
+        assert importer.library.ExitInitializationMode(component) == OK
+    assert importer.library.DoStep(component, 0.0, 1e-3, 1) == OK
+    importer.library.FreeInstance(component)
+    other = importer.resources.parent / "other"
+    shutil.copytree(importer.resources, other)
+    for content in (None, "{"):
+        if content:
+            (other / "machine.json").write_text(content)
+        assert importer.library.instantiate(resources=f"file://{other}", logging_on=True) is None
+        assert (
+            f"{other}/machine.json cannot be read, unpack the whole archive again" in importer.library.messages[-1][2]
+        )
+
+
+def interrupted_steps(importer: Importer) -> None:
+    """Ctrl-C inside a step, which is no Exception: the instance lives on, as after any other refusal."""
+    component = importer.initialised()
+    (slave,) = (module for name, module in sys.modules.items() if name.startswith("feed_drive_"))
+    advance = slave.FeedDrivePy.advance
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    for _ in range(50):
+        slave.FeedDrivePy.advance = interrupt
+        assert importer.library.DoStep(component, 0.0, 1e-3, 1) == FATAL
+        assert "KeyboardInterrupt" in importer.library.messages[-1][2]
+        slave.FeedDrivePy.advance = advance
+    assert importer.library.DoStep(component, 0.0, 1e-3, 1) == OK
+    assert importer.library.DoStep(component, 0.0, float("nan"), 1) == DISCARD
+    importer.library.FreeInstance(component)
+
+
+CAUGHT: dict[str, Callable[[Importer], object]] = {
+    function.__name__: function
+    for function in (foreign_guid, freed_state, refused_experiments, lost_description, interrupted_steps)
+}
+
+
+if __name__ == "__main__":
+    _, folder, case = sys.argv
+    call = CAUGHT.get(case) or KILLING[case][1]
+    call(Importer(Path(folder)))
+    print("survived", flush=True)
+    os._exit(0)  # pythonfmu's library would corrupt the heap while the process exits

@@ -1,0 +1,140 @@
+"""Closed loops with random parameters of the compensator: the library's and the C core's, each with its own drive."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from c_core import COMPENSATOR, DESCRIPTIONS, TS, CModel, library_compensator
+from numpy.typing import NDArray
+
+from hybridsep.compensate.sep_lookahead import SepLookAhead
+from hybridsep.machine import load_machine
+from hybridsep.plants.plant import Encoder, Plant
+from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest
+
+Array = NDArray[np.float64]
+
+MACHINES = ("spring_mass_damper", "als25010_x", "als25010_y")
+
+LIMITS = {"trajectory": (0.08, 8.0, 1000.0), "drive": (0.1, 16.0, 5000.0)}
+"""v_max, a_max and j_max: those of the trajectory, so that nearly every plan is bounded, and the usual ones."""
+
+for _name in MACHINES:
+    DESCRIPTIONS[f"compensator_{_name}"] = {
+        "model": "SepCompensator",
+        "parameters": COMPENSATOR,
+        "modes": [
+            {"f_n": mode.f_n, "zeta": mode.zeta, "alpha": mode.alpha, "beta": mode.beta}
+            for mode in load_machine(_name).model.modes
+        ],
+    }
+
+
+@dataclass(frozen=True)
+class Loop:
+    """One closed loop.
+
+    Attributes
+    ----------
+    machine : str
+    values : dict
+        FMI parameters of the compensator.
+    r : (n,) array, m
+        Commanded positions, as they enter the look-ahead; they begin at the position of rest.
+    noise_seed : int
+        Of the encoder.
+    """
+
+    machine: str
+    values: dict[str, Any]
+    r: Array
+    noise_seed: int
+
+    @property
+    def model(self) -> str:
+        """Key of :data:`c_core.DESCRIPTIONS`."""
+        return f"compensator_{self.machine}"
+
+    def drive(self) -> tuple[Plant, Encoder]:
+        """Return the plant, at rest at the start, and its encoder."""
+        machine = load_machine(self.machine)
+        assert machine.plant is not None
+        plant = machine.new_plant()
+        plant.reset(float(self.r[0]))
+        return plant, Encoder(machine.plant.noise_std, self.noise_seed)
+
+
+def random_loop(seed: int, n: int = 2500, machine: str | None = None, **fixed: float) -> Loop:
+    """Return a loop whose parameters follow from a seed, ``n`` samples long.
+
+    Parameters
+    ----------
+    seed : int
+    n : int
+        Samples.
+    machine : str, optional
+        Random too if left out.
+    **fixed
+        Parameters that are not random.
+    """
+    rng = np.random.default_rng(seed)
+    drawn = MACHINES[rng.integers(3)]
+    Np = int(rng.choice([20, 24, 30, 40, 50, 60, 80, 100]))
+    spacing = int(rng.choice([s for s in (1, 2, 3, 4, 5, 8, 10) if Np % s == 0]))
+    least = Np + 4 * spacing + 3
+    values: dict[str, Any] = {
+        "Np": Np,
+        "spacing": spacing,
+        "preview": int(rng.integers(least, max(least + 1, 260))),
+        "p": int(rng.integers(1, min(Np, 60) + 1)),
+        "q": int(rng.integers(0, min(Np, 45))),
+        "lambda": float(10 ** rng.uniform(-12, -6)),
+    }
+    chosen = (LIMITS["trajectory"], LIMITS["drive"], None)[rng.integers(3)]
+    if chosen is None:
+        v_max, a_max, j_max = np.array(LIMITS["trajectory"]) * rng.uniform(1, 3, 3)
+        chosen = float(v_max), float(a_max), float(j_max)
+    values |= dict(zip(("v_max", "a_max", "j_max"), chosen, strict=True))
+    values |= {
+        "change_max": float(rng.choice([1e-4, 2e-4, 5e-4, 1e-3, 5e-3])),
+        "jerk_weight": float(10 ** rng.uniform(-2, 2.5)),
+        "v_s": float(rng.choice([0.0, 1e-3, 2e-3, 5e-3])),
+        "keep_direction": int(rng.integers(2)),
+        "t_init": float(rng.choice([0.0, 0.05, 0.1, 0.3])),
+    }
+    stops = np.cumsum(np.concatenate(([0.0], rng.uniform(-0.01, 0.01, 30))))
+    r = rest_to_rest(stops, PAPER_LIMITS, TS, dwell=float(rng.uniform(0, 0.3)))[:n]
+    start = float(rng.choice([0.0, 0.1]))
+    return Loop(machine or drawn, {**COMPENSATOR, **values, **fixed}, r + start, int(rng.integers(1000)))
+
+
+def run_library(loop: Loop) -> tuple[Array, NDArray[np.int64]]:
+    """Return ``x_dm``, m, and ``sep_state`` of every sample with the library's compensator, ``(n,)`` both."""
+    plant, encoder = loop.drive()
+    start = float(loop.r[0])
+    ahead = SepLookAhead(library_compensator(loop.values, loop.model, start), start)
+    x_dm, states = np.empty(len(loop.r)), np.empty(len(loop.r), dtype=np.int64)
+    for k, r in enumerate(loop.r):
+        x_meas = encoder.measure(plant.x)
+        x_dm[k], states[k] = ahead.x_dm, ahead.sep_state
+        plant.step(ahead.x_dm, TS)
+        ahead.sample(float(r), x_meas)
+    return x_dm, states
+
+
+def run_c(loop: Loop, perturbation: float = 0.0) -> tuple[Array, NDArray[np.int64]]:
+    """Return the same with the C core's; ``perturbation``: largest relative change of its two inputs, random."""
+    plant, encoder = loop.drive()
+    start = float(loop.r[0])
+    model = CModel(loop.model, {**loop.values, "x_d_ahead": start, "x_meas": start}).initialise()
+    factors = 1.0 + perturbation * np.random.default_rng(0).uniform(-1, 1, (len(loop.r), 2))
+    x_dm, states = np.empty(len(loop.r)), np.empty(len(loop.r), dtype=np.int64)
+    for k, r in enumerate(loop.r):
+        x_meas = encoder.measure(plant.x)
+        x_dm[k], states[k] = model["x_dm"], model["sep_state"]
+        plant.step(model["x_dm"], TS)
+        model["x_d_ahead"], model["x_meas"] = float(r * factors[k, 0]), float(x_meas * factors[k, 1])
+        model.step(k * TS, TS)
+    return x_dm, states
