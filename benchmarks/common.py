@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel
-from hybridsep.plants.plant import FeedDrive, simulate
+from hybridsep.plants.feed_drive import FeedDrive
+from hybridsep.plants.plant import simulate
 from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.predictor import HybridPredictor
 

@@ -34,7 +34,8 @@ from scipy.linalg import toeplitz
 
 from hybridsep.base.parameters import check
 from hybridsep.base.signals import Array
-from hybridsep.model.physics import DiscreteModel, ModalModel, Mode
+from hybridsep.model.discrete import DiscreteModel
+from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.plants.trajectory import staircase
 
 __all__ = [

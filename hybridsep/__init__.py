@@ -20,8 +20,7 @@ from .base.errors import (
     StateError,
 )
 from .base.limits import Limits
-from .compensate.compensator import SepCompensator, SepPlan, SepState
-from .compensate.sep_lookahead import SepLookAhead
+from .compensate.compensator import SepCompensator, SepState
 from .cosim.compensator_run import SepCoSimulation, cosimulate_sep
 from .cosim.importer import FmuInstance
 from .cosim.predictor_run import CoSimulation, cosimulate
@@ -30,13 +29,17 @@ from .evaluate.closed_loop import ClosedLoop, contour_error, run_closed_loop
 from .fmi.archive import build_fmu, fmu_names
 from .logs import Log, LogReader, open_log, read_log
 from .machine import Machine, load_machine, machine_names
-from .model.physics import DiscreteModel, ModalModel, Mode
-from .plants.plant import Encoder, FeedDrive, StageDrive, simulate
+from .model.discrete import DiscreteModel
+from .model.physics import ModalModel, Mode
+from .plants.encoder import Encoder
+from .plants.feed_drive import FeedDrive
+from .plants.plant import simulate
+from .plants.stage_drive import StageDrive
 from .plants.trajectory import PAPER_LIMITS, along_path, archimedean_spiral, from_file, rest_to_rest, spiral, staircase
-from .predict.lookahead import LookAhead
+from .predict.look_ahead import LookAhead
 from .predict.predictor import HybridPredictor
 from .predict.regression import RidgeRegression
-from .predict.window import Prediction, WindowOperator
+from .predict.window import Prediction, PublishedWindow, WindowOperator
 
 __all__ = [
     "PAPER_LIMITS",
@@ -62,12 +65,11 @@ __all__ = [
     "ModelError",
     "ParameterError",
     "Prediction",
+    "PublishedWindow",
     "RidgeRegression",
     "Scores",
     "SepCoSimulation",
     "SepCompensator",
-    "SepLookAhead",
-    "SepPlan",
     "SepState",
     "SignalError",
     "StageDrive",

@@ -18,7 +18,9 @@ from .base.limits import Limits
 from .base.parameters import INPUT_HOLDS, PARAMETERS, check, check_lags, check_preview
 from .compensate.compensator import SepCompensator, SepState
 from .model.physics import ModalModel, Mode
-from .plants.plant import FeedDrive, Plant, StageDrive
+from .plants.feed_drive import FeedDrive
+from .plants.plant import Plant
+from .plants.stage_drive import StageDrive
 from .predict.predictor import HybridPredictor
 
 if sys.version_info >= (3, 11):

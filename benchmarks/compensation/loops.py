@@ -17,7 +17,9 @@ from hybridsep.cosim.compensator_run import SepCoSimulation, cosimulate_sep
 from hybridsep.evaluate.closed_loop import ClosedLoop, run_closed_loop
 from hybridsep.fmi.archive import build_fmu, fmu_names
 from hybridsep.machine import Machine
-from hybridsep.plants.plant import Encoder, FeedDrive, Plant
+from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.feed_drive import FeedDrive
+from hybridsep.plants.plant import Plant
 
 __all__ = ["Case", "FmuLoops", "LibraryLoops", "Loops", "noise_seed"]
 

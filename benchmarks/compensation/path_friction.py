@@ -8,7 +8,9 @@ from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepState
 from hybridsep.evaluate.closed_loop import ClosedLoop, run_closed_loop
 from hybridsep.machine import Machine, StageSection
-from hybridsep.plants.plant import Encoder, Plant, StageDrive
+from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.plant import Plant
+from hybridsep.plants.stage_drive import StageDrive
 
 from .loops import noise_seed
 

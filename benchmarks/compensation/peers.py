@@ -14,7 +14,8 @@ from scipy.signal import lfilter, ss2tf
 
 from hybridsep.base.errors import ParameterError
 from hybridsep.base.signals import Array, as_samples
-from hybridsep.model.physics import DiscreteModel, ModalModel
+from hybridsep.model.discrete import DiscreteModel
+from hybridsep.model.physics import ModalModel
 
 __all__ = ["input_shaper", "shape", "zero_phase_command"]
 

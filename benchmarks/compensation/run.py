@@ -30,7 +30,8 @@ from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepState
 from hybridsep.evaluate.closed_loop import ClosedLoop, contour_error
 from hybridsep.machine import CompensatorSection, Machine, load_machine
-from hybridsep.plants.plant import FeedDrive, simulate
+from hybridsep.plants.feed_drive import FeedDrive
+from hybridsep.plants.plant import simulate
 from hybridsep.plants.trajectory import archimedean_spiral, spiral, staircase
 
 UM = 1e6

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from hybridsep.fmi.c_header import c_header
 from hybridsep.fmi.compiler import compile_flags
 from hybridsep.model.physics import ModalModel
-from hybridsep.plants.plant import FeedDrive, simulate
+from hybridsep.plants.feed_drive import FeedDrive
+from hybridsep.plants.plant import simulate
 from hybridsep.plants.trajectory import staircase
 
 __all__ = ["PREDICTOR", "Array", "Host", "build", "drive_log", "instructions"]

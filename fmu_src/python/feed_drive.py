@@ -12,7 +12,10 @@ from hybridsep.base.signals import POSITION_MAX
 from hybridsep.fmi import slave
 from hybridsep.fmi.variables import modes_from
 from hybridsep.model.physics import ModalModel, Mode
-from hybridsep.plants.plant import Encoder, FeedDrive, Plant, StageDrive
+from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.feed_drive import FeedDrive
+from hybridsep.plants.plant import Plant
+from hybridsep.plants.stage_drive import StageDrive
 
 
 class FeedDrivePy(slave.TableSlave):

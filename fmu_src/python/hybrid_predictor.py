@@ -8,24 +8,23 @@ from hybridsep.fmi import look_ahead_slave
 from hybridsep.fmi.variables import modes_from
 from hybridsep.fmi.weights import WEIGHTS_FILE, restore_weights
 from hybridsep.model.physics import ModalModel, Mode
-from hybridsep.predict.lookahead import LookAhead
 from hybridsep.predict.predictor import HybridPredictor
 
 
 class HybridPredictorPy(look_ahead_slave.LookAheadSlave):
     """Sits between the interpolator and the drive: delays the command by Np samples and predicts what follows."""
 
-    look_ahead_type = LookAhead
+    model_type = HybridPredictor
 
-    def new_look_ahead(self) -> LookAhead:
-        """Make the look-ahead from the parameters as they are now, with what the resources say was learned."""
+    def new_model(self) -> HybridPredictor:
+        """Make the predictor from the parameters as they are now, with what the resources say was learned."""
         names = ("Np", "p", "q", "lambda", "T_s", "t_init", "input_hold")
         model = ModalModel([Mode(**mode) for mode in modes_from(self.values)], self.values["dead_time"])
         predictor = HybridPredictor.with_parameters(model, {name: self.values[name] for name in names})
         trained = Path(self.resources) / WEIGHTS_FILE
         if trained.exists():
             restore_weights(predictor, trained.read_bytes())
-        return LookAhead(predictor, self.values["x_d_ahead"])
+        return predictor
 
     def initial_value(self, name: str) -> float | int | bool:
         """Return the value at ``t_0``: the drive rests at the start value of ``x_d_ahead``."""
@@ -44,7 +43,7 @@ class HybridPredictorPy(look_ahead_slave.LookAheadSlave):
             value: float | int | bool = getattr(self.look_ahead, name)
             return value
         window, i = _window_index(name)
-        samples = getattr(self.look_ahead, window)
+        samples = getattr(self.look_ahead.window, window.removesuffix("_window"))
         return float(samples[i]) if i < len(samples) else 0.0
 
 

@@ -9,18 +9,18 @@ from hybridsep.base.errors import HybridSepError, ParameterError
 from hybridsep.base.limits import Limits
 from hybridsep.base.parameters import check
 from hybridsep.compensate.compensator import SepCompensator, SepState
-from hybridsep.compensate.sep_lookahead import SepLookAhead
 from hybridsep.fmi import look_ahead_slave
 from hybridsep.fmi.variables import PLANNING, modes_from
 from hybridsep.fmi.weights import WEIGHTS_FILE, restore_weights
 from hybridsep.model.physics import ModalModel, Mode
+from hybridsep.predict.look_ahead import LookAhead
 from hybridsep.predict.predictor import HybridPredictor
 
 
 class SepCompensatorPy(look_ahead_slave.LookAheadSlave):
     """Sits between the interpolator and the drive: delays the command by the preview and modifies it."""
 
-    look_ahead_type = SepLookAhead
+    model_type = SepCompensator
 
     def initial_value(self, name: str) -> float | int | bool:
         """Return the value at ``t_0``, when the first window has been planned already.
@@ -37,8 +37,8 @@ class SepCompensatorPy(look_ahead_slave.LookAheadSlave):
         """Return an output now."""
         return _output(self.look_ahead, name)
 
-    def new_look_ahead(self) -> SepLookAhead:
-        """Make the look-ahead from the parameters as they are now, with what the resources say was learned."""
+    def new_model(self) -> SepCompensator:
+        """Make the compensator from the parameters as they are now, with what the resources say was learned."""
         values = self.values
         names = ("Np", "p", "q", "lambda", "T_s", "t_init", "input_hold")
         model = ModalModel([Mode(**mode) for mode in modes_from(values)], values["dead_time"])
@@ -47,7 +47,7 @@ class SepCompensatorPy(look_ahead_slave.LookAheadSlave):
         trained = Path(self.resources) / WEIGHTS_FILE
         if trained.exists():
             restore_weights(predictor, trained.read_bytes())
-        compensator = SepCompensator(
+        return SepCompensator(
             predictor,
             preview=planning["preview"],
             spacing=planning["spacing"],
@@ -57,7 +57,6 @@ class SepCompensatorPy(look_ahead_slave.LookAheadSlave):
             keep_direction=bool(planning["keep_direction"]),
             best=SepState(planning["compensate"]),
         )
-        return SepLookAhead(compensator, values["x_d_ahead"])
 
     def _planning(self) -> dict[str, Any]:
         """Return the compensator's own parameters, each within its range; name all that are not."""
@@ -72,6 +71,6 @@ class SepCompensatorPy(look_ahead_slave.LookAheadSlave):
         return planning
 
 
-def _output(look_ahead: SepLookAhead, name: str) -> float | int:
+def _output(look_ahead: LookAhead, name: str) -> float | int:
     value = getattr(look_ahead, name)
     return int(value) if name in ("sep_state", "batch") else float(value)

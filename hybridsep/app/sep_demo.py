@@ -14,7 +14,7 @@ from ..cosim.compensator_run import SepCoSimulation, cosimulate_sep
 from ..evaluate.closed_loop import contour_error, run_closed_loop
 from ..fmi.archive import build_fmu, fmu_names
 from ..machine import Machine
-from ..plants.plant import Encoder
+from ..plants.encoder import Encoder
 from ..plants.trajectory import archimedean_spiral
 
 __all__ = ["KINDS", "Runs", "build_for_host", "compensate", "contour_errors", "mean_summary", "train"]

@@ -26,14 +26,14 @@ from ..base.saved import Saved
 from ..base.signals import Array, as_published, as_samples
 from ..base.state import pack, unpack
 from ..predict.predictor import HybridPredictor
-from ..predict.window import Prediction
+from ..predict.window import Prediction, PublishedWindow
 from .bounded import DriveBounds, solve
-from .plan import PendingPlan, SepPlan, SepState
+from .plan import PendingPlan, SepState
 from .sensor import SensorWatch
 from .splines import N_DECIDED, SplineBasis, direct_samples
 from .trust import Trust, has_stable_poles
 
-__all__ = ["RECOMMENDED", "SepCompensator", "SepPlan", "SepState", "direct_samples"]
+__all__ = ["RECOMMENDED", "SepCompensator", "SepState", "direct_samples"]
 
 _KIND = "compensator"
 
@@ -127,7 +127,7 @@ class SepCompensator:
         self._x_d_before = np.full(3, np.nan)
         self._pending: PendingPlan | None = None
 
-    def plan(self, x_d: ArrayLike) -> SepPlan:
+    def plan(self, x_d: ArrayLike) -> PublishedWindow:
         """Plan the next window.
 
         May be called again, with other commands, before :meth:`update`; the last call counts.
@@ -139,7 +139,7 @@ class SepCompensator:
 
         Returns
         -------
-        SepPlan
+        PublishedWindow
 
         Raises
         ------
@@ -158,10 +158,11 @@ class SepCompensator:
         prediction = predictor.predict(x_dm, reference=command)
         self._pending = PendingPlan(coefficients, delta, command[:Np].copy(), prediction, state)
         as_published(prediction.x_pb, "x_pb")
-        x_h = prediction.x_pb.copy()
         if state is SepState.HYBRID:
-            x_h = as_published(prediction.x_pb + prediction.e_h, "x_h")
-        return SepPlan(x_dm=x_dm, x_pb=prediction.x_pb, x_h=x_h, state=state)
+            x_h, n_warm_up = as_published(prediction.x_pb + prediction.e_h, "x_h"), 0
+        else:
+            x_h, n_warm_up = prediction.x_pb.copy(), Np
+        return PublishedWindow(command[:Np].copy(), x_dm, prediction.x_pb, x_h, state, n_warm_up)
 
     def update(self, x: ArrayLike) -> None:
         """Learn from the measurement of the planned window.

@@ -8,7 +8,7 @@ from enum import IntEnum
 from ..base.signals import Array
 from ..predict.window import Prediction
 
-__all__ = ["PendingPlan", "SepPlan", "SepState"]
+__all__ = ["PendingPlan", "SepState"]
 
 
 class SepState(IntEnum):
@@ -17,25 +17,6 @@ class SepState(IntEnum):
     OFF = 0
     PHYSICS = 1
     HYBRID = 2
-
-
-@dataclass(frozen=True)
-class SepPlan:
-    """What is sent to the drive over the next window, and what it will do.
-
-    Attributes
-    ----------
-    x_dm : (Np,) array, m
-        Modified command.
-    x_pb, x_h : (Np,) arrays, m
-        Physics-based prediction under it, and that of the model which planned it.
-    state : SepState
-    """
-
-    x_dm: Array
-    x_pb: Array
-    x_h: Array
-    state: SepState
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,9 @@ from scipy.spatial import cKDTree
 from ..base.signals import Array, as_samples
 from ..base.threads import one_blas_thread
 from ..compensate.compensator import SepCompensator
-from ..compensate.sep_lookahead import SepLookAhead
-from ..plants.plant import Encoder, Plant
+from ..plants.encoder import Encoder
+from ..plants.plant import Plant
+from ..predict.look_ahead import LookAhead
 
 __all__ = ["ClosedLoop", "contour_error", "run_closed_loop"]
 
@@ -87,8 +88,8 @@ def run_closed_loop(
     """
     command = as_samples(r, "r")
     encoder = Encoder() if encoder is None else encoder
-    look_ahead = SepLookAhead(compensator, float(command[0]), t_init=t_init)
-    preview, n = look_ahead.preview, len(command)
+    look_ahead = LookAhead(compensator, float(command[0]), t_init=t_init)
+    preview, n = look_ahead.delay, len(command)
     Ts = compensator.predictor.Ts
     plant.reset(float(command[0]))
     signals = np.empty((n + preview, 6))

@@ -7,31 +7,37 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from ..base.saved import Saved
-from ..predict.sampled_inputs import SampledInputs
+from ..predict.look_ahead import LookAhead, Planner
+from ..predict.look_ahead_inputs import LookAheadInputs
+from ..predict.predictor import HybridPredictor
 from .slave import TableSlave
 
 __all__ = ["LookAheadSlave"]
 
 
 class LookAheadSlave(TableSlave):
-    """A slave whose core is a look-ahead: it has ``check``, ``sample`` and ``to_bytes``.
+    """A slave whose core is a look-ahead.
 
     Attributes
     ----------
-    look_ahead_type : type
-        Has ``from_bytes``.
+    model_type : type
+        That of the look-ahead's predictor or planner.
     """
 
-    look_ahead_type: ClassVar[Any]
+    model_type: ClassVar[type[HybridPredictor] | type[Planner]]
 
     @abstractmethod
-    def new_look_ahead(self) -> Any:
-        """Make the look-ahead from the parameters as they are now, with what the resources say was learned."""
+    def new_model(self) -> HybridPredictor | Planner:
+        """Make the predictor or planner from the parameters as they are now, with what the resources have learned."""
+
+    def new_look_ahead(self) -> LookAhead:
+        """Make the look-ahead from the parameters as they are now."""
+        return LookAhead(self.new_model(), self.values["x_d_ahead"])
 
     def initialise(self) -> None:
         """Make the look-ahead and start the clock."""
         self.look_ahead = self.new_look_ahead()
-        self.inputs = SampledInputs(self.start_time, self.values["T_s"], self.values["x_d_ahead"])
+        self.inputs = LookAheadInputs(self.start_time, self.values["T_s"], self.values["x_d_ahead"])
 
     def advance(self, t: float, h: float) -> None:
         """Execute the samples that the step reaches."""
@@ -46,8 +52,8 @@ class LookAheadSlave(TableSlave):
     def restore_core(self, meta: Mapping[str, Any], blob: bytes) -> None:
         """Take over a clock and a look-ahead."""
         state = Saved("look-ahead", meta, {}, {})
-        inputs = SampledInputs.from_state(state.numbers("inputs", SampledInputs.STATE_SIZE))
-        look_ahead = self.look_ahead_type.from_bytes(blob)
+        inputs = LookAheadInputs.from_state(state.numbers("inputs", LookAheadInputs.STATE_SIZE))
+        look_ahead = LookAhead.from_bytes(blob, self.model_type)
         if inputs.clock.T_s != self.values["T_s"] or inputs.clock.k != look_ahead.k:
             raise state.error("its clock must count the samples of this look-ahead")
         self.look_ahead, self.inputs = look_ahead, inputs

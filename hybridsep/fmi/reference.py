@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.signals import Array, as_samples
-from ..compensate.sep_lookahead import SepLookAhead
 from ..machine import Machine
-from ..plants.plant import Encoder
+from ..plants.encoder import Encoder
 from ..plants.trajectory import staircase
-from ..predict.lookahead import LookAhead
+from ..predict.look_ahead import LookAhead
 from ..predict.predictor import HybridPredictor
 from .variables import variables_of
 from .weights import restore_weights, weights_file
@@ -103,7 +102,7 @@ def _look_ahead_run(
     predictor = machine.new_predictor(t_init=t_init) if compensator is None else compensator.predictor
     if trained is not None:
         restore_weights(predictor, weights_file(trained))
-    look_ahead = LookAhead(predictor, 0.0) if compensator is None else SepLookAhead(compensator, 0.0)
+    look_ahead = LookAhead(predictor, 0.0) if compensator is None else LookAhead(compensator, 0.0)
     warm_up = max(predictor.n_init, 0 if compensator is None else compensator.preview)
     least = _SAMPLES if compensator is None else _COMPENSATED_SAMPLES
     n = min(max(least, 3 * predictor.Np + warm_up), _SAMPLES_MAX)

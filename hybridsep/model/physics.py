@@ -1,8 +1,7 @@
 """The physics-based linear model ``G_pb`` of a feed drive, as a sum of modes, eq. (15).
 
 ``G_pb(s) = Σ_i (α_i + β_i s) / (s² + 2 ζ_i ω_i s + ω_i²)``; the spring-mass-damper of eq. (11) is one such mode.
-:class:`ModalModel` is the continuous model, :class:`DiscreteModel` what it is between two samples of a command
-that is held (zero-order) or interpolated (first-order); both are exact at the samples.
+:class:`ModalModel` is the continuous model.
 """
 
 from __future__ import annotations
@@ -13,22 +12,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import block_diag, expm, toeplitz
+from scipy.linalg import block_diag
 
 from ..base.errors import ModelError, ParameterError
-from ..base.parameters import INPUT_HOLDS, check
+from ..base.parameters import check
 from ..base.signals import Array
+from .discrete import BLOCK_MAX, DiscreteModel
 
 if TYPE_CHECKING:
     import control
 
-__all__ = ["DiscreteModel", "ModalModel", "Mode"]
+__all__ = ["ModalModel", "Mode"]
 
 MODES_MAX = 100
 """Modes of one model, at most; its tables grow with their square."""
-
-BLOCK_MAX = 256
-"""Longest stretch answered by one pair of lifted matrices; longer windows go block by block."""
 
 
 @dataclass(frozen=True)
@@ -182,7 +179,7 @@ class ModalModel:
         ParameterError
             If ``Ts ≤ 0`` or the hold is unknown.
         """
-        return DiscreteModel(self, Ts, input_hold, block)
+        return DiscreteModel(self.state_space(), self.dead_time, Ts, input_hold, block)
 
     def frequency_response(self, f: ArrayLike, Ts: float | None = None) -> NDArray[np.complex128]:
         """Return ``G_pb(j 2π f)``.
@@ -239,109 +236,3 @@ class ModalModel:
             register = control.ss(np.eye(d, k=-1), np.eye(d, 1), np.eye(1, d, k=d - 1), [[0.0]], Ts)
             system = control.series(register, system)
         return system
-
-
-class DiscreteModel:
-    """``x_pb = G_pb x_d`` at the samples, eq. (2), with a state that is carried from window to window.
-
-    ``s(k+1) = A s(k) + b u(k)``, ``x_pb(k) = c s(k) + d u(k)``, ``u`` being ``x_d`` after the dead time. Windows are
-    answered by the lifted form of that recursion, ``x_pb = O s + T u`` with ``T`` lower-triangular Toeplitz.
-
-    Positions are relative to the point where the drive was at rest; the state is plain data, ``(n_state,)``.
-    """
-
-    def __init__(self, model: ModalModel, Ts: float, input_hold: str = "zoh", block: int = BLOCK_MAX) -> None:
-        if input_hold not in INPUT_HOLDS:
-            raise ParameterError(f"input_hold must be one of {', '.join(INPUT_HOLDS)}, got {input_hold!r}")
-        self.model = model
-        self.Ts: float = check("T_s", Ts)
-        self.input_hold = input_hold
-        self.dead_time = model.dead_time
-        self.A, self.b, self.c, self.d = _discrete(model, self.Ts, input_hold)
-        self._n = len(self.b)
-        self._block = max(1, min(block, BLOCK_MAX))
-        self._tabulate()
-
-    @property
-    def n_state(self) -> int:
-        """Length of the state: two for each mode, and the commands still in the dead time."""
-        return self._n + self.dead_time
-
-    def rest(self) -> Array:
-        """Return the state of a drive at rest at position 0, ``(n_state,)``."""
-        return np.zeros(self.n_state)
-
-    def respond(self, state: Array, x_d: Array) -> tuple[Array, Array]:
-        """Return the model's positions over a window and the state at its end; eq. (2).
-
-        Parameters
-        ----------
-        state : (n_state,) array, m
-            From :meth:`rest` or an earlier call; not changed.
-        x_d : (n,) array, m
-            Commanded positions, any length.
-
-        Returns
-        -------
-        x_pb : (n,) array, m
-        state : (n_state,) array, m
-            To be given to the next window.
-        """
-        n = len(x_d)
-        s, u, register = state, x_d, state[:0]
-        if self.dead_time:
-            line = np.concatenate((state[self._n :], x_d))
-            s, u, register = state[: self._n], line[:n], line[n:]
-        if n <= self._block:
-            x_pb, s = self._respond_block(s, u)
-        else:
-            x_pb = np.empty(n)
-            for i in range(0, n, self._block):
-                stop = min(i + self._block, n)
-                x_pb[i:stop], s = self._respond_block(s, u[i:stop])
-        return x_pb, (np.concatenate((s, register)) if self.dead_time else s)
-
-    def impulse_response(self, n: int) -> Array:
-        """Return the first column of the lower-triangular Toeplitz ``G_pb`` of a window, ``(n,)``, m/m."""
-        impulse = np.zeros(n)
-        impulse[0] = 1.0
-        return self.respond(self.rest(), impulse)[0]
-
-    def _respond_block(self, s: Array, u: Array) -> tuple[Array, Array]:
-        n = len(u)
-        x_pb = self._O[:n] @ s + self._T[:n, :n] @ u
-        return x_pb, self._powers[n] @ s + self._K[:, self._block - n :] @ u
-
-    def _tabulate(self) -> None:
-        """Tabulate, for windows of up to ``block`` samples, what ``x_pb`` and the end state are made of."""
-        m, n = self._block, self._n
-        self._powers = np.empty((m + 1, n, n))  # A⁰ … Aᵐ
-        self._powers[0] = np.eye(n)
-        for i in range(m):
-            self._powers[i + 1] = self.A @ self._powers[i]
-        self._O = np.ascontiguousarray(self.c @ self._powers[:m])  # row i: c Aⁱ
-        self._K = np.ascontiguousarray((self._powers[:m] @ self.b)[::-1].T)  # [Aᵐ⁻¹b … A b, b]
-        markov = np.concatenate(([self.d], self._O[: m - 1] @ self.b))  # d, c b, c A b, …
-        self._T = toeplitz(markov, np.zeros(m))
-
-
-def _discrete(model: ModalModel, Ts: float, input_hold: str) -> tuple[Array, Array, Array, float]:
-    """Discretise each mode by the matrix exponential of its augmented system (Van Loan)."""
-    A, b, c = model.state_space()
-    A_d, b_d, d = np.zeros_like(A), np.zeros_like(b), 0.0
-    for i in range(0, len(b), 2):
-        block = slice(i, i + 2)
-        augmented = np.zeros((4, 4))
-        augmented[:2, :2] = A[block, block] * Ts
-        augmented[:2, 2] = b[block] * Ts
-        augmented[2, 3] = 1.0  # the ramp from u(k) to u(k+1)
-        exponential = expm(augmented)
-        phi, gamma_1, gamma_2 = exponential[:2, :2], exponential[:2, 2], exponential[:2, 3]
-        A_d[block, block] = phi
-        if input_hold == "zoh":
-            b_d[block] = gamma_1
-        else:
-            # ξ(k+1) = Φ ξ + Γ₁ u(k) + Γ₂ (u(k+1) − u(k)); with s = ξ − Γ₂ u it needs no future command.
-            b_d[block] = phi @ gamma_2 + gamma_1 - gamma_2
-            d += float(c[block] @ gamma_2)
-    return A_d, b_d, c, d

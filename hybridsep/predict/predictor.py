@@ -8,40 +8,25 @@ is one free run of an ARX recursion from the last ``p`` measured residuals, and 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.lib.stride_tricks import as_strided
 from numpy.typing import ArrayLike
 from scipy.signal import lfilter
 
 from ..base.errors import SignalError
 from ..base.output import written_whole
 from ..base.parameters import INPUT_HOLDS, check, check_together, samples_before
-from ..base.saved import Saved
 from ..base.signals import Array, as_samples
-from ..base.state import pack, unpack
-from ..model.physics import ModalModel, Mode
+from ..model.physics import ModalModel
+from .features import FeatureLayout, PastSamples
+from .reference_features import ReferenceFeatures
 from .regression import RidgeRegression
-from .schedule import N_SCHEDULED, ReferenceSchedule
-from .window import Prediction, WindowOperator
+from .saved_predictor import predictor_blob, predictor_from
+from .window import PredictedWindow, Prediction, WindowOperator
 
 __all__ = ["HybridPredictor"]
-
-_KIND = "predictor"
-
-
-@dataclass(frozen=True)
-class _Pending:
-    """The last predicted window, waiting to be measured."""
-
-    x_d: Array
-    x_pb: Array
-    start: float
-    reference: Array
-    signs: Array
 
 
 class HybridPredictor:
@@ -71,7 +56,7 @@ class HybridPredictor:
         are relative to it inside, because ridge regression is not invariant to an offset.
     v_s : float
         Velocity over which the drive's friction changes its sign, m/s: φ has further features then, of the reference
-        alone (:mod:`hybridsep._schedule`). 0, as in the paper: none.
+        alone (:mod:`~hybridsep.predict.reference_features`). 0, as in the paper: none.
 
     Raises
     ------
@@ -98,9 +83,10 @@ class HybridPredictor:
         self.Ts, self.lam, self.t_init = float(Ts), float(lam), float(t_init)
         self.model = model
         self.discrete = model.discretise(self.Ts, input_hold, block=self.Np)
-        self._schedule = ReferenceSchedule(check("v_s", v_s), self.Ts)
-        self.regression = RidgeRegression(2 + self.q + self.p + self._schedule.n, self.lam)
-        self._allocate()
+        self.reference_features = ReferenceFeatures(check("v_s", v_s), self.Ts)
+        self.layout = FeatureLayout(self.p, self.q, self.reference_features.n)
+        self.past = PastSamples(self.layout, self.Np)
+        self.regression = RidgeRegression(self.layout.n, self.lam)
         self.new_run(start, t_init=t_init)
 
     @classmethod
@@ -114,18 +100,18 @@ class HybridPredictor:
 
     @property
     def n_features(self) -> int:
-        """``n = 2 + q + p``, and the reference-scheduled ones."""
-        return self.regression.n_features
+        """``n``, of all groups of features."""
+        return self.layout.n
 
     @property
     def v_s(self) -> float:
         """Velocity over which friction changes its sign, m/s; 0 without reference-scheduled features."""
-        return self._schedule.v_s
+        return self.reference_features.v_s
 
     @property
     def residual_weights(self) -> Array:
         """Weights of the past residuals, ``(p,)``: those of the learned recursion."""
-        return self.weights[2 + self.q : 2 + self.q + self.p]
+        return self.weights[self.layout.e_pb]
 
     @property
     def weights(self) -> Array:
@@ -146,11 +132,10 @@ class HybridPredictor:
         self.n_init = samples_before(check("t_init", t_init), self.Ts)
         self.start = rest
         self.k = 0
-        self._state = self.discrete.rest()
-        # x_pb and e_pb before the first sample are zero in φ.
-        self._x[:], self._e[:] = 0.0, 0.0
-        self._schedule.new_run()
-        self._pending: _Pending | None = None
+        self.state = self.discrete.rest()
+        self.past.restart()
+        self.reference_features.new_run()
+        self.waiting: PredictedWindow | None = None
 
     def predict(self, x_d: ArrayLike, *, reference: ArrayLike | None = None) -> Prediction:
         """Predict the next window from its commands and all that was measured before; eqs. (2), (4).
@@ -180,13 +165,13 @@ class HybridPredictor:
             raise SignalError("x_d must have at least one sample, got none")
         start = float(command[0]) if self.start is None else self.start
         command = command - start
-        x_pb, _ = self.discrete.respond(self._state, command)  # Eq. (2)
+        x_pb, _ = self.discrete.respond(self.state, command)  # Eq. (2)
         path = command + start if reference is None else as_samples(reference, "reference")
         if len(path) < n:
             raise SignalError(f"reference must have at least the {n} samples of x_d, got {len(path)}")
-        signs = self._schedule.signs(path, start)
-        self._pending = _Pending(command, x_pb, start, path, signs)
-        e_h = self._free_run(x_pb, self._schedule.features(signs, n))
+        signs = self.reference_features.signs(path, start)
+        self.waiting = PredictedWindow(command, x_pb, start, path, signs)
+        e_h = self._free_run(x_pb, self.reference_features.features(signs, n))
         return Prediction(x_pb + start, e_h, min(max(self.n_init - self.k, 0), n))
 
     def update(self, x: ArrayLike, *, learn: bool = True) -> None:
@@ -204,23 +189,23 @@ class HybridPredictor:
         SignalError
             If nothing was predicted, ``x`` is longer than the window, or a value is not finite. Nothing is changed.
         """
-        pending = self._pending
-        if pending is None:
+        waiting = self.waiting
+        if waiting is None:
             raise SignalError("update must follow predict: there is no predicted window to measure")
         measured = as_samples(x, "x")
-        if not 1 <= len(measured) <= len(pending.x_d):
-            raise SignalError(f"x must have 1 … {len(pending.x_d)} samples, as predicted, got {len(measured)}")
+        if not 1 <= len(measured) <= len(waiting.x_d):
+            raise SignalError(f"x must have 1 … {len(waiting.x_d)} samples, as predicted, got {len(measured)}")
         m = len(measured)
-        e_pb = measured - pending.start - pending.x_pb[:m]
-        scheduled = self._schedule.features(pending.signs, m)
+        e_pb = measured - waiting.start - waiting.x_pb[:m]
+        scheduled = self.reference_features.features(waiting.signs, m)
         for i in range(0, m, self.Np):
             stop = min(i + self.Np, m)
-            self._take_in(pending.x_pb[i:stop], e_pb[i:stop], scheduled[i:stop], learn)
-        self._schedule.advance(pending.signs, pending.reference, m)
-        _, self._state = self.discrete.respond(self._state, pending.x_d[:m])
-        self.start = pending.start
+            self._take_in(waiting.x_pb[i:stop], e_pb[i:stop], scheduled[i:stop], learn)
+        self.reference_features.advance(waiting.signs, waiting.reference, m)
+        _, self.state = self.discrete.respond(self.state, waiting.x_d[:m])
+        self.start = waiting.start
         self.k += m
-        self._pending = None
+        self.waiting = None
 
     def operator(self, n: int | None = None, *, reference: ArrayLike | None = None) -> WindowOperator:
         """Return the model of the next ``n`` samples (``Np`` if left out) as an affine map of their commands; eq. (3).
@@ -236,17 +221,17 @@ class HybridPredictor:
         length = self.Np if n is None else n
         if length < 1:
             raise SignalError(f"n must be ≥ 1, got {length}")
-        start = self.start if self.start is not None or self._pending is None else self._pending.start
+        start = self.start if self.start is not None or self.waiting is None else self.waiting.start
         if start is None:
             raise SignalError("the start is not known yet: give start= or predict the first window before")
-        w_x, w_e = self.weights[1 : 2 + self.q], self.residual_weights
+        w_x, w_e = self.weights[self.layout.x_pb], self.residual_weights
         g_pb = self.discrete.impulse_response(length)
         # x_h = x_pb + wᵀφ as filters: G_h = (1 + W_x(z) / (1 − W_e(z))) G_pb
         denominator = np.concatenate(([1.0], -w_e))
         g_h = g_pb + lfilter(w_x, denominator, g_pb)
-        free_pb, _ = self.discrete.respond(self._state, np.zeros(length))
+        free_pb, _ = self.discrete.respond(self.state, np.zeros(length))
         path = np.full(length, start) if reference is None else as_samples(reference, "reference", length)
-        scheduled = self._schedule.features(self._schedule.signs(path, start), length)
+        scheduled = self.reference_features.features(self.reference_features.signs(path, start), length)
         free = free_pb + self._free_run(free_pb, scheduled)
         return WindowOperator(
             g_h=g_h,
@@ -258,36 +243,15 @@ class HybridPredictor:
     @property
     def n_pending(self) -> int:
         """Samples of the predicted window that waits for its measurement; 0 if there is none."""
-        return 0 if self._pending is None else len(self._pending.x_d)
+        return 0 if self.waiting is None else len(self.waiting.x_d)
 
     def last_residual(self) -> float:
         """Return the last measured residual ``e_pb``, m; what the hold baseline keeps over a window."""
-        return float(self._e[self.p - 1])
+        return float(self.past.e_pb[-1])
 
     def to_bytes(self) -> bytes:
         """Return parameters and state, a window that waits for its measurement too, as a versioned blob."""
-        meta = {
-            **{name: getattr(self, name) for name in ("Ts", "Np", "p", "q", "lam", "t_init", "k", "n_init", "start")},
-            "v_s": self.v_s,
-            "input_hold": self.discrete.input_hold,
-            "dead_time": self.model.dead_time,
-            "n_samples": self.regression.n_samples,
-            "pending_start": None if self._pending is None else self._pending.start,
-        }
-        modes = np.array([[mode.f_n, mode.zeta, mode.alpha, mode.beta] for mode in self.model.modes])
-        arrays = {
-            "modes": modes,
-            "state": self._state,
-            "x_pb": self._x[: self.q],
-            "e_pb": self._e[: self.p],
-            "factor": self.regression.factor,
-            "signs": self._schedule.before,
-            "reference": np.array([self._schedule.last]),
-        }
-        if self._pending is not None:
-            names = ("x_d", "x_pb", "reference", "signs")
-            arrays |= {f"pending_{name}": getattr(self._pending, name) for name in names}
-        return pack(_KIND, meta, arrays)
+        return predictor_blob(self)
 
     @classmethod
     def from_bytes(cls, blob: bytes) -> HybridPredictor:
@@ -298,32 +262,7 @@ class HybridPredictor:
         StateError
             If the blob is foreign, truncated or of another version.
         """
-        saved = Saved(_KIND, *unpack(_KIND, blob))
-        names = ("Ts", "Np", "p", "q", "lam", "t_init", "v_s", "input_hold")
-        values = {name: saved.field(name) for name in names}
-        with saved.consistent():
-            # What is allocated follows from numbers that the arrays confirm first.
-            check_together(**{name: values[name] for name in names[:6]})
-            n = 2 + int(values["q"]) + int(values["p"]) + (N_SCHEDULED if check("v_s", values["v_s"]) > 0 else 0)
-            factor = saved.array("factor", n + 1, n + 1)
-            model = ModalModel([Mode(*row) for row in saved.array("modes", None, 4).tolist()], saved.field("dead_time"))
-            predictor = cls(model, **values, start=saved.number_or_none("start"))
-            predictor.regression.restore(factor, saved.whole("n_samples"))
-        predictor.k, predictor.n_init = saved.whole("k"), saved.whole("n_init")
-        predictor._state[:] = saved.array("state", predictor.discrete.n_state)
-        predictor._x[: predictor.q] = saved.array("x_pb", predictor.q)
-        predictor._e[: predictor.p] = saved.array("e_pb", predictor.p)
-        schedule = predictor._schedule
-        schedule.before = saved.array("signs", len(schedule.before))
-        schedule.last = float(saved.array("reference", 1, finite=False)[0])
-        start = saved.number_or_none("pending_start")
-        if start is not None:
-            x_d, reference = saved.array("pending_x_d", None), saved.array("pending_reference", None)
-            if not 0 < len(x_d) <= len(reference):
-                raise saved.error("the window that waits must have samples, and a reference at least as long")
-            signs = saved.array("pending_signs", len(schedule.signs(reference, start)))
-            predictor._pending = _Pending(x_d, saved.array("pending_x_pb", len(x_d)), start, reference, signs)
-        return predictor
+        return predictor_from(cls, blob)
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Copies and pickles go through the saved state: the lags are views, which a plain copy would cut off.
@@ -346,40 +285,28 @@ class HybridPredictor:
         """
         return cls.from_bytes(Path(path).read_bytes())
 
-    def _allocate(self) -> None:
-        """Make the buffers: ``q`` and ``p`` past samples followed by one window, with the lags as views on them."""
-        p, q, Np = self.p, self.q, self.Np
-        self._x, self._e = np.zeros(q + Np), np.zeros(p + Np)
-        step = self._x.itemsize
-        self._x_lags = as_strided(self._x[q:], (Np, q + 1), (step, -step))  # x_pb(k) … x_pb(k−q)
-        self._e_lags = as_strided(self._e[p - 1 :], (Np, p), (step, -step))  # e_pb(k−1) … e_pb(k−p)
-        self._rows = np.empty((Np, self.n_features + 1), order="F")
-
-    def _free_run(self, x_pb: Array, scheduled: Array) -> Array:
+    def _free_run(self, x_pb: Array, reference: Array) -> Array:
         """Return ``wᵀφ`` over a window whose residuals are predicted as it goes, ``(n,)``; eq. (4)."""
-        w, q, p = self.weights, self.q, self.p
+        w, layout, past = self.weights, self.layout, self.past
         # What the command drives: w₀ + Σ_i w_x,i x_pb(k−i)
-        drive = w[0] + np.convolve(np.concatenate((self._x[:q], x_pb)), w[1 : 2 + q], "valid")
-        if self._schedule.n:
-            drive += scheduled @ w[2 + q + p :]
+        drive = w[layout.bias] + np.convolve(np.concatenate((past.x_pb, x_pb)), w[layout.x_pb], "valid")
+        if layout.n_reference:
+            drive += reference @ w[layout.reference]
         # e(k) = drive(k) + Σ_i w_e,i e(k−i), an all-pole filter started from the measured residuals:
         # its state is z_j = Σ_m w_e,j+m e(−m)
-        w_e = self.residual_weights
-        state = np.correlate(w_e, self._e[:p][::-1], "full")[p - 1 :]
+        w_e = w[layout.e_pb]
+        state = np.correlate(w_e, past.e_pb[::-1], "full")[layout.p - 1 :]
         e_h, _ = lfilter([1.0], np.concatenate(([1.0], -w_e)), drive, zi=state)
         return np.asarray(e_h)
 
-    def _take_in(self, x_pb: Array, e_pb: Array, scheduled: Array, learn: bool) -> None:
-        """Fold one stretch of at most ``Np`` samples into the regression, if it is to learn, and into the lags."""
-        m, p, q = len(e_pb), self.p, self.q
-        self._x[q : q + m], self._e[p : p + m] = x_pb, e_pb
+    def _take_in(self, x_pb: Array, e_pb: Array, reference: Array, learn: bool) -> None:
+        """Make one stretch of at most ``Np`` measured samples the past, and learn it if it is to be learned."""
+        m = len(e_pb)
+        self.past.append(x_pb, e_pb)
         if learn:
-            rows = self._rows if m == self.Np else np.empty((m, self.n_features + 1), order="F")
-            # Eq. (5): φ(k) = [1, x_pb(k) … x_pb(k−q), e_pb(k−1) … e_pb(k−p)], with its target e_pb(k) beside it
-            rows[:, 0] = 1.0
-            rows[:, 1 : 2 + q] = self._x_lags[:m]
-            rows[:, 2 + q : 2 + q + p] = self._e_lags[:m]
-            rows[:, 2 + q + p : -1] = scheduled
-            rows[:, -1] = e_pb
-            self.regression.update_stacked(rows)
-        self._x[:q], self._e[:p] = self._x[m : m + q].copy(), self._e[m : m + p].copy()
+            self._learn(self.past.rows(m, reference))
+        self.past.advance(m)
+
+    def _learn(self, rows: Array) -> None:
+        """Fold rows ``[φ(k) | e_pb(k)]`` into the regression; where a guard may weigh, drop or replace them."""
+        self.regression.update_stacked(rows)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,7 +12,7 @@ from scipy.signal import lfilter
 
 from ..base.signals import Array, as_published, as_samples
 
-__all__ = ["Prediction", "WindowOperator"]
+__all__ = ["PredictedWindow", "Prediction", "PublishedWindow", "WindowOperator"]
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,66 @@ class Prediction:
     def active(self) -> NDArray[np.bool_]:
         """``(n,)`` array of bool: whether ``x_h`` is the hybrid prediction there."""
         return np.asarray(np.arange(len(self.x_pb)) >= self.n_warm_up)
+
+
+@dataclass(frozen=True)
+class PredictedWindow:
+    """The last predicted window, which waits for its measurement.
+
+    Attributes
+    ----------
+    x_d, x_pb : (n,) arrays, m
+        Commands and what the physics model answers, relative to ``start``.
+    start : float
+        Position of rest, m.
+    reference : (≥ n,) array, m
+        Commanded positions before a compensator modified them.
+    signs : array
+        What the features of the reference are made from.
+    """
+
+    x_d: Array
+    x_pb: Array
+    start: float
+    reference: Array
+    signs: Array
+
+
+@dataclass(frozen=True)
+class PublishedWindow:
+    """What is sent to the drive over a window, and what it will do.
+
+    Attributes
+    ----------
+    x_d, x_dm : (Np,) arrays, m
+        Commanded position, and the command that the drive gets: the same unless a planner modifies it.
+    x_pb, x_h : (Np,) arrays, m
+        Physics-based prediction under ``x_dm``, and that of the best model there is.
+    state : int
+        What a planner planned it with (:class:`~hybridsep.compensate.plan.SepState`); 0 without one.
+    n_warm_up : int
+        Leading samples where ``x_h = x_pb``.
+    """
+
+    SIGNALS: ClassVar[tuple[str, ...]] = ("x_d", "x_dm", "x_pb", "x_h")
+
+    x_d: Array
+    x_dm: Array
+    x_pb: Array
+    x_h: Array
+    state: int
+    n_warm_up: int
+
+    @classmethod
+    def at_rest(cls, start: float, Np: int) -> PublishedWindow:
+        """Return a window of a drive that rests at ``start``, m, in which nothing is predicted."""
+        rest = np.full(Np, start)
+        return cls(rest, rest, rest, rest, 0, Np)
+
+    @classmethod
+    def of_prediction(cls, x_d: Array, prediction: Prediction) -> PublishedWindow:
+        """Return the window of commands that are sent as they are; SignalError if its prediction diverges."""
+        return cls(x_d, x_d, prediction.x_pb, prediction.x_h, 0, prediction.n_warm_up)
 
 
 @dataclass(frozen=True)

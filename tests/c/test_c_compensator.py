@@ -10,9 +10,9 @@ import staircase_data as staircase
 from c_core import TS, CModel, sep_look_ahead
 from numpy.typing import NDArray
 
-from hybridsep.compensate.sep_lookahead import SepLookAhead
 from hybridsep.machine import load_machine
-from hybridsep.plants.plant import Encoder
+from hybridsep.plants.encoder import Encoder
+from hybridsep.predict.look_ahead import LookAhead
 
 Array = NDArray[np.float64]
 
@@ -20,7 +20,7 @@ OUTPUTS = ("x_dm", "x_d", "x_pb", "x_h", "e_servo", "rms_e", "rms_pb", "rms_h")
 
 
 def compare_loops(
-    ahead: SepLookAhead,
+    ahead: LookAhead,
     model: CModel,
     r: Array,
     tolerance: float,

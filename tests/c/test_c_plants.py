@@ -13,7 +13,10 @@ import staircase_data as staircase
 from c_core import TS, CModel, write_trajectory
 
 from hybridsep.model.physics import ModalModel, Mode
-from hybridsep.plants.plant import Encoder, FeedDrive, Plant, StageDrive
+from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.feed_drive import FeedDrive
+from hybridsep.plants.plant import Plant
+from hybridsep.plants.stage_drive import StageDrive
 
 
 def plants() -> dict[str, Plant]:

@@ -10,7 +10,7 @@ import staircase_data as staircase
 from c_core import CModel, look_ahead, write_weights
 from numpy.typing import NDArray
 
-from hybridsep.predict.lookahead import LookAhead
+from hybridsep.predict.look_ahead import LookAhead
 
 Array = NDArray[np.float64]
 

@@ -17,8 +17,9 @@ from hybridsep.base.errors import FmuError, HybridSepError
 from hybridsep.base.parameters import check, check_together
 from hybridsep.fmi.variables import modes_from
 from hybridsep.model.physics import ModalModel, Mode
-from hybridsep.plants.plant import FeedDrive, StageDrive
-from hybridsep.predict.sampled_window import checked_start
+from hybridsep.plants.feed_drive import FeedDrive
+from hybridsep.plants.stage_drive import StageDrive
+from hybridsep.predict.look_ahead import checked_start
 
 
 @pytest.mark.parametrize(

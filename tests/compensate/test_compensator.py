@@ -27,7 +27,9 @@ from hybridsep.compensate.trust import Trust, has_stable_poles
 from hybridsep.evaluate.closed_loop import ClosedLoop, contour_error, run_closed_loop
 from hybridsep.machine import load_machine
 from hybridsep.model.physics import ModalModel
-from hybridsep.plants.plant import Encoder, FeedDrive, Plant
+from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.feed_drive import FeedDrive
+from hybridsep.plants.plant import Plant
 from hybridsep.plants.trajectory import PAPER_LIMITS, archimedean_spiral, rest_to_rest, spiral
 from hybridsep.predict.predictor import HybridPredictor
 

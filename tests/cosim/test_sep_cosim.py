@@ -17,7 +17,7 @@ from hybridsep.evaluate.closed_loop import ClosedLoop, run_closed_loop
 from hybridsep.evaluate.sep_plots import contour_figure, tracking_figure
 from hybridsep.fmi.archive import BACKENDS
 from hybridsep.machine import Machine
-from hybridsep.plants.plant import Encoder
+from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.trajectory import spiral, staircase
 
 MACHINE = load_machine("spring_mass_damper")

@@ -9,6 +9,7 @@ import time
 import tracemalloc
 import zlib
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,9 +19,8 @@ from hybridsep.base.errors import HybridSepError, StateError
 from hybridsep.base.limits import Limits
 from hybridsep.base.state import VERSION
 from hybridsep.compensate.compensator import SepCompensator
-from hybridsep.compensate.sep_lookahead import SepLookAhead
 from hybridsep.model.physics import ModalModel
-from hybridsep.predict.lookahead import LookAhead
+from hybridsep.predict.look_ahead import LookAhead
 from hybridsep.predict.predictor import HybridPredictor
 
 MODEL = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0, dead_time=2)
@@ -34,7 +34,7 @@ MEMORY_MAX = 300e6  # bytes, for a state of a few kilobytes
 TIME_MAX = 20.0  # s
 
 
-def sampled(look_ahead: LookAhead | SepLookAhead, count: int) -> None:
+def sampled(look_ahead: LookAhead | LookAhead, count: int) -> None:
     for k in range(count):
         look_ahead.sample(1e-3 * np.sin(0.1 * k), 1e-3 * np.sin(0.1 * k - 0.3) + 1e-9 * (k % 3))
 
@@ -54,7 +54,7 @@ def use_predictor(predictor: HybridPredictor) -> None:
     predictor.to_bytes()
 
 
-def use_look_ahead(look_ahead: LookAhead | SepLookAhead) -> None:
+def use_look_ahead(look_ahead: LookAhead | LookAhead) -> None:
     for _ in range(2):
         sampled(look_ahead, 12)
         outputs = [look_ahead.x_d, look_ahead.x_pb, look_ahead.x_h, look_ahead.rms_pb, look_ahead.rms_h]
@@ -84,7 +84,7 @@ def look_ahead_state() -> bytes:
 
 
 def sep_look_ahead_state() -> bytes:
-    look_ahead = SepLookAhead(small_compensator(), 0.0)
+    look_ahead = LookAhead(small_compensator(), 0.0)
     sampled(look_ahead, 90)
     return look_ahead.to_bytes()
 
@@ -98,9 +98,13 @@ def compensator_state() -> bytes:
 
 STATES: dict[str, tuple[Callable[[], bytes], Callable[[bytes], Any], Callable[[Any], None]]] = {
     "predictor": (predictor_state, HybridPredictor.from_bytes, use_predictor),
-    "look-ahead": (look_ahead_state, LookAhead.from_bytes, use_look_ahead),
+    "look-ahead": (look_ahead_state, partial(LookAhead.from_bytes, model_type=HybridPredictor), use_look_ahead),
     "compensator": (compensator_state, SepCompensator.from_bytes, use_compensator),
-    "sep-look-ahead": (sep_look_ahead_state, SepLookAhead.from_bytes, use_look_ahead),
+    "look-ahead of a compensator": (
+        sep_look_ahead_state,
+        partial(LookAhead.from_bytes, model_type=SepCompensator),
+        use_look_ahead,
+    ),
 }
 
 

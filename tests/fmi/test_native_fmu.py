@@ -33,9 +33,9 @@ from hybridsep.fmi.compiler import ALL_TARGETS, TARGETS, compile_flags, host_tar
 from hybridsep.fmi.macho import universal
 from hybridsep.fmi.variables import Variable, variables_of
 from hybridsep.machine import Machine, load_machine, machine_names
-from hybridsep.plants.plant import Encoder
+from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.trajectory import spiral, staircase
-from hybridsep.predict.lookahead import LookAhead
+from hybridsep.predict.look_ahead import LookAhead
 
 etree: Any = import_module("lxml.etree")  # comes with fmpy, has no types
 

@@ -19,7 +19,6 @@ from hybridsep.base.errors import FmuError, StateError
 from hybridsep.base.limits import Limits
 from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepCompensator, SepState
-from hybridsep.compensate.sep_lookahead import SepLookAhead
 from hybridsep.cosim.importer import FmuInstance
 from hybridsep.evaluate.closed_loop import run_closed_loop
 from hybridsep.fmi.archive import build_fmu
@@ -27,8 +26,9 @@ from hybridsep.fmi.c_header import c_header
 from hybridsep.fmi.reference import reference_files
 from hybridsep.fmi.weights import weights_file
 from hybridsep.machine import load_machine
-from hybridsep.plants.plant import Encoder
+from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.trajectory import staircase
+from hybridsep.predict.look_ahead import LookAhead
 from hybridsep.predict.predictor import HybridPredictor
 
 MACHINE = load_machine("spring_mass_damper")
@@ -40,7 +40,7 @@ OUTPUTS = ("x_dm", "x_d", "x_pb", "x_h", "e_servo", "sep_state", "rms_e", "rms_p
 Fmu = Callable[[str], Path]
 
 
-def closed_loop(look_ahead: SepLookAhead, n: int) -> tuple[Array, Array, Array]:
+def closed_loop(look_ahead: LookAhead, n: int) -> tuple[Array, Array, Array]:
     """Return ``r(k)``, ``x_meas(k)`` and the outputs at ``t_k``, ``(n, 10)``, of the library and the plant alone."""
     plant, encoder = MACHINE.new_plant(), Encoder(5e-6, 0)
     plant.reset(0.0)
@@ -55,7 +55,7 @@ def closed_loop(look_ahead: SepLookAhead, n: int) -> tuple[Array, Array, Array]:
 
 @pytest.fixture(scope="module")
 def run() -> tuple[Array, Array, Array]:
-    return closed_loop(SepLookAhead(MACHINE.new_compensator(), 0.0), N)
+    return closed_loop(LookAhead(MACHINE.new_compensator(), 0.0), N)
 
 
 @pytest.fixture
@@ -168,7 +168,7 @@ def test_another_axis_with_modes_and_other_parameters(python_fmu: Fmu) -> None:
     changes |= {"change_max": 3e-4, "keep_direction": 0}
     bounds = {"v_max": 0.0805, "a_max": 8.1, "j_max": 2000.0}
     library = machine.new_compensator(SepState.PHYSICS, limits=Limits(*bounds.values()), **changes)
-    look_ahead = SepLookAhead(library, 0.1)
+    look_ahead = LookAhead(library, 0.1)
     r = staircase()[:700] + 0.1
     x = np.concatenate((np.full(200, 0.1), r[:500])) + 1e-6 * np.sin(np.arange(700))
     with FmuInstance(python_fmu("SepCompensatorPy_als25010_y")) as instance:
@@ -348,7 +348,7 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_warm_run_is_the_librarys_second_run(trained: Path, tmp_path: Path) -> None:
     limits, change_max = MACHINE.command_limits()
     second = SepCompensator(HybridPredictor.load(trained), limits=limits, change_max=change_max)
-    r, x, expected = closed_loop(SepLookAhead(second, 0.0, t_init=0.0), 700)
+    r, x, expected = closed_loop(LookAhead(second, 0.0, t_init=0.0), 700)
     path = build_fmu(MACHINE, "SepCompensatorPy", tmp_path, "python", weights=trained)
     with zipfile.ZipFile(path) as archive:
         assert archive.read("resources/weights.bin") == weights_file(HybridPredictor.load(trained))
@@ -411,13 +411,13 @@ def travelling(path: Path) -> dict[str, str]:
 
 def test_each_fmu_carries_what_it_needs(python_fmu: Fmu, tmp_path: Path) -> None:
     mine = travelling(python_fmu("SepCompensatorPy"))
-    assert {"compensator.py", "sep_lookahead.py", "limits.py", "_interior.py", "fmi/slave.py"} < set(mine)
-    assert "_schedule.py" in mine
-    assert not {"closed_loop.py", "trajectory.py", "plant.py", "machine.py"} & set(mine)
+    assert {"compensate/compensator.py", "predict/look_ahead.py", "base/limits.py", "fmi/slave.py"} < set(mine)
+    assert {"predict/reference_features.py", "compensate/interior.py", "compensate/__init__.py"} < set(mine)
+    assert not {"machine.py", "plants/plant.py", "plants/trajectory.py", "fmi/archive.py"} & set(mine)
     for name in ("HybridPredictorPy", "FeedDrivePy"):
         theirs = travelling(python_fmu(name))
-        assert not {"compensator.py", "sep_lookahead.py", "_interior.py"} & set(theirs)
-        assert "lookahead.py" in theirs or name == "FeedDrivePy"
+        assert not any(module.startswith("compensate/") for module in theirs)
+        assert "predict/look_ahead.py" in theirs or name == "FeedDrivePy"
     for name in ("SepCompensatorPy", "HybridPredictorPy", "FeedDrivePy"):
         needs_nothing_else(python_fmu(name), tmp_path / name)
 

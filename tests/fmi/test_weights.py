@@ -28,7 +28,8 @@ from hybridsep.fmi.archive import BACKENDS, build_fmu, fmu_names
 from hybridsep.fmi.weights import WEIGHTS_FILE, restore_weights, weights_file
 from hybridsep.machine import load_machine
 from hybridsep.model.physics import ModalModel, Mode
-from hybridsep.plants.plant import Encoder, simulate
+from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.plant import simulate
 from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.predictor import HybridPredictor
 

@@ -17,7 +17,8 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from hybridsep.base.errors import ModelError, ParameterError
-from hybridsep.model.physics import BLOCK_MAX, DiscreteModel, ModalModel, Mode
+from hybridsep.model.discrete import BLOCK_MAX, DiscreteModel
+from hybridsep.model.physics import ModalModel, Mode
 
 Array = NDArray[np.float64]
 
@@ -341,7 +342,7 @@ def test_modes_out_of_range(values: tuple[float, float, float, float], message: 
         (lambda: ModalModel.spring_mass_damper(1.0, 0.0, 1.0), "c must be 1e-09 … 1e+12 N.s/m, got 0.0"),
         (lambda: ModalModel.spring_mass_damper(1.0, 1.0, -1.0), "k must be 1e-06 … 1e+15 N/m, got -1.0"),
         (lambda: ModalModel([UNDER]).discretise(0.0), "T_s must be 1e-05 … 1 s, got 0.0"),
-        (lambda: DiscreteModel(ModalModel([UNDER]), -1.0), "T_s must be 1e-05 … 1 s, got -1.0"),
+        (lambda: DiscreteModel(ModalModel([UNDER]).state_space(), 0, -1.0), "T_s must be 1e-05 … 1 s, got -1.0"),
         (lambda: ModalModel([UNDER]).discretise(TS, "soh"), "input_hold must be one of zoh, foh, got 'soh'"),
     ],
 )

@@ -20,7 +20,7 @@ from hybridsep import (
     load_machine,
     simulate,
 )
-from hybridsep.plants.plant import FRICTION_VELOCITY
+from hybridsep.plants.stage_drive import FRICTION_VELOCITY
 from hybridsep.plants.trajectory import spiral, staircase
 
 Array = NDArray[np.float64]

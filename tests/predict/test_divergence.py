@@ -12,11 +12,10 @@ from c_core import TS, CModel, refusal, write_weights
 
 from hybridsep.base.errors import SignalError
 from hybridsep.base.signals import Array
-from hybridsep.compensate.sep_lookahead import SepLookAhead
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.fmi.weights import WEIGHTS_FILE, restore_weights
 from hybridsep.model.physics import ModalModel, Mode
-from hybridsep.predict.lookahead import LookAhead
+from hybridsep.predict.look_ahead import LookAhead
 from hybridsep.predict.predictor import HybridPredictor
 from hybridsep.predict.window import Prediction
 
@@ -47,16 +46,16 @@ def test_a_window_that_diverges_is_refused(tmp_path: Path) -> None:
     look_ahead = LookAhead(runaway_predictor(tmp_path), 0.0)
     for _ in range(99):
         look_ahead.sample(1e-3, 0.0)
-    shown = look_ahead.x_h_window
+    shown = look_ahead.window.x_h
     with pytest.raises(SignalError) as caught:
         look_ahead.sample(1e-3, 0.0)
     assert str(caught.value) == SAID
-    restored = LookAhead.from_bytes(look_ahead.to_bytes())
+    restored = LookAhead.from_bytes(look_ahead.to_bytes(), HybridPredictor)
     for again in (look_ahead, restored):
         with pytest.raises(SignalError) as caught:
             again.sample(0.0, 0.0)
         assert str(caught.value) == SAID
-    assert look_ahead.x_h_window is shown
+    assert look_ahead.window.x_h is shown
 
 
 def test_a_window_that_diverges_is_refused_in_c(tmp_path: Path) -> None:
@@ -118,9 +117,9 @@ def test_a_restored_state_shows_no_output_that_is_not_finite(offset: int) -> Non
 
 
 def test_a_plan_that_diverges_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    look_ahead = SepLookAhead(c_core.library_compensator({**c_core.COMPENSATOR, "t_init": 0.0}, "compensator"), 0.0)
+    look_ahead = LookAhead(c_core.library_compensator({**c_core.COMPENSATOR, "t_init": 0.0}, "compensator"), 0.0)
     diverging = Prediction(np.full(100, np.inf), np.zeros(100), 0)
-    monkeypatch.setattr(look_ahead.compensator.predictor, "predict", lambda *_, **__: diverging)
+    monkeypatch.setattr(look_ahead.predictor, "predict", lambda *_, **__: diverging)
     for _ in range(99):
         look_ahead.sample(0.0, 0.0)
     for _ in range(3):

@@ -22,13 +22,15 @@ from hybridsep.app import cli
 from hybridsep.base.errors import HybridSepError, MachineError, ParameterError
 from hybridsep.base.limits import Limits
 from hybridsep.base.parameters import PARAMETERS
-from hybridsep.compensate.sep_lookahead import SepLookAhead
 from hybridsep.fmi.variables import variables_of
 from hybridsep.machine import load_machine
 from hybridsep.model.physics import ModalModel, Mode
-from hybridsep.plants.plant import Encoder, FeedDrive, Plant, StageDrive
+from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.feed_drive import FeedDrive
+from hybridsep.plants.plant import Plant
+from hybridsep.plants.stage_drive import StageDrive
 from hybridsep.plants.trajectory import rest_to_rest
-from hybridsep.predict.lookahead import LookAhead
+from hybridsep.predict.look_ahead import LookAhead
 from hybridsep.predict.predictor import HybridPredictor
 
 SAMPLES = 40
@@ -104,7 +106,7 @@ def model_from(values: Mapping[str, float]) -> ModalModel:
     return ModalModel([Mode(*(values[f"mode[{i}].{key}"] for key in MODE)) for i in range(1, n + 1)])
 
 
-def check_look_ahead(look_ahead: LookAhead | SepLookAhead, names: tuple[str, ...], samples: Any) -> None:
+def check_look_ahead(look_ahead: LookAhead | LookAhead, names: tuple[str, ...], samples: Any) -> None:
     for x_d_ahead, x_meas in samples.tolist():
         look_ahead.sample(x_d_ahead, x_meas)
         outputs = [getattr(look_ahead, name) for name in names]
@@ -152,7 +154,7 @@ def test_the_compensator(values: dict[str, float], modes: dict[str, float], samp
             mode = dict(zip(MODE, modes.values(), strict=True))
             patch.setitem(c_core.DESCRIPTIONS, "extreme", {"modes": [mode]})
             compensator = c_core.library_compensator(all_values, "extreme")
-        look_ahead = SepLookAhead(compensator, 0.0)
+        look_ahead = LookAhead(compensator, 0.0)
         names = ("x_d", "x_dm", "x_pb", "x_h", "e_servo", "rms_e", "rms_pb", "rms_h")
         check_look_ahead(look_ahead, names, samples)
 

@@ -26,12 +26,11 @@ from places import ROOT
 
 from hybridsep.base.limits import Limits
 from hybridsep.compensate.compensator import SepCompensator, SepState
-from hybridsep.compensate.sep_lookahead import SepLookAhead
 from hybridsep.fmi.c_header import c_header
 from hybridsep.fmi.variables import INTERPOLATED, variables_of
 from hybridsep.machine import load_machine
 from hybridsep.model.physics import ModalModel, Mode
-from hybridsep.predict.lookahead import LookAhead
+from hybridsep.predict.look_ahead import LookAhead
 from hybridsep.predict.predictor import HybridPredictor
 
 Array = NDArray[np.float64]
@@ -330,12 +329,12 @@ def library_compensator(values: Mapping[str, Any], name: str, start: float = 0.0
     )
 
 
-def sep_look_ahead(name: str, **parameters: float) -> tuple[SepLookAhead, CModel]:
+def sep_look_ahead(name: str, **parameters: float) -> tuple[LookAhead, CModel]:
     """Return the library's compensating look-ahead and the C model with the same parameters, start included."""
     start = parameters.pop("start", 0.0)
     values: dict[str, Any] = {**COMPENSATOR, **parameters}
     c_model = CModel(name, {**values, "x_d_ahead": start, "x_meas": start}).initialise()
-    return SepLookAhead(library_compensator(values, name, start), start), c_model
+    return LookAhead(library_compensator(values, name, start), start), c_model
 
 
 def write_weights(folder: Path, name: str, factor: Array, n_samples: int, **settings: float) -> None:

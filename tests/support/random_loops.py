@@ -9,10 +9,11 @@ import numpy as np
 from c_core import COMPENSATOR, DESCRIPTIONS, TS, CModel, library_compensator
 from numpy.typing import NDArray
 
-from hybridsep.compensate.sep_lookahead import SepLookAhead
 from hybridsep.machine import load_machine
-from hybridsep.plants.plant import Encoder, Plant
+from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.plant import Plant
 from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest
+from hybridsep.predict.look_ahead import LookAhead
 
 Array = NDArray[np.float64]
 
@@ -114,7 +115,7 @@ def run_library(loop: Loop) -> tuple[Array, NDArray[np.int64]]:
     """Return ``x_dm``, m, and ``sep_state`` of every sample with the library's compensator, ``(n,)`` both."""
     plant, encoder = loop.drive()
     start = float(loop.r[0])
-    ahead = SepLookAhead(library_compensator(loop.values, loop.model, start), start)
+    ahead = LookAhead(library_compensator(loop.values, loop.model, start), start)
     x_dm, states = np.empty(len(loop.r)), np.empty(len(loop.r), dtype=np.int64)
     for k, r in enumerate(loop.r):
         x_meas = encoder.measure(plant.x)

@@ -18,14 +18,12 @@ from hybridsep import FmuError, FmuInstance, HybridSepError, build_fmu, load_mac
 from hybridsep.base.limits import Limits
 from hybridsep.base.state import pack, unpack
 from hybridsep.compensate.compensator import SepCompensator, SepState
-from hybridsep.compensate.sep_lookahead import SepLookAhead
 from hybridsep.machine import Machine
 from hybridsep.plants.plant import Plant
 from hybridsep.plants.trajectory import staircase
-from hybridsep.predict.lookahead import LookAhead
+from hybridsep.predict.look_ahead import LookAhead
+from hybridsep.predict.look_ahead_inputs import LookAheadInputs
 from hybridsep.predict.predictor import HybridPredictor
-from hybridsep.predict.sampled_inputs import SampledInputs
-from hybridsep.predict.sampled_window import SampledWindow
 
 Value = float | int | bool
 
@@ -275,8 +273,8 @@ class LookAheadStream(LibraryStream):
         self._inputs = {"x_d_ahead": position, "x_meas": float(values.get("x_meas", 0.0))}
         new = _predictor if self._name == PREDICTOR else _compensator
         try:
-            self._look_ahead: SampledWindow = new(machine, values, position)
-            self._clock = SampledInputs(start, machine.T_s, position)
+            self._look_ahead: LookAhead = new(machine, values, position)
+            self._clock = LookAheadInputs(start, machine.T_s, position)
         except HybridSepError as error:
             raise RefusedStreamError(str(error)) from error
 
@@ -297,8 +295,8 @@ class LookAheadStream(LibraryStream):
 
     def restore(self, blob: bytes) -> None:
         meta, _, parts = unpack("stream", blob)
-        self._clock = SampledInputs.from_state(meta["clock"])
-        self._look_ahead = type(self._look_ahead).from_bytes(parts["core"])
+        self._clock = LookAheadInputs.from_state(meta["clock"])
+        self._look_ahead = LookAhead.from_bytes(parts["core"], type(self._look_ahead.model))
 
 
 class PlantStream(LibraryStream):
@@ -341,7 +339,7 @@ def _predictor(machine: Machine, values: Mapping[str, Value], start: float) -> L
     return LookAhead(HybridPredictor.with_parameters(machine.model, {name: parameters[name] for name in names}), start)
 
 
-def _compensator(machine: Machine, values: Mapping[str, Value], start: float) -> SepLookAhead:
+def _compensator(machine: Machine, values: Mapping[str, Value], start: float) -> LookAhead:
     parameters: dict[str, Any] = {**machine.fmi_compensator_parameters(), **values}
     names = ("Np", "p", "q", "lambda", "T_s", "t_init", "input_hold", "v_s")
     compensator = SepCompensator(
@@ -351,7 +349,7 @@ def _compensator(machine: Machine, values: Mapping[str, Value], start: float) ->
         best=SepState(parameters["compensate"]),
         **{name: parameters[name] for name in ("preview", "spacing", "jerk_weight", "change_max")},
     )
-    return SepLookAhead(compensator, start)
+    return LookAhead(compensator, start)
 
 
 def write_resources(folder: Path) -> None:

@@ -10,12 +10,12 @@ from collections.abc import Sequence
 
 from ..base.clock import SampleClock
 from ..base.errors import SignalError
-from .sampled_window import SampledWindow
+from .look_ahead import LookAhead
 
-__all__ = ["SampledInputs"]
+__all__ = ["LookAheadInputs"]
 
 
-class SampledInputs:
+class LookAheadInputs:
     """The clock of a look-ahead, and the inputs of its sample in progress.
 
     Parameters
@@ -37,12 +37,12 @@ class SampledInputs:
         self.clock = SampleClock.begin(t_start, T_s)
         self._latched = (start, start)
 
-    def advance(self, look_ahead: SampledWindow, x_d_ahead: float, x_meas: float, t: float, h: float) -> str:
+    def advance(self, look_ahead: LookAhead, x_d_ahead: float, x_meas: float, t: float, h: float) -> str:
         """Execute the samples that the communication step from ``t`` by ``h``, s, reaches.
 
         Parameters
         ----------
-        look_ahead : LookAhead or SepLookAhead
+        look_ahead : LookAhead
         x_d_ahead, x_meas : float
             Inputs, m, constant over the step.
 
@@ -85,7 +85,7 @@ class SampledInputs:
         return [*self.clock.state(), *self._latched]
 
     @classmethod
-    def from_state(cls, state: Sequence[float]) -> SampledInputs:
+    def from_state(cls, state: Sequence[float]) -> LookAheadInputs:
         """Return what :meth:`state` described."""
         *clock, x_d_ahead, x_meas = state
         inputs = cls.__new__(cls)

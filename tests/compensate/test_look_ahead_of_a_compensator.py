@@ -12,8 +12,8 @@ from hybridsep.base.errors import SignalError, StateError
 from hybridsep.base.limits import Limits
 from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepCompensator, SepState
-from hybridsep.compensate.sep_lookahead import SepLookAhead
 from hybridsep.model.physics import ModalModel
+from hybridsep.predict.look_ahead import LookAhead
 from hybridsep.predict.predictor import HybridPredictor
 
 MODEL = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
@@ -26,11 +26,11 @@ def compensator(preview: int = 200, t_init: float = 0.1) -> SepCompensator:
     return SepCompensator(predictor, preview=preview, limits=LIMITS)
 
 
-def outputs(look_ahead: SepLookAhead) -> tuple[float, ...]:
+def outputs(look_ahead: LookAhead) -> tuple[float, ...]:
     return tuple(float(getattr(look_ahead, name)) for name in NAMES)
 
 
-def run(look_ahead: SepLookAhead, r: Array, x: Array, first: int = 0, last: int | None = None) -> Array:
+def run(look_ahead: LookAhead, r: Array, x: Array, first: int = 0, last: int | None = None) -> Array:
     """Feed samples ``first … last − 1`` and return the outputs before each."""
     found = []
     for k in range(first, len(r) if last is None else last):
@@ -50,7 +50,7 @@ def delayed(preview: int, shift: float = 0.0, n: int = 1500) -> tuple[Array, Arr
 @pytest.mark.parametrize("shift", [0.0, 0.1])
 def test_equals_plans_made_window_by_window(preview: int, shift: float) -> None:
     r, x = delayed(preview, shift)
-    found = run(SepLookAhead(compensator(preview), float(r[0])), r, x)
+    found = run(LookAhead(compensator(preview), float(r[0])), r, x)
     x_d = np.concatenate((np.full(preview, r[0]), r))
     by_window = compensator(preview)
     by_window.new_run(float(r[0]), t_init=0.1, lead_in=preview)
@@ -66,28 +66,28 @@ def test_equals_plans_made_window_by_window(preview: int, shift: float) -> None:
 
 def test_a_move_is_prepared_in_the_fill_and_the_fill_is_not_learned() -> None:
     r, x = delayed(200)
-    look_ahead = SepLookAhead(compensator(), float(r[0]))
+    look_ahead = LookAhead(compensator(), float(r[0]))
     found = run(look_ahead, r, x, last=200)
     np.testing.assert_array_equal(found[:, 1], 0.0)
     assert not found[:50, 0].any()  # nothing was in sight yet
     assert found[50:, 0].any()
-    assert look_ahead.compensator.predictor.regression.n_samples == 0
+    assert look_ahead.predictor.regression.n_samples == 0
     run(look_ahead, r, x, 200, 250)
-    assert look_ahead.compensator.predictor.regression.n_samples == 50
+    assert look_ahead.predictor.regression.n_samples == 50
 
 
 def test_warm_up_counts_from_the_end_of_the_fill() -> None:
     r, x = delayed(200)
-    cold = SepLookAhead(compensator(t_init=0.3), 0.0)
+    cold = LookAhead(compensator(t_init=0.3), 0.0)
     states = run(cold, r, x)[:, 5]
     assert np.flatnonzero(states == SepState.HYBRID)[0] == 500
-    warm = run(SepLookAhead(cold.compensator, 0.0, t_init=0.0), r, x)[:, 5]
+    warm = run(LookAhead(cold.model, 0.0, t_init=0.0), r, x)[:, 5]
     assert warm[0] == SepState.HYBRID
 
 
 def test_running_rms() -> None:
     r, x = delayed(200)
-    look_ahead = SepLookAhead(compensator(), 0.0)
+    look_ahead = LookAhead(compensator(), 0.0)
     found = run(look_ahead, r, x)
     first = 200 + 100
     for name, column in (("rms_e", 1), ("rms_pb", 2), ("rms_h", 3)):
@@ -99,16 +99,16 @@ def test_running_rms() -> None:
 @pytest.mark.parametrize("cut", [1, 49, 50, 201, 1234])
 def test_a_saved_state_goes_on_bit_for_bit(cut: int) -> None:
     r, x = delayed(200)
-    look_ahead = SepLookAhead(compensator(), 0.0)
+    look_ahead = LookAhead(compensator(), 0.0)
     run(look_ahead, r, x, last=cut)
-    restored = SepLookAhead.from_bytes(look_ahead.to_bytes())
+    restored = LookAhead.from_bytes(look_ahead.to_bytes(), SepCompensator)
     assert restored.to_bytes() == look_ahead.to_bytes()
     np.testing.assert_array_equal(run(restored, r, x, first=cut), run(look_ahead, r, x, first=cut))
     assert restored.to_bytes() == look_ahead.to_bytes()
 
 
 def test_bad_samples_and_foreign_states_are_refused() -> None:
-    look_ahead = SepLookAhead(compensator(), 0.0)
+    look_ahead = LookAhead(compensator(), 0.0)
     look_ahead.sample(0.0, 0.0)
     before = look_ahead.to_bytes()
     with pytest.raises(SignalError, match="x_meas must be finite, got nan at sample 1"):
@@ -116,7 +116,7 @@ def test_bad_samples_and_foreign_states_are_refused() -> None:
     with pytest.raises(SignalError, match="x_d_ahead must be within"):
         look_ahead.sample(1e12, 0.0)
     assert look_ahead.to_bytes() == before
-    with pytest.raises(StateError, match="kind 'sep-look-ahead' was expected, got one of kind 'compensator'"):
-        SepLookAhead.from_bytes(look_ahead.compensator.to_bytes())
+    with pytest.raises(StateError, match="kind 'look-ahead' was expected, got one of kind 'compensator'"):
+        LookAhead.from_bytes(look_ahead.model.to_bytes(), SepCompensator)
     with pytest.raises(SignalError, match="start value of x_d_ahead must be finite, got inf"):
-        SepLookAhead(compensator(), math.inf)
+        LookAhead(compensator(), math.inf)

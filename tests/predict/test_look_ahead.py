@@ -89,7 +89,7 @@ def test_a_saved_state_goes_on_bit_for_bit(cut: int) -> None:
     r, x = delayed(n=1700)
     look_ahead = LookAhead(HybridPredictor(MODEL), float(r[0]))
     run(look_ahead, r, x, last=cut)
-    restored = LookAhead.from_bytes(look_ahead.to_bytes())
+    restored = LookAhead.from_bytes(look_ahead.to_bytes(), HybridPredictor)
     assert restored.to_bytes() == look_ahead.to_bytes()
     assert run(restored, r, x, first=cut) == run(look_ahead, r, x, first=cut)
 
@@ -97,9 +97,9 @@ def test_a_saved_state_goes_on_bit_for_bit(cut: int) -> None:
 def test_foreign_states_are_refused() -> None:
     look_ahead = LookAhead(HybridPredictor(MODEL), 0.0)
     with pytest.raises(StateError, match="truncated or damaged"):
-        LookAhead.from_bytes(look_ahead.to_bytes()[:-1])
+        LookAhead.from_bytes(look_ahead.to_bytes()[:-1], HybridPredictor)
     with pytest.raises(StateError, match="kind 'look-ahead' was expected, got one of kind 'predictor'"):
-        LookAhead.from_bytes(look_ahead.predictor.to_bytes())
+        LookAhead.from_bytes(look_ahead.predictor.to_bytes(), HybridPredictor)
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..base.signals import Array
 
-__all__ = ["N_SCHEDULED", "ReferenceSchedule"]
+__all__ = ["N_REFERENCE", "ReferenceFeatures"]
 
 _SHIFTS = (-40, -30, -20, -15, -10, -5, 0, 5, 10, 15, 20, 30, 40)
 """Samples by which ψ is shifted in each feature: a reversal's effect is spread, and early where the model is late."""
@@ -22,11 +22,11 @@ _REACH = _SHIFTS[-1]
 _SCALE = 1e-3
 """Factor of the features, m: with a penalty λ that fits the other features, friction up to this is hardly damped."""
 
-N_SCHEDULED = len(_SHIFTS)
+N_REFERENCE = len(_SHIFTS)
 
 
-class ReferenceSchedule:
-    """Makes the reference-scheduled features of consecutive windows.
+class ReferenceFeatures:
+    """Makes the features of the reference of consecutive windows.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class ReferenceSchedule:
 
     def __init__(self, v_s: float, Ts: float) -> None:
         self.v_s, self.Ts = v_s, Ts
-        self.n = N_SCHEDULED if v_s > 0 else 0
+        self.n = N_REFERENCE if v_s > 0 else 0
         self.new_run()
 
     def new_run(self) -> None:

@@ -17,10 +17,11 @@ from hybridsep.base.errors import ParameterError, SignalError
 from hybridsep.base.signals import Array
 from hybridsep.machine import load_machine
 from hybridsep.model.physics import ModalModel, Mode
-from hybridsep.plants.plant import Encoder, simulate
+from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.plant import simulate
 from hybridsep.plants.trajectory import spiral
 from hybridsep.predict.predictor import HybridPredictor
-from hybridsep.predict.schedule import N_SCHEDULED, ReferenceSchedule
+from hybridsep.predict.reference_features import N_REFERENCE, ReferenceFeatures
 
 TS, V_S = 1e-3, 2e-3
 SHIFTS = (-40, -30, -20, -15, -10, -5, 0, 5, 10, 15, 20, 30, 40)
@@ -52,7 +53,7 @@ def reversing(n: int, start: float = 0.0) -> Array:
     return np.asarray(start + slow, dtype=np.float64)
 
 
-def windows(schedule: ReferenceSchedule, path: Array, start: float, lengths: Sequence[int], ahead: int) -> list[Array]:
+def windows(schedule: ReferenceFeatures, path: Array, start: float, lengths: Sequence[int], ahead: int) -> list[Array]:
     """Return the features of consecutive windows, of each of which ``ahead`` more samples of the path are known."""
     found, first = [], 0
     for n in lengths:
@@ -74,7 +75,7 @@ def test_features_are_those_of_the_formula_from_window_to_window(start: float, a
     path = reversing(400, start) + 1e-5
     lengths = (50, 50, 1, 39, 100, 10, 150)
     first = 0
-    for n, features in zip(lengths, windows(ReferenceSchedule(V_S, TS), path, start, lengths, ahead), strict=True):
+    for n, features in zip(lengths, windows(ReferenceFeatures(V_S, TS), path, start, lengths, ahead), strict=True):
         known = min(first + n + ahead, len(path))
         expected = formula(path.tolist(), start, first, n, known)
         np.testing.assert_allclose(features, expected, rtol=0, atol=1e-15)
@@ -87,24 +88,24 @@ def test_features_are_those_of_the_formula_from_window_to_window(start: float, a
 def test_how_windows_are_cut_changes_nothing_where_the_same_is_known(cuts: list[int], seed: int) -> None:
     n = sum(cuts)
     path: Array = np.cumsum(np.random.default_rng(seed).normal(0, V_S * TS, n + 40))
-    parts = windows(ReferenceSchedule(V_S, TS), path, 0.0, cuts, len(path))
-    (whole,) = windows(ReferenceSchedule(V_S, TS), path, 0.0, [n], 40)
+    parts = windows(ReferenceFeatures(V_S, TS), path, 0.0, cuts, len(path))
+    (whole,) = windows(ReferenceFeatures(V_S, TS), path, 0.0, [n], 40)
     np.testing.assert_array_equal(np.concatenate(parts), whole)
 
 
 def test_a_new_run_begins_at_rest() -> None:
-    schedule, path = ReferenceSchedule(V_S, TS), reversing(100, 0.1)
+    schedule, path = ReferenceFeatures(V_S, TS), reversing(100, 0.1)
     (before,) = windows(schedule, path, 0.1, [100], 0)
     schedule.new_run()
     np.testing.assert_array_equal(windows(schedule, path, 0.1, [100], 0)[0], before)
-    assert not windows(ReferenceSchedule(V_S, TS), np.full(100, 0.1), 0.1, [100], 0)[0].any()
+    assert not windows(ReferenceFeatures(V_S, TS), np.full(100, 0.1), 0.1, [100], 0)[0].any()
 
 
 def test_fast_friction_is_a_sign_and_slow_friction_viscous() -> None:
     path = 0.01 * TS * np.arange(1.0, 101.0)  # 10 mm/s
     at = SHIFTS.index(0)
-    (fast,) = windows(ReferenceSchedule(1e-5, TS), path, 0.0, [100], 0)
-    (slow,) = windows(ReferenceSchedule(1.0, TS), path, 0.0, [100], 0)
+    (fast,) = windows(ReferenceFeatures(1e-5, TS), path, 0.0, [100], 0)
+    (slow,) = windows(ReferenceFeatures(1.0, TS), path, 0.0, [100], 0)
     np.testing.assert_allclose(fast[:, at], SCALE, rtol=1e-12)
     np.testing.assert_allclose(slow[:, at], SCALE * 0.01, rtol=1e-4)
 
@@ -156,7 +157,7 @@ def test_weights_are_the_directly_solved_ridge_problem(ahead: int) -> None:
     scheduled = [formula(r.tolist(), start, k, 20, min(k + 20 + ahead, 700)) for k in range(0, 600, 20)]
     rows = np.column_stack((rows, np.concatenate(scheduled)))
     exact = oracle.ridge_extended(rows, np.array(e_pb), predictor.lam).astype(np.float64)
-    assert predictor.n_features == len(exact) == 2 + 3 + 5 + N_SCHEDULED
+    assert predictor.n_features == len(exact) == 2 + 3 + 5 + N_REFERENCE
     assert np.linalg.norm(predictor.weights - exact) <= 1e-9 * np.linalg.norm(exact)
     np.testing.assert_array_equal(predictor.residual_weights, predictor.weights[5:10])
     assert np.abs(predictor.weights[10:]).max() > 1e-4  # something was learned of the path

@@ -1,0 +1,142 @@
+"""The physics model between two samples of a command that is held or interpolated, eq. (2); exact at the samples."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import expm, toeplitz
+
+from ..base.errors import ParameterError
+from ..base.parameters import INPUT_HOLDS, check
+from ..base.signals import Array
+
+__all__ = ["BLOCK_MAX", "DiscreteModel"]
+
+BLOCK_MAX = 256
+"""Longest stretch answered by one pair of lifted matrices; longer windows go block by block."""
+
+StateSpace = tuple[Array, Array, Array]
+
+
+class DiscreteModel:
+    """``x_pb = G_pb x_d`` at the samples, eq. (2), with a state that is carried from window to window.
+
+    ``s(k+1) = A s(k) + b u(k)``, ``x_pb(k) = c s(k) + d u(k)``, ``u`` being ``x_d`` after the dead time. Windows are
+    answered by the lifted form of that recursion, ``x_pb = O s + T u`` with ``T`` lower-triangular Toeplitz.
+
+    Positions are relative to the point where the drive was at rest; the state is plain data, ``(n_state,)``.
+
+    Parameters
+    ----------
+    state_space : tuple of arrays
+        ``(A, b, c)`` of the modes, block diagonal, as :meth:`ModalModel.state_space` returns it.
+    dead_time : int
+        Whole samples.
+    Ts : float
+        Sampling interval, s.
+    input_hold : {"zoh", "foh"}
+        How ``x_d`` runs between samples.
+    block : int
+        Longest window answered in one piece.
+
+    Raises
+    ------
+    ParameterError
+        If ``Ts`` is out of its range or the hold is unknown.
+    """
+
+    def __init__(
+        self, state_space: StateSpace, dead_time: int, Ts: float, input_hold: str = "zoh", block: int = BLOCK_MAX
+    ) -> None:
+        if input_hold not in INPUT_HOLDS:
+            raise ParameterError(f"input_hold must be one of {', '.join(INPUT_HOLDS)}, got {input_hold!r}")
+        self.Ts: float = check("T_s", Ts)
+        self.input_hold = input_hold
+        self.dead_time = dead_time
+        self.A, self.b, self.c, self.d = _discretised(state_space, self.Ts, input_hold)
+        self._n = len(self.b)
+        self._block = max(1, min(block, BLOCK_MAX))
+        self._tabulate()
+
+    @property
+    def n_state(self) -> int:
+        """Length of the state: two for each mode, and the commands still in the dead time."""
+        return self._n + self.dead_time
+
+    def rest(self) -> Array:
+        """Return the state of a drive at rest at position 0, ``(n_state,)``."""
+        return np.zeros(self.n_state)
+
+    def respond(self, state: Array, x_d: Array) -> tuple[Array, Array]:
+        """Return the model's positions over a window and the state at its end; eq. (2).
+
+        Parameters
+        ----------
+        state : (n_state,) array, m
+            From :meth:`rest` or an earlier call; not changed.
+        x_d : (n,) array, m
+            Commanded positions, any length.
+
+        Returns
+        -------
+        x_pb : (n,) array, m
+        state : (n_state,) array, m
+            To be given to the next window.
+        """
+        n = len(x_d)
+        s, u, register = state, x_d, state[:0]
+        if self.dead_time:
+            line = np.concatenate((state[self._n :], x_d))
+            s, u, register = state[: self._n], line[:n], line[n:]
+        if n <= self._block:
+            x_pb, s = self._respond_block(s, u)
+        else:
+            x_pb = np.empty(n)
+            for i in range(0, n, self._block):
+                stop = min(i + self._block, n)
+                x_pb[i:stop], s = self._respond_block(s, u[i:stop])
+        return x_pb, (np.concatenate((s, register)) if self.dead_time else s)
+
+    def impulse_response(self, n: int) -> Array:
+        """Return the first column of the lower-triangular Toeplitz ``G_pb`` of a window, ``(n,)``, m/m."""
+        impulse = np.zeros(n)
+        impulse[0] = 1.0
+        return self.respond(self.rest(), impulse)[0]
+
+    def _respond_block(self, s: Array, u: Array) -> tuple[Array, Array]:
+        n = len(u)
+        x_pb = self._O[:n] @ s + self._T[:n, :n] @ u
+        return x_pb, self._powers[n] @ s + self._K[:, self._block - n :] @ u
+
+    def _tabulate(self) -> None:
+        """Tabulate, for windows of up to ``block`` samples, what ``x_pb`` and the end state are made of."""
+        m, n = self._block, self._n
+        self._powers = np.empty((m + 1, n, n))  # A⁰ … Aᵐ
+        self._powers[0] = np.eye(n)
+        for i in range(m):
+            self._powers[i + 1] = self.A @ self._powers[i]
+        self._O = np.ascontiguousarray(self.c @ self._powers[:m])  # row i: c Aⁱ
+        self._K = np.ascontiguousarray((self._powers[:m] @ self.b)[::-1].T)  # [Aᵐ⁻¹b … A b, b]
+        markov = np.concatenate(([self.d], self._O[: m - 1] @ self.b))  # d, c b, c A b, …
+        self._T = toeplitz(markov, np.zeros(m))
+
+
+def _discretised(state_space: StateSpace, Ts: float, input_hold: str) -> tuple[Array, Array, Array, float]:
+    """Discretise each mode by the matrix exponential of its augmented system (Van Loan)."""
+    A, b, c = state_space
+    A_d, b_d, d = np.zeros_like(A), np.zeros_like(b), 0.0
+    for i in range(0, len(b), 2):
+        block = slice(i, i + 2)
+        augmented = np.zeros((4, 4))
+        augmented[:2, :2] = A[block, block] * Ts
+        augmented[:2, 2] = b[block] * Ts
+        augmented[2, 3] = 1.0  # the ramp from u(k) to u(k+1)
+        exponential = expm(augmented)
+        phi, gamma_1, gamma_2 = exponential[:2, :2], exponential[:2, 2], exponential[:2, 3]
+        A_d[block, block] = phi
+        if input_hold == "zoh":
+            b_d[block] = gamma_1
+        else:
+            # ξ(k+1) = Φ ξ + Γ₁ u(k) + Γ₂ (u(k+1) − u(k)); with s = ξ − Γ₂ u it needs no future command.
+            b_d[block] = phi @ gamma_2 + gamma_1 - gamma_2
+            d += float(c[block] @ gamma_2)
+    return A_d, b_d, c, d

@@ -1,0 +1,132 @@
+"""The stage: the modes of eq. (15) behind a command that friction and cable stiffness offset."""
+
+from __future__ import annotations
+
+import math
+
+from ..base.clock import SampleClock
+from ..base.errors import ParameterError, SignalError
+from ..base.parameters import check
+from ..model.physics import ModalModel, Mode
+from .plant import RATE_MAX, STATE_MAX, check_command, check_step, internal_steps
+
+__all__ = ["FRICTION_VELOCITY", "StageDrive"]
+
+FRICTION_VELOCITY = 2e-3
+"""Velocity over which the stage's friction changes sign, m/s."""
+
+
+class StageDrive:
+    """A linear-motor stage: a modal model whose command is disturbed by friction and cable stiffness.
+
+    ``x = G_pb (x_d − d)`` with ``d = f·tanh(v_d / 2 mm/s) + κ·x·|x|``: the carriage's friction follows the commanded
+    velocity ``v_d``, the backward difference of ``x_d`` over ``T_s``.
+
+    Parameters
+    ----------
+    model : ModalModel
+        ``G_pb``, eq. (15), without dead time.
+    f : float
+        Friction as an offset of the command, m, ≥ 0.
+    kappa : float
+        Cable stiffness as an offset of the command, 1/m, ≥ 0.
+    Ts : float
+        Interval at which the command is sampled, s, over which ``v_d`` is taken.
+    """
+
+    def __init__(self, model: ModalModel, f: float = 0.0, kappa: float = 0.0, Ts: float = 1e-3) -> None:
+        if model.dead_time:
+            raise ParameterError(f"the stage's model must have no dead time, got {model.dead_time} samples")
+        self.model = model
+        self.f: float = check("f", f)
+        self.kappa: float = check("kappa", kappa)
+        self.Ts: float = check("T_s", Ts)
+        self._modes = [(mode.omega**2, 2 * mode.zeta * mode.omega, mode.alpha, mode.beta) for mode in model.modes]
+        self._rate = max(map(_mode_rate, model.modes))
+        for i, mode in enumerate(model.modes, start=1):
+            if _mode_rate(mode) > RATE_MAX:
+                raise ParameterError(
+                    f"2 pi f_n and 4 pi f_n zeta of mode[{i}] must be at most {RATE_MAX:g} 1/s in a plant, "
+                    f"got {_mode_rate(mode):g}; lower f_n or zeta"
+                )
+        self.reset()
+
+    def reset(self, start: float = 0.0) -> None:
+        """Put the stage to rest at ``start``, m."""
+        self._start = start
+        self._z = [0.0] * (2 * len(self._modes))
+        self._last_x_d, self._v_d, self._v = 0.0, 0.0, 0.0
+        self._clock = SampleClock.begin(0.0, self.Ts)  # a time of its own
+
+    @property
+    def x(self) -> float:
+        """True position, m."""
+        return self._start + self._position(self._z)
+
+    @property
+    def v(self) -> float:
+        """True velocity under the command of the last step, m/s."""
+        return self._v
+
+    def step(self, x_d: float, h: float) -> None:
+        """Advance by ``h`` seconds with the command ``x_d``, m, held."""
+        check_command(x_d)
+        check_step(h, self._rate)
+        step = self._clock.stepped(self._clock.end, h)
+        r, z = x_d - self._start, self._z
+        last_x_d, v_d, done = self._last_x_d, self._v_d, 0.0
+        # v_d is taken at the instants, in whatever steps they come.
+        for i in range(step.n_latched + 1):
+            end = max(done, step.first + i * self.Ts) if i < step.n_latched else h
+            if end > done:
+                z = self._integrated(z, self._pushed(r, v_d), end - done)
+                done = end
+            if i < step.n_latched:
+                last_x_d, v_d = r, (r - last_x_d) / self.Ts
+        if not all(abs(s) < STATE_MAX for s in z):
+            raise SignalError(f"the stage's state left the range of numbers (command {x_d} m)")
+        self._z, self._v = z, self._position(self._derivative(z, self._pushed(r, v_d)))
+        self._last_x_d, self._v_d, self._clock = last_x_d, v_d, step.after
+
+    def state(self) -> list[float]:
+        """Return ``[start, last x_d, v_d, v, 7 numbers of the clock, z …]``."""
+        return [self._start, self._last_x_d, self._v_d, self._v, *self._clock.state(), *self._z]
+
+    def restore(self, state: list[float]) -> None:
+        """Take over what :meth:`state` returned."""
+        self._start, self._last_x_d, self._v_d, self._v = state[:4]
+        self._clock = SampleClock.from_state(state[4:11])
+        self._z = list(state[11:])
+
+    def _pushed(self, r: float, v_d: float) -> float:
+        """Return the command after the carriage's friction, which follows the commanded velocity."""
+        return r - self.f * math.tanh(v_d / FRICTION_VELOCITY)
+
+    def _integrated(self, z: list[float], pushed: float, time: float) -> list[float]:
+        """Return ``z`` after ``time`` seconds of a held command."""
+        n = internal_steps(time, self._rate)
+        dt, f = time / n, self._derivative
+        for _ in range(n):
+            k1 = f(z, pushed)
+            k2 = f([s + dt / 2 * k for s, k in zip(z, k1, strict=True)], pushed)
+            k3 = f([s + dt / 2 * k for s, k in zip(z, k2, strict=True)], pushed)
+            k4 = f([s + dt * k for s, k in zip(z, k3, strict=True)], pushed)
+            z = [s + dt / 6 * (a + 2 * b + 2 * c + d) for s, a, b, c, d in zip(z, k1, k2, k3, k4, strict=True)]
+        return z
+
+    def _position(self, z: list[float]) -> float:
+        return sum(alpha * z[2 * i] + beta * z[2 * i + 1] for i, (_, _, alpha, beta) in enumerate(self._modes))
+
+    def _derivative(self, z: list[float], pushed: float) -> list[float]:
+        x = self._position(z)
+        u = pushed - self.kappa * x * abs(x)
+        slope = []
+        for i, (w2, two_zw, _, _) in enumerate(self._modes):
+            # z̈ + 2ζω ż + ω² z = u, eq. (15)
+            slope += [z[2 * i + 1], u - two_zw * z[2 * i + 1] - w2 * z[2 * i]]
+        return slope
+
+
+def _mode_rate(mode: Mode) -> float:
+    """Return the fastest rate of a mode, 1/s."""
+    return max(math.sqrt(mode.omega**2), 2 * mode.zeta * mode.omega)

@@ -1,0 +1,117 @@
+"""The features φ of eq. (5): which of them stands where in φ and in w, and their values from the past samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.lib.stride_tricks import as_strided
+
+from ..base.signals import Array
+
+__all__ = ["FeatureLayout", "PastSamples"]
+
+
+@dataclass(frozen=True)
+class FeatureLayout:
+    """Places of the groups of features in φ, and of their weights in w.
+
+    ``φ(k) = [1, x_pb(k) … x_pb(k−q), e_pb(k−1) … e_pb(k−p), those of the reference]``; eq. (5). The C core's is
+    ``hsep_features.h``.
+
+    Parameters
+    ----------
+    p, q : int
+        Lags of ``e_pb`` and of ``x_pb``.
+    n_reference : int
+        Features of the reference; none in the paper.
+    """
+
+    p: int
+    q: int
+    n_reference: int = 0
+
+    @property
+    def bias(self) -> int:
+        """The constant."""
+        return 0
+
+    @property
+    def x_pb(self) -> slice:
+        """``x_pb(k) … x_pb(k−q)``."""
+        return slice(1, 2 + self.q)
+
+    @property
+    def e_pb(self) -> slice:
+        """``e_pb(k−1) … e_pb(k−p)``: the weights of the learned recursion."""
+        return slice(self.x_pb.stop, self.x_pb.stop + self.p)
+
+    @property
+    def reference(self) -> slice:
+        """Features of the reference."""
+        return slice(self.e_pb.stop, self.n)
+
+    @property
+    def n(self) -> int:
+        """Number of features."""
+        return int(self.e_pb.stop) + self.n_reference
+
+
+class PastSamples:
+    """``x_pb`` and ``e_pb`` of the samples that φ looks back to, and of the window that is taken in behind them.
+
+    Parameters
+    ----------
+    layout : FeatureLayout
+    Np : int
+        Most samples that are taken in at once.
+
+    Attributes
+    ----------
+    x_pb : (q,) array, m
+        Oldest first; like ``e_pb`` zero before the first sample.
+    e_pb : (p,) array, m
+        Oldest first.
+    """
+
+    def __init__(self, layout: FeatureLayout, Np: int) -> None:
+        p, q = layout.p, layout.q
+        self.layout, self.Np = layout, Np
+        self._x, self._e = np.zeros(q + Np), np.zeros(p + Np)
+        self.x_pb, self.e_pb = self._x[:q], self._e[:p]
+        step = self._x.itemsize
+        self._x_lags = as_strided(self._x[q:], (Np, q + 1), (step, -step))  # x_pb(k) … x_pb(k−q)
+        self._e_lags = as_strided(self._e[p - 1 :], (Np, p), (step, -step))  # e_pb(k−1) … e_pb(k−p)
+        self._rows = np.empty((Np, layout.n + 1), order="F")
+
+    def restart(self) -> None:
+        """Begin at rest."""
+        self._x[:], self._e[:] = 0.0, 0.0
+
+    def append(self, x_pb: Array, e_pb: Array) -> None:
+        """Put ``m ≤ Np`` samples, m, behind the past ones."""
+        p, q, m = self.layout.p, self.layout.q, len(e_pb)
+        self._x[q : q + m], self._e[p : p + m] = x_pb, e_pb
+
+    def rows(self, m: int, reference: Array) -> Array:
+        """Return the rows ``[φ(k) | e_pb(k)]`` of the ``m`` appended samples, ``(m, n + 1)``; eq. (5).
+
+        Parameters
+        ----------
+        m : int
+        reference : (m, n_reference) array, m
+            Features of the reference.
+        """
+        layout, p = self.layout, self.layout.p
+        rows = self._rows if m == self.Np else np.empty((m, layout.n + 1), order="F")
+        rows[:, layout.bias] = 1.0
+        rows[:, layout.x_pb] = self._x_lags[:m]
+        rows[:, layout.e_pb] = self._e_lags[:m]
+        rows[:, layout.reference] = reference
+        rows[:, -1] = self._e[p : p + m]
+        return rows
+
+    def advance(self, m: int) -> None:
+        """Let the ``m`` appended samples become past ones."""
+        p, q = self.layout.p, self.layout.q
+        self.x_pb[:], self.e_pb[:] = self._x[m : m + q].copy(), self._e[m : m + p].copy()

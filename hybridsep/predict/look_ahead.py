@@ -1,0 +1,307 @@
+"""The look-ahead buffer between the interpolator and the drive, sample by sample.
+
+The FMU's timing contract. Sample ``k`` brings ``x_d_ahead = r(k)`` and ``x_meas = x(k)``; after it the outputs are
+those of ``k + 1``, and ``x_d(k) = r(k − delay)``, where ``delay`` is ``Np``, or a planner's preview. When ``k + 1`` is
+a multiple of ``Np``, all commands of the next window (of its preview) and every measurement before it have arrived: the
+weights are solved and the window is predicted, or planned, in that sample.
+
+During the first fill (``k < delay``) the commanded position is the start. Without a planner it is neither predicted nor
+learned. A planner plans from the beginning, so that a move that is already in sight can be prepared; what is measured
+over the fill is not learned. ``t_init`` counts from its end.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import numpy as np
+
+from ..base.errors import SignalError
+from ..base.parameters import samples_before
+from ..base.saved import Saved
+from ..base.signals import POSITION_MAX, Array
+from ..base.state import pack, unpack
+from .predictor import HybridPredictor
+from .window import PublishedWindow
+
+__all__ = ["LookAhead", "Planner", "checked_start"]
+
+_KIND = "look-ahead"
+
+
+class Planner(Protocol):
+    """What modifies the commands of a window before they are predicted; it holds the predictor.
+
+    Attributes
+    ----------
+    predictor : HybridPredictor
+    preview : int
+        Samples of command that a plan needs, at least ``Np``.
+    """
+
+    predictor: HybridPredictor
+    preview: int
+
+    def new_run(self, start: float | None = None, *, t_init: float = 0.0, lead_in: int = 0) -> None:
+        """Begin another run, at rest at ``start``, m, with what is learned kept."""
+
+    def plan(self, x_d: Array) -> PublishedWindow:
+        """Plan the next window from ``(preview,)`` commands, m."""
+
+    def update(self, x: Array) -> None:
+        """Take in what was measured over the planned window, ``(Np,)``, m."""
+
+    @property
+    def is_planned(self) -> bool:
+        """Whether a planned window waits for its measurement."""
+
+    def to_bytes(self) -> bytes:
+        """Return parameters and state, the predictor's too."""
+
+    @classmethod
+    def from_bytes(cls, blob: bytes) -> Planner:
+        """Return what :meth:`to_bytes` described."""
+
+
+class LookAhead:
+    """Delays commands, predicts the drive's position while they wait, and modifies them if there is a planner.
+
+    Parameters
+    ----------
+    model : HybridPredictor or Planner
+        Put to the beginning of a run here, with what it has learned kept.
+    start : float
+        Position where the drive is at rest, m.
+    t_init : float, optional
+        Warm-up after the first fill, s; the predictor's own if left out, 0 for a warm start.
+
+    Attributes
+    ----------
+    k : int
+        Sample that comes next, counted from the beginning of the run.
+    Np, delay : int
+        Samples in a window; samples by which commands are delayed.
+    model : HybridPredictor or Planner
+    window : PublishedWindow
+        The window that ``k`` is part of.
+    diverged : str
+        Why the window could not be predicted; every further sample is refused then. Empty as long as it could.
+
+    Raises
+    ------
+    SignalError
+        If ``start`` is not finite.
+    """
+
+    diverged: str = ""
+
+    def __init__(self, model: HybridPredictor | Planner, start: float, *, t_init: float | None = None) -> None:
+        self._hold(model)
+        warm_up = self.predictor.t_init if t_init is None else t_init
+        self.start = checked_start(start)
+        self.k = 0
+        self._first_scored = self.delay + samples_before(warm_up, self.predictor.Ts)
+        self._n_scored, self._sums = 0, np.zeros(3)
+        # The last commands, r(k − delay) … r(k − 1), which is x_d(k) … x_d(k + delay − 1)
+        self._ahead, self._measured = np.full(self.delay, self.start), np.full(self.Np, self.start)
+        if self.planner is None:
+            self.predictor.new_run(self.start, t_init=warm_up)
+            self.window = PublishedWindow.at_rest(self.start, self.Np)
+        else:
+            self.planner.new_run(self.start, t_init=warm_up, lead_in=self.delay)
+            self.window = self.planner.plan(self._ahead.copy())
+
+    def _hold(self, model: HybridPredictor | Planner) -> None:
+        self.model = model
+        self.planner = None if isinstance(model, HybridPredictor) else model
+        self.predictor = model if isinstance(model, HybridPredictor) else model.predictor
+        self.Np = self.predictor.Np
+        self.delay = self.Np if self.planner is None else self.planner.preview
+
+    @property
+    def batch(self) -> int:
+        """``⌊k/Np⌋``."""
+        return self.k // self.Np
+
+    @property
+    def x_d(self) -> float:
+        """Commanded position now, m."""
+        return self._now(self.window.x_d)
+
+    @property
+    def x_dm(self) -> float:
+        """Command that the drive gets now, m: ``x_d`` as the planner has modified it."""
+        return self._now(self.window.x_dm)
+
+    @property
+    def x_pb(self) -> float:
+        """Physics-based prediction for now, m."""
+        return self._now(self.window.x_pb)
+
+    @property
+    def x_h(self) -> float:
+        """Prediction for now by the best model there is, m."""
+        return self._now(self.window.x_h)
+
+    @property
+    def e_servo(self) -> float:
+        """Predicted servo error ``x_d − x_h``, m."""
+        return self.x_d - self.x_h
+
+    @property
+    def hybrid_active(self) -> bool:
+        """Whether ``x_h`` is the hybrid prediction now."""
+        return self.k % self.Np >= self.window.n_warm_up
+
+    @property
+    def sep_state(self) -> int:
+        """What the window was planned with; 0 without a planner."""
+        return self.window.state
+
+    @property
+    def rms_e(self) -> float:
+        """Running RMS of the measured servo error ``x_d − x_meas`` since ``t_init``, m; 0 before."""
+        return self._rms(0)
+
+    @property
+    def rms_pb(self) -> float:
+        """Running RMS of ``x_meas − x_pb`` since ``t_init``, m; 0 before."""
+        return self._rms(1)
+
+    @property
+    def rms_h(self) -> float:
+        """Running RMS of ``x_meas − x_h`` since ``t_init``, m; 0 before."""
+        return self._rms(2)
+
+    def sample(self, x_d_ahead: float, x_meas: float) -> None:
+        """Take in sample ``k`` and move on to ``k + 1``.
+
+        Parameters
+        ----------
+        x_d_ahead : float, m
+            ``r(k)``, the command for ``delay`` samples later.
+        x_meas : float, m
+            ``x(k)``, the position measured now.
+
+        Raises
+        ------
+        SignalError
+            If one of them is not finite; nothing is changed then. If the window that begins diverges, all that follows
+            is refused, too.
+        """
+        self.check(x_d_ahead, x_meas)
+        self._ahead[self.k % self.delay], self._measured[self.k % self.Np] = x_d_ahead, x_meas
+        if self.k >= self._first_scored:
+            self._n_scored += 1
+            self._sums += np.square([x_meas - self.x_d, x_meas - self.x_pb, x_meas - self.x_h])
+        self.k += 1
+        if self.k % self.Np == 0:
+            self._learn()
+            self._begin_window()
+
+    def check(self, x_d_ahead: float, x_meas: float, k: int | None = None) -> None:
+        """Raise SignalError if a value cannot be taken in as sample ``k``, the next one if left out.
+
+        Nothing is changed then. Nothing can be taken in once a window has diverged.
+        """
+        if self.diverged:
+            raise SignalError(self.diverged)
+        sample = self.k if k is None else k
+        for name, value in (("x_d_ahead", x_d_ahead), ("x_meas", x_meas)):
+            _check_position(name, value, f" at sample {sample}")
+
+    def to_bytes(self) -> bytes:
+        """Return the whole state, the predictor's and the planner's included, as a versioned blob."""
+        meta = {
+            "start": self.start,
+            "k": self.k,
+            "first_scored": self._first_scored,
+            "n_scored": self._n_scored,
+            "n_warm_up": self.window.n_warm_up,
+            "state": int(self.window.state),
+            "diverged": self.diverged,
+        }
+        arrays = {"sums": self._sums, "ahead": self._ahead, "measured": self._measured}
+        arrays |= {name: getattr(self.window, name) for name in PublishedWindow.SIGNALS}
+        return pack(_KIND, meta, arrays, {"model": self.model.to_bytes()})
+
+    @classmethod
+    def from_bytes(cls, blob: bytes, model_type: type[HybridPredictor] | type[Planner]) -> LookAhead:
+        """Return the look-ahead that :meth:`to_bytes` described.
+
+        Parameters
+        ----------
+        blob : bytes
+        model_type : type
+            That of the look-ahead's predictor or planner.
+
+        Raises
+        ------
+        StateError
+            If the blob is foreign, truncated or of another version.
+        """
+        saved = Saved(_KIND, *unpack(_KIND, blob))
+        look_ahead = cls.__new__(cls)
+        look_ahead._hold(model_type.from_bytes(saved.part("model")))
+        Np = look_ahead.Np
+        with saved.consistent():
+            look_ahead.start = checked_start(saved.real("start"))
+        look_ahead.k = saved.whole("k")
+        look_ahead._first_scored, look_ahead._n_scored = saved.whole("first_scored"), saved.whole("n_scored")
+        look_ahead.diverged = saved.text("diverged")
+        look_ahead._sums = np.abs(saved.array("sums", 3))
+        look_ahead._ahead, look_ahead._measured = saved.array("ahead", look_ahead.delay), saved.array("measured", Np)
+        look_ahead.window = PublishedWindow(
+            **{name: saved.array(name, Np) for name in PublishedWindow.SIGNALS},
+            state=saved.whole("state"),
+            n_warm_up=saved.whole("n_warm_up", Np),
+        )
+        if not (look_ahead._is_predicted or look_ahead.diverged):
+            raise saved.error("the window that runs must be predicted, and planned if there is a planner")
+        return look_ahead
+
+    @property
+    def _is_predicted(self) -> bool:
+        if self.planner is not None:
+            return self.planner.is_planned
+        return self.predictor.n_pending == (self.Np if self.k >= self.Np else 0)
+
+    def _learn(self) -> None:
+        """Learn the window that has been measured."""
+        if self.planner is not None:
+            self.planner.update(self._measured)
+        elif self.k > self.Np:  # the first fill was not predicted
+            self.predictor.update(self._measured)
+
+    def _begin_window(self) -> None:
+        """Go on to the next window; if it diverges, none is shown and no sample is taken in any more."""
+        x_d = np.roll(self._ahead, -(self.k % self.delay))
+        try:
+            if self.planner is None:
+                self.window = PublishedWindow.of_prediction(x_d, self.predictor.predict(x_d))
+            else:
+                self.window = self.planner.plan(x_d)
+        except SignalError as error:
+            self.diverged = str(error)
+            raise
+
+    def _now(self, signal: Array) -> float:
+        return float(signal[self.k % self.Np])
+
+    def _rms(self, i: int) -> float:
+        return math.sqrt(self._sums[i] / self._n_scored) if self._n_scored else 0.0
+
+
+def checked_start(start: float) -> float:
+    """Return the position, m, where a drive rests."""
+    _check_position("the start value of x_d_ahead", start)
+    return start
+
+
+def _check_position(name: str, value: float, when: str = "") -> None:
+    """Raise SignalError if a position, m, is not finite, or further out than any machine is."""
+    if not math.isfinite(value):
+        raise SignalError(f"{name} must be finite, got {value}{when}")
+    if abs(value) > POSITION_MAX:
+        raise SignalError(f"{name} must be within ±{POSITION_MAX:g} m, got {value:g}{when}")

@@ -1,0 +1,86 @@
+"""The saved state of a predictor: its parameters, what it has learned, and where its run stands."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..base.parameters import check, check_together
+from ..base.saved import Saved
+from ..base.state import pack, unpack
+from ..model.physics import ModalModel, Mode
+from .features import FeatureLayout
+from .reference_features import N_REFERENCE
+from .window import PredictedWindow
+
+if TYPE_CHECKING:
+    from .predictor import HybridPredictor
+
+__all__ = ["predictor_blob", "predictor_from"]
+
+_KIND = "predictor"
+
+
+def predictor_blob(predictor: HybridPredictor) -> bytes:
+    """Return parameters and state, a window that waits for its measurement too, as a versioned blob."""
+    waiting, past, reference = predictor.waiting, predictor.past, predictor.reference_features
+    numbers = ("Ts", "Np", "p", "q", "lam", "t_init", "k", "n_init", "start")
+    meta = {
+        **{name: getattr(predictor, name) for name in numbers},
+        "v_s": predictor.v_s,
+        "input_hold": predictor.discrete.input_hold,
+        "dead_time": predictor.model.dead_time,
+        "n_samples": predictor.regression.n_samples,
+        "pending_start": None if waiting is None else waiting.start,
+    }
+    modes = np.array([[mode.f_n, mode.zeta, mode.alpha, mode.beta] for mode in predictor.model.modes])
+    arrays = {
+        "modes": modes,
+        "state": predictor.state,
+        "x_pb": past.x_pb,
+        "e_pb": past.e_pb,
+        "factor": predictor.regression.factor,
+        "signs": reference.before,
+        "reference": np.array([reference.last]),
+    }
+    if waiting is not None:
+        arrays |= {f"pending_{name}": getattr(waiting, name) for name in ("x_d", "x_pb", "reference", "signs")}
+    return pack(_KIND, meta, arrays)
+
+
+def predictor_from(kind: type[HybridPredictor], blob: bytes) -> HybridPredictor:
+    """Return the predictor that :func:`predictor_blob` described.
+
+    Raises
+    ------
+    StateError
+        If the blob is foreign, truncated or of another version.
+    """
+    saved = Saved(_KIND, *unpack(_KIND, blob))
+    names = ("Ts", "Np", "p", "q", "lam", "t_init", "v_s", "input_hold")
+    values = {name: saved.field(name) for name in names}
+    with saved.consistent():
+        # What is allocated follows from numbers that the arrays confirm first.
+        check_together(**{name: values[name] for name in names[:6]})
+        n_reference = N_REFERENCE if check("v_s", values["v_s"]) > 0 else 0
+        n = FeatureLayout(int(values["p"]), int(values["q"]), n_reference).n
+        factor = saved.array("factor", n + 1, n + 1)
+        model = ModalModel([Mode(*row) for row in saved.array("modes", None, 4).tolist()], saved.field("dead_time"))
+        predictor = kind(model, **values, start=saved.number_or_none("start"))
+        predictor.regression.restore(factor, saved.whole("n_samples"))
+    predictor.k, predictor.n_init = saved.whole("k"), saved.whole("n_init")
+    predictor.state[:] = saved.array("state", predictor.discrete.n_state)
+    predictor.past.x_pb[:] = saved.array("x_pb", predictor.q)
+    predictor.past.e_pb[:] = saved.array("e_pb", predictor.p)
+    features = predictor.reference_features
+    features.before = saved.array("signs", len(features.before))
+    features.last = float(saved.array("reference", 1, finite=False)[0])
+    start = saved.number_or_none("pending_start")
+    if start is not None:
+        x_d, reference = saved.array("pending_x_d", None), saved.array("pending_reference", None)
+        if not 0 < len(x_d) <= len(reference):
+            raise saved.error("the window that waits must have samples, and a reference at least as long")
+        signs = saved.array("pending_signs", len(features.signs(reference, start)))
+        predictor.waiting = PredictedWindow(x_d, saved.array("pending_x_pb", len(x_d)), start, reference, signs)
+    return predictor
