@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel
 from hybridsep.plants.feed_drive import FeedDrive
@@ -44,14 +45,14 @@ def staircase_log(n: int) -> tuple[Array, Array]:
 
 def staircase_predictor(p: int, q: int) -> HybridPredictor:
     """Return a predictor for the staircase with the linear part of its drive as the physics model."""
-    return HybridPredictor(ModalModel.spring_mass_damper(m=1.0, c=15.7, k=24674.0), p=p, q=q)
+    return HybridPredictor(ModalModel.spring_mass_damper(m=1.0, c=15.7, k=24674.0), PredictorSettings(p=p, q=q))
 
 
 def physics_response(predictor: HybridPredictor, x_d: Array) -> Array:
     """Return ``x_pb`` from rest, (n,), m, relative to the first command, batch by batch as a predictor does it."""
     state, parts = predictor.discrete.rest(), []
     for i in range(0, len(x_d), predictor.Np):
-        x_pb, state = predictor.discrete.respond(state, x_d[i : i + predictor.Np] - x_d[0])
+        x_pb, state = predictor.discrete.forced_response(state, x_d[i : i + predictor.Np] - x_d[0])
         parts.append(x_pb)
     return np.concatenate(parts)
 

@@ -17,6 +17,8 @@ import zipfile
 from pathlib import Path
 from time import perf_counter
 
+from hybridsep.base.settings import PredictorSettings
+
 os.environ["OMP_NUM_THREADS"] = "1"
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
@@ -49,7 +51,7 @@ GROWTH_MAX = 1_000_000
 def make_predictor() -> HybridPredictor:
     """Return n = 55 features on a well-damped drive: 40 Hz at ζ = 0.7 decays by e^−880 in 5 s, that is, to zero."""
     model = ModalModel([Mode(f_n=40.0, zeta=0.7, alpha=(80 * np.pi) ** 2)])
-    return HybridPredictor(model, Ts=TS, p=P_LAGS, q=Q_LAGS)
+    return HybridPredictor(model, PredictorSettings(T_s=TS, p=P_LAGS, q=Q_LAGS))
 
 
 def minimum_jerk(tau: Array) -> Array:
@@ -117,7 +119,7 @@ def main() -> int:
         write_repeated(path, repetitions, x_d=x_d, x=x)
         size = path.stat().st_size
         begin = perf_counter()
-        scores = backtest_stream(predictor, open_log(path, Ts=TS).chunks(BLOCK), on_batch=measure)
+        scores = backtest_stream(predictor, open_log(path, T_s=TS).chunks(BLOCK), on_batch=measure)
         seconds = perf_counter() - begin
 
     rows = feature_rows(x_pb, x - x_pb, P_LAGS, Q_LAGS)

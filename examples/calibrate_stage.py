@@ -9,6 +9,7 @@ the paper does not print, to see how far the hybrid's gain depends on them.
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import brentq
@@ -47,7 +48,7 @@ def calibrate(axis: str, command: Array, ratio: float = KAPPA_OVER_F) -> float:
     """Return ``f`` in metres for one axis; ``command`` is ``(n,)``, m, and ``ratio`` is ``κ/f``, 1/m²."""
     machine, aim = load_machine(f"als25010_{axis}"), printed(axis)
     discrete = machine.model.discretise(machine.T_s)
-    x_pb, _ = discrete.respond(discrete.rest(), command)
+    x_pb, _ = discrete.forced_response(discrete.rest(), command)
 
     def miss(f: float) -> float:
         return float(np.sqrt(np.mean((measured(machine, command, f, ratio) - x_pb) ** 2))) - aim
@@ -61,7 +62,9 @@ def compare_assumptions() -> None:
         for axis, command in zip("xy", spiral(radius=radius, turns=turns), strict=True):
             machine, f = load_machine(f"als25010_{axis}"), calibrate(axis, command, ratio)
             # The warm-up is 5 % of the trajectory, as in the paper
-            predictor = machine.new_predictor(t_init=0.05 * machine.T_s * len(command))
+            predictor = machine.new_predictor(
+                replace(machine.predictor_settings, t_init=0.05 * machine.T_s * len(command))
+            )
             found = backtest(predictor, command, measured(machine, command, f, ratio)).overall
             print(
                 f"{axis.upper()}  {name:<26}f = {f:.4e} m: {1e6 * found.rms_pb:6.1f} → {1e6 * found.rms_h:5.1f} µm, "

@@ -82,14 +82,14 @@ class Drive:
     V_d: float
 
     @classmethod
-    def spring_mass_damper(cls, m: float = 1.0, c: float = 15.7, k: float = 24674.0, Ts: float = 1e-3) -> Drive:
-        """Return eq. (11) pushed by a force, ``h`` in N: ``m`` kg, ``c`` N·s/m, ``k`` N/m, sampled every ``Ts`` s."""
+    def spring_mass_damper(cls, m: float = 1.0, c: float = 15.7, k: float = 24674.0, T_s: float = 1e-3) -> Drive:
+        """Return eq. (11) pushed by a force, ``h`` in N: ``m`` kg, ``c`` N·s/m, ``k`` N/m, sampled every ``T_s`` s."""
         model = ModalModel.spring_mass_damper(m, c, k)
         A, b, output = model.state_space()
-        discrete = model.discretise(Ts)
+        discrete = model.discretise(T_s)
         # A force moves x by 1 / (m s² + c s + k): nothing at once in x, 1/m in ẍ.
         b_h = np.linalg.solve(np.array([output, output @ A]), np.array([0.0, 1.0 / m]))
-        # Γ = ∫₀^Ts exp(A τ) dτ b_h = A⁻¹ (A_d − I) b_h
+        # Γ = ∫₀^T_s exp(A τ) dτ b_h = A⁻¹ (A_d − I) b_h
         held = np.linalg.solve(A, (discrete.A - np.eye(len(b))) @ b_h)
         return cls(
             discrete.A, discrete.b, np.asarray(held, dtype=np.float64), discrete.c, output @ A, float(output @ b)
@@ -177,9 +177,9 @@ def polynomial(degree: int) -> Array:
     return np.asarray(np.poly(np.ones(degree + 1)), dtype=np.float64)
 
 
-def sinusoid(f: float, Ts: float) -> Array:
-    """Return the recursion ``η`` of a sinusoid of ``f`` Hz sampled every ``Ts`` s, ``1 − 2 cos(2π f Ts) D + D²``."""
-    return np.array([1.0, -2 * np.cos(2 * np.pi * f * check("T_s", Ts)), 1.0])
+def sinusoid(f: float, T_s: float) -> Array:
+    """Return the recursion ``η`` of a sinusoid of ``f`` Hz sampled every ``T_s`` s, ``1 − 2 cos(2π f T_s) D + D²``."""
+    return np.array([1.0, -2 * np.cos(2 * np.pi * f * check("T_s", T_s)), 1.0])
 
 
 def innovation(e_pb: Array, recursion: Array, known: Array | None = None) -> Array:
@@ -254,20 +254,20 @@ class Case:
     n_spikes: int
 
 
-def demonstrate(n: int = 2000, Ts: float = 1e-3) -> tuple[Case, ...]:
+def demonstrate(n: int = 2000, T_s: float = 1e-3) -> tuple[Case, ...]:
     """Run the paper's drive with each kind of ``h``, along a 10 mm, 2 Hz raised cosine of ``n`` samples.
 
     First the paper's ``x_d²``, there and along the staircase, with ``Γ`` of a force of −1000 N/m² · ``x_d²``; then
     those that its Remark allows.
     """
-    drive = Drive.spring_mass_damper(Ts=Ts)
+    drive = Drive.spring_mass_damper(T_s=T_s)
     squaring = replace(drive, Gamma=-1000.0 * drive.Gamma)
-    t = Ts * np.arange(n)
+    t = T_s * np.arange(n)
     x_d = 0.005 * (1 - np.cos(2 * np.pi * 2.0 * t))
-    mode = ModalModel([Mode(60.0, 0.02, 300.0 * (2 * np.pi * 60.0) ** 2)]).discretise(Ts)
+    mode = ModalModel([Mode(60.0, 0.02, 300.0 * (2 * np.pi * 60.0) ** 2)]).discretise(T_s)
     chi = characteristic(drive.A)
     # x_d² of a raised cosine is a constant and sinusoids of once and twice its frequency
-    eta = np.convolve(polynomial(0), np.convolve(sinusoid(2.0, Ts), sinusoid(4.0, Ts)))
+    eta = np.convolve(polynomial(0), np.convolve(sinusoid(2.0, T_s), sinusoid(4.0, T_s)))
     r, s = recursion_with_mode(drive, mode)
 
     def ripple(k: int, *_: object) -> float:
@@ -297,13 +297,13 @@ def demonstrate(n: int = 2000, Ts: float = 1e-3) -> tuple[Case, ...]:
 
     friction, curve = coulomb(2.0, x_d), quadratic(drive, 100.0, 1000.0)
     # A jerk-limited move is piecewise cubic, its square piecewise of degree 6
-    piecewise, stairs = np.convolve(chi, polynomial(6)), staircase(Ts)[:n]
+    piecewise, stairs = np.convolve(chi, polynomial(6)), staircase(T_s)[:n]
     return (
         case("x_d², η alone (the paper)", squared_command, eta, of=squaring),
         case("x_d², η and χ", squared_command, np.convolve(chi, eta), of=squaring),
         case("x_d², staircase", squared_command, piecewise, of=squaring, along=stairs),
         case("Coulomb friction", friction, np.convolve(chi, polynomial(0))),
-        case("sinusoid of time", ripple, np.convolve(chi, sinusoid(7.0, Ts))),
+        case("sinusoid of time", ripple, np.convolve(chi, sinusoid(7.0, T_s))),
         case("mode, its order left out", linear_mode(drive, mode), chi),
         case("mode, with past x_pb", linear_mode(drive, mode), r, of_x_pb=s),
         *(case(f"quadratic, η of degree {d}", curve, np.convolve(chi, polynomial(d))) for d in range(3)),

@@ -7,6 +7,7 @@ the hybrid one, RMS on the staircase.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from mechanism import Drive, simulate
@@ -38,7 +39,7 @@ def eq_13(x: float, v: float) -> float:
 
 def residual(force: Force, x_d: Array) -> Array:
     """Return ``x − x_pb``, ``(n,)``, m, of the paper's drive; the command is held for 1 ms, the force for 0.1 ms."""
-    drive = Drive.spring_mass_damper(Ts=1e-3 / FINER)
+    drive = Drive.spring_mass_damper(T_s=1e-3 / FINER)
 
     def pushed(_: int, z: Array, command: float) -> float:
         return -force(float(drive.C @ z), float(drive.V @ z) + drive.V_d * command)
@@ -61,10 +62,10 @@ def main() -> None:
         print(f"  {name:<52}{measured:9.2f}{true:10.3f}")
     machine = load_machine("spring_mass_damper")
     discrete = machine.model.discretise(machine.T_s)
-    x = discrete.respond(discrete.rest(), x_d)[0] + residual(in_mm(eq_12), x_d) + noise
+    x = discrete.forced_response(discrete.rest(), x_d)[0] + residual(in_mm(eq_12), x_d) + noise
     print("Hybrid RMS, µm, over λ, m² (printed 14.7)")
     for exponent in range(-16, -5):
-        found = backtest(machine.new_predictor(lam=10.0**exponent), x_d, x)
+        found = backtest(machine.new_predictor(replace(machine.predictor_settings, lam=10.0**exponent)), x_d, x)
         print(f"  1e{exponent:<5}{1e6 * found.overall.rms_h:9.2f}")
 
 

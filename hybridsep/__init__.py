@@ -19,7 +19,7 @@ from .base.errors import (
     SignalError,
     StateError,
 )
-from .base.limits import Limits
+from .base.settings import Limits
 from .compensate.compensator import SepCompensator, SepState
 from .cosim.compensator_run import SepCoSimulation, cosimulate_sep
 from .cosim.importer import FmuInstance
@@ -35,7 +35,15 @@ from .plants.encoder import Encoder
 from .plants.feed_drive import FeedDrive
 from .plants.plant import simulate
 from .plants.stage_drive import StageDrive
-from .plants.trajectory import PAPER_LIMITS, along_path, archimedean_spiral, from_file, rest_to_rest, spiral, staircase
+from .plants.trajectory import (
+    PAPER_LIMITS,
+    along_path,
+    archimedean_spiral,
+    read_trajectory,
+    rest_to_rest,
+    spiral,
+    staircase,
+)
 from .predict.look_ahead import LookAhead
 from .predict.predictor import HybridPredictor
 from .predict.regression import RidgeRegression
@@ -84,11 +92,11 @@ __all__ = [
     "cosimulate",
     "cosimulate_sep",
     "fmu_names",
-    "from_file",
     "load_machine",
     "machine_names",
     "open_log",
     "read_log",
+    "read_trajectory",
     "rest_to_rest",
     "run_closed_loop",
     "simulate",

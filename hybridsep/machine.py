@@ -1,22 +1,35 @@
 """Machine files: everything the library, the FMUs and the command line need to know of one axis, as TOML.
 
-Values are SI. Ranges come from :data:`hybridsep.parameters.PARAMETERS`; a file that does not hold together is
-refused with a message that names the file, the entry, what was expected and what came.
+Values are SI. A file that is inconsistent is refused with a message that names the file, the entry, what was expected
+and what came.
 """
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, ValidationInfo, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from .base.data_files import data_folder
 from .base.errors import MachineError, ParameterError, brief
-from .base.limits import Limits
-from .base.parameters import INPUT_HOLDS, PARAMETERS, check, check_lags, check_preview
-from .compensate.compensator import SepCompensator, SepState
+from .base.settings import PARAMETERS, CompensatorSettings, Limits, PredictorSettings
+from .compensate.compensator import SepCompensator
+from .machine_sections import (
+    CompensatorSection,
+    DriveLimitsSection,
+    FeedDriveSection,
+    LimitsSection,
+    Line,
+    LogSection,
+    Number,
+    Physics,
+    PredictorSection,
+    Section,
+    StageSection,
+)
 from .model.physics import ModalModel, Mode
 from .plants.feed_drive import FeedDrive
 from .plants.plant import Plant
@@ -33,151 +46,13 @@ __all__ = ["DEFAULT_MACHINE", "Machine", "load_machine", "machine_names", "machi
 DEFAULT_MACHINE = "spring_mass_damper"
 
 
-def _checked(value: Any, info: ValidationInfo) -> Any:
-    """Check a field against the parameter of the same (FMI) name."""
-    names = {"lam": "lambda", "Ts": "T_s"}
-    name = str(info.field_name)
-    return check(names.get(name, name), value)
-
-
-def _checked_limit(value: Any, info: ValidationInfo) -> Any:
-    """Check one of a drive's or a trajectory's limits against the range of the compensator's."""
-    name = str(info.field_name)
-    return check({"velocity": "v_max", "acceleration": "a_max", "jerk": "j_max"}[name], value, label=name)
-
-
-Number = Annotated[float, BeforeValidator(_checked)]
-Whole = Annotated[int, BeforeValidator(_checked)]
-Limit = Annotated[float, BeforeValidator(_checked_limit)]
-OptionalNumber = Annotated[float | None, BeforeValidator(_checked)]
-OptionalWhole = Annotated[int | None, BeforeValidator(_checked)]
-"""Given, or left out; there is no null in TOML."""
-
-
-Line = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f\x{FFFE}\x{FFFF}]+$")]
-"""One line of printable text, of characters that XML 1.0 allows: the modelDescription and the FMU's page have it."""
-
-
-def _default(name: str) -> Any:
-    return PARAMETERS[name].default
-
-
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class ModeSection(_Section):
-    """One mode of eq. (15)."""
-
-    f_n: Number
-    zeta: Number
-    alpha: Number
-    beta: Number = 0.0
-
-
-class SpringMassDamper(_Section):
-    """Eq. (11)."""
-
-    m: Number
-    c: Number
-    k: Number
-
-
-class Physics(_Section):
-    """``G_pb``: either ``[[physics.mode]]`` entries or one ``[physics.spring_mass_damper]``."""
-
-    mode: tuple[ModeSection, ...] = ()
-    spring_mass_damper: SpringMassDamper | None = None
-    dead_time: Whole = _default("dead_time")
-    input_hold: Literal["zoh", "foh"] = "zoh"
-
-    @model_validator(mode="after")
-    def _one_of_both(self) -> Physics:
-        if bool(self.mode) == (self.spring_mass_damper is not None):
-            raise ValueError("give either [[physics.mode]] entries or one [physics.spring_mass_damper]")
-        return self
-
-
-class PredictorSection(_Section):
-    """Parameters of the hybrid predictor."""
-
-    Np: Whole = _default("Np")
-    p: Whole = _default("p")
-    q: Whole = _default("q")
-    lam: Number = Field(default=_default("lambda"), alias="lambda")
-    t_init: Number = _default("t_init")
-
-    @model_validator(mode="after")
-    def _lags_fit(self) -> PredictorSection:
-        if problems := check_lags(Np=self.Np, p=self.p, q=self.q):
-            raise ValueError("; ".join(problems))
-        return self
-
-
-class CompensatorSection(_Section):
-    """Parameters of the compensator; the predictor's count where ``Np``, ``p``, ``q``, λ or ``t_init`` is left out."""
-
-    Np: OptionalWhole = None
-    p: OptionalWhole = None
-    q: OptionalWhole = None
-    lam: OptionalNumber = Field(default=None, alias="lambda")
-    t_init: OptionalNumber = None
-    preview: OptionalWhole = None
-    spacing: OptionalWhole = None
-    jerk_weight: Number = _default("jerk_weight")
-    v_s: Number = _default("v_s")
-    keep_direction: Whole = _default("keep_direction")
-
-
-class FeedDriveSection(_Section):
-    """The drive of eq. (13); its linear part is ``[physics.spring_mass_damper]``."""
-
-    kind: Literal["feed_drive"]
-    c_nl: Number = _default("c_nl")
-    k_nl: Number = _default("k_nl")
-    noise_std: Number = _default("noise_std")
-    seed: Whole = _default("seed")
-
-
-class StageSection(_Section):
-    """The stage: ``[[physics.mode]]`` with friction and cable stiffness on the command."""
-
-    kind: Literal["stage"]
-    f: Number = _default("f")
-    kappa: Number = _default("kappa")
-    noise_std: Number = _default("noise_std")
-    seed: Whole = _default("seed")
-
-
-class LimitsSection(_Section):
-    """Velocity, acceleration and jerk of the reference trajectory, m/s, m/s², m/s³."""
-
-    velocity: Limit
-    acceleration: Limit
-    jerk: Limit
-
-
-class DriveLimitsSection(LimitsSection):
-    """What the drive itself allows of a modified command, wider than the trajectory's limits."""
-
-    change_max: Number = _default("change_max")
-
-
-class LogSection(_Section):
-    """Names of a recorded log's columns."""
-
-    t: str = "t"
-    x_d: str = "x_d"
-    x: str = "x"
-
-
-class Machine(_Section):
+class Machine(Section):
     """One axis: what it is, its physics model, the predictor's parameters and, where there is one, its plant."""
 
     name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")
     title: Line
     sources: tuple[Line, ...] = Field(min_length=1)
-    T_s: Number = _default("T_s")
+    T_s: Number = PARAMETERS["T_s"].default
     physics: Physics
     predictor: PredictorSection = PredictorSection()
     compensator: CompensatorSection = CompensatorSection()
@@ -207,9 +82,12 @@ class Machine(_Section):
     def _compensator_fits(self) -> Machine:
         if self.drive_limits is None and "compensator" not in self.model_fields_set:
             return self  # no compensator is meant
-        values = self._compensation()
-        problems = check_lags(**{name: values[name] for name in ("Np", "p", "q")})
-        problems += check_preview(**{name: values[name] for name in ("Np", "preview", "spacing")})
+        problems, Np = [], self._entry("Np")
+        for fit in (lambda: self.compensator_predictor, lambda: self._compensation().for_window(Np)):
+            try:
+                fit()
+            except ParameterError as error:
+                problems.append(str(error))
         if problems:
             inherited = [name for name in ("Np", "p", "q") if getattr(self.compensator, name) is None]
             origin = f" ({', '.join(inherited)} of [predictor])" if inherited else ""
@@ -224,28 +102,53 @@ class Machine(_Section):
             return ModalModel.spring_mass_damper(smd.m, smd.c, smd.k, self.physics.dead_time)
         return ModalModel([Mode(**mode.model_dump()) for mode in self.physics.mode], self.physics.dead_time)
 
-    def new_predictor(self, **changes: Any) -> HybridPredictor:
-        """Return a predictor for this machine; ``changes`` are arguments of :class:`HybridPredictor`."""
-        return HybridPredictor(
-            self.model,
-            **{"Ts": self.T_s, "input_hold": self.physics.input_hold, **self.predictor.model_dump(), **changes},
-        )
+    @property
+    def predictor_settings(self) -> PredictorSettings:
+        """Settings of the predictor."""
+        return PredictorSettings(**self.predictor.given(), **self._sampling)
 
-    def new_compensator(self, best: SepState = SepState.HYBRID, **changes: Any) -> SepCompensator:
-        """Return a compensator for this machine, within its ``[drive_limits]`` if it has some.
+    @property
+    def compensator_predictor(self) -> PredictorSettings:
+        """Settings of the compensator's own predictor: those of the predictor where the section has no others."""
+        own = self.compensator.given()
+        entries = {name: value for name, value in own.items() if name in PredictorSettings.parameters()}
+        return PredictorSettings(**{**self.predictor.given(), **entries}, **self._sampling)
+
+    @property
+    def compensator_settings(self) -> CompensatorSettings:
+        """Settings of the compensator, within the ``[drive_limits]`` if there are some."""
+        return self._compensation().for_window(self.compensator_predictor.Np)
+
+    def changed(self, section: Literal["predictor", "compensator"], values: Mapping[str, Any]) -> Machine:
+        """Return this machine with other entries of a section, by their names in the file.
+
+        Raises
+        ------
+        ParameterError
+            If they are out of range or do not fit together.
+        """
+        table = self.model_dump(by_alias=True, exclude_unset=True)
+        table[section] = {**table.get(section, {}), **values}
+        return _validated(table)
+
+    def new_predictor(self, settings: PredictorSettings | None = None) -> HybridPredictor:
+        """Return a predictor for this machine, with its :attr:`predictor_settings` unless others are given."""
+        return HybridPredictor(self.model, self.predictor_settings if settings is None else settings)
+
+    def new_compensator(
+        self, settings: CompensatorSettings | None = None, *, predictor: PredictorSettings | None = None
+    ) -> SepCompensator:
+        """Return a compensator for this machine.
 
         Parameters
         ----------
-        best : SepState
-            Best model to use.
-        **changes
-            Arguments of :class:`SepCompensator`, or of :class:`HybridPredictor` for its predictor.
+        settings : CompensatorSettings, optional
+            :attr:`compensator_settings` if left out.
+        predictor : PredictorSettings, optional
+            :attr:`compensator_predictor` if left out.
         """
-        limits, change_max = self.command_limits()
-        own = ("preview", "spacing", "jerk_weight", "limits", "change_max", "keep_direction")
-        values = {"limits": limits, "change_max": change_max, **self._compensation(**changes)}
-        predictor = self.new_predictor(**{name: value for name, value in values.items() if name not in own})
-        return SepCompensator(predictor, best=best, **{name: values[name] for name in own})
+        own = self.new_predictor(self.compensator_predictor if predictor is None else predictor)
+        return SepCompensator(own, self._compensation() if settings is None else settings)
 
     def new_plant(self, **changes: float) -> Plant:
         """Return the nonlinear plant; ``changes`` are values of its own section, such as ``c_nl`` or ``kappa``.
@@ -263,13 +166,15 @@ class Machine(_Section):
         if isinstance(self.plant, FeedDriveSection):
             assert self.physics.spring_mass_damper is not None  # by _plant_fits_physics
             return FeedDrive(**self.physics.spring_mass_damper.model_dump(), **values)
-        return StageDrive(self.model, **values, Ts=self.T_s)
+        return StageDrive(self.model, **values, T_s=self.T_s)
 
-    def fmi_parameters(self) -> dict[str, float | int]:
+    def fmi_parameters(self) -> dict[str, float | int | bool]:
         """Return the start values of the predictor FMU's scalar parameters, under their FMI names."""
-        return {**self.predictor.model_dump(by_alias=True), **self._fmi_physics()}
+        values = {**self.predictor_settings.to_fmi(), "dead_time": self.physics.dead_time}
+        del values["v_friction"]  # a predictor alone does not see the reference behind its window
+        return values
 
-    def fmi_compensator_parameters(self) -> dict[str, float | int]:
+    def fmi_compensator_parameters(self) -> dict[str, float | int | bool]:
         """Return the start values of the compensator FMU's scalar parameters, under their FMI names.
 
         Raises
@@ -277,29 +182,25 @@ class Machine(_Section):
         MachineError
             If the file has no ``[drive_limits]``: without them there is no such FMU.
         """
-        limits, change_max = self.command_limits()
-        if limits is None or change_max is None:
+        if self.drive_limits is None:
             raise MachineError(f"machine {self.name} has no [drive_limits] section, which a compensator FMU needs")
-        values = self._compensation()
-        values["lambda"] = values.pop("lam")
-        bounds = {"v_max": limits.velocity, "a_max": limits.acceleration, "j_max": limits.jerk}
-        more = {"change_max": change_max, "compensate": _default("compensate")}
-        return {**values, **self._fmi_physics(), **bounds, **more}
+        predictor = self.compensator_predictor.to_fmi()
+        return {**predictor, **self.compensator_settings.to_fmi(), "dead_time": self.physics.dead_time}
 
-    def _fmi_physics(self) -> dict[str, float | int]:
-        hold = INPUT_HOLDS.index(self.physics.input_hold)
-        return {"T_s": self.T_s, "input_hold": hold, "dead_time": self.physics.dead_time}
+    @property
+    def _sampling(self) -> dict[str, Any]:
+        return {"T_s": self.T_s, "input_hold": self.physics.input_hold}
 
-    def _compensation(self, **changes: Any) -> dict[str, Any]:
-        """Return the predictor's and the compensator's parameters, by the library's names.
+    def _entry(self, name: str) -> Any:
+        """Return an entry of the compensator's section, or the predictor's where it has none."""
+        own = getattr(self.compensator, name)
+        return getattr(self.predictor, name) if own is None else own
 
-        Where they are left out, ``spacing`` and ``preview`` fit ``Np``, if a preview in its range does.
-        """
-        section = self.compensator.model_dump(exclude_none=True)
-        values = {**self.predictor.model_dump(), **section, **changes}
-        values.setdefault("spacing", 1 if values["Np"] % _default("spacing") else _default("spacing"))
-        values.setdefault("preview", min(max(2 * values["Np"], _default("preview")), PARAMETERS["preview"].maximum))
-        return values
+    def _compensation(self) -> CompensatorSettings:
+        own = self.compensator.given()
+        entries = {name: value for name, value in own.items() if name in CompensatorSettings.parameters()}
+        limits, change_max = self.command_limits()
+        return CompensatorSettings(**entries, limits=limits, change_max=change_max)
 
     def trajectory_limits(self) -> Limits:
         """Return the limits of the reference trajectory.
@@ -360,12 +261,19 @@ def load_machine(machine: str | Path) -> Machine:
     except (ValueError, RecursionError) as error:  # an integer of 5000 digits is a ValueError, too
         raise MachineError(f"{path.name} is not valid TOML: {error}") from error
     try:
+        return _validated(content)
+    except ParameterError as error:
+        raise MachineError(f"{path.name}: {error}") from error
+
+
+def _validated(content: Mapping[str, Any]) -> Machine:
+    """Return the machine that a file's content describes; ParameterError if it describes none."""
+    try:
         return Machine(**content)
     except ValidationError as error:
-        problems = "; ".join(_describe(problem) for problem in error.errors())
-        raise MachineError(f"{path.name}: {problems}") from error
-    except (ParameterError, TypeError) as error:
-        raise MachineError(f"{path.name}: {error}") from error
+        raise ParameterError("; ".join(_describe(problem) for problem in error.errors())) from error
+    except TypeError as error:
+        raise ParameterError(str(error)) from error
 
 
 def _describe(problem: Any) -> str:

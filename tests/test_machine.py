@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -44,7 +45,7 @@ def test_the_machines_that_come_with_the_library() -> None:
         machine = load_machine(name)
         assert machine.name == name
         assert machine.model.dc_gain == pytest.approx(1.0, abs=1e-12 if name[:3] != "als" else 3e-4)
-        assert machine.new_predictor().Ts == machine.T_s
+        assert machine.new_predictor().T_s == machine.T_s
 
 
 TABLE_1 = {
@@ -78,7 +79,7 @@ def test_the_stages_friction_is_calibrated(axis: str, printed: float) -> None:
     machine, x_d = load_machine(f"als25010_{axis}"), dict(zip("xy", spiral(), strict=True))[axis]
     x = Encoder(1e-6, 0).measure_all(simulate(machine.new_plant(), x_d, machine.T_s))
     discrete = machine.model.discretise(machine.T_s)
-    x_pb, _ = discrete.respond(discrete.rest(), x_d)
+    x_pb, _ = discrete.forced_response(discrete.rest(), x_d)
     assert 1e6 * np.sqrt(np.mean((x - x_pb) ** 2)) == pytest.approx(printed, rel=1e-4)
 
 
@@ -111,8 +112,8 @@ def test_a_file_with_defaults(tmp_path: Path) -> None:
         "input_hold": 0,
         "dead_time": 0,
     }
-    predictor = machine.new_predictor(p=10)
-    assert (predictor.p, predictor.Ts) == (10, 0.002)
+    predictor = machine.new_predictor(replace(machine.predictor_settings, p=10))
+    assert (predictor.p, predictor.T_s) == (10, 0.002)
 
 
 @pytest.mark.parametrize(
@@ -158,7 +159,7 @@ def test_the_compensators_settings_are_the_recommended_ones() -> None:
         assert (compensator.preview, compensator.spacing, compensator.jerk_weight) == (200, 2, 1.0)
         assert (compensator.limits, compensator.change_max) == (Limits(0.1, 16.0, 5000.0), 1e-3)
         assert compensator.best is SepState.HYBRID
-        assert compensator.keep_direction
+        assert compensator.no_reversal
         assert machine.new_predictor().Np == 100
 
 
@@ -182,24 +183,24 @@ def test_what_the_compensator_section_leaves_out_is_the_predictors(tmp_path: Pat
         "a_max": 8.0,
         "j_max": 900.0,
         "change_max": 1e-3,
-        "v_s": 2e-3,
-        "keep_direction": 1,
+        "v_friction": 2e-3,
+        "no_reversal": 1,
         "compensate": 2,
     }
     entries = "Np = 30\nq = 9\nlambda = 1e-9\nt_init = 0.1\npreview = 180\nspacing = 3\njerk_weight = 0\n"
-    entries += "v_s = 1e-3\nkeep_direction = 0\n"
+    entries += "v_friction = 1e-3\nkeep_direction = 0\n"
     machine = load_machine(write(tmp_path, COMPENSATED + entries))
     given = {"Np": 30, "p": 20, "q": 9, "lambda": 1e-9, "t_init": 0.1, "preview": 180, "spacing": 3, "jerk_weight": 0.0}
-    given |= {"v_s": 1e-3, "keep_direction": 0}
+    given |= {"v_friction": 1e-3, "no_reversal": 0}
     found = machine.fmi_compensator_parameters()
     assert {name: found[name] for name in given} == given
     compensator = machine.new_compensator(SepState.PHYSICS, p=10, preview=90, change_max=None)
     assert (compensator.predictor.p, compensator.predictor.Np, compensator.predictor.lam) == (10, 30, 1e-9)
     assert (compensator.preview, compensator.spacing, compensator.change_max) == (90, 3, None)
-    assert (compensator.best, compensator.predictor.Ts) == (SepState.PHYSICS, 0.002)
-    assert (compensator.predictor.v_s, compensator.keep_direction) == (1e-3, False)
-    assert machine.new_compensator(v_s=0.0, keep_direction=True).predictor.n_features == 2 + 9 + 20
-    assert machine.new_predictor().v_s == 0.0  # it predicts with the paper's features
+    assert (compensator.best, compensator.predictor.T_s) == (SepState.PHYSICS, 0.002)
+    assert (compensator.predictor.v_friction, compensator.no_reversal) == (1e-3, False)
+    assert machine.new_compensator(v_friction=0.0, no_reversal=True).predictor.n_features == 2 + 9 + 20
+    assert machine.new_predictor().v_friction == 0.0  # it predicts with the paper's features
     assert machine.fmi_parameters()["Np"] == 50
 
 
@@ -221,10 +222,10 @@ def test_a_predictors_section_alone_gives_a_compensator(tmp_path: Path, Np: int,
         ("Np = 2.5", r"compensator.Np: Np must be a whole number, got 2.5"),
         ('p = "many"', r"compensator.p: p must be a number, got 'many'"),
         ("change_max = 1e-3", r"compensator.change_max is not an entry"),
-        ("v_s = -1e-3", r"compensator.v_s: v_s must be 0 or 1e-09 … 10000 m/s, got -0.001"),
-        ("v_s = inf", r"compensator.v_s: v_s must be finite, got inf"),
-        ("keep_direction = 2", r"compensator.keep_direction: keep_direction must be 0 … 1, got 2"),
-        ("keep_direction = true", r"compensator.keep_direction: keep_direction must be a number, got True"),
+        ("v_friction = -1e-3", r"compensator.v_friction: v_friction must be 0 or 1e-09 … 10000 m/s, got -0.001"),
+        ("v_friction = inf", r"compensator.v_friction: v_friction must be finite, got inf"),
+        ("no_reversal = 2", r"compensator.no_reversal: no_reversal must be 0 … 1, got 2"),
+        ("no_reversal = true", r"compensator.no_reversal: no_reversal must be a number, got True"),
         ("spacing = 3", r"compensator: spacing must be ≥ 1 and divide Np = 50, got 3 \(Np, p, q of \[predictor\]\)"),
         ("Np = 60\npreview = 70", r"compensator: preview must be ≥ Np \+ 4·spacing \+ 3 = 71, got 70 \(p, q of "),
         ("Np = 20\np = 5\nq = 20", r"compensator: q must be 0 … Np − 1 = 19, got 20; lower q or raise Np$"),

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from hybridsep.base.limits import Limits
+from hybridsep.base.settings import Limits
 from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepCompensator, SepState
 from hybridsep.cosim.compensator_run import SepCoSimulation, cosimulate_sep

@@ -24,7 +24,7 @@ class PathFriction(StageDrive):
 
     def step(self, x_d: float, h: float) -> None:
         """Step by ``T_s`` as :class:`StageDrive` does, with the last command where ``v_d`` is the path's velocity."""
-        self._last_x_d = x_d - self._start - self.path_velocity * self.Ts
+        self._last_x_d = x_d - self._start - self.path_velocity * self.T_s
         super().step(x_d, h)
 
 
@@ -41,7 +41,7 @@ def runs_with_path_friction(machine: Machine, r: Array, seed: int) -> list[Close
     return [
         run_closed_loop(
             compensator,
-            PathFriction(machine.model, f=machine.plant.f, kappa=machine.plant.kappa, Ts=machine.T_s),
+            PathFriction(machine.model, f=machine.plant.f, kappa=machine.plant.kappa, T_s=machine.T_s),
             r,
             encoder=Encoder(machine.plant.noise_std, noise_seed(seed, run)),
             t_init=None if run == 0 else 0.0,

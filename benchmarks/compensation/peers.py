@@ -26,7 +26,7 @@ Modes in antiphase have zeros at 0.99 … 0.998 on the paper's stage; left in ``
 """
 
 
-def input_shaper(model: ModalModel, Ts: float, kind: str = "zv") -> Array:
+def input_shaper(model: ModalModel, T_s: float, kind: str = "zv") -> Array:
     """Return the impulses of an input shaper for all modes of a model.
 
     Singer and Seering, *J. Dyn. Sys. Meas. Control* 112 (1990): two (ZV) or three (ZVD) impulses half a damped period
@@ -36,7 +36,7 @@ def input_shaper(model: ModalModel, Ts: float, kind: str = "zv") -> Array:
     ----------
     model : ModalModel
         Natural frequencies and damping ratios.
-    Ts : float
+    T_s : float
         Sampling interval, s.
     kind : {"zv", "zvd"}
         Zero vibration, or zero vibration and derivative.
@@ -60,9 +60,9 @@ def input_shaper(model: ModalModel, Ts: float, kind: str = "zv") -> Array:
         damped = mode.omega * math.sqrt(1 - mode.zeta**2)
         ratio = math.exp(-mode.zeta * math.pi / math.sqrt(1 - mode.zeta**2))
         weights = [1.0, ratio] if kind == "zv" else [1.0, 2 * ratio, ratio**2]
-        impulses = np.zeros(math.ceil(2 * math.pi / damped / Ts) + 2)
+        impulses = np.zeros(math.ceil(2 * math.pi / damped / T_s) + 2)
         for i, weight in enumerate(weights):
-            whole, part = divmod(i * math.pi / damped / Ts, 1.0)
+            whole, part = divmod(i * math.pi / damped / T_s, 1.0)
             impulses[int(whole)] += weight * (1 - part)
             impulses[int(whole) + 1] += weight * part
         shaper = np.convolve(shaper, np.trim_zeros(impulses, "b") / sum(weights))

@@ -25,7 +25,7 @@ from benchmarks.compensation.loops import Case, FmuLoops, LibraryLoops, Loops
 from benchmarks.compensation.path_friction import runs_with_path_friction
 from benchmarks.compensation.peers import input_shaper, shape, zero_phase_command
 from benchmarks.compensation.report import Report
-from hybridsep.base.limits import Limits
+from hybridsep.base.settings import Limits
 from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepState
 from hybridsep.evaluate.closed_loop import ClosedLoop, contour_error
@@ -42,13 +42,13 @@ LESS_THAN_5_PERCENT_WORSE = 1.05
 
 STAGE_HYBRIDS: dict[str, dict[str, float]] = {
     "hybrid": {},
-    "hybrid, v_s = 0,": {"v_s": 0.0},
-    "hybrid, keep_direction = 0,": {"keep_direction": 0},
-    "hybrid, v_s = 0, keep_direction = 0,": {"v_s": 0.0, "keep_direction": 0},
+    "hybrid, v_friction = 0,": {"v_friction": 0.0},
+    "hybrid, no_reversal = 0,": {"no_reversal": 0},
+    "hybrid, v_friction = 0, no_reversal = 0,": {"v_friction": 0.0, "no_reversal": 0},
 }
 """What is left out on the stage."""
 STAGE_KINDS = (
-    *("none", "physics", "physics, keep_direction"),
+    *("none", "physics", "physics, no_reversal"),
     *(f"{name} {run}" for name in STAGE_HYBRIDS for run in ("cold", "warm")),
 )
 
@@ -80,7 +80,7 @@ CASES = {
 
 def with_the_papers_settings(machine: Machine) -> Machine:
     """Return a machine that compensates with the settings of its ``[predictor]`` and the features of eq. (5) alone."""
-    return machine.model_copy(update={"compensator": CompensatorSection(v_s=0.0)})
+    return machine.model_copy(update={"compensator": CompensatorSection(v_friction=0.0)})
 
 
 def with_settings(machine: Machine, **changes: float) -> Machine:
@@ -90,16 +90,16 @@ def with_settings(machine: Machine, **changes: float) -> Machine:
 
 def as_published(machine: Machine) -> Machine:
     """Return a machine whose commands may turn where the path does not, as the published methods' may."""
-    return with_settings(machine, keep_direction=0)
+    return with_settings(machine, no_reversal=0)
 
 
-def excess(loop: ClosedLoop, compensator_limits: tuple[Limits | None, float | None], Ts: float) -> float:
+def excess(loop: ClosedLoop, compensator_limits: tuple[Limits | None, float | None], T_s: float) -> float:
     """Return how far the command goes beyond a limit, in shares of it; ≤ 0 if it keeps all."""
     limits, change_max = compensator_limits
     shares = [0.0]
     if limits is not None:
         for order, limit in enumerate((limits.velocity, limits.acceleration, limits.jerk), start=1):
-            shares.append(float(np.max(np.abs(np.diff(loop.x_dm, order)))) / (limit * Ts**order) - 1.0)
+            shares.append(float(np.max(np.abs(np.diff(loop.x_dm, order)))) / (limit * T_s**order) - 1.0)
     if change_max is not None:
         shares.append(float(np.max(np.abs(loop.x_dm - loop.x_d))) / change_max - 1.0)
     return max(shares)
@@ -140,7 +140,7 @@ def stage_rows(report: Report, loops: Loops, seeds: range) -> None:
         plain = as_published(machine)
         found["none"].append([loops.run(machine, r, SepState.OFF, s)[0] for s in seeds])
         found["physics"].append([loops.run(plain, r, SepState.PHYSICS, s)[0] for s in seeds])
-        found["physics, keep_direction"].append([loops.run(machine, r, SepState.PHYSICS, s)[0] for s in seeds])
+        found["physics, no_reversal"].append([loops.run(machine, r, SepState.PHYSICS, s)[0] for s in seeds])
         for name, changes in STAGE_HYBRIDS.items():
             used = with_settings(machine, **changes)
             pairs = [loops.run(used, r, SepState.HYBRID, s, 2) for s in seeds]
@@ -148,25 +148,27 @@ def stage_rows(report: Report, loops: Loops, seeds: range) -> None:
             found[f"{name} warm"].append([pair[1] for pair in pairs])
     for axis, r in enumerate(commands):
         label, figures = "XY"[axis], {name: mean_rms(found[name][axis]) for name in STAGE_KINDS}
-        physics, keeping = figures["physics"], figures["physics, keep_direction"]
+        physics, keeping = figures["physics"], figures["physics, no_reversal"]
         for name, figure in figures.items():
-            shares = f"{figure / physics:.0%} of physics, {figure / keeping:.0%} of physics with keep_direction"
+            shares = f"{figure / physics:.0%} of physics, {figure / keeping:.0%} of physics with no_reversal"
             if name == "hybrid warm":
                 report.most(f"{label}  {name}", figure, physics / 2, f"half of physics; {shares}")
             else:
                 report.line(f"{label}  {name}", figure, note=shares)
         near = after_reversals(r)
-        for name in ("physics", "physics, keep_direction", "hybrid warm"):
+        for name in ("physics", "physics, no_reversal", "hybrid warm"):
             errors = np.array([loop.x_d - loop.x for loop in found[name][axis]])
             outside = UM * float(np.sqrt(np.mean(errors[:, ~near] ** 2)))
             share = float(np.sum(errors[:, near] ** 2) / np.sum(errors**2))
             note = f"{share:.0%} of the mean square is within 0.1 s of a reversal, {np.mean(near):.0%} of the time"
             report.line(f"   {name}, away from reversals", outside, note=note)
-        for v_s in OTHER_V_S:
-            used = with_settings(machines[axis], v_s=v_s)
+        for v_friction in OTHER_V_S:
+            used = with_settings(machines[axis], v_friction=v_friction)
             warm = mean_rms([LibraryLoops().run(used, r, SepState.HYBRID, s, 2)[1] for s in seeds])
-            report.line(f"   v_s = {1e3 * v_s:g} mm/s, the friction's is 2: hybrid warm", warm, note="library")
-        for name, used in (("", machines[axis]), (", keep_direction = 0", as_published(machines[axis]))):
+            report.line(
+                f"   v_friction = {1e3 * v_friction:g} mm/s, the friction's is 2: hybrid warm", warm, note="library"
+            )
+        for name, used in (("", machines[axis]), (", no_reversal = 0", as_published(machines[axis]))):
             warm = mean_rms([runs_with_path_friction(used, r, s)[1] for s in seeds])
             report.line(f"   if friction followed the path: hybrid warm{name}", warm, note="library")
     for name, (x, y) in found.items():

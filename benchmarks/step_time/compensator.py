@@ -34,15 +34,15 @@ COMPENSATOR = {
     "a_max": 16.0,
     "j_max": 5000.0,
     "change_max": 1e-3,
-    "v_s": 0.0,
-    "keep_direction": 1,
+    "v_friction": 0.0,
+    "no_reversal": 1,
     "compensate": 2,
 }
 PAPER, SCHEDULED = "the paper's settings", "with features of the reference"
 CASES: dict[str, dict[str, Any]] = {
     PAPER: {},
-    SCHEDULED: {"v_s": 2e-3},
-    "limits of the drive = those of the trajectory": {"v_s": 2e-3, "v_max": 0.08, "a_max": 8.0, "j_max": 1000.0},
+    SCHEDULED: {"v_friction": 2e-3},
+    "limits of the drive = those of the trajectory": {"v_friction": 2e-3, "v_max": 0.08, "a_max": 8.0, "j_max": 1000.0},
 }
 REPETITIONS, COUNTED_STEPS = 5, 3500
 TAIL_MAX = 300e3

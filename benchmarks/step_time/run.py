@@ -20,6 +20,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from hybridsep.base.settings import PredictorSettings
+
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # benchmarks are no part of the package
 
@@ -64,7 +66,7 @@ def python_ns(p: int, q: int) -> Array:
     """Return the times of the library's look-ahead, which the pythonfmu flavour steps, (6000,), ns."""
     x_d, x = drive_log()
     model = ModalModel.spring_mass_damper(m=1.0, c=15.7, k=24674.0)
-    ahead = LookAhead(HybridPredictor(model, Np=NP, p=p, q=q, lam=LAM), 0.0)
+    ahead = LookAhead(HybridPredictor(model, PredictorSettings(Np=NP, p=p, q=q, lam=LAM)), 0.0)
     took = np.empty(len(x_d))
     for k, command in enumerate(x_d.tolist()):
         before = time.perf_counter_ns()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from hybridsep.base.settings import PredictorSettings
 from hybridsep.fmi import look_ahead_slave
 from hybridsep.fmi.variables import modes_from
 from hybridsep.fmi.weights import WEIGHTS_FILE, restore_weights
@@ -18,9 +19,8 @@ class HybridPredictorPy(look_ahead_slave.LookAheadSlave):
 
     def new_model(self) -> HybridPredictor:
         """Make the predictor from the parameters as they are now, with what the resources say was learned."""
-        names = ("Np", "p", "q", "lambda", "T_s", "t_init", "input_hold")
         model = ModalModel([Mode(**mode) for mode in modes_from(self.values)], self.values["dead_time"])
-        predictor = HybridPredictor.with_parameters(model, {name: self.values[name] for name in names})
+        predictor = HybridPredictor(model, PredictorSettings.from_fmi(self.values))
         trained = Path(self.resources) / WEIGHTS_FILE
         if trained.exists():
             restore_weights(predictor, trained.read_bytes())

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
-from hybridsep.base.errors import HybridSepError, ParameterError
-from hybridsep.base.limits import Limits
-from hybridsep.base.parameters import check
-from hybridsep.compensate.compensator import SepCompensator, SepState
+from hybridsep.base.errors import HybridSepError
+from hybridsep.base.settings import CompensatorSettings, PredictorSettings
+from hybridsep.compensate.compensator import SepCompensator
 from hybridsep.fmi import look_ahead_slave
-from hybridsep.fmi.variables import PLANNING, modes_from
+from hybridsep.fmi.variables import modes_from
 from hybridsep.fmi.weights import WEIGHTS_FILE, restore_weights
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.look_ahead import LookAhead
@@ -39,36 +37,13 @@ class SepCompensatorPy(look_ahead_slave.LookAheadSlave):
 
     def new_model(self) -> SepCompensator:
         """Make the compensator from the parameters as they are now, with what the resources say was learned."""
-        values = self.values
-        names = ("Np", "p", "q", "lambda", "T_s", "t_init", "input_hold")
-        model = ModalModel([Mode(**mode) for mode in modes_from(values)], values["dead_time"])
-        planning = self._planning()
-        predictor = HybridPredictor.with_parameters(model, {name: values[name] for name in names}, v_s=planning["v_s"])
+        model = ModalModel([Mode(**mode) for mode in modes_from(self.values)], self.values["dead_time"])
+        settings = CompensatorSettings.from_fmi(self.values)
+        predictor = HybridPredictor(model, PredictorSettings.from_fmi(self.values))
         trained = Path(self.resources) / WEIGHTS_FILE
         if trained.exists():
             restore_weights(predictor, trained.read_bytes())
-        return SepCompensator(
-            predictor,
-            preview=planning["preview"],
-            spacing=planning["spacing"],
-            jerk_weight=planning["jerk_weight"],
-            limits=Limits(planning["v_max"], planning["a_max"], planning["j_max"]),
-            change_max=planning["change_max"],
-            keep_direction=bool(planning["keep_direction"]),
-            best=SepState(planning["compensate"]),
-        )
-
-    def _planning(self) -> dict[str, Any]:
-        """Return the compensator's own parameters, each within its range; name all that are not."""
-        planning, problems = {}, []
-        for name in PLANNING:
-            try:
-                planning[name] = check(name, self.values[name])
-            except ParameterError as error:
-                problems.append(str(error))
-        if problems:
-            raise ParameterError("; ".join(problems))
-        return planning
+        return SepCompensator(predictor, settings)
 
 
 def _output(look_ahead: LookAhead, name: str) -> float | int:

@@ -17,7 +17,7 @@ from ..fmi.compiler import compilers
 from ..fmi.warm_start import load_trained
 from ..logs.log import check_reading
 from ..machine import Machine, load_machine, machine_names
-from ..plants.trajectory import PAPER_LIMITS, from_file, spiral, staircase
+from ..plants.trajectory import PAPER_LIMITS, read_trajectory, spiral, staircase
 
 __all__ = [
     "COMPENSATIONS",
@@ -59,44 +59,43 @@ def jobs_of(fmus: Sequence[str], machines: Sequence[str], backend: str, targets:
 
 
 def extras_of(
-    jobs: Sequence[Job], weights: Path | None, trajectory: Path | None, unit: str, Ts: float | None
+    jobs: Sequence[Job], weights: Path | None, trajectory: Path | None, unit: str, T_s: float | None
 ) -> dict[str, dict[str, Any]]:
     """Return by model what one of the FMUs gets besides its machine: weights, samples of a trajectory."""
     extras: dict[str, dict[str, Any]] = {}
-    check_reading(unit, Ts)
+    check_reading(unit, T_s)
     if weights is not None:
         axis, model = _one_of(jobs, ("HybridPredictor", "SepCompensator"), "--weights")
         load_trained(weights, axis, model)
         extras[model] = {"weights": weights}
     if trajectory is not None:
         axis, model = _one_of(jobs, ("ReferenceTrajectory",), "--trajectory")
-        samples, found = from_file(trajectory, unit=unit, Ts=Ts)
+        samples, found = read_trajectory(trajectory, unit=unit, T_s=T_s)
         check_interval(trajectory.name, found, axis)
         extras[model] = {"samples": samples}
     return extras
 
 
-def read_command(trajectory: str, axis: Machine, unit: str, Ts: float | None) -> Array:
+def read_command(trajectory: str, axis: Machine, unit: str, T_s: float | None) -> Array:
     """Return the samples of a named trajectory or of a file, at the machine's sampling interval."""
-    check_reading(unit, Ts)
+    check_reading(unit, T_s)
     limits = PAPER_LIMITS if axis.limits is None else axis.trajectory_limits()
     if trajectory == "staircase":
         return staircase(axis.T_s, limits=limits)
     if trajectory in TRAJECTORIES:
         return spiral(axis.T_s, limits=limits)[trajectory == "spiral_y"]
-    command, found = from_file(trajectory, unit=unit, Ts=Ts)
+    command, found = read_trajectory(trajectory, unit=unit, T_s=T_s)
     check_interval(trajectory, found, axis)
     return command
 
 
 def fitting(axis: Machine, compensate: str | None, values: Mapping[str, Any]) -> dict[str, Any]:
     """Check the FMI values of a look-ahead FMU that will be built; return them with what must change with them."""
-    changes = {"lam" if name == "lambda" else name: value for name, value in values.items()}
+    changed = axis.changed("predictor" if compensate is None else "compensator", values)
     if compensate is None:
-        axis.new_predictor(**changes)
         return dict(values)
-    compensator = axis.new_compensator(**changes)
-    windows = {"preview": compensator.preview, "spacing": compensator.spacing} if "Np" in values else {}
+    settings = changed.compensator_settings
+    windows = {"preview": settings.preview, "spacing": settings.spacing} if "Np" in values else {}
     return {**values, **windows}
 
 
@@ -141,15 +140,15 @@ def check_pair(
         compilers(("host",))
 
 
-def check_interval(name: str, Ts: float, axis: Machine) -> None:
+def check_interval(name: str, T_s: float, axis: Machine) -> None:
     """Say that a file is sampled at another interval than the machine, if it is."""
-    if abs(Ts - axis.T_s) <= 0.01 * axis.T_s:
+    if abs(T_s - axis.T_s) <= 0.01 * axis.T_s:
         return
     hint = "resample the file or correct T_s"
     for factor, unit in ((1e3, "ms"), (1e6, "µs")):
-        if abs(Ts / axis.T_s / factor - 1) < 0.01:
+        if abs(T_s / axis.T_s / factor - 1) < 0.01:
             hint = f"is its time in {unit}? It must be in seconds"
-    raise ParameterError(f"{name} is sampled every {Ts:g} s, but machine {axis.name} has T_s = {axis.T_s:g} s; {hint}")
+    raise ParameterError(f"{name} is sampled every {T_s:g} s, but machine {axis.name} has T_s = {axis.T_s:g} s; {hint}")
 
 
 def check_ending(path: Path | None, option: str, endings: Sequence[str]) -> None:

@@ -16,7 +16,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from .. import __version__
 from ..base.errors import ParameterError
 from ..base.output import written_text
-from ..base.parameters import check
+from ..base.settings import check
 from ..cosim.compensator_run import SepCoSimulation, cosimulate_sep
 from ..cosim.predictor_run import CoSimulation, cosimulate
 from ..cosim.wiring import RESULT_SUFFIXES
@@ -122,14 +122,14 @@ def build(
         typer.Option(help="CSV, .npz or .mat file with the columns t and x_d, for ReferenceTrajectory to play."),
     ] = None,
     unit: UnitOption = "m",
-    Ts: TsOption = None,
+    T_s: TsOption = None,
     out: Annotated[Path, typer.Option(help="Folder for the archives.")] = Path("dist"),
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Build FMUs from machine files; the same machine gives the same bytes."""
     jobs = jobs_of(fmus or [], machine or [], backend, target or [])
-    extras = extras_of(jobs, weights, trajectory, unit, Ts)
+    extras = extras_of(jobs, weights, trajectory, unit, T_s)
     inputs = {f"machine file {source}": machine_path(source) for source in machine or []}
     check_outputs(
         [Output("--out", out / f"{name}.fmu", FMU) for _, name, _ in jobs],
@@ -156,7 +156,7 @@ def cosim(
         str, typer.Option(help=f"{', '.join(TRAJECTORIES)}, or a CSV, .npz or .mat file with the columns t and x_d.")
     ] = "staircase",
     unit: UnitOption = "m",
-    Ts: TsOption = None,
+    T_s: TsOption = None,
     compensate: Annotated[
         str | None,
         typer.Option(
@@ -191,7 +191,7 @@ def cosim(
     check_ending(figure, "--figure", (".png",))
     if compensate is not None and compensate not in COMPENSATIONS:
         raise ParameterError(f"--compensate must be one of {', '.join(COMPENSATIONS)}, got {compensate!r}")
-    command = read_command(trajectory, axis, unit, Ts)
+    command = read_command(trajectory, axis, unit, T_s)
     given = {"Np": Np, "p": p, "q": q, "lambda": lam, "t_init": t_init}
     values = {name: value for name, value in given.items() if value is not None}
     if predictor is None:
@@ -237,7 +237,7 @@ def backtest_command(
     log: Annotated[Path, typer.Argument(help="CSV with the columns t, x_d, x, or .npz or .mat with named columns.")],
     machine: MachineOption,
     unit: UnitOption = "m",
-    Ts: TsOption = None,
+    T_s: TsOption = None,
     t: Annotated[str | None, typer.Option("--t", help="Name of the time column.")] = None,
     x_d: Annotated[str | None, typer.Option("--x-d", help="Name of the commanded position's column.")] = None,
     x: Annotated[str | None, typer.Option("--x", help="Name of the measured position's column.")] = None,
@@ -254,12 +254,13 @@ def backtest_command(
     axis = load_machine(machine)
     given = {"t": t, "x_d": x_d, "x": x}
     names = {role: given[role] or column for role, column in axis.log.model_dump().items()}
-    if Ts is not None and t is None:
+    if T_s is not None and t is None:
         del names["t"]  # there may be none
-    changes = {"Np": Np, "p": p, "q": q, "lam": lam, "t_init": t_init}
-    predictor = axis.new_predictor(**{name: value for name, value in changes.items() if value is not None})
-    reader = open_log(log, columns=names, unit=unit, Ts=Ts)
-    check_interval(log.name, reader.Ts, axis)
+    changes = {"Np": Np, "p": p, "q": q, "lambda": lam, "t_init": t_init}
+    given_values = {name: value for name, value in changes.items() if value is not None}
+    predictor = axis.changed("predictor", given_values).new_predictor()
+    reader = open_log(log, columns=names, unit=unit, T_s=T_s)
+    check_interval(log.name, reader.T_s, axis)
     outputs = [] if out is None else [Output("--out", out, BATCHES)]
     check_outputs(outputs, {"log": log, "machine file": machine_path(machine)}, force=force)
     rows: list[tuple[float, ...]] = []
@@ -267,7 +268,7 @@ def backtest_command(
 
         def on_batch(batch: Batch) -> None:
             if out is not None:
-                rows.append((round(batch.k * reader.Ts, 9), batch.rms_pb, batch.rms_hold, batch.rms_h))
+                rows.append((round(batch.k * reader.T_s, 9), batch.rms_pb, batch.rms_hold, batch.rms_h))
             if batch.j % 100 == 0:
                 advance("replay", batch.k / reader.n_samples)
 

@@ -54,7 +54,7 @@ class RecordedReplay:
     @property
     def t(self) -> Array:
         """Time, s."""
-        return np.asarray(np.arange(len(self.log.x)) * self.log.Ts, dtype=np.float64)
+        return np.asarray(np.arange(len(self.log.x)) * self.log.T_s, dtype=np.float64)
 
     @property
     def x_d(self) -> Array:

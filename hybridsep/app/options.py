@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..base.parameters import PARAMETERS
+from ..base.settings import PARAMETERS
 from ..fmi.archive import BACKENDS
 
 __all__ = [

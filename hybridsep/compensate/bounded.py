@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
-from ..base.limits import Limits
+from ..base.settings import Limits
 from ..base.signals import Array
 from .interior import PRIMAL_RESIDUAL, minimise
 from .splines import N_DECIDED, PlanCost, SplineBasis
@@ -63,29 +63,29 @@ class DriveBounds:
     Parameters
     ----------
     basis : SplineBasis
-    Ts : float
+    T_s : float
         Sampling interval, s.
     limits : Limits or None
         The drive's velocity, acceleration and jerk.
     change_max : float or None
         Bound on ``|δ|``, m.
-    keep_direction : bool
+    no_reversal : bool
         Whether the velocity of ``x_dm``, if it is limited, keeps the sign of that of ``x_d`` where that one moves.
     """
 
     def __init__(
         self,
         basis: SplineBasis,
-        Ts: float,
+        T_s: float,
         limits: Limits | None,
         change_max: float | None,
         *,
-        keep_direction: bool = False,
+        no_reversal: bool = False,
     ) -> None:
-        self._keep_direction = keep_direction
+        self._keep_direction = no_reversal
         self._scales: list[tuple[int, float]] = []
         if limits is not None:
-            bounds = limits.velocity * Ts, limits.acceleration * Ts**2, limits.jerk * Ts**3
+            bounds = limits.velocity * T_s, limits.acceleration * T_s**2, limits.jerk * T_s**3
             self._scales += list(enumerate(bounds, start=1))
         if change_max is not None:
             self._scales.append((0, change_max))

@@ -14,15 +14,12 @@ of the last one is followed to its end.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.errors import ParameterError, SignalError
-from ..base.limits import Limits
-from ..base.parameters import check, check_preview
+from ..base.errors import SignalError
 from ..base.saved import Saved
+from ..base.settings import CompensatorSettings, PredictorSettings
 from ..base.signals import Array, as_published, as_samples
 from ..base.state import pack, unpack
 from ..predict.predictor import HybridPredictor
@@ -40,8 +37,8 @@ _KIND = "compensator"
 _PINNED = 8
 """Samples at the beginning of a window in which a bounded plan follows the last one: the time to solve it."""
 
-RECOMMENDED: dict[str, Any] = {"Np": 50, "p": 50, "q": 40, "lam": 1e-8, "t_init": 0.1, "v_s": 2e-3}
-"""Arguments of HybridPredictor with which compensation was best on the staircase drive, with the defaults below."""
+RECOMMENDED = PredictorSettings(Np=50, p=50, q=40, lam=1e-8, t_init=0.1, v_friction=2e-3)
+"""Settings of the predictor with which compensation was best on the staircase drive, with the defaults below."""
 
 
 class SepCompensator:
@@ -54,56 +51,32 @@ class SepCompensator:
     ----------
     predictor : HybridPredictor
         At the beginning of a run; it learns from the commands that the drive really gets.
-    preview : int, optional
-        Samples planned ahead, at least ``Np + 4·spacing + 3``; ``2·Np`` or 200, whichever is more, if left out.
-    spacing : int
-        Samples between knots, ≥ 1, a divisor of ``Np``: the finer, the faster ``δ`` may change.
-    jerk_weight : float
-        Weight, ≥ 0, of the sum of squares of δ's third differences, against that of the tracking error.
-    limits : Limits, optional
-        The drive's own limits, which ``x_dm`` keeps in its differences; none if left out.
-    change_max : float, optional
-        Bound on ``|δ|``, m; none if None.
-    keep_direction : bool
-        Whether ``x_dm`` never turns while ``x_d`` moves: friction would turn with it. Needs ``limits``; without them it
-        has no effect, and a predictor with ``v_s > 0`` may then be worse than without.
-    best : SepState
-        Best model to use: OFF leaves the command as it is.
+    settings : CompensatorSettings, optional
+        The defaults if left out.
 
     Raises
     ------
     ParameterError
-        If a parameter is out of its range.
+        If ``preview`` or ``spacing`` does not fit the predictor's ``Np``.
     """
 
-    def __init__(
-        self,
-        predictor: HybridPredictor,
-        *,
-        preview: int | None = None,
-        spacing: int = 2,
-        jerk_weight: float = 1.0,
-        limits: Limits | None = None,
-        change_max: float | None = 1e-3,
-        keep_direction: bool = True,
-        best: SepState = SepState.HYBRID,
-    ) -> None:
+    def __init__(self, predictor: HybridPredictor, settings: CompensatorSettings | None = None) -> None:
         Np = predictor.Np
-        self.preview: int = check("preview", max(2 * Np, 200) if preview is None else preview)
-        self.spacing: int = check("spacing", spacing)
-        if problems := check_preview(Np=Np, preview=self.preview, spacing=self.spacing):
-            raise ParameterError("; ".join(problems))
-        self.jerk_weight: float = check("jerk_weight", jerk_weight)
-        self.change_max: float | None = None if change_max is None else check("change_max", change_max)
-        self.predictor, self.limits, self.best = predictor, limits, SepState(best)
-        self.keep_direction = bool(keep_direction)
+        self.predictor = predictor
+        self.settings = settings = (settings or CompensatorSettings()).for_window(Np)
+        assert settings.preview is not None
+        assert settings.spacing is not None
+        self.preview, self.spacing = settings.preview, settings.spacing
+        self._best = SepState[settings.compensate.upper()]
         self._basis = SplineBasis(self.preview, self.spacing)
         self._n_pinned = min(_PINNED, Np // 2) // self.spacing
-        self._bounds = DriveBounds(self._basis, predictor.Ts, limits, change_max, keep_direction=self.keep_direction)
+        self._bounds = DriveBounds(
+            self._basis, predictor.T_s, settings.limits, settings.change_max, no_reversal=settings.no_reversal
+        )
         self._trust = Trust()
-        self.new_run(predictor.start, t_init=predictor.t_init)
+        self.restart(predictor.start, t_init=predictor.settings.t_init)
 
-    def new_run(self, start: float | None = None, *, t_init: float = 0.0, lead_in: int = 0) -> None:
+    def restart(self, start: float | None = None, *, t_init: float = 0.0, lead_in: int = 0) -> None:
         """Begin another run, at rest at ``start``, with what is learned kept (a warm start).
 
         Parameters
@@ -116,9 +89,9 @@ class SepCompensator:
             Samples at rest before the trajectory, which are not learned.
         """
         predictor = self.predictor
-        predictor.new_run(start, t_init=t_init + lead_in * predictor.Ts if t_init > 0 else 0.0)
+        predictor.restart(start, t_init=t_init + lead_in * predictor.T_s if t_init > 0 else 0.0)
         self.lead_in = int(lead_in)
-        self._trust.new_run()
+        self._trust.restart()
         self._sensor = SensorWatch()
         self._measured_before = True
         # Coefficients of the rest of the last plan; the last three values of δ and of x_d
@@ -228,7 +201,7 @@ class SepCompensator:
             g, free = (operator.g_h, operator.free) if hybrid else (operator.g_pb, operator.free_pb)
             if not (np.isfinite(g).all() and np.isfinite(free).all()):
                 continue
-            cost = self._basis.cost(g, free, command, rest[:N_DECIDED], self._delta_before, self.jerk_weight)
+            cost = self._basis.cost(g, free, command, rest[:N_DECIDED], self._delta_before, self.settings.jerk_weight)
             found = solve(cost, bounds, rest[N_DECIDED:], self._n_pinned)
             if found is not None:
                 return state, np.concatenate((rest[:N_DECIDED], found))
@@ -238,23 +211,21 @@ class SepCompensator:
         """Return the models to try, best first."""
         predictor = self.predictor
         hybrid = (
-            self.best is SepState.HYBRID
+            self._best is SepState.HYBRID
             and predictor.k >= predictor.n_init
             and predictor.regression.n_samples > 0
             and self._trust.hybrid
             and has_stable_poles(predictor.residual_weights)
         )
         candidates = [SepState.HYBRID] if hybrid else []
-        return candidates + ([SepState.PHYSICS] if self.best is not SepState.OFF else [])
+        return candidates + ([SepState.PHYSICS] if self._best is not SepState.OFF else [])
 
     def to_bytes(self) -> bytes:
         """Return parameters and state, the predictor's and a planned window included, as a versioned blob."""
-        limits, pending = self.limits, self._pending
+        pending = self._pending
         meta = {
-            **{name: getattr(self, name) for name in ("preview", "spacing", "jerk_weight", "change_max", "lead_in")},
-            "limits": None if limits is None else [limits.velocity, limits.acceleration, limits.jerk],
-            "keep_direction": self.keep_direction,
-            "best": int(self.best),
+            "settings": self.settings.as_table(),
+            "lead_in": self.lead_in,
             "excess": self._trust.excess,
             "measured_before": self._measured_before,
             "pending": None if pending is None else [int(pending.state), pending.prediction.n_warm_up],
@@ -282,15 +253,8 @@ class SepCompensator:
         saved = Saved(_KIND, *unpack(_KIND, blob))
         predictor = HybridPredictor.from_bytes(saved.part("predictor"))
         restored = HybridPredictor.from_bytes(saved.part("predictor"))
-        limits = None if saved.field("limits") is None else saved.numbers("limits", 3)
         with saved.consistent():
-            compensator = cls(
-                predictor,
-                limits=None if limits is None else Limits(*limits),
-                best=SepState(saved.whole("best", max(SepState))),
-                keep_direction=saved.flag("keep_direction"),
-                **{name: saved.field(name) for name in ("preview", "spacing", "jerk_weight", "change_max")},
-            )
+            compensator = cls(predictor, CompensatorSettings.from_table(saved.table("settings")))
         compensator.predictor = restored  # the constructor has begun a new run on the other one
         compensator.lead_in = saved.whole("lead_in")
         compensator._trust.excess, compensator._measured_before = saved.real("excess"), saved.flag("measured_before")

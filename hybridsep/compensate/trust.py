@@ -73,7 +73,7 @@ class Trust:
         worse = hybrid - physics - _NOISE_SHARE * noise_variance
         self.excess = _FORGET * self.excess + (1 - _FORGET) * worse
 
-    def new_run(self) -> None:
+    def restart(self) -> None:
         """Give the hybrid model the benefit of the doubt again."""
         self.excess = min(self.excess, 0.0)
 

@@ -146,7 +146,7 @@ OnBatch = Callable[[Batch], object]
 def backtest(predictor: HybridPredictor, x_d: ArrayLike, x: ArrayLike, *, on_batch: OnBatch | None = None) -> Backtest:
     """Replay a log that is in memory.
 
-    The predictor goes on from where it is; a second run with the weights kept is asked for by its ``new_run``.
+    The predictor goes on from where it is; a second run with the weights kept is asked for by its ``restart``.
 
     Parameters
     ----------

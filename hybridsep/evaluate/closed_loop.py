@@ -90,7 +90,7 @@ def run_closed_loop(
     encoder = Encoder() if encoder is None else encoder
     look_ahead = LookAhead(compensator, float(command[0]), t_init=t_init)
     preview, n = look_ahead.delay, len(command)
-    Ts = compensator.predictor.Ts
+    T_s = compensator.predictor.T_s
     plant.reset(float(command[0]))
     signals = np.empty((n + preview, 6))
     state = np.empty(n + preview, dtype=np.int64)
@@ -104,7 +104,7 @@ def run_closed_loop(
         x_dm = look_ahead.x_dm
         signals[k] = look_ahead.x_d, x_dm, x, x_meas, look_ahead.x_pb, look_ahead.x_h
         state[k] = look_ahead.sep_state
-        plant.step(x_dm, Ts)
+        plant.step(x_dm, T_s)
         look_ahead.sample(float(command[min(k, n - 1)]), x_meas)
     x_d, x_dm, x, x_meas, x_pb, x_h = signals[preview:].T.copy()
     return ClosedLoop(x_d, x_dm, x, x_meas, x_pb, x_h, state[preview:])

@@ -84,8 +84,8 @@ def prediction_figure(replay: Replay, title: str, path: str | Path) -> None:
 def _draw_batches(axes: Axes, replay: Replay) -> None:
     """Draw the RMS error of each batch and mark the batches where the hybrid is worse than the physics model."""
     rms = {name: 1e6 * values for name, values in replay.batch_rms().items()}
-    Ts = float(replay.t[1] - replay.t[0])
-    edges = np.append(np.arange(len(rms["x_pb"])) * replay.Np, len(replay.t)) * Ts
+    T_s = float(replay.t[1] - replay.t[0])
+    edges = np.append(np.arange(len(rms["x_pb"])) * replay.Np, len(replay.t)) * T_s
     for name, color, label in (
         ("x_pb", PHYSICS, "physics"),
         ("x_hold", HOLD, "hold"),

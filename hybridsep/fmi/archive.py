@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike
 
 from ..base.errors import FmuError
 from ..base.output import written_whole
-from ..machine import DEFAULT_MACHINE, FeedDriveSection, Machine
+from ..machine import DEFAULT_MACHINE, Machine
+from ..machine_sections import FeedDriveSection
 from . import native_backend, python_backend
 from .warm_start import load_trained
 

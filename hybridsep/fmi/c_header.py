@@ -12,6 +12,9 @@ from .variables import INTERPOLATED, Variable, variables_of
 
 __all__ = ["c_header"]
 
+_C_KINDS = {"Enumeration": "Integer"}
+"""FMI 2.0 reads and writes both by the same functions."""
+
 
 def c_header(description: Mapping[str, object], guid: str) -> str:
     """Return the header of one FMU.
@@ -92,7 +95,7 @@ def _row(variable: Variable) -> str:
     fields = [
         _string(variable.name),
         _string(unit),
-        f"HSEP_{variable.kind.upper()}",
+        f"HSEP_{_C_KINDS.get(variable.kind, variable.kind).upper()}",
         f"HSEP_{variable.causality.upper()}",
         str(int(variable.variability == "tunable")),
         _double(variable.start or 0.0),

@@ -35,5 +35,5 @@ def stop_time(machine: Machine, description: Mapping[str, Any], samples: ArrayLi
     else:
         return _WITHOUT_TRAJECTORY
     # A compensator delays by its preview, everything else runs beside a predictor.
-    delay = int(description["parameters"].get("preview", machine.predictor.Np))
+    delay = int(description["parameters"].get("preview", machine.predictor_settings.Np))
     return round((n - 1 + delay) * machine.T_s, 9)

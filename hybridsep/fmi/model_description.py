@@ -106,6 +106,7 @@ def model_description(info: FmuInfo, table: Sequence[Variable]) -> bytes:
         for file in info.source_files:
             ET.SubElement(files, "File", name=file)
     _unit_definitions(root, table)
+    _type_definitions(root, table)
     categories = ET.SubElement(root, "LogCategories")
     for status in ("Warning", "Discard", "Error", "Fatal"):
         ET.SubElement(
@@ -161,6 +162,18 @@ def _unit_definitions(root: ET.Element, table: Sequence[Variable]) -> None:
             ET.SubElement(element, "DisplayUnit", name=display, factor=_text(factor))
 
 
+def _type_definitions(root: ET.Element, table: Sequence[Variable]) -> None:
+    """Name the values of the enumerations; each variable has a type of its own, called like it."""
+    enumerations = [variable for variable in table if variable.items]
+    if not enumerations:
+        return
+    definitions = ET.SubElement(root, "TypeDefinitions")
+    for variable in enumerations:
+        element = ET.SubElement(ET.SubElement(definitions, "SimpleType", name=variable.name), "Enumeration")
+        for value, item in enumerate(variable.items):
+            ET.SubElement(element, "Item", name=item, value=str(value))
+
+
 def _scalar_variable(parent: ET.Element, reference: int, variable: Variable) -> None:
     attributes = {
         "name": variable.name,
@@ -174,13 +187,13 @@ def _scalar_variable(parent: ET.Element, reference: int, variable: Variable) -> 
     elif variable.causality != "input":
         attributes["initial"] = "calculated"
     element = ET.SubElement(parent, "ScalarVariable", attributes)
-    values = {}
+    values = {"declaredType": variable.name} if variable.items else {}
     if variable.unit not in (None, "1"):
         values["unit"] = str(variable.unit)
         if variable.display_unit:
             values["displayUnit"] = variable.display_unit
     for key, number in (("min", variable.minimum), ("max", variable.maximum), ("nominal", variable.nominal)):
-        if number is not None:
+        if number is not None and variable.kind != "Boolean":
             values[key] = _text(float(number) if variable.kind == "Real" else int(number))
     if variable.start is not None:
         values["start"] = _text(float(variable.start) if variable.kind == "Real" else variable.start)

@@ -48,9 +48,10 @@ this is affine in the command, x<sub>h</sub> = <i>G</i><sub>h</sub> x<sub>dm</su
 δ = x<sub>dm</sub> − x<sub>d</sub> is a sum of cubic B-splines, one knot every <code>spacing</code> samples, that
 minimises Σ (x<sub>d</sub> − x<sub>h</sub>)² and <code>jerk_weight</code> times the sum of squares of δ's third
 differences, within <code>v_max</code>, <code>a_max</code>, <code>j_max</code> and <code>change_max</code>; with
-<code>keep_direction</code>, x<sub>dm</sub> never turns while x<sub>d</sub> moves. It is planned anew every
-<code>Np</code> samples, from what was measured until then. With <code>v_s</code> &gt; 0, φ has further features of the
-reference alone, tanh of x<sub>d</sub>'s velocity over <code>v_s</code>, from which the sign of friction is learned.</p>
+<code>no_reversal</code>, x<sub>dm</sub> never turns while x<sub>d</sub> moves. It is planned anew every
+<code>Np</code> samples, from what was measured until then. With <code>v_friction</code> &gt; 0, φ has further
+features of the reference alone, tanh of x<sub>d</sub>'s velocity over <code>v_friction</code>, from which the sign of
+friction is learned.</p>
 <p><code>sep_state</code> says which model planned the current window. Until <code>t_init</code> after the first fill,
 and whenever the hybrid model is less accurate than the physics model or unstable, it is the physics model;
 <code>compensate</code> limits the choice, and 0 leaves the command as it is.</p>

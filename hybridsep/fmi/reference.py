@@ -8,12 +8,14 @@ parameters have their start values. The result is the library's: a second implem
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.signals import Array, as_samples
+from ..compensate.compensator import SepCompensator
 from ..machine import Machine
 from ..plants.encoder import Encoder
 from ..plants.trajectory import staircase
@@ -98,8 +100,9 @@ def _look_ahead_run(
     It is the compensator's if ``names``, the outputs, have a modified command, which then is what the drive gets.
     """
     sent = "x_dm" if "x_dm" in names else "x_d"
-    compensator = machine.new_compensator(t_init=t_init) if sent == "x_dm" else None
-    predictor = machine.new_predictor(t_init=t_init) if compensator is None else compensator.predictor
+    compensator = _compensator(machine, t_init) if sent == "x_dm" else None
+    settings = replace(machine.predictor_settings, t_init=t_init)
+    predictor = machine.new_predictor(settings) if compensator is None else compensator.predictor
     if trained is not None:
         restore_weights(predictor, weights_file(trained))
     look_ahead = LookAhead(predictor, 0.0) if compensator is None else LookAhead(compensator, 0.0)
@@ -118,6 +121,10 @@ def _look_ahead_run(
     return inputs, outputs
 
 
+def _compensator(machine: Machine, t_init: float) -> SepCompensator:
+    return machine.new_compensator(predictor=replace(machine.compensator_predictor, t_init=t_init))
+
+
 def _drive(machine: Machine, predictor: HybridPredictor) -> Callable[[float], float]:
     """Return a function of ``x_d(k)`` that gives the measured ``x(k)``: the plant, or a linear drive 2 % off."""
     if machine.plant is not None:
@@ -134,7 +141,7 @@ def _drive(machine: Machine, predictor: HybridPredictor) -> Callable[[float], fl
 
     def measure_linear(x_d: float) -> float:
         nonlocal state
-        x, state = predictor.discrete.respond(state, np.array([x_d]))
+        x, state = predictor.discrete.forced_response(state, np.array([x_d]))
         return encoder.measure(_GAIN * float(x[0]))
 
     return measure_linear

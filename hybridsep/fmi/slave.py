@@ -35,7 +35,7 @@ _LAST_READ: dict[str, dict[str, Any]] = {}
 
 _KIND = "fmu"
 _STOP_TOLERANCE = 1e-6  # of a step: a last step that ended at the stop time but for rounding
-_TYPES = {"Real": Real, "Integer": Integer, "Boolean": Boolean}
+_TYPES = {"Real": Real, "Integer": Integer, "Boolean": Boolean, "Enumeration": Integer}  # pythonfmu has no Enumeration
 
 
 _Method = TypeVar("_Method", bound=Callable[..., Any])

@@ -9,12 +9,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from ..base.parameters import PARAMETERS, check
+from ..base.settings import PARAMETERS, CompensatorSettings, PredictorSettings, check
 
 __all__ = [
     "INTERPOLATED",
     "MODELS",
-    "PLANNING",
     "Variable",
     "compensator_variables",
     "modes_from",
@@ -26,13 +25,10 @@ __all__ = [
 
 Value = float | int | bool
 
-_PREDICTION = ("Np", "p", "q", "lambda", "T_s", "t_init", "input_hold", "dead_time")
-
-PLANNING = (
-    *("preview", "spacing", "jerk_weight", "v_max", "a_max", "j_max", "change_max"),
-    *("v_s", "keep_direction", "compensate"),
-)
-"""Parameters that a compensator has besides those of the HybridPredictor."""
+_PREDICTION = (*(name for name in PredictorSettings.fmi_parameters() if name != "v_friction"), "dead_time")
+_COMPENSATION = (*_PREDICTION, "v_friction", *CompensatorSettings.fmi_parameters())
+_SEP_MODELS = CompensatorSettings.parameters()["compensate"].choices
+_KINDS = {int: "Integer", float: "Real", bool: "Boolean", str: "Enumeration"}
 
 
 @dataclass(frozen=True)
@@ -42,7 +38,7 @@ class Variable:
     Attributes
     ----------
     name, description : str
-    kind : {"Real", "Integer", "Boolean"}
+    kind : {"Real", "Integer", "Boolean", "Enumeration"}
     causality : {"input", "output", "parameter", "local"}
     variability : {"fixed", "tunable", "continuous", "discrete"}
     start : float, int, bool or None
@@ -54,6 +50,10 @@ class Variable:
     nonzero : float
         Least value that is not 0; FMI cannot say it, the check does.
     nominal : float or None
+    items : tuple of str
+        Names of an Enumeration's values, which count from 0.
+    learned : bool
+        Whether a parameter shapes what is learned: a warm start needs the same.
     initially_from : tuple of str
         Inputs and parameters an output depends on during initialization; none at any later point.
     """
@@ -71,6 +71,8 @@ class Variable:
     nonzero: float = 0.0
     nominal: float | None = None
     initially_from: tuple[str, ...] = ()
+    items: tuple[str, ...] = ()
+    learned: bool = False
 
 
 def _position(
@@ -101,16 +103,18 @@ def _parameter(name: str, start: Value, *, label: str | None = None) -> Variable
     parameter = PARAMETERS[name]
     return Variable(
         label or name,
-        "Integer" if parameter.kind is int else "Real",
+        _KINDS[parameter.kind],
         "parameter",
         "fixed",
         parameter.description,
         start=start,
-        unit=None if parameter.kind is int else parameter.unit,
+        unit=parameter.unit if parameter.kind is float else None,
         display_unit=parameter.display_unit,
         minimum=parameter.minimum,
         maximum=parameter.maximum,
         nonzero=parameter.nonzero,
+        items=parameter.choices,
+        learned=parameter.learned,
     )
 
 
@@ -191,7 +195,7 @@ def compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mappi
     ahead = ("x_d_ahead",)
     # With weights from an earlier run and no warm-up, the hybrid model may plan the first window already.
     model = ("t_init", "compensate")
-    state = "model that planned the current window: 0 off, 1 physics, 2 hybrid"
+    state = "model that planned the current window"
     return [
         _position("x_d_ahead", "input", "commanded position entering the look-ahead, preview samples early", start=0.0),
         _position("x_meas", "input", "measured position now", start=0.0),
@@ -208,12 +212,12 @@ def compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mappi
             display_unit="um",
             initially_from=(*ahead, *model),
         ),
-        Variable("sep_state", "Integer", "output", "discrete", state, initially_from=model),
+        Variable("sep_state", "Enumeration", "output", "discrete", state, initially_from=model, items=_SEP_MODELS),
         _position("rms_e", "output", "running RMS of x_d - x_meas since t_init", display_unit="um"),
         _position("rms_pb", "output", "running RMS of x_meas - x_pb since t_init", display_unit="um"),
         _position("rms_h", "output", "running RMS of x_meas - x_h since t_init", display_unit="um"),
         Variable("batch", "Integer", "output", "discrete", "number of the window, floor(k / Np)"),
-        *(_parameter(name, parameters[name]) for name in (*_PREDICTION, *PLANNING)),
+        *(_parameter(name, parameters[name]) for name in _COMPENSATION),
         *_modes(modes),
     ]
 

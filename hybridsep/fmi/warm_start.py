@@ -20,7 +20,7 @@ def load_trained(path: str | Path, machine: Machine, model: str) -> HybridPredic
     path : str or Path
     machine : Machine
         What it must have been trained for: its ``Np``, ``p``, ``q``, ``lambda``, ``T_s``, ``input_hold``,
-        ``dead_time``, ``v_s`` and modes.
+        ``dead_time``, ``v_friction`` and modes.
     model : {"HybridPredictor", "SepCompensator"}
         Which of the machine's two sets of ``Np``, ``p``, ``q`` and ``lambda`` is meant.
 
@@ -55,4 +55,4 @@ def load_trained(path: str | Path, machine: Machine, model: str) -> HybridPredic
 
 def _parameters(predictor: HybridPredictor) -> dict[str, object]:
     """Return all that must agree, under the names of the machine file."""
-    return {"Np": predictor.Np, **learned_settings(predictor), "input_hold": predictor.discrete.input_hold}
+    return {"Np": predictor.Np, **learned_settings(predictor), "input_hold": predictor.settings.input_hold}

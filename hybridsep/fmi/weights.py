@@ -1,8 +1,8 @@
 """``resources/weights.bin``: what a trained predictor has learned, for an FMU that starts warm.
 
 Layout, little-endian, 8 bytes each: ``HSEPWGT2``; ``p``, ``q``, ``input_hold``, ``dead_time``, the number of modes and
-that of the learned samples as u64; ``lambda``, ``T_s``, ``v_s``, then the four numbers of each mode as float64; the
-upper triangle of the factor ``[R z; 0 ρ]`` of :class:`~hybridsep.regression.RidgeRegression` by rows; the CRC-32 of all
+that of the learned samples as u64; ``lambda``, ``T_s``, ``v_friction``, then the four numbers of each mode as float64;
+the upper triangle of the factor ``[R z; 0 ρ]`` of :class:`~hybridsep.regression.RidgeRegression` by rows; the CRC-32 of all
 before as u64. The settings are all that shape the features and the factor: with others the weights mean something else.
 This module travels inside the pythonfmu FMUs; the C model reads the same file.
 """
@@ -15,7 +15,7 @@ import zlib
 import numpy as np
 
 from ..base.errors import SignalError, StateError
-from ..base.parameters import INPUT_HOLDS
+from ..base.settings import PredictorSettings
 from ..predict.predictor import HybridPredictor
 
 __all__ = ["WEIGHTS_FILE", "learned_settings", "restore_weights", "weights_file"]
@@ -30,15 +30,10 @@ _DAMAGED = f"{WEIGHTS_FILE} must be a factor of learned rows; it is damaged or t
 
 def learned_settings(predictor: HybridPredictor) -> dict[str, float]:
     """Return all settings that what is learned depends on, by their names in the FMU."""
-    values: dict[str, float] = {
-        "p": predictor.p,
-        "q": predictor.q,
-        "lambda": predictor.lam,
-        "T_s": predictor.Ts,
-        "input_hold": INPUT_HOLDS.index(predictor.discrete.input_hold),
-        "dead_time": predictor.model.dead_time,
-        "v_s": predictor.v_s,
-    }
+    numbers = predictor.settings.to_fmi()
+    learned = [name for name, parameter in PredictorSettings.fmi_parameters().items() if parameter.learned]
+    values: dict[str, float] = {name: numbers[name] for name in learned}
+    values["dead_time"] = predictor.model.dead_time
     for i, mode in enumerate(predictor.model.modes, start=1):
         values |= {f"mode[{i}].{name}": getattr(mode, name) for name in _MODE}
     return values
@@ -47,9 +42,9 @@ def learned_settings(predictor: HybridPredictor) -> dict[str, float]:
 def weights_file(predictor: HybridPredictor) -> bytes:
     """Return the file's content for what a predictor has learned."""
     regression, n_modes = predictor.regression, len(predictor.model.modes)
-    p, q, lam, T_s, input_hold, dead_time, v_s, *modes = learned_settings(predictor).values()
+    p, q, lam, T_s, input_hold, v_friction, dead_time, *modes = learned_settings(predictor).values()
     triangle = regression.factor[np.triu_indices(predictor.n_features + 1)]
-    content = _HEAD.pack(_MAGIC, p, q, input_hold, dead_time, n_modes, regression.n_samples, lam, T_s, v_s)
+    content = _HEAD.pack(_MAGIC, p, q, input_hold, dead_time, n_modes, regression.n_samples, lam, T_s, v_friction)
     content += np.array([*modes, *triangle], dtype="<f8").tobytes()
     return content + _CHECKSUM.pack(zlib.crc32(content))
 
@@ -70,10 +65,10 @@ def restore_weights(predictor: HybridPredictor, content: bytes) -> None:
         or _CHECKSUM.pack(zlib.crc32(body)) != content[-_CHECKSUM.size :]
     ):
         raise StateError(_DAMAGED)
-    _, p, q, input_hold, dead_time, n_modes, n_samples, lam, T_s, v_s = _HEAD.unpack_from(body)
+    _, p, q, input_hold, dead_time, n_modes, n_samples, lam, T_s, v_friction = _HEAD.unpack_from(body)
     numbers = np.frombuffer(body, "<f8", offset=_HEAD.size)
     settings = learned_settings(predictor)
-    learned = [p, q, lam, T_s, input_hold, dead_time, v_s, *numbers[: 4 * n_modes].tolist()]
+    learned = [p, q, lam, T_s, input_hold, v_friction, dead_time, *numbers[: 4 * n_modes].tolist()]
     problems = [
         f"{name} must be {then!r}, with which {WEIGHTS_FILE} was learned, got {now!r}"
         for (name, now), then in zip(settings.items(), learned, strict=False)

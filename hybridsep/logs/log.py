@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..base.errors import LogError
-from ..base.parameters import check
+from ..base.settings import check
 from ..base.signals import Array
 from .mat import MatSource
 from .npz import NpzSource
@@ -26,7 +26,7 @@ SPAN_MAX = 100.0
 """Longest plausible travel of an axis, m; a longer one is a log in a smaller unit."""
 
 TS_TOLERANCE = 0.01
-"""Largest relative difference between a given ``Ts`` and the time column's."""
+"""Largest relative difference between a given ``T_s`` and the time column's."""
 
 _SOURCES: Mapping[str, type[Source]] = {
     ".csv": TextSource,
@@ -46,10 +46,10 @@ class Log:
     Attributes
     ----------
     t : (n,) array, s
-        Times as recorded, or ``k·Ts`` if the file has no time column.
+        Times as recorded, or ``k·T_s`` if the file has no time column.
     x_d, x : (n,) array, m
         Commanded and measured positions.
-    Ts : float
+    T_s : float
         Sampling interval, s.
     path : Path
         The file.
@@ -58,21 +58,21 @@ class Log:
     t: Array
     x_d: Array
     x: Array
-    Ts: float
+    T_s: float
     path: Path
 
 
 class LogReader:
     """A log that is read chunk by chunk; made by :func:`open_log`.
 
-    Opening goes once over the time column (over ``x_d`` if there is none), so that ``Ts`` is the mean over the whole
+    Opening goes once over the time column (over ``x_d`` if there is none), so that ``T_s`` is the mean over the whole
     file and a bad time axis is reported before anything is predicted from it. No file stays open between calls.
 
     Attributes
     ----------
     path : Path
         The file.
-    Ts : float
+    T_s : float
         Sampling interval, s: the given one, or the mean of the time column's, rounded to what it determines.
     n_samples : int
         Samples in the log.
@@ -84,20 +84,20 @@ class LogReader:
         *,
         columns: Mapping[str, str] | None = None,
         unit: str = "m",
-        Ts: float | None = None,
+        T_s: float | None = None,
     ) -> None:
         self.path = Path(path)
-        given = check_reading(unit, Ts)
+        given = check_reading(unit, T_s)
         self._unit = unit
         self._source = _open_source(self.path)
         self._names = _column_names(self._source, columns, time_needed=given is None)
         self.n_samples, found = self._scan()
         if given is not None and found is not None and abs(found - given) > TS_TOLERANCE * given:
             raise LogError(
-                f"{self.path}: Ts = {given:g} s was given, but column {self._names['t']!r} has an interval of "
-                f"{found:g} s; leave Ts out, or correct it or the column"
+                f"{self.path}: T_s = {given:g} s was given, but column {self._names['t']!r} has an interval of "
+                f"{found:g} s; leave T_s out, or correct it or the column"
             )
-        self.Ts = float(given or found or 0.0)  # one of them is there, both are > 0
+        self.T_s = float(given or found or 0.0)  # one of them is there, both are > 0
 
     def chunks(self, n: int = _BLOCK) -> Iterator[tuple[Array, Array]]:
         """Give the log from its beginning as pairs ``(x_d, x)``, m, of at most ``n`` samples each.
@@ -116,9 +116,9 @@ class LogReader:
         roles = ("x_d", "x", "t") if "t" in self._names else ("x_d", "x")
         columns = [np.concatenate(parts) for parts in zip(*self._positions(_BLOCK, roles), strict=True)]
         if len(columns) == 2:
-            columns.append(np.arange(self.n_samples, dtype=np.float64) * self.Ts)
+            columns.append(np.arange(self.n_samples, dtype=np.float64) * self.T_s)
         x_d, x, t = columns
-        return Log(t, x_d, x, self.Ts, self.path)
+        return Log(t, x_d, x, self.T_s, self.path)
 
     def _positions(self, n: int, roles: tuple[str, ...]) -> Iterator[tuple[Array, ...]]:
         """Give the columns ``roles``, the first two being positions, checked and in SI units."""
@@ -160,15 +160,15 @@ class LogReader:
             raise LogError(f"{self.path}, {block.where(i)}: column {name!r} must be finite, got {column[i]}")
 
 
-def check_reading(unit: str, Ts: float | None) -> float | None:
+def check_reading(unit: str, T_s: float | None) -> float | None:
     """Return the sampling interval that was given, or raise LogError or ParameterError if it or the unit is none."""
     if unit not in UNITS:
         raise LogError(f"unit must be one of {', '.join(UNITS)}, got {unit!r}")
-    return None if Ts is None else float(check("T_s", Ts, label="Ts"))
+    return None if T_s is None else float(check("T_s", T_s, label="T_s"))
 
 
 def open_log(
-    path: str | Path, *, columns: Mapping[str, str] | None = None, unit: str = "m", Ts: float | None = None
+    path: str | Path, *, columns: Mapping[str, str] | None = None, unit: str = "m", T_s: float | None = None
 ) -> LogReader:
     """Open a log for reading in bounded memory.
 
@@ -183,7 +183,7 @@ def open_log(
         The file's names of ``"t"``, ``"x_d"`` and ``"x"`` where they are others, such as ``{"x_d": "qg", "x": "qm"}``.
     unit : {"m", "mm", "um"}
         Unit of the file's positions.
-    Ts : float, optional
+    T_s : float, optional
         Sampling interval, s; needed only if the file has no time column, checked against that if it has.
 
     Returns
@@ -195,14 +195,14 @@ def open_log(
     LogError
         If the file, its columns or its time axis cannot be used.
     """
-    return LogReader(path, columns=columns, unit=unit, Ts=Ts)
+    return LogReader(path, columns=columns, unit=unit, T_s=T_s)
 
 
 def read_log(
-    path: str | Path, *, columns: Mapping[str, str] | None = None, unit: str = "m", Ts: float | None = None
+    path: str | Path, *, columns: Mapping[str, str] | None = None, unit: str = "m", T_s: float | None = None
 ) -> Log:
     """Return a whole log; parameters and errors as for :func:`open_log`."""
-    return LogReader(path, columns=columns, unit=unit, Ts=Ts).read()
+    return LogReader(path, columns=columns, unit=unit, T_s=T_s).read()
 
 
 def _open_source(path: Path) -> Source:
@@ -229,7 +229,7 @@ def _column_names(source: Source, columns: Mapping[str, str] | None, *, time_nee
     for role, name in names.items():
         if name not in source.names:
             there = ", ".join(repr(other) for other in source.names) or "none"
-            hint = "; give its name in columns, or Ts" if role == "t" else "; give its name in columns"
+            hint = "; give its name in columns, or T_s" if role == "t" else "; give its name in columns"
             what = repr(name) if name == role else f"{name!r} ({role})"
             raise LogError(f"{source.path}: column {what} is missing, the file has {there}{hint}{source.advice}")
         if source.names.count(name) > 1:

@@ -110,6 +110,6 @@ class TimeAxis:
             raise LogError(
                 f"{self._path}, {block.where(i + shift)}: time {self._name!r} must be uniform: an interval of "
                 f"{self._median:.6g} s ± {100 * TOLERANCE:g} % was expected, got {steps[i]:.6g} s{samples}; "
-                f"resample the log, or remove the time column and give Ts"
+                f"resample the log, or remove the time column and give T_s"
             )
         self._jitter = max(self._jitter, worst)

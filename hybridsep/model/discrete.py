@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import expm, toeplitz
 
-from ..base.errors import ParameterError
-from ..base.parameters import INPUT_HOLDS, check
+from ..base.settings import check
 from ..base.signals import Array
 
 __all__ = ["BLOCK_MAX", "DiscreteModel"]
@@ -31,7 +30,7 @@ class DiscreteModel:
         ``(A, b, c)`` of the modes, block diagonal, as :meth:`ModalModel.state_space` returns it.
     dead_time : int
         Whole samples.
-    Ts : float
+    T_s : float
         Sampling interval, s.
     input_hold : {"zoh", "foh"}
         How ``x_d`` runs between samples.
@@ -41,18 +40,16 @@ class DiscreteModel:
     Raises
     ------
     ParameterError
-        If ``Ts`` is out of its range or the hold is unknown.
+        If ``T_s`` is out of its range or the hold is unknown.
     """
 
     def __init__(
-        self, state_space: StateSpace, dead_time: int, Ts: float, input_hold: str = "zoh", block: int = BLOCK_MAX
+        self, state_space: StateSpace, dead_time: int, T_s: float, input_hold: str = "zoh", block: int = BLOCK_MAX
     ) -> None:
-        if input_hold not in INPUT_HOLDS:
-            raise ParameterError(f"input_hold must be one of {', '.join(INPUT_HOLDS)}, got {input_hold!r}")
-        self.Ts: float = check("T_s", Ts)
-        self.input_hold = input_hold
+        self.T_s: float = check("T_s", T_s)
+        self.input_hold: str = check("input_hold", input_hold)
         self.dead_time = dead_time
-        self.A, self.b, self.c, self.d = _discretised(state_space, self.Ts, input_hold)
+        self.A, self.b, self.c, self.d = _discretised(state_space, self.T_s, input_hold)
         self._n = len(self.b)
         self._block = max(1, min(block, BLOCK_MAX))
         self._tabulate()
@@ -66,7 +63,7 @@ class DiscreteModel:
         """Return the state of a drive at rest at position 0, ``(n_state,)``."""
         return np.zeros(self.n_state)
 
-    def respond(self, state: Array, x_d: Array) -> tuple[Array, Array]:
+    def forced_response(self, state: Array, x_d: Array) -> tuple[Array, Array]:
         """Return the model's positions over a window and the state at its end; eq. (2).
 
         Parameters
@@ -88,21 +85,21 @@ class DiscreteModel:
             line = np.concatenate((state[self._n :], x_d))
             s, u, register = state[: self._n], line[:n], line[n:]
         if n <= self._block:
-            x_pb, s = self._respond_block(s, u)
+            x_pb, s = self._block_response(s, u)
         else:
             x_pb = np.empty(n)
             for i in range(0, n, self._block):
                 stop = min(i + self._block, n)
-                x_pb[i:stop], s = self._respond_block(s, u[i:stop])
+                x_pb[i:stop], s = self._block_response(s, u[i:stop])
         return x_pb, (np.concatenate((s, register)) if self.dead_time else s)
 
     def impulse_response(self, n: int) -> Array:
         """Return the first column of the lower-triangular Toeplitz ``G_pb`` of a window, ``(n,)``, m/m."""
         impulse = np.zeros(n)
         impulse[0] = 1.0
-        return self.respond(self.rest(), impulse)[0]
+        return self.forced_response(self.rest(), impulse)[0]
 
-    def _respond_block(self, s: Array, u: Array) -> tuple[Array, Array]:
+    def _block_response(self, s: Array, u: Array) -> tuple[Array, Array]:
         n = len(u)
         x_pb = self._O[:n] @ s + self._T[:n, :n] @ u
         return x_pb, self._powers[n] @ s + self._K[:, self._block - n :] @ u
@@ -120,15 +117,15 @@ class DiscreteModel:
         self._T = toeplitz(markov, np.zeros(m))
 
 
-def _discretised(state_space: StateSpace, Ts: float, input_hold: str) -> tuple[Array, Array, Array, float]:
+def _discretised(state_space: StateSpace, T_s: float, input_hold: str) -> tuple[Array, Array, Array, float]:
     """Discretise each mode by the matrix exponential of its augmented system (Van Loan)."""
     A, b, c = state_space
     A_d, b_d, d = np.zeros_like(A), np.zeros_like(b), 0.0
     for i in range(0, len(b), 2):
         block = slice(i, i + 2)
         augmented = np.zeros((4, 4))
-        augmented[:2, :2] = A[block, block] * Ts
-        augmented[:2, 2] = b[block] * Ts
+        augmented[:2, :2] = A[block, block] * T_s
+        augmented[:2, 2] = b[block] * T_s
         augmented[2, 3] = 1.0  # the ramp from u(k) to u(k+1)
         exponential = expm(augmented)
         phi, gamma_1, gamma_2 = exponential[:2, :2], exponential[:2, 2], exponential[:2, 3]

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import block_diag
 
 from ..base.errors import ModelError, ParameterError
-from ..base.parameters import check
+from ..base.settings import check
 from ..base.signals import Array
 from .discrete import BLOCK_MAX, DiscreteModel
 
@@ -162,12 +162,12 @@ class ModalModel:
             c += [mode.alpha / w**2, mode.beta / w]
         return block_diag(*blocks), np.array(b), np.array(c)
 
-    def discretise(self, Ts: float, input_hold: str = "zoh", block: int = BLOCK_MAX) -> DiscreteModel:
-        """Return the model at the samples ``k·Ts``, exact for a command held or interpolated in between.
+    def discretise(self, T_s: float, input_hold: str = "zoh", block: int = BLOCK_MAX) -> DiscreteModel:
+        """Return the model at the samples ``k·T_s``, exact for a command held or interpolated in between.
 
         Parameters
         ----------
-        Ts : float
+        T_s : float
             Sampling interval, s.
         input_hold : {"zoh", "foh"}
             How ``x_d`` runs between samples.
@@ -177,18 +177,18 @@ class ModalModel:
         Raises
         ------
         ParameterError
-            If ``Ts ≤ 0`` or the hold is unknown.
+            If ``T_s ≤ 0`` or the hold is unknown.
         """
-        return DiscreteModel(self.state_space(), self.dead_time, Ts, input_hold, block)
+        return DiscreteModel(self.state_space(), self.dead_time, T_s, input_hold, block)
 
-    def frequency_response(self, f: ArrayLike, Ts: float | None = None) -> NDArray[np.complex128]:
+    def frequency_response(self, f: ArrayLike, T_s: float | None = None) -> NDArray[np.complex128]:
         """Return ``G_pb(j 2π f)``.
 
         Parameters
         ----------
         f : array_like, Hz
             Frequencies, any shape.
-        Ts : float, optional
+        T_s : float, optional
             Sampling interval, s; needed when there is a dead time, which is counted in samples.
 
         Returns
@@ -198,9 +198,9 @@ class ModalModel:
         Raises
         ------
         ParameterError
-            If there is a dead time and no ``Ts``.
+            If there is a dead time and no ``T_s``.
         """
-        if self.dead_time and Ts is None:
+        if self.dead_time and T_s is None:
             raise ParameterError(f"T_s is needed: dead_time = {self.dead_time} is counted in samples")
         s = 2j * np.pi * np.asarray(f, dtype=np.float64)
         # Eq. (15)
@@ -208,10 +208,10 @@ class ModalModel:
             (mode.alpha + mode.beta * s) / (s**2 + 2 * mode.zeta * mode.omega * s + mode.omega**2)
             for mode in self.modes
         )
-        return np.asarray(G * np.exp(-s * self.dead_time * (Ts or 0.0)), dtype=np.complex128)
+        return np.asarray(G * np.exp(-s * self.dead_time * (T_s or 0.0)), dtype=np.complex128)
 
-    def to_control(self, Ts: float | None = None, input_hold: str = "zoh") -> control.StateSpace:
-        """Return a python-control system: continuous without ``Ts``, otherwise discrete with the dead time in it.
+    def to_control(self, T_s: float | None = None, input_hold: str = "zoh") -> control.StateSpace:
+        """Return a python-control system: continuous without ``T_s``, otherwise discrete with the dead time in it.
 
         Raises
         ------
@@ -220,19 +220,19 @@ class ModalModel:
         """
         import control
 
-        if Ts is None:
+        if T_s is None:
             if self.dead_time:
                 raise ModelError(
                     f"a dead time of {self.dead_time} samples has no continuous rational form; "
-                    "give Ts for a discrete one"
+                    "give T_s for a discrete one"
                 )
             A, b, c = self.state_space()
             return control.ss(A, b[:, None], c[None, :], [[0.0]])
-        discrete = self.discretise(Ts, input_hold, block=1)
-        system = control.ss(discrete.A, discrete.b[:, None], discrete.c[None, :], [[discrete.d]], Ts)
+        discrete = self.discretise(T_s, input_hold, block=1)
+        system = control.ss(discrete.A, discrete.b[:, None], discrete.c[None, :], [[discrete.d]], T_s)
         if self.dead_time:
             # x_d delayed by d samples: a shift register in front.
             d = self.dead_time
-            register = control.ss(np.eye(d, k=-1), np.eye(d, 1), np.eye(1, d, k=d - 1), [[0.0]], Ts)
+            register = control.ss(np.eye(d, k=-1), np.eye(d, 1), np.eye(1, d, k=d - 1), [[0.0]], T_s)
             system = control.series(register, system)
         return system

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.parameters import check
+from ..base.settings import check
 from ..base.signals import Array, as_samples
 
 __all__ = ["Encoder"]

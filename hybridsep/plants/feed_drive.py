@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..base.errors import ParameterError, SignalError
-from ..base.parameters import check
+from ..base.settings import check
 from .plant import RATE_MAX, STATE_MAX, check_command, check_step, internal_steps
 
 __all__ = ["FeedDrive"]

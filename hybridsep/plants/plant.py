@@ -64,7 +64,7 @@ class Plant(Protocol):
         """Take over what :meth:`state` returned."""
 
 
-def simulate(plant: Plant, x_d: ArrayLike, Ts: float, *, start: float | None = None) -> Array:
+def simulate(plant: Plant, x_d: ArrayLike, T_s: float, *, start: float | None = None) -> Array:
     """Return the true positions of a plant that gets each command held over one sampling interval.
 
     Parameters
@@ -73,7 +73,7 @@ def simulate(plant: Plant, x_d: ArrayLike, Ts: float, *, start: float | None = N
         Reset first.
     x_d : (n,) array_like, m
         Commanded positions.
-    Ts : float
+    T_s : float
         Sampling interval, s.
     start : float, optional
         Where the drive rests at first, m; the first command if left out.
@@ -90,7 +90,7 @@ def simulate(plant: Plant, x_d: ArrayLike, Ts: float, *, start: float | None = N
     x = np.empty(len(commands))
     for k, command in enumerate(commands.tolist()):
         x[k] = plant.x
-        plant.step(command, Ts)
+        plant.step(command, T_s)
     return x
 
 

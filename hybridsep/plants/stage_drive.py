@@ -6,7 +6,7 @@ import math
 
 from ..base.clock import SampleClock
 from ..base.errors import ParameterError, SignalError
-from ..base.parameters import check
+from ..base.settings import check
 from ..model.physics import ModalModel, Mode
 from .plant import RATE_MAX, STATE_MAX, check_command, check_step, internal_steps
 
@@ -30,17 +30,17 @@ class StageDrive:
         Friction as an offset of the command, m, ≥ 0.
     kappa : float
         Cable stiffness as an offset of the command, 1/m, ≥ 0.
-    Ts : float
+    T_s : float
         Interval at which the command is sampled, s, over which ``v_d`` is taken.
     """
 
-    def __init__(self, model: ModalModel, f: float = 0.0, kappa: float = 0.0, Ts: float = 1e-3) -> None:
+    def __init__(self, model: ModalModel, f: float = 0.0, kappa: float = 0.0, T_s: float = 1e-3) -> None:
         if model.dead_time:
             raise ParameterError(f"the stage's model must have no dead time, got {model.dead_time} samples")
         self.model = model
         self.f: float = check("f", f)
         self.kappa: float = check("kappa", kappa)
-        self.Ts: float = check("T_s", Ts)
+        self.T_s: float = check("T_s", T_s)
         self._modes = [(mode.omega**2, 2 * mode.zeta * mode.omega, mode.alpha, mode.beta) for mode in model.modes]
         self._rate = max(map(_mode_rate, model.modes))
         for i, mode in enumerate(model.modes, start=1):
@@ -56,7 +56,7 @@ class StageDrive:
         self._start = start
         self._z = [0.0] * (2 * len(self._modes))
         self._last_x_d, self._v_d, self._v = 0.0, 0.0, 0.0
-        self._clock = SampleClock.begin(0.0, self.Ts)  # a time of its own
+        self._clock = SampleClock.begin(0.0, self.T_s)  # a time of its own
 
     @property
     def x(self) -> float:
@@ -77,12 +77,12 @@ class StageDrive:
         last_x_d, v_d, done = self._last_x_d, self._v_d, 0.0
         # v_d is taken at the instants, in whatever steps they come.
         for i in range(step.n_latched + 1):
-            end = max(done, step.first + i * self.Ts) if i < step.n_latched else h
+            end = max(done, step.first + i * self.T_s) if i < step.n_latched else h
             if end > done:
                 z = self._integrated(z, self._pushed(r, v_d), end - done)
                 done = end
             if i < step.n_latched:
-                last_x_d, v_d = r, (r - last_x_d) / self.Ts
+                last_x_d, v_d = r, (r - last_x_d) / self.T_s
         if not all(abs(s) < STATE_MAX for s in z):
             raise SignalError(f"the stage's state left the range of numbers (command {x_d} m)")
         self._z, self._v = z, self._position(self._derivative(z, self._pushed(r, v_d)))

@@ -1,6 +1,6 @@
 """Commanded positions: rest-to-rest moves, planar paths and the paper's two test trajectories.
 
-Every function returns positions in metres, sampled exactly at ``k·Ts``; jerk-limited, time-optimal moves come from
+Every function returns positions in metres, sampled exactly at ``k·T_s``; jerk-limited, time-optimal moves come from
 ruckig (Berscheid and Kröger, RSS 2021).
 """
 
@@ -16,8 +16,7 @@ from ruckig import InputParameter, Result, Ruckig
 from ruckig import Trajectory as RuckigTrajectory
 
 from ..base.errors import ParameterError, SignalError
-from ..base.limits import Limits
-from ..base.parameters import check, samples_before
+from ..base.settings import Limits, check, samples_before
 from ..base.signals import Array, as_samples
 from ..logs import read_log
 
@@ -25,7 +24,7 @@ __all__ = [
     "PAPER_LIMITS",
     "along_path",
     "archimedean_spiral",
-    "from_file",
+    "read_trajectory",
     "rest_to_rest",
     "spiral",
     "staircase",
@@ -44,7 +43,7 @@ PAPER_LIMITS = Limits(velocity=0.08, acceleration=8.0, jerk=1000.0)
 def rest_to_rest(
     positions: ArrayLike,
     limits: Limits,
-    Ts: float = 1e-3,
+    T_s: float = 1e-3,
     *,
     start_times: Sequence[float] | None = None,
     dwell: float = 0.0,
@@ -58,7 +57,7 @@ def rest_to_rest(
         Where the axis starts, then where each of the ``m`` moves ends.
     limits : Limits
         Velocity, acceleration and jerk limits.
-    Ts : float
+    T_s : float
         Sampling interval, s.
     start_times : sequence of m floats, optional
         When each move starts, s; otherwise each starts ``dwell`` after the one before has ended.
@@ -70,7 +69,7 @@ def rest_to_rest(
     Returns
     -------
     x_d : (n,) array, m
-        Samples at ``0, Ts, …``, the last one at or after the end.
+        Samples at ``0, T_s, …``, the last one at or after the end.
 
     Raises
     ------
@@ -80,7 +79,7 @@ def rest_to_rest(
     SignalError
         If ``positions`` has less than one move or is not finite.
     """
-    Ts = check("T_s", Ts)
+    T_s = check("T_s", T_s)
     points = as_samples(positions, "positions")
     if len(points) < 2:
         raise SignalError(f"positions must hold the start and at least one target, got {len(points)} values")
@@ -93,26 +92,26 @@ def rest_to_rest(
     moves, begin = [], 0.0
     for i, (here, there) in enumerate(pairwise(points.tolist())):
         start = begin if start_times is None else float(start_times[i])
-        if start < begin - 1e-6 * Ts:
+        if start < begin - 1e-6 * T_s:
             raise ParameterError(f"move {i + 1} starts at {start:g} s, before the one before has ended at {begin:g} s")
         move = _plan(here, there, limits)
         moves.append((start, move))
         begin = start + move.duration + (dwell if start_times is None else 0.0)
     end = begin if duration is None else duration
-    if end < begin - 1e-6 * Ts:
+    if end < begin - 1e-6 * T_s:
         raise ParameterError(f"duration is {end:g} s, but the moves need {begin:g} s")
-    if not end / Ts < SAMPLES_MAX:
+    if not end / T_s < SAMPLES_MAX:
         raise ParameterError(
-            f"a trajectory must have fewer than {SAMPLES_MAX} samples, got {end:g} s at T_s = {Ts:g} s; "
+            f"a trajectory must have fewer than {SAMPLES_MAX} samples, got {end:g} s at T_s = {T_s:g} s; "
             "raise its limits or T_s"
         )
-    n = samples_before(end, Ts) + 1
+    n = samples_before(end, T_s) + 1
     x_d = np.empty(n)
     x_d[:] = points[0]
     for start, move in moves:
-        first = samples_before(start, Ts)
+        first = samples_before(start, T_s)
         for k in range(first, n):
-            t = k * Ts - start
+            t = k * T_s - start
             if t >= move.duration:
                 x_d[k:] = move.at_time(move.duration)[0][0]
                 break
@@ -120,12 +119,12 @@ def rest_to_rest(
     return x_d
 
 
-def staircase(Ts: float = 1e-3, *, limits: Limits = PAPER_LIMITS) -> Array:
+def staircase(T_s: float = 1e-3, *, limits: Limits = PAPER_LIMITS) -> Array:
     """Return the paper's staircase: a 10 mm move at the start of every second, three up, three down, 6 s.
 
     Returns
     -------
-    x_d : (6 / Ts + 1,) array, m
+    x_d : (6 / T_s + 1,) array, m
         6001 samples at 1 ms; each move takes 0.143 s under eq. (14).
 
     Raises
@@ -134,11 +133,11 @@ def staircase(Ts: float = 1e-3, *, limits: Limits = PAPER_LIMITS) -> Array:
         If a move would take more than a second under other limits.
     """
     steps = np.array([0.0, 1, 2, 3, 2, 1, 0]) * 0.010
-    return rest_to_rest(steps, limits, Ts, start_times=range(6), duration=6.0)
+    return rest_to_rest(steps, limits, T_s, start_times=range(6), duration=6.0)
 
 
 def spiral(
-    Ts: float = 1e-3, *, radius: float = 0.030, turns: float = 5.0, limits: Limits = PAPER_LIMITS
+    T_s: float = 1e-3, *, radius: float = 0.030, turns: float = 5.0, limits: Limits = PAPER_LIMITS
 ) -> tuple[Array, Array]:
     """Return the commands of X and Y for the paper's spiral from the centre, 5 turns, 30 mm, eq. (14) along the path.
 
@@ -148,12 +147,12 @@ def spiral(
         5.9 s at the default values.
     """
     position, derivative, end = archimedean_spiral(radius, turns)
-    points = along_path(position, derivative, end, limits, Ts)
+    points = along_path(position, derivative, end, limits, T_s)
     return np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1])
 
 
-def from_file(
-    path: str | Path, *, column: str = "x_d", unit: str = "m", Ts: float | None = None
+def read_trajectory(
+    path: str | Path, *, column: str = "x_d", unit: str = "m", T_s: float | None = None
 ) -> tuple[Array, float]:
     """Read a commanded position from a CSV, ``.npz`` or ``.mat`` file.
 
@@ -165,21 +164,21 @@ def from_file(
         The command's name in the file.
     unit : {"m", "mm", "um"}
         Unit of the command.
-    Ts : float, optional
+    T_s : float, optional
         Sampling interval, s, for a file without a time column.
 
     Returns
     -------
     x_d : (n,) array, m
-    Ts : float, s
+    T_s : float, s
 
     Raises
     ------
     LogError
         If the file, the column or the time axis cannot be used.
     """
-    log = read_log(path, columns={"x_d": column, "x": column}, unit=unit, Ts=Ts)
-    return log.x_d, log.Ts
+    log = read_log(path, columns={"x_d": column, "x": column}, unit=unit, T_s=T_s)
+    return log.x_d, log.T_s
 
 
 def archimedean_spiral(radius: float, turns: float) -> tuple[Curve, Curve, float]:
@@ -199,7 +198,7 @@ def archimedean_spiral(radius: float, turns: float) -> tuple[Curve, Curve, float
     return position, derivative, end
 
 
-def along_path(position: Curve, derivative: Curve, end: float, limits: Limits, Ts: float = 1e-3) -> Array:
+def along_path(position: Curve, derivative: Curve, end: float, limits: Limits, T_s: float = 1e-3) -> Array:
     """Run along a planar path from rest to rest, with the limits along the arc.
 
     Parameters
@@ -210,16 +209,16 @@ def along_path(position: Curve, derivative: Curve, end: float, limits: Limits, T
         Last value of ``u``, > 0.
     limits : Limits
         Velocity, acceleration and jerk along the arc.
-    Ts : float
+    T_s : float
         Sampling interval, s.
 
     Returns
     -------
     (n, d) array, m
-        Positions at ``k·Ts``; the arc length is inverted to 1e-12 of its whole.
+        Positions at ``k·T_s``; the arc length is inverted to 1e-12 of its whole.
     """
     nodes, arc = _arc_length(derivative, end)
-    s = rest_to_rest([0.0, arc[-1]], limits, Ts)
+    s = rest_to_rest([0.0, arc[-1]], limits, T_s)
     u = np.interp(s, arc, nodes)
     # Newton on s(u) = s_k, the integral taken by Gauss-Legendre from the panel's left end.
     panel = np.clip(np.searchsorted(arc, s, "right") - 1, 0, len(nodes) - 2)

@@ -18,8 +18,8 @@ from typing import Protocol
 import numpy as np
 
 from ..base.errors import SignalError
-from ..base.parameters import samples_before
 from ..base.saved import Saved
+from ..base.settings import samples_before
 from ..base.signals import POSITION_MAX, Array
 from ..base.state import pack, unpack
 from .predictor import HybridPredictor
@@ -43,7 +43,7 @@ class Planner(Protocol):
     predictor: HybridPredictor
     preview: int
 
-    def new_run(self, start: float | None = None, *, t_init: float = 0.0, lead_in: int = 0) -> None:
+    def restart(self, start: float | None = None, *, t_init: float = 0.0, lead_in: int = 0) -> None:
         """Begin another run, at rest at ``start``, m, with what is learned kept."""
 
     def plan(self, x_d: Array) -> PublishedWindow:
@@ -98,18 +98,18 @@ class LookAhead:
 
     def __init__(self, model: HybridPredictor | Planner, start: float, *, t_init: float | None = None) -> None:
         self._hold(model)
-        warm_up = self.predictor.t_init if t_init is None else t_init
+        warm_up = self.predictor.settings.t_init if t_init is None else t_init
         self.start = checked_start(start)
         self.k = 0
-        self._first_scored = self.delay + samples_before(warm_up, self.predictor.Ts)
+        self._first_scored = self.delay + samples_before(warm_up, self.predictor.T_s)
         self._n_scored, self._sums = 0, np.zeros(3)
         # The last commands, r(k − delay) … r(k − 1), which is x_d(k) … x_d(k + delay − 1)
         self._ahead, self._measured = np.full(self.delay, self.start), np.full(self.Np, self.start)
         if self.planner is None:
-            self.predictor.new_run(self.start, t_init=warm_up)
+            self.predictor.restart(self.start, t_init=warm_up)
             self.window = PublishedWindow.at_rest(self.start, self.Np)
         else:
-            self.planner.new_run(self.start, t_init=warm_up, lead_in=self.delay)
+            self.planner.restart(self.start, t_init=warm_up, lead_in=self.delay)
             self.window = self.planner.plan(self._ahead.copy())
 
     def _hold(self, model: HybridPredictor | Planner) -> None:

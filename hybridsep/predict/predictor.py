@@ -7,7 +7,6 @@ is one free run of an ARX recursion from the last ``p`` measured residuals, and 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from scipy.signal import lfilter
 
 from ..base.errors import SignalError
 from ..base.output import written_whole
-from ..base.parameters import INPUT_HOLDS, check, check_together, samples_before
+from ..base.settings import PredictorSettings, check, samples_before
 from ..base.signals import Array, as_samples
 from ..model.physics import ModalModel
 from .features import FeatureLayout, PastSamples
@@ -39,74 +38,30 @@ class HybridPredictor:
     ----------
     model : ModalModel
         ``G_pb``, eq. (15).
-    Ts : float
-        Sampling interval, s.
-    Np : int
-        Samples in a window (a batch), ≥ 1.
-    p, q : int
-        Lags of ``e_pb`` and of ``x_pb`` in φ, ``1 ≤ p ≤ Np`` and ``0 ≤ q < Np``; ``n = 2 + q + p`` features.
-    lam : float
-        λ of eq. (6), m², > 0.
-    t_init : float
-        Warm-up, s: for ``t < t_init``, ``x_h = x_pb`` is published.
-    input_hold : {"zoh", "foh"}
-        How ``x_d`` runs between samples in the physics model.
+    settings : PredictorSettings, optional
+        The defaults if left out.
     start : float, optional
         Position, m, where the drive is at rest before the first sample; the first command if left out. All positions
         are relative to it inside, because ridge regression is not invariant to an offset.
-    v_s : float
-        Velocity over which the drive's friction changes its sign, m/s: φ has further features then, of the reference
-        alone (:mod:`~hybridsep.predict.reference_features`). 0, as in the paper: none.
-
-    Raises
-    ------
-    ParameterError
-        If a parameter is out of its range or they do not fit together; all problems are named at once.
     """
 
     def __init__(
-        self,
-        model: ModalModel,
-        *,
-        Ts: float = 1e-3,
-        Np: int = 100,
-        p: int = 50,
-        q: int = 3,
-        lam: float = 1e-12,
-        t_init: float = 0.3,
-        input_hold: str = "zoh",
-        start: float | None = None,
-        v_s: float = 0.0,
+        self, model: ModalModel, settings: PredictorSettings | None = None, *, start: float | None = None
     ) -> None:
-        check_together(Np=Np, p=p, q=q, lam=lam, Ts=Ts, t_init=t_init)
-        self.Np, self.p, self.q = int(Np), int(p), int(q)
-        self.Ts, self.lam, self.t_init = float(Ts), float(lam), float(t_init)
+        self.settings = settings = PredictorSettings() if settings is None else settings
+        self.Np, self.T_s = settings.Np, settings.T_s
         self.model = model
-        self.discrete = model.discretise(self.Ts, input_hold, block=self.Np)
-        self.reference_features = ReferenceFeatures(check("v_s", v_s), self.Ts)
-        self.layout = FeatureLayout(self.p, self.q, self.reference_features.n)
+        self.discrete = model.discretise(self.T_s, settings.input_hold, block=self.Np)
+        self.reference_features = ReferenceFeatures(settings.v_friction, self.T_s)
+        self.layout = FeatureLayout(settings.p, settings.q, self.reference_features.n)
         self.past = PastSamples(self.layout, self.Np)
-        self.regression = RidgeRegression(self.layout.n, self.lam)
-        self.new_run(start, t_init=t_init)
-
-    @classmethod
-    def with_parameters(cls, model: ModalModel, parameters: Mapping[str, Any], **more: Any) -> HybridPredictor:
-        """Return a predictor from FMI parameter names (``lambda``, ``T_s``, ``input_hold`` as 0 or 1)."""
-        renamed = {"lambda": "lam", "T_s": "Ts"}
-        keywords = {renamed.get(name, name): value for name, value in parameters.items()}
-        if "input_hold" in keywords:
-            keywords["input_hold"] = INPUT_HOLDS[check("input_hold", keywords["input_hold"])]
-        return cls(model, **keywords, **more)
+        self.regression = RidgeRegression(self.layout.n, settings.lam)
+        self.restart(start, t_init=settings.t_init)
 
     @property
     def n_features(self) -> int:
         """``n``, of all groups of features."""
         return self.layout.n
-
-    @property
-    def v_s(self) -> float:
-        """Velocity over which friction changes its sign, m/s; 0 without reference-scheduled features."""
-        return self.reference_features.v_s
 
     @property
     def residual_weights(self) -> Array:
@@ -118,7 +73,7 @@ class HybridPredictor:
         """``w`` of eq. (6) from all measured windows, ``(n,)``."""
         return self.regression.weights
 
-    def new_run(self, start: float | None = None, *, t_init: float = 0.0) -> None:
+    def restart(self, start: float | None = None, *, t_init: float = 0.0) -> None:
         """Begin another run, at rest at ``start``, with what is learned kept (a warm start).
 
         Parameters
@@ -129,12 +84,12 @@ class HybridPredictor:
             Warm-up of the new run, s; none unless asked for.
         """
         rest = None if start is None else float(as_samples([start], "start")[0])
-        self.n_init = samples_before(check("t_init", t_init), self.Ts)
+        self.n_init = samples_before(check("t_init", t_init), self.T_s)
         self.start = rest
         self.k = 0
         self.state = self.discrete.rest()
         self.past.restart()
-        self.reference_features.new_run()
+        self.reference_features.restart()
         self.waiting: PredictedWindow | None = None
 
     def predict(self, x_d: ArrayLike, *, reference: ArrayLike | None = None) -> Prediction:
@@ -165,7 +120,7 @@ class HybridPredictor:
             raise SignalError("x_d must have at least one sample, got none")
         start = float(command[0]) if self.start is None else self.start
         command = command - start
-        x_pb, _ = self.discrete.respond(self.state, command)  # Eq. (2)
+        x_pb, _ = self.discrete.forced_response(self.state, command)  # Eq. (2)
         path = command + start if reference is None else as_samples(reference, "reference")
         if len(path) < n:
             raise SignalError(f"reference must have at least the {n} samples of x_d, got {len(path)}")
@@ -202,7 +157,7 @@ class HybridPredictor:
             stop = min(i + self.Np, m)
             self._take_in(waiting.x_pb[i:stop], e_pb[i:stop], scheduled[i:stop], learn)
         self.reference_features.advance(waiting.signs, waiting.reference, m)
-        _, self.state = self.discrete.respond(self.state, waiting.x_d[:m])
+        _, self.state = self.discrete.forced_response(self.state, waiting.x_d[:m])
         self.start = waiting.start
         self.k += m
         self.waiting = None
@@ -229,7 +184,7 @@ class HybridPredictor:
         # x_h = x_pb + wᵀφ as filters: G_h = (1 + W_x(z) / (1 − W_e(z))) G_pb
         denominator = np.concatenate(([1.0], -w_e))
         g_h = g_pb + lfilter(w_x, denominator, g_pb)
-        free_pb, _ = self.discrete.respond(self.state, np.zeros(length))
+        free_pb, _ = self.discrete.forced_response(self.state, np.zeros(length))
         path = np.full(length, start) if reference is None else as_samples(reference, "reference", length)
         scheduled = self.reference_features.features(self.reference_features.signs(path, start), length)
         free = free_pb + self._free_run(free_pb, scheduled)
@@ -276,7 +231,7 @@ class HybridPredictor:
 
     @classmethod
     def load(cls, path: str | Path) -> HybridPredictor:
-        """Read what :meth:`save` wrote; call :meth:`new_run` on it to start a second run warm.
+        """Read what :meth:`save` wrote; call :meth:`restart` on it to start a second run warm.
 
         Raises
         ------

@@ -1,8 +1,8 @@
 """Features of φ that follow from the reference alone: which way friction will push.
 
 Friction changes its sign with the velocity. A model that is linear in the command cannot say so, but the reference, the
-commanded position before it is modified, is known in advance: ``ψ = tanh(v_d/v_s)`` of its velocity, and of it some
-samples before and after, enter eq. (5) as further features. They are a part of the free response, so the model
+commanded position before it is modified, is known in advance: ``ψ = tanh(v_d/v_friction)`` of its velocity, and of it
+some samples before and after, enter eq. (5) as further features. They are a part of the free response, so the model
 stays linear in what a compensator may change.
 """
 
@@ -30,18 +30,18 @@ class ReferenceFeatures:
 
     Parameters
     ----------
-    v_s : float
+    v_friction : float
         Velocity over which friction changes its sign, m/s; 0 for no features.
-    Ts : float
+    T_s : float
         Sampling interval, s.
     """
 
-    def __init__(self, v_s: float, Ts: float) -> None:
-        self.v_s, self.Ts = v_s, Ts
-        self.n = N_REFERENCE if v_s > 0 else 0
-        self.new_run()
+    def __init__(self, v_friction: float, T_s: float) -> None:
+        self.v_friction, self.T_s = v_friction, T_s
+        self.n = N_REFERENCE if v_friction > 0 else 0
+        self.restart()
 
-    def new_run(self) -> None:
+    def restart(self) -> None:
         """Begin at rest."""
         self.before = np.zeros(_REACH)
         self.last = np.nan
@@ -59,7 +59,7 @@ class ReferenceFeatures:
         if not self.n:
             return np.zeros(0)
         last = start if np.isnan(self.last) else self.last
-        ahead = np.tanh(np.diff(reference, prepend=last) / (self.v_s * self.Ts))
+        ahead = np.tanh(np.diff(reference, prepend=last) / (self.v_friction * self.T_s))
         return np.concatenate((self.before, ahead, np.zeros(_REACH)))
 
     def features(self, signs: Array, n: int) -> Array:

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from scipy.linalg import lapack
 
 from ..base.errors import ParameterError, SignalError
-from ..base.parameters import check
+from ..base.settings import check
 from ..base.signals import Array, as_samples
 
 __all__ = ["RidgeRegression"]

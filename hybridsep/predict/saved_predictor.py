@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.parameters import check, check_together
 from ..base.saved import Saved
+from ..base.settings import PredictorSettings
 from ..base.state import pack, unpack
 from ..model.physics import ModalModel, Mode
 from .features import FeatureLayout
@@ -25,11 +25,9 @@ _KIND = "predictor"
 def predictor_blob(predictor: HybridPredictor) -> bytes:
     """Return parameters and state, a window that waits for its measurement too, as a versioned blob."""
     waiting, past, reference = predictor.waiting, predictor.past, predictor.reference_features
-    numbers = ("Ts", "Np", "p", "q", "lam", "t_init", "k", "n_init", "start")
     meta = {
-        **{name: getattr(predictor, name) for name in numbers},
-        "v_s": predictor.v_s,
-        "input_hold": predictor.discrete.input_hold,
+        "settings": predictor.settings.as_table(),
+        **{name: getattr(predictor, name) for name in ("k", "n_init", "start")},
         "dead_time": predictor.model.dead_time,
         "n_samples": predictor.regression.n_samples,
         "pending_start": None if waiting is None else waiting.start,
@@ -58,21 +56,18 @@ def predictor_from(kind: type[HybridPredictor], blob: bytes) -> HybridPredictor:
         If the blob is foreign, truncated or of another version.
     """
     saved = Saved(_KIND, *unpack(_KIND, blob))
-    names = ("Ts", "Np", "p", "q", "lam", "t_init", "v_s", "input_hold")
-    values = {name: saved.field(name) for name in names}
     with saved.consistent():
+        settings = PredictorSettings.from_table(saved.table("settings"))
         # What is allocated follows from numbers that the arrays confirm first.
-        check_together(**{name: values[name] for name in names[:6]})
-        n_reference = N_REFERENCE if check("v_s", values["v_s"]) > 0 else 0
-        n = FeatureLayout(int(values["p"]), int(values["q"]), n_reference).n
+        n = FeatureLayout(settings.p, settings.q, N_REFERENCE if settings.v_friction > 0 else 0).n
         factor = saved.array("factor", n + 1, n + 1)
         model = ModalModel([Mode(*row) for row in saved.array("modes", None, 4).tolist()], saved.field("dead_time"))
-        predictor = kind(model, **values, start=saved.number_or_none("start"))
+        predictor = kind(model, settings, start=saved.number_or_none("start"))
         predictor.regression.restore(factor, saved.whole("n_samples"))
     predictor.k, predictor.n_init = saved.whole("k"), saved.whole("n_init")
     predictor.state[:] = saved.array("state", predictor.discrete.n_state)
-    predictor.past.x_pb[:] = saved.array("x_pb", predictor.q)
-    predictor.past.e_pb[:] = saved.array("e_pb", predictor.p)
+    predictor.past.x_pb[:] = saved.array("x_pb", settings.q)
+    predictor.past.e_pb[:] = saved.array("e_pb", settings.p)
     features = predictor.reference_features
     features.before = saved.array("signs", len(features.before))
     features.last = float(saved.array("reference", 1, finite=False)[0])

@@ -13,7 +13,7 @@ from places import EMPS
 from staircase_data import commanded
 
 from hybridsep import Encoder, __version__, load_machine, run_closed_loop, staircase
-from hybridsep.base.parameters import PARAMETERS
+from hybridsep.base.settings import PARAMETERS
 
 
 def test_backtest_of_a_csv(hybridsep: Run, tmp_path: Path) -> None:

@@ -92,8 +92,8 @@ def test_times_that_cannot_be_divided_by(hybridsep: Run, tmp_path: Path, t: list
 
 def test_a_given_interval_that_cannot_be_divided_by(hybridsep: Run, tmp_path: Path) -> None:
     log = write(tmp_path / "log.csv", {"x_d": np.zeros(9), "x": np.zeros(9)})
-    for Ts in ("5e-324", "1e-300", DIGITS):
-        refusal(hybridsep, "backtest", log, "-m", MACHINE, "--Ts", Ts)
+    for T_s in ("5e-324", "1e-300", DIGITS):
+        refusal(hybridsep, "backtest", log, "-m", MACHINE, "--Ts", T_s)
 
 
 def test_numbers_of_5000_digits(hybridsep: Run, tmp_path: Path) -> None:

@@ -18,12 +18,13 @@ from hybridsep.base.parameters import (
     check_together,
     samples_before,
 )
+from hybridsep.base.settings import CompensatorSettings, PredictorSettings
 from hybridsep.base.signals import as_samples
 from hybridsep.compensate.compensator import SepCompensator
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.predictor import HybridPredictor
 
-GOOD: dict[str, Any] = {"Np": 100, "p": 50, "q": 3, "lam": 1e-12, "Ts": 1e-3, "t_init": 0.3}
+GOOD: dict[str, Any] = {"Np": 100, "p": 50, "q": 3, "lam": 1e-12, "T_s": 1e-3, "t_init": 0.3}
 
 
 def outside(parameter: Parameter) -> list[float]:
@@ -100,7 +101,7 @@ def test_the_largest_seed_is_in_its_message() -> None:
         ("alpha", "numerator of the mode, constant term [1/s2], -1e+15 … 1e+15"),
         ("k_nl", "quadratic stiffness, force k_nl·x·|x| [N/m2], 0 … 1e+15"),
         ("jerk_weight", "weight of the change's jerk against the tracking error, 0 … 1e+12"),
-        ("keep_direction", "1: x_dm never turns while the commanded position moves, 0 … 1"),
+        ("no_reversal", "1: x_dm never turns while the commanded position moves, 0 … 1"),
     ],
 )
 def test_help(name: str, text: str) -> None:
@@ -108,7 +109,7 @@ def test_help(name: str, text: str) -> None:
 
 
 def test_a_range_in_which_0_stands_apart() -> None:
-    assert PARAMETERS["v_s"].range_text == "0 or 1e-09 … 10000"
+    assert PARAMETERS["v_friction"].range_text == "0 or 1e-09 … 10000"
 
 
 def test_lags_fit() -> None:
@@ -131,7 +132,7 @@ def test_lower_q_or_raise_np() -> None:
 
 def test_all_problems_at_once() -> None:
     with pytest.raises(ParameterError) as caught:
-        check_together(Np=0, p=0, q=-1, lam=0.0, Ts=-1.0, t_init=-0.5)
+        check_together(Np=0, p=0, q=-1, lam=0.0, T_s=-1.0, t_init=-0.5)
     assert [part.split()[0] for part in str(caught.value).split("; ")] == ["Np", "p", "q", "lambda", "T_s", "t_init"]
 
 
@@ -149,17 +150,17 @@ def test_a_preview_is_refused_as_the_compensator_refuses_it(
 ) -> None:
     problems = check_preview(Np=Np, preview=preview, spacing=spacing)
     assert len(problems) == n_problems
-    predictor = HybridPredictor(ModalModel.spring_mass_damper(1.0, 15.7, 24674.0), Np=Np, p=1, q=0)
+    predictor = HybridPredictor(ModalModel.spring_mass_damper(1.0, 15.7, 24674.0), PredictorSettings(Np=Np, p=1, q=0))
     if not problems:
-        SepCompensator(predictor, preview=preview, spacing=spacing)
+        SepCompensator(predictor, CompensatorSettings(preview=preview, spacing=spacing))
         return
     with pytest.raises(ParameterError) as caught:
-        SepCompensator(predictor, preview=preview, spacing=spacing)
+        SepCompensator(predictor, CompensatorSettings(preview=preview, spacing=spacing))
     assert str(caught.value) == "; ".join(problems)
 
 
 @pytest.mark.parametrize(
-    ("t_init", "Ts", "count"),
+    ("t_init", "T_s", "count"),
     [
         (0.0, 1e-3, 0),
         (0.3, 1e-3, 300),
@@ -171,8 +172,8 @@ def test_a_preview_is_refused_as_the_compensator_refuses_it(
         (1e-8, 1e-3, 1),
     ],
 )
-def test_warm_up_is_counted_in_samples(t_init: float, Ts: float, count: int) -> None:
-    assert samples_before(t_init, Ts) == count
+def test_warm_up_is_counted_in_samples(t_init: float, T_s: float, count: int) -> None:
+    assert samples_before(t_init, T_s) == count
 
 
 def test_samples_are_taken_as_they_are() -> None:

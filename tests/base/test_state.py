@@ -14,17 +14,18 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
 from hybridsep.base.errors import HybridSepError, StateError
+from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.state import VERSION, pack, unpack
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.predictor import HybridPredictor
 
-META: dict[str, Any] = {"k": 7, "Ts": 1e-3, "start": None, "input_hold": "zoh"}
+META: dict[str, Any] = {"k": 7, "T_s": 1e-3, "start": None, "input_hold": "zoh"}
 PARTS = {"inner": b"\x00HSEP\xff", "nothing": b""}
 BLOB = pack("test", META, {"a": np.arange(6.0).reshape(2, 3), "empty": np.empty(0)}, PARTS)
 
 
 def predictor_blob() -> bytes:
-    predictor = HybridPredictor(ModalModel.spring_mass_damper(1.0, 15.7, 24674.0), Np=5, p=2, q=1)
+    predictor = HybridPredictor(ModalModel.spring_mass_damper(1.0, 15.7, 24674.0), PredictorSettings(Np=5, p=2, q=1))
     predictor.predict(np.linspace(0.1, 0.2, 5))
     predictor.update(np.linspace(0.1, 0.21, 5))
     predictor.predict(np.linspace(0.2, 0.3, 5))

@@ -54,7 +54,7 @@ class CPhysics:
     def _block(self) -> Any:
         return self.block.ctypes.data_as(ctypes.c_void_p)
 
-    def respond(self, x_d: Array) -> Array:
+    def forced_response(self, x_d: Array) -> Array:
         x_pb = np.empty_like(x_d)
         pointers = (x_d.ctypes.data_as(ctypes.c_void_p), x_pb.ctypes.data_as(ctypes.c_void_p))
         self.library.hsep_physics_respond(self._block, *pointers, ctypes.c_size_t(len(x_d)))
@@ -102,9 +102,11 @@ def test_the_physics_model_answers_as_the_library_does(damping: str, hold: str, 
     modes = [MODES[damping], (98.0, 0.05, 5000.0, 0.0)]
     x_d = staircase.commanded()[:1200]
     discrete = ModalModel([Mode(*mode) for mode in modes], dead_time).discretise(TS, hold)
-    expected, _ = discrete.respond(discrete.rest(), x_d)
+    expected, _ = discrete.forced_response(discrete.rest(), x_d)
     core = CPhysics(modes, dead_time, hold)
-    got = np.concatenate((core.respond(x_d[:1]), core.respond(x_d[1:500]), core.respond(x_d[500:])))
+    got = np.concatenate(
+        (core.forced_response(x_d[:1]), core.forced_response(x_d[1:500]), core.forced_response(x_d[500:]))
+    )
     tolerance = 1e-12 if damping == "stiff" else remembered(modes)
     assert np.max(np.abs(got - expected)) <= tolerance * np.max(np.abs(expected))
 
@@ -120,7 +122,7 @@ def test_the_physics_model_answers_as_extended_precision_does(damping: str, hold
     for u in x_d:
         expected.append(exact["c"] @ s + exact["d"][0] * u)
         s = exact["A"] @ s + exact["b"] * u
-    got = CPhysics([mode], 0, hold).respond(x_d)
+    got = CPhysics([mode], 0, hold).forced_response(x_d)
     error = np.max(np.abs(got - np.array(expected)))
     assert error <= remembered([mode]) * np.max(np.abs(got))
 

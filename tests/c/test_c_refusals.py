@@ -14,7 +14,7 @@ from c_core import TS, CModel, refusal, write_trajectory, write_weights
 
 from hybridsep.base.clock import SampleClock
 from hybridsep.base.errors import FmuError, HybridSepError
-from hybridsep.base.parameters import check, check_together
+from hybridsep.base.settings import check, check_together
 from hybridsep.fmi.variables import modes_from
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.plants.feed_drive import FeedDrive
@@ -42,7 +42,7 @@ from hybridsep.predict.look_ahead import checked_start
     ],
 )
 def test_bad_parameters_are_refused_in_the_librarys_words(wrong: dict[str, float]) -> None:
-    names = {"lambda": "lam", "T_s": "Ts"}
+    names = {"lambda": "lam", "T_s": "T_s"}
     given: Any = {key: wrong.get(key, c_core.PREDICTOR[key]) for key in ("Np", "p", "q", "lambda", "T_s", "t_init")}
     with pytest.raises(HybridSepError) as caught:
         check_together(**{names.get(key, key): value for key, value in given.items()})
@@ -152,8 +152,8 @@ def test_a_start_further_out_than_any_machine_is_refused(name: str) -> None:
     [
         ({"spacing": 3}, "spacing must be ≥ 1 and divide Np = 100, got 3"),
         ({"preview": 110}, "preview must be ≥ Np + 4·spacing + 3 = 111, got 110"),
-        ({"v_s": 5e-324}, "v_s must be 0 or 1e-09 … 10000 m/s, got 5e-324"),
-        ({"v_s": -1.0}, "v_s must be 0 or 1e-09 … 10000 m/s, got -1.0"),
+        ({"v_friction": 5e-324}, "v_friction must be 0 or 1e-09 … 10000 m/s, got 5e-324"),
+        ({"v_friction": -1.0}, "v_friction must be 0 or 1e-09 … 10000 m/s, got -1.0"),
     ],
 )
 def test_a_plan_that_cannot_be_is_refused_in_the_librarys_words(wrong: dict[str, float], message: str) -> None:
@@ -165,11 +165,11 @@ def test_a_plan_that_cannot_be_is_refused_in_the_librarys_words(wrong: dict[str,
 @pytest.mark.parametrize(("learned", "now"), [(2e-3, 0.0), (0.0, 2e-3), (2e-3, 1e-3)])
 def test_weights_of_other_features_are_refused(learned: float, now: float, tmp_path: Path) -> None:
     n = 2 + 3 + 50 + (13 if learned else 0)
-    write_weights(tmp_path, "compensator", np.eye(n + 1), 100, v_s=learned)
-    assert refusal(CModel("compensator", {"v_s": now}, tmp_path).initialise) == (
-        f"v_s must be {learned!r}, with which weights.bin was learned, got {now!r}"
+    write_weights(tmp_path, "compensator", np.eye(n + 1), 100, v_friction=learned)
+    assert refusal(CModel("compensator", {"v_friction": now}, tmp_path).initialise) == (
+        f"v_friction must be {learned!r}, with which weights.bin was learned, got {now!r}"
     )
-    CModel("compensator", {"v_s": learned}, tmp_path).initialise()
+    CModel("compensator", {"v_friction": learned}, tmp_path).initialise()
 
 
 @pytest.mark.parametrize(

@@ -91,7 +91,7 @@ def test_rows_that_outweigh_all_before_them_lose_nothing() -> None:
 def staircase_rows(p: int, q: int, n: int) -> tuple[Array, Array]:
     """Return rows of features, (n, 2 + q + p), and their targets, (n,), of the measured staircase; eq. (5)."""
     discrete = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0).discretise(TS)
-    x_pb, _ = discrete.respond(discrete.rest(), staircase.commanded())
+    x_pb, _ = discrete.forced_response(discrete.rest(), staircase.commanded())
     e_pb = staircase.measured(0) - x_pb
     first = 200  # the lags before it are there
     columns = [np.ones(n)] + [x_pb[first - i : first - i + n] for i in range(q + 1)]

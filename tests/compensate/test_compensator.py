@@ -17,7 +17,7 @@ from staircase_data import commanded
 
 from benchmarks.compensation.peers import input_shaper, shape, zero_phase_command
 from hybridsep.base.errors import ParameterError, SignalError, StateError
-from hybridsep.base.limits import Limits
+from hybridsep.base.settings import CompensatorSettings, Limits, PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.compensate.bounded import Bounds, DriveBounds, solve
 from hybridsep.compensate.compensator import RECOMMENDED, SepCompensator, SepState, direct_samples
@@ -42,11 +42,14 @@ def compensator(
     best: SepState = SepState.HYBRID,
     limits: Limits | None = DRIVE_LIMITS,
     *,
-    keep_direction: bool = True,
+    no_reversal: bool = True,
     **changes: Any,
 ) -> SepCompensator:
-    predictor = HybridPredictor(MODEL, **changes)
-    return SepCompensator(predictor, preview=200, limits=limits, best=best, keep_direction=keep_direction)
+    predictor = HybridPredictor(MODEL, PredictorSettings(**changes))
+    return SepCompensator(
+        predictor,
+        CompensatorSettings(preview=200, limits=limits, compensate=best.name.lower(), no_reversal=no_reversal),
+    )
 
 
 def plant() -> Plant:
@@ -243,13 +246,15 @@ def test_a_refused_solve_falls_back_to_physics_then_to_the_rest(monkeypatch: pyt
     st.sampled_from([PAPER_LIMITS, DRIVE_LIMITS]),
     st.sampled_from([0.0, 2e-3]),
 )
-def test_a_command_never_turns_where_the_path_moves(seed: int, spread: float, limits: Limits, v_s: float) -> None:
+def test_a_command_never_turns_where_the_path_moves(
+    seed: int, spread: float, limits: Limits, v_friction: float
+) -> None:
     """Whatever is measured, from window to window, and within the limits."""
     rng = np.random.default_rng(seed)
     stops = np.cumsum(np.concatenate(([0.0], rng.uniform(-0.004, 0.004, 5))))
     r = rest_to_rest(stops, PAPER_LIMITS, TS, dwell=float(rng.uniform(0.0, 0.03)))
     x_d, commands = np.concatenate((r, np.full(300, r[-1]))), []
-    sep = compensator(limits=limits, Np=50, p=10, q=3, t_init=0.0, v_s=v_s)
+    sep = compensator(limits=limits, Np=50, p=10, q=3, t_init=0.0, v_friction=v_friction)
     for k in range(0, len(r), 50):
         plan = sep.plan(x_d[k : k + 200])
         commands.append(plan.x_dm)
@@ -264,7 +269,7 @@ def test_only_the_velocity_where_the_path_moves_is_bounded_by_the_direction() ->
     basis, n, step = SplineBasis(80, 4), 80, 1e-5
     steps = np.concatenate((np.full(30, step), np.zeros(30), np.full(20, -step)))  # it moves from the first sample on
     x_d, before, rest = 0.01 + np.cumsum(steps), np.full(3, 0.01), np.zeros(basis.values.shape[1])
-    of = {keep: DriveBounds(basis, TS, DRIVE_LIMITS, 1e-3, keep_direction=keep) for keep in (False, True)}
+    of = {keep: DriveBounds(basis, TS, DRIVE_LIMITS, 1e-3, no_reversal=keep) for keep in (False, True)}
     free, kept = (of[keep].bounds(x_d, before, np.zeros(3), rest) for keep in (False, True))
     forward, backward = np.zeros(4 * n, dtype=np.bool_), np.zeros(4 * n, dtype=np.bool_)
     forward[:30], backward[60:80] = True, True
@@ -282,7 +287,7 @@ def test_the_rest_of_a_plan_that_turned_is_still_a_plan(seed: int) -> None:
     rng = np.random.default_rng(seed)
     basis = SplineBasis(80, 4)
     rest: Array = np.asarray(2e-4 * rng.normal(size=basis.values.shape[1]))
-    bounds = DriveBounds(basis, TS, DRIVE_LIMITS, 1e-3, keep_direction=True)
+    bounds = DriveBounds(basis, TS, DRIVE_LIMITS, 1e-3, no_reversal=True)
     found = bounds.bounds(move(80), np.zeros(3), np.zeros(3), rest)
     assert found.allow(rest[N_DECIDED:])
     assert np.min(np.diff(move(80) + basis.values @ rest)) < -1e-6  # it does turn
@@ -293,7 +298,7 @@ def test_friction_that_follows_the_command_makes_turning_dear() -> None:
     machine, r = load_machine("als25010_y"), spiral()[1]
     found = {}
     for keep in (True, False):
-        sep = machine.new_compensator(SepState.PHYSICS, keep_direction=keep)
+        sep = machine.new_compensator(SepState.PHYSICS, no_reversal=keep)
         found[keep] = run_closed_loop(sep, machine.new_plant(), r, encoder=Encoder(1e-6, 0))
     assert 1e6 * found[True].rms == pytest.approx(126.65, abs=0.5)
     assert 1e6 * found[False].rms == pytest.approx(128.39, abs=0.5)
@@ -338,7 +343,7 @@ def test_trust_needs_more_than_noise_to_be_lost() -> None:
     for _ in range(3):
         trust.observe(noise, rng.normal(0, 20e-6, 100), 25e-12)
     assert not trust.hybrid
-    trust.new_run()
+    trust.restart()
     assert trust.hybrid
     trust.observe(noise, np.full(100, np.inf), 25e-12)
     assert not trust.hybrid
@@ -426,7 +431,7 @@ def test_figures_with_the_recommended_settings() -> None:
 
 def test_what_the_features_of_the_reference_bring() -> None:
     """Without them the recommended settings are those of before: 4.7 and 1.95 µm."""
-    sep = compensator(**(RECOMMENDED | {"v_s": 0.0}))
+    sep = compensator(**(RECOMMENDED | {"v_friction": 0.0}))
     assert 1e6 * closed(sep).rms == pytest.approx(4.75, abs=0.3)
     assert 1e6 * closed(sep, 1000, t_init=0.0).rms == pytest.approx(1.95, abs=0.2)
 
@@ -464,12 +469,12 @@ def test_trouble_never_makes_it_worse_than_physics(settings_: dict[str, Any], tr
 # State and parameters ------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("v_s", [0.0, 2e-3])
+@pytest.mark.parametrize("v_friction", [0.0, 2e-3])
 @pytest.mark.parametrize("planned", [False, True])
-def test_a_saved_state_goes_on_bit_for_bit(planned: bool, v_s: float) -> None:
+def test_a_saved_state_goes_on_bit_for_bit(planned: bool, v_friction: float) -> None:
     r = np.concatenate((commanded()[900:2600], np.zeros(200)))
     rng = np.random.default_rng(0)
-    sep = compensator(Np=50, p=20, q=3, t_init=0.1, v_s=v_s, keep_direction=v_s > 0)
+    sep = compensator(Np=50, p=20, q=3, t_init=0.1, v_friction=v_friction, no_reversal=v_friction > 0)
 
     def window(one: SepCompensator, k: int, noise: Array) -> Array:
         plan = one.plan(r[k : k + 200])
@@ -482,7 +487,7 @@ def test_a_saved_state_goes_on_bit_for_bit(planned: bool, v_s: float) -> None:
         sep.plan(r[600:800])
     other = SepCompensator.from_bytes(sep.to_bytes())
     assert other.to_bytes() == sep.to_bytes()
-    assert other.keep_direction is sep.keep_direction is (v_s > 0)
+    assert other.no_reversal is sep.no_reversal is (v_friction > 0)
     for k in range(600, 1200, 50):
         noise = 5e-6 * rng.normal(size=50)
         np.testing.assert_array_equal(window(other, k, noise), window(sep, k, noise))
@@ -503,7 +508,7 @@ def test_a_saved_state_goes_on_bit_for_bit(planned: bool, v_s: float) -> None:
 )
 def test_parameters_out_of_range_are_named(values: dict[str, Any], message: str) -> None:
     with pytest.raises(ParameterError, match=message):
-        SepCompensator(HybridPredictor(MODEL), **values)
+        SepCompensator(HybridPredictor(MODEL), CompensatorSettings(**values))
 
 
 def test_bad_samples_change_nothing() -> None:
@@ -529,8 +534,8 @@ def test_a_shaper_leaves_no_vibration_in_its_model(kind: str) -> None:
     step = np.concatenate((np.zeros(10), np.full(400, 0.01)))
     shaper = input_shaper(MODEL, TS, kind)
     assert np.sum(shaper) == pytest.approx(1.0)
-    plain, _ = discrete.respond(discrete.rest(), step)
-    shaped, _ = discrete.respond(discrete.rest(), shape(step, shaper))
+    plain, _ = discrete.forced_response(discrete.rest(), step)
+    shaped, _ = discrete.forced_response(discrete.rest(), shape(step, shaper))
     assert np.ptp(shaped[100:]) < 0.02 * np.ptp(plain[100:])
 
 
@@ -538,7 +543,7 @@ def test_a_shaper_leaves_no_vibration_in_its_model(kind: str) -> None:
 def test_zero_phase_error_tracking_follows_on_its_model(name: str) -> None:
     discrete = load_machine(name).new_predictor().discrete
     x_d = move(600)
-    reached, _ = discrete.respond(discrete.rest(), zero_phase_command(x_d, discrete))
+    reached, _ = discrete.forced_response(discrete.rest(), zero_phase_command(x_d, discrete))
     # What is left is the zero-phase filter B⁻(z) B⁻(1/z) / B⁻(1)² of the zeros outside the unit circle.
     den, impulse = np.poly(discrete.A), discrete.impulse_response(len(discrete.b) + 1)
     num = np.convolve(den, impulse)[1 : len(den)]
@@ -547,7 +552,7 @@ def test_zero_phase_error_tracking_follows_on_its_model(name: str) -> None:
     m = len(outside) - 1
     padded = np.pad(x_d, m, mode="edge")
     expected = np.convolve(padded, np.convolve(outside, outside[::-1]) / np.sum(outside) ** 2, "valid")
-    plain, _ = discrete.respond(discrete.rest(), x_d)
+    plain, _ = discrete.forced_response(discrete.rest(), x_d)
     error = np.std(plain - x_d)
     assert np.max(np.abs(reached - expected)) < 1e-4 * error
     assert np.std(reached - x_d) < 0.102 * error

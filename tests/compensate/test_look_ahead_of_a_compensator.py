@@ -9,7 +9,7 @@ import pytest
 from staircase_data import commanded, measured
 
 from hybridsep.base.errors import SignalError, StateError
-from hybridsep.base.limits import Limits
+from hybridsep.base.settings import CompensatorSettings, Limits, PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepCompensator, SepState
 from hybridsep.model.physics import ModalModel
@@ -22,8 +22,8 @@ NAMES = ("x_dm", "x_d", "x_pb", "x_h", "e_servo", "sep_state", "batch", "rms_e",
 
 
 def compensator(preview: int = 200, t_init: float = 0.1) -> SepCompensator:
-    predictor = HybridPredictor(MODEL, Np=50, p=20, q=3, t_init=t_init)
-    return SepCompensator(predictor, preview=preview, limits=LIMITS)
+    predictor = HybridPredictor(MODEL, PredictorSettings(Np=50, p=20, q=3, t_init=t_init))
+    return SepCompensator(predictor, CompensatorSettings(preview=preview, limits=LIMITS))
 
 
 def outputs(look_ahead: LookAhead) -> tuple[float, ...]:
@@ -53,7 +53,7 @@ def test_equals_plans_made_window_by_window(preview: int, shift: float) -> None:
     found = run(LookAhead(compensator(preview), float(r[0])), r, x)
     x_d = np.concatenate((np.full(preview, r[0]), r))
     by_window = compensator(preview)
-    by_window.new_run(float(r[0]), t_init=0.1, lead_in=preview)
+    by_window.restart(float(r[0]), t_init=0.1, lead_in=preview)
     for k in range(0, len(r), 50):
         plan = by_window.plan(x_d[k : k + preview])
         np.testing.assert_array_equal(found[k : k + 50, 0], plan.x_dm)

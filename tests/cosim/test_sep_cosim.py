@@ -21,7 +21,7 @@ from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.trajectory import spiral, staircase
 
 MACHINE = load_machine("spring_mass_damper")
-PAPER = {"Np": 100, "p": 50, "q": 3, "lambda": 1e-12, "t_init": 0.3, "v_s": 0.0}
+PAPER = {"Np": 100, "p": 50, "q": 3, "lambda": 1e-12, "t_init": 0.3, "v_friction": 0.0}
 KINDS = {"none": SepState.OFF, "physics": SepState.PHYSICS, "hybrid": SepState.HYBRID}
 TOLERANCE = 1e-9  # m, between library and FMU
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -212,9 +212,9 @@ def test_the_direction_and_the_features_of_the_reference_can_be_turned_off(flavo
     pair = build(machine, flavour, "SepCompensator", tmp_path), build(machine, flavour, "FeedDrive", tmp_path)
     settings: tuple[dict[str, Any], ...] = (
         {},
-        {"v_s": 0.0},
-        {"keep_direction": 0},
-        {"v_s": 0.0, "keep_direction": 0},
+        {"v_friction": 0.0},
+        {"no_reversal": 0},
+        {"v_friction": 0.0, "no_reversal": 0},
     )
     commands = []
     for values in settings:
@@ -222,7 +222,7 @@ def test_the_direction_and_the_features_of_the_reference_can_be_turned_off(flavo
         loop = run_closed_loop(machine.new_compensator(**values), machine.new_plant(), r, encoder=Encoder(1e-6, 0))
         assert_same(run, loop)
         against = np.diff(run.x_dm) * np.sign(np.diff(run.x_d))
-        assert (np.min(against) < -1e-6) == ("keep_direction" in values)
+        assert (np.min(against) < -1e-6) == ("no_reversal" in values)
         commands.append(run.x_dm)
     for i in range(4):
         for j in range(i):

@@ -44,7 +44,7 @@ MODE = ModalModel([Mode(60.0, 0.02, 300.0 * (120 * np.pi) ** 2)]).discretise(TS)
 
 def test_the_model_beside_the_disturbance_is_the_librarys() -> None:
     discrete = ModalModel.spring_mass_damper(M, C, K).discretise(TS)
-    x_pb, _ = discrete.respond(discrete.rest(), X_D)
+    x_pb, _ = discrete.forced_response(discrete.rest(), X_D)
     run = simulate(DRIVE, X_D, lambda *_: 0.0)
     np.testing.assert_allclose(run.x_pb, x_pb, rtol=0, atol=1e-16)
     np.testing.assert_array_equal(run.e_pb, 0.0)
@@ -73,7 +73,7 @@ def test_velocity_is_that_of_the_drive() -> None:
     # The step response of (11) starts with velocity c/m times the step; elsewhere a central difference at 10 µs.
     assert seen[0] == pytest.approx(C / M * 0.01, rel=1e-12)
     fine = ModalModel.spring_mass_damper(M, C, K).discretise(1e-5)
-    x, _ = fine.respond(fine.rest(), np.full(6000, 0.01))
+    x, _ = fine.forced_response(fine.rest(), np.full(6000, 0.01))
     slope = (x[101:5902:100] - x[99:5900:100]) / 2e-5
     np.testing.assert_allclose(seen[1:60], slope, rtol=0, atol=1e-6)
 
@@ -128,7 +128,7 @@ def test_the_papers_argument_needs_the_response_to_have_decayed() -> None:
     alone, exact = (np.abs(innovation(run.e_pb, r)) for r in (eta, np.convolve(CHI, eta)))
     assert np.max(exact[7:]) < 1e-9 * size
     assert np.max(alone[7:80]) > 5e-9 * size
-    assert np.max(alone[600:]) < 0.02 * np.max(alone)  # exp(−600 Ts c/2m) = 0.009
+    assert np.max(alone[600:]) < 0.02 * np.max(alone)  # exp(−600 T_s c/2m) = 0.009
 
 
 def test_decay_is_that_of_the_mode() -> None:

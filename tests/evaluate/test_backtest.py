@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from places import EMPS
 
 from hybridsep.base.errors import SignalError
+from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.evaluate.backtest import Backtest, Batch, backtest, backtest_stream
 from hybridsep.logs import Log, open_log, read_log
@@ -24,7 +25,9 @@ EMPS_COLUMNS = {"t": "t", "x_d": "qg", "x": "qm"}
 
 
 def predictor(Np: int = 20, p: int = 5, q: int = 2, t_init: float = 0.05) -> HybridPredictor:
-    return HybridPredictor(ModalModel([Mode(25.0, 0.7, (50 * np.pi) ** 2)]), Np=Np, p=p, q=q, t_init=t_init)
+    return HybridPredictor(
+        ModalModel([Mode(25.0, 0.7, (50 * np.pi) ** 2)]), PredictorSettings(Np=Np, p=p, q=q, t_init=t_init)
+    )
 
 
 def log(n: int = 1010) -> tuple[Array, Array]:
@@ -40,7 +43,9 @@ def emps_predictor() -> HybridPredictor:
     kp, kv, gtau, M, Fv = 160.18, 243.45, 35.15065188, 95.1089, 203.5034
     omega = math.sqrt(gtau * kv * kp / M)
     mode = Mode(f_n=omega / (2 * np.pi), zeta=(Fv + gtau * kv) / M / (2 * omega), alpha=omega**2)
-    return HybridPredictor(ModalModel([mode]), Np=100, p=50, q=3, lam=1e-12, input_hold="foh", t_init=1.242)
+    return HybridPredictor(
+        ModalModel([mode]), PredictorSettings(Np=100, p=50, q=3, lam=1e-12, input_hold="foh", t_init=1.242)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -123,7 +128,7 @@ def test_perfect_physics_leaves_nothing_to_reduce() -> None:
     assert backtest(predictor(), x_d, x_d).overall.reduction_percent == 0.0
     warm = predictor()
     backtest(warm, *log())
-    warm.new_run()
+    warm.restart()
     score = backtest(warm, x_d, x_d).overall
     assert (score.rms_pb, score.reduction_percent) == (0.0, -math.inf)
 
@@ -174,7 +179,7 @@ def test_second_run_starts_warm() -> None:
     x_d, x = log()
     learning = predictor()
     cold = backtest(learning, x_d, x)
-    learning.new_run()
+    learning.restart()
     warm = backtest(learning, x_d, x)
     assert warm.active.all()
     assert warm.overall.rms_h < cold.overall.rms_h

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from hybridsep.base.errors import HybridSepError, StateError
-from hybridsep.base.limits import Limits
+from hybridsep.base.settings import CompensatorSettings, Limits, PredictorSettings
 from hybridsep.base.state import VERSION
 from hybridsep.compensate.compensator import SepCompensator
 from hybridsep.model.physics import ModalModel
@@ -40,11 +40,13 @@ def sampled(look_ahead: LookAhead | LookAhead, count: int) -> None:
 
 
 def small_predictor(**more: Any) -> HybridPredictor:
-    return HybridPredictor(MODEL, Np=8, p=3, q=2, lam=1e-8, t_init=0.0, **more)
+    return HybridPredictor(MODEL, PredictorSettings(Np=8, p=3, q=2, lam=1e-8, t_init=0.0, **more))
 
 
 def small_compensator() -> SepCompensator:
-    return SepCompensator(small_predictor(v_s=2e-3), preview=24, limits=Limits(0.1, 16.0, 5000.0))
+    return SepCompensator(
+        small_predictor(v_friction=2e-3), CompensatorSettings(preview=24, limits=Limits(0.1, 16.0, 5000.0))
+    )
 
 
 def use_predictor(predictor: HybridPredictor) -> None:
@@ -71,7 +73,7 @@ def use_compensator(compensator: SepCompensator) -> None:
 
 
 def predictor_state() -> bytes:
-    predictor = small_predictor(v_s=2e-3)
+    predictor = small_predictor(v_friction=2e-3)
     use_predictor(predictor)
     predictor.predict(np.linspace(0, 1e-3, 8))
     return predictor.to_bytes()

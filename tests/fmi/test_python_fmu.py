@@ -145,7 +145,7 @@ def test_staircase_equals_library_and_oracle(predictor: FmuInstance, shift: floa
         np.array([1.0, C / M, K / M]),
         commanded() + shift,
         measured(0) + shift,
-        Ts=TS,
+        T_s=TS,
         Np=100,
         p=50,
         q=3,

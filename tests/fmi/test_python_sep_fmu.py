@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from hybridsep.base.errors import FmuError, StateError
-from hybridsep.base.limits import Limits
+from hybridsep.base.settings import CompensatorSettings, Limits
 from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepCompensator, SepState
 from hybridsep.cosim.importer import FmuInstance
@@ -105,8 +105,8 @@ def test_the_interface_is_the_contract(compensator: FmuInstance) -> None:
         ("a_max", "parameter", "Real", "m/s2", "16.0"),
         ("j_max", "parameter", "Real", "m/s3", "5000.0"),
         ("change_max", "parameter", "Real", "m", "0.001"),
-        ("v_s", "parameter", "Real", "m/s", "0.002"),
-        ("keep_direction", "parameter", "Integer", None, "1"),
+        ("v_friction", "parameter", "Real", "m/s", "0.002"),
+        ("no_reversal", "parameter", "Integer", None, "1"),
         ("compensate", "parameter", "Integer", None, "2"),
     ]
     variables = list(compensator.variables.values())
@@ -165,7 +165,7 @@ def test_a_closed_loop_is_the_librarys_bit_for_bit(
 def test_another_axis_with_modes_and_other_parameters(python_fmu: Fmu) -> None:
     machine = load_machine("als25010_y")
     changes: dict[str, Any] = {"Np": 40, "p": 30, "q": 5, "preview": 190, "spacing": 4, "jerk_weight": 0.5}
-    changes |= {"change_max": 3e-4, "keep_direction": 0}
+    changes |= {"change_max": 3e-4, "no_reversal": 0}
     bounds = {"v_max": 0.0805, "a_max": 8.1, "j_max": 2000.0}
     library = machine.new_compensator(SepState.PHYSICS, limits=Limits(*bounds.values()), **changes)
     look_ahead = LookAhead(library, 0.1)
@@ -282,9 +282,9 @@ def test_a_state_of_another_axis_is_refused(compensator: FmuInstance, python_fmu
             {"change_max": 0.0, "j_max": 0.0},
             "j_max must be 1e-06 … 1e+12 m/s3, got 0.0; change_max must be 1e-12 … 10 m, got 0.0",
         ),
-        ({"v_s": -1e-3}, "v_s must be 0 or 1e-09 … 10000 m/s, got -0.001"),
-        ({"v_s": math.nan}, "v_s must be finite, got nan"),
-        ({"keep_direction": 2}, "keep_direction must be 0 … 1, got 2"),
+        ({"v_friction": -1e-3}, "v_friction must be 0 or 1e-09 … 10000 m/s, got -0.001"),
+        ({"v_friction": math.nan}, "v_friction must be finite, got nan"),
+        ({"no_reversal": 2}, "no_reversal must be 0 … 1, got 2"),
         ({"compensate": 3}, "compensate must be 0 … 2, got 3"),
         ({"compensate": -1}, "compensate must be 0 … 2, got -1"),
         ({"p": 60, "q": 50}, "p must be 1 … Np = 50, got 60; lower p or raise Np; q must be 0 … Np − 1 = 49, got 50"),
@@ -347,7 +347,7 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_warm_run_is_the_librarys_second_run(trained: Path, tmp_path: Path) -> None:
     limits, change_max = MACHINE.command_limits()
-    second = SepCompensator(HybridPredictor.load(trained), limits=limits, change_max=change_max)
+    second = SepCompensator(HybridPredictor.load(trained), CompensatorSettings(limits=limits, change_max=change_max))
     r, x, expected = closed_loop(LookAhead(second, 0.0, t_init=0.0), 700)
     path = build_fmu(MACHINE, "SepCompensatorPy", tmp_path, "python", weights=trained)
     with zipfile.ZipFile(path) as archive:
@@ -368,9 +368,9 @@ def test_a_warm_run_is_the_librarys_second_run(trained: Path, tmp_path: Path) ->
         instance.initialise({"q": 3})
     with (
         FmuInstance(path) as instance,
-        pytest.raises(FmuError, match=r"v_s must be 0.002, with which weights.bin was learned, got 0.0"),
+        pytest.raises(FmuError, match=r"v_friction must be 0.002, with which weights.bin was learned, got 0.0"),
     ):
-        instance.initialise({"v_s": 0.0})
+        instance.initialise({"v_friction": 0.0})
 
 
 def test_weights_of_other_settings_are_refused(trained: Path, tmp_path: Path) -> None:
@@ -385,7 +385,7 @@ def test_weights_of_other_settings_are_refused(trained: Path, tmp_path: Path) ->
         return str(caught.value)
 
     differing = "Np = 100 instead of 50, q = 3 instead of 40, lambda = 1e-12 instead of 1e-08"
-    differing += ", v_s = 0.0 instead of 0.002"
+    differing += ", v_friction = 0.0 instead of 0.002"
     assert refused("SepCompensatorPy", tmp_path / "other.state").startswith(
         f"other.state was not trained for machine spring_mass_damper's compensator: it has {differing}; "
     )

@@ -9,6 +9,7 @@ import sys
 import zipfile
 import zlib
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from c_core import CModel, refusal, write_weights
 
 from hybridsep.app import cli
 from hybridsep.base.errors import FmuError, StateError
+from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.cosim.importer import FmuInstance
 from hybridsep.cosim.predictor_run import cosimulate
@@ -68,7 +70,7 @@ def test_a_warm_run_is_the_librarys_second_run(warm: Path, trained: Path, tmp_pa
     run = cosimulate(warm, build("native", tmp_path, model="FeedDrive"), staircase())
     assert run.active.all()
     predictor = HybridPredictor.load(trained)
-    predictor.new_run()
+    predictor.restart()
     expected = backtest(predictor, run.x_d, run.x_meas)
     np.testing.assert_allclose(run.x_pb, expected.x_pb, rtol=0, atol=TOLERANCE)
     np.testing.assert_allclose(run.x_h, expected.x_h, rtol=0, atol=TOLERANCE)
@@ -158,13 +160,13 @@ def test_the_weights_are_in_the_resources_and_in_the_guid(backend: str, tmp_path
         ({"p": 40}, "p = 40 instead of 50"),
         ({"q": 5, "lam": 1e-9}, "q = 5 instead of 3, lambda = 1e-09 instead of 1e-12"),
         ({"Np": 60}, "Np = 60 instead of 100"),
-        ({"Ts": 2e-3, "input_hold": "foh"}, "T_s = 0.002 instead of 0.001, input_hold = foh instead of zoh"),
+        ({"T_s": 2e-3, "input_hold": "foh"}, "T_s = 0.002 instead of 0.001, input_hold = foh instead of zoh"),
     ],
 )
 def test_a_state_of_other_parameters_is_refused_by_name(
     changes: dict[str, Any], differing: str, tmp_path: Path
 ) -> None:
-    predictor = MACHINE.new_predictor(**changes)
+    predictor = MACHINE.new_predictor(replace(MACHINE.predictor_settings, **changes))
     predictor.predict(np.linspace(0, 1e-3, 50))
     predictor.update(np.linspace(0, 1e-3, 50))
     predictor.save(tmp_path / "other.state")
@@ -274,9 +276,9 @@ def test_both_flavours_say_the_same_of_other_settings(tmp_path: Path) -> None:
     description = c_core.DESCRIPTIONS["predictor_2"]
     for changes in ({"p": 30, "q": 9}, {"lambda": 1e-8}, {"T_s": 1e-3 / 3}, {"input_hold": 1, "dead_time": 7}):
         learned, now = (
-            HybridPredictor.with_parameters(
+            HybridPredictor(
                 ModalModel([Mode(**mode) for mode in modes], int(values.pop("dead_time"))),
-                {name: value for name, value in values.items() if name != "v_s"},
+                PredictorSettings.from_fmi({name: value for name, value in values.items() if name != "v_friction"}),
             )
             for values, modes in (
                 ({**c_core.PREDICTOR, **changes}, description["modes"][::-1]),

@@ -53,11 +53,11 @@ def test_bad_time_names_the_line(tmp_path: Path) -> None:
 
 def test_given_ts_must_agree_with_the_time(tmp_path: Path) -> None:
     path = write(tmp_path / "log.csv", columns())
-    assert open_log(path, Ts=1.005e-3).Ts == 1.005e-3
-    with pytest.raises(LogError, match=r"Ts = 0.002 s was given, but column 't' has an interval of 0.001 s"):
-        open_log(path, Ts=2e-3)
-    with pytest.raises(ParameterError, match="Ts must be 1e-05 … 1 s, got -1"):
-        open_log(path, Ts=-1.0)
+    assert open_log(path, T_s=1.005e-3).T_s == 1.005e-3
+    with pytest.raises(LogError, match=r"T_s = 0.002 s was given, but column 't' has an interval of 0.001 s"):
+        open_log(path, T_s=2e-3)
+    with pytest.raises(ParameterError, match="T_s must be 1e-05 … 1 s, got -1"):
+        open_log(path, T_s=-1.0)
 
 
 # Columns and values
@@ -67,12 +67,12 @@ def test_given_ts_must_agree_with_the_time(tmp_path: Path) -> None:
 def test_missing_columns(tmp_path: Path, suffix: str) -> None:
     data = columns()
     path = write(tmp_path / f"log{suffix}", {"x_d": data["x_d"], "qm": data["x"]})
-    with pytest.raises(LogError, match=r"column 't' is missing, the file has 'x_d', 'qm'; .*columns, or Ts"):
+    with pytest.raises(LogError, match=r"column 't' is missing, the file has 'x_d', 'qm'; .*columns, or T_s"):
         open_log(path)
     with pytest.raises(LogError, match=r"column 'x' is missing, the file has 'x_d', 'qm'; give its name in columns"):
-        open_log(path, Ts=1e-3)
+        open_log(path, T_s=1e-3)
     with pytest.raises(LogError, match=r"column 'time' \(t\) is missing"):
-        open_log(path, columns={"t": "time", "x": "qm"}, Ts=1e-3)
+        open_log(path, columns={"t": "time", "x": "qm"}, T_s=1e-3)
     with pytest.raises(LogError, match=r"columns may name t, x_d, x, got 'y'"):
         open_log(path, columns={"y": "qm"})
 
@@ -134,14 +134,14 @@ def test_bad_arrays(tmp_path: Path, suffix: str, bad: Columns, message: str) -> 
 
 @FORMATS
 @pytest.mark.parametrize(("n", "came"), [(0, "none"), (1, "1")])
-@pytest.mark.parametrize("Ts", [None, 1e-3])
-def test_too_short(tmp_path: Path, suffix: str, n: int, came: str, Ts: float | None) -> None:
+@pytest.mark.parametrize("T_s", [None, 1e-3])
+def test_too_short(tmp_path: Path, suffix: str, n: int, came: str, T_s: float | None) -> None:
     data = columns(n)
-    if Ts is not None:
+    if T_s is not None:
         del data["t"]
     path = write(tmp_path / f"log{suffix}", data)
     with pytest.raises(LogError, match=f"a log needs at least 2 samples, got {came}"):
-        open_log(path, Ts=Ts)
+        open_log(path, T_s=T_s)
 
 
 @FORMATS

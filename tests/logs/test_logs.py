@@ -22,7 +22,7 @@ def test_every_format_gives_the_same_log(tmp_path: Path, suffix: str) -> None:
     np.testing.assert_array_equal(log.t, data["t"])
     np.testing.assert_array_equal(log.x_d, data["x_d"])
     np.testing.assert_array_equal(log.x, data["x"])
-    assert log.Ts == 1e-3
+    assert log.T_s == 1e-3
     assert log.path == tmp_path / f"log{suffix}"
 
 
@@ -32,7 +32,7 @@ def test_chunks_are_the_log_in_pieces(tmp_path: Path, suffix: str, n: int) -> No
     data = columns()
     reader = open_log(write(tmp_path / f"log{suffix}", data))
     assert isinstance(reader, LogReader)
-    assert (reader.Ts, reader.n_samples) == (1e-3, 50)
+    assert (reader.T_s, reader.n_samples) == (1e-3, 50)
     pieces = list(reader.chunks(n))
     assert all(len(x_d) == len(x) <= n for x_d, x in pieces)
     np.testing.assert_array_equal(np.concatenate([x_d for x_d, _ in pieces]), data["x_d"])
@@ -43,16 +43,16 @@ def test_chunks_are_the_log_in_pieces(tmp_path: Path, suffix: str, n: int) -> No
 def test_named_columns_unit_and_ts(tmp_path: Path, suffix: str) -> None:
     data = columns()
     path = write(tmp_path / f"log{suffix}", {"extra": data["t"], "qg": data["x_d"] * 1e3, "qm": data["x"] * 1e3})
-    log = read_log(path, columns={"x_d": "qg", "x": "qm"}, unit="mm", Ts=2e-3)
+    log = read_log(path, columns={"x_d": "qg", "x": "qm"}, unit="mm", T_s=2e-3)
     np.testing.assert_allclose(log.x_d, data["x_d"], rtol=1e-15)
     np.testing.assert_allclose(log.x, data["x"], rtol=1e-15)
     np.testing.assert_array_equal(log.t, np.arange(50) * 2e-3)
-    assert log.Ts == 2e-3
+    assert log.T_s == 2e-3
 
 
 def test_micrometres(tmp_path: Path) -> None:
     path = write_csv(tmp_path / "log.csv", "x_d,x\n1,2\n3,4\n")
-    np.testing.assert_allclose(read_log(path, unit="um", Ts=1.0).x, [2e-6, 4e-6])
+    np.testing.assert_allclose(read_log(path, unit="um", T_s=1.0).x, [2e-6, 4e-6])
 
 
 @pytest.mark.parametrize(
@@ -74,7 +74,7 @@ def test_micrometres(tmp_path: Path) -> None:
 )
 def test_spellings_of_csv(tmp_path: Path, text: str) -> None:
     log = read_log(write_csv(tmp_path / "log.csv", text))
-    assert (log.t.tolist(), log.x_d.tolist(), log.x.tolist(), log.Ts) == ([0, 1], [1, 3], [2, 4], 1.0)
+    assert (log.t.tolist(), log.x_d.tolist(), log.x.tolist(), log.T_s) == ([0, 1], [1, 3], [2, 4], 1.0)
 
 
 @pytest.mark.parametrize("suffix", [".npz", ".mat"])
@@ -95,10 +95,10 @@ def test_compressed_npz(tmp_path: Path) -> None:
 # The time axis
 
 
-@pytest.mark.parametrize("Ts", [1e-3, 1 / 3000, 1 / 8192, 2.5e-4, 1.25e-5, 0.0040012])
-def test_interval_is_the_mean_rounded_sensibly(tmp_path: Path, Ts: float) -> None:
-    path = write(tmp_path / "log.npz", columns(2000, Ts) | {"t": 17.0 + np.arange(2000) * Ts * (1 + 3e-9)})
-    assert read_log(path).Ts == Ts
+@pytest.mark.parametrize("T_s", [1e-3, 1 / 3000, 1 / 8192, 2.5e-4, 1.25e-5, 0.0040012])
+def test_interval_is_the_mean_rounded_sensibly(tmp_path: Path, T_s: float) -> None:
+    path = write(tmp_path / "log.npz", columns(2000, T_s) | {"t": 17.0 + np.arange(2000) * T_s * (1 + 3e-9)})
+    assert read_log(path).T_s == T_s
 
 
 @given(seed=st.integers(0, 2**32 - 1), n=st.integers(1000, 30_000))
@@ -108,7 +108,7 @@ def test_jitter_of_a_clock_does_not_move_the_interval(
 ) -> None:
     t = np.arange(n) * 1e-3 + np.random.default_rng(seed).uniform(-1e-5, 1e-5, n)
     path = write(tmp_path_factory.mktemp("jitter") / "log.npz", {"t": t, "x_d": t, "x": t})
-    assert read_log(path).Ts == pytest.approx(1e-3, rel=2e-5)
+    assert read_log(path).T_s == pytest.approx(1e-3, rel=2e-5)
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".npz"])
@@ -127,5 +127,5 @@ def test_recorded_axis() -> None:
     if not EMPS.is_file():
         pytest.skip("the recorded axis is not here: ../shared/data/emps/DATA_EMPS.mat, beside the repository")
     log = read_log(EMPS, columns={"t": "t", "x_d": "qg", "x": "qm"})
-    assert (len(log.x), log.Ts) == (24_841, 1e-3)
+    assert (len(log.x), log.T_s) == (24_841, 1e-3)
     assert 1e6 * np.sqrt(np.mean((log.x_d - log.x) ** 2)) == pytest.approx(577.8, abs=0.1)

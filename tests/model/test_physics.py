@@ -105,34 +105,34 @@ class TestDiscretisation:
     def test_is_the_matrix_exponential(self, model: ModalModel, hold: str) -> None:
         x_d = command(400)
         discrete = model.discretise(TS, hold)
-        x_pb, _ = discrete.respond(discrete.rest(), x_d)
+        x_pb, _ = discrete.forced_response(discrete.rest(), x_d)
         np.testing.assert_allclose(x_pb, by_exponential(model, x_d, hold), rtol=0, atol=1e-15)
 
     def test_is_the_differential_equation(self, model: ModalModel, hold: str) -> None:
         x_d = command(60, seed=1)
         discrete = model.discretise(TS, hold)
-        x_pb, _ = discrete.respond(discrete.rest(), x_d)
+        x_pb, _ = discrete.forced_response(discrete.rest(), x_d)
         np.testing.assert_allclose(x_pb, by_solver(model, x_d, hold), rtol=0, atol=1e-14)
 
     def test_is_the_oracle(self, model: ModalModel, hold: str) -> None:
         x_d = command(300, seed=2)
         behind = ModalModel(model.modes, dead_time=7)
         discrete = behind.discretise(TS, hold)
-        x_pb, _ = discrete.respond(discrete.rest(), x_d)
-        expected = oracle.physics(*transfer_function(model), x_d.tolist(), Ts=TS, hold=hold, dead_time=7)
+        x_pb, _ = discrete.forced_response(discrete.rest(), x_d)
+        expected = oracle.physics(*transfer_function(model), x_d.tolist(), T_s=TS, hold=hold, dead_time=7)
         np.testing.assert_allclose(x_pb, expected, rtol=0, atol=1e-14)
 
     def test_settles_at_the_dc_gain(self, model: ModalModel, hold: str) -> None:
         discrete = model.discretise(TS, hold)
-        x_pb, _ = discrete.respond(discrete.rest(), np.full(6000, 0.02))
+        x_pb, _ = discrete.forced_response(discrete.rest(), np.full(6000, 0.02))
         assert x_pb[-1] == pytest.approx(0.02 * model.dc_gain, rel=1e-9)
 
     def test_does_not_change_what_it_is_given(self, model: ModalModel, hold: str) -> None:
         discrete = model.discretise(TS, hold)
-        _, state = discrete.respond(discrete.rest(), command(10))
+        _, state = discrete.forced_response(discrete.rest(), command(10))
         x_d = command(300)
         kept = state.copy(), x_d.copy()
-        discrete.respond(state, x_d)
+        discrete.forced_response(state, x_d)
         np.testing.assert_array_equal(state, kept[0])
         np.testing.assert_array_equal(x_d, kept[1])
 
@@ -148,10 +148,10 @@ def test_pieces_equal_one_piece(lengths: list[int], dead_time: int, hold: str, b
     model = ModalModel([UNDER, OVER], dead_time)
     discrete = model.discretise(TS, hold, block=block)
     x_d = command(sum(lengths))
-    whole, end = model.discretise(TS, hold).respond(discrete.rest(), x_d)
+    whole, end = model.discretise(TS, hold).forced_response(discrete.rest(), x_d)
     state, pieces = discrete.rest(), []
     for piece in np.split(x_d, np.cumsum(lengths)[:-1]):
-        x_pb, state = discrete.respond(state, piece)
+        x_pb, state = discrete.forced_response(state, piece)
         pieces.append(x_pb)
     np.testing.assert_allclose(np.concatenate(pieces), whole, rtol=0, atol=1e-16)
     np.testing.assert_allclose(state, end, rtol=0, atol=1e-16)
@@ -163,8 +163,8 @@ def test_dead_time_is_a_shift(dead_time: int, hold: str) -> None:
     x_d = command(700)
     plain = ModalModel([UNDER]).discretise(TS, hold)
     late = ModalModel([UNDER], dead_time).discretise(TS, hold)
-    x_pb, _ = plain.respond(plain.rest(), x_d)
-    x_late, state = late.respond(late.rest(), x_d)
+    x_pb, _ = plain.forced_response(plain.rest(), x_d)
+    x_late, state = late.forced_response(late.rest(), x_d)
     assert len(state) == late.n_state == plain.n_state + dead_time
     np.testing.assert_array_equal(x_late[:dead_time], 0.0)
     np.testing.assert_allclose(x_late[dead_time:], x_pb[:-dead_time], rtol=0, atol=1e-16)
@@ -174,7 +174,7 @@ def test_dead_time_is_a_shift(dead_time: int, hold: str) -> None:
 def test_impulse_response_is_the_first_column(hold: str) -> None:
     discrete = ModalModel([UNDER, LIGHT], 3).discretise(TS, hold)
     n = 40
-    G = np.column_stack([discrete.respond(discrete.rest(), np.eye(n)[j])[0] for j in range(n)])
+    G = np.column_stack([discrete.forced_response(discrete.rest(), np.eye(n)[j])[0] for j in range(n)])
     g = discrete.impulse_response(n)
     np.testing.assert_array_equal(g, G[:, 0])
     for j in range(n):
@@ -187,7 +187,7 @@ def test_first_order_hold_is_exact_on_a_ramp() -> None:
     # A ramp of slope v from rest: x_pb → v (t − c/k) + v β/ω² with β/ω² = c/k, so the drive follows it exactly.
     discrete = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0).discretise(TS, "foh")
     ramp = 0.05 * TS * np.arange(3000)
-    x_pb, _ = discrete.respond(discrete.rest(), np.asarray(ramp, dtype=np.float64))
+    x_pb, _ = discrete.forced_response(discrete.rest(), np.asarray(ramp, dtype=np.float64))
     np.testing.assert_allclose(x_pb[2500:], ramp[2500:], rtol=0, atol=1e-11)
 
 
@@ -281,7 +281,7 @@ def test_discrete_python_control_system_answers_the_same(dead_time: int, hold: s
     assert system.dt == TS
     x_d = command(300)
     discrete = model.discretise(TS, hold)
-    x_pb, _ = discrete.respond(discrete.rest(), x_d)
+    x_pb, _ = discrete.forced_response(discrete.rest(), x_d)
     answer = control.forced_response(system, np.arange(300) * TS, x_d)
     np.testing.assert_allclose(answer.outputs, x_pb, rtol=0, atol=1e-14)
 
@@ -353,5 +353,5 @@ def test_models_out_of_range(make: Callable[[], object], message: str) -> None:
 
 
 def test_a_dead_time_has_no_continuous_form() -> None:
-    with pytest.raises(ModelError, match=r"^a dead time of 3 samples has no continuous rational form; give Ts for"):
+    with pytest.raises(ModelError, match=r"^a dead time of 3 samples has no continuous rational form; give T_s for"):
         ModalModel([UNDER], 3).to_control()

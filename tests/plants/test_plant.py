@@ -79,11 +79,11 @@ def test_without_nonlinearity_the_plants_are_their_models() -> None:
     x_d = staircase()[:1500]
     model = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
     discrete = model.discretise(TS)
-    x_pb, _ = discrete.respond(discrete.rest(), x_d)
+    x_pb, _ = discrete.forced_response(discrete.rest(), x_d)
     np.testing.assert_allclose(simulate(FeedDrive(1.0, 15.7, 24674.0), x_d, TS), x_pb, atol=1e-10)
     modal = ModalModel([Mode(40.0, 0.3, 9e4, 5.0), Mode(90.0, 0.05, -2e4, 1.0)])
     discrete = modal.discretise(TS)
-    x_pb, _ = discrete.respond(discrete.rest(), x_d)
+    x_pb, _ = discrete.forced_response(discrete.rest(), x_d)
     np.testing.assert_allclose(simulate(StageDrive(modal), x_d, TS), x_pb, atol=1e-10)
 
 
@@ -92,7 +92,7 @@ def test_fast_modes_are_resolved(f_n: float) -> None:
     x_d = staircase()[:300]
     mode = Mode(f_n, 0.05, (2 * math.pi * f_n) ** 2)
     discrete = ModalModel([mode]).discretise(TS)
-    x_pb, _ = discrete.respond(discrete.rest(), x_d)
+    x_pb, _ = discrete.forced_response(discrete.rest(), x_d)
     assert np.max(np.abs(simulate(StageDrive(ModalModel([mode])), x_d, TS) - x_pb)) < 1e-9
 
 

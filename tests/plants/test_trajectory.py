@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hybridsep import LogError, ParameterError, SignalError
-from hybridsep.base.limits import Limits
+from hybridsep.base.settings import Limits
 from hybridsep.plants.trajectory import (
     PAPER_LIMITS,
     along_path,
     archimedean_spiral,
-    from_file,
+    read_trajectory,
     rest_to_rest,
     spiral,
     staircase,
@@ -51,12 +51,12 @@ def test_a_move_starts_as_its_jerk_says() -> None:
 def test_limits_hold_and_targets_are_reached(
     positions: list[float], velocity: float, acceleration: float, jerk: float
 ) -> None:
-    Ts = 1e-3
-    x_d = rest_to_rest(positions, Limits(velocity, acceleration, jerk), Ts, dwell=0.005)
-    # Mean values over an interval cannot exceed the limit; rounding of positions is magnified by 1/Ts
-    assert np.max(np.abs(np.diff(x_d)), initial=0.0) / Ts <= velocity * (1 + 1e-9) + 1e-12
-    assert np.max(np.abs(np.diff(x_d, 2)), initial=0.0) / Ts**2 <= acceleration * (1 + 1e-6) + 1e-8
-    assert np.max(np.abs(np.diff(x_d, 3)), initial=0.0) / Ts**3 <= jerk * (1 + 1e-3) + 1e-5
+    T_s = 1e-3
+    x_d = rest_to_rest(positions, Limits(velocity, acceleration, jerk), T_s, dwell=0.005)
+    # Mean values over an interval cannot exceed the limit; rounding of positions is magnified by 1/T_s
+    assert np.max(np.abs(np.diff(x_d)), initial=0.0) / T_s <= velocity * (1 + 1e-9) + 1e-12
+    assert np.max(np.abs(np.diff(x_d, 2)), initial=0.0) / T_s**2 <= acceleration * (1 + 1e-6) + 1e-8
+    assert np.max(np.abs(np.diff(x_d, 3)), initial=0.0) / T_s**3 <= jerk * (1 + 1e-3) + 1e-5
     assert x_d[0] == positions[0]
     assert x_d[-1] == pytest.approx(positions[-1], abs=1e-12)
 
@@ -94,11 +94,11 @@ def test_arc_length_against_the_closed_form() -> None:
 def test_from_file(tmp_path: Path) -> None:
     path = tmp_path / "command.csv"
     path.write_text("t,x_d\n0,0\n0.002,1.5\n0.004,3\n")
-    x_d, Ts = from_file(path, unit="mm")
+    x_d, T_s = read_trajectory(path, unit="mm")
     np.testing.assert_allclose(x_d, [0, 1.5e-3, 3e-3])
-    assert Ts == pytest.approx(0.002)
+    assert T_s == pytest.approx(0.002)
     with pytest.raises(LogError, match="speed"):
-        from_file(path, column="speed")
+        read_trajectory(path, column="speed")
 
 
 def test_what_cannot_be_planned_is_refused() -> None:

@@ -11,6 +11,7 @@ import pytest
 from c_core import TS, CModel, refusal, write_weights
 
 from hybridsep.base.errors import SignalError
+from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.fmi.weights import WEIGHTS_FILE, restore_weights
@@ -37,7 +38,7 @@ def runaway_predictor(folder: Path) -> HybridPredictor:
     write_weights(folder, "predictor", runaway_factor(55, 5), 1000)
     model = ModalModel([Mode(**c_core.SPRING_MASS_DAMPER)])
     parameters = {name: value for name, value in c_core.PREDICTOR.items() if name != "dead_time"}
-    predictor = HybridPredictor.with_parameters(model, {**parameters, "t_init": 0.0})
+    predictor = HybridPredictor(model, PredictorSettings.from_fmi({**parameters, "t_init": 0.0}))
     restore_weights(predictor, (folder / WEIGHTS_FILE).read_bytes())
     return predictor
 
@@ -79,7 +80,7 @@ def test_a_window_that_diverges_is_refused_in_c(tmp_path: Path) -> None:
 
 def test_the_warm_up_hides_what_diverges(tmp_path: Path) -> None:
     predictor = runaway_predictor(tmp_path)
-    predictor.new_run(0.0, t_init=0.1)
+    predictor.restart(0.0, t_init=0.1)
     prediction = predictor.predict(np.full(100, 1e-3))
     assert not np.isfinite(prediction.e_h).all()
     np.testing.assert_array_equal(prediction.x_h, prediction.x_pb)

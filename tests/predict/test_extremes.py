@@ -20,8 +20,7 @@ from places import ROOT
 
 from hybridsep.app import cli
 from hybridsep.base.errors import HybridSepError, MachineError, ParameterError
-from hybridsep.base.limits import Limits
-from hybridsep.base.parameters import PARAMETERS
+from hybridsep.base.settings import PARAMETERS, Limits, PredictorSettings
 from hybridsep.fmi.variables import variables_of
 from hybridsep.machine import load_machine
 from hybridsep.model.physics import ModalModel, Mode
@@ -38,7 +37,7 @@ SMALL = {"Np": 8, "p": 4, "q": 2, "dead_time": 0, "preview": 24, "spacing": 2}
 """Small windows, so that several fit into a short run."""
 
 LEARNING = ("lambda", "T_s", "t_init")
-PLANNING = ("jerk_weight", "v_max", "a_max", "j_max", "change_max", "v_s")
+PLANNING = ("jerk_weight", "v_max", "a_max", "j_max", "change_max", "v_friction")
 MODE = ("f_n", "zeta", "alpha", "beta")
 FEED_DRIVE = ("m", "c", "k", "c_nl", "k_nl", "noise_std")
 STAGE = ("f", "kappa", "T_s", "noise_std")
@@ -130,7 +129,7 @@ def test_the_predictor(learning: dict[str, float], modes: dict[str, float], samp
 
     def run() -> None:
         parameters = {**learning, **{name: SMALL[name] for name in ("Np", "p", "q")}, "input_hold": hold}
-        predictor = HybridPredictor.with_parameters(model_from(modes), parameters)
+        predictor = HybridPredictor(model_from(modes), PredictorSettings.from_fmi(parameters))
         check_look_ahead(LookAhead(predictor, 0.0), ("x_d", "x_pb", "x_h", "e_servo", "rms_pb", "rms_h"), samples)
 
     refused(values, run)

@@ -9,6 +9,7 @@ import pytest
 from staircase_data import commanded, measured
 
 from hybridsep import HybridPredictor, LookAhead, ModalModel, SignalError, StateError, backtest
+from hybridsep.base.settings import PredictorSettings
 
 MODEL = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
 
@@ -68,7 +69,7 @@ def test_first_fill_keeps_the_drive_at_its_start() -> None:
 
 def test_running_rms_counts_from_t_init() -> None:
     r, x = delayed()
-    look_ahead = LookAhead(HybridPredictor(MODEL, t_init=0.25), float(r[0]))
+    look_ahead = LookAhead(HybridPredictor(MODEL, PredictorSettings(t_init=0.25)), float(r[0]))
     x_pb, x_h = [look_ahead.x_pb], [look_ahead.x_h]
     for k in range(len(r)):
         look_ahead.sample(float(r[k]), float(x[k]))

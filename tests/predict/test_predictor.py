@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from hybridsep.base.errors import ParameterError, SignalError, StateError
+from hybridsep.base.settings import PredictorSettings
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
 from hybridsep.predict.window import Prediction
@@ -27,7 +28,7 @@ Array = NDArray[np.float64]
 
 MODEL = ModalModel.spring_mass_damper(staircase.M, staircase.C, staircase.K)
 NUMERATOR, DENOMINATOR = np.array([staircase.C, staircase.K]), np.array([staircase.M, staircase.C, staircase.K])
-PAPER: dict[str, Any] = {"Ts": 1e-3, "Np": 100, "p": 50, "q": 3, "lam": 1e-12, "t_init": 0.3}
+PAPER: dict[str, Any] = {"T_s": 1e-3, "Np": 100, "p": 50, "q": 3, "lam": 1e-12, "t_init": 0.3}
 
 
 def replay(predictor: HybridPredictor, x_d: Array, x: Array) -> tuple[Array, Array, Array]:
@@ -50,7 +51,7 @@ def rms(error: Array) -> float:
 @lru_cache(maxsize=1)
 def replayed() -> tuple[Array, Array, Array]:
     """Return the paper's run with noise seed 0."""
-    return replay(HybridPredictor(MODEL, **PAPER), staircase.commanded(), staircase.measured(0))
+    return replay(HybridPredictor(MODEL, PredictorSettings(**PAPER)), staircase.commanded(), staircase.measured(0))
 
 
 def small_signals(n: int, seed: int = 0, start: float = 0.0) -> tuple[Array, Array]:
@@ -64,8 +65,8 @@ def small_signals(n: int, seed: int = 0, start: float = 0.0) -> tuple[Array, Arr
 
 def trained(n: int, **changes: Any) -> HybridPredictor:
     """Return a small predictor in mid-run, after n samples."""
-    settings_ = {"Ts": 1e-3, "Np": 10, "p": 4, "q": 2, "lam": 1e-9, "t_init": 0.0} | changes
-    predictor = HybridPredictor(ModalModel([Mode(25.0, 0.05, 24674.0, 15.7)]), **settings_)
+    settings_ = {"T_s": 1e-3, "Np": 10, "p": 4, "q": 2, "lam": 1e-9, "t_init": 0.0} | changes
+    predictor = HybridPredictor(ModalModel([Mode(25.0, 0.05, 24674.0, 15.7)]), PredictorSettings(**settings_))
     x_d, x = small_signals(n)
     replay(predictor, x_d, x)
     return predictor
@@ -82,7 +83,7 @@ class TestStaircase:
 
     def test_equals_the_oracle_elsewhere_on_the_axis(self) -> None:
         x_d, x = staircase.commanded() + 0.1, staircase.measured(0) + 0.1
-        _, x_h, _ = replay(HybridPredictor(MODEL, **PAPER), x_d, x)
+        _, x_h, _ = replay(HybridPredictor(MODEL, PredictorSettings(**PAPER)), x_d, x)
         slow = oracle.run(NUMERATOR, DENOMINATOR, x_d, x, **PAPER)
         np.testing.assert_allclose(x_h, slow.x_h, rtol=0, atol=1e-12)
         np.testing.assert_allclose(x_h - 0.1, replayed()[1], rtol=0, atol=1e-10)
@@ -91,12 +92,12 @@ class TestStaircase:
         x_d = staircase.commanded()
         physics, cold, warm = [], [], []
         for seed in range(10):
-            predictor = HybridPredictor(MODEL, **PAPER)
+            predictor = HybridPredictor(MODEL, PredictorSettings(**PAPER))
             x = staircase.measured(seed)
             x_pb, x_h, _ = replay(predictor, x_d, x)
             physics.append(rms(x - x_pb))
             cold.append(rms(x - x_h))
-            predictor.new_run()
+            predictor.restart()
             x = staircase.measured(100 + seed)
             warm.append(rms(x - replay(predictor, x_d, x)[1]))
         # µm, RMS against the measured position, mean of ten noise seeds; the paper prints 33.7 and 14.7.
@@ -122,8 +123,8 @@ def test_equals_the_oracle_with_other_parameters(
     modes = [(25.0, 0.05, 20000.0, 15.7), (15.0, 2.0, 1600.0, 3.0)]
     model = ModalModel([Mode(*numbers) for numbers in modes], dead_time)
     x_d, x = small_signals(655, start=0.07)
-    parameters: dict[str, Any] = {"Ts": 1e-3, "Np": Np, "p": p, "q": q, "lam": 1e-7, "t_init": t_init}
-    x_pb, x_h, active = replay(HybridPredictor(model, input_hold=hold, **parameters), x_d, x)
+    parameters: dict[str, Any] = {"T_s": 1e-3, "Np": Np, "p": p, "q": q, "lam": 1e-7, "t_init": t_init}
+    x_pb, x_h, active = replay(HybridPredictor(model, PredictorSettings(input_hold=hold, **parameters)), x_d, x)
     slow = oracle.run(*oracle.transfer_function(modes), x_d, x, hold=hold, dead_time=dead_time, **parameters)
     np.testing.assert_allclose(x_pb, slow.x_pb, rtol=0, atol=1e-13)
     np.testing.assert_allclose(x_h, slow.x_h, rtol=0, atol=1e-12)
@@ -152,7 +153,9 @@ def test_operator_equals_predict(data: st.DataObject, Np: int, windows: int, hol
     start = data.draw(st.sampled_from([0.0, 0.25, -1.5]), "start")
     n = data.draw(st.integers(1, 3 * Np), "n")
     model = ModalModel([Mode(25.0, 0.05, 24674.0, 15.7)], dead_time)
-    predictor = HybridPredictor(model, Np=Np, p=p, q=q, lam=1e-6, t_init=0.0, input_hold=hold, start=start)
+    predictor = HybridPredictor(
+        model, PredictorSettings(Np=Np, p=p, q=q, lam=1e-6, t_init=0.0, input_hold=hold), start=start
+    )
     replay(predictor, *small_signals(windows * Np + data.draw(st.integers(0, Np - 1), "rest"), start=start))
     operator = predictor.operator(n)
     x_d = start + 0.01 * np.random.default_rng(n).normal(size=n)
@@ -251,7 +254,9 @@ def test_start_is_the_first_command_unless_given() -> None:
 def test_saved_in_mid_run_continues_bit_for_bit(way: str, measured: bool, tmp_path: Path) -> None:
     x_d, x = small_signals(120)
     model = ModalModel([Mode(25.0, 0.05, 24674.0, 15.7), Mode(90.0, 1.5, -40.0, 0.1)], 2)
-    original = HybridPredictor(model, Np=10, p=4, q=2, lam=1e-9, t_init=0.071, input_hold="foh", start=0.001)
+    original = HybridPredictor(
+        model, PredictorSettings(Np=10, p=4, q=2, lam=1e-9, t_init=0.071, input_hold="foh"), start=0.001
+    )
     replay(original, x_d[:63], x[:63])
     if not measured:
         original.predict(x_d[63:73])
@@ -278,7 +283,7 @@ def test_a_new_run_keeps_the_weights_and_forgets_the_rest() -> None:
     predictor = trained(57)
     weights = predictor.weights.copy()
     predictor.predict(np.zeros(10))
-    predictor.new_run(0.5, t_init=0.013)
+    predictor.restart(0.5, t_init=0.013)
     np.testing.assert_array_equal(predictor.weights, weights)
     assert (predictor.k, predictor.start, predictor.last_residual()) == (0, 0.5, 0.0)
     with pytest.raises(SignalError, match=r"^update must follow predict"):
@@ -291,7 +296,7 @@ def test_a_new_run_keeps_the_weights_and_forgets_the_rest() -> None:
 
 def test_the_warm_up_of_a_new_run_is_saved() -> None:
     predictor = trained(57, t_init=0.5)
-    predictor.new_run(t_init=0.013)
+    predictor.restart(t_init=0.013)
     replay(predictor, *small_signals(10))
     twin = HybridPredictor.from_bytes(predictor.to_bytes())
     assert twin.predict(np.zeros(10)).n_warm_up == predictor.predict(np.zeros(10)).n_warm_up == 3
@@ -315,12 +320,12 @@ def test_memory_does_not_grow() -> None:
 
 def test_fmi_names() -> None:
     parameters = {"lambda": 1e-9, "T_s": 5e-4, "input_hold": 1, "Np": 8, "p": 3, "q": 1, "t_init": 0.0}
-    predictor = HybridPredictor.with_parameters(MODEL, parameters, start=0.5)
-    assert (predictor.lam, predictor.Ts, predictor.discrete.input_hold) == (1e-9, 5e-4, "foh")
+    predictor = HybridPredictor(MODEL, PredictorSettings.from_fmi(parameters), start=0.5)
+    assert (predictor.lam, predictor.T_s, predictor.discrete.input_hold) == (1e-9, 5e-4, "foh")
     assert (predictor.Np, predictor.p, predictor.q, predictor.start) == (8, 3, 1, 0.5)
     assert predictor.n_features == len(predictor.weights) == 6
     with pytest.raises(ParameterError, match=r"^input_hold must be 0 … 1, got 2$"):
-        HybridPredictor.with_parameters(MODEL, {"input_hold": 2})
+        HybridPredictor(MODEL, PredictorSettings.from_fmi({"input_hold": 2}))
 
 
 @pytest.mark.parametrize(
@@ -329,14 +334,14 @@ def test_fmi_names() -> None:
         ({"p": 120}, "p must be 1 … Np = 100, got 120; lower p or raise Np"),
         ({"q": 100}, "q must be 0 … Np − 1 = 99, got 100; lower q or raise Np"),
         ({"Np": 0, "lam": -1.0}, "Np must be 1 … 100000, got 0; lambda must be 1e-40 … 1e+12 m2, got -1.0"),
-        ({"Ts": 0.0}, "T_s must be 1e-05 … 1 s, got 0.0"),
+        ({"T_s": 0.0}, "T_s must be 1e-05 … 1 s, got 0.0"),
         ({"t_init": -0.1}, "t_init must be 0 … 1000000 s, got -0.1"),
         ({"input_hold": "soh"}, "input_hold must be one of zoh, foh, got 'soh'"),
     ],
 )
 def test_parameters_that_do_not_fit(change: dict[str, Any], message: str) -> None:
     with pytest.raises(ParameterError) as caught:
-        HybridPredictor(MODEL, **change)
+        HybridPredictor(MODEL, PredictorSettings(**change))
     assert str(caught.value) == message
 
 
@@ -351,9 +356,9 @@ def test_parameters_that_do_not_fit(change: dict[str, Any], message: str) -> Non
         (lambda p: p.update([0.0, math.inf]), "x must be finite, got inf at sample 1"),
         (lambda p: p.operator(0), "n must be ≥ 1, got 0"),
         (lambda p: p.operator(3)([0.0]), "x_d must have 3 samples, got 1"),
-        (lambda p: p.new_run(math.nan), "start must be finite, got nan at sample 0"),
-        (lambda p: p.new_run(0.1, t_init=-1.0), "t_init must be 0 … 1000000 s, got -1.0"),
-        (lambda p: p.new_run(0.1, t_init=math.nan), "t_init must be finite, got nan"),
+        (lambda p: p.restart(math.nan), "start must be finite, got nan at sample 0"),
+        (lambda p: p.restart(0.1, t_init=-1.0), "t_init must be 0 … 1000000 s, got -1.0"),
+        (lambda p: p.restart(0.1, t_init=math.nan), "t_init must be finite, got nan"),
     ],
 )
 def test_bad_calls_are_refused_and_change_nothing(use: Callable[[HybridPredictor], object], message: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -14,6 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hybridsep.base.errors import ParameterError, SignalError
+from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.machine import load_machine
 from hybridsep.model.physics import ModalModel, Mode
@@ -30,23 +32,23 @@ MODES = [(25.0, 0.05, 24674.0, 15.7)]
 MODEL = ModalModel([Mode(*numbers) for numbers in MODES])
 
 
-def formula(path: Sequence[float], start: float, first: int, n: int, known: int, v_s: float = V_S) -> Array:
+def formula(path: Sequence[float], start: float, first: int, n: int, known: int, v_friction: float = V_S) -> Array:
     """Return the features of samples ``first … first + n − 1`` where ``path`` is known before ``known``, ``(n, 13)``.
 
-    ``ψ(k) = tanh((r(k) − r(k−1)) / (v_s T_s))``, at rest before sample 0 and held from ``known`` on; each feature is ψ
+    ``ψ(k) = tanh((r(k) − r(k−1)) / (v_friction T_s))``, at rest before sample 0 and held from ``known`` on; each feature is ψ
     shifted, in metres.
     """
 
     def sign(k: int) -> float:
         if not 0 <= k < known:
             return 0.0
-        return math.tanh((path[k] - (path[k - 1] if k else start)) / (v_s * TS))
+        return math.tanh((path[k] - (path[k - 1] if k else start)) / (v_friction * TS))
 
     return SCALE * np.array([[sign(k + shift) for shift in SHIFTS] for k in range(first, first + n)])
 
 
 def reversing(n: int, start: float = 0.0) -> Array:
-    """Return a path that turns, rests and moves at speeds around ``v_s``, ``(n,)``, m."""
+    """Return a path that turns, rests and moves at speeds around ``v_friction``, ``(n,)``, m."""
     t = TS * np.arange(n)
     slow = 2e-4 * np.sin(23 * t) + 1e-3 * (1 - np.cos(9 * t))
     slow[n // 3 : n // 2] = slow[n // 3]
@@ -96,7 +98,7 @@ def test_how_windows_are_cut_changes_nothing_where_the_same_is_known(cuts: list[
 def test_a_new_run_begins_at_rest() -> None:
     schedule, path = ReferenceFeatures(V_S, TS), reversing(100, 0.1)
     (before,) = windows(schedule, path, 0.1, [100], 0)
-    schedule.new_run()
+    schedule.restart()
     np.testing.assert_array_equal(windows(schedule, path, 0.1, [100], 0)[0], before)
     assert not windows(ReferenceFeatures(V_S, TS), np.full(100, 0.1), 0.1, [100], 0)[0].any()
 
@@ -114,8 +116,8 @@ def test_fast_friction_is_a_sign_and_slow_friction_viscous() -> None:
 
 
 def small(**changes: Any) -> HybridPredictor:
-    values = {"Ts": TS, "Np": 20, "p": 5, "q": 3, "lam": 1e-9, "t_init": 0.0, "v_s": V_S} | changes
-    return HybridPredictor(MODEL, **values)
+    values = {"T_s": TS, "Np": 20, "p": 5, "q": 3, "lam": 1e-9, "t_init": 0.0, "v_friction": V_S} | changes
+    return HybridPredictor(MODEL, PredictorSettings(**values))
 
 
 @lru_cache(maxsize=1)
@@ -126,7 +128,7 @@ def signals() -> tuple[Array, Array, Array]:
     x_d = r + 2e-5 * np.sin(0.11 * np.arange(700))
     speed = np.diff(r, prepend=r[0]) / TS
     lag = np.convolve(np.tanh(speed / V_S), np.full(12, 1 / 12))[:700]
-    x, _ = MODEL.discretise(TS, "zoh").respond(MODEL.discretise(TS, "zoh").rest(), x_d - 5e-5 * lag)
+    x, _ = MODEL.discretise(TS, "zoh").forced_response(MODEL.discretise(TS, "zoh").rest(), x_d - 5e-5 * lag)
     return r, x_d, x + 1e-6 * rng.normal(size=700)
 
 
@@ -151,7 +153,7 @@ def test_weights_are_the_directly_solved_ridge_problem(ahead: int) -> None:
     r, x_d, x = signals()
     follow(predictor, 0, 600, ahead=ahead)
     start = float(x_d[0])
-    x_pb = oracle.physics(*oracle.transfer_function(MODES), (x_d[:600] - start).tolist(), Ts=TS)
+    x_pb = oracle.physics(*oracle.transfer_function(MODES), (x_d[:600] - start).tolist(), T_s=TS)
     e_pb = (x[:600] - start - np.array(x_pb)).tolist()
     rows = np.array([oracle.features(x_pb, e_pb, k, 5, 3) for k in range(600)])
     scheduled = [formula(r.tolist(), start, k, 20, min(k + 20 + ahead, 700)) for k in range(0, 600, 20)]
@@ -170,7 +172,7 @@ def test_a_batch_equals_its_rows_one_by_one(ahead: int) -> None:
     r, x_d, x = signals()
     follow(predictor, 0, 300, ahead=ahead)
     start, stop = float(x_d[0]), min(320 + ahead, 700)
-    x_pb = oracle.physics(*oracle.transfer_function(MODES), (x_d[:320] - start).tolist(), Ts=TS)
+    x_pb = oracle.physics(*oracle.transfer_function(MODES), (x_d[:320] - start).tolist(), T_s=TS)
     guessed = (x[:300] - start - np.array(x_pb[:300])).tolist()
     path = formula(r.tolist(), start, 300, 20, stop)
     for k in range(300, 320):
@@ -222,7 +224,7 @@ def test_the_command_is_its_own_reference_unless_another_is_given() -> None:
 
 
 def test_the_features_of_the_paper_know_no_reference() -> None:
-    first, second = small(v_s=0.0), small(v_s=0.0)
+    first, second = small(v_friction=0.0), small(v_friction=0.0)
     assert first.n_features == 2 + 3 + 5
     np.testing.assert_array_equal(follow(first, 0, 300), follow(second, 0, 300, scheduled=False))
     np.testing.assert_array_equal(first.weights, second.weights)
@@ -256,7 +258,7 @@ def test_saved_in_mid_run_continues_bit_for_bit(learned: int, measured: bool) ->
         original.predict(x_d[learned : learned + 20], reference=r[learned : learned + 65])
     twin = HybridPredictor.from_bytes(original.to_bytes())
     assert twin.to_bytes() == original.to_bytes()
-    assert twin.v_s == V_S
+    assert twin.v_friction == V_S
     if not measured:
         for predictor in (original, twin):
             predictor.update(x[learned : learned + 13])
@@ -276,19 +278,19 @@ def test_elsewhere_on_the_axis_the_features_are_the_same() -> None:
         there.update(x[k : k + 20] + 0.25)
 
 
-@pytest.mark.parametrize(("v_s", "most"), [(1e-3, 63.0), (V_S, 60.0), (5e-3, 69.0)])
-def test_friction_is_predicted_better(v_s: float, most: float) -> None:
+@pytest.mark.parametrize(("v_friction", "most"), [(1e-3, 63.0), (V_S, 60.0), (5e-3, 69.0)])
+def test_friction_is_predicted_better(v_friction: float, most: float) -> None:
     """The stage's Y axis over the spiral: RMS against the measured position, µm; its own friction has 2 mm/s."""
     assert 97.0 < stage_y_prediction_error(0.0) < 98.5
-    assert stage_y_prediction_error(v_s) < most
+    assert stage_y_prediction_error(v_friction) < most
 
 
 @lru_cache(maxsize=4)
-def stage_y_prediction_error(v_s: float) -> float:
+def stage_y_prediction_error(v_friction: float) -> float:
     machine = load_machine("als25010_y")
     r, encoder = spiral()[1], Encoder(1e-6, 0)
     x = encoder.measure_all(simulate(machine.new_plant(), r, TS))
-    predictor = machine.new_predictor(v_s=v_s)
+    predictor = machine.new_predictor(replace(machine.predictor_settings, v_friction=v_friction))
     errors = []
     for k in range(0, len(r), 100):
         errors.append(x[k : k + 100] - predictor.predict(r[k : k + 100], reference=r[k : k + 200]).x_h)
@@ -322,14 +324,14 @@ def test_a_reference_that_does_not_fit_is_refused(use: Callable[[HybridPredictor
 
 
 @pytest.mark.parametrize(
-    ("v_s", "message"),
+    ("v_friction", "message"),
     [
-        (-1e-3, "v_s must be 0 or 1e-09 … 10000 m/s, got -0.001"),
-        (math.nan, "v_s must be finite, got nan"),
-        (math.inf, "v_s must be finite, got inf"),
+        (-1e-3, "v_friction must be 0 or 1e-09 … 10000 m/s, got -0.001"),
+        (math.nan, "v_friction must be finite, got nan"),
+        (math.inf, "v_friction must be finite, got inf"),
     ],
 )
-def test_a_velocity_out_of_range_is_refused(v_s: float, message: str) -> None:
+def test_a_velocity_out_of_range_is_refused(v_friction: float, message: str) -> None:
     with pytest.raises(ParameterError) as caught:
-        small(v_s=v_s)
+        small(v_friction=v_friction)
     assert str(caught.value) == message

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from hybridsep.base.errors import ParameterError, SignalError
+from hybridsep.base.settings import PredictorSettings
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.predictor import HybridPredictor
 from hybridsep.predict.regression import RidgeRegression
@@ -164,7 +165,9 @@ def test_parameters_out_of_range(n: int, lam: float, message: str) -> None:
 def test_weights_after_the_staircase_against_extended_precision(p: int, q: int, tolerance: float) -> None:
     n, lam = 6000, 1e-12
     x_d, x = staircase.commanded()[:n], staircase.measured(0)[:n]
-    predictor = HybridPredictor(ModalModel.spring_mass_damper(staircase.M, staircase.C, staircase.K), p=p, q=q, lam=lam)
+    predictor = HybridPredictor(
+        ModalModel.spring_mass_damper(staircase.M, staircase.C, staircase.K), PredictorSettings(p=p, q=q, lam=lam)
+    )
     x_pb: list[float] = []
     for first in range(0, n, predictor.Np):
         x_pb += predictor.predict(x_d[first : first + predictor.Np]).x_pb.tolist()

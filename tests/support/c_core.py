@@ -24,7 +24,7 @@ import pytest
 from numpy.typing import NDArray
 from places import ROOT
 
-from hybridsep.base.limits import Limits
+from hybridsep.base.settings import CompensatorSettings, Limits, PredictorSettings
 from hybridsep.compensate.compensator import SepCompensator, SepState
 from hybridsep.fmi.c_header import c_header
 from hybridsep.fmi.variables import INTERPOLATED, variables_of
@@ -66,8 +66,8 @@ COMPENSATOR = {
     "a_max": 16.0,
     "j_max": 5000.0,
     "change_max": 1e-3,
-    "v_s": 2e-3,
-    "keep_direction": 1,
+    "v_friction": 2e-3,
+    "no_reversal": 1,
     "compensate": 2,
 }
 
@@ -310,22 +310,26 @@ def look_ahead(name: str, **parameters: float) -> tuple[LookAhead, CModel]:
     values = {**PREDICTOR, **parameters}
     model = ModalModel([Mode(**mode) for mode in DESCRIPTIONS[name]["modes"]], int(values["dead_time"]))
     known = {key: value for key, value in values.items() if key != "dead_time"}
-    predictor = HybridPredictor.with_parameters(model, known)
+    predictor = HybridPredictor(model, PredictorSettings.from_fmi(known))
     return LookAhead(predictor, start), CModel(name, {**values, "x_d_ahead": start, "x_meas": start}).initialise()
 
 
 def library_compensator(values: Mapping[str, Any], name: str, start: float = 0.0) -> SepCompensator:
     """Return the library's compensator with the parameters of a C model."""
     model = ModalModel([Mode(**mode) for mode in DESCRIPTIONS[name]["modes"]], int(values["dead_time"]))
-    predictor = HybridPredictor.with_parameters(
-        model, {key: values[key] for key in (*PREDICTOR, "v_s") if key != "dead_time"}, start=start
+    predictor = HybridPredictor(
+        model,
+        PredictorSettings.from_fmi({key: values[key] for key in (*PREDICTOR, "v_friction") if key != "dead_time"}),
+        start=start,
     )
     return SepCompensator(
         predictor,
-        limits=Limits(values["v_max"], values["a_max"], values["j_max"]),
-        best=SepState(values["compensate"]),
-        keep_direction=bool(values["keep_direction"]),
-        **{key: values[key] for key in ("preview", "spacing", "jerk_weight", "change_max")},
+        CompensatorSettings(
+            limits=Limits(values["v_max"], values["a_max"], values["j_max"]),
+            compensate=SepState(values["compensate"]).name.lower(),
+            no_reversal=bool(values["no_reversal"]),
+            **{key: values[key] for key in ("preview", "spacing", "jerk_weight", "change_max")},
+        ),
     )
 
 
@@ -339,10 +343,10 @@ def sep_look_ahead(name: str, **parameters: float) -> tuple[LookAhead, CModel]:
 
 def write_weights(folder: Path, name: str, factor: Array, n_samples: int, **settings: float) -> None:
     """Write ``weights.bin``, as the C model describes it, into a resources folder; ``settings`` replace the table's."""
-    values = {"v_s": 0.0, **DESCRIPTIONS[name]["parameters"], **settings}
+    values = {"v_friction": 0.0, **DESCRIPTIONS[name]["parameters"], **settings}
     modes = [mode[key] for mode in DESCRIPTIONS[name]["modes"] for key in ("f_n", "zeta", "alpha", "beta")]
     whole = (*(int(values[key]) for key in ("p", "q", "input_hold", "dead_time")), len(modes) // 4, n_samples)
-    content = b"HSEPWGT2" + struct.pack("<6Q3d", *whole, *(values[key] for key in ("lambda", "T_s", "v_s")))
+    content = b"HSEPWGT2" + struct.pack("<6Q3d", *whole, *(values[key] for key in ("lambda", "T_s", "v_friction")))
     content += np.concatenate([modes, *(factor[i, i:] for i in range(len(factor)))]).astype("<f8").tobytes()
     (folder / "weights.bin").write_bytes(content + struct.pack("<Q", zlib.crc32(content)))
 

@@ -304,7 +304,7 @@ class Fuzzer:
             "dead_time": (0, 10),
             "preview": (150, 260),
             "spacing": (1, 2),
-            "keep_direction": (0, 1),
+            "no_reversal": (0, 1),
             "compensate": (0, 2),
             "trajectory": (0, 2),
             "seed": (0, 9),

@@ -14,8 +14,8 @@ __all__ = ["FORMATS", "Columns", "columns", "write", "write_csv"]
 Columns = dict[str, Any]
 
 
-def columns(n: int = 50, Ts: float = 1e-3) -> Columns:
-    t = np.arange(n) * Ts
+def columns(n: int = 50, T_s: float = 1e-3) -> Columns:
+    t = np.arange(n) * T_s
     return {"t": t, "x_d": np.sin(t), "x": 0.9 * np.sin(t)}
 
 

@@ -41,7 +41,7 @@ def transfer_function(modes: Sequence[tuple[float, float, float, float]]) -> tup
 
 
 def physics(
-    numerator: Array, denominator: Array, x_d: Sequence[float], *, Ts: float, hold: str = "zoh", dead_time: int = 0
+    numerator: Array, denominator: Array, x_d: Sequence[float], *, T_s: float, hold: str = "zoh", dead_time: int = 0
 ) -> list[float]:
     """Eq. (2): answer commands from rest, sample by sample.
 
@@ -51,7 +51,7 @@ def physics(
         G_pb(s), highest power first.
     x_d : sequence of float, m
         Commands relative to the position of rest.
-    Ts : float, s
+    T_s : float, s
     hold : {"zoh", "foh"}
     dead_time : int, samples
 
@@ -60,8 +60,8 @@ def physics(
     list of float, m
     """
     # With the sampling interval as the unit of time the coefficients stay near one another.
-    num = numerator * Ts ** -np.arange(len(numerator) - 1.0, -1.0, -1.0)
-    den = denominator * Ts ** -np.arange(len(denominator) - 1.0, -1.0, -1.0)
+    num = numerator * T_s ** -np.arange(len(numerator) - 1.0, -1.0, -1.0)
+    den = denominator * T_s ** -np.arange(len(denominator) - 1.0, -1.0, -1.0)
     A, B, C, D = (np.asarray(matrix) for matrix in cont2discrete(tf2ss(num, den), 1.0, method=hold)[:4])
     s = np.zeros(len(A))
     x_pb = []
@@ -137,7 +137,7 @@ def run(
     x_d: Array,
     x: Array,
     *,
-    Ts: float,
+    T_s: float,
     Np: int,
     p: int,
     q: int,
@@ -154,7 +154,7 @@ def run(
         G_pb(s), highest power first.
     x_d, x : (n,) arrays, m
         Commanded and measured positions; the last batch may be short.
-    Ts, t_init : float, s
+    T_s, t_init : float, s
     Np, p, q : int
     lam : float, m²
     hold : {"zoh", "foh"}
@@ -162,7 +162,7 @@ def run(
     """
     start = float(x_d[0])
     relative = [float(value) - start for value in x_d]
-    x_pb = physics(numerator, denominator, relative, Ts=Ts, hold=hold, dead_time=dead_time)
+    x_pb = physics(numerator, denominator, relative, T_s=T_s, hold=hold, dead_time=dead_time)
     out = OracleRun()
     e_pb: list[float] = []  # measured residuals so far
     rows: list[list[float]] = []
@@ -175,7 +175,7 @@ def run(
         guessed = list(e_pb)
         for k in batch:
             guessed.append(float(w @ np.array(features(x_pb, guessed, k, p, q))))
-            warm = k * Ts < t_init - 1e-6 * Ts
+            warm = k * T_s < t_init - 1e-6 * T_s
             out.x_pb.append(x_pb[k] + start)
             out.x_h.append(x_pb[k] + start + (0.0 if warm else guessed[k]))
             out.active.append(not warm)

@@ -15,7 +15,7 @@ import pytest
 from c_core import CModel, RefusedError, write_trajectory
 
 from hybridsep import FmuError, FmuInstance, HybridSepError, build_fmu, load_machine
-from hybridsep.base.limits import Limits
+from hybridsep.base.settings import CompensatorSettings, Limits, PredictorSettings
 from hybridsep.base.state import pack, unpack
 from hybridsep.compensate.compensator import SepCompensator, SepState
 from hybridsep.machine import Machine
@@ -336,18 +336,22 @@ _LIBRARY: dict[str, type[LookAheadStream] | type[PlantStream]] = {
 def _predictor(machine: Machine, values: Mapping[str, Value], start: float) -> LookAhead:
     parameters = {**machine.fmi_parameters(), **values}
     names = ("Np", "p", "q", "lambda", "T_s", "t_init", "input_hold")
-    return LookAhead(HybridPredictor.with_parameters(machine.model, {name: parameters[name] for name in names}), start)
+    return LookAhead(
+        HybridPredictor(machine.model, PredictorSettings.from_fmi({name: parameters[name] for name in names})), start
+    )
 
 
 def _compensator(machine: Machine, values: Mapping[str, Value], start: float) -> LookAhead:
     parameters: dict[str, Any] = {**machine.fmi_compensator_parameters(), **values}
-    names = ("Np", "p", "q", "lambda", "T_s", "t_init", "input_hold", "v_s")
+    names = ("Np", "p", "q", "lambda", "T_s", "t_init", "input_hold", "v_friction")
     compensator = SepCompensator(
-        HybridPredictor.with_parameters(machine.model, {name: parameters[name] for name in names}),
-        limits=Limits(parameters["v_max"], parameters["a_max"], parameters["j_max"]),
-        keep_direction=bool(parameters["keep_direction"]),
-        best=SepState(parameters["compensate"]),
-        **{name: parameters[name] for name in ("preview", "spacing", "jerk_weight", "change_max")},
+        HybridPredictor(machine.model, PredictorSettings.from_fmi({name: parameters[name] for name in names})),
+        CompensatorSettings(
+            limits=Limits(parameters["v_max"], parameters["a_max"], parameters["j_max"]),
+            no_reversal=bool(parameters["no_reversal"]),
+            compensate=SepState(parameters["compensate"]).name.lower(),
+            **{name: parameters[name] for name in ("preview", "spacing", "jerk_weight", "change_max")},
+        ),
     )
     return LookAhead(compensator, start)
 

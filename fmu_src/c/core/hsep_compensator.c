@@ -31,7 +31,7 @@ HSEP_API hsep_regression *hsep_compensator_regression(hsep_compensator *self)
 
 static uint64_t compensator_scheduled(const hsep_compensator_parameters *parameters)
 {
-    return parameters->v_s > 0.0 ? HSEP_SCHEDULED : 0;
+    return parameters->v_friction > 0.0 ? HSEP_SCHEDULED : 0;
 }
 
 /* Entries of phi. */
@@ -73,7 +73,7 @@ static void compensator_lay_out(hsep_compensator *self, const hsep_compensator_p
     self->p = parameters->p;
     self->q = parameters->q;
     self->n_scheduled = compensator_scheduled(parameters);
-    self->sign_step = parameters->v_s * parameters->T_s;
+    self->sign_step = parameters->v_friction * parameters->T_s;
     self->best = (uint64_t)parameters->best;
     self->n_init = parameters->n_init;
     uint64_t end = compensator_first;

@@ -42,7 +42,7 @@ typedef struct {
     uint64_t n_modes;   /* >= 1 */
     double lambda;      /* m2, > 0 */
     double T_s;         /* s, > 0 */
-    double v_s;         /* m/s, over which friction changes its sign; 0: no features of the reference */
+    double v_friction;         /* m/s, over which friction changes its sign; 0: no features of the reference */
     double n_init;      /* samples from the beginning in which the physics model plans; whole, >= 0 */
     hsep_hold hold;
     hsep_sep_state best;
@@ -54,7 +54,7 @@ typedef struct {
     uint64_t n_scheduled; /* features of the reference */
     uint64_t best;
     double n_init;
-    double sign_step;    /* v_s T_s, m */
+    double sign_step;    /* v_friction T_s, m */
     double start;        /* position of rest, m */
     double x_d_last;     /* m, the commanded position before the window */
     uint64_t k;          /* the sample that comes next */

@@ -54,7 +54,7 @@ static void planner_lay_out(hsep_planner *self, const hsep_planner_parameters *p
     self->Np = parameters->Np;
     self->n_pinned = (half < PLANNER_PINNED ? half : PLANNER_PINNED) / parameters->spacing;
     self->size = (uint64_t)hsep_planner_size(parameters);
-    self->keep_direction = parameters->keep_direction != 0;
+    self->no_reversal = parameters->no_reversal != 0;
     self->jerk_weight = parameters->jerk_weight;
     uint64_t end = planner_first;
     self->c = planner_take(&end, HSEP_DECIDED + n);
@@ -151,7 +151,7 @@ static void planner_total(const hsep_planner *self, const double x_d[])
         const double delta = hsep_planner_delta(self, k), step = x_d[k] - last;
         double now[HSEP_ORDERS];
         last = x_d[k];
-        moves[k] = self->keep_direction ? (double)((step > planner_moves) - (step < -planner_moves)) : 0.0;
+        moves[k] = self->no_reversal ? (double)((step > planner_moves) - (step < -planner_moves)) : 0.0;
         now[0] = x_d[k] + delta;
         total[k] = delta * splines->share[0];
         for (unsigned order = 1; order < HSEP_ORDERS; order++) {

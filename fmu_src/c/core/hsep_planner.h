@@ -23,7 +23,7 @@ typedef struct {
     uint64_t spacing;  /* samples between knots, a divisor of Np */
     double jerk_weight; /* of the third differences of delta against the tracking error, >= 0 */
     double limit[HSEP_ORDERS]; /* of |delta|, m, and of the differences of x_dm of orders 1 to 3, m; all > 0 */
-    int keep_direction;        /* whether x_dm never turns while x_d moves */
+    int no_reversal;        /* whether x_dm never turns while x_d moves */
 } hsep_planner_parameters;
 
 typedef enum {
@@ -36,7 +36,7 @@ typedef struct {
     uint64_t Np;
     uint64_t n_pinned; /* splines of a bounded plan that stay as they were */
     uint64_t size;     /* of the block, bytes */
-    uint64_t keep_direction;
+    uint64_t no_reversal;
     double jerk_weight;
     double delta_before[3], x_d_before[3]; /* m, of the samples before the plan */
     /* Offsets in doubles from the beginning of the struct */

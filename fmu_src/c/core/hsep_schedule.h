@@ -1,4 +1,4 @@
-/* Features that follow from the reference alone: which way friction will push. psi = tanh(v / v_s) of the commanded
+/* Features that follow from the reference alone: which way friction will push. psi = tanh(v / v_friction) of the commanded
  * velocity v, and of it some samples before and after, enter phi as further features.
  *
  * The signs psi of a plan are kept from HSEP_SCHEDULE_REACH samples before it to as many after it, (n + 2 reach,): that
@@ -15,7 +15,7 @@
 #define HSEP_SCHEDULE_REACH 40 /* samples by which the farthest of them are shifted */
 
 /* Fill the signs of n samples of the reference, m, and what follows them, which is at rest. last: the reference one
- * sample before, m; step: v_s T_s, m. Cost: n tanh. */
+ * sample before, m; step: v_friction T_s, m. Cost: n tanh. */
 HSEP_API void hsep_schedule_signs(double signs[], const double reference[], uint64_t n, double last, double step);
 
 /* The features of sample k, m. */

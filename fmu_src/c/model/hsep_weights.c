@@ -13,7 +13,7 @@
 typedef struct {
     char magic[8];
     uint64_t p, q, input_hold, dead_time, n_modes, n_samples;
-    double lambda, T_s, v_s;
+    double lambda, T_s, v_friction;
 } weights_head;
 
 /* CRC-32 as in zlib, 4 bits at a time, of bytes behind those that gave crc. */
@@ -106,7 +106,7 @@ static int weights_take(
     weights_compare("T_s", head.T_s, settings->T_s, HSEP_REAL, message);
     weights_compare("input_hold", (double)head.input_hold, (double)settings->input_hold, HSEP_INTEGER, message);
     weights_compare("dead_time", (double)head.dead_time, (double)settings->dead_time, HSEP_INTEGER, message);
-    weights_compare("v_s", head.v_s, settings->v_s, HSEP_REAL, message);
+    weights_compare("v_friction", head.v_friction, settings->v_friction, HSEP_REAL, message);
     if (!weights_compare_modes(file, head.n_modes, settings, message) || message[0] != '\0') {
         return 0;
     }

@@ -119,7 +119,7 @@ HSEP_API hsep_status hsep_model_initialise(
         .n_modes = HSEP_N_MODES,
         .lambda = parameters.lambda,
         .T_s = parameters.T_s,
-        .v_s = 0.0,
+        .v_friction = 0.0,
         .modes = modes};
     if (hsep_weights_load(context, &learned, hsep_predictor_regression(&self->predictor), message) != HSEP_OK) {
         return HSEP_REFUSED;

@@ -56,7 +56,7 @@ static hsep_status compensator_checked(
     int problems = hsep_check_lags(values[HSEP_VR_Np], values[HSEP_VR_p], values[HSEP_VR_q], message);
     problems += compensator_check_plan(values, message);
     const double v_max = values[HSEP_VR_v_max] * T_s, a_max = values[HSEP_VR_a_max] * (T_s * T_s);
-    const double j_max = values[HSEP_VR_j_max] * (T_s * T_s * T_s), v_s = values[HSEP_VR_v_s];
+    const double j_max = values[HSEP_VR_j_max] * (T_s * T_s * T_s), v_friction = values[HSEP_VR_v_friction];
     /* The warm-up counts from the end of the first fill; without one, the first window is planned with what is known. */
     const double t_plan = t_init > 0.0 ? t_init + values[HSEP_VR_preview] * T_s : 0.0;
     const double n_init = hsep_warm_up_samples(t_plan, T_s);
@@ -72,14 +72,14 @@ static hsep_status compensator_checked(
              .jerk_weight = values[HSEP_VR_jerk_weight],
              .limit =
                  {values[HSEP_VR_change_max], v_max, a_max, j_max},
-             .keep_direction = values[HSEP_VR_keep_direction] > 0.0},
+             .no_reversal = values[HSEP_VR_no_reversal] > 0.0},
         .p = (uint64_t)values[HSEP_VR_p],
         .q = (uint64_t)values[HSEP_VR_q],
         .dead_time = (uint64_t)values[HSEP_VR_dead_time],
         .n_modes = HSEP_N_MODES,
         .lambda = values[HSEP_VR_lambda],
         .T_s = T_s,
-        .v_s = v_s,
+        .v_friction = v_friction,
         .n_init = n_init,
         .hold = values[HSEP_VR_input_hold] > 0.0 ? HSEP_FIRST_ORDER_HOLD : HSEP_ZERO_ORDER_HOLD,
         .best = (hsep_sep_state)values[HSEP_VR_compensate],
@@ -137,7 +137,7 @@ HSEP_API hsep_status hsep_model_initialise(
         .n_modes = HSEP_N_MODES,
         .lambda = parameters.lambda,
         .T_s = parameters.T_s,
-        .v_s = parameters.v_s,
+        .v_friction = parameters.v_friction,
         .modes = modes};
     if (hsep_weights_load(context, &learned, hsep_compensator_regression(&self->compensator), message) != HSEP_OK) {
         return HSEP_REFUSED;

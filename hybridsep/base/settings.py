@@ -1,0 +1,343 @@
+"""Every parameter, declared once: settings of the predictor and the compensator, and the numbers of machines.
+
+The library's checks, the machine files' entries, the FMUs' variables, the saved states, the check of a warm start, the
+command line's help and the C core's settings all come from here. Section 2 of the paper's method fixes the limits that
+tie several together: ``0 ≤ q < Np`` and ``1 ≤ p ≤ Np``.
+
+The ranges of physical quantities are a few powers of ten wider than any feed drive needs, and so narrow that no
+arithmetic on them overflows: the largest response to a position of 1 km, of the slowest mode with the largest gain and
+the least damping, is below 1e30 m, and the least limit, counted in samples, that anything is divided by is 1e-21 m.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import MISSING, asdict, dataclass, fields, replace
+from typing import Any, ClassVar, TypeVar
+
+from .errors import ParameterError
+from .parameters import Parameter, choice, flag, real, whole
+
+__all__ = [
+    "PARAMETERS",
+    "CompensatorSettings",
+    "Limits",
+    "PredictorSettings",
+    "Settings",
+    "check",
+    "samples_before",
+]
+
+_SettingsType = TypeVar("_SettingsType", bound="Settings")
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Parameters that belong together, each checked when it is given.
+
+    Raises
+    ------
+    ParameterError
+        Naming every parameter that is out of its range, or what does not fit together.
+    """
+
+    OPTIONAL: ClassVar[tuple[str, ...]] = ()
+    """Fields that may be None."""
+
+    def __post_init__(self) -> None:
+        problems = []
+        for name, parameter in self.parameters().items():
+            value = getattr(self, name)
+            if value is None and name in self.OPTIONAL:
+                continue
+            try:
+                object.__setattr__(self, name, parameter.checked(value, self._label(name)))
+            except ParameterError as error:
+                problems.append(str(error))
+        problems = problems or self._misfits()
+        if problems:
+            raise ParameterError("; ".join(problems))
+
+    @classmethod
+    def parameters(cls) -> dict[str, Parameter]:
+        """Return the parameters by the names of their fields."""
+        return {
+            field.name: replace(field.metadata["parameter"], name=field.metadata["parameter"].name or field.name)
+            for field in fields(cls)
+            if "parameter" in field.metadata
+        }
+
+    @classmethod
+    def fmi_parameters(cls) -> dict[str, Parameter]:
+        """Return the parameters, those of settings within these too, by their names in FMUs."""
+        return {parameter.name: parameter for parameter in cls.parameters().values()}
+
+    @classmethod
+    def from_fmi(cls: type[_SettingsType], values: Mapping[str, Any]) -> _SettingsType:
+        """Return the settings that an FMU's values describe.
+
+        Parameters
+        ----------
+        values : mapping
+            By the names of the variables; may hold more, and what it lacks has its default.
+
+        Raises
+        ------
+        ParameterError
+            Naming every value that is out of its range.
+        """
+        given, problems = {}, []
+        for name, parameter in cls.fmi_parameters().items():
+            if name in values:
+                try:
+                    given[name] = parameter.checked(parameter.from_fmi(values[name]))
+                except ParameterError as error:
+                    problems.append(str(error))
+        if problems:
+            raise ParameterError("; ".join(problems))
+        return cls._from_checked(given)
+
+    @classmethod
+    def _from_checked(cls: type[_SettingsType], values: Mapping[str, Any]) -> _SettingsType:
+        parameters = cls.parameters().items()
+        return cls(**{name: values[parameter.name] for name, parameter in parameters if parameter.name in values})
+
+    def to_fmi(self) -> dict[str, float | int | bool]:
+        """Return the values of an FMU's variables; None, for what an FMU must have, is left out."""
+        found = {parameter.name: (parameter, getattr(self, name)) for name, parameter in self.parameters().items()}
+        return {name: parameter.to_fmi(value) for name, (parameter, value) in found.items() if value is not None}
+
+    def as_table(self) -> dict[str, Any]:
+        """Return plain scalars and tables by the names of the fields, for a saved state."""
+        return asdict(self)
+
+    @classmethod
+    def from_table(cls: type[_SettingsType], table: Mapping[str, Any]) -> _SettingsType:
+        """Return what :meth:`as_table` described; ParameterError if an entry is missing, unknown or out of range."""
+        names = [field.name for field in fields(cls)]
+        if sorted(table) != sorted(names):
+            raise ParameterError(f"settings must be {', '.join(names)}, got {', '.join(map(str, table))}")
+        return cls(**table)
+
+    def _misfits(self) -> list[str]:
+        """Say what does not fit together; nothing if all does."""
+        return []
+
+    @classmethod
+    def _label(cls, name: str) -> str | None:
+        """Return what a field is called in messages; None for its parameter's name."""
+        return None
+
+
+@dataclass(frozen=True, kw_only=True)
+class PredictorSettings(Settings):
+    """Parameters of the hybrid predictor, eqs. (3) to (6).
+
+    Attributes
+    ----------
+    Np : int
+        Samples in a window (a batch).
+    p, q : int
+        Lags of ``e_pb`` and of ``x_pb`` in φ, ``1 ≤ p ≤ Np`` and ``0 ≤ q < Np``.
+    lam : float
+        λ of eq. (6), m²; ``lambda`` in FMUs and machine files.
+    T_s : float
+        Sampling interval, s.
+    t_init : float
+        Warm-up, s: for ``t < t_init``, ``x_h = x_pb`` is published.
+    input_hold : {"zoh", "foh"}
+        How ``x_d`` runs between samples in the physics model.
+    v_friction : float
+        Velocity over which the drive's friction changes its sign, m/s: φ has further features then, of the reference
+        alone (:mod:`~hybridsep.predict.reference_features`). 0, as in the paper: none.
+    """
+
+    Np: int = whole(100, 1, 100_000, "samples in a look-ahead window (a batch)")
+    p: int = whole(50, 1, 5000, "past residuals e_pb in the features", learned=True)
+    q: int = whole(3, 0, 5000, "past physics-based predictions x_pb in the features", learned=True)
+    lam: float = real(1e-12, 1e-40, 1e12, "m2", "ridge penalty on the weights", name="lambda", learned=True)
+    T_s: float = real(1e-3, 1e-5, 1.0, "s", "sampling interval", display_unit="ms", learned=True)
+    t_init: float = real(0.3, 0.0, 1e6, "s", "warm-up: until then x_h = x_pb, while learning goes on")
+    input_hold: str = choice("zoh", ("zoh", "foh"), "x_d between samples: zero-order or first-order hold", learned=True)
+    v_friction: float = real(
+        *(2e-3, 0.0, 1e4, "m/s"),
+        "velocity over which friction changes its sign, for features of the reference; 0: none of them",
+        display_unit="mm/s",
+        nonzero=1e-9,
+        learned=True,
+        unless_given=0.0,
+    )
+
+    def _misfits(self) -> list[str]:
+        problems = []
+        if not self.p <= self.Np:
+            problems.append(f"p must be 1 … Np = {self.Np}, got {self.p}; lower p or raise Np")
+        if not self.q < self.Np:
+            problems.append(f"q must be 0 … Np − 1 = {self.Np - 1}, got {self.q}; lower q or raise Np")
+        return problems
+
+
+@dataclass(frozen=True)
+class Limits(Settings):
+    """What a move may demand.
+
+    Attributes
+    ----------
+    velocity, acceleration, jerk : float
+        m/s, m/s² and m/s³; ``v_max``, ``a_max`` and ``j_max`` in FMUs.
+    """
+
+    velocity: float = real(
+        *(0.1, 1e-9, 1e4, "m/s", "largest velocity of the modified command"),
+        name="v_max",
+        display_unit="mm/s",
+        unless_given=MISSING,
+    )
+    acceleration: float = real(
+        *(16.0, 1e-6, 1e6, "m/s2", "largest acceleration of the modified command"), name="a_max", unless_given=MISSING
+    )
+    jerk: float = real(
+        *(5000.0, 1e-6, 1e12, "m/s3", "largest jerk of the modified command"), name="j_max", unless_given=MISSING
+    )
+
+    @classmethod
+    def _label(cls, name: str) -> str:
+        return f"the {name} limit"
+
+
+@dataclass(frozen=True, kw_only=True)
+class CompensatorSettings(Settings):
+    """Parameters that a compensator has besides its predictor's.
+
+    Attributes
+    ----------
+    preview : int, optional
+        Samples planned ahead, at least ``Np + 4·spacing + 3``; ``2·Np`` or 200, whichever is more, if left out.
+    spacing : int, optional
+        Samples between knots, a divisor of ``Np``: the finer, the faster the change of the command may vary.
+    jerk_weight : float
+        Weight of the sum of squares of the change's third differences, against that of the tracking error.
+    limits : Limits, optional
+        The drive's own limits, which ``x_dm`` keeps in its differences; none if left out.
+    change_max : float, optional
+        Bound on the magnitude of the change, m; none if None.
+    no_reversal : bool
+        Whether ``x_dm`` never turns while ``x_d`` moves: friction would turn with it. Needs ``limits``; without them it
+        has no effect, and a predictor with ``v_friction > 0`` may then be worse than without.
+    compensate : {"off", "physics", "hybrid"}
+        Best model to use; ``"off"`` leaves the command as it is.
+    """
+
+    OPTIONAL: ClassVar[tuple[str, ...]] = ("preview", "spacing", "change_max")
+
+    preview: int | None = whole(
+        *(200, 8, 2000, "samples planned ahead, at least Np + 4·spacing + 3"), unless_given=None
+    )
+    spacing: int | None = whole(
+        *(2, 1, 1000, "samples between the knots of the change, a divisor of Np"), unless_given=None
+    )
+    jerk_weight: float = real(1.0, 0.0, 1e12, "1", "weight of the change's jerk against the tracking error")
+    limits: Limits | None = None
+    change_max: float | None = real(1e-3, 1e-12, 10.0, "m", "largest change of the command", display_unit="mm")
+    no_reversal: bool = flag(True, "whether x_dm never turns while the commanded position moves")
+    compensate: str = choice("hybrid", ("off", "physics", "hybrid"), "best model to compensate with")
+
+    def for_window(self, Np: int) -> CompensatorSettings:
+        """Return these settings for windows of ``Np`` samples, with what was left out.
+
+        Raises
+        ------
+        ParameterError
+            If ``preview`` or ``spacing`` does not fit ``Np``.
+        """
+        usual = self.parameters()
+        spacing, preview = self.spacing, self.preview
+        if spacing is None:
+            spacing = 1 if Np % usual["spacing"].default else int(usual["spacing"].default)
+        if preview is None:
+            preview = min(max(2 * Np, int(usual["preview"].default)), int(usual["preview"].maximum))
+        problems = []
+        if Np % spacing:
+            problems.append(f"spacing must be ≥ 1 and divide Np = {Np}, got {spacing}")
+        least = Np + 4 * spacing + 3
+        if preview < least:
+            problems.append(f"preview must be ≥ Np + 4·spacing + 3 = {least}, got {preview}")
+        if problems:
+            raise ParameterError("; ".join(problems))
+        return replace(self, spacing=spacing, preview=preview)
+
+    @classmethod
+    def fmi_parameters(cls) -> dict[str, Parameter]:
+        """Return the parameters, those of the limits too, by their names in FMUs."""
+        return {**super().fmi_parameters(), **Limits.fmi_parameters()}
+
+    @classmethod
+    def _from_checked(cls, values: Mapping[str, Any]) -> CompensatorSettings:
+        return replace(super()._from_checked(values), limits=Limits._from_checked(values))
+
+    def to_fmi(self) -> dict[str, float | int | bool]:
+        """Return the values of an FMU's variables; None, for what an FMU must have, is left out."""
+        return {**super().to_fmi(), **({} if self.limits is None else self.limits.to_fmi())}
+
+    @classmethod
+    def from_table(cls, table: Mapping[str, Any]) -> CompensatorSettings:
+        """Return what :meth:`as_table` described."""
+        limits = table.get("limits")
+        return super().from_table({**table, "limits": None if limits is None else Limits.from_table(limits)})
+
+
+_OTHERS = (
+    whole(0, 0, 100_000, "whole samples of dead time in the physics model", name="dead_time", learned=True),
+    # One mode of eq. (15).
+    real(None, 1e-3, 1e5, "Hz", "natural frequency of the mode", name="f_n", learned=True),
+    real(None, 1e-6, 1e4, "1", "damping ratio of the mode", name="zeta", learned=True),
+    real(None, -1e15, 1e15, "1/s2", "numerator of the mode, constant term", name="alpha", learned=True),
+    real(None, -1e10, 1e10, "1/s", "numerator of the mode, factor of s", name="beta", learned=True),
+    # The nonlinear drive of eq. (13).
+    real(None, 1e-6, 1e6, "kg", "moving mass", name="m"),
+    real(None, 1e-9, 1e12, "N.s/m", "damping", name="c"),
+    real(None, 1e-6, 1e15, "N/m", "stiffness", name="k"),
+    real(0.0, 0.0, 1e12, "N.s2/m2", "quadratic damping, force c_nl·v·|v|", name="c_nl"),
+    real(0.0, 0.0, 1e15, "N/m2", "quadratic stiffness, force k_nl·x·|x|", name="k_nl"),
+    # The stage's disturbance and the encoder.
+    real(0.0, 0.0, 1.0, "m", "friction of the carriage, as an offset of the command", name="f", display_unit="um"),
+    real(0.0, 0.0, 1e6, "1/m", "cable stiffness, an offset kappa·x·|x| of the command", name="kappa"),
+    real(0.0, 0.0, 1.0, "m", "standard deviation of the encoder noise", name="noise_std", display_unit="um"),
+    whole(0, 0, 2**31 - 1, "seed of the encoder noise", name="seed"),
+    # The source of commands.
+    choice("staircase", ("staircase", "spiral_x", "spiral_y", "samples"), "what is played", name="trajectory"),
+)
+"""Arguments of models, plants and trajectories."""
+
+PARAMETERS: Mapping[str, Parameter] = {
+    **PredictorSettings.fmi_parameters(),
+    **CompensatorSettings.fmi_parameters(),
+    **{parameter.name: parameter for parameter in (field.metadata["parameter"] for field in _OTHERS)},
+}
+"""All parameters by their names in FMUs."""
+
+
+def check(name: str, value: Any, *, label: str | None = None) -> Any:
+    """Return ``value`` as the own type of a parameter of :data:`PARAMETERS`.
+
+    Parameters
+    ----------
+    name : str
+        In FMUs.
+    value : Any
+        What the user gave.
+    label : str, optional
+        Name to use in the message, for example ``"mode[2].zeta"``.
+
+    Raises
+    ------
+    ParameterError
+        If the value is of another kind, not finite, or out of range.
+    """
+    return PARAMETERS[name].checked(value, label)
+
+
+def samples_before(t: float, T_s: float) -> int:
+    """Return how many samples ``0, T_s, …`` come before ``t``, both in s, so that rounding of times cannot tell."""
+    return max(0, math.ceil(t / T_s - 1e-6))

@@ -1,0 +1,190 @@
+"""Sections of a machine file; their entries' ranges come from :mod:`hybridsep.base.settings`."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, create_model, model_validator
+
+from .base.settings import PARAMETERS, CompensatorSettings, PredictorSettings, Settings, check
+
+__all__ = [
+    "CompensatorSection",
+    "DriveLimitsSection",
+    "Entries",
+    "FeedDriveSection",
+    "LimitsSection",
+    "Line",
+    "LogSection",
+    "Number",
+    "Physics",
+    "PredictorSection",
+    "Section",
+    "StageSection",
+]
+
+
+def _checked(value: Any, info: ValidationInfo) -> Any:
+    """Check a field against the parameter of the same (FMI) name."""
+    name = str(info.field_name)
+    return check({"lam": "lambda"}.get(name, name), value)
+
+
+def _checked_limit(value: Any, info: ValidationInfo) -> Any:
+    """Check one of a drive's or a trajectory's limits against the range of the compensator's."""
+    name = str(info.field_name)
+    return check({"velocity": "v_max", "acceleration": "a_max", "jerk": "j_max"}[name], value, label=name)
+
+
+Number = Annotated[float, BeforeValidator(_checked)]
+Whole = Annotated[int, BeforeValidator(_checked)]
+Limit = Annotated[float, BeforeValidator(_checked_limit)]
+
+Line = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f\x{FFFE}\x{FFFF}]+$")]
+"""One line of printable text, of characters that XML 1.0 allows: the modelDescription and the FMU's page have it."""
+
+
+class Section(BaseModel):
+    """Entries of a table of the file; unknown ones are refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class ModeSection(Section):
+    """One mode of eq. (15)."""
+
+    f_n: Number
+    zeta: Number
+    alpha: Number
+    beta: Number = 0.0
+
+
+class SpringMassDamper(Section):
+    """Eq. (11)."""
+
+    m: Number
+    c: Number
+    k: Number
+
+
+class Physics(Section):
+    """``G_pb``: either ``[[physics.mode]]`` entries or one ``[physics.spring_mass_damper]``."""
+
+    mode: tuple[ModeSection, ...] = ()
+    spring_mass_damper: SpringMassDamper | None = None
+    dead_time: Whole = PARAMETERS["dead_time"].default
+    input_hold: Literal["zoh", "foh"] = "zoh"
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> Physics:
+        if bool(self.mode) == (self.spring_mass_damper is not None):
+            raise ValueError("give either [[physics.mode]] entries or one [physics.spring_mass_damper]")
+        return self
+
+
+def _settings_section(settings: type[Settings], without: tuple[str, ...], *, inherits: bool = False) -> dict[str, Any]:
+    """Return the entries of a section, by the names of the fields of settings.
+
+    Parameters
+    ----------
+    settings : type of Settings
+    without : tuple of str
+        Fields that come from elsewhere.
+    inherits : bool
+        Whether an entry that is left out is another section's.
+    """
+    entries: dict[str, Any] = {}
+    for field, parameter in ((field, settings.parameters().get(field.name)) for field in fields(settings)):
+        if parameter is not None and field.name not in without:
+            default = None if inherits else field.default
+            kind: Any = parameter.kind if default is not None else parameter.kind | None
+            kind = Annotated[kind, BeforeValidator(_checked)]
+            alias = None if parameter.name == field.name else parameter.name
+            entries[field.name] = (kind, Field(default=default, alias=alias))
+    return entries
+
+
+_FROM_ELSEWHERE = ("T_s", "input_hold", "v_friction")
+
+
+class Entries(Section):
+    """A section whose entries are settings."""
+
+    def given(self) -> dict[str, Any]:
+        """Return the entries that the file has or that have a default, by the names of the settings' fields."""
+        return self.model_dump(exclude_none=True)
+
+
+class _PredictorEntries(Entries):
+    @model_validator(mode="after")
+    def _lags_fit(self) -> _PredictorEntries:
+        PredictorSettings(**self.given())
+        return self
+
+
+if TYPE_CHECKING:  # no checker of types follows create_model
+
+    class PredictorSection(Entries): ...
+
+    class CompensatorSection(Entries): ...
+
+else:
+    PredictorSection = create_model(
+        "PredictorSection",
+        __base__=_PredictorEntries,
+        __doc__="Parameters of the hybrid predictor.",
+        **_settings_section(PredictorSettings, _FROM_ELSEWHERE),
+    )
+    CompensatorSection = create_model(
+        "CompensatorSection",
+        __base__=Entries,
+        __doc__="Parameters of the compensator; the predictor's count where they are left out.",
+        **{
+            **_settings_section(PredictorSettings, ("T_s", "input_hold", "v_friction"), inherits=True),
+            **_settings_section(CompensatorSettings, ("limits", "change_max", "compensate")),
+            "v_friction": (Number, PARAMETERS["v_friction"].default),
+        },
+    )
+
+
+class FeedDriveSection(Section):
+    """The drive of eq. (13); its linear part is ``[physics.spring_mass_damper]``."""
+
+    kind: Literal["feed_drive"]
+    c_nl: Number = PARAMETERS["c_nl"].default
+    k_nl: Number = PARAMETERS["k_nl"].default
+    noise_std: Number = PARAMETERS["noise_std"].default
+    seed: Whole = PARAMETERS["seed"].default
+
+
+class StageSection(Section):
+    """The stage: ``[[physics.mode]]`` with friction and cable stiffness on the command."""
+
+    kind: Literal["stage"]
+    f: Number = PARAMETERS["f"].default
+    kappa: Number = PARAMETERS["kappa"].default
+    noise_std: Number = PARAMETERS["noise_std"].default
+    seed: Whole = PARAMETERS["seed"].default
+
+
+class LimitsSection(Section):
+    """Velocity, acceleration and jerk of the reference trajectory, m/s, m/s², m/s³."""
+
+    velocity: Limit
+    acceleration: Limit
+    jerk: Limit
+
+
+class DriveLimitsSection(LimitsSection):
+    """What the drive itself allows of a modified command, wider than the trajectory's limits."""
+
+    change_max: Number = PARAMETERS["change_max"].default
+
+
+class LogSection(Section):
+    """Names of a recorded log's columns."""
+
+    t: str = "t"
+    x_d: str = "x_d"
+    x: str = "x"
