@@ -123,7 +123,7 @@ def main() -> int:
         seconds = perf_counter() - begin
 
     rows = feature_rows(x_pb, x - x_pb, P_LAGS, Q_LAGS)
-    error = relative_error(predictor.weights, exact_weights(rows, predictor.lam, repetitions))
+    error = relative_error(predictor.weights, exact_weights(rows, predictor.settings.lam, repetitions))
     growth = memory[1] - memory[0]
 
     table = Table(title=f"n = {predictor.n_features} features, a block of {BLOCK} samples {repetitions} times")

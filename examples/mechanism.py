@@ -32,7 +32,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import toeplitz
 
-from hybridsep.base.parameters import check
+from hybridsep.base.settings import check
 from hybridsep.base.signals import Array
 from hybridsep.model.discrete import DiscreteModel
 from hybridsep.model.physics import ModalModel, Mode

@@ -21,6 +21,7 @@ __all__ = [
     "Physics",
     "PredictorSection",
     "Section",
+    "SpringMassDamper",
     "StageSection",
 ]
 
@@ -125,9 +126,11 @@ class _PredictorEntries(Entries):
 
 if TYPE_CHECKING:  # no checker of types follows create_model
 
-    class PredictorSection(Entries): ...
+    class PredictorSection(Entries):  # noqa: D101
+        ...
 
-    class CompensatorSection(Entries): ...
+    class CompensatorSection(Entries):  # noqa: D101
+        ...
 
 else:
     PredictorSection = create_model(

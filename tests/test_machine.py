@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hybridsep import Encoder, Limits, MachineError, SepState, load_machine, machine_names, simulate, spiral
+from hybridsep import Encoder, Limits, MachineError, load_machine, machine_names, simulate, spiral
+from hybridsep.base.settings import CompensatorSettings, PredictorSettings
 from hybridsep.compensate.compensator import RECOMMENDED
-from hybridsep.machine import Machine, Physics, SpringMassDamper, StageSection
+from hybridsep.machine import Machine
+from hybridsep.machine_sections import Physics, SpringMassDamper, StageSection
 
 GOOD = """
 name = "axis"
@@ -101,7 +103,8 @@ def test_emps_follows_from_its_published_constants() -> None:
 
 def test_a_file_with_defaults(tmp_path: Path) -> None:
     machine = load_machine(write(tmp_path, GOOD))
-    assert (machine.predictor.Np, machine.predictor.p, machine.predictor.q) == (50, 20, 3)
+    settings = machine.predictor_settings
+    assert (settings.Np, settings.p, settings.q) == (50, 20, 3)
     assert machine.fmi_parameters() == {
         "Np": 50,
         "p": 20,
@@ -113,7 +116,7 @@ def test_a_file_with_defaults(tmp_path: Path) -> None:
         "dead_time": 0,
     }
     predictor = machine.new_predictor(replace(machine.predictor_settings, p=10))
-    assert (predictor.p, predictor.T_s) == (10, 0.002)
+    assert (predictor.settings.p, predictor.T_s) == (10, 0.002)
 
 
 @pytest.mark.parametrize(
@@ -155,11 +158,9 @@ def test_the_compensators_settings_are_the_recommended_ones() -> None:
     for name in ("spring_mass_damper", "als25010_x", "als25010_y"):
         machine = load_machine(name)
         compensator = machine.new_compensator()
-        assert {key: getattr(compensator.predictor, key) for key in RECOMMENDED} == RECOMMENDED
-        assert (compensator.preview, compensator.spacing, compensator.jerk_weight) == (200, 2, 1.0)
-        assert (compensator.limits, compensator.change_max) == (Limits(0.1, 16.0, 5000.0), 1e-3)
-        assert compensator.best is SepState.HYBRID
-        assert compensator.no_reversal
+        assert compensator.predictor.settings == RECOMMENDED
+        limits = Limits(0.1, 16.0, 5000.0)
+        assert compensator.settings == CompensatorSettings(preview=200, spacing=2, limits=limits, change_max=1e-3)
         assert machine.new_predictor().Np == 100
 
 
@@ -184,23 +185,25 @@ def test_what_the_compensator_section_leaves_out_is_the_predictors(tmp_path: Pat
         "j_max": 900.0,
         "change_max": 1e-3,
         "v_friction": 2e-3,
-        "no_reversal": 1,
+        "no_reversal": True,
         "compensate": 2,
     }
     entries = "Np = 30\nq = 9\nlambda = 1e-9\nt_init = 0.1\npreview = 180\nspacing = 3\njerk_weight = 0\n"
-    entries += "v_friction = 1e-3\nkeep_direction = 0\n"
+    entries += "v_friction = 1e-3\nno_reversal = false\n"
     machine = load_machine(write(tmp_path, COMPENSATED + entries))
     given = {"Np": 30, "p": 20, "q": 9, "lambda": 1e-9, "t_init": 0.1, "preview": 180, "spacing": 3, "jerk_weight": 0.0}
-    given |= {"v_friction": 1e-3, "no_reversal": 0}
+    given |= {"v_friction": 1e-3, "no_reversal": False}
     found = machine.fmi_compensator_parameters()
     assert {name: found[name] for name in given} == given
-    compensator = machine.new_compensator(SepState.PHYSICS, p=10, preview=90, change_max=None)
-    assert (compensator.predictor.p, compensator.predictor.Np, compensator.predictor.lam) == (10, 30, 1e-9)
-    assert (compensator.preview, compensator.spacing, compensator.change_max) == (90, 3, None)
-    assert (compensator.best, compensator.predictor.T_s) == (SepState.PHYSICS, 0.002)
-    assert (compensator.predictor.v_friction, compensator.no_reversal) == (1e-3, False)
-    assert machine.new_compensator(v_friction=0.0, no_reversal=True).predictor.n_features == 2 + 9 + 20
-    assert machine.new_predictor().v_friction == 0.0  # it predicts with the paper's features
+    changes = replace(machine.compensator_settings, preview=90, change_max=None, compensate="physics")
+    compensator = machine.new_compensator(changes, predictor=replace(machine.compensator_predictor, p=10))
+    settings = PredictorSettings(Np=30, p=10, q=9, lam=1e-9, T_s=0.002, t_init=0.1, v_friction=1e-3)
+    assert compensator.predictor.settings == settings
+    assert compensator.settings == changes
+    assert (changes.spacing, changes.no_reversal, changes.jerk_weight) == (3, False, 0.0)
+    without = machine.new_compensator(predictor=replace(machine.compensator_predictor, v_friction=0.0))
+    assert without.predictor.n_features == 2 + 9 + 20
+    assert machine.predictor_settings.v_friction == 0.0  # it predicts with the paper's features
     assert machine.fmi_parameters()["Np"] == 50
 
 
@@ -224,8 +227,8 @@ def test_a_predictors_section_alone_gives_a_compensator(tmp_path: Path, Np: int,
         ("change_max = 1e-3", r"compensator.change_max is not an entry"),
         ("v_friction = -1e-3", r"compensator.v_friction: v_friction must be 0 or 1e-09 … 10000 m/s, got -0.001"),
         ("v_friction = inf", r"compensator.v_friction: v_friction must be finite, got inf"),
-        ("no_reversal = 2", r"compensator.no_reversal: no_reversal must be 0 … 1, got 2"),
-        ("no_reversal = true", r"compensator.no_reversal: no_reversal must be a number, got True"),
+        ("no_reversal = 2", r"compensator.no_reversal: no_reversal must be true or false, got 2"),
+        ('no_reversal = "no"', r"compensator.no_reversal: no_reversal must be true or false, got 'no'"),
         ("spacing = 3", r"compensator: spacing must be ≥ 1 and divide Np = 50, got 3 \(Np, p, q of \[predictor\]\)"),
         ("Np = 60\npreview = 70", r"compensator: preview must be ≥ Np \+ 4·spacing \+ 3 = 71, got 70 \(p, q of "),
         ("Np = 20\np = 5\nq = 20", r"compensator: q must be 0 … Np − 1 = 19, got 20; lower q or raise Np$"),
@@ -239,7 +242,7 @@ def test_bad_entries_of_the_compensator_are_refused_by_name(tmp_path: Path, entr
 
 def test_a_long_window_without_a_compensator_is_allowed(tmp_path: Path) -> None:
     long = GOOD.replace("Np = 50", "Np = 5000")
-    assert load_machine(write(tmp_path, long)).predictor.Np == 5000
+    assert load_machine(write(tmp_path, long)).predictor_settings.Np == 5000
     expected = r"compensator: preview must be ≥ Np \+ 4·spacing \+ 3 = 5011, got 2000 \(Np, p, q of \[predictor\]\)"
     for more in ("[compensator]\n", "[drive_limits]\nvelocity = 1\nacceleration = 1\njerk = 1\n"):
         with pytest.raises(MachineError, match=expected):
@@ -249,7 +252,7 @@ def test_a_long_window_without_a_compensator_is_allowed(tmp_path: Path) -> None:
 def test_without_drive_limits_there_is_a_compensator_but_no_fmu(tmp_path: Path) -> None:
     machine = load_machine(write(tmp_path, GOOD))
     compensator = machine.new_compensator()
-    assert (compensator.limits, compensator.change_max) == (None, None)
+    assert (compensator.settings.limits, compensator.settings.change_max) == (None, None)
     with pytest.raises(MachineError, match=r"machine axis has no \[drive_limits\] section, which a compensator FMU"):
         machine.fmi_compensator_parameters()
 

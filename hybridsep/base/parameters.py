@@ -63,7 +63,7 @@ class Parameter:
     def help(self) -> str:
         """Description, unit and range on one line."""
         unit = "" if self.unit == "1" else f" [{self.unit}]"
-        return f"{self.description}{unit}, {self.range_text}"
+        return f"{self.description}{unit}" + ("" if self.kind is bool else f", {self.range_text}")
 
     def allows(self, number: float) -> bool:
         """Return whether a number is in the range."""

@@ -2,7 +2,7 @@
 
 Layout, little-endian, 8 bytes each: ``HSEPWGT2``; ``p``, ``q``, ``input_hold``, ``dead_time``, the number of modes and
 that of the learned samples as u64; ``lambda``, ``T_s``, ``v_friction``, then the four numbers of each mode as float64;
-the upper triangle of the factor ``[R z; 0 ρ]`` of :class:`~hybridsep.regression.RidgeRegression` by rows; the CRC-32 of all
+the upper triangle of the factor ``[R z; 0 ρ]`` by rows; the CRC-32 of all
 before as u64. The settings are all that shape the features and the factor: with others the weights mean something else.
 This module travels inside the pythonfmu FMUs; the C model reads the same file.
 """

@@ -9,16 +9,8 @@ import numpy as np
 import pytest
 
 from hybridsep.base.errors import HybridSepError, ParameterError, SignalError
-from hybridsep.base.parameters import (
-    PARAMETERS,
-    Parameter,
-    check,
-    check_lags,
-    check_preview,
-    check_together,
-    samples_before,
-)
-from hybridsep.base.settings import CompensatorSettings, PredictorSettings
+from hybridsep.base.parameters import Parameter
+from hybridsep.base.settings import PARAMETERS, CompensatorSettings, Limits, PredictorSettings, check, samples_before
 from hybridsep.base.signals import as_samples
 from hybridsep.compensate.compensator import SepCompensator
 from hybridsep.model.physics import ModalModel
@@ -41,8 +33,9 @@ def inside(parameter: Parameter) -> list[float]:
     return [bound for bound in bounds if bound is not None]
 
 
-OUTSIDE = [(name, value) for name, parameter in PARAMETERS.items() for value in outside(parameter)]
-INSIDE = [(name, value) for name, parameter in PARAMETERS.items() for value in inside(parameter)]
+NUMBERS = {name: parameter for name, parameter in PARAMETERS.items() if parameter.kind in (int, float)}
+OUTSIDE = [(name, value) for name, parameter in NUMBERS.items() for value in outside(parameter)]
+INSIDE = [(name, value) for name, parameter in NUMBERS.items() for value in inside(parameter)]
 
 
 @pytest.mark.parametrize(("name", "value"), OUTSIDE)
@@ -62,14 +55,14 @@ def test_the_bounds_belong_to_the_range(name: str, value: float) -> None:
     assert type(answer) is PARAMETERS[name].kind
 
 
-@pytest.mark.parametrize("name", PARAMETERS)
+@pytest.mark.parametrize("name", NUMBERS)
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 def test_not_finite(name: str, value: float) -> None:
     with pytest.raises(ParameterError, match=f"^{name} must be finite, got {value!r}$"):
         check(name, value)
 
 
-@pytest.mark.parametrize("name", PARAMETERS)
+@pytest.mark.parametrize("name", NUMBERS)
 @pytest.mark.parametrize("value", ["fast", "100", None, [1.0], True, 10**400, pytest.param(10**5000, id="10**5000")])
 def test_not_a_number(name: str, value: object) -> None:
     with pytest.raises(ParameterError, match=f"^{name} must be a number, got "):
@@ -101,7 +94,8 @@ def test_the_largest_seed_is_in_its_message() -> None:
         ("alpha", "numerator of the mode, constant term [1/s2], -1e+15 … 1e+15"),
         ("k_nl", "quadratic stiffness, force k_nl·x·|x| [N/m2], 0 … 1e+15"),
         ("jerk_weight", "weight of the change's jerk against the tracking error, 0 … 1e+12"),
-        ("no_reversal", "1: x_dm never turns while the commanded position moves, 0 … 1"),
+        ("no_reversal", "whether x_dm never turns while the commanded position moves"),
+        ("input_hold", "x_d between samples: zero-order or first-order hold, zoh or foh"),
     ],
 )
 def test_help(name: str, text: str) -> None:
@@ -113,50 +107,48 @@ def test_a_range_in_which_0_stands_apart() -> None:
 
 
 def test_lags_fit() -> None:
-    check_together(**GOOD)
-    check_together(**{**GOOD, "Np": 1, "p": 1, "q": 0})
-    check_together(**{**GOOD, "Np": 100, "p": np.int64(100), "q": 99.0})
+    PredictorSettings(**GOOD)
+    PredictorSettings(**{**GOOD, "Np": 1, "p": 1, "q": 0})
+    PredictorSettings(**{**GOOD, "Np": 100, "p": np.int64(100), "q": 99.0})
 
 
 def test_lower_p_or_raise_np() -> None:
     with pytest.raises(ParameterError) as caught:
-        check_together(**{**GOOD, "p": 120})
+        PredictorSettings(**{**GOOD, "p": 120})
     assert str(caught.value) == "p must be 1 … Np = 100, got 120; lower p or raise Np"
 
 
 def test_lower_q_or_raise_np() -> None:
     with pytest.raises(ParameterError) as caught:
-        check_together(**{**GOOD, "q": 100})
+        PredictorSettings(**{**GOOD, "q": 100})
     assert str(caught.value) == "q must be 0 … Np − 1 = 99, got 100; lower q or raise Np"
 
 
 def test_all_problems_at_once() -> None:
     with pytest.raises(ParameterError) as caught:
-        check_together(Np=0, p=0, q=-1, lam=0.0, T_s=-1.0, t_init=-0.5)
+        PredictorSettings(Np=0, p=0, q=-1, lam=0.0, T_s=-1.0, t_init=-0.5)
     assert [part.split()[0] for part in str(caught.value).split("; ")] == ["Np", "p", "q", "lambda", "T_s", "t_init"]
 
 
 def test_both_lags_at_once() -> None:
-    assert len(check_lags(Np=4, p=5, q=4)) == 2
     with pytest.raises(ParameterError, match=r"p must be 1 … Np = 4, got 5; .*; q must be 0 … Np − 1 = 3, got 4"):
-        check_together(**{**GOOD, "Np": 4, "p": 5, "q": 4})
+        PredictorSettings(**{**GOOD, "Np": 4, "p": 5, "q": 4})
 
 
 @pytest.mark.parametrize(("Np", "preview", "spacing", "n_problems"), [
     (50, 61, 2, 0), (50, 60, 2, 1), (50, 200, 3, 1), (50, 200, 100, 2), (1, 8, 1, 0), (75, 98, 5, 0), (75, 97, 5, 1),
 ])  # fmt: skip
-def test_a_preview_is_refused_as_the_compensator_refuses_it(
+def test_a_preview_that_does_not_fit_the_window_is_refused(
     Np: int, preview: int, spacing: int, n_problems: int
 ) -> None:
-    problems = check_preview(Np=Np, preview=preview, spacing=spacing)
-    assert len(problems) == n_problems
+    settings = CompensatorSettings(preview=preview, spacing=spacing)
     predictor = HybridPredictor(ModalModel.spring_mass_damper(1.0, 15.7, 24674.0), PredictorSettings(Np=Np, p=1, q=0))
-    if not problems:
-        SepCompensator(predictor, CompensatorSettings(preview=preview, spacing=spacing))
+    if not n_problems:
+        assert SepCompensator(predictor, settings).settings == settings
         return
     with pytest.raises(ParameterError) as caught:
-        SepCompensator(predictor, CompensatorSettings(preview=preview, spacing=spacing))
-    assert str(caught.value) == "; ".join(problems)
+        SepCompensator(predictor, settings)
+    assert len(str(caught.value).split("; ")) == n_problems
 
 
 @pytest.mark.parametrize(
@@ -205,3 +197,44 @@ def test_every_error_is_of_this_library() -> None:
     for error in (ParameterError, SignalError):
         assert issubclass(error, HybridSepError)
         assert issubclass(error, ValueError)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("input_hold", "second", "input_hold must be one of zoh, foh, got 'second'"),
+        ("compensate", 2, "compensate must be one of off, physics, hybrid, got 2"),
+        ("no_reversal", "no", "no_reversal must be true or false, got 'no'"),
+        ("no_reversal", math.nan, "no_reversal must be true or false, got nan"),
+    ],
+)
+def test_choices_and_truth_values(name: str, value: object, message: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        check(name, value)
+    assert str(caught.value) == message
+
+
+def test_settings_and_an_fmus_values_are_the_same() -> None:
+    predictor = PredictorSettings(Np=60, p=7, q=2, lam=1e-9, T_s=2e-3, t_init=0.0, input_hold="foh", v_friction=1e-3)
+    limits = Limits(0.2, 3.0, 40.0)
+    compensator = CompensatorSettings(preview=90, spacing=3, limits=limits, no_reversal=False, compensate="physics")
+    values = {**predictor.to_fmi(), **compensator.to_fmi()}
+    assert values.keys() == {*PredictorSettings.fmi_parameters(), *CompensatorSettings.fmi_parameters()}
+    assert (values["input_hold"], values["compensate"], values["v_max"]) == (1, 1, 0.2)
+    assert PredictorSettings.from_fmi(values) == predictor
+    assert CompensatorSettings.from_fmi(values) == compensator
+    assert PredictorSettings.from_table(predictor.as_table()) == predictor
+    assert CompensatorSettings.from_table(compensator.as_table()) == compensator
+    with pytest.raises(
+        ParameterError, match=r"^compensate must be 0 … 2, got 3; v_max must be 1e-09 … 10000 m/s, got 0$"
+    ):
+        CompensatorSettings.from_fmi({**values, "compensate": 3, "v_max": 0})
+
+
+def test_a_table_of_settings_has_all_of_them_and_nothing_else() -> None:
+    table = PredictorSettings().as_table()
+    for wrong in ({**table, "more": 1}, {name: value for name, value in table.items() if name != "q"}):
+        with pytest.raises(
+            ParameterError, match="settings must be Np, p, q, lam, T_s, t_init, input_hold, v_friction, got"
+        ):
+            PredictorSettings.from_table(wrong)

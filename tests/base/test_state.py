@@ -148,6 +148,8 @@ def test_an_inconsistent_predictor(change: dict[str, Any]) -> None:
     for name, value in change.items():
         if name in meta:
             meta[name] = value
+        elif name in meta["settings"]:
+            meta["settings"][name] = value
         elif value is None:
             del values[name]
         else:

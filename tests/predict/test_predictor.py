@@ -321,8 +321,8 @@ def test_memory_does_not_grow() -> None:
 def test_fmi_names() -> None:
     parameters = {"lambda": 1e-9, "T_s": 5e-4, "input_hold": 1, "Np": 8, "p": 3, "q": 1, "t_init": 0.0}
     predictor = HybridPredictor(MODEL, PredictorSettings.from_fmi(parameters), start=0.5)
-    assert (predictor.lam, predictor.T_s, predictor.discrete.input_hold) == (1e-9, 5e-4, "foh")
-    assert (predictor.Np, predictor.p, predictor.q, predictor.start) == (8, 3, 1, 0.5)
+    assert (predictor.settings.lam, predictor.T_s, predictor.discrete.input_hold) == (1e-9, 5e-4, "foh")
+    assert (predictor.Np, predictor.settings.p, predictor.settings.q, predictor.start) == (8, 3, 1, 0.5)
     assert predictor.n_features == len(predictor.weights) == 6
     with pytest.raises(ParameterError, match=r"^input_hold must be 0 … 1, got 2$"):
         HybridPredictor(MODEL, PredictorSettings.from_fmi({"input_hold": 2}))

@@ -117,7 +117,8 @@ def test_fast_friction_is_a_sign_and_slow_friction_viscous() -> None:
 
 def small(**changes: Any) -> HybridPredictor:
     values = {"T_s": TS, "Np": 20, "p": 5, "q": 3, "lam": 1e-9, "t_init": 0.0, "v_friction": V_S} | changes
-    return HybridPredictor(MODEL, PredictorSettings(**values))
+    start = values.pop("start", None)
+    return HybridPredictor(MODEL, PredictorSettings(**values), start=start)
 
 
 @lru_cache(maxsize=1)
@@ -158,7 +159,7 @@ def test_weights_are_the_directly_solved_ridge_problem(ahead: int) -> None:
     rows = np.array([oracle.features(x_pb, e_pb, k, 5, 3) for k in range(600)])
     scheduled = [formula(r.tolist(), start, k, 20, min(k + 20 + ahead, 700)) for k in range(0, 600, 20)]
     rows = np.column_stack((rows, np.concatenate(scheduled)))
-    exact = oracle.ridge_extended(rows, np.array(e_pb), predictor.lam).astype(np.float64)
+    exact = oracle.ridge_extended(rows, np.array(e_pb), predictor.settings.lam).astype(np.float64)
     assert predictor.n_features == len(exact) == 2 + 3 + 5 + N_REFERENCE
     assert np.linalg.norm(predictor.weights - exact) <= 1e-9 * np.linalg.norm(exact)
     np.testing.assert_array_equal(predictor.residual_weights, predictor.weights[5:10])
@@ -258,7 +259,7 @@ def test_saved_in_mid_run_continues_bit_for_bit(learned: int, measured: bool) ->
         original.predict(x_d[learned : learned + 20], reference=r[learned : learned + 65])
     twin = HybridPredictor.from_bytes(original.to_bytes())
     assert twin.to_bytes() == original.to_bytes()
-    assert twin.v_friction == V_S
+    assert twin.settings.v_friction == V_S
     if not measured:
         for predictor in (original, twin):
             predictor.update(x[learned : learned + 13])
