@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from hybridsep import Encoder, Machine, backtest, load_machine, simulate, spiral
-from hybridsep.app.demo import PRINTED
+from hybridsep.app.printed import PRINTED
 from hybridsep.base.signals import Array
 from hybridsep.machine import StageSection
 

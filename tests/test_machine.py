@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hybridsep import Encoder, Limits, MachineError, SepState, load_machine, machine_names, simulate, spiral
+from hybridsep import Encoder, Limits, SepState, load_machine, machine_names, simulate, spiral
+from hybridsep.base.errors import MachineError
 from hybridsep.compensate.compensator import RECOMMENDED
 from hybridsep.machine import Machine, Physics, SpringMassDamper, StageSection
 

@@ -6,7 +6,8 @@ import numpy as np
 
 from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepState
-from hybridsep.evaluate.closed_loop import ClosedLoop, run_closed_loop
+from hybridsep.cosim.loop import cosimulate
+from hybridsep.cosim.run import Run
 from hybridsep.machine import Machine, StageSection
 from hybridsep.plants.plant import Encoder, Plant, StageDrive
 
@@ -26,7 +27,7 @@ class PathFriction(StageDrive):
         super().step(x_d, h)
 
 
-def runs_with_path_friction(machine: Machine, r: Array, seed: int) -> list[ClosedLoop]:
+def runs_with_path_friction(machine: Machine, r: Array, seed: int) -> list[Run]:
     """Return the library's cold and warm run over ``r``, ``(n,)``, m, with the hybrid model."""
     assert isinstance(machine.plant, StageSection)
     compensator = machine.new_compensator(SepState.HYBRID)
@@ -37,7 +38,7 @@ def runs_with_path_friction(machine: Machine, r: Array, seed: int) -> list[Close
         plant.path_velocity = float(velocity[k]) if 0 <= k < len(r) else 0.0
 
     return [
-        run_closed_loop(
+        cosimulate(
             compensator,
             PathFriction(machine.model, f=machine.plant.f, kappa=machine.plant.kappa, Ts=machine.T_s),
             r,

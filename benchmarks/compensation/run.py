@@ -26,9 +26,10 @@ from benchmarks.compensation.path_friction import runs_with_path_friction
 from benchmarks.compensation.peers import input_shaper, shape, zero_phase_command
 from benchmarks.compensation.report import Report
 from hybridsep.base.limits import Limits
+from hybridsep.base.metrics import contour_error
 from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepState
-from hybridsep.evaluate.closed_loop import ClosedLoop, contour_error
+from hybridsep.cosim.run import Run
 from hybridsep.machine import CompensatorSection, Machine, load_machine
 from hybridsep.plants.plant import FeedDrive, simulate
 from hybridsep.plants.trajectory import archimedean_spiral, spiral, staircase
@@ -92,7 +93,7 @@ def as_published(machine: Machine) -> Machine:
     return with_settings(machine, keep_direction=0)
 
 
-def excess(loop: ClosedLoop, compensator_limits: tuple[Limits | None, float | None], Ts: float) -> float:
+def excess(loop: Run, compensator_limits: tuple[Limits | None, float | None], Ts: float) -> float:
     """Return how far the command goes beyond a limit, in shares of it; ≤ 0 if it keeps all."""
     limits, change_max = compensator_limits
     shares = [0.0]
@@ -104,8 +105,8 @@ def excess(loop: ClosedLoop, compensator_limits: tuple[Limits | None, float | No
     return max(shares)
 
 
-def mean_rms(loops: list[ClosedLoop]) -> float:
-    return UM * float(np.mean([loop.rms for loop in loops]))
+def mean_rms(loops: list[Run]) -> float:
+    return UM * float(np.mean([loop.tracking_rms for loop in loops]))
 
 
 def staircase_rows(report: Report, loops: Loops, seeds: range) -> tuple[float, float]:
@@ -134,7 +135,7 @@ def stage_rows(report: Report, loops: Loops, seeds: range) -> None:
     report.title("3  stage, spiral, recommended settings; physics: filtered basis functions as published")
     position, derivative, end = archimedean_spiral(0.030, 5.0)
     machines, commands = [load_machine("als25010_x"), load_machine("als25010_y")], spiral()
-    found: dict[str, list[list[ClosedLoop]]] = {name: [] for name in STAGE_KINDS}
+    found: dict[str, list[list[Run]]] = {name: [] for name in STAGE_KINDS}
     for machine, r in zip(machines, commands, strict=True):
         plain = as_published(machine)
         found["none"].append([loops.run(machine, r, SepState.OFF, s)[0] for s in seeds])

@@ -8,21 +8,20 @@ from typing import Any
 
 from ..base.errors import ParameterError
 from ..base.signals import Array
-from ..compensate.compensator import SepState
-from ..cosim.compensator_run import COMPENSATOR
-from ..cosim.predictor_run import PREDICTOR
-from ..cosim.wiring import check_look_ahead, check_plant
+from ..compensate.plan import SepState
+from ..cosim.fmus import check_controller, check_plant
+from ..cosim.run import COMPENSATOR, PREDICTOR
 from ..fmi.archive import fmu_names
 from ..fmi.compiler import compilers
 from ..fmi.warm_start import load_trained
 from ..logs.log import check_reading
 from ..machine import Machine, load_machine, machine_names
 from ..plants.trajectory import PAPER_LIMITS, from_file, spiral, staircase
+from .options import COMPENSATIONS, TRAJECTORIES
 
 __all__ = [
-    "COMPENSATIONS",
-    "TRAJECTORIES",
     "Job",
+    "best_model",
     "check_ending",
     "check_interval",
     "check_pair",
@@ -31,12 +30,6 @@ __all__ = [
     "jobs_of",
     "read_command",
 ]
-
-COMPENSATIONS = {"none": SepState.OFF, "physics": SepState.PHYSICS, "hybrid": SepState.HYBRID}
-"""What ``--compensate`` takes: the best model to use."""
-
-TRAJECTORIES = ("staircase", "spiral_x", "spiral_y")
-"""What ``--trajectory`` takes besides a file."""
 
 Job = tuple[Machine, str, str]
 """An FMU to build: its machine, name and model."""
@@ -89,10 +82,17 @@ def read_command(trajectory: str, axis: Machine, unit: str, Ts: float | None) ->
     return command
 
 
-def fitting(axis: Machine, compensate: str | None, values: Mapping[str, Any]) -> dict[str, Any]:
+def best_model(compensate: str) -> SepState:
+    """Return the best model to compensate with, as ``--compensate`` names it."""
+    if compensate not in COMPENSATIONS:
+        raise ParameterError(f"--compensate must be one of {', '.join(COMPENSATIONS)}, got {compensate!r}")
+    return SepState(COMPENSATIONS.index(compensate))
+
+
+def fitting(axis: Machine, model: str, values: Mapping[str, Any]) -> dict[str, Any]:
     """Check the FMI values of a look-ahead FMU that will be built; return them with what must change with them."""
     changes = {"lam" if name == "lambda" else name: value for name, value in values.items()}
-    if compensate is None:
+    if model == "HybridPredictor":
         axis.new_predictor(**changes)
         return dict(values)
     compensator = axis.new_compensator(**changes)
@@ -132,7 +132,7 @@ def check_pair(
     if predictor is not None and weights is not None:
         raise ParameterError("--weights go into an FMU that is built here; leave out --predictor")
     if predictor is not None:
-        check_look_ahead(predictor, PREDICTOR if model == "HybridPredictor" else COMPENSATOR)
+        check_controller(predictor, PREDICTOR if model == "HybridPredictor" else COMPENSATOR)
     if plant is not None:
         check_plant(plant)
     if weights is not None:

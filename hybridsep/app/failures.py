@@ -13,9 +13,9 @@ from contextlib import suppress
 
 from rich.console import Console
 
-from .. import __version__
 from ..base.errors import HybridSepError
 from ..base.interrupt import interrupts_between_calls
+from ..base.version import __version__
 
 __all__ = ["DEBUG_VARIABLE", "errors_console", "run"]
 

@@ -17,9 +17,9 @@ from pathlib import Path
 import fmpy
 from numpy.typing import ArrayLike
 
-from .. import __version__
 from ..base.data_files import data_folder
 from ..base.signals import as_samples
+from ..base.version import __version__
 from ..machine import Machine
 from ..plants.trajectory import spiral, staircase
 from ..predict.predictor import HybridPredictor

@@ -15,8 +15,8 @@ from pathlib import Path
 
 import pythonfmu
 
-from .. import __version__
 from ..base.data_files import data_folder
+from ..base.version import __version__
 from ..machine import Machine
 from ..predict.predictor import HybridPredictor
 from .content import content_guid, fmu_title

@@ -19,7 +19,7 @@ from ..base.errors import ParameterError, SignalError
 from ..base.limits import Limits
 from ..base.parameters import check, samples_before
 from ..base.signals import Array, as_samples
-from ..logs import read_log
+from ..logs.log import read_log
 
 __all__ = [
     "PAPER_LIMITS",

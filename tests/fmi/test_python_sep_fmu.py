@@ -21,7 +21,7 @@ from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepCompensator, SepState
 from hybridsep.compensate.sep_lookahead import SepLookAhead
 from hybridsep.cosim.importer import FmuInstance
-from hybridsep.evaluate.closed_loop import run_closed_loop
+from hybridsep.cosim.loop import cosimulate
 from hybridsep.fmi.archive import build_fmu
 from hybridsep.fmi.c_header import c_header
 from hybridsep.fmi.reference import reference_files
@@ -339,7 +339,7 @@ def test_calls_that_are_not_allowed_now(compensator: FmuInstance) -> None:
 def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The predictor of a compensator that has run over one staircase."""
     learned = MACHINE.new_compensator()
-    run_closed_loop(learned, MACHINE.new_plant(), staircase()[:4000], encoder=Encoder(5e-6, 7))
+    cosimulate(learned, MACHINE.new_plant(), staircase()[:4000], encoder=Encoder(5e-6, 7))
     path = tmp_path_factory.mktemp("trained") / "closed_loop.state"
     learned.predictor.save(path)
     return path

@@ -9,18 +9,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from hybridsep import (
-    Encoder,
-    FeedDrive,
-    ModalModel,
-    Mode,
-    ParameterError,
-    SignalError,
-    StageDrive,
-    load_machine,
-    simulate,
-)
-from hybridsep.plants.plant import FRICTION_VELOCITY
+from hybridsep import Encoder, ModalModel, Mode, load_machine, simulate
+from hybridsep.base.errors import ParameterError, SignalError
+from hybridsep.plants.plant import FRICTION_VELOCITY, FeedDrive, StageDrive
 from hybridsep.plants.trajectory import spiral, staircase
 
 Array = NDArray[np.float64]

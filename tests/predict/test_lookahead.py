@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from staircase_data import commanded, measured
 
-from hybridsep import HybridPredictor, LookAhead, ModalModel, SignalError, StateError, backtest
+from hybridsep import HybridPredictor, ModalModel, backtest
+from hybridsep.base.errors import SignalError, StateError
+from hybridsep.predict.lookahead import LookAhead
 
 MODEL = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
 

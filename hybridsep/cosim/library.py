@@ -1,0 +1,76 @@
+"""The library's own controllers and plants in the loop."""
+
+from __future__ import annotations
+
+from ..compensate.compensator import SepCompensator
+from ..compensate.plan import SepState
+from ..compensate.sep_lookahead import SepLookAhead
+from ..plants.plant import Encoder, Plant
+from ..predict.lookahead import LookAhead
+from ..predict.predictor import HybridPredictor
+from .run import COMPENSATOR, PREDICTOR, Kind
+
+__all__ = ["LibraryController", "LibraryDrive"]
+
+
+class LibraryController:
+    """A predictor or compensator behind its look-ahead, with the FMU's timing.
+
+    Parameters
+    ----------
+    controller : HybridPredictor or SepCompensator
+    t_init : float, optional
+        Warm-up, s; its own if left out.
+    """
+
+    name = "the controller"
+
+    def __init__(self, controller: HybridPredictor | SepCompensator, t_init: float | None) -> None:
+        self._controller, self._t_init = controller, t_init
+        compensates = isinstance(controller, SepCompensator)
+        self.kind: Kind = COMPENSATOR if compensates else PREDICTOR
+        predictor = controller.predictor if isinstance(controller, SepCompensator) else controller
+        self.T_s, self.Np = predictor.Ts, predictor.Np
+        self.delay: int = controller.preview if isinstance(controller, SepCompensator) else predictor.Np
+
+    def initialise(self, start: float) -> None:
+        """Begin a run at rest at ``start``, m, with what was learned kept."""
+        if isinstance(self._controller, SepCompensator):
+            self._look_ahead: LookAhead | SepLookAhead = SepLookAhead(self._controller, start, t_init=self._t_init)
+            return
+        self._look_ahead = LookAhead(self._controller, start)
+        if self._t_init is not None:
+            self._controller.new_run(start, t_init=self._t_init)
+
+    def outputs(self) -> tuple[tuple[float, ...], int]:
+        """Return the positions of the kind's outputs, m, and the state, now."""
+        ahead = self._look_ahead
+        if isinstance(ahead, SepLookAhead):
+            return (ahead.x_dm, ahead.x_d, ahead.x_pb, ahead.x_h), ahead.sep_state
+        return (ahead.x_d, ahead.x_pb, ahead.x_h), SepState.HYBRID if ahead.hybrid_active else SepState.PHYSICS
+
+    def step(self, k: int, x_d_ahead: float, x_meas: float) -> None:
+        """Take in sample ``k``, m, and move on to the next."""
+        self._look_ahead.sample(x_d_ahead, x_meas)
+
+
+class LibraryDrive:
+    """A plant and its encoder."""
+
+    name, T_s = "the plant", None
+
+    def __init__(self, plant: Plant, encoder: Encoder) -> None:
+        self.plant, self._encoder = plant, encoder
+
+    def initialise(self, start: float) -> None:
+        """Put the plant to rest at ``start``, m."""
+        self.plant.reset(start)
+
+    def outputs(self) -> tuple[float, float]:
+        """Return the true and the measured position now, m."""
+        x = self.plant.x
+        return x, self._encoder.measure(x)
+
+    def step(self, k: int, x_d: float, h: float) -> None:
+        """Advance by ``h`` seconds with the command ``x_d``, m, held."""
+        self.plant.step(x_d, h)
