@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import argparse
 
-import numpy as np
 from scipy.optimize import brentq
 
 from hybridsep import Encoder, Machine, backtest, load_machine, simulate, spiral
 from hybridsep.app.printed import PRINTED
+from hybridsep.base.metrics import rms
 from hybridsep.base.signals import Array
 from hybridsep.machine import StageSection
 
@@ -50,7 +50,7 @@ def calibrate(axis: str, command: Array, ratio: float = KAPPA_OVER_F) -> float:
     x_pb, _ = discrete.respond(discrete.rest(), command)
 
     def miss(f: float) -> float:
-        return float(np.sqrt(np.mean((measured(machine, command, f, ratio) - x_pb) ** 2))) - aim
+        return rms(measured(machine, command, f, ratio) - x_pb) - aim
 
     return float(brentq(miss, 0.2 * aim, 1.5 * aim, rtol=1e-4))
 

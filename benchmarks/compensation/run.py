@@ -26,7 +26,7 @@ from benchmarks.compensation.path_friction import runs_with_path_friction
 from benchmarks.compensation.peers import input_shaper, shape, zero_phase_command
 from benchmarks.compensation.report import Report
 from hybridsep.base.limits import Limits
-from hybridsep.base.metrics import contour_error
+from hybridsep.base.metrics import contour_error, largest, peak_derivatives, rms
 from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepState
 from hybridsep.cosim.run import Run
@@ -98,10 +98,10 @@ def excess(loop: Run, compensator_limits: tuple[Limits | None, float | None], Ts
     limits, change_max = compensator_limits
     shares = [0.0]
     if limits is not None:
-        for order, limit in enumerate((limits.velocity, limits.acceleration, limits.jerk), start=1):
-            shares.append(float(np.max(np.abs(np.diff(loop.x_dm, order)))) / (limit * Ts**order) - 1.0)
+        allowed = (limits.velocity, limits.acceleration, limits.jerk)
+        shares += [peak / limit - 1.0 for peak, limit in zip(peak_derivatives(loop.x_dm, Ts), allowed, strict=True)]
     if change_max is not None:
-        shares.append(float(np.max(np.abs(loop.x_dm - loop.x_d))) / change_max - 1.0)
+        shares.append(largest(loop.change) / change_max - 1.0)
     return max(shares)
 
 
@@ -157,8 +157,8 @@ def stage_rows(report: Report, loops: Loops, seeds: range) -> None:
                 report.line(f"{label}  {name}", figure, note=shares)
         near = after_reversals(r)
         for name in ("physics", "physics, keep_direction", "hybrid warm"):
-            errors = np.array([loop.x_d - loop.x for loop in found[name][axis]])
-            outside = UM * float(np.sqrt(np.mean(errors[:, ~near] ** 2)))
+            errors = np.array([loop.error for loop in found[name][axis]])
+            outside = UM * rms(errors[:, ~near])
             share = float(np.sum(errors[:, near] ** 2) / np.sum(errors**2))
             note = f"{share:.0%} of the mean square is within 0.1 s of a reversal, {np.mean(near):.0%} of the time"
             report.line(f"   {name}, away from reversals", outside, note=note)
@@ -172,7 +172,7 @@ def stage_rows(report: Report, loops: Loops, seeds: range) -> None:
     for name, (x, y) in found.items():
         points = [np.column_stack((a.x, b.x)) for a, b in zip(x, y, strict=True)]
         errors = np.array([contour_error(point, position, derivative, end) for point in points])
-        report.line(f"contour error, {name}", UM * float(np.sqrt(np.mean(errors**2))))
+        report.line(f"contour error, {name}", UM * rms(errors))
 
 
 def after_reversals(r: Array) -> Any:
@@ -199,9 +199,9 @@ def peer_rows(report: Report, cold: float, warm: float) -> None:
     commands["filtered basis functions, physics model"] = loop.x_dm
     for name, command in commands.items():
         reached = loop.x if command is loop.x_dm else simulate(machine.new_plant(), command, machine.T_s)
-        rms = UM * float(np.sqrt(np.mean((r - reached) ** 2)))
-        peaks = [float(np.max(np.abs(np.diff(command, i)))) / machine.T_s**i for i in (2, 3)]
-        report.line(name, rms, "ours is ahead", cold < rms and warm < rms, f"{peaks[0]:.1f} m/s², {peaks[1]:.0f} m/s³")
+        error = UM * rms(r - reached)
+        _, a, j = peak_derivatives(command, machine.T_s)
+        report.line(name, error, "ours is ahead", cold < error and warm < error, f"{a:.1f} m/s², {j:.0f} m/s³")
     report.line("hybrid, recommended settings, cold", cold)
     report.line("hybrid, recommended settings, warm", warm)
 
