@@ -27,9 +27,8 @@ from .c_header import c_header
 from .compiler import ALL_TARGETS, binaries
 from .content import content_guid, fmu_title
 from .experiment import stop_time
-from .icon import icon
 from .model_description import FmuInfo, build_description, model_description
-from .pages import index_page
+from .pages import icon, index_page
 from .reference import reference_files
 from .variables import INTERPOLATED, variables_of
 from .weights import WEIGHTS_FILE, weights_file
