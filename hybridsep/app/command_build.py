@@ -44,7 +44,7 @@ def build(
     """Build FMUs from machine files; the same machine gives the same bytes."""
     from ..fmi.archive import build_fmu
     from ..machine import machine_path
-    from .arguments import extras_of, jobs_of
+    from .build_arguments import extras_of, jobs_of
     from .overwrite import FMU, Output, check_outputs
     from .progress import progress_bar
     from .tables import console, print_json

@@ -71,8 +71,9 @@ def cosim(
     from ..cosim.loop import cosimulate
     from ..cosim.run import RESULT_SUFFIXES
     from ..machine import load_machine, machine_path
-    from .arguments import best_model, check_ending, check_pair, fitting, read_command
+    from .arguments import check_ending
     from .builds import build_for_host
+    from .cosim_arguments import best_model, check_pair, fitting, read_command
     from .overwrite import FIGURE, RUN, Output, check_outputs
     from .progress import progress_bar
     from .tables import print_run

@@ -14,7 +14,6 @@ from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
-import fmpy
 from numpy.typing import ArrayLike
 
 from ..base.data_files import data_folder
@@ -131,6 +130,8 @@ def all_c(files: Sequence[str]) -> str:
 
 def fmi_headers() -> dict[str, bytes]:
     """Return the FMI 2.0 headers for shared libraries, as fmpy carries them, with the line ends of a text file."""
+    import fmpy
+
     folder = Path(fmpy.__file__).parent / "c-code"
     return {file: (folder / file).read_bytes().replace(b"\r\n", b"\n") for file in _FMI_HEADERS}
 
