@@ -1,6 +1,6 @@
 """The compensator, sample by sample: the look-ahead buffer between the interpolator and the drive.
 
-The FMU's timing contract, as in :mod:`hybridsep.predict.lookahead`, with ``preview`` samples in place of ``Np``. Sample ``k``
+The FMU's timing contract, as in :mod:`hybridsep.lookahead`, with ``preview`` samples in place of ``Np``. Sample ``k``
 brings ``x_d_ahead = r(k)`` and ``x_meas = x(k)``; after it the outputs are those of ``k + 1``, and
 ``x_d(k) = r(k − preview)``. When ``k + 1`` is a multiple of ``Np``, the whole preview of the next window and every
 measurement before it have arrived: the weights are solved and the window is planned in that sample.
