@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from ..base.output import written_text
+from .failures import loading
 from .options import (
     ForceOption,
     InitOption,
@@ -43,13 +44,14 @@ def backtest(
     as_json: JsonOption = False,
 ) -> None:
     """Replay a recorded log causally: physics model, hold baseline and hybrid."""
-    from ..evaluate.backtest import Batch, backtest_stream
-    from ..logs.log import open_log
-    from ..machine import load_machine, machine_path
-    from .arguments import check_interval
-    from .overwrite import BATCH_COLUMNS, BATCHES, Output, check_outputs
-    from .progress import progress_bar
-    from .tables import print_scores
+    with loading():
+        from ..evaluate.backtest import Batch, backtest_stream
+        from ..logs.log import open_log
+        from ..machine import load_machine, machine_path
+        from .arguments import check_interval
+        from .overwrite import BATCH_COLUMNS, BATCHES, Output, check_outputs
+        from .progress import progress_bar
+        from .tables import print_scores
 
     axis = load_machine(machine)
     given = {"t": t, "x_d": x_d, "x": x}

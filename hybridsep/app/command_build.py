@@ -9,6 +9,7 @@ import typer
 
 from ..fmi.backends import BACKENDS
 from ..fmi.compiler import TARGET_NAMES
+from .failures import loading
 from .options import BackendOption, ForceOption, JsonOption, TsOption, UnitOption, WeightsOption
 
 __all__ = ["build"]
@@ -42,12 +43,13 @@ def build(
     as_json: JsonOption = False,
 ) -> None:
     """Build FMUs from machine files; the same machine gives the same bytes."""
-    from ..fmi.archive import build_fmu
-    from ..machine import machine_path
-    from .build_arguments import extras_of, jobs_of
-    from .overwrite import FMU, Output, check_outputs
-    from .progress import progress_bar
-    from .tables import console, print_json
+    with loading():
+        from ..fmi.archive import build_fmu
+        from ..machine import machine_path
+        from .build_arguments import extras_of, jobs_of
+        from .overwrite import FMU, Output, check_outputs
+        from .progress import progress_bar
+        from .tables import console, print_json
 
     jobs = jobs_of(fmus or [], machine or [], backend, target or [])
     extras = extras_of(jobs, weights, trajectory, unit, Ts)

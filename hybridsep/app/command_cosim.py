@@ -11,6 +11,7 @@ import typer
 from ..base.data_files import DEFAULT_MACHINE
 from ..base.parameters import check
 from ..fmi.backends import BACKENDS
+from .failures import loading
 from .options import (
     COMPENSATIONS,
     TRAJECTORIES,
@@ -68,15 +69,19 @@ def cosim(
     as_json: JsonOption = False,
 ) -> None:
     """Co-simulate a predictor FMU, or a compensator FMU, with a plant FMU over a trajectory."""
-    from ..cosim.loop import cosimulate
-    from ..cosim.run import RESULT_SUFFIXES
-    from ..machine import load_machine, machine_path
-    from .arguments import check_ending
-    from .builds import build_for_host
-    from .cosim_arguments import best_model, check_pair, fitting, read_command
-    from .overwrite import FIGURE, RUN, Output, check_outputs
-    from .progress import progress_bar
-    from .tables import print_run
+    with loading():
+        from ..cosim.loop import cosimulate
+        from ..cosim.run import RESULT_SUFFIXES
+        from ..machine import load_machine, machine_path
+        from .arguments import check_ending
+        from .builds import build_for_host
+        from .cosim_arguments import best_model, check_pair, fitting, read_command
+        from .overwrite import FIGURE, RUN, Output, check_outputs
+        from .progress import progress_bar
+        from .tables import print_run
+
+        if figure is not None:
+            from ..evaluate.time_plots import prediction_figure, tracking_figure
 
     axis = load_machine(machine)
     check_ending(out, "--out", RESULT_SUFFIXES)
@@ -114,8 +119,6 @@ def cosim(
     if out is not None:
         run.save(out)
     if figure is not None:
-        from ..evaluate.time_plots import prediction_figure, tracking_figure
-
         if compensate is None:
             prediction_figure(run, title, figure)
         else:

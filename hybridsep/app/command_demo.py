@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from ..fmi.backends import BACKENDS
+from .failures import loading
 from .options import ForceOption, JsonOption
 
 __all__ = ["demo"]
@@ -25,12 +26,13 @@ def demo(
     as_json: JsonOption = False,
 ) -> None:
     """Build the FMUs, co-simulate the paper's staircase and spiral, draw and score them."""
-    from .builds import default_backend
-    from .demo import demo as run_demo
-    from .demo import demo_files
-    from .overwrite import BY_ENDING, Output, check_outputs
-    from .progress import progress_bar
-    from .tables import console, print_compensation, print_json, print_predictions
+    with loading():
+        from .builds import default_backend
+        from .demo import demo as run_demo
+        from .demo import demo_files
+        from .overwrite import BY_ENDING, Output, check_outputs
+        from .progress import progress_bar
+        from .tables import console, print_compensation, print_json, print_predictions
 
     backend = backend or default_backend()
     files = demo_files(out, backend, emps=emps is not None)

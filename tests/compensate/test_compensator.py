@@ -18,7 +18,6 @@ from staircase_data import commanded
 from benchmarks.compensation.peers import input_shaper, shape, zero_phase_command
 from hybridsep.base.errors import ParameterError, SignalError, StateError
 from hybridsep.base.limits import Limits
-from hybridsep.base.metrics import contour_error
 from hybridsep.base.signals import Array
 from hybridsep.compensate.bounded import Bounds, DriveBounds, solve
 from hybridsep.compensate.compensator import RECOMMENDED, SepCompensator, SepState, direct_samples
@@ -30,7 +29,7 @@ from hybridsep.cosim.run import Run
 from hybridsep.machine import load_machine
 from hybridsep.model.physics import ModalModel
 from hybridsep.plants.plant import Encoder, FeedDrive, Plant
-from hybridsep.plants.trajectory import PAPER_LIMITS, archimedean_spiral, rest_to_rest, spiral
+from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest, spiral
 from hybridsep.predict.predictor import HybridPredictor
 
 MODEL = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
@@ -551,13 +550,3 @@ def test_zero_phase_error_tracking_follows_on_its_model(name: str) -> None:
     error = np.std(plain - x_d)
     assert np.max(np.abs(reached - expected)) < 1e-4 * error
     assert np.std(reached - x_d) < 0.102 * error
-
-
-def test_contour_error_is_the_distance_to_the_path() -> None:
-    position, derivative, end = archimedean_spiral(0.03, 5.0)
-    u = np.linspace(1.0, end - 1.0, 301)
-    slope = derivative(u)
-    normal = np.column_stack((-slope[:, 1], slope[:, 0])) / np.linalg.norm(slope, axis=1)[:, None]
-    distance = 1e-4 * np.sin(7 * u)
-    found = contour_error(position(u) + distance[:, None] * normal, position, derivative, end)
-    np.testing.assert_allclose(found, np.abs(distance), rtol=0, atol=1e-9)
