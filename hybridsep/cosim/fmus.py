@@ -30,7 +30,8 @@ class _OpenedFmu(AbstractContextManager["_OpenedFmu"]):
     """
 
     def __init__(self, path: str | Path, role: str, values: Mapping[str, Any], start_time: float) -> None:
-        self._path, self._role, self._values, self._start_time = Path(path), role, values, start_time
+        self._path, self._role, self._values, self._start_time = path, role, values, start_time
+        self.name: str = Path(path).name
 
     def __enter__(self) -> _OpenedFmu:
         self.fmu = FmuInstance(self._path, self._role)
@@ -38,11 +39,6 @@ class _OpenedFmu(AbstractContextManager["_OpenedFmu"]):
 
     def __exit__(self, *error: object) -> None:
         self.fmu.close()
-
-    @property
-    def name(self) -> str:
-        """The archive's."""
-        return self._path.name
 
     def _initialise(self, inputs: Mapping[str, float]) -> None:
         self.fmu.initialise({**self._values, **inputs}, start_time=self._start_time)
@@ -98,13 +94,9 @@ class FmuDrive(_OpenedFmu):
         check_plant(path)
         super().__init__(path, "plant", values, start_time)
 
-    @property
-    def plant(self) -> FmuInstance:
-        """The instance."""
-        return self.fmu
-
     def initialise(self, start: float) -> None:
         """Begin a run at rest at ``start``, m."""
+        self.plant: Any = self.fmu
         self._initialise({"x_d": start})
         if "T_s" in self.fmu.variables:
             self.T_s = float(self.fmu.get("T_s"))

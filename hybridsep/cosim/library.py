@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from ..compensate.compensator import SepCompensator
 from ..compensate.plan import SepState
 from ..compensate.sep_lookahead import SepLookAhead
@@ -23,15 +25,16 @@ class LibraryController:
         Warm-up, s; its own if left out.
     """
 
-    name = "the controller"
+    name: str = "the controller"
 
     def __init__(self, controller: HybridPredictor | SepCompensator, t_init: float | None) -> None:
         self._controller, self._t_init = controller, t_init
-        compensates = isinstance(controller, SepCompensator)
-        self.kind: Kind = COMPENSATOR if compensates else PREDICTOR
-        predictor = controller.predictor if isinstance(controller, SepCompensator) else controller
+        self.kind: Kind
+        if isinstance(controller, SepCompensator):
+            self.kind, predictor, self.delay = COMPENSATOR, controller.predictor, controller.preview
+        else:
+            self.kind, predictor, self.delay = PREDICTOR, controller, controller.Np
         self.T_s, self.Np = predictor.Ts, predictor.Np
-        self.delay: int = controller.preview if isinstance(controller, SepCompensator) else predictor.Np
 
     def initialise(self, start: float) -> None:
         """Begin a run at rest at ``start``, m, with what was learned kept."""
@@ -57,10 +60,12 @@ class LibraryController:
 class LibraryDrive:
     """A plant and its encoder."""
 
-    name, T_s = "the plant", None
+    name: str = "the plant"
+    T_s: float | None = None
 
     def __init__(self, plant: Plant, encoder: Encoder) -> None:
-        self.plant, self._encoder = plant, encoder
+        self.plant: Any = plant
+        self._encoder = encoder
 
     def initialise(self, start: float) -> None:
         """Put the plant to rest at ``start``, m."""

@@ -40,19 +40,22 @@ Progress = Callable[[int, int], object]
 class Controller(Protocol):
     """A look-ahead between interpolator and drive.
 
-    ``T_s``, s, ``Np`` and ``delay``, samples, are known after :meth:`initialise`.
+    Attributes
+    ----------
+    name : str
+        As error messages call it.
+    kind : Kind
+    T_s : float
+        Sampling interval, s; like the next two, known after :meth:`initialise`.
+    Np, delay : int
+        Samples in a batch; samples by which it delays the trajectory.
     """
 
-    @property
-    def name(self) -> str: ...  # noqa: D102
-    @property
-    def kind(self) -> Kind: ...  # noqa: D102
-    @property
-    def T_s(self) -> float: ...  # noqa: D102
-    @property
-    def Np(self) -> int: ...  # noqa: D102
-    @property
-    def delay(self) -> int: ...  # noqa: D102
+    name: str
+    kind: Kind
+    T_s: float
+    Np: int
+    delay: int
 
     def initialise(self, start: float) -> None:
         """Begin a run at rest at ``start``, m."""
@@ -65,14 +68,21 @@ class Controller(Protocol):
 
 
 class Drive(Protocol):
-    """A plant with its encoder; ``T_s``, s, is None if it steps at any interval, ``plant`` is what is disturbed."""
+    """A plant with its encoder.
 
-    @property
-    def name(self) -> str: ...  # noqa: D102
-    @property
-    def T_s(self) -> float | None: ...  # noqa: D102
-    @property
-    def plant(self) -> Any: ...  # noqa: D102
+    Attributes
+    ----------
+    name : str
+        As error messages call it.
+    T_s : float, optional
+        Sampling interval, s, known after :meth:`initialise`; None if it can be any.
+    plant : object
+        What is disturbed; known after :meth:`initialise`.
+    """
+
+    name: str
+    T_s: float | None
+    plant: Any
 
     def initialise(self, start: float) -> None:
         """Begin a run at rest at ``start``, m."""

@@ -120,12 +120,12 @@ class CController:
         Largest relative change of its two inputs, random.
     """
 
-    kind = COMPENSATOR_KIND
-    name, T_s = "the C core", TS
+    name, kind, T_s = "the C core", COMPENSATOR_KIND, TS
 
     def __init__(self, loop: Loop, perturbation: float = 0.0) -> None:
         self.loop = loop
-        self.Np, self.delay = loop.values["Np"], loop.values["preview"]
+        self.Np: int = loop.values["Np"]
+        self.delay: int = loop.values["preview"]
         self.factors = 1.0 + perturbation * np.random.default_rng(0).uniform(-1, 1, (len(loop.r), 2))
 
     def initialise(self, start: float) -> None:
