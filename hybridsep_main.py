@@ -1,4 +1,4 @@
-"""Entry point of the command line, outside the package: ready for Ctrl-C before the library is, which takes seconds."""
+"""Entry point of the command line, outside the package: ready for Ctrl-C before the library is."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def main() -> None:
     try:
         if ours:
             signal.signal(signal.SIGINT, signal.default_int_handler)
-        run()
+        run(_leave if ours else None)
     except KeyboardInterrupt:
         _leave()
     except SystemExit as stop:

@@ -36,7 +36,7 @@ from benchmarks.common import (
     require_extended_precision,
 )
 from hybridsep.evaluate.backtest import Batch, backtest_stream
-from hybridsep.logs import open_log
+from hybridsep.logs.log import open_log
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
 

@@ -11,13 +11,13 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 
-import numpy as np
 from scipy.optimize import brentq
 
 from hybridsep import Encoder, Machine, backtest, load_machine, simulate, spiral
-from hybridsep.app.demo import PRINTED
+from hybridsep.app.printed import PRINTED
+from hybridsep.base.metrics import rms
 from hybridsep.base.signals import Array
-from hybridsep.machine import StageSection
+from hybridsep.machine_sections import StageSection
 
 KAPPA_OVER_F = 1.5e3  # 1/m²
 ASSUMPTIONS = {
@@ -51,7 +51,7 @@ def calibrate(axis: str, command: Array, ratio: float = KAPPA_OVER_F) -> float:
     x_pb, _ = discrete.forced_response(discrete.rest(), command)
 
     def miss(f: float) -> float:
-        return float(np.sqrt(np.mean((measured(machine, command, f, ratio) - x_pb) ** 2))) - aim
+        return rms(measured(machine, command, f, ratio) - x_pb) - aim
 
     return float(brentq(miss, 0.2 * aim, 1.5 * aim, rtol=1e-4))
 

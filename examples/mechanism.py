@@ -32,6 +32,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import toeplitz
 
+from hybridsep.base.metrics import rms
 from hybridsep.base.settings import check
 from hybridsep.base.signals import Array
 from hybridsep.model.discrete import DiscreteModel
@@ -288,9 +289,9 @@ def demonstrate(n: int = 2000, T_s: float = 1e-3) -> tuple[Case, ...]:
         return Case(
             name=name,
             order=len(recursion) - 1,
-            residual_rms=float(np.sqrt(np.mean(run.e_pb**2))),
+            residual_rms=rms(run.e_pb),
             closed_form_error=float(np.max(np.abs(run.e_pb - split(of, along, run.h)[1]))),
-            innovation_rms=float(np.sqrt(np.mean(news**2))),
+            innovation_rms=rms(news),
             innovation_max=float(np.max(news)),
             n_spikes=int(np.sum(news > 1e-9 * np.max(np.abs(run.e_pb)))),
         )

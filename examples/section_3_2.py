@@ -13,6 +13,7 @@ import numpy as np
 from mechanism import Drive, simulate
 
 from hybridsep import Encoder, backtest, load_machine, staircase
+from hybridsep.base.metrics import rms
 from hybridsep.base.signals import Array
 
 FINER = 10
@@ -58,7 +59,7 @@ def main() -> None:
         ("(13) as printed, (k + |x| x) x, in mm and kg·mm/s²", in_mm(eq_13)),
     ):
         e_pb = residual(force, x_d)
-        measured, true = (1e6 * float(np.sqrt(np.mean(e**2))) for e in (e_pb + noise, e_pb))
+        measured, true = (1e6 * rms(e) for e in (e_pb + noise, e_pb))
         print(f"  {name:<52}{measured:9.2f}{true:10.3f}")
     machine = load_machine("spring_mass_damper")
     discrete = machine.model.discretise(machine.T_s)

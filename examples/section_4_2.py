@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridsep import PAPER_LIMITS, Encoder, Machine, backtest, load_machine, rest_to_rest, simulate, spiral
+from hybridsep.base.metrics import rms
 from hybridsep.base.signals import Array
 from hybridsep.evaluate.backtest import Backtest, Batch
 
@@ -42,11 +43,6 @@ def near_reversals(x_d: Array) -> NDArray[np.bool_]:
     return near
 
 
-def rms(error: Array) -> float:
-    """Return an RMS in µm."""
-    return 1e6 * float(np.sqrt(np.mean(error**2)))
-
-
 def parts_of_the_spiral() -> None:
     """Print both models' errors on parts of the spiral."""
     print("Spiral, RMS in µm                     samples  physics   hybrid  share of the hybrid's mean square")
@@ -64,8 +60,8 @@ def parts_of_the_spiral() -> None:
             physics, hybrid = (x - predicted for predicted in (result.x_pb, result.x_h))
             share = float(np.sum(hybrid[part] ** 2) / np.sum(hybrid**2))
             print(
-                f"  {axis.upper()}  {name:<32}{np.count_nonzero(part):9d}{rms(physics[part]):9.1f}"
-                f"{rms(hybrid[part]):9.1f}{share:9.0%}"
+                f"  {axis.upper()}  {name:<32}{np.count_nonzero(part):9d}{1e6 * rms(physics[part]):9.1f}"
+                f"{1e6 * rms(hybrid[part]):9.1f}{share:9.0%}"
             )
 
 
@@ -77,7 +73,7 @@ def other_paths() -> None:
         for length, dwell in ((0.030, 0.3), (0.030, 0.0), (0.013, 0.3), (0.013, 0.0)):
             x_d = rest_to_rest(np.resize([0.0, length], 8), PAPER_LIMITS, machine.T_s, dwell=dwell)
             x, result, poles = replay(machine, x_d)
-            physics, hybrid = rms(x - result.x_pb), rms(x - result.x_h)
+            physics, hybrid = 1e6 * rms(x - result.x_pb), 1e6 * rms(x - result.x_h)
             worst = int(np.argmax(result.batch_rms_h))
             print(
                 f"  {axis.upper()}  {1e3 * length:.0f} mm, {dwell:g} s of rest".ljust(38)

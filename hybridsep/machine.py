@@ -41,9 +41,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-__all__ = ["DEFAULT_MACHINE", "Machine", "load_machine", "machine_names", "machine_path"]
-
-DEFAULT_MACHINE = "spring_mass_damper"
+__all__ = ["Machine", "load_machine", "machine_names", "machine_path"]
 
 
 class Machine(Section):

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hybridsep import Encoder, Limits, MachineError, load_machine, machine_names, simulate, spiral
+from hybridsep import Encoder, Limits, load_machine, machine_names, simulate, spiral
+from hybridsep.base.errors import MachineError
 from hybridsep.base.settings import CompensatorSettings, PredictorSettings
 from hybridsep.compensate.compensator import RECOMMENDED
 from hybridsep.machine import Machine

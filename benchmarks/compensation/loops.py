@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -13,8 +13,8 @@ import numpy as np
 from hybridsep.base.settings import Limits
 from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepCompensator, SepState
-from hybridsep.cosim.compensator_run import SepCoSimulation, cosimulate_sep
-from hybridsep.evaluate.closed_loop import ClosedLoop, run_closed_loop
+from hybridsep.cosim.loop import cosimulate
+from hybridsep.cosim.run import Run
 from hybridsep.fmi.archive import build_fmu, fmu_names
 from hybridsep.machine import Machine
 from hybridsep.plants.encoder import Encoder
@@ -53,7 +53,7 @@ class Loops(Protocol):
 
     def run(
         self, machine: Machine, r: Array, best: SepState, seed: int, n: int = 1, case: Case | None = None
-    ) -> list[ClosedLoop]:
+    ) -> list[Run]:
         """Return ``n`` runs in a row, each warm after the first.
 
         Parameters
@@ -84,19 +84,17 @@ class LibraryLoops:
 
     def run(
         self, machine: Machine, r: Array, best: SepState, seed: int, n: int = 1, case: Case | None = None
-    ) -> list[ClosedLoop]:
+    ) -> list[Run]:
         """Return ``n`` runs in a row; see :class:`Loops`."""
         compensator = self.compensator(machine, best, case or Case())
         return [self.once(compensator, machine, r, seed, i, case or Case()) for i in range(n)]
 
     def compensator(self, machine: Machine, best: SepState, case: Case) -> SepCompensator:
         """Return a compensator that has learned nothing."""
-        changes = {} if case.limits is None else {"limits": case.limits}
-        return machine.new_compensator(best, **changes)
+        settings = replace(machine.compensator_settings, compensate=best.name.lower())
+        return machine.new_compensator(settings if case.limits is None else replace(settings, limits=case.limits))
 
-    def once(
-        self, compensator: SepCompensator, machine: Machine, r: Array, seed: int, run: int, case: Case
-    ) -> ClosedLoop:
+    def once(self, compensator: SepCompensator, machine: Machine, r: Array, seed: int, run: int, case: Case) -> Run:
         """Return run number ``run`` of a compensator, warm if it is not the first."""
         assert machine.plant is not None
 
@@ -104,7 +102,7 @@ class LibraryLoops:
             if case.change is not None and k == case.at and isinstance(moved, FeedDrive):
                 case.change(moved)
 
-        return run_closed_loop(
+        return cosimulate(
             compensator,
             machine.new_plant(),
             r,
@@ -145,7 +143,7 @@ class FmuLoops:
 
     def run(
         self, machine: Machine, r: Array, best: SepState, seed: int, n: int = 1, case: Case | None = None
-    ) -> list[ClosedLoop]:
+    ) -> list[Run]:
         """Return ``n`` ≤ 2 runs in a row; see :class:`Loops`.
 
         Raises
@@ -166,24 +164,21 @@ class FmuLoops:
         compensator.predictor.save(weights)
         return [cold, self._once(machine, r, best, seed, 1, case, self._fmu(machine, "SepCompensator", weights))]
 
-    def _once(
-        self, machine: Machine, r: Array, best: SepState, seed: int, run: int, case: Case, fmu: Path
-    ) -> ClosedLoop:
+    def _once(self, machine: Machine, r: Array, best: SepState, seed: int, run: int, case: Case, fmu: Path) -> Run:
         assert machine.plant is not None
         values: dict[str, Any] = {"compensate": int(best)}
         if case.limits is not None:
             limits = case.limits
             values |= {"v_max": limits.velocity, "a_max": limits.acceleration, "j_max": limits.jerk}
         plant = {"seed": noise_seed(seed, run), "noise_std": machine.plant.noise_std * case.noise}
-        found: SepCoSimulation = cosimulate_sep(
+        return cosimulate(
             fmu,
             self._fmu(machine, "FeedDrive"),
             r,
-            compensator_values=values,
+            controller_values=values,
             plant_values=plant,
             sensor=None if case.held is None else HeldSensor(*case.held),
         )
-        return ClosedLoop(found.x_d, found.x_dm, found.x, found.x_meas, found.x_pb, found.x_h, found.state)
 
     def _fmu(self, machine: Machine, model: str, weights: Path | None = None) -> Path:
         """Return an FMU of a machine; only those with weights are built anew."""

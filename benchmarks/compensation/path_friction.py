@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from hybridsep.base.signals import Array
-from hybridsep.compensate.compensator import SepState
-from hybridsep.evaluate.closed_loop import ClosedLoop, run_closed_loop
-from hybridsep.machine import Machine, StageSection
+from hybridsep.cosim.loop import cosimulate
+from hybridsep.cosim.run import Run
+from hybridsep.machine import Machine
+from hybridsep.machine_sections import StageSection
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.plant import Plant
 from hybridsep.plants.stage_drive import StageDrive
@@ -28,10 +29,10 @@ class PathFriction(StageDrive):
         super().step(x_d, h)
 
 
-def runs_with_path_friction(machine: Machine, r: Array, seed: int) -> list[ClosedLoop]:
+def runs_with_path_friction(machine: Machine, r: Array, seed: int) -> list[Run]:
     """Return the library's cold and warm run over ``r``, ``(n,)``, m, with the hybrid model."""
     assert isinstance(machine.plant, StageSection)
-    compensator = machine.new_compensator(SepState.HYBRID)
+    compensator = machine.new_compensator()
     velocity = np.diff(r, prepend=r[0]) / machine.T_s
 
     def follow(k: int, plant: Plant) -> None:
@@ -39,7 +40,7 @@ def runs_with_path_friction(machine: Machine, r: Array, seed: int) -> list[Close
         plant.path_velocity = float(velocity[k]) if 0 <= k < len(r) else 0.0
 
     return [
-        run_closed_loop(
+        cosimulate(
             compensator,
             PathFriction(machine.model, f=machine.plant.f, kappa=machine.plant.kappa, T_s=machine.T_s),
             r,

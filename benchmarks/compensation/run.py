@@ -25,11 +25,13 @@ from benchmarks.compensation.loops import Case, FmuLoops, LibraryLoops, Loops
 from benchmarks.compensation.path_friction import runs_with_path_friction
 from benchmarks.compensation.peers import input_shaper, shape, zero_phase_command
 from benchmarks.compensation.report import Report
+from hybridsep.base.metrics import contour_error, largest, peak_derivatives, rms
 from hybridsep.base.settings import Limits
 from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepState
-from hybridsep.evaluate.closed_loop import ClosedLoop, contour_error
-from hybridsep.machine import CompensatorSection, Machine, load_machine
+from hybridsep.cosim.run import Run
+from hybridsep.machine import Machine, load_machine
+from hybridsep.machine_sections import CompensatorSection
 from hybridsep.plants.feed_drive import FeedDrive
 from hybridsep.plants.plant import simulate
 from hybridsep.plants.trajectory import archimedean_spiral, spiral, staircase
@@ -80,7 +82,7 @@ CASES = {
 
 def with_the_papers_settings(machine: Machine) -> Machine:
     """Return a machine that compensates with the settings of its ``[predictor]`` and the features of eq. (5) alone."""
-    return machine.model_copy(update={"compensator": CompensatorSection(v_friction=0.0)})
+    return machine.model_copy(update={"compensator": CompensatorSection.model_validate({"v_friction": 0.0})})
 
 
 def with_settings(machine: Machine, **changes: float) -> Machine:
@@ -93,20 +95,20 @@ def as_published(machine: Machine) -> Machine:
     return with_settings(machine, no_reversal=0)
 
 
-def excess(loop: ClosedLoop, compensator_limits: tuple[Limits | None, float | None], T_s: float) -> float:
+def excess(loop: Run, compensator_limits: tuple[Limits | None, float | None], T_s: float) -> float:
     """Return how far the command goes beyond a limit, in shares of it; ≤ 0 if it keeps all."""
     limits, change_max = compensator_limits
     shares = [0.0]
     if limits is not None:
-        for order, limit in enumerate((limits.velocity, limits.acceleration, limits.jerk), start=1):
-            shares.append(float(np.max(np.abs(np.diff(loop.x_dm, order)))) / (limit * T_s**order) - 1.0)
+        allowed = (limits.velocity, limits.acceleration, limits.jerk)
+        shares += [peak / limit - 1.0 for peak, limit in zip(peak_derivatives(loop.x_dm, T_s), allowed, strict=True)]
     if change_max is not None:
-        shares.append(float(np.max(np.abs(loop.x_dm - loop.x_d))) / change_max - 1.0)
+        shares.append(largest(loop.change) / change_max - 1.0)
     return max(shares)
 
 
-def mean_rms(loops: list[ClosedLoop]) -> float:
-    return UM * float(np.mean([loop.rms for loop in loops]))
+def mean_rms(loops: list[Run]) -> float:
+    return UM * float(np.mean([loop.tracking_rms for loop in loops]))
 
 
 def staircase_rows(report: Report, loops: Loops, seeds: range) -> tuple[float, float]:
@@ -135,7 +137,7 @@ def stage_rows(report: Report, loops: Loops, seeds: range) -> None:
     report.title("3  stage, spiral, recommended settings; physics: filtered basis functions as published")
     position, derivative, end = archimedean_spiral(0.030, 5.0)
     machines, commands = [load_machine("als25010_x"), load_machine("als25010_y")], spiral()
-    found: dict[str, list[list[ClosedLoop]]] = {name: [] for name in STAGE_KINDS}
+    found: dict[str, list[list[Run]]] = {name: [] for name in STAGE_KINDS}
     for machine, r in zip(machines, commands, strict=True):
         plain = as_published(machine)
         found["none"].append([loops.run(machine, r, SepState.OFF, s)[0] for s in seeds])
@@ -157,8 +159,8 @@ def stage_rows(report: Report, loops: Loops, seeds: range) -> None:
                 report.line(f"{label}  {name}", figure, note=shares)
         near = after_reversals(r)
         for name in ("physics", "physics, no_reversal", "hybrid warm"):
-            errors = np.array([loop.x_d - loop.x for loop in found[name][axis]])
-            outside = UM * float(np.sqrt(np.mean(errors[:, ~near] ** 2)))
+            errors = np.array([loop.error for loop in found[name][axis]])
+            outside = UM * rms(errors[:, ~near])
             share = float(np.sum(errors[:, near] ** 2) / np.sum(errors**2))
             note = f"{share:.0%} of the mean square is within 0.1 s of a reversal, {np.mean(near):.0%} of the time"
             report.line(f"   {name}, away from reversals", outside, note=note)
@@ -174,7 +176,7 @@ def stage_rows(report: Report, loops: Loops, seeds: range) -> None:
     for name, (x, y) in found.items():
         points = [np.column_stack((a.x, b.x)) for a, b in zip(x, y, strict=True)]
         errors = np.array([contour_error(point, position, derivative, end) for point in points])
-        report.line(f"contour error, {name}", UM * float(np.sqrt(np.mean(errors**2))))
+        report.line(f"contour error, {name}", UM * rms(errors))
 
 
 def after_reversals(r: Array) -> Any:
@@ -201,9 +203,9 @@ def peer_rows(report: Report, cold: float, warm: float) -> None:
     commands["filtered basis functions, physics model"] = loop.x_dm
     for name, command in commands.items():
         reached = loop.x if command is loop.x_dm else simulate(machine.new_plant(), command, machine.T_s)
-        rms = UM * float(np.sqrt(np.mean((r - reached) ** 2)))
-        peaks = [float(np.max(np.abs(np.diff(command, i)))) / machine.T_s**i for i in (2, 3)]
-        report.line(name, rms, "ours is ahead", cold < rms and warm < rms, f"{peaks[0]:.1f} m/s², {peaks[1]:.0f} m/s³")
+        error = UM * rms(r - reached)
+        _, a, j = peak_derivatives(command, machine.T_s)
+        report.line(name, error, "ours is ahead", cold < error and warm < error, f"{a:.1f} m/s², {j:.0f} m/s³")
     report.line("hybrid, recommended settings, cold", cold)
     report.line("hybrid, recommended settings, warm", warm)
 

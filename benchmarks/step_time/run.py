@@ -30,7 +30,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.step_time.host import PREDICTOR, Array, Host, build, drive_log, instructions
-from hybridsep.evaluate.plots import save_figure
+from hybridsep.evaluate.canvas import save_figure
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.look_ahead import LookAhead
 from hybridsep.predict.predictor import HybridPredictor

@@ -1,143 +1,14 @@
-"""Checks of the command line's arguments, all of them before any work, and what follows from the arguments."""
+"""Checks of arguments that several commands have."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from ..base.errors import ParameterError
-from ..base.signals import Array
-from ..compensate.compensator import SepState
-from ..cosim.compensator_run import COMPENSATOR
-from ..cosim.predictor_run import PREDICTOR
-from ..cosim.wiring import check_look_ahead, check_plant
-from ..fmi.archive import fmu_names
-from ..fmi.compiler import compilers
-from ..fmi.warm_start import load_trained
-from ..logs.log import check_reading
-from ..machine import Machine, load_machine, machine_names
-from ..plants.trajectory import PAPER_LIMITS, read_trajectory, spiral, staircase
+from ..machine import Machine
 
-__all__ = [
-    "COMPENSATIONS",
-    "TRAJECTORIES",
-    "Job",
-    "check_ending",
-    "check_interval",
-    "check_pair",
-    "extras_of",
-    "fitting",
-    "jobs_of",
-    "read_command",
-]
-
-COMPENSATIONS = {"none": SepState.OFF, "physics": SepState.PHYSICS, "hybrid": SepState.HYBRID}
-"""What ``--compensate`` takes: the best model to use."""
-
-TRAJECTORIES = ("staircase", "spiral_x", "spiral_y")
-"""What ``--trajectory`` takes besides a file."""
-
-Job = tuple[Machine, str, str]
-"""An FMU to build: its machine, name and model."""
-
-
-def jobs_of(fmus: Sequence[str], machines: Sequence[str], backend: str, targets: Sequence[str]) -> list[Job]:
-    """Return the FMUs to build, all of the machines' if none is named."""
-    jobs = [
-        (axis, name, model)
-        for axis in map(load_machine, machines or machine_names())
-        for name, model in fmu_names(axis, backend).items()
-    ]
-    if unknown := sorted(set(fmus) - {name for _, name, _ in jobs}):
-        raise ParameterError(f"no FMU {', '.join(unknown)}; there are {', '.join(name for _, name, _ in jobs)}")
-    if targets and backend != "native":
-        raise ParameterError(f"--target is for native FMUs; with --backend {backend} leave it out")
-    if backend == "native":
-        compilers(targets or ("host",))
-    return [job for job in jobs if not fmus or job[1] in fmus]
-
-
-def extras_of(
-    jobs: Sequence[Job], weights: Path | None, trajectory: Path | None, unit: str, T_s: float | None
-) -> dict[str, dict[str, Any]]:
-    """Return by model what one of the FMUs gets besides its machine: weights, samples of a trajectory."""
-    extras: dict[str, dict[str, Any]] = {}
-    check_reading(unit, T_s)
-    if weights is not None:
-        axis, model = _one_of(jobs, ("HybridPredictor", "SepCompensator"), "--weights")
-        load_trained(weights, axis, model)
-        extras[model] = {"weights": weights}
-    if trajectory is not None:
-        axis, model = _one_of(jobs, ("ReferenceTrajectory",), "--trajectory")
-        samples, found = read_trajectory(trajectory, unit=unit, T_s=T_s)
-        check_interval(trajectory.name, found, axis)
-        extras[model] = {"samples": samples}
-    return extras
-
-
-def read_command(trajectory: str, axis: Machine, unit: str, T_s: float | None) -> Array:
-    """Return the samples of a named trajectory or of a file, at the machine's sampling interval."""
-    check_reading(unit, T_s)
-    limits = PAPER_LIMITS if axis.limits is None else axis.trajectory_limits()
-    if trajectory == "staircase":
-        return staircase(axis.T_s, limits=limits)
-    if trajectory in TRAJECTORIES:
-        return spiral(axis.T_s, limits=limits)[trajectory == "spiral_y"]
-    command, found = read_trajectory(trajectory, unit=unit, T_s=T_s)
-    check_interval(trajectory, found, axis)
-    return command
-
-
-def fitting(axis: Machine, compensate: str | None, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Check the FMI values of a look-ahead FMU that will be built; return them with what must change with them."""
-    changed = axis.changed("predictor" if compensate is None else "compensator", values)
-    if compensate is None:
-        return dict(values)
-    settings = changed.compensator_settings
-    windows = {"preview": settings.preview, "spacing": settings.spacing} if "Np" in values else {}
-    return {**values, **windows}
-
-
-def check_pair(
-    axis: Machine,
-    model: str,
-    predictor: Path | None,
-    plant: Path | None,
-    weights: Path | None,
-    backend: str,
-) -> None:
-    """Check a co-simulation's two FMUs: those that are given, and that the others can be built.
-
-    Parameters
-    ----------
-    axis : Machine
-    model : {"HybridPredictor", "SepCompensator"}
-        The look-ahead.
-    predictor, plant : Path, optional
-        Archives; built if left out.
-    weights : Path, optional
-        For a look-ahead that is built.
-    backend : {"native", "python"}
-    """
-    models = fmu_names(axis, backend).values()
-    if plant is None and "FeedDrive" not in models:
-        raise ParameterError(f"machine {axis.name} has no plant; name a plant FMU with --plant")
-    if predictor is None and model not in models:
-        raise ParameterError(
-            f"machine {axis.name} has no [drive_limits], which a compensator must keep; add them, or name a "
-            "compensator FMU with --predictor"
-        )
-    if predictor is not None and weights is not None:
-        raise ParameterError("--weights go into an FMU that is built here; leave out --predictor")
-    if predictor is not None:
-        check_look_ahead(predictor, PREDICTOR if model == "HybridPredictor" else COMPENSATOR)
-    if plant is not None:
-        check_plant(plant)
-    if weights is not None:
-        load_trained(weights, axis, model)
-    if backend == "native" and None in (predictor, plant):
-        compilers(("host",))
+__all__ = ["check_ending", "check_interval"]
 
 
 def check_interval(name: str, T_s: float, axis: Machine) -> None:
@@ -155,14 +26,3 @@ def check_ending(path: Path | None, option: str, endings: Sequence[str]) -> None
     """Say that a file has another ending than those that can be written, if it is given."""
     if path is not None and path.suffix.lower() not in endings:
         raise ParameterError(f"{option} must end in {' or '.join(endings)}, got {path.name!r}")
-
-
-def _one_of(jobs: Sequence[Job], models: Sequence[str], option: str) -> tuple[Machine, str]:
-    """Return machine and model of the only FMU of these models that is built, which an option is meant for."""
-    found = [job for job in jobs if job[2] in models]
-    if len(found) != 1:
-        names = ", ".join(name for _, name, _ in found) or "none"
-        raise ParameterError(
-            f"{option} is for one {' or '.join(models)}, this would build {names}; name one, or its --machine"
-        )
-    return found[0][0], found[0][2]

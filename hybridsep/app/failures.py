@@ -7,17 +7,18 @@ from __future__ import annotations
 
 import codecs
 import os
+import signal
 import sys
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 
 from rich.console import Console
 
-from .. import __version__
 from ..base.errors import HybridSepError
 from ..base.interrupt import interrupts_between_calls
+from ..base.version import __version__
 
-__all__ = ["DEBUG_VARIABLE", "errors_console", "run"]
+__all__ = ["DEBUG_VARIABLE", "errors_console", "loading", "run"]
 
 DEBUG_VARIABLE = "HYBRIDSEP_DEBUG"
 """Environment variable: if it is set, an unexpected error shows its traceback."""
@@ -34,8 +35,37 @@ class _Interrupted(BaseException):
     """Ctrl-C; no KeyboardInterrupt, which typer would turn into an exit without a word."""
 
 
-def run(app: Callable[[], object]) -> int:
-    """Run a command line; return its exit status."""
+_leave: Callable[..., object] | None = None
+"""Handler of Ctrl-C that ends the process at once; None where Ctrl-C is somebody else's."""
+
+
+@contextmanager
+def loading() -> Iterator[None]:
+    """Let Ctrl-C end the process at once while a command imports what it works with.
+
+    Nothing is open then, and an exception that is raised inside another library's import may be lost.
+    """
+    if _leave is None:
+        yield
+        return
+    before = signal.signal(signal.SIGINT, _leave)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def run(app: Callable[[], object], leave: Callable[..., object] | None = None) -> int:
+    """Run a command line; return its exit status.
+
+    Parameters
+    ----------
+    app : callable
+    leave : callable, optional
+        Handler of Ctrl-C while a command is :func:`loading`; as at other times if left out.
+    """
+    global _leave
+    _leave = leave
     for stream in (sys.stdout, sys.stderr):
         with suppress(AttributeError):  # a stream in a program that has its own
             stream.reconfigure(errors=_PLAIN_ERRORS)  # type: ignore[union-attr]

@@ -1,4 +1,7 @@
-"""Options that several commands of the command line share; ranges and units come from the table of parameters."""
+"""Options of the command line's commands; ranges and units come from the table of parameters.
+
+What a command works with is imported when it runs, so that its help, and that of the others, needs none of it.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +11,11 @@ from typing import Annotated
 import typer
 
 from ..base.settings import PARAMETERS
-from ..fmi.archive import BACKENDS
+from ..fmi.backends import BACKENDS
 
 __all__ = [
+    "COMPENSATIONS",
+    "TRAJECTORIES",
     "BackendOption",
     "ForceOption",
     "InitOption",
@@ -25,6 +30,13 @@ __all__ = [
     "WeightsOption",
     "parameter_help",
 ]
+
+
+COMPENSATIONS = ("none", "physics", "hybrid")
+"""What ``--compensate`` takes: the best model to use, in the order of :class:`~hybridsep.compensate.plan.SepState`."""
+
+TRAJECTORIES = ("staircase", "spiral_x", "spiral_y")
+"""What ``--trajectory`` takes besides a file."""
 
 
 def parameter_help(name: str) -> str:

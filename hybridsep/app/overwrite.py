@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..base.errors import ParameterError
-from ..cosim import compensator_run as sep_cosim
-from ..cosim import predictor_run as cosim
+from ..cosim.run import COMPENSATOR, PREDICTOR
 
 __all__ = ["BATCHES", "BATCH_COLUMNS", "BY_ENDING", "FIGURE", "FMU", "RUN", "Kind", "Output", "check_outputs"]
 
@@ -86,7 +85,7 @@ def _members(path: Path) -> list[str]:
 
 
 BATCHES = Kind("CSV of hybridsep backtest", _has_columns(BATCH_COLUMNS))
-RUN = Kind("result of hybridsep cosim", _has_columns(cosim.COLUMNS, sep_cosim.COLUMNS))
+RUN = Kind("result of hybridsep cosim", _has_columns(PREDICTOR.columns, COMPENSATOR.columns))
 FIGURE = Kind("PNG", _begins_with(b"\x89PNG\r\n\x1a\n"))
 FMU = Kind("FMU of hybridsep", _is_our_fmu)
 STATE = Kind("saved predictor", _begins_with(b"HSEP"))

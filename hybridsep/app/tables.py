@@ -12,17 +12,17 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from .demo import PRINTED, Summary
-from .sep_demo import KINDS
+from ..cosim.run import PREDICTOR, Run
+from .printed import PRINTED
 
-__all__ = ["console", "print_compensation", "print_json", "print_predictions", "print_scores", "print_tracking"]
+__all__ = ["console", "print_compensation", "print_json", "print_predictions", "print_run", "print_scores"]
 
 console = Console()
 
 PAPER_COLUMN = "paper: physics → hybrid, reduction, as printed there"
 
 
-def print_predictions(summary: Summary) -> None:
+def print_predictions(summary: Mapping[str, Mapping[str, Any]]) -> None:
     """Print what the demo's predictors came to."""
     table = Table(
         title="Prediction error, RMS in µm against the measured position",
@@ -52,22 +52,22 @@ def print_predictions(summary: Summary) -> None:
         )
 
 
-def print_compensation(summary: Summary) -> None:
+def print_compensation(summary: Mapping[str, Mapping[str, Any]]) -> None:
     """Print what the demo's compensators came to."""
-    labels = {kind: kind.replace("_", " ") for kind in KINDS}
+    kinds = list(summary["staircase"]["compensation"])
     table = Table(
         title="\nTracking error with compensation, RMS in µm of the true position",
         caption="warm: weights of an earlier run; contour: X and Y",
         box=box.SIMPLE,
         pad_edge=False,
     )
-    for column in ("case", *labels.values()):
+    for column in ("case", *(kind.replace("_", " ") for kind in kinds)):
         table.add_column(column, justify="left" if column == "case" else "right", no_wrap=True)
     rows = {name: (name, "tracking_rms_um") for name, case in summary.items() if "compensation" in case}
     rows["spiral, contour"] = ("spiral_x", "contour_rms_um")
     for label, (name, figure) in rows.items():
         compensation = summary[name]["compensation"]
-        table.add_row(label, *(_figure(compensation[kind][figure]) for kind in KINDS))
+        table.add_row(label, *(_figure(compensation[kind][figure]) for kind in kinds))
     console.print(table)
 
 
@@ -91,7 +91,7 @@ def _figure(value: float | None, unit: str = "") -> str:
 
 
 def print_scores(summary: Mapping[str, float | int], as_json: bool, title: str) -> None:
-    """Print the scores of a backtest."""
+    """Print prediction errors, of a run or of a backtest."""
     if as_json:
         print_json(summary)
         return
@@ -109,8 +109,14 @@ def print_scores(summary: Mapping[str, float | int], as_json: bool, title: str) 
     console.print(table)
 
 
-def print_tracking(summary: Mapping[str, float | int], as_json: bool, title: str) -> None:
-    """Print what a compensated co-simulation came to."""
+def print_run(run: Run, as_json: bool, title: str) -> None:
+    """Print the figures of a run: of its predictions, or of its tracking."""
+    show = print_scores if run.kind == PREDICTOR else _print_tracking
+    show(run.summary(), as_json, title)
+
+
+def _print_tracking(summary: Mapping[str, float | int], as_json: bool, title: str) -> None:
+    """Print what a compensated run came to."""
     if as_json:
         print_json(summary)
         return

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-__all__ = ["data_folder"]
+__all__ = ["DEFAULT_MACHINE", "data_folder"]
+
+DEFAULT_MACHINE = "spring_mass_damper"
+"""The machine file of the paper's staircase, whose FMUs have no suffix."""
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 

@@ -67,7 +67,7 @@ class SepCompensator:
         assert settings.preview is not None
         assert settings.spacing is not None
         self.preview, self.spacing = settings.preview, settings.spacing
-        self._best = SepState[settings.compensate.upper()]
+        self.compensate = SepState[settings.compensate.upper()]
         self._basis = SplineBasis(self.preview, self.spacing)
         self._n_pinned = min(_PINNED, Np // 2) // self.spacing
         self._bounds = DriveBounds(
@@ -211,14 +211,14 @@ class SepCompensator:
         """Return the models to try, best first."""
         predictor = self.predictor
         hybrid = (
-            self._best is SepState.HYBRID
+            self.compensate is SepState.HYBRID
             and predictor.k >= predictor.n_init
             and predictor.regression.n_samples > 0
             and self._trust.hybrid
             and has_stable_poles(predictor.residual_weights)
         )
         candidates = [SepState.HYBRID] if hybrid else []
-        return candidates + ([SepState.PHYSICS] if self._best is not SepState.OFF else [])
+        return candidates + ([SepState.PHYSICS] if self.compensate is not SepState.OFF else [])
 
     def to_bytes(self) -> bytes:
         """Return parameters and state, the predictor's and a planned window included, as a versioned blob."""

@@ -16,11 +16,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base.errors import SignalError
+from ..base.metrics import RunningErrors
 from ..base.signals import PREDICTION_MAX, Array, as_samples
 from ..base.threads import one_blas_thread
 from ..predict.predictor import HybridPredictor
+from .scores import Score, Scores
 
-__all__ = ["Backtest", "Batch", "Score", "Scores", "backtest", "backtest_stream"]
+__all__ = ["Backtest", "Batch", "backtest", "backtest_stream"]
 
 
 class Batch(NamedTuple):
@@ -53,68 +55,6 @@ class Batch(NamedTuple):
     rms_pb: float
     rms_hold: float
     rms_h: float
-
-
-@dataclass(frozen=True)
-class Score:
-    """Prediction errors against the measured position; NaN where there are no samples.
-
-    Attributes
-    ----------
-    n_samples : int
-        Samples they were taken over.
-    rms_pb, rms_hold, rms_h : float
-        RMS of physics model, hold baseline and hybrid, m.
-    max_pb, max_hold, max_h : float
-        Largest absolute error of each, m.
-    """
-
-    n_samples: int
-    rms_pb: float
-    rms_hold: float
-    rms_h: float
-    max_pb: float
-    max_hold: float
-    max_h: float
-
-    @property
-    def reduction_percent(self) -> float:
-        """By how much the hybrid's RMS is below the physics model's, percent of the latter."""
-        if self.rms_pb == 0.0:
-            return 0.0 if self.rms_h == 0.0 else -math.inf
-        return 100.0 * (1.0 - self.rms_h / self.rms_pb)
-
-
-@dataclass(frozen=True)
-class Scores:
-    """What a replay came to.
-
-    Attributes
-    ----------
-    overall, after_warm_up : Score
-        Over all samples, and over those after the warm-up.
-    n_batches : int
-        Batches replayed, the last one may be incomplete.
-    """
-
-    overall: Score
-    after_warm_up: Score
-    n_batches: int
-
-    def summary(self) -> dict[str, float | int]:
-        """Return all scores by name: ``rms_pb_um``, ``max_h_um``, ``reduction_percent``, ….
-
-        Errors are in micrometres against the measured position; the names with ``_after_warm_up`` leave the warm-up
-        out and are NaN if nothing is left.
-        """
-        result: dict[str, float | int] = {"n_batches": self.n_batches}
-        for score, suffix in ((self.overall, ""), (self.after_warm_up, "_after_warm_up")):
-            for quantity in ("rms", "max"):
-                for name in ("pb", "hold", "h"):
-                    result[f"{quantity}_{name}_um{suffix}"] = 1e6 * float(getattr(score, f"{quantity}_{name}"))
-            result[f"reduction_percent{suffix}"] = score.reduction_percent
-            result[f"n_samples{suffix}"] = score.n_samples
-        return result
 
 
 @dataclass(frozen=True)
@@ -221,7 +161,7 @@ def backtest_stream(
         If a chunk's samples cannot be used, there are none at all, or a prediction diverges. What came before it is
         learned.
     """
-    overall, after = _Sums(), _Sums()
+    overall, after = RunningErrors(3), RunningErrors(3)
     j = 0
     for x_d, x in _batches(chunks, predictor.Np):
         residual = predictor.last_residual()
@@ -248,27 +188,7 @@ def backtest_stream(
             on_batch(batch)
     if j == 0:
         raise SignalError("a log must have at least one sample, got none")
-    return Scores(overall.score(), after.score(), j)
-
-
-class _Sums:
-    """Running sums of squares and largest absolute errors of the three predictors."""
-
-    def __init__(self) -> None:
-        self.n = 0
-        self.squares, self.peaks = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
-
-    def add(self, n: int, squares: list[float], peaks: list[float]) -> None:
-        self.n += n
-        for i in range(3):
-            self.squares[i] += squares[i]
-            if peaks[i] > self.peaks[i]:
-                self.peaks[i] = peaks[i]
-
-    def score(self) -> Score:
-        if self.n == 0:
-            return Score(0, *[math.nan] * 6)
-        return Score(self.n, *[math.sqrt(square / self.n) for square in self.squares], *self.peaks)
+    return Scores(Score.of(overall), Score.of(after), j)
 
 
 def _measure(error: Array, k: int) -> tuple[list[float], list[float]]:

@@ -13,17 +13,16 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
+from ..base.data_files import DEFAULT_MACHINE
 from ..base.errors import FmuError
 from ..base.output import written_whole
-from ..machine import DEFAULT_MACHINE, Machine
+from ..machine import Machine
 from ..machine_sections import FeedDriveSection
 from . import native_backend, python_backend
+from .backends import BACKENDS
 from .warm_start import load_trained
 
-__all__ = ["BACKENDS", "build_fmu", "fmu_names"]
-
-BACKENDS = ("native", "python")
-"""Flavours, the default first."""
+__all__ = ["build_fmu", "fmu_names"]
 
 _SUFFIX = {"native": "", "python": "Py"}
 _SAMPLES_TRAJECTORY = 3

@@ -14,12 +14,11 @@ from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
-import fmpy
 from numpy.typing import ArrayLike
 
-from .. import __version__
 from ..base.data_files import data_folder
 from ..base.signals import as_samples
+from ..base.version import __version__
 from ..machine import Machine
 from ..plants.trajectory import spiral, staircase
 from ..predict.predictor import HybridPredictor
@@ -27,9 +26,8 @@ from .c_header import c_header
 from .compiler import ALL_TARGETS, binaries
 from .content import content_guid, fmu_title
 from .experiment import stop_time
-from .icon import icon
 from .model_description import FmuInfo, build_description, model_description
-from .pages import index_page
+from .pages import icon, index_page
 from .reference import reference_files
 from .variables import INTERPOLATED, variables_of
 from .weights import WEIGHTS_FILE, weights_file
@@ -132,6 +130,8 @@ def all_c(files: Sequence[str]) -> str:
 
 def fmi_headers() -> dict[str, bytes]:
     """Return the FMI 2.0 headers for shared libraries, as fmpy carries them, with the line ends of a text file."""
+    import fmpy
+
     folder = Path(fmpy.__file__).parent / "c-code"
     return {file: (folder / file).read_bytes().replace(b"\r\n", b"\n") for file in _FMI_HEADERS}
 

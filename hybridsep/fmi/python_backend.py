@@ -15,16 +15,16 @@ from pathlib import Path
 
 import pythonfmu
 
-from .. import __version__
 from ..base.data_files import data_folder
+from ..base.version import __version__
 from ..machine import Machine
 from ..predict.predictor import HybridPredictor
 from .content import content_guid, fmu_title
 from .experiment import stop_time
 from .imported import imported_modules
 from .model_description import FmuInfo, model_description
-from .pages import index_page
-from .pythonfmu_limits import checked_version, limits_section
+from .pages import filled, index_page
+from .pythonfmu_limits import checked_version
 from .variables import variables_of
 from .weights import WEIGHTS_FILE, weights_file
 
@@ -61,7 +61,8 @@ def files(
     if trained is not None:
         content[f"resources/{WEIGHTS_FILE}"] = weights_file(trained)
     needs = "The FMU needs a Python 3 with NumPy and SciPy in the importing tool's process."
-    content["documentation/index.html"] = index_page(machine, description, needs, limits=limits_section(version))
+    limits = filled("pythonfmu_limits", version=version)
+    content["documentation/index.html"] = index_page(machine, description, needs, limits=limits)
     for source in ("linux64/libpythonfmu-export.so", "win64/pythonfmu-export.dll"):
         binary = Path(pythonfmu.__file__).parent / "resources" / "binaries" / source
         content[f"binaries/{Path(source).parent}/{name}{binary.suffix}"] = binary.read_bytes()

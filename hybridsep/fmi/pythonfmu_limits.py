@@ -11,23 +11,10 @@ from urllib.parse import quote
 
 from ..base.errors import FmuError
 
-__all__ = ["check_unpacked", "checked_version", "limits_section"]
+__all__ = ["check_unpacked", "checked_version"]
 
 SERIES = "0.7."
-"""Whose reference counting ``slave.py`` balances, and of which the limits below were measured."""
-
-_KILLS = (
-    "an instance name that is NULL or not UTF-8",
-    "a resource location that is NULL, no <code>file:///</code> path, has other percent codes than <code>%20</code>, or"
-    " where <code>slavemodule.txt</code> or the slave that it names is missing",
-    "a message while logging is on and the callbacks or the logger are NULL",
-    "a NULL component, a NULL array of more than 0 values, a NULL place for a state, NULL log categories",
-    "at times, an exit while the library is loaded: it releases memory twice, which corrupts the heap (Linux)",
-)
-_IGNORED = (
-    "the GUID and the type, co-simulation or model exchange, that <code>fmi2Instantiate</code> gets",
-    "whether a state has been freed already; its pointer is not set to NULL",
-)
+"""Whose reference counting ``slave.py`` balances, and of which the limits in ``templates`` were measured."""
 
 
 def checked_version() -> str:
@@ -45,24 +32,6 @@ def checked_version() -> str:
             f"pip install 'pythonfmu~={SERIES}0'"
         )
     return version
-
-
-def limits_section(version: str) -> str:
-    """Return the limits as a section of the FMU's page."""
-    kills, ignored = ("\n".join(f"<li>{limit}</li>" for limit in limits) for limits in (_KILLS, _IGNORED))
-    return f"""<h2>Limits of pythonfmu {version}</h2>
-<p>The binary of this FMU is pythonfmu's. These end the importer's process, and no Python code of this FMU can prevent
-it:</p>
-<ul>
-{kills}
-</ul>
-<p>These are not looked at:</p>
-<ul>
-{ignored}
-</ul>
-<p>It has no <code>fmi2Error</code>: a step that is refused is <code>fmi2Discard</code>, any other refusal is
-<code>fmi2Fatal</code>, after which this FMU can be used all the same. The native flavour has none of these limits.
-</p>"""
 
 
 def check_unpacked(folder: Path, generation_tool: str) -> None:

@@ -9,16 +9,18 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
-from ruckig import InputParameter, Result, Ruckig
-from ruckig import Trajectory as RuckigTrajectory
 
 from ..base.errors import ParameterError, SignalError
 from ..base.settings import Limits, check, samples_before
 from ..base.signals import Array, as_samples
-from ..logs import read_log
+from ..logs.log import read_log
+
+if TYPE_CHECKING:
+    import ruckig
 
 __all__ = [
     "PAPER_LIMITS",
@@ -230,15 +232,17 @@ def along_path(position: Curve, derivative: Curve, end: float, limits: Limits, T
     return position(u)
 
 
-def _plan(here: float, there: float, limits: Limits) -> RuckigTrajectory:
+def _plan(here: float, there: float, limits: Limits) -> ruckig.Trajectory:
     """Return ruckig's time-optimal move between two points at rest."""
-    request = InputParameter(1)
+    import ruckig
+
+    request = ruckig.InputParameter(1)
     request.current_position, request.target_position = [here], [there]
     request.max_velocity, request.max_acceleration = [limits.velocity], [limits.acceleration]
     request.max_jerk = [limits.jerk]
-    move = RuckigTrajectory(1)
-    result = Ruckig(1).calculate(request, move)
-    if result not in (Result.Working, Result.Finished):
+    move = ruckig.Trajectory(1)
+    result = ruckig.Ruckig(1).calculate(request, move)
+    if result not in (ruckig.Result.Working, ruckig.Result.Finished):
         raise ParameterError(f"no move from {here:g} m to {there:g} m under {limits}: {result}")
     return move
 

@@ -12,7 +12,7 @@ from command_line import Run, write_log
 from places import EMPS
 from staircase_data import commanded
 
-from hybridsep import Encoder, __version__, load_machine, run_closed_loop, staircase
+from hybridsep import Encoder, __version__, cosimulate, load_machine, staircase
 from hybridsep.base.settings import PARAMETERS
 
 
@@ -111,7 +111,7 @@ def test_cosim_with_compensation(hybridsep: Run, tmp_path: Path) -> None:
 def test_weights_for_a_compensator(hybridsep: Run, tmp_path: Path) -> None:
     machine, weights = load_machine("spring_mass_damper"), tmp_path / "trained.state"
     compensator = machine.new_compensator()
-    run_closed_loop(compensator, machine.new_plant(), staircase(), encoder=Encoder(5e-6, 1))
+    cosimulate(compensator, machine.new_plant(), staircase(), encoder=Encoder(5e-6, 1))
     compensator.predictor.save(weights)
     options = ("--backend", "python", "--weights", weights)
     status, out, _ = hybridsep("cosim", "--compensate", "hybrid", *options, "--json")

@@ -14,8 +14,7 @@ from log_files import columns, write
 from hybridsep import HybridPredictor, load_machine
 from hybridsep.app import demo
 from hybridsep.app.overwrite import BATCHES, FIGURE, FMU, RUN, STATE, SUMMARY
-from hybridsep.cosim import compensator_run, predictor_run
-from hybridsep.cosim.wiring import save_columns
+from hybridsep.cosim.run import COMPENSATOR, PREDICTOR, save_columns
 from hybridsep.machine import machine_path
 
 MACHINE = "spring_mass_damper"
@@ -156,7 +155,7 @@ def test_kinds_are_recognised_and_others_are_not(tmp_path: Path, python_fmu: Cal
         FMU: [python_fmu("FeedDrivePy")],
     }
     for path in ours[RUN]:
-        names = (predictor_run if path.stem == "a" else compensator_run).COLUMNS
+        names = (PREDICTOR if path.stem == "a" else COMPENSATOR).columns
         save_columns({name: np.zeros(3) for name in names}, path)
     HybridPredictor(load_machine(MACHINE).model).save(ours[STATE][0])
     every = [path for paths in ours.values() for path in paths]
@@ -202,11 +201,9 @@ def test_arguments_are_checked_before_any_work(
     folder = tmp_path / "here"
     folder.mkdir()
     monkeypatch.chdir(folder)
-    for module in ("hybridsep.app.cli", "hybridsep.app.sep_demo"):
+    for module in ("hybridsep.fmi.archive", "hybridsep.app.builds"):
         monkeypatch.setattr(f"{module}.build_fmu", work)
-    monkeypatch.setattr("hybridsep.app.cli.build_for_host", work)
-    monkeypatch.setattr("hybridsep.app.demo.build_for_host", work)
-    monkeypatch.setattr("hybridsep.app.cli.backtest_stream", work)
+    monkeypatch.setattr("hybridsep.evaluate.backtest.backtest_stream", work)
     names = {"log": log, "folder": folder, "fmu": python_fmu("HybridPredictorPy")}
     assert message in refusal(hybridsep, *(argument.format(**names) for argument in arguments))
     assert [path for path in folder.rglob("*") if path.is_file()] == []

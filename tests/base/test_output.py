@@ -20,8 +20,8 @@ from matplotlib.figure import Figure
 from hybridsep import HybridPredictor, ModalModel, build_fmu, load_machine
 from hybridsep.base import output
 from hybridsep.base.output import written_text, written_whole
-from hybridsep.cosim.wiring import save_columns
-from hybridsep.evaluate.plots import save_figure
+from hybridsep.cosim.run import save_columns
+from hybridsep.evaluate.canvas import save_figure
 
 POSIX = pytest.mark.skipif(sys.platform == "win32", reason="POSIX only")
 OLD = b"what was there before"

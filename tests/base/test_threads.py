@@ -17,17 +17,7 @@ import pytest
 from places import SUPPORT
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from hybridsep import (
-    Encoder,
-    HybridPredictor,
-    backtest,
-    backtest_stream,
-    cosimulate,
-    load_machine,
-    run_closed_loop,
-    simulate,
-    staircase,
-)
+from hybridsep import Encoder, HybridPredictor, backtest, backtest_stream, cosimulate, load_machine, simulate, staircase
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.threads import one_blas_thread
 
@@ -55,7 +45,7 @@ def results() -> dict[str, str]:
     noise = Encoder(5e-6, 0)
     x = simulate(machine.new_plant(), x_d, machine.T_s) + noise.measure_all(np.zeros(N))
     replay = backtest(HybridPredictor(machine.model, PredictorSettings(Np=500, p=400, q=3)), x_d, x)
-    loop = run_closed_loop(machine.new_compensator(), machine.new_plant(), x_d, encoder=noise)
+    loop = cosimulate(machine.new_compensator(), machine.new_plant(), x_d, encoder=noise)
     signals = {"replay": replay.x_h, "closed loop": loop.x_dm}
     return {name: hashlib.sha256(signal.tobytes()).hexdigest() for name, signal in signals.items()}
 
@@ -87,7 +77,7 @@ def test_replays_and_loops_use_one_thread(two_threads: None, python_fmu: Callabl
 
     backtest(machine.new_predictor(), x_d, x_d, on_batch=look)
     backtest_stream(machine.new_predictor(), iter([(x_d, x_d)]), on_batch=look)
-    run_closed_loop(machine.new_compensator(), machine.new_plant(), x_d[:3], sensor=look_and_pass)
+    cosimulate(machine.new_compensator(), machine.new_plant(), x_d[:3], sensor=look_and_pass)
     cosimulate(python_fmu("HybridPredictorPy"), python_fmu("FeedDrivePy"), x_d[:3], progress=look)
     assert len(seen) > 100
     assert set.union(*seen) == {1}

@@ -14,7 +14,7 @@ from c_core import TS, CModel, refusal, write_trajectory, write_weights
 
 from hybridsep.base.clock import SampleClock
 from hybridsep.base.errors import FmuError, HybridSepError
-from hybridsep.base.settings import check, check_together
+from hybridsep.base.settings import PredictorSettings, check
 from hybridsep.fmi.variables import modes_from
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.plants.feed_drive import FeedDrive
@@ -42,10 +42,9 @@ from hybridsep.predict.look_ahead import checked_start
     ],
 )
 def test_bad_parameters_are_refused_in_the_librarys_words(wrong: dict[str, float]) -> None:
-    names = {"lambda": "lam", "T_s": "T_s"}
     given: Any = {key: wrong.get(key, c_core.PREDICTOR[key]) for key in ("Np", "p", "q", "lambda", "T_s", "t_init")}
     with pytest.raises(HybridSepError) as caught:
-        check_together(**{names.get(key, key): value for key, value in given.items()})
+        PredictorSettings.from_fmi(given)
     assert refusal(CModel("predictor", wrong).size) == str(caught.value)
     assert refusal(CModel("predictor", wrong).initialise) == str(caught.value)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -24,13 +25,14 @@ from hybridsep.compensate.compensator import RECOMMENDED, SepCompensator, SepSta
 from hybridsep.compensate.sensor import SensorWatch
 from hybridsep.compensate.splines import N_DECIDED, PlanCost, SplineBasis
 from hybridsep.compensate.trust import Trust, has_stable_poles
-from hybridsep.evaluate.closed_loop import ClosedLoop, contour_error, run_closed_loop
+from hybridsep.cosim.loop import cosimulate
+from hybridsep.cosim.run import Run
 from hybridsep.machine import load_machine
 from hybridsep.model.physics import ModalModel
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.feed_drive import FeedDrive
 from hybridsep.plants.plant import Plant
-from hybridsep.plants.trajectory import PAPER_LIMITS, archimedean_spiral, rest_to_rest, spiral
+from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest, spiral
 from hybridsep.predict.predictor import HybridPredictor
 
 MODEL = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
@@ -167,7 +169,7 @@ def test_a_bounded_plan_costs_what_another_solver_finds(
         return c
 
     monkeypatch.setattr("hybridsep.compensate.compensator.solve", compare)
-    run_closed_loop(compensator(limits=limits), plant(), commanded()[:4000], encoder=Encoder(5e-6, 0))
+    cosimulate(compensator(limits=limits), plant(), commanded()[:4000], encoder=Encoder(5e-6, 0))
     assert len(bounded) >= n_bounded
     assert np.max(np.abs(bounded)) <= 1e-5
 
@@ -201,7 +203,7 @@ def test_what_is_left_of_a_plan_is_followed_when_there_is_no_other() -> None:
     ahead = np.concatenate((commanded()[950:], np.zeros(200)))
     plans = []
     for k in range(0, 500, 100):
-        sep.best = SepState.PHYSICS if k < 200 else SepState.OFF
+        sep.compensate = SepState.PHYSICS if k < 200 else SepState.OFF
         plans.append(sep.plan(ahead[k : k + 200]))
         sep.update(plans[-1].x_pb)
     states = [plan.state for plan in plans]
@@ -215,7 +217,7 @@ def test_what_is_left_of_a_plan_is_followed_when_there_is_no_other() -> None:
 
 def test_the_command_is_continuous_where_the_model_changes() -> None:
     sep = compensator(limits=None)
-    loop = run_closed_loop(sep, plant(), commanded()[:1500], encoder=Encoder(5e-6, 1))
+    loop = cosimulate(sep, plant(), commanded()[:1500], encoder=Encoder(5e-6, 1))
     switch = int(np.flatnonzero(np.diff(loop.state) != 0)[0]) + 1
     third = np.abs(np.diff(loop.x_dm, 3))
     assert np.max(third[switch - 4 : switch + 4]) < np.max(third)
@@ -298,10 +300,11 @@ def test_friction_that_follows_the_command_makes_turning_dear() -> None:
     machine, r = load_machine("als25010_y"), spiral()[1]
     found = {}
     for keep in (True, False):
-        sep = machine.new_compensator(SepState.PHYSICS, no_reversal=keep)
-        found[keep] = run_closed_loop(sep, machine.new_plant(), r, encoder=Encoder(1e-6, 0))
-    assert 1e6 * found[True].rms == pytest.approx(126.65, abs=0.5)
-    assert 1e6 * found[False].rms == pytest.approx(128.39, abs=0.5)
+        settings = replace(machine.compensator_settings, compensate="physics", no_reversal=keep)
+        sep = machine.new_compensator(settings)
+        found[keep] = cosimulate(sep, machine.new_plant(), r, encoder=Encoder(1e-6, 0))
+    assert 1e6 * found[True].tracking_rms == pytest.approx(126.65, abs=0.5)
+    assert 1e6 * found[False].tracking_rms == pytest.approx(128.39, abs=0.5)
     assert turned(found[True].x_dm, found[True].x_d) == 0
     assert turned(found[False].x_dm, found[False].x_d) > 10
 
@@ -364,7 +367,7 @@ def test_trust_is_not_judged_before_the_warm_up_is_over() -> None:
 
 def test_a_bad_start_is_not_remembered() -> None:
     """A seed whose few first rows predict badly: 8.0 µm if the warm-up counted."""
-    assert 1e6 * closed(compensator(), 506).rms < 6.6
+    assert 1e6 * closed(compensator(), 506).tracking_rms < 6.6
 
 
 # Sensor --------------------------------------------------------------------------------------------------------
@@ -405,25 +408,25 @@ def test_no_measurement_is_not_learned() -> None:
 # Closed loop ---------------------------------------------------------------------------------------------------
 
 
-def closed(sep: SepCompensator, seed: int = 0, **more: Any) -> ClosedLoop:
-    return run_closed_loop(sep, plant(), commanded(), encoder=Encoder(more.pop("noise", 5e-6), seed), **more)
+def closed(sep: SepCompensator, seed: int = 0, **more: Any) -> Run:
+    return cosimulate(sep, plant(), commanded(), encoder=Encoder(more.pop("noise", 5e-6), seed), **more)
 
 
 def test_figures_with_the_papers_settings() -> None:
-    assert 1e6 * closed(compensator(SepState.OFF)).rms == pytest.approx(88.5, abs=0.2)
-    assert 1e6 * closed(compensator(SepState.PHYSICS)).rms == pytest.approx(20.2, abs=0.2)
+    assert 1e6 * closed(compensator(SepState.OFF)).tracking_rms == pytest.approx(88.5, abs=0.2)
+    assert 1e6 * closed(compensator(SepState.PHYSICS)).tracking_rms == pytest.approx(20.2, abs=0.2)
     sep = compensator()
-    assert 1e6 * closed(sep).rms == pytest.approx(6.34, abs=0.3)
+    assert 1e6 * closed(sep).tracking_rms == pytest.approx(6.34, abs=0.3)
     warm = closed(sep, 1000, t_init=0.0)
-    assert 1e6 * warm.rms == pytest.approx(4.97, abs=0.3)
+    assert 1e6 * warm.tracking_rms == pytest.approx(4.97, abs=0.3)
     assert (warm.state == SepState.HYBRID).all()
 
 
 def test_figures_with_the_recommended_settings() -> None:
-    sep = compensator(**RECOMMENDED)
+    sep = compensator(**asdict(RECOMMENDED))
     cold, warm = closed(sep), closed(sep, 1000, t_init=0.0)
-    assert 1e6 * cold.rms == pytest.approx(4.4, abs=0.3)
-    assert 1e6 * warm.rms == pytest.approx(1.46, abs=0.15)
+    assert 1e6 * cold.tracking_rms == pytest.approx(4.4, abs=0.3)
+    assert 1e6 * warm.tracking_rms == pytest.approx(1.46, abs=0.15)
     for loop in (cold, warm):
         assert beyond(loop.x_dm, DRIVE_LIMITS) <= 1.0
         assert turned(loop.x_dm, loop.x_d) == 0
@@ -431,12 +434,12 @@ def test_figures_with_the_recommended_settings() -> None:
 
 def test_what_the_features_of_the_reference_bring() -> None:
     """Without them the recommended settings are those of before: 4.7 and 1.95 µm."""
-    sep = compensator(**(RECOMMENDED | {"v_friction": 0.0}))
-    assert 1e6 * closed(sep).rms == pytest.approx(4.75, abs=0.3)
-    assert 1e6 * closed(sep, 1000, t_init=0.0).rms == pytest.approx(1.95, abs=0.2)
+    sep = compensator(**asdict(replace(RECOMMENDED, v_friction=0.0)))
+    assert 1e6 * closed(sep).tracking_rms == pytest.approx(4.75, abs=0.3)
+    assert 1e6 * closed(sep, 1000, t_init=0.0).tracking_rms == pytest.approx(1.95, abs=0.2)
 
 
-@pytest.mark.parametrize("settings_", [{}, RECOMMENDED], ids=["paper", "recommended"])
+@pytest.mark.parametrize("settings_", [{}, asdict(RECOMMENDED)], ids=["paper", "recommended"])
 @pytest.mark.parametrize("trouble", ["changed", "held", "noise", "limits"])
 def test_trouble_never_makes_it_worse_than_physics(settings_: dict[str, Any], trouble: str) -> None:
     held = [0.0]
@@ -460,7 +463,7 @@ def test_trouble_never_makes_it_worse_than_physics(settings_: dict[str, Any], tr
     limits = PAPER_LIMITS if trouble == "limits" else DRIVE_LIMITS
     physics = closed(compensator(SepState.PHYSICS, limits, **settings_), **more)
     hybrid = closed(compensator(limits=limits, **settings_), **more)
-    assert hybrid.rms <= 1.05 * physics.rms
+    assert hybrid.tracking_rms <= 1.05 * physics.tracking_rms
     assert np.isfinite(hybrid.x_dm).all()
     assert beyond(hybrid.x_dm, limits) <= 1.0 + 1e-9
     assert np.max(np.abs(hybrid.x_dm - hybrid.x_d)) <= 1e-3
@@ -487,7 +490,8 @@ def test_a_saved_state_goes_on_bit_for_bit(planned: bool, v_friction: float) -> 
         sep.plan(r[600:800])
     other = SepCompensator.from_bytes(sep.to_bytes())
     assert other.to_bytes() == sep.to_bytes()
-    assert other.no_reversal is sep.no_reversal is (v_friction > 0)
+    assert other.settings == sep.settings
+    assert sep.settings.no_reversal is (v_friction > 0)
     for k in range(600, 1200, 50):
         noise = 5e-6 * rng.normal(size=50)
         np.testing.assert_array_equal(window(other, k, noise), window(sep, k, noise))
@@ -556,13 +560,3 @@ def test_zero_phase_error_tracking_follows_on_its_model(name: str) -> None:
     error = np.std(plain - x_d)
     assert np.max(np.abs(reached - expected)) < 1e-4 * error
     assert np.std(reached - x_d) < 0.102 * error
-
-
-def test_contour_error_is_the_distance_to_the_path() -> None:
-    position, derivative, end = archimedean_spiral(0.03, 5.0)
-    u = np.linspace(1.0, end - 1.0, 301)
-    slope = derivative(u)
-    normal = np.column_stack((-slope[:, 1], slope[:, 0])) / np.linalg.norm(slope, axis=1)[:, None]
-    distance = 1e-4 * np.sin(7 * u)
-    found = contour_error(position(u) + distance[:, None] * normal, position, derivative, end)
-    np.testing.assert_allclose(found, np.abs(distance), rtol=0, atol=1e-9)

@@ -18,7 +18,8 @@ from typing import Any
 import fmpy.fmi1
 import pytest
 
-from hybridsep import FmuError, FmuInstance, build_fmu, load_machine
+from hybridsep import FmuInstance, build_fmu, load_machine
+from hybridsep.base.errors import FmuError
 
 TS = 1e-3
 N_THREADS = 8

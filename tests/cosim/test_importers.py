@@ -16,16 +16,7 @@ import pytest
 from importers_closed_system import SYSTEMS, Array, ClosedSystem, exists_here
 from places import SUPPORT
 
-from hybridsep import (
-    CoSimulation,
-    SepCoSimulation,
-    build_fmu,
-    cosimulate,
-    cosimulate_sep,
-    load_machine,
-    machine_names,
-    staircase,
-)
+from hybridsep import Run, build_fmu, cosimulate, load_machine, machine_names, staircase
 from hybridsep.fmi.archive import fmu_names
 
 NATIVE = {name: machine for machine in map(load_machine, machine_names()) for name in fmu_names(machine)}
@@ -112,8 +103,10 @@ def test_the_loop_without_an_importer_is_cosimulate(fmus: Path, system: ClosedSy
 
 
 @pytest.mark.parametrize("system", ["compensator"], indirect=True)
-def test_the_loop_without_an_importer_is_cosimulate_sep(fmus: Path, system: ClosedSystem, expected: Array) -> None:
-    run = cosimulate_sep(fmus / "SepCompensator.fmu", fmus / "FeedDrive.fmu", staircase())
+def test_the_compensated_loop_without_an_importer_is_the_same(
+    fmus: Path, system: ClosedSystem, expected: Array
+) -> None:
+    run = cosimulate(fmus / "SepCompensator.fmu", fmus / "FeedDrive.fmu", staircase())
     assert_bit_for_bit(run, system, expected)
     summary = run.summary()
     assert figures(system, expected)[2:] == [f"{summary['tracking_rms_um']:#.4g}"]
@@ -121,7 +114,7 @@ def test_the_loop_without_an_importer_is_cosimulate_sep(fmus: Path, system: Clos
     assert summary["share_hybrid"] > 0.9
 
 
-def assert_bit_for_bit(run: CoSimulation | SepCoSimulation, system: ClosedSystem, rows: Array) -> None:
+def assert_bit_for_bit(run: Run, system: ClosedSystem, rows: Array) -> None:
     of = columns(system, rows)
     assert len(run.t) == len(staircase())
     for name in (*system.positions, "x", "x_meas"):

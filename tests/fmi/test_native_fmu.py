@@ -25,10 +25,11 @@ from places import SUPPORT
 
 from hybridsep.base.errors import FmuError, SignalError
 from hybridsep.base.signals import Array
-from hybridsep.cosim.compensator_run import cosimulate_sep
 from hybridsep.cosim.importer import FmuInstance
-from hybridsep.cosim.predictor_run import CoSimulation, cosimulate
-from hybridsep.fmi.archive import BACKENDS, build_fmu, fmu_names
+from hybridsep.cosim.loop import cosimulate
+from hybridsep.cosim.run import Run
+from hybridsep.fmi.archive import build_fmu, fmu_names
+from hybridsep.fmi.backends import BACKENDS
 from hybridsep.fmi.compiler import ALL_TARGETS, TARGETS, compile_flags, host_target
 from hybridsep.fmi.macho import universal
 from hybridsep.fmi.variables import Variable, variables_of
@@ -77,7 +78,7 @@ def reference(machine: Machine, r: Array) -> dict[str, Array]:
     return dict(zip(("x_d", "x_pb", "x_h", "x", "x_meas"), np.array(rows)[predictor.Np :].T, strict=True))
 
 
-def assert_equal(run: CoSimulation, expected: dict[str, Array]) -> None:
+def assert_equal(run: Run, expected: dict[str, Array]) -> None:
     for name, samples in expected.items():
         np.testing.assert_allclose(getattr(run, name), samples, rtol=0, atol=TOLERANCE, err_msg=name)
 
@@ -292,8 +293,8 @@ TIGHT = {"v_max": 0.08, "a_max": 8.0, "j_max": 1000.0}
 def test_both_flavours_of_the_compensator_command_the_same(fmus: Fmus, machine: str, values: dict[str, float]) -> None:
     command = {"": staircase(), "_als25010_x": spiral()[0], "_als25010_y": spiral()[1]}[machine][:4000]
     native, python = (
-        cosimulate_sep(
-            fmus[f"SepCompensator{suffix}{machine}"], fmus[f"FeedDrive{machine}"], command, compensator_values=values
+        cosimulate(
+            fmus[f"SepCompensator{suffix}{machine}"], fmus[f"FeedDrive{machine}"], command, controller_values=values
         )
         for suffix in ("", "Py")
     )

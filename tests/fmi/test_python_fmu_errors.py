@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from fmu_driving import TS, delayed, drive
 
-from hybridsep import FmuError, FmuInstance, build_fmu, fmu_names, load_machine
+from hybridsep import FmuInstance, build_fmu, fmu_names, load_machine
+from hybridsep.base.errors import FmuError
 
 Fmu = Callable[[str], Path]
 

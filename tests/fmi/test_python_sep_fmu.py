@@ -16,11 +16,11 @@ import numpy as np
 import pytest
 
 from hybridsep.base.errors import FmuError, StateError
-from hybridsep.base.settings import CompensatorSettings, Limits
+from hybridsep.base.settings import CompensatorSettings, PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepCompensator, SepState
 from hybridsep.cosim.importer import FmuInstance
-from hybridsep.evaluate.closed_loop import run_closed_loop
+from hybridsep.cosim.loop import cosimulate
 from hybridsep.fmi.archive import build_fmu
 from hybridsep.fmi.c_header import c_header
 from hybridsep.fmi.reference import reference_files
@@ -167,7 +167,10 @@ def test_another_axis_with_modes_and_other_parameters(python_fmu: Fmu) -> None:
     changes: dict[str, Any] = {"Np": 40, "p": 30, "q": 5, "preview": 190, "spacing": 4, "jerk_weight": 0.5}
     changes |= {"change_max": 3e-4, "no_reversal": 0}
     bounds = {"v_max": 0.0805, "a_max": 8.1, "j_max": 2000.0}
-    library = machine.new_compensator(SepState.PHYSICS, limits=Limits(*bounds.values()), **changes)
+    values = {**machine.fmi_compensator_parameters(), **changes, **bounds, "compensate": 1}
+    library = machine.new_compensator(
+        CompensatorSettings.from_fmi(values), predictor=PredictorSettings.from_fmi(values)
+    )
     look_ahead = LookAhead(library, 0.1)
     r = staircase()[:700] + 0.1
     x = np.concatenate((np.full(200, 0.1), r[:500])) + 1e-6 * np.sin(np.arange(700))
@@ -339,7 +342,7 @@ def test_calls_that_are_not_allowed_now(compensator: FmuInstance) -> None:
 def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The predictor of a compensator that has run over one staircase."""
     learned = MACHINE.new_compensator()
-    run_closed_loop(learned, MACHINE.new_plant(), staircase()[:4000], encoder=Encoder(5e-6, 7))
+    cosimulate(learned, MACHINE.new_plant(), staircase()[:4000], encoder=Encoder(5e-6, 7))
     path = tmp_path_factory.mktemp("trained") / "closed_loop.state"
     learned.predictor.save(path)
     return path

@@ -13,7 +13,8 @@ import pytest
 import pythonfmu_calls
 from pythonfmu_calls import CAUGHT, KILLING
 
-from hybridsep import FmuError, FmuInstance, build_fmu, load_machine
+from hybridsep import FmuInstance, build_fmu, load_machine
+from hybridsep.base.errors import FmuError
 from hybridsep.fmi import pythonfmu_limits
 
 Fmu = Callable[[str], Path]

@@ -24,9 +24,10 @@ from hybridsep.base.errors import FmuError, StateError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.cosim.importer import FmuInstance
-from hybridsep.cosim.predictor_run import cosimulate
+from hybridsep.cosim.loop import cosimulate
 from hybridsep.evaluate.backtest import backtest
-from hybridsep.fmi.archive import BACKENDS, build_fmu, fmu_names
+from hybridsep.fmi.archive import build_fmu, fmu_names
+from hybridsep.fmi.backends import BACKENDS
 from hybridsep.fmi.weights import WEIGHTS_FILE, restore_weights, weights_file
 from hybridsep.machine import load_machine
 from hybridsep.model.physics import ModalModel, Mode

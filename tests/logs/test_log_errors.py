@@ -12,7 +12,7 @@ from scipy import sparse
 
 from hybridsep.base.errors import HybridSepError, LogError, ParameterError
 from hybridsep.base.signals import Array
-from hybridsep.logs import open_log, read_log
+from hybridsep.logs.log import open_log, read_log
 
 
 def time_at(i: int, value: float, n: int = 25_000) -> Array:

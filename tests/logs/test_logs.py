@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from log_files import FORMATS, columns, write, write_csv
 from places import EMPS
 
-from hybridsep.logs import LogReader, open_log, read_log
+from hybridsep.logs.log import LogReader, open_log, read_log
 
 
 @FORMATS

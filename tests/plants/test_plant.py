@@ -9,18 +9,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from hybridsep import (
-    Encoder,
-    FeedDrive,
-    ModalModel,
-    Mode,
-    ParameterError,
-    SignalError,
-    StageDrive,
-    load_machine,
-    simulate,
-)
-from hybridsep.plants.stage_drive import FRICTION_VELOCITY
+from hybridsep import Encoder, ModalModel, Mode, load_machine, simulate
+from hybridsep.base.errors import ParameterError, SignalError
+from hybridsep.plants.feed_drive import FeedDrive
+from hybridsep.plants.stage_drive import FRICTION_VELOCITY, StageDrive
 from hybridsep.plants.trajectory import spiral, staircase
 
 Array = NDArray[np.float64]

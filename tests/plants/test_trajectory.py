@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybridsep import LogError, ParameterError, SignalError
+from hybridsep.base.errors import LogError, ParameterError, SignalError
 from hybridsep.base.settings import Limits
 from hybridsep.plants.trajectory import (
     PAPER_LIMITS,

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from staircase_data import commanded, measured
 
-from hybridsep import HybridPredictor, LookAhead, ModalModel, SignalError, StateError, backtest
+from hybridsep import HybridPredictor, ModalModel, backtest
+from hybridsep.base.errors import SignalError, StateError
 from hybridsep.base.settings import PredictorSettings
+from hybridsep.predict.look_ahead import LookAhead
 
 MODEL = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
 

@@ -35,8 +35,8 @@ MODEL = ModalModel([Mode(*numbers) for numbers in MODES])
 def formula(path: Sequence[float], start: float, first: int, n: int, known: int, v_friction: float = V_S) -> Array:
     """Return the features of samples ``first … first + n − 1`` where ``path`` is known before ``known``, ``(n, 13)``.
 
-    ``ψ(k) = tanh((r(k) − r(k−1)) / (v_friction T_s))``, at rest before sample 0 and held from ``known`` on; each feature is ψ
-    shifted, in metres.
+    ``ψ(k) = tanh((r(k) − r(k−1)) / (v_friction T_s))``, at rest before sample 0 and held from ``known`` on; each
+    feature is ψ shifted, in metres.
     """
 
     def sign(k: int) -> float:

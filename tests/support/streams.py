@@ -14,7 +14,8 @@ from typing import Any, ClassVar, Protocol
 import pytest
 from c_core import CModel, RefusedError, write_trajectory
 
-from hybridsep import FmuError, FmuInstance, HybridSepError, build_fmu, load_machine
+from hybridsep import FmuInstance, HybridSepError, build_fmu, load_machine
+from hybridsep.base.errors import FmuError
 from hybridsep.base.settings import CompensatorSettings, Limits, PredictorSettings
 from hybridsep.base.state import pack, unpack
 from hybridsep.compensate.compensator import SepCompensator, SepState

@@ -22,7 +22,7 @@ import fmpy
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridsep import Encoder, build_fmu, load_machine, run_closed_loop, simulate, staircase
+from hybridsep import Encoder, build_fmu, cosimulate, load_machine, simulate, staircase
 from hybridsep.fmi.compiler import TARGETS
 
 Array = NDArray[np.float64]
@@ -108,7 +108,7 @@ def signals() -> dict[str, Array]:
     """Return what each FMU is given, a row a sample: the staircase, and a drive that follows it."""
     machine, r = load_machine("spring_mass_damper"), staircase()
     compensator = machine.new_compensator()
-    compensated = run_closed_loop(compensator, machine.new_plant(), r, encoder=Encoder(NOISE, 0)).x_meas
+    compensated = cosimulate(compensator, machine.new_plant(), r, encoder=Encoder(NOISE, 0)).x_meas
     preview, Np = compensator.preview, machine.new_predictor().Np
     x_d = np.concatenate((np.full(Np, r[0]), r))
     x_meas = simulate(machine.new_plant(), x_d, machine.T_s)

@@ -10,12 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hybridsep import FmuError, SignalError, build_fmu, fmu_names, load_machine
+from hybridsep import build_fmu, fmu_names, load_machine
+from hybridsep.base.errors import FmuError, SignalError
+from hybridsep.base.settings import CompensatorSettings, PredictorSettings
 from hybridsep.compensate.compensator import SepState
-from hybridsep.cosim.compensator_run import SepCoSimulation, cosimulate_sep
-from hybridsep.evaluate.closed_loop import ClosedLoop, run_closed_loop
-from hybridsep.evaluate.sep_plots import contour_figure, tracking_figure
-from hybridsep.fmi.archive import BACKENDS
+from hybridsep.cosim.fmus import check_controller
+from hybridsep.cosim.loop import cosimulate
+from hybridsep.cosim.run import COMPENSATOR, Run
+from hybridsep.evaluate.path_plots import contour_figure
+from hybridsep.evaluate.time_plots import tracking_figure
+from hybridsep.fmi.backends import BACKENDS
 from hybridsep.machine import Machine
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.trajectory import spiral, staircase
@@ -47,10 +51,10 @@ def pair(flavour: str, tmp_path_factory: pytest.TempPathFactory) -> Pair:
 
 
 @pytest.fixture(scope="module")
-def runs(pair: Pair) -> dict[str, SepCoSimulation]:
+def runs(pair: Pair) -> dict[str, Run]:
     """The staircase with the paper's settings."""
     return {
-        kind: cosimulate_sep(*pair, staircase(), compensator_values={**PAPER, "compensate": int(best)})
+        kind: cosimulate(*pair, staircase(), controller_values={**PAPER, "compensate": int(best)})
         for kind, best in KINDS.items()
     }
 
@@ -61,11 +65,11 @@ def python_pair(python_fmu: Fmu) -> Pair:
 
 
 @pytest.fixture(scope="module")
-def short(python_pair: Pair) -> SepCoSimulation:
-    return cosimulate_sep(*python_pair, staircase()[:600])
+def short(python_pair: Pair) -> Run:
+    return cosimulate(*python_pair, staircase()[:600])
 
 
-def assert_same(run: SepCoSimulation, loop: ClosedLoop) -> None:
+def assert_same(run: Run, loop: Run) -> None:
     for name in ("x_d", "x_dm", "x", "x_meas", "x_pb", "x_h"):
         np.testing.assert_allclose(getattr(run, name), getattr(loop, name), rtol=0, atol=TOLERANCE, err_msg=name)
     np.testing.assert_array_equal(run.state, loop.state)
@@ -74,13 +78,13 @@ def assert_same(run: SepCoSimulation, loop: ClosedLoop) -> None:
 @pytest.mark.parametrize(
     ("kind", "least", "most"), [("none", 87.0, 90.0), ("physics", 0.0, 20.5), ("hybrid", 0.0, 6.6)]
 )
-def test_staircase_tracking_error(runs: dict[str, SepCoSimulation], kind: str, least: float, most: float) -> None:
+def test_staircase_tracking_error(runs: dict[str, Run], kind: str, least: float, most: float) -> None:
     """µm of the true position, p = 50, q = 3, one noise seed."""
     assert least <= runs[kind].summary()["tracking_rms_um"] <= most
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_drives_limits_are_kept(runs: dict[str, SepCoSimulation], kind: str) -> None:
+def test_the_drives_limits_are_kept(runs: dict[str, Run], kind: str) -> None:
     limits, change_max = MACHINE.command_limits()
     assert limits is not None
     assert change_max is not None
@@ -92,10 +96,11 @@ def test_the_drives_limits_are_kept(runs: dict[str, SepCoSimulation], kind: str)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_fmus_equal_the_library(runs: dict[str, SepCoSimulation], kind: str) -> None:
-    changes = {"lam" if name == "lambda" else name: value for name, value in PAPER.items()}
-    compensator = MACHINE.new_compensator(KINDS[kind], **changes)
-    loop = run_closed_loop(compensator, MACHINE.new_plant(), staircase(), encoder=Encoder(5e-6, 0))
+def test_fmus_equal_the_library(runs: dict[str, Run], kind: str) -> None:
+    values = {**MACHINE.fmi_compensator_parameters(), **PAPER, "compensate": int(KINDS[kind])}
+    settings = CompensatorSettings.from_fmi(values)
+    compensator = MACHINE.new_compensator(settings, predictor=PredictorSettings.from_fmi(values))
+    loop = cosimulate(compensator, MACHINE.new_plant(), staircase(), encoder=Encoder(5e-6, 0))
     assert_same(runs[kind], loop)
     np.testing.assert_array_equal(runs[kind].x_d, staircase())
     assert runs[kind].t[0] == pytest.approx(0.2)
@@ -103,14 +108,14 @@ def test_fmus_equal_the_library(runs: dict[str, SepCoSimulation], kind: str) -> 
 
 def test_recommended_settings_cold_and_warm(flavour: str, pair: Pair, tmp_path: Path) -> None:
     compensator = MACHINE.new_compensator()
-    first = run_closed_loop(compensator, MACHINE.new_plant(), staircase(), encoder=Encoder(5e-6, 1))
+    first = cosimulate(compensator, MACHINE.new_plant(), staircase(), encoder=Encoder(5e-6, 1))
     compensator.predictor.save(tmp_path / "trained.state")
-    cold = cosimulate_sep(*pair, staircase(), plant_values={"seed": 1})
+    cold = cosimulate(*pair, staircase(), plant_values={"seed": 1})
     assert_same(cold, first)
     assert cold.summary()["tracking_rms_um"] < 5.0
     trained = build(MACHINE, flavour, "SepCompensator", tmp_path, tmp_path / "trained.state")
-    warm = cosimulate_sep(trained, pair[1], staircase(), plant_values={"seed": 2})
-    second = run_closed_loop(compensator, MACHINE.new_plant(), staircase(), encoder=Encoder(5e-6, 2), t_init=0.0)
+    warm = cosimulate(trained, pair[1], staircase(), plant_values={"seed": 2})
+    second = cosimulate(compensator, MACHINE.new_plant(), staircase(), encoder=Encoder(5e-6, 2), t_init=0.0)
     assert_same(warm, second)
     assert warm.summary()["tracking_rms_um"] < 1.8
     assert warm.summary()["share_hybrid"] == 1.0
@@ -127,13 +132,13 @@ def test_a_held_sensor_is_the_librarys(python_pair: Pair) -> None:
             return self.value
 
     r = staircase()[:1500]
-    run = cosimulate_sep(*python_pair, r, sensor=Held())
-    loop = run_closed_loop(MACHINE.new_compensator(), MACHINE.new_plant(), r, encoder=Encoder(5e-6, 0), sensor=Held())
+    run = cosimulate(*python_pair, r, sensor=Held())
+    loop = cosimulate(MACHINE.new_compensator(), MACHINE.new_plant(), r, encoder=Encoder(5e-6, 0), sensor=Held())
     assert_same(run, loop)
     assert np.ptp(run.x_meas[1050:1250]) == 0.0
 
 
-def test_summary_is_what_the_signals_say(short: SepCoSimulation) -> None:
+def test_summary_is_what_the_signals_say(short: Run) -> None:
     summary = short.summary()
     error = 1e6 * (short.x_d - short.x)
     assert summary["tracking_rms_um"] == pytest.approx(np.sqrt(np.mean(error**2)))
@@ -152,14 +157,14 @@ def test_summary_is_what_the_signals_say(short: SepCoSimulation) -> None:
     assert summary["n_samples"] == 600
 
 
-def test_start_time_and_a_shifted_start(python_pair: Pair, short: SepCoSimulation) -> None:
-    moved = cosimulate_sep(*python_pair, staircase()[:600] + 0.1, start_time=50.0)
+def test_start_time_and_a_shifted_start(python_pair: Pair, short: Run) -> None:
+    moved = cosimulate(*python_pair, staircase()[:600] + 0.1, start_time=50.0)
     np.testing.assert_allclose(moved.x_dm - 0.1, short.x_dm, rtol=0, atol=1e-9)
     np.testing.assert_allclose(moved.t - 50.0, short.t, rtol=0, atol=1e-12)
     assert (moved.Np, moved.T_s) == (50, 1e-3)
 
 
-def test_results_as_csv_and_npz(short: SepCoSimulation, tmp_path: Path) -> None:
+def test_results_as_csv_and_npz(short: Run, tmp_path: Path) -> None:
     short.save(tmp_path / "run.csv")
     short.save(tmp_path / "run.npz")
     with (tmp_path / "run.csv").open(newline="") as file:
@@ -176,25 +181,25 @@ def test_results_as_csv_and_npz(short: SepCoSimulation, tmp_path: Path) -> None:
 
 def test_progress_is_reported_to_the_end(python_pair: Pair) -> None:
     calls: list[tuple[int, int]] = []
-    cosimulate_sep(*python_pair, staircase()[:100], progress=lambda k, n: calls.append((k, n)))
+    cosimulate(*python_pair, staircase()[:100], progress=lambda k, n: calls.append((k, n)))
     assert calls[-1] == (300, 300)
 
 
 def test_what_is_refused(python_pair: Pair, python_fmu: Fmu) -> None:
     compensator, plant = python_pair
     with pytest.raises(SignalError, match="r must be finite, got nan at sample 1"):
-        cosimulate_sep(compensator, plant, [0.0, float("nan")])
+        cosimulate(compensator, plant, [0.0, float("nan")])
     with pytest.raises(SignalError, match="r must have 1 samples, got 0"):
-        cosimulate_sep(compensator, plant, [])
+        cosimulate(compensator, plant, [])
     with pytest.raises(FmuError, match=r"HybridPredictorPy.fmu is no compensator: it has no output x_dm"):
-        cosimulate_sep(python_fmu("HybridPredictorPy"), plant, [0.0, 0.0])
+        check_controller(python_fmu("HybridPredictorPy"), COMPENSATOR)
     with pytest.raises(FmuError, match=r"SepCompensatorPy.fmu is no plant: it has no input x_d$"):
-        cosimulate_sep(compensator, compensator, [0.0, 0.0])
+        cosimulate(compensator, compensator, [0.0, 0.0])
     with pytest.raises(FmuError, match="preview must be ≥ Np"):
-        cosimulate_sep(compensator, plant, [0.0, 0.0], compensator_values={"preview": 60})
+        cosimulate(compensator, plant, [0.0, 0.0], controller_values={"preview": 60})
 
 
-def test_figures(short: SepCoSimulation, tmp_path: Path) -> None:
+def test_figures(short: Run, tmp_path: Path) -> None:
     several = {"none": short, "physics": short, "hybrid_cold": short, "hybrid_warm": short}
     tracking_figure(several, "several", tmp_path / "several.png")
     for kind in ("none", "physics", "hybrid"):
@@ -218,8 +223,8 @@ def test_the_direction_and_the_features_of_the_reference_can_be_turned_off(flavo
     )
     commands = []
     for values in settings:
-        run = cosimulate_sep(*pair, r, compensator_values=values)
-        loop = run_closed_loop(machine.new_compensator(**values), machine.new_plant(), r, encoder=Encoder(1e-6, 0))
+        run = cosimulate(*pair, r, controller_values=values)
+        loop = cosimulate(machine.new_compensator(**values), machine.new_plant(), r, encoder=Encoder(1e-6, 0))
         assert_same(run, loop)
         against = np.diff(run.x_dm) * np.sign(np.diff(run.x_d))
         assert (np.min(against) < -1e-6) == ("no_reversal" in values)

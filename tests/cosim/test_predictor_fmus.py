@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hybridsep import CoSimulation, Encoder, FmuError, SignalError, backtest, cosimulate, load_machine, simulate
+from hybridsep import Encoder, Run, backtest, cosimulate, load_machine, simulate
+from hybridsep.base.errors import FmuError, SignalError
 from hybridsep.plants.trajectory import spiral, staircase
 
 Fmu = Callable[[str], Path]
@@ -21,7 +22,7 @@ def pair(python_fmu: Fmu) -> tuple[Path, Path]:
 
 
 @pytest.fixture(scope="module")
-def run(pair: tuple[Path, Path]) -> CoSimulation:
+def run(pair: tuple[Path, Path]) -> Run:
     return cosimulate(*pair, staircase())
 
 
@@ -53,7 +54,7 @@ def test_spiral_error_reduction(python_fmu: Fmu, axis: str, printed: float, tole
     assert stiffness["reduction_percent"] > 70.0 > both["reduction_percent"] > friction["reduction_percent"] > 15.0
 
 
-def test_fmus_equal_the_library(run: CoSimulation) -> None:
+def test_fmus_equal_the_library(run: Run) -> None:
     machine = load_machine("spring_mass_damper")
     x = simulate(machine.new_plant(), staircase(), machine.T_s)
     np.testing.assert_allclose(run.x, x, atol=1e-15)
@@ -70,21 +71,21 @@ def test_fmus_equal_the_library(run: CoSimulation) -> None:
     np.testing.assert_allclose(run.batch_rms()["x_h"], result.batch_rms_h, rtol=1e-9)
 
 
-def test_a_shifted_start_gives_the_same_errors(pair: tuple[Path, Path], run: CoSimulation) -> None:
+def test_a_shifted_start_gives_the_same_errors(pair: tuple[Path, Path], run: Run) -> None:
     shifted = cosimulate(*pair, staircase() + 0.1)
     np.testing.assert_allclose(shifted.x_h - 0.1, run.x_h, rtol=0, atol=1e-10)
 
 
 def test_start_time_and_parameters(pair: tuple[Path, Path]) -> None:
     r = staircase()[:1200]
-    at_zero = cosimulate(*pair, r, predictor_values={"Np": 50, "p": 20})
-    later = cosimulate(*pair, r, predictor_values={"Np": 50, "p": 20}, start_time=100.0)
+    at_zero = cosimulate(*pair, r, controller_values={"Np": 50, "p": 20})
+    later = cosimulate(*pair, r, controller_values={"Np": 50, "p": 20}, start_time=100.0)
     np.testing.assert_array_equal(at_zero.x_h, later.x_h)
     assert later.t[0] == pytest.approx(100.05)
     assert (later.Np, len(later.t)) == (50, len(r))
 
 
-def test_results_as_csv_and_npz(run: CoSimulation, tmp_path: Path) -> None:
+def test_results_as_csv_and_npz(run: Run, tmp_path: Path) -> None:
     run.save(tmp_path / "run.csv")
     run.save(tmp_path / "run.npz")
     with (tmp_path / "run.csv").open(newline="") as file:
@@ -111,7 +112,7 @@ def test_what_is_refused(pair: tuple[Path, Path]) -> None:
     with pytest.raises(SignalError, match="r must have 1 samples, got 0"):
         cosimulate(*pair, [])
     with pytest.raises(FmuError, match="p must be 1 … Np = 100, got 101"):
-        cosimulate(*pair, [0.0, 0.0], predictor_values={"p": 101})
+        cosimulate(*pair, [0.0, 0.0], controller_values={"p": 101})
     with pytest.raises(FmuError, match="has no variable 'stiffness'"):
         cosimulate(*pair, [0.0, 0.0], plant_values={"stiffness": 1.0})
     with pytest.raises(FmuError, match=r"FeedDrivePy.fmu is no predictor: it has no input x_d_ahead"):

@@ -1,4 +1,4 @@
-"""The demo's second half: the same cases with a compensator FMU in place of the predictor FMU."""
+"""The demonstration's compensated cases: a compensator FMU in place of the predictor FMU, cold and warm."""
 
 from __future__ import annotations
 
@@ -8,16 +8,17 @@ from typing import Any
 
 import numpy as np
 
+from ..base.metrics import contour_error
 from ..base.signals import Array
-from ..compensate.compensator import SepState
-from ..cosim.compensator_run import SepCoSimulation, cosimulate_sep
-from ..evaluate.closed_loop import contour_error, run_closed_loop
-from ..fmi.archive import build_fmu, fmu_names
+from ..compensate.plan import SepState
+from ..cosim.loop import cosimulate
+from ..cosim.run import Run
 from ..machine import Machine
 from ..plants.encoder import Encoder
 from ..plants.trajectory import archimedean_spiral
+from .builds import build_for_host
 
-__all__ = ["KINDS", "Runs", "build_for_host", "compensate", "contour_errors", "mean_summary", "train"]
+__all__ = ["KINDS", "Runs", "compensate", "contour_errors", "mean_summary", "train"]
 
 TRAINING_SEED = 1000
 """Noise seed of the run that a warm compensator has learned from; no case is run with it."""
@@ -28,9 +29,9 @@ KINDS = {
     "hybrid_cold": SepState.HYBRID,
     "hybrid_warm": SepState.HYBRID,
 }
-"""Kinds of compensation, under the keys of :data:`hybridsep.sep_plots.CASES`, and the best model of each."""
+"""Kinds of compensation, under the keys of :data:`hybridsep.evaluate.canvas.CASES`, and the best model of each."""
 
-Runs = dict[str, SepCoSimulation]
+Runs = dict[str, Run]
 
 
 def compensate(
@@ -66,7 +67,7 @@ def compensate(
     runs : dict
         The first seed's, by the keys of :data:`KINDS`.
     summary : dict
-        The same keys → means over the seeds of :meth:`SepCoSimulation.summary`, with the spread
+        The same keys → means over the seeds of :meth:`Run.summary`, with the spread
         ``tracking_rms_um_std``.
     """
     cold = build_for_host(machine, "SepCompensator", out / "fmus", backend)
@@ -79,9 +80,7 @@ def compensate(
         advance(key.replace("_", " "))
         fmu = warm if key == "hybrid_warm" else cold
         of_seeds = [
-            cosimulate_sep(
-                fmu, plant, command, compensator_values={"compensate": int(best)}, plant_values={"seed": seed}
-            )
+            cosimulate(fmu, plant, command, controller_values={"compensate": int(best)}, plant_values={"seed": seed})
             for seed in seeds
         ]
         runs[key] = of_seeds[0]
@@ -94,7 +93,7 @@ def train(machine: Machine, command: Array, path: Path) -> None:
     assert machine.plant is not None
     compensator = machine.new_compensator()
     encoder = Encoder(machine.plant.noise_std, TRAINING_SEED)
-    run_closed_loop(compensator, machine.new_plant(), command, encoder=encoder)
+    cosimulate(compensator, machine.new_plant(), command, encoder=encoder)
     compensator.predictor.save(path)
 
 
@@ -102,12 +101,6 @@ def contour_errors(x: Runs, y: Runs) -> dict[str, Array]:
     """Return how far the paper's spiral is missed, ``(n,)``, m, of the runs of X and Y with the same key."""
     path = archimedean_spiral(0.030, 5.0)
     return {key: contour_error(np.column_stack((x[key].x, y[key].x)), *path) for key in x}
-
-
-def build_for_host(machine: Machine, model: str, out: Path, backend: str, *, weights: Path | None = None) -> Path:
-    """Build one of a machine's FMUs for this computer."""
-    names = {built: name for name, built in fmu_names(machine, backend).items()}
-    return build_fmu(machine, names[model], out, backend, targets=("host",), weights=weights)
 
 
 def mean_summary(summaries: list[dict[str, float | int]], *, spread: str) -> dict[str, Any]:

@@ -1,0 +1,66 @@
+"""Checks of the arguments of ``hybridsep build``, all of them before any work, and what follows from them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from ..base.errors import ParameterError
+from ..fmi.archive import fmu_names
+from ..fmi.compiler import compilers
+from ..fmi.warm_start import load_trained
+from ..logs.log import check_reading
+from ..machine import Machine, load_machine, machine_names
+from ..plants.trajectory import read_trajectory
+from .arguments import check_interval
+
+__all__ = ["Job", "extras_of", "jobs_of"]
+
+Job = tuple[Machine, str, str]
+"""An FMU to build: its machine, name and model."""
+
+
+def jobs_of(fmus: Sequence[str], machines: Sequence[str], backend: str, targets: Sequence[str]) -> list[Job]:
+    """Return the FMUs to build, all of the machines' if none is named."""
+    jobs = [
+        (axis, name, model)
+        for axis in map(load_machine, machines or machine_names())
+        for name, model in fmu_names(axis, backend).items()
+    ]
+    if unknown := sorted(set(fmus) - {name for _, name, _ in jobs}):
+        raise ParameterError(f"no FMU {', '.join(unknown)}; there are {', '.join(name for _, name, _ in jobs)}")
+    if targets and backend != "native":
+        raise ParameterError(f"--target is for native FMUs; with --backend {backend} leave it out")
+    if backend == "native":
+        compilers(targets or ("host",))
+    return [job for job in jobs if not fmus or job[1] in fmus]
+
+
+def extras_of(
+    jobs: Sequence[Job], weights: Path | None, trajectory: Path | None, unit: str, T_s: float | None
+) -> dict[str, dict[str, Any]]:
+    """Return by model what one of the FMUs gets besides its machine: weights, samples of a trajectory."""
+    extras: dict[str, dict[str, Any]] = {}
+    check_reading(unit, T_s)
+    if weights is not None:
+        axis, model = _one_of(jobs, ("HybridPredictor", "SepCompensator"), "--weights")
+        load_trained(weights, axis, model)
+        extras[model] = {"weights": weights}
+    if trajectory is not None:
+        axis, model = _one_of(jobs, ("ReferenceTrajectory",), "--trajectory")
+        samples, found = read_trajectory(trajectory, unit=unit, T_s=T_s)
+        check_interval(trajectory.name, found, axis)
+        extras[model] = {"samples": samples}
+    return extras
+
+
+def _one_of(jobs: Sequence[Job], models: Sequence[str], option: str) -> tuple[Machine, str]:
+    """Return machine and model of the only FMU of these models that is built, which an option is meant for."""
+    found = [job for job in jobs if job[2] in models]
+    if len(found) != 1:
+        names = ", ".join(name for _, name, _ in found) or "none"
+        raise ParameterError(
+            f"{option} is for one {' or '.join(models)}, this would build {names}; name one, or its --machine"
+        )
+    return found[0][0], found[0][2]

@@ -1,0 +1,72 @@
+"""``hybridsep build``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..fmi.backends import BACKENDS
+from ..fmi.compiler import TARGET_NAMES
+from .failures import loading
+from .options import BackendOption, ForceOption, JsonOption, TsOption, UnitOption, WeightsOption
+
+__all__ = ["build"]
+
+
+def build(
+    fmus: Annotated[
+        list[str] | None, typer.Argument(help="FMUs to build, by name; all of the machines' if left out.")
+    ] = None,
+    machine: Annotated[
+        list[str] | None,
+        typer.Option("--machine", "-m", help="Machine file (.toml) or name; may be repeated; all if left out."),
+    ] = None,
+    backend: BackendOption = BACKENDS[0],
+    target: Annotated[
+        list[str] | None,
+        typer.Option(
+            help=f"Platform of a native FMU, may be repeated: {', '.join(TARGET_NAMES)}. If left out: all platforms "
+            "where ziglang is installed, this machine (host) otherwise."
+        ),
+    ] = None,
+    weights: WeightsOption = None,
+    trajectory: Annotated[
+        Path | None,
+        typer.Option(help="CSV, .npz or .mat file with the columns t and x_d, for ReferenceTrajectory to play."),
+    ] = None,
+    unit: UnitOption = "m",
+    T_s: TsOption = None,
+    out: Annotated[Path, typer.Option(help="Folder for the archives.")] = Path("dist"),
+    force: ForceOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Build FMUs from machine files; the same machine gives the same bytes."""
+    with loading():
+        from ..fmi.archive import build_fmu
+        from ..machine import machine_path
+        from .build_arguments import extras_of, jobs_of
+        from .overwrite import FMU, Output, check_outputs
+        from .progress import progress_bar
+        from .tables import console, print_json
+
+    jobs = jobs_of(fmus or [], machine or [], backend, target or [])
+    extras = extras_of(jobs, weights, trajectory, unit, T_s)
+    inputs = {f"machine file {source}": machine_path(source) for source in machine or []}
+    check_outputs(
+        [Output("--out", out / f"{name}.fmu", FMU) for _, name, _ in jobs],
+        {**inputs, "saved predictor": weights, "trajectory": trajectory},
+        force=force,
+    )
+    paths = []
+    with progress_bar(as_json) as advance:
+        for i, (axis, name, model) in enumerate(jobs):
+            advance(name, i / len(jobs))
+            paths.append(build_fmu(axis, name, out, backend, targets=target or None, **extras.get(model, {})))
+        advance("done", 1.0)
+    if as_json:
+        print_json([str(path) for path in paths])
+    else:
+        for path in paths:
+            console.print(f"{path}  {path.stat().st_size / 1024:.0f} KiB", highlight=False)

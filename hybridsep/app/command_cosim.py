@@ -1,0 +1,126 @@
+"""``hybridsep cosim``."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..base.data_files import DEFAULT_MACHINE
+from ..base.settings import check
+from ..fmi.backends import BACKENDS
+from .failures import loading
+from .options import (
+    COMPENSATIONS,
+    TRAJECTORIES,
+    BackendOption,
+    ForceOption,
+    InitOption,
+    JsonOption,
+    LamOption,
+    MachineOption,
+    NpOption,
+    POption,
+    QOption,
+    TsOption,
+    UnitOption,
+    WeightsOption,
+    parameter_help,
+)
+
+__all__ = ["cosim"]
+
+
+def cosim(
+    machine: MachineOption = DEFAULT_MACHINE,
+    trajectory: Annotated[
+        str, typer.Option(help=f"{', '.join(TRAJECTORIES)}, or a CSV, .npz or .mat file with the columns t and x_d.")
+    ] = "staircase",
+    unit: UnitOption = "m",
+    T_s: TsOption = None,
+    compensate: Annotated[
+        str | None,
+        typer.Option(
+            help=f"Compensate the servo error with the best model given: {', '.join(COMPENSATIONS)}. The drive gets "
+            "the command that a SepCompensator FMU has modified; if left out, a HybridPredictor only predicts."
+        ),
+    ] = None,
+    predictor: Annotated[
+        Path | None,
+        typer.Option(help="Predictor FMU, or with --compensate a compensator FMU; built from the machine if left out."),
+    ] = None,
+    plant: Annotated[Path | None, typer.Option(help="Plant FMU; built from the machine if left out.")] = None,
+    weights: WeightsOption = None,
+    seed: Annotated[int | None, typer.Option(help=parameter_help("seed"))] = None,
+    Np: NpOption = None,
+    p: POption = None,
+    q: QOption = None,
+    lam: LamOption = None,
+    t_init: InitOption = None,
+    backend: BackendOption = BACKENDS[0],
+    out: Annotated[Path | None, typer.Option(help="File for all signals, .csv or .npz.")] = None,
+    figure: Annotated[
+        Path | None,
+        typer.Option(help="PNG with the errors over time: of the predictions, or with --compensate of the position."),
+    ] = None,
+    force: ForceOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Co-simulate a predictor FMU, or a compensator FMU, with a plant FMU over a trajectory."""
+    with loading():
+        from ..cosim.loop import cosimulate
+        from ..cosim.run import RESULT_SUFFIXES
+        from ..machine import load_machine, machine_path
+        from .arguments import check_ending
+        from .builds import build_for_host
+        from .cosim_arguments import best_model, check_pair, fitting, read_command
+        from .overwrite import FIGURE, RUN, Output, check_outputs
+        from .progress import progress_bar
+        from .tables import print_run
+
+        if figure is not None:
+            from ..evaluate.time_plots import prediction_figure, tracking_figure
+
+    axis = load_machine(machine)
+    check_ending(out, "--out", RESULT_SUFFIXES)
+    check_ending(figure, "--figure", (".png",))
+    best = None if compensate is None else best_model(compensate)
+    model = "HybridPredictor" if best is None else "SepCompensator"
+    command = read_command(trajectory, axis, unit, T_s)
+    given = {"Np": Np, "p": p, "q": q, "lambda": lam, "t_init": t_init}
+    values = {name: value for name, value in given.items() if value is not None}
+    if predictor is None:
+        values = fitting(axis, model, values)
+    if seed is not None:
+        check("seed", seed)
+    if best is not None:
+        values["compensate"] = int(best)
+    check_pair(axis, model, predictor, plant, weights, backend)
+    results = (("--out", out, RUN), ("--figure", figure, FIGURE))
+    outputs = [Output(option, path, kind) for option, path, kind in results if path is not None]
+    file = None if trajectory in TRAJECTORIES else trajectory
+    inputs = {"trajectory": file, "predictor": predictor, "plant": plant, "saved predictor": weights}
+    check_outputs(outputs, {"machine file": machine_path(machine), **inputs}, force=force)
+    title = f"{' and '.join(path.name for path in (predictor, plant) if path is not None) or axis.title}, {trajectory}"
+    with tempfile.TemporaryDirectory() as place, progress_bar(as_json) as advance:
+        folder = Path(place)
+        ahead = predictor or build_for_host(axis, model, folder, backend, weights=weights)
+        drive = plant or build_for_host(axis, "FeedDrive", folder, backend)
+        run = cosimulate(
+            ahead,
+            drive,
+            command,
+            controller_values=values,
+            plant_values={} if seed is None else {"seed": seed},
+            progress=lambda k, n: advance("co-simulation", k / n),
+        )
+    if out is not None:
+        run.save(out)
+    if figure is not None:
+        if compensate is None:
+            prediction_figure(run, title, figure)
+        else:
+            tracking_figure({compensate: run}, title, figure)
+    print_run(run, as_json, title)

@@ -1,0 +1,94 @@
+"""Checks of the arguments of ``hybridsep cosim``, all of them before any work, and what follows from them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ..base.errors import ParameterError
+from ..base.signals import Array
+from ..compensate.plan import SepState
+from ..cosim.fmus import check_controller, check_plant
+from ..cosim.run import COMPENSATOR, PREDICTOR
+from ..fmi.archive import fmu_names
+from ..fmi.compiler import compilers
+from ..fmi.warm_start import load_trained
+from ..logs.log import check_reading
+from ..machine import Machine
+from ..plants.trajectory import PAPER_LIMITS, read_trajectory, spiral, staircase
+from .arguments import check_interval
+from .options import COMPENSATIONS, TRAJECTORIES
+
+__all__ = ["best_model", "check_pair", "fitting", "read_command"]
+
+
+def read_command(trajectory: str, axis: Machine, unit: str, T_s: float | None) -> Array:
+    """Return the samples of a named trajectory or of a file, at the machine's sampling interval."""
+    check_reading(unit, T_s)
+    limits = PAPER_LIMITS if axis.limits is None else axis.trajectory_limits()
+    if trajectory == "staircase":
+        return staircase(axis.T_s, limits=limits)
+    if trajectory in TRAJECTORIES:
+        return spiral(axis.T_s, limits=limits)[trajectory == "spiral_y"]
+    command, found = read_trajectory(trajectory, unit=unit, T_s=T_s)
+    check_interval(trajectory, found, axis)
+    return command
+
+
+def best_model(compensate: str) -> SepState:
+    """Return the best model to compensate with, as ``--compensate`` names it."""
+    if compensate not in COMPENSATIONS:
+        raise ParameterError(f"--compensate must be one of {', '.join(COMPENSATIONS)}, got {compensate!r}")
+    return SepState(COMPENSATIONS.index(compensate))
+
+
+def fitting(axis: Machine, model: str, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Check the FMI values of a look-ahead FMU that will be built; return them with what must change with them."""
+    if compensate is None:
+        axis.changed("predictor", values)
+        return dict(values)
+    settings = axis.changed("compensator", values).compensator_settings
+    windows = {"preview": settings.preview, "spacing": settings.spacing} if "Np" in values else {}
+    return {**values, **windows}
+
+
+def check_pair(
+    axis: Machine,
+    model: str,
+    predictor: Path | None,
+    plant: Path | None,
+    weights: Path | None,
+    backend: str,
+) -> None:
+    """Check a co-simulation's two FMUs: those that are given, and that the others can be built.
+
+    Parameters
+    ----------
+    axis : Machine
+    model : {"HybridPredictor", "SepCompensator"}
+        The look-ahead.
+    predictor, plant : Path, optional
+        Archives; built if left out.
+    weights : Path, optional
+        For a look-ahead that is built.
+    backend : {"native", "python"}
+    """
+    models = fmu_names(axis, backend).values()
+    if plant is None and "FeedDrive" not in models:
+        raise ParameterError(f"machine {axis.name} has no plant; name a plant FMU with --plant")
+    if predictor is None and model not in models:
+        raise ParameterError(
+            f"machine {axis.name} has no [drive_limits], which a compensator must keep; add them, or name a "
+            "compensator FMU with --predictor"
+        )
+    if predictor is not None and weights is not None:
+        raise ParameterError("--weights go into an FMU that is built here; leave out --predictor")
+    if predictor is not None:
+        check_controller(predictor, PREDICTOR if model == "HybridPredictor" else COMPENSATOR)
+    if plant is not None:
+        check_plant(plant)
+    if weights is not None:
+        load_trained(weights, axis, model)
+    if backend == "native" and None in (predictor, plant):
+        compilers(("host",))

@@ -1,0 +1,149 @@
+"""The demonstration's cases: the paper's staircase and spiral, and a recorded axis."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..base.metrics import largest, rms
+from ..compensate.plan import SepState
+from ..cosim.loop import cosimulate
+from ..cosim.run import PREDICTOR, Run
+from ..evaluate.backtest import backtest
+from ..evaluate.path_plots import contour_figure, spiral_figure
+from ..evaluate.time_plots import prediction_figure, tracking_figure
+from ..logs.log import Log, read_log
+from ..machine import load_machine
+from ..plants.trajectory import spiral, staircase
+from .builds import build_pair
+from .demo_compensation import KINDS, Runs, compensate, contour_errors, mean_summary
+
+__all__ = ["MACHINES", "Summary", "read_recorded", "recorded_case", "spiral_case", "staircase_case"]
+
+Summary = dict[str, dict[str, Any]]
+
+MACHINES = {"staircase": "spring_mass_damper", "spiral_x": "als25010_x", "spiral_y": "als25010_y"}
+"""The machine of each case."""
+
+
+def staircase_case(out: Path, seeds: int, backend: str, advance: Callable[[str], None]) -> dict[str, Any]:
+    """Predict and compensate on the staircase."""
+    machine = load_machine(MACHINES["staircase"])
+    command = staircase(machine.T_s)
+    fmus = build_pair(machine, out / "fmus", backend)
+    runs = []
+    for seed in range(seeds):
+        advance(f"staircase, FMU against FMU, noise seed {seed}")
+        runs.append(cosimulate(*fmus, command, plant_values={"seed": seed}))
+    runs[0].save(out / "staircase.csv")
+    title = "Staircase (cf. the paper's Fig. 4), FMU against FMU, noise seed 0"
+    prediction_figure(runs[0], title, out / "staircase.png")
+    compensated, compensation = compensate(
+        machine, fmus[1], command, out, backend, seeds=range(seeds), advance=partial(_say, advance, "staircase")
+    )
+    compensated["hybrid_warm"].save(out / "staircase_compensated.csv")
+    title = "Staircase, compensated: FMU against FMU, noise seed 0"
+    tracking_figure(compensated, title, out / "staircase_compensated.png")
+    return {
+        **mean_summary([run.summary() for run in runs], spread="rms_h_um"),
+        "n_seeds": seeds,
+        "batches_of_seed": 0,
+        **_worse(runs[0]),
+        "compensation": compensation,
+    }
+
+
+def spiral_case(out: Path, backend: str, advance: Callable[[str], None]) -> Summary:
+    """Predict and compensate on the spiral, both axes."""
+    summary: Summary = {}
+    axes: dict[str, Run] = {}
+    compensated: dict[str, Runs] = {}
+    for axis, command in zip(("x", "y"), spiral(), strict=True):
+        machine, label = load_machine(MACHINES[f"spiral_{axis}"]), f"spiral, {axis.upper()} axis"
+        fmus = build_pair(machine, out / "fmus", backend)
+        advance(label)
+        axes[axis] = run = cosimulate(*fmus, command)
+        case = summary[f"spiral_{axis}"] = {**run.summary(), "physics_tuned_to_printed": True, **_worse(run)}
+        for name, off in (("friction_alone", "kappa"), ("stiffness_alone", "f")):
+            advance(f"{label}, {name.replace('_', ' ')}")
+            case[name] = cosimulate(*fmus, command, plant_values={off: 0.0}).summary()
+        run.save(out / f"spiral_{axis}.csv")
+        title = f"Spiral, {axis.upper()} axis (cf. the paper's Fig. 8), FMU against FMU"
+        prediction_figure(run, title, out / f"spiral_{axis}.png")
+        compensated[axis], case["compensation"] = compensate(
+            machine, fmus[1], command, out, backend, advance=partial(_say, advance, label)
+        )
+        compensated[axis]["hybrid_warm"].save(out / f"spiral_{axis}_compensated.csv")
+        title = f"Spiral, {axis.upper()} axis, compensated: FMU against FMU"
+        tracking_figure(compensated[axis], title, out / f"spiral_{axis}_compensated.png")
+    spiral_figure(axes["x"], axes["y"], out / "spiral.png")
+    errors = contour_errors(compensated["x"], compensated["y"])
+    pairs = {kind: (compensated["x"][kind], compensated["y"][kind]) for kind in KINDS}
+    contour_figure(pairs, errors, "Spiral, X and Y compensated: contour error", out / "spiral_contour.png")
+    for case in summary.values():
+        for kind, error in errors.items():
+            case["compensation"][kind] |= {
+                "contour_rms_um": 1e6 * rms(error),
+                "contour_max_um": 1e6 * largest(error),
+            }
+    return summary
+
+
+def read_recorded(path: str | Path) -> Log:
+    """Read the EMPS recording.
+
+    Raises
+    ------
+    LogError
+        If the file cannot be read as a ``DATA_EMPS.mat``.
+    """
+    return read_log(path, columns=load_machine("emps").log.model_dump())
+
+
+def recorded_case(log: Log, out: Path) -> dict[str, Any]:
+    """Replay the EMPS recording with its published constants."""
+    predictor = load_machine("emps").new_predictor()
+    found = backtest(predictor, log.x_d, log.x)
+    run = Run(
+        kind=PREDICTOR,
+        t=np.asarray(np.arange(len(log.x)) * log.T_s, dtype=np.float64),
+        x_d=log.x_d,
+        x_dm=log.x_d,
+        x=np.full(len(log.x), np.nan),
+        x_meas=log.x,
+        x_pb=found.x_pb,
+        x_h=found.x_h,
+        state=np.where(found.active, SepState.HYBRID, SepState.PHYSICS),
+        T_s=log.T_s,
+        Np=predictor.Np,
+    )
+    prediction_figure(run, "EMPS, a recorded axis: causal replay", out / "emps.png")
+    return {**found.summary(), **_worse(run)}
+
+
+def _say(advance: Callable[[str], None], case: str, kind: str) -> None:
+    """Say which kind of compensation of a case is run next."""
+    advance(f"{case}, {kind}")
+
+
+def _worse(run: Run) -> dict[str, Any]:
+    """Return in which batches the hybrid is worse than the physics model, and in how many worse than hold."""
+    errors = run.batch_rms()
+    worse = np.flatnonzero(errors["x_h"] > errors["x_pb"])
+    step = run.Np * run.T_s
+    return {
+        "n_batches": len(errors["x_h"]),
+        "n_batches_worse_than_hold": int(np.count_nonzero(errors["x_h"] > errors["x_hold"])),
+        "batches_hybrid_worse": [
+            {
+                "t_s": round(float(j * step), 9),
+                "rms_pb_um": 1e6 * float(errors["x_pb"][j]),
+                "rms_h_um": 1e6 * float(errors["x_h"][j]),
+            }
+            for j in worse
+        ],
+    }

@@ -1,0 +1,147 @@
+"""Figures of merit of sampled signals: RMS and largest magnitude, hold baseline, derivatives, shares, contour error."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .signals import Array
+
+__all__ = [
+    "RunningErrors",
+    "batch_rms",
+    "contour_error",
+    "hold",
+    "largest",
+    "peak_derivatives",
+    "reduction_percent",
+    "rms",
+    "shares",
+]
+
+_NODES = 20_000
+"""Points of a path among which the nearest one is looked up before it is refined."""
+
+
+def rms(error: ArrayLike) -> float:
+    """Return the root mean square of samples of any shape."""
+    return float(np.sqrt(np.mean(np.square(error))))
+
+
+def largest(error: ArrayLike) -> float:
+    """Return the largest magnitude of samples of any shape; 0 if there are none."""
+    return float(np.max(np.abs(error), initial=0.0))
+
+
+def reduction_percent(rms_h: float, rms_pb: float) -> float:
+    """Return by how much the hybrid's RMS is below the physics model's, percent of the latter."""
+    if rms_pb == 0.0:
+        return 0.0 if rms_h == 0.0 else -math.inf
+    return 100.0 * (1.0 - rms_h / rms_pb)
+
+
+class RunningErrors:
+    """RMS and largest magnitude of several errors whose samples arrive in blocks.
+
+    Parameters
+    ----------
+    m : int
+        How many errors.
+
+    Attributes
+    ----------
+    n : int
+        Samples so far.
+    """
+
+    def __init__(self, m: int) -> None:
+        self.n = 0
+        self._squares, self._peaks = [0.0] * m, [0.0] * m
+
+    def add(self, n: int, squares: Iterable[float], peaks: Iterable[float]) -> None:
+        """Take in the sums of squares and the largest magnitudes of ``n`` samples more."""
+        self.n += n
+        self._squares = [total + square for total, square in zip(self._squares, squares, strict=True)]
+        self._peaks = [max(largest_yet, peak) for largest_yet, peak in zip(self._peaks, peaks, strict=True)]
+
+    @property
+    def rms(self) -> list[float]:
+        """RMS of each error; NaN without samples."""
+        return [math.sqrt(square / self.n) if self.n else math.nan for square in self._squares]
+
+    @property
+    def peaks(self) -> list[float]:
+        """Largest magnitude of each error; NaN without samples."""
+        return list(self._peaks) if self.n else [math.nan] * len(self._peaks)
+
+
+def hold(x_pb: Array, x_meas: Array, active: NDArray[np.bool_], Np: int) -> Array:
+    """Return the hold baseline: the last residual before each batch, held over it, and ``x_pb`` in the warm-up.
+
+    Parameters
+    ----------
+    x_pb, x_meas : (n,) array, m
+        Physics-based prediction and measured position.
+    active : (n,) array of bool
+        Whether the warm-up is over.
+    Np : int
+        Samples in a batch.
+    """
+    last = np.arange(len(x_meas)) // Np * Np - 1
+    residual = np.where(last >= 0, (x_meas - x_pb)[last], 0.0)
+    return np.where(active, x_pb + residual, x_pb)
+
+
+def batch_rms(error: Array, Np: int) -> Array:
+    """Return the RMS batch by batch, ``(n_batches,)``, of an error ``(n,)``; the last batch may be shorter."""
+    starts = np.arange(0, len(error), Np)
+    lengths = np.diff(np.append(starts, len(error)))
+    return np.sqrt(np.add.reduceat(error**2, starts) / lengths)
+
+
+def peak_derivatives(x: Array, T_s: float) -> tuple[float, float, float]:
+    """Return the largest velocity, acceleration and jerk in the differences of positions ``(n,)``, m/s, m/s², m/s³."""
+    velocity, acceleration, jerk = (largest(np.diff(x, order)) / T_s**order for order in (1, 2, 3))
+    return velocity, acceleration, jerk
+
+
+def shares(states: NDArray[np.int64], kinds: type[IntEnum]) -> dict[str, float]:
+    """Return what share of the samples is in each state, 0 … 1, by its name in lower case."""
+    return {kind.name.lower(): float(np.mean(states == kind)) for kind in kinds}
+
+
+def contour_error(
+    points: ArrayLike, position: Callable[[Array], Array], derivative: Callable[[Array], Array], end: float
+) -> Array:
+    """Return the distance of each point to a planar path.
+
+    Parameters
+    ----------
+    points : (n, 2) array_like, m
+        Positions reached.
+    position, derivative : callable, (n,) → (n, 2)
+        The path and its derivative over a parameter from 0 to ``end``, as
+        :func:`~hybridsep.plants.trajectory.along_path` takes them.
+    end : float
+        Last value of the parameter.
+
+    Returns
+    -------
+    (n,) array, m
+    """
+    from scipy.spatial import cKDTree
+
+    reached = np.asarray(points, dtype=np.float64)
+    nodes = np.linspace(0.0, end, _NODES)
+    _, nearest = cKDTree(position(nodes)).query(reached)
+    u = nodes[nearest]
+    for _ in range(5):
+        # Gauss-Newton: the point's distance is least where it is perpendicular to the path
+        slope = derivative(u)
+        along = np.sum((reached - position(u)) * slope, axis=1) / np.sum(slope**2, axis=1)
+        u = np.clip(u + along, 0.0, end)
+    return np.asarray(np.linalg.norm(reached - position(u), axis=1))

@@ -1,0 +1,76 @@
+"""The library's own controllers and plants in the loop."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..compensate.compensator import SepCompensator
+from ..compensate.plan import SepState
+from ..plants.encoder import Encoder
+from ..plants.plant import Plant
+from ..predict.look_ahead import LookAhead
+from ..predict.predictor import HybridPredictor
+from .run import COMPENSATOR, PREDICTOR, Kind
+
+__all__ = ["LibraryController", "LibraryDrive"]
+
+
+class LibraryController:
+    """A predictor or compensator behind its look-ahead, with the FMU's timing.
+
+    Parameters
+    ----------
+    controller : HybridPredictor or SepCompensator
+    t_init : float, optional
+        Warm-up, s; its own if left out.
+    """
+
+    name: str = "the controller"
+
+    def __init__(self, controller: HybridPredictor | SepCompensator, t_init: float | None) -> None:
+        self._controller, self._t_init = controller, t_init
+        self.kind: Kind
+        if isinstance(controller, SepCompensator):
+            self.kind, predictor, self.delay = COMPENSATOR, controller.predictor, controller.preview
+        else:
+            self.kind, predictor, self.delay = PREDICTOR, controller, controller.Np
+        self.T_s, self.Np = predictor.T_s, predictor.Np
+
+    def initialise(self, start: float) -> None:
+        """Begin a run at rest at ``start``, m, with what was learned kept."""
+        self._look_ahead = LookAhead(self._controller, start, t_init=self._t_init)
+
+    def outputs(self) -> tuple[tuple[float, ...], int]:
+        """Return the positions of the kind's outputs, m, and the state, now."""
+        ahead = self._look_ahead
+        if self.kind is COMPENSATOR:
+            return (ahead.x_dm, ahead.x_d, ahead.x_pb, ahead.x_h), ahead.sep_state
+        return (ahead.x_d, ahead.x_pb, ahead.x_h), SepState.HYBRID if ahead.hybrid_active else SepState.PHYSICS
+
+    def step(self, k: int, x_d_ahead: float, x_meas: float) -> None:
+        """Take in sample ``k``, m, and move on to the next."""
+        self._look_ahead.sample(x_d_ahead, x_meas)
+
+
+class LibraryDrive:
+    """A plant and its encoder."""
+
+    name: str = "the plant"
+    T_s: float | None = None
+
+    def __init__(self, plant: Plant, encoder: Encoder) -> None:
+        self.plant: Any = plant
+        self._encoder = encoder
+
+    def initialise(self, start: float) -> None:
+        """Put the plant to rest at ``start``, m."""
+        self.plant.reset(start)
+
+    def outputs(self) -> tuple[float, float]:
+        """Return the true and the measured position now, m."""
+        x = self.plant.x
+        return x, self._encoder.measure(x)
+
+    def step(self, k: int, x_d: float, h: float) -> None:
+        """Advance by ``h`` seconds with the command ``x_d``, m, held."""
+        self.plant.step(x_d, h)

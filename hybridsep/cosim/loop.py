@@ -1,0 +1,256 @@
+"""The loop of a controller and a drive: how they are wired, stepped and recorded, FMUs and the library's objects alike.
+
+The Jacobi wiring: at ``t_k`` the drive gets the command that the controller gives it, the controller gets ``x_meas``
+and ``x_d_ahead = r(k)``; then both step. The controller delays the trajectory, so ``r`` is held at its end for as many
+samples more, and a run is recorded without the first fill.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, ExitStack
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..base.errors import FmuError, ParameterError
+from ..base.interrupt import interrupts_between_calls
+from ..base.signals import Array, as_samples
+from ..base.threads import one_blas_thread
+from ..compensate.compensator import SepCompensator
+from ..plants.encoder import Encoder
+from ..plants.plant import Plant
+from ..predict.predictor import HybridPredictor
+from .library import LibraryController, LibraryDrive
+from .run import Kind, Run
+
+__all__ = ["Controller", "Disturb", "Drive", "Progress", "Sensor", "cosimulate", "record"]
+
+Sensor = Callable[[int, float], float]
+"""Called as ``sensor(k, x_meas)``, ``k`` counted from the end of the fill; returns what arrives in its place."""
+
+Disturb = Callable[[int, Any], object]
+"""Called as ``disturb(k, plant)`` before sample ``k``, counted likewise; may change the plant."""
+
+Progress = Callable[[int, int], object]
+"""Called with samples done and samples in all, about a hundred times."""
+
+
+class Controller(Protocol):
+    """A look-ahead between interpolator and drive.
+
+    Attributes
+    ----------
+    name : str
+        As error messages call it.
+    kind : Kind
+    T_s : float
+        Sampling interval, s; like the next two, known after :meth:`initialise`.
+    Np, delay : int
+        Samples in a batch; samples by which it delays the trajectory.
+    """
+
+    name: str
+    kind: Kind
+    T_s: float
+    Np: int
+    delay: int
+
+    def initialise(self, start: float) -> None:
+        """Begin a run at rest at ``start``, m."""
+
+    def outputs(self) -> tuple[tuple[float, ...], int]:
+        """Return the positions of the kind's outputs, m, and the state, now."""
+
+    def step(self, k: int, x_d_ahead: float, x_meas: float) -> None:
+        """Take in sample ``k``, m, and move on to the next."""
+
+
+class Drive(Protocol):
+    """A plant with its encoder.
+
+    Attributes
+    ----------
+    name : str
+        As error messages call it.
+    T_s : float, optional
+        Sampling interval, s, known after :meth:`initialise`; None if it can be any.
+    plant : object
+        What is disturbed; known after :meth:`initialise`.
+    """
+
+    name: str
+    T_s: float | None
+    plant: Any
+
+    def initialise(self, start: float) -> None:
+        """Begin a run at rest at ``start``, m."""
+
+    def outputs(self) -> tuple[float, float]:
+        """Return the true and the measured position now, m."""
+
+    def step(self, k: int, x_d: float, h: float) -> None:
+        """Advance from sample ``k`` by ``h`` seconds with the command ``x_d``, m, held."""
+
+
+def cosimulate(
+    controller: str | Path | HybridPredictor | SepCompensator,
+    plant: str | Path | Plant,
+    r: ArrayLike,
+    *,
+    controller_values: Mapping[str, Any] | None = None,
+    plant_values: Mapping[str, Any] | None = None,
+    encoder: Encoder | None = None,
+    t_init: float | None = None,
+    start_time: float = 0.0,
+    sensor: Sensor | None = None,
+    disturb: Disturb | None = None,
+    progress: Progress | None = None,
+) -> Run:
+    """Run a predictor or a compensator and a drive together over a trajectory.
+
+    Parameters
+    ----------
+    controller : str, Path, HybridPredictor or SepCompensator
+        An FMU's archive, or an object of the library, which begins a run with what it has learned kept.
+    plant : str, Path or Plant
+        An FMU's archive, or an object of the library, which is reset to rest at ``r(0)``.
+    r : (n,) array_like, m
+        Commanded positions at ``k·T_s``.
+    controller_values, plant_values : mapping, optional
+        Parameters of an FMU to set before the initialization, for example ``{"compensate": 1}`` and ``{"seed": 3}``.
+    encoder : Encoder, optional
+        Position sensor of a plant of the library; without noise if left out.
+    t_init : float, optional
+        Warm-up of a controller of the library, s; its own if left out, 0 for a warm start.
+    start_time : float
+        Start of the experiment, s.
+    sensor : callable, optional
+        Called as ``sensor(k, x_meas)``, ``k`` counted from the end of the fill; returns what arrives in its place.
+    disturb : callable, optional
+        Called as ``disturb(k, plant)`` before sample ``k``, counted likewise, with the plant or its ``FmuInstance``,
+        which it may change.
+    progress : callable, optional
+        Called with ``(k, n)`` about a hundred times.
+
+    Returns
+    -------
+    Run
+
+    Raises
+    ------
+    FmuError
+        If an FMU refuses to load, to initialise or to step, or does not fit; its message is part of the error.
+    ParameterError
+        If an argument is for an FMU where there is an object, or the other way round.
+    SignalError
+        If ``r`` is empty or not finite.
+    """
+    command = as_samples(r, "r")
+    as_samples(command[:1], "r", 1)
+    ahead = _controller(controller, controller_values, t_init, start_time)
+    drive = _drive(plant, plant_values, encoder, start_time)
+    with one_blas_thread, interrupts_between_calls(), ExitStack() as stack:
+        for adapter in (ahead, drive):
+            if isinstance(adapter, AbstractContextManager):
+                stack.enter_context(adapter)
+        start = float(command[0])
+        ahead.initialise(start)
+        drive.initialise(start)
+        delay, T_s = ahead.delay, ahead.T_s
+        if drive.T_s is not None and abs(drive.T_s - T_s) > 1e-6 * T_s:
+            raise FmuError(f"{drive.name} has T_s = {drive.T_s:g} s, but {ahead.name} has {T_s:g} s; they must agree")
+        signals, state = record(
+            ahead, drive, command, len(command) + delay, sensor=sensor, disturb=disturb, progress=progress
+        )
+    found = {name: samples[delay:] for name, samples in signals.items()}
+    found.setdefault("x_dm", found["x_d"])
+    t = np.asarray(start_time + np.arange(delay, len(state)) * T_s, dtype=np.float64)
+    return Run(kind=ahead.kind, t=t, **found, state=state[delay:], T_s=T_s, Np=ahead.Np)
+
+
+def record(
+    controller: Controller,
+    drive: Drive,
+    command: Array,
+    n: int,
+    *,
+    sensor: Sensor | None = None,
+    disturb: Disturb | None = None,
+    progress: Progress | None = None,
+) -> tuple[dict[str, Array], NDArray[np.int64]]:
+    """Step a controller and a drive, both initialised, for ``n`` samples.
+
+    Parameters
+    ----------
+    controller : Controller
+    drive : Drive
+    command : (m,) array, m
+        Commanded positions; held at the end.
+    n : int
+        Samples.
+    sensor, disturb, progress : callable, optional
+        As :func:`cosimulate` takes them.
+
+    Returns
+    -------
+    signals : dict of (n,) arrays, m
+        The kind's outputs, and the drive's ``x`` and ``x_meas`` as the controller got it.
+    state : (n,) array of int
+        :class:`~hybridsep.compensate.plan.SepState`.
+    """
+    kind, delay, T_s = controller.kind, controller.delay, controller.T_s
+    signals = np.empty((n, len(kind.outputs) + 2))
+    state = np.empty(n, dtype=np.int64)
+    every = max(1, n // 100)
+    for k in range(n):
+        if disturb is not None:
+            disturb(k - delay, drive.plant)
+        outputs, state[k] = controller.outputs()
+        x, x_meas = drive.outputs()
+        if sensor is not None:
+            x_meas = sensor(k - delay, x_meas)
+        signals[k] = *outputs, x, x_meas
+        drive.step(k, outputs[0], T_s)
+        controller.step(k, float(command[min(k, len(command) - 1)]), x_meas)
+        if progress is not None and (k % every == 0 or k == n - 1):
+            progress(k + 1, n)
+    names = (*kind.outputs, "x", "x_meas")
+    return dict(zip(names, signals.T.copy(), strict=True)), state
+
+
+def _controller(
+    controller: str | Path | HybridPredictor | SepCompensator,
+    values: Mapping[str, Any] | None,
+    t_init: float | None,
+    start_time: float,
+) -> Controller:
+    """Return what the loop steps in a controller's place."""
+    if isinstance(controller, (str, Path)):
+        from .fmus import FmuController  # fmpy is loaded where an FMU is
+
+        _refuse(t_init, "t_init is for a controller of the library; an FMU's is among its controller_values")
+        return FmuController(controller, values or {}, start_time)
+    _refuse(values, "controller_values are for an FMU; make the controller with these parameters")
+    return LibraryController(controller, t_init)
+
+
+def _drive(
+    plant: str | Path | Plant, values: Mapping[str, Any] | None, encoder: Encoder | None, start_time: float
+) -> Drive:
+    """Return what the loop steps in a plant's place."""
+    if isinstance(plant, (str, Path)):
+        from .fmus import FmuDrive
+
+        _refuse(encoder, "encoder is for a plant of the library; an FMU's noise and seed are among its plant_values")
+        return FmuDrive(plant, values or {}, start_time)
+    _refuse(values, "plant_values are for an FMU; make the plant with these parameters")
+    return LibraryDrive(plant, Encoder() if encoder is None else encoder)
+
+
+def _refuse(given: object, message: str) -> None:
+    """Raise ParameterError if an argument is given that has no use."""
+    if given is not None:
+        raise ParameterError(message)

@@ -1,0 +1,222 @@
+"""Record of a run: what a controller and a drive did over a trajectory, sample by sample, its figures and its file."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.metrics import batch_rms, hold, largest, peak_derivatives, reduction_percent, rms, shares
+from ..base.output import written_text, written_whole
+from ..base.signals import Array
+from ..compensate.plan import SepState
+
+__all__ = ["COMPENSATOR", "PREDICTOR", "RESULT_SUFFIXES", "Kind", "Run", "save_columns"]
+
+RESULT_SUFFIXES = (".csv", ".npz")
+"""Endings of files that :func:`save_columns` can write."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Kind of a controller: what the loop asks of it, and what its runs save.
+
+    Attributes
+    ----------
+    name : str
+        As error messages call it.
+    outputs : tuple of str
+        Its positions, m; the first one goes to the drive.
+    state : str
+        Its Integer or Boolean output that says which model predicts.
+    lowest : SepState
+        What that output means by 0.
+    delay : str
+        The parameter that says by how many samples it delays the trajectory.
+    columns : tuple of str
+        Attributes of :class:`Run` that a file of a run has.
+    """
+
+    name: str
+    outputs: tuple[str, ...]
+    state: str
+    lowest: SepState
+    delay: str
+    columns: tuple[str, ...]
+
+
+PREDICTOR = Kind(
+    "predictor",
+    ("x_d", "x_pb", "x_h"),
+    state="hybrid_active",
+    lowest=SepState.PHYSICS,
+    delay="Np",
+    columns=("t", "x_d", "x", "x_meas", "x_pb", "x_hold", "x_h", "active"),
+)
+"""The loop is open: the drive gets the commanded position."""
+
+COMPENSATOR = Kind(
+    "compensator",
+    ("x_dm", "x_d", "x_pb", "x_h"),
+    state="sep_state",
+    lowest=SepState.OFF,
+    delay="preview",
+    columns=("t", "x_d", "x_dm", "x", "x_meas", "x_pb", "x_h", "state"),
+)
+"""The loop is closed: the drive gets the modified command."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """Signals of a run, without the first fill of the look-ahead.
+
+    Attributes
+    ----------
+    kind : Kind
+        :data:`PREDICTOR` or :data:`COMPENSATOR`.
+    t : (n,) array, s
+        Communication points.
+    x_d, x_dm : (n,) array, m
+        Commanded position and what the drive got in its place; the same where the loop is open.
+    x, x_meas : (n,) array, m
+        True and measured position; the true one of a recorded axis is NaN.
+    x_pb, x_h : (n,) array, m
+        Physics-based prediction under ``x_dm``, and the one by the model in ``state``.
+    state : (n,) array of int
+        :class:`~hybridsep.compensate.plan.SepState` of each sample: the model that predicts, or that planned.
+    T_s : float
+        Sampling interval, s.
+    Np : int
+        Samples in a batch.
+    """
+
+    kind: Kind
+    t: Array
+    x_d: Array
+    x_dm: Array
+    x: Array
+    x_meas: Array
+    x_pb: Array
+    x_h: Array
+    state: NDArray[np.int64]
+    T_s: float
+    Np: int
+
+    @property
+    def active(self) -> NDArray[np.bool_]:
+        """Whether the hybrid model predicts, ``(n,)``."""
+        return np.asarray(self.state == SepState.HYBRID)
+
+    @property
+    def x_hold(self) -> Array:
+        """Hold baseline, ``(n,)``, m."""
+        return hold(self.x_pb, self.x_meas, self.active, self.Np)
+
+    @property
+    def change(self) -> Array:
+        """How the command was modified, ``x_dm − x_d``, ``(n,)``, m."""
+        return np.asarray(self.x_dm - self.x_d, dtype=np.float64)
+
+    @property
+    def error(self) -> Array:
+        """Tracking error ``x_d − x`` of the true position, ``(n,)``, m."""
+        return np.asarray(self.x_d - self.x, dtype=np.float64)
+
+    @property
+    def tracking_rms(self) -> float:
+        """RMS of the tracking error of the true position, m."""
+        return rms(self.error)
+
+    def summary(self) -> dict[str, float | int]:
+        """Return the figures of the run's kind: of its predictions, or of its tracking."""
+        return self.prediction_figures() if self.kind == PREDICTOR else self.tracking_figures()
+
+    def prediction_figures(self) -> dict[str, float | int]:
+        """Return RMS errors in µm over the whole trajectory, against the measured position unless named true."""
+        rms_pb, rms_h = rms(self.x_meas - self.x_pb), rms(self.x_meas - self.x_h)
+        return {
+            "rms_pb_um": 1e6 * rms_pb,
+            "rms_hold_um": 1e6 * rms(self.x_meas - self.x_hold),
+            "rms_h_um": 1e6 * rms_h,
+            "reduction_percent": reduction_percent(rms_h, rms_pb),
+            "rms_pb_true_um": 1e6 * rms(self.x - self.x_pb),
+            "rms_h_true_um": 1e6 * rms(self.x - self.x_h),
+            "servo_error_rms_um": 1e6 * rms(self.error),
+            "max_h_um": 1e6 * largest(self.x_meas - self.x_h),
+            "n_samples": len(self.t),
+        }
+
+    def tracking_figures(self) -> dict[str, float | int]:
+        """Return what compensation came to over the whole trajectory.
+
+        Returns
+        -------
+        dict
+            RMS and largest magnitude in µm of the tracking error, against the true position and (``_measured_``) the
+            measured one, and of the command's change; the largest velocity, acceleration and jerk of ``x_dm``, of its
+            differences; the share of the samples that each model planned, 0 … 1.
+        """
+        figures: dict[str, float | int] = {}
+        for name, signal in (
+            ("tracking", self.error),
+            ("tracking_measured", self.x_d - self.x_meas),
+            ("change", self.change),
+        ):
+            figures[f"{name}_rms_um"] = 1e6 * rms(signal)
+            figures[f"{name}_max_um"] = 1e6 * largest(signal)
+        peaks = peak_derivatives(self.x_dm, self.T_s)
+        for name, peak in zip(("velocity_m_s", "acceleration_m_s2", "jerk_m_s3"), peaks, strict=True):
+            figures[f"peak_{name}"] = peak
+        figures |= {f"share_{name}": share for name, share in shares(self.state, SepState).items()}
+        return {**figures, "n_samples": len(self.t)}
+
+    def batch_rms(self) -> dict[str, Array]:
+        """Return the RMS errors batch by batch, m, ``(n_batches,)`` each, of ``x_pb``, ``x_hold`` and ``x_h``."""
+        return {name: batch_rms(self.x_meas - getattr(self, name), self.Np) for name in ("x_pb", "x_hold", "x_h")}
+
+    def save(self, path: str | Path) -> None:
+        """Write the columns of the run's kind to ``path``: ``.csv`` with one row a sample, or ``.npz``.
+
+        Raises
+        ------
+        ValueError
+            If the suffix is another one.
+        """
+        save_columns({name: getattr(self, name) for name in self.kind.columns}, path)
+
+
+def save_columns(columns: Mapping[str, Any], path: str | Path) -> None:
+    """Write arrays of one length to ``path``: ``.csv`` with one row a sample, or ``.npz``.
+
+    Parameters
+    ----------
+    columns : mapping
+        Name → ``(n,)`` array; truth values become 0 and 1 in a CSV.
+    path : str or Path
+
+    Raises
+    ------
+    ValueError
+        If the suffix is another one.
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix == ".npz":
+        with written_whole(path) as archive:
+            np.savez_compressed(archive, **columns)
+    elif suffix == ".csv":
+        texts = [
+            map(repr, (column.astype(np.int64) if column.dtype == np.bool_ else column).tolist())
+            for column in columns.values()
+        ]
+        with written_text(path) as file:
+            writer = csv.writer(file)
+            writer.writerow(columns)
+            writer.writerows(zip(*texts, strict=True))
+    else:
+        raise ValueError(f"results are written as {' or '.join(RESULT_SUFFIXES)}, got {path.name!r}")

@@ -1,0 +1,39 @@
+"""Canvas of the figures: drawn without a display and written as PNG, and the colour of each model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from ..base.output import written_whole
+
+__all__ = ["CASES", "HOLD", "HYBRID", "PHYSICS", "finish_panels", "save_figure"]
+
+PHYSICS, HOLD, HYBRID = "#d95f02", "#7f7f7f", "#1b6ca8"
+
+CASES = {
+    "none": ("no compensation", HOLD),
+    "physics": ("physics model", PHYSICS),
+    "hybrid_cold": ("hybrid, cold", "#74b3e0"),
+    "hybrid_warm": ("hybrid, warm", HYBRID),
+    "hybrid": ("hybrid", HYBRID),
+}
+"""Kinds of compensation in the order of what they are worth: key → label, colour."""
+
+
+def finish_panels(panels: Iterable[Axes]) -> None:
+    """Give panels over time a grid, and no frame above and on the right."""
+    for axes in panels:
+        axes.grid(alpha=0.3)
+        axes.spines[["top", "right"]].set_visible(False)
+
+
+def save_figure(figure: Figure, path: str | Path, dpi: int = 130) -> None:
+    """Write a figure to a PNG."""
+    FigureCanvasAgg(figure)
+    with written_whole(path) as file:
+        figure.savefig(file, dpi=dpi, format="png")

@@ -1,0 +1,145 @@
+"""Figures over time: prediction errors like the paper's Figs. 4 and 8, tracking errors and changes of the command."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from ..base.metrics import rms
+from ..base.signals import Array
+from ..compensate.plan import SepState
+from ..cosim.run import Run
+from .canvas import CASES, HOLD, HYBRID, PHYSICS, finish_panels, save_figure
+
+__all__ = ["prediction_figure", "tracking_figure"]
+
+_SPANS = {SepState.OFF: ("not compensated", HOLD), SepState.PHYSICS: ("planned by the physics model", PHYSICS)}
+"""How spans are shaded that a run's best model did not plan."""
+
+
+def prediction_figure(run: Run, title: str, path: str | Path) -> None:
+    """Draw the command, the two models' prediction errors and the RMS of each batch to a PNG.
+
+    Parameters
+    ----------
+    run : Run
+        Of a predictor, or the replay of a log.
+    title : str
+        Heading.
+    path : str or Path
+        The PNG.
+    """
+    figure = Figure(figsize=(9.0, 8.0), layout="constrained")
+    command, error, batches = figure.subplots(3, 1, sharex=True, height_ratios=[1.0, 2.0, 1.4])
+    figure.suptitle(title)
+    t = run.t - run.t[0]
+    command.plot(t, 1e3 * run.x_d, color="black", linewidth=1.2)
+    command.set_ylabel("commanded\nposition [mm]")
+    error.plot(t, 1e6 * (run.x_meas - run.x_pb), color=PHYSICS, linewidth=0.8, label="physics-based model")
+    hybrid = np.where(run.active, 1e6 * (run.x_meas - run.x_h), np.nan)
+    error.plot(t, hybrid, color=HYBRID, linewidth=0.8, label="linear hybrid model, after the warm-up")
+    if not run.active.all():
+        t_init = float(t[np.argmax(run.active)])
+        for axes in (error, batches):
+            axes.axvline(t_init, color="black", linewidth=0.8, linestyle=":")
+        error.annotate(
+            "t_init", (t_init, 0.02), xycoords=("data", "axes fraction"), xytext=(4, 0), textcoords="offset points"
+        )
+    error.set_ylabel("prediction error\nx − x̂ [µm]")
+    error.margins(y=0.15)
+    error.legend(loc="upper right", ncols=2, frameon=False)
+    _draw_batches(batches, run)
+    batches.set_xlabel("time [s]")
+    finish_panels((command, error, batches))
+    save_figure(figure, path)
+
+
+def _draw_batches(axes: Axes, run: Run) -> None:
+    """Draw the RMS error of each batch and mark the batches where the hybrid is worse than the physics model."""
+    errors = {name: 1e6 * values for name, values in run.batch_rms().items()}
+    edges = np.append(np.arange(len(errors["x_pb"])) * run.Np, len(run.t)) * run.T_s
+    for name, color, label in (
+        ("x_pb", PHYSICS, "physics"),
+        ("x_hold", HOLD, "hold"),
+        ("x_h", HYBRID, "hybrid"),
+    ):
+        axes.stairs(errors[name], edges, baseline=None, color=color, linewidth=1.2, label=label)
+    worse = errors["x_h"] > errors["x_pb"]
+    for begin, end in zip(edges[:-1][worse], edges[1:][worse], strict=True):
+        axes.axvspan(begin, end, color=PHYSICS, alpha=0.15, linewidth=0)
+    axes.set_ylim(0.0, 1.35 * max(float(values.max()) for values in errors.values()))
+    axes.set_ylabel("RMS of each\nbatch [µm]")
+    axes.legend(loc="upper right", ncols=3, frameon=False, title="shaded: hybrid worse than physics", title_fontsize=8)
+
+
+def tracking_figure(runs: Mapping[str, Run], title: str, path: str | Path) -> None:
+    """Draw command, tracking error and change of the command of one or several runs to a PNG.
+
+    Parameters
+    ----------
+    runs : mapping
+        Keys of :data:`~hybridsep.evaluate.canvas.CASES` → runs over the same command. Where it is one run only, the
+        spans are shaded that its best model did not plan.
+    title : str
+        Heading.
+    path : str or Path
+        The PNG.
+    """
+    compensated = {key: run for key, run in runs.items() if key != "none"}
+    enlarged = 0 < len(compensated) < len(runs)
+    ratios = [1.0, 1.6, *([1.8] if enlarged else []), 1.5]
+    figure = Figure(figsize=(9.0, 1.8 + 1.15 * sum(ratios)), layout="constrained")
+    panels: Sequence[Axes] = figure.subplots(len(ratios), 1, sharex=True, height_ratios=ratios)
+    figure.suptitle(title)
+    first = next(iter(runs.values()))
+    panels[0].plot(first.t - first.t[0], 1e3 * first.x_d, color="black", linewidth=1.2)
+    panels[0].set_ylabel("commanded\nposition [mm]")
+    _draw_signals(panels[1], {key: run.error for key, run in runs.items()}, runs)
+    panels[1].set_ylabel("tracking error\nx_d − x [µm]")
+    if enlarged:
+        _draw_signals(panels[2], {key: run.error for key, run in compensated.items()}, runs)
+        panels[2].set_ylabel("tracking error,\nenlarged [µm]")
+    _draw_signals(panels[-1], {key: run.change for key, run in (compensated or runs).items()}, runs)
+    panels[-1].set_ylabel("change of command\nx_dm − x_d [µm]")
+    panels[-1].set_xlabel("time [s]")
+    handles = [*panels[1].get_lines(), *(_shade(panels[1:], first) if len(runs) == 1 else [])]
+    figure.legend(
+        handles=handles,
+        title="RMS of the tracking error (true position)",
+        loc="outside lower center",
+        ncols=len(handles),
+        columnspacing=1.4,
+        frameon=False,
+    )
+    finish_panels(panels)
+    figure.align_ylabels()
+    save_figure(figure, path)
+
+
+def _draw_signals(axes: Axes, signals: Mapping[str, Array], runs: Mapping[str, Run]) -> None:
+    """Draw one signal of each run in µm, labelled with the run's tracking error."""
+    for key, signal in signals.items():
+        label, color = CASES[key]
+        run = runs[key]
+        label = f"{label}: {1e6 * rms(run.error):.1f} µm"
+        axes.plot(run.t - run.t[0], 1e6 * signal, color=color, linewidth=0.9, label=label)
+
+
+def _shade(panels: Sequence[Axes], run: Run) -> list[Patch]:
+    """Shade the spans that another model than the run's best one planned; return what the legend says of them."""
+    patches = []
+    edges_of_samples = np.append(run.t, run.t[-1] + run.T_s) - run.t[0]
+    for state, (label, color) in _SPANS.items():
+        inside = (run.state == state) & (state < run.state.max())
+        edges = edges_of_samples[np.flatnonzero(np.diff(inside.astype(np.int8), prepend=0, append=0))]
+        for begin, end in edges.reshape(-1, 2):
+            for axes in panels:
+                axes.axvspan(begin, end, color=color, alpha=0.2, linewidth=0)
+        if len(edges):
+            patches.append(Patch(color=color, alpha=0.2, linewidth=0, label=label))
+    return patches

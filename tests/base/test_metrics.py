@@ -1,0 +1,92 @@
+"""Figures of merit against closed forms."""
+
+from __future__ import annotations
+
+import math
+from enum import IntEnum
+
+import numpy as np
+import pytest
+
+from hybridsep.base.metrics import (
+    RunningErrors,
+    batch_rms,
+    contour_error,
+    hold,
+    largest,
+    peak_derivatives,
+    reduction_percent,
+    rms,
+    shares,
+)
+from hybridsep.base.signals import Array
+from hybridsep.plants.trajectory import archimedean_spiral
+
+
+def test_rms_and_largest() -> None:
+    sine = 3.0 * np.sin(2 * np.pi * np.arange(400) / 100)
+    assert rms(sine) == pytest.approx(3.0 / math.sqrt(2))
+    assert rms([[3.0, -4.0]]) == pytest.approx(math.sqrt(12.5))
+    assert largest([1.0, -4.0, 2.0]) == 4.0
+    assert largest([]) == 0.0
+
+
+def test_reduction() -> None:
+    assert reduction_percent(1.0, 4.0) == 75.0
+    assert reduction_percent(5.0, 4.0) == -25.0
+    assert reduction_percent(0.0, 0.0) == 0.0
+    assert reduction_percent(1.0, 0.0) == -math.inf
+
+
+def test_blocks_of_errors_are_one_error() -> None:
+    errors = np.random.default_rng(0).normal(size=(2, 1000))
+    running = RunningErrors(2)
+    assert all(map(math.isnan, (*running.rms, *running.peaks)))
+    for block in np.array_split(errors, 7, axis=1):
+        running.add(block.shape[1], np.sum(block**2, axis=1), np.max(np.abs(block), axis=1))
+    assert running.n == 1000
+    assert running.rms == pytest.approx([rms(error) for error in errors])
+    assert running.peaks == [largest(error) for error in errors]
+
+
+def test_hold_keeps_the_last_residual_over_the_next_batch() -> None:
+    x_pb, residual = np.arange(8.0), np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0])
+    active = np.arange(8) >= 4
+    # Batches of 3: the second one holds residual 2, the third residual 5; samples 0 to 3 are the warm-up
+    expected = x_pb + np.array([0.0, 0.0, 0.0, 0.0, 3.0, 3.0, 6.0, 6.0])
+    np.testing.assert_array_equal(hold(x_pb, x_pb + residual, active, 3), expected)
+    everywhere = np.ones(8, dtype=np.bool_)
+    np.testing.assert_array_equal(hold(x_pb, x_pb + residual, everywhere, 3)[:4] - x_pb[:4], [0.0, 0.0, 0.0, 3.0])
+
+
+def test_batch_rms_with_a_short_last_batch() -> None:
+    np.testing.assert_allclose(batch_rms(np.array([3.0, 4.0, 1.0, -1.0, 2.0]), 2), [math.sqrt(12.5), 1.0, 2.0])
+
+
+def test_peak_derivatives_of_a_cubic() -> None:
+    T_s, n = 1e-2, 101
+    t: Array = T_s * np.arange(n, dtype=np.float64)
+    velocity, acceleration, jerk = peak_derivatives(t**3, T_s)
+    # Backward differences of t³ at the last sample
+    assert velocity == pytest.approx(3 - 3 * T_s + T_s**2)
+    assert acceleration == pytest.approx(6 - 6 * T_s)
+    assert jerk == pytest.approx(6.0, rel=1e-6)
+    assert peak_derivatives(t[:1], T_s) == (0.0, 0.0, 0.0)
+
+
+def test_shares_have_the_names_of_the_states() -> None:
+    class State(IntEnum):
+        OFF = 0
+        ON = 1
+
+    assert shares(np.array([0, 1, 1, 1]), State) == {"off": 0.25, "on": 0.75}
+
+
+def test_contour_error_is_the_distance_to_the_path() -> None:
+    position, derivative, end = archimedean_spiral(0.03, 5.0)
+    u = np.linspace(1.0, end - 1.0, 301)
+    slope = derivative(u)
+    normal = np.column_stack((-slope[:, 1], slope[:, 0])) / np.linalg.norm(slope, axis=1)[:, None]
+    distance = 1e-4 * np.sin(7 * u)
+    found = contour_error(position(u) + distance[:, None] * normal, position, derivative, end)
+    np.testing.assert_allclose(found, np.abs(distance), rtol=0, atol=1e-9)
