@@ -45,7 +45,7 @@ def best_model(compensate: str) -> SepState:
 
 def fitting(axis: Machine, model: str, values: Mapping[str, Any]) -> dict[str, Any]:
     """Check the FMI values of a look-ahead FMU that will be built; return them with what must change with them."""
-    if compensate is None:
+    if model == "HybridPredictor":
         axis.changed("predictor", values)
         return dict(values)
     settings = axis.changed("compensator", values).compensator_settings

@@ -159,7 +159,9 @@ class PredictorSettings(Settings):
     lam: float = real(1e-12, 1e-40, 1e12, "m2", "ridge penalty on the weights", name="lambda", learned=True)
     T_s: float = real(1e-3, 1e-5, 1.0, "s", "sampling interval", display_unit="ms", learned=True)
     t_init: float = real(0.3, 0.0, 1e6, "s", "warm-up: until then x_h = x_pb, while learning goes on")
-    input_hold: str = choice("zoh", ("zoh", "foh"), "x_d between samples: zero-order or first-order hold", learned=True)
+    input_hold: str = choice(
+        "zoh", ("zoh", "foh"), "how x_d runs between samples, zero-order or first-order hold", learned=True
+    )
     v_friction: float = real(
         *(2e-3, 0.0, 1e4, "m/s"),
         "velocity over which friction changes its sign, for features of the reference; 0: none of them",

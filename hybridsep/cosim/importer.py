@@ -32,6 +32,9 @@ from ..fmi.pythonfmu_limits import check_unpacked
 
 __all__ = ["FmuInstance", "read_description"]
 
+_ACCESS = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}
+"""Which of the FMU's functions reads and writes a type."""
+
 
 def read_description(path: str | Path) -> Any:
     """Return fmpy's model description of an FMI 2.0 co-simulation FMU.
@@ -192,20 +195,18 @@ class FmuInstance:
     def set(self, name: str, value: Any) -> None:
         """Set one variable."""
         variable = self._variable(name)
-        if variable.type == "Integer" and not (isinstance(value, int) and abs(value) < 2**31):
+        if variable.type in ("Integer", "Enumeration") and not (isinstance(value, int) and abs(value) < 2**31):
             raise FmuError(f"{self.path.name}: {name} must be a whole number within ±{2**31 - 1}, got {value!r}")
         if variable.type == "Real" and not isinstance(value, (int, float)):
             raise FmuError(f"{self.path.name}: {name} must be a number, got {value!r}")
-        if variable.type not in ("Real", "Integer", "Boolean"):
+        if variable.type not in _ACCESS:
             raise FmuError(f"{self.path.name}: {name} is a {variable.type}, which is not supported here")
-        setter = {"Real": self.slave.setReal, "Integer": self.slave.setInteger, "Boolean": self.slave.setBoolean}
-        self._call(setter[variable.type], [variable.valueReference], [value])
+        self._call(getattr(self.slave, f"set{_ACCESS[variable.type]}"), [variable.valueReference], [value])
 
     def get(self, name: str) -> Any:
         """Return one variable."""
         variable = self._variable(name)
-        getter = {"Real": self.slave.getReal, "Integer": self.slave.getInteger, "Boolean": self.slave.getBoolean}
-        return self._call(getter[variable.type], [variable.valueReference])[0]
+        return self._call(getattr(self.slave, f"get{_ACCESS[variable.type]}"), [variable.valueReference])[0]
 
     def real_writer(self, names: Sequence[str]) -> Callable[[Sequence[float]], None]:
         """Return a function that sets these Reals in one FMI call."""

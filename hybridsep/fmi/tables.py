@@ -23,6 +23,12 @@ def interface_table(table: Iterable[Variable]) -> list[tuple[str, str, str, str,
         name = re.sub(r"^(\w+_window)\[\d+\]", r"\1[i]", variable.name)
         causality = "parameter, fixed" if variable.causality == "parameter" else variable.causality
         unit = "" if variable.unit in (None, "1") else f", {variable.unit}"
-        start = "" if variable.start is None else f"{variable.start:.10g}"
-        rows.setdefault(name, (name, causality, f"{variable.kind}{unit}", start, variable.description))
+        start = "" if variable.start is None else _start(variable)
+        items = ", ".join(f"{number} {item}" for number, item in enumerate(variable.items))
+        meaning = f"{variable.description}: {items}" if items else variable.description
+        rows.setdefault(name, (name, causality, f"{variable.kind}{unit}", start, meaning))
     return list(rows.values())
+
+
+def _start(variable: Variable) -> str:
+    return str(variable.start).lower() if variable.kind == "Boolean" else f"{variable.start:.10g}"

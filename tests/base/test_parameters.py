@@ -95,7 +95,7 @@ def test_the_largest_seed_is_in_its_message() -> None:
         ("k_nl", "quadratic stiffness, force k_nl·x·|x| [N/m2], 0 … 1e+15"),
         ("jerk_weight", "weight of the change's jerk against the tracking error, 0 … 1e+12"),
         ("no_reversal", "whether x_dm never turns while the commanded position moves"),
-        ("input_hold", "x_d between samples: zero-order or first-order hold, zoh or foh"),
+        ("input_hold", "how x_d runs between samples, zero-order or first-order hold, zoh or foh"),
     ],
 )
 def test_help(name: str, text: str) -> None:
