@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import c_core
@@ -13,6 +15,16 @@ import staircase_data as staircase
 from c_core import write_trajectory
 
 from hybridsep.fmi.native_backend import all_c
+
+
+def test_the_c_files_are_formatted() -> None:
+    command = shutil.which("clang-format", path=str(Path(sys.executable).parent))
+    assert command, "clang-format is missing: pip install -e '.[test]'"
+    files = [path for folder in ("fmu_src", "tests", "benchmarks") for path in (c_core.ROOT / folder).rglob("*.[ch]")]
+    assert len(files) > 60
+    done = subprocess.run([command, "--dry-run", "--Werror", *files], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert [path for path in files if max(map(len, path.read_text(encoding="utf-8").splitlines())) > 120] == []
 
 
 def test_the_core_needs_libm_alone() -> None:

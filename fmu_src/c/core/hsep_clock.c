@@ -7,10 +7,7 @@ static const double clock_spacings = 8.0;      /* of doubles at t: a few roundin
 static const double clock_split = 134217729.0; /* 2^27 + 1, splits a double into two halves (Veltkamp 1968) */
 static const double clock_samples_max = 9007199254740992.0; /* 2^53: counted exactly in a double */
 
-static double clock_resolution(double t)
-{
-    return clock_spacings * (nextafter(fabs(t), HUGE_VAL) - fabs(t));
-}
+static double clock_resolution(double t) { return clock_spacings * (nextafter(fabs(t), HUGE_VAL) - fabs(t)); }
 
 /* delta at t, s. Times so long that doubles no longer tell a quarter of T_s are beyond any run. */
 static double clock_delta(const hsep_clock *self, double t)
@@ -69,6 +66,5 @@ HSEP_API int hsep_clock_valid(const hsep_clock *self)
 {
     return isfinite(self->start) && self->T_s > 0.0 && isfinite(self->T_s) && self->k >= 0 &&
            (double)self->k < clock_samples_max && fabs(self->since) <= self->T_s &&
-           fabs(self->carry) <= fabs(self->since) && isfinite(self->end) &&
-           (self->latched == 0 || self->latched == 1);
+           fabs(self->carry) <= fabs(self->since) && isfinite(self->end) && (self->latched == 0 || self->latched == 1);
 }

@@ -26,11 +26,11 @@ typedef struct {
 
 /* One communication step in samples. */
 typedef struct {
-    hsep_clock after;   /* the clock at the step's end */
-    int64_t n_samples;  /* samples that the step executes */
-    int64_t n_latched;  /* instants whose inputs are read in it, one after the other */
-    double first;       /* s, from the step's start to the first of them; may be slightly below 0 */
-    int inside;         /* whether one of them is no communication point */
+    hsep_clock after;  /* the clock at the step's end */
+    int64_t n_samples; /* samples that the step executes */
+    int64_t n_latched; /* instants whose inputs are read in it, one after the other */
+    double first;      /* s, from the step's start to the first of them; may be slightly below 0 */
+    int inside;        /* whether one of them is no communication point */
 } hsep_clock_step;
 
 /* Begin at start, s. Fails, and returns 0, if doubles near start cannot tell a quarter of T_s. */

@@ -49,8 +49,8 @@ HSEP_API double hsep_compensator_size(const hsep_compensator_parameters *paramet
                            (preview + 2.0 * HSEP_SCHEDULE_REACH) + preview + (preview + q) + (preview + p) +
                            3.0 * preview;
     return (double)sizeof(hsep_compensator) + doubles * (double)sizeof(double) +
-           2.0 * hsep_physics_size(parameters->n_modes, parameters->dead_time) +
-           2.0 * hsep_regression_size(features) + hsep_planner_size(&parameters->planner);
+           2.0 * hsep_physics_size(parameters->n_modes, parameters->dead_time) + 2.0 * hsep_regression_size(features) +
+           hsep_planner_size(&parameters->planner);
 }
 
 /* Take count doubles behind what is taken already; return their offset. */
@@ -137,16 +137,15 @@ HSEP_API int hsep_compensator_valid(const void *block, const hsep_compensator_pa
     expected = got; /* what may differ from a fresh block is taken over, the rest must be equal */
     compensator_lay_out(&expected, parameters);
     const uint64_t n = compensator_features(parameters);
-    int sound = memcmp(&expected, &got, sizeof got) == 0 && got.state <= HSEP_SEP_HYBRID && got.solving <= 1 &&
-                got.predicted <= got.Np && got.k % got.Np < (got.solving ? got.predicted : got.Np) &&
-                (got.solving || got.predicted == got.Np) && got.learning <= 1 && got.missing <= 1 &&
-                got.divergence <= HSEP_DIVERGES_X_DM &&
-                (got.divergence ||
-                 hsep_within(
-                     bytes + expected.ahead * sizeof(double), 2 * got.preview + 3 * got.Np, HSEP_PREDICTION_MAX)) &&
-                got.sum_e >= 0.0 && isfinite(got.sum_e) && got.sum_pb >= 0.0 && isfinite(got.sum_pb) &&
-                got.sum_h >= 0.0 && isfinite(got.sum_h) &&
-                hsep_planner_valid(bytes + expected.planner * sizeof(double), &parameters->planner);
+    int sound =
+        memcmp(&expected, &got, sizeof got) == 0 && got.state <= HSEP_SEP_HYBRID && got.solving <= 1 &&
+        got.predicted <= got.Np && got.k % got.Np < (got.solving ? got.predicted : got.Np) &&
+        (got.solving || got.predicted == got.Np) && got.learning <= 1 && got.missing <= 1 &&
+        got.divergence <= HSEP_DIVERGES_X_DM &&
+        (got.divergence ||
+         hsep_within(bytes + expected.ahead * sizeof(double), 2 * got.preview + 3 * got.Np, HSEP_PREDICTION_MAX)) &&
+        got.sum_e >= 0.0 && isfinite(got.sum_e) && got.sum_pb >= 0.0 && isfinite(got.sum_pb) && got.sum_h >= 0.0 &&
+        isfinite(got.sum_h) && hsep_planner_valid(bytes + expected.planner * sizeof(double), &parameters->planner);
     const uint64_t physics_at[2] = {expected.physics, expected.trial};
     const uint64_t regression_at[2] = {expected.regression, expected.saved};
     for (int i = 0; i < 2; i++) {
@@ -281,8 +280,7 @@ static void compensator_schedule(const hsep_compensator *self)
     if (self->n_scheduled == 0) {
         return;
     }
-    hsep_schedule_signs(
-        signs, compensator_at(self, self->x_d), self->preview, self->x_d_last, self->sign_step);
+    hsep_schedule_signs(signs, compensator_at(self, self->x_d), self->preview, self->x_d_last, self->sign_step);
     for (uint64_t k = 0; k < self->preview; k++) {
         double sum = 0.0;
         hsep_schedule_features(signs, k, features);
@@ -310,14 +308,14 @@ static void compensator_plan(hsep_compensator *self)
     if (compensator_trusts(self)) {
         compensator_filter_spline(self);
         compensator_target(self, HSEP_SEP_HYBRID);
-        status = hsep_planner_begin(
-            planner, compensator_at(self, self->spline_h), compensator_at(self, self->target), x_d);
+        status =
+            hsep_planner_begin(planner, compensator_at(self, self->spline_h), compensator_at(self, self->target), x_d);
         self->state = status == HSEP_PLAN_FAILED ? HSEP_SEP_OFF : HSEP_SEP_HYBRID;
     }
     if (status == HSEP_PLAN_FAILED && self->best != HSEP_SEP_OFF) {
         compensator_target(self, HSEP_SEP_PHYSICS);
-        status = hsep_planner_begin(
-            planner, compensator_at(self, self->spline_pb), compensator_at(self, self->target), x_d);
+        status =
+            hsep_planner_begin(planner, compensator_at(self, self->spline_pb), compensator_at(self, self->target), x_d);
         self->state = status == HSEP_PLAN_FAILED ? HSEP_SEP_OFF : HSEP_SEP_PHYSICS;
     }
     self->predicted = 0;
@@ -354,7 +352,8 @@ static void compensator_learn(hsep_compensator *self, uint64_t i)
     const uint64_t p = self->p, q = self->q, j = self->Np - 1 - i;
     const double *x = compensator_at(self, self->past_x) + j, *e = compensator_at(self, self->past_e) + j;
     double *row = hsep_regression_row(hsep_compensator_regression(self));
-    /* phi(k) = [1, x_pb(k) ... x_pb(k-q), e_pb(k-1) ... e_pb(k-p)] and the scheduled ones, its target e_pb(k) beside it */
+    /* phi(k) = [1, x_pb(k) ... x_pb(k-q), e_pb(k-1) ... e_pb(k-p)] and the scheduled ones, its target e_pb(k) beside
+     * it */
     row[0] = 1.0;
     memcpy(row + 1, x, (size_t)(q + 1) * sizeof(double));
     memcpy(row + 2 + q, e + 1, (size_t)p * sizeof(double));
@@ -380,8 +379,7 @@ static void compensator_measured(hsep_compensator *self)
         }
     } else if (self->learning && (double)(self->k - Np) >= self->n_init) {
         /* What is predicted from a few rows before the warm-up is over moves nothing: it is not judged. */
-        hsep_trust_observe(
-            &self->trust, past_e, e_h, Np, regression->residual_sum / (double)regression->n_samples);
+        hsep_trust_observe(&self->trust, past_e, e_h, Np, regression->residual_sum / (double)regression->n_samples);
     }
     hsep_planner_next(compensator_planner(self), compensator_at(self, self->x_d));
     if (self->n_scheduled > 0) {

@@ -25,9 +25,9 @@ typedef struct {
     uint64_t n; /* entries of x */
     double rho;
     double *x, *v, *force, *dx;
-    double *bound[2];          /* low and high */
-    double *values, *along;    /* A x and A dx */
-    double *rows;              /* work */
+    double *bound[2];       /* low and high */
+    double *values, *along; /* A x and A dx */
+    double *rows;           /* work */
     interior_side side[2];
     double *triangle;
 } interior_arrays;
@@ -269,8 +269,7 @@ static double interior_measure(
 }
 
 /* The mean of s z after the predictor's step. */
-static double interior_reached(
-    const interior_arrays *a, const interior_range ranges[HSEP_ORDERS], double sides)
+static double interior_reached(const interior_arrays *a, const interior_range ranges[HSEP_ORDERS], double sides)
 {
     const interior_room room = interior_rooms(a, ranges);
     double sum = 0.0;

@@ -8,10 +8,10 @@
 
 #define PLANNER_PINNED 8 /* samples at the beginning of a window in which a bounded plan follows the last one */
 
-static const double planner_ridge = 1e-12;   /* on the diagonal, relative to its largest entry */
-static const double planner_rounding = 1e-9; /* share of a limit that is taken for rounding */
+static const double planner_ridge = 1e-12;          /* on the diagonal, relative to its largest entry */
+static const double planner_rounding = 1e-9;        /* share of a limit that is taken for rounding */
 static const double planner_interior_share = 1e-10; /* by which a row at its bound may differ from the last plan */
-static const double planner_moves = 1e-12;   /* m a sample, step of x_d that counts as a move */
+static const double planner_moves = 1e-12;          /* m a sample, step of x_d that counts as a move */
 
 static const uint64_t planner_first = sizeof(hsep_planner) / sizeof(double);
 
@@ -35,8 +35,8 @@ HSEP_API double hsep_planner_size(const hsep_planner_parameters *parameters)
     const uint64_t count = hsep_splines_count(parameters->preview, parameters->spacing);
     const double n = (double)count;
     const double doubles = 3.0 + n + (HSEP_ORDERS + 2.0) * preview + 2.0 * planner_triangle(n);
-    return (double)sizeof(hsep_planner) + doubles * (double)sizeof(double) +
-           hsep_splines_size(parameters->spacing) + hsep_interior_size(parameters->preview, count);
+    return (double)sizeof(hsep_planner) + doubles * (double)sizeof(double) + hsep_splines_size(parameters->spacing) +
+           hsep_interior_size(parameters->preview, count);
 }
 
 static uint64_t planner_take(uint64_t *end, double count)
@@ -265,8 +265,8 @@ static void planner_bound(hsep_planner *self, double cost)
     hsep_interior_begin(interior, splines, planner_at(self, self->P), first, cost);
 }
 
-HSEP_API hsep_plan_status hsep_planner_begin(
-    hsep_planner *self, const double filtered[], const double target[], const double x_d[])
+HSEP_API hsep_plan_status
+hsep_planner_begin(hsep_planner *self, const double filtered[], const double target[], const double x_d[])
 {
     const hsep_splines *splines = planner_splines(self);
     const uint64_t n = splines->n;

@@ -18,10 +18,10 @@
 #include <stdint.h>
 
 typedef struct {
-    uint64_t Np;       /* samples of a window */
-    uint64_t preview;  /* samples of a plan, at least Np + 4 spacing + 3 */
-    uint64_t spacing;  /* samples between knots, a divisor of Np */
-    double jerk_weight; /* of the third differences of delta against the tracking error, >= 0 */
+    uint64_t Np;               /* samples of a window */
+    uint64_t preview;          /* samples of a plan, at least Np + 4 spacing + 3 */
+    uint64_t spacing;          /* samples between knots, a divisor of Np */
+    double jerk_weight;        /* of the third differences of delta against the tracking error, >= 0 */
     double limit[HSEP_ORDERS]; /* of |delta|, m, and of the differences of x_dm of orders 1 to 3, m; all > 0 */
     int keep_direction;        /* whether x_dm never turns while x_d moves */
 } hsep_planner_parameters;
@@ -69,8 +69,8 @@ HSEP_API double hsep_planner_decided(const hsep_planner *self, uint64_t k);
 
 /* Plan. filtered: the spline behind the model, (preview,); target: x_d minus the model's response to x_d with what is
  * decided of delta, m; x_d: commanded positions, m, (preview,) both. Cost: n^3 / 6 + n preview multiply-adds. */
-HSEP_API hsep_plan_status hsep_planner_begin(
-    hsep_planner *self, const double filtered[], const double target[], const double x_d[]);
+HSEP_API hsep_plan_status
+hsep_planner_begin(hsep_planner *self, const double filtered[], const double target[], const double x_d[]);
 
 /* Do a step of a bounded plan; return whether it was the last one. Cost: that of hsep_interior_step. */
 HSEP_API int hsep_planner_step(hsep_planner *self);

@@ -2,12 +2,12 @@
 
 #include <math.h>
 
-static const double plant_internal_step = 1e-4;      /* s */
-static const double plant_friction_velocity = 2e-3;  /* m/s, over which the stage's friction changes sign */
-static const double plant_steps_per_time = 16.0;     /* internal steps in the fastest time constant */
-static const double plant_steps_max = 1e6;           /* internal steps of one step */
-static const double plant_state_max = 1e100;         /* of a drive's state: outputs and their squares stay finite */
-static const double plant_tolerance = 1e-6;          /* of an internal step */
+static const double plant_internal_step = 1e-4;     /* s */
+static const double plant_friction_velocity = 2e-3; /* m/s, over which the stage's friction changes sign */
+static const double plant_steps_per_time = 16.0;    /* internal steps in the fastest time constant */
+static const double plant_steps_max = 1e6;          /* internal steps of one step */
+static const double plant_state_max = 1e100;        /* of a drive's state: outputs and their squares stay finite */
+static const double plant_tolerance = 1e-6;         /* of an internal step */
 static const double plant_two_pi = 6.283185307179586;
 
 /* Number of internal steps for a step of h seconds: the fewest that are at most 0.1 ms and 1/(16 rate) long. */
@@ -27,7 +27,10 @@ HSEP_API double hsep_plant_mode_rate(const hsep_mode *mode)
     return fmax(sqrt(omega * omega), 2.0 * mode->zeta * omega);
 }
 
-HSEP_API double hsep_feed_drive_rate(const hsep_feed_drive *self) { return fmax(sqrt(self->k / self->m), self->c / self->m); }
+HSEP_API double hsep_feed_drive_rate(const hsep_feed_drive *self)
+{
+    return fmax(sqrt(self->k / self->m), self->c / self->m);
+}
 
 HSEP_API void hsep_feed_drive_reset(hsep_feed_drive *self, double start)
 {

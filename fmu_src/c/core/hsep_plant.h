@@ -39,7 +39,7 @@ HSEP_API void hsep_feed_drive_reset(hsep_feed_drive *self, double start);
 HSEP_API int hsep_feed_drive_step(hsep_feed_drive *self, double x_d, double h, double *x);
 
 HSEP_API double hsep_feed_drive_rate(const hsep_feed_drive *self); /* of the linear part, 1/s */
-HSEP_API double hsep_feed_drive_x(const hsep_feed_drive *self); /* true position, m */
+HSEP_API double hsep_feed_drive_x(const hsep_feed_drive *self);    /* true position, m */
 HSEP_API double hsep_feed_drive_v(const hsep_feed_drive *self); /* true velocity under the last step's command, m/s */
 
 /* One mode of the stage: z'' + two_zeta_omega z' + omega2 z = command, eq. (15). */
@@ -73,6 +73,6 @@ HSEP_API void hsep_stage_init(
 HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work[]);
 
 HSEP_API double hsep_stage_rate(const hsep_stage *self); /* of the fastest mode, 1/s */
-HSEP_API double hsep_stage_x(const hsep_stage *self); /* true position, m */
+HSEP_API double hsep_stage_x(const hsep_stage *self);    /* true position, m */
 
 #endif

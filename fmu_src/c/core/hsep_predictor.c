@@ -61,8 +61,8 @@ static void predictor_lay_out(hsep_predictor *self, const hsep_predictor_paramet
     self->past_x = predictor_take(&end, Np + q);
     self->past_e = predictor_take(&end, Np + p);
     self->weights = predictor_take(&end, 2.0 + q + p);
-    self->physics = predictor_take(
-        &end, hsep_physics_size(parameters->n_modes, parameters->dead_time) / (double)sizeof(double));
+    self->physics =
+        predictor_take(&end, hsep_physics_size(parameters->n_modes, parameters->dead_time) / (double)sizeof(double));
     self->regression = end;
 }
 
@@ -99,8 +99,7 @@ HSEP_API int hsep_predictor_valid(const void *block, const hsep_predictor_parame
     memcpy(&physics, bytes + expected.physics * sizeof(double), sizeof physics);
     memcpy(&regression, bytes + expected.regression * sizeof(double), sizeof regression);
     const uint64_t n = 2 + parameters->q + parameters->p;
-    return memcmp(&expected, &got, sizeof got) == 0 && got.n_warm_up <= got.Np &&
-           got.divergence <= HSEP_DIVERGES_X_H &&
+    return memcmp(&expected, &got, sizeof got) == 0 && got.n_warm_up <= got.Np && got.divergence <= HSEP_DIVERGES_X_H &&
            (got.divergence || hsep_within(bytes + expected.ahead * sizeof(double), 5 * got.Np, HSEP_PREDICTION_MAX)) &&
            got.sum_pb >= 0.0 && isfinite(got.sum_pb) && got.sum_h >= 0.0 && isfinite(got.sum_h) &&
            physics.n_modes == parameters->n_modes && physics.dead_time == parameters->dead_time &&

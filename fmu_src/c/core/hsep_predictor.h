@@ -37,12 +37,12 @@ typedef struct {
 typedef struct {
     uint64_t Np, p, q;
     double n_init;
-    double start;        /* position of rest, m */
-    uint64_t k;          /* the sample that comes next */
-    uint64_t n_warm_up;  /* leading samples of this window where x_h = x_pb */
-    uint64_t n_measured; /* samples since t_init */
+    double start;         /* position of rest, m */
+    uint64_t k;           /* the sample that comes next */
+    uint64_t n_warm_up;   /* leading samples of this window where x_h = x_pb */
+    uint64_t n_measured;  /* samples since t_init */
     double sum_pb, sum_h; /* m2, sums of squared prediction errors over them */
-    uint64_t divergence; /* hsep_divergence of the first window that could not be predicted; stays */
+    uint64_t divergence;  /* hsep_divergence of the first window that could not be predicted; stays */
     /* Offsets in doubles from the beginning of the struct */
     uint64_t ahead;    /* (Np,) m, commands that came during this window */
     uint64_t ahead_pb; /* (Np,) m, what the physics model answers to them, relative to start */
@@ -56,10 +56,10 @@ typedef struct {
 } hsep_predictor;
 
 typedef struct {
-    double x_d, x_pb, x_h;   /* m, now */
-    double rms_pb, rms_h;    /* m, since t_init */
-    uint64_t batch;          /* floor(k / Np) */
-    int hybrid_active;       /* whether x_h is the hybrid prediction now */
+    double x_d, x_pb, x_h; /* m, now */
+    double rms_pb, rms_h;  /* m, since t_init */
+    uint64_t batch;        /* floor(k / Np) */
+    int hybrid_active;     /* whether x_h is the hybrid prediction now */
 } hsep_predictor_outputs;
 
 /* Bytes of the block, counted in double so that no size can overflow. */

@@ -11,7 +11,7 @@
 
 #include <stdint.h>
 
-#define HSEP_SCHEDULED 13       /* features */
+#define HSEP_SCHEDULED 13      /* features */
 #define HSEP_SCHEDULE_REACH 40 /* samples by which the farthest of them are shifted */
 
 /* Fill the signs of n samples of the reference, m, and what follows them, which is at rest. last: the reference one

@@ -18,7 +18,7 @@
 
 typedef struct {
     uint64_t preview, spacing;
-    uint64_t n; /* splines that begin in a plan */
+    uint64_t n;                /* splines that begin in a plan */
     double share[HSEP_ORDERS]; /* what one metre of difference is of its limit, 1/m */
     /* followed by double[4 spacing], b; then double[4 spacing + 3] for each order, its differences in shares */
 } hsep_splines;

@@ -1,5 +1,5 @@
-/* Sums and products of vectors, four entries at a time: compilers make vectors of them without knowing n, and no addition
- * waits for the one before. Reentrant; allocate nothing. */
+/* Sums and products of vectors, four entries at a time: compilers make vectors of them without knowing n, and no
+ * addition waits for the one before. Reentrant; allocate nothing. */
 #ifndef HSEP_VECTOR_H
 #define HSEP_VECTOR_H
 

@@ -5,18 +5,13 @@
 
 static const double stop_tolerance = 1e-6; /* of a step: a last step that ended at the stop time but for rounding */
 
-const char *fmi2GetTypesPlatform(void)
-{
-    return fmi2TypesPlatform;
-}
+const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 
-const char *fmi2GetVersion(void)
-{
-    return "2.0";
-}
+const char *fmi2GetVersion(void) { return "2.0"; }
 
-fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance, fmi2Real startTime,
-    fmi2Boolean stopTimeDefined, fmi2Real stopTime)
+fmi2Status fmi2SetupExperiment(
+    fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance, fmi2Real startTime, fmi2Boolean stopTimeDefined,
+    fmi2Real stopTime)
 {
     hsep_instance *instance = hsep_begin(c, HSEP_CALL_SETUP_EXPERIMENT);
     (void)toleranceDefined;
@@ -48,7 +43,8 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c)
     return fmi2OK;
 }
 
-/* All memory of the simulation is taken here. If the parameters do not fit, they may be corrected and it called again. */
+/* All memory of the simulation is taken here. If the parameters do not fit, they may be corrected and it called
+ * again. */
 fmi2Status fmi2ExitInitializationMode(fmi2Component c)
 {
     hsep_instance *instance = hsep_begin(c, HSEP_CALL_EXIT_INITIALIZATION_MODE);
@@ -62,7 +58,8 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component c)
     }
     instance->state = hsep_new(instance, size);
     if (instance->state == NULL) {
-        return hsep_refuse(instance, "fmi2ExitInitializationMode: no memory for a state of %lu bytes", (unsigned long)size);
+        return hsep_refuse(
+            instance, "fmi2ExitInitializationMode: no memory for a state of %lu bytes", (unsigned long)size);
     }
     instance->state_size = size;
     if (hsep_model_initialise(
@@ -71,7 +68,8 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component c)
         return hsep_refuse(instance, "%s", message);
     }
     instance->phase = HSEP_STEPPING;
-    hsep_log(instance, HSEP_LOG_ALL, "initialized at %g s with a state of %lu bytes", instance->start_time,
+    hsep_log(
+        instance, HSEP_LOG_ALL, "initialized at %g s with a state of %lu bytes", instance->start_time,
         (unsigned long)size);
     return fmi2OK;
 }
@@ -86,7 +84,8 @@ fmi2Status fmi2Terminate(fmi2Component c)
     return fmi2OK;
 }
 
-fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2Real communicationStepSize,
+fmi2Status fmi2DoStep(
+    fmi2Component c, fmi2Real currentCommunicationPoint, fmi2Real communicationStepSize,
     fmi2Boolean noSetFMUStatePriorToCurrentPoint)
 {
     hsep_instance *instance = hsep_begin(c, HSEP_CALL_DO_STEP);
@@ -97,13 +96,15 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2R
     if (instance == NULL) {
         return fmi2Error;
     }
-    if (instance->has_stop_time
-        && currentCommunicationPoint >= instance->stop_time - stop_tolerance * communicationStepSize) {
-        return hsep_refuse(instance, "fmi2DoStep: a step must begin before the stop time %.9g s, got one from %.9g s",
+    if (instance->has_stop_time &&
+        currentCommunicationPoint >= instance->stop_time - stop_tolerance * communicationStepSize) {
+        return hsep_refuse(
+            instance, "fmi2DoStep: a step must begin before the stop time %.9g s, got one from %.9g s",
             instance->stop_time, currentCommunicationPoint);
     }
-    status = hsep_model_step(&instance->context, instance->state, instance->values, currentCommunicationPoint,
-        communicationStepSize, message);
+    status = hsep_model_step(
+        &instance->context, instance->state, instance->values, currentCommunicationPoint, communicationStepSize,
+        message);
     if (status == HSEP_REFUSED) {
         return hsep_refuse(instance, "%s", message);
     }
@@ -142,8 +143,9 @@ fmi2Status fmi2GetRealOutputDerivatives(
     return hsep_unsupported(c, HSEP_CALL_GET_REAL_OUTPUT_DERIVATIVES, "maxOutputDerivativeOrder is 0");
 }
 
-fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference vUnknown_ref[], size_t nUnknown,
-    const fmi2ValueReference vKnown_ref[], size_t nKnown, const fmi2Real dvKnown[], fmi2Real dvUnknown[])
+fmi2Status fmi2GetDirectionalDerivative(
+    fmi2Component c, const fmi2ValueReference vUnknown_ref[], size_t nUnknown, const fmi2ValueReference vKnown_ref[],
+    size_t nKnown, const fmi2Real dvKnown[], fmi2Real dvUnknown[])
 {
     (void)vUnknown_ref, (void)nUnknown, (void)vKnown_ref, (void)nKnown, (void)dvKnown, (void)dvUnknown;
     return hsep_unsupported(c, HSEP_CALL_GET_DIRECTIONAL_DERIVATIVE, "providesDirectionalDerivative is false");
@@ -153,7 +155,8 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
 
 static fmi2Status hsep_discard(hsep_instance *instance, hsep_call call)
 {
-    hsep_log(instance, HSEP_LOG_DISCARD, "%s: there is nothing of this kind to tell, no step is ever pending",
+    hsep_log(
+        instance, HSEP_LOG_DISCARD, "%s: there is nothing of this kind to tell, no step is ever pending",
         hsep_calls[call].name);
     return fmi2Discard;
 }

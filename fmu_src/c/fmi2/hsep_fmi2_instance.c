@@ -61,7 +61,8 @@ static int hsep_keep_texts(hsep_instance *instance, const char *name, const char
     }
     (void)strcpy(instance->name, name);
     if (resources != NULL && !hsep_uri_folder(resources, HSEP_WINDOWS, instance->resources)) {
-        hsep_log(instance, HSEP_LOG_WARNING,
+        hsep_log(
+            instance, HSEP_LOG_WARNING,
             "fmi2Instantiate: fmuResourceLocation must be a file: URI on this machine, got %.300s; it is not used",
             resources);
         hsep_delete(instance, instance->resources);
@@ -78,16 +79,18 @@ static int hsep_check_arguments(hsep_instance *instance, fmi2String name, fmi2Ty
     } else if (type != fmi2CoSimulation) {
         (void)hsep_refuse(instance, "fmi2Instantiate: fmuType must be fmi2CoSimulation, got %d", (int)type);
     } else if (guid == NULL || strcmp(guid, HSEP_GUID) != 0) {
-        (void)hsep_refuse(instance, "fmi2Instantiate: fmuGUID must be %s as in modelDescription.xml, got %.100s",
-            HSEP_GUID, (guid == NULL) ? "NULL" : guid);
+        (void)hsep_refuse(
+            instance, "fmi2Instantiate: fmuGUID must be %s as in modelDescription.xml, got %.100s", HSEP_GUID,
+            (guid == NULL) ? "NULL" : guid);
     } else {
         return 1;
     }
     return 0;
 }
 
-fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID,
-    fmi2String fmuResourceLocation, const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean loggingOn)
+fmi2Component fmi2Instantiate(
+    fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID, fmi2String fmuResourceLocation,
+    const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean loggingOn)
 {
     const int own_memory = functions == NULL || functions->allocateMemory == NULL || functions->freeMemory == NULL;
     const hsep_allocate allocate = own_memory ? calloc : functions->allocateMemory;
@@ -96,7 +99,8 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     (void)visible;
     if (instance == NULL) {
         if (logger != NULL) {
-            logger(functions->componentEnvironment, HSEP_MODEL_IDENTIFIER, fmi2Error, "logStatusError",
+            logger(
+                functions->componentEnvironment, HSEP_MODEL_IDENTIFIER, fmi2Error, "logStatusError",
                 "fmi2Instantiate: no memory for an instance of %lu bytes", (unsigned long)sizeof *instance);
         }
         return NULL;
@@ -110,8 +114,8 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     if (loggingOn) {
         instance->categories |= HSEP_LOG_ALL;
     }
-    if (!hsep_check_arguments(instance, instanceName, fmuType, fmuGUID)
-        || !hsep_keep_texts(instance, instanceName, fmuResourceLocation)) {
+    if (!hsep_check_arguments(instance, instanceName, fmuType, fmuGUID) ||
+        !hsep_keep_texts(instance, instanceName, fmuResourceLocation)) {
         fmi2FreeInstance(instance);
         return NULL;
     }

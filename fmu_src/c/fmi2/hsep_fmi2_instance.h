@@ -39,7 +39,7 @@ typedef struct {
     double time;       /* s, where the last step ended */
     void *state;       /* the model's, NULL before the initialization has ended */
     size_t state_size;
-    int warned;        /* whether the model has warned of a step */
+    int warned;                   /* whether the model has warned of a step */
     double values[HSEP_N_VALUES]; /* by value reference, then the time derivatives of inputs */
 } hsep_instance;
 

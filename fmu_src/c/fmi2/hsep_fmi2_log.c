@@ -39,7 +39,8 @@ static void hsep_log_list(hsep_instance *instance, hsep_category category, const
         escaped[n++] = *c;
     }
     escaped[n] = '\0';
-    instance->logger(instance->environment, (instance->name == NULL) ? HSEP_MODEL_IDENTIFIER : instance->name,
+    instance->logger(
+        instance->environment, (instance->name == NULL) ? HSEP_MODEL_IDENTIFIER : instance->name,
         hsep_category_status[place], hsep_category_names[place], escaped);
 }
 
@@ -87,7 +88,8 @@ HSEP_API hsep_instance *hsep_begin(fmi2Component component, hsep_call call)
             (void)strcat(strcat(legal, (legal[0] == '\0') ? "; it is allowed in: " : ", "), hsep_phase_name(phase));
         }
     }
-    (void)hsep_refuse(instance, "%s is not allowed in the state %s%s", row->name, hsep_phase_name(instance->phase), legal);
+    (void)hsep_refuse(
+        instance, "%s is not allowed in the state %s%s", row->name, hsep_phase_name(instance->phase), legal);
     return NULL;
 }
 
@@ -102,8 +104,8 @@ fmi2Status fmi2SetDebugLogging(
         return fmi2Error;
     }
     if (nCategories > 0 && categories == NULL) {
-        return hsep_refuse(instance, "fmi2SetDebugLogging: categories is NULL, but nCategories is %lu",
-            (unsigned long)nCategories);
+        return hsep_refuse(
+            instance, "fmi2SetDebugLogging: categories is NULL, but nCategories is %lu", (unsigned long)nCategories);
     }
     for (size_t i = 0; i < nCategories; ++i) {
         for (unsigned place = 0; categories[i] != NULL && place < HSEP_N_CATEGORIES; ++place) {

@@ -17,8 +17,8 @@ static uint64_t hsep_checksum(const unsigned char *bytes, size_t size)
 static uint64_t hsep_block_checksum(hsep_header header, const unsigned char *block, size_t size)
 {
     header.checksum = 0;
-    return hsep_checksum((const unsigned char *)&header, sizeof header)
-        ^ hsep_checksum(block + sizeof header, size - sizeof header);
+    return hsep_checksum((const unsigned char *)&header, sizeof header) ^
+           hsep_checksum(block + sizeof header, size - sizeof header);
 }
 
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, size_t *size)
@@ -55,7 +55,8 @@ fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byt
     }
     memcpy(&header, saved->block, sizeof header);
     if (serializedState == NULL || size < header.size) {
-        return hsep_refuse(instance, "fmi2SerializeFMUstate: serializedState must have room for %lu bytes, got %lu%s",
+        return hsep_refuse(
+            instance, "fmi2SerializeFMUstate: serializedState must have room for %lu bytes, got %lu%s",
             (unsigned long)header.size, (unsigned long)size, (serializedState == NULL) ? " and NULL" : "");
     }
     header.checksum = hsep_block_checksum(header, (const unsigned char *)saved->block, (size_t)header.size);
@@ -117,11 +118,13 @@ fmi2Status fmi2DeSerializeFMUstate(
         return fmi2Error;
     }
     if (serializedState == NULL || FMUstate == NULL) {
-        return hsep_refuse(instance, "fmi2DeSerializeFMUstate: %s is NULL",
+        return hsep_refuse(
+            instance, "fmi2DeSerializeFMUstate: %s is NULL",
             (serializedState == NULL) ? "serializedState" : "FMUstate");
     }
     if (size < HSEP_FIXED_SIZE) {
-        return hsep_refuse(instance, "fmi2DeSerializeFMUstate: a state has at least %lu bytes, got %lu",
+        return hsep_refuse(
+            instance, "fmi2DeSerializeFMUstate: a state has at least %lu bytes, got %lu",
             (unsigned long)HSEP_FIXED_SIZE, (unsigned long)size);
     }
     if (*FMUstate != NULL) {

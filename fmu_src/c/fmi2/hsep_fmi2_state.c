@@ -106,7 +106,8 @@ fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate)
     block = (const unsigned char *)saved->block;
     memcpy(&header, block, sizeof header);
     if (strcmp(header.guid, HSEP_GUID) != 0) {
-        return hsep_refuse(instance, "fmi2SetFMUstate: the state belongs to the FMU %s, not to %s", header.guid, HSEP_GUID);
+        return hsep_refuse(
+            instance, "fmi2SetFMUstate: the state belongs to the FMU %s, not to %s", header.guid, HSEP_GUID);
     }
     if (header.state_size != instance->state_size) {
         void *state = NULL;

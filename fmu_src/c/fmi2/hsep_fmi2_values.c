@@ -17,17 +17,20 @@ static hsep_instance *hsep_access(
         return NULL;
     }
     if (n > 0 && (vr == NULL || value == NULL)) {
-        (void)hsep_refuse(instance, "%s: %s is NULL, but nvr is %lu", name, (vr == NULL) ? "vr" : "value", (unsigned long)n);
+        (void)hsep_refuse(
+            instance, "%s: %s is NULL, but nvr is %lu", name, (vr == NULL) ? "vr" : "value", (unsigned long)n);
         return NULL;
     }
     for (size_t i = 0; i < n; ++i) {
         if (vr[i] >= HSEP_N_VARIABLES) {
-            (void)hsep_refuse(instance, "%s: value reference must be 0 ... %d, got %u", name, HSEP_N_VARIABLES - 1, vr[i]);
+            (void)hsep_refuse(
+                instance, "%s: value reference must be 0 ... %d, got %u", name, HSEP_N_VARIABLES - 1, vr[i]);
             return NULL;
         }
         if (hsep_variables[vr[i]].kind != kind) {
-            (void)hsep_refuse(instance, "%s: %s (value reference %u) is of type %s, not %s", name,
-                hsep_variables[vr[i]].name, vr[i], hsep_kind_names[hsep_variables[vr[i]].kind], hsep_kind_names[kind]);
+            (void)hsep_refuse(
+                instance, "%s: %s (value reference %u) is of type %s, not %s", name, hsep_variables[vr[i]].name, vr[i],
+                hsep_kind_names[hsep_variables[vr[i]].kind], hsep_kind_names[kind]);
             return NULL;
         }
     }
@@ -54,12 +57,14 @@ static hsep_instance *hsep_writing(
         const hsep_variable *variable = &hsep_variables[vr[i]];
         const char *name = hsep_calls[call].name;
         if (variable->causality != HSEP_INPUT && variable->causality != HSEP_PARAMETER) {
-            (void)hsep_refuse(instance, "%s: %s is %s and cannot be set", name, variable->name,
+            (void)hsep_refuse(
+                instance, "%s: %s is %s and cannot be set", name, variable->name,
                 hsep_causality_names[variable->causality]);
             return NULL;
         }
         if (variable->causality == HSEP_PARAMETER && !variable->tunable && instance->phase == HSEP_STEPPING) {
-            (void)hsep_refuse(instance,
+            (void)hsep_refuse(
+                instance,
                 "%s: %s is a fixed parameter and cannot be set after the initialization; call fmi2Reset first", name,
                 variable->name);
             return NULL;
@@ -142,8 +147,8 @@ fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
 }
 
 /* The derivatives count for the next step alone. Like the values, none is taken if one is refused. */
-fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-    const fmi2Integer order[], const fmi2Real value[])
+fmi2Status fmi2SetRealInputDerivatives(
+    fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer order[], const fmi2Real value[])
 {
     static const char name[] = "fmi2SetRealInputDerivatives";
     hsep_instance *instance = hsep_access(c, HSEP_CALL_SET_REAL_INPUT_DERIVATIVES, HSEP_REAL, vr, nvr, value);
@@ -151,14 +156,16 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
         return fmi2Error;
     }
     if (HSEP_N_INTERPOLATED == 0) {
-        return hsep_refuse(instance, "%s is not supported: canInterpolateInputs is false in modelDescription.xml", name);
+        return hsep_refuse(
+            instance, "%s is not supported: canInterpolateInputs is false in modelDescription.xml", name);
     }
     if (nvr > 0 && order == NULL) {
         return hsep_refuse(instance, "%s: order is NULL, but nvr is %lu", name, (unsigned long)nvr);
     }
     for (size_t i = 0; i < nvr; ++i) {
         if (vr[i] + 1 > HSEP_N_INTERPOLATED) {
-            return hsep_refuse(instance, "%s: %s takes no derivative, only inputs do", name, hsep_variables[vr[i]].name);
+            return hsep_refuse(
+                instance, "%s: %s takes no derivative, only inputs do", name, hsep_variables[vr[i]].name);
         }
         if (order[i] != 1) {
             return hsep_refuse(
@@ -166,7 +173,8 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
         }
         if (!isfinite(value[i])) {
             return hsep_refuse(
-                instance, "%s: the derivative of %s must be finite, got %g", name, hsep_variables[vr[i]].name, value[i]);
+                instance, "%s: the derivative of %s must be finite, got %g", name, hsep_variables[vr[i]].name,
+                value[i]);
         }
     }
     for (size_t i = 0; i < nvr; ++i) {

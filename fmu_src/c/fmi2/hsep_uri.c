@@ -4,10 +4,7 @@
 #include <stddef.h>
 #include <string.h>
 
-static int hsep_is_letter(char c)
-{
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
-}
+static int hsep_is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
 
 /* Whether text begins with prefix, which is written in lower case. */
 static int hsep_begins(const char *text, const char *prefix)

@@ -35,8 +35,7 @@ HSEP_API hsep_status hsep_drive_check_start(double x_d, char message[])
 {
     char number[HSEP_NUMBER_SIZE];
     if (!isfinite(x_d)) {
-        hsep_message_add(
-            message, "the start value of x_d must be finite, got %s", hsep_number(number, x_d, HSEP_REAL));
+        hsep_message_add(message, "the start value of x_d must be finite, got %s", hsep_number(number, x_d, HSEP_REAL));
     } else if (fabs(x_d) > drive_position_max) {
         hsep_message_add(
             message, "the start value of x_d must be within " HSEP_PLUS_MINUS "%g m, got %g", drive_position_max, x_d);

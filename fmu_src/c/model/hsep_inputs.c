@@ -37,8 +37,8 @@ static hsep_status inputs_check(const hsep_clock *clock, const char *name, doubl
     }
     if (isfinite(value)) {
         hsep_message_add(
-            message, "%s must be within " HSEP_PLUS_MINUS "%g m, got %g at sample %.0f", name, inputs_position_max, value,
-            sample);
+            message, "%s must be within " HSEP_PLUS_MINUS "%g m, got %g at sample %.0f", name, inputs_position_max,
+            value, sample);
     } else {
         hsep_message_add(
             message, "%s must be finite, got %s at sample %.0f", name, hsep_number(number, value, HSEP_REAL), sample);
@@ -79,7 +79,8 @@ HSEP_API hsep_status hsep_inputs_count(
     }
     if (step->counted.inside) {
         hsep_message_add(
-            message, "the step from %.9g s by %.9g s passes instants of T_s = %g s between its ends: x_meas is read up to "
+            message,
+            "the step from %.9g s by %.9g s passes instants of T_s = %g s between its ends: x_meas is read up to "
             "%g s late, so a closed loop needs steps of T_s",
             t, h, self->clock.T_s, fmin(last, h));
         return HSEP_WARNED;

@@ -39,7 +39,8 @@ HSEP_API hsep_status hsep_inputs_count(
     const hsep_inputs *self, hsep_input x_d_ahead, hsep_input x_meas, double t, double h, hsep_inputs_step *step,
     char message[]);
 
-/* Go on in a counted step: return 1 with the next sample to execute in x_d_ahead and x_meas, 0 when the step is done. */
+/* Go on in a counted step: return 1 with the next sample to execute in x_d_ahead and x_meas, 0 when the step is
+ * done. */
 HSEP_API int hsep_inputs_next(hsep_inputs *self, hsep_inputs_step *step);
 
 /* Whether inputs that were read from a state count samples of T_s, s, within their bounds, and are at sample k. */

@@ -57,8 +57,8 @@ HSEP_API void hsep_state_mark(
 }
 
 HSEP_API hsep_status hsep_state_check(
-    const hsep_context *context, const double values[], const void *state, size_t size, uint64_t kind,
-    size_t expected, char message[])
+    const hsep_context *context, const double values[], const void *state, size_t size, uint64_t kind, size_t expected,
+    char message[])
 {
     hsep_state_header header;
     if (size < sizeof header || size != expected) {

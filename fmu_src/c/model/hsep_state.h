@@ -28,8 +28,8 @@ HSEP_API void hsep_state_mark(
 
 /* Check the first bytes of what may be a state of that kind and size, in any alignment. */
 HSEP_API hsep_status hsep_state_check(
-    const hsep_context *context, const double values[], const void *state, size_t size, uint64_t kind,
-    size_t expected, char message[]);
+    const hsep_context *context, const double values[], const void *state, size_t size, uint64_t kind, size_t expected,
+    char message[]);
 
 /* Refuse a state whose header fits and whose content does not. */
 HSEP_API hsep_status hsep_state_damaged(char message[]);

@@ -69,8 +69,7 @@ static void weights_compare(const char *name, double learned, double got, hsep_k
 }
 
 /* Read the modes that the file has and compare those that there are on both sides. */
-static int weights_compare_modes(
-    FILE *file, uint64_t n_learned, const hsep_weights_settings *settings, char message[])
+static int weights_compare_modes(FILE *file, uint64_t n_learned, const hsep_weights_settings *settings, char message[])
 {
     static const char *const names[4] = {"f_n", "zeta", "alpha", "beta"};
     for (uint64_t i = 0; i < n_learned && i < settings->n_modes; i++) {
@@ -91,8 +90,7 @@ static int weights_compare_modes(
 }
 
 /* Read the file: 0 if it is damaged; with a message, if it was learned with other settings. */
-static int weights_take(
-    FILE *file, const hsep_weights_settings *settings, hsep_regression *regression, char message[])
+static int weights_take(FILE *file, const hsep_weights_settings *settings, hsep_regression *regression, char message[])
 {
     weights_head head;
     double size = 0.0;

@@ -1,9 +1,9 @@
 /* What was learned before the simulation.
  *
- * The resource weights.bin, little-endian, 8 bytes each: "HSEPWGT2"; p, q, input_hold, dead_time, the number of modes and
- * that of the learned samples as uint64; lambda, T_s and v_s as doubles; f_n, zeta, alpha and beta of each mode; the upper
- * triangle of the factor [R z; 0 rho] by rows, (n + 1)(n + 2)/2 doubles, n = 2 + q + p, and HSEP_SCHEDULED more if
- * v_s > 0; the CRC-32 of all before as uint64. These are all settings that shape the features and the factor.
+ * The resource weights.bin, little-endian, 8 bytes each: "HSEPWGT2"; p, q, input_hold, dead_time, the number of modes
+ * and that of the learned samples as uint64; lambda, T_s and v_s as doubles; f_n, zeta, alpha and beta of each mode;
+ * the upper triangle of the factor [R z; 0 rho] by rows, (n + 1)(n + 2)/2 doubles, n = 2 + q + p, and HSEP_SCHEDULED
+ * more if v_s > 0; the CRC-32 of all before as uint64. These are all settings that shape the features and the factor.
  */
 #ifndef HSEP_WEIGHTS_H
 #define HSEP_WEIGHTS_H

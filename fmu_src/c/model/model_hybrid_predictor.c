@@ -1,7 +1,8 @@
 /* HybridPredictor: the look-ahead buffer that predicts the drive's position one window early.
  *
- * Inputs are latched at the instants t_k that lie in a step, outputs are those of the last instant that was reached; the
- * arithmetic is hsep_predictor's. If the resources hold weights (hsep_weights.h), the first window is predicted with them.
+ * Inputs are latched at the instants t_k that lie in a step, outputs are those of the last instant that was reached;
+ * the arithmetic is hsep_predictor's. If the resources hold weights (hsep_weights.h), the first window is predicted
+ * with them.
  */
 #include "hsep_fmu.h"
 
@@ -129,15 +130,16 @@ HSEP_API hsep_status hsep_model_initialise(
     return HSEP_OK;
 }
 
-HSEP_API hsep_status hsep_model_step(
-    const hsep_context *context, void *state, double values[], double t, double h, char message[])
+HSEP_API hsep_status
+hsep_model_step(const hsep_context *context, void *state, double values[], double t, double h, char message[])
 {
     (void)context;
     predictor_state *self = state;
     int window = 0;
     hsep_inputs_step step;
     message[0] = '\0';
-    if (hsep_check_divergence((hsep_divergence)self->predictor.divergence, message) != HSEP_OK) { /* of an earlier step */
+    if (hsep_check_divergence((hsep_divergence)self->predictor.divergence, message) !=
+        HSEP_OK) { /* of an earlier step */
         return HSEP_REFUSED;
     }
     const hsep_status status = hsep_inputs_count(

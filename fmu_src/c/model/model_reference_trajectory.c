@@ -121,8 +121,8 @@ HSEP_API hsep_status hsep_model_initialise(
     return HSEP_OK;
 }
 
-HSEP_API hsep_status hsep_model_step(
-    const hsep_context *context, void *state, double values[], double t, double h, char message[])
+HSEP_API hsep_status
+hsep_model_step(const hsep_context *context, void *state, double values[], double t, double h, char message[])
 {
     (void)context;
     trajectory_state *self = state;

@@ -1,7 +1,7 @@
 /* SepCompensator: the look-ahead buffer that modifies the command so that the drive follows it.
  *
- * Inputs are latched at the instants t_k that lie in a step, outputs are those of the last instant that was reached; the
- * arithmetic is hsep_compensator's. If the resources hold weights (hsep_weights.h), it starts with them.
+ * Inputs are latched at the instants t_k that lie in a step, outputs are those of the last instant that was reached;
+ * the arithmetic is hsep_compensator's. If the resources hold weights (hsep_weights.h), it starts with them.
  */
 #include "hsep_fmu.h"
 
@@ -37,7 +37,8 @@ static int compensator_check_plan(const double values[], char message[])
     }
     if (preview < least) {
         hsep_message_add(
-            message, "preview must be " HSEP_AT_LEAST " Np + 4" HSEP_DOT "spacing + 3 = %.0f, got %.0f", least, preview);
+            message, "preview must be " HSEP_AT_LEAST " Np + 4" HSEP_DOT "spacing + 3 = %.0f, got %.0f", least,
+            preview);
         problems++;
     }
     return problems;
@@ -57,7 +58,8 @@ static hsep_status compensator_checked(
     problems += compensator_check_plan(values, message);
     const double v_max = values[HSEP_VR_v_max] * T_s, a_max = values[HSEP_VR_a_max] * (T_s * T_s);
     const double j_max = values[HSEP_VR_j_max] * (T_s * T_s * T_s), v_s = values[HSEP_VR_v_s];
-    /* The warm-up counts from the end of the first fill; without one, the first window is planned with what is known. */
+    /* The warm-up counts from the end of the first fill; without one, the first window is planned with what is
+     * known. */
     const double t_plan = t_init > 0.0 ? t_init + values[HSEP_VR_preview] * T_s : 0.0;
     const double n_init = hsep_warm_up_samples(t_plan, T_s);
     if (problems > 0) {
@@ -70,8 +72,7 @@ static hsep_status compensator_checked(
              .preview = (uint64_t)values[HSEP_VR_preview],
              .spacing = (uint64_t)values[HSEP_VR_spacing],
              .jerk_weight = values[HSEP_VR_jerk_weight],
-             .limit =
-                 {values[HSEP_VR_change_max], v_max, a_max, j_max},
+             .limit = {values[HSEP_VR_change_max], v_max, a_max, j_max},
              .keep_direction = values[HSEP_VR_keep_direction] > 0.0},
         .p = (uint64_t)values[HSEP_VR_p],
         .q = (uint64_t)values[HSEP_VR_q],
@@ -150,14 +151,15 @@ HSEP_API hsep_status hsep_model_initialise(
     return HSEP_OK;
 }
 
-HSEP_API hsep_status hsep_model_step(
-    const hsep_context *context, void *state, double values[], double t, double h, char message[])
+HSEP_API hsep_status
+hsep_model_step(const hsep_context *context, void *state, double values[], double t, double h, char message[])
 {
     (void)context;
     compensator_state *self = state;
     hsep_inputs_step step;
     message[0] = '\0';
-    if (hsep_check_divergence((hsep_divergence)self->compensator.divergence, message) != HSEP_OK) { /* of an earlier step */
+    if (hsep_check_divergence((hsep_divergence)self->compensator.divergence, message) !=
+        HSEP_OK) { /* of an earlier step */
         return HSEP_REFUSED;
     }
     const hsep_status status = hsep_inputs_count(

@@ -60,8 +60,7 @@ HSEP_API hsep_status hsep_model_initialise(
     hsep_mode modes[HSEP_N_MODES];
     size_t needed = 0;
     if (hsep_model_size(context, values, &needed, message) != HSEP_OK ||
-        hsep_state_fits(needed, size, message) != HSEP_OK ||
-        hsep_check_start_time(t_start, message) != HSEP_OK ||
+        hsep_state_fits(needed, size, message) != HSEP_OK || hsep_check_start_time(t_start, message) != HSEP_OK ||
         hsep_drive_check_start(values[HSEP_VR_x_d], message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
@@ -76,8 +75,8 @@ HSEP_API hsep_status hsep_model_initialise(
     return HSEP_OK;
 }
 
-HSEP_API hsep_status hsep_model_step(
-    const hsep_context *context, void *state, double values[], double t, double h, char message[])
+HSEP_API hsep_status
+hsep_model_step(const hsep_context *context, void *state, double values[], double t, double h, char message[])
 {
     (void)context;
     stage_drive_state *self = state;
@@ -87,8 +86,7 @@ HSEP_API hsep_status hsep_model_step(
         return HSEP_REFUSED;
     }
     if (!hsep_stage_step(&self->stage, values[HSEP_VR_x_d], h, work)) {
-        hsep_message_add(
-            message, "the stage's state left the range of numbers (command %g m)", values[HSEP_VR_x_d]);
+        hsep_message_add(message, "the stage's state left the range of numbers (command %g m)", values[HSEP_VR_x_d]);
         return HSEP_REFUSED;
     }
     const double x_meas = hsep_encoder_measure(&self->encoder, hsep_stage_x(&self->stage));
