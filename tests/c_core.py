@@ -43,7 +43,7 @@ FMI_HEADERS = Path(fmpy.__file__).parent / "c-code"
 """fmpy's, for shared libraries: the names of the FMI functions are the plain ones."""
 
 EXPOSE = ROOT / "tests" / "c" / "expose.c"
-FLAGS = ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", "-ffp-contract=off"]
+FLAGS = ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wcast-qual", "-pedantic", "-Werror", "-ffp-contract=off"]
 MESSAGE_SIZE = 512
 
 SPRING_MASS_DAMPER = {"f_n": np.sqrt(24674.0) / (2 * np.pi), "zeta": 15.7 / (2 * np.sqrt(24674.0))} | {

@@ -10,6 +10,9 @@
 
 #include <stdint.h>
 
+/* Doubles of a triangle of n rows. */
+static inline double hsep_triangle(uint64_t n) { return 0.5 * (double)n * ((double)n + 1.0); }
+
 /* Turn the upper triangle of P into R, in place. Returns 0 if P is not positive definite or not finite; the triangle
  * is used up then. Cost: n^3 / 6 multiply-adds. */
 HSEP_API int hsep_cholesky_factor(double triangle[], uint64_t n);

@@ -9,6 +9,7 @@
 #define HSEP_CLOCK_H
 
 #include "hsep_api.h"
+#include "hsep_layout.h"
 
 #include <stdint.h>
 
@@ -23,6 +24,8 @@ typedef struct {
     double end;      /* s, where the last step ended in the importer's time */
     int64_t latched; /* whether the inputs of sample k have been read */
 } hsep_clock;
+
+HSEP_ASSERT_WORDS(hsep_clock, 7);
 
 /* One communication step in samples. */
 typedef struct {

@@ -22,6 +22,7 @@
 #define HSEP_COMPENSATOR_H
 
 #include "hsep_api.h"
+#include "hsep_layout.h"
 #include "hsep_physics.h"
 #include "hsep_planner.h"
 #include "hsep_recursion.h"
@@ -88,6 +89,8 @@ typedef struct {
     uint64_t spline_h;  /* (preview,) m/m, and behind the hybrid one */
     uint64_t physics, trial, regression, saved, planner; /* saved: the regression as it was before this window */
 } hsep_compensator;
+
+HSEP_ASSERT_WORDS(hsep_compensator, 48);
 
 typedef struct {
     double x_d, x_dm, x_pb, x_h; /* m, now */

@@ -4,6 +4,7 @@
 #define HSEP_ENCODER_H
 
 #include "hsep_api.h"
+#include "hsep_layout.h"
 
 #include <stdint.h>
 
@@ -12,6 +13,8 @@ typedef struct {
     uint64_t seed;
     uint64_t n_draws; /* so far */
 } hsep_encoder;
+
+HSEP_ASSERT_WORDS(hsep_encoder, 3);
 
 HSEP_API void hsep_encoder_init(hsep_encoder *self, double noise_std, uint64_t seed);
 

@@ -21,16 +21,25 @@ typedef struct {
     double cost;    /* m2, of the beginning, for each of the bounds */
     double sides;   /* number of bounds, low and high ones */
     double rho;     /* 1/m2, proximal regularisation of the multipliers */
-    /* followed by arrays, see hsep_interior.c */
+    /* followed by arrays, see interior_lay_out */
 } hsep_interior;
+
+HSEP_ASSERT_WORDS(hsep_interior, 5);
 
 HSEP_API double hsep_interior_size(uint64_t preview, uint64_t n); /* bytes of the block, counted in double */
 
 /* Where the problem goes before hsep_interior_begin; of v and x the first n - first entries count. */
-HSEP_API double *hsep_interior_v(hsep_interior *self, const hsep_splines *splines);    /* (n,) m */
-HSEP_API double *hsep_interior_x(hsep_interior *self, const hsep_splines *splines);    /* (n,) m, start and result */
-HSEP_API double *hsep_interior_low(hsep_interior *self, const hsep_splines *splines);  /* (4 preview,), in shares */
-HSEP_API double *hsep_interior_high(hsep_interior *self, const hsep_splines *splines); /* (4 preview,) */
+typedef struct {
+    double *v;          /* (n,) m */
+    double *x;          /* (n,) m, start and result */
+    double *low, *high; /* (4 preview,), in shares */
+} hsep_problem;
+
+HSEP_API hsep_problem hsep_interior_problem(hsep_interior *self, const hsep_splines *splines);
+
+/* Whether a block, in any alignment, has counts within their bounds. first_max: largest number of splines not asked
+ * for. */
+HSEP_API int hsep_interior_valid(const void *block, uint64_t first_max);
 
 /* Begin with x and the bounds as they are. P: the triangle of all n rows; cost: size of the cost, m2, > 0, by which the
  * end is recognised. */

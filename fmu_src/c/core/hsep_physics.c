@@ -86,32 +86,52 @@ HSEP_API void hsep_discretise(hsep_discrete_mode *mode, const hsep_mode *continu
     mode->s[0] = mode->s[1] = 0.0;
 }
 
+/* Set what follows from the parameters; return the bytes of the block. */
+static double physics_lay_out(hsep_physics *self, uint64_t n_modes, uint64_t dead_time)
+{
+    double end = HSEP_WORDS(hsep_physics);
+    self->n_modes = n_modes;
+    self->dead_time = dead_time;
+    self->modes = hsep_take(&end, (double)n_modes * HSEP_WORDS(hsep_discrete_mode));
+    self->ring = hsep_take(&end, (double)dead_time);
+    return end * sizeof(double);
+}
+
+static hsep_discrete_mode *physics_modes(hsep_physics *self)
+{
+    return (hsep_discrete_mode *)hsep_at(self, self->modes);
+}
+
 HSEP_API double hsep_physics_size(uint64_t n_modes, uint64_t dead_time)
 {
-    return (double)sizeof(hsep_physics) + (double)n_modes * (double)sizeof(hsep_discrete_mode) +
-           (double)dead_time * (double)sizeof(double);
+    hsep_physics layout;
+    return physics_lay_out(&layout, n_modes, dead_time);
+}
+
+HSEP_API int hsep_physics_valid(const void *block, uint64_t n_modes, uint64_t dead_time)
+{
+    hsep_physics expected, got;
+    memcpy(&got, block, sizeof got);
+    expected = got;
+    (void)physics_lay_out(&expected, n_modes, dead_time);
+    return memcmp(&expected, &got, sizeof got) == 0 && (got.oldest == 0 || got.oldest < dead_time);
 }
 
 HSEP_API void hsep_physics_init(
     hsep_physics *self, const hsep_mode modes[], uint64_t n_modes, uint64_t dead_time, double Ts, hsep_hold hold)
 {
-    self->n_modes = n_modes;
-    self->dead_time = dead_time;
+    (void)physics_lay_out(self, n_modes, dead_time);
     self->oldest = 0;
-    hsep_discrete_mode *discrete = (hsep_discrete_mode *)(self + 1);
     for (uint64_t i = 0; i < n_modes; i++) {
-        hsep_discretise(&discrete[i], &modes[i], Ts, hold);
+        hsep_discretise(&physics_modes(self)[i], &modes[i], Ts, hold);
     }
-    double *ring = (double *)(discrete + n_modes);
-    for (uint64_t i = 0; i < dead_time; i++) {
-        ring[i] = 0.0;
-    }
+    memset(hsep_at(self, self->ring), 0, (size_t)dead_time * sizeof(double));
 }
 
 HSEP_API void hsep_physics_respond(hsep_physics *self, const double x_d[], double x_pb[], size_t n)
 {
-    hsep_discrete_mode *modes = (hsep_discrete_mode *)(self + 1);
-    double *ring = (double *)(modes + self->n_modes);
+    hsep_discrete_mode *modes = physics_modes(self);
+    double *ring = hsep_at(self, self->ring);
     for (size_t k = 0; k < n; k++) {
         double u = x_d[k];
         if (self->dead_time > 0) {

@@ -7,6 +7,7 @@
 #define HSEP_PHYSICS_H
 
 #include "hsep_api.h"
+#include "hsep_layout.h"
 
 #include <stddef.h>
 #include <stdint.h>
@@ -34,8 +35,14 @@ typedef struct {
     uint64_t n_modes;
     uint64_t dead_time; /* whole samples by which the command is delayed */
     uint64_t oldest;    /* place in the dead time's ring of the command that comes out next */
-    /* followed by hsep_discrete_mode[n_modes] and double[dead_time], m, the ring */
+    /* Offsets in doubles from the beginning of the struct */
+    uint64_t modes; /* hsep_discrete_mode[n_modes] */
+    uint64_t ring;  /* (dead_time,) m, commands that have not come out yet */
 } hsep_physics;
+
+HSEP_ASSERT_WORDS(hsep_mode, 4);
+HSEP_ASSERT_WORDS(hsep_discrete_mode, 11);
+HSEP_ASSERT_WORDS(hsep_physics, 5);
 
 /* Fill a mode for the sampling interval Ts, s, at rest. Exact up to rounding in every damping regime.
  * Cost: about 2 000 multiply-adds, and 64 for each doubling of the norm of the mode times Ts. */
@@ -47,6 +54,9 @@ HSEP_API double hsep_physics_size(uint64_t n_modes, uint64_t dead_time);
 /* Fill the block, at rest at position 0. modes: (n_modes,). */
 HSEP_API void hsep_physics_init(
     hsep_physics *self, const hsep_mode modes[], uint64_t n_modes, uint64_t dead_time, double Ts, hsep_hold hold);
+
+/* Whether a block, in any alignment, is one that hsep_physics_init with these parameters began. */
+HSEP_API int hsep_physics_valid(const void *block, uint64_t n_modes, uint64_t dead_time);
 
 /* Answer n commands x_d, (n,), m, relative to the position of rest, with x_pb, (n,), m; eq. (2).
  * The state is carried from call to call. Cost: 9 multiply-adds a mode and sample. */

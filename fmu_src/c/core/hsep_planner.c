@@ -1,6 +1,7 @@
 #include "hsep_planner.h"
 
 #include "hsep_cholesky.h"
+#include "hsep_constraints.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -8,94 +9,62 @@
 
 #define PLANNER_PINNED 8 /* samples at the beginning of a window in which a bounded plan follows the last one */
 
-static const double planner_ridge = 1e-12;          /* on the diagonal, relative to its largest entry */
-static const double planner_rounding = 1e-9;        /* share of a limit that is taken for rounding */
-static const double planner_interior_share = 1e-10; /* by which a row at its bound may differ from the last plan */
-static const double planner_moves = 1e-12;          /* m a sample, step of x_d that counts as a move */
+static const double planner_ridge = 1e-12; /* on the diagonal, relative to its largest entry */
 
-static const uint64_t planner_first = sizeof(hsep_planner) / sizeof(double);
-
-static double *planner_at(const hsep_planner *self, uint64_t offset) { return (double *)(uintptr_t)self + offset; }
-
-static hsep_splines *planner_splines(const hsep_planner *self)
+static const hsep_splines *planner_splines(const hsep_planner *self)
 {
-    return (hsep_splines *)planner_at(self, self->splines);
+    return (const hsep_splines *)hsep_at_const(self, self->splines);
 }
 
-static hsep_interior *planner_interior(const hsep_planner *self)
-{
-    return (hsep_interior *)planner_at(self, self->interior);
-}
+static hsep_interior *planner_interior(hsep_planner *self) { return (hsep_interior *)hsep_at(self, self->interior); }
 
-static double planner_triangle(double n) { return 0.5 * n * (n + 1.0); }
+/* Set what follows from the parameters; return the bytes of the block. */
+static double planner_lay_out(hsep_planner *self, const hsep_planner_parameters *parameters)
+{
+    const double preview = (double)parameters->preview;
+    const uint64_t n = hsep_splines_count(parameters->preview, parameters->spacing), half = parameters->Np / 2;
+    double end = HSEP_WORDS(hsep_planner);
+    self->Np = parameters->Np;
+    self->n_pinned = (half < PLANNER_PINNED ? half : PLANNER_PINNED) / parameters->spacing;
+    self->keep_direction = parameters->keep_direction != 0;
+    self->jerk_weight = parameters->jerk_weight;
+    self->c = hsep_take(&end, HSEP_DECIDED + (double)n);
+    self->total = hsep_take(&end, HSEP_ORDERS * preview);
+    self->moves = hsep_take(&end, preview);
+    self->third = hsep_take(&end, preview);
+    self->P = hsep_take(&end, hsep_triangle(n));
+    self->factor = hsep_take(&end, hsep_triangle(n));
+    self->splines = hsep_take_block(&end, hsep_splines_size(parameters->preview, parameters->spacing));
+    self->interior = hsep_take_block(&end, hsep_interior_size(parameters->preview, n));
+    return end * sizeof(double);
+}
 
 HSEP_API double hsep_planner_size(const hsep_planner_parameters *parameters)
 {
-    const double preview = (double)parameters->preview;
-    const uint64_t count = hsep_splines_count(parameters->preview, parameters->spacing);
-    const double n = (double)count;
-    const double doubles = 3.0 + n + (HSEP_ORDERS + 2.0) * preview + 2.0 * planner_triangle(n);
-    return (double)sizeof(hsep_planner) + doubles * (double)sizeof(double) + hsep_splines_size(parameters->spacing) +
-           hsep_interior_size(parameters->preview, count);
-}
-
-static uint64_t planner_take(uint64_t *end, double count)
-{
-    const uint64_t offset = *end;
-    *end += (uint64_t)count;
-    return offset;
-}
-
-static void planner_lay_out(hsep_planner *self, const hsep_planner_parameters *parameters)
-{
-    const double preview = (double)parameters->preview;
-    const double n = (double)hsep_splines_count(parameters->preview, parameters->spacing);
-    const uint64_t half = parameters->Np / 2;
-    self->Np = parameters->Np;
-    self->n_pinned = (half < PLANNER_PINNED ? half : PLANNER_PINNED) / parameters->spacing;
-    self->size = (uint64_t)hsep_planner_size(parameters);
-    self->keep_direction = parameters->keep_direction != 0;
-    self->jerk_weight = parameters->jerk_weight;
-    uint64_t end = planner_first;
-    self->c = planner_take(&end, HSEP_DECIDED + n);
-    self->total = planner_take(&end, HSEP_ORDERS * preview);
-    self->moves = planner_take(&end, preview);
-    self->third = planner_take(&end, preview);
-    self->P = planner_take(&end, planner_triangle(n));
-    self->factor = planner_take(&end, planner_triangle(n));
-    self->splines = planner_take(&end, hsep_splines_size(parameters->spacing) / (double)sizeof(double));
-    self->interior = end;
+    hsep_planner layout;
+    return planner_lay_out(&layout, parameters);
 }
 
 HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameters *parameters, double start)
 {
-    memset(self, 0, sizeof *self);
-    planner_lay_out(self, parameters);
-    const uint64_t end = self->size / sizeof(double);
-    for (uint64_t i = planner_first; i < end; i++) {
-        *planner_at(self, i) = 0.0;
-    }
+    memset(self, 0, (size_t)hsep_planner_size(parameters));
+    (void)planner_lay_out(self, parameters);
     for (int i = 0; i < 3; i++) {
         self->x_d_before[i] = start;
     }
-    hsep_splines_init(planner_splines(self), parameters->preview, parameters->spacing, parameters->limit);
+    hsep_splines_init(
+        (hsep_splines *)hsep_at(self, self->splines), parameters->preview, parameters->spacing, parameters->limit);
 }
 
 HSEP_API int hsep_planner_valid(const void *block, const hsep_planner_parameters *parameters)
 {
-    const char *bytes = block;
     hsep_planner expected, got;
-    hsep_splines splines;
-    hsep_interior interior;
-    memcpy(&got, bytes, sizeof got);
+    memcpy(&got, block, sizeof got);
     expected = got; /* what may differ from a fresh block is taken over, the rest must be equal */
-    planner_lay_out(&expected, parameters);
-    memcpy(&splines, bytes + expected.splines * sizeof(double), sizeof splines);
-    memcpy(&interior, bytes + expected.interior * sizeof(double), sizeof interior);
-    return memcmp(&expected, &got, sizeof got) == 0 && splines.preview == parameters->preview &&
-           splines.spacing == parameters->spacing &&
-           splines.n == hsep_splines_count(parameters->preview, parameters->spacing) &&
-           interior.first <= expected.n_pinned && interior.steps <= HSEP_INTERIOR_STEPS;
+    (void)planner_lay_out(&expected, parameters);
+    return memcmp(&expected, &got, sizeof got) == 0 &&
+           hsep_splines_valid(hsep_at_bytes(block, expected.splines), parameters->preview, parameters->spacing) &&
+           hsep_interior_valid(hsep_at_bytes(block, expected.interior), expected.n_pinned);
 }
 
 HSEP_API const double *hsep_planner_spline(const hsep_planner *self)
@@ -110,19 +79,19 @@ HSEP_API uint64_t hsep_planner_pinned(const hsep_planner *self)
 
 HSEP_API double hsep_planner_decided(const hsep_planner *self, uint64_t k)
 {
-    return hsep_splines_sum(planner_splines(self), planner_at(self, self->c), HSEP_DECIDED, k);
+    return hsep_splines_sum(planner_splines(self), hsep_at_const(self, self->c), HSEP_DECIDED, k);
 }
 
 HSEP_API double hsep_planner_delta(const hsep_planner *self, uint64_t k)
 {
     const hsep_splines *splines = planner_splines(self);
-    return hsep_splines_sum(splines, planner_at(self, self->c), HSEP_DECIDED + splines->n, k);
+    return hsep_splines_sum(splines, hsep_at_const(self, self->c), HSEP_DECIDED + splines->n, k);
 }
 
 /* The third differences of what is decided of delta. */
-static void planner_third(const hsep_planner *self)
+static void planner_third(hsep_planner *self)
 {
-    double *third = planner_at(self, self->third);
+    double *third = hsep_at(self, self->third);
     const uint64_t preview = planner_splines(self)->preview;
     double d[4] = {self->delta_before[0], self->delta_before[1], self->delta_before[2], 0.0};
     for (uint64_t k = 0; k < preview; k++) {
@@ -132,43 +101,11 @@ static void planner_third(const hsep_planner *self)
     }
 }
 
-/* The rows of x_dm, and of delta in order 0, under the rest of the last plan, in shares; and which way x_d moves. */
-static void planner_total(const hsep_planner *self, const double x_d[])
-{
-    const hsep_splines *splines = planner_splines(self);
-    const uint64_t preview = splines->preview;
-    double *total = planner_at(self, self->total), *moves = planner_at(self, self->moves);
-    double last = self->x_d_before[2];
-    double before[HSEP_ORDERS]; /* differences of orders 0 to 2 at the sample before */
-    double y[3];
-    for (int i = 0; i < 3; i++) {
-        y[i] = self->x_d_before[i] + self->delta_before[i];
-    }
-    before[0] = y[2];
-    before[1] = y[2] - y[1];
-    before[2] = (y[2] - y[1]) - (y[1] - y[0]);
-    for (uint64_t k = 0; k < preview; k++) {
-        const double delta = hsep_planner_delta(self, k), step = x_d[k] - last;
-        double now[HSEP_ORDERS];
-        last = x_d[k];
-        moves[k] = self->keep_direction ? (double)((step > planner_moves) - (step < -planner_moves)) : 0.0;
-        now[0] = x_d[k] + delta;
-        total[k] = delta * splines->share[0];
-        for (unsigned order = 1; order < HSEP_ORDERS; order++) {
-            now[order] = now[order - 1] - before[order - 1];
-            total[order * preview + k] = now[order] * splines->share[order];
-        }
-        for (unsigned order = 0; order < HSEP_ORDERS - 1; order++) {
-            before[order] = now[order];
-        }
-    }
-}
-
 /* P := W' W + jerk_weight D' D with a small ridge. */
-static void planner_quadratic(const hsep_planner *self, const double filtered[])
+static void planner_quadratic(hsep_planner *self, const double filtered[])
 {
     const hsep_splines *splines = planner_splines(self);
-    double *P = planner_at(self, self->P);
+    double *P = hsep_at(self, self->P);
     hsep_splines_filtered_gram(splines, filtered, P);
     hsep_splines_jerk_gram(splines, self->jerk_weight, P);
     double largest = 0.0;
@@ -184,71 +121,21 @@ static void planner_quadratic(const hsep_planner *self, const double filtered[])
     }
 }
 
-/* What a row may be, in shares. What the rest of the last plan demands is always allowed, and a little more: bounds
- * without an interior are none for an interior-point method. */
-static void planner_range(const hsep_planner *self, uint64_t r, double *least, double *most)
-{
-    const uint64_t preview = planner_splines(self)->preview;
-    const double total = planner_at(self, self->total)[r];
-    *most = 1.0 - planner_rounding;
-    *least = -*most;
-    if (r >= preview && r < 2 * preview) { /* velocities */
-        const double moves = planner_at(self, self->moves)[r - preview];
-        *least = moves > 0.0 ? 0.0 : *least;
-        *most = moves < 0.0 ? 0.0 : *most;
-    }
-    *least = fmin(*least, total - planner_interior_share);
-    *most = fmax(*most, total + planner_interior_share);
-}
-
-/* The largest share, 0 ... 1, of the way from the rest, whose rows are in total, by rows of way, within the limits. */
-static double planner_share(const hsep_planner *self, const double way[])
-{
-    const double *total = planner_at(self, self->total);
-    const uint64_t rows = HSEP_ORDERS * planner_splines(self)->preview;
-    double share = 1.0;
-    for (uint64_t r = 0; r < rows; r++) {
-        double least, most;
-        planner_range(self, r, &least, &most);
-        const double to = fabs(way[r]), room = way[r] > 0.0 ? most - total[r] : total[r] - least;
-        if (to > planner_rounding && room < share * to) {
-            share = room / to;
-        }
-    }
-    return share;
-}
-
-/* Whether the rows of way, added to those of the rest, keep the limits. */
-static int planner_allows(const hsep_planner *self, const double way[])
-{
-    const double *total = planner_at(self, self->total);
-    const uint64_t rows = HSEP_ORDERS * planner_splines(self)->preview;
-    for (uint64_t r = 0; r < rows; r++) {
-        const double there = total[r] + way[r];
-        double least, most;
-        planner_range(self, r, &least, &most);
-        if (!(there <= most && there >= least)) {
-            return 0;
-        }
-    }
-    return 1;
-}
-
 /* Hand the bounded problem over: x is what follows the pinned splines, its bounds are what the others leave. */
 static void planner_bound(hsep_planner *self, double cost)
 {
     const hsep_splines *splines = planner_splines(self);
     hsep_interior *interior = planner_interior(self);
     const uint64_t n = splines->n, first = self->n_pinned, preview = splines->preview;
-    const double *rest = planner_at(self, self->c) + HSEP_DECIDED, *P = planner_at(self, self->P);
-    const double *total = planner_at(self, self->total);
-    double *x = hsep_interior_x(interior, splines), *v = hsep_interior_v(interior, splines);
-    double *low = hsep_interior_low(interior, splines), *high = hsep_interior_high(interior, splines);
+    const double *rest = hsep_at(self, self->c) + HSEP_DECIDED, *P = hsep_at(self, self->P);
+    const double *total = hsep_at(self, self->total);
+    const hsep_problem problem = hsep_interior_problem(interior, splines);
+    double *x = problem.x, *v = problem.v, *low = problem.low, *high = problem.high;
     hsep_splines_rows(splines, rest + first, first, low);
     for (uint64_t r = 0; r < HSEP_ORDERS * preview; r++) {
         const double other = total[r] - low[r];
         double least, most;
-        planner_range(self, r, &least, &most);
+        hsep_constraints_range(self, r, &least, &most);
         low[r] = least - other + HSEP_INTERIOR_PRIMAL;
         high[r] = most - other - HSEP_INTERIOR_PRIMAL;
     }
@@ -262,7 +149,7 @@ static void planner_bound(hsep_planner *self, double cost)
         v[j - first] = v[j];
         x[j - first] = rest[j];
     }
-    hsep_interior_begin(interior, splines, planner_at(self, self->P), first, cost);
+    hsep_interior_begin(interior, splines, hsep_at(self, self->P), first, cost);
 }
 
 HSEP_API hsep_plan_status
@@ -270,17 +157,16 @@ hsep_planner_begin(hsep_planner *self, const double filtered[], const double tar
 {
     const hsep_splines *splines = planner_splines(self);
     const uint64_t n = splines->n;
-    double *c = planner_at(self, self->c), *P = planner_at(self, self->P);
-    double *factor = planner_at(self, self->factor);
-    hsep_interior *interior = planner_interior(self);
-    double *free_minimum = hsep_interior_x(interior, splines), *v = hsep_interior_v(interior, splines);
-    double *rows = hsep_interior_low(interior, splines); /* work */
+    double *c = hsep_at(self, self->c), *P = hsep_at(self, self->P);
+    double *factor = hsep_at(self, self->factor);
+    const hsep_problem problem = hsep_interior_problem(planner_interior(self), splines);
+    double *free_minimum = problem.x, *v = problem.v, *rows = problem.low; /* work */
 
     planner_third(self);
-    planner_total(self, x_d);
+    hsep_constraints_total(self, x_d);
     planner_quadratic(self, filtered);
-    hsep_splines_project(splines, filtered, target, self->jerk_weight, planner_at(self, self->third), v);
-    memcpy(factor, P, (size_t)planner_triangle((double)n) * sizeof(double));
+    hsep_splines_project(splines, filtered, target, self->jerk_weight, hsep_at(self, self->third), v);
+    memcpy(factor, P, (size_t)hsep_triangle(n) * sizeof(double));
     if (!hsep_cholesky_factor(factor, n)) {
         return HSEP_PLAN_FAILED;
     }
@@ -296,7 +182,7 @@ hsep_planner_begin(hsep_planner *self, const double filtered[], const double tar
         return HSEP_PLAN_FAILED;
     }
     hsep_splines_rows(splines, free_minimum, 0, rows);
-    if (planner_allows(self, rows)) {
+    if (hsep_constraints_allow(self, rows)) {
         for (uint64_t j = 0; j < n; j++) {
             c[HSEP_DECIDED + j] += free_minimum[j];
         }
@@ -320,11 +206,12 @@ HSEP_API int hsep_planner_step(hsep_planner *self)
 {
     const hsep_splines *splines = planner_splines(self);
     hsep_interior *interior = planner_interior(self);
-    if (!hsep_interior_step(interior, splines, planner_at(self, self->P))) {
+    if (!hsep_interior_step(interior, splines, hsep_at(self, self->P))) {
         return 0;
     }
-    double *way = hsep_interior_x(interior, splines), *rows = hsep_interior_low(interior, splines);
-    double *rest = planner_at(self, self->c) + HSEP_DECIDED + self->n_pinned;
+    const hsep_problem problem = hsep_interior_problem(interior, splines);
+    double *way = problem.x, *rows = problem.low;
+    double *rest = hsep_at(self, self->c) + HSEP_DECIDED + self->n_pinned;
     const uint64_t n = splines->n - self->n_pinned;
     double finite = 0.0;
     for (uint64_t j = 0; j < n; j++) {
@@ -333,7 +220,7 @@ HSEP_API int hsep_planner_step(hsep_planner *self)
     }
     if (isfinite(finite)) {
         hsep_splines_rows(splines, way, self->n_pinned, rows);
-        const double share = planner_share(self, rows);
+        const double share = hsep_constraints_share(self, rows);
         for (uint64_t j = 0; j < n; j++) {
             rest[j] += share * way[j];
         }
@@ -344,7 +231,7 @@ HSEP_API int hsep_planner_step(hsep_planner *self)
 HSEP_API void hsep_planner_next(hsep_planner *self, const double x_d[])
 {
     const hsep_splines *splines = planner_splines(self);
-    double *c = planner_at(self, self->c);
+    double *c = hsep_at(self, self->c);
     for (uint64_t k = self->Np > 3 ? self->Np - 3 : 0; k < self->Np; k++) {
         for (int i = 0; i < 2; i++) {
             self->delta_before[i] = self->delta_before[i + 1];

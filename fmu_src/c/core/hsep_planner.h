@@ -13,6 +13,7 @@
 
 #include "hsep_api.h"
 #include "hsep_interior.h"
+#include "hsep_layout.h"
 #include "hsep_splines.h"
 
 #include <stdint.h>
@@ -35,7 +36,6 @@ typedef enum {
 typedef struct {
     uint64_t Np;
     uint64_t n_pinned; /* splines of a bounded plan that stay as they were */
-    uint64_t size;     /* of the block, bytes */
     uint64_t keep_direction;
     double jerk_weight;
     double delta_before[3], x_d_before[3]; /* m, of the samples before the plan */
@@ -48,6 +48,8 @@ typedef struct {
     uint64_t factor; /* triangle of n rows */
     uint64_t splines, interior;
 } hsep_planner;
+
+HSEP_ASSERT_WORDS(hsep_planner, 18);
 
 /* Bytes of the block, counted in double so that no size can overflow. */
 HSEP_API double hsep_planner_size(const hsep_planner_parameters *parameters);

@@ -1,6 +1,7 @@
 #include "hsep_plant.h"
 
 #include <math.h>
+#include <string.h>
 
 static const double plant_internal_step = 1e-4;     /* s */
 static const double plant_friction_velocity = 2e-3; /* m/s, over which the stage's friction changes sign */
@@ -75,9 +76,33 @@ HSEP_API int hsep_feed_drive_step(hsep_feed_drive *self, double x_d, double h, d
     return 1;
 }
 
+/* Set what follows from the number of modes; return the bytes of the block. */
+static double stage_lay_out(hsep_stage *self, uint64_t n_modes)
+{
+    double end = HSEP_WORDS(hsep_stage);
+    self->n_modes = n_modes;
+    self->modes = hsep_take(&end, (double)n_modes * HSEP_WORDS(hsep_stage_mode));
+    return end * sizeof(double);
+}
+
+static const hsep_stage_mode *stage_modes(const hsep_stage *self)
+{
+    return (const hsep_stage_mode *)hsep_at_const(self, self->modes);
+}
+
 HSEP_API double hsep_stage_size(uint64_t n_modes)
 {
-    return (double)sizeof(hsep_stage) + (double)n_modes * (double)sizeof(hsep_stage_mode);
+    hsep_stage layout;
+    return stage_lay_out(&layout, n_modes);
+}
+
+HSEP_API int hsep_stage_valid(const void *block, uint64_t n_modes)
+{
+    hsep_stage expected, got;
+    memcpy(&got, block, sizeof got);
+    expected = got;
+    (void)stage_lay_out(&expected, n_modes);
+    return memcmp(&expected, &got, sizeof got) == 0 && hsep_clock_valid(&got.clock);
 }
 
 HSEP_API void hsep_stage_init(
@@ -88,8 +113,8 @@ HSEP_API void hsep_stage_init(
     self->start = start;
     self->last_x_d = self->v_d = self->v = 0.0;
     (void)hsep_clock_init(&self->clock, 0.0, T_s);
-    self->n_modes = n_modes;
-    hsep_stage_mode *stage = (hsep_stage_mode *)(self + 1);
+    (void)stage_lay_out(self, n_modes);
+    hsep_stage_mode *stage = (hsep_stage_mode *)hsep_at(self, self->modes);
     for (uint64_t i = 0; i < n_modes; i++) {
         const double omega = plant_two_pi * modes[i].f_n;
         stage[i].omega2 = omega * omega;
@@ -103,7 +128,7 @@ HSEP_API void hsep_stage_init(
 /* sum alpha z + beta z' over the modes, z: (2 n_modes,). */
 static double plant_position(const hsep_stage *s, const double z[])
 {
-    const hsep_stage_mode *mode = (const hsep_stage_mode *)(s + 1);
+    const hsep_stage_mode *mode = stage_modes(s);
     double x = 0.0;
     for (uint64_t i = 0; i < s->n_modes; i++) {
         x += mode[i].alpha * z[2 * i] + mode[i].beta * z[2 * i + 1];
@@ -114,7 +139,7 @@ static double plant_position(const hsep_stage *s, const double z[])
 /* The slope of z, (2 n_modes,), under a command that friction has pushed back already. */
 static void plant_stage_slope(const hsep_stage *s, const double z[], double pushed, double slope[])
 {
-    const hsep_stage_mode *mode = (const hsep_stage_mode *)(s + 1);
+    const hsep_stage_mode *mode = stage_modes(s);
     const double x = plant_position(s, z);
     const double u = pushed - s->kappa * x * fabs(x);
     for (uint64_t i = 0; i < s->n_modes; i++) {
@@ -155,7 +180,7 @@ static void plant_stage_internal_step(const hsep_stage *s, double z[], double pu
 
 HSEP_API double hsep_stage_rate(const hsep_stage *self)
 {
-    const hsep_stage_mode *mode = (const hsep_stage_mode *)(self + 1);
+    const hsep_stage_mode *mode = stage_modes(self);
     double rate = 0.0;
     for (uint64_t i = 0; i < self->n_modes; i++) {
         rate = fmax(rate, fmax(sqrt(mode[i].omega2), mode[i].two_zeta_omega));
@@ -174,7 +199,7 @@ static void plant_stage_integrate(const hsep_stage *s, double z[], double r, dou
 
 HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work[])
 {
-    hsep_stage_mode *mode = (hsep_stage_mode *)(self + 1);
+    hsep_stage_mode *mode = (hsep_stage_mode *)hsep_at(self, self->modes);
     const double r = x_d - self->start;
     double last_x_d = self->last_x_d, v_d = self->v_d, done = 0.0;
     double *z = work, *slope = work + 2 * self->n_modes;
@@ -215,7 +240,7 @@ HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work
 
 HSEP_API double hsep_stage_x(const hsep_stage *self)
 {
-    const hsep_stage_mode *mode = (const hsep_stage_mode *)(self + 1);
+    const hsep_stage_mode *mode = stage_modes(self);
     double x = 0.0;
     for (uint64_t i = 0; i < self->n_modes; i++) {
         x += mode[i].alpha * mode[i].z[0] + mode[i].beta * mode[i].z[1];

@@ -10,6 +10,7 @@
 
 #include "hsep_api.h"
 #include "hsep_clock.h"
+#include "hsep_layout.h"
 #include "hsep_physics.h"
 
 #include <stdint.h>
@@ -57,12 +58,19 @@ typedef struct {
     double last_x_d, v_d; /* m from start, at the last instant; m/s */
     double v;             /* m/s */
     uint64_t n_modes;
-    /* followed by hsep_stage_mode[n_modes] */
+    uint64_t modes; /* offset of hsep_stage_mode[n_modes] in doubles from the beginning of the struct */
 } hsep_stage;
+
+HSEP_ASSERT_WORDS(hsep_feed_drive, 9);
+HSEP_ASSERT_WORDS(hsep_stage_mode, 6);
+HSEP_ASSERT_WORDS(hsep_stage, 15);
 
 #define HSEP_STAGE_WORK 8 /* doubles of work space for each mode */
 
 HSEP_API double hsep_stage_size(uint64_t n_modes); /* bytes of the block, counted in double */
+
+/* Whether a block, in any alignment, is one that hsep_stage_init with so many modes began, with a valid clock. */
+HSEP_API int hsep_stage_valid(const void *block, uint64_t n_modes);
 
 /* Put the stage to rest at start, m. modes: (n_modes,). */
 HSEP_API void hsep_stage_init(

@@ -7,78 +7,56 @@
 #include <stddef.h>
 #include <string.h>
 
-/* Where the arrays begin, in doubles from the struct. */
-static const uint64_t predictor_first = sizeof(hsep_predictor) / sizeof(double);
-
-static double *predictor_at(hsep_predictor *self, uint64_t offset) { return (double *)self + offset; }
-
-static hsep_physics *predictor_physics(hsep_predictor *self)
-{
-    return (hsep_physics *)predictor_at(self, self->physics);
-}
+static hsep_physics *predictor_physics(hsep_predictor *self) { return (hsep_physics *)hsep_at(self, self->physics); }
 
 HSEP_API hsep_regression *hsep_predictor_regression(hsep_predictor *self)
 {
-    return (hsep_regression *)predictor_at(self, self->regression);
+    return (hsep_regression *)hsep_at(self, self->regression);
 }
 
 HSEP_API const double *hsep_predictor_array(const hsep_predictor *self, uint64_t offset)
 {
-    return (const double *)self + offset;
+    return hsep_at_const(self, offset);
 }
 
-HSEP_API double hsep_predictor_size(const hsep_predictor_parameters *parameters)
+/* Set what follows from the parameters; return the bytes of the block. */
+static double predictor_lay_out(hsep_predictor *self, const hsep_predictor_parameters *parameters)
 {
     const double Np = (double)parameters->Np, p = (double)parameters->p, q = (double)parameters->q;
-    const double doubles = 5.0 * Np + (Np + q) + (Np + p) + (2.0 + q + p);
-    return (double)sizeof(hsep_predictor) + doubles * (double)sizeof(double) +
-           hsep_physics_size(parameters->n_modes, parameters->dead_time) +
-           hsep_regression_size(2 + parameters->q + parameters->p);
-}
-
-/* Take count doubles behind what is taken already; return their offset. */
-static uint64_t predictor_take(uint64_t *end, double count)
-{
-    const uint64_t offset = *end;
-    *end += (uint64_t)count;
-    return offset;
-}
-
-/* Set what follows from the parameters alone: sizes and offsets. */
-static void predictor_lay_out(hsep_predictor *self, const hsep_predictor_parameters *parameters)
-{
-    const double Np = (double)parameters->Np, p = (double)parameters->p, q = (double)parameters->q;
+    double end = HSEP_WORDS(hsep_predictor);
     self->Np = parameters->Np;
     self->p = parameters->p;
     self->q = parameters->q;
     self->n_init = parameters->n_init;
-    uint64_t end = predictor_first;
-    self->ahead = predictor_take(&end, Np);
-    self->ahead_pb = predictor_take(&end, Np);
-    self->x_d = predictor_take(&end, Np);
-    self->x_pb = predictor_take(&end, Np);
-    self->x_h = predictor_take(&end, Np);
-    self->past_x = predictor_take(&end, Np + q);
-    self->past_e = predictor_take(&end, Np + p);
-    self->weights = predictor_take(&end, 2.0 + q + p);
-    self->physics =
-        predictor_take(&end, hsep_physics_size(parameters->n_modes, parameters->dead_time) / (double)sizeof(double));
-    self->regression = end;
+    self->ahead = hsep_take(&end, Np);
+    self->ahead_pb = hsep_take(&end, Np);
+    self->x_d = hsep_take(&end, Np);
+    self->x_pb = hsep_take(&end, Np);
+    self->x_h = hsep_take(&end, Np);
+    self->past_x = hsep_take(&end, Np + q);
+    self->past_e = hsep_take(&end, Np + p);
+    self->weights = hsep_take(&end, 2.0 + q + p);
+    self->physics = hsep_take_block(&end, hsep_physics_size(parameters->n_modes, parameters->dead_time));
+    self->regression = hsep_take_block(&end, hsep_regression_size(2 + parameters->q + parameters->p));
+    return end * sizeof(double);
+}
+
+HSEP_API double hsep_predictor_size(const hsep_predictor_parameters *parameters)
+{
+    hsep_predictor layout;
+    return predictor_lay_out(&layout, parameters);
 }
 
 HSEP_API void hsep_predictor_init(hsep_predictor *self, const hsep_predictor_parameters *parameters, double start)
 {
-    memset(self, 0, sizeof *self);
-    predictor_lay_out(self, parameters);
+    memset(self, 0, (size_t)hsep_predictor_size(parameters));
+    (void)predictor_lay_out(self, parameters);
     self->start = start;
     self->n_warm_up = self->Np; /* the first fill is not predicted */
-    for (uint64_t i = predictor_first; i < self->physics; i++) {
-        *predictor_at(self, i) = 0.0;
-    }
     for (uint64_t i = 0; i < self->Np; i++) {
-        predictor_at(self, self->x_d)[i] = start;
-        predictor_at(self, self->x_pb)[i] = start;
-        predictor_at(self, self->x_h)[i] = start;
+        hsep_at(self, self->x_d)[i] = start;
+        hsep_at(self, self->x_pb)[i] = start;
+        hsep_at(self, self->x_h)[i] = start;
     }
     hsep_physics_init(
         predictor_physics(self), parameters->modes, parameters->n_modes, parameters->dead_time, parameters->T_s,
@@ -88,34 +66,27 @@ HSEP_API void hsep_predictor_init(hsep_predictor *self, const hsep_predictor_par
 
 HSEP_API int hsep_predictor_valid(const void *block, const hsep_predictor_parameters *parameters)
 {
-    const char *bytes = block;
     hsep_predictor expected, got;
-    hsep_physics physics;
-    hsep_regression regression;
-    memcpy(&got, bytes, sizeof got);
+    memcpy(&got, block, sizeof got);
     /* What may differ from a fresh block of these parameters is taken over, the rest must be equal. */
     expected = got;
-    predictor_lay_out(&expected, parameters);
-    memcpy(&physics, bytes + expected.physics * sizeof(double), sizeof physics);
-    memcpy(&regression, bytes + expected.regression * sizeof(double), sizeof regression);
-    const uint64_t n = 2 + parameters->q + parameters->p;
+    (void)predictor_lay_out(&expected, parameters);
     return memcmp(&expected, &got, sizeof got) == 0 && got.n_warm_up <= got.Np && got.divergence <= HSEP_DIVERGES_X_H &&
-           (got.divergence || hsep_within(bytes + expected.ahead * sizeof(double), 5 * got.Np, HSEP_PREDICTION_MAX)) &&
+           (got.divergence || hsep_within(hsep_at_bytes(block, got.ahead), 5 * got.Np, HSEP_PREDICTION_MAX)) &&
            got.sum_pb >= 0.0 && isfinite(got.sum_pb) && got.sum_h >= 0.0 && isfinite(got.sum_h) &&
-           physics.n_modes == parameters->n_modes && physics.dead_time == parameters->dead_time &&
-           (physics.oldest == 0 || physics.oldest < physics.dead_time) && regression.n == n &&
-           regression.n_tiles == n / 4 + 1;
+           hsep_physics_valid(hsep_at_bytes(block, got.physics), parameters->n_modes, parameters->dead_time) &&
+           hsep_regression_valid(hsep_at_bytes(block, got.regression), 2 + parameters->q + parameters->p);
 }
 
 /* Solve the weights from all that was learned and predict the window that begins. */
 static void predictor_next_window(hsep_predictor *self)
 {
     const uint64_t Np = self->Np, p = self->p, q = self->q;
-    double *past_x = predictor_at(self, self->past_x), *past_e = predictor_at(self, self->past_e);
-    double *w = predictor_at(self, self->weights);
-    const double *ahead = predictor_at(self, self->ahead), *ahead_pb = predictor_at(self, self->ahead_pb);
-    double *x_d = predictor_at(self, self->x_d), *x_pb = predictor_at(self, self->x_pb);
-    double *x_h = predictor_at(self, self->x_h);
+    double *past_x = hsep_at(self, self->past_x), *past_e = hsep_at(self, self->past_e);
+    double *w = hsep_at(self, self->weights);
+    const double *ahead = hsep_at(self, self->ahead), *ahead_pb = hsep_at(self, self->ahead_pb);
+    double *x_d = hsep_at(self, self->x_d), *x_pb = hsep_at(self, self->x_pb);
+    double *x_h = hsep_at(self, self->x_h);
 
     memcpy(past_x + Np, past_x, (size_t)q * sizeof(double)); /* q < Np, p <= Np: they do not overlap */
     memcpy(past_e + Np, past_e, (size_t)p * sizeof(double));
@@ -145,8 +116,8 @@ static void predictor_next_window(hsep_predictor *self)
 static void predictor_learn(hsep_predictor *self, uint64_t i, double x_meas)
 {
     const uint64_t p = self->p, q = self->q, j = self->Np - 1 - i;
-    const double *x = predictor_at(self, self->past_x) + j;
-    double *e = predictor_at(self, self->past_e) + j;
+    const double *x = hsep_at(self, self->past_x) + j;
+    double *e = hsep_at(self, self->past_e) + j;
     double *row = hsep_regression_row(hsep_predictor_regression(self));
     e[0] = x_meas - self->start - x[0]; /* e_pb = x - x_pb */
     /* phi(k) = [1, x_pb(k) ... x_pb(k-q), e_pb(k-1) ... e_pb(k-p)], its target e_pb(k) beside it */
@@ -161,13 +132,13 @@ HSEP_API int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, doubl
 {
     const uint64_t i = self->k % self->Np;
     const double relative = x_d_ahead - self->start;
-    predictor_at(self, self->ahead)[i] = x_d_ahead;
-    hsep_physics_respond(predictor_physics(self), &relative, predictor_at(self, self->ahead_pb) + i, 1);
+    hsep_at(self, self->ahead)[i] = x_d_ahead;
+    hsep_physics_respond(predictor_physics(self), &relative, hsep_at(self, self->ahead_pb) + i, 1);
     if (self->k >= self->Np) {
         predictor_learn(self, i, x_meas);
         if ((double)(self->k - self->Np) >= self->n_init) {
-            const double e_pb = x_meas - predictor_at(self, self->x_pb)[i];
-            const double e_h = x_meas - predictor_at(self, self->x_h)[i];
+            const double e_pb = x_meas - hsep_at(self, self->x_pb)[i];
+            const double e_h = x_meas - hsep_at(self, self->x_h)[i];
             self->n_measured++;
             self->sum_pb += e_pb * e_pb;
             self->sum_h += e_h * e_h;

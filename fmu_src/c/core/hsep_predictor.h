@@ -16,6 +16,7 @@
 #define HSEP_PREDICTOR_H
 
 #include "hsep_api.h"
+#include "hsep_layout.h"
 #include "hsep_physics.h"
 #include "hsep_regression.h"
 
@@ -54,6 +55,8 @@ typedef struct {
     uint64_t weights;  /* (2 + q + p,) w */
     uint64_t physics, regression;
 } hsep_predictor;
+
+HSEP_ASSERT_WORDS(hsep_predictor, 21);
 
 typedef struct {
     double x_d, x_pb, x_h; /* m, now */

@@ -2,6 +2,7 @@
 
 #include <math.h>
 #include <stddef.h>
+#include <string.h>
 
 /* The unit triangle U = D^(-1/2) R with z beside it is kept in tiles of 4 x 4, by rows, row of tiles after row of
  * tiles, from the diagonal tile to the right: a sweep over 4 rows runs through memory once, and a compiler makes
@@ -14,49 +15,53 @@
 
 static const double regression_lambda_min = 1e-290;
 
-static double *regression_inverse_d(hsep_regression *self) { return (double *)(self + 1); }
-
-static double *regression_tiles(hsep_regression *self)
-{
-    return regression_inverse_d(self) + 2 * REGRESSION_TILE * self->n_tiles;
-}
-
 /* Entry (i, j), i <= j, of [U z], its row in a tile. */
 static double *regression_entry(hsep_regression *self, uint64_t i, uint64_t j)
 {
     const uint64_t I = i / REGRESSION_TILE, J = j / REGRESSION_TILE;
     const uint64_t tile = I * self->n_tiles - I * (I + 1) / 2 + J; /* (n_tiles - I') tiles in each row above */
-    return regression_tiles(self) + REGRESSION_STRIDE * tile + 4 * (i % REGRESSION_TILE) + j % REGRESSION_TILE;
+    return hsep_at(self, self->tiles) + REGRESSION_STRIDE * tile + 4 * (i % REGRESSION_TILE) + j % REGRESSION_TILE;
+}
+
+/* Set what follows from the number of features; return the bytes of the block. */
+static double regression_lay_out(hsep_regression *self, uint64_t n)
+{
+    double end = HSEP_WORDS(hsep_regression);
+    self->n = n;
+    self->n_tiles = n / REGRESSION_TILE + 1;
+    const double n_tiles = (double)self->n_tiles;
+    self->inverse_d = hsep_take(&end, REGRESSION_TILE * n_tiles);
+    self->row = hsep_take(&end, REGRESSION_TILE * n_tiles);
+    self->tiles = hsep_take(&end, REGRESSION_STRIDE * 0.5 * n_tiles * (n_tiles + 1.0));
+    return end * sizeof(double);
 }
 
 HSEP_API double hsep_regression_size(uint64_t n)
 {
-    const double n_tiles = floor((double)n / REGRESSION_TILE) + 1.0;
-    return (double)sizeof(hsep_regression) +
-           (8.0 * n_tiles + 16.0 * n_tiles * (n_tiles + 1.0)) * (double)sizeof(double);
+    hsep_regression layout;
+    return regression_lay_out(&layout, n);
+}
+
+HSEP_API int hsep_regression_valid(const void *block, uint64_t n)
+{
+    hsep_regression expected, got;
+    memcpy(&got, block, sizeof got);
+    expected = got;
+    (void)regression_lay_out(&expected, n);
+    return memcmp(&expected, &got, sizeof got) == 0;
 }
 
 HSEP_API void hsep_regression_init(hsep_regression *self, uint64_t n, double lambda)
 {
-    self->n = n;
-    self->n_tiles = n / REGRESSION_TILE + 1;
-    self->n_samples = 0;
-    self->residual_sum = 0.0;
-    double *data = (double *)(self + 1);
-    const uint64_t size = 8 * self->n_tiles + 16 * self->n_tiles * (self->n_tiles + 1);
-    for (uint64_t i = 0; i < size; i++) {
-        data[i] = 0.0;
-    }
+    memset(self, 0, (size_t)hsep_regression_size(n));
+    (void)regression_lay_out(self, n);
     for (uint64_t i = 0; i < n; i++) {
-        data[i] = 1.0 / (lambda < regression_lambda_min ? regression_lambda_min : lambda);
+        hsep_at(self, self->inverse_d)[i] = 1.0 / (lambda < regression_lambda_min ? regression_lambda_min : lambda);
         *regression_entry(self, i, i) = 1.0;
     }
 }
 
-HSEP_API double *hsep_regression_row(hsep_regression *self)
-{
-    return regression_inverse_d(self) + REGRESSION_TILE * self->n_tiles;
-}
+HSEP_API double *hsep_regression_row(hsep_regression *self) { return hsep_at(self, self->row); }
 
 /* u := u + change with what rounding takes from it kept in carry, and given back next time (Kahan 1965). */
 static inline void regression_add(double *restrict u, double *restrict carry, double change)
@@ -114,9 +119,9 @@ static void regression_rotate(double *tile, int place, double *x, double pivot, 
 
 HSEP_API void hsep_regression_fold(hsep_regression *self)
 {
-    double *inverse_d = regression_inverse_d(self);
+    double *inverse_d = hsep_at(self, self->inverse_d);
     double *x = hsep_regression_row(self);
-    double *tile = regression_tiles(self);
+    double *tile = hsep_at(self, self->tiles);
     /* The row still weighs 1/v. With x_j its entry at the pivot, u a row of U and d that row's weight:
      *   v' = v + x_j^2 / d          d' = d v'/v         keep = v / v' = cos^2        gain = x_j / (d v')
      *   x := x - x_j u              u := keep u + gain x = u + gain (x - x_j u)
@@ -164,7 +169,7 @@ HSEP_API void hsep_regression_fold(hsep_regression *self)
 HSEP_API void hsep_regression_solve(const hsep_regression *self, double w[])
 {
     const uint64_t n = self->n, n_tiles = self->n_tiles;
-    const double *tile = (const double *)(self + 1) + 2 * REGRESSION_TILE * n_tiles + 16 * n_tiles * (n_tiles + 1);
+    const double *tile = hsep_at_const(self, self->tiles) + REGRESSION_STRIDE / 2 * n_tiles * (n_tiles + 1);
     /* U w = z from the last row to the first; z is column n, and what is behind it is 0. */
     for (uint64_t I = n_tiles; I-- > 0;) {
         const uint64_t first = REGRESSION_TILE * I, height = n - first < REGRESSION_TILE ? n - first : REGRESSION_TILE;
@@ -207,7 +212,7 @@ HSEP_API int hsep_regression_load(hsep_regression *self, uint64_t i)
     if (row[0] == 0.0) {
         return 0;
     }
-    regression_inverse_d(self)[i] = 1.0 / fmax(row[0] * row[0], regression_lambda_min);
+    hsep_at(self, self->inverse_d)[i] = 1.0 / fmax(row[0] * row[0], regression_lambda_min);
     for (uint64_t j = i + 1; j <= n; j++) {
         double *entry = regression_entry(self, i, j);
         entry[0] = row[j - i] / row[0]; /* U = D^(-1/2) R, and z alike */

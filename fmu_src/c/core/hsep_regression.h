@@ -14,6 +14,7 @@
 #define HSEP_REGRESSION_H
 
 #include "hsep_api.h"
+#include "hsep_layout.h"
 
 #include <stdint.h>
 
@@ -22,8 +23,13 @@ typedef struct {
     uint64_t n_tiles;    /* tiles of 4 columns that n features and the target need */
     uint64_t n_samples;  /* rows taken in */
     double residual_sum; /* rho^2 = sum (target - w' phi)^2 + lambda |w|^2 at the optimum */
-    /* followed by double[4 n_tiles], 1/D; double[4 n_tiles], the row; double[16 n_tiles (n_tiles + 1)], U in tiles */
+    /* Offsets in doubles from the beginning of the struct */
+    uint64_t inverse_d; /* (4 n_tiles,) 1/D */
+    uint64_t row;       /* (4 n_tiles,) the row that comes next */
+    uint64_t tiles;     /* (16 n_tiles (n_tiles + 1),) U in tiles */
 } hsep_regression;
+
+HSEP_ASSERT_WORDS(hsep_regression, 7);
 
 /* Bytes of the block, counted in double so that no size can overflow: about 8 n^2. */
 HSEP_API double hsep_regression_size(uint64_t n);
@@ -31,6 +37,9 @@ HSEP_API double hsep_regression_size(uint64_t n);
 /* Fill the block for n >= 1 features and lambda > 0, in the unit of a row's entry squared.
  * A lambda below 1e-290 counts as 1e-290, so that its reciprocal is a number. */
 HSEP_API void hsep_regression_init(hsep_regression *self, uint64_t n, double lambda);
+
+/* Whether a block, in any alignment, is one that hsep_regression_init with n features began. */
+HSEP_API int hsep_regression_valid(const void *block, uint64_t n);
 
 /* Where the next row goes, (n + 1,): phi, then its target. */
 HSEP_API double *hsep_regression_row(hsep_regression *self);

@@ -8,6 +8,7 @@
 #define HSEP_SENSOR_H
 
 #include "hsep_api.h"
+#include "hsep_layout.h"
 
 typedef struct {
     double value;     /* m, the last one; NaN before the first */
@@ -15,6 +16,8 @@ typedef struct {
     double low, high; /* m, predicted positions meanwhile */
     double step;      /* m, the smallest change ever; infinite before the first */
 } hsep_sensor;
+
+HSEP_ASSERT_WORDS(hsep_sensor, 5);
 
 HSEP_API void hsep_sensor_init(hsep_sensor *self);
 

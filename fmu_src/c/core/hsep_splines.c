@@ -2,14 +2,14 @@
 
 #include "hsep_vector.h"
 
-static double *splines_table(hsep_splines *self) { return (double *)(self + 1); }
+#include <string.h>
 
-HSEP_API const double *hsep_splines_shape(const hsep_splines *self) { return (const double *)(self + 1); }
+HSEP_API const double *hsep_splines_shape(const hsep_splines *self) { return hsep_at_const(self, self->shape); }
 
 /* The differences of an order of one spline, in shares, (4 spacing + order,); the first one is 0. */
 static const double *splines_differences(const hsep_splines *self, unsigned order)
 {
-    return hsep_splines_shape(self) + 4 * self->spacing + order * (4 * self->spacing + 3);
+    return hsep_at_const(self, self->differences[order]);
 }
 
 static uint64_t splines_length(const hsep_splines *self, unsigned order) { return 4 * self->spacing + order; }
@@ -19,10 +19,33 @@ HSEP_API uint64_t hsep_splines_count(uint64_t preview, uint64_t spacing)
     return (preview - 4 * spacing - HSEP_DECIDED) / spacing + 1;
 }
 
-HSEP_API double hsep_splines_size(uint64_t spacing)
+/* Set what follows from the parameters; return the bytes of the block. */
+static double splines_lay_out(hsep_splines *self, uint64_t preview, uint64_t spacing)
 {
-    const double width = 4.0 * (double)spacing;
-    return (double)sizeof(hsep_splines) + (width + HSEP_ORDERS * (width + 3.0)) * (double)sizeof(double);
+    double end = HSEP_WORDS(hsep_splines);
+    self->preview = preview;
+    self->spacing = spacing;
+    self->n = hsep_splines_count(preview, spacing);
+    self->shape = hsep_take(&end, 4.0 * (double)spacing);
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        self->differences[order] = hsep_take(&end, 4.0 * (double)spacing + 3.0);
+    }
+    return end * sizeof(double);
+}
+
+HSEP_API double hsep_splines_size(uint64_t preview, uint64_t spacing)
+{
+    hsep_splines layout;
+    return splines_lay_out(&layout, preview, spacing);
+}
+
+HSEP_API int hsep_splines_valid(const void *block, uint64_t preview, uint64_t spacing)
+{
+    hsep_splines expected, got;
+    memcpy(&got, block, sizeof got);
+    expected = got;
+    (void)splines_lay_out(&expected, preview, spacing);
+    return memcmp(&expected, &got, sizeof got) == 0;
 }
 
 /* The uniform cubic B-spline on the knots 0, 1, 2, 3, 4. */
@@ -36,17 +59,15 @@ static double splines_b(double u)
 
 HSEP_API void hsep_splines_init(hsep_splines *self, uint64_t preview, uint64_t spacing, const double limit[HSEP_ORDERS])
 {
-    self->preview = preview;
-    self->spacing = spacing;
-    self->n = hsep_splines_count(preview, spacing);
+    (void)splines_lay_out(self, preview, spacing);
     const uint64_t width = 4 * spacing;
-    double *b = splines_table(self);
+    double *b = hsep_at(self, self->shape);
     for (uint64_t k = 0; k < width; k++) {
         b[k] = splines_b((double)k / (double)spacing);
     }
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         self->share[order] = 1.0 / limit[order];
-        double *e = b + width + order * (width + 3);
+        double *e = hsep_at(self, self->differences[order]);
         for (uint64_t k = 0; k < width + 3; k++) {
             const double at[HSEP_ORDERS] = {
                 k < width ? b[k] : 0.0, k >= 1 && k - 1 < width ? b[k - 1] : 0.0,

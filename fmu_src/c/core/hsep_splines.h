@@ -10,6 +10,7 @@
 #define HSEP_SPLINES_H
 
 #include "hsep_api.h"
+#include "hsep_layout.h"
 
 #include <stdint.h>
 
@@ -20,17 +21,25 @@ typedef struct {
     uint64_t preview, spacing;
     uint64_t n;                /* splines that begin in a plan */
     double share[HSEP_ORDERS]; /* what one metre of difference is of its limit, 1/m */
-    /* followed by double[4 spacing], b; then double[4 spacing + 3] for each order, its differences in shares */
+    /* Offsets in doubles from the beginning of the struct */
+    uint64_t shape;                    /* (4 spacing,) b */
+    uint64_t differences[HSEP_ORDERS]; /* (4 spacing + 3,) of each order, in shares */
 } hsep_splines;
 
-/* How many splines begin in a plan: those that end four samples before it does. preview >= 4 spacing + 3. */
+HSEP_ASSERT_WORDS(hsep_splines, 12);
+
+/* Splines that begin in a plan: those that end four samples before it does. preview >= 4 spacing + 3. */
 HSEP_API uint64_t hsep_splines_count(uint64_t preview, uint64_t spacing);
 
-HSEP_API double hsep_splines_size(uint64_t spacing); /* bytes of the block, counted in double */
+/* Bytes of the block, counted in double. */
+HSEP_API double hsep_splines_size(uint64_t preview, uint64_t spacing);
 
 /* Fill the block. limit: of the change, m, and of its differences of orders 1 to 3, m a sample to that power. */
 HSEP_API void hsep_splines_init(
     hsep_splines *self, uint64_t preview, uint64_t spacing, const double limit[HSEP_ORDERS]);
+
+/* Whether a block, in any alignment, is one that hsep_splines_init with these parameters began. */
+HSEP_API int hsep_splines_valid(const void *block, uint64_t preview, uint64_t spacing);
 
 /* What the first count splines give at sample k, with coefficients c, (count,), those of the splines -3, -2, -1 first.
  * 4 multiply-adds. */

@@ -4,6 +4,7 @@
 #define HSEP_TRAJECTORY_H
 
 #include "hsep_api.h"
+#include "hsep_layout.h"
 
 #include <stdint.h>
 
@@ -11,6 +12,8 @@ typedef struct {
     uint64_t count; /* samples, >= 1 */
     /* followed by double[count], m */
 } hsep_trajectory;
+
+HSEP_ASSERT_WORDS(hsep_trajectory, 1);
 
 HSEP_API double hsep_trajectory_size(uint64_t count); /* bytes of the block, counted in double */
 

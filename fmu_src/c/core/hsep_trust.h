@@ -4,12 +4,15 @@
 #define HSEP_TRUST_H
 
 #include "hsep_api.h"
+#include "hsep_layout.h"
 
 #include <stdint.h>
 
 typedef struct {
     double excess; /* m2; trusted while <= 0 */
 } hsep_trust;
+
+HSEP_ASSERT_WORDS(hsep_trust, 1);
 
 /* Take in a measured window. e_pb: measured residuals of the physics model, e_h: what the hybrid model predicted of
  * them, both (n,), m; noise_variance: of what no model explains, m2. */

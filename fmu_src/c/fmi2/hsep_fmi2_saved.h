@@ -10,6 +10,7 @@
 
 #include "hsep_api.h"
 #include "hsep_fmi2_instance.h"
+#include "hsep_layout.h"
 
 #include <stdint.h>
 
@@ -32,6 +33,8 @@ typedef struct {
     double time;
     uint64_t state_size; /* bytes of the model's state */
 } hsep_header;
+
+HSEP_ASSERT_WORDS(hsep_header, 15);
 
 /* What an fmi2FMUstate points to. */
 typedef struct {

@@ -9,12 +9,15 @@
 
 #include "hsep_api.h"
 #include "hsep_clock.h"
+#include "hsep_layout.h"
 #include "hsep_model.h"
 
 typedef struct {
     hsep_clock clock;
     double x_d_ahead, x_meas; /* m, of the sample in progress */
 } hsep_inputs;
+
+HSEP_ASSERT_WORDS(hsep_inputs, 9);
 
 /* What the importer has set for a step: an input and its time derivative. */
 typedef struct {

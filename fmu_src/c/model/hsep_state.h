@@ -3,11 +3,12 @@
 #define HSEP_STATE_H
 
 #include "hsep_api.h"
+#include "hsep_layout.h"
 #include "hsep_model.h"
 
 #include <stdint.h>
 
-#define HSEP_STATE_VERSION 2 /* changes whenever the layout of any state does */
+#define HSEP_STATE_VERSION 3 /* changes whenever the layout of any state does */
 
 typedef struct {
     uint64_t kind;       /* one number for each model */
@@ -15,6 +16,8 @@ typedef struct {
     uint64_t size;       /* of the whole state, bytes */
     uint64_t parameters; /* a hash of the values of all parameters that are not tunable */
 } hsep_state_header;
+
+HSEP_ASSERT_WORDS(hsep_state_header, 4);
 
 /* Turn a size that was counted in double into bytes. Fails if it is more than memory can be asked for. */
 HSEP_API hsep_status hsep_state_size(double bytes, size_t *size, char message[]);

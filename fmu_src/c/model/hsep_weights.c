@@ -1,6 +1,7 @@
 #include "hsep_weights.h"
 
 #include "hsep_check.h"
+#include "hsep_layout.h"
 #include "hsep_resource.h"
 
 #include <string.h>
@@ -15,6 +16,8 @@ typedef struct {
     uint64_t p, q, input_hold, dead_time, n_modes, n_samples;
     double lambda, T_s, v_s;
 } weights_head;
+
+HSEP_ASSERT_WORDS(weights_head, 10);
 
 /* CRC-32 as in zlib, 4 bits at a time, of bytes behind those that gave crc. */
 static uint32_t weights_crc(uint32_t crc, const unsigned char bytes[], size_t size)

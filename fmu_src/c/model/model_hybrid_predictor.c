@@ -26,6 +26,9 @@ typedef struct {
     hsep_predictor predictor; /* its arrays follow */
 } predictor_state;
 
+/* The arrays behind the structs begin at a multiple of 16 bytes, as memory of an importer does. */
+HSEP_ASSERT(alignment_of_predictor_state, sizeof(predictor_state) % 16 == 0);
+
 /* Read the parameters; those that are whole numbers must have been checked. modes: (HSEP_N_MODES,). */
 static hsep_predictor_parameters predictor_parameters(const double values[], double n_init, hsep_mode modes[])
 {

@@ -118,7 +118,7 @@ HSEP_API hsep_status hsep_model_check_state(
                               head.stage.last_x_d,    head.stage.v_d, head.stage.v};
     const int finite = hsep_within(numbers, sizeof numbers / sizeof *numbers, HSEP_PREDICTION_MAX) &&
                        hsep_within(modes, (size - sizeof head) / sizeof(double), HSEP_PREDICTION_MAX);
-    if (!finite || head.stage.n_modes != HSEP_N_MODES || !hsep_clock_valid(&head.stage.clock) ||
+    if (!finite || !hsep_stage_valid(modes - sizeof head.stage, HSEP_N_MODES) ||
         head.stage.clock.T_s != values[HSEP_VR_T_s]) {
         return hsep_state_damaged(message);
     }
