@@ -1,8 +1,8 @@
 /* Layout of a block of memory: a struct, then its arrays as doubles, each at an offset that the struct holds.
  *
  * One function of a block walks its arrays with a cursor, the end of what is taken so far in doubles: the offsets and
- * the size are the same walk. A block holds no pointers, so a copy of it is its state. Its struct has members of 8 bytes
- * alone, which HSEP_ASSERT_WORDS proves: no byte of a state is padding.
+ * the size are the same walk. A block holds no pointers, so a copy of it is its state. Its struct has members of 8
+ * bytes alone, which HSEP_ASSERT_WORDS proves: no byte of a state is padding.
  */
 #ifndef HSEP_LAYOUT_H
 #define HSEP_LAYOUT_H

@@ -107,7 +107,7 @@ HSEP_API int hsep_inputs_next(hsep_inputs *self, hsep_inputs_step *step)
     return 0;
 }
 
-HSEP_API int hsep_inputs_valid(const hsep_inputs *self, double T_s, uint64_t k)
+HSEP_API int hsep_inputs_valid(const hsep_inputs *self, double T_s)
 {
-    return hsep_clock_valid(&self->clock) && self->clock.T_s == T_s && (uint64_t)self->clock.k == k;
+    return hsep_clock_valid(&self->clock) && self->clock.T_s == T_s;
 }
