@@ -62,13 +62,12 @@ HSEP_API void hsep_compensator_init(hsep_compensator *self, const hsep_compensat
 HSEP_API int hsep_compensator_valid(const void *block, const hsep_compensator_parameters *parameters, uint64_t k)
 {
     const hsep_predictor_parameters *predictor = &parameters->predictor;
-    hsep_compensator expected, got;
+    hsep_compensator got;
     hsep_predictor online;
     memcpy(&got, block, sizeof got);
-    expected = got; /* what may differ from a fresh block is taken over, the rest must be equal */
-    (void)compensator_lay_out(&expected, parameters);
-    memcpy(&online, hsep_at_bytes(block, expected.predictor), sizeof online);
-    return memcmp(&expected, &got, sizeof got) == 0 && got.state <= HSEP_SEP_HYBRID && got.solving <= 1 &&
+    (void)compensator_lay_out(&got, parameters); /* changes nothing where it is sound */
+    memcpy(&online, hsep_at_bytes(block, got.predictor), sizeof online);
+    return memcmp(&got, block, sizeof got) == 0 && got.state <= HSEP_SEP_HYBRID && got.solving <= 1 &&
            (got.solving || online.n_published == predictor->Np) &&
            (online.divergence || hsep_within(hsep_at_bytes(block, got.x_dm), predictor->Np, HSEP_PREDICTION_MAX)) &&
            hsep_physics_valid(hsep_at_bytes(block, got.trial), predictor->n_modes, predictor->dead_time) &&

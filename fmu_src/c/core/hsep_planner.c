@@ -58,13 +58,12 @@ HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameter
 
 HSEP_API int hsep_planner_valid(const void *block, const hsep_planner_parameters *parameters)
 {
-    hsep_planner expected, got;
+    hsep_planner got;
     memcpy(&got, block, sizeof got);
-    expected = got; /* what may differ from a fresh block is taken over, the rest must be equal */
-    (void)planner_lay_out(&expected, parameters);
-    return memcmp(&expected, &got, sizeof got) == 0 &&
-           hsep_splines_valid(hsep_at_bytes(block, expected.splines), parameters->preview, parameters->spacing) &&
-           hsep_interior_valid(hsep_at_bytes(block, expected.interior), expected.n_pinned);
+    (void)planner_lay_out(&got, parameters); /* changes nothing where it is sound */
+    return memcmp(&got, block, sizeof got) == 0 &&
+           hsep_splines_valid(hsep_at_bytes(block, got.splines), parameters->preview, parameters->spacing) &&
+           hsep_interior_valid(hsep_at_bytes(block, got.interior), got.n_pinned);
 }
 
 HSEP_API const double *hsep_planner_spline(const hsep_planner *self)

@@ -98,11 +98,10 @@ HSEP_API double hsep_stage_size(uint64_t n_modes)
 
 HSEP_API int hsep_stage_valid(const void *block, uint64_t n_modes)
 {
-    hsep_stage expected, got;
+    hsep_stage got;
     memcpy(&got, block, sizeof got);
-    expected = got;
-    (void)stage_lay_out(&expected, n_modes);
-    return memcmp(&expected, &got, sizeof got) == 0 && hsep_clock_valid(&got.clock);
+    (void)stage_lay_out(&got, n_modes); /* changes nothing where it is sound */
+    return memcmp(&got, block, sizeof got) == 0 && hsep_clock_valid(&got.clock);
 }
 
 HSEP_API void hsep_stage_init(

@@ -41,11 +41,10 @@ HSEP_API double hsep_splines_size(uint64_t preview, uint64_t spacing)
 
 HSEP_API int hsep_splines_valid(const void *block, uint64_t preview, uint64_t spacing)
 {
-    hsep_splines expected, got;
+    hsep_splines got;
     memcpy(&got, block, sizeof got);
-    expected = got;
-    (void)splines_lay_out(&expected, preview, spacing);
-    return memcmp(&expected, &got, sizeof got) == 0;
+    (void)splines_lay_out(&got, preview, spacing); /* changes nothing where it is sound */
+    return memcmp(&got, block, sizeof got) == 0;
 }
 
 /* The uniform cubic B-spline on the knots 0, 1, 2, 3, 4. */

@@ -14,35 +14,14 @@ HSEP_API int hsep_online_check(const double values[], char message[])
 
 HSEP_API void hsep_online_read(const double values[], hsep_online_parameters *parameters)
 {
-    hsep_predictor_parameters *predictor = &parameters->predictor;
-    predictor->preview = predictor->Np;
+    parameters->preview = parameters->Np;
     /* The warm-up counts from the end of the first fill. */
-    predictor->n_init = (double)predictor->Np + hsep_warm_up_samples(values[HSEP_VR_t_init], predictor->T_s);
-}
-
-HSEP_API double hsep_online_size(const hsep_online_parameters *parameters)
-{
-    return hsep_predictor_size(&parameters->predictor);
-}
-
-HSEP_API void hsep_online_init(hsep_online *self, const hsep_online_parameters *parameters, double start)
-{
-    hsep_predictor_init(self, &parameters->predictor, start);
+    parameters->n_init = (double)parameters->Np + hsep_warm_up_samples(values[HSEP_VR_t_init], parameters->T_s);
 }
 
 HSEP_API void hsep_online_begin(hsep_online *self) { (void)self; }
 
 HSEP_API hsep_predictor *hsep_online_predictor(hsep_online *self) { return self; }
-
-HSEP_API int hsep_online_valid(const void *block, const hsep_online_parameters *parameters, uint64_t k)
-{
-    return hsep_predictor_valid(block, &parameters->predictor, k);
-}
-
-HSEP_API int hsep_online_sample(hsep_online *self, double x_d_ahead, double x_meas)
-{
-    return hsep_predictor_sample(self, x_d_ahead, x_meas);
-}
 
 HSEP_API void hsep_online_write(const hsep_online *self, int window, double values[])
 {

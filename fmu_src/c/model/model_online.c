@@ -38,7 +38,7 @@ static hsep_status online_checked(
         return HSEP_REFUSED;
     }
     hsep_modes_read(&values[HSEP_VR_mode], HSEP_N_MODES, modes);
-    parameters->predictor = (hsep_predictor_parameters){
+    *(hsep_predictor_parameters *)parameters = (hsep_predictor_parameters){
         .Np = (uint64_t)values[HSEP_VR_Np],
         .p = (uint64_t)values[HSEP_VR_p],
         .q = (uint64_t)values[HSEP_VR_q],
@@ -61,7 +61,7 @@ static hsep_status online_measured(
         return HSEP_REFUSED;
     }
     const double before = (double)(sizeof(online_state) - sizeof(hsep_online));
-    return hsep_state_size(before + hsep_online_size(parameters), size, message);
+    return hsep_state_size(before + HSEP_ONLINE(size)(parameters), size, message);
 }
 
 HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[])
@@ -81,13 +81,15 @@ HSEP_API hsep_status hsep_model_initialise(
     size_t needed = 0;
     if (online_measured(context, values, &parameters, modes, &needed, message) != HSEP_OK ||
         hsep_state_fits(needed, size, message) != HSEP_OK ||
-        hsep_inputs_init(&self->inputs, t_start, parameters.predictor.T_s, start, message) != HSEP_OK) {
+        hsep_inputs_init(&self->inputs, t_start, values[HSEP_VR_T_s], start, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     hsep_state_mark(&self->header, context, values, HSEP_ONLINE_KIND, size);
-    hsep_online_init(&self->online, &parameters, start);
+    HSEP_ONLINE(init)(&self->online, &parameters, start);
     hsep_predictor *predictor = hsep_online_predictor(&self->online);
-    if (hsep_weights_load(context, &parameters.predictor, hsep_predictor_regression(predictor), message) != HSEP_OK) {
+    if (hsep_weights_load(
+            context, (hsep_predictor_parameters *)&parameters, hsep_predictor_regression(predictor), message) !=
+        HSEP_OK) {
         return HSEP_REFUSED;
     }
     hsep_online_begin(&self->online);
@@ -117,7 +119,7 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
         return HSEP_REFUSED;
     }
     while (hsep_inputs_next(&self->inputs, &step)) {
-        window |= hsep_online_sample(&self->online, self->inputs.x_d_ahead, self->inputs.x_meas);
+        window |= HSEP_ONLINE(sample)(&self->online, self->inputs.x_d_ahead, self->inputs.x_meas);
         if (hsep_check_divergence((hsep_divergence)predictor->divergence, message) != HSEP_OK) {
             return HSEP_REFUSED;
         }
@@ -139,8 +141,8 @@ HSEP_API hsep_status hsep_model_check_state(
     }
     memcpy(&head, state, sizeof head);
     const char *online = (const char *)state + (sizeof head - sizeof head.online);
-    if (!hsep_inputs_valid(&head.inputs, parameters.predictor.T_s) ||
-        !hsep_online_valid(online, &parameters, (uint64_t)head.inputs.clock.k)) {
+    if (!hsep_inputs_valid(&head.inputs, values[HSEP_VR_T_s]) ||
+        !HSEP_ONLINE(valid)(online, &parameters, (uint64_t)head.inputs.clock.k)) {
         return hsep_state_damaged(message);
     }
     return HSEP_OK;

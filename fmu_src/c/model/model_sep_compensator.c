@@ -48,26 +48,9 @@ HSEP_API void hsep_online_read(const double values[], hsep_online_parameters *pa
     parameters->best = (hsep_sep_state)values[HSEP_VR_compensate];
 }
 
-HSEP_API double hsep_online_size(const hsep_online_parameters *parameters) { return hsep_compensator_size(parameters); }
-
-HSEP_API void hsep_online_init(hsep_online *self, const hsep_online_parameters *parameters, double start)
-{
-    hsep_compensator_init(self, parameters, start);
-}
-
 HSEP_API void hsep_online_begin(hsep_online *self) { hsep_compensator_begin(self); }
 
 HSEP_API hsep_predictor *hsep_online_predictor(hsep_online *self) { return hsep_compensator_predictor(self); }
-
-HSEP_API int hsep_online_valid(const void *block, const hsep_online_parameters *parameters, uint64_t k)
-{
-    return hsep_compensator_valid(block, parameters, k);
-}
-
-HSEP_API int hsep_online_sample(hsep_online *self, double x_d_ahead, double x_meas)
-{
-    return hsep_compensator_sample(self, x_d_ahead, x_meas);
-}
 
 HSEP_API void hsep_online_write(const hsep_online *self, int window, double values[])
 {
