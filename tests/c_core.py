@@ -127,7 +127,7 @@ def address_sanitizer(command: Sequence[str]) -> str:
 
 def sources() -> list[str]:
     """Return every C file of core and models."""
-    return sorted(str(path) for folder in ("core", "model") for path in (C_SOURCES / folder).glob("*.c"))
+    return sorted(str(path) for folder in ("core", "model") for path in (C_SOURCES / folder).rglob("*.c"))
 
 
 def run_compiler(arguments: Sequence[str | Path], *, command: Sequence[str] = ()) -> None:
@@ -172,7 +172,8 @@ def object_files() -> list[str]:
 
 
 def include_flags() -> list[str]:
-    return [f"-I{C_SOURCES / folder}" for folder in ("core", "model")]
+    """Return the options with which a file finds every header by its name."""
+    return [f"-I{folder}" for folder in sorted({path.parent for path in C_SOURCES.rglob("*.h")})]
 
 
 def write_header(name: str, folder: Path) -> None:

@@ -46,7 +46,7 @@ def test_the_core_needs_libm_alone() -> None:
         "fmax",
         "fmin",
     }
-    core = {path.stem for path in (c_core.C_SOURCES / "core").glob("*.c")}
+    core = {path.stem for path in (c_core.C_SOURCES / "core").rglob("*.c")}
     for built in c_core.object_files():
         if Path(built).stem not in core:
             continue

@@ -522,7 +522,7 @@ def test_a_resource_that_grows_during_the_initialization_is_refused(folders: dic
 
 
 def test_uris_of_windows(tmp_path: Path) -> None:
-    root = Path(__file__).parent.parent / "fmu_src" / "c" / "fmi2"
+    root = Path(__file__).parent.parent / "fmu_src" / "c" / "fmi"
     library = tmp_path / "uri.so"
     run_compiler(["-shared", "-fPIC", "-O1", *include_flags(), "-o", library, root / "hsep_uri.c"])
     convert = ctypes.CDLL(str(library)).hsep_uri_folder

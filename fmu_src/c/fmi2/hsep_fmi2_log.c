@@ -21,26 +21,27 @@ static int hsep_category_place(hsep_category category)
     return place;
 }
 
-static void hsep_log_list(hsep_instance *instance, hsep_category category, const char *format, va_list arguments)
+static void hsep_log_list(const hsep_instance *instance, hsep_category category, const char *format, va_list arguments)
 {
     char text[2 * HSEP_MESSAGE_SIZE];
     char escaped[4 * HSEP_MESSAGE_SIZE];
     const int place = hsep_category_place(category);
     size_t n = 0;
-    if (instance->logger == NULL || (instance->categories & (unsigned)category) == 0) {
+    const hsep_component *component = (const hsep_component *)instance;
+    if (component->logger == NULL || (component->categories & (unsigned)category) == 0) {
         return;
     }
     (void)vsnprintf(text, sizeof text, format, arguments);
     /* The logger reads its message as printf does: a percent sign in ours stands for itself. */
-    for (const char *c = text; *c != '\0'; ++c) {
+    for (const char *c = text; *c != '\0'; c++) {
         if (*c == '%') {
             escaped[n++] = '%';
         }
         escaped[n++] = *c;
     }
     escaped[n] = '\0';
-    instance->logger(
-        instance->environment, (instance->name == NULL) ? HSEP_MODEL_IDENTIFIER : instance->name,
+    component->logger(
+        component->environment, (instance->name == NULL) ? HSEP_MODEL_IDENTIFIER : instance->name,
         hsep_category_status[place], hsep_category_names[place], escaped);
 }
 
@@ -80,7 +81,7 @@ HSEP_API hsep_instance *hsep_begin(fmi2Component component, hsep_call call)
     hsep_instance *instance = component;
     const hsep_call_row *row = &hsep_calls[call];
     char legal[HSEP_MESSAGE_SIZE] = "";
-    if (instance == NULL || (row->legal & (unsigned)instance->phase) != 0) {
+    if (instance == NULL || (row->legal & (unsigned)instance->experiment.phase) != 0) {
         return instance;
     }
     for (unsigned phase = HSEP_INSTANTIATED; phase <= HSEP_TERMINATED; phase *= 2) {
@@ -89,7 +90,7 @@ HSEP_API hsep_instance *hsep_begin(fmi2Component component, hsep_call call)
         }
     }
     (void)hsep_refuse(
-        instance, "%s is not allowed in the state %s%s", row->name, hsep_phase_name(instance->phase), legal);
+        instance, "%s is not allowed in the state %s%s", row->name, hsep_phase_name(instance->experiment.phase), legal);
     return NULL;
 }
 
@@ -99,6 +100,7 @@ fmi2Status fmi2SetDebugLogging(
     fmi2Component c, fmi2Boolean loggingOn, size_t nCategories, const fmi2String categories[])
 {
     hsep_instance *instance = hsep_begin(c, HSEP_CALL_SET_DEBUG_LOGGING);
+    hsep_component *component = c;
     unsigned named = 0;
     if (instance == NULL) {
         return fmi2Error;
@@ -107,8 +109,8 @@ fmi2Status fmi2SetDebugLogging(
         return hsep_refuse(
             instance, "fmi2SetDebugLogging: categories is NULL, but nCategories is %lu", (unsigned long)nCategories);
     }
-    for (size_t i = 0; i < nCategories; ++i) {
-        for (unsigned place = 0; categories[i] != NULL && place < HSEP_N_CATEGORIES; ++place) {
+    for (size_t i = 0; i < nCategories; i++) {
+        for (unsigned place = 0; categories[i] != NULL && place < HSEP_N_CATEGORIES; place++) {
             if (strcmp(categories[i], hsep_category_names[place]) == 0) {
                 named |= 1U << place;
             }
@@ -118,9 +120,9 @@ fmi2Status fmi2SetDebugLogging(
         named = HSEP_LOG_EVERYTHING;
     }
     if (nCategories == 0) {
-        instance->categories = loggingOn ? HSEP_LOG_EVERYTHING : HSEP_LOG_EVERYTHING & ~(unsigned)HSEP_LOG_ALL;
+        component->categories = loggingOn ? HSEP_LOG_EVERYTHING : HSEP_LOG_EVERYTHING & ~(unsigned)HSEP_LOG_ALL;
     } else if (named != 0) {
-        instance->categories = loggingOn ? named : instance->categories & ~named;
+        component->categories = loggingOn ? named : component->categories & ~named;
     }
     return fmi2OK;
 }

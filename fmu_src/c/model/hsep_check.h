@@ -7,7 +7,7 @@
 #include "hsep_clock.h"
 #include "hsep_model.h"
 #include "hsep_physics.h"
-#include "hsep_vector.h"
+#include "hsep_range.h"
 
 #define HSEP_NUMBER_SIZE 40 /* bytes of a number as text */
 
@@ -36,6 +36,10 @@ HSEP_API double hsep_warm_up_samples(double t_init, double T_s);
 
 /* Refuse outputs of a window that diverges. */
 HSEP_API hsep_status hsep_check_divergence(hsep_divergence divergence, char message[]);
+
+/* Check that a position, m, is finite and no further out than any machine is. where: format of at, the end of the
+ * message. */
+HSEP_API hsep_status hsep_check_position(const char *name, double value, const char *where, double at, char message[]);
 
 /* Check that the simulation starts at a number. */
 HSEP_API hsep_status hsep_check_start_time(double t_start, char message[]);

@@ -30,18 +30,22 @@ HSEP_API hsep_status hsep_state_fits(size_t needed, size_t size, char message[])
     return HSEP_OK;
 }
 
-/* FNV-1a (Fowler, Noll and Vo 1991) over the bytes of the parameters. */
+HSEP_API uint64_t hsep_fnv(uint64_t hash, const void *bytes, size_t size)
+{
+    const unsigned char *byte = bytes;
+    for (size_t i = 0; i < size; i++) {
+        hash = (hash ^ byte[i]) * UINT64_C(0x100000001B3);
+    }
+    return hash;
+}
+
+/* A hash of the values of all parameters that are not tunable. */
 static uint64_t state_hash(const hsep_context *context, const double values[])
 {
-    uint64_t hash = UINT64_C(0xCBF29CE484222325);
+    uint64_t hash = HSEP_FNV_BEGIN;
     for (size_t i = 0; i < context->n_variables; i++) {
-        if (context->variables[i].causality != HSEP_PARAMETER || context->variables[i].tunable) {
-            continue;
-        }
-        unsigned char bytes[sizeof(double)];
-        memcpy(bytes, &values[i], sizeof bytes);
-        for (size_t b = 0; b < sizeof bytes; b++) {
-            hash = (hash ^ bytes[b]) * UINT64_C(0x100000001B3);
+        if (context->variables[i].causality == HSEP_PARAMETER && !context->variables[i].tunable) {
+            hash = hsep_fnv(hash, &values[i], sizeof values[i]);
         }
     }
     return hash;

@@ -19,6 +19,11 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_state_header, 4);
 
+#define HSEP_FNV_BEGIN UINT64_C(0xCBF29CE484222325)
+
+/* FNV-1a, 64 bit (Fowler, Noll and Vo 1991), of bytes behind those that gave hash; HSEP_FNV_BEGIN before the first. */
+HSEP_API uint64_t hsep_fnv(uint64_t hash, const void *bytes, size_t size);
+
 /* Turn a size that was counted in double into bytes. Fails if it is more than memory can be asked for. */
 HSEP_API hsep_status hsep_state_size(double bytes, size_t *size, char message[]);
 

@@ -24,10 +24,10 @@ typedef struct {
 /* The arrays behind the struct begin at a multiple of 16 bytes, as an importer's memory does. */
 HSEP_ASSERT(alignment_of_online_state, sizeof(online_state) % 16 == 0);
 
-/* Check all parameters and read them. modes: (HSEP_N_MODES,). */
+/* Check all parameters, read them and tell the bytes of the state. modes: (HSEP_N_MODES,). */
 static hsep_status online_checked(
     const hsep_context *context, const double values[], hsep_online_parameters *parameters, hsep_mode modes[],
-    char message[])
+    size_t *size, char message[])
 {
     message[0] = '\0';
     if (hsep_check_parameters(context, values, message) > 0) {
@@ -49,17 +49,6 @@ static hsep_status online_checked(
         .hold = values[HSEP_VR_input_hold] > 0.0 ? HSEP_FIRST_ORDER_HOLD : HSEP_ZERO_ORDER_HOLD,
         .modes = modes};
     hsep_online_read(values, parameters);
-    return HSEP_OK;
-}
-
-/* Check all parameters, read them and tell the bytes of the state. */
-static hsep_status online_measured(
-    const hsep_context *context, const double values[], hsep_online_parameters *parameters, hsep_mode modes[],
-    size_t *size, char message[])
-{
-    if (online_checked(context, values, parameters, modes, message) != HSEP_OK) {
-        return HSEP_REFUSED;
-    }
     const double before = (double)(sizeof(online_state) - sizeof(hsep_online));
     return hsep_state_size(before + HSEP_ONLINE(size)(parameters), size, message);
 }
@@ -68,7 +57,7 @@ HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double v
 {
     hsep_mode modes[HSEP_N_MODES];
     hsep_online_parameters parameters;
-    return online_measured(context, values, &parameters, modes, size, message);
+    return online_checked(context, values, &parameters, modes, size, message);
 }
 
 HSEP_API hsep_status hsep_model_initialise(
@@ -79,7 +68,7 @@ HSEP_API hsep_status hsep_model_initialise(
     hsep_online_parameters parameters;
     const double start = values[HSEP_VR_x_d_ahead];
     size_t needed = 0;
-    if (online_measured(context, values, &parameters, modes, &needed, message) != HSEP_OK ||
+    if (online_checked(context, values, &parameters, modes, &needed, message) != HSEP_OK ||
         hsep_state_fits(needed, size, message) != HSEP_OK ||
         hsep_inputs_init(&self->inputs, t_start, values[HSEP_VR_T_s], start, message) != HSEP_OK) {
         return HSEP_REFUSED;
@@ -135,7 +124,7 @@ HSEP_API hsep_status hsep_model_check_state(
     hsep_online_parameters parameters;
     online_state head;
     size_t expected = 0;
-    if (online_measured(context, values, &parameters, modes, &expected, message) != HSEP_OK ||
+    if (online_checked(context, values, &parameters, modes, &expected, message) != HSEP_OK ||
         hsep_state_check(context, values, state, size, HSEP_ONLINE_KIND, expected, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }

@@ -6,14 +6,9 @@ static const double constraints_rounding = 1e-9;        /* share of a limit that
 static const double constraints_interior_share = 1e-10; /* by which a row at its bound may differ from the last plan */
 static const double constraints_move = 1e-12;           /* m a sample, step of x_d that counts as a move */
 
-static const hsep_splines *constraints_splines(const hsep_planner *self)
-{
-    return (const hsep_splines *)hsep_at_const(self, self->splines);
-}
-
 HSEP_API void hsep_constraints_total(hsep_planner *self, const double x_d[])
 {
-    const hsep_splines *splines = constraints_splines(self);
+    const hsep_splines *splines = hsep_planner_splines(self);
     const uint64_t preview = splines->preview;
     double *total = hsep_at(self, self->total), *moves = hsep_at(self, self->moves);
     double last = self->x_d_before[2];
@@ -44,7 +39,7 @@ HSEP_API void hsep_constraints_total(hsep_planner *self, const double x_d[])
 
 HSEP_API void hsep_constraints_range(const hsep_planner *self, uint64_t r, double *least, double *most)
 {
-    const uint64_t preview = constraints_splines(self)->preview;
+    const uint64_t preview = hsep_planner_splines(self)->preview;
     const double total = hsep_at_const(self, self->total)[r];
     *most = 1.0 - constraints_rounding;
     *least = -*most;
@@ -60,7 +55,7 @@ HSEP_API void hsep_constraints_range(const hsep_planner *self, uint64_t r, doubl
 HSEP_API double hsep_constraints_share(const hsep_planner *self, const double way[])
 {
     const double *total = hsep_at_const(self, self->total);
-    const uint64_t rows = HSEP_ORDERS * constraints_splines(self)->preview;
+    const uint64_t rows = HSEP_ORDERS * hsep_planner_splines(self)->preview;
     double share = 1.0;
     for (uint64_t r = 0; r < rows; r++) {
         double least, most;
@@ -76,7 +71,7 @@ HSEP_API double hsep_constraints_share(const hsep_planner *self, const double wa
 HSEP_API int hsep_constraints_allow(const hsep_planner *self, const double way[])
 {
     const double *total = hsep_at_const(self, self->total);
-    const uint64_t rows = HSEP_ORDERS * constraints_splines(self)->preview;
+    const uint64_t rows = HSEP_ORDERS * hsep_planner_splines(self)->preview;
     for (uint64_t r = 0; r < rows; r++) {
         const double there = total[r] + way[r];
         double least, most;

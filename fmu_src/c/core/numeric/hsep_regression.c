@@ -36,11 +36,7 @@ static double regression_lay_out(hsep_regression *self, uint64_t n)
     return end * sizeof(double);
 }
 
-HSEP_API double hsep_regression_size(uint64_t n)
-{
-    hsep_regression layout;
-    return regression_lay_out(&layout, n);
-}
+HSEP_API double hsep_regression_size(uint64_t n) { return regression_lay_out(&(hsep_regression){0}, n); }
 
 HSEP_API int hsep_regression_valid(const void *block, uint64_t n)
 {

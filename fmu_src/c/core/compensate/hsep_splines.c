@@ -35,8 +35,7 @@ static double splines_lay_out(hsep_splines *self, uint64_t preview, uint64_t spa
 
 HSEP_API double hsep_splines_size(uint64_t preview, uint64_t spacing)
 {
-    hsep_splines layout;
-    return splines_lay_out(&layout, preview, spacing);
+    return splines_lay_out(&(hsep_splines){0}, preview, spacing);
 }
 
 HSEP_API int hsep_splines_valid(const void *block, uint64_t preview, uint64_t spacing)

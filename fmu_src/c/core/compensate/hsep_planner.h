@@ -60,8 +60,8 @@ HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameter
 /* Whether a block, in any alignment, is one that hsep_planner_init with these parameters began. */
 HSEP_API int hsep_planner_valid(const void *block, const hsep_planner_parameters *parameters);
 
-/* The spline to be filtered, (4 spacing,). */
-HSEP_API const double *hsep_planner_spline(const hsep_planner *self);
+/* The splines of a plan; hsep_splines_shape is to be filtered. */
+HSEP_API const hsep_splines *hsep_planner_splines(const hsep_planner *self);
 
 /* How many samples a bounded plan leaves as they are, the time there is for its steps; and the steps it may need. */
 HSEP_API uint64_t hsep_planner_pinned(const hsep_planner *self);

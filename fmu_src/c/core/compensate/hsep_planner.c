@@ -11,7 +11,7 @@
 
 static const double planner_ridge = 1e-12; /* on the diagonal, relative to its largest entry */
 
-static const hsep_splines *planner_splines(const hsep_planner *self)
+HSEP_API const hsep_splines *hsep_planner_splines(const hsep_planner *self)
 {
     return (const hsep_splines *)hsep_at_const(self, self->splines);
 }
@@ -41,8 +41,7 @@ static double planner_lay_out(hsep_planner *self, const hsep_planner_parameters 
 
 HSEP_API double hsep_planner_size(const hsep_planner_parameters *parameters)
 {
-    hsep_planner layout;
-    return planner_lay_out(&layout, parameters);
+    return planner_lay_out(&(hsep_planner){0}, parameters);
 }
 
 HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameters *parameters, double start)
@@ -66,24 +65,19 @@ HSEP_API int hsep_planner_valid(const void *block, const hsep_planner_parameters
            hsep_interior_valid(hsep_at_bytes(block, got.interior), got.n_pinned);
 }
 
-HSEP_API const double *hsep_planner_spline(const hsep_planner *self)
-{
-    return hsep_splines_shape(planner_splines(self));
-}
-
 HSEP_API uint64_t hsep_planner_pinned(const hsep_planner *self)
 {
-    return self->n_pinned * planner_splines(self)->spacing;
+    return self->n_pinned * hsep_planner_splines(self)->spacing;
 }
 
 HSEP_API double hsep_planner_decided(const hsep_planner *self, uint64_t k)
 {
-    return hsep_splines_sum(planner_splines(self), hsep_at_const(self, self->c), HSEP_DECIDED, k);
+    return hsep_splines_sum(hsep_planner_splines(self), hsep_at_const(self, self->c), HSEP_DECIDED, k);
 }
 
 HSEP_API double hsep_planner_delta(const hsep_planner *self, uint64_t k)
 {
-    const hsep_splines *splines = planner_splines(self);
+    const hsep_splines *splines = hsep_planner_splines(self);
     return hsep_splines_sum(splines, hsep_at_const(self, self->c), HSEP_DECIDED + splines->n, k);
 }
 
@@ -91,7 +85,7 @@ HSEP_API double hsep_planner_delta(const hsep_planner *self, uint64_t k)
 static void planner_third(hsep_planner *self)
 {
     double *third = hsep_at(self, self->third);
-    const uint64_t preview = planner_splines(self)->preview;
+    const uint64_t preview = hsep_planner_splines(self)->preview;
     double d[4] = {self->delta_before[0], self->delta_before[1], self->delta_before[2], 0.0};
     for (uint64_t k = 0; k < preview; k++) {
         d[3] = hsep_planner_decided(self, k);
@@ -103,7 +97,7 @@ static void planner_third(hsep_planner *self)
 /* P := W' W + jerk_weight D' D with a small ridge. */
 static void planner_quadratic(hsep_planner *self, const double filtered[])
 {
-    const hsep_splines *splines = planner_splines(self);
+    const hsep_splines *splines = hsep_planner_splines(self);
     double *P = hsep_at(self, self->P);
     hsep_splines_filtered_gram(splines, filtered, P);
     hsep_splines_jerk_gram(splines, self->jerk_weight, P);
@@ -123,7 +117,7 @@ static void planner_quadratic(hsep_planner *self, const double filtered[])
 /* Hand the bounded problem over: x is what follows the pinned splines, its bounds are what the others leave. */
 static void planner_bound(hsep_planner *self, double cost)
 {
-    const hsep_splines *splines = planner_splines(self);
+    const hsep_splines *splines = hsep_planner_splines(self);
     hsep_interior *interior = planner_interior(self);
     const uint64_t n = splines->n, first = self->n_pinned, preview = splines->preview;
     const double *rest = hsep_at(self, self->c) + HSEP_DECIDED, *P = hsep_at(self, self->P);
@@ -154,7 +148,7 @@ static void planner_bound(hsep_planner *self, double cost)
 HSEP_API hsep_plan_status
 hsep_planner_begin(hsep_planner *self, const double filtered[], const double target[], const double x_d[])
 {
-    const hsep_splines *splines = planner_splines(self);
+    const hsep_splines *splines = hsep_planner_splines(self);
     const uint64_t n = splines->n;
     double *c = hsep_at(self, self->c), *P = hsep_at(self, self->P);
     double *factor = hsep_at(self, self->factor);
@@ -203,7 +197,7 @@ hsep_planner_begin(hsep_planner *self, const double filtered[], const double tar
 
 HSEP_API int hsep_planner_step(hsep_planner *self)
 {
-    const hsep_splines *splines = planner_splines(self);
+    const hsep_splines *splines = hsep_planner_splines(self);
     hsep_interior *interior = planner_interior(self);
     if (!hsep_interior_step(interior, splines, hsep_at(self, self->P))) {
         return 0;
@@ -229,7 +223,7 @@ HSEP_API int hsep_planner_step(hsep_planner *self)
 
 HSEP_API void hsep_planner_next(hsep_planner *self, const double x_d[])
 {
-    const hsep_splines *splines = planner_splines(self);
+    const hsep_splines *splines = hsep_planner_splines(self);
     double *c = hsep_at(self, self->c);
     for (uint64_t k = self->Np > 3 ? self->Np - 3 : 0; k < self->Np; k++) {
         for (int i = 0; i < 2; i++) {

@@ -82,6 +82,7 @@ static double stage_lay_out(hsep_stage *self, uint64_t n_modes)
     double end = HSEP_WORDS(hsep_stage);
     self->n_modes = n_modes;
     self->modes = hsep_take(&end, (double)n_modes * HSEP_WORDS(hsep_stage_mode));
+    self->z = hsep_take(&end, 2.0 * (double)n_modes);
     return end * sizeof(double);
 }
 
@@ -90,11 +91,7 @@ static const hsep_stage_mode *stage_modes(const hsep_stage *self)
     return (const hsep_stage_mode *)hsep_at_const(self, self->modes);
 }
 
-HSEP_API double hsep_stage_size(uint64_t n_modes)
-{
-    hsep_stage layout;
-    return stage_lay_out(&layout, n_modes);
-}
+HSEP_API double hsep_stage_size(uint64_t n_modes) { return stage_lay_out(&(hsep_stage){0}, n_modes); }
 
 HSEP_API int hsep_stage_valid(const void *block, uint64_t n_modes)
 {
@@ -120,8 +117,8 @@ HSEP_API void hsep_stage_init(
         stage[i].two_zeta_omega = 2.0 * modes[i].zeta * omega;
         stage[i].alpha = modes[i].alpha;
         stage[i].beta = modes[i].beta;
-        stage[i].z[0] = stage[i].z[1] = 0.0;
     }
+    memset(hsep_at(self, self->z), 0, (size_t)(2 * n_modes) * sizeof(double));
 }
 
 /* sum alpha z + beta z' over the modes, z: (2 n_modes,). */
@@ -198,16 +195,13 @@ static void plant_stage_integrate(const hsep_stage *s, double z[], double r, dou
 
 HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work[])
 {
-    hsep_stage_mode *mode = (hsep_stage_mode *)hsep_at(self, self->modes);
     const double r = x_d - self->start;
     double last_x_d = self->last_x_d, v_d = self->v_d, done = 0.0;
+    const size_t z_size = (size_t)(2 * self->n_modes) * sizeof(double);
     double *z = work, *slope = work + 2 * self->n_modes;
     hsep_clock_step step;
     (void)hsep_clock_count(&self->clock, self->clock.end, h, &step);
-    for (uint64_t i = 0; i < self->n_modes; i++) {
-        z[2 * i] = mode[i].z[0];
-        z[2 * i + 1] = mode[i].z[1];
-    }
+    memcpy(z, hsep_at(self, self->z), z_size);
     /* v_d is taken at the instants, in whatever steps they come. */
     for (int64_t i = 0; i <= step.n_latched; i++) {
         const double next = i < step.n_latched ? fmax(done, step.first + (double)i * self->clock.T_s) : h;
@@ -227,10 +221,7 @@ HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work
     }
     plant_stage_slope(self, z, plant_pushed(self, r, v_d), slope);
     self->v = plant_position(self, slope);
-    for (uint64_t i = 0; i < self->n_modes; i++) {
-        mode[i].z[0] = z[2 * i];
-        mode[i].z[1] = z[2 * i + 1];
-    }
+    memcpy(hsep_at(self, self->z), z, z_size);
     self->last_x_d = last_x_d;
     self->v_d = v_d;
     self->clock = step.after;
@@ -239,10 +230,5 @@ HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work
 
 HSEP_API double hsep_stage_x(const hsep_stage *self)
 {
-    const hsep_stage_mode *mode = stage_modes(self);
-    double x = 0.0;
-    for (uint64_t i = 0; i < self->n_modes; i++) {
-        x += mode[i].alpha * mode[i].z[0] + mode[i].beta * mode[i].z[1];
-    }
-    return self->start + x;
+    return self->start + plant_position(self, hsep_at_const(self, self->z));
 }

@@ -104,8 +104,7 @@ static hsep_discrete_mode *physics_modes(hsep_physics *self)
 
 HSEP_API double hsep_physics_size(uint64_t n_modes, uint64_t dead_time)
 {
-    hsep_physics layout;
-    return physics_lay_out(&layout, n_modes, dead_time);
+    return physics_lay_out(&(hsep_physics){0}, n_modes, dead_time);
 }
 
 HSEP_API int hsep_physics_valid(const void *block, uint64_t n_modes, uint64_t dead_time)

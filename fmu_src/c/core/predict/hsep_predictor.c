@@ -1,7 +1,7 @@
 #include "hsep_predictor.h"
 
+#include "hsep_range.h"
 #include "hsep_schedule.h"
-#include "hsep_vector.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -49,8 +49,7 @@ static double predictor_lay_out(hsep_predictor *self, const hsep_predictor_param
 
 HSEP_API double hsep_predictor_size(const hsep_predictor_parameters *parameters)
 {
-    hsep_predictor layout;
-    return predictor_lay_out(&layout, parameters);
+    return predictor_lay_out(&(hsep_predictor){0}, parameters);
 }
 
 HSEP_API void hsep_predictor_init(hsep_predictor *self, const hsep_predictor_parameters *parameters, double start)

@@ -1,6 +1,6 @@
 #include "hsep_compensator.h"
 
-#include "hsep_vector.h"
+#include "hsep_range.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -37,8 +37,7 @@ static double compensator_lay_out(hsep_compensator *self, const hsep_compensator
 
 HSEP_API double hsep_compensator_size(const hsep_compensator_parameters *parameters)
 {
-    hsep_compensator layout;
-    return compensator_lay_out(&layout, parameters);
+    return compensator_lay_out(&(hsep_compensator){0}, parameters);
 }
 
 HSEP_API void hsep_compensator_init(hsep_compensator *self, const hsep_compensator_parameters *parameters, double start)
@@ -54,7 +53,7 @@ HSEP_API void hsep_compensator_init(hsep_compensator *self, const hsep_compensat
     hsep_physics_init(
         trial, predictor->modes, predictor->n_modes, predictor->dead_time, predictor->T_s, predictor->hold);
     memcpy(
-        spline, hsep_planner_spline(compensator_planner(self)),
+        spline, hsep_splines_shape(hsep_planner_splines(compensator_planner(self))),
         (size_t)(4 * parameters->planner.spacing) * sizeof(double));
     hsep_physics_respond(trial, spline, spline, (size_t)predictor->preview);
 }

@@ -47,7 +47,6 @@ HSEP_API double hsep_feed_drive_v(const hsep_feed_drive *self); /* true velocity
 typedef struct {
     double omega2, two_zeta_omega; /* 1/s^2, 1/s */
     double alpha, beta;            /* 1/s^2, 1/s */
-    double z[2];                   /* z and z', m s^2 and m s */
 } hsep_stage_mode;
 
 /* x = G_pb (x_d - d) with d = f tanh(v_d / 2 mm/s) + kappa x|x|; v_d is the backward difference of x_d over T_s. */
@@ -58,12 +57,14 @@ typedef struct {
     double last_x_d, v_d; /* m from start, at the last instant; m/s */
     double v;             /* m/s */
     uint64_t n_modes;
-    uint64_t modes; /* offset of hsep_stage_mode[n_modes] in doubles from the beginning of the struct */
+    /* Offsets in doubles from the beginning of the struct */
+    uint64_t modes; /* hsep_stage_mode[n_modes] */
+    uint64_t z;     /* (2 n_modes,) z and z' of each, m s^2 and m s */
 } hsep_stage;
 
 HSEP_ASSERT_WORDS(hsep_feed_drive, 9);
-HSEP_ASSERT_WORDS(hsep_stage_mode, 6);
-HSEP_ASSERT_WORDS(hsep_stage, 15);
+HSEP_ASSERT_WORDS(hsep_stage_mode, 4);
+HSEP_ASSERT_WORDS(hsep_stage, 16);
 
 #define HSEP_STAGE_WORK 8 /* doubles of work space for each mode */
 
