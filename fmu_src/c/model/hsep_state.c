@@ -17,19 +17,6 @@ HSEP_API hsep_status hsep_state_size(double bytes, size_t *size, char message[])
     return HSEP_OK;
 }
 
-HSEP_API hsep_status hsep_state_fits(size_t needed, size_t size, char message[])
-{
-    if (needed != size) {
-        hsep_message_add(
-            message,
-            "the state must have %.0f bytes, got memory for %.0f; its file in the resources has changed meanwhile: "
-            "initialise again",
-            (double)needed, (double)size);
-        return HSEP_REFUSED;
-    }
-    return HSEP_OK;
-}
-
 HSEP_API uint64_t hsep_fnv(uint64_t hash, const void *bytes, size_t size)
 {
     const unsigned char *byte = bytes;
@@ -51,19 +38,29 @@ static uint64_t state_hash(const hsep_context *context, const double values[])
     return hash;
 }
 
-HSEP_API void hsep_state_mark(
-    hsep_state_header *header, const hsep_context *context, const double values[], uint64_t kind, size_t size)
+HSEP_API hsep_status hsep_state_begin(
+    hsep_state_header *header, const hsep_context *context, const double values[], uint64_t kind, size_t needed,
+    size_t size, char message[])
 {
-    header->kind = kind;
-    header->version = HSEP_STATE_VERSION;
-    header->size = size;
-    header->parameters = state_hash(context, values);
+    if (needed != size) {
+        hsep_message_add(
+            message,
+            "the state must have %.0f bytes, got memory for %.0f; its file in the resources has changed meanwhile: "
+            "initialise again",
+            (double)needed, (double)size);
+        return HSEP_REFUSED;
+    }
+    *header = (hsep_state_header){kind, HSEP_STATE_VERSION, size, state_hash(context, values)};
+    return HSEP_OK;
 }
 
 HSEP_API hsep_status hsep_state_check(
-    const hsep_context *context, const double values[], const void *state, size_t size, uint64_t kind, size_t expected,
-    char message[])
+    const hsep_context *context, const double values[], const void *state, size_t size, uint64_t kind, char message[])
 {
+    size_t expected = 0;
+    if (hsep_model_size(context, values, &expected, message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
     hsep_state_header header;
     if (size < sizeof header || size != expected) {
         hsep_message_add(

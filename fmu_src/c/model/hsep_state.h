@@ -27,17 +27,15 @@ HSEP_API uint64_t hsep_fnv(uint64_t hash, const void *bytes, size_t size);
 /* Turn a size that was counted in double into bytes. Fails if it is more than memory can be asked for. */
 HSEP_API hsep_status hsep_state_size(double bytes, size_t *size, char message[]);
 
-/* Check that memory of size bytes is what the state needs: a resource may have changed since the size was told. */
-HSEP_API hsep_status hsep_state_fits(size_t needed, size_t size, char message[]);
+/* Fill the header of a state in memory of size bytes. Fails if it needs another size: a resource may have changed since
+ * the size was told. */
+HSEP_API hsep_status hsep_state_begin(
+    hsep_state_header *header, const hsep_context *context, const double values[], uint64_t kind, size_t needed,
+    size_t size, char message[]);
 
-/* Fill the header of a state. */
-HSEP_API void hsep_state_mark(
-    hsep_state_header *header, const hsep_context *context, const double values[], uint64_t kind, size_t size);
-
-/* Check the first bytes of what may be a state of that kind and size, in any alignment. */
+/* Check the first bytes of what may be a state of that kind for these parameters, in any alignment. */
 HSEP_API hsep_status hsep_state_check(
-    const hsep_context *context, const double values[], const void *state, size_t size, uint64_t kind, size_t expected,
-    char message[]);
+    const hsep_context *context, const double values[], const void *state, size_t size, uint64_t kind, char message[]);
 
 /* Refuse a state whose header fits and whose content does not. */
 HSEP_API hsep_status hsep_state_damaged(char message[]);

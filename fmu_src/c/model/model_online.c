@@ -24,10 +24,10 @@ typedef struct {
 /* The arrays behind the struct begin at a multiple of 16 bytes, as an importer's memory does. */
 HSEP_ASSERT(alignment_of_online_state, sizeof(online_state) % 16 == 0);
 
-/* Check all parameters, read them and tell the bytes of the state. modes: (HSEP_N_MODES,). */
+/* Check all parameters and read them. modes: (HSEP_N_MODES,). */
 static hsep_status online_checked(
     const hsep_context *context, const double values[], hsep_online_parameters *parameters, hsep_mode modes[],
-    size_t *size, char message[])
+    char message[])
 {
     message[0] = '\0';
     if (hsep_check_parameters(context, values, message) > 0) {
@@ -49,31 +49,34 @@ static hsep_status online_checked(
         .hold = values[HSEP_VR_input_hold] > 0.0 ? HSEP_FIRST_ORDER_HOLD : HSEP_ZERO_ORDER_HOLD,
         .modes = modes};
     hsep_online_read(values, parameters);
-    const double before = (double)(sizeof(online_state) - sizeof(hsep_online));
-    return hsep_state_size(before + HSEP_ONLINE(size)(parameters), size, message);
+    return HSEP_OK;
 }
 
 HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[])
 {
     hsep_mode modes[HSEP_N_MODES];
     hsep_online_parameters parameters;
-    return online_checked(context, values, &parameters, modes, size, message);
+    if (online_checked(context, values, &parameters, modes, message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
+    const double before = (double)(sizeof(online_state) - sizeof(hsep_online));
+    return hsep_state_size(before + HSEP_ONLINE(size)(&parameters), size, message);
 }
 
 HSEP_API hsep_status hsep_model_initialise(
     const hsep_context *context, void *state, size_t size, double values[], double t_start, char message[])
 {
+    size_t needed = 0;
     online_state *self = state;
     hsep_mode modes[HSEP_N_MODES];
     hsep_online_parameters parameters;
     const double start = values[HSEP_VR_x_d_ahead];
-    size_t needed = 0;
-    if (online_checked(context, values, &parameters, modes, &needed, message) != HSEP_OK ||
-        hsep_state_fits(needed, size, message) != HSEP_OK ||
+    if (online_checked(context, values, &parameters, modes, message) != HSEP_OK ||
+        hsep_model_size(context, values, &needed, message) != HSEP_OK ||
+        hsep_state_begin(&self->header, context, values, HSEP_ONLINE_KIND, needed, size, message) != HSEP_OK ||
         hsep_inputs_init(&self->inputs, t_start, values[HSEP_VR_T_s], start, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
-    hsep_state_mark(&self->header, context, values, HSEP_ONLINE_KIND, size);
     HSEP_ONLINE(init)(&self->online, &parameters, start);
     hsep_predictor *predictor = hsep_online_predictor(&self->online);
     if (hsep_weights_load(
@@ -123,9 +126,8 @@ HSEP_API hsep_status hsep_model_check_state(
     hsep_mode modes[HSEP_N_MODES];
     hsep_online_parameters parameters;
     online_state head;
-    size_t expected = 0;
-    if (online_checked(context, values, &parameters, modes, &expected, message) != HSEP_OK ||
-        hsep_state_check(context, values, state, size, HSEP_ONLINE_KIND, expected, message) != HSEP_OK) {
+    if (online_checked(context, values, &parameters, modes, message) != HSEP_OK ||
+        hsep_state_check(context, values, state, size, HSEP_ONLINE_KIND, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     memcpy(&head, state, sizeof head);

@@ -56,15 +56,15 @@ static void stage_drive_write_outputs(const stage_drive_state *self, double valu
 HSEP_API hsep_status hsep_model_initialise(
     const hsep_context *context, void *state, size_t size, double values[], double t_start, char message[])
 {
+    size_t needed = 0;
     stage_drive_state *self = state;
     hsep_mode modes[HSEP_N_MODES];
-    size_t needed = 0;
     if (hsep_model_size(context, values, &needed, message) != HSEP_OK ||
-        hsep_state_fits(needed, size, message) != HSEP_OK || hsep_check_start_time(t_start, message) != HSEP_OK ||
+        hsep_state_begin(&self->header, context, values, STAGE_DRIVE_KIND, needed, size, message) != HSEP_OK ||
+        hsep_check_start_time(t_start, message) != HSEP_OK ||
         hsep_drive_check_start(values[HSEP_VR_x_d], message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
-    hsep_state_mark(&self->header, context, values, STAGE_DRIVE_KIND, size);
     hsep_encoder_init(&self->encoder, values[HSEP_VR_noise_std], (uint64_t)values[HSEP_VR_seed]);
     hsep_modes_read(&values[HSEP_VR_mode], HSEP_N_MODES, modes);
     hsep_stage_init(
@@ -107,9 +107,7 @@ HSEP_API hsep_status hsep_model_check_state(
     const hsep_context *context, const void *state, size_t size, const double values[], char message[])
 {
     stage_drive_state head;
-    size_t expected = 0;
-    if (hsep_model_size(context, values, &expected, message) != HSEP_OK ||
-        hsep_state_check(context, values, state, size, STAGE_DRIVE_KIND, expected, message) != HSEP_OK) {
+    if (hsep_state_check(context, values, state, size, STAGE_DRIVE_KIND, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     memcpy(&head, state, sizeof head);

@@ -105,8 +105,8 @@ HSEP_API const double *hsep_predictor_drive(const hsep_predictor *self, uint64_t
     return scheduled ? hsep_at_const(self, self->drive) + (self->preview - n) : NULL;
 }
 
-/* Whether the row of the sample in progress is learned. Missing is a measurement that is held while the drive moves. */
-static int predictor_guards(hsep_predictor *self, double x_meas, double x_pb)
+/* Before a row is learned: whether it is. A measurement that is held while the drive moves is missing. */
+static int predictor_guard(hsep_predictor *self, double x_meas, double x_pb)
 {
     if (self->saved && hsep_sensor_misses(&self->sensor, x_meas, x_pb)) {
         self->missing = 1;
@@ -138,7 +138,7 @@ HSEP_API int hsep_predictor_take_in(hsep_predictor *self, double x_d_ahead, doub
     const double x_h = hsep_at(self, self->x_h)[i];
     hsep_at(self, self->ahead)[self->k % self->preview] = x_d_ahead;
     hsep_at(self, self->past_e)[j] = x_meas - self->start - hsep_at(self, self->past_x)[j]; /* e_pb = x - x_pb */
-    if (predictor_guards(self, x_meas, x_pb)) {
+    if (predictor_guard(self, x_meas, x_pb)) {
         predictor_learn(self, i);
     }
     if (self->k >= self->preview && (double)self->k >= self->n_init) {
@@ -198,6 +198,15 @@ static void predictor_schedule(hsep_predictor *self)
     }
 }
 
+/* The weights of the window that begins, and what follows from them; eq. (6). */
+static void predictor_solve(hsep_predictor *self)
+{
+    hsep_regression_solve(hsep_predictor_regression(self), hsep_at(self, self->weights));
+    if (self->features.n > self->features.scheduled) {
+        predictor_schedule(self);
+    }
+}
+
 HSEP_API void hsep_predictor_begin(hsep_predictor *self)
 {
     const uint64_t Np = self->Np, oldest = self->k % self->preview, newest = self->preview - oldest;
@@ -206,10 +215,7 @@ HSEP_API void hsep_predictor_begin(hsep_predictor *self)
     memcpy(x_d, ahead + oldest, (size_t)newest * sizeof(double));
     memcpy(x_d + newest, ahead, (size_t)oldest * sizeof(double));
     memcpy(e_h + Np, past_e + Np, (size_t)self->features.p * sizeof(double));
-    hsep_regression_solve(hsep_predictor_regression(self), hsep_at(self, self->weights)); /* Eq. (6) */
-    if (self->features.n > self->features.scheduled) {
-        predictor_schedule(self);
-    }
+    predictor_solve(self);
     self->n_published = 0;
     self->learning = !self->missing && self->k >= self->preview; /* over the first fill there is nothing to learn */
     self->missing = 0;
@@ -217,6 +223,17 @@ HSEP_API void hsep_predictor_begin(hsep_predictor *self)
         memcpy(
             hsep_at(self, self->saved), hsep_at(self, self->regression),
             (size_t)(self->saved - self->regression) * sizeof(double));
+    }
+}
+
+/* Before the samples first ... last - 1 of a window are published: whether they diverge. */
+static void predictor_bound(hsep_predictor *self, uint64_t first, uint64_t last)
+{
+    const double *x_pb = hsep_at(self, self->x_pb) + first, *x_h = hsep_at(self, self->x_h) + first;
+    if (self->divergence == HSEP_CONVERGES && !hsep_within(x_pb, last - first, HSEP_PREDICTION_MAX)) {
+        self->divergence = HSEP_DIVERGES_X_PB;
+    } else if (self->divergence == HSEP_CONVERGES && !hsep_within(x_h, last - first, HSEP_PREDICTION_MAX)) {
+        self->divergence = HSEP_DIVERGES_X_H;
     }
 }
 
@@ -231,11 +248,7 @@ HSEP_API void hsep_predictor_publish(hsep_predictor *self, uint64_t last)
         x_pb[i] = past_x[Np - 1 - i] + self->start;
         x_h[i] = i < self->n_physics ? x_pb[i] : x_pb[i] + e_h[Np - 1 - i]; /* Eq. (4) */
     }
-    if (self->divergence == HSEP_CONVERGES && !hsep_within(x_pb + first, last - first, HSEP_PREDICTION_MAX)) {
-        self->divergence = HSEP_DIVERGES_X_PB;
-    } else if (self->divergence == HSEP_CONVERGES && !hsep_within(x_h + first, last - first, HSEP_PREDICTION_MAX)) {
-        self->divergence = HSEP_DIVERGES_X_H;
-    }
+    predictor_bound(self, first, last);
     self->n_published = last;
 }
 

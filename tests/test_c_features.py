@@ -1,0 +1,61 @@
+"""The layout of φ in the C core against the rows that the library learns."""
+
+from __future__ import annotations
+
+import ctypes
+
+import c_core
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from hybridsep.physics import ModalModel
+from hybridsep.predictor import HybridPredictor
+
+Array = NDArray[np.float64]
+
+NP, V_S = 8, 2e-3
+N_SCHEDULED = 13
+
+
+class Features(ctypes.Structure):
+    """hsep_features."""
+
+    _fields_ = tuple((name, ctypes.c_uint64) for name in ("p", "q", "x", "e", "scheduled", "n"))
+
+
+def layout(p: int, q: int, n_scheduled: int) -> Features:
+    features = Features()
+    c_core.library("predictor").hsep_features_lay_out(
+        ctypes.byref(features), *map(ctypes.c_uint64, (p, q, n_scheduled))
+    )
+    return features
+
+
+@pytest.mark.parametrize(("p", "q", "v_s"), [(1, 0, 0.0), (3, 2, 0.0), (8, 7, 0.0), (3, 2, V_S), (8, 0, V_S)])
+def test_a_row_of_the_library_has_the_slices_of_the_core(
+    p: int, q: int, v_s: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
+    predictor = HybridPredictor(model, Np=NP, p=p, q=q, lam=1e-8, t_init=0.0, v_s=v_s, start=0.0)
+    learned: list[Array] = []
+    monkeypatch.setattr(predictor.regression, "update_stacked", lambda rows: learned.append(rows.copy()))
+    features = layout(p, q, N_SCHEDULED if v_s else 0)
+    chance = np.random.default_rng(0)
+    x_pb, e_pb = np.zeros(0), np.zeros(0)
+    for window in range(3):
+        predicted = predictor.predict(1e-3 * np.sin(0.3 * np.arange(NP) + window))
+        measured = predicted.x_pb + chance.normal(0.0, 1e-6, NP)
+        predictor.update(measured)
+        x_pb = np.concatenate((x_pb, predicted.x_pb))
+        e_pb = np.concatenate((e_pb, measured - predicted.x_pb))
+    assert (features.p, features.q, features.n) == (p, q, predictor.n_features)
+    assert learned[-1].shape == (NP, features.n + 1)
+    for k, row in enumerate(learned[-1], start=2 * NP):
+        assert row[0] == 1.0
+        assert row[features.x : features.e] == pytest.approx(x_pb[k - q : k + 1][::-1], abs=1e-15)
+        assert row[features.e : features.scheduled] == pytest.approx(e_pb[k - p : k][::-1], abs=1e-15)
+        assert np.all(np.abs(row[features.scheduled : features.n]) <= 1e-3)
+        assert row[features.n] == pytest.approx(e_pb[k], abs=1e-15)
+    assert features.n - features.scheduled == (N_SCHEDULED if v_s else 0)
+    assert np.any(learned[-1][:, features.scheduled : features.n]) == bool(v_s)
