@@ -12,11 +12,16 @@ static const char *const hsep_category_names[HSEP_N_CATEGORIES] = {
 static const fmi2Status hsep_category_status[HSEP_N_CATEGORIES] = {
     fmi2Warning, fmi2Discard, fmi2Error, fmi2Fatal, fmi2OK};
 
-static int hsep_category_place(hsep_category category)
+/* Names of the states, one bit each. */
+static const char *const hsep_phase_names[] = {
+    "instantiated", "Initialization Mode", "stepping (after fmi2ExitInitializationMode)", "terminated"};
+
+/* The place of the only bit that is set. */
+static int hsep_place(unsigned bit)
 {
     int place = 0;
-    while ((1U << place) != (unsigned)category) {
-        ++place;
+    while ((1U << place) != bit) {
+        place++;
     }
     return place;
 }
@@ -25,7 +30,7 @@ static void hsep_log_list(const hsep_instance *instance, hsep_category category,
 {
     char text[2 * HSEP_MESSAGE_SIZE];
     char escaped[4 * HSEP_MESSAGE_SIZE];
-    const int place = hsep_category_place(category);
+    const int place = hsep_place((unsigned)category);
     size_t n = 0;
     const hsep_component *component = (const hsep_component *)instance;
     if (component->logger == NULL || (component->categories & (unsigned)category) == 0) {
@@ -62,20 +67,6 @@ HSEP_API fmi2Status hsep_refuse(hsep_instance *instance, const char *format, ...
     return fmi2Error;
 }
 
-static const char *hsep_phase_name(unsigned phase)
-{
-    switch (phase) {
-    case HSEP_INSTANTIATED:
-        return "instantiated";
-    case HSEP_INITIALIZATION:
-        return "Initialization Mode";
-    case HSEP_STEPPING:
-        return "stepping (after fmi2ExitInitializationMode)";
-    default:
-        return "terminated";
-    }
-}
-
 HSEP_API hsep_instance *hsep_begin(fmi2Component component, hsep_call call)
 {
     hsep_instance *instance = component;
@@ -86,11 +77,13 @@ HSEP_API hsep_instance *hsep_begin(fmi2Component component, hsep_call call)
     }
     for (unsigned phase = HSEP_INSTANTIATED; phase <= HSEP_TERMINATED; phase *= 2) {
         if ((row->legal & phase) != 0) {
-            (void)strcat(strcat(legal, (legal[0] == '\0') ? "; it is allowed in: " : ", "), hsep_phase_name(phase));
+            (void)strcat(
+                strcat(legal, (legal[0] == '\0') ? "; it is allowed in: " : ", "), hsep_phase_names[hsep_place(phase)]);
         }
     }
     (void)hsep_refuse(
-        instance, "%s is not allowed in the state %s%s", row->name, hsep_phase_name(instance->experiment.phase), legal);
+        instance, "%s is not allowed in the state %s%s", row->name,
+        hsep_phase_names[hsep_place(instance->experiment.phase)], legal);
     return NULL;
 }
 
