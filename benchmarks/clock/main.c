@@ -1,7 +1,8 @@
 /* Accumulate steps in the C core's clock and compare with the exact sum of the same doubles in 128-bit integers.
  *
- * Arguments: number of steps, start s, T_s s, then the step sizes s that take turns. Prints the largest deviation of the
- * clock's time from the exact one, in T_s, and how often the number of instants reached was another one than the rule's.
+ * Arguments: number of steps, start s, T_s s, then the step sizes s that take turns. Prints the largest deviation of
+ * the clock's time from the exact one, in T_s, and how often the number of instants reached was another one than the
+ * rule's.
  */
 #include "hsep_clock.h"
 
@@ -14,7 +15,8 @@
 
 typedef __int128 wide;
 
-static const int unit = -84; /* times are counted in 2^-84 s: every double of at least 2^-31 s is a whole number of them */
+/* Times are counted in 2^-84 s: every double of at least 2^-31 s is a whole number of them. */
+static const int unit = -84;
 
 static wide exact(double time)
 {

@@ -24,7 +24,7 @@ from rich.table import Table
 from hybridsep.fmi.compiler import compile_flags
 
 HERE = Path(__file__).resolve().parent
-CORE = HERE.parents[1] / "fmu_src" / "c" / "core"
+CORE = HERE.parents[1] / "fmu_src" / "c" / "core" / "numeric"
 DEVIATION_MAX = 1e-9
 CASES = (
     (0.0, 1e-3, (1e-3,)),

@@ -61,8 +61,8 @@ def build(folder: Path, model: str, parameters: dict[str, Any]) -> Host:
     (folder / "hsep_fmu.h").write_text(c_header(description, "{benchmark}"), encoding="utf-8")
     compiler = os.environ.get("CC") or shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
     command = compiler.split() if compiler else [sys.executable, "-m", "ziglang", "cc", "-mcpu=baseline"]
-    sources = sorted((C_SOURCES / "core").glob("*.c")) + sorted((C_SOURCES / "model").glob("*.c"))
-    includes = [f"-I{path}" for path in (folder, C_SOURCES / "core", C_SOURCES / "model")]
+    sources = [path for part in ("core", "model") for path in sorted((C_SOURCES / part).rglob("*.c"))]
+    includes = [f"-I{path}" for path in (folder, *sorted({path.parent for path in C_SOURCES.rglob("*.h")}))]
     program = folder / "step_time"
     subprocess.run(
         [

@@ -101,8 +101,7 @@ static double measured(position_source *source, const double values[], size_t k)
 /* Count to n; the compiler cannot know that this does nothing. */
 static void idle(size_t n)
 {
-    for (volatile size_t i = 0; i < n; i++) {
-    }
+    for (volatile size_t i = 0; i < n; i++) {}
 }
 
 int main(int n_arguments, char *arguments[])

@@ -34,7 +34,6 @@ from .weights import WEIGHTS_FILE, weights_file
 
 __all__ = ["all_c", "files", "fmi_headers", "sources"]
 
-_FOLDERS = ("core", "model", "fmi2")
 _FMI_HEADERS = ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")
 _TRAJECTORY_MAGIC = b"HSEPTRJ1"
 
@@ -114,7 +113,7 @@ def sources(description: Mapping[str, object], guid: str) -> dict[str, bytes]:
         The modelDescription's.
     """
     root = data_folder("fmu_src") / "c"
-    ours = {path.name: path.read_bytes() for folder in _FOLDERS for path in sorted((root / folder).glob("*.[ch]"))}
+    ours = {path.name: path.read_bytes() for path in sorted(root.rglob("*.[ch]"))}
     unit = all_c([file for file in ours if file.endswith(".c")])
     return {"all.c": unit.encode(), **ours, "hsep_fmu.h": c_header(description, guid).encode()}
 

@@ -1,6 +1,6 @@
-/* Ask ReferenceTrajectory for its size, put another file in its resource's place, and initialise it in memory of exactly
- * that size; to be compiled with the address sanitiser. Arguments: the resources folder with a trailing slash, the file
- * in it, and what takes its place. Prints the message of a refusal, or the last position that is played. */
+/* Ask ReferenceTrajectory for its size, put another file in its resource's place, and initialise it in memory of
+ * exactly that size; to be compiled with the address sanitiser. Arguments: the resources folder with a trailing slash,
+ * the file in it, and what takes its place. Prints the message of a refusal, or the last position that is played. */
 #include "hsep_fmu.h"
 
 #include <stdio.h>

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
+import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import c_core
@@ -14,6 +17,16 @@ from c_core import write_trajectory
 from places import ROOT
 
 from hybridsep.fmi.native_backend import all_c
+
+
+def test_the_c_files_are_formatted() -> None:
+    command = shutil.which("clang-format", path=str(Path(sys.executable).parent))
+    assert command, "clang-format is missing: pip install -e '.[test]'"
+    files = [path for folder in ("fmu_src", "tests", "benchmarks") for path in (ROOT / folder).rglob("*.[ch]*")]
+    assert len(files) > 60
+    done = subprocess.run([command, "--dry-run", "--Werror", *files], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert [path for path in files if max(map(len, path.read_text(encoding="utf-8").splitlines())) > 120] == []
 
 
 def test_the_core_needs_libm_alone() -> None:
@@ -35,7 +48,7 @@ def test_the_core_needs_libm_alone() -> None:
         "fmax",
         "fmin",
     }
-    core = {path.stem for path in (c_core.C_SOURCES / "core").glob("*.c")}
+    core = {path.stem for path in (c_core.C_SOURCES / "core").rglob("*.c")}
     for built in c_core.object_files():
         if Path(built).stem not in core:
             continue
@@ -53,6 +66,25 @@ def test_everything_compiles_as_one_file(name: str) -> None:
     everything.write_text(all_c(c_core.sources()))
     for level in ("-O0", "-O3"):
         c_core.run_compiler([level, f"-I{folder}", *c_core.include_flags(), "-c", everything, "-o", folder / "all.o"])
+
+
+def cpp_compiler() -> list[str]:
+    """Return the command of a C++ compiler; empty if there is none."""
+    found = next((path for name in ("c++", "g++", "clang++") if (path := shutil.which(name))), None)
+    return [found] if found else [sys.executable, "-m", "ziglang", "c++"] if find_spec("ziglang") else []
+
+
+@pytest.mark.skipif(not cpp_compiler(), reason="no C++ compiler here; install g++, clang++ or the ziglang package")
+def test_one_header_serves_c_plus_plus() -> None:
+    """Compiled as C++11, it links with the core that C compiled, and predicts a window."""
+    program = c_core.build_folder() / "header"
+    source = ROOT / "tests" / "c" / "header.cpp"
+    flags = ["-std=c++11", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", *c_core.include_flags()]
+    arguments = [*cpp_compiler(), *flags, str(source), *c_core.object_files(), "-lm", "-o", str(program)]
+    built = subprocess.run(arguments, capture_output=True, text=True, check=False)
+    assert built.returncode == 0, built.stderr
+    done = subprocess.run([program], capture_output=True, text=True, check=True)
+    assert done.stdout == "9 1\n"
 
 
 @c_core.needs_sanitisers

@@ -34,8 +34,14 @@ typedef struct {
     extern fmi2FreeInstanceTYPE model##_fmi2FreeInstance;
 
 #define FUNCTIONS(model) \
-    {model##_fmi2Instantiate, model##_fmi2EnterInitializationMode, model##_fmi2ExitInitializationMode, \
-     model##_fmi2SetReal, model##_fmi2GetReal, model##_fmi2DoStep, model##_fmi2FreeInstance, NULL}
+    {model##_fmi2Instantiate, \
+     model##_fmi2EnterInitializationMode, \
+     model##_fmi2ExitInitializationMode, \
+     model##_fmi2SetReal, \
+     model##_fmi2GetReal, \
+     model##_fmi2DoStep, \
+     model##_fmi2FreeInstance, \
+     NULL}
 
 DECLARE(ReferenceTrajectory)
 DECLARE(HybridPredictor)
@@ -49,8 +55,9 @@ static void expect(int held, const char *what)
     }
 }
 
-static void logged(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status, fmi2String category,
-    fmi2String message, ...)
+static void logged(
+    fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status, fmi2String category, fmi2String message,
+    ...)
 {
     va_list arguments;
     (void)environment;
@@ -86,7 +93,9 @@ static void set(const fmu *self, fmi2ValueReference reference, double value)
 
 int main(int n_arguments, char *arguments[])
 {
-    fmu reference = FUNCTIONS(ReferenceTrajectory), predictor = FUNCTIONS(HybridPredictor), plant = FUNCTIONS(FeedDrive);
+    fmu reference = FUNCTIONS(ReferenceTrajectory);
+    fmu predictor = FUNCTIONS(HybridPredictor);
+    fmu plant = FUNCTIONS(FeedDrive);
     expect(n_arguments == 3, "two arguments");
     const long steps = strtol(arguments[1], NULL, 10);
     begin(&reference, "reference", REFERENCE_GUID, arguments[2]);

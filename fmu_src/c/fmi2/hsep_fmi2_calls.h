@@ -8,20 +8,10 @@
 #ifndef HSEP_FMI2_CALLS_H
 #define HSEP_FMI2_CALLS_H
 
-typedef enum {
-    HSEP_INSTANTIATED = 1,
-    HSEP_INITIALIZATION = 2,
-    HSEP_STEPPING = 4,
-    HSEP_TERMINATED = 8
-} hsep_phase;
+#include "hsep_instance.h"
 
 /* The states, short, for the columns of the table below. */
-enum {
-    HSEP_I = HSEP_INSTANTIATED,
-    HSEP_M = HSEP_INITIALIZATION,
-    HSEP_S = HSEP_STEPPING,
-    HSEP_T = HSEP_TERMINATED
-};
+enum { HSEP_I = HSEP_INSTANTIATED, HSEP_M = HSEP_INITIALIZATION, HSEP_S = HSEP_STEPPING, HSEP_T = HSEP_TERMINATED };
 
 /* The calls that belong to an instance. */
 typedef enum {

@@ -1,74 +1,8 @@
-/* The life of an instance: memory, instantiation, reset, end. */
+/* The life of an instance: instantiation, reset, end. */
 #include "hsep_fmi2_instance.h"
 
 #include <stdlib.h>
 #include <string.h>
-
-#include "hsep_uri.h"
-
-#ifdef _WIN32
-enum { HSEP_WINDOWS = 1 };
-#else
-enum { HSEP_WINDOWS = 0 };
-#endif
-
-HSEP_API void *hsep_new(const hsep_instance *instance, size_t size)
-{
-    void *block = instance->allocate(1, size);
-    return (block == NULL) ? NULL : memset(block, 0, size);
-}
-
-HSEP_API void hsep_delete(const hsep_instance *instance, void *block)
-{
-    if (block != NULL) {
-        instance->release(block);
-    }
-}
-
-HSEP_API void hsep_drop_state(hsep_instance *instance)
-{
-    hsep_delete(instance, instance->state);
-    instance->state = NULL;
-    instance->state_size = 0;
-}
-
-/* As after fmi2Instantiate: start values, no experiment, no state. */
-static void hsep_begin_again(hsep_instance *instance)
-{
-    hsep_drop_state(instance);
-    memset(instance->values, 0, sizeof instance->values);
-    for (size_t i = 0; i < HSEP_N_VARIABLES; ++i) {
-        instance->values[i] = hsep_variables[i].start;
-    }
-    hsep_model_start_values(&instance->context, instance->values);
-    instance->has_stop_time = 0;
-    instance->start_time = 0.0;
-    instance->stop_time = 0.0;
-    instance->time = 0.0;
-    instance->phase = HSEP_INSTANTIATED;
-}
-
-/* Keep name and resources; 0, with a message, if there is no memory for them. */
-static int hsep_keep_texts(hsep_instance *instance, const char *name, const char *resources)
-{
-    instance->name = hsep_new(instance, strlen(name) + 1);
-    if (resources != NULL) {
-        instance->resources = hsep_new(instance, HSEP_FOLDER_SIZE(strlen(resources)));
-    }
-    if (instance->name == NULL || (resources != NULL && instance->resources == NULL)) {
-        (void)hsep_refuse(instance, "fmi2Instantiate: no memory for the instance's name and resources");
-        return 0;
-    }
-    (void)strcpy(instance->name, name);
-    if (resources != NULL && !hsep_uri_folder(resources, HSEP_WINDOWS, instance->resources)) {
-        hsep_log(instance, HSEP_LOG_WARNING,
-            "fmi2Instantiate: fmuResourceLocation must be a file: URI on this machine, got %.300s; it is not used",
-            resources);
-        hsep_delete(instance, instance->resources);
-        instance->resources = NULL;
-    }
-    return 1;
-}
 
 /* Say why the arguments of fmi2Instantiate cannot be used; 1 if they can. */
 static int hsep_check_arguments(hsep_instance *instance, fmi2String name, fmi2Type type, fmi2String guid)
@@ -78,60 +12,64 @@ static int hsep_check_arguments(hsep_instance *instance, fmi2String name, fmi2Ty
     } else if (type != fmi2CoSimulation) {
         (void)hsep_refuse(instance, "fmi2Instantiate: fmuType must be fmi2CoSimulation, got %d", (int)type);
     } else if (guid == NULL || strcmp(guid, HSEP_GUID) != 0) {
-        (void)hsep_refuse(instance, "fmi2Instantiate: fmuGUID must be %s as in modelDescription.xml, got %.100s",
-            HSEP_GUID, (guid == NULL) ? "NULL" : guid);
+        (void)hsep_refuse(
+            instance, "fmi2Instantiate: fmuGUID must be %s as in modelDescription.xml, got %.100s", HSEP_GUID,
+            (guid == NULL) ? "NULL" : guid);
     } else {
         return 1;
     }
     return 0;
 }
 
-fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID,
-    fmi2String fmuResourceLocation, const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean loggingOn)
+fmi2Component fmi2Instantiate(
+    fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID, fmi2String fmuResourceLocation,
+    const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean loggingOn)
 {
     const int own_memory = functions == NULL || functions->allocateMemory == NULL || functions->freeMemory == NULL;
     const hsep_allocate allocate = own_memory ? calloc : functions->allocateMemory;
     const fmi2CallbackLogger logger = (functions == NULL) ? NULL : functions->logger;
-    hsep_instance *instance = allocate(1, sizeof *instance);
+    char message[HSEP_MESSAGE_SIZE] = "";
+    hsep_component *component = allocate(1, sizeof *component);
     (void)visible;
-    if (instance == NULL) {
+    if (component == NULL) {
         if (logger != NULL) {
-            logger(functions->componentEnvironment, HSEP_MODEL_IDENTIFIER, fmi2Error, "logStatusError",
-                "fmi2Instantiate: no memory for an instance of %lu bytes", (unsigned long)sizeof *instance);
+            logger(
+                functions->componentEnvironment, HSEP_MODEL_IDENTIFIER, fmi2Error, "logStatusError",
+                "fmi2Instantiate: no memory for an instance of %lu bytes", (unsigned long)sizeof *component);
         }
         return NULL;
     }
-    memset(instance, 0, sizeof *instance);
+    memset(component, 0, sizeof *component);
+    component->logger = logger;
+    component->environment = (functions == NULL) ? NULL : functions->componentEnvironment;
+    component->categories = HSEP_LOG_WARNING | HSEP_LOG_DISCARD | HSEP_LOG_ERROR | HSEP_LOG_FATAL;
+    if (loggingOn) {
+        component->categories |= HSEP_LOG_ALL;
+    }
+    hsep_instance *instance = &component->instance;
     instance->allocate = allocate;
     instance->release = own_memory ? free : functions->freeMemory;
-    instance->logger = logger;
-    instance->environment = (functions == NULL) ? NULL : functions->componentEnvironment;
-    instance->categories = HSEP_LOG_WARNING | HSEP_LOG_DISCARD | HSEP_LOG_ERROR | HSEP_LOG_FATAL;
-    if (loggingOn) {
-        instance->categories |= HSEP_LOG_ALL;
+    hsep_status status = HSEP_REFUSED;
+    if (hsep_check_arguments(instance, instanceName, fmuType, fmuGUID)) {
+        status = hsep_instance_name(instance, "fmi2Instantiate", instanceName, fmuResourceLocation, message);
+        if (status != HSEP_OK) {
+            hsep_log(instance, status == HSEP_WARNED ? HSEP_LOG_WARNING : HSEP_LOG_ERROR, "%s", message);
+        }
     }
-    if (!hsep_check_arguments(instance, instanceName, fmuType, fmuGUID)
-        || !hsep_keep_texts(instance, instanceName, fmuResourceLocation)) {
-        fmi2FreeInstance(instance);
+    if (status == HSEP_REFUSED) {
+        hsep_instance_free(instance);
         return NULL;
     }
-    instance->context.variables = hsep_variables;
-    instance->context.n_variables = HSEP_N_VARIABLES;
-    instance->context.resources = instance->resources;
-    hsep_begin_again(instance);
-    return instance;
+    hsep_instance_reset(instance);
+    return component;
 }
 
 void fmi2FreeInstance(fmi2Component c)
 {
-    hsep_instance *instance = c;
-    if (instance == NULL) {
-        return;
+    hsep_component *component = c;
+    if (component != NULL) {
+        hsep_instance_free(&component->instance);
     }
-    hsep_drop_state(instance);
-    hsep_delete(instance, instance->resources);
-    hsep_delete(instance, instance->name);
-    instance->release(instance);
 }
 
 fmi2Status fmi2Reset(fmi2Component c)
@@ -140,6 +78,6 @@ fmi2Status fmi2Reset(fmi2Component c)
     if (instance == NULL) {
         return fmi2Error;
     }
-    hsep_begin_again(instance);
+    hsep_instance_reset(instance);
     return fmi2OK;
 }

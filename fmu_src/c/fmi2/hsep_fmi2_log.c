@@ -12,34 +12,41 @@ static const char *const hsep_category_names[HSEP_N_CATEGORIES] = {
 static const fmi2Status hsep_category_status[HSEP_N_CATEGORIES] = {
     fmi2Warning, fmi2Discard, fmi2Error, fmi2Fatal, fmi2OK};
 
-static int hsep_category_place(hsep_category category)
+/* Names of the states, one bit each. */
+static const char *const hsep_phase_names[] = {
+    "instantiated", "Initialization Mode", "stepping (after fmi2ExitInitializationMode)", "terminated"};
+
+/* The place of the only bit that is set. */
+static int hsep_place(unsigned bit)
 {
     int place = 0;
-    while ((1U << place) != (unsigned)category) {
-        ++place;
+    while ((1U << place) != bit) {
+        place++;
     }
     return place;
 }
 
-static void hsep_log_list(hsep_instance *instance, hsep_category category, const char *format, va_list arguments)
+static void hsep_log_list(const hsep_instance *instance, hsep_category category, const char *format, va_list arguments)
 {
     char text[2 * HSEP_MESSAGE_SIZE];
     char escaped[4 * HSEP_MESSAGE_SIZE];
-    const int place = hsep_category_place(category);
+    const int place = hsep_place((unsigned)category);
     size_t n = 0;
-    if (instance->logger == NULL || (instance->categories & (unsigned)category) == 0) {
+    const hsep_component *component = (const hsep_component *)instance;
+    if (component->logger == NULL || (component->categories & (unsigned)category) == 0) {
         return;
     }
     (void)vsnprintf(text, sizeof text, format, arguments);
     /* The logger reads its message as printf does: a percent sign in ours stands for itself. */
-    for (const char *c = text; *c != '\0'; ++c) {
+    for (const char *c = text; *c != '\0'; c++) {
         if (*c == '%') {
             escaped[n++] = '%';
         }
         escaped[n++] = *c;
     }
     escaped[n] = '\0';
-    instance->logger(instance->environment, (instance->name == NULL) ? HSEP_MODEL_IDENTIFIER : instance->name,
+    component->logger(
+        component->environment, (instance->name == NULL) ? HSEP_MODEL_IDENTIFIER : instance->name,
         hsep_category_status[place], hsep_category_names[place], escaped);
 }
 
@@ -60,34 +67,23 @@ HSEP_API fmi2Status hsep_refuse(hsep_instance *instance, const char *format, ...
     return fmi2Error;
 }
 
-static const char *hsep_phase_name(unsigned phase)
-{
-    switch (phase) {
-    case HSEP_INSTANTIATED:
-        return "instantiated";
-    case HSEP_INITIALIZATION:
-        return "Initialization Mode";
-    case HSEP_STEPPING:
-        return "stepping (after fmi2ExitInitializationMode)";
-    default:
-        return "terminated";
-    }
-}
-
 HSEP_API hsep_instance *hsep_begin(fmi2Component component, hsep_call call)
 {
     hsep_instance *instance = component;
     const hsep_call_row *row = &hsep_calls[call];
     char legal[HSEP_MESSAGE_SIZE] = "";
-    if (instance == NULL || (row->legal & (unsigned)instance->phase) != 0) {
+    if (instance == NULL || (row->legal & (unsigned)instance->experiment.phase) != 0) {
         return instance;
     }
     for (unsigned phase = HSEP_INSTANTIATED; phase <= HSEP_TERMINATED; phase *= 2) {
         if ((row->legal & phase) != 0) {
-            (void)strcat(strcat(legal, (legal[0] == '\0') ? "; it is allowed in: " : ", "), hsep_phase_name(phase));
+            (void)strcat(
+                strcat(legal, (legal[0] == '\0') ? "; it is allowed in: " : ", "), hsep_phase_names[hsep_place(phase)]);
         }
     }
-    (void)hsep_refuse(instance, "%s is not allowed in the state %s%s", row->name, hsep_phase_name(instance->phase), legal);
+    (void)hsep_refuse(
+        instance, "%s is not allowed in the state %s%s", row->name,
+        hsep_phase_names[hsep_place(instance->experiment.phase)], legal);
     return NULL;
 }
 
@@ -97,16 +93,17 @@ fmi2Status fmi2SetDebugLogging(
     fmi2Component c, fmi2Boolean loggingOn, size_t nCategories, const fmi2String categories[])
 {
     hsep_instance *instance = hsep_begin(c, HSEP_CALL_SET_DEBUG_LOGGING);
+    hsep_component *component = c;
     unsigned named = 0;
     if (instance == NULL) {
         return fmi2Error;
     }
     if (nCategories > 0 && categories == NULL) {
-        return hsep_refuse(instance, "fmi2SetDebugLogging: categories is NULL, but nCategories is %lu",
-            (unsigned long)nCategories);
+        return hsep_refuse(
+            instance, "fmi2SetDebugLogging: categories is NULL, but nCategories is %lu", (unsigned long)nCategories);
     }
-    for (size_t i = 0; i < nCategories; ++i) {
-        for (unsigned place = 0; categories[i] != NULL && place < HSEP_N_CATEGORIES; ++place) {
+    for (size_t i = 0; i < nCategories; i++) {
+        for (unsigned place = 0; categories[i] != NULL && place < HSEP_N_CATEGORIES; place++) {
             if (strcmp(categories[i], hsep_category_names[place]) == 0) {
                 named |= 1U << place;
             }
@@ -116,9 +113,9 @@ fmi2Status fmi2SetDebugLogging(
         named = HSEP_LOG_EVERYTHING;
     }
     if (nCategories == 0) {
-        instance->categories = loggingOn ? HSEP_LOG_EVERYTHING : HSEP_LOG_EVERYTHING & ~(unsigned)HSEP_LOG_ALL;
+        component->categories = loggingOn ? HSEP_LOG_EVERYTHING : HSEP_LOG_EVERYTHING & ~(unsigned)HSEP_LOG_ALL;
     } else if (named != 0) {
-        instance->categories = loggingOn ? named : instance->categories & ~named;
+        component->categories = loggingOn ? named : component->categories & ~named;
     }
     return fmi2OK;
 }

@@ -1,90 +1,45 @@
-/* Saving and restoring an instance. */
-#include "hsep_fmi2_saved.h"
+/* Saving, restoring and serialising an instance. */
+#include "hsep_fmi2_instance.h"
 
-#include <string.h>
+#include "hsep_saved.h"
 
-static hsep_header hsep_header_of(const hsep_instance *instance)
+/* The instance if the call is legal and the handle is a saved state, which goes to *saved; otherwise NULL, with a
+ * message. */
+static hsep_instance *hsep_begin_saved(fmi2Component c, hsep_call call, fmi2FMUstate state, hsep_saved **saved)
 {
-    hsep_header header;
-    memset(&header, 0, sizeof header);
-    memcpy(header.magic, HSEP_SAVED_MAGIC, sizeof header.magic);
-    header.version = HSEP_SAVED_VERSION;
-    header.byte_order = HSEP_BYTE_ORDER;
-    memcpy(header.guid, HSEP_GUID, sizeof HSEP_GUID);
-    header.size = HSEP_FIXED_SIZE + instance->state_size;
-    header.phase = (uint32_t)instance->phase;
-    header.has_stop_time = instance->has_stop_time ? 1U : 0U;
-    header.start_time = instance->start_time;
-    header.stop_time = instance->stop_time;
-    header.time = instance->time;
-    header.state_size = instance->state_size;
-    return header;
-}
-
-HSEP_API hsep_saved *hsep_saved_of(hsep_instance *instance, hsep_call call, fmi2FMUstate state)
-{
-    hsep_saved *saved = state;
-    if (saved == NULL) {
+    hsep_instance *instance = hsep_begin(c, call);
+    *saved = state;
+    if (instance != NULL && state == NULL) {
         (void)hsep_refuse(instance, "%s: FMUstate is NULL", hsep_calls[call].name);
-    } else if (memcmp(saved->magic, HSEP_SAVED_MAGIC, sizeof saved->magic) != 0) {
+        return NULL;
+    }
+    if (instance != NULL && !hsep_is_saved(*saved)) {
         (void)hsep_refuse(instance, "%s: FMUstate is no state of this FMU", hsep_calls[call].name);
-        saved = NULL;
+        return NULL;
     }
-    return saved;
+    return instance;
 }
 
-HSEP_API void hsep_free_saved(hsep_saved *saved)
+/* The same where a place for a handle is given, which may hold none. */
+static hsep_instance *hsep_begin_place(fmi2Component c, hsep_call call, fmi2FMUstate *place, hsep_saved **saved)
 {
-    memset(saved->magic, 0, sizeof saved->magic);
-    saved->release(saved);
-}
-
-HSEP_API hsep_saved *hsep_room(hsep_instance *instance, hsep_saved *saved, size_t size)
-{
-    if (saved != NULL && saved->capacity >= size) {
-        return saved;
-    }
-    saved = hsep_new(instance, sizeof *saved + size);
-    if (saved != NULL) {
-        memcpy(saved->magic, HSEP_SAVED_MAGIC, sizeof saved->magic);
-        saved->capacity = size;
-        saved->release = instance->release;
-    }
-    return saved;
+    *saved = NULL;
+    return place != NULL && *place != NULL ? hsep_begin_saved(c, call, *place, saved) : hsep_begin(c, call);
 }
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate)
 {
-    hsep_instance *instance = hsep_begin(c, HSEP_CALL_GET_FMU_STATE);
-    hsep_saved *old = NULL;
+    char message[HSEP_MESSAGE_SIZE] = "";
     hsep_saved *saved;
-    unsigned char *block;
-    hsep_header header;
+    hsep_instance *instance = hsep_begin_place(c, HSEP_CALL_GET_FMU_STATE, FMUstate, &saved);
     if (instance == NULL) {
         return fmi2Error;
     }
     if (FMUstate == NULL) {
         return hsep_refuse(instance, "fmi2GetFMUstate: FMUstate is NULL");
     }
-    if (*FMUstate != NULL) {
-        old = hsep_saved_of(instance, HSEP_CALL_GET_FMU_STATE, *FMUstate);
-        if (old == NULL) {
-            return fmi2Error;
-        }
-    }
-    header = hsep_header_of(instance);
-    saved = hsep_room(instance, old, (size_t)header.size);
-    if (saved == NULL) {
-        return hsep_refuse(instance, "fmi2GetFMUstate: no memory for %lu bytes", (unsigned long)header.size);
-    }
-    block = (unsigned char *)saved->block;
-    memcpy(block, &header, sizeof header);
-    memcpy(block + sizeof header, instance->values, HSEP_VALUES_SIZE);
-    if (instance->state != NULL) {
-        memcpy(block + HSEP_FIXED_SIZE, instance->state, instance->state_size);
-    }
-    if (old != NULL && old != saved) {
-        hsep_free_saved(old);
+    if (hsep_save(instance, &saved, message) != HSEP_OK) {
+        return hsep_refuse(instance, "fmi2GetFMUstate: %s", message);
     }
     *FMUstate = saved;
     return fmi2OK;
@@ -92,62 +47,77 @@ fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate)
 
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate)
 {
-    hsep_instance *instance = hsep_begin(c, HSEP_CALL_SET_FMU_STATE);
-    const hsep_saved *saved;
-    const unsigned char *block;
-    hsep_header header;
+    char message[HSEP_MESSAGE_SIZE] = "";
+    hsep_saved *saved;
+    hsep_instance *instance = hsep_begin_saved(c, HSEP_CALL_SET_FMU_STATE, FMUstate, &saved);
     if (instance == NULL) {
         return fmi2Error;
     }
-    saved = hsep_saved_of(instance, HSEP_CALL_SET_FMU_STATE, FMUstate);
-    if (saved == NULL) {
-        return fmi2Error;
+    if (hsep_restore(instance, saved, message) != HSEP_OK) {
+        return hsep_refuse(instance, "fmi2SetFMUstate: %s", message);
     }
-    block = (const unsigned char *)saved->block;
-    memcpy(&header, block, sizeof header);
-    if (strcmp(header.guid, HSEP_GUID) != 0) {
-        return hsep_refuse(instance, "fmi2SetFMUstate: the state belongs to the FMU %s, not to %s", header.guid, HSEP_GUID);
-    }
-    if (header.state_size != instance->state_size) {
-        void *state = NULL;
-        if (header.state_size > 0) {
-            state = hsep_new(instance, (size_t)header.state_size);
-            if (state == NULL) {
-                return hsep_refuse(
-                    instance, "fmi2SetFMUstate: no memory for %lu bytes", (unsigned long)header.state_size);
-            }
-        }
-        hsep_drop_state(instance);
-        instance->state = state;
-        instance->state_size = (size_t)header.state_size;
-    }
-    memcpy(instance->values, block + sizeof header, HSEP_VALUES_SIZE);
-    if (instance->state != NULL) {
-        memcpy(instance->state, block + HSEP_FIXED_SIZE, instance->state_size);
-    }
-    instance->phase = (hsep_phase)header.phase;
-    instance->has_stop_time = (int)header.has_stop_time;
-    instance->start_time = header.start_time;
-    instance->stop_time = header.stop_time;
-    instance->time = header.time;
     return fmi2OK;
 }
 
 fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *FMUstate)
 {
-    hsep_instance *instance = hsep_begin(c, HSEP_CALL_FREE_FMU_STATE);
     hsep_saved *saved;
+    if (hsep_begin_place(c, HSEP_CALL_FREE_FMU_STATE, FMUstate, &saved) == NULL) {
+        return fmi2Error;
+    }
+    if (saved != NULL) { /* the standard: freeing nothing is fine */
+        hsep_free_saved(saved);
+        *FMUstate = NULL;
+    }
+    return fmi2OK;
+}
+
+fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, size_t *size)
+{
+    hsep_saved *saved;
+    hsep_instance *instance = hsep_begin_saved(c, HSEP_CALL_SERIALIZED_FMU_STATE_SIZE, FMUstate, &saved);
     if (instance == NULL) {
         return fmi2Error;
     }
-    if (FMUstate == NULL || *FMUstate == NULL) {
-        return fmi2OK; /* the standard: freeing nothing is fine */
+    if (size == NULL) {
+        return hsep_refuse(instance, "fmi2SerializedFMUstateSize: size is NULL");
     }
-    saved = hsep_saved_of(instance, HSEP_CALL_FREE_FMU_STATE, *FMUstate);
-    if (saved == NULL) {
+    *size = hsep_saved_size(saved);
+    return fmi2OK;
+}
+
+fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byte serializedState[], size_t size)
+{
+    hsep_saved *saved;
+    hsep_instance *instance = hsep_begin_saved(c, HSEP_CALL_SERIALIZE_FMU_STATE, FMUstate, &saved);
+    if (instance == NULL) {
         return fmi2Error;
     }
-    hsep_free_saved(saved);
-    *FMUstate = NULL;
+    if (serializedState == NULL || size < hsep_saved_size(saved)) {
+        return hsep_refuse(
+            instance, "fmi2SerializeFMUstate: serializedState must have room for %lu bytes, got %lu%s",
+            (unsigned long)hsep_saved_size(saved), (unsigned long)size, serializedState == NULL ? " and NULL" : "");
+    }
+    hsep_serialise(saved, serializedState);
+    return fmi2OK;
+}
+
+fmi2Status fmi2DeSerializeFMUstate(
+    fmi2Component c, const fmi2Byte serializedState[], size_t size, fmi2FMUstate *FMUstate)
+{
+    char message[HSEP_MESSAGE_SIZE] = "";
+    hsep_saved *saved;
+    hsep_instance *instance = hsep_begin_place(c, HSEP_CALL_DESERIALIZE_FMU_STATE, FMUstate, &saved);
+    if (instance == NULL) {
+        return fmi2Error;
+    }
+    if (serializedState == NULL || FMUstate == NULL) {
+        return hsep_refuse(
+            instance, "fmi2DeSerializeFMUstate: %s is NULL", serializedState == NULL ? "serializedState" : "FMUstate");
+    }
+    if (hsep_deserialise(instance, serializedState, size, &saved, message) != HSEP_OK) {
+        return hsep_refuse(instance, "fmi2DeSerializeFMUstate: %s", message);
+    }
+    *FMUstate = saved;
     return fmi2OK;
 }

@@ -7,6 +7,7 @@
 #include <string.h>
 
 static const double check_warm_up_tolerance = 1e-6; /* samples */
+static const double check_position_max = 1e3;       /* m */
 
 HSEP_API void hsep_message_add(char message[], const char *format, ...)
 {
@@ -122,6 +123,22 @@ HSEP_API hsep_status hsep_check_divergence(hsep_divergence divergence, char mess
         "%s must stay within " HSEP_PLUS_MINUS "%g m: what was learned makes it diverge; raise lambda, lower p or "
         "restart",
         names[divergence], HSEP_PREDICTION_MAX);
+    return HSEP_REFUSED;
+}
+
+HSEP_API hsep_status hsep_check_position(const char *name, double value, const char *where, double at, char message[])
+{
+    char number[HSEP_NUMBER_SIZE], end[HSEP_NUMBER_SIZE];
+    if (fabs(value) <= check_position_max) {
+        return HSEP_OK;
+    }
+    snprintf(end, sizeof end, where, at);
+    if (isfinite(value)) {
+        hsep_message_add(
+            message, "%s must be within " HSEP_PLUS_MINUS "%g m, got %g%s", name, check_position_max, value, end);
+    } else {
+        hsep_message_add(message, "%s must be finite, got %s%s", name, hsep_number(number, value, HSEP_REAL), end);
+    }
     return HSEP_REFUSED;
 }
 

@@ -7,14 +7,14 @@
 #include "hsep_clock.h"
 #include "hsep_model.h"
 #include "hsep_physics.h"
-#include "hsep_vector.h"
+#include "hsep_range.h"
 
 #define HSEP_NUMBER_SIZE 40 /* bytes of a number as text */
 
 /* UTF-8, spelled out for compilers that read sources in another encoding */
-#define HSEP_TO "\xe2\x80\xa6"            /* the dots of a range */
-#define HSEP_AT_LEAST "\xe2\x89\xa5"      /* greater than or equal */
-#define HSEP_AT_MOST "\xe2\x89\xa4"       /* less than or equal */
+#define HSEP_TO "\xe2\x80\xa6"       /* the dots of a range */
+#define HSEP_AT_LEAST "\xe2\x89\xa5" /* greater than or equal */
+#define HSEP_AT_MOST "\xe2\x89\xa4"  /* less than or equal */
 #define HSEP_MINUS "\xe2\x88\x92"
 #define HSEP_DOT "\xc2\xb7"
 #define HSEP_PLUS_MINUS "\xc2\xb1"
@@ -37,6 +37,10 @@ HSEP_API double hsep_warm_up_samples(double t_init, double T_s);
 /* Refuse outputs of a window that diverges. */
 HSEP_API hsep_status hsep_check_divergence(hsep_divergence divergence, char message[]);
 
+/* Check that a position, m, is finite and no further out than any machine is. where: format of at, the end of the
+ * message. */
+HSEP_API hsep_status hsep_check_position(const char *name, double value, const char *where, double at, char message[]);
+
 /* Check that the simulation starts at a number. */
 HSEP_API hsep_status hsep_check_start_time(double t_start, char message[]);
 
@@ -47,7 +51,8 @@ HSEP_API hsep_status hsep_check_clock(hsep_clock *clock, double t_start, double 
 HSEP_API hsep_status hsep_check_step_size(double h, char message[]);
 
 /* Check that the step from t by h, s, comes next, and count it. */
-HSEP_API hsep_status hsep_check_step(const hsep_clock *clock, double t, double h, hsep_clock_step *step, char message[]);
+HSEP_API hsep_status
+hsep_check_step(const hsep_clock *clock, double t, double h, hsep_clock_step *step, char message[]);
 
 /* Read n modes from the values of mode[i].f_n, .zeta, .alpha and .beta, which have been checked. */
 HSEP_API void hsep_modes_read(const double values[], size_t n, hsep_mode modes[]);

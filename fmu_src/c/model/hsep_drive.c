@@ -6,17 +6,14 @@
 #include <math.h>
 
 static const double drive_seed_max = 2147483647.0;
-static const double drive_position_max = 1e3; /* m */
 
 HSEP_API hsep_status hsep_drive_check(double x_d, double t, double h, double rate, char message[])
 {
     char number[HSEP_NUMBER_SIZE];
-    if (!isfinite(x_d)) {
-        hsep_message_add(message, "x_d must be finite, got %s at t = %g s", hsep_number(number, x_d, HSEP_REAL), t);
-    } else if (fabs(x_d) > drive_position_max) {
-        hsep_message_add(
-            message, "x_d must be within " HSEP_PLUS_MINUS "%g m, got %g at t = %g s", drive_position_max, x_d, t);
-    } else if (!isfinite(t)) {
+    if (hsep_check_position("x_d", x_d, " at t = %g s", t, message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
+    if (!isfinite(t)) {
         hsep_message_add(
             message, "the communication point must be finite, got %s s", hsep_number(number, t, HSEP_REAL));
     } else if (hsep_check_step_size(h, message) != HSEP_OK) {
@@ -33,17 +30,7 @@ HSEP_API hsep_status hsep_drive_check(double x_d, double t, double h, double rat
 
 HSEP_API hsep_status hsep_drive_check_start(double x_d, char message[])
 {
-    char number[HSEP_NUMBER_SIZE];
-    if (!isfinite(x_d)) {
-        hsep_message_add(
-            message, "the start value of x_d must be finite, got %s", hsep_number(number, x_d, HSEP_REAL));
-    } else if (fabs(x_d) > drive_position_max) {
-        hsep_message_add(
-            message, "the start value of x_d must be within " HSEP_PLUS_MINUS "%g m, got %g", drive_position_max, x_d);
-    } else {
-        return HSEP_OK;
-    }
-    return HSEP_REFUSED;
+    return hsep_check_position("the start value of x_d", x_d, "", 0.0, message);
 }
 
 HSEP_API double hsep_drive_first_measurement(double noise_std, double seed, double x)

@@ -9,12 +9,15 @@
 
 #include "hsep_api.h"
 #include "hsep_clock.h"
+#include "hsep_layout.h"
 #include "hsep_model.h"
 
 typedef struct {
     hsep_clock clock;
     double x_d_ahead, x_meas; /* m, of the sample in progress */
 } hsep_inputs;
+
+HSEP_ASSERT_WORDS(hsep_inputs, 9);
 
 /* What the importer has set for a step: an input and its time derivative. */
 typedef struct {
@@ -39,10 +42,11 @@ HSEP_API hsep_status hsep_inputs_count(
     const hsep_inputs *self, hsep_input x_d_ahead, hsep_input x_meas, double t, double h, hsep_inputs_step *step,
     char message[]);
 
-/* Go on in a counted step: return 1 with the next sample to execute in x_d_ahead and x_meas, 0 when the step is done. */
+/* Go on in a counted step: return 1 with the next sample to execute in x_d_ahead and x_meas, 0 when the step is
+ * done. */
 HSEP_API int hsep_inputs_next(hsep_inputs *self, hsep_inputs_step *step);
 
-/* Whether inputs that were read from a state count samples of T_s, s, within their bounds, and are at sample k. */
-HSEP_API int hsep_inputs_valid(const hsep_inputs *self, double T_s, uint64_t k);
+/* Whether inputs that were read from a state count samples of T_s, s, within their bounds. */
+HSEP_API int hsep_inputs_valid(const hsep_inputs *self, double T_s);
 
 #endif

@@ -2,10 +2,10 @@
  *
  * An adapter (FMI 2.0 now, another one beside it later) owns one array of HSEP_N_VALUES values, one place per variable
  * of the generated table (hsep_fmu.h), then the time derivatives of the first HSEP_N_INTERPOLATED of them, inputs that
- * may change within a step, which it sets to 0 after each step; and one block of memory, the state, whose size the model tells from the parameters.
- * The state is plain data without pointers: saving, restoring and serialising it is one copy of its bytes. Outputs
- * change only where their sample does, so what an adapter saves is the state together with the values.
- * Numbers lie in memory and in files as a little-endian machine has them.
+ * may change within a step, which it sets to 0 after each step; and one block of memory, the state, whose size the
+ * model tells from the parameters. The state is plain data without pointers: saving, restoring and serialising it is
+ * one copy of its bytes. Outputs change only where their sample does, so what an adapter saves is the state together
+ * with the values. Numbers lie in memory and in files as a little-endian machine has them.
  *
  * Nothing here allocates. Each function is reentrant; two threads may use two different instances at once.
  */
@@ -66,8 +66,8 @@ HSEP_API hsep_status hsep_model_initialise(
  * lead out of the range of numbers leaves the state unchanged.
  * Warns if inputs are read at an instant that is no communication point.
  * Cost: bounded by the parameters and h/T_s, the same at the first and at the 10^9th call; allocates nothing. */
-HSEP_API hsep_status hsep_model_step(
-    const hsep_context *context, void *state, double values[], double t, double h, char message[]);
+HSEP_API hsep_status
+hsep_model_step(const hsep_context *context, void *state, double values[], double t, double h, char message[]);
 
 /* Write outputs and locals as they follow from inputs and parameters before hsep_model_initialise.
  * Cannot fail: parameters that are out of range, and resources that are missing, leave start values. What a model that

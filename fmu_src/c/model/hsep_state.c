@@ -17,7 +17,30 @@ HSEP_API hsep_status hsep_state_size(double bytes, size_t *size, char message[])
     return HSEP_OK;
 }
 
-HSEP_API hsep_status hsep_state_fits(size_t needed, size_t size, char message[])
+HSEP_API uint64_t hsep_fnv(uint64_t hash, const void *bytes, size_t size)
+{
+    const unsigned char *byte = bytes;
+    for (size_t i = 0; i < size; i++) {
+        hash = (hash ^ byte[i]) * UINT64_C(0x100000001B3);
+    }
+    return hash;
+}
+
+/* A hash of the values of all parameters that are not tunable. */
+static uint64_t state_hash(const hsep_context *context, const double values[])
+{
+    uint64_t hash = HSEP_FNV_BEGIN;
+    for (size_t i = 0; i < context->n_variables; i++) {
+        if (context->variables[i].causality == HSEP_PARAMETER && !context->variables[i].tunable) {
+            hash = hsep_fnv(hash, &values[i], sizeof values[i]);
+        }
+    }
+    return hash;
+}
+
+HSEP_API hsep_status hsep_state_begin(
+    hsep_state_header *header, const hsep_context *context, const double values[], uint64_t kind, size_t needed,
+    size_t size, char message[])
 {
     if (needed != size) {
         hsep_message_add(
@@ -27,39 +50,17 @@ HSEP_API hsep_status hsep_state_fits(size_t needed, size_t size, char message[])
             (double)needed, (double)size);
         return HSEP_REFUSED;
     }
+    *header = (hsep_state_header){kind, HSEP_STATE_VERSION, size, state_hash(context, values)};
     return HSEP_OK;
 }
 
-/* FNV-1a (Fowler, Noll and Vo 1991) over the bytes of the parameters. */
-static uint64_t state_hash(const hsep_context *context, const double values[])
-{
-    uint64_t hash = UINT64_C(0xCBF29CE484222325);
-    for (size_t i = 0; i < context->n_variables; i++) {
-        if (context->variables[i].causality != HSEP_PARAMETER || context->variables[i].tunable) {
-            continue;
-        }
-        unsigned char bytes[sizeof(double)];
-        memcpy(bytes, &values[i], sizeof bytes);
-        for (size_t b = 0; b < sizeof bytes; b++) {
-            hash = (hash ^ bytes[b]) * UINT64_C(0x100000001B3);
-        }
-    }
-    return hash;
-}
-
-HSEP_API void hsep_state_mark(
-    hsep_state_header *header, const hsep_context *context, const double values[], uint64_t kind, size_t size)
-{
-    header->kind = kind;
-    header->version = HSEP_STATE_VERSION;
-    header->size = size;
-    header->parameters = state_hash(context, values);
-}
-
 HSEP_API hsep_status hsep_state_check(
-    const hsep_context *context, const double values[], const void *state, size_t size, uint64_t kind,
-    size_t expected, char message[])
+    const hsep_context *context, const double values[], const void *state, size_t size, uint64_t kind, char message[])
 {
+    size_t expected = 0;
+    if (hsep_model_size(context, values, &expected, message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
     hsep_state_header header;
     if (size < sizeof header || size != expected) {
         hsep_message_add(

@@ -3,11 +3,12 @@
 #define HSEP_STATE_H
 
 #include "hsep_api.h"
+#include "hsep_layout.h"
 #include "hsep_model.h"
 
 #include <stdint.h>
 
-#define HSEP_STATE_VERSION 2 /* changes whenever the layout of any state does */
+#define HSEP_STATE_VERSION 3 /* changes whenever the layout of any state does */
 
 typedef struct {
     uint64_t kind;       /* one number for each model */
@@ -16,20 +17,25 @@ typedef struct {
     uint64_t parameters; /* a hash of the values of all parameters that are not tunable */
 } hsep_state_header;
 
+HSEP_ASSERT_WORDS(hsep_state_header, 4);
+
+#define HSEP_FNV_BEGIN UINT64_C(0xCBF29CE484222325)
+
+/* FNV-1a, 64 bit (Fowler, Noll and Vo 1991), of bytes behind those that gave hash; HSEP_FNV_BEGIN before the first. */
+HSEP_API uint64_t hsep_fnv(uint64_t hash, const void *bytes, size_t size);
+
 /* Turn a size that was counted in double into bytes. Fails if it is more than memory can be asked for. */
 HSEP_API hsep_status hsep_state_size(double bytes, size_t *size, char message[]);
 
-/* Check that memory of size bytes is what the state needs: a resource may have changed since the size was told. */
-HSEP_API hsep_status hsep_state_fits(size_t needed, size_t size, char message[]);
+/* Fill the header of a state in memory of size bytes. Fails if it needs another size: a resource may have changed since
+ * the size was told. */
+HSEP_API hsep_status hsep_state_begin(
+    hsep_state_header *header, const hsep_context *context, const double values[], uint64_t kind, size_t needed,
+    size_t size, char message[]);
 
-/* Fill the header of a state. */
-HSEP_API void hsep_state_mark(
-    hsep_state_header *header, const hsep_context *context, const double values[], uint64_t kind, size_t size);
-
-/* Check the first bytes of what may be a state of that kind and size, in any alignment. */
+/* Check the first bytes of what may be a state of that kind for these parameters, in any alignment. */
 HSEP_API hsep_status hsep_state_check(
-    const hsep_context *context, const double values[], const void *state, size_t size, uint64_t kind,
-    size_t expected, char message[]);
+    const hsep_context *context, const double values[], const void *state, size_t size, uint64_t kind, char message[]);
 
 /* Refuse a state whose header fits and whose content does not. */
 HSEP_API hsep_status hsep_state_damaged(char message[]);

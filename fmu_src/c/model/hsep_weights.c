@@ -1,6 +1,7 @@
 #include "hsep_weights.h"
 
 #include "hsep_check.h"
+#include "hsep_layout.h"
 #include "hsep_resource.h"
 
 #include <string.h>
@@ -15,6 +16,8 @@ typedef struct {
     uint64_t p, q, input_hold, dead_time, n_modes, n_samples;
     double lambda, T_s, v_friction;
 } weights_head;
+
+HSEP_ASSERT_WORDS(weights_head, 10);
 
 /* CRC-32 as in zlib, 4 bits at a time, of bytes behind those that gave crc. */
 static uint32_t weights_crc(uint32_t crc, const unsigned char bytes[], size_t size)
@@ -70,7 +73,7 @@ static void weights_compare(const char *name, double learned, double got, hsep_k
 
 /* Read the modes that the file has and compare those that there are on both sides. */
 static int weights_compare_modes(
-    FILE *file, uint64_t n_learned, const hsep_weights_settings *settings, char message[])
+    FILE *file, uint64_t n_learned, const hsep_predictor_parameters *settings, char message[])
 {
     static const char *const names[4] = {"f_n", "zeta", "alpha", "beta"};
     for (uint64_t i = 0; i < n_learned && i < settings->n_modes; i++) {
@@ -92,7 +95,7 @@ static int weights_compare_modes(
 
 /* Read the file: 0 if it is damaged; with a message, if it was learned with other settings. */
 static int weights_take(
-    FILE *file, const hsep_weights_settings *settings, hsep_regression *regression, char message[])
+    FILE *file, const hsep_predictor_parameters *settings, hsep_regression *regression, char message[])
 {
     weights_head head;
     double size = 0.0;
@@ -104,7 +107,7 @@ static int weights_take(
     weights_compare("q", (double)head.q, (double)settings->q, HSEP_INTEGER, message);
     weights_compare("lambda", head.lambda, settings->lambda, HSEP_REAL, message);
     weights_compare("T_s", head.T_s, settings->T_s, HSEP_REAL, message);
-    weights_compare("input_hold", (double)head.input_hold, (double)settings->input_hold, HSEP_INTEGER, message);
+    weights_compare("input_hold", (double)head.input_hold, (double)settings->hold, HSEP_INTEGER, message);
     weights_compare("dead_time", (double)head.dead_time, (double)settings->dead_time, HSEP_INTEGER, message);
     weights_compare("v_friction", head.v_friction, settings->v_friction, HSEP_REAL, message);
     if (!weights_compare_modes(file, head.n_modes, settings, message) || message[0] != '\0') {
@@ -126,7 +129,7 @@ static int weights_take(
 }
 
 HSEP_API hsep_status hsep_weights_load(
-    const hsep_context *context, const hsep_weights_settings *settings, hsep_regression *regression, char message[])
+    const hsep_context *context, const hsep_predictor_parameters *settings, hsep_regression *regression, char message[])
 {
     FILE *file = hsep_resource_open(context, WEIGHTS_FILE);
     if (file == NULL) {

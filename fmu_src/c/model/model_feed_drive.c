@@ -31,12 +31,12 @@ HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double v
     if (hsep_check_parameters(context, values, message) > 0) {
         return HSEP_REFUSED;
     }
-    const double rate = hsep_feed_drive_rate(&(hsep_feed_drive){
-        .m = values[HSEP_VR_m], .c = values[HSEP_VR_c], .k = values[HSEP_VR_k]});
+    const double rate = hsep_feed_drive_rate(
+        &(hsep_feed_drive){.m = values[HSEP_VR_m], .c = values[HSEP_VR_c], .k = values[HSEP_VR_k]});
     if (rate > HSEP_PLANT_RATE_MAX) {
         hsep_message_add(
-            message, "sqrt(k/m) and c/m must be at most %g 1/s, got %g; lower k or c, or raise m",
-            HSEP_PLANT_RATE_MAX, rate);
+            message, "sqrt(k/m) and c/m must be at most %g 1/s, got %g; lower k or c, or raise m", HSEP_PLANT_RATE_MAX,
+            rate);
         return HSEP_REFUSED;
     }
     return HSEP_OK;
@@ -52,15 +52,14 @@ static void feed_drive_write_outputs(const feed_drive_state *self, double values
 HSEP_API hsep_status hsep_model_initialise(
     const hsep_context *context, void *state, size_t size, double values[], double t_start, char message[])
 {
-    feed_drive_state *self = state;
     size_t needed = 0;
+    feed_drive_state *self = state;
     if (hsep_model_size(context, values, &needed, message) != HSEP_OK ||
-        hsep_state_fits(needed, size, message) != HSEP_OK ||
+        hsep_state_begin(&self->header, context, values, FEED_DRIVE_KIND, needed, size, message) != HSEP_OK ||
         hsep_check_start_time(t_start, message) != HSEP_OK ||
         hsep_drive_check_start(values[HSEP_VR_x_d], message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
-    hsep_state_mark(&self->header, context, values, FEED_DRIVE_KIND, size);
     hsep_encoder_init(&self->encoder, values[HSEP_VR_noise_std], (uint64_t)values[HSEP_VR_seed]);
     self->drive.m = values[HSEP_VR_m];
     self->drive.c = values[HSEP_VR_c];
@@ -73,8 +72,8 @@ HSEP_API hsep_status hsep_model_initialise(
     return HSEP_OK;
 }
 
-HSEP_API hsep_status hsep_model_step(
-    const hsep_context *context, void *state, double values[], double t, double h, char message[])
+HSEP_API hsep_status
+hsep_model_step(const hsep_context *context, void *state, double values[], double t, double h, char message[])
 {
     (void)context;
     feed_drive_state *self = state;
@@ -104,9 +103,7 @@ HSEP_API hsep_status hsep_model_check_state(
     const hsep_context *context, const void *state, size_t size, const double values[], char message[])
 {
     feed_drive_state head;
-    size_t expected = 0;
-    if (hsep_model_size(context, values, &expected, message) != HSEP_OK ||
-        hsep_state_check(context, values, state, size, FEED_DRIVE_KIND, expected, message) != HSEP_OK) {
+    if (hsep_state_check(context, values, state, size, FEED_DRIVE_KIND, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     memcpy(&head, state, sizeof head);

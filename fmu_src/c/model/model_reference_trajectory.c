@@ -100,7 +100,8 @@ HSEP_API hsep_status hsep_model_initialise(
         return HSEP_REFUSED;
     }
     /* Memory was taken for the samples that were there when hsep_model_size looked. */
-    if (trajectory_bytes(count, &needed, message) != HSEP_OK || hsep_state_fits(needed, size, message) != HSEP_OK) {
+    if (trajectory_bytes(count, &needed, message) != HSEP_OK ||
+        hsep_state_begin(&self->header, context, values, TRAJECTORY_KIND, needed, size, message) != HSEP_OK) {
         fclose(file);
         return HSEP_REFUSED;
     }
@@ -116,13 +117,12 @@ HSEP_API hsep_status hsep_model_initialise(
             return HSEP_REFUSED;
         }
     }
-    hsep_state_mark(&self->header, context, values, TRAJECTORY_KIND, size);
     values[HSEP_VR_r] = hsep_trajectory_position(&self->trajectory, 0);
     return HSEP_OK;
 }
 
-HSEP_API hsep_status hsep_model_step(
-    const hsep_context *context, void *state, double values[], double t, double h, char message[])
+HSEP_API hsep_status
+hsep_model_step(const hsep_context *context, void *state, double values[], double t, double h, char message[])
 {
     (void)context;
     trajectory_state *self = state;
@@ -156,9 +156,7 @@ HSEP_API hsep_status hsep_model_check_state(
     const hsep_context *context, const void *state, size_t size, const double values[], char message[])
 {
     trajectory_state head;
-    size_t expected = 0;
-    if (hsep_model_size(context, values, &expected, message) != HSEP_OK ||
-        hsep_state_check(context, values, state, size, TRAJECTORY_KIND, expected, message) != HSEP_OK) {
+    if (hsep_state_check(context, values, state, size, TRAJECTORY_KIND, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     memcpy(&head, state, sizeof head);

@@ -56,16 +56,15 @@ static void stage_drive_write_outputs(const stage_drive_state *self, double valu
 HSEP_API hsep_status hsep_model_initialise(
     const hsep_context *context, void *state, size_t size, double values[], double t_start, char message[])
 {
+    size_t needed = 0;
     stage_drive_state *self = state;
     hsep_mode modes[HSEP_N_MODES];
-    size_t needed = 0;
     if (hsep_model_size(context, values, &needed, message) != HSEP_OK ||
-        hsep_state_fits(needed, size, message) != HSEP_OK ||
+        hsep_state_begin(&self->header, context, values, STAGE_DRIVE_KIND, needed, size, message) != HSEP_OK ||
         hsep_check_start_time(t_start, message) != HSEP_OK ||
         hsep_drive_check_start(values[HSEP_VR_x_d], message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
-    hsep_state_mark(&self->header, context, values, STAGE_DRIVE_KIND, size);
     hsep_encoder_init(&self->encoder, values[HSEP_VR_noise_std], (uint64_t)values[HSEP_VR_seed]);
     hsep_modes_read(&values[HSEP_VR_mode], HSEP_N_MODES, modes);
     hsep_stage_init(
@@ -76,8 +75,8 @@ HSEP_API hsep_status hsep_model_initialise(
     return HSEP_OK;
 }
 
-HSEP_API hsep_status hsep_model_step(
-    const hsep_context *context, void *state, double values[], double t, double h, char message[])
+HSEP_API hsep_status
+hsep_model_step(const hsep_context *context, void *state, double values[], double t, double h, char message[])
 {
     (void)context;
     stage_drive_state *self = state;
@@ -87,8 +86,7 @@ HSEP_API hsep_status hsep_model_step(
         return HSEP_REFUSED;
     }
     if (!hsep_stage_step(&self->stage, values[HSEP_VR_x_d], h, work)) {
-        hsep_message_add(
-            message, "the stage's state left the range of numbers (command %g m)", values[HSEP_VR_x_d]);
+        hsep_message_add(message, "the stage's state left the range of numbers (command %g m)", values[HSEP_VR_x_d]);
         return HSEP_REFUSED;
     }
     const double x_meas = hsep_encoder_measure(&self->encoder, hsep_stage_x(&self->stage));
@@ -109,9 +107,7 @@ HSEP_API hsep_status hsep_model_check_state(
     const hsep_context *context, const void *state, size_t size, const double values[], char message[])
 {
     stage_drive_state head;
-    size_t expected = 0;
-    if (hsep_model_size(context, values, &expected, message) != HSEP_OK ||
-        hsep_state_check(context, values, state, size, STAGE_DRIVE_KIND, expected, message) != HSEP_OK) {
+    if (hsep_state_check(context, values, state, size, STAGE_DRIVE_KIND, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     memcpy(&head, state, sizeof head);
@@ -120,7 +116,7 @@ HSEP_API hsep_status hsep_model_check_state(
                               head.stage.last_x_d,    head.stage.v_d, head.stage.v};
     const int finite = hsep_within(numbers, sizeof numbers / sizeof *numbers, HSEP_PREDICTION_MAX) &&
                        hsep_within(modes, (size - sizeof head) / sizeof(double), HSEP_PREDICTION_MAX);
-    if (!finite || head.stage.n_modes != HSEP_N_MODES || !hsep_clock_valid(&head.stage.clock) ||
+    if (!finite || !hsep_stage_valid(modes - sizeof head.stage, HSEP_N_MODES) ||
         head.stage.clock.T_s != values[HSEP_VR_T_s]) {
         return hsep_state_damaged(message);
     }

@@ -1,0 +1,88 @@
+/* Servo error pre-compensation, sample by sample: a predictor (hsep_predictor.h) whose commands are modified while they
+ * wait; eqs. (2) to (6) and hsep_planner.h.
+ *
+ * Sample k brings x_d_ahead = r(k) and x_meas = x(k); after it the outputs are those of k + 1. When k + 1 is a multiple
+ * of Np, the whole preview of the next window and every measurement before it have arrived: the weights are solved and
+ * the window is planned in that sample. A plan that the drive's limits bound is solved over the samples that follow,
+ * while the command follows the last plan.
+ *
+ * Cost of a sample, with n features and m splines in a plan: that of hsep_regression_fold(n). At the end of a window on
+ * top n^2 / 2 + p^2 / 2 + (2 preview + Np) (p + q) + m^3 / 6 + m preview multiply-adds, the last two twice if the
+ * hybrid plan fails, and copies of the regression and of the dead time. While a plan is being solved that of
+ * hsep_interior_step, three times in each of the 8 samples that follow; where so many are not pinned (Np < 16, or
+ * spacing > 8) more often, or HSEP_INTERIOR_STEPS times at once. All of it is bounded by the parameters; m = 1000 is
+ * far from real time.
+ *
+ * Memory is one block: the struct, then what its offsets tell; no pointers, so a copy of the block is the state.
+ * Reentrant; allocates nothing. Once the parameters are in range nothing here fails but the prediction of a window, as
+ * in hsep_predictor.h.
+ */
+#ifndef HSEP_COMPENSATOR_H
+#define HSEP_COMPENSATOR_H
+
+#include "hsep_api.h"
+#include "hsep_layout.h"
+#include "hsep_planner.h"
+#include "hsep_predictor.h"
+#include "hsep_trust.h"
+
+#include <stdint.h>
+
+/* What a window's command was planned with; of a parameter: the best there may be. */
+typedef enum { HSEP_SEP_OFF = 0, HSEP_SEP_PHYSICS = 1, HSEP_SEP_HYBRID = 2 } hsep_sep_state;
+
+typedef struct {
+    hsep_predictor_parameters predictor; /* planned */
+    hsep_planner_parameters planner;     /* Np and preview as the predictor's */
+    hsep_sep_state best;
+} hsep_compensator_parameters;
+
+typedef struct {
+    uint64_t best;
+    uint64_t state;   /* hsep_sep_state of the window */
+    uint64_t solving; /* whether its plan is being solved */
+    hsep_trust trust;
+    /* Offsets in doubles from the beginning of the struct */
+    uint64_t x_dm;      /* (Np,) m, the window: modified commands */
+    uint64_t trial_x;   /* (preview + q,) m, x_pb of a trial, newest first */
+    uint64_t trial_e;   /* (preview + p,) m, its residuals */
+    uint64_t target;    /* (preview,) m */
+    uint64_t spline_pb; /* (preview,) m/m, a spline behind the physics model, */
+    uint64_t spline_h;  /* (preview,) m/m, and behind the hybrid one */
+    uint64_t trial;     /* the physics model of a trial */
+    uint64_t planner, predictor;
+} hsep_compensator;
+
+HSEP_ASSERT_WORDS(hsep_compensator, 13);
+
+typedef struct {
+    hsep_predictor_outputs predicted; /* x_h: of the model that planned the window */
+    double x_dm;                      /* m, now */
+    hsep_sep_state state;
+} hsep_compensator_outputs;
+
+/* Bytes of the block, counted in double so that no size can overflow. */
+HSEP_API double hsep_compensator_size(const hsep_compensator_parameters *parameters);
+
+/* Fill the block for a drive at rest at start, m. hsep_compensator_begin has to follow. */
+HSEP_API void hsep_compensator_init(
+    hsep_compensator *self, const hsep_compensator_parameters *parameters, double start);
+
+/* The predictor, to start warm between hsep_compensator_init and _begin. */
+HSEP_API hsep_predictor *hsep_compensator_predictor(hsep_compensator *self);
+
+/* Plan the first window. */
+HSEP_API void hsep_compensator_begin(hsep_compensator *self);
+
+/* Tell whether a block of bytes, in any alignment and hsep_compensator_size(parameters) long, is one that
+ * hsep_compensator_init with these parameters began and that is at sample k: its layout is the same and every index
+ * lies within it. */
+HSEP_API int hsep_compensator_valid(const void *block, const hsep_compensator_parameters *parameters, uint64_t k);
+
+/* Take in sample k, both finite, m, and move on to k + 1; return whether a new window has begun. */
+HSEP_API int hsep_compensator_sample(hsep_compensator *self, double x_d_ahead, double x_meas);
+
+/* Tell the outputs of the sample that comes next. Constant cost. */
+HSEP_API void hsep_compensator_read(const hsep_compensator *self, hsep_compensator_outputs *outputs);
+
+#endif

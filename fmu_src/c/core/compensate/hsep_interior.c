@@ -1,0 +1,195 @@
+#include "hsep_interior.h"
+
+#include "hsep_cholesky.h"
+#include "hsep_slacks.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+static const double interior_mu = 1e-15;             /* mu at the end, as a share of the cost */
+static const double interior_dual = 1e-9;            /* dual residual at the end, as a share of its largest term */
+static const double interior_regularisation = 1e-14; /* proximal term of z, relative to rows and P */
+
+/* The arrays behind the struct. */
+typedef struct {
+    uint64_t n;       /* entries of x */
+    double *x, *v;    /* (n,) iterate and linear term */
+    double *r_d, *dx; /* (n,) dual residual v - P x + B' z, and step */
+    double *factor;   /* triangle of n rows */
+    hsep_slacks slacks;
+} interior_arrays;
+
+/* Take count doubles of a block; NULL if there is no block but only its size is asked for. */
+static double *interior_take(double *block, double *end, double count)
+{
+    const uint64_t offset = hsep_take(end, count);
+    return block != NULL ? block + offset : NULL;
+}
+
+/* Walk the arrays of n splines; return the bytes of the block. */
+static double interior_lay_out(double *block, uint64_t preview, uint64_t n, interior_arrays *a)
+{
+    const double columns = (double)n, rows = HSEP_ORDERS * (double)preview;
+    double end = HSEP_WORDS(hsep_interior);
+    a->x = interior_take(block, &end, columns);
+    a->v = interior_take(block, &end, columns);
+    a->r_d = interior_take(block, &end, columns);
+    a->dx = interior_take(block, &end, columns);
+    a->slacks.Ax = interior_take(block, &end, rows);
+    a->slacks.Adx = interior_take(block, &end, rows);
+    a->slacks.work = interior_take(block, &end, rows);
+    for (int i = 0; i < 2; i++) {
+        hsep_side *side = &a->slacks.side[i];
+        side->b = interior_take(block, &end, rows);
+        side->s = interior_take(block, &end, rows);
+        side->z = interior_take(block, &end, rows);
+        side->inverse = interior_take(block, &end, rows);
+        side->r_c = interior_take(block, &end, rows);
+        side->r_p = interior_take(block, &end, rows);
+    }
+    a->factor = interior_take(block, &end, hsep_triangle(n));
+    return end * sizeof(double);
+}
+
+HSEP_API double hsep_interior_size(uint64_t preview, uint64_t n)
+{
+    interior_arrays arrays;
+    return interior_lay_out(NULL, preview, n, &arrays);
+}
+
+HSEP_API int hsep_interior_valid(const void *block, uint64_t first_max)
+{
+    hsep_interior got;
+    memcpy(&got, block, sizeof got);
+    return got.first <= first_max && got.steps <= HSEP_INTERIOR_STEPS;
+}
+
+static interior_arrays interior_open(hsep_interior *self, const hsep_splines *splines)
+{
+    interior_arrays a;
+    (void)interior_lay_out((double *)self, splines->preview, splines->n, &a);
+    a.n = splines->n - self->first;
+    a.slacks.rho = self->rho;
+    a.slacks.sides = self->sides;
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        uint64_t begin, end;
+        hsep_splines_touched(splines, self->first, order, &begin, &end);
+        a.slacks.range[order].begin = begin + order * splines->preview;
+        a.slacks.range[order].end = end + order * splines->preview;
+    }
+    return a;
+}
+
+HSEP_API hsep_problem hsep_interior_problem(hsep_interior *self, const hsep_splines *splines)
+{
+    const interior_arrays a = interior_open(self, splines);
+    return (hsep_problem){.v = a.v, .x = a.x, .low = a.slacks.side[0].b, .high = a.slacks.side[1].b};
+}
+
+/* The rows of P, a triangle, from the first one asked for. */
+static const double *interior_asked(const hsep_interior *self, const hsep_splines *splines, const double P[])
+{
+    return P + (self->first * splines->n - self->first * (self->first - 1) / 2);
+}
+
+/* The proximal term that bounds A' W A by P / interior_regularisation: where active bounds hardly differ, its rounding
+ * would outgrow P. */
+static double interior_proximal(const hsep_splines *splines, const double *P, uint64_t n)
+{
+    double largest = 0.0;
+    for (uint64_t i = 0; i < n; i++) {
+        largest = fmax(largest, P[0]);
+        P += n - i;
+    }
+    return interior_regularisation * hsep_splines_energy(splines) / largest;
+}
+
+HSEP_API void hsep_interior_begin(
+    hsep_interior *self, const hsep_splines *splines, const double P[], uint64_t first, double cost)
+{
+    self->first = first;
+    self->steps = 0;
+    self->sides = 0.0;
+    interior_arrays a = interior_open(self, splines);
+    a.slacks.rho = self->rho = interior_proximal(splines, interior_asked(self, splines, P), a.n);
+    hsep_splines_rows(splines, a.x, first, a.slacks.Ax);
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        self->sides += 2.0 * (double)(a.slacks.range[order].end - a.slacks.range[order].begin);
+    }
+    self->cost = cost / self->sides;
+    hsep_slacks_begin(&a.slacks, self->cost);
+}
+
+/* r_d := v - P x, P being the triangle of the splines first ... n - 1. */
+static void interior_gradient(const interior_arrays *a, const double *P)
+{
+    memcpy(a->r_d, a->v, (size_t)a->n * sizeof(double));
+    for (uint64_t i = 0; i < a->n; i++) {
+        const double x = a->x[i];
+        double sum = P[0] * x;
+        for (uint64_t j = 1; j < a->n - i; j++) {
+            sum += P[j] * a->x[i + j];
+            a->r_d[i + j] -= P[j] * x;
+        }
+        a->r_d[i] -= sum;
+        P += a->n - i;
+    }
+}
+
+/* r_d := v - P x + B' z, the rows of B' z being in work; return its largest entry as a share of the largest one of its
+ * terms. */
+static double interior_dual_residual(
+    const interior_arrays *a, const hsep_splines *splines, uint64_t first, const double *P)
+{
+    double residual = 0.0, largest = 0.0;
+    interior_gradient(a, P);
+    memset(a->dx, 0, (size_t)a->n * sizeof(double));
+    hsep_splines_transpose(splines, a->slacks.work, first, a->dx);
+    for (uint64_t j = 0; j < a->n; j++) {
+        largest = fmax(fmax(largest, fabs(a->v[j])), fmax(fabs(a->v[j] - a->r_d[j]), fabs(a->dx[j])));
+        a->r_d[j] += a->dx[j];
+        residual = fmax(residual, fabs(a->r_d[j]));
+    }
+    return residual / largest;
+}
+
+/* dx := (P + A' W A)^-1 (r_d + A' push), and what it does to the rows. */
+static void interior_direction(const interior_arrays *a, const hsep_splines *splines, uint64_t first)
+{
+    hsep_slacks_push(&a->slacks);
+    memcpy(a->dx, a->r_d, (size_t)a->n * sizeof(double));
+    hsep_splines_transpose(splines, a->slacks.work, first, a->dx);
+    hsep_cholesky_solve(a->factor, a->n, a->dx);
+    hsep_splines_rows(splines, a->dx, first, a->slacks.Adx);
+}
+
+HSEP_API int hsep_interior_step(hsep_interior *self, const hsep_splines *splines, const double P[])
+{
+    const interior_arrays a = interior_open(self, splines);
+    double primal;
+    P = interior_asked(self, splines, P);
+    hsep_splines_rows(splines, a.x, self->first, a.slacks.Ax);
+    const double mu = hsep_slacks_residuals(&a.slacks, &primal);
+    const double dual = interior_dual_residual(&a, splines, self->first, P);
+    if (self->steps == HSEP_INTERIOR_STEPS ||
+        (mu < interior_mu * self->cost && primal < HSEP_INTERIOR_PRIMAL && dual < interior_dual)) {
+        return 1;
+    }
+    self->steps++;
+    memcpy(a.factor, P, (size_t)hsep_triangle(a.n) * sizeof(double));
+    hsep_splines_gram(splines, a.slacks.Adx, self->first, a.factor);
+    if (!hsep_cholesky_factor(a.factor, a.n)) {
+        return 1;
+    }
+    /* Newton: P dx - B' dz = r_d,  ds = B dx + r_p + rho dz,  z ds + s dz = r_c (s + rho z) */
+    interior_direction(&a, splines, self->first);
+    const double share = hsep_slacks_predicted(&a.slacks) / mu; /* sigma = share^3 */
+    hsep_slacks_correct(&a.slacks, fmax(mu * share * share * share, 0.1 * interior_mu * self->cost));
+    interior_direction(&a, splines, self->first);
+    const double alpha = hsep_slacks_move(&a.slacks);
+    for (uint64_t j = 0; j < a.n; j++) {
+        a.x[j] += alpha * a.dx[j];
+    }
+    return 0;
+}

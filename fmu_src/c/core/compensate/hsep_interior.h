@@ -1,0 +1,54 @@
+/* A plan within the drive's limits, by Mehrotra's predictor-corrector interior-point method (Mehrotra 1992), one step a
+ * call:  min 1/2 x' P x - v' x  with  low <= A x <= high, A being hsep_splines_rows.
+ *
+ * Every iterate stays inside the bounds it has reached once, so that what is found after any number of steps keeps
+ * them. Memory is one block: the struct, then its arrays as doubles; no pointers. Reentrant; allocates nothing.
+ */
+#ifndef HSEP_INTERIOR_H
+#define HSEP_INTERIOR_H
+
+#include "hsep_api.h"
+#include "hsep_splines.h"
+
+#include <stdint.h>
+
+#define HSEP_INTERIOR_STEPS 24     /* at most, for one plan */
+#define HSEP_INTERIOR_PRIMAL 1e-11 /* share of a bound by which it may be exceeded at the end */
+
+typedef struct {
+    uint64_t first; /* the splines before it are not asked for; x is (n - first,) */
+    uint64_t steps; /* done for this plan */
+    double cost;    /* m2, of the beginning, for each of the bounds */
+    double sides;   /* number of bounds, low and high ones */
+    double rho;     /* 1/m2, proximal regularisation of the multipliers */
+    /* followed by arrays, see interior_lay_out */
+} hsep_interior;
+
+HSEP_ASSERT_WORDS(hsep_interior, 5);
+
+HSEP_API double hsep_interior_size(uint64_t preview, uint64_t n); /* bytes of the block, counted in double */
+
+/* Where the problem goes before hsep_interior_begin; of v and x the first n - first entries count. */
+typedef struct {
+    double *v;          /* (n,) m */
+    double *x;          /* (n,) m, start and result */
+    double *low, *high; /* (4 preview,), in shares */
+} hsep_problem;
+
+HSEP_API hsep_problem hsep_interior_problem(hsep_interior *self, const hsep_splines *splines);
+
+/* Whether a block, in any alignment, has counts within their bounds. first_max: largest number of splines not asked
+ * for. */
+HSEP_API int hsep_interior_valid(const void *block, uint64_t first_max);
+
+/* Begin with x and the bounds as they are. P: the triangle of all n rows; cost: size of the cost, m2, > 0, by which the
+ * end is recognised. */
+HSEP_API void hsep_interior_begin(
+    hsep_interior *self, const hsep_splines *splines, const double P[], uint64_t first, double cost);
+
+/* Do a step; P as in hsep_interior_begin. Returns whether it was the last one.
+ * Cost: n^3 / 6 multiply-adds for a factor and 2 n^2 with it, about 900 operations and 8 divisions a sample of the
+ * plan beside it. */
+HSEP_API int hsep_interior_step(hsep_interior *self, const hsep_splines *splines, const double P[]);
+
+#endif

@@ -1,0 +1,240 @@
+#include "hsep_planner.h"
+
+#include "hsep_cholesky.h"
+#include "hsep_constraints.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+#define PLANNER_PINNED 8 /* samples at the beginning of a window in which a bounded plan follows the last one */
+
+static const double planner_ridge = 1e-12; /* on the diagonal, relative to its largest entry */
+
+HSEP_API const hsep_splines *hsep_planner_splines(const hsep_planner *self)
+{
+    return (const hsep_splines *)hsep_at_const(self, self->splines);
+}
+
+static hsep_interior *planner_interior(hsep_planner *self) { return (hsep_interior *)hsep_at(self, self->interior); }
+
+/* Set what follows from the parameters; return the bytes of the block. */
+static double planner_lay_out(hsep_planner *self, const hsep_planner_parameters *parameters)
+{
+    const double preview = (double)parameters->preview;
+    const uint64_t n = hsep_splines_count(parameters->preview, parameters->spacing), half = parameters->Np / 2;
+    double end = HSEP_WORDS(hsep_planner);
+    self->Np = parameters->Np;
+    self->n_pinned = (half < PLANNER_PINNED ? half : PLANNER_PINNED) / parameters->spacing;
+    self->no_reversal = parameters->no_reversal != 0;
+    self->jerk_weight = parameters->jerk_weight;
+    self->c = hsep_take(&end, HSEP_DECIDED + (double)n);
+    self->total = hsep_take(&end, HSEP_ORDERS * preview);
+    self->moves = hsep_take(&end, preview);
+    self->third = hsep_take(&end, preview);
+    self->P = hsep_take(&end, hsep_triangle(n));
+    self->factor = hsep_take(&end, hsep_triangle(n));
+    self->splines = hsep_take_block(&end, hsep_splines_size(parameters->preview, parameters->spacing));
+    self->interior = hsep_take_block(&end, hsep_interior_size(parameters->preview, n));
+    return end * sizeof(double);
+}
+
+HSEP_API double hsep_planner_size(const hsep_planner_parameters *parameters)
+{
+    return planner_lay_out(&(hsep_planner){0}, parameters);
+}
+
+HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameters *parameters, double start)
+{
+    memset(self, 0, (size_t)hsep_planner_size(parameters));
+    (void)planner_lay_out(self, parameters);
+    for (int i = 0; i < 3; i++) {
+        self->x_d_before[i] = start;
+    }
+    hsep_splines_init(
+        (hsep_splines *)hsep_at(self, self->splines), parameters->preview, parameters->spacing, parameters->limit);
+}
+
+HSEP_API int hsep_planner_valid(const void *block, const hsep_planner_parameters *parameters)
+{
+    hsep_planner got;
+    memcpy(&got, block, sizeof got);
+    (void)planner_lay_out(&got, parameters); /* changes nothing where it is sound */
+    return memcmp(&got, block, sizeof got) == 0 &&
+           hsep_splines_valid(hsep_at_bytes(block, got.splines), parameters->preview, parameters->spacing) &&
+           hsep_interior_valid(hsep_at_bytes(block, got.interior), got.n_pinned);
+}
+
+HSEP_API uint64_t hsep_planner_pinned(const hsep_planner *self)
+{
+    return self->n_pinned * hsep_planner_splines(self)->spacing;
+}
+
+HSEP_API double hsep_planner_decided(const hsep_planner *self, uint64_t k)
+{
+    return hsep_splines_sum(hsep_planner_splines(self), hsep_at_const(self, self->c), HSEP_DECIDED, k);
+}
+
+HSEP_API double hsep_planner_delta(const hsep_planner *self, uint64_t k)
+{
+    const hsep_splines *splines = hsep_planner_splines(self);
+    return hsep_splines_sum(splines, hsep_at_const(self, self->c), HSEP_DECIDED + splines->n, k);
+}
+
+/* The third differences of what is decided of delta. */
+static void planner_third(hsep_planner *self)
+{
+    double *third = hsep_at(self, self->third);
+    const uint64_t preview = hsep_planner_splines(self)->preview;
+    double d[4] = {self->delta_before[0], self->delta_before[1], self->delta_before[2], 0.0};
+    for (uint64_t k = 0; k < preview; k++) {
+        d[3] = hsep_planner_decided(self, k);
+        third[k] = ((d[3] - d[2]) - (d[2] - d[1])) - ((d[2] - d[1]) - (d[1] - d[0]));
+        d[0] = d[1], d[1] = d[2], d[2] = d[3];
+    }
+}
+
+/* P := W' W + jerk_weight D' D with a small ridge. */
+static void planner_quadratic(hsep_planner *self, const double filtered[])
+{
+    const hsep_splines *splines = hsep_planner_splines(self);
+    double *P = hsep_at(self, self->P);
+    hsep_splines_filtered_gram(splines, filtered, P);
+    hsep_splines_jerk_gram(splines, self->jerk_weight, P);
+    double largest = 0.0;
+    uint64_t place = 0;
+    for (uint64_t i = 0; i < splines->n; i++) {
+        largest = fmax(largest, P[place]);
+        place += splines->n - i;
+    }
+    place = 0;
+    for (uint64_t i = 0; i < splines->n; i++) {
+        P[place] += planner_ridge * largest;
+        place += splines->n - i;
+    }
+}
+
+/* Hand the bounded problem over: x is what follows the pinned splines, its bounds are what the others leave. */
+static void planner_bound(hsep_planner *self, double cost)
+{
+    const hsep_splines *splines = hsep_planner_splines(self);
+    hsep_interior *interior = planner_interior(self);
+    const uint64_t n = splines->n, first = self->n_pinned, preview = splines->preview;
+    const double *rest = hsep_at(self, self->c) + HSEP_DECIDED, *P = hsep_at(self, self->P);
+    const double *total = hsep_at(self, self->total);
+    const hsep_problem problem = hsep_interior_problem(interior, splines);
+    double *x = problem.x, *v = problem.v, *low = problem.low, *high = problem.high;
+    hsep_splines_rows(splines, rest + first, first, low);
+    for (uint64_t r = 0; r < HSEP_ORDERS * preview; r++) {
+        const double other = total[r] - low[r];
+        double least, most;
+        hsep_constraints_range(self, r, &least, &most);
+        low[r] = least - other + HSEP_INTERIOR_PRIMAL;
+        high[r] = most - other - HSEP_INTERIOR_PRIMAL;
+    }
+    for (uint64_t i = 0; i < first; i++) { /* v := v_2 - P_21 pinned */
+        for (uint64_t j = first; j < n; j++) {
+            v[j] -= P[j - i] * rest[i];
+        }
+        P += n - i;
+    }
+    for (uint64_t j = first; j < n; j++) {
+        v[j - first] = v[j];
+        x[j - first] = rest[j];
+    }
+    hsep_interior_begin(interior, splines, hsep_at(self, self->P), first, cost);
+}
+
+HSEP_API hsep_plan_status
+hsep_planner_begin(hsep_planner *self, const double filtered[], const double target[], const double x_d[])
+{
+    const hsep_splines *splines = hsep_planner_splines(self);
+    const uint64_t n = splines->n;
+    double *c = hsep_at(self, self->c), *P = hsep_at(self, self->P);
+    double *factor = hsep_at(self, self->factor);
+    const hsep_problem problem = hsep_interior_problem(planner_interior(self), splines);
+    double *free_minimum = problem.x, *v = problem.v, *rows = problem.low; /* work */
+
+    planner_third(self);
+    hsep_constraints_total(self, x_d);
+    planner_quadratic(self, filtered);
+    hsep_splines_project(splines, filtered, target, self->jerk_weight, hsep_at(self, self->third), v);
+    memcpy(factor, P, (size_t)hsep_triangle(n) * sizeof(double));
+    if (!hsep_cholesky_factor(factor, n)) {
+        return HSEP_PLAN_FAILED;
+    }
+    memcpy(free_minimum, v, (size_t)n * sizeof(double));
+    hsep_cholesky_solve(factor, n, free_minimum);
+    double cost = 0.0, finite = 0.0;
+    for (uint64_t j = 0; j < n; j++) {
+        cost += v[j] * free_minimum[j];
+        finite += fabs(free_minimum[j]);
+        free_minimum[j] -= c[HSEP_DECIDED + j]; /* the way there */
+    }
+    if (!isfinite(finite)) {
+        return HSEP_PLAN_FAILED;
+    }
+    hsep_splines_rows(splines, free_minimum, 0, rows);
+    if (hsep_constraints_allow(self, rows)) {
+        for (uint64_t j = 0; j < n; j++) {
+            c[HSEP_DECIDED + j] += free_minimum[j];
+        }
+        return HSEP_PLAN_DONE;
+    }
+    const double *row = P;
+    for (uint64_t i = 0; i < n; i++) { /* cost += rest' P rest */
+        const double *rest = c + HSEP_DECIDED + i;
+        double sum = 0.5 * row[0] * rest[0];
+        for (uint64_t j = 1; j < n - i; j++) {
+            sum += row[j] * rest[j];
+        }
+        cost += 2.0 * rest[0] * sum;
+        row += n - i;
+    }
+    planner_bound(self, cost);
+    return HSEP_PLAN_BOUNDED;
+}
+
+HSEP_API int hsep_planner_step(hsep_planner *self)
+{
+    const hsep_splines *splines = hsep_planner_splines(self);
+    hsep_interior *interior = planner_interior(self);
+    if (!hsep_interior_step(interior, splines, hsep_at(self, self->P))) {
+        return 0;
+    }
+    const hsep_problem problem = hsep_interior_problem(interior, splines);
+    double *way = problem.x, *rows = problem.low;
+    double *rest = hsep_at(self, self->c) + HSEP_DECIDED + self->n_pinned;
+    const uint64_t n = splines->n - self->n_pinned;
+    double finite = 0.0;
+    for (uint64_t j = 0; j < n; j++) {
+        way[j] -= rest[j];
+        finite += fabs(way[j]);
+    }
+    if (isfinite(finite)) {
+        hsep_splines_rows(splines, way, self->n_pinned, rows);
+        const double share = hsep_constraints_share(self, rows);
+        for (uint64_t j = 0; j < n; j++) {
+            rest[j] += share * way[j];
+        }
+    }
+    return 1;
+}
+
+HSEP_API void hsep_planner_next(hsep_planner *self, const double x_d[])
+{
+    const hsep_splines *splines = hsep_planner_splines(self);
+    double *c = hsep_at(self, self->c);
+    for (uint64_t k = self->Np > 3 ? self->Np - 3 : 0; k < self->Np; k++) {
+        for (int i = 0; i < 2; i++) {
+            self->delta_before[i] = self->delta_before[i + 1];
+            self->x_d_before[i] = self->x_d_before[i + 1];
+        }
+        self->delta_before[2] = hsep_planner_delta(self, k);
+        self->x_d_before[2] = x_d[k];
+    }
+    const uint64_t kept = self->Np / splines->spacing, n = HSEP_DECIDED + splines->n;
+    for (uint64_t i = 0; i < n; i++) {
+        c[i] = i + kept < n ? c[i + kept] : 0.0;
+    }
+}

@@ -1,0 +1,86 @@
+/* Plans of the modified command, x_dm = x_d + delta, over a preview: delta is a sum of cubic B-splines
+ * (hsep_splines.h), each filtered through a linear model (the filtered-basis-functions method: Ramani, Duan, Okwudire
+ * and Ulsoy 2017), and makes the model's response follow x_d within the drive's limits.
+ *
+ * Of a plan only the splines that begin in the first window are followed; hsep_planner_next moves on by a window, and
+ * what is left of the plan is where the next one starts from: it leads back to x_d within the limits. A plan whose free
+ * minimum keeps the limits is there at once; another one is solved in steps, of which each costs the same.
+ *
+ * Memory is one block: the struct, then its arrays as doubles; no pointers. Reentrant; allocates nothing.
+ */
+#ifndef HSEP_PLANNER_H
+#define HSEP_PLANNER_H
+
+#include "hsep_api.h"
+#include "hsep_interior.h"
+#include "hsep_layout.h"
+#include "hsep_splines.h"
+
+#include <stdint.h>
+
+typedef struct {
+    uint64_t Np;               /* samples of a window */
+    uint64_t preview;          /* samples of a plan, at least Np + 4 spacing + 3 */
+    uint64_t spacing;          /* samples between knots, a divisor of Np */
+    double jerk_weight;        /* of the third differences of delta against the tracking error, >= 0 */
+    double limit[HSEP_ORDERS]; /* of |delta|, m, and of the differences of x_dm of orders 1 to 3, m; all > 0 */
+    int no_reversal;           /* whether x_dm never turns while x_d moves */
+} hsep_planner_parameters;
+
+typedef enum {
+    HSEP_PLAN_FAILED = 0, /* no finite plan: what is left of the last one is followed */
+    HSEP_PLAN_DONE,
+    HSEP_PLAN_BOUNDED /* hsep_planner_step is to be called until it returns 1 */
+} hsep_plan_status;
+
+typedef struct {
+    uint64_t Np;
+    uint64_t n_pinned; /* splines of a bounded plan that stay as they were */
+    uint64_t no_reversal;
+    double jerk_weight;
+    double delta_before[3], x_d_before[3]; /* m, of the samples before the plan */
+    /* Offsets in doubles from the beginning of the struct */
+    uint64_t c;      /* (3 + n,) m, coefficients */
+    uint64_t total;  /* (4 preview,) rows of x_dm under the rest of the last plan, in shares */
+    uint64_t moves;  /* (preview,) which way x_d moves: -1, 0, 1; 0 where that does not matter */
+    uint64_t third;  /* (preview,) m, third differences of what is decided */
+    uint64_t P;      /* triangle of n rows */
+    uint64_t factor; /* triangle of n rows */
+    uint64_t splines, interior;
+} hsep_planner;
+
+HSEP_ASSERT_WORDS(hsep_planner, 18);
+
+/* Bytes of the block, counted in double so that no size can overflow. */
+HSEP_API double hsep_planner_size(const hsep_planner_parameters *parameters);
+
+/* Fill the block for a drive at rest at start, m. */
+HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameters *parameters, double start);
+
+/* Whether a block, in any alignment, is one that hsep_planner_init with these parameters began. */
+HSEP_API int hsep_planner_valid(const void *block, const hsep_planner_parameters *parameters);
+
+/* The splines of a plan; hsep_splines_shape is to be filtered. */
+HSEP_API const hsep_splines *hsep_planner_splines(const hsep_planner *self);
+
+/* How many samples a bounded plan leaves as they are, the time there is for its steps; and the steps it may need. */
+HSEP_API uint64_t hsep_planner_pinned(const hsep_planner *self);
+
+/* The part of delta at sample k that is decided before a plan is made, m. */
+HSEP_API double hsep_planner_decided(const hsep_planner *self, uint64_t k);
+
+/* Plan. filtered: the spline behind the model, (preview,); target: x_d minus the model's response to x_d with what is
+ * decided of delta, m; x_d: commanded positions, m, (preview,) both. Cost: n^3 / 6 + n preview multiply-adds. */
+HSEP_API hsep_plan_status
+hsep_planner_begin(hsep_planner *self, const double filtered[], const double target[], const double x_d[]);
+
+/* Do a step of a bounded plan; return whether it was the last one. Cost: that of hsep_interior_step. */
+HSEP_API int hsep_planner_step(hsep_planner *self);
+
+/* delta at sample k of the plan, m; of a bounded one that is not solved yet, at its first hsep_planner_pinned. */
+HSEP_API double hsep_planner_delta(const hsep_planner *self, uint64_t k);
+
+/* Move on by a window with the commanded positions x_d, (Np,), m. */
+HSEP_API void hsep_planner_next(hsep_planner *self, const double x_d[]);
+
+#endif

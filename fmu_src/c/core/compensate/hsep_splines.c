@@ -1,0 +1,222 @@
+#include "hsep_splines.h"
+
+#include "hsep_vector.h"
+
+#include <string.h>
+
+HSEP_API const double *hsep_splines_shape(const hsep_splines *self) { return hsep_at_const(self, self->shape); }
+
+/* The differences of an order of one spline, in shares, (4 spacing + order,); the first one is 0. */
+static const double *splines_differences(const hsep_splines *self, unsigned order)
+{
+    return hsep_at_const(self, self->differences[order]);
+}
+
+static uint64_t splines_length(const hsep_splines *self, unsigned order) { return 4 * self->spacing + order; }
+
+HSEP_API uint64_t hsep_splines_count(uint64_t preview, uint64_t spacing)
+{
+    return (preview - 4 * spacing - HSEP_DECIDED) / spacing + 1;
+}
+
+/* Set what follows from the parameters; return the bytes of the block. */
+static double splines_lay_out(hsep_splines *self, uint64_t preview, uint64_t spacing)
+{
+    double end = HSEP_WORDS(hsep_splines);
+    self->preview = preview;
+    self->spacing = spacing;
+    self->n = hsep_splines_count(preview, spacing);
+    self->shape = hsep_take(&end, 4.0 * (double)spacing);
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        self->differences[order] = hsep_take(&end, 4.0 * (double)spacing + 3.0);
+    }
+    return end * sizeof(double);
+}
+
+HSEP_API double hsep_splines_size(uint64_t preview, uint64_t spacing)
+{
+    return splines_lay_out(&(hsep_splines){0}, preview, spacing);
+}
+
+HSEP_API int hsep_splines_valid(const void *block, uint64_t preview, uint64_t spacing)
+{
+    hsep_splines got;
+    memcpy(&got, block, sizeof got);
+    (void)splines_lay_out(&got, preview, spacing); /* changes nothing where it is sound */
+    return memcmp(&got, block, sizeof got) == 0;
+}
+
+/* The uniform cubic B-spline on the knots 0, 1, 2, 3, 4. */
+static double splines_b(double u)
+{
+    if (u >= 2.0) {
+        u = 4.0 - u; /* it is symmetric */
+    }
+    return u < 1.0 ? u * u * u / 6.0 : (((-3.0 * u + 12.0) * u - 12.0) * u + 4.0) / 6.0;
+}
+
+HSEP_API void hsep_splines_init(hsep_splines *self, uint64_t preview, uint64_t spacing, const double limit[HSEP_ORDERS])
+{
+    (void)splines_lay_out(self, preview, spacing);
+    const uint64_t width = 4 * spacing;
+    double *b = hsep_at(self, self->shape);
+    for (uint64_t k = 0; k < width; k++) {
+        b[k] = splines_b((double)k / (double)spacing);
+    }
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        self->share[order] = 1.0 / limit[order];
+        double *e = hsep_at(self, self->differences[order]);
+        for (uint64_t k = 0; k < width + 3; k++) {
+            const double at[HSEP_ORDERS] = {
+                k < width ? b[k] : 0.0, k >= 1 && k - 1 < width ? b[k - 1] : 0.0,
+                k >= 2 && k - 2 < width ? b[k - 2] : 0.0, k >= 3 ? b[k - 3] : 0.0};
+            const double difference[HSEP_ORDERS] = {
+                at[0], at[0] - at[1], (at[0] - at[1]) - (at[1] - at[2]),
+                ((at[0] - at[1]) - (at[1] - at[2])) - ((at[1] - at[2]) - (at[2] - at[3]))};
+            e[k] = difference[order] * self->share[order];
+        }
+    }
+}
+
+HSEP_API double hsep_splines_sum(const hsep_splines *self, const double c[], uint64_t count, uint64_t k)
+{
+    const double *b = hsep_splines_shape(self);
+    const uint64_t place = k / self->spacing, within = k % self->spacing;
+    double sum = 0.0;
+    for (uint64_t i = 0; i <= HSEP_DECIDED && place + i < count; i++) {
+        sum += c[place + i] * b[within + (HSEP_DECIDED - i) * self->spacing];
+    }
+    return sum;
+}
+
+HSEP_API void hsep_splines_rows(const hsep_splines *self, const double c[], uint64_t first, double rows[])
+{
+    const double *b = hsep_splines_shape(self);
+    const uint64_t preview = self->preview, spacing = self->spacing, count = self->n - first;
+    double before[HSEP_ORDERS] = {0.0, 0.0, 0.0, 0.0};
+    for (uint64_t k = 0; k < preview; k++) {
+        double now[HSEP_ORDERS] = {0.0, 0.0, 0.0, 0.0};
+        if (k >= first * spacing) {
+            const uint64_t place = k / spacing - first, within = k % spacing;
+            for (uint64_t i = 0; i <= HSEP_DECIDED && i <= place; i++) {
+                if (place - i < count) {
+                    now[0] += c[place - i] * b[within + i * spacing];
+                }
+            }
+        }
+        rows[k] = now[0] * self->share[0];
+        for (unsigned order = 1; order < HSEP_ORDERS; order++) {
+            now[order] = now[order - 1] - before[order - 1];
+            rows[order * preview + k] = now[order] * self->share[order];
+        }
+        for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+            before[order] = now[order];
+        }
+    }
+}
+
+HSEP_API void hsep_splines_touched(
+    const hsep_splines *self, uint64_t first, unsigned order, uint64_t *begin, uint64_t *end)
+{
+    *begin = first * self->spacing + 1; /* a spline begins with 0 */
+    *end = (self->n - 1) * self->spacing + splines_length(self, order);
+}
+
+HSEP_API void hsep_splines_transpose(const hsep_splines *self, const double rows[], uint64_t first, double g[])
+{
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        const double *e = splines_differences(self, order);
+        const uint64_t length = splines_length(self, order);
+        for (uint64_t j = first; j < self->n; j++) {
+            const double *row = rows + order * self->preview + j * self->spacing;
+            double sum = 0.0;
+            for (uint64_t k = 1; k < length; k++) {
+                sum += e[k] * row[k];
+            }
+            g[j - first] += sum;
+        }
+    }
+}
+
+HSEP_API void hsep_splines_gram(const hsep_splines *self, const double weights[], uint64_t first, double triangle[])
+{
+    const uint64_t spacing = self->spacing;
+    for (uint64_t i = first; i < self->n; i++) {
+        for (uint64_t d = 0; i + d < self->n && d * spacing + 1 < splines_length(self, HSEP_ORDERS - 1); d++) {
+            double sum = 0.0;
+            for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+                const double *e = splines_differences(self, order);
+                const double *weight = weights + order * self->preview + i * spacing;
+                for (uint64_t k = d * spacing + 1; k < splines_length(self, order); k++) {
+                    sum += weight[k] * e[k] * e[k - d * spacing];
+                }
+            }
+            triangle[d] += sum;
+        }
+        triangle += self->n - i;
+    }
+}
+
+HSEP_API double hsep_splines_energy(const hsep_splines *self)
+{
+    double sum = 0.0;
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        const double *e = splines_differences(self, order);
+        sum += hsep_dot(e, e, splines_length(self, order));
+    }
+    return sum;
+}
+
+/* Entry (i, j), i <= j, of a triangle of n rows. */
+static double *splines_entry(double triangle[], uint64_t n, uint64_t i, uint64_t j)
+{
+    return triangle + i * n - i * (i + 1) / 2 + j; /* rows 0 ... i - 1 have n, n - 1, ... entries */
+}
+
+HSEP_API void hsep_splines_filtered_gram(const hsep_splines *self, const double filtered[], double triangle[])
+{
+    const uint64_t n = self->n, spacing = self->spacing;
+    for (uint64_t d = 0; d < n; d++) {
+        /* Columns j - d and j: sum over u of s(u + d spacing) s(u), up to where column j is cut off */
+        double sum = 0.0;
+        uint64_t u = 0;
+        for (uint64_t j = n; j-- > d;) {
+            for (; u + j * spacing < self->preview; u++) {
+                sum += filtered[u + d * spacing] * filtered[u];
+            }
+            *splines_entry(triangle, n, j - d, j) = sum;
+        }
+    }
+}
+
+HSEP_API void hsep_splines_jerk_gram(const hsep_splines *self, double weight, double triangle[])
+{
+    const double *e = splines_differences(self, 3);
+    const double unit = 1.0 / self->share[3];
+    const uint64_t spacing = self->spacing, length = splines_length(self, 3);
+    for (uint64_t d = 0; d < self->n && d * spacing + 1 < length; d++) {
+        double sum = 0.0;
+        for (uint64_t k = d * spacing + 1; k < length; k++) {
+            sum += (e[k] * unit) * (e[k - d * spacing] * unit);
+        }
+        for (uint64_t i = 0; i + d < self->n; i++) {
+            *splines_entry(triangle, self->n, i, i + d) += weight * sum;
+        }
+    }
+}
+
+HSEP_API void hsep_splines_project(
+    const hsep_splines *self, const double filtered[], const double target[], double weight, const double third[],
+    double v[])
+{
+    const double *e = splines_differences(self, 3);
+    const double unit = weight / self->share[3];
+    for (uint64_t j = 0; j < self->n; j++) {
+        const double *aim = target + j * self->spacing, *past = third + j * self->spacing;
+        double jerk = 0.0;
+        for (uint64_t k = 1; k < splines_length(self, 3); k++) {
+            jerk += e[k] * past[k];
+        }
+        v[j] = hsep_dot(filtered, aim, self->preview - j * self->spacing) - unit * jerk;
+    }
+}

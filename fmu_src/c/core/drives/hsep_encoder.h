@@ -1,0 +1,24 @@
+/* A position sensor with normal noise that draws the same on every platform: SplitMix64 (Steele, Lea and Flood
+ * 2014) gives two uniforms a draw, Box and Muller (1958) make one normal of them. Plain data; reentrant. */
+#ifndef HSEP_ENCODER_H
+#define HSEP_ENCODER_H
+
+#include "hsep_api.h"
+#include "hsep_layout.h"
+
+#include <stdint.h>
+
+typedef struct {
+    double noise_std; /* m, >= 0 */
+    uint64_t seed;
+    uint64_t n_draws; /* so far */
+} hsep_encoder;
+
+HSEP_ASSERT_WORDS(hsep_encoder, 3);
+
+HSEP_API void hsep_encoder_init(hsep_encoder *self, double noise_std, uint64_t seed);
+
+/* Return one measurement of the position x, m. Constant cost; allocates nothing; cannot fail. */
+HSEP_API double hsep_encoder_measure(hsep_encoder *self, double x);
+
+#endif

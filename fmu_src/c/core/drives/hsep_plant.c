@@ -1,0 +1,234 @@
+#include "hsep_plant.h"
+
+#include <math.h>
+#include <string.h>
+
+static const double plant_internal_step = 1e-4;     /* s */
+static const double plant_friction_velocity = 2e-3; /* m/s, over which the stage's friction changes sign */
+static const double plant_steps_per_time = 16.0;    /* internal steps in the fastest time constant */
+static const double plant_steps_max = 1e6;          /* internal steps of one step */
+static const double plant_state_max = 1e100;        /* of a drive's state: outputs and their squares stay finite */
+static const double plant_tolerance = 1e-6;         /* of an internal step */
+static const double plant_two_pi = 6.283185307179586;
+
+/* Number of internal steps for a step of h seconds: the fewest that are at most 0.1 ms and 1/(16 rate) long. */
+static double plant_internal_steps(double h, double rate)
+{
+    return fmax(1.0, ceil(fmax(h / plant_internal_step, h * rate * plant_steps_per_time) - plant_tolerance));
+}
+
+HSEP_API double hsep_plant_step_max(double rate)
+{
+    return fmin(plant_steps_max * plant_internal_step, plant_steps_max / plant_steps_per_time / rate);
+}
+
+HSEP_API double hsep_plant_mode_rate(const hsep_mode *mode)
+{
+    const double omega = plant_two_pi * mode->f_n;
+    return fmax(sqrt(omega * omega), 2.0 * mode->zeta * omega);
+}
+
+HSEP_API double hsep_feed_drive_rate(const hsep_feed_drive *self)
+{
+    return fmax(sqrt(self->k / self->m), self->c / self->m);
+}
+
+HSEP_API void hsep_feed_drive_reset(hsep_feed_drive *self, double start)
+{
+    self->start = start;
+    self->x = self->u = self->x_d = 0.0;
+}
+
+HSEP_API double hsep_feed_drive_x(const hsep_feed_drive *self) { return self->start + self->x; }
+
+HSEP_API double hsep_feed_drive_v(const hsep_feed_drive *self) { return self->u + self->c / self->m * self->x_d; }
+
+/* The slopes p = x' and q = u' of eq. (13) under the command r. */
+static void plant_slope(const hsep_feed_drive *d, double x, double u, double r, double *p, double *q)
+{
+    const double a = d->c / d->m, w2 = d->k / d->m, c_m = d->c_nl / d->m, k_m = d->k_nl / d->m;
+    const double v = u + a * r;
+    *p = v;
+    /* Eq. (13): u' = -(c/m) v - (k/m)(x - x_d) - H_NL/m */
+    *q = -a * v - w2 * (x - r) - c_m * v * fabs(v) - k_m * x * fabs(x);
+}
+
+HSEP_API int hsep_feed_drive_step(hsep_feed_drive *self, double x_d, double h, double *reached)
+{
+    const double n = plant_internal_steps(h, hsep_feed_drive_rate(self)), dt = h / n, r = x_d - self->start;
+    double x = self->x, u = self->u;
+    for (double i = 0.0; i < n; i += 1.0) {
+        double p1, p2, p3, p4, q1, q2, q3, q4;
+        plant_slope(self, x, u, r, &p1, &q1);
+        plant_slope(self, x + dt / 2.0 * p1, u + dt / 2.0 * q1, r, &p2, &q2);
+        plant_slope(self, x + dt / 2.0 * p2, u + dt / 2.0 * q2, r, &p3, &q3);
+        plant_slope(self, x + dt * p3, u + dt * q3, r, &p4, &q4);
+        x += dt / 6.0 * (p1 + 2.0 * p2 + 2.0 * p3 + p4);
+        u += dt / 6.0 * (q1 + 2.0 * q2 + 2.0 * q3 + q4);
+    }
+    *reached = x;
+    if (!(fabs(x) < plant_state_max && fabs(u) < plant_state_max)) { /* NaN too */
+        return 0;
+    }
+    self->x = x;
+    self->u = u;
+    self->x_d = r;
+    return 1;
+}
+
+/* Set what follows from the number of modes; return the bytes of the block. */
+static double stage_lay_out(hsep_stage *self, uint64_t n_modes)
+{
+    double end = HSEP_WORDS(hsep_stage);
+    self->n_modes = n_modes;
+    self->modes = hsep_take(&end, (double)n_modes * HSEP_WORDS(hsep_stage_mode));
+    self->z = hsep_take(&end, 2.0 * (double)n_modes);
+    return end * sizeof(double);
+}
+
+static const hsep_stage_mode *stage_modes(const hsep_stage *self)
+{
+    return (const hsep_stage_mode *)hsep_at_const(self, self->modes);
+}
+
+HSEP_API double hsep_stage_size(uint64_t n_modes) { return stage_lay_out(&(hsep_stage){0}, n_modes); }
+
+HSEP_API int hsep_stage_valid(const void *block, uint64_t n_modes)
+{
+    hsep_stage got;
+    memcpy(&got, block, sizeof got);
+    (void)stage_lay_out(&got, n_modes); /* changes nothing where it is sound */
+    return memcmp(&got, block, sizeof got) == 0 && hsep_clock_valid(&got.clock);
+}
+
+HSEP_API void hsep_stage_init(
+    hsep_stage *self, const hsep_mode modes[], uint64_t n_modes, double f, double kappa, double T_s, double start)
+{
+    self->f = f;
+    self->kappa = kappa;
+    self->start = start;
+    self->last_x_d = self->v_d = self->v = 0.0;
+    (void)hsep_clock_init(&self->clock, 0.0, T_s);
+    (void)stage_lay_out(self, n_modes);
+    hsep_stage_mode *stage = (hsep_stage_mode *)hsep_at(self, self->modes);
+    for (uint64_t i = 0; i < n_modes; i++) {
+        const double omega = plant_two_pi * modes[i].f_n;
+        stage[i].omega2 = omega * omega;
+        stage[i].two_zeta_omega = 2.0 * modes[i].zeta * omega;
+        stage[i].alpha = modes[i].alpha;
+        stage[i].beta = modes[i].beta;
+    }
+    memset(hsep_at(self, self->z), 0, (size_t)(2 * n_modes) * sizeof(double));
+}
+
+/* sum alpha z + beta z' over the modes, z: (2 n_modes,). */
+static double plant_position(const hsep_stage *s, const double z[])
+{
+    const hsep_stage_mode *mode = stage_modes(s);
+    double x = 0.0;
+    for (uint64_t i = 0; i < s->n_modes; i++) {
+        x += mode[i].alpha * z[2 * i] + mode[i].beta * z[2 * i + 1];
+    }
+    return x;
+}
+
+/* The slope of z, (2 n_modes,), under a command that friction has pushed back already. */
+static void plant_stage_slope(const hsep_stage *s, const double z[], double pushed, double slope[])
+{
+    const hsep_stage_mode *mode = stage_modes(s);
+    const double x = plant_position(s, z);
+    const double u = pushed - s->kappa * x * fabs(x);
+    for (uint64_t i = 0; i < s->n_modes; i++) {
+        /* z'' + 2 zeta omega z' + omega^2 z = u, eq. (15) */
+        slope[2 * i] = z[2 * i + 1];
+        slope[2 * i + 1] = u - mode[i].two_zeta_omega * z[2 * i + 1] - mode[i].omega2 * z[2 * i];
+    }
+}
+
+/* The command after the carriage's friction, which follows the commanded velocity: d = f tanh(v_d / 2 mm/s). */
+static double plant_pushed(const hsep_stage *s, double r, double v_d)
+{
+    return r - s->f * tanh(v_d / plant_friction_velocity);
+}
+
+/* One Runge-Kutta step of z, (size,), with three more vectors of work space behind it. */
+static void plant_stage_internal_step(const hsep_stage *s, double z[], double pushed, double dt)
+{
+    static const double weight[4] = {1.0, 2.0, 2.0, 1.0};
+    const double reach[4] = {dt / 2.0, dt / 2.0, dt, 0.0}; /* from z to where the next slope is taken */
+    const uint64_t size = 2 * s->n_modes;
+    double *slope = z + size, *at = slope + size, *sum = at + size;
+    for (uint64_t i = 0; i < size; i++) {
+        at[i] = z[i];
+        sum[i] = 0.0;
+    }
+    for (int stage = 0; stage < 4; stage++) {
+        plant_stage_slope(s, at, pushed, slope);
+        for (uint64_t i = 0; i < size; i++) {
+            sum[i] += weight[stage] * slope[i];
+            at[i] = z[i] + reach[stage] * slope[i];
+        }
+    }
+    for (uint64_t i = 0; i < size; i++) {
+        z[i] += dt / 6.0 * sum[i];
+    }
+}
+
+HSEP_API double hsep_stage_rate(const hsep_stage *self)
+{
+    const hsep_stage_mode *mode = stage_modes(self);
+    double rate = 0.0;
+    for (uint64_t i = 0; i < self->n_modes; i++) {
+        rate = fmax(rate, fmax(sqrt(mode[i].omega2), mode[i].two_zeta_omega));
+    }
+    return rate;
+}
+
+/* Integrate z over time, s, with the command r, m from the start, and the commanded velocity v_d held. */
+static void plant_stage_integrate(const hsep_stage *s, double z[], double r, double v_d, double time)
+{
+    const double n = plant_internal_steps(time, hsep_stage_rate(s)), pushed = plant_pushed(s, r, v_d);
+    for (double i = 0.0; i < n; i += 1.0) {
+        plant_stage_internal_step(s, z, pushed, time / n);
+    }
+}
+
+HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work[])
+{
+    const double r = x_d - self->start;
+    double last_x_d = self->last_x_d, v_d = self->v_d, done = 0.0;
+    const size_t z_size = (size_t)(2 * self->n_modes) * sizeof(double);
+    double *z = work, *slope = work + 2 * self->n_modes;
+    hsep_clock_step step;
+    (void)hsep_clock_count(&self->clock, self->clock.end, h, &step);
+    memcpy(z, hsep_at(self, self->z), z_size);
+    /* v_d is taken at the instants, in whatever steps they come. */
+    for (int64_t i = 0; i <= step.n_latched; i++) {
+        const double next = i < step.n_latched ? fmax(done, step.first + (double)i * self->clock.T_s) : h;
+        if (next > done) {
+            plant_stage_integrate(self, z, r, v_d, next - done);
+            done = next;
+        }
+        if (i < step.n_latched) {
+            v_d = (r - last_x_d) / self->clock.T_s;
+            last_x_d = r;
+        }
+    }
+    for (uint64_t i = 0; i < 2 * self->n_modes; i++) {
+        if (!(fabs(z[i]) < plant_state_max)) { /* NaN too */
+            return 0;
+        }
+    }
+    plant_stage_slope(self, z, plant_pushed(self, r, v_d), slope);
+    self->v = plant_position(self, slope);
+    memcpy(hsep_at(self, self->z), z, z_size);
+    self->last_x_d = last_x_d;
+    self->v_d = v_d;
+    self->clock = step.after;
+    return 1;
+}
+
+HSEP_API double hsep_stage_x(const hsep_stage *self)
+{
+    return self->start + plant_position(self, hsep_at_const(self, self->z));
+}

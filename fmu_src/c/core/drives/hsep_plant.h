@@ -1,0 +1,87 @@
+/* Nonlinear feed drives: eq. (13), and a stage with friction and cable stiffness.
+ *
+ * Both hold the command constant over a step and measure positions from where they rested at first. Classical
+ * Runge-Kutta of order 4 in internal steps of at most 0.1 ms and 1/16 of the linear part's fastest time constant;
+ * the command is never differentiated.
+ * Cost of a step: 4 slopes for each internal step. Plain data; reentrant; allocates nothing.
+ */
+#ifndef HSEP_PLANT_H
+#define HSEP_PLANT_H
+
+#include "hsep_api.h"
+#include "hsep_clock.h"
+#include "hsep_layout.h"
+#include "hsep_physics.h"
+
+#include <stdint.h>
+
+#define HSEP_PLANT_RATE_MAX 1e5 /* 1/s, of a drive's linear part */
+
+/* Longest step, s, of a drive whose fastest rate is that, 1/s: 10^6 internal steps, which bounds its cost. */
+HSEP_API double hsep_plant_step_max(double rate);
+
+/* The fastest rate of a mode, 1/s. */
+HSEP_API double hsep_plant_mode_rate(const hsep_mode *mode);
+
+/* m x'' + c x' + k x + H_NL = c x_d' + k x_d with H_NL = c_nl x'|x'| + k_nl x|x|, eq. (13), in the states x and
+ * u = x' - (c/m) x_d. */
+typedef struct {
+    double m, c, k;    /* kg, N.s/m, N/m, > 0 */
+    double c_nl, k_nl; /* N.s2/m2, N/m2, >= 0 */
+    double start;      /* position of rest, m */
+    double x, u, x_d;  /* m, m/s, and the last command, m, from there */
+} hsep_feed_drive;
+
+/* Put the drive to rest at start, m; its parameters are set by the caller. */
+HSEP_API void hsep_feed_drive_reset(hsep_feed_drive *self, double start);
+
+/* Advance by h, s, at most hsep_plant_step_max, with the command x_d, m, held. Fails, and returns 0 with the state
+ * unchanged, if the state would leave the range of numbers; *x then tells the position reached, m. */
+HSEP_API int hsep_feed_drive_step(hsep_feed_drive *self, double x_d, double h, double *x);
+
+HSEP_API double hsep_feed_drive_rate(const hsep_feed_drive *self); /* of the linear part, 1/s */
+HSEP_API double hsep_feed_drive_x(const hsep_feed_drive *self);    /* true position, m */
+HSEP_API double hsep_feed_drive_v(const hsep_feed_drive *self); /* true velocity under the last step's command, m/s */
+
+/* One mode of the stage: z'' + two_zeta_omega z' + omega2 z = command, eq. (15). */
+typedef struct {
+    double omega2, two_zeta_omega; /* 1/s^2, 1/s */
+    double alpha, beta;            /* 1/s^2, 1/s */
+} hsep_stage_mode;
+
+/* x = G_pb (x_d - d) with d = f tanh(v_d / 2 mm/s) + kappa x|x|; v_d is the backward difference of x_d over T_s. */
+typedef struct {
+    double f, kappa;      /* m, 1/m */
+    double start;         /* position of rest, m */
+    hsep_clock clock;     /* of the instants at which the command is looked at, in a time of its own */
+    double last_x_d, v_d; /* m from start, at the last instant; m/s */
+    double v;             /* m/s */
+    uint64_t n_modes;
+    /* Offsets in doubles from the beginning of the struct */
+    uint64_t modes; /* hsep_stage_mode[n_modes] */
+    uint64_t z;     /* (2 n_modes,) z and z' of each, m s^2 and m s */
+} hsep_stage;
+
+HSEP_ASSERT_WORDS(hsep_feed_drive, 9);
+HSEP_ASSERT_WORDS(hsep_stage_mode, 4);
+HSEP_ASSERT_WORDS(hsep_stage, 16);
+
+#define HSEP_STAGE_WORK 8 /* doubles of work space for each mode */
+
+HSEP_API double hsep_stage_size(uint64_t n_modes); /* bytes of the block, counted in double */
+
+/* Whether a block, in any alignment, is one that hsep_stage_init with so many modes began, with a valid clock. */
+HSEP_API int hsep_stage_valid(const void *block, uint64_t n_modes);
+
+/* Put the stage to rest at start, m. modes: (n_modes,). */
+HSEP_API void hsep_stage_init(
+    hsep_stage *self, const hsep_mode modes[], uint64_t n_modes, double f, double kappa, double T_s, double start);
+
+/* Advance by h, s, at most hsep_plant_step_max, with the command x_d, m, held. work: (HSEP_STAGE_WORK n_modes,).
+ * Fails, and returns 0 with the state unchanged, if the state would leave the range of numbers. */
+HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work[]);
+
+HSEP_API double hsep_stage_rate(const hsep_stage *self); /* of the fastest mode, 1/s */
+HSEP_API double hsep_stage_x(const hsep_stage *self);    /* true position, m */
+
+#endif

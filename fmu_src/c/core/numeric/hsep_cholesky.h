@@ -1,0 +1,23 @@
+/* Cholesky factor of a symmetric, positive definite matrix, P = R' R, and the equations it solves.
+ *
+ * A triangle of n rows is kept without gaps, by rows from the diagonal to the right: n (n + 1) / 2 doubles.
+ * Reentrant; allocates nothing.
+ */
+#ifndef HSEP_CHOLESKY_H
+#define HSEP_CHOLESKY_H
+
+#include "hsep_api.h"
+
+#include <stdint.h>
+
+/* Doubles of a triangle of n rows. */
+static inline double hsep_triangle(uint64_t n) { return 0.5 * (double)n * ((double)n + 1.0); }
+
+/* Turn the upper triangle of P into R, in place. Returns 0 if P is not positive definite or not finite; the triangle
+ * is used up then. Cost: n^3 / 6 multiply-adds. */
+HSEP_API int hsep_cholesky_factor(double triangle[], uint64_t n);
+
+/* Turn b, (n,), into the solution x of R' R x = b. Cost: n^2 multiply-adds. */
+HSEP_API void hsep_cholesky_solve(const double triangle[], uint64_t n, double b[]);
+
+#endif

@@ -1,0 +1,26 @@
+/* Range of what is published. Reentrant; allocates nothing. */
+#ifndef HSEP_RANGE_H
+#define HSEP_RANGE_H
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#define HSEP_PREDICTION_MAX 1e100 /* m, of what is published: sums of squares of what is smaller never overflow */
+
+/* Which prediction of a window is beyond it, because what was learned diverges. */
+typedef enum { HSEP_CONVERGES = 0, HSEP_DIVERGES_X_PB, HSEP_DIVERGES_X_H, HSEP_DIVERGES_X_DM } hsep_divergence;
+
+/* Whether all entries of a, (n,) doubles in any alignment, are numbers within +- limit. */
+static inline int hsep_within(const void *a, uint64_t n, double limit)
+{
+    int within = 1;
+    for (uint64_t i = 0; i < n; i++) {
+        double entry;
+        memcpy(&entry, (const char *)a + i * sizeof entry, sizeof entry);
+        within &= fabs(entry) <= limit; /* NaN is not */
+    }
+    return within;
+}
+
+#endif

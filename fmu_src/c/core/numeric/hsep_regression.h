@@ -1,0 +1,60 @@
+/* Recursive ridge regression, one row a call, carried as a triangular factor; eq. (6).
+ *
+ * w = argmin_w sum_k [target(k) - w' phi(k)]^2 + lambda |w|^2
+ *
+ * The QR factor [R z; 0 rho] of all rows [phi | target] so far, with sqrt(lambda) I as its first R, is updated by
+ * Givens rotations without square roots (Gentleman 1973): R = D^(1/2) U with a unit triangle U. Weights and data
+ * never meet as normal equations, so nothing is squared but single numbers. Error bound: that of ordinary Givens
+ * rotations times at most sqrt(2), see hsep_regression.c; and what rounding takes from an entry is carried along and
+ * given back with the next row, so that the digits do not wear off over 10^8 rows.
+ *
+ * Memory is one block: the struct, then its arrays as doubles; no pointers. Reentrant; allocates nothing.
+ */
+#ifndef HSEP_REGRESSION_H
+#define HSEP_REGRESSION_H
+
+#include "hsep_api.h"
+#include "hsep_layout.h"
+
+#include <stdint.h>
+
+typedef struct {
+    uint64_t n;          /* features */
+    uint64_t n_tiles;    /* tiles of 4 columns that n features and the target need */
+    uint64_t n_samples;  /* rows taken in */
+    double residual_sum; /* rho^2 = sum (target - w' phi)^2 + lambda |w|^2 at the optimum */
+    /* Offsets in doubles from the beginning of the struct */
+    uint64_t inverse_d; /* (4 n_tiles,) 1/D */
+    uint64_t row;       /* (4 n_tiles,) the row that comes next */
+    uint64_t tiles;     /* (16 n_tiles (n_tiles + 1),) U in tiles */
+} hsep_regression;
+
+HSEP_ASSERT_WORDS(hsep_regression, 7);
+
+/* Bytes of the block, counted in double so that no size can overflow: about 8 n^2. */
+HSEP_API double hsep_regression_size(uint64_t n);
+
+/* Fill the block for n >= 1 features and lambda > 0, in the unit of a row's entry squared.
+ * A lambda below 1e-290 counts as 1e-290, so that its reciprocal is a number. */
+HSEP_API void hsep_regression_init(hsep_regression *self, uint64_t n, double lambda);
+
+/* Whether a block, in any alignment, is one that hsep_regression_init with n features began. */
+HSEP_API int hsep_regression_valid(const void *block, uint64_t n);
+
+/* Where the next row goes, (n + 1,): phi, then its target. */
+HSEP_API double *hsep_regression_row(hsep_regression *self);
+
+/* Fold that row into the factor; the row's memory is used up. All n + 1 entries must be finite.
+ * Cost: n^2 / 2 times 2 multiplications and 5 additions, and 2 n divisions, no matter how many rows were there
+ * before; in scalar instead of vector instructions for rows that outweigh all before them, as the first ones do. */
+HSEP_API void hsep_regression_fold(hsep_regression *self);
+
+/* Solve R w = z for w, (n,). Cost: n^2 / 2 multiply-adds. */
+HSEP_API void hsep_regression_solve(const hsep_regression *self, double w[]);
+
+/* Take over row i of a factor [R z; 0 rho], its entries i ... n, which the caller has put where
+ * hsep_regression_row tells. All n + 1 rows make a factor. Fails, and returns 0 with the factor unchanged, if an entry
+ * is not finite or a diagonal entry of R is 0. Cost: n divisions. */
+HSEP_API int hsep_regression_load(hsep_regression *self, uint64_t i);
+
+#endif

@@ -1,0 +1,153 @@
+#include "hsep_physics.h"
+
+#include <math.h>
+#include <string.h>
+
+#define PHYSICS_TERMS 20 /* of the series: 0.5^20 / 20! < 1e-24 */
+
+static const double physics_two_pi = 6.283185307179586;
+
+/* E := F G + scale E, all (4, 4) by rows; E is none of the others. */
+static void physics_multiply(double E[16], const double F[16], const double G[16], double scale)
+{
+    for (int i = 0; i < 4; i++) {
+        for (int j = 0; j < 4; j++) {
+            double sum = scale * E[4 * i + j];
+            for (int k = 0; k < 4; k++) {
+                sum += F[4 * i + k] * G[4 * k + j];
+            }
+            E[4 * i + j] = sum;
+        }
+    }
+}
+
+/* E := exp(M) - I, both (4, 4) by rows; M is halved on the way until its norm is at most 1/2.
+ * Scaling and squaring (Moler and Van Loan 2003, method 3) of exp - I instead of exp: entries much smaller than 1
+ * keep their relative accuracy, and many squarings do not wear the digits off. */
+static void physics_expm1(double E[16], double M[16])
+{
+    double norm = 0.0;
+    for (int i = 0; i < 16; i += 4) {
+        norm = fmax(norm, fabs(M[i]) + fabs(M[i + 1]) + fabs(M[i + 2]) + fabs(M[i + 3]));
+    }
+    int exponent = 0;
+    (void)frexp(norm, &exponent); /* norm < 2^exponent */
+    const int squarings = exponent + 1 > 0 ? exponent + 1 : 0;
+    for (int i = 0; i < 16; i++) {
+        M[i] = ldexp(M[i], -squarings);
+    }
+    /* exp(M) - I = M (I + M/2 (I + M/3 (I + ...))), from the inside out */
+    double P[16], Q[16];
+    memset(P, 0, sizeof P);
+    for (int term = PHYSICS_TERMS; term >= 1; term--) {
+        memcpy(Q, M, sizeof Q);
+        physics_multiply(Q, M, P, 1.0); /* Q = M + M P */
+        for (int i = 0; i < 16; i++) {
+            P[i] = Q[i] / term;
+        }
+    }
+    memcpy(E, P, 16 * sizeof *E);
+    for (int i = 0; i < squarings; i++) {
+        memcpy(P, E, sizeof P);
+        physics_multiply(E, P, P, 2.0); /* (I + P)^2 - I = 2 P + P P */
+    }
+}
+
+HSEP_API void hsep_discretise(hsep_discrete_mode *mode, const hsep_mode *continuous, double Ts, hsep_hold hold)
+{
+    const double omega = physics_two_pi * continuous->f_n; /* rad/s */
+    /* States (omega^2 z, omega z') with z'' + 2 zeta omega z' + omega^2 z = u, both in m; then u and its ramp
+     * (Van Loan 1978): the exponential of the augmented matrix holds Phi, Gamma_1 and Gamma_2. */
+    double M[16] = {0.0}, E[16];
+    M[1] = omega * Ts;
+    M[4] = -omega * Ts;
+    M[5] = -2.0 * continuous->zeta * omega * Ts;
+    M[6] = omega * Ts;
+    M[11] = 1.0; /* the ramp from u(k) to u(k+1) */
+    physics_expm1(E, M);
+    mode->A[0] = 1.0 + E[0];
+    mode->A[1] = E[1];
+    mode->A[2] = E[4];
+    mode->A[3] = 1.0 + E[5];
+    mode->c[0] = continuous->alpha / (omega * omega);
+    mode->c[1] = continuous->beta / omega;
+    const double gamma_1[2] = {E[2], E[6]}, gamma_2[2] = {E[3], E[7]};
+    if (hold == HSEP_ZERO_ORDER_HOLD) {
+        mode->b[0] = gamma_1[0];
+        mode->b[1] = gamma_1[1];
+        mode->d = 0.0;
+    } else {
+        /* xi(k+1) = Phi xi + Gamma_1 u(k) + Gamma_2 (u(k+1) - u(k)); s = xi - Gamma_2 u needs no future command:
+         * b = Phi Gamma_2 + Gamma_1 - Gamma_2 */
+        mode->b[0] = E[0] * gamma_2[0] + E[1] * gamma_2[1] + gamma_1[0];
+        mode->b[1] = E[4] * gamma_2[0] + E[5] * gamma_2[1] + gamma_1[1];
+        mode->d = mode->c[0] * gamma_2[0] + mode->c[1] * gamma_2[1];
+    }
+    mode->s[0] = mode->s[1] = 0.0;
+}
+
+/* Set what follows from the parameters; return the bytes of the block. */
+static double physics_lay_out(hsep_physics *self, uint64_t n_modes, uint64_t dead_time)
+{
+    double end = HSEP_WORDS(hsep_physics);
+    self->n_modes = n_modes;
+    self->dead_time = dead_time;
+    self->modes = hsep_take(&end, (double)n_modes * HSEP_WORDS(hsep_discrete_mode));
+    self->ring = hsep_take(&end, (double)dead_time);
+    return end * sizeof(double);
+}
+
+static hsep_discrete_mode *physics_modes(hsep_physics *self)
+{
+    return (hsep_discrete_mode *)hsep_at(self, self->modes);
+}
+
+HSEP_API double hsep_physics_size(uint64_t n_modes, uint64_t dead_time)
+{
+    return physics_lay_out(&(hsep_physics){0}, n_modes, dead_time);
+}
+
+HSEP_API int hsep_physics_valid(const void *block, uint64_t n_modes, uint64_t dead_time)
+{
+    hsep_physics got;
+    memcpy(&got, block, sizeof got);
+    (void)physics_lay_out(&got, n_modes, dead_time); /* changes nothing where it is sound */
+    return memcmp(&got, block, sizeof got) == 0 && (got.oldest == 0 || got.oldest < dead_time);
+}
+
+HSEP_API void hsep_physics_init(
+    hsep_physics *self, const hsep_mode modes[], uint64_t n_modes, uint64_t dead_time, double Ts, hsep_hold hold)
+{
+    (void)physics_lay_out(self, n_modes, dead_time);
+    self->oldest = 0;
+    for (uint64_t i = 0; i < n_modes; i++) {
+        hsep_discretise(&physics_modes(self)[i], &modes[i], Ts, hold);
+    }
+    memset(hsep_at(self, self->ring), 0, (size_t)dead_time * sizeof(double));
+}
+
+HSEP_API void hsep_physics_respond(hsep_physics *self, const double x_d[], double x_pb[], size_t n)
+{
+    hsep_discrete_mode *modes = physics_modes(self);
+    double *ring = hsep_at(self, self->ring);
+    for (size_t k = 0; k < n; k++) {
+        double u = x_d[k];
+        if (self->dead_time > 0) {
+            const double delayed = ring[self->oldest];
+            ring[self->oldest] = u;
+            u = delayed;
+            self->oldest = self->oldest + 1 == self->dead_time ? 0 : self->oldest + 1;
+        }
+        double sum = 0.0;
+        for (uint64_t i = 0; i < self->n_modes; i++) {
+            hsep_discrete_mode *m = &modes[i];
+            const double s0 = m->s[0], s1 = m->s[1];
+            /* x_pb = c s + d u */
+            sum += m->c[0] * s0 + m->c[1] * s1 + m->d * u;
+            /* s := A s + b u */
+            m->s[0] = m->A[0] * s0 + m->A[1] * s1 + m->b[0] * u;
+            m->s[1] = m->A[2] * s0 + m->A[3] * s1 + m->b[1] * u;
+        }
+        x_pb[k] = sum;
+    }
+}

@@ -1,0 +1,294 @@
+#include "hsep_predictor.h"
+
+#include "hsep_range.h"
+#include "hsep_schedule.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+HSEP_API hsep_physics *hsep_predictor_physics(hsep_predictor *self)
+{
+    return (hsep_physics *)hsep_at(self, self->physics);
+}
+
+HSEP_API hsep_regression *hsep_predictor_regression(hsep_predictor *self)
+{
+    return (hsep_regression *)hsep_at(self, self->regression);
+}
+
+/* Set what follows from the parameters; return the bytes of the block. */
+static double predictor_lay_out(hsep_predictor *self, const hsep_predictor_parameters *parameters)
+{
+    const double Np = (double)parameters->Np, preview = (double)parameters->preview;
+    const double p = (double)parameters->p, q = (double)parameters->q;
+    const int scheduled = parameters->v_friction > 0.0;
+    double end = HSEP_WORDS(hsep_predictor);
+    hsep_features_lay_out(&self->features, parameters->p, parameters->q, scheduled ? HSEP_SCHEDULED : 0);
+    const double regression = hsep_regression_size(self->features.n);
+    self->Np = parameters->Np;
+    self->preview = parameters->preview;
+    self->n_init = parameters->n_init;
+    self->sign_step = parameters->v_friction * parameters->T_s;
+    self->ahead = hsep_take(&end, preview);
+    self->x_d = hsep_take(&end, preview);
+    self->x_pb = hsep_take(&end, Np);
+    self->x_h = hsep_take(&end, Np);
+    self->ahead_pb = hsep_take(&end, parameters->planned ? 0.0 : Np);
+    self->e_h = hsep_take(&end, Np + p);
+    self->past_x = hsep_take(&end, Np + q);
+    self->past_e = hsep_take(&end, Np + p);
+    self->weights = hsep_take(&end, (double)self->features.n);
+    self->signs = hsep_take(&end, scheduled ? preview + 2.0 * HSEP_SCHEDULE_REACH : 0.0);
+    self->drive = hsep_take(&end, scheduled ? preview : 0.0);
+    self->physics = hsep_take_block(&end, hsep_physics_size(parameters->n_modes, parameters->dead_time));
+    self->regression = hsep_take_block(&end, regression);
+    self->saved = parameters->unlearns ? hsep_take_block(&end, regression) : 0;
+    return end * sizeof(double);
+}
+
+HSEP_API double hsep_predictor_size(const hsep_predictor_parameters *parameters)
+{
+    return predictor_lay_out(&(hsep_predictor){0}, parameters);
+}
+
+HSEP_API void hsep_predictor_init(hsep_predictor *self, const hsep_predictor_parameters *parameters, double start)
+{
+    memset(self, 0, (size_t)hsep_predictor_size(parameters));
+    (void)predictor_lay_out(self, parameters);
+    self->start = self->x_d_last = start;
+    self->n_published = self->n_physics = self->Np; /* the first fill is not predicted */
+    hsep_sensor_init(&self->sensor);
+    for (uint64_t i = 0; i < self->preview; i++) {
+        hsep_at(self, self->ahead)[i] = hsep_at(self, self->x_d)[i] = start;
+    }
+    for (uint64_t i = 0; i < self->Np; i++) {
+        hsep_at(self, self->x_pb)[i] = hsep_at(self, self->x_h)[i] = start;
+    }
+    hsep_physics_init(
+        hsep_predictor_physics(self), parameters->modes, parameters->n_modes, parameters->dead_time, parameters->T_s,
+        parameters->hold);
+    hsep_regression_init(hsep_predictor_regression(self), self->features.n, parameters->lambda);
+}
+
+HSEP_API int hsep_predictor_valid(const void *block, const hsep_predictor_parameters *parameters, uint64_t k)
+{
+    hsep_predictor got;
+    memcpy(&got, block, sizeof got);
+    (void)predictor_lay_out(&got, parameters); /* changes nothing where it is sound */
+    const double sums[3] = {got.sum_e, got.sum_pb, got.sum_h};
+    int sound =
+        memcmp(&got, block, sizeof got) == 0 && got.k == k && got.n_published <= got.Np &&
+        k % got.Np < got.n_published && got.n_physics <= got.Np && got.learning <= 1 && got.missing <= 1 &&
+        (!got.missing || got.saved) && got.divergence <= HSEP_DIVERGES_X_DM &&
+        (got.divergence || hsep_within(hsep_at_bytes(block, got.ahead), got.e_h - got.ahead, HSEP_PREDICTION_MAX)) &&
+        hsep_physics_valid(hsep_at_bytes(block, got.physics), parameters->n_modes, parameters->dead_time) &&
+        hsep_regression_valid(hsep_at_bytes(block, got.regression), got.features.n) &&
+        (!got.saved || hsep_regression_valid(hsep_at_bytes(block, got.saved), got.features.n));
+    for (int i = 0; i < 3; i++) {
+        sound = sound && sums[i] >= 0.0 && isfinite(sums[i]);
+    }
+    return sound;
+}
+
+HSEP_API hsep_recursion hsep_predictor_recursion(const hsep_predictor *self, int with_bias)
+{
+    const hsep_features *f = &self->features;
+    const double *w = hsep_at_const(self, self->weights);
+    return (hsep_recursion){
+        .w_x = w + f->x, .w_e = w + f->e, .p = f->p, .q = f->q, .bias = with_bias ? w[HSEP_BIAS] : 0.0};
+}
+
+HSEP_API const double *hsep_predictor_drive(const hsep_predictor *self, uint64_t n)
+{
+    const int scheduled = self->features.n > self->features.scheduled;
+    return scheduled ? hsep_at_const(self, self->drive) + (self->preview - n) : NULL;
+}
+
+/* Before a row is learned: whether it is. A measurement that is held while the drive moves is missing. */
+static int predictor_guard(hsep_predictor *self, double x_meas, double x_pb)
+{
+    if (self->saved && hsep_sensor_misses(&self->sensor, x_meas, x_pb)) {
+        self->missing = 1;
+    }
+    return self->learning && !self->missing;
+}
+
+/* Fold the row of a sample, at place i of its window, into the regression; eqs. (5) and (6). */
+static void predictor_learn(hsep_predictor *self, uint64_t i)
+{
+    const hsep_features *f = &self->features;
+    const uint64_t j = self->Np - 1 - i;
+    const double *x = hsep_at(self, self->past_x) + j, *e = hsep_at(self, self->past_e) + j;
+    double *row = hsep_regression_row(hsep_predictor_regression(self)); /* phi(k), its target e_pb(k) behind it */
+    row[HSEP_BIAS] = 1.0;
+    memcpy(row + f->x, x, (size_t)(f->q + 1) * sizeof(double));
+    memcpy(row + f->e, e + 1, (size_t)f->p * sizeof(double));
+    if (f->n > f->scheduled) {
+        hsep_schedule_features(hsep_at(self, self->signs), i, row + f->scheduled);
+    }
+    row[f->n] = e[0];
+    hsep_regression_fold(hsep_predictor_regression(self));
+}
+
+HSEP_API int hsep_predictor_take_in(hsep_predictor *self, double x_d_ahead, double x_meas)
+{
+    const uint64_t i = self->k % self->Np, j = self->Np - 1 - i;
+    const double x_d = hsep_at(self, self->x_d)[i], x_pb = hsep_at(self, self->x_pb)[i];
+    const double x_h = hsep_at(self, self->x_h)[i];
+    hsep_at(self, self->ahead)[self->k % self->preview] = x_d_ahead;
+    hsep_at(self, self->past_e)[j] = x_meas - self->start - hsep_at(self, self->past_x)[j]; /* e_pb = x - x_pb */
+    if (predictor_guard(self, x_meas, x_pb)) {
+        predictor_learn(self, i);
+    }
+    if (self->k >= self->preview && (double)self->k >= self->n_init) {
+        self->n_measured++;
+        self->sum_e += (x_meas - x_d) * (x_meas - x_d);
+        self->sum_pb += (x_meas - x_pb) * (x_meas - x_pb);
+        self->sum_h += (x_meas - x_h) * (x_meas - x_h);
+    }
+    self->k++;
+    return i + 1 == self->Np;
+}
+
+/* Take back what was learned of the window; what was predicted stands for what was not measured. */
+static void predictor_unlearn(hsep_predictor *self)
+{
+    const double *e_h = hsep_at(self, self->e_h);
+    double *past_e = hsep_at(self, self->past_e);
+    memcpy(
+        hsep_at(self, self->regression), hsep_at(self, self->saved),
+        (size_t)(self->saved - self->regression) * sizeof(double));
+    for (uint64_t i = 0, j = self->Np; j-- > 0; i++) {
+        past_e[j] = i < self->n_physics ? 0.0 : e_h[j];
+    }
+}
+
+HSEP_API int hsep_predictor_finish(hsep_predictor *self)
+{
+    const hsep_features *f = &self->features;
+    const uint64_t Np = self->Np;
+    double *past_x = hsep_at(self, self->past_x), *past_e = hsep_at(self, self->past_e);
+    if (self->missing) {
+        predictor_unlearn(self);
+    }
+    if (f->n > f->scheduled) {
+        hsep_schedule_next(hsep_at(self, self->signs), Np);
+    }
+    self->x_d_last = hsep_at(self, self->x_d)[Np - 1];
+    memcpy(past_x + Np, past_x, (size_t)f->q * sizeof(double)); /* q < Np, p <= Np: they do not overlap */
+    memcpy(past_e + Np, past_e, (size_t)f->p * sizeof(double));
+    return self->learning && !self->missing;
+}
+
+/* Take in the reference of the window that begins: the signs of its velocity, and what they add to the residuals. */
+static void predictor_schedule(hsep_predictor *self)
+{
+    const double *w = hsep_at(self, self->weights) + self->features.scheduled;
+    double *signs = hsep_at(self, self->signs), *drive = hsep_at(self, self->drive);
+    double features[HSEP_SCHEDULED];
+    hsep_schedule_signs(signs, hsep_at(self, self->x_d), self->preview, self->x_d_last, self->sign_step);
+    for (uint64_t k = 0; k < self->preview; k++) {
+        double sum = 0.0;
+        hsep_schedule_features(signs, k, features);
+        for (int i = 0; i < HSEP_SCHEDULED; i++) {
+            sum += features[i] * w[i];
+        }
+        drive[self->preview - 1 - k] = sum;
+    }
+}
+
+/* The weights of the window that begins, and what follows from them; eq. (6). */
+static void predictor_solve(hsep_predictor *self)
+{
+    hsep_regression_solve(hsep_predictor_regression(self), hsep_at(self, self->weights));
+    if (self->features.n > self->features.scheduled) {
+        predictor_schedule(self);
+    }
+}
+
+HSEP_API void hsep_predictor_begin(hsep_predictor *self)
+{
+    const uint64_t Np = self->Np, oldest = self->k % self->preview, newest = self->preview - oldest;
+    const double *ahead = hsep_at(self, self->ahead), *past_e = hsep_at(self, self->past_e);
+    double *x_d = hsep_at(self, self->x_d), *e_h = hsep_at(self, self->e_h);
+    memcpy(x_d, ahead + oldest, (size_t)newest * sizeof(double));
+    memcpy(x_d + newest, ahead, (size_t)oldest * sizeof(double));
+    memcpy(e_h + Np, past_e + Np, (size_t)self->features.p * sizeof(double));
+    predictor_solve(self);
+    self->n_published = 0;
+    self->learning = !self->missing && self->k >= self->preview; /* over the first fill there is nothing to learn */
+    self->missing = 0;
+    if (self->saved) {
+        memcpy(
+            hsep_at(self, self->saved), hsep_at(self, self->regression),
+            (size_t)(self->saved - self->regression) * sizeof(double));
+    }
+}
+
+/* Before the samples first ... last - 1 of a window are published: whether they diverge. */
+static void predictor_bound(hsep_predictor *self, uint64_t first, uint64_t last)
+{
+    const double *x_pb = hsep_at(self, self->x_pb) + first, *x_h = hsep_at(self, self->x_h) + first;
+    if (self->divergence == HSEP_CONVERGES && !hsep_within(x_pb, last - first, HSEP_PREDICTION_MAX)) {
+        self->divergence = HSEP_DIVERGES_X_PB;
+    } else if (self->divergence == HSEP_CONVERGES && !hsep_within(x_h, last - first, HSEP_PREDICTION_MAX)) {
+        self->divergence = HSEP_DIVERGES_X_H;
+    }
+}
+
+HSEP_API void hsep_predictor_publish(hsep_predictor *self, uint64_t last)
+{
+    const uint64_t Np = self->Np, first = self->n_published;
+    const hsep_recursion recursion = hsep_predictor_recursion(self, 1);
+    const double *past_x = hsep_at(self, self->past_x);
+    double *x_pb = hsep_at(self, self->x_pb), *x_h = hsep_at(self, self->x_h), *e_h = hsep_at(self, self->e_h);
+    hsep_recursion_run(&recursion, past_x, hsep_predictor_drive(self, Np), e_h, Np, first, last); /* Eq. (4) */
+    for (uint64_t i = first; i < last; i++) {
+        x_pb[i] = past_x[Np - 1 - i] + self->start;
+        x_h[i] = i < self->n_physics ? x_pb[i] : x_pb[i] + e_h[Np - 1 - i]; /* Eq. (4) */
+    }
+    predictor_bound(self, first, last);
+    self->n_published = last;
+}
+
+HSEP_API int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, double x_meas)
+{
+    const uint64_t Np = self->Np;
+    const double relative = x_d_ahead - self->start;
+    double *past_x = hsep_at(self, self->past_x), *ahead_pb = hsep_at(self, self->ahead_pb);
+    hsep_physics_respond(hsep_predictor_physics(self), &relative, ahead_pb + self->k % Np, 1);
+    if (!hsep_predictor_take_in(self, x_d_ahead, x_meas)) {
+        return 0;
+    }
+    (void)hsep_predictor_finish(self);
+    if (self->k == self->preview) { /* what was measured over the first fill is not used */
+        memset(hsep_at(self, self->past_e), 0, (size_t)(Np + self->features.p) * sizeof(double));
+    }
+    hsep_predictor_begin(self);
+    for (uint64_t i = 0; i < Np; i++) {
+        past_x[Np - 1 - i] = ahead_pb[i]; /* Eq. (2), answered command by command as they came */
+    }
+    const double warm_up = self->n_init - (double)self->k;
+    self->n_physics = warm_up >= (double)Np ? Np : warm_up > 0.0 ? (uint64_t)warm_up : 0;
+    hsep_predictor_publish(self, Np);
+    return 1;
+}
+
+static double predictor_rms(const hsep_predictor *self, double sum)
+{
+    return self->n_measured > 0 ? sqrt(sum / (double)self->n_measured) : 0.0;
+}
+
+HSEP_API void hsep_predictor_read(const hsep_predictor *self, hsep_predictor_outputs *outputs)
+{
+    const uint64_t i = self->k % self->Np;
+    outputs->x_d = hsep_at_const(self, self->x_d)[i];
+    outputs->x_pb = hsep_at_const(self, self->x_pb)[i];
+    outputs->x_h = hsep_at_const(self, self->x_h)[i];
+    outputs->rms_e = predictor_rms(self, self->sum_e);
+    outputs->rms_pb = predictor_rms(self, self->sum_pb);
+    outputs->rms_h = predictor_rms(self, self->sum_h);
+    outputs->batch = self->k / self->Np;
+    outputs->hybrid_active = i >= self->n_physics;
+}

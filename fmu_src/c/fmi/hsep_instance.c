@@ -1,0 +1,116 @@
+#include "hsep_instance.h"
+
+#include "hsep_check.h"
+#include "hsep_uri.h"
+
+#include <string.h>
+
+#ifdef _WIN32
+enum { INSTANCE_WINDOWS = 1 };
+#else
+enum { INSTANCE_WINDOWS = 0 };
+#endif
+
+/* Share of a step by which rounding may end the last step before the stop time. */
+static const double instance_stop_tolerance = 1e-6;
+
+HSEP_API void *hsep_new(const hsep_instance *instance, size_t size)
+{
+    void *block = instance->allocate(1, size);
+    return block == NULL ? NULL : memset(block, 0, size);
+}
+
+HSEP_API void hsep_delete(const hsep_instance *instance, void *block)
+{
+    if (block != NULL) {
+        instance->release(block);
+    }
+}
+
+HSEP_API void hsep_instance_drop_state(hsep_instance *instance)
+{
+    hsep_delete(instance, instance->state);
+    instance->state = NULL;
+    instance->state_size = 0;
+}
+
+HSEP_API hsep_status
+hsep_instance_name(hsep_instance *instance, const char *call, const char *name, const char *resources, char message[])
+{
+    instance->name = hsep_new(instance, strlen(name) + 1);
+    if (resources != NULL) {
+        instance->resources = hsep_new(instance, HSEP_FOLDER_SIZE(strlen(resources)));
+    }
+    if (instance->name == NULL || (resources != NULL && instance->resources == NULL)) {
+        hsep_message_add(message, "%s: no memory for the instance's name and resources", call);
+        return HSEP_REFUSED;
+    }
+    (void)strcpy(instance->name, name);
+    if (resources != NULL && !hsep_uri_folder(resources, INSTANCE_WINDOWS, instance->resources)) {
+        hsep_message_add(
+            message, "%s: fmuResourceLocation must be a file: URI on this machine, got %.300s; it is not used", call,
+            resources);
+        hsep_delete(instance, instance->resources);
+        instance->resources = NULL;
+        return HSEP_WARNED;
+    }
+    return HSEP_OK;
+}
+
+HSEP_API void hsep_instance_reset(hsep_instance *instance)
+{
+    hsep_instance_drop_state(instance);
+    instance->context = (hsep_context){hsep_variables, HSEP_N_VARIABLES, instance->resources};
+    memset(instance->values, 0, sizeof instance->values);
+    for (size_t i = 0; i < HSEP_N_VARIABLES; i++) {
+        instance->values[i] = hsep_variables[i].start;
+    }
+    hsep_model_start_values(&instance->context, instance->values);
+    instance->experiment = (hsep_experiment){.phase = HSEP_INSTANTIATED};
+}
+
+HSEP_API hsep_status hsep_instance_initialise(hsep_instance *instance, const char *call, char message[])
+{
+    size_t size = 0;
+    if (hsep_model_size(&instance->context, instance->values, &size, message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
+    instance->state = hsep_new(instance, size);
+    if (instance->state == NULL) {
+        hsep_message_add(message, "%s: no memory for a state of %lu bytes", call, (unsigned long)size);
+        return HSEP_REFUSED;
+    }
+    instance->state_size = size;
+    if (hsep_model_initialise(
+            &instance->context, instance->state, size, instance->values, instance->experiment.start_time, message) !=
+        HSEP_OK) {
+        hsep_instance_drop_state(instance);
+        return HSEP_REFUSED;
+    }
+    instance->experiment.phase = HSEP_STEPPING;
+    return HSEP_OK;
+}
+
+HSEP_API hsep_status hsep_instance_step(hsep_instance *instance, const char *call, double t, double h, char message[])
+{
+    if (instance->experiment.has_stop_time && t >= instance->experiment.stop_time - instance_stop_tolerance * h) {
+        hsep_message_add(
+            message, "%s: a step must begin before the stop time %.9g s, got one from %.9g s", call,
+            instance->experiment.stop_time, t);
+        return HSEP_REFUSED;
+    }
+    const hsep_status status = hsep_model_step(&instance->context, instance->state, instance->values, t, h, message);
+    if (status != HSEP_REFUSED) {
+        memset(instance->values + HSEP_N_VARIABLES, 0, HSEP_N_INTERPOLATED * sizeof(double));
+        instance->experiment.time = t + h;
+    }
+    return status;
+}
+
+HSEP_API void hsep_instance_free(hsep_instance *instance)
+{
+    hsep_instance_drop_state(instance);
+    hsep_delete(instance, instance->resources);
+    hsep_delete(instance, instance->name);
+    instance->release(instance);
+}

@@ -1,0 +1,75 @@
+/* An instance of an FMU in any version of FMI: memory, values, state, experiment; no arithmetic.
+ *
+ * What can fail returns HSEP_REFUSED, changes nothing unless said otherwise, and adds the reason to a message of
+ * HSEP_MESSAGE_SIZE bytes, which an adapter hands to its importer; call is the name in what is not the model's own.
+ * Memory is taken from the importer when an instance is made, initialised or saved; a step takes none.
+ */
+#ifndef HSEP_INSTANCE_H
+#define HSEP_INSTANCE_H
+
+#include "hsep_api.h"
+#include "hsep_fmu.h"
+#include "hsep_layout.h"
+
+#include <stddef.h>
+#include <stdint.h>
+
+/* The states of a co-simulation whose steps are done when the call returns. */
+typedef enum { HSEP_INSTANTIATED = 1, HSEP_INITIALIZATION = 2, HSEP_STEPPING = 4, HSEP_TERMINATED = 8 } hsep_phase;
+
+/* The importer's memory functions, or the C library's. */
+typedef void *(*hsep_allocate)(size_t count, size_t size);
+typedef void (*hsep_release)(void *block);
+
+/* Where a simulation is. */
+typedef struct {
+    uint32_t phase; /* hsep_phase */
+    uint32_t has_stop_time;
+    double start_time; /* s */
+    double stop_time;  /* s */
+    double time;       /* s, where the last step ended */
+} hsep_experiment;
+
+HSEP_ASSERT_WORDS(hsep_experiment, 4);
+
+typedef struct {
+    hsep_allocate allocate;
+    hsep_release release;
+    char *name;      /* NULL until it is known */
+    char *resources; /* NULL if there is no usable folder */
+    hsep_context context;
+    hsep_experiment experiment;
+    void *state; /* the model's, NULL before the initialization has ended */
+    size_t state_size;
+    double values[HSEP_N_VALUES]; /* by value reference, then the time derivatives of inputs */
+} hsep_instance;
+
+/* A zeroed block from the importer's memory; NULL if there is none left. */
+HSEP_API void *hsep_new(const hsep_instance *instance, size_t size);
+
+/* Give a block back; NULL is fine. */
+HSEP_API void hsep_delete(const hsep_instance *instance, void *block);
+
+/* Forget the model's state. */
+HSEP_API void hsep_instance_drop_state(hsep_instance *instance);
+
+/* Keep name and resources, a URI or NULL. Fails if there is no memory; HSEP_WARNED: the URI is no folder here, and is
+ * not used. */
+HSEP_API hsep_status
+hsep_instance_name(hsep_instance *instance, const char *call, const char *name, const char *resources, char message[]);
+
+/* As after the instantiation: start values, no experiment, no state. */
+HSEP_API void hsep_instance_reset(hsep_instance *instance);
+
+/* Take all memory of the simulation and fill it. If the parameters do not fit, they may be corrected and it called
+ * again. */
+HSEP_API hsep_status hsep_instance_initialise(hsep_instance *instance, const char *call, char message[]);
+
+/* Do a communication step from t by h, s; time derivatives of inputs count for it alone. HSEP_WARNED as
+ * hsep_model_step. */
+HSEP_API hsep_status hsep_instance_step(hsep_instance *instance, const char *call, double t, double h, char message[]);
+
+/* Give all memory back, the instance's too. */
+HSEP_API void hsep_instance_free(hsep_instance *instance);
+
+#endif

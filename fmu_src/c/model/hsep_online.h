@@ -1,0 +1,47 @@
+/* What HybridPredictor and SepCompensator, the models with a look-ahead, do each in its own way; model_online.c does
+ * the rest for both. One of them is compiled into an FMU, so the functions are bound when it is. */
+#ifndef HSEP_ONLINE_H
+#define HSEP_ONLINE_H
+
+#include "hsep_api.h"
+#include "hsep_fmu.h"
+
+#if defined(HSEP_MODEL_HYBRID_PREDICTOR)
+
+#include "hsep_predictor.h"
+
+#define HSEP_ONLINE_KIND UINT64_C(0x4453524550594848) /* any number that no other model has */
+#define HSEP_ONLINE(function) hsep_predictor_##function
+typedef hsep_predictor hsep_online;
+typedef hsep_predictor_parameters hsep_online_parameters;
+
+#elif defined(HSEP_MODEL_SEP_COMPENSATOR)
+
+#include "hsep_compensator.h"
+
+#define HSEP_ONLINE_KIND UINT64_C(0x4E45504D4F435053) /* any number that no other model has */
+#define HSEP_ONLINE(function) hsep_compensator_##function
+typedef hsep_compensator hsep_online;
+typedef hsep_compensator_parameters hsep_online_parameters; /* the predictor's are the first of them */
+
+#endif
+
+#if defined(HSEP_ONLINE_KIND)
+
+/* Check what no other model has; return how many settings are wrong, each added to message. */
+HSEP_API int hsep_online_check(const double values[], char message[]);
+
+/* Read what no other model has, after all parameters were checked; the predictor's others are there already. */
+HSEP_API void hsep_online_read(const double values[], hsep_online_parameters *parameters);
+
+/* Begin, once what was learned is there. */
+HSEP_API void hsep_online_begin(hsep_online *self);
+
+HSEP_API hsep_predictor *hsep_online_predictor(hsep_online *self);
+
+/* Write outputs and locals; window: whether it is a new one. */
+HSEP_API void hsep_online_write(const hsep_online *self, int window, double values[]);
+
+#endif
+
+#endif

@@ -1,0 +1,144 @@
+/* HybridPredictor and SepCompensator: sizes, initialization, steps and states.
+ *
+ * Inputs are latched at the instants t_k that lie in a step, outputs are those of the last instant that was reached;
+ * the arithmetic is the core's. If the resources hold weights (hsep_weights.h), it starts with them.
+ */
+#include "hsep_online.h"
+
+#if defined(HSEP_ONLINE_KIND)
+
+#include "hsep_check.h"
+#include "hsep_inputs.h"
+#include "hsep_model.h"
+#include "hsep_state.h"
+#include "hsep_weights.h"
+
+#include <string.h>
+
+typedef struct {
+    hsep_state_header header;
+    hsep_inputs inputs;
+    hsep_online online; /* its arrays follow */
+} online_state;
+
+/* The arrays behind the struct begin at a multiple of 16 bytes, as an importer's memory does. */
+HSEP_ASSERT(alignment_of_online_state, sizeof(online_state) % 16 == 0);
+
+/* Check all parameters and read them. modes: (HSEP_N_MODES,). */
+static hsep_status online_checked(
+    const hsep_context *context, const double values[], hsep_online_parameters *parameters, hsep_mode modes[],
+    char message[])
+{
+    message[0] = '\0';
+    if (hsep_check_parameters(context, values, message) > 0) {
+        return HSEP_REFUSED;
+    }
+    const int lags = hsep_check_lags(values[HSEP_VR_Np], values[HSEP_VR_p], values[HSEP_VR_q], message);
+    if (hsep_online_check(values, message) + lags > 0) {
+        return HSEP_REFUSED;
+    }
+    hsep_modes_read(&values[HSEP_VR_mode], HSEP_N_MODES, modes);
+    *(hsep_predictor_parameters *)parameters = (hsep_predictor_parameters){
+        .Np = (uint64_t)values[HSEP_VR_Np],
+        .p = (uint64_t)values[HSEP_VR_p],
+        .q = (uint64_t)values[HSEP_VR_q],
+        .dead_time = (uint64_t)values[HSEP_VR_dead_time],
+        .n_modes = HSEP_N_MODES,
+        .lambda = values[HSEP_VR_lambda],
+        .T_s = values[HSEP_VR_T_s],
+        .hold = values[HSEP_VR_input_hold] > 0.0 ? HSEP_FIRST_ORDER_HOLD : HSEP_ZERO_ORDER_HOLD,
+        .modes = modes};
+    hsep_online_read(values, parameters);
+    return HSEP_OK;
+}
+
+HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[])
+{
+    hsep_mode modes[HSEP_N_MODES];
+    hsep_online_parameters parameters;
+    if (online_checked(context, values, &parameters, modes, message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
+    const double before = (double)(sizeof(online_state) - sizeof(hsep_online));
+    return hsep_state_size(before + HSEP_ONLINE(size)(&parameters), size, message);
+}
+
+HSEP_API hsep_status hsep_model_initialise(
+    const hsep_context *context, void *state, size_t size, double values[], double t_start, char message[])
+{
+    size_t needed = 0;
+    online_state *self = state;
+    hsep_mode modes[HSEP_N_MODES];
+    hsep_online_parameters parameters;
+    const double start = values[HSEP_VR_x_d_ahead];
+    if (online_checked(context, values, &parameters, modes, message) != HSEP_OK ||
+        hsep_model_size(context, values, &needed, message) != HSEP_OK ||
+        hsep_state_begin(&self->header, context, values, HSEP_ONLINE_KIND, needed, size, message) != HSEP_OK ||
+        hsep_inputs_init(&self->inputs, t_start, values[HSEP_VR_T_s], start, message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
+    HSEP_ONLINE(init)(&self->online, &parameters, start);
+    hsep_predictor *predictor = hsep_online_predictor(&self->online);
+    if (hsep_weights_load(
+            context, (hsep_predictor_parameters *)&parameters, hsep_predictor_regression(predictor), message) !=
+        HSEP_OK) {
+        return HSEP_REFUSED;
+    }
+    hsep_online_begin(&self->online);
+    if (hsep_check_divergence((hsep_divergence)predictor->divergence, message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
+    hsep_online_write(&self->online, 1, values);
+    return HSEP_OK;
+}
+
+HSEP_API hsep_status
+hsep_model_step(const hsep_context *context, void *state, double values[], double t, double h, char message[])
+{
+    (void)context;
+    online_state *self = state;
+    const hsep_predictor *predictor = hsep_online_predictor(&self->online);
+    const hsep_input x_d_ahead = {values[HSEP_VR_x_d_ahead], values[HSEP_SLOPE_x_d_ahead]};
+    const hsep_input x_meas = {values[HSEP_VR_x_meas], values[HSEP_SLOPE_x_meas]};
+    int window = 0;
+    hsep_inputs_step step;
+    message[0] = '\0';
+    if (hsep_check_divergence((hsep_divergence)predictor->divergence, message) != HSEP_OK) { /* of an earlier step */
+        return HSEP_REFUSED;
+    }
+    const hsep_status status = hsep_inputs_count(&self->inputs, x_d_ahead, x_meas, t, h, &step, message);
+    if (status == HSEP_REFUSED) {
+        return HSEP_REFUSED;
+    }
+    while (hsep_inputs_next(&self->inputs, &step)) {
+        window |= HSEP_ONLINE(sample)(&self->online, self->inputs.x_d_ahead, self->inputs.x_meas);
+        if (hsep_check_divergence((hsep_divergence)predictor->divergence, message) != HSEP_OK) {
+            return HSEP_REFUSED;
+        }
+    }
+    hsep_online_write(&self->online, window, values);
+    return status;
+}
+
+HSEP_API hsep_status hsep_model_check_state(
+    const hsep_context *context, const void *state, size_t size, const double values[], char message[])
+{
+    hsep_mode modes[HSEP_N_MODES];
+    hsep_online_parameters parameters;
+    online_state head;
+    if (online_checked(context, values, &parameters, modes, message) != HSEP_OK ||
+        hsep_state_check(context, values, state, size, HSEP_ONLINE_KIND, message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
+    memcpy(&head, state, sizeof head);
+    const char *online = (const char *)state + (sizeof head - sizeof head.online);
+    if (!hsep_inputs_valid(&head.inputs, values[HSEP_VR_T_s]) ||
+        !HSEP_ONLINE(valid)(online, &parameters, (uint64_t)head.inputs.clock.k)) {
+        return hsep_state_damaged(message);
+    }
+    return HSEP_OK;
+}
+
+#else
+typedef int hsep_no_online; /* a translation unit must not be empty */
+#endif
