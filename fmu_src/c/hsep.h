@@ -11,8 +11,8 @@
  *   hsep_*_size                       | constant                                        | nothing
  *   hsep_*_init                       | the block's size, and the modes' exponentials   | nothing
  *   hsep_*_valid                      | constant; the predictor's, its windows          | returns 0 for what is unsound
- *   hsep_predictor_sample             | n^2 rotations; at a window's end Np (p + q) on  | divergence is set and stays
- *                                     | top                                             |
+ *   hsep_predictor_sample             | hsep_regression_fold; at a window's end         | divergence is set and stays
+ *                                     | Np (p + q) + n^2 / 2 on top                     |
  *   hsep_compensator_begin            | a window's end                                  | divergence is set and stays
  *   hsep_compensator_sample           | as the predictor's; at a window's end a plan,   | divergence is set and stays
  *                                     | m^3 / 6; hsep_interior_step after a bounded one |

@@ -35,9 +35,9 @@ static double predictor_lay_out(hsep_predictor *self, const hsep_predictor_param
     self->x_pb = hsep_take(&end, Np);
     self->x_h = hsep_take(&end, Np);
     self->ahead_pb = hsep_take(&end, parameters->planned ? 0.0 : Np);
-    self->e_h = hsep_take(&end, Np + p);
     self->past_x = hsep_take(&end, Np + q);
     self->past_e = hsep_take(&end, Np + p);
+    self->e_h = parameters->planned ? hsep_take(&end, Np + p) : self->past_e;
     self->weights = hsep_take(&end, (double)self->features.n);
     self->signs = hsep_take(&end, scheduled ? preview + 2.0 * HSEP_SCHEDULE_REACH : 0.0);
     self->drive = hsep_take(&end, scheduled ? preview : 0.0);
@@ -81,7 +81,7 @@ HSEP_API int hsep_predictor_valid(const void *block, const hsep_predictor_parame
         memcmp(&got, block, sizeof got) == 0 && got.k == k && got.n_published <= got.Np &&
         k % got.Np < got.n_published && got.n_physics <= got.Np && got.learning <= 1 && got.missing <= 1 &&
         (!got.missing || got.saved) && got.divergence <= HSEP_DIVERGES_X_DM &&
-        (got.divergence || hsep_within(hsep_at_bytes(block, got.ahead), got.e_h - got.ahead, HSEP_PREDICTION_MAX)) &&
+        (got.divergence || hsep_within(hsep_at_bytes(block, got.ahead), got.past_x - got.ahead, HSEP_PREDICTION_MAX)) &&
         hsep_physics_valid(hsep_at_bytes(block, got.physics), parameters->n_modes, parameters->dead_time) &&
         hsep_regression_valid(hsep_at_bytes(block, got.regression), got.features.n) &&
         (!got.saved || hsep_regression_valid(hsep_at_bytes(block, got.saved), got.features.n));
@@ -214,7 +214,9 @@ HSEP_API void hsep_predictor_begin(hsep_predictor *self)
     double *x_d = hsep_at(self, self->x_d), *e_h = hsep_at(self, self->e_h);
     memcpy(x_d, ahead + oldest, (size_t)newest * sizeof(double));
     memcpy(x_d + newest, ahead, (size_t)oldest * sizeof(double));
-    memcpy(e_h + Np, past_e + Np, (size_t)self->features.p * sizeof(double));
+    if (e_h != past_e) {
+        memcpy(e_h + Np, past_e + Np, (size_t)self->features.p * sizeof(double));
+    }
     predictor_solve(self);
     self->n_published = 0;
     self->learning = !self->missing && self->k >= self->preview; /* over the first fill there is nothing to learn */

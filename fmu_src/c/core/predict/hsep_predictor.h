@@ -69,9 +69,9 @@ typedef struct {
     uint64_t x_pb;     /* (Np,) m, the window: physics-based predictions, */
     uint64_t x_h;      /* (Np,) m, hybrid predictions */
     uint64_t ahead_pb; /* (Np,) m, what the physics model answers to ahead, relative to start; alone */
-    uint64_t e_h;      /* (Np + p,) m, e_pb as predicted, newest first, behind it the measured ones */
     uint64_t past_x;   /* (Np + q,) m, x_pb of this window and of the q samples before it, newest first */
     uint64_t past_e;   /* (Np + p,) m, e_pb likewise, as measured */
+    uint64_t e_h;      /* (Np + p,) m, e_pb as predicted, behind it the measured ones; alone it is past_e */
     uint64_t weights;  /* (n,) w */
     uint64_t signs;    /* (preview + 2 HSEP_SCHEDULE_REACH,) of the reference's velocity; if it has features */
     uint64_t drive;    /* (preview,) m, what they add to the residuals, newest first */
