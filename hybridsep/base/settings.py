@@ -272,7 +272,9 @@ class CompensatorSettings(Settings):
     @classmethod
     def fmi_parameters(cls) -> dict[str, Parameter]:
         """Return the parameters, those of the limits too, by their names in FMUs."""
-        return {**super().fmi_parameters(), **Limits.fmi_parameters()}
+        own = list(super().fmi_parameters().items())
+        place = [name for name, _ in own].index("change_max")
+        return dict((*own[:place], *Limits.fmi_parameters().items(), *own[place:]))
 
     @classmethod
     def _from_checked(cls, values: Mapping[str, Any]) -> CompensatorSettings:

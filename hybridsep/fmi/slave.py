@@ -182,7 +182,9 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
             raise StateError(f"the state belongs to another FMU than {self.modelName} as it is here")
         running, terminated, values = saved.flag("running"), saved.flag("terminated"), saved.table("values")
         start_time, stop_time = saved.real("start_time"), saved.number_or_none("stop_time")
-        if values.keys() != self.values.keys() or not all(type(value) in (int, float) for value in values.values()):
+        if values.keys() != self.values.keys() or not all(
+            type(value) in (int, float, bool) for value in values.values()
+        ):
             raise saved.error("it must have a number for each input and parameter")
         before = self.values
         self.values = values

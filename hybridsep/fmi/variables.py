@@ -12,8 +12,10 @@ from dataclasses import dataclass
 from ..base.settings import PARAMETERS, CompensatorSettings, PredictorSettings, check
 
 __all__ = [
+    "COMPENSATOR_SETTINGS",
     "INTERPOLATED",
     "MODELS",
+    "PREDICTOR_SETTINGS",
     "Variable",
     "compensator_variables",
     "modes_from",
@@ -25,8 +27,12 @@ __all__ = [
 
 Value = float | int | bool
 
-_PREDICTION = (*(name for name in PredictorSettings.fmi_parameters() if name != "v_friction"), "dead_time")
-_COMPENSATION = (*_PREDICTION, "v_friction", *CompensatorSettings.fmi_parameters())
+PREDICTOR_SETTINGS = (*(name for name in PredictorSettings.fmi_parameters() if name != "v_friction"), "dead_time")
+"""Parameters of a HybridPredictor, which does not see the reference behind its window."""
+
+COMPENSATOR_SETTINGS = ("v_friction", *CompensatorSettings.fmi_parameters())
+"""Parameters that a SepCompensator has besides."""
+
 _SEP_MODELS = CompensatorSettings.parameters()["compensate"].choices
 _KINDS = {int: "Integer", float: "Real", bool: "Boolean", str: "Enumeration"}
 
@@ -170,7 +176,7 @@ def predictor_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping
         _position("rms_h", "output", "running RMS of x_meas - x_h since t_init", display_unit="um"),
         Variable("batch", "Integer", "output", "discrete", "number of the batch, floor(k / Np); 0 is the first fill"),
     ]
-    table += [_parameter(name, parameters[name]) for name in _PREDICTION]
+    table += [_parameter(name, parameters[name]) for name in PREDICTOR_SETTINGS]
     table += _modes(modes)
     for name, meaning in (
         ("x_d", "commanded positions"),
@@ -217,7 +223,7 @@ def compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mappi
         _position("rms_pb", "output", "running RMS of x_meas - x_pb since t_init", display_unit="um"),
         _position("rms_h", "output", "running RMS of x_meas - x_h since t_init", display_unit="um"),
         Variable("batch", "Integer", "output", "discrete", "number of the window, floor(k / Np)"),
-        *(_parameter(name, parameters[name]) for name in _COMPENSATION),
+        *(_parameter(name, parameters[name]) for name in (*PREDICTOR_SETTINGS, *COMPENSATOR_SETTINGS)),
         *_modes(modes),
     ]
 

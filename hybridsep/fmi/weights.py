@@ -1,10 +1,9 @@
 """``resources/weights.bin``: what a trained predictor has learned, for an FMU that starts warm.
 
-Layout, little-endian, 8 bytes each: ``HSEPWGT2``; ``p``, ``q``, ``input_hold``, ``dead_time``, the number of modes and
-that of the learned samples as u64; ``lambda``, ``T_s``, ``v_friction``, then the four numbers of each mode as float64;
-the upper triangle of the factor ``[R z; 0 ρ]`` by rows; the CRC-32 of all
-before as u64. The settings are all that shape the features and the factor: with others the weights mean something else.
-This module travels inside the pythonfmu FMUs; the C model reads the same file.
+Layout, little-endian: ``HSEPWGT3``; the numbers of settings, of modes and of learned samples as u64; each setting that
+shapes the features and the factor (with others the weights mean something else), its name in 24 bytes and its value as
+float64; the upper triangle of the factor ``[R z; 0 ρ]`` by rows; the CRC-32 of all before as u64. This module travels
+inside the pythonfmu FMUs; the C model reads the same file.
 """
 
 from __future__ import annotations
@@ -21,8 +20,9 @@ from ..predict.predictor import HybridPredictor
 __all__ = ["WEIGHTS_FILE", "learned_settings", "restore_weights", "weights_file"]
 
 WEIGHTS_FILE = "weights.bin"
-_MAGIC = b"HSEPWGT2"
-_HEAD = struct.Struct("<8s6Q3d")
+_MAGIC = b"HSEPWGT3"
+_HEAD = struct.Struct("<8s3Q")
+_SETTING = struct.Struct("<24sd")
 _CHECKSUM = struct.Struct("<Q")
 _MODE = ("f_n", "zeta", "alpha", "beta")
 _DAMAGED = f"{WEIGHTS_FILE} must be a factor of learned rows; it is damaged or truncated"
@@ -41,11 +41,11 @@ def learned_settings(predictor: HybridPredictor) -> dict[str, float]:
 
 def weights_file(predictor: HybridPredictor) -> bytes:
     """Return the file's content for what a predictor has learned."""
-    regression, n_modes = predictor.regression, len(predictor.model.modes)
-    p, q, lam, T_s, input_hold, v_friction, dead_time, *modes = learned_settings(predictor).values()
-    triangle = regression.factor[np.triu_indices(predictor.n_features + 1)]
-    content = _HEAD.pack(_MAGIC, p, q, input_hold, dead_time, n_modes, regression.n_samples, lam, T_s, v_friction)
-    content += np.array([*modes, *triangle], dtype="<f8").tobytes()
+    settings = learned_settings(predictor)
+    content = _HEAD.pack(_MAGIC, len(settings), len(predictor.model.modes), predictor.regression.n_samples)
+    content += b"".join(_SETTING.pack(name.encode(), value) for name, value in settings.items())
+    triangle = predictor.regression.factor[np.triu_indices(predictor.n_features + 1)]
+    content += triangle.astype("<f8").tobytes()
     return content + _CHECKSUM.pack(zlib.crc32(content))
 
 
@@ -65,29 +65,37 @@ def restore_weights(predictor: HybridPredictor, content: bytes) -> None:
         or _CHECKSUM.pack(zlib.crc32(body)) != content[-_CHECKSUM.size :]
     ):
         raise StateError(_DAMAGED)
-    _, p, q, input_hold, dead_time, n_modes, n_samples, lam, T_s, v_friction = _HEAD.unpack_from(body)
-    numbers = np.frombuffer(body, "<f8", offset=_HEAD.size)
+    _, n_settings, n_modes, n_samples = _HEAD.unpack_from(body)
+    start = _HEAD.size + n_settings * _SETTING.size
+    if start > len(body):
+        raise StateError(_DAMAGED)
+    learned = {
+        name.rstrip(b"\0").decode("ascii", "replace"): value
+        for name, value in _SETTING.iter_unpack(body[_HEAD.size : start])
+    }
+    problems = _differences("the number of modes", n_modes, len(predictor.model.modes))
     settings = learned_settings(predictor)
-    learned = [p, q, lam, T_s, input_hold, v_friction, dead_time, *numbers[: 4 * n_modes].tolist()]
-    problems = [
-        f"{name} must be {then!r}, with which {WEIGHTS_FILE} was learned, got {now!r}"
-        for (name, now), then in zip(settings.items(), learned, strict=False)
-        if now != then
-    ]
-    if n_modes != len(predictor.model.modes):
-        problems.append(
-            f"the number of modes must be {n_modes}, with which {WEIGHTS_FILE} was learned, "
-            f"got {len(predictor.model.modes)}"
-        )
+    for name, then in learned.items():
+        if name in settings or not name.startswith("mode["):
+            problems += _differences(name, then, settings.get(name, 0.0))
     if problems:
         raise StateError("; ".join(problems))
     size = predictor.n_features + 1
     upper = np.triu_indices(size)
-    if len(numbers) != 4 * n_modes + len(upper[0]):
+    if learned.keys() != settings.keys() or len(body) - start != 8 * len(upper[0]):
         raise StateError(_DAMAGED)
     factor = np.zeros((size, size))
-    factor[upper] = numbers[4 * n_modes :]
+    factor[upper] = np.frombuffer(body, "<f8", offset=start)
     try:
         predictor.regression.restore(factor, n_samples)
     except SignalError:
         raise StateError(_DAMAGED) from None
+
+
+def _differences(name: str, then: float, now: float) -> list[str]:
+    """Return what is wrong if a setting has changed since it was learned with: nothing or one message."""
+    if then == now:
+        return []
+    whole = isinstance(now, int)
+    shown = int(then) if whole and then == int(then) else then
+    return [f"{name} must be {shown!r}, with which {WEIGHTS_FILE} was learned, got {now!r}"]

@@ -38,6 +38,7 @@ typedef struct {
     double minimum; /* -HUGE_VAL if there is none */
     double maximum; /* HUGE_VAL if there is none */
     double nonzero; /* least value that is not 0; 0 if there is none */
+    int learned;    /* a parameter that what was learned depends on */
 } hsep_variable;
 
 /* What stays the same for one instance: the generated table and where its resources are. */

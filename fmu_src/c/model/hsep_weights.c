@@ -7,17 +7,22 @@
 #include <string.h>
 
 #define WEIGHTS_FILE "weights.bin"
-#define WEIGHTS_MAGIC "HSEPWGT2"
+#define WEIGHTS_MAGIC "HSEPWGT3"
 #define WEIGHTS_CHUNK 512 /* bytes that are summed up at once, a multiple of 8 */
 
-/* What stands before the modes. */
 typedef struct {
     char magic[8];
-    uint64_t p, q, input_hold, dead_time, n_modes, n_samples;
-    double lambda, T_s, v_friction;
+    uint64_t n_settings, n_modes, n_samples;
 } weights_head;
 
-HSEP_ASSERT_WORDS(weights_head, 10);
+HSEP_ASSERT_WORDS(weights_head, 4);
+
+typedef struct {
+    char name[24]; /* filled with 0 */
+    double value;
+} weights_setting;
+
+HSEP_ASSERT_WORDS(weights_setting, 4);
 
 /* CRC-32 as in zlib, 4 bits at a time, of bytes behind those that gave crc. */
 static uint32_t weights_crc(uint32_t crc, const unsigned char bytes[], size_t size)
@@ -71,31 +76,46 @@ static void weights_compare(const char *name, double learned, double got, hsep_k
     }
 }
 
-/* Read the modes that the file has and compare those that there are on both sides. */
-static int weights_compare_modes(
-    FILE *file, uint64_t n_learned, const hsep_predictor_parameters *settings, char message[])
+/* Tell which variable has a name, n_variables if none has. */
+static size_t weights_variable(const hsep_context *context, const char *name)
 {
-    static const char *const names[4] = {"f_n", "zeta", "alpha", "beta"};
-    for (uint64_t i = 0; i < n_learned && i < settings->n_modes; i++) {
-        const hsep_mode *mode = &settings->modes[i];
-        const double got[4] = {mode->f_n, mode->zeta, mode->alpha, mode->beta};
-        double learned[4];
-        if (fread(learned, sizeof *learned, 4, file) != 4) {
+    size_t i = 0;
+    while (i < context->n_variables && strcmp(context->variables[i].name, name) != 0) {
+        i++;
+    }
+    return i;
+}
+
+/* Read the settings of the file and compare them with those of the table: 0 if it is damaged. A setting that the table
+ * has not is 0 here; modes that only one side has are told by their number. */
+static int weights_compare_settings(
+    FILE *file, const hsep_context *context, const double values[], uint64_t n_settings, char message[])
+{
+    uint64_t n_missing = 0;
+    for (size_t i = 0; i < context->n_variables; i++) {
+        n_missing += context->variables[i].learned != 0;
+    }
+    for (uint64_t i = 0; i < n_settings; i++) {
+        weights_setting setting;
+        if (fread(&setting, sizeof setting, 1, file) != 1 || setting.name[sizeof setting.name - 1] != '\0') {
             return 0;
         }
-        for (int j = 0; j < 4; j++) {
-            char name[HSEP_NUMBER_SIZE];
-            snprintf(name, sizeof name, "mode[%.0f].%s", (double)i + 1.0, names[j]);
-            weights_compare(name, learned[j], got[j], HSEP_REAL, message);
+        const size_t place = weights_variable(context, setting.name);
+        if (place < context->n_variables) {
+            const hsep_variable *variable = &context->variables[place];
+            weights_compare(setting.name, setting.value, values[place], variable->kind, message);
+            n_missing -= variable->learned != 0;
+        } else if (strncmp(setting.name, "mode[", 5) != 0) {
+            weights_compare(setting.name, setting.value, 0.0, HSEP_REAL, message);
         }
     }
-    weights_compare("the number of modes", (double)n_learned, (double)settings->n_modes, HSEP_INTEGER, message);
-    return 1;
+    return n_missing == 0 || message[0] != '\0';
 }
 
 /* Read the file: 0 if it is damaged; with a message, if it was learned with other settings. */
 static int weights_take(
-    FILE *file, const hsep_predictor_parameters *settings, hsep_regression *regression, char message[])
+    FILE *file, const hsep_context *context, const double values[], uint64_t n_modes, hsep_regression *regression,
+    char message[])
 {
     weights_head head;
     double size = 0.0;
@@ -103,18 +123,12 @@ static int weights_take(
         memcmp(head.magic, WEIGHTS_MAGIC, sizeof head.magic) != 0) {
         return 0;
     }
-    weights_compare("p", (double)head.p, (double)settings->p, HSEP_INTEGER, message);
-    weights_compare("q", (double)head.q, (double)settings->q, HSEP_INTEGER, message);
-    weights_compare("lambda", head.lambda, settings->lambda, HSEP_REAL, message);
-    weights_compare("T_s", head.T_s, settings->T_s, HSEP_REAL, message);
-    weights_compare("input_hold", (double)head.input_hold, (double)settings->hold, HSEP_INTEGER, message);
-    weights_compare("dead_time", (double)head.dead_time, (double)settings->dead_time, HSEP_INTEGER, message);
-    weights_compare("v_friction", head.v_friction, settings->v_friction, HSEP_REAL, message);
-    if (!weights_compare_modes(file, head.n_modes, settings, message) || message[0] != '\0') {
+    weights_compare("the number of modes", (double)head.n_modes, (double)n_modes, HSEP_INTEGER, message);
+    if (!weights_compare_settings(file, context, values, head.n_settings, message) || message[0] != '\0') {
         return 0;
     }
-    const double n = (double)regression->n, doubles = 4.0 * (double)head.n_modes + 0.5 * (n + 1.0) * (n + 2.0) + 1.0;
-    if (size != (double)sizeof head + doubles * (double)sizeof(double)) {
+    const double n = (double)regression->n, words = 4.0 * (double)head.n_settings + 0.5 * (n + 1.0) * (n + 2.0) + 1.0;
+    if (size != (double)sizeof head + words * (double)sizeof(double)) {
         return 0;
     }
     for (uint64_t i = 0; i <= regression->n; i++) { /* row after row through the regression's own row */
@@ -129,13 +143,13 @@ static int weights_take(
 }
 
 HSEP_API hsep_status hsep_weights_load(
-    const hsep_context *context, const hsep_predictor_parameters *settings, hsep_regression *regression, char message[])
+    const hsep_context *context, const double values[], uint64_t n_modes, hsep_regression *regression, char message[])
 {
     FILE *file = hsep_resource_open(context, WEIGHTS_FILE);
     if (file == NULL) {
         return HSEP_OK;
     }
-    const int taken = weights_take(file, settings, regression, message);
+    const int taken = weights_take(file, context, values, n_modes, regression, message);
     fclose(file);
     if (!taken && message[0] == '\0') {
         hsep_message_add(message, WEIGHTS_FILE " must be a factor of learned rows; it is damaged or truncated");

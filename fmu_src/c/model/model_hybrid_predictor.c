@@ -14,9 +14,11 @@ HSEP_API int hsep_online_check(const double values[], char message[])
 
 HSEP_API void hsep_online_read(const double values[], hsep_online_parameters *parameters)
 {
-    parameters->preview = parameters->Np;
+    parameters->preview = parameters->settings.Np;
     /* The warm-up counts from the end of the first fill. */
-    parameters->n_init = (double)parameters->Np + hsep_warm_up_samples(values[HSEP_VR_t_init], parameters->T_s);
+    const hsep_predictor_settings *settings = &parameters->settings;
+    (void)values;
+    parameters->n_init = (double)settings->Np + hsep_warm_up_samples(settings->t_init, settings->T_s);
 }
 
 HSEP_API void hsep_online_begin(hsep_online *self) { (void)self; }

@@ -38,16 +38,11 @@ static hsep_status online_checked(
         return HSEP_REFUSED;
     }
     hsep_modes_read(&values[HSEP_VR_mode], HSEP_N_MODES, modes);
-    *(hsep_predictor_parameters *)parameters = (hsep_predictor_parameters){
-        .Np = (uint64_t)values[HSEP_VR_Np],
-        .p = (uint64_t)values[HSEP_VR_p],
-        .q = (uint64_t)values[HSEP_VR_q],
-        .dead_time = (uint64_t)values[HSEP_VR_dead_time],
-        .n_modes = HSEP_N_MODES,
-        .lambda = values[HSEP_VR_lambda],
-        .T_s = values[HSEP_VR_T_s],
-        .hold = values[HSEP_VR_input_hold] > 0.0 ? HSEP_FIRST_ORDER_HOLD : HSEP_ZERO_ORDER_HOLD,
-        .modes = modes};
+    hsep_predictor_parameters *predictor = (hsep_predictor_parameters *)parameters;
+    *predictor = (hsep_predictor_parameters){.n_modes = HSEP_N_MODES, .modes = modes};
+#define READ(type, name) predictor->settings.name = (type)values[HSEP_VR_##name];
+    HSEP_PREDICTOR_SETTINGS(READ)
+#undef READ
     hsep_online_read(values, parameters);
     return HSEP_OK;
 }
@@ -79,9 +74,7 @@ HSEP_API hsep_status hsep_model_initialise(
     }
     HSEP_ONLINE(init)(&self->online, &parameters, start);
     hsep_predictor *predictor = hsep_online_predictor(&self->online);
-    if (hsep_weights_load(
-            context, (hsep_predictor_parameters *)&parameters, hsep_predictor_regression(predictor), message) !=
-        HSEP_OK) {
+    if (hsep_weights_load(context, values, HSEP_N_MODES, hsep_predictor_regression(predictor), message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     hsep_online_begin(&self->online);

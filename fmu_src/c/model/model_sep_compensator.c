@@ -28,24 +28,28 @@ HSEP_API int hsep_online_check(const double values[], char message[])
 
 HSEP_API void hsep_online_read(const double values[], hsep_online_parameters *parameters)
 {
+    hsep_compensator_settings settings;
+#define READ(type, name) settings.name = (type)values[HSEP_VR_##name];
+    HSEP_COMPENSATOR_SETTINGS(READ)
+#undef READ
     hsep_predictor_parameters *predictor = &parameters->predictor;
-    const double T_s = predictor->T_s, t_init = values[HSEP_VR_t_init];
-    predictor->preview = (uint64_t)values[HSEP_VR_preview];
-    predictor->v_friction = values[HSEP_VR_v_friction];
+    const double T_s = predictor->settings.T_s, t_init = predictor->settings.t_init;
+    predictor->preview = settings.preview;
+    predictor->v_friction = settings.v_friction;
     /* The warm-up counts from the end of the first fill; without one, the first window is planned with what is
      * known. */
-    predictor->n_init = hsep_warm_up_samples(t_init > 0.0 ? t_init + values[HSEP_VR_preview] * T_s : 0.0, T_s);
+    predictor->n_init = hsep_warm_up_samples(t_init > 0.0 ? t_init + (double)settings.preview * T_s : 0.0, T_s);
     predictor->planned = predictor->unlearns = 1;
-    const double v_max = values[HSEP_VR_v_max] * T_s, a_max = values[HSEP_VR_a_max] * (T_s * T_s);
-    const double j_max = values[HSEP_VR_j_max] * (T_s * T_s * T_s);
     parameters->planner = (hsep_planner_parameters){
-        .Np = predictor->Np,
-        .preview = predictor->preview,
-        .spacing = (uint64_t)values[HSEP_VR_spacing],
-        .jerk_weight = values[HSEP_VR_jerk_weight],
-        .limit = {values[HSEP_VR_change_max], v_max, a_max, j_max},
-        .no_reversal = values[HSEP_VR_no_reversal] > 0.0};
-    parameters->best = (hsep_sep_state)values[HSEP_VR_compensate];
+        .Np = predictor->settings.Np,
+        .preview = settings.preview,
+        .spacing = settings.spacing,
+        .jerk_weight = settings.jerk_weight,
+        .limit =
+            {settings.change_max, settings.v_max * T_s, settings.a_max * (T_s * T_s),
+             settings.j_max * (T_s * T_s * T_s)},
+        .no_reversal = settings.no_reversal != 0};
+    parameters->best = (hsep_sep_state)settings.compensate;
 }
 
 HSEP_API void hsep_online_begin(hsep_online *self) { hsep_compensator_begin(self); }

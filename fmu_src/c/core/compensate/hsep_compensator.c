@@ -23,13 +23,13 @@ static double compensator_lay_out(hsep_compensator *self, const hsep_compensator
     const double preview = (double)predictor->preview;
     double end = HSEP_WORDS(hsep_compensator);
     self->best = (uint64_t)parameters->best;
-    self->x_dm = hsep_take(&end, (double)predictor->Np);
-    self->trial_x = hsep_take(&end, preview + (double)predictor->q);
-    self->trial_e = hsep_take(&end, preview + (double)predictor->p);
+    self->x_dm = hsep_take(&end, (double)predictor->settings.Np);
+    self->trial_x = hsep_take(&end, preview + (double)predictor->settings.q);
+    self->trial_e = hsep_take(&end, preview + (double)predictor->settings.p);
     self->target = hsep_take(&end, preview);
     self->spline_pb = hsep_take(&end, preview);
     self->spline_h = hsep_take(&end, preview);
-    self->trial = hsep_take_block(&end, hsep_physics_size(predictor->n_modes, predictor->dead_time));
+    self->trial = hsep_take_block(&end, hsep_physics_size(predictor->n_modes, predictor->settings.dead_time));
     self->planner = hsep_take_block(&end, hsep_planner_size(&parameters->planner));
     self->predictor = hsep_take_block(&end, hsep_predictor_size(predictor));
     return end * sizeof(double);
@@ -51,7 +51,8 @@ HSEP_API void hsep_compensator_init(hsep_compensator *self, const hsep_compensat
     hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
     double *spline = hsep_at(self, self->spline_pb);
     hsep_physics_init(
-        trial, predictor->modes, predictor->n_modes, predictor->dead_time, predictor->T_s, predictor->hold);
+        trial, predictor->modes, predictor->n_modes, predictor->settings.dead_time, predictor->settings.T_s,
+        (hsep_hold)predictor->settings.input_hold);
     memcpy(
         spline, hsep_splines_shape(hsep_planner_splines(compensator_planner(self))),
         (size_t)(4 * parameters->planner.spacing) * sizeof(double));
@@ -67,9 +68,10 @@ HSEP_API int hsep_compensator_valid(const void *block, const hsep_compensator_pa
     (void)compensator_lay_out(&got, parameters); /* changes nothing where it is sound */
     memcpy(&online, hsep_at_bytes(block, got.predictor), sizeof online);
     return memcmp(&got, block, sizeof got) == 0 && got.state <= HSEP_SEP_HYBRID && got.solving <= 1 &&
-           (got.solving || online.n_published == predictor->Np) &&
-           (online.divergence || hsep_within(hsep_at_bytes(block, got.x_dm), predictor->Np, HSEP_PREDICTION_MAX)) &&
-           hsep_physics_valid(hsep_at_bytes(block, got.trial), predictor->n_modes, predictor->dead_time) &&
+           (got.solving || online.n_published == predictor->settings.Np) &&
+           (online.divergence ||
+            hsep_within(hsep_at_bytes(block, got.x_dm), predictor->settings.Np, HSEP_PREDICTION_MAX)) &&
+           hsep_physics_valid(hsep_at_bytes(block, got.trial), predictor->n_modes, predictor->settings.dead_time) &&
            hsep_planner_valid(hsep_at_bytes(block, got.planner), &parameters->planner) &&
            hsep_predictor_valid(hsep_at_bytes(block, got.predictor), predictor, k);
 }

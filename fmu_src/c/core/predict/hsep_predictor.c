@@ -20,16 +20,17 @@ HSEP_API hsep_regression *hsep_predictor_regression(hsep_predictor *self)
 /* Set what follows from the parameters; return the bytes of the block. */
 static double predictor_lay_out(hsep_predictor *self, const hsep_predictor_parameters *parameters)
 {
-    const double Np = (double)parameters->Np, preview = (double)parameters->preview;
-    const double p = (double)parameters->p, q = (double)parameters->q;
+    const double Np = (double)parameters->settings.Np, preview = (double)parameters->preview;
+    const double p = (double)parameters->settings.p, q = (double)parameters->settings.q;
     const int scheduled = parameters->v_friction > 0.0;
     double end = HSEP_WORDS(hsep_predictor);
-    hsep_features_lay_out(&self->features, parameters->p, parameters->q, scheduled ? HSEP_SCHEDULED : 0);
+    hsep_features_lay_out(
+        &self->features, parameters->settings.p, parameters->settings.q, scheduled ? HSEP_SCHEDULED : 0);
     const double regression = hsep_regression_size(self->features.n);
-    self->Np = parameters->Np;
+    self->Np = parameters->settings.Np;
     self->preview = parameters->preview;
     self->n_init = parameters->n_init;
-    self->sign_step = parameters->v_friction * parameters->T_s;
+    self->sign_step = parameters->v_friction * parameters->settings.T_s;
     self->ahead = hsep_take(&end, preview);
     self->x_d = hsep_take(&end, preview);
     self->x_pb = hsep_take(&end, Np);
@@ -41,7 +42,7 @@ static double predictor_lay_out(hsep_predictor *self, const hsep_predictor_param
     self->weights = hsep_take(&end, (double)self->features.n);
     self->signs = hsep_take(&end, scheduled ? preview + 2.0 * HSEP_SCHEDULE_REACH : 0.0);
     self->drive = hsep_take(&end, scheduled ? preview : 0.0);
-    self->physics = hsep_take_block(&end, hsep_physics_size(parameters->n_modes, parameters->dead_time));
+    self->physics = hsep_take_block(&end, hsep_physics_size(parameters->n_modes, parameters->settings.dead_time));
     self->regression = hsep_take_block(&end, regression);
     self->saved = parameters->unlearns ? hsep_take_block(&end, regression) : 0;
     return end * sizeof(double);
@@ -66,9 +67,9 @@ HSEP_API void hsep_predictor_init(hsep_predictor *self, const hsep_predictor_par
         hsep_at(self, self->x_pb)[i] = hsep_at(self, self->x_h)[i] = start;
     }
     hsep_physics_init(
-        hsep_predictor_physics(self), parameters->modes, parameters->n_modes, parameters->dead_time, parameters->T_s,
-        parameters->hold);
-    hsep_regression_init(hsep_predictor_regression(self), self->features.n, parameters->lambda);
+        hsep_predictor_physics(self), parameters->modes, parameters->n_modes, parameters->settings.dead_time,
+        parameters->settings.T_s, (hsep_hold)parameters->settings.input_hold);
+    hsep_regression_init(hsep_predictor_regression(self), self->features.n, parameters->settings.lambda);
 }
 
 HSEP_API int hsep_predictor_valid(const void *block, const hsep_predictor_parameters *parameters, uint64_t k)
@@ -82,7 +83,7 @@ HSEP_API int hsep_predictor_valid(const void *block, const hsep_predictor_parame
         k % got.Np < got.n_published && got.n_physics <= got.Np && got.learning <= 1 && got.missing <= 1 &&
         (!got.missing || got.saved) && got.divergence <= HSEP_DIVERGES_X_DM &&
         (got.divergence || hsep_within(hsep_at_bytes(block, got.ahead), got.past_x - got.ahead, HSEP_PREDICTION_MAX)) &&
-        hsep_physics_valid(hsep_at_bytes(block, got.physics), parameters->n_modes, parameters->dead_time) &&
+        hsep_physics_valid(hsep_at_bytes(block, got.physics), parameters->n_modes, parameters->settings.dead_time) &&
         hsep_regression_valid(hsep_at_bytes(block, got.regression), got.features.n) &&
         (!got.saved || hsep_regression_valid(hsep_at_bytes(block, got.saved), got.features.n));
     for (int i = 0; i < 3; i++) {

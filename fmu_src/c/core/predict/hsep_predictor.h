@@ -27,23 +27,18 @@
 #include "hsep_recursion.h"
 #include "hsep_regression.h"
 #include "hsep_sensor.h"
+#include "hsep_settings.h"
 
 #include <stdint.h>
 
 typedef struct {
-    uint64_t Np;        /* samples in a window, >= 1 */
-    uint64_t preview;   /* samples from r(k) to the drive, >= Np; Np alone */
-    uint64_t p;         /* lags of e_pb, 1 ... Np */
-    uint64_t q;         /* lags of x_pb, 0 ... Np - 1 */
-    uint64_t dead_time; /* samples */
-    uint64_t n_modes;   /* >= 1 */
-    double lambda;      /* m2, > 0 */
-    double T_s;         /* s, > 0 */
-    double v_friction;  /* m/s, over which friction changes its sign; 0: no features of the reference */
-    double n_init;      /* samples of warm-up from the beginning, that are not judged; whole, >= 0 */
-    hsep_hold hold;
+    hsep_predictor_settings settings;
+    double v_friction;      /* m/s, over which friction changes its sign; 0: no features of the reference */
+    uint64_t preview;       /* samples from r(k) to the drive, >= Np; Np alone */
+    double n_init;          /* samples of warm-up from the beginning, that are not judged; whole, >= 0 */
     int planned;            /* whether a compensator decides the commands of a window when it begins */
     int unlearns;           /* whether a window with a sample that was not measured is unlearned */
+    uint64_t n_modes;       /* >= 1 */
     const hsep_mode *modes; /* (n_modes,) */
 } hsep_predictor_parameters;
 

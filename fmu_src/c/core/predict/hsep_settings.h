@@ -1,0 +1,61 @@
+/* Settings as they are declared in hybridsep/base/settings.py, from which this file is generated. Whole numbers,
+ * truth values and choices are uint64_t. */
+#ifndef HSEP_SETTINGS_H
+#define HSEP_SETTINGS_H
+
+#include <stdint.h>
+
+/* clang-format off */
+#define HSEP_PREDICTOR_SETTINGS(SETTING) \
+    /* samples in a look-ahead window (a batch) */ \
+    SETTING(uint64_t, Np) \
+    /* past residuals e_pb in the features */ \
+    SETTING(uint64_t, p) \
+    /* past physics-based predictions x_pb in the features */ \
+    SETTING(uint64_t, q) \
+    /* ridge penalty on the weights, m2 */ \
+    SETTING(double, lambda) \
+    /* sampling interval, s */ \
+    SETTING(double, T_s) \
+    /* warm-up: until then x_h = x_pb, while learning goes on, s */ \
+    SETTING(double, t_init) \
+    /* how x_d runs between samples, zero-order or first-order hold: 0 zoh, 1 foh */ \
+    SETTING(uint64_t, input_hold) \
+    /* whole samples of dead time in the physics model */ \
+    SETTING(uint64_t, dead_time)
+
+#define HSEP_COMPENSATOR_SETTINGS(SETTING) \
+    /* velocity over which friction changes its sign, for features of the reference; 0: none of them, m/s */ \
+    SETTING(double, v_friction) \
+    /* samples planned ahead, at least Np + 4 spacing + 3 */ \
+    SETTING(uint64_t, preview) \
+    /* samples between the knots of the change, a divisor of Np */ \
+    SETTING(uint64_t, spacing) \
+    /* weight of the change's jerk against the tracking error */ \
+    SETTING(double, jerk_weight) \
+    /* largest velocity of the modified command, m/s */ \
+    SETTING(double, v_max) \
+    /* largest acceleration of the modified command, m/s2 */ \
+    SETTING(double, a_max) \
+    /* largest jerk of the modified command, m/s3 */ \
+    SETTING(double, j_max) \
+    /* largest change of the command, m */ \
+    SETTING(double, change_max) \
+    /* whether x_dm never turns while the commanded position moves */ \
+    SETTING(uint64_t, no_reversal) \
+    /* best model to compensate with: 0 off, 1 physics, 2 hybrid */ \
+    SETTING(uint64_t, compensate)
+
+/* clang-format on */
+
+#define HSEP_SETTING(type, name) type name;
+
+typedef struct {
+    HSEP_PREDICTOR_SETTINGS(HSEP_SETTING)
+} hsep_predictor_settings;
+
+typedef struct {
+    HSEP_COMPENSATOR_SETTINGS(HSEP_SETTING)
+} hsep_compensator_settings;
+
+#endif
