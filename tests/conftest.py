@@ -14,10 +14,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from built_once import BuiltFmus
 from command_line import Run
 from hypothesis import HealthCheck, settings
-
-from hybridsep import build_fmu, fmu_names, load_machine, machine_names
 
 # No test fails because something else keeps the cores busy.
 settings.register_profile("patient", deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -38,18 +37,22 @@ def _working_directory_kept() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session")
-def python_fmu(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """Return a function that gives the path of a pythonfmu FMU by name, built once a session."""
-    folder = tmp_path_factory.mktemp("fmus")
-    machines = {
-        name: machine for machine in map(load_machine, machine_names()) for name in fmu_names(machine, "python")
-    }
+def session_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the test session, which all of xdist's workers share."""
+    own = tmp_path_factory.getbasetemp()
+    return own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
 
-    def path(name: str) -> Path:
-        archive = folder / f"{name}.fmu"
-        return archive if archive.exists() else build_fmu(machines[name], name, folder, "python")
 
-    return path
+@pytest.fixture(scope="session")
+def fmus(session_folder: Path) -> BuiltFmus:
+    """Any FMU of any machine by name, built once a session."""
+    return BuiltFmus(session_folder / "fmus")
+
+
+@pytest.fixture(scope="session")
+def python_fmu(fmus: BuiltFmus) -> Callable[[str], Path]:
+    """Return a function that gives the path of a pythonfmu FMU by name."""
+    return fmus
 
 
 @pytest.fixture

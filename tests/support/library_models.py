@@ -1,0 +1,124 @@
+"""The library's models from the values of an FMU's parameters: how every test that needs both puts them together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hybridsep.base.limits import Limits
+from hybridsep.base.parameters import check
+from hybridsep.compensate.compensator import SepCompensator, SepState
+from hybridsep.compensate.sep_lookahead import SepLookAhead
+from hybridsep.evaluate.backtest import backtest
+from hybridsep.evaluate.closed_loop import run_closed_loop
+from hybridsep.fmi.variables import PLANNING, modes_from
+from hybridsep.fmi.weights import restore_weights, weights_file
+from hybridsep.machine import load_machine
+from hybridsep.model.physics import ModalModel, Mode
+from hybridsep.plants.plant import Encoder, FeedDrive, Plant, StageDrive, simulate
+from hybridsep.plants.trajectory import staircase
+from hybridsep.predict.lookahead import LookAhead
+from hybridsep.predict.predictor import HybridPredictor
+
+PREDICTION = ("Np", "p", "q", "lambda", "T_s", "t_init", "input_hold")
+
+RUNAWAY = 1e5
+"""Pole of the recursion that diverges: e_h grows by it with each sample."""
+
+
+def numbered(modes: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    """Return modes under the names of their FMU variables, ``mode[i].*``."""
+    return {f"mode[{i}].{key}": value for i, mode in enumerate(modes, start=1) for key, value in mode.items()}
+
+
+def library_predictor(values: Mapping[str, Any]) -> HybridPredictor:
+    """Return the predictor; ``v_s`` may be among the values, ``dead_time`` and ``mode[i].*`` must."""
+    model = ModalModel([Mode(**mode) for mode in modes_from(values)], values["dead_time"])
+    return HybridPredictor.with_parameters(
+        model, {name: values[name] for name in (*PREDICTION, "v_s") if name in values}
+    )
+
+
+def library_compensator(values: Mapping[str, Any]) -> SepCompensator:
+    """Return the compensator, whose parameters are checked under their FMI names first, as in an FMU."""
+    planning: dict[str, Any] = {name: check(name, values[name]) for name in PLANNING}
+    return SepCompensator(
+        library_predictor(values),
+        limits=Limits(planning["v_max"], planning["a_max"], planning["j_max"]),
+        best=SepState(planning["compensate"]),
+        keep_direction=bool(planning["keep_direction"]),
+        **{name: planning[name] for name in ("preview", "spacing", "jerk_weight", "change_max")},
+    )
+
+
+def library_plant(values: Mapping[str, Any]) -> Plant:
+    """Return the stage where there are modes among the values, the nonlinear drive otherwise."""
+    if modes := modes_from(values):
+        model = ModalModel([Mode(**mode) for mode in modes])
+        return StageDrive(model, values["f"], values["kappa"], values["T_s"])
+    return FeedDrive(*(values[name] for name in ("m", "c", "k", "c_nl", "k_nl")))
+
+
+def library_look_ahead(values: Mapping[str, Any], weights: bytes = b"") -> LookAhead | SepLookAhead:
+    """Return the compensator's look-ahead where the values have a preview, the predictor's otherwise.
+
+    Parameters
+    ----------
+    values : mapping
+        Parameters and ``x_d_ahead``, where it starts.
+    weights : bytes, optional
+        Content of ``weights.bin``, with which it starts warm.
+    """
+    start = float(values["x_d_ahead"])
+    if "preview" not in values:
+        predictor = _learned(library_predictor(values), weights)
+        return LookAhead(predictor, start)
+    compensator = library_compensator(values)
+    _learned(compensator.predictor, weights)
+    return SepLookAhead(compensator, start)
+
+
+def restored_look_ahead(kind: str, blob: bytes) -> LookAhead | SepLookAhead:
+    """Return what a look-ahead's ``to_bytes`` described; ``kind``: the FMU's model."""
+    look_ahead: type[LookAhead] | type[SepLookAhead] = LookAhead if kind == "HybridPredictor" else SepLookAhead
+    return look_ahead.from_bytes(blob)
+
+
+def learned_file(saved: Path | None) -> bytes:
+    """Return the content of ``weights.bin`` for a saved predictor; none without one."""
+    return weights_file(HybridPredictor.load(saved)) if saved else b""
+
+
+def trained(kind: str) -> HybridPredictor:
+    """Return the predictor of the default machine's FMU ``kind`` after one staircase."""
+    machine, encoder = load_machine("spring_mass_damper"), Encoder(5e-6, 7)
+    if kind == "HybridPredictor":
+        predictor = machine.new_predictor()
+        backtest(predictor, staircase(), encoder.measure_all(simulate(machine.new_plant(), staircase(), machine.T_s)))
+        return predictor
+    compensator = machine.new_compensator()
+    run_closed_loop(compensator, machine.new_plant(), staircase()[:4000], encoder=encoder)
+    return compensator.predictor
+
+
+def runaway(predictor: HybridPredictor) -> HybridPredictor:
+    """Return the predictor with a learned recursion that diverges: a bias and one past residual.
+
+    Both are so firmly learned that a run changes nothing.
+    """
+    n = predictor.n_features
+    weights = np.zeros(n)
+    weights[0], weights[2 + predictor.q] = 1e-3, RUNAWAY
+    factor = 1e6 * np.eye(n + 1)
+    factor[:-1, -1] = factor[:-1, :-1] @ weights
+    predictor.regression.restore(factor, 1000)
+    return predictor
+
+
+def _learned(predictor: HybridPredictor, weights: bytes) -> HybridPredictor:
+    if weights:
+        restore_weights(predictor, weights)
+    return predictor
