@@ -157,7 +157,7 @@ def test_plants_move_as_the_librarys_do(new_stream: StreamMaker, h: float) -> No
             outputs.append(each.outputs())
             each.set("x_d", command)
             each.step(k * h, h)
-    x, v, x_meas = np.transpose(np.subtract(*rows))
+    x, v, x_meas = (np.array(rows[0]) - np.array(rows[1])).T
     for difference, tolerance in ((x, 1e-12), (v, 1e-10), (x_meas, 1e-12)):
         assert np.max(np.abs(difference)) <= tolerance
     assert len({row[2] - row[0] for row in rows[0]}) == 1200  # a new draw each communication step

@@ -29,8 +29,9 @@ class CoreStream:
         DESCRIPTIONS.setdefault(model, description_of(model))
         self.model = model
         self._kind = f"core {model}"
-        self._new = lambda: CModel(model, {"t_init": 0.0} if warm else {}, resources)
-        self._core = self._new()
+        self._start = {"t_init": 0.0} if warm else {}
+        self._resources = resources
+        self.reset()
         self._outputs = OUTPUTS[kind_of(model)]
         self._warnings: list[str] = []
 
@@ -75,7 +76,7 @@ class CoreStream:
         self._core.state = arrays["state"].copy()
 
     def reset(self) -> None:
-        self._core = self._new()
+        self._core = CModel(self.model, self._start, self._resources)
 
     def warnings(self) -> list[str]:
         return self._warnings

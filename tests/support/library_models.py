@@ -104,18 +104,18 @@ def trained(kind: str) -> HybridPredictor:
     return compensator.predictor
 
 
-def runaway(predictor: HybridPredictor) -> HybridPredictor:
-    """Return the predictor with a learned recursion that diverges: a bias and one past residual.
+def runaway_file() -> bytes:
+    """Return the content of ``weights.bin`` for a recursion of the default machine that diverges.
 
-    Both are so firmly learned that a run changes nothing.
+    It has a bias and one past residual, so firmly learned that a run changes nothing.
     """
-    n = predictor.n_features
-    weights = np.zeros(n)
+    predictor = load_machine("spring_mass_damper").new_predictor()
+    weights = np.zeros(predictor.n_features)
     weights[0], weights[2 + predictor.q] = 1e-3, RUNAWAY
-    factor = 1e6 * np.eye(n + 1)
+    factor = 1e6 * np.eye(predictor.n_features + 1)
     factor[:-1, -1] = factor[:-1, :-1] @ weights
     predictor.regression.restore(factor, 1000)
-    return predictor
+    return weights_file(predictor)
 
 
 def _learned(predictor: HybridPredictor, weights: bytes) -> HybridPredictor:

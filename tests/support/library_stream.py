@@ -69,7 +69,11 @@ class LookAheadStream(LibraryStream):
         super().__init__(model)
         self._weights = weights
         self._n_shown = int(self._values["Np"])
-        if weights:
+        self.reset()
+
+    def reset(self) -> None:
+        super().reset()
+        if self._weights:
             self._values["t_init"] = 0.0
 
     def initialise(self, values: Mapping[str, Value], *, start: float = 0.0, stop: float | None = None) -> None:

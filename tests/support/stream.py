@@ -33,6 +33,12 @@ CANNOT = {
     (LIBRARY, "one warning"): "it warns at each step; what is said once an instance is the adapter's",
     (CORE, "one warning"): "it warns at each step; what is said once an instance is the adapter's",
     (LIBRARY, "outputs before"): "before its object is made there is nothing to ask",
+    (LIBRARY, "weights before"): "before its object is made there is nothing to ask",
+    (CORE, "weights before"): "the resources are read when the initialization ends",
+    (NATIVE, "weights before"): "the resources are read when the initialization ends",
+    (LIBRARY, "outputs kept"): "the sample that begins the window is counted before the window is known to diverge",
+    (PYTHON, "outputs kept"): "the library's",
+    (PYTHON, "diverged states"): "of that sample its clock knows nothing, so that such a state is inconsistent",
     (LIBRARY, "agreement"): "it is what the others are compared with; test_windows.py and the oracle are its truth",
     (
         CORE,

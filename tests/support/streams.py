@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
 import tempfile
+import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -42,23 +44,33 @@ class StreamMaker:
         self._made.append(self._new(model or self.model, weights))
         return self._made[-1]
 
+    def planted(self, learned: bytes) -> Stream:
+        """Return a new stream whose resources have this ``weights.bin``, which no build would have let in."""
+        self._made.append(self._new(self.model, None, learned))
+        return self._made[-1]
+
     def close(self) -> None:
         for stream in self._made:
             stream.close()
 
-    def _new(self, model: str, weights: Path | None) -> Stream:
+    def _new(self, model: str, weights: Path | None, planted: bytes = b"") -> Stream:
+        folder = Path(tempfile.mkdtemp(dir=self.folder))
         if self.implementation not in (LIBRARY, CORE):
-            return FmuStream(self.fmus(fmu_name(model, self.implementation), weights=weights), model)
-        learned = learned_file(weights)
+            archive = self.fmus(fmu_name(model, self.implementation), weights=weights)
+            if planted:
+                archive = Path(shutil.copy(archive, folder))
+                with zipfile.ZipFile(archive, "a") as content:
+                    content.writestr(f"resources/{WEIGHTS_FILE}", planted)
+            return FmuStream(archive, model)
+        learned = planted or learned_file(weights)
         if self.implementation == LIBRARY:
             return PlantStream(model) if "FeedDrive" in model else LookAheadStream(model, learned)
-        resources = Path(tempfile.mkdtemp(dir=self.folder))
         if learned:
-            (resources / WEIGHTS_FILE).write_bytes(learned)
+            (folder / WEIGHTS_FILE).write_bytes(learned)
         if model == TRAJECTORY:
-            write_trajectory(resources, staircase())
-            (resources / "trajectory_3.bin").rename(resources / "trajectory_0.bin")
-        return CoreStream(model, resources, warm=bool(weights))
+            write_trajectory(folder, staircase())
+            (folder / "trajectory_3.bin").rename(folder / "trajectory_0.bin")
+        return CoreStream(model, folder, warm=bool(learned))
 
 
 def fmu_name(model: str, implementation: str) -> str:
@@ -79,6 +91,6 @@ def cases(models: Sequence[str], *, needs: str = "") -> list[Any]:
     ]
 
 
-def on_all(models: Sequence[str], *, needs: str = "") -> Any:
+def on_all(models: Sequence[str], *, needs: str = "") -> pytest.MarkDecorator:
     """Return the mark of a test that takes ``new_stream``, on all implementations."""
     return pytest.mark.parametrize("new_stream", cases(models, needs=needs), indirect=True)
