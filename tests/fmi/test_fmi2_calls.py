@@ -306,22 +306,6 @@ def test_bad_parameters_are_named_and_can_be_corrected(fmu: Library) -> None:
 # Steps -------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
-@pytest.mark.parametrize("name", ["x_d_ahead", "x_meas"])
-def test_a_refused_input_changes_nothing(fmu: Library, name: str, bad: float) -> None:
-    component, twin = component_in(fmu, "stepping"), component_in(fmu, "stepping")
-    steps(fmu, component, 0, 317)
-    steps(fmu, twin, 0, 317)
-    fmu.set(component, name, bad)
-    assert fmu.DoStep(component, 0.317, 1e-3, 1) == ERROR
-    assert re.search(rf"{name} must be finite, got", fmu.messages[-1][2])
-    steps(fmu, component, 317, 450)
-    steps(fmu, twin, 317, 450)
-    assert fmu.save(component) == fmu.save(twin)
-    fmu.FreeInstance(component)
-    fmu.FreeInstance(twin)
-
-
 def test_a_bad_experiment_is_refused(fmu: Library) -> None:
     component = component_in(fmu, "instantiated")
     assert fmu.SetupExperiment(component, 0, 0.0, math.nan, 0, 0.0) == ERROR

@@ -5,11 +5,8 @@ from __future__ import annotations
 import re
 import shutil
 import struct
-import subprocess
 import sys
-import threading
 import zipfile
-from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -21,7 +18,6 @@ from elf import symbols
 from fmpy.build import build_platform_binary
 from fmpy.model_description import read_build_description
 from fmpy.validation import validate_fmu
-from places import SUPPORT
 
 from hybridsep.base.errors import FmuError, SignalError
 from hybridsep.base.signals import Array
@@ -392,94 +388,6 @@ def drive(
             instance.set("x_d_ahead", 99.0)  # inputs count at the beginning of a sample only
         outputs.append(tuple(instance.get(name) for name in ("x_d", "x_pb", "x_h", "e_servo", "rms_pb", "rms_h")))
     return outputs
-
-
-@pytest.fixture(scope="module")
-def expected_outputs(fmus: Fmus) -> list[tuple[float, ...]]:
-    with FmuInstance(fmus["HybridPredictor"]) as instance:
-        instance.initialise()
-        return drive(instance, 0, 800)
-
-
-def test_rollback_at_random_times_is_exact(fmus: Fmus, expected_outputs: list[tuple[float, ...]]) -> None:
-    rng = np.random.default_rng(5)
-    with FmuInstance(fmus["HybridPredictor"]) as instance:
-        instance.initialise()
-        k = 0
-        while k < 800:
-            ahead, back = min(800, k + int(rng.integers(1, 150))), instance.save()
-            drive(instance, k, ahead)
-            instance.restore(back)
-            assert drive(instance, k, ahead) == expected_outputs[k:ahead]
-            k = ahead
-
-
-def test_a_saved_state_goes_on_in_a_second_instance_and_process(
-    fmus: Fmus, expected_outputs: list[tuple[float, ...]], tmp_path: Path
-) -> None:
-    with FmuInstance(fmus["HybridPredictor"]) as first, FmuInstance(fmus["HybridPredictor"]) as second:
-        first.initialise()
-        drive(first, 0, 345)
-        blob = first.save()
-        second.restore(blob)
-        assert drive(second, 345, 800) == expected_outputs[345:]
-        assert first.save() == blob
-    (tmp_path / "blob").write_bytes(blob)
-    script = f"""
-import sys
-sys.path[:0] = {[str(Path(__file__).parent), str(SUPPORT)]!r}
-from pathlib import Path
-from hybridsep.cosim.importer import FmuInstance
-from test_native_fmu import drive
-with FmuInstance({str(fmus["HybridPredictor"])!r}) as instance:
-    instance.restore(Path({str(tmp_path / "blob")!r}).read_bytes())
-    print([tuple(map(float.hex, row)) for row in drive(instance, 345, 800)])
-"""
-    result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
-    assert result.returncode == 0, result.stderr
-    assert result.stdout.strip() == str([tuple(map(float.hex, row)) for row in expected_outputs[345:]])
-
-
-def test_reset_is_repeatable(fmus: Fmus, expected_outputs: list[tuple[float, ...]]) -> None:
-    with FmuInstance(fmus["HybridPredictor"]) as instance:
-        for _ in range(3):
-            instance.initialise()
-            assert drive(instance, 0, 300) == expected_outputs[:300]
-            instance.reset()
-
-
-def test_threads_with_an_instance_each(fmus: Fmus, expected_outputs: list[tuple[float, ...]]) -> None:
-    results: dict[int, list[tuple[float, ...]]] = {}
-
-    def worker(i: int) -> Callable[[], None]:
-        def run() -> None:
-            with FmuInstance(fmus["HybridPredictor"], f"thread {i}") as instance:
-                instance.initialise()
-                results[i] = drive(instance, 0, 400)
-
-        return run
-
-    threads = [threading.Thread(target=worker(i)) for i in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert results == dict.fromkeys(range(4), expected_outputs[:400])
-
-
-def test_other_parameters_than_built_with(fmus: Fmus) -> None:
-    """The window may grow and shrink: entries past a smaller Np are 0, a larger Np shows the first ones."""
-    for Np in (20, 150):
-        values = {"Np": Np, "p": 10, "q": 2, "t_init": 0.0}
-        with FmuInstance(fmus["HybridPredictor"]) as native, FmuInstance(fmus["HybridPredictorPy"]) as python:
-            names = [f"x_h_window[{i}]" for i in (1, 20, 21, 100)] + ["batch", "hybrid_active", "x_h", "rms_h"]
-            for instance in (native, python):
-                instance.initialise(values)
-                drive(instance, 0, 500)
-            assert [native.get(name) for name in names] == pytest.approx(
-                [python.get(name) for name in names], abs=TOLERANCE
-            )
-            assert (native.get("x_h_window[21]") == 0.0) == (Np == 20)
 
 
 # Sources -----------------------------------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from driving import T_S, TIGHT, Loop, closed_loop, replay
+from driving import T_S, TIGHT, Loop, Sensor, closed_loop, replay
 from staircase_data import commanded
 from stream import (
     COMPENSATOR,
@@ -21,7 +21,6 @@ from stream import (
     STAGE_COMPENSATOR,
     STAGE_PREDICTOR,
     TRAJECTORY,
-    WINDOWS,
     Value,
     kind_of,
 )
@@ -29,12 +28,12 @@ from streams import StreamMaker, on_all
 
 from hybridsep.plants.trajectory import staircase
 
+PAPER: dict[str, Any] = {"Np": 100, "p": 50, "q": 3, "lambda": 1e-12, "t_init": 0.3}
 
-def assert_agreement(
-    new_stream: StreamMaker, n: int, values: dict[str, Value], tolerance: float, start: float = 0.0
-) -> Loop:
+
+def assert_agreement(new_stream: StreamMaker, n: int, values: dict[str, Value], tolerance: float, **how: Any) -> Loop:
     """Replay a closed loop of the library, whose outputs must be the same, and return it."""
-    loop, stream = closed_loop(new_stream.model, n, values, start=start), new_stream()
+    loop, stream = closed_loop(new_stream.model, n, values, **how), new_stream()
     stream.initialise(loop.values, start=12.5)
     shown = replay(stream, loop, start_time=12.5)
     if new_stream.implementation == PYTHON:
@@ -53,7 +52,7 @@ def named(values: object) -> str:
 @pytest.mark.parametrize("start", [0.0, 0.1])
 @pytest.mark.parametrize(("p", "q"), [(50, 3), (100, 99)])
 def test_the_staircase_is_predicted_as_by_the_library(new_stream: StreamMaker, p: int, q: int, start: float) -> None:
-    loop = assert_agreement(new_stream, 6001, {"p": p, "q": q}, 1e-11, start)
+    loop = assert_agreement(new_stream, 6001, {"p": p, "q": q}, 1e-11, start=start)
     assert 5e-6 < loop.column(PREDICTOR, "rms_h")[-1] < 1.6e-5
 
 
@@ -76,35 +75,13 @@ def test_every_parameter_predicts_as_in_the_library(new_stream: StreamMaker, val
     assert_agreement(new_stream, 1500, values, 1e-11)
 
 
-@on_all((PREDICTOR,), needs="agreement")
-@pytest.mark.parametrize("Np", [20, 100, 150])
-def test_windows_are_shown_as_by_the_library(new_stream: StreamMaker, Np: int) -> None:
-    # Of a smaller Np than built with, zeros follow; of a larger one the first samples are shown.
-    values: dict[str, Value] = {"Np": Np, "p": 10, "q": 2, "t_init": 0.0}
-    loop, stream = closed_loop(PREDICTOR, 500, values), new_stream()
-    library = type(new_stream)("library", PREDICTOR, new_stream.fmus, new_stream.folder)()
-    for each in (stream, library):
-        each.initialise(loop.values)
-    for k in range(0, 500, 50):
-        for each in (stream, library):
-            replay(each, loop, k, k + 50)
-        for name in WINDOWS:
-            np.testing.assert_allclose(stream.window(name), library.window(name), rtol=0, atol=1e-11)
-    assert len(stream.window("x_h_window")) == 100
-    assert (stream.window("x_h_window")[20:] == 0.0).all() == (Np == 20)
-
-
 @on_all((COMPENSATOR,), needs="agreement")
 @pytest.mark.parametrize("start", [0.0, 0.1])
 def test_the_staircase_is_compensated_as_by_the_library(new_stream: StreamMaker, start: float) -> None:
     # The paper's features; the limits act in some windows.
-    values: dict[str, Value] = {"Np": 100, "p": 50, "q": 3, "lambda": 1e-12, "t_init": 0.3}
-    loop = assert_agreement(new_stream, 4000, values, 1e-11, start)
+    loop = assert_agreement(new_stream, 4000, PAPER, 1e-11, start=start)
     assert set(loop.column(COMPENSATOR, "sep_state")) == {1.0, 2.0}
     assert 4e-6 < loop.column(COMPENSATOR, "rms_e")[-1] < 1.5e-5
-
-
-PAPER: dict[str, Any] = {"Np": 100, "p": 50, "q": 3, "lambda": 1e-12, "t_init": 0.3}
 
 
 @on_all((COMPENSATOR,), needs="agreement")
@@ -141,6 +118,31 @@ def test_every_parameter_compensates_as_in_the_library(new_stream: StreamMaker, 
 @pytest.mark.parametrize("values", [{"q": 20}, TIGHT, {"compensate": 1, "change_max": 3e-4, "spacing": 5}], ids=named)
 def test_the_stage_is_compensated_as_by_the_library(new_stream: StreamMaker, values: dict[str, Value]) -> None:
     assert_agreement(new_stream, 1600, values, 1e-9)
+
+
+def held_from(first: int) -> Sensor:
+    return lambda k, x_meas, last: last if first <= k < first + 500 else x_meas
+
+
+HELD = {first: held_from(first) for first in (800, 1050, 1200)}
+
+
+@on_all((COMPENSATOR,), needs="agreement")
+@pytest.mark.parametrize("first", HELD)
+def test_a_held_sensor_is_not_learned_either(new_stream: StreamMaker, first: int) -> None:
+    loop = assert_agreement(new_stream, 2500, PAPER | {"t_init": 0.1}, 1e-10, sensor=HELD[first])
+    assert set(loop.column(COMPENSATOR, "sep_state")) == {1.0, 2.0}
+
+
+def growing(k: int, x_meas: float, last: float) -> float:
+    return x_meas + (1e-6 * 1.1 ** (k - 250) if 250 <= k < 300 else 0.0)
+
+
+@on_all((COMPENSATOR,), needs="agreement")
+def test_an_unstable_recursion_never_plans(new_stream: StreamMaker) -> None:
+    values = PAPER | {"Np": 50, "p": 2, "q": 0, "t_init": 0.0}
+    loop = assert_agreement(new_stream, 700, values, 1e-9, size=0.0, sensor=growing)
+    assert (loop.column(COMPENSATOR, "sep_state")[300:350] == 1.0).all()
 
 
 @on_all(PLANTS, needs="agreement")

@@ -20,6 +20,7 @@ from stream import (
     RefusedStreamError,
     Stream,
     Value,
+    kind_of,
 )
 from streams import StreamMaker, on_all
 
@@ -28,6 +29,17 @@ PREDICTION: list[tuple[dict[str, Value], str]] = [
     ({"Np": 100_001}, "Np must be 1 … 100000, got 100001"),
     ({"p": 0, "lambda": 0.0}, "p must be 1 … 5000, got 0; lambda must be 1e-40 … 1e+12 m2, got 0.0"),
     ({"lambda": -1.0, "T_s": 0.0}, "lambda must be 1e-40 … 1e+12 m2, got -1.0; T_s must be 1e-05 … 1 s, got 0.0"),
+    (
+        {"lambda": -1e-12, "T_s": 0.0, "t_init": -0.25},
+        "lambda must be 1e-40 … 1e+12 m2, got -1e-12; T_s must be 1e-05 … 1 s, got 0.0; "
+        "t_init must be 0 … 1000000 s, got -0.25",
+    ),
+    ({"lambda": 1e-300}, "lambda must be 1e-40 … 1e+12 m2, got 1e-300"),
+    ({"lambda": -1e16}, "lambda must be 1e-40 … 1e+12 m2, got -1e+16"),
+    ({"lambda": math.inf}, "lambda must be finite, got inf"),
+    ({"T_s": -123456.789}, "T_s must be 1e-05 … 1 s, got -123456.789"),
+    ({"t_init": -1e22}, "t_init must be 0 … 1000000 s, got -1e+22"),
+    ({"T_s": 1e-300, "t_init": 1e300}, "T_s must be 1e-05 … 1 s, got 1e-300; t_init must be 0 … 1000000 s, got 1e+300"),
     ({"lambda": math.nan}, "lambda must be finite, got nan"),
     ({"lambda": -5e-324}, "lambda must be 1e-40 … 1e+12 m2, got -5e-324"),
     ({"T_s": 1e-300}, "T_s must be 1e-05 … 1 s, got 1e-300"),
@@ -52,6 +64,7 @@ PLANNING: list[tuple[dict[str, Value], str]] = [
     ({"spacing": 3}, "spacing must be ≥ 1 and divide Np = 50, got 3"),
     ({"jerk_weight": -1.0}, "jerk_weight must be 0 … 1e+12, got -1.0"),
     ({"jerk_weight": math.nan}, "jerk_weight must be finite, got nan"),
+    ({"jerk_weight": 1e300}, "jerk_weight must be 0 … 1e+12, got 1e+300"),
     ({"v_max": 0.0}, "v_max must be 1e-09 … 10000 m/s, got 0.0"),
     ({"a_max": -16.0}, "a_max must be 1e-06 … 1000000 m/s2, got -16.0"),
     ({"a_max": 1e308}, "a_max must be 1e-06 … 1000000 m/s2, got 1e+308"),
@@ -63,7 +76,10 @@ PLANNING: list[tuple[dict[str, Value], str]] = [
     ({"keep_direction": 2}, "keep_direction must be 0 … 1, got 2"),
     ({"compensate": 3}, "compensate must be 0 … 2, got 3"),
     ({"compensate": -1}, "compensate must be 0 … 2, got -1"),
-    ({"p": 60, "q": 50}, "p must be 1 … Np = 50, got 60; lower p or raise Np; q must be 0 … Np − 1 = 49, got 50"),
+    (
+        {"p": 60, "q": 50},
+        "p must be 1 … Np = 50, got 60; lower p or raise Np; q must be 0 … Np − 1 = 49, got 50; lower q or raise Np",
+    ),
 ]
 OF_ONE_MODEL: dict[str, list[tuple[dict[str, Value], str]]] = {
     PREDICTOR: [
@@ -76,6 +92,7 @@ OF_ONE_MODEL: dict[str, list[tuple[dict[str, Value], str]]] = {
         ({"m": 0.0}, "m must be 1e-06 … 1000000 kg, got 0.0"),
         ({"k": -24674.0}, "k must be 1e-06 … 1e+15 N/m, got -24674.0"),
         ({"k": 1e308}, "k must be 1e-06 … 1e+15 N/m, got 1e+308"),
+        ({"c_nl": -1.0}, "c_nl must be 0 … 1e+12 N.s2/m2, got -1.0"),
         ({"k_nl": -1.0}, "k_nl must be 0 … 1e+15 N/m2, got -1.0"),
         ({"noise_std": math.nan}, "noise_std must be finite, got nan"),
         ({"noise_std": 1e300}, "noise_std must be 0 … 1 m, got 1e+300"),
@@ -83,25 +100,34 @@ OF_ONE_MODEL: dict[str, list[tuple[dict[str, Value], str]]] = {
         ({"k": 1e12}, "sqrt(k/m) and c/m must be at most 100000 1/s, got 1e+06; lower k or c, or raise m"),
         ({"c": 1e6}, "sqrt(k/m) and c/m must be at most 100000 1/s, got 1e+06; lower k or c, or raise m"),
     ],
+    TRAJECTORY: [
+        ({"trajectory": 4}, "trajectory must be 0 … 3, got 4"),
+        ({"T_s": 1e-6}, "T_s must be 1e-05 … 1 s, got 1e-06"),
+    ],
     STAGE: [
         ({"f": -1.0}, "f must be 0 … 1 m, got -1.0"),
         ({"kappa": -1.0}, "kappa must be 0 … 1000000 1/m, got -1.0"),
+        ({"kappa": 1e300}, "kappa must be 0 … 1000000 1/m, got 1e+300"),
         ({"T_s": 0.0}, "T_s must be 1e-05 … 1 s, got 0.0"),
         ({"mode[2].zeta": -0.1}, "mode[2].zeta must be 1e-06 … 10000, got -0.1"),
-        ({"mode[1].f_n": 2e4}, "2 pi f_n and 4 pi f_n zeta of mode[1] must be at most 100000 1/s in a plant, got"),
+        (
+            {"mode[1].f_n": 2e4},
+            "2 pi f_n and 4 pi f_n zeta of mode[1] must be at most 100000 1/s in a plant, got 125664; "
+            "lower f_n or zeta",
+        ),
     ],
 }
 
 
-@on_all((*LOOK_AHEADS, STAGE_PREDICTOR, *PLANTS))
+@on_all((*LOOK_AHEADS, STAGE_PREDICTOR, *PLANTS, TRAJECTORY))
 def test_bad_parameters_are_named_and_others_live_on(new_stream: StreamMaker) -> None:
     good, bad, fresh = new_stream(), new_stream(), new_stream()
     good.initialise({})
     expected = steps(good, 0, 3)
-    of_all = [] if new_stream.model in PLANTS else PREDICTION
+    of_all = PREDICTION if kind_of(new_stream.model) in LOOK_AHEADS else []
     for values, message in (*of_all, *OF_ONE_MODEL[new_stream.model]):
         for _ in range(2):  # a second failure ends nothing either
-            with pytest.raises(RefusedStreamError, match=re.escape(message)):
+            with pytest.raises(RefusedStreamError, match=rf"(^|: ){re.escape(message)}$"):
                 bad.initialise(values)
             bad.reset()
     for each in (bad, fresh):
@@ -195,3 +221,11 @@ def test_a_plants_command_that_is_no_position_changes_nothing(
 def test_a_plants_start_that_is_no_position_is_refused(new_stream: StreamMaker, value: float, expected: str) -> None:
     with pytest.raises(RefusedStreamError, match=f"the start value of x_d must be {expected}, got"):
         new_stream().initialise({"x_d": value})
+
+
+@on_all((DRIVE,))
+def test_a_step_too_long_for_a_fast_plant_is_refused(new_stream: StreamMaker) -> None:
+    stream = new_stream()
+    stream.initialise({"k": 9e9})
+    assert_refused(stream, 0.0, 50.0, "the step size must be at most 0.658808 s for a drive as fast as 94868.3 1/s")
+    stream.step(0.0, T_S)

@@ -80,6 +80,37 @@ def test_the_first_fill_keeps_the_drive_at_its_start_and_is_not_learned(new_stre
     assert first[OUTPUTS[PREDICTOR].index("hybrid_active")] == 1.0
 
 
+@on_all((PREDICTOR,))
+@pytest.mark.parametrize(("Np", "n"), [(20, 500), (40, 120), (100, 400), (150, 450)])
+def test_windows_show_the_batch(new_stream: StreamMaker, Np: int, n: int) -> None:
+    # Of a smaller Np than built with, zeros follow; of a larger one the first samples are shown.
+    values: dict[str, Value] = {"Np": Np, "p": 10, "q": 2, "t_init": 0.0}
+    loop, stream = closed_loop(PREDICTOR, n + Np, values), new_stream()
+    stream.initialise(loop.values)
+    replay(stream, loop, 0, n)
+    assert stream.outputs()[-1] == n // Np
+    length = min(Np, 100)
+    for name in ("x_d", "x_pb", "x_h"):
+        expected = np.zeros(100)
+        expected[:length] = loop.column(PREDICTOR, name)[n : n + length]
+        np.testing.assert_allclose(stream.window(f"{name}_window"), expected, rtol=0, atol=tolerance_of(new_stream))
+    np.testing.assert_array_equal(stream.window("x_d_window")[:length], loop.r[n - Np : n - Np + length])
+
+
+@on_all((PREDICTOR,))
+def test_an_offset_changes_no_prediction(new_stream: StreamMaker) -> None:
+    shown, moved = (shown_by(new_stream, 2500, {}, start) for start in (0.0, 0.1))
+    for name in ("x_d", "x_pb", "x_h"):
+        np.testing.assert_allclose(moved[name] - 0.1, shown[name], rtol=0, atol=1e-10)
+
+
+@on_all(LOOK_AHEADS)
+def test_the_warm_up_counts_from_the_end_of_the_fill(new_stream: StreamMaker) -> None:
+    name, hybrid, fill = ("hybrid_active", 1.0, 100) if new_stream.model == PREDICTOR else ("sep_state", 2.0, 200)
+    shown = shown_by(new_stream, 700, {"t_init": 0.3})
+    assert np.flatnonzero(shown[name] == hybrid)[0] == fill + 300
+
+
 @on_all((COMPENSATOR,))
 def test_a_move_in_sight_is_prepared_in_the_fill_which_is_not_learned(new_stream: StreamMaker) -> None:
     values = SHORT[COMPENSATOR]

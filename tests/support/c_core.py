@@ -24,15 +24,9 @@ import pytest
 from numpy.typing import NDArray
 from places import ROOT
 
-from hybridsep.base.limits import Limits
-from hybridsep.compensate.compensator import SepCompensator, SepState
-from hybridsep.compensate.sep_lookahead import SepLookAhead
 from hybridsep.fmi.c_header import c_header
 from hybridsep.fmi.variables import INTERPOLATED, variables_of
 from hybridsep.machine import load_machine
-from hybridsep.model.physics import ModalModel, Mode
-from hybridsep.predict.lookahead import LookAhead
-from hybridsep.predict.predictor import HybridPredictor
 
 Array = NDArray[np.float64]
 
@@ -303,39 +297,6 @@ class CModel:
         if status == 1:
             raise RefusedError(message.value.decode("utf-8"))
         self.warning = message.value.decode("utf-8") if status else ""
-
-
-def look_ahead(name: str, **parameters: float) -> tuple[LookAhead, CModel]:
-    """Return the library's look-ahead and the C model with the same parameters, start included."""
-    start = parameters.pop("start", 0.0)
-    values = {**PREDICTOR, **parameters}
-    model = ModalModel([Mode(**mode) for mode in DESCRIPTIONS[name]["modes"]], int(values["dead_time"]))
-    known = {key: value for key, value in values.items() if key != "dead_time"}
-    predictor = HybridPredictor.with_parameters(model, known)
-    return LookAhead(predictor, start), CModel(name, {**values, "x_d_ahead": start, "x_meas": start}).initialise()
-
-
-def library_compensator(values: Mapping[str, Any], name: str, start: float = 0.0) -> SepCompensator:
-    """Return the library's compensator with the parameters of a C model."""
-    model = ModalModel([Mode(**mode) for mode in DESCRIPTIONS[name]["modes"]], int(values["dead_time"]))
-    predictor = HybridPredictor.with_parameters(
-        model, {key: values[key] for key in (*PREDICTOR, "v_s") if key != "dead_time"}, start=start
-    )
-    return SepCompensator(
-        predictor,
-        limits=Limits(values["v_max"], values["a_max"], values["j_max"]),
-        best=SepState(values["compensate"]),
-        keep_direction=bool(values["keep_direction"]),
-        **{key: values[key] for key in ("preview", "spacing", "jerk_weight", "change_max")},
-    )
-
-
-def sep_look_ahead(name: str, **parameters: float) -> tuple[SepLookAhead, CModel]:
-    """Return the library's compensating look-ahead and the C model with the same parameters, start included."""
-    start = parameters.pop("start", 0.0)
-    values: dict[str, Any] = {**COMPENSATOR, **parameters}
-    c_model = CModel(name, {**values, "x_d_ahead": start, "x_meas": start}).initialise()
-    return SepLookAhead(library_compensator(values, name, start), start), c_model
 
 
 def write_weights(folder: Path, name: str, factor: Array, n_samples: int, **settings: float) -> None:

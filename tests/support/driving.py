@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -86,19 +86,50 @@ class Loop:
         return self.outputs[:, OUTPUTS[kind_of(model)].index(name)]
 
 
-def closed_loop(
-    model: str, n: int, values: Mapping[str, Value] | None = None, *, start: float = 0.0, weights: Path | None = None
-) -> Loop:
-    """Return the closed loop over ``n`` samples of the staircase, moved by ``start``, m; the same is run once.
+Sensor = Callable[[int, float, float], float]
+"""What a sensor shows at sample k of the measured position, given what it showed last, m."""
 
-    ``weights``: saved predictor that the look-ahead starts warm with.
+
+def _faithful(k: int, x_meas: float, last: float) -> float:
+    return x_meas
+
+
+def closed_loop(
+    model: str,
+    n: int,
+    values: Mapping[str, Value] | None = None,
+    *,
+    start: float = 0.0,
+    weights: Path | None = None,
+    size: float = 1.0,
+    sensor: Sensor = _faithful,
+) -> Loop:
+    """Return a closed loop over the staircase; the same is run once.
+
+    Parameters
+    ----------
+    model : str
+        A look-ahead.
+    n : int
+        Samples.
+    values : mapping, optional
+        Parameters.
+    start : float
+        Position of rest, m.
+    weights : Path, optional
+        Saved predictor that the look-ahead starts warm with.
+    size : float
+        Of the staircase, as a fraction.
+    sensor : function
     """
     given = {**(values or {}), "x_d_ahead": start, "x_meas": start}
-    return _closed_loop(model, n, tuple(given.items()), weights)
+    return _closed_loop(model, n, tuple(given.items()), weights, size, sensor)
 
 
 @cache
-def _closed_loop(model: str, n: int, given: tuple[tuple[str, Value], ...], weights: Path | None) -> Loop:
+def _closed_loop(
+    model: str, n: int, given: tuple[tuple[str, Value], ...], weights: Path | None, size: float, sensor: Sensor
+) -> Loop:
     machine, values = machine_of(model), dict(given)
     assert machine.plant is not None
     plant, encoder = machine.new_plant(), Encoder(machine.plant.noise_std, 1)
@@ -106,10 +137,10 @@ def _closed_loop(model: str, n: int, given: tuple[tuple[str, Value], ...], weigh
     T_s = float(values.get("T_s", T_S))
     stream.initialise(values)
     plant.reset(start)
-    r, x = commanded()[:n] + start, np.empty(n)
+    r, x = size * commanded()[:n] + start, np.empty(n)
     outputs = [stream.outputs()]
     for k in range(n):
-        x[k] = encoder.measure(plant.x)
+        x[k] = sensor(k, encoder.measure(plant.x), float(x[k - 1]) if k else start)
         plant.step(outputs[-1][0], T_s)  # x_d of a predictor, x_dm of a compensator
         stream.set("x_d_ahead", float(r[k]))
         stream.set("x_meas", float(x[k]))

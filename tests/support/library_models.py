@@ -104,18 +104,18 @@ def trained(kind: str) -> HybridPredictor:
     return compensator.predictor
 
 
-def runaway_file() -> bytes:
-    """Return the content of ``weights.bin`` for a recursion of the default machine that diverges.
+def runaway_predictor() -> HybridPredictor:
+    """Return a predictor of the default machine, without warm-up, whose learned recursion diverges.
 
     It has a bias and one past residual, so firmly learned that a run changes nothing.
     """
-    predictor = load_machine("spring_mass_damper").new_predictor()
+    predictor = load_machine("spring_mass_damper").new_predictor(t_init=0.0)
     weights = np.zeros(predictor.n_features)
     weights[0], weights[2 + predictor.q] = 1e-3, RUNAWAY
     factor = 1e6 * np.eye(predictor.n_features + 1)
     factor[:-1, -1] = factor[:-1, :-1] @ weights
     predictor.regression.restore(factor, 1000)
-    return weights_file(predictor)
+    return predictor
 
 
 def _learned(predictor: HybridPredictor, weights: bytes) -> HybridPredictor:

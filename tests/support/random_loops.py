@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from c_core import COMPENSATOR, DESCRIPTIONS, TS, CModel, library_compensator
+from c_core import COMPENSATOR, DESCRIPTIONS, TS, CModel
+from library_models import library_compensator, numbered
 from numpy.typing import NDArray
 
 from hybridsep.compensate.sep_lookahead import SepLookAhead
@@ -114,7 +115,8 @@ def run_library(loop: Loop) -> tuple[Array, NDArray[np.int64]]:
     """Return ``x_dm``, m, and ``sep_state`` of every sample with the library's compensator, ``(n,)`` both."""
     plant, encoder = loop.drive()
     start = float(loop.r[0])
-    ahead = SepLookAhead(library_compensator(loop.values, loop.model, start), start)
+    values = {**loop.values, **numbered(DESCRIPTIONS[loop.model]["modes"])}
+    ahead = SepLookAhead(library_compensator(values), start)
     x_dm, states = np.empty(len(loop.r)), np.empty(len(loop.r), dtype=np.int64)
     for k, r in enumerate(loop.r):
         x_meas = encoder.measure(plant.x)

@@ -7,16 +7,18 @@ import re
 import numpy as np
 import pytest
 from driving import T_S, steps
-from library_models import runaway_file
+from library_models import runaway_predictor
 from stream import CANNOT, PREDICTOR, WINDOWS, RefusedStreamError
 from streams import StreamMaker, on_all
+
+from hybridsep.fmi.weights import weights_file
 
 SAID = re.escape("x_h must stay within ±1e+100 m: what was learned makes it diverge; raise lambda, lower p or restart")
 
 
 @on_all((PREDICTOR,))
 def test_a_window_that_diverges_is_refused_until_another_state_is_set(new_stream: StreamMaker) -> None:
-    stream, other = new_stream.planted(runaway_file()), new_stream.planted(runaway_file())
+    stream, other = (new_stream.planted(weights_file(runaway_predictor())) for _ in range(2))
     stream.initialise({"t_init": 0.0, "x_d_ahead": 0.01})
     beginning = stream.save()
     first = steps(stream, 0, 99)
@@ -40,7 +42,7 @@ def test_a_window_that_diverges_is_refused_until_another_state_is_set(new_stream
 
 @on_all((PREDICTOR,))
 def test_the_warm_up_hides_what_diverges(new_stream: StreamMaker) -> None:
-    stream = new_stream.planted(runaway_file())
+    stream = new_stream.planted(weights_file(runaway_predictor()))
     stream.initialise({"t_init": 0.1})
     for row in steps(stream, 0, 199):
         assert row[1] == row[2]
