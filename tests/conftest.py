@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import zipfile
 
 # Threads make the small factorisations of these tests slower by two orders of magnitude on a busy machine. The
 # variable must be set before NumPy is loaded.
@@ -14,7 +15,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from built_once import BuiltFmus
+from built_once import BuiltFmus, built_once
 from command_line import Run
 from hypothesis import HealthCheck, settings
 
@@ -53,6 +54,20 @@ def fmus(session_folder: Path) -> BuiltFmus:
 def python_fmu(fmus: BuiltFmus) -> Callable[[str], Path]:
     """Return a function that gives the path of a pythonfmu FMU by name."""
     return fmus
+
+
+@pytest.fixture(scope="session")
+def folders(fmus: BuiltFmus) -> Callable[[str], Path]:
+    """Return a function that gives the folder of an unpacked FMU by name, unpacked once a session."""
+
+    def unpacked(name: str) -> Path:
+        def unpack(folder: Path) -> None:
+            with zipfile.ZipFile(fmus(name)) as archive:
+                archive.extractall(folder)
+
+        return built_once(fmus.folder.parent / "unpacked" / name, unpack)
+
+    return unpacked
 
 
 @pytest.fixture

@@ -12,18 +12,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from library_models import trained_predictor
 
 from hybridsep.base.errors import FmuError, StateError
 from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepState
 from hybridsep.cosim.importer import FmuInstance
-from hybridsep.evaluate.closed_loop import run_closed_loop
 from hybridsep.fmi.archive import build_fmu
 from hybridsep.fmi.c_header import c_header
 from hybridsep.fmi.reference import reference_files
 from hybridsep.machine import load_machine
-from hybridsep.plants.plant import Encoder
-from hybridsep.plants.trajectory import staircase
 
 MACHINE = load_machine("spring_mass_damper")
 TS = 1e-3
@@ -141,10 +139,8 @@ def test_parameters_may_be_set_one_after_the_other(compensator: FmuInstance) -> 
 @pytest.fixture(scope="module")
 def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The predictor of a compensator that has run over one staircase."""
-    learned = MACHINE.new_compensator()
-    run_closed_loop(learned, MACHINE.new_plant(), staircase()[:4000], encoder=Encoder(5e-6, 7))
     path = tmp_path_factory.mktemp("trained") / "closed_loop.state"
-    learned.predictor.save(path)
+    trained_predictor("SepCompensator").save(path)
     return path
 
 

@@ -17,36 +17,25 @@ import fmpy
 import numpy as np
 import pytest
 from c_core import CModel, refusal, write_weights
+from library_models import trained_predictor
 
 from hybridsep.app import cli
 from hybridsep.base.errors import FmuError, StateError
-from hybridsep.base.signals import Array
 from hybridsep.cosim.importer import FmuInstance
-from hybridsep.evaluate.backtest import backtest
 from hybridsep.fmi.archive import BACKENDS, build_fmu, fmu_names
 from hybridsep.fmi.weights import WEIGHTS_FILE, restore_weights, weights_file
 from hybridsep.machine import load_machine
 from hybridsep.model.physics import ModalModel, Mode
-from hybridsep.plants.plant import Encoder, simulate
-from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.predictor import HybridPredictor
 
 MACHINE = load_machine("spring_mass_damper")
 
 
-def measured(seed: int) -> Array:
-    encoder = Encoder(5e-6, seed)
-    positions = simulate(MACHINE.new_plant(), staircase(), MACHINE.T_s)
-    return np.array([encoder.measure(x) for x in positions.tolist()])
-
-
 @pytest.fixture(scope="module")
 def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The state of a predictor that has seen one staircase."""
-    predictor = MACHINE.new_predictor()
-    backtest(predictor, staircase(), measured(7))
     path = tmp_path_factory.mktemp("trained") / "trained.state"
-    predictor.save(path)
+    trained_predictor("HybridPredictor").save(path)
     return path
 
 

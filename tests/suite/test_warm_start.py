@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from driving import closed_loop, replay, steps
-from library_models import trained
+from library_models import trained_predictor
 from stream import COMPENSATOR, LIBRARY, LOOK_AHEADS, OUTPUTS, PREDICTOR, PYTHON, RefusedStreamError, Value
 from streams import StreamMaker, on_all
 
@@ -24,7 +24,7 @@ def weights(tmp_path_factory: pytest.TempPathFactory) -> Trained:
     def saved(model: str) -> Path:
         path = folder / f"{model}.state"
         if not path.exists():
-            trained(model).save(path)
+            trained_predictor(model).save(path)
         return path
 
     return saved

@@ -19,6 +19,10 @@ _FMUS = {
     for name in fmu_names(machine, backend)
 }
 
+NATIVE = [name for name, (_, backend) in _FMUS.items() if backend == "native"]
+PYTHON = [name for name, (_, backend) in _FMUS.items() if backend == "python"]
+"""Names of all FMUs of all machines."""
+
 
 def built_once(path: Path, build: Callable[[Path], object]) -> Path:
     """Return ``path``, which ``build`` makes, given a name beside it; other processes wait meanwhile."""

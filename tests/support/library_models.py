@@ -92,7 +92,7 @@ def learned_file(saved: Path | None) -> bytes:
     return weights_file(HybridPredictor.load(saved)) if saved else b""
 
 
-def trained(kind: str) -> HybridPredictor:
+def trained_predictor(kind: str) -> HybridPredictor:
     """Return the predictor of the default machine's FMU ``kind`` after one staircase."""
     machine, encoder = load_machine("spring_mass_damper"), Encoder(5e-6, 7)
     if kind == "HybridPredictor":
