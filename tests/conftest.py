@@ -18,10 +18,18 @@ import pytest
 from built_once import BuiltFmus, built_once
 from command_line import Run
 from hypothesis import HealthCheck, settings
+from slow_tests import is_slow
 
 # No test fails because something else keeps the cores busy.
 settings.register_profile("patient", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("patient")
+
+
+@pytest.hookimpl(tryfirst=True)  # before pytest deselects by marker
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if is_slow(item.nodeid):
+            item.add_marker("slow")
 
 
 @pytest.fixture(autouse=True)
