@@ -136,10 +136,8 @@ def test_bad_parameters_are_named_and_others_live_on(new_stream: StreamMaker) ->
     assert len(steps(good, 3, 6)) == 3
 
 
-every = on_all((*LOOK_AHEADS, TRAJECTORY, *PLANTS))
-
-
 def assert_refused(stream: Stream, t: float, h: float, message: str) -> None:
+    """Step; the stream must refuse with the message, and be as it was."""
     before, outputs = stream.save(), stream.outputs()
     with pytest.raises(RefusedStreamError, match=re.escape(message)):
         stream.step(t, h)
@@ -147,7 +145,7 @@ def assert_refused(stream: Stream, t: float, h: float, message: str) -> None:
     assert stream.outputs() == outputs
 
 
-@every
+@on_all((*LOOK_AHEADS, TRAJECTORY, *PLANTS))
 @pytest.mark.parametrize("h", [0.0, -T_S, -1e-320, math.nan, math.inf, 100.5])
 def test_a_step_size_that_cannot_be_changes_nothing(new_stream: StreamMaker, h: float) -> None:
     stream = new_stream()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 
-from driving import SHORT, set_inputs, steps
+from driving import SHORT, T_S, set_inputs, steps
 from stream import (
     COMPENSATOR,
     DRIVE,
@@ -18,7 +18,6 @@ from stream import (
 )
 from streams import StreamMaker, on_all
 
-T_S = 1e-3
 OTHERS = {PREDICTOR: STAGE_PREDICTOR, COMPENSATOR: STAGE_COMPENSATOR, DRIVE: STAGE, STAGE: DRIVE}
 N_SAMPLES = 300
 

@@ -40,10 +40,7 @@ CANNOT = {
     (PYTHON, "outputs kept"): "the library's",
     (PYTHON, "diverged states"): "of that sample its clock knows nothing, so that such a state is inconsistent",
     (LIBRARY, "agreement"): "it is what the others are compared with; test_windows.py and the oracle are its truth",
-    (
-        CORE,
-        "bad states",
-    ): "the checksum is the adapter's; what the core checks itself is in tests/c/test_c_states.py",
+    (CORE, "bad states"): "checksum and GUID are the adapter's; what it checks itself: tests/c/test_c_states.py",
     (LIBRARY, "a plant's time"): "its plants are stepped by an interval, and put to rest wherever asked for",
 }
 """(implementation, model or ability): why it is not there."""
