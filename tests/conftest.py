@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import zipfile
 
 # Threads make the small factorisations of these tests slower by two orders of magnitude on a busy machine. The
 # variable must be set before NumPy is loaded.
@@ -14,14 +15,21 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from built_once import BuiltFmus, built_once
 from command_line import Run
 from hypothesis import HealthCheck, settings
-
-from hybridsep import build_fmu, fmu_names, load_machine, machine_names
+from slow_tests import is_slow
 
 # No test fails because something else keeps the cores busy.
 settings.register_profile("patient", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("patient")
+
+
+@pytest.hookimpl(tryfirst=True)  # before pytest deselects by marker
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if is_slow(item.nodeid):
+            item.add_marker("slow")
 
 
 @pytest.fixture(autouse=True)
@@ -38,18 +46,36 @@ def _working_directory_kept() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session")
-def python_fmu(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """Return a function that gives the path of a pythonfmu FMU by name, built once a session."""
-    folder = tmp_path_factory.mktemp("fmus")
-    machines = {
-        name: machine for machine in map(load_machine, machine_names()) for name in fmu_names(machine, "python")
-    }
+def session_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the test session, which all of xdist's workers share."""
+    own = tmp_path_factory.getbasetemp()
+    return own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
 
-    def path(name: str) -> Path:
-        archive = folder / f"{name}.fmu"
-        return archive if archive.exists() else build_fmu(machines[name], name, folder, "python")
 
-    return path
+@pytest.fixture(scope="session")
+def fmus(session_folder: Path) -> BuiltFmus:
+    """Any FMU of any machine by name, built once a session."""
+    return BuiltFmus(session_folder / "fmus")
+
+
+@pytest.fixture(scope="session")
+def python_fmu(fmus: BuiltFmus) -> Callable[[str], Path]:
+    """Return a function that gives the path of a pythonfmu FMU by name."""
+    return fmus
+
+
+@pytest.fixture(scope="session")
+def folders(fmus: BuiltFmus) -> Callable[[str], Path]:
+    """Return a function that gives the folder of an unpacked FMU by name, unpacked once a session."""
+
+    def unpacked(name: str) -> Path:
+        def unpack(folder: Path) -> None:
+            with zipfile.ZipFile(fmus(name)) as archive:
+                archive.extractall(folder)
+
+        return built_once(fmus.folder.parent / "unpacked" / name, unpack)
+
+    return unpacked
 
 
 @pytest.fixture

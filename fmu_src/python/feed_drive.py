@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from hybridsep.base.errors import SignalError
+from hybridsep.base.errors import FmuError, SignalError
 from hybridsep.base.saved import Saved
 from hybridsep.base.signals import POSITION_MAX
 from hybridsep.fmi import slave
@@ -31,6 +31,8 @@ class FeedDrivePy(slave.TableSlave):
 
     def advance(self, t: float, h: float) -> None:
         """Step the plant and measure it."""
+        if not math.isfinite(t):
+            raise FmuError(f"the communication point must be finite, got {t} s")
         _check_position("x_d", self.values["x_d"], f" at t = {t:g} s")
         self.plant.step(self.values["x_d"], h)
         self.x_meas = self.encoder.measure(self.plant.x)

@@ -22,7 +22,7 @@ from . import native_backend, python_backend
 from .backends import BACKENDS
 from .warm_start import load_trained
 
-__all__ = ["build_fmu", "fmu_names"]
+__all__ = ["build_fmu", "fmu_description", "fmu_names"]
 
 _SUFFIX = {"native": "", "python": "Py"}
 _SAMPLES_TRAJECTORY = 3
@@ -112,7 +112,7 @@ def build_fmu(
         if given is not None and model not in models:
             raise FmuError(f"{what} are for a {' or a '.join(models)}, {name} is a {model}")
     trained = None if weights is None else load_trained(weights, machine, model)
-    description = _description(machine, model, name)
+    description = fmu_description(machine, model, name)
     if samples is not None:
         description["parameters"] = {**description["parameters"], "trajectory": _SAMPLES_TRAJECTORY}
     if trained is not None:
@@ -127,7 +127,7 @@ def build_fmu(
     return path
 
 
-def _description(machine: Machine, model: str, name: str) -> dict[str, Any]:
+def fmu_description(machine: Machine, model: str, name: str) -> dict[str, Any]:
     """Return what an FMU is made from: model, name, start values and modes."""
     if model in ("HybridPredictor", "SepCompensator"):
         physics = [{"f_n": m.f_n, "zeta": m.zeta, "alpha": m.alpha, "beta": m.beta} for m in machine.model.modes]

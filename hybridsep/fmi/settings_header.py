@@ -18,8 +18,8 @@ __all__ = ["settings_header", "settings_header_path"]
 def settings_header() -> str:
     """Return the header."""
     lists = (("PREDICTOR", PREDICTOR_SETTINGS), ("COMPENSATOR", COMPENSATOR_SETTINGS))
-    return f"""/* Settings as they are declared in hybridsep/base/settings.py, from which this file is generated. Whole numbers,
- * truth values and choices are uint64_t. */
+    return f"""/* Settings as they are declared in hybridsep/base/settings.py, from which this file is generated.
+ * Whole numbers, truth values and choices are uint64_t. */
 #ifndef HSEP_SETTINGS_H
 #define HSEP_SETTINGS_H
 

@@ -9,12 +9,12 @@ int main()
 {
     const hsep_mode mode = {25.0, 0.05, 24674.0, 15.7};
     hsep_predictor_parameters parameters = {};
-    parameters.Np = parameters.preview = 100;
-    parameters.p = 5;
-    parameters.q = 2;
+    parameters.settings.Np = parameters.preview = 100;
+    parameters.settings.p = 5;
+    parameters.settings.q = 2;
     parameters.n_modes = 1;
-    parameters.lambda = 1e-8;
-    parameters.T_s = 1e-3;
+    parameters.settings.lambda = 1e-8;
+    parameters.settings.T_s = 1e-3;
     parameters.modes = &mode;
     std::vector<double> block(static_cast<size_t>(hsep_predictor_size(&parameters)) / sizeof(double));
     hsep_predictor *predictor = reinterpret_cast<hsep_predictor *>(block.data());

@@ -1,4 +1,4 @@
-"""The C core's plants, encoder and trajectory against the library. Each test states its tolerance."""
+"""The C core's encoder against the library's, and the trajectory that it reads from a file."""
 
 from __future__ import annotations
 
@@ -7,46 +7,11 @@ import struct
 from pathlib import Path
 
 import c_core
-import numpy as np
 import pytest
 import staircase_data as staircase
 from c_core import TS, CModel, write_trajectory
 
-from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.plants.encoder import Encoder
-from hybridsep.plants.feed_drive import FeedDrive
-from hybridsep.plants.plant import Plant
-from hybridsep.plants.stage_drive import StageDrive
-
-
-def plants() -> dict[str, Plant]:
-    stage = ModalModel([Mode(**mode) for mode in c_core.STAGE_MODES])
-    return {
-        "feed_drive": FeedDrive(*(c_core.FEED_DRIVE[name] for name in ("m", "c", "k", "c_nl", "k_nl"))),
-        "stage_drive": StageDrive(stage, c_core.STAGE_DRIVE["f"], c_core.STAGE_DRIVE["kappa"], 1e-3),
-    }
-
-
-@pytest.mark.parametrize("h", [1e-3, 0.25e-3, 2.5e-3, 0.7e-4])
-@pytest.mark.parametrize("name", ["feed_drive", "stage_drive"])
-def test_the_plants_move_as_the_librarys_do(name: str, h: float) -> None:
-    # 1e-12 m in position, 1e-10 m/s in velocity, 1e-12 m in the measurement.
-    plant = plants()[name]
-    parameters = c_core.DESCRIPTIONS[name]["parameters"]
-    encoder = Encoder(parameters["noise_std"], parameters["seed"])
-    plant.reset(0.1)
-    model = CModel(name, {"x_d": 0.1})
-    model.start_values()
-    before = model.values.copy()
-    np.testing.assert_array_equal(model.initialise().values, before)
-    assert abs(model["x_meas"] - encoder.measure(plant.x)) <= 1e-12
-    for k, command in enumerate((staircase.commanded()[:1200] + 0.1).tolist()):
-        model["x_d"] = command
-        model.step(k * h, h)
-        plant.step(command, h)
-        assert abs(model["x"] - plant.x) <= 1e-12
-        assert abs(model["v"] - plant.v) <= 1e-10
-        assert abs(model["x_meas"] - encoder.measure(plant.x)) <= 1e-12
 
 
 @pytest.mark.parametrize("seed", [0, 1, 12345, 2**31 - 1])

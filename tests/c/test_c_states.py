@@ -6,7 +6,6 @@ import struct
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
 import staircase_data as staircase
 from c_core import TS, CModel, RefusedError, write_trajectory
@@ -26,25 +25,6 @@ def steppable(name: str, folder: Path) -> tuple[CModel, Callable[[int], None]]:
         model.step(k * TS)
 
     return model, step
-
-
-@pytest.mark.parametrize("name", ["predictor", "predictor_2", "compensator", "feed_drive", "stage_drive", "trajectory"])
-def test_a_run_from_a_saved_state_is_the_same_to_the_last_bit(name: str, tmp_path: Path) -> None:
-    model, step = steppable(name, tmp_path)
-    other, step_other = steppable(name, tmp_path)
-    for k in range(250):
-        step(k)
-    state, values = model.state.copy(), model.values.copy()
-    model.check_state(state.tobytes())
-    seen = []
-    for k in range(250, 520):
-        step(k)
-        seen.append(model.values.copy())
-    other.state[:], other.values[:] = state, values
-    for k in range(250, 520):
-        step_other(k)
-        np.testing.assert_array_equal(other.values, seen[k - 250])
-    assert other.state.tobytes() == model.state.tobytes()
 
 
 @pytest.mark.parametrize("name", ["predictor", "compensator", "feed_drive", "stage_drive", "trajectory"])

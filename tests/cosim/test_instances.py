@@ -7,19 +7,17 @@ import os
 import platform
 import subprocess
 import sys
-import zipfile
 from collections.abc import Callable
 from ctypes import c_double, c_uint
 from pathlib import Path
 
 import numpy as np
 import pytest
-from fuzz_fmi2 import OK, Library
+from fmi2_library import OK, Library
 from numpy.typing import NDArray
 from places import SUPPORT
 
-from hybridsep import build_fmu, load_machine
-from hybridsep.fmi.archive import fmu_names
+from hybridsep import load_machine
 from hybridsep.fmi.variables import variables_of
 
 N_INSTANCES = 1000
@@ -28,15 +26,10 @@ TS = 1e-3
 OVERHEAD = 1.2  # at most, of the arrays
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+@pytest.fixture
+def folder(folders: Callable[[str], Path]) -> Path:
     """The unpacked HybridPredictor with the paper's parameters, built for this machine."""
-    machine = load_machine("spring_mass_damper")
-    assert "HybridPredictor" in fmu_names(machine)
-    out = tmp_path_factory.mktemp("instances")
-    with zipfile.ZipFile(build_fmu(machine, "HybridPredictor", out, targets=("host",))) as archive:
-        archive.extractall(out / "unpacked")
-    return out / "unpacked"
+    return folders("HybridPredictor")
 
 
 @pytest.fixture

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 import fmpy
 import numpy as np
 import pytest
+from built_once import BuiltFmus
 from fmpy.util import read_csv, read_ref_opt_file
 
 from hybridsep.fmi.archive import build_fmu, fmu_names
@@ -21,11 +23,11 @@ TOLERANCE = {"HybridPredictor": 1e-11, "SepCompensator": 1e-9, "FeedDrive": 1e-1
 
 
 @pytest.mark.parametrize(("machine", "name"), NAMES)
-def test_fmpy_gets_the_reference_result(machine: str, name: str, tmp_path: Path) -> None:
-    path = build_fmu(load_machine(machine), name, tmp_path, targets=("host",))
-    with zipfile.ZipFile(path) as archive:
-        archive.extractall(tmp_path)
-    base = tmp_path / "documentation" / "reference" / name
+def test_fmpy_gets_the_reference_result(
+    machine: str, name: str, fmus: BuiltFmus, folders: Callable[[str], Path]
+) -> None:
+    path, documentation = fmus(name), folders(name) / "documentation"
+    base = documentation / "reference" / name
     options = read_ref_opt_file(f"{base}_ref.opt")
     expected = read_csv(f"{base}_ref.csv")
     inputs = read_csv(f"{base}_in.csv") if Path(f"{base}_in.csv").exists() else None
@@ -51,10 +53,10 @@ def test_fmpy_gets_the_reference_result(machine: str, name: str, tmp_path: Path)
     if model == "HybridPredictor":
         assert expected["hybrid_active"][-1] == 1.0
         assert 0 < expected["rms_h"][-1] < 1e-4
-    page = (tmp_path / "documentation" / "index.html").read_text(encoding="utf-8")
+    page = (documentation / "index.html").read_text(encoding="utf-8")
     assert f"<sup>−{-np.log10(TOLERANCE[model]):.0f}</sup> m" in page
     for link in re.findall(r'href="(reference/[^"]+)"', page):
-        assert (tmp_path / "documentation" / link).is_file()
+        assert (documentation / link).is_file()
 
 
 def test_the_reference_is_short_and_the_same_every_time() -> None:

@@ -18,131 +18,33 @@ import fmpy
 import numpy as np
 import pytest
 from c_core import CModel, refusal, write_weights
+from library_models import trained_predictor
 
 from hybridsep.app import cli
 from hybridsep.base.errors import FmuError, StateError
 from hybridsep.base.settings import PredictorSettings
-from hybridsep.base.signals import Array
 from hybridsep.cosim.importer import FmuInstance
-from hybridsep.cosim.loop import cosimulate
-from hybridsep.evaluate.backtest import backtest
 from hybridsep.fmi.archive import build_fmu, fmu_names
 from hybridsep.fmi.backends import BACKENDS
 from hybridsep.fmi.weights import WEIGHTS_FILE, restore_weights, weights_file
 from hybridsep.machine import load_machine
 from hybridsep.model.physics import ModalModel, Mode
-from hybridsep.plants.encoder import Encoder
-from hybridsep.plants.plant import simulate
-from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.predictor import HybridPredictor
 
 MACHINE = load_machine("spring_mass_damper")
-TOLERANCE = 1e-11  # m
-
-
-def measured(seed: int) -> Array:
-    encoder = Encoder(5e-6, seed)
-    positions = simulate(MACHINE.new_plant(), staircase(), MACHINE.T_s)
-    return np.array([encoder.measure(x) for x in positions.tolist()])
 
 
 @pytest.fixture(scope="module")
 def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The state of a predictor that has seen one staircase."""
-    predictor = MACHINE.new_predictor()
-    backtest(predictor, staircase(), measured(7))
     path = tmp_path_factory.mktemp("trained") / "trained.state"
-    predictor.save(path)
+    trained_predictor("HybridPredictor").save(path)
     return path
-
-
-@pytest.fixture(scope="module", params=BACKENDS)
-def warm(request: pytest.FixtureRequest, trained: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The HybridPredictor FMU of each flavour with that state in it."""
-    return build(request.param, tmp_path_factory.mktemp(request.param), trained)
 
 
 def build(backend: str, out: Path, weights: Path | None = None, model: str = "HybridPredictor") -> Path:
     name = next(name for name, built in fmu_names(MACHINE, backend).items() if built == model)
     return build_fmu(MACHINE, name, out, backend, targets=("host",), weights=weights)
-
-
-def test_a_warm_run_is_the_librarys_second_run(warm: Path, trained: Path, tmp_path: Path) -> None:
-    run = cosimulate(warm, build("native", tmp_path, model="FeedDrive"), staircase())
-    assert run.active.all()
-    predictor = HybridPredictor.load(trained)
-    predictor.restart()
-    expected = backtest(predictor, run.x_d, run.x_meas)
-    np.testing.assert_allclose(run.x_pb, expected.x_pb, rtol=0, atol=TOLERANCE)
-    np.testing.assert_allclose(run.x_h, expected.x_h, rtol=0, atol=TOLERANCE)
-    assert run.summary()["rms_h_um"] == pytest.approx(8.9, abs=0.2)
-    cold = cosimulate(build("native", tmp_path), tmp_path / "FeedDrive.fmu", staircase())
-    assert cold.summary()["rms_h_um"] == pytest.approx(14.8, abs=0.3)
-
-
-def test_the_warm_up_is_over_at_once_unless_asked_for(warm: Path) -> None:
-    for values, active in (({}, True), ({"t_init": 0.05}, False)):
-        with FmuInstance(warm) as instance:
-            assert instance.get("t_init") == 0.0
-            instance.initialise(values)
-            for k in range(100):
-                instance.step(k * 1e-3, 1e-3)
-            assert instance.get("hybrid_active") == active
-
-
-def test_a_warm_state_can_be_saved_and_the_instance_reset(warm: Path) -> None:
-    with FmuInstance(warm) as instance:
-        for _ in range(2):
-            instance.initialise()
-            seen = drive(instance, 0, 250)
-            blob = instance.save()
-            ahead = drive(instance, 250, 420)
-            instance.restore(blob)
-            assert drive(instance, 250, 420) == ahead
-            if warm.stem.endswith("Py"):  # pythonfmu has no reset
-                break
-            instance.reset()
-    assert any(x_h != x_pb for x_h, x_pb in seen[100:])
-
-
-def drive(instance: FmuInstance, first: int, last: int) -> list[tuple[float, float]]:
-    outputs = []
-    for k in range(first, last):
-        instance.set("x_d_ahead", 1e-3 * np.sin(0.02 * k))
-        instance.set("x_meas", 1e-3 * np.sin(0.02 * (k - 105)))
-        instance.step(k * 1e-3, 1e-3)
-        outputs.append((instance.get("x_h"), instance.get("x_pb")))
-    return outputs
-
-
-@pytest.mark.parametrize(
-    ("values", "expected"),
-    [
-        ({"p": 40}, "p must be 50, with which weights.bin was learned, got 40"),
-        (
-            {"p": 49, "q": 4},
-            "p must be 50, with which weights.bin was learned, got 49; "
-            "q must be 3, with which weights.bin was learned, got 4",
-        ),
-        ({"lambda": 1e-9}, "lambda must be 1e-12, with which weights.bin was learned, got 1e-09"),
-        ({"T_s": 0.002}, "T_s must be 0.001, with which weights.bin was learned, got 0.002"),
-        ({"input_hold": 1}, "input_hold must be 0, with which weights.bin was learned, got 1"),
-        ({"dead_time": 3}, "dead_time must be 0, with which weights.bin was learned, got 3"),
-        ({"mode[1].alpha": 24000.0}, "mode[1].alpha must be 24674.0, with which weights.bin was learned, got 24000.0"),
-    ],
-)
-def test_other_settings_than_learned_are_refused_by_the_fmu(
-    warm: Path, values: dict[str, float], expected: str
-) -> None:
-    with FmuInstance(warm) as instance, pytest.raises(FmuError) as caught:
-        instance.initialise(values)
-    assert expected in str(caught.value)
-
-
-def test_what_does_not_shape_the_features_may_be_another(warm: Path) -> None:
-    with FmuInstance(warm) as instance:
-        instance.initialise({"Np": 60, "t_init": 0.1})
-        assert instance.get("p") == 50
 
 
 @pytest.mark.parametrize("backend", BACKENDS)

@@ -1,104 +1,44 @@
-"""Windows that diverge: refused with the output's name, none of it shown, until another state is restored."""
+"""Predictions that diverge, window by window, and states that hold what is no number."""
 
 from __future__ import annotations
 
 from collections import Counter
-from pathlib import Path
 
 import c_core
 import numpy as np
 import pytest
-from c_core import TS, CModel, refusal, write_weights
+from c_core import TS, CModel
+from library_models import library_compensator, numbered, runaway_predictor
 
 from hybridsep.base.errors import SignalError
-from hybridsep.base.settings import PredictorSettings
-from hybridsep.base.signals import Array
 from hybridsep.evaluate.backtest import backtest
-from hybridsep.fmi.weights import WEIGHTS_FILE, restore_weights
-from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.look_ahead import LookAhead
-from hybridsep.predict.predictor import HybridPredictor
 from hybridsep.predict.window import Prediction
 
 SAID = "x_h must stay within ±1e+100 m: what was learned makes it diverge; raise lambda, lower p or restart"
-RUNAWAY = 1e5
-"""Pole of the learned recursion: e_h grows by it with each sample."""
 
 
-def runaway_factor(n: int, place: int) -> Array:
-    """Return a factor whose weights are a bias and one past residual, so firmly learned that a run changes nothing."""
-    weights = np.zeros(n)
-    weights[0], weights[place] = 1e-3, RUNAWAY
-    factor = 1e6 * np.eye(n + 1)
-    factor[:-1, -1] = factor[:-1, :-1] @ weights
-    return factor
-
-
-def runaway_predictor(folder: Path) -> HybridPredictor:
-    write_weights(folder, "predictor", runaway_factor(55, 5), 1000)
-    model = ModalModel([Mode(**c_core.SPRING_MASS_DAMPER)])
-    parameters = {name: value for name, value in c_core.PREDICTOR.items() if name != "dead_time"}
-    predictor = HybridPredictor(model, PredictorSettings.from_fmi({**parameters, "t_init": 0.0}))
-    restore_weights(predictor, (folder / WEIGHTS_FILE).read_bytes())
-    return predictor
-
-
-def test_a_window_that_diverges_is_refused(tmp_path: Path) -> None:
-    look_ahead = LookAhead(runaway_predictor(tmp_path), 0.0)
-    for _ in range(99):
-        look_ahead.sample(1e-3, 0.0)
-    shown = look_ahead.window.x_h
-    with pytest.raises(SignalError) as caught:
-        look_ahead.sample(1e-3, 0.0)
-    assert str(caught.value) == SAID
-    restored = LookAhead.from_bytes(look_ahead.to_bytes(), HybridPredictor)
-    for again in (look_ahead, restored):
-        with pytest.raises(SignalError) as caught:
-            again.sample(0.0, 0.0)
-        assert str(caught.value) == SAID
-    assert look_ahead.window.x_h is shown
-
-
-def test_a_window_that_diverges_is_refused_in_c(tmp_path: Path) -> None:
-    runaway_predictor(tmp_path)
-    model = CModel("predictor", {"t_init": 0.0}, tmp_path).initialise()
-    model["x_d_ahead"] = 1e-3
-    for k in range(99):
-        model.step(k * TS)
-    before = model.state.copy()
-    values = model.values.copy()
-    for k in range(99, 105):
-        assert refusal(lambda k=k: model.step(k * TS)) == SAID  # type: ignore[misc]
-        np.testing.assert_array_equal(model.values, values)
-    model.check_state(model.state.tobytes())  # may be saved: it stays what it is
-    model.state = before
-    model.check_state(before.tobytes())
-    assert refusal(lambda: model.step(99 * TS)) == SAID
-    model.initialise()
-    model.step(0.0)
-
-
-def test_the_warm_up_hides_what_diverges(tmp_path: Path) -> None:
-    predictor = runaway_predictor(tmp_path)
+def test_the_warm_up_hides_what_diverges() -> None:
+    predictor = runaway_predictor()
     predictor.restart(0.0, t_init=0.1)
     prediction = predictor.predict(np.full(100, 1e-3))
     assert not np.isfinite(prediction.e_h).all()
     np.testing.assert_array_equal(prediction.x_h, prediction.x_pb)
 
 
-def test_a_direct_prediction_that_diverges_is_refused(tmp_path: Path) -> None:
+def test_a_direct_prediction_that_diverges_is_refused() -> None:
     with pytest.raises(SignalError) as caught:
-        _ = runaway_predictor(tmp_path).predict(np.full(100, 1e-3)).x_h
+        _ = runaway_predictor().predict(np.full(100, 1e-3)).x_h
     assert str(caught.value) == SAID
     with pytest.raises(SignalError, match="x_pb must stay within"):
         _ = Prediction(np.array([np.nan]), np.zeros(1), 1).x_h
 
 
-def test_a_replay_that_diverges_is_refused(tmp_path: Path) -> None:
+def test_a_replay_that_diverges_is_refused() -> None:
     x_d = np.full(250, 1e-3)
     x_d[0] = 0.0
     with pytest.raises(SignalError, match="x_h diverges in the batch from sample 0 on; raise lambda or lower p"):
-        backtest(runaway_predictor(tmp_path), x_d, np.zeros(250))
+        backtest(runaway_predictor(), x_d, np.zeros(250))
 
 
 @pytest.mark.parametrize("offset", [0, 1])
@@ -118,7 +58,8 @@ def test_a_restored_state_shows_no_output_that_is_not_finite(offset: int) -> Non
 
 
 def test_a_plan_that_diverges_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    look_ahead = LookAhead(c_core.library_compensator({**c_core.COMPENSATOR, "t_init": 0.0}, "compensator"), 0.0)
+    values = {**c_core.COMPENSATOR, **numbered([c_core.SPRING_MASS_DAMPER]), "t_init": 0.0}
+    look_ahead = LookAhead(library_compensator(values), 0.0)
     diverging = Prediction(np.full(100, np.inf), np.zeros(100), 0)
     monkeypatch.setattr(look_ahead.predictor, "predict", lambda *_, **__: diverging)
     for _ in range(99):

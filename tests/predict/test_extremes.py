@@ -16,6 +16,7 @@ import pytest
 from c_core import CModel, RefusedError
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from library_models import library_compensator
 from places import ROOT
 
 from hybridsep.app import cli
@@ -148,11 +149,7 @@ def test_the_predictor_in_c(learning: dict[str, float], modes: dict[str, float],
 def test_the_compensator(values: dict[str, float], modes: dict[str, float], samples: Any) -> None:
     def run() -> None:
         Mode(*modes.values())
-        all_values = {**c_core.COMPENSATOR, **SMALL, **values}
-        with pytest.MonkeyPatch.context() as patch:
-            mode = dict(zip(MODE, modes.values(), strict=True))
-            patch.setitem(c_core.DESCRIPTIONS, "extreme", {"modes": [mode]})
-            compensator = c_core.library_compensator(all_values, "extreme")
+        compensator = library_compensator({**c_core.COMPENSATOR, **SMALL, **values, **modes})
         look_ahead = LookAhead(compensator, 0.0)
         names = ("x_d", "x_dm", "x_pb", "x_h", "e_servo", "rms_e", "rms_pb", "rms_h")
         check_look_ahead(look_ahead, names, samples)

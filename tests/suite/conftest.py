@@ -3,25 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
 
 import pytest
-from streams import StreamMaker, archive_of, write_resources
-
-
-@pytest.fixture(scope="session")
-def archives(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder for FMUs, each built when first asked for, and for the C core's resources."""
-    folder = tmp_path_factory.mktemp("suite")
-    write_resources(folder)
-    return folder
+from built_once import BuiltFmus
+from streams import StreamMaker
 
 
 @pytest.fixture
-def new_stream(request: pytest.FixtureRequest, archives: Path) -> Iterator[StreamMaker]:
+def new_stream(request: pytest.FixtureRequest, fmus: BuiltFmus, tmp_path: Path) -> Iterator[StreamMaker]:
     """Make streams of the ``(implementation, model)`` that a test is parametrised with."""
     implementation, model = request.param
-    maker = StreamMaker(implementation, model, partial(archive_of, model, implementation, archives), archives, [])
+    maker = StreamMaker(implementation, model, fmus, tmp_path)
     yield maker
     maker.close()

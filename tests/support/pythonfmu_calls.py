@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from fuzz_fmi2 import DISCARD, FATAL, OK, Callbacks, Library, Logger
+from fmi2_library import DISCARD, FATAL, OK, Callbacks, Library, Logger
 
 
 class Importer:

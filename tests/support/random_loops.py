@@ -6,15 +6,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from c_core import COMPENSATOR, DESCRIPTIONS, TS, CModel, library_compensator
+from c_core import COMPENSATOR, DESCRIPTIONS, TS, CModel
+from library_models import library_compensator, numbered
 from numpy.typing import NDArray
 
-from hybridsep.cosim.library import LibraryController, LibraryDrive
-from hybridsep.cosim.loop import Controller, record
-from hybridsep.cosim.run import COMPENSATOR as COMPENSATOR_KIND
 from hybridsep.machine import load_machine
 from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.plant import Plant
 from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest
+from hybridsep.predict.look_ahead import LookAhead
 
 Array = NDArray[np.float64]
 
@@ -59,11 +59,13 @@ class Loop:
         """Key of :data:`c_core.DESCRIPTIONS`."""
         return f"compensator_{self.machine}"
 
-    def drive(self) -> LibraryDrive:
-        """Return the plant and its encoder."""
+    def drive(self) -> tuple[Plant, Encoder]:
+        """Return the plant, at rest at the start, and its encoder."""
         machine = load_machine(self.machine)
         assert machine.plant is not None
-        return LibraryDrive(machine.new_plant(), Encoder(machine.plant.noise_std, self.noise_seed))
+        plant = machine.new_plant()
+        plant.reset(float(self.r[0]))
+        return plant, Encoder(machine.plant.noise_std, self.noise_seed)
 
 
 def random_loop(seed: int, n: int = 2500, machine: str | None = None, **fixed: float) -> Loop:
@@ -110,55 +112,32 @@ def random_loop(seed: int, n: int = 2500, machine: str | None = None, **fixed: f
     return Loop(machine or drawn, {**COMPENSATOR, **values, **fixed}, r + start, int(rng.integers(1000)))
 
 
-class CController:
-    """The C core's compensator in the loop.
-
-    Parameters
-    ----------
-    loop : Loop
-    perturbation : float
-        Largest relative change of its two inputs, random.
-    """
-
-    name, kind, T_s = "the C core", COMPENSATOR_KIND, TS
-
-    def __init__(self, loop: Loop, perturbation: float = 0.0) -> None:
-        self.loop = loop
-        self.Np: int = loop.values["Np"]
-        self.delay: int = loop.values["preview"]
-        self.factors = 1.0 + perturbation * np.random.default_rng(0).uniform(-1, 1, (len(loop.r), 2))
-
-    def initialise(self, start: float) -> None:
-        """Begin at rest at ``start``, m."""
-        self.model = CModel(self.loop.model, {**self.loop.values, "x_d_ahead": start, "x_meas": start}).initialise()
-
-    def outputs(self) -> tuple[tuple[float, ...], int]:
-        """Return the positions of a compensator's outputs, m, and its state."""
-        return tuple(self.model[name] for name in self.kind.outputs), int(self.model["sep_state"])
-
-    def step(self, k: int, x_d_ahead: float, x_meas: float) -> None:
-        """Take in sample ``k``, m, changed by its factors."""
-        inputs = np.array([x_d_ahead, x_meas]) * self.factors[k]
-        self.model["x_d_ahead"], self.model["x_meas"] = inputs.tolist()
-        self.model.step(k * TS, TS)
-
-
 def run_library(loop: Loop) -> tuple[Array, NDArray[np.int64]]:
     """Return ``x_dm``, m, and ``sep_state`` of every sample with the library's compensator, ``(n,)`` both."""
-    compensator = library_compensator(loop.values, loop.model, float(loop.r[0]))
-    return _run(LibraryController(compensator, None), loop)
+    plant, encoder = loop.drive()
+    start = float(loop.r[0])
+    values = {**loop.values, **numbered(DESCRIPTIONS[loop.model]["modes"])}
+    ahead = LookAhead(library_compensator(values), start)
+    x_dm, states = np.empty(len(loop.r)), np.empty(len(loop.r), dtype=np.int64)
+    for k, r in enumerate(loop.r):
+        x_meas = encoder.measure(plant.x)
+        x_dm[k], states[k] = ahead.x_dm, ahead.sep_state
+        plant.step(ahead.x_dm, TS)
+        ahead.sample(float(r), x_meas)
+    return x_dm, states
 
 
 def run_c(loop: Loop, perturbation: float = 0.0) -> tuple[Array, NDArray[np.int64]]:
     """Return the same with the C core's; ``perturbation``: largest relative change of its two inputs, random."""
-    return _run(CController(loop, perturbation), loop)
-
-
-def _run(controller: Controller, loop: Loop) -> tuple[Array, NDArray[np.int64]]:
-    """Return command and state of every sample, the fill included."""
-    drive = loop.drive()
+    plant, encoder = loop.drive()
     start = float(loop.r[0])
-    controller.initialise(start)
-    drive.initialise(start)
-    signals, state = record(controller, drive, loop.r, len(loop.r))
-    return signals["x_dm"], state
+    model = CModel(loop.model, {**loop.values, "x_d_ahead": start, "x_meas": start}).initialise()
+    factors = 1.0 + perturbation * np.random.default_rng(0).uniform(-1, 1, (len(loop.r), 2))
+    x_dm, states = np.empty(len(loop.r)), np.empty(len(loop.r), dtype=np.int64)
+    for k, r in enumerate(loop.r):
+        x_meas = encoder.measure(plant.x)
+        x_dm[k], states[k] = model["x_dm"], model["sep_state"]
+        plant.step(model["x_dm"], TS)
+        model["x_d_ahead"], model["x_meas"] = float(r * factors[k, 0]), float(x_meas * factors[k, 1])
+        model.step(k * TS, TS)
+    return x_dm, states

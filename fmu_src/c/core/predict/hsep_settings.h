@@ -1,5 +1,5 @@
-/* Settings as they are declared in hybridsep/base/settings.py, from which this file is generated. Whole numbers,
- * truth values and choices are uint64_t. */
+/* Settings as they are declared in hybridsep/base/settings.py, from which this file is generated.
+ * Whole numbers, truth values and choices are uint64_t. */
 #ifndef HSEP_SETTINGS_H
 #define HSEP_SETTINGS_H
 

@@ -1,0 +1,182 @@
+"""Plans against independent oracles; limits, continuity and fall-back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from bounded_oracle import clarabel_minimum
+from compensator_cases import DRIVE_LIMITS, MODEL, TS, beyond, compensator, move, plant
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from scipy.linalg import toeplitz
+from scipy.optimize import nnls
+from staircase_data import commanded
+
+from hybridsep.base.settings import Limits
+from hybridsep.base.signals import Array
+from hybridsep.compensate.bounded import Bounds, DriveBounds, solve
+from hybridsep.compensate.compensator import SepState, direct_samples
+from hybridsep.compensate.splines import N_DECIDED, PlanCost, SplineBasis
+from hybridsep.cosim.loop import cosimulate
+from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest
+from hybridsep.predict.predictor import HybridPredictor
+
+
+def tracking_cost(g: Array, x_d: Array, delta: Array, weight: float) -> float:
+    error = x_d - np.asarray(toeplitz(g, np.zeros(len(g)))) @ (x_d + delta)
+    return float(error @ error + weight * np.sum(np.diff(np.concatenate((np.zeros(3), delta)), 3) ** 2))
+
+
+def test_splines_approach_the_direct_samples() -> None:
+    x_d, weight, rest = move(), 1.0, np.zeros(3)
+    predictor = HybridPredictor(MODEL, start=0.0)
+    g, free = predictor.operator(200).g_pb, np.zeros(200)
+    direct = direct_samples(g, free, x_d, rest, weight)
+    least = tracking_cost(g, x_d, direct, weight)
+    excess, distance = [], []
+    for spacing in (10, 5, 2, 1):
+        basis = SplineBasis(200, spacing)
+        cost = basis.cost(g, free, x_d, np.zeros(3), rest, weight)
+        delta = basis.values[:, N_DECIDED:] @ np.linalg.solve(cost.P, cost.v)
+        excess.append(tracking_cost(g, x_d, delta, weight) / least - 1.0)
+        distance.append(float(np.max(np.abs((delta - direct)[:150])) / np.max(np.abs(direct))))
+    assert min(excess) > -1e-6  # nothing is better than every sample free
+    assert excess == sorted(excess, reverse=True)
+    assert distance == sorted(distance, reverse=True)
+    assert distance[-1] < 0.01
+
+
+def test_one_filtered_spline_and_its_shifts_are_all_of_them() -> None:
+    basis = SplineBasis(120, 5)
+    g = HybridPredictor(MODEL, start=0.0).operator(120).g_pb
+    expected = toeplitz(g, np.zeros(120)) @ basis.values[:, N_DECIDED:]
+    np.testing.assert_allclose(basis.filtered(g), expected, rtol=0, atol=1e-13)
+
+
+def test_the_splines_end_so_that_what_follows_is_the_command_itself() -> None:
+    for preview, spacing in ((200, 1), (120, 5), (64, 10)):
+        values = SplineBasis(preview, spacing).values
+        assert not values[-3:].any()
+        assert values[:, N_DECIDED:].any(axis=0).all()
+
+
+@settings(max_examples=25)
+@example(11777665, 0.734375)  # an active bound is left by 0.2 % of it: the cost is within 4e-6 all the same
+@given(st.integers(0, 2**31), st.floats(0.05, 0.95))
+def test_a_bounded_plan_satisfies_the_optimality_conditions(seed: int, tightness: float) -> None:
+    """Karush-Kuhn-Tucker: the gradient is a non-negative combination of the active bounds' normals."""
+    rng = np.random.default_rng(seed)
+    basis = SplineBasis(80, 4)
+    g = HybridPredictor(MODEL, start=0.0).operator(80).g_pb
+    x_d = move(80, 0.01 * float(rng.uniform(-1, 1)))
+    cost = basis.cost(g, 1e-5 * rng.normal(size=80), x_d, np.zeros(3), np.zeros(3), 1.0)
+    free = np.linalg.solve(cost.P, cost.v)
+    change_max = tightness * float(np.max(np.abs(basis.values[:, N_DECIDED:] @ free)))
+    rest = np.zeros(basis.values.shape[1])
+    bounds = DriveBounds(basis, TS, None, change_max).bounds(x_d, np.zeros(3), np.zeros(3), rest)
+    c = solve(cost, bounds, rest[N_DECIDED:], 0)
+    assert c is not None
+    assert bounds.allow(c)
+    values, gradient = bounds.rows @ c, cost.P @ c - cost.v
+    upper = np.flatnonzero(values > bounds.high - 3e-3)
+    lower = np.flatnonzero(values < bounds.low + 3e-3)
+    normals = np.concatenate((-bounds.rows[upper], bounds.rows[lower]))
+    _, residual = nnls(normals.T, gradient)
+    assert residual <= 1e-3 * np.linalg.norm(cost.v)
+
+
+@pytest.mark.parametrize(("limits", "n_bounded"), [(PAPER_LIMITS, 30), (DRIVE_LIMITS, 3)], ids=["tight", "usual"])
+def test_a_bounded_plan_costs_what_another_solver_finds(
+    monkeypatch: pytest.MonkeyPatch, limits: Limits, n_bounded: int
+) -> None:
+    bounded = []
+
+    def compare(cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int) -> Array | None:
+        c = solve(cost, bounds, rest, n_pinned)
+        assert c is not None
+        assert np.max(np.maximum(bounds.rows @ c - bounds.high, bounds.low - bounds.rows @ c)) <= 1e-12
+        free = np.asarray(np.linalg.solve(cost.P, cost.v), dtype=np.float64)
+        if bounds.allow(free):
+            np.testing.assert_allclose(c, free, rtol=0, atol=1e-9)
+            return c
+        np.testing.assert_allclose(c[:n_pinned], rest[:n_pinned], rtol=0, atol=1e-15)
+        P, rows = cost.P[n_pinned:, n_pinned:], bounds.rows[:, n_pinned:]
+        v = cost.v[n_pinned:] - cost.P[n_pinned:, :n_pinned] @ rest[:n_pinned]
+        taken = bounds.rows[:, :n_pinned] @ rest[:n_pinned]
+        found = clarabel_minimum(P, v, rows, bounds.low - taken, bounds.high - taken)
+
+        def value(x: Array) -> float:
+            return float(0.5 * x @ P @ x - v @ x)
+
+        bounded.append((value(c[n_pinned:]) - value(found)) / float(cost.v @ free))
+        return c
+
+    monkeypatch.setattr("hybridsep.compensate.compensator.solve", compare)
+    cosimulate(compensator(limits=limits), plant(), commanded()[:4000], encoder=Encoder(5e-6, 0))
+    assert len(bounded) >= n_bounded
+    assert np.max(np.abs(bounded)) <= 1e-5
+
+
+@settings(max_examples=12)
+@given(st.integers(0, 2**31), st.sampled_from([1e-6, 1e-4, 1e-2]), st.sampled_from([PAPER_LIMITS, DRIVE_LIMITS]))
+def test_limits_hold_whatever_is_measured(seed: int, spread: float, limits: Limits) -> None:
+    rng = np.random.default_rng(seed)
+    stops = np.cumsum(np.concatenate(([0.0], rng.uniform(-0.01, 0.01, 4))))
+    r = rest_to_rest(stops, PAPER_LIMITS, TS, dwell=0.05)
+    sep = compensator(limits=limits, Np=50, p=10, q=3, t_init=0.0)
+    ahead = np.concatenate((r, np.full(300, r[-1])))
+    commands, changes = [], []
+    for k in range(0, len(r), 50):
+        plan = sep.plan(ahead[k : k + 200])
+        commands.append(plan.x_dm)
+        changes.append(plan.x_dm - ahead[k : k + 50])
+        sep.update(plan.x_pb + spread * rng.normal(size=50))
+    x_dm = np.concatenate((np.full(3, r[0]), *commands))  # from rest
+    assert np.isfinite(x_dm).all()
+    # ruckig's own moves reach their limits exactly: rounding is all that may be added.
+    assert beyond(x_dm, limits) <= 1.0 + 1e-6
+    assert np.max(np.abs(np.concatenate(changes))) <= 1e-3
+
+
+def test_what_is_left_of_a_plan_is_followed_when_there_is_no_other() -> None:
+    sep = compensator()
+    ahead = np.concatenate((commanded()[950:], np.zeros(200)))
+    plans = []
+    for k in range(0, 500, 100):
+        sep.compensate = SepState.PHYSICS if k < 200 else SepState.OFF
+        plans.append(sep.plan(ahead[k : k + 200]))
+        sep.update(plans[-1].x_pb)
+    states = [plan.state for plan in plans]
+    assert states == [SepState.PHYSICS] * 2 + [SepState.OFF] * 3
+    x_dm = np.concatenate([plan.x_dm for plan in plans])
+    changes = x_dm - ahead[:500]
+    assert np.max(np.abs(changes[200:296])) > 1e-6
+    assert not changes[297:].any()  # back on the command
+    assert beyond(x_dm, DRIVE_LIMITS) <= 1.0
+
+
+def test_the_command_is_continuous_where_the_model_changes() -> None:
+    sep = compensator(limits=None)
+    loop = cosimulate(sep, plant(), commanded()[:1500], encoder=Encoder(5e-6, 1))
+    switch = int(np.flatnonzero(np.diff(loop.state) != 0)[0]) + 1
+    third = np.abs(np.diff(loop.x_dm, 3))
+    assert np.max(third[switch - 4 : switch + 4]) < np.max(third)
+
+
+def test_a_refused_solve_falls_back_to_physics_then_to_the_rest(monkeypatch: pytest.MonkeyPatch) -> None:
+    sep = compensator(Np=50, p=10, t_init=0.0)
+    ahead = np.zeros(2000)
+    rng = np.random.default_rng(0)
+    for _ in range(3):
+        state = sep.plan(ahead[:200]).state
+        sep.update(1e-5 + 1e-6 * rng.normal(size=50))
+    assert state is SepState.HYBRID
+    answers: list[Callable[..., Any]] = [lambda *_: None, solve]
+    monkeypatch.setattr("hybridsep.compensate.compensator.solve", lambda *a: answers.pop(0)(*a))
+    assert sep.plan(ahead[:200]).state is SepState.PHYSICS
+    monkeypatch.setattr("hybridsep.compensate.compensator.solve", lambda *_: None)
+    assert sep.plan(ahead[:200]).state is SepState.OFF

@@ -1,0 +1,91 @@
+"""The native FMUs' sources: random calls under sanitizers, and each file compiled alone."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import fuzz_fmi2
+import pytest
+from c_core import (
+    FMI_HEADERS,
+    address_sanitizer,
+    needs_sanitisers,
+    run_compiler,
+    sanitising_compiler,
+)
+
+from hybridsep.fmi.native_backend import sources
+from hybridsep.machine import load_machine
+
+FUZZED = {
+    "HybridPredictor": 16,
+    "SepCompensator": 12,
+    "FeedDrive": 6,
+    "FeedDrive_als25010_x": 6,
+    "ReferenceTrajectory": 6,
+}
+
+
+"""How many seconds each model is called at random."""
+
+
+SANITIZERS = ("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
+
+
+@needs_sanitisers
+def test_random_calls_under_sanitizers(folders: Callable[[str], Path], tmp_path: Path) -> None:
+    """All models at the same time, so that it takes no longer than one."""
+    compiler = sanitising_compiler()
+    environment = {
+        **os.environ,
+        "LD_PRELOAD": address_sanitizer(compiler),
+        "ASAN_OPTIONS": "detect_leaks=0:allocator_may_return_null=1",  # Python's own leaks; ours are counted
+        "UBSAN_OPTIONS": "print_stacktrace=1",
+    }
+    fuzzer = fuzz_fmi2.__file__
+
+    def findings(name: str) -> str:
+        folder = folders(name) / "sources"
+        library = tmp_path / f"{name}.so"
+        files: list[str | Path] = [f"-I{folder}", f"-I{FMI_HEADERS}", folder / "all.c", "-lm", "-o", library]
+        run_compiler(["-O1", "-g", *SANITIZERS, "-fPIC", "-shared", *files], command=compiler)
+        command = [sys.executable, fuzzer, str(library), str(folders(name) / "modelDescription.xml")]
+        command += [(folders(name) / "resources").as_uri(), "--seconds", str(FUZZED[name]), "--seed", "1"]
+        result = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+        held = result.returncode == 0 and "no finding" in result.stdout
+        return "" if held else f"{name}: {result.stdout}{result.stderr}"
+
+    with ThreadPoolExecutor(len(FUZZED)) as pool:
+        assert not "".join(pool.map(findings, FUZZED))
+
+
+GCC = pytest.param(["gcc"], marks=pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc"), id="gcc")
+
+
+CLANG = pytest.param([sys.executable, "-m", "ziglang", "cc"], id="clang")
+
+
+@pytest.mark.parametrize("compiler", [GCC, CLANG])
+@pytest.mark.parametrize("model", ["HybridPredictor", "SepCompensator", "FeedDrive"])
+def test_each_source_compiles_alone_without_warnings(tmp_path: Path, compiler: list[str], model: str) -> None:
+    parameters: dict[str, object] = dict.fromkeys(("f", "kappa", "noise_std", "seed"), 0) | {"T_s": 1e-3}
+    mode = {"f_n": 25.0, "zeta": 0.05, "alpha": 1.0, "beta": 0.0}
+    description = {"model": "FeedDrive", "name": "Stage", "parameters": parameters, "modes": [mode]}
+    if model != "FeedDrive":
+        machine = load_machine("spring_mass_damper")
+        fmi = machine.fmi_parameters() if model == "HybridPredictor" else machine.fmi_compensator_parameters()
+        description = {"model": model, "name": model, "parameters": fmi, "modes": [mode]}
+    for file, content in sources(description, "{}").items():
+        (tmp_path / file).write_bytes(content)
+
+    def compile_alone(path: Path) -> None:
+        run_compiler(["-O2", f"-I{FMI_HEADERS}", "-c", path, "-o", path.with_suffix(".o")], command=compiler)
+
+    with ThreadPoolExecutor() as pool:
+        list(pool.map(compile_alone, sorted(tmp_path.glob("*.c"))))

@@ -1,0 +1,174 @@
+"""Native and pythonfmu FMUs in co-simulation, in every pairing, against the library in the same wiring."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from built_once import NATIVE, PYTHON, BuiltFmus
+from library_models import library_look_ahead
+from library_stream import start_values
+
+from hybridsep.base.errors import FmuError, SignalError
+from hybridsep.base.signals import Array
+from hybridsep.cosim.importer import FmuInstance
+from hybridsep.cosim.loop import cosimulate
+from hybridsep.cosim.run import Run
+from hybridsep.fmi.archive import build_fmu, fmu_names
+from hybridsep.fmi.backends import BACKENDS
+from hybridsep.machine import Machine, load_machine
+from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.trajectory import spiral, staircase
+
+TOLERANCE = 1e-11  # m
+
+
+def reference(machine: Machine, r: Array) -> dict[str, Array]:
+    """Return what the library alone computes in the same wiring, without the first fill."""
+    assert machine.plant is not None
+    plant, encoder = machine.new_plant(), Encoder(machine.plant.noise_std, machine.plant.seed)
+    model = next(iter(fmu_names(machine)))
+    look_ahead = library_look_ahead({**start_values(model), "x_d_ahead": float(r[0])})
+    plant.reset(float(r[0]))
+    x_meas = encoder.measure(plant.x)
+    rows = []
+    for k in range(len(r) + look_ahead.Np):
+        rows.append((look_ahead.x_d, look_ahead.x_pb, look_ahead.x_h, plant.x, x_meas))
+        x_d = look_ahead.x_d
+        look_ahead.sample(float(r[min(k, len(r) - 1)]), x_meas)
+        plant.step(x_d, machine.T_s)
+        x_meas = encoder.measure(plant.x)
+    return dict(zip(("x_d", "x_pb", "x_h", "x", "x_meas"), np.array(rows)[look_ahead.Np :].T, strict=True))
+
+
+def assert_equal(run: Run, expected: dict[str, Array]) -> None:
+    for name, samples in expected.items():
+        np.testing.assert_allclose(getattr(run, name), samples, rtol=0, atol=TOLERANCE, err_msg=name)
+
+
+@pytest.mark.parametrize("plant", BACKENDS)
+@pytest.mark.parametrize("predictor", BACKENDS)
+def test_every_pairing_agrees_with_the_library_on_the_staircase(fmus: BuiltFmus, predictor: str, plant: str) -> None:
+    machine = load_machine("spring_mass_damper")
+    suffix = {"native": "", "python": "Py"}
+    run = cosimulate(fmus(f"HybridPredictor{suffix[predictor]}"), fmus(f"FeedDrive{suffix[plant]}"), staircase())
+    assert_equal(run, reference(machine, staircase()))
+    assert run.summary()["reduction_percent"] > 50
+
+
+@pytest.mark.parametrize("plant", BACKENDS)
+@pytest.mark.parametrize("predictor", BACKENDS)
+@pytest.mark.parametrize("axis", [0, 1])
+def test_every_pairing_agrees_with_the_library_on_the_spiral(
+    fmus: BuiltFmus, predictor: str, plant: str, axis: int
+) -> None:
+    machine = load_machine(f"als25010_{'xy'[axis]}")
+    names = [
+        next(n for n, m in fmu_names(machine, b).items() if m == model)
+        for b, model in ((predictor, "HybridPredictor"), (plant, "FeedDrive"))
+    ]
+    command = spiral()[axis]
+    assert_equal(cosimulate(fmus(names[0]), fmus(names[1]), command), reference(machine, command))
+
+
+PAPER = {"Np": 100, "p": 50, "q": 3, "lambda": 1e-12, "t_init": 0.3}
+
+TIGHT = {"v_max": 0.08, "a_max": 8.0, "j_max": 1000.0}
+
+"""Limits of the trajectory itself: most plans are bounded by them."""
+
+
+@pytest.mark.parametrize(
+    ("machine", "values"),
+    [("", {}), ("", PAPER), ("", TIGHT), ("_als25010_x", {}), ("_als25010_x", TIGHT), ("_als25010_y", {})],
+    ids=["staircase", "staircase, paper", "staircase, tight", "spiral X", "spiral X, tight", "spiral Y"],
+)
+def test_both_flavours_of_the_compensator_command_the_same(
+    fmus: BuiltFmus, machine: str, values: dict[str, float]
+) -> None:
+    command = {"": staircase(), "_als25010_x": spiral()[0], "_als25010_y": spiral()[1]}[machine][:4000]
+    native, python = (
+        cosimulate(
+            fmus(f"SepCompensator{suffix}{machine}"), fmus(f"FeedDrive{machine}"), command, controller_values=values
+        )
+        for suffix in ("", "Py")
+    )
+    np.testing.assert_allclose(native.x_dm, python.x_dm, rtol=0, atol=1e-9)
+    np.testing.assert_array_equal(native.state, python.state)
+    assert set(native.state) == {1, 2}
+    assert np.max(np.abs(native.change)) > 1e-5
+
+
+def test_another_start_and_start_time(fmus: BuiltFmus) -> None:
+    command = 0.1 + staircase()[:2001]
+    run = cosimulate(fmus("HybridPredictor"), fmus("FeedDrive"), command, start_time=1234.5)
+    assert_equal(run, reference(load_machine("spring_mass_damper"), command))
+    assert run.t[0] == pytest.approx(1234.6)
+
+
+def test_the_whole_system_without_a_script(fmus: BuiltFmus) -> None:
+    """ReferenceTrajectory → HybridPredictor → FeedDrive give what the same system gives with commands from outside."""
+    expected = reference(load_machine("spring_mass_damper"), staircase())
+    rows = []
+    with (
+        FmuInstance(fmus("ReferenceTrajectory")) as source,
+        FmuInstance(fmus("HybridPredictor")) as predictor,
+        FmuInstance(fmus("FeedDrive")) as plant,
+    ):
+        for instance in (source, predictor, plant):
+            instance.initialise()
+        for k in range(2000):
+            x_d, x_h, x_meas = predictor.get("x_d"), predictor.get("x_h"), plant.get("x_meas")
+            rows.append((x_d, x_h, x_meas))
+            predictor.set("x_d_ahead", source.get("r"))
+            predictor.set("x_meas", x_meas)
+            plant.set("x_d", x_d)
+            for instance in (source, predictor, plant):
+                instance.step(k * 1e-3, 1e-3)
+    for samples, name in zip(np.array(rows)[100:].T, ("x_d", "x_h", "x_meas"), strict=True):
+        np.testing.assert_allclose(samples, expected[name][:1900], rtol=0, atol=TOLERANCE, err_msg=name)
+
+
+@pytest.mark.parametrize("n", [0, 1, 2])
+def test_the_trajectories(fmus: BuiltFmus, n: int) -> None:
+    command = (staircase(), *spiral())[n]
+    assert_played(fmus("ReferenceTrajectory"), n, command)
+
+
+def test_given_samples_are_trajectory_3(tmp_path: Path) -> None:
+    machine = load_machine("spring_mass_damper")
+    samples = 0.2 + np.cumsum(np.random.default_rng(1).normal(0, 1e-4, 40))
+    path = build_fmu(machine, "ReferenceTrajectory", tmp_path, targets=("host",), samples=samples)
+    assert_played(path, 3, samples)
+    with pytest.raises(SignalError, match="samples"):
+        build_fmu(machine, "ReferenceTrajectory", tmp_path, targets=("host",), samples=[0.0, np.nan])
+
+
+def assert_played(path: Path, n: int, command: Array) -> None:
+    with FmuInstance(path) as source:
+        source.initialise({"trajectory": n}, start_time=3.0)
+        played = [source.get("r")]
+        for k in range(len(command) + 5):
+            source.step(3.0 + k * 1e-3, 1e-3)
+            played.append(source.get("r"))
+    np.testing.assert_array_equal(played[: len(command)], command)
+    assert set(played[len(command) :]) == {command[-1]}
+
+
+def test_a_trajectory_that_is_not_there_is_named(fmus: BuiltFmus) -> None:
+    with FmuInstance(fmus("ReferenceTrajectory")) as source, pytest.raises(FmuError, match="trajectory"):
+        source.initialise({"trajectory": 3})
+
+
+@pytest.mark.parametrize("name", [*NATIVE, *PYTHON])
+def test_a_run_with_the_importers_defaults_reaches_the_end(fmus: BuiltFmus, name: str) -> None:
+    stop = float(fmpy.read_model_description(str(fmus(name))).defaultExperiment.stopTime)
+    end = {"emps": 10.0}.get(name.rpartition("_")[2], 6.0 + (0.2 if "Sep" in name else 0.1))
+    assert stop == pytest.approx(end, abs=0.011)
+    for interval in (None, stop / 500):
+        result = fmpy.simulate_fmu(str(fmus(name)), output_interval=interval)
+        assert result["time"][-1] == pytest.approx(stop, abs=1e-9)
+        assert len(result) >= 500
+        assert all(np.isfinite(result[column].astype(float)).all() for column in result.dtype.names)

@@ -1,0 +1,177 @@
+"""The implementations against the library, output by output and sample by sample, in closed loops of the library.
+
+1e-11 m for a predictor and for a compensator with its usual limits, 1e-9 m for all other parameters of a compensator,
+whose loop amplifies what is rounded apart; a pythonfmu FMU is the library itself and agrees to the last bit.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from driving import T_S, TIGHT, Loop, Sensor, closed_loop, replay
+from library_stream import PlantStream
+from staircase_data import commanded
+from stream import (
+    COMPENSATOR,
+    OUTPUTS,
+    PLANTS,
+    PREDICTOR,
+    PYTHON,
+    STAGE_COMPENSATOR,
+    STAGE_PREDICTOR,
+    TRAJECTORY,
+    Value,
+    kind_of,
+)
+from streams import StreamMaker, on_all
+
+from hybridsep.plants.trajectory import staircase
+
+PAPER: dict[str, Any] = {"Np": 100, "p": 50, "q": 3, "lambda": 1e-12, "t_init": 0.3}
+
+
+def assert_agreement(new_stream: StreamMaker, n: int, values: dict[str, Value], tolerance: float, **how: Any) -> Loop:
+    """Replay a closed loop of the library, whose outputs must be the same, and return it."""
+    loop, stream = closed_loop(new_stream.model, n, values, **how), new_stream()
+    stream.initialise(loop.values, start=12.5)
+    shown = replay(stream, loop, start_time=12.5)
+    if new_stream.implementation == PYTHON:
+        tolerance = 0.0
+    for name, output, expected in zip(OUTPUTS[kind_of(new_stream.model)], shown.T, loop.outputs.T, strict=True):
+        whole = name in ("batch", "hybrid_active", "sep_state")
+        np.testing.assert_allclose(output, expected, rtol=0, atol=0 if whole else tolerance, err_msg=name)
+    return loop
+
+
+def named(values: object) -> str:
+    return ",".join(f"{key}={value:g}" for key, value in values.items()) if isinstance(values, dict) else str(values)
+
+
+@on_all((PREDICTOR,), needs="agreement")
+@pytest.mark.parametrize("start", [0.0, 0.1])
+@pytest.mark.parametrize(("p", "q"), [(50, 3), (100, 99)])
+def test_the_staircase_is_predicted_as_by_the_library(new_stream: StreamMaker, p: int, q: int, start: float) -> None:
+    loop = assert_agreement(new_stream, 6001, {"p": p, "q": q}, 1e-11, start=start)
+    assert 5e-6 < loop.column(PREDICTOR, "rms_h")[-1] < 1.5e-5
+
+
+@on_all((STAGE_PREDICTOR,), needs="agreement")
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"Np": 7, "p": 7, "q": 6},
+        {"Np": 1, "p": 1, "q": 0},
+        {"Np": 30, "p": 2, "q": 1, "t_init": 0.0},
+        {"p": 10, "q": 2, "t_init": 0.2505, "lambda": 1e-9},
+        {"p": 10, "input_hold": 1, "dead_time": 3},
+        {"p": 10, "dead_time": 150, "t_init": 1e6},
+        {"T_s": 2e-3, "p": 20},
+        {"mode[1].zeta": 0.3, "mode[2].f_n": 70.0},
+    ],
+    ids=named,
+)
+def test_every_parameter_predicts_as_in_the_library(new_stream: StreamMaker, values: dict[str, Value]) -> None:
+    assert_agreement(new_stream, 1500, values, 1e-11)
+
+
+@on_all((COMPENSATOR,), needs="agreement")
+@pytest.mark.parametrize("start", [0.0, 0.1])
+def test_the_staircase_is_compensated_as_by_the_library(new_stream: StreamMaker, start: float) -> None:
+    # The paper's features; the limits act in some windows.
+    loop = assert_agreement(new_stream, 4000, PAPER, 1e-11, start=start)
+    assert set(loop.column(COMPENSATOR, "sep_state")) == {1.0, 2.0}
+    assert 4e-6 < loop.column(COMPENSATOR, "rms_e")[-1] < 1.5e-5
+
+
+@on_all((COMPENSATOR,), needs="agreement")
+@pytest.mark.parametrize(
+    "values",
+    [
+        {},
+        TIGHT,
+        {"Np": 50, "p": 50, "q": 40, "lambda": 1e-8, "t_init": 0.1},
+        PAPER | TIGHT,  # nearly every plan is bounded
+        PAPER | TIGHT | {"Np": 50, "p": 20, "t_init": 0.1},
+        PAPER | {"change_max": 2e-4, "t_init": 0.1},
+        PAPER | {"v_friction": 0.0},
+        PAPER | {"no_reversal": 0, "t_init": 0.1},
+        PAPER | {"compensate": 0},
+        PAPER | {"compensate": 1, "spacing": 5},
+        PAPER | {"spacing": 1, "preview": 130, "p": 7, "q": 0},
+        PAPER | {"spacing": 20, "preview": 207, "p": 7, "q": 99},
+        {"Np": 12, "p": 7, "q": 5, "lambda": 1e-12, "spacing": 3, "preview": 77, "t_init": 0.05, "v_friction": 0.0},
+        {"Np": 20, "p": 10, "q": 5, "lambda": 1e-12, "t_init": 0.3, "preview": 160, "v_friction": 5e-3},
+        {"Np": 8, "p": 5, "q": 2, "preview": 160, "t_init": 0.3},
+        {"Np": 1, "p": 1, "q": 0, "lambda": 1e-12, "spacing": 1, "preview": 60, "t_init": 0.05, "v_friction": 0.0},
+        PAPER | {"input_hold": 1, "dead_time": 3, "p": 10},
+        PAPER | {"jerk_weight": 0.0, "t_init": 0.0, "p": 10},
+        PAPER | {"jerk_weight": 300.0, "lambda": 1e-6},
+    ],
+    ids=named,
+)
+def test_every_parameter_compensates_as_in_the_library(new_stream: StreamMaker, values: dict[str, Value]) -> None:
+    assert_agreement(new_stream, 500 if values.get("Np") == 1 else 1600, values, 1e-9)
+
+
+@on_all((STAGE_COMPENSATOR,), needs="agreement")
+@pytest.mark.parametrize("values", [{"q": 20}, TIGHT, {"compensate": 1, "change_max": 3e-4, "spacing": 5}], ids=named)
+def test_the_stage_is_compensated_as_by_the_library(new_stream: StreamMaker, values: dict[str, Value]) -> None:
+    assert_agreement(new_stream, 1600, values, 1e-9)
+
+
+def held_from(first: int) -> Sensor:
+    return lambda k, x_meas, last: last if first <= k < first + 500 else x_meas
+
+
+HELD = {first: held_from(first) for first in (800, 1050, 1200)}
+
+
+@on_all((COMPENSATOR,), needs="agreement")
+@pytest.mark.parametrize("first", HELD)
+def test_a_held_sensor_is_not_learned_either(new_stream: StreamMaker, first: int) -> None:
+    loop = assert_agreement(new_stream, 2500, PAPER | {"t_init": 0.1}, 1e-10, sensor=HELD[first])
+    assert set(loop.column(COMPENSATOR, "sep_state")) == {1.0, 2.0}
+
+
+def growing(k: int, x_meas: float, last: float) -> float:
+    return x_meas + (1e-6 * 1.1 ** (k - 250) if 250 <= k < 300 else 0.0)
+
+
+@on_all((COMPENSATOR,), needs="agreement")
+def test_an_unstable_recursion_never_plans(new_stream: StreamMaker) -> None:
+    values = PAPER | {"Np": 50, "p": 2, "q": 0, "t_init": 0.0}
+    loop = assert_agreement(new_stream, 700, values, 1e-9, size=0.0, sensor=growing)
+    assert (loop.column(COMPENSATOR, "sep_state")[300:350] == 1.0).all()
+
+
+@on_all(PLANTS, needs="agreement")
+@pytest.mark.parametrize("h", [1e-3, 0.25e-3, 2.5e-3, 0.7e-4])
+def test_plants_move_as_the_librarys_do(new_stream: StreamMaker, h: float) -> None:
+    # 1e-12 m in position and measurement, 1e-10 m/s in velocity.
+    library, stream = PlantStream(new_stream.model), new_stream()
+    for each in (stream, library):
+        each.initialise({"x_d": 0.1, "seed": 12345})
+    rows: list[list[list[float]]] = [[], []]
+    for k, command in enumerate((commanded()[:1200] + 0.1).tolist()):
+        for each, outputs in zip((stream, library), rows, strict=True):
+            outputs.append(each.outputs())
+            each.set("x_d", command)
+            each.step(k * h, h)
+    x, v, x_meas = (np.array(rows[0]) - np.array(rows[1])).T
+    for difference, tolerance in ((x, 1e-12), (v, 1e-10), (x_meas, 1e-12)):
+        assert np.max(np.abs(difference)) <= tolerance
+    assert len({row[2] - row[0] for row in rows[0]}) == 1200  # a new draw each communication step
+
+
+@on_all((TRAJECTORY,))
+@pytest.mark.parametrize("parts", [1, 2])
+def test_a_trajectory_is_played_and_held_at_its_end(new_stream: StreamMaker, parts: int) -> None:
+    stream, expected = new_stream(), staircase()
+    stream.initialise({}, start=3.0)
+    assert stream.outputs() == [expected[0]]
+    for k in range(len(expected) + 5):
+        for part in range(parts):
+            assert stream.outputs() == [expected[min(k, len(expected) - 1)]]
+            stream.step(3.0 + (k + part / parts) * T_S, T_S / parts)

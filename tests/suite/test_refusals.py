@@ -1,0 +1,229 @@
+"""What every implementation refuses, in the same words, and that a refused call changes nothing."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import pytest
+from driving import T_S, initialise, set_inputs, steps
+from stream import (
+    CANNOT,
+    COMPENSATOR,
+    DRIVE,
+    LOOK_AHEADS,
+    PLANTS,
+    PREDICTOR,
+    STAGE,
+    STAGE_PREDICTOR,
+    TRAJECTORY,
+    RefusedStreamError,
+    Stream,
+    Value,
+    kind_of,
+)
+from streams import StreamMaker, on_all
+
+PREDICTION: list[tuple[dict[str, Value], str]] = [
+    ({"Np": 0}, "Np must be 1 … 100000, got 0"),
+    ({"Np": 100_001}, "Np must be 1 … 100000, got 100001"),
+    ({"p": 0, "lambda": 0.0}, "p must be 1 … 5000, got 0; lambda must be 1e-40 … 1e+12 m2, got 0.0"),
+    ({"lambda": -1.0, "T_s": 0.0}, "lambda must be 1e-40 … 1e+12 m2, got -1.0; T_s must be 1e-05 … 1 s, got 0.0"),
+    (
+        {"lambda": -1e-12, "T_s": 0.0, "t_init": -0.25},
+        "lambda must be 1e-40 … 1e+12 m2, got -1e-12; T_s must be 1e-05 … 1 s, got 0.0; "
+        "t_init must be 0 … 1000000 s, got -0.25",
+    ),
+    ({"lambda": 1e-300}, "lambda must be 1e-40 … 1e+12 m2, got 1e-300"),
+    ({"lambda": -1e16}, "lambda must be 1e-40 … 1e+12 m2, got -1e+16"),
+    ({"lambda": math.inf}, "lambda must be finite, got inf"),
+    ({"T_s": -123456.789}, "T_s must be 1e-05 … 1 s, got -123456.789"),
+    ({"t_init": -1e22}, "t_init must be 0 … 1000000 s, got -1e+22"),
+    ({"T_s": 1e-300, "t_init": 1e300}, "T_s must be 1e-05 … 1 s, got 1e-300; t_init must be 0 … 1000000 s, got 1e+300"),
+    ({"lambda": math.nan}, "lambda must be finite, got nan"),
+    ({"lambda": -5e-324}, "lambda must be 1e-40 … 1e+12 m2, got -5e-324"),
+    ({"T_s": 1e-300}, "T_s must be 1e-05 … 1 s, got 1e-300"),
+    ({"T_s": -math.inf}, "T_s must be finite, got -inf"),
+    ({"t_init": -0.1}, "t_init must be 0 … 1000000 s, got -0.1"),
+    ({"input_hold": 2}, "input_hold must be 0 … 1, got 2"),
+    ({"dead_time": -1}, "dead_time must be 0 … 100000, got -1"),
+    ({"mode[1].zeta": 0.0}, "mode[1].zeta must be 1e-06 … 10000, got 0.0"),
+    ({"mode[1].f_n": 1e308}, "mode[1].f_n must be 0.001 … 100000 Hz, got 1e+308"),
+    ({"mode[1].alpha": math.inf}, "mode[1].alpha must be finite, got inf"),
+    *(
+        ({"x_d_ahead": value}, f"the start value of x_d_ahead must be finite, got {value}")
+        for value in (math.inf, -math.inf, math.nan)
+    ),
+    ({"x_d_ahead": -1e6}, "the start value of x_d_ahead must be within ±1000 m, got -1e+06"),
+]
+PLANNING: list[tuple[dict[str, Value], str]] = [
+    ({"preview": 7}, "preview must be 8 … 2000, got 7"),
+    ({"preview": 2001}, "preview must be 8 … 2000, got 2001"),
+    ({"preview": 60}, "preview must be ≥ Np + 4·spacing + 3 = 61, got 60"),
+    ({"spacing": 0}, "spacing must be 1 … 1000, got 0"),
+    ({"spacing": 3}, "spacing must be ≥ 1 and divide Np = 50, got 3"),
+    ({"jerk_weight": -1.0}, "jerk_weight must be 0 … 1e+12, got -1.0"),
+    ({"jerk_weight": math.nan}, "jerk_weight must be finite, got nan"),
+    ({"jerk_weight": 1e300}, "jerk_weight must be 0 … 1e+12, got 1e+300"),
+    ({"v_max": 0.0}, "v_max must be 1e-09 … 10000 m/s, got 0.0"),
+    ({"a_max": -16.0}, "a_max must be 1e-06 … 1000000 m/s2, got -16.0"),
+    ({"a_max": 1e308}, "a_max must be 1e-06 … 1000000 m/s2, got 1e+308"),
+    ({"j_max": math.inf}, "j_max must be finite, got inf"),
+    ({"change_max": 0.0}, "change_max must be 1e-12 … 10 m, got 0.0"),
+    ({"v_friction": -1e-3}, "v_friction must be 0 or 1e-09 … 10000 m/s, got -0.001"),
+    ({"v_friction": 5e-324}, "v_friction must be 0 or 1e-09 … 10000 m/s, got 5e-324"),
+    ({"v_friction": math.nan}, "v_friction must be finite, got nan"),
+    ({"no_reversal": 2}, "no_reversal must be 0 … 1, got 2"),
+    ({"compensate": 3}, "compensate must be 0 … 2, got 3"),
+    ({"compensate": -1}, "compensate must be 0 … 2, got -1"),
+    (
+        {"p": 60, "q": 50},
+        "p must be 1 … Np = 50, got 60; lower p or raise Np; q must be 0 … Np − 1 = 49, got 50; lower q or raise Np",
+    ),
+]
+OF_ONE_MODEL: dict[str, list[tuple[dict[str, Value], str]]] = {
+    PREDICTOR: [
+        ({"p": 120}, "p must be 1 … Np = 100, got 120; lower p or raise Np"),
+        ({"q": 100}, "q must be 0 … Np − 1 = 99, got 100; lower q or raise Np"),
+    ],
+    STAGE_PREDICTOR: [({"mode[2].zeta": 0.0}, "mode[2].zeta must be 1e-06 … 10000, got 0.0")],
+    COMPENSATOR: PLANNING,
+    DRIVE: [
+        ({"m": 0.0}, "m must be 1e-06 … 1000000 kg, got 0.0"),
+        ({"k": -24674.0}, "k must be 1e-06 … 1e+15 N/m, got -24674.0"),
+        ({"k": 1e308}, "k must be 1e-06 … 1e+15 N/m, got 1e+308"),
+        ({"c_nl": -1.0}, "c_nl must be 0 … 1e+12 N.s2/m2, got -1.0"),
+        ({"k_nl": -1.0}, "k_nl must be 0 … 1e+15 N/m2, got -1.0"),
+        ({"noise_std": math.nan}, "noise_std must be finite, got nan"),
+        ({"noise_std": 1e300}, "noise_std must be 0 … 1 m, got 1e+300"),
+        ({"seed": -1}, "seed must be 0 … 2147483647, got -1"),
+        ({"k": 1e12}, "sqrt(k/m) and c/m must be at most 100000 1/s, got 1e+06; lower k or c, or raise m"),
+        ({"c": 1e6}, "sqrt(k/m) and c/m must be at most 100000 1/s, got 1e+06; lower k or c, or raise m"),
+    ],
+    TRAJECTORY: [
+        ({"trajectory": 4}, "trajectory must be 0 … 3, got 4"),
+        ({"T_s": 1e-6}, "T_s must be 1e-05 … 1 s, got 1e-06"),
+    ],
+    STAGE: [
+        ({"f": -1.0}, "f must be 0 … 1 m, got -1.0"),
+        ({"kappa": -1.0}, "kappa must be 0 … 1000000 1/m, got -1.0"),
+        ({"kappa": 1e300}, "kappa must be 0 … 1000000 1/m, got 1e+300"),
+        ({"T_s": 0.0}, "T_s must be 1e-05 … 1 s, got 0.0"),
+        ({"mode[2].zeta": -0.1}, "mode[2].zeta must be 1e-06 … 10000, got -0.1"),
+        (
+            {"mode[1].f_n": 2e4},
+            "2 pi f_n and 4 pi f_n zeta of mode[1] must be at most 100000 1/s in a plant, got 125664; "
+            "lower f_n or zeta",
+        ),
+    ],
+}
+
+
+@on_all((*LOOK_AHEADS, STAGE_PREDICTOR, *PLANTS, TRAJECTORY))
+def test_bad_parameters_are_named_and_others_live_on(new_stream: StreamMaker) -> None:
+    good, bad, fresh = new_stream(), new_stream(), new_stream()
+    good.initialise({})
+    expected = steps(good, 0, 3)
+    of_all = PREDICTION if kind_of(new_stream.model) in LOOK_AHEADS else []
+    for values, message in (*of_all, *OF_ONE_MODEL[new_stream.model]):
+        for _ in range(2):  # a second failure ends nothing either
+            with pytest.raises(RefusedStreamError, match=rf"(^|: ){re.escape(message)}$"):
+                bad.initialise(values)
+            bad.reset()
+    for each in (bad, fresh):
+        each.initialise({})
+        assert steps(each, 0, 3) == expected
+    assert len(steps(good, 3, 6)) == 3
+
+
+def assert_refused(stream: Stream, t: float, h: float, message: str) -> None:
+    """Step; the stream must refuse with the message, and be as it was."""
+    before, outputs = stream.save(), stream.outputs()
+    with pytest.raises(RefusedStreamError, match=re.escape(message)):
+        stream.step(t, h)
+    assert stream.save() == before
+    assert stream.outputs() == outputs
+
+
+@on_all((*LOOK_AHEADS, TRAJECTORY, *PLANTS))
+@pytest.mark.parametrize("h", [0.0, -T_S, -1e-320, math.nan, math.inf, 100.5])
+def test_a_step_size_that_cannot_be_changes_nothing(new_stream: StreamMaker, h: float) -> None:
+    stream = new_stream()
+    initialise(stream)
+    steps(stream, 0, 50)
+    assert_refused(stream, 0.05, h, f"the communication step size must be > 0 and ≤ 100 s, got {h}")
+    stream.step(0.05, T_S)
+
+
+@on_all((*LOOK_AHEADS, TRAJECTORY))
+@pytest.mark.parametrize("t", [0.0, 0.0506, 0.0494, 1e9, math.nan, math.inf, -math.inf])
+def test_a_step_from_another_time_changes_nothing(new_stream: StreamMaker, t: float) -> None:
+    stream = new_stream()
+    initialise(stream)
+    steps(stream, 0, 50)
+    message = f"the communication point must be 0.05 s, where the last step ended, got {t} s"
+    assert_refused(stream, t, T_S, message)
+    stream.step(0.05, T_S)
+
+
+@on_all(PLANTS, needs="a plant's time")
+def test_a_plant_starts_no_step_at_infinity(new_stream: StreamMaker) -> None:
+    stream = new_stream()
+    stream.initialise({})
+    assert_refused(stream, math.inf, T_S, "the communication point must be finite, got inf s")
+
+
+BAD_POSITIONS = [(math.nan, "finite"), (math.inf, "finite"), (-math.inf, "finite"), (1e30, "within ±1000 m")]
+
+
+@on_all(LOOK_AHEADS)
+@pytest.mark.parametrize("name", ["x_d_ahead", "x_meas"])
+@pytest.mark.parametrize(("value", "expected"), BAD_POSITIONS)
+def test_an_input_that_is_no_position_changes_nothing(
+    new_stream: StreamMaker, name: str, value: float, expected: str
+) -> None:
+    stream, untroubled = new_stream(), new_stream()
+    for each in (stream, untroubled):
+        initialise(each)
+        steps(each, 0, 245)
+        each.step(0.245, 0.4 * T_S)
+        set_inputs(each, 0.246)
+    stream.set(name, value)
+    # The step's later instants are checked before its first one is executed.
+    assert_refused(stream, 0.2454, 8 * T_S, f"{name} must be {expected}, got {value:g} at sample 246")
+    for each in (stream, untroubled):
+        set_inputs(each, 0.246)
+        each.step(0.2454, 0.6 * T_S)
+    assert steps(stream, 246, 330) == steps(untroubled, 246, 330)
+    assert stream.save() == untroubled.save()
+
+
+@on_all(PLANTS)
+@pytest.mark.parametrize(("value", "expected"), BAD_POSITIONS)
+def test_a_plants_command_that_is_no_position_changes_nothing(
+    new_stream: StreamMaker, value: float, expected: str
+) -> None:
+    stream, untroubled = new_stream(), new_stream()
+    for each in (stream, untroubled):
+        initialise(each)
+        steps(each, 0, 3)
+    stream.set("x_d", value)
+    timeless = (new_stream.implementation, "a plant's time") in CANNOT
+    said = f"within ±1000 m, got {value:g}" if timeless else f"{expected}, got {value:g} at t = 0.003 s"
+    assert_refused(stream, 0.003, T_S, f"x_d must be {said}")
+    assert steps(stream, 3, 50) == steps(untroubled, 3, 50)
+
+
+@on_all(PLANTS, needs="a plant's time")
+@pytest.mark.parametrize(("value", "expected"), BAD_POSITIONS)
+def test_a_plants_start_that_is_no_position_is_refused(new_stream: StreamMaker, value: float, expected: str) -> None:
+    with pytest.raises(RefusedStreamError, match=f"the start value of x_d must be {expected}, got"):
+        new_stream().initialise({"x_d": value})
+
+
+@on_all((DRIVE,))
+def test_a_step_too_long_for_a_fast_plant_is_refused(new_stream: StreamMaker) -> None:
+    stream = new_stream()
+    stream.initialise({"k": 9e9})
+    assert_refused(stream, 0.0, 50.0, "the step size must be at most 0.658808 s for a drive as fast as 94868.3 1/s")
+    stream.step(0.0, T_S)

@@ -1,0 +1,145 @@
+"""Saved states, on every implementation: a run from one is the same to the last bit, wherever it goes on."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from built_once import BuiltFmus
+from driving import SHORT, T_S, TIGHT, initialise, set_inputs, steps
+from places import SUPPORT
+from stream import CANNOT, COMPENSATOR, LOOK_AHEADS, PLANTS, PREDICTOR, TRAJECTORY, RefusedStreamError, Stream, Value
+from streams import StreamMaker, on_all
+
+ALL = (*LOOK_AHEADS, TRAJECTORY, *PLANTS)
+N_SAMPLES = 420
+
+every = on_all(ALL)
+
+
+class Times:
+    """Communication points at random places in the samples and between them; the same for every run."""
+
+    def __init__(self) -> None:
+        sizes = np.random.default_rng(5).choice([0.25, 0.5, 1.0, 1.0, 1.0, 3.75], 2 * N_SAMPLES)
+        self.points = np.concatenate(([0.0], np.cumsum(sizes)))
+        self.n = int(np.searchsorted(self.points, N_SAMPLES))
+
+    def run(self, stream: Stream, first: int, last: int) -> list[list[float]]:
+        outputs = []
+        for begin, end in zip(self.points[first:last], self.points[first + 1 : last + 1], strict=True):
+            set_inputs(stream, float(begin) * T_S)
+            stream.step(float(begin) * T_S, float(end - begin) * T_S)
+            outputs.append(stream.outputs())
+        return outputs
+
+
+def assert_exact(new_stream: StreamMaker, values: dict[str, Value]) -> None:
+    """Go back to random times again and again, within windows and within samples."""
+    rng, times = np.random.default_rng(7), Times()
+    stream, whole = new_stream(), new_stream()
+    for each in (stream, whole):
+        each.initialise(values)
+    expected = times.run(whole, 0, times.n)
+    i = 0
+    while i < times.n:
+        ahead = min(times.n, i + int(rng.integers(1, 60)))
+        blob = stream.save()
+        assert times.run(stream, i, ahead) == expected[i:ahead]
+        after = stream.save()
+        stream.restore(blob)
+        assert stream.save() == blob
+        assert times.run(stream, i, ahead) == expected[i:ahead]
+        assert stream.save() == after
+        i = ahead
+    assert stream.save() == whole.save()
+
+
+@every
+def test_rollback_is_exact(new_stream: StreamMaker) -> None:
+    assert_exact(new_stream, {})
+
+
+@on_all(LOOK_AHEADS)
+def test_rollback_is_exact_with_short_windows(new_stream: StreamMaker) -> None:
+    assert_exact(new_stream, SHORT[new_stream.model])
+
+
+@on_all((COMPENSATOR,))
+def test_rollback_is_exact_while_a_bounded_plan_is_solved(new_stream: StreamMaker) -> None:
+    # It is there 8 samples after its window has begun.
+    assert_exact(new_stream, SHORT[COMPENSATOR] | TIGHT)
+
+
+@every
+@pytest.mark.parametrize("cut", [1, 19, 20, 21, 57, 203])
+def test_a_state_goes_on_in_a_second_instance(new_stream: StreamMaker, cut: int) -> None:
+    first, second = new_stream(), new_stream()
+    initialise(first, **({"p": 5} if new_stream.model in LOOK_AHEADS else {}))
+    steps(first, 0, cut)
+    blob = first.save()
+    second.restore(blob)  # with parameters of its own, and not even initialised
+    assert second.save() == blob
+    assert steps(second, cut, cut + 150) == steps(first, cut, cut + 150)
+    assert second.save() == first.save()
+
+
+@on_all((PREDICTOR,))
+def test_states_go_on_in_another_process(new_stream: StreamMaker, fmus: BuiltFmus, tmp_path: Path) -> None:
+    expected = {}
+    for model in ALL:
+        if (new_stream.implementation, model) not in CANNOT:
+            stream = new_stream(model)
+            initialise(stream)
+            steps(stream, 0, 250)
+            (tmp_path / model).write_bytes(stream.save())
+            expected[model] = steps(stream, 250, 400)
+    script = f"""
+import json, sys
+from pathlib import Path
+sys.path.insert(0, {str(SUPPORT)!r})
+from built_once import BuiltFmus
+from driving import steps
+from streams import StreamMaker
+folder = Path({str(tmp_path)!r})
+maker = StreamMaker({new_stream.implementation!r}, "", BuiltFmus(Path({str(fmus.folder)!r})), folder)
+outputs = {{}}
+for model in {list(expected)}:
+    stream = maker(model)
+    stream.restore((folder / model).read_bytes())
+    outputs[model] = steps(stream, 250, 400)
+maker.close()
+print(json.dumps(outputs))
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout) == expected
+
+
+@on_all(ALL, needs="bad states")
+def test_damaged_and_truncated_states_are_refused(new_stream: StreamMaker) -> None:
+    stream = new_stream()
+    initialise(stream)
+    steps(stream, 0, 130)
+    blob = stream.save()
+    damaged = [bytes((*blob[:i], blob[i] ^ 0x10, *blob[i + 1 :])) for i in range(0, len(blob), 1 + len(blob) // 60)]
+    for bad in (*damaged, b"", blob[:100], blob[:-4], bytes(len(blob)), blob + b"\0"):
+        with pytest.raises(RefusedStreamError):
+            stream.restore(bad)
+        assert stream.save() == blob
+
+
+@on_all(LOOK_AHEADS, needs="bad states")
+def test_states_of_other_models_are_refused(new_stream: StreamMaker) -> None:
+    stream = new_stream()
+    initialise(stream)
+    before = stream.save()
+    other = new_stream(next(model for model in LOOK_AHEADS if model != new_stream.model))
+    other.initialise({})
+    with pytest.raises(RefusedStreamError):
+        stream.restore(other.save())
+    assert stream.save() == before

@@ -1,0 +1,133 @@
+"""Where a run begins and ends, on every implementation."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from driving import T_S, closed_loop, initialise, replay, steps
+from stream import (
+    COMPENSATOR,
+    DRIVE,
+    LOOK_AHEADS,
+    OUTPUTS,
+    PLANTS,
+    PREDICTOR,
+    TRAJECTORY,
+    WINDOWS,
+    RefusedStreamError,
+    Value,
+)
+from streams import StreamMaker, on_all
+
+ALL = (*LOOK_AHEADS, TRAJECTORY, *PLANTS)
+
+
+@on_all(ALL, needs="stop time")
+def test_a_step_begins_before_the_stop_time(new_stream: StreamMaker) -> None:
+    stream = new_stream()
+    stream.initialise({}, stop=0.0305)
+    t = 0.0
+    while t < 0.0304:
+        stream.step(t, 4e-3)  # the last one ends beyond the stop time
+        t += 4e-3
+    with pytest.raises(
+        RefusedStreamError, match=r"a step must begin before the stop time 0.0305 s, got one from 0.032"
+    ):
+        stream.step(t, 4e-3)
+
+
+@on_all(ALL, needs="stop time")
+def test_the_stop_time_is_reached_in_rounded_sums(new_stream: StreamMaker) -> None:
+    stream = new_stream()
+    stream.initialise({}, stop=0.1)
+    t = 0.0
+    for _ in range(100):
+        stream.step(t, T_S)
+        t += T_S
+    assert t != 0.1
+    with pytest.raises(RefusedStreamError, match="before the stop time"):
+        stream.step(t, T_S)
+
+
+@on_all(LOOK_AHEADS)
+def test_any_start_time_gives_the_same(new_stream: StreamMaker) -> None:
+    loop, stream = closed_loop(new_stream.model, 700), new_stream()
+    stream.initialise(loop.values, start=1234.5)
+    shown = replay(stream, loop, start_time=1234.5)
+    other = new_stream()
+    other.initialise(loop.values)
+    np.testing.assert_array_equal(replay(other, loop), shown)
+
+
+@on_all((*LOOK_AHEADS, TRAJECTORY))
+@pytest.mark.parametrize(
+    ("start", "message"),
+    [
+        (1e13, "small enough to count samples of T_s = 0.001 s from, got 1e+13 s"),
+        (-1e300, "small enough to count samples of T_s = 0.001 s from, got -1e+300 s"),
+        *((start, "ime must be finite") for start in (math.inf, -math.inf, math.nan)),
+    ],
+)
+def test_a_start_time_that_cannot_be_counted_from(new_stream: StreamMaker, start: float, message: str) -> None:
+    with pytest.raises(RefusedStreamError, match=message.replace("+", r"\+")):
+        initialise(new_stream(), start)
+
+
+AT_REST: dict[str, dict[str, Value]] = {
+    PREDICTOR: {"x_d_ahead": 0.25, "Np": 60},
+    COMPENSATOR: {"x_d_ahead": 0.25},
+    DRIVE: {"x_d": 0.25, "noise_std": 0.0},
+}
+"""Start values of a system that is at rest at 0.25 m."""
+
+
+def at_rest(model: str, **others: float) -> list[float]:
+    """Return the outputs that belong to :data:`AT_REST`."""
+    shown = {**dict.fromkeys(("x_dm", "x_d", "x_pb", "x_h", "x", "x_meas"), 0.25), **others}
+    return [shown.get(name, 0.0) for name in OUTPUTS[model]]
+
+
+@on_all((*LOOK_AHEADS, DRIVE))
+def test_outputs_right_after_the_initialization(new_stream: StreamMaker) -> None:
+    stream = new_stream()
+    stream.initialise(AT_REST[new_stream.model])
+    assert stream.outputs() == at_rest(new_stream.model, sep_state=1.0)
+    if new_stream.model == PREDICTOR:
+        for name in WINDOWS:
+            np.testing.assert_array_equal(stream.window(name), [0.25] * 60 + [0.0] * 40)
+
+
+@on_all((*LOOK_AHEADS, DRIVE), needs="outputs before")
+def test_outputs_before_the_initialization_has_ended(new_stream: StreamMaker) -> None:
+    shown = new_stream().outputs_before(AT_REST[new_stream.model])
+    assert shown == at_rest(new_stream.model, sep_state=1.0)
+
+
+@on_all((COMPENSATOR,))
+@pytest.mark.parametrize(("compensate", "state"), [(0, 0), (1, 1), (2, 1)])
+def test_the_model_that_plans_first(new_stream: StreamMaker, compensate: int, state: int) -> None:
+    stream = new_stream()
+    stream.initialise({**AT_REST[COMPENSATOR], "compensate": compensate})
+    assert stream.outputs() == at_rest(COMPENSATOR, sep_state=state)
+
+
+@on_all((*LOOK_AHEADS, *PLANTS))
+def test_a_reset_forgets_everything(new_stream: StreamMaker) -> None:
+    stream, fresh = new_stream(), new_stream()
+    initialise(fresh)
+    expected = steps(fresh, 0, 300)
+    for values in ({"x_d_ahead": 0.1, "q": 1}, {"x_d_ahead": -0.2, "lambda": 1e-9}):
+        other = {"x_d": 0.1, "seed": 5} if "FeedDrive" in new_stream.model else values
+        initialise(stream, **other)
+        steps(stream, 0, 130)
+        stream.reset()
+    initialise(stream)
+    assert steps(stream, 0, 300) == expected
+    default, reset = new_stream(), new_stream()
+    initialise(reset)
+    reset.reset()
+    for each in (default, reset):
+        each.initialise({})
+    assert steps(default, 0, 130) == steps(reset, 0, 130)

@@ -1,0 +1,128 @@
+"""Weights of an earlier run, on every implementation: they predict at once, and fit one set of settings alone."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from driving import closed_loop, replay, steps
+from library_models import trained_predictor
+from stream import COMPENSATOR, LIBRARY, LOOK_AHEADS, OUTPUTS, PREDICTOR, PYTHON, RefusedStreamError, Value
+from streams import StreamMaker, on_all
+
+Trained = Callable[[str], Path]
+
+
+@pytest.fixture(scope="module")
+def weights(tmp_path_factory: pytest.TempPathFactory) -> Trained:
+    """Return a function that gives a predictor as it was saved after one staircase, of a predictor or a compensator."""
+    folder = tmp_path_factory.mktemp("trained")
+
+    def saved(model: str) -> Path:
+        path = folder / f"{model}.state"
+        if not path.exists():
+            trained_predictor(model).save(path)
+        return path
+
+    return saved
+
+
+@on_all(LOOK_AHEADS)
+def test_a_warm_run_is_the_librarys_second_run(new_stream: StreamMaker, weights: Trained) -> None:
+    # 1e-11 m at every sample; a pythonfmu FMU is the library.
+    tolerance = 0.0 if new_stream.implementation in (LIBRARY, PYTHON) else 1e-11
+    path, model = weights(new_stream.model), new_stream.model
+    loop = closed_loop(model, 6001, weights=path)
+    stream = new_stream(weights=path)
+    stream.initialise(loop.values)
+    np.testing.assert_allclose(replay(stream, loop), loop.outputs, rtol=0, atol=tolerance)
+    # The learned weights are used from the first predicted window on.
+    if model == PREDICTOR:
+        assert (loop.column(model, "hybrid_active")[100:] == 1.0).all()
+        assert loop.column(model, "rms_h")[-1] == pytest.approx(8.9e-6, abs=2e-7)
+    else:
+        assert (loop.column(model, "sep_state") == 2.0).all()
+        assert loop.outputs[0, OUTPUTS[model].index("x_h")] != 0.0
+        assert loop.column(model, "rms_e")[-1] < 5.5e-6  # the encoder's noise is 5 µm
+
+
+@on_all(LOOK_AHEADS, needs="weights before")
+def test_outputs_before_the_initialization_has_ended(new_stream: StreamMaker, weights: Trained) -> None:
+    path = weights(new_stream.model)
+    expected = closed_loop(new_stream.model, 1500, weights=path).outputs[0]
+    assert new_stream(weights=path).outputs_before({}) == expected.tolist()
+
+
+@on_all(LOOK_AHEADS)
+def test_a_warm_up_and_the_physics_model_can_be_asked_for(new_stream: StreamMaker, weights: Trained) -> None:
+    model = new_stream.model
+    choices: dict[str, list[tuple[dict[str, Value], str, int, list[float]]]] = {
+        PREDICTOR: [({"t_init": 0.05}, "hybrid_active", 100, [0.0] * 50 + [1.0] * 50)],
+        COMPENSATOR: [({"t_init": 0.1}, "sep_state", 0, [1.0] * 200), ({"compensate": 1}, "sep_state", 0, [1.0] * 200)],
+    }
+    for values, name, first, expected in choices[model]:
+        stream = new_stream(weights=weights(model))
+        stream.initialise(values)
+        shown = [stream.outputs(), *steps(stream, 0, 250)]
+        assert [row[OUTPUTS[model].index(name)] for row in shown[first : first + len(expected)]] == expected
+
+
+@on_all(LOOK_AHEADS)
+def test_a_warm_state_is_saved_and_an_instance_reset(new_stream: StreamMaker, weights: Trained) -> None:
+    stream, other = (new_stream(weights=weights(new_stream.model)) for _ in range(2))
+    runs = []
+    for _ in range(2):
+        stream.initialise({})
+        runs.append(steps(stream, 0, 250))
+        blob = stream.save()
+        expected = steps(stream, 250, 420)
+        for each in (stream, other):
+            each.restore(blob)
+            assert steps(each, 250, 420) == expected
+        stream.reset()
+    assert runs[0] == runs[1]
+    names = OUTPUTS[new_stream.model]
+    assert any(row[names.index("x_h")] != row[names.index("x_pb")] for row in runs[0])
+
+
+LEARNED: dict[str, dict[str, Value]] = {
+    PREDICTOR: {"p": 50, "q": 3, "lambda": 1e-12, "T_s": 0.001, "input_hold": 0, "dead_time": 0},
+    COMPENSATOR: {"p": 50, "q": 40, "lambda": 1e-8, "T_s": 0.001, "input_hold": 0, "dead_time": 0, "v_friction": 0.002},
+}
+OTHERS: list[dict[str, Value]] = [
+    {"p": 40},
+    {"p": 49, "q": 4},
+    {"lambda": 1e-9},
+    {"T_s": 0.002},
+    {"input_hold": 1},
+    {"dead_time": 3},
+    {"mode[1].alpha": 24000.0},
+    {"v_friction": 0.0},
+    {"v_friction": 1e-3},
+]
+
+
+@on_all(LOOK_AHEADS)
+def test_other_settings_than_learned_are_refused(new_stream: StreamMaker, weights: Trained) -> None:
+    stream, learned = new_stream(weights=weights(new_stream.model)), LEARNED[new_stream.model]
+    for values in OTHERS:
+        if "v_friction" in values and new_stream.model == PREDICTOR:
+            continue
+        message = "; ".join(
+            f"{name} must be {learned.get(name, 24674.0)!r}, with which weights.bin was learned, got {now!r}"
+            for name, now in values.items()
+        )
+        with pytest.raises(RefusedStreamError, match=re.escape(message)):
+            stream.initialise(values)
+        stream.reset()
+    stream.initialise({})
+
+
+@on_all(LOOK_AHEADS)
+def test_what_does_not_shape_the_features_may_be_another(new_stream: StreamMaker, weights: Trained) -> None:
+    stream = new_stream(weights=weights(new_stream.model))
+    stream.initialise({"Np": 60, "t_init": 0.1})
+    steps(stream, 0, 130)

@@ -1,0 +1,148 @@
+"""What every implementation shows, against windows that are computed one by one from the whole log."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import oracle
+import pytest
+from by_window import plans, predictions
+from driving import SHORT, closed_loop, initialise, replay
+from staircase_data import TS, C, K, M
+from stream import COMPENSATOR, LIBRARY, LOOK_AHEADS, OUTPUTS, PREDICTOR, PYTHON, Value
+from streams import StreamMaker, on_all
+
+
+def shown_by(new_stream: StreamMaker, n: int, values: dict[str, Value], start: float = 0.0) -> dict[str, np.ndarray]:
+    """Return the inputs of a closed loop of the library and what a stream shows of it."""
+    loop, stream = closed_loop(new_stream.model, n, values, start=start), new_stream()
+    stream.initialise(loop.values)
+    return dict(zip(OUTPUTS[new_stream.model], replay(stream, loop).T, strict=True)) | {"r": loop.r, "x_meas": loop.x}
+
+
+def tolerance_of(new_stream: StreamMaker) -> float:
+    return 1e-16 if new_stream.implementation in (LIBRARY, PYTHON) else 1e-11
+
+
+@on_all((PREDICTOR,))
+@pytest.mark.parametrize("start", [0.0, 0.1])
+def test_predictions_are_those_of_the_delayed_log(new_stream: StreamMaker, start: float) -> None:
+    shown = shown_by(new_stream, 2500, {}, start)
+    x_pb, x_h, active = predictions(shown["r"][:-100], shown["x_meas"][100:])
+    n, tolerance = len(x_pb), tolerance_of(new_stream)
+    np.testing.assert_array_equal(shown["x_d"][100 : 100 + n], shown["r"][:n])
+    np.testing.assert_allclose(shown["x_pb"][100 : 100 + n], x_pb, rtol=0, atol=tolerance)
+    np.testing.assert_allclose(shown["x_h"][100 : 100 + n], x_h, rtol=0, atol=tolerance)
+    np.testing.assert_array_equal(shown["hybrid_active"][100 : 100 + n] == 1.0, active)
+
+
+@on_all((PREDICTOR,))
+def test_the_staircase_is_predicted_as_by_the_directly_solved_problem(new_stream: StreamMaker) -> None:
+    # The oracle shares no code with the library and solves each batch from all its rows.
+    shown = shown_by(new_stream, 6001, {})
+    numerator, denominator = np.array([C / M, K / M]), np.array([1.0, C / M, K / M])
+    x_d, x = shown["r"][:-100], shown["x_meas"][100:]
+    truth = oracle.run(numerator, denominator, x_d, x, T_s=TS, Np=100, p=50, q=3, lam=1e-12, t_init=0.3)
+    tolerance = 1e-12 if new_stream.implementation in (LIBRARY, PYTHON) else 1e-11
+    assert np.max(np.abs(shown["x_h"][100:-1] - np.array(truth.x_h))) < tolerance
+
+
+@on_all((COMPENSATOR,))
+@pytest.mark.parametrize("preview", [200, 170])
+@pytest.mark.parametrize("start", [0.0, 0.1])
+def test_commands_are_those_of_plans_made_window_by_window(new_stream: StreamMaker, preview: int, start: float) -> None:
+    values: dict[str, Value] = {"Np": 50, "p": 20, "q": 3, "t_init": 0.1, "preview": preview}
+    shown = shown_by(new_stream, 1500, values, start)
+    expected = plans(values, shown["r"], shown["x_meas"])
+    exact = new_stream.implementation in (LIBRARY, PYTHON)
+    for name in ("x_dm", "x_d", "x_pb", "x_h", "sep_state"):
+        np.testing.assert_allclose(shown[name][:1500], expected[name], rtol=0, atol=0 if exact else 1e-9, err_msg=name)
+    assert set(expected["sep_state"]) == {1, 2}
+
+
+@on_all((PREDICTOR,))
+def test_the_first_fill_keeps_the_drive_at_its_start_and_is_not_learned(new_stream: StreamMaker) -> None:
+    streams = [new_stream(), new_stream()]
+    for stream, x_meas in zip(streams, (17.0, 0.25), strict=True):
+        initialise(stream, x_d_ahead=0.25)
+        for k in range(20):
+            stream.set("x_d_ahead", 0.3)
+            stream.set("x_meas", x_meas)
+            assert stream.outputs() == [0.25, 0.25, 0.25, 0.0, 0.0, 0.0, 0.0, 0.0], k
+            stream.step(k * TS, TS)
+        assert stream.outputs()[0] == 0.3
+        for k in range(20, 100):
+            stream.set("x_meas", 0.26 + 1e-4 * math.sin(k))
+            stream.step(k * TS, TS)
+    first, second = (stream.outputs() for stream in streams)
+    assert first == second
+    assert first[OUTPUTS[PREDICTOR].index("hybrid_active")] == 1.0
+
+
+@on_all((PREDICTOR,))
+@pytest.mark.parametrize(("Np", "n"), [(20, 500), (40, 120), (100, 400), (150, 450)])
+def test_windows_show_the_batch(new_stream: StreamMaker, Np: int, n: int) -> None:
+    # Of a smaller Np than built with, zeros follow; of a larger one the first samples are shown.
+    values: dict[str, Value] = {"Np": Np, "p": 10, "q": 2, "t_init": 0.0}
+    loop, stream = closed_loop(PREDICTOR, n + Np, values), new_stream()
+    stream.initialise(loop.values)
+    replay(stream, loop, 0, n)
+    assert stream.outputs()[-1] == n // Np
+    length = min(Np, 100)
+    for name in ("x_d", "x_pb", "x_h"):
+        expected = np.zeros(100)
+        expected[:length] = loop.column(PREDICTOR, name)[n : n + length]
+        np.testing.assert_allclose(stream.window(f"{name}_window"), expected, rtol=0, atol=tolerance_of(new_stream))
+    np.testing.assert_array_equal(stream.window("x_d_window")[:length], loop.r[n - Np : n - Np + length])
+
+
+@on_all((PREDICTOR,))
+def test_an_offset_changes_no_prediction(new_stream: StreamMaker) -> None:
+    shown, moved = (shown_by(new_stream, 2500, {}, start) for start in (0.0, 0.1))
+    for name in ("x_d", "x_pb", "x_h"):
+        np.testing.assert_allclose(moved[name] - 0.1, shown[name], rtol=0, atol=1e-10)
+
+
+@on_all(LOOK_AHEADS)
+def test_the_warm_up_counts_from_the_end_of_the_fill(new_stream: StreamMaker) -> None:
+    name, hybrid, fill = ("hybrid_active", 1.0, 100) if new_stream.model == PREDICTOR else ("sep_state", 2.0, 200)
+    shown = shown_by(new_stream, 700, {"t_init": 0.3})
+    assert np.flatnonzero(shown[name] == hybrid)[0] == fill + 300
+
+
+@on_all((COMPENSATOR,))
+def test_a_move_in_sight_is_prepared_in_the_fill_which_is_not_learned(new_stream: StreamMaker) -> None:
+    values = SHORT[COMPENSATOR]
+    loop = closed_loop(COMPENSATOR, 300, values)
+    runs = []
+    for fill in (loop.x, np.where(np.arange(300) < 60, 1e-4 * np.sin(np.arange(300)), loop.x)):
+        stream = new_stream()
+        stream.initialise(loop.values)
+        runs.append(replay(stream, type(loop)(loop.values, loop.r, fill, loop.outputs)))
+    x_dm, x_d = runs[0].T[:2]
+    np.testing.assert_array_equal(x_d[:60], 0.0)
+    assert not x_dm[:20].any()  # nothing was in sight yet
+    assert x_dm[20:60].any()
+    state = OUTPUTS[COMPENSATOR].index("sep_state")
+    assert runs[0][:, state].max() == 2.0
+    # What was measured over the fill is in no weight and no error; the window behind it is.
+    np.testing.assert_array_equal(runs[0][:61], runs[1][:61])
+
+
+@on_all(LOOK_AHEADS)
+@pytest.mark.parametrize("t_init", [0.05, 0.25])
+def test_running_rms_counts_from_the_warm_up(new_stream: StreamMaker, t_init: float) -> None:
+    shown = shown_by(new_stream, 1500, {"t_init": t_init})
+    fill, Np = (100, 100) if new_stream.model == PREDICTOR else (200, 50)
+    first = fill + round(t_init / TS)
+    sums = {"rms_pb": shown["x_pb"], "rms_h": shown["x_h"]}
+    if new_stream.model == COMPENSATOR:
+        sums["rms_e"] = shown["x_d"]
+    for name, against in sums.items():
+        assert not shown[name][: first + 1].any()
+        for k in (first, first + 1, first + 400, 1499):
+            expected = math.sqrt(np.mean((shown["x_meas"][first : k + 1] - against[first : k + 1]) ** 2))
+            assert shown[name][k + 1] == pytest.approx(expected, rel=1e-9)
+    assert shown["rms_h"][-1] < shown["rms_pb"][-1]
+    np.testing.assert_array_equal(shown["batch"], np.arange(1501) // Np)

@@ -1,0 +1,80 @@
+"""What is built once in a test session, whichever of xdist's workers asks for it first."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from hybridsep import build_fmu, fmu_names, load_machine, machine_names
+from hybridsep.fmi.backends import BACKENDS
+from hybridsep.machine import Machine
+
+_FMUS = {
+    name: (machine, backend)
+    for machine in map(load_machine, machine_names())
+    for backend in BACKENDS
+    for name in fmu_names(machine, backend)
+}
+
+NATIVE = [name for name, (_, backend) in _FMUS.items() if backend == "native"]
+PYTHON = [name for name, (_, backend) in _FMUS.items() if backend == "python"]
+"""Names of all FMUs of all machines."""
+
+
+def built_once(path: Path, build: Callable[[Path], object]) -> Path:
+    """Return ``path``, which ``build`` makes, given a name beside it; other processes wait meanwhile."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    lock, unfinished = path.with_name(f"{path.name}.lock"), path.with_name(f"{path.name}.unfinished")
+    while not path.exists():
+        try:
+            lock.mkdir()
+        except FileExistsError:
+            time.sleep(0.05)
+            continue
+        try:
+            if not path.exists():
+                build(unfinished)
+                os.replace(unfinished, path)  # noqa: PTH105 - a folder as well as a file
+        finally:
+            lock.rmdir()
+    return path
+
+
+class BuiltFmus:
+    """The FMUs of all machines in both flavours, for this machine.
+
+    Parameters
+    ----------
+    folder : Path
+        Shared by all workers of a session.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def __call__(self, name: str, *, machine: Machine | None = None, weights: Path | None = None) -> Path:
+        """Return an FMU's archive, built when it is first asked for.
+
+        Parameters
+        ----------
+        name : str
+            Of :func:`hybridsep.fmu_names`.
+        machine : Machine, optional
+            With other values than the machine file of that name has.
+        weights : Path, optional
+            Saved predictor that it starts warm with.
+        """
+        own, backend = _FMUS[name]
+        machine = machine or own
+        content = machine.model_dump_json().encode() + (weights.read_bytes() if weights else b"")
+        folder = self.folder / hashlib.sha256(content).hexdigest()[:16]
+        targets = ("host",) if backend == "native" else None
+
+        def build(unfinished: Path) -> None:
+            made = build_fmu(machine, name, unfinished.with_suffix(".d"), backend, targets=targets, weights=weights)
+            os.replace(made, unfinished)  # noqa: PTH105
+
+        return built_once(folder / f"{name}.fmu", build)

@@ -1,0 +1,161 @@
+"""Inputs for streams and how they are stepped; closed loops that the library's stream has run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from library_models import learned_file
+from library_stream import LookAheadStream
+from staircase_data import commanded
+from stream import COMPENSATOR, LOOK_AHEADS, OUTPUTS, PREDICTOR, TRAJECTORY, Array, Stream, Value, kind_of, machine_of
+
+from hybridsep.plants.encoder import Encoder
+
+T_S = 1e-3  # s
+
+SHORT: dict[str, dict[str, Value]] = {
+    PREDICTOR: {"Np": 20, "p": 6, "q": 2, "t_init": 0.05},
+    COMPENSATOR: {"Np": 20, "p": 6, "q": 2, "t_init": 0.05, "preview": 60},
+}
+"""Windows short enough for many of them."""
+
+TIGHT: dict[str, Value] = {"v_max": 0.08, "a_max": 8.0, "j_max": 1000.0}
+"""Limits of the trajectory itself: most of a compensator's plans are bounded by them."""
+
+
+def position(t: float) -> float:
+    """Return a smooth command, m."""
+    return 0.01 * (1 - math.cos(9 * t)) + 1e-3 * math.sin(40 * t)
+
+
+def measured(t: float) -> float:
+    return position(t - 0.03) + 2e-5 * math.sin(300 * t)
+
+
+def initialise(stream: Stream, start: float = 0.0, **values: Value) -> None:
+    """Initialise, a look-ahead with short windows."""
+    stream.initialise({**SHORT.get(kind_of(stream.model), {}), **values}, start=start)
+
+
+def set_inputs(stream: Stream, t: float, shift: float = 0.0) -> None:
+    """Set the smooth motion at ``t``, s, moved by ``shift``, m."""
+    kind = kind_of(stream.model)
+    if kind in LOOK_AHEADS:
+        stream.set("x_d_ahead", position(t) + shift)
+        stream.set("x_meas", measured(t) + shift)
+    elif kind != TRAJECTORY:
+        stream.set("x_d", position(t) + shift)
+
+
+def steps(stream: Stream, first: int, last: int, shift: float = 0.0) -> list[list[float]]:
+    """Step samples ``first … last − 1`` of the smooth motion; return the outputs after each."""
+    outputs = []
+    for k in range(first, last):
+        set_inputs(stream, k * T_S, shift)
+        stream.step(k * T_S, T_S)
+        outputs.append(stream.outputs())
+    return outputs
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A closed loop of the library's look-ahead with a plant of the library.
+
+    Attributes
+    ----------
+    values : dict
+        What the look-ahead was initialised with.
+    r, x : (n,) arrays, m
+        Its inputs.
+    outputs : (n + 1, n_outputs) array
+        Before each sample and after the last.
+    """
+
+    values: dict[str, Value]
+    r: Array
+    x: Array
+    outputs: Array
+
+    def column(self, model: str, name: str) -> Array:
+        """Return one of the model's outputs."""
+        return self.outputs[:, OUTPUTS[kind_of(model)].index(name)]
+
+
+Sensor = Callable[[int, float, float], float]
+"""What a sensor shows at sample k of the measured position, given what it showed last, m."""
+
+
+def _faithful(k: int, x_meas: float, last: float) -> float:
+    return x_meas
+
+
+def closed_loop(
+    model: str,
+    n: int,
+    values: Mapping[str, Value] | None = None,
+    *,
+    start: float = 0.0,
+    weights: Path | None = None,
+    size: float = 1.0,
+    sensor: Sensor = _faithful,
+) -> Loop:
+    """Return a closed loop over the staircase; the same is run once.
+
+    Parameters
+    ----------
+    model : str
+        A look-ahead.
+    n : int
+        Samples.
+    values : mapping, optional
+        Parameters.
+    start : float
+        Position of rest, m.
+    weights : Path, optional
+        Saved predictor that the look-ahead starts warm with.
+    size : float
+        Of the staircase, as a fraction.
+    sensor : function
+    """
+    given = {**(values or {}), "x_d_ahead": start, "x_meas": start}
+    return _closed_loop(model, n, tuple(given.items()), weights, size, sensor)
+
+
+@cache
+def _closed_loop(
+    model: str, n: int, given: tuple[tuple[str, Value], ...], weights: Path | None, size: float, sensor: Sensor
+) -> Loop:
+    machine, values = machine_of(model), dict(given)
+    assert machine.plant is not None
+    plant, encoder = machine.new_plant(), Encoder(machine.plant.noise_std, 1)
+    stream, start = LookAheadStream(model, learned_file(weights)), float(values["x_d_ahead"])
+    T_s = float(values.get("T_s", T_S))
+    stream.initialise(values)
+    plant.reset(start)
+    r, x = size * commanded()[:n] + start, np.empty(n)
+    outputs = [stream.outputs()]
+    for k in range(n):
+        x[k] = sensor(k, encoder.measure(plant.x), float(x[k - 1]) if k else start)
+        plant.step(outputs[-1][0], T_s)  # x_d of a predictor, x_dm of a compensator
+        stream.set("x_d_ahead", float(r[k]))
+        stream.set("x_meas", float(x[k]))
+        stream.step(k * T_s, T_s)
+        outputs.append(stream.outputs())
+    return Loop(values, r, x, np.array(outputs))
+
+
+def replay(stream: Stream, loop: Loop, first: int = 0, last: int | None = None, start_time: float = 0.0) -> Array:
+    """Step samples ``first … last − 1`` of a loop; return the outputs before each and after the last."""
+    T_s = float(loop.values.get("T_s", T_S))
+    outputs = [stream.outputs()]
+    for k in range(first, len(loop.r) if last is None else last):
+        stream.set("x_d_ahead", float(loop.r[k]))
+        stream.set("x_meas", float(loop.x[k]))
+        stream.step(start_time + k * T_s, T_s)
+        outputs.append(stream.outputs())
+    return np.array(outputs)

@@ -1,0 +1,76 @@
+"""An FMU as a stream."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from stream import OUTPUTS, Array, RefusedStreamError, Value, kind_of
+
+from hybridsep.base.errors import FmuError
+from hybridsep.cosim.importer import FmuInstance
+
+
+class FmuStream:
+    """An FMU through fmpy."""
+
+    def __init__(self, archive: Path, model: str) -> None:
+        self.model = model
+        self._outputs = OUTPUTS[kind_of(model)]
+        self._fmu = FmuInstance(archive)
+
+    def initialise(self, values: Mapping[str, Value], *, start: float = 0.0, stop: float | None = None) -> None:
+        self._enter(values, start, stop)
+        self._refusing(self._fmu._call, self._fmu.slave.exitInitializationMode)
+
+    def outputs_before(self, values: Mapping[str, Value]) -> list[float]:
+        self._enter(values, 0.0, None)
+        return self.outputs()
+
+    def set(self, name: str, value: Value) -> None:
+        self._fmu.set(name, value)
+
+    def set_slope(self, name: str, slope: float) -> None:
+        reference = self._fmu.variables[name].valueReference
+        self._refusing(self._fmu._call, self._fmu.slave.setRealInputDerivatives, [reference], [1], [slope])
+
+    def step(self, t: float, h: float) -> None:
+        self._refusing(self._fmu.step, t, h)
+
+    def outputs(self) -> list[float]:
+        return [float(self._fmu.get(name)) for name in self._outputs]
+
+    def window(self, name: str) -> Array:
+        names = [variable for variable in self._fmu.variables if variable.startswith(f"{name}[")]
+        return np.array(self._fmu.real_reader(names)())
+
+    def save(self) -> bytes:
+        return self._fmu.save()
+
+    def restore(self, blob: bytes) -> None:
+        self._refusing(self._fmu.restore, blob)
+
+    def reset(self) -> None:
+        self._fmu.reset()
+
+    def warnings(self) -> list[str]:
+        return [message for status, message in self._fmu.log if status == 1]
+
+    def close(self) -> None:
+        self._fmu.close()
+
+    def _enter(self, values: Mapping[str, Value], start: float, stop: float | None) -> None:
+        slave = self._fmu.slave
+        self._refusing(self._fmu._call, slave.setupExperiment, startTime=start, stopTime=stop)
+        slave.enterInitializationMode()
+        for name, value in values.items():
+            self._fmu.set(name, value)
+
+    @staticmethod
+    def _refusing(function: Callable[..., Any], *arguments: Any, **keywords: Any) -> None:
+        try:
+            function(*arguments, **keywords)
+        except FmuError as error:
+            raise RefusedStreamError(str(error)) from error

@@ -1,0 +1,115 @@
+"""The library's models from the values of an FMU's parameters: how every test that needs both puts them together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hybridsep.base.settings import CompensatorSettings, PredictorSettings
+from hybridsep.compensate.compensator import SepCompensator
+from hybridsep.cosim.loop import cosimulate
+from hybridsep.evaluate.backtest import backtest
+from hybridsep.fmi.variables import modes_from
+from hybridsep.fmi.weights import restore_weights, weights_file
+from hybridsep.machine import load_machine
+from hybridsep.model.physics import ModalModel, Mode
+from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.feed_drive import FeedDrive
+from hybridsep.plants.plant import Plant, simulate
+from hybridsep.plants.stage_drive import StageDrive
+from hybridsep.plants.trajectory import staircase
+from hybridsep.predict.look_ahead import LookAhead
+from hybridsep.predict.predictor import HybridPredictor
+
+RUNAWAY = 1e5
+"""Pole of the recursion that diverges: e_h grows by it with each sample."""
+
+
+def numbered(modes: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    """Return modes under the names of their FMU variables, ``mode[i].*``."""
+    return {f"mode[{i}].{key}": value for i, mode in enumerate(modes, start=1) for key, value in mode.items()}
+
+
+def library_predictor(values: Mapping[str, Any]) -> HybridPredictor:
+    """Return the predictor; ``v_friction`` may be among the values, ``dead_time`` and ``mode[i].*`` must."""
+    model = ModalModel([Mode(**mode) for mode in modes_from(values)], values["dead_time"])
+    return HybridPredictor(model, PredictorSettings.from_fmi({"v_friction": 0.0, **values}))
+
+
+def library_compensator(values: Mapping[str, Any]) -> SepCompensator:
+    """Return the compensator."""
+    return SepCompensator(library_predictor(values), CompensatorSettings.from_fmi(values))
+
+
+def library_plant(values: Mapping[str, Any]) -> Plant:
+    """Return the stage where there are modes among the values, the nonlinear drive otherwise."""
+    if modes := modes_from(values):
+        model = ModalModel([Mode(**mode) for mode in modes])
+        return StageDrive(model, values["f"], values["kappa"], values["T_s"])
+    return FeedDrive(*(values[name] for name in ("m", "c", "k", "c_nl", "k_nl")))
+
+
+def library_look_ahead(values: Mapping[str, Any], weights: bytes = b"") -> LookAhead:
+    """Return the compensator's look-ahead where the values have a preview, the predictor's otherwise.
+
+    Parameters
+    ----------
+    values : mapping
+        Parameters and ``x_d_ahead``, where it starts.
+    weights : bytes, optional
+        Content of ``weights.bin``, with which it starts warm.
+    """
+    start = float(values["x_d_ahead"])
+    if "preview" not in values:
+        predictor = _learned(library_predictor(values), weights)
+        return LookAhead(predictor, start)
+    compensator = library_compensator(values)
+    _learned(compensator.predictor, weights)
+    return LookAhead(compensator, start)
+
+
+def restored_look_ahead(kind: str, blob: bytes) -> LookAhead:
+    """Return what a look-ahead's ``to_bytes`` described; ``kind``: the FMU's model."""
+    return LookAhead.from_bytes(blob, HybridPredictor if kind == "HybridPredictor" else SepCompensator)
+
+
+def learned_file(saved: Path | None) -> bytes:
+    """Return the content of ``weights.bin`` for a saved predictor; none without one."""
+    return weights_file(HybridPredictor.load(saved)) if saved else b""
+
+
+def trained_predictor(kind: str) -> HybridPredictor:
+    """Return the predictor of the default machine's FMU ``kind`` after one staircase."""
+    machine, encoder = load_machine("spring_mass_damper"), Encoder(5e-6, 7)
+    if kind == "HybridPredictor":
+        predictor = machine.new_predictor()
+        backtest(predictor, staircase(), encoder.measure_all(simulate(machine.new_plant(), staircase(), machine.T_s)))
+        return predictor
+    compensator = machine.new_compensator()
+    cosimulate(compensator, machine.new_plant(), staircase()[:4000], encoder=encoder)
+    return compensator.predictor
+
+
+def runaway_predictor() -> HybridPredictor:
+    """Return a predictor of the default machine, without warm-up, whose learned recursion diverges.
+
+    It has a bias and one past residual, so firmly learned that a run changes nothing.
+    """
+    machine = load_machine("spring_mass_damper")
+    predictor = machine.new_predictor(replace(machine.predictor_settings, t_init=0.0))
+    weights = np.zeros(predictor.n_features)
+    weights[0], weights[predictor.layout.e_pb.start] = 1e-3, RUNAWAY
+    factor = 1e6 * np.eye(predictor.n_features + 1)
+    factor[:-1, -1] = factor[:-1, :-1] @ weights
+    predictor.regression.restore(factor, 1000)
+    return predictor
+
+
+def _learned(predictor: HybridPredictor, weights: bytes) -> HybridPredictor:
+    if weights:
+        restore_weights(predictor, weights)
+    return predictor

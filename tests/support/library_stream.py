@@ -1,0 +1,139 @@
+"""The library's models as streams, stepped as FMUs are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+from library_models import library_look_ahead, library_plant, numbered, restored_look_ahead
+from stream import CANNOT, LIBRARY, OUTPUTS, Array, RefusedStreamError, Value, description_of, kind_of
+
+from hybridsep import HybridSepError
+from hybridsep.base.state import pack, unpack
+from hybridsep.plants.encoder import Encoder
+from hybridsep.predict.look_ahead_inputs import LookAheadInputs
+
+
+@contextmanager
+def refusing() -> Iterator[None]:
+    """Turn the library's errors into the streams'."""
+    try:
+        yield
+    except HybridSepError as error:
+        raise RefusedStreamError(str(error)) from error
+
+
+def start_values(model: str) -> dict[str, Any]:
+    """Return the start values of a model's inputs and parameters."""
+    description: Any = description_of(model)
+    inputs = {"x_d": 0.0} if "FeedDrive" in model else {"x_d_ahead": 0.0, "x_meas": 0.0}
+    return {**inputs, **description["parameters"], **numbered(description["modes"])}
+
+
+class LibraryStream:
+    """What the library's streams share."""
+
+    def __init__(self, model: str) -> None:
+        self.model, self._kind = model, kind_of(model)
+        self._warnings: list[str] = []
+        self._values = start_values(model)
+
+    def set(self, name: str, value: Value) -> None:
+        self._values[name] = value
+
+    def set_slope(self, name: str, slope: float) -> None:
+        raise RefusedStreamError(CANNOT[LIBRARY, "slopes"])
+
+    def outputs_before(self, values: Mapping[str, Value]) -> list[float]:
+        raise RefusedStreamError(CANNOT[LIBRARY, "outputs before"])
+
+    def window(self, name: str) -> Array:
+        raise NotImplementedError
+
+    def reset(self) -> None:
+        self._values = start_values(self.model)
+
+    def warnings(self) -> list[str]:
+        return self._warnings
+
+    def close(self) -> None:
+        pass
+
+
+class LookAheadStream(LibraryStream):
+    """A look-ahead of the library behind the clock that FMUs use."""
+
+    def __init__(self, model: str, weights: bytes = b"") -> None:
+        super().__init__(model)
+        self._weights = weights
+        self._n_shown = int(self._values["Np"])
+        self.reset()
+
+    def reset(self) -> None:
+        super().reset()
+        if self._weights:
+            self._values["t_init"] = 0.0
+
+    def initialise(self, values: Mapping[str, Value], *, start: float = 0.0, stop: float | None = None) -> None:
+        self._values |= values
+        with refusing():
+            self._look_ahead = library_look_ahead(self._values, self._weights)
+            self._clock = LookAheadInputs(start, self._values["T_s"], self._values["x_d_ahead"])
+
+    def step(self, t: float, h: float) -> None:
+        with refusing():
+            inputs = float(self._values["x_d_ahead"]), float(self._values["x_meas"])
+            if warning := self._clock.advance(self._look_ahead, *inputs, t, h):
+                self._warnings.append(warning)
+
+    def outputs(self) -> list[float]:
+        return [float(getattr(self._look_ahead, name)) for name in OUTPUTS[self._kind]]
+
+    def window(self, name: str) -> Array:
+        shown = np.zeros(self._n_shown)
+        samples = getattr(self._look_ahead, name)[: self._n_shown]
+        shown[: len(samples)] = samples
+        return shown
+
+    def save(self) -> bytes:
+        meta = {"clock": self._clock.state(), "values": self._values}
+        return pack(f"stream {self.model}", meta, {}, {"core": self._look_ahead.to_bytes()})
+
+    def restore(self, blob: bytes) -> None:
+        with refusing():
+            meta, _, parts = unpack(f"stream {self.model}", blob)
+            self._look_ahead = restored_look_ahead(self._kind, parts["core"])
+        self._clock, self._values = LookAheadInputs.from_state(meta["clock"]), meta["values"]
+
+
+class PlantStream(LibraryStream):
+    """A plant of the library with its encoder."""
+
+    def initialise(self, values: Mapping[str, Value], *, start: float = 0.0, stop: float | None = None) -> None:
+        self._values |= values
+        with refusing():
+            self._plant = library_plant(self._values)
+            self._encoder = Encoder(self._values["noise_std"], self._values["seed"])
+        self._plant.reset(float(self._values["x_d"]))
+        self._x_meas = self._encoder.measure(self._plant.x)
+
+    def step(self, t: float, h: float) -> None:
+        with refusing():
+            self._plant.step(float(self._values["x_d"]), h)
+        self._x_meas = self._encoder.measure(self._plant.x)
+
+    def outputs(self) -> list[float]:
+        return [self._plant.x, self._plant.v, self._x_meas]
+
+    def save(self) -> bytes:
+        drawn = {"n_draws": self._encoder.n_draws, "x_meas": self._x_meas}
+        return pack(f"stream {self.model}", {"plant": self._plant.state(), "values": self._values, **drawn}, {})
+
+    def restore(self, blob: bytes) -> None:
+        with refusing():
+            meta, _, _ = unpack(f"stream {self.model}", blob)
+        self.initialise(meta["values"])
+        self._plant.restore(meta["plant"])
+        self._encoder.n_draws, self._x_meas = meta["n_draws"], meta["x_meas"]

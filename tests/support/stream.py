@@ -1,0 +1,116 @@
+"""One interface to a model in every implementation; what an implementation cannot do stands in :data:`CANNOT`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridsep import load_machine
+from hybridsep.fmi.archive import fmu_description
+from hybridsep.machine import Machine
+
+Array = NDArray[np.float64]
+Value = float | int | bool
+
+LIBRARY, CORE, PYTHON, NATIVE = IMPLEMENTATIONS = ("library", "C core", "pythonfmu FMU", "native FMU")
+
+PREDICTOR, COMPENSATOR, TRAJECTORY = "HybridPredictor", "SepCompensator", "ReferenceTrajectory"
+STAGE_PREDICTOR, STAGE_COMPENSATOR = "HybridPredictor_als25010_x", "SepCompensator_als25010_x"
+DRIVE, STAGE = "FeedDrive", "FeedDrive_als25010_x"
+LOOK_AHEADS = (PREDICTOR, COMPENSATOR)
+PLANTS = (DRIVE, STAGE)
+
+CANNOT = {
+    (LIBRARY, TRAJECTORY): "an array of positions needs no player",
+    (PYTHON, TRAJECTORY): "the native one runs beside pythonfmu FMUs; a table of numbers has nothing to edit",
+    (LIBRARY, "slopes"): "its inputs are samples",
+    (PYTHON, "slopes"): "pythonfmu has no fmi2SetRealInputDerivatives",
+    (LIBRARY, "stop time"): "a stop time is the adapter's",
+    (CORE, "stop time"): "a stop time is the adapter's",
+    (LIBRARY, "one warning"): "it warns at each step; what is said once an instance is the adapter's",
+    (CORE, "one warning"): "it warns at each step; what is said once an instance is the adapter's",
+    (LIBRARY, "outputs before"): "before its object is made there is nothing to ask",
+    (LIBRARY, "weights before"): "before its object is made there is nothing to ask",
+    (CORE, "weights before"): "the resources are read when the initialization ends",
+    (NATIVE, "weights before"): "the resources are read when the initialization ends",
+    (LIBRARY, "outputs kept"): "the sample that begins the window is counted before the window is known to diverge",
+    (PYTHON, "outputs kept"): "the library's",
+    (PYTHON, "diverged states"): "of that sample its clock knows nothing, so that such a state is inconsistent",
+    (LIBRARY, "agreement"): "it is what the others are compared with; test_windows.py and the oracle are its truth",
+    (CORE, "bad states"): "checksum and GUID are the adapter's; what it checks itself: tests/c/test_c_states.py",
+    (LIBRARY, "a plant's time"): "its plants are stepped by an interval, and put to rest wherever asked for",
+}
+"""(implementation, model or ability): why it is not there."""
+
+OUTPUTS = {
+    PREDICTOR: ("x_d", "x_pb", "x_h", "e_servo", "hybrid_active", "rms_pb", "rms_h", "batch"),
+    COMPENSATOR: ("x_dm", "x_d", "x_pb", "x_h", "e_servo", "sep_state", "rms_e", "rms_pb", "rms_h", "batch"),
+    TRAJECTORY: ("r",),
+    DRIVE: ("x", "v", "x_meas"),
+}
+
+WINDOWS = ("x_d_window", "x_pb_window", "x_h_window")
+"""Arrays that a predictor shows."""
+
+
+class RefusedStreamError(Exception):
+    """An implementation refused a call; the text is its message."""
+
+
+class Stream(Protocol):
+    """One instance of a model in one implementation."""
+
+    model: str
+
+    def initialise(self, values: Mapping[str, Value], *, start: float = 0.0, stop: float | None = None) -> None:
+        """Set parameters and start values, and begin at ``start``, s."""
+
+    def outputs_before(self, values: Mapping[str, Value]) -> list[float]:
+        """Set parameters and start values, and return the outputs as they are while an FMU initialises."""
+
+    def set(self, name: str, value: Value) -> None:
+        """Set an input."""
+
+    def set_slope(self, name: str, slope: float) -> None:
+        """Set an input's time derivative for the next step."""
+
+    def step(self, t: float, h: float) -> None:
+        """Do one communication step."""
+
+    def outputs(self) -> list[float]:
+        """Return the model's :data:`OUTPUTS`."""
+
+    def window(self, name: str) -> Array:
+        """Return one of a predictor's :data:`WINDOWS`, ``(Np as built,)``."""
+
+    def save(self) -> bytes:
+        """Return the whole state, serialised."""
+
+    def restore(self, blob: bytes) -> None:
+        """Take over a state that :meth:`save` returned, whether initialised or not."""
+
+    def reset(self) -> None:
+        """Forget everything, parameters included."""
+
+    def warnings(self) -> list[str]:
+        """Return the warnings of all steps so far, as far as the implementation keeps them."""
+
+    def close(self) -> None:
+        """End the instance."""
+
+
+def kind_of(model: str) -> str:
+    """Return the model without the machine: a key of :data:`OUTPUTS`."""
+    return model.partition("_")[0]
+
+
+def machine_of(model: str) -> Machine:
+    return load_machine(model.partition("_")[2] or "spring_mass_damper")
+
+
+def description_of(model: str) -> dict[str, object]:
+    """Return what the model's FMU is made from: start values and modes."""
+    return fmu_description(machine_of(model), kind_of(model), model)
