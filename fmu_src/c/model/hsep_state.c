@@ -55,12 +55,9 @@ HSEP_API hsep_status hsep_state_begin(
 }
 
 HSEP_API hsep_status hsep_state_check(
-    const hsep_context *context, const double values[], const void *state, size_t size, uint64_t kind, char message[])
+    const hsep_context *context, const double values[], const void *state, size_t size, uint64_t kind, size_t expected,
+    char message[])
 {
-    size_t expected = 0;
-    if (hsep_model_size(context, values, &expected, message) != HSEP_OK) {
-        return HSEP_REFUSED;
-    }
     hsep_state_header header;
     if (size < sizeof header || size != expected) {
         hsep_message_add(

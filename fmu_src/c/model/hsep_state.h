@@ -33,9 +33,10 @@ HSEP_API hsep_status hsep_state_begin(
     hsep_state_header *header, const hsep_context *context, const double values[], uint64_t kind, size_t needed,
     size_t size, char message[]);
 
-/* Check the first bytes of what may be a state of that kind for these parameters, in any alignment. */
+/* Check the first bytes of what may be a state of that kind and of expected bytes, in any alignment. */
 HSEP_API hsep_status hsep_state_check(
-    const hsep_context *context, const double values[], const void *state, size_t size, uint64_t kind, char message[]);
+    const hsep_context *context, const double values[], const void *state, size_t size, uint64_t kind, size_t expected,
+    char message[]);
 
 /* Refuse a state whose header fits and whose content does not. */
 HSEP_API hsep_status hsep_state_damaged(char message[]);

@@ -116,11 +116,13 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
 HSEP_API hsep_status hsep_model_check_state(
     const hsep_context *context, const void *state, size_t size, const double values[], char message[])
 {
+    size_t expected = 0;
     hsep_mode modes[HSEP_N_MODES];
     hsep_online_parameters parameters;
     online_state head;
     if (online_checked(context, values, &parameters, modes, message) != HSEP_OK ||
-        hsep_state_check(context, values, state, size, HSEP_ONLINE_KIND, message) != HSEP_OK) {
+        hsep_model_size(context, values, &expected, message) != HSEP_OK ||
+        hsep_state_check(context, values, state, size, HSEP_ONLINE_KIND, expected, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     memcpy(&head, state, sizeof head);

@@ -106,8 +106,10 @@ HSEP_API void hsep_model_start_values(const hsep_context *context, double values
 HSEP_API hsep_status hsep_model_check_state(
     const hsep_context *context, const void *state, size_t size, const double values[], char message[])
 {
+    size_t expected = 0;
     stage_drive_state head;
-    if (hsep_state_check(context, values, state, size, STAGE_DRIVE_KIND, message) != HSEP_OK) {
+    if (hsep_model_size(context, values, &expected, message) != HSEP_OK ||
+        hsep_state_check(context, values, state, size, STAGE_DRIVE_KIND, expected, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     memcpy(&head, state, sizeof head);
