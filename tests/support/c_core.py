@@ -37,7 +37,7 @@ FMI_HEADERS = Path(fmpy.__file__).parent / "c-code"
 """fmpy's, for shared libraries: the names of the FMI functions are the plain ones."""
 
 EXPOSE = ROOT / "tests" / "c" / "expose.c"
-FLAGS = ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", "-ffp-contract=off"]
+FLAGS = ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wcast-qual", "-pedantic", "-Werror", "-ffp-contract=off"]
 MESSAGE_SIZE = 512
 
 SPRING_MASS_DAMPER = {"f_n": np.sqrt(24674.0) / (2 * np.pi), "zeta": 15.7 / (2 * np.sqrt(24674.0))} | {
@@ -121,7 +121,7 @@ def address_sanitizer(command: Sequence[str]) -> str:
 
 def sources() -> list[str]:
     """Return every C file of core and models."""
-    return sorted(str(path) for folder in ("core", "model") for path in (C_SOURCES / folder).glob("*.c"))
+    return sorted(str(path) for folder in ("core", "model") for path in (C_SOURCES / folder).rglob("*.c"))
 
 
 def run_compiler(arguments: Sequence[str | Path], *, command: Sequence[str] = ()) -> None:
@@ -166,7 +166,8 @@ def object_files() -> list[str]:
 
 
 def include_flags() -> list[str]:
-    return [f"-I{C_SOURCES / folder}" for folder in ("core", "model")]
+    """Return the options with which a file finds every header by its name."""
+    return [f"-I{folder}" for folder in sorted({path.parent for path in C_SOURCES.rglob("*.h")})]
 
 
 def write_header(name: str, folder: Path) -> None:
