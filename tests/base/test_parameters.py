@@ -226,7 +226,7 @@ def test_settings_and_an_fmus_values_are_the_same() -> None:
     assert PredictorSettings.from_table(predictor.as_table()) == predictor
     assert CompensatorSettings.from_table(compensator.as_table()) == compensator
     with pytest.raises(
-        ParameterError, match=r"^compensate must be 0 … 2, got 3; v_max must be 1e-09 … 10000 m/s, got 0$"
+        ParameterError, match=r"^v_max must be 1e-09 … 10000 m/s, got 0; compensate must be 0 … 2, got 3$"
     ):
         CompensatorSettings.from_fmi({**values, "compensate": 3, "v_max": 0})
 

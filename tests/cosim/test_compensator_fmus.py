@@ -218,13 +218,17 @@ def test_the_direction_and_the_features_of_the_reference_can_be_turned_off(flavo
     settings: tuple[dict[str, Any], ...] = (
         {},
         {"v_friction": 0.0},
-        {"no_reversal": 0},
-        {"v_friction": 0.0, "no_reversal": 0},
+        {"no_reversal": False},
+        {"v_friction": 0.0, "no_reversal": False},
     )
     commands = []
     for values in settings:
         run = cosimulate(*pair, r, controller_values=values)
-        loop = cosimulate(machine.new_compensator(**values), machine.new_plant(), r, encoder=Encoder(1e-6, 0))
+        fmi = {**machine.fmi_compensator_parameters(), **values}
+        compensator = machine.new_compensator(
+            CompensatorSettings.from_fmi(fmi), predictor=PredictorSettings.from_fmi(fmi)
+        )
+        loop = cosimulate(compensator, machine.new_plant(), r, encoder=Encoder(1e-6, 0))
         assert_same(run, loop)
         against = np.diff(run.x_dm) * np.sign(np.diff(run.x_d))
         assert (np.min(against) < -1e-6) == ("no_reversal" in values)

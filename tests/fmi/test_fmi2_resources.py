@@ -79,7 +79,7 @@ def test_a_resource_that_grows_during_the_initialization_is_refused(
 
 
 def test_uris_of_windows(tmp_path: Path) -> None:
-    root = C_SOURCES / "fmi2"
+    root = C_SOURCES / "fmi"
     library = tmp_path / "uri.so"
     run_compiler(["-shared", "-fPIC", "-O1", *include_flags(), "-o", library, root / "hsep_uri.c"])
     convert = ctypes.CDLL(str(library)).hsep_uri_folder

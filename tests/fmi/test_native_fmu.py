@@ -125,7 +125,8 @@ def test_the_header_says_what_the_model_description_says(fmus: BuiltFmus) -> Non
     rows = re.findall(r'^    \{"([^"]+)", "([^"]*)", HSEP_(\w+), HSEP_(\w+), \d, ([^,]+),', header, re.MULTILINE)
     assert len(rows) == len(description.modelVariables)
     for (name, unit, kind, causality, start), variable in zip(rows, description.modelVariables, strict=True):
-        assert (name, unit, kind) == (variable.name, variable.unit or "", variable.type.upper())
+        c_kind = "Integer" if variable.type == "Enumeration" else variable.type
+        assert (name, unit, kind) == (variable.name, variable.unit or "", c_kind.upper())
         assert causality == variable.causality.upper()
         assert float(start) == float(variable.start or 0)
     references = dict(re.findall(r"^    HSEP_VR_(\w+) = (\d+)", header, re.MULTILINE))

@@ -85,7 +85,7 @@ def test_interface_of_the_predictor(predictor: FmuInstance) -> None:
         "lambda": ("parameter", "Real", "m2"),
         "T_s": ("parameter", "Real", "s"),
         "t_init": ("parameter", "Real", "s"),
-        "input_hold": ("parameter", "Integer", None),
+        "input_hold": ("parameter", "Enumeration", None),
         "dead_time": ("parameter", "Integer", None),
         "mode[1].f_n": ("parameter", "Real", "Hz"),
         "mode[1].zeta": ("parameter", "Real", None),

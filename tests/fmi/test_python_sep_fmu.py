@@ -48,7 +48,7 @@ def test_the_interface_is_the_contract(compensator: FmuInstance) -> None:
         ("x_d_ahead", "input", "Real", "m", "0.0"),
         ("x_meas", "input", "Real", "m", "0.0"),
         *((name, "output", "Real", "m", None) for name in ("x_dm", "x_d", "x_pb", "x_h", "e_servo")),
-        ("sep_state", "output", "Integer", None, None),
+        ("sep_state", "output", "Enumeration", None, None),
         *((name, "output", "Real", "m", None) for name in ("rms_e", "rms_pb", "rms_h")),
         ("batch", "output", "Integer", None, None),
         ("Np", "parameter", "Integer", None, "50"),
@@ -57,8 +57,9 @@ def test_the_interface_is_the_contract(compensator: FmuInstance) -> None:
         ("lambda", "parameter", "Real", "m2", "1e-08"),
         ("T_s", "parameter", "Real", "s", "0.001"),
         ("t_init", "parameter", "Real", "s", "0.1"),
-        ("input_hold", "parameter", "Integer", None, "0"),
+        ("input_hold", "parameter", "Enumeration", None, "0"),
         ("dead_time", "parameter", "Integer", None, "0"),
+        ("v_friction", "parameter", "Real", "m/s", "0.002"),
         ("preview", "parameter", "Integer", None, "200"),
         ("spacing", "parameter", "Integer", None, "2"),
         ("jerk_weight", "parameter", "Real", None, "1.0"),
@@ -66,9 +67,8 @@ def test_the_interface_is_the_contract(compensator: FmuInstance) -> None:
         ("a_max", "parameter", "Real", "m/s2", "16.0"),
         ("j_max", "parameter", "Real", "m/s3", "5000.0"),
         ("change_max", "parameter", "Real", "m", "0.001"),
-        ("v_friction", "parameter", "Real", "m/s", "0.002"),
-        ("no_reversal", "parameter", "Integer", None, "1"),
-        ("compensate", "parameter", "Integer", None, "2"),
+        ("no_reversal", "parameter", "Boolean", None, "true"),
+        ("compensate", "parameter", "Enumeration", None, "2"),
     ]
     variables = list(compensator.variables.values())
     found = [(v.name, v.causality, v.type, v.unit, v.start) for v in variables]
@@ -90,7 +90,7 @@ def test_both_flavours_have_the_table_and_the_page_shows_the_wiring(python_fmu: 
         description = json.loads(archive.read("resources/machine.json"))
         page = archive.read("documentation/index.html").decode()
     header = c_header(description, "{0}")
-    for line in ("HSEP_MODEL_SEP_COMPENSATOR 1", "HSEP_VR_x_dm = 2,", "HSEP_VR_preview = 20,", "HSEP_VR_mode = 30"):
+    for line in ("HSEP_MODEL_SEP_COMPENSATOR 1", "HSEP_VR_x_dm = 2,", "HSEP_VR_preview = 21,", "HSEP_VR_mode = 30"):
         assert line in header
     assert "SepCompensator</text>" in page
     assert "x_dm → x_d" in page
@@ -182,13 +182,13 @@ def travelling(path: Path) -> dict[str, str]:
 
 def test_each_fmu_carries_what_it_needs(python_fmu: Fmu, tmp_path: Path) -> None:
     mine = travelling(python_fmu("SepCompensatorPy"))
-    compensation = {f"compensate/{name}.py" for name in ("compensator", "sep_lookahead", "interior")}
-    assert compensation | {"base/limits.py", "predict/schedule.py", "fmi/slave.py"} < set(mine)
-    assert not {"evaluate/closed_loop.py", "plants/trajectory.py", "plants/plant.py", "machine.py"} & set(mine)
+    assert {"compensate/compensator.py", "predict/look_ahead.py", "base/settings.py", "fmi/slave.py"} < set(mine)
+    assert {"predict/reference_features.py", "compensate/interior.py", "compensate/__init__.py"} < set(mine)
+    assert not {"machine.py", "plants/plant.py", "plants/trajectory.py", "fmi/archive.py"} & set(mine)
     for name in ("HybridPredictorPy", "FeedDrivePy"):
         theirs = travelling(python_fmu(name))
-        assert not compensation & set(theirs)
-        assert "predict/lookahead.py" in theirs or name == "FeedDrivePy"
+        assert not any(module.startswith("compensate/") for module in theirs)
+        assert "predict/look_ahead.py" in theirs or name == "FeedDrivePy"
     for name in ("SepCompensatorPy", "HybridPredictorPy", "FeedDrivePy"):
         needs_nothing_else(python_fmu(name), tmp_path / name)
 

@@ -26,7 +26,7 @@ from hybridsep.base.settings import PredictorSettings
 from hybridsep.cosim.importer import FmuInstance
 from hybridsep.fmi.archive import build_fmu, fmu_names
 from hybridsep.fmi.backends import BACKENDS
-from hybridsep.fmi.weights import WEIGHTS_FILE, restore_weights, weights_file
+from hybridsep.fmi.weights import WEIGHTS_FILE, learned_settings, restore_weights, weights_file
 from hybridsep.machine import load_machine
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
@@ -108,7 +108,7 @@ def test_weights_and_samples_have_one_model_each(tmp_path: Path, trained: Path) 
 def test_damaged_files_leave_the_predictor_as_it_was(trained: Path) -> None:
     content = weights_file(HybridPredictor.load(trained))
     predictor = MACHINE.new_predictor()
-    first = 8 * (10 + 4)  # of the triangle, behind the head and one mode
+    first = 32 + 32 * len(learned_settings(predictor))  # of the triangle, behind the head and the settings
     zero = sealed(content[:first] + bytes(8) + content[first + 8 : -8])
     infinite = sealed(content[:first] + struct.pack("<d", np.inf) + content[first + 8 : -8])
     longer = sealed(content[:-8] + bytes(8))

@@ -34,7 +34,8 @@ MODEL = ModalModel([Mode(*numbers) for numbers in MODES])
 
 def small(**changes: Any) -> HybridPredictor:
     values = {"T_s": TS, "Np": 20, "p": 5, "q": 3, "lam": 1e-9, "t_init": 0.0, "v_friction": V_S} | changes
-    return HybridPredictor(MODEL, PredictorSettings(**values))
+    start = values.pop("start", None)
+    return HybridPredictor(MODEL, PredictorSettings(**values), start=start)
 
 
 @lru_cache(maxsize=1)

@@ -73,7 +73,6 @@ PLANNING: list[tuple[dict[str, Value], str]] = [
     ({"v_friction": -1e-3}, "v_friction must be 0 or 1e-09 … 10000 m/s, got -0.001"),
     ({"v_friction": 5e-324}, "v_friction must be 0 or 1e-09 … 10000 m/s, got 5e-324"),
     ({"v_friction": math.nan}, "v_friction must be finite, got nan"),
-    ({"no_reversal": 2}, "no_reversal must be 0 … 1, got 2"),
     ({"compensate": 3}, "compensate must be 0 … 2, got 3"),
     ({"compensate": -1}, "compensate must be 0 … 2, got -1"),
     (

@@ -93,7 +93,7 @@ class LookAheadStream(LibraryStream):
 
     def window(self, name: str) -> Array:
         shown = np.zeros(self._n_shown)
-        samples = getattr(self._look_ahead, name)[: self._n_shown]
+        samples = getattr(self._look_ahead.window, name.removesuffix("_window"))[: self._n_shown]
         shown[: len(samples)] = samples
         return shown
 
