@@ -284,6 +284,7 @@ class LookAhead:
                 self.window = self.planner.plan(x_d)
         except SignalError as error:
             self.diverged = str(error)
+            self.k -= 1  # the sample is refused, and outputs stay those of the last one
             raise
 
     def _now(self, signal: Array) -> float:

@@ -303,10 +303,13 @@ class CModel:
 def write_weights(folder: Path, name: str, factor: Array, n_samples: int, **settings: float) -> None:
     """Write ``weights.bin``, as the C model describes it, into a resources folder; ``settings`` replace the table's."""
     values = {"v_friction": 0.0, **DESCRIPTIONS[name]["parameters"], **settings}
-    modes = [mode[key] for mode in DESCRIPTIONS[name]["modes"] for key in ("f_n", "zeta", "alpha", "beta")]
-    whole = (*(int(values[key]) for key in ("p", "q", "input_hold", "dead_time")), len(modes) // 4, n_samples)
-    content = b"HSEPWGT2" + struct.pack("<6Q3d", *whole, *(values[key] for key in ("lambda", "T_s", "v_friction")))
-    content += np.concatenate([modes, *(factor[i, i:] for i in range(len(factor)))]).astype("<f8").tobytes()
+    modes = DESCRIPTIONS[name]["modes"]
+    names = ("p", "q", "lambda", "T_s", "input_hold", "v_friction", "dead_time")
+    learned = {key: values[key] for key in names}
+    learned |= {f"mode[{i}].{key}": value for i, mode in enumerate(modes, start=1) for key, value in mode.items()}
+    content = b"HSEPWGT3" + struct.pack("<3Q", len(learned), len(modes), n_samples)
+    content += b"".join(struct.pack("<24sd", key.encode(), value) for key, value in learned.items())
+    content += np.concatenate([factor[i, i:] for i in range(len(factor))]).astype("<f8").tobytes()
     (folder / "weights.bin").write_bytes(content + struct.pack("<Q", zlib.crc32(content)))
 
 
