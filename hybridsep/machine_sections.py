@@ -84,29 +84,24 @@ class Physics(Section):
         return self
 
 
-def _settings_section(settings: type[Settings], without: tuple[str, ...], *, inherits: bool = False) -> dict[str, Any]:
+def _settings_section(settings: type[Settings], *, inherits: bool = False) -> dict[str, Any]:
     """Return the entries of a section, by the names of the fields of settings.
 
     Parameters
     ----------
     settings : type of Settings
-    without : tuple of str
-        Fields that come from elsewhere.
     inherits : bool
         Whether an entry that is left out is another section's.
     """
     entries: dict[str, Any] = {}
     for field, parameter in ((field, settings.parameters().get(field.name)) for field in fields(settings)):
-        if parameter is not None and field.name not in without:
+        if parameter is not None and field.name not in settings.ELSEWHERE:
             default = None if inherits else field.default
             kind: Any = parameter.kind if default is not None else parameter.kind | None
             kind = Annotated[kind, BeforeValidator(_checked)]
             alias = None if parameter.name == field.name else parameter.name
             entries[field.name] = (kind, Field(default=default, alias=alias))
     return entries
-
-
-_FROM_ELSEWHERE = ("T_s", "input_hold", "v_friction")
 
 
 class Entries(Section):
@@ -137,15 +132,15 @@ else:
         "PredictorSection",
         __base__=_PredictorEntries,
         __doc__="Parameters of the hybrid predictor.",
-        **_settings_section(PredictorSettings, _FROM_ELSEWHERE),
+        **_settings_section(PredictorSettings),
     )
     CompensatorSection = create_model(
         "CompensatorSection",
         __base__=Entries,
         __doc__="Parameters of the compensator; the predictor's count where they are left out.",
         **{
-            **_settings_section(PredictorSettings, ("T_s", "input_hold", "v_friction"), inherits=True),
-            **_settings_section(CompensatorSettings, ("limits", "change_max", "compensate")),
+            **_settings_section(PredictorSettings, inherits=True),
+            **_settings_section(CompensatorSettings),
             "v_friction": (Number, PARAMETERS["v_friction"].default),
         },
     )

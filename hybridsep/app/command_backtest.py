@@ -4,28 +4,19 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from ..base.output import written_text
 from .failures import loading
-from .options import (
-    ForceOption,
-    InitOption,
-    JsonOption,
-    LamOption,
-    MachineOption,
-    NpOption,
-    POption,
-    QOption,
-    TsOption,
-    UnitOption,
-)
+from .options import ForceOption, JsonOption, MachineOption, TsOption, UnitOption
+from .parameter_options import PREDICTOR_ENTRIES, takes_parameters
 
 __all__ = ["backtest"]
 
 
+@takes_parameters(PREDICTOR_ENTRIES)
 def backtest(
     log: Annotated[Path, typer.Argument(help="CSV with the columns t, x_d, x, or .npz or .mat with named columns.")],
     machine: MachineOption,
@@ -34,11 +25,8 @@ def backtest(
     t: Annotated[str | None, typer.Option("--t", help="Name of the time column.")] = None,
     x_d: Annotated[str | None, typer.Option("--x-d", help="Name of the commanded position's column.")] = None,
     x: Annotated[str | None, typer.Option("--x", help="Name of the measured position's column.")] = None,
-    Np: NpOption = None,
-    p: POption = None,
-    q: QOption = None,
-    lam: LamOption = None,
-    t_init: InitOption = None,
+    *,
+    parameters: dict[str, Any],
     out: Annotated[Path | None, typer.Option(help="CSV for the RMS errors batch by batch.")] = None,
     force: ForceOption = False,
     as_json: JsonOption = False,
@@ -58,9 +46,7 @@ def backtest(
     names = {role: given[role] or column for role, column in axis.log.model_dump().items()}
     if T_s is not None and t is None:
         del names["t"]  # there may be none
-    changes = {"Np": Np, "p": p, "q": q, "lambda": lam, "t_init": t_init}
-    entries = {name: value for name, value in changes.items() if value is not None}
-    predictor = axis.changed("predictor", entries).new_predictor()
+    predictor = axis.changed("predictor", parameters).new_predictor()
     reader = open_log(log, columns=names, unit=unit, T_s=T_s)
     check_interval(log.name, reader.T_s, axis)
     outputs = [] if out is None else [Output("--out", out, BATCHES)]

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from ..base.data_files import DEFAULT_MACHINE
-from ..base.settings import check
+from ..base.settings import PARAMETERS, check
 from ..fmi.backends import BACKENDS
 from .failures import loading
 from .options import (
@@ -17,22 +17,18 @@ from .options import (
     TRAJECTORIES,
     BackendOption,
     ForceOption,
-    InitOption,
     JsonOption,
-    LamOption,
     MachineOption,
-    NpOption,
-    POption,
-    QOption,
     TsOption,
     UnitOption,
     WeightsOption,
-    parameter_help,
 )
+from .parameter_options import COMPENSATOR_ENTRIES, PREDICTOR_ENTRIES, parameter_help, takes_parameters
 
 __all__ = ["cosim"]
 
 
+@takes_parameters(PREDICTOR_ENTRIES, COMPENSATOR_ENTRIES)
 def cosim(
     machine: MachineOption = DEFAULT_MACHINE,
     trajectory: Annotated[
@@ -53,12 +49,9 @@ def cosim(
     ] = None,
     plant: Annotated[Path | None, typer.Option(help="Plant FMU; built from the machine if left out.")] = None,
     weights: WeightsOption = None,
-    seed: Annotated[int | None, typer.Option(help=parameter_help("seed"))] = None,
-    Np: NpOption = None,
-    p: POption = None,
-    q: QOption = None,
-    lam: LamOption = None,
-    t_init: InitOption = None,
+    seed: Annotated[int | None, typer.Option(help=parameter_help(PARAMETERS["seed"]))] = None,
+    *,
+    parameters: dict[str, Any],
     backend: BackendOption = BACKENDS[0],
     out: Annotated[Path | None, typer.Option(help="File for all signals, .csv or .npz.")] = None,
     figure: Annotated[
@@ -75,7 +68,7 @@ def cosim(
         from ..machine import load_machine, machine_path
         from .arguments import check_ending
         from .builds import build_for_host
-        from .cosim_arguments import best_model, check_pair, fitting, read_command
+        from .cosim_arguments import best_model, check_pair, checked_group, fitting, read_command
         from .overwrite import FIGURE, RUN, Output, check_outputs
         from .progress import progress_bar
         from .tables import print_run
@@ -89,8 +82,7 @@ def cosim(
     best = None if compensate is None else best_model(compensate)
     model = "HybridPredictor" if best is None else "SepCompensator"
     command = read_command(trajectory, axis, unit, T_s)
-    given = {"Np": Np, "p": p, "q": q, "lambda": lam, "t_init": t_init}
-    values = {name: value for name, value in given.items() if value is not None}
+    values = checked_group(parameters, model)
     if predictor is None:
         values = fitting(axis, model, values)
     if seed is not None:

@@ -19,8 +19,9 @@ from ..machine import Machine
 from ..plants.trajectory import PAPER_LIMITS, read_trajectory, spiral, staircase
 from .arguments import check_interval
 from .options import COMPENSATIONS, TRAJECTORIES
+from .parameter_options import COMPENSATOR_ENTRIES
 
-__all__ = ["best_model", "check_pair", "fitting", "read_command"]
+__all__ = ["best_model", "check_pair", "checked_group", "fitting", "read_command"]
 
 
 def read_command(trajectory: str, axis: Machine, unit: str, T_s: float | None) -> Array:
@@ -41,6 +42,14 @@ def best_model(compensate: str) -> SepState:
     if compensate not in COMPENSATIONS:
         raise ParameterError(f"--compensate must be one of {', '.join(COMPENSATIONS)}, got {compensate!r}")
     return SepState(COMPENSATIONS.index(compensate))
+
+
+def checked_group(values: Mapping[str, Any], model: str) -> dict[str, Any]:
+    """Return the values of a look-ahead FMU's parameters, by name; ParameterError if it has none of that name."""
+    wrong = [name for name in values if name in COMPENSATOR_ENTRIES] if model == "HybridPredictor" else []
+    if wrong:
+        raise ParameterError(f"{', '.join(f'--{name}' for name in wrong)} must come with --compensate")
+    return dict(values)
 
 
 def fitting(axis: Machine, model: str, values: Mapping[str, Any]) -> dict[str, Any]:

@@ -10,7 +10,6 @@ from typing import Annotated
 
 import typer
 
-from ..base.settings import PARAMETERS
 from ..fmi.backends import BACKENDS
 
 __all__ = [
@@ -18,17 +17,11 @@ __all__ = [
     "TRAJECTORIES",
     "BackendOption",
     "ForceOption",
-    "InitOption",
     "JsonOption",
-    "LamOption",
     "MachineOption",
-    "NpOption",
-    "POption",
-    "QOption",
     "TsOption",
     "UnitOption",
     "WeightsOption",
-    "parameter_help",
 ]
 
 
@@ -37,11 +30,6 @@ COMPENSATIONS = ("none", "physics", "hybrid")
 
 TRAJECTORIES = ("staircase", "spiral_x", "spiral_y")
 """What ``--trajectory`` takes besides a file."""
-
-
-def parameter_help(name: str) -> str:
-    """Return the help of an option that changes a parameter of the machine."""
-    return PARAMETERS[name].help + "; the machine's own if left out"
 
 
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and nothing else.")]
@@ -53,7 +41,7 @@ MachineOption = Annotated[
 ]
 BackendOption = Annotated[str, typer.Option(help=f"Flavour of the FMUs: {', '.join(BACKENDS)}.")]
 TsOption = Annotated[
-    float | None, typer.Option("--Ts", help="Sampling interval [s], for a file without a time column.")
+    float | None, typer.Option("--T_s", "--Ts", help="Sampling interval [s], for a file without a time column.")
 ]
 UnitOption = Annotated[str, typer.Option(help="Unit of the positions in the file: m, mm or um.")]
 WeightsOption = Annotated[
@@ -63,8 +51,3 @@ WeightsOption = Annotated[
         "here starts warm; name it where there are more."
     ),
 ]
-NpOption = Annotated[int | None, typer.Option("--Np", help=parameter_help("Np"))]
-POption = Annotated[int | None, typer.Option("--p", help=parameter_help("p"))]
-QOption = Annotated[int | None, typer.Option("--q", help=parameter_help("q"))]
-LamOption = Annotated[float | None, typer.Option("--lam", help=parameter_help("lambda"))]
-InitOption = Annotated[float | None, typer.Option("--t-init", help=parameter_help("t_init"))]

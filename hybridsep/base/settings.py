@@ -45,6 +45,9 @@ class Settings:
     OPTIONAL: ClassVar[tuple[str, ...]] = ()
     """Fields that may be None."""
 
+    ELSEWHERE: ClassVar[tuple[str, ...]] = ()
+    """Fields that are no entries of these settings' own section of a machine file."""
+
     def __post_init__(self) -> None:
         problems = []
         for name, parameter in self.parameters().items():
@@ -153,6 +156,8 @@ class PredictorSettings(Settings):
         alone (:mod:`~hybridsep.predict.reference_features`). 0, as in the paper: none.
     """
 
+    ELSEWHERE: ClassVar[tuple[str, ...]] = ("T_s", "input_hold", "v_friction")
+
     Np: int = whole(100, 1, 100_000, "samples in a look-ahead window (a batch)")
     p: int = whole(50, 1, 5000, "past residuals e_pb in the features", learned=True)
     q: int = whole(3, 0, 5000, "past physics-based predictions x_pb in the features", learned=True)
@@ -232,6 +237,7 @@ class CompensatorSettings(Settings):
     """
 
     OPTIONAL: ClassVar[tuple[str, ...]] = ("preview", "spacing", "change_max")
+    ELSEWHERE: ClassVar[tuple[str, ...]] = ("limits", "change_max", "compensate")
 
     preview: int | None = whole(
         *(200, 8, 2000, "samples planned ahead, at least Np + 4·spacing + 3"), unless_given=None

@@ -13,6 +13,7 @@ from places import EMPS
 from staircase_data import commanded
 
 from hybridsep import Encoder, __version__, cosimulate, load_machine, staircase
+from hybridsep.app.parameter_options import PREDICTOR_ENTRIES
 from hybridsep.base.settings import PARAMETERS
 
 
@@ -218,3 +219,45 @@ def test_a_log_at_another_sampling_interval_is_refused(hybridsep: Run, tmp_path:
     status, _, err = hybridsep("backtest", log, "-m", "spring_mass_damper")
     assert status == 2
     assert "sampled every 0.004 s, but machine spring_mass_damper has T_s = 0.001 s" in " ".join(err.split())
+
+
+@pytest.mark.parametrize(
+    "name", sorted(PredictorSettings.fmi_parameters().keys() - {"T_s", "input_hold", "v_friction"})
+)
+def test_each_parameter_of_the_predictor_is_an_option(hybridsep: Run, name: str) -> None:
+    parameter = PREDICTOR_ENTRIES[name]
+    for command in ("backtest", "cosim"):
+        _, out, _ = hybridsep(command, "--help")
+        assert f"--{parameter.name}" in out
+        assert " ".join(parameter.help.split()) in " ".join(out.split())
+
+
+def test_the_compensators_parameters_are_options_and_need_a_compensator(hybridsep: Run, tmp_path: Path) -> None:
+    command = write_log(tmp_path / "log.csv", n=600)
+    given = (
+        "--Np",
+        40,
+        "--p",
+        10,
+        "--q",
+        2,
+        "--lam",
+        1e-9,
+        "--spacing",
+        4,
+        "--no-reversal",
+        "false",
+        "--v_friction",
+        0,
+    )
+    run = ("cosim", "--trajectory", command, "--backend", "python", "--json")
+    status, out, _ = hybridsep(*run, "--compensate", "physics", *given)
+    assert status == 0
+    assert json.loads(out)["share_physics"] == 1.0
+    for option, value in (("--preview", 90), ("--no_reversal", "true"), ("--jerk-weight", 2)):
+        status, _, err = hybridsep(*run, option, value)
+        assert status == 2
+        assert f"{option.replace('jerk-', 'jerk_')} must come with --compensate" in err
+    status, _, err = hybridsep(*run, "--compensate", "physics", "--no_reversal", "maybe")
+    assert status == 2
+    assert "'maybe' is neither true nor false" in " ".join(err.split())

@@ -1,0 +1,84 @@
+"""Command-line options of the predictor's and the compensator's parameters, made from their declaration."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterator
+from functools import wraps
+from typing import Annotated, Any
+
+import typer
+
+from ..base.parameters import Parameter
+from ..base.settings import PARAMETERS, CompensatorSettings, PredictorSettings, Settings
+
+__all__ = ["COMPENSATOR_ENTRIES", "PREDICTOR_ENTRIES", "parameter_help", "takes_parameters"]
+
+
+def _entries(settings: type[Settings]) -> dict[str, Parameter]:
+    return {name: entry for name, entry in settings.parameters().items() if name not in settings.ELSEWHERE}
+
+
+PREDICTOR_ENTRIES = _entries(PredictorSettings)
+"""Parameters that the section ``[predictor]`` of a machine file may have, by the names of the settings' fields."""
+
+COMPENSATOR_ENTRIES = {**_entries(CompensatorSettings), "v_friction": PARAMETERS["v_friction"]}
+"""Parameters that the section ``[compensator]`` may have besides."""
+
+
+def parameter_help(parameter: Parameter) -> str:
+    """Return the help of an option that changes a parameter of the machine."""
+    return parameter.help + "; the machine's own if left out"
+
+
+def takes_parameters(*groups: dict[str, Parameter]) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Return a decorator that gives a command an option for each parameter.
+
+    The command's argument ``parameters`` becomes the mapping of those that are given, by their names in FMUs.
+
+    Parameters
+    ----------
+    *groups : dict
+        Of :data:`PREDICTOR_ENTRIES` and :data:`COMPENSATOR_ENTRIES`.
+    """
+    options = {field: parameter for group in groups for field, parameter in group.items()}
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        @wraps(command)
+        def run(**arguments: Any) -> None:
+            given = {parameter.name: arguments.pop(field) for field, parameter in options.items()}
+            command(**arguments, parameters={name: value for name, value in given.items() if value is not None})
+
+        signature = inspect.signature(command, eval_str=True)
+        arguments = list(_with_options(signature, options))
+        run.__signature__ = signature.replace(parameters=arguments)  # type: ignore[attr-defined]
+        run.__annotations__ = {argument.name: argument.annotation for argument in arguments}
+        return run
+
+    return decorate
+
+
+def _with_options(signature: inspect.Signature, options: dict[str, Parameter]) -> Iterator[inspect.Parameter]:
+    """Yield a command's arguments, the options in the place of ``parameters``."""
+    for name, argument in signature.parameters.items():
+        if name != "parameters":
+            yield argument.replace(kind=inspect.Parameter.KEYWORD_ONLY)
+            continue
+        for field, parameter in options.items():
+            kind: Any = str if parameter.kind is bool else parameter.kind
+            annotation = Annotated[kind | None, _option(field, parameter)]  # type: ignore[valid-type]
+            yield inspect.Parameter(field, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
+
+
+def _option(field: str, parameter: Parameter) -> Any:
+    """Return the option, under the FMU's name; with hyphens or by the field's name it is accepted, too."""
+    names = dict.fromkeys(f"--{name}" for name in (parameter.name, parameter.name.replace("_", "-"), field))
+    more: dict[str, Any] = {"parser": _truth_value, "metavar": "true|false"} if parameter.kind is bool else {}
+    return typer.Option(*names, help=parameter_help(parameter), **more)
+
+
+def _truth_value(text: str | bool) -> bool:
+    values = {"true": True, "false": False}
+    if str(text).lower() not in values:
+        raise typer.BadParameter(f"{text!r} is neither true nor false")
+    return values[str(text).lower()]
