@@ -66,7 +66,7 @@ def _with_options(signature: inspect.Signature, options: dict[str, Parameter]) -
             continue
         for field, parameter in options.items():
             kind: Any = str if parameter.kind is bool else parameter.kind
-            annotation = Annotated[kind | None, _option(field, parameter)]  # type: ignore[valid-type]
+            annotation = Annotated[kind | None, _option(field, parameter)]
             yield inspect.Parameter(field, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
 
 

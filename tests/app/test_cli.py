@@ -221,9 +221,7 @@ def test_a_log_at_another_sampling_interval_is_refused(hybridsep: Run, tmp_path:
     assert "sampled every 0.004 s, but machine spring_mass_damper has T_s = 0.001 s" in " ".join(err.split())
 
 
-@pytest.mark.parametrize(
-    "name", sorted(PredictorSettings.fmi_parameters().keys() - {"T_s", "input_hold", "v_friction"})
-)
+@pytest.mark.parametrize("name", sorted(PREDICTOR_ENTRIES))
 def test_each_parameter_of_the_predictor_is_an_option(hybridsep: Run, name: str) -> None:
     parameter = PREDICTOR_ENTRIES[name]
     for command in ("backtest", "cosim"):
