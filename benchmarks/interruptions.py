@@ -31,7 +31,7 @@ COMMANDS = {
     "demo": ["demo", "--seeds", "1", "--out", "."],
     "build": ["build", "-m", "spring_mass_damper", "--target", "host", "--out", "."],
     "backtest": ["backtest", "../log.csv", "-m", "spring_mass_damper", "--out", "batches.csv"],
-    "cosim": ["cosim", "--backend", "python", "--out", "run.csv", "--figure", "run.png"],
+    "cosim": ["cosim", "--flavour", "python", "--out", "run.csv", "--figure", "run.png"],
 }
 """Run in the folder of their results."""
 

@@ -120,7 +120,7 @@ class FmuLoops:
 
     Parameters
     ----------
-    backend : {"native", "python"}
+    flavour : {"native", "python"}
         Flavour of the FMUs.
 
     Attributes
@@ -129,8 +129,8 @@ class FmuLoops:
         Largest difference of ``x_dm`` from the library's cold runs so far.
     """
 
-    def __init__(self, backend: str) -> None:
-        self.backend, self.apart = backend, 0.0
+    def __init__(self, flavour: str) -> None:
+        self.flavour, self.apart = flavour, 0.0
         self._folder = tempfile.TemporaryDirectory()
         self._built: dict[tuple[str, ...], Path] = {}
         self._library = LibraryLoops()
@@ -184,9 +184,9 @@ class FmuLoops:
         """Return an FMU of a machine; only those with weights are built anew."""
         key = (machine.name, model, str(machine.compensator))
         if weights is not None or key not in self._built:
-            name = next(name for name, built in fmu_names(machine, self.backend).items() if built == model)
+            name = next(name for name, built in fmu_names(machine, self.flavour).items() if built == model)
             folder = Path(self._folder.name) / ("warm" if weights else str(len(self._built)))
-            path = build_fmu(machine, name, folder, self.backend, targets=("host",), weights=weights)
+            path = build_fmu(machine, name, folder, self.flavour, targets=("host",), weights=weights)
             if weights is not None:
                 return path
             self._built[key] = path

@@ -57,7 +57,7 @@ STAGE_KINDS = (
 OTHER_V_S = (1e-3, 5e-3)
 """m/s; how well the friction must be known."""
 
-FMU_BACKEND = "native"
+FMU_FLAVOUR = "native"
 """Flavour of the FMUs if none is asked for."""
 
 
@@ -239,7 +239,7 @@ def robustness_rows(report: Report, loops: Loops, seeds: range) -> None:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=5, help="noise seeds to average over")
-    parser.add_argument("--fmu", choices=("native", "python", "none"), default=FMU_BACKEND, help="flavour of the FMUs")
+    parser.add_argument("--fmu", choices=("native", "python", "none"), default=FMU_FLAVOUR, help="flavour of the FMUs")
     parser.add_argument("--first-seed", type=int, default=0, help="the first of them")
     options = parser.parse_args()
     seeds, report = range(options.first_seed, options.first_seed + options.seeds), Report()

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridsep.fmi.native_backend import fmi_headers, sources
+from hybridsep.fmi.native_flavour import fmi_headers, sources
 from hybridsep.machine import load_machine
 
 Array = NDArray[np.float64]

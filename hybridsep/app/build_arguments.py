@@ -21,18 +21,18 @@ Job = tuple[Machine, str, str]
 """An FMU to build: its machine, name and model."""
 
 
-def jobs_of(fmus: Sequence[str], machines: Sequence[str], backend: str, targets: Sequence[str]) -> list[Job]:
+def jobs_of(fmus: Sequence[str], machines: Sequence[str], flavour: str, targets: Sequence[str]) -> list[Job]:
     """Return the FMUs to build, all of the machines' if none is named."""
     jobs = [
         (axis, name, model)
         for axis in map(load_machine, machines or machine_names())
-        for name, model in fmu_names(axis, backend).items()
+        for name, model in fmu_names(axis, flavour).items()
     ]
     if unknown := sorted(set(fmus) - {name for _, name, _ in jobs}):
         raise ParameterError(f"no FMU {', '.join(unknown)}; there are {', '.join(name for _, name, _ in jobs)}")
-    if targets and backend != "native":
-        raise ParameterError(f"--target is for native FMUs; with --backend {backend} leave it out")
-    if backend == "native":
+    if targets and flavour != "native":
+        raise ParameterError(f"--target is for native FMUs; with --flavour {flavour} leave it out")
+    if flavour == "native":
         compilers(targets or ("host",))
     return [job for job in jobs if not fmus or job[1] in fmus]
 

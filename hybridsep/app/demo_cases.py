@@ -30,11 +30,11 @@ MACHINES = {"staircase": "spring_mass_damper", "spiral_x": "als25010_x", "spiral
 """The machine of each case."""
 
 
-def staircase_case(out: Path, seeds: int, backend: str, advance: Callable[[str], None]) -> dict[str, Any]:
+def staircase_case(out: Path, seeds: int, flavour: str, advance: Callable[[str], None]) -> dict[str, Any]:
     """Predict and compensate on the staircase."""
     machine = load_machine(MACHINES["staircase"])
     command = staircase(machine.T_s)
-    fmus = build_pair(machine, out / "fmus", backend)
+    fmus = build_pair(machine, out / "fmus", flavour)
     runs = []
     for seed in range(seeds):
         advance(f"staircase, FMU against FMU, noise seed {seed}")
@@ -43,7 +43,7 @@ def staircase_case(out: Path, seeds: int, backend: str, advance: Callable[[str],
     title = "Staircase (cf. the paper's Fig. 4), FMU against FMU, noise seed 0"
     prediction_figure(runs[0], title, out / "staircase.png")
     compensated, compensation = compensate(
-        machine, fmus[1], command, out, backend, seeds=range(seeds), advance=partial(_say, advance, "staircase")
+        machine, fmus[1], command, out, flavour, seeds=range(seeds), advance=partial(_say, advance, "staircase")
     )
     compensated["hybrid_warm"].save(out / "staircase_compensated.csv")
     title = "Staircase, compensated: FMU against FMU, noise seed 0"
@@ -57,14 +57,14 @@ def staircase_case(out: Path, seeds: int, backend: str, advance: Callable[[str],
     }
 
 
-def spiral_case(out: Path, backend: str, advance: Callable[[str], None]) -> Summary:
+def spiral_case(out: Path, flavour: str, advance: Callable[[str], None]) -> Summary:
     """Predict and compensate on the spiral, both axes."""
     summary: Summary = {}
     axes: dict[str, Run] = {}
     compensated: dict[str, Runs] = {}
     for axis, command in zip(("x", "y"), spiral(), strict=True):
         machine, label = load_machine(MACHINES[f"spiral_{axis}"]), f"spiral, {axis.upper()} axis"
-        fmus = build_pair(machine, out / "fmus", backend)
+        fmus = build_pair(machine, out / "fmus", flavour)
         advance(label)
         axes[axis] = run = cosimulate(*fmus, command)
         case = summary[f"spiral_{axis}"] = {**run.summary(), "physics_tuned_to_printed": True, **_worse(run)}
@@ -75,7 +75,7 @@ def spiral_case(out: Path, backend: str, advance: Callable[[str], None]) -> Summ
         title = f"Spiral, {axis.upper()} axis (cf. the paper's Fig. 8), FMU against FMU"
         prediction_figure(run, title, out / f"spiral_{axis}.png")
         compensated[axis], case["compensation"] = compensate(
-            machine, fmus[1], command, out, backend, advance=partial(_say, advance, label)
+            machine, fmus[1], command, out, flavour, advance=partial(_say, advance, label)
         )
         compensated[axis]["hybrid_warm"].save(out / f"spiral_{axis}_compensated.csv")
         title = f"Spiral, {axis.upper()} axis, compensated: FMU against FMU"

@@ -39,7 +39,7 @@ def compensate(
     plant: Path,
     command: Array,
     out: Path,
-    backend: str,
+    flavour: str,
     *,
     seeds: Sequence[int] = (0,),
     advance: Callable[[str], object] = lambda message: None,
@@ -55,7 +55,7 @@ def compensate(
         Commanded positions.
     out : Path
         Folder: the FMU goes to ``fmus``, the trained one to ``fmus/warm``, what it learned from to ``<machine>.state``.
-    backend : {"native", "python"}
+    flavour : {"native", "python"}
         Flavour of the FMU.
     seeds : sequence of int
         Noise seeds.
@@ -70,10 +70,10 @@ def compensate(
         The same keys → means over the seeds of :meth:`Run.summary`, with the spread
         ``tracking_rms_um_std``.
     """
-    cold = build_for_host(machine, "SepCompensator", out / "fmus", backend)
+    cold = build_for_host(machine, "SepCompensator", out / "fmus", flavour)
     weights = out / f"{machine.name}.state"
     train(machine, command, weights)
-    warm = build_for_host(machine, "SepCompensator", out / "fmus" / "warm", backend, weights=weights)
+    warm = build_for_host(machine, "SepCompensator", out / "fmus" / "warm", flavour, weights=weights)
     runs: Runs = {}
     summary: dict[str, Any] = {}
     for key, best in KINDS.items():

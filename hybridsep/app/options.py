@@ -11,12 +11,12 @@ from typing import Annotated
 import typer
 
 from ..base.settings import PARAMETERS
-from ..fmi.backends import BACKENDS
+from ..fmi.flavours import FLAVOURS
 
 __all__ = [
     "COMPENSATIONS",
     "TRAJECTORIES",
-    "BackendOption",
+    "FlavourOption",
     "ForceOption",
     "InitOption",
     "JsonOption",
@@ -51,7 +51,7 @@ ForceOption = Annotated[
 MachineOption = Annotated[
     str, typer.Option("--machine", "-m", help="Machine file (.toml), or the name of one that comes with the library.")
 ]
-BackendOption = Annotated[str, typer.Option(help=f"Flavour of the FMUs: {', '.join(BACKENDS)}.")]
+FlavourOption = Annotated[str, typer.Option(help=f"Flavour of the FMUs: {', '.join(FLAVOURS)}.")]
 TsOption = Annotated[
     float | None, typer.Option("--Ts", help="Sampling interval [s], for a file without a time column.")
 ]

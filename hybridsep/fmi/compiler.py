@@ -214,7 +214,7 @@ def _host_compiler() -> list[str]:
         return _zig(TARGETS[host_target()].triple)
     raise FmuError(
         "no C compiler: none of $CC, cc, gcc, clang; install one, or pip install ziglang, or build with "
-        "--backend python"
+        "--flavour python"
     )
 
 

@@ -1,4 +1,4 @@
-"""What both backends say about an FMU: what its models are, and the GUID that follows from its content."""
+"""What both flavours say about an FMU: what its models are, and the GUID that follows from its content."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ def shown(tmp_path_factory: pytest.TempPathFactory) -> Demonstration:
     out = tmp_path_factory.mktemp("demo")
     fractions: list[float] = []
     emps = EMPS if EMPS.exists() else None
-    summary = demo(out, backend="python", emps=emps, progress=lambda message, fraction: fractions.append(fraction))
+    summary = demo(out, flavour="python", emps=emps, progress=lambda message, fraction: fractions.append(fraction))
     return Demonstration(out, summary, fractions)
 
 
@@ -118,7 +118,7 @@ def test_compensation_in_the_readme(shown: Demonstration, case: str, figure: str
 
 def test_build_fmu_is_a_front_of_the_command_line(tmp_path: Path) -> None:
     command = [sys.executable, str(ROOT / "build_fmu.py"), "--machine", str(ROOT / "models" / "als25010_x.toml")]
-    subprocess.run([*command, "--backend", "python", "--out", str(tmp_path)], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([*command, "--flavour", "python", "--out", str(tmp_path)], check=True, stdout=subprocess.DEVNULL)
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         "FeedDrivePy_als25010_x.fmu",
         "HybridPredictorPy_als25010_x.fmu",

@@ -19,7 +19,7 @@ from hybridsep.cosim.loop import cosimulate
 from hybridsep.cosim.run import COMPENSATOR, Run
 from hybridsep.evaluate.path_plots import contour_figure
 from hybridsep.evaluate.time_plots import tracking_figure
-from hybridsep.fmi.backends import BACKENDS
+from hybridsep.fmi.flavours import FLAVOURS
 from hybridsep.machine import Machine
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.trajectory import spiral, staircase
@@ -34,12 +34,12 @@ Fmu = Callable[[str], Path]
 Pair = tuple[Path, Path]
 
 
-def build(machine: Machine, backend: str, model: str, out: Path, weights: Path | None = None) -> Path:
-    name = next(name for name, built in fmu_names(machine, backend).items() if built == model)
-    return build_fmu(machine, name, out, backend, targets=("host",), weights=weights)
+def build(machine: Machine, flavour: str, model: str, out: Path, weights: Path | None = None) -> Path:
+    name = next(name for name, built in fmu_names(machine, flavour).items() if built == model)
+    return build_fmu(machine, name, out, flavour, targets=("host",), weights=weights)
 
 
-@pytest.fixture(scope="module", params=BACKENDS)
+@pytest.fixture(scope="module", params=FLAVOURS)
 def flavour(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 

@@ -20,7 +20,7 @@ from c_core import (
     sanitising_compiler,
 )
 
-from hybridsep.fmi.native_backend import sources
+from hybridsep.fmi.native_flavour import sources
 from hybridsep.machine import load_machine
 
 FUZZED = {

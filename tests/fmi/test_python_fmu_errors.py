@@ -63,5 +63,5 @@ def test_what_is_no_fmu(tmp_path: Path) -> None:
     machine = load_machine("emps")
     with pytest.raises(FmuError, match=r"machine emps has no FMU 'FeedDrivePy_emps'; it has HybridPredictorPy_emps"):
         build_fmu(machine, "FeedDrivePy_emps", tmp_path, "python")
-    with pytest.raises(FmuError, match=r"backend must be one of .*, got 'fortran'"):
+    with pytest.raises(FmuError, match=r"flavour must be one of .*, got 'fortran'"):
         fmu_names(machine, "fortran")
