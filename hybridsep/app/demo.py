@@ -11,7 +11,7 @@ from ..fmi.archive import fmu_names
 from ..machine import load_machine
 from .builds import default_flavour
 from .demo_cases import MACHINES, Summary, read_recorded, recorded_case, spiral_case, staircase_case
-from .demo_compensation import KINDS
+from .demo_compensation import COMPENSATED
 from .printed import PRINTED
 
 __all__ = ["demo", "demo_files"]
@@ -81,7 +81,7 @@ def demo(
     recorded = None if emps is None else read_recorded(emps)  # a file that cannot be read must not end four minutes
     out = Path(out)
     out.mkdir(parents=True, exist_ok=True)
-    total = seeds + 6 + 3 * len(KINDS) + (recorded is not None)
+    total = seeds + 6 + 3 * len(COMPENSATED) + (recorded is not None)
     done = 0
 
     def advance(message: str) -> None:

@@ -20,7 +20,7 @@ from ..logs.log import Log, read_log
 from ..machine import load_machine
 from ..plants.trajectory import spiral, staircase
 from .builds import build_pair
-from .demo_compensation import KINDS, Runs, compensate, contour_errors, mean_summary
+from .demo_compensation import COMPENSATED, Runs, compensate, contour_errors, mean_summary
 
 __all__ = ["MACHINES", "Summary", "read_recorded", "recorded_case", "spiral_case", "staircase_case"]
 
@@ -82,7 +82,7 @@ def spiral_case(out: Path, flavour: str, advance: Callable[[str], None]) -> Summ
         tracking_figure(compensated[axis], title, out / f"spiral_{axis}_compensated.png")
     spiral_figure(axes["x"], axes["y"], out / "spiral.png")
     errors = contour_errors(compensated["x"], compensated["y"])
-    pairs = {kind: (compensated["x"][kind], compensated["y"][kind]) for kind in KINDS}
+    pairs = {kind: (compensated["x"][kind], compensated["y"][kind]) for kind in COMPENSATED}
     contour_figure(pairs, errors, "Spiral, X and Y compensated: contour error", out / "spiral_contour.png")
     for case in summary.values():
         for kind, error in errors.items():

@@ -19,7 +19,7 @@ from .canvas import CASES, HOLD, HYBRID, PHYSICS, finish_panels, save_figure
 __all__ = ["prediction_figure", "tracking_figure"]
 
 _SPANS = {SepState.OFF: ("not compensated", HOLD), SepState.PHYSICS: ("planned by the physics model", PHYSICS)}
-"""How spans are shaded that a run's best model did not plan."""
+"""Shading of spans that a lesser model planned than others of the run."""
 
 
 def prediction_figure(run: Run, title: str, path: str | Path) -> None:
@@ -83,8 +83,8 @@ def tracking_figure(runs: Mapping[str, Run], title: str, path: str | Path) -> No
     Parameters
     ----------
     runs : mapping
-        Keys of :data:`~hybridsep.evaluate.canvas.CASES` → runs over the same command. Where it is one run only, the
-        spans are shaded that its best model did not plan.
+        Keys of :data:`~hybridsep.evaluate.canvas.CASES` → runs over the same command. Of one run alone,
+        the spans are shaded that a lesser model planned.
     title : str
         Heading.
     path : str or Path
@@ -131,7 +131,7 @@ def _draw_signals(axes: Axes, signals: Mapping[str, Array], runs: Mapping[str, R
 
 
 def _shade(panels: Sequence[Axes], run: Run) -> list[Patch]:
-    """Shade the spans that another model than the run's best one planned; return what the legend says of them."""
+    """Shade the spans that a lesser model planned than others of the run; return their legend entries."""
     patches = []
     edges_of_samples = np.append(run.t, run.t[-1] + run.T_s) - run.t[0]
     for state, (label, color) in _SPANS.items():

@@ -14,12 +14,12 @@ import pytest
 from places import EMPS, ROOT
 
 from hybridsep.app.demo import demo, demo_files
+from hybridsep.app.demo_compensation import COMPENSATED
 from hybridsep.app.overwrite import BY_ENDING
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 PNG = b"\x89PNG\r\n\x1a\n"
 CASES = ("staircase", "spiral_x", "spiral_y")
-KINDS = ("none", "physics", "hybrid_cold", "hybrid_warm")
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Demonstration:
     fractions: list[float]
 
     def compensation(self, case: str, figure: str) -> list[float]:
-        return [self.summary[case]["compensation"][kind][figure] for kind in KINDS]
+        return [self.summary[case]["compensation"][kind][figure] for kind in COMPENSATED]
 
 
 @pytest.fixture(scope="module")
