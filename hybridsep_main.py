@@ -1,4 +1,4 @@
-"""Entry point of the command line, outside the package: ready for Ctrl-C before the library is."""
+"""Entry point of the command line, outside the package: handles Ctrl-C before the library is loaded."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ctrl-C, kill -9 and a full disk at random moments of each command: every file is whole, as it was or complete.
+"""Interruption test of each command, by Ctrl-C, kill -9 or a full disk at random moments: every file is whole.
 
 Each command first runs undisturbed, for its duration and its files, whose bytes do not depend on the run. Then it runs
 again and again over older files of the same names. Ctrl-C and kill -9 come at uniformly random moments; the disk, a

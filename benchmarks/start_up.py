@@ -1,4 +1,4 @@
-"""How long the library and its command line take to load, beside ``import scipy.signal`` in the same run.
+"""Load times of the library and its command line, beside ``import scipy.signal`` in the same run.
 
     python benchmarks/start_up.py [--runs 15]
 

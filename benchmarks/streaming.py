@@ -1,4 +1,4 @@
-"""A long log streamed from a file: 10⁷ samples in constant memory, with the weights still exact at the end.
+"""Streaming benchmark: a log of 10⁷ samples in constant memory, with the weights exact at the end.
 
 Run with ``python benchmarks/streaming.py``; exits with 1 if memory grew or the weights are off by more than 1e-10.
 

@@ -26,7 +26,7 @@ __all__ = ["Case", "FmuLoops", "LibraryLoops", "Loops", "noise_seed"]
 
 @dataclass(frozen=True)
 class Case:
-    """What is done to the loop: another plant from sample ``at`` on, a held sensor, other limits or noise."""
+    """Disturbance of the loop: another plant from sample ``at`` on, a held sensor, other limits or noise."""
 
     change: Callable[[FeedDrive], None] | None = None
     at: int = 3050
@@ -69,7 +69,7 @@ class Loops(Protocol):
         n : int
             Runs.
         case : Case, optional
-            What is done to the loop.
+            Disturbance of the loop.
         """
         ...
 

@@ -1,4 +1,4 @@
-"""What users have today against servo errors, to compare with: input shaping and zero-phase-error tracking control.
+"""Peers in compensation: input shaping and zero-phase-error tracking control.
 
 Both are filters of the commanded position that know the physics model only. The third peer, a filtered-basis-function
 compensator on the physics model, is ``SepCompensator`` with ``compensate = "physics"``.

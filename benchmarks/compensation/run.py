@@ -1,4 +1,4 @@
-"""What compensation is worth: tracking errors in closed loop, with and without it, beside what users have today.
+"""Benchmark of compensation: tracking errors in closed loop, with and without it, beside peers.
 
     python benchmarks/compensation/run.py [--seeds 5] [--first-seed 0] [--fmu native|python|none]
 
@@ -47,14 +47,14 @@ STAGE_HYBRIDS: dict[str, dict[str, float]] = {
     "hybrid, no_reversal = 0,": {"no_reversal": False},
     "hybrid, v_friction = 0, no_reversal = 0,": {"v_friction": 0.0, "no_reversal": False},
 }
-"""What is left out on the stage."""
+"""Settings of the hybrid runs on the stage."""
 STAGE_CASES = (
     *("none", "physics", "physics, no_reversal"),
     *(f"{name} {run}" for name in STAGE_HYBRIDS for run in ("cold", "warm")),
 )
 
 OTHER_V_FRICTION = (1e-3, 5e-3)
-"""m/s; how well the friction must be known."""
+"""m/s; sensitivity to the friction velocity."""
 
 FMU_FLAVOUR = "native"
 """Flavour of the FMUs if none is asked for."""
@@ -187,7 +187,7 @@ def after_reversals(r: Array) -> Any:
 
 
 def peer_rows(report: Report, cold: float, warm: float) -> None:
-    """Row 4: what users have today; the true position does not depend on the noise, except for the hybrid's."""
+    """Row 4: peers; the true position does not depend on the noise, except for the hybrid's."""
     report.title("4  peers on the staircase drive")
     machine, r = load_machine("spring_mass_damper"), staircase()
     discrete = machine.new_predictor().discrete
@@ -210,7 +210,7 @@ def peer_rows(report: Report, cold: float, warm: float) -> None:
 
 
 def robustness_rows(report: Report, loops: Loops, seeds: range) -> None:
-    """Row 5: what goes wrong in practice."""
+    """Row 5: disturbances in practice."""
     recommended, r = load_machine("spring_mass_damper"), staircase()
     usual_limits, change_max = recommended.command_limits()
     for title, machine in (

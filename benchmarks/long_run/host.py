@@ -1,4 +1,4 @@
-"""Build and call ``main.c``: the C core for long, with the allocator's calls counted."""
+"""Build and calls of ``main.c``, which runs the C core for long and counts the allocator's calls."""
 
 from __future__ import annotations
 

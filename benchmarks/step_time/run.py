@@ -1,7 +1,7 @@
-"""How long one step of the native HybridPredictor takes, and how evenly, beside blocked LAPACK in the same run.
+"""Step time of the native HybridPredictor and its tail, beside blocked LAPACK in the same run.
 
 Builds a C host around the model (``main.c``), times every step of it, times LAPACK's ``dtpqrt`` on the same rows
-batch by batch, counts instructions step by step where valgrind is installed, prints the ratios, draws the
+window by window, counts instructions step by step where valgrind is installed, prints the ratios, draws the
 distribution, and ends with 1 if a limit is missed.
 """
 
@@ -49,7 +49,7 @@ TAIL_OVER_MEDIAN_MAX = 15.0
 
 
 def lapack_ns_per_sample(n: int) -> float:
-    """Return the time of RidgeRegression's one dtpqrt call a batch, per sample, ns; the median of 300 batches."""
+    """Return the time of RidgeRegression's one dtpqrt call a window, per sample, ns; the median of 300 windows."""
     regression = RidgeRegression(n, LAM)
     rng = np.random.default_rng(0)
     rows = np.asfortranarray(np.cumsum(rng.normal(0.0, 1e-6, (NP, n + 1)), axis=0))

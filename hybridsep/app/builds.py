@@ -1,4 +1,4 @@
-"""FMUs that a command builds for itself, for this computer alone."""
+"""FMUs built for a command's own use, for this platform alone."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def default_flavour() -> str:
 
 
 def build_for_host(machine: Machine, model: str, out: Path, flavour: str, *, weights: Path | None = None) -> Path:
-    """Build one of a machine's FMUs for this computer."""
+    """Build one of a machine's FMUs for this platform."""
     names = {built: name for name, built in fmu_names(machine, flavour).items()}
     return build_fmu(machine, names[model], out, flavour, targets=("host",), weights=weights)
 

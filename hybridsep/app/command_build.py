@@ -1,4 +1,4 @@
-"""``hybridsep build``."""
+"""Command ``hybridsep build``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``hybridsep demo``."""
+"""Command ``hybridsep demo``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Checks of the arguments of ``hybridsep cosim``, all of them before any work, and what follows from them."""
+"""Checks of the arguments of ``hybridsep cosim`` before any work, and the values for the FMUs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The main job, end to end: build the FMUs, co-simulate the paper's cases, score them, draw them."""
+"""Demonstration: builds the FMUs, co-simulates the paper's cases, scores and draws them."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def demo(
         If ``emps`` cannot be read; nothing has been done then.
     """
     flavour = flavour or default_flavour()
-    recorded = None if emps is None else read_recorded(emps)  # a file that cannot be read must not end four minutes
+    recorded = None if emps is None else read_recorded(emps)  # first: a refusal must not come after minutes of work
     out = Path(out)
     out.mkdir(parents=True, exist_ok=True)
     total = seeds + 6 + 3 * len(COMPENSATED) + (recorded is not None)

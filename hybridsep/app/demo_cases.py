@@ -1,4 +1,4 @@
-"""The demonstration's cases: the paper's staircase and spiral, and a recorded axis."""
+"""Cases of the demonstration: the paper's staircase and spiral, and a recorded axis."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def staircase_case(out: Path, seeds: int, flavour: str, advance: Callable[[str],
     title = "Staircase (cf. the paper's Fig. 4), FMU against FMU, noise seed 0"
     prediction_figure(runs[0], title, out / "staircase.png")
     compensated, compensation = compensate(
-        machine, fmus[1], command, out, flavour, seeds=range(seeds), advance=partial(_say, advance, "staircase")
+        machine, fmus[1], command, out, flavour, seeds=range(seeds), advance=partial(_announce, advance, "staircase")
     )
     compensated["hybrid_warm"].save(out / "staircase_compensated.csv")
     title = "Staircase, compensated: FMU against FMU, noise seed 0"
@@ -75,7 +75,7 @@ def spiral_case(out: Path, flavour: str, advance: Callable[[str], None]) -> Summ
         title = f"Spiral, {axis.upper()} axis (cf. the paper's Fig. 8), FMU against FMU"
         prediction_figure(run, title, out / f"spiral_{axis}.png")
         compensated[axis], case["compensation"] = compensate(
-            machine, fmus[1], command, out, flavour, advance=partial(_say, advance, label)
+            machine, fmus[1], command, out, flavour, advance=partial(_announce, advance, label)
         )
         compensated[axis]["hybrid_warm"].save(out / f"spiral_{axis}_compensated.csv")
         title = f"Spiral, {axis.upper()} axis, compensated: FMU against FMU"
@@ -125,13 +125,13 @@ def recorded_case(log: Log, out: Path) -> dict[str, Any]:
     return {**found.summary(), **_worse(run)}
 
 
-def _say(advance: Callable[[str], None], case: str, kind: str) -> None:
-    """Say which kind of compensation of a case is run next."""
-    advance(f"{case}, {kind}")
+def _announce(advance: Callable[[str], None], case: str, run: str) -> None:
+    """Report the compensated run of a case that is next."""
+    advance(f"{case}, {run}")
 
 
 def _worse(run: Run) -> dict[str, Any]:
-    """Return in which batches the hybrid is worse than the physics model, and in how many worse than hold."""
+    """Return the windows in which the hybrid is worse than the physics model, and how many in which worse than hold."""
     errors = run.batch_rms()
     worse = np.flatnonzero(errors["x_h"] > errors["x_pb"])
     step = run.Np * run.T_s

@@ -1,4 +1,4 @@
-"""The demonstration's compensated cases: a compensator FMU in place of the predictor FMU, cold and warm."""
+"""Compensated runs of the demonstration: a compensator FMU in place of the predictor FMU, cold and warm."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .builds import build_for_host
 __all__ = ["COMPENSATED", "Runs", "compensate", "contour_errors", "mean_summary", "train"]
 
 TRAINING_SEED = 1000
-"""Noise seed of the run that a warm compensator has learned from; no case is run with it."""
+"""Noise seed of the training run of a warm compensator; no case uses it."""
 
 COMPENSATED = {"none": "off", "physics": "physics", "hybrid_cold": "hybrid", "hybrid_warm": "hybrid"}
 """Compensated runs of a case, by the keys of :data:`hybridsep.evaluate.canvas.CASES`: value of ``compensate``."""
@@ -93,7 +93,7 @@ def train(machine: Machine, command: Array, path: Path) -> None:
 
 
 def contour_errors(x: Runs, y: Runs) -> dict[str, Array]:
-    """Return how far the paper's spiral is missed, ``(n,)``, m, of the runs of X and Y with the same key."""
+    """Return the contour errors on the paper's spiral, ``(n,)``, m, of the runs of X and Y with the same key."""
     path = archimedean_spiral(0.030, 5.0)
     return {key: contour_error(np.column_stack((x[key].x, y[key].x)), *path) for key in x}
 

@@ -23,7 +23,7 @@ _SPANS = {SepState.OFF: ("not compensated", HOLD), SepState.PHYSICS: ("planned b
 
 
 def prediction_figure(run: Run, title: str, path: str | Path) -> None:
-    """Draw the command, the two models' prediction errors and the RMS of each batch to a PNG.
+    """Draw the command, the two models' prediction errors and the RMS of each window to a PNG.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def prediction_figure(run: Run, title: str, path: str | Path) -> None:
         The PNG.
     """
     figure = Figure(figsize=(9.0, 8.0), layout="constrained")
-    command, error, batches = figure.subplots(3, 1, sharex=True, height_ratios=[1.0, 2.0, 1.4])
+    command, error, windows = figure.subplots(3, 1, sharex=True, height_ratios=[1.0, 2.0, 1.4])
     figure.suptitle(title)
     t = run.t - run.t[0]
     command.plot(t, 1e3 * run.x_d, color="black", linewidth=1.2)
@@ -45,7 +45,7 @@ def prediction_figure(run: Run, title: str, path: str | Path) -> None:
     error.plot(t, hybrid, color=HYBRID, linewidth=0.8, label="linear hybrid model, after the warm-up")
     if not run.active.all():
         t_init = float(t[np.argmax(run.active)])
-        for axes in (error, batches):
+        for axes in (error, windows):
             axes.axvline(t_init, color="black", linewidth=0.8, linestyle=":")
         error.annotate(
             "t_init", (t_init, 0.02), xycoords=("data", "axes fraction"), xytext=(4, 0), textcoords="offset points"
@@ -53,14 +53,14 @@ def prediction_figure(run: Run, title: str, path: str | Path) -> None:
     error.set_ylabel("prediction error\nx − x̂ [µm]")
     error.margins(y=0.15)
     error.legend(loc="upper right", ncols=2, frameon=False)
-    _draw_batches(batches, run)
-    batches.set_xlabel("time [s]")
-    finish_panels((command, error, batches))
+    _draw_windows(windows, run)
+    windows.set_xlabel("time [s]")
+    finish_panels((command, error, windows))
     save_figure(figure, path)
 
 
-def _draw_batches(axes: Axes, run: Run) -> None:
-    """Draw the RMS error of each batch and mark the batches where the hybrid is worse than the physics model."""
+def _draw_windows(axes: Axes, run: Run) -> None:
+    """Draw the RMS error of each window and mark the windows where the hybrid is worse than the physics model."""
     errors = {name: 1e6 * values for name, values in run.batch_rms().items()}
     edges = np.append(np.arange(len(errors["x_pb"])) * run.Np, len(run.t)) * run.T_s
     for name, color, label in (
@@ -73,7 +73,7 @@ def _draw_batches(axes: Axes, run: Run) -> None:
     for begin, end in zip(edges[:-1][worse], edges[1:][worse], strict=True):
         axes.axvspan(begin, end, color=PHYSICS, alpha=0.15, linewidth=0)
     axes.set_ylim(0.0, 1.35 * max(float(values.max()) for values in errors.values()))
-    axes.set_ylabel("RMS of each\nbatch [µm]")
+    axes.set_ylabel("RMS of each\nwindow [µm]")
     axes.legend(loc="upper right", ncols=3, frameon=False, title="shaded: hybrid worse than physics", title_fontsize=8)
 
 

@@ -1,6 +1,6 @@
-"""Build FMUs: the same sources and the same machine give the same bytes.
+"""FMU archives, reproducible byte for byte from the sources and the machine.
 
-What an FMU carries besides its interface is its flavour's: :mod:`hybridsep.fmi.native_flavour` compiles the C sources,
+The content follows from the flavour: :mod:`hybridsep.fmi.native_flavour` compiles the C sources,
 :mod:`hybridsep.fmi.python_flavour` wraps this library.
 """
 
@@ -128,7 +128,7 @@ def build_fmu(
 
 
 def fmu_description(machine: Machine, model: str, name: str) -> dict[str, Any]:
-    """Return what an FMU is made from: model, name, start values and modes."""
+    """Return the description from which an FMU is made: model, name, start values and modes."""
     if model in ("HybridPredictor", "SepCompensator"):
         physics = [{"f_n": m.f_n, "zeta": m.zeta, "alpha": m.alpha, "beta": m.beta} for m in machine.model.modes]
         values = machine.fmi_parameters() if model == "HybridPredictor" else machine.fmi_compensator_parameters()

@@ -1,4 +1,4 @@
-"""The command line as a user meets it: results, JSON, help and errors."""
+"""Command line: results, JSON, help and errors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Failures of the command line: one line on standard error and a status, whatever goes wrong."""
+"""Failures of the command line: one line on standard error and an exit status."""
 
 from __future__ import annotations
 

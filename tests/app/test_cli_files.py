@@ -1,4 +1,4 @@
-"""The user's files: no command overwrites what it reads, or a file of another kind; arguments come before any work."""
+"""Output files of the command line: no input or file of another kind is overwritten; arguments are checked first."""
 
 from __future__ import annotations
 

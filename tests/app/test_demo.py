@@ -1,4 +1,4 @@
-"""The main job: FMUs, figures, summary, and that the README's results are what it makes."""
+"""Demonstration: FMUs, figures, summary, and the README's results against them."""
 
 from __future__ import annotations
 

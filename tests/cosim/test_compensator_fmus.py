@@ -1,4 +1,4 @@
-"""Compensator FMU against plant FMU: what it gains, the drive's limits, the library's numbers, files and figures."""
+"""Compensator FMU against plant FMU: tracking errors, limits, agreement with the library, files and figures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A thousand native HybridPredictors in one process: what one costs, that none sees another, that none is left over."""
+"""A thousand native HybridPredictors in one process: memory of each, isolation, no leaks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The native FMUs as archives: what is in them, what they are compiled to, and from what."""
+"""Archives of the native FMUs: content, binaries, sources."""
 
 from __future__ import annotations
 

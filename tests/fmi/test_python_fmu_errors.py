@@ -1,4 +1,4 @@
-"""The pythonfmu FMUs through fmpy: what is refused, how it is said, and that nothing else is harmed."""
+"""Errors of the pythonfmu FMUs through fmpy: refusals, their messages, and no other effect."""
 
 from __future__ import annotations
 
