@@ -80,7 +80,7 @@ def exact_weights(rows: Array, lam: float, repetitions: int = 1) -> NDArray[np.l
     lam : float
         Ridge penalty, m².
     repetitions : int
-        How often the rows occur.
+        Repetitions of the rows.
     """
     n = rows.shape[1] - 1
     R = np.zeros((n, n + 1), dtype=np.longdouble)

@@ -30,7 +30,7 @@ SCRIPTS = (
 """Programs whose printed lines are figures."""
 
 DECIMALS = 2
-"""Of the demo's figures, µm and %, as README prints them."""
+"""Decimals of the demo's figures, µm and %, as README prints them."""
 
 
 def main() -> int:

@@ -20,14 +20,14 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 
 SLOW_MODULES = ("matplotlib", "control", "fmpy", "ruckig", "scipy.spatial")
-"""What must not be loaded before it is used."""
+"""Modules that must not be loaded before they are used."""
 
 PEER = "import scipy.signal"
 
 
 @dataclass(frozen=True)
 class Start:
-    """What is started: its code, the largest ratio to :data:`PEER`, and whether it may load :data:`SLOW_MODULES`."""
+    """Program that is started: its code, the largest ratio to :data:`PEER`, and whether it may load :data:`SLOW_MODULES`."""
 
     code: str
     most: float | None = None

@@ -37,7 +37,7 @@ class Host:
     compiler : list of str
         Command of a C compiler for glibc's Linux, whose allocator the program can stand in for.
     flags : list of str
-        What it is compiled with.
+        Compiler options.
     """
 
     def __init__(self, folder: Path, compiler: list[str], flags: list[str]) -> None:

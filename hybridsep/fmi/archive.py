@@ -78,12 +78,12 @@ def build_fmu(
     flavour : {"native", "python"}
         Flavour.
     targets : sequence of str, optional
-        What a native FMU gets binaries for: of :data:`hybridsep.fmi.compiler.TARGET_NAMES`, ``"host"`` being this
+        Platforms of a native FMU's binaries: of :data:`hybridsep.fmi.compiler.TARGET_NAMES`, ``"host"`` being this
         machine. If left out: all platforms where ``ziglang`` is installed, this machine otherwise.
     samples : (n,) array_like, m, optional
         Trajectory 3 of ReferenceTrajectory, at the machine's ``T_s``; played unless another one is chosen.
     weights : str or Path, optional
-        What :meth:`HybridPredictor.save` wrote, trained with the settings of this FMU, for a SepCompensator best in
+        File of :meth:`HybridPredictor.save`, trained with the settings of this FMU, for a SepCompensator best in
         closed loop (``compensator.predictor.save(...)``): the FMU starts with these weights, without a warm-up.
 
     Returns

@@ -32,7 +32,7 @@ FUZZED = {
 }
 
 
-"""How many seconds each model is called at random."""
+"""Duration of the random calls of each model, s."""
 
 
 SANITIZERS = ("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")

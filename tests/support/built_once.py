@@ -1,4 +1,4 @@
-"""What is built once in a test session, whichever of xdist's workers asks for it first."""
+"""Files built once in a test session, by whichever of xdist's workers asks first."""
 
 from __future__ import annotations
 
