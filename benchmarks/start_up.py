@@ -27,7 +27,7 @@ PEER = "import scipy.signal"
 
 @dataclass(frozen=True)
 class Start:
-    """Program that is started: its code, the largest ratio to :data:`PEER`, and whether it may load :data:`SLOW_MODULES`."""
+    """Program to start: its code, largest ratio to :data:`PEER`, whether it may load :data:`SLOW_MODULES`."""
 
     code: str
     most: float | None = None

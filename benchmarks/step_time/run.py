@@ -20,8 +20,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from hybridsep.base.settings import PredictorSettings
-
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # benchmarks are no part of the package
 
@@ -30,6 +28,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.step_time.host import PREDICTOR, Array, Host, build, drive_log, instructions
+from hybridsep.base.settings import PredictorSettings
 from hybridsep.evaluate.canvas import save_figure
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.look_ahead import LookAhead

@@ -90,7 +90,7 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
         for variable in self.table:
             self.register_variable(self._as_pythonfmu(variable), nested=False)
 
-    # Implemented by each slave -------------------------------------------------------------------------------------
+    # Implemented by each slave -----------------------------------------------------------------------------------
 
     @abstractmethod
     def initialise(self) -> None:
