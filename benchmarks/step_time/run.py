@@ -62,7 +62,7 @@ def lapack_ns_per_sample(n: int) -> float:
 
 
 def python_ns(p: int, q: int) -> Array:
-    """Return the times of the library's look-ahead, which the pythonfmu flavour steps, (6000,), ns."""
+    """Return the times of the library's look-ahead, which the Python flavour steps, (6000,), ns."""
     x_d, x = drive_log()
     model = ModalModel.spring_mass_damper(m=1.0, c=15.7, k=24674.0)
     ahead = LookAhead(HybridPredictor(model, PredictorSettings(Np=NP, p=p, q=q, lam=LAM)), 0.0)

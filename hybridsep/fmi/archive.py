@@ -76,7 +76,7 @@ def build_fmu(
     out : str or Path
         Folder for the archive; made if needed.
     flavour : {"native", "python"}
-        Flavour.
+        Flavour of the FMU.
     targets : sequence of str, optional
         Platforms of a native FMU's binaries: of :data:`hybridsep.fmi.compiler.TARGET_NAMES`, ``"host"`` being this
         machine. If left out: all platforms where ``ziglang`` is installed, this machine otherwise.
