@@ -1,4 +1,4 @@
-"""Build the FMUs: ``python build_fmu.py [--machine models/X.toml] [--backend python] [--out dist] [FMU …]``.
+"""FMU build script: ``python build_fmu.py [--machine models/X.toml] [--flavour python] [--out dist] [FMU …]``.
 
 A thin front of ``hybridsep build``; without arguments all FMUs go to ``dist/``.
 """

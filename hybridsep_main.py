@@ -1,4 +1,4 @@
-"""Entry point of the command line, outside the package: ready for Ctrl-C before the library is."""
+"""Entry point of the command line, outside the package: handles Ctrl-C before the library is loaded."""
 
 from __future__ import annotations
 
@@ -18,7 +18,9 @@ def _leave(*_: object) -> None:
 
 def main() -> None:
     """Load the library and run the command line."""
-    ours = signal.getsignal(signal.SIGINT) is signal.default_int_handler  # otherwise Ctrl-C is somebody else's
+    ours = (
+        signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    )  # otherwise the calling program handles Ctrl-C itself
     if ours:
         signal.signal(signal.SIGINT, _leave)
     from hybridsep.app.cli import main as run

@@ -1,4 +1,4 @@
-"""One BLAS thread against two, in the regression and in a closed loop.
+"""Benchmark of one BLAS thread against two, in the regression and in a closed loop.
 
 Run with ``python benchmarks/blas_threads.py``, or with ``--busy`` while as many processes as the machine has cores
 compete. The package itself uses one thread inside replays and loops, whatever is set; here the same window by window

@@ -1,4 +1,4 @@
-"""What the benchmarks share: a staircase log, rows of features written out plainly, and exact weights."""
+"""Reference data of the benchmarks: a staircase log, rows of features written out plainly, and exact weights."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def staircase_predictor(p: int, q: int) -> HybridPredictor:
 
 
 def physics_response(predictor: HybridPredictor, x_d: Array) -> Array:
-    """Return ``x_pb`` from rest, (n,), m, relative to the first command, batch by batch as a predictor does it."""
+    """Return ``x_pb`` from rest, (n,), m, relative to the first command, window by window as a predictor does it."""
     state, parts = predictor.discrete.rest(), []
     for i in range(0, len(x_d), predictor.Np):
         x_pb, state = predictor.discrete.forced_response(state, x_d[i : i + predictor.Np] - x_d[0])
@@ -80,7 +80,7 @@ def exact_weights(rows: Array, lam: float, repetitions: int = 1) -> NDArray[np.l
     lam : float
         Ridge penalty, m².
     repetitions : int
-        How often the rows occur.
+        Repetitions of the rows.
     """
     n = rows.shape[1] - 1
     R = np.zeros((n, n + 1), dtype=np.longdouble)

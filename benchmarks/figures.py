@@ -1,4 +1,4 @@
-"""Every figure of README and docs/ that does not depend on the machine's speed, in one JSON file, or compared with one.
+"""Baseline of all figures of README and docs/ that do not depend on the machine's speed: written to JSON, or compared.
 
     python benchmarks/figures.py --out benchmarks/figures.json [--emps PATH]      (some ten minutes)
     python benchmarks/figures.py --compare benchmarks/figures.json [--emps PATH]
@@ -30,7 +30,7 @@ SCRIPTS = (
 """Programs whose printed lines are figures."""
 
 DECIMALS = 2
-"""Of the demo's figures, µm and %, as README prints them."""
+"""Decimals of the demo's figures, µm and %, as README prints them."""
 
 
 def main() -> int:

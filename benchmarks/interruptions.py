@@ -1,4 +1,4 @@
-"""Ctrl-C, kill -9 and a full disk at random moments of each command: every file is whole, as it was or complete.
+"""Interruption test of each command, by Ctrl-C, kill -9 or a full disk at random moments: every file is whole.
 
 Each command first runs undisturbed, for its duration and its files, whose bytes do not depend on the run. Then it runs
 again and again over older files of the same names. Ctrl-C and kill -9 come at uniformly random moments; the disk, a
@@ -31,7 +31,7 @@ COMMANDS = {
     "demo": ["demo", "--seeds", "1", "--out", "."],
     "build": ["build", "-m", "spring_mass_damper", "--target", "host", "--out", "."],
     "backtest": ["backtest", "../log.csv", "-m", "spring_mass_damper", "--out", "batches.csv"],
-    "cosim": ["cosim", "--backend", "python", "--out", "run.csv", "--figure", "run.png"],
+    "cosim": ["cosim", "--flavour", "python", "--out", "run.csv", "--figure", "run.png"],
 }
 """Run in the folder of their results."""
 
@@ -39,7 +39,7 @@ WAYS = ("ctrl-c", "kill -9", "full disk")
 MAIN = [sys.executable, "-c", "import hybridsep_main, os; os.write(1, b'x'); hybridsep_main.main()"]
 """The command line, which says that Python has started and loaded the entry point: before, Ctrl-C is Python's."""
 OLD_END = b"\nthis is the older file\n"
-"""What an older file has after the content of a newer one, by which it is still known as one of its kind."""
+"""Suffix of an older file's content, which keeps its kind recognisable."""
 
 ON_A_DISK = """
 size=$1 disk=$2 old=$3 copy=$4; shift 4
@@ -52,7 +52,7 @@ cp -a . "$copy"; exit $status
 
 @dataclass
 class Outcome:
-    """What the runs of one command that were ended in one way came to."""
+    """Results of the runs of one command that were ended in one way."""
 
     runs: int = 0
     undisturbed: int = 0
@@ -111,7 +111,7 @@ class Case:
         return done.returncode, 0.0, done.stderr
 
     def faults(self, way: str, status: int, err: str) -> list[str]:
-        """Say what is wrong after a run."""
+        """Record what is wrong after a run."""
         found = contents(self.folder)
         faults = [f"{path} is missing" for path in self.new if path not in found]
         for path, content in found.items():

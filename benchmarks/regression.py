@@ -1,4 +1,4 @@
-"""Speed and accuracy of the whole replay against bare LAPACK and against other packages' recursive regressions.
+"""Benchmark of the replay's speed and accuracy against bare LAPACK and other packages' recursive regressions.
 
 Run with ``python benchmarks/regression.py``; exits with 1 if a limit is missed: replaying a log may take at most 3
 times as long as LAPACK's ``dtpqrt`` alone takes for the same rows, and padasip's RLS filter must take at least 15 times

@@ -1,4 +1,4 @@
-"""How long the library and its command line take to load, beside ``import scipy.signal`` in the same run.
+"""Load times of the library and its command line, beside ``import scipy.signal`` in the same run.
 
     python benchmarks/start_up.py [--runs 15]
 
@@ -20,14 +20,14 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 
 SLOW_MODULES = ("matplotlib", "control", "fmpy", "ruckig", "scipy.spatial")
-"""What must not be loaded before it is used."""
+"""Modules that must not be loaded before they are used."""
 
 PEER = "import scipy.signal"
 
 
 @dataclass(frozen=True)
 class Start:
-    """What is started: its code, the largest ratio to :data:`PEER`, and whether it may load :data:`SLOW_MODULES`."""
+    """Program to start: its code, largest ratio to :data:`PEER`, whether it may load :data:`SLOW_MODULES`."""
 
     code: str
     most: float | None = None

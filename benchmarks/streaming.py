@@ -1,4 +1,4 @@
-"""A long log streamed from a file: 10⁷ samples in constant memory, with the weights still exact at the end.
+"""Streaming benchmark: a log of 10⁷ samples in constant memory, with the weights exact at the end.
 
 Run with ``python benchmarks/streaming.py``; exits with 1 if memory grew or the weights are off by more than 1e-10.
 
@@ -17,8 +17,6 @@ import zipfile
 from pathlib import Path
 from time import perf_counter
 
-from hybridsep.base.settings import PredictorSettings
-
 os.environ["OMP_NUM_THREADS"] = "1"
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
@@ -35,6 +33,7 @@ from benchmarks.common import (
     relative_error,
     require_extended_precision,
 )
+from hybridsep.base.settings import PredictorSettings
 from hybridsep.evaluate.backtest import Batch, backtest_stream
 from hybridsep.logs.log import open_log
 from hybridsep.model.physics import ModalModel, Mode

@@ -1,4 +1,4 @@
-"""Calibrate the stage's friction: the ``f`` with which the physics model errs as the paper prints.
+"""Calibration of the stage's friction ``f`` to the physics-only error that the paper prints.
 
 The modes are those of Table 1 and the ratio ``κ/f = 1.5e-3 mm⁻²`` is fixed; ``f`` alone is found, so that the
 physics-only RMS on the spiral, against the measured position, is 22.0 µm on X and 130.2 µm on Y. The results stand in

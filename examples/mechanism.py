@@ -1,4 +1,4 @@
-"""Why a linear recursion in past residuals can capture an unmodelled nonlinearity: section 3.1 of the paper, runnable.
+"""Mechanism of section 3.1 of the paper: how a linear recursion in past residuals can capture a nonlinearity.
 
 Eq. (7): the linear part ``A``, ``B``, ``C`` of a drive is known, an input ``h`` that acts on it through ``Γ`` is not.
 The physics-based model is the drive without it::

@@ -1,4 +1,4 @@
-"""Section 3.1 of the paper in numbers: which unmodelled inputs past residuals give away, and where news comes in.
+"""Section 3.1 of the paper in numbers: unmodelled inputs that past residuals determine, and the innovation left.
 
 Run it with ``python examples/section_3_1.py``.
 """

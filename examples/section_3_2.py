@@ -1,4 +1,4 @@
-"""Section 3.2 of the paper: what its equations (12) and (13) come to as printed, and what λ does, which is not printed.
+"""Section 3.2 of the paper: readings of its equations (12) and (13), and the effect of λ, which is not printed.
 
 Run it with ``python examples/section_3_2.py``. The printed figures are 33.7 µm for the physics model and 14.7 µm for
 the hybrid one, RMS on the staircase.

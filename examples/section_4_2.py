@@ -1,4 +1,4 @@
-"""Section 4.2 of the paper on the simulated stage: where on the spiral each model errs, and where the hybrid is worse.
+"""Section 4.2 of the paper on the simulated stage: errors along the spiral, and paths where the hybrid is worse.
 
 Run it with ``python examples/section_4_2.py``. Table 1's modes, the paper's ``Np``, ``p``, ``q`` and eq. (14), the
 library, noise seed 0, RMS against the measured position. The second table moves the same stage between two points.
@@ -22,7 +22,7 @@ SLOWING = 18
 
 
 def replay(machine: Machine, x_d: Array) -> tuple[Array, Backtest, list[float]]:
-    """Return the measured positions, ``(n,)``, m, the predictions, and the largest pole of each batch's recursion."""
+    """Return the measured positions, ``(n,)``, m, the predictions, and the largest pole of each window's recursion."""
     assert machine.plant is not None
     encoder = Encoder(machine.plant.noise_std, machine.plant.seed)
     x = encoder.measure_all(simulate(machine.new_plant(), x_d, machine.T_s))

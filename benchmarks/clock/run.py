@@ -1,4 +1,4 @@
-"""Accumulate a thousand million communication steps in the C core's clock.
+"""Accumulation test of the C core's clock over 10⁹ communication steps.
 
 The clock's time is compared after each step with the exact sum of the step sizes, in 128-bit integers, and the number
 of instants reached with the rule's. The importer's time is its own rounded sum, which drifts. Ends with 1 if the clock

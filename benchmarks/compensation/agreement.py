@@ -1,4 +1,4 @@
-"""Whether the library's compensator and the C core's command the same, in closed loop with random parameters.
+"""Agreement of the library's compensator and the C core's, in closed loop with random parameters.
 
     python benchmarks/compensation/agreement.py [--sets 100] [--first 0]
 
@@ -35,7 +35,7 @@ PERTURBATION = 1e-15
 
 @dataclass(frozen=True)
 class Comparison:
-    """What came of one set: largest differences of ``x_dm``, m.
+    """Result of one set: largest differences of ``x_dm``, m.
 
     Attributes
     ----------

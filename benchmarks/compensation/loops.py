@@ -10,9 +10,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from hybridsep.base.settings import Limits
+from hybridsep.base.settings import PARAMETERS, Limits
 from hybridsep.base.signals import Array
-from hybridsep.compensate.compensator import SepCompensator, SepState
+from hybridsep.compensate.compensator import SepCompensator
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.cosim.run import Run
 from hybridsep.fmi.archive import build_fmu, fmu_names
@@ -26,7 +26,7 @@ __all__ = ["Case", "FmuLoops", "LibraryLoops", "Loops", "noise_seed"]
 
 @dataclass(frozen=True)
 class Case:
-    """What is done to the loop: another plant from sample ``at`` on, a held sensor, other limits or noise."""
+    """Disturbance of the loop: another plant from sample ``at`` on, a held sensor, other limits or noise."""
 
     change: Callable[[FeedDrive], None] | None = None
     at: int = 3050
@@ -52,7 +52,7 @@ class Loops(Protocol):
     """Runs a machine's drive behind its compensator."""
 
     def run(
-        self, machine: Machine, r: Array, best: SepState, seed: int, n: int = 1, case: Case | None = None
+        self, machine: Machine, r: Array, compensate: str, seed: int, n: int = 1, case: Case | None = None
     ) -> list[Run]:
         """Return ``n`` runs in a row, each warm after the first.
 
@@ -62,14 +62,14 @@ class Loops(Protocol):
             With the settings of its ``[compensator]``.
         r : (n,) array, m
             Commanded positions.
-        best : SepState
-            Best model to use.
+        compensate : {"off", "physics", "hybrid"}
+            As in :class:`~hybridsep.base.settings.CompensatorSettings`.
         seed : int
             Noise seed; each run has another one, :func:`noise_seed`.
         n : int
             Runs.
         case : Case, optional
-            What is done to the loop.
+            Disturbance of the loop.
         """
         ...
 
@@ -83,15 +83,15 @@ class LibraryLoops:
     """The library's compensator and plant, with the FMU's timing."""
 
     def run(
-        self, machine: Machine, r: Array, best: SepState, seed: int, n: int = 1, case: Case | None = None
+        self, machine: Machine, r: Array, compensate: str, seed: int, n: int = 1, case: Case | None = None
     ) -> list[Run]:
         """Return ``n`` runs in a row; see :class:`Loops`."""
-        compensator = self.compensator(machine, best, case or Case())
+        compensator = self.compensator(machine, compensate, case or Case())
         return [self.once(compensator, machine, r, seed, i, case or Case()) for i in range(n)]
 
-    def compensator(self, machine: Machine, best: SepState, case: Case) -> SepCompensator:
+    def compensator(self, machine: Machine, compensate: str, case: Case) -> SepCompensator:
         """Return a compensator that has learned nothing."""
-        settings = replace(machine.compensator_settings, compensate=best.name.lower())
+        settings = replace(machine.compensator_settings, compensate=compensate)
         return machine.new_compensator(settings if case.limits is None else replace(settings, limits=case.limits))
 
     def once(self, compensator: SepCompensator, machine: Machine, r: Array, seed: int, run: int, case: Case) -> Run:
@@ -120,7 +120,7 @@ class FmuLoops:
 
     Parameters
     ----------
-    backend : {"native", "python"}
+    flavour : {"native", "python"}
         Flavour of the FMUs.
 
     Attributes
@@ -129,8 +129,8 @@ class FmuLoops:
         Largest difference of ``x_dm`` from the library's cold runs so far.
     """
 
-    def __init__(self, backend: str) -> None:
-        self.backend, self.apart = backend, 0.0
+    def __init__(self, flavour: str) -> None:
+        self.flavour, self.apart = flavour, 0.0
         self._folder = tempfile.TemporaryDirectory()
         self._built: dict[tuple[str, ...], Path] = {}
         self._library = LibraryLoops()
@@ -142,7 +142,7 @@ class FmuLoops:
         self._folder.cleanup()
 
     def run(
-        self, machine: Machine, r: Array, best: SepState, seed: int, n: int = 1, case: Case | None = None
+        self, machine: Machine, r: Array, compensate: str, seed: int, n: int = 1, case: Case | None = None
     ) -> list[Run]:
         """Return ``n`` ≤ 2 runs in a row; see :class:`Loops`.
 
@@ -154,19 +154,20 @@ class FmuLoops:
         case = case or Case()
         if case.change is not None or n > 2:
             raise ValueError("FMUs can be run twice in a row, and their plant cannot change in mid-run")
-        cold = self._once(machine, r, best, seed, 0, case, self._fmu(machine, "SepCompensator"))
-        compensator = self._library.compensator(machine, best, case)
+        cold = self._once(machine, r, compensate, seed, 0, case, self._fmu(machine, "SepCompensator"))
+        compensator = self._library.compensator(machine, compensate, case)
         same = self._library.once(compensator, machine, r, seed, 0, case)
         self.apart = max(self.apart, float(np.max(np.abs(cold.x_dm - same.x_dm))))
         if n == 1:
             return [cold]
         weights = Path(self._folder.name) / "trained.state"
         compensator.predictor.save(weights)
-        return [cold, self._once(machine, r, best, seed, 1, case, self._fmu(machine, "SepCompensator", weights))]
+        trained = self._fmu(machine, "SepCompensator", weights)
+        return [cold, self._once(machine, r, compensate, seed, 1, case, trained)]
 
-    def _once(self, machine: Machine, r: Array, best: SepState, seed: int, run: int, case: Case, fmu: Path) -> Run:
+    def _once(self, machine: Machine, r: Array, compensate: str, seed: int, run: int, case: Case, fmu: Path) -> Run:
         assert machine.plant is not None
-        values: dict[str, Any] = {"compensate": int(best)}
+        values: dict[str, Any] = {"compensate": PARAMETERS["compensate"].to_fmi(compensate)}
         if case.limits is not None:
             limits = case.limits
             values |= {"v_max": limits.velocity, "a_max": limits.acceleration, "j_max": limits.jerk}
@@ -184,9 +185,9 @@ class FmuLoops:
         """Return an FMU of a machine; only those with weights are built anew."""
         key = (machine.name, model, str(machine.compensator))
         if weights is not None or key not in self._built:
-            name = next(name for name, built in fmu_names(machine, self.backend).items() if built == model)
+            name = next(name for name, built in fmu_names(machine, self.flavour).items() if built == model)
             folder = Path(self._folder.name) / ("warm" if weights else str(len(self._built)))
-            path = build_fmu(machine, name, folder, self.backend, targets=("host",), weights=weights)
+            path = build_fmu(machine, name, folder, self.flavour, targets=("host",), weights=weights)
             if weights is not None:
                 return path
             self._built[key] = path

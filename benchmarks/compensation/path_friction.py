@@ -1,4 +1,4 @@
-"""What limits the stage: the same drive if its friction followed the path, not the command that is modified."""
+"""Bound on the stage's compensation: the same drive with friction of the path instead of the modified command."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""What users have today against servo errors, to compare with: input shaping and zero-phase-error tracking control.
+"""Peers in compensation: input shaping and zero-phase-error tracking control.
 
 Both are filters of the commanded position that know the physics model only. The third peer, a filtered-basis-function
-compensator on the physics model, is ``SepCompensator`` with ``best=SepState.PHYSICS``.
+compensator on the physics model, is ``SepCompensator`` with ``compensate = "physics"``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Figures beside their limits, and which are missed."""
+"""Report of figures beside their limits."""
 
 from __future__ import annotations
 

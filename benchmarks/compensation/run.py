@@ -1,4 +1,4 @@
-"""What compensation is worth: tracking errors in closed loop, with and without it, beside what users have today.
+"""Benchmark of compensation: tracking errors in closed loop, with and without it, beside peers.
 
     python benchmarks/compensation/run.py [--seeds 5] [--first-seed 0] [--fmu native|python|none]
 
@@ -28,7 +28,6 @@ from benchmarks.compensation.report import Report
 from hybridsep.base.metrics import contour_error, largest, peak_derivatives, rms
 from hybridsep.base.settings import Limits
 from hybridsep.base.signals import Array
-from hybridsep.compensate.compensator import SepState
 from hybridsep.cosim.run import Run
 from hybridsep.machine import Machine, load_machine
 from hybridsep.machine_sections import CompensatorSection
@@ -45,19 +44,19 @@ LESS_THAN_5_PERCENT_WORSE = 1.05
 STAGE_HYBRIDS: dict[str, dict[str, float]] = {
     "hybrid": {},
     "hybrid, v_friction = 0,": {"v_friction": 0.0},
-    "hybrid, no_reversal = 0,": {"no_reversal": 0},
-    "hybrid, v_friction = 0, no_reversal = 0,": {"v_friction": 0.0, "no_reversal": 0},
+    "hybrid, no_reversal = 0,": {"no_reversal": False},
+    "hybrid, v_friction = 0, no_reversal = 0,": {"v_friction": 0.0, "no_reversal": False},
 }
-"""What is left out on the stage."""
-STAGE_KINDS = (
+"""Settings of the hybrid runs on the stage."""
+STAGE_CASES = (
     *("none", "physics", "physics, no_reversal"),
     *(f"{name} {run}" for name in STAGE_HYBRIDS for run in ("cold", "warm")),
 )
 
-OTHER_V_S = (1e-3, 5e-3)
-"""m/s; how well the friction must be known."""
+OTHER_V_FRICTION = (1e-3, 5e-3)
+"""m/s; sensitivity to the friction velocity."""
 
-FMU_BACKEND = "native"
+FMU_FLAVOUR = "native"
 """Flavour of the FMUs if none is asked for."""
 
 
@@ -92,7 +91,7 @@ def with_settings(machine: Machine, **changes: float) -> Machine:
 
 def as_published(machine: Machine) -> Machine:
     """Return a machine whose commands may turn where the path does not, as the published methods' may."""
-    return with_settings(machine, no_reversal=0)
+    return with_settings(machine, no_reversal=False)
 
 
 def excess(loop: Run, compensator_limits: tuple[Limits | None, float | None], T_s: float) -> float:
@@ -116,16 +115,16 @@ def staircase_rows(report: Report, loops: Loops, seeds: range) -> tuple[float, f
     recommended, r = load_machine("spring_mass_damper"), staircase()
     machine = with_the_papers_settings(recommended)
     report.title("1  staircase, p = 50, q = 3, the paper's features (tracking RMS of the true position, µm)")
-    none = mean_rms([loops.run(machine, r, SepState.OFF, s)[0] for s in seeds])
+    none = mean_rms([loops.run(machine, r, "off", s)[0] for s in seeds])
     report.line("no compensation", none, "87 … 90", 87 <= none <= 90)
-    physics = mean_rms([loops.run(machine, r, SepState.PHYSICS, s)[0] for s in seeds])
+    physics = mean_rms([loops.run(machine, r, "physics", s)[0] for s in seeds])
     report.most("physics model", physics, 20.5)
-    pairs = [loops.run(machine, r, SepState.HYBRID, s, 2) for s in seeds]
+    pairs = [loops.run(machine, r, "hybrid", s, 2) for s in seeds]
     report.most("hybrid, cold", mean_rms([pair[0] for pair in pairs]), 6.5)
     report.most("hybrid, warm", mean_rms([pair[1] for pair in pairs]), 5.2)
     settings = recommended.compensator.model_dump(by_alias=True, exclude_none=True)
     report.title("2  staircase, recommended settings " + ", ".join(f"{k} = {v:g}" for k, v in settings.items()))
-    pairs = [loops.run(recommended, r, SepState.HYBRID, s, 2) for s in seeds]
+    pairs = [loops.run(recommended, r, "hybrid", s, 2) for s in seeds]
     cold, warm = mean_rms([pair[0] for pair in pairs]), mean_rms([pair[1] for pair in pairs])
     report.most("hybrid, cold", cold, 5.0)
     report.most("hybrid, warm", warm, 2.2, "aim: 1.5")
@@ -137,19 +136,19 @@ def stage_rows(report: Report, loops: Loops, seeds: range) -> None:
     report.title("3  stage, spiral, recommended settings; physics: filtered basis functions as published")
     position, derivative, end = archimedean_spiral(0.030, 5.0)
     machines, commands = [load_machine("als25010_x"), load_machine("als25010_y")], spiral()
-    found: dict[str, list[list[Run]]] = {name: [] for name in STAGE_KINDS}
+    found: dict[str, list[list[Run]]] = {name: [] for name in STAGE_CASES}
     for machine, r in zip(machines, commands, strict=True):
         plain = as_published(machine)
-        found["none"].append([loops.run(machine, r, SepState.OFF, s)[0] for s in seeds])
-        found["physics"].append([loops.run(plain, r, SepState.PHYSICS, s)[0] for s in seeds])
-        found["physics, no_reversal"].append([loops.run(machine, r, SepState.PHYSICS, s)[0] for s in seeds])
+        found["none"].append([loops.run(machine, r, "off", s)[0] for s in seeds])
+        found["physics"].append([loops.run(plain, r, "physics", s)[0] for s in seeds])
+        found["physics, no_reversal"].append([loops.run(machine, r, "physics", s)[0] for s in seeds])
         for name, changes in STAGE_HYBRIDS.items():
             used = with_settings(machine, **changes)
-            pairs = [loops.run(used, r, SepState.HYBRID, s, 2) for s in seeds]
+            pairs = [loops.run(used, r, "hybrid", s, 2) for s in seeds]
             found[f"{name} cold"].append([pair[0] for pair in pairs])
             found[f"{name} warm"].append([pair[1] for pair in pairs])
     for axis, r in enumerate(commands):
-        label, figures = "XY"[axis], {name: mean_rms(found[name][axis]) for name in STAGE_KINDS}
+        label, figures = "XY"[axis], {name: mean_rms(found[name][axis]) for name in STAGE_CASES}
         physics, keeping = figures["physics"], figures["physics, no_reversal"]
         for name, figure in figures.items():
             shares = f"{figure / physics:.0%} of physics, {figure / keeping:.0%} of physics with no_reversal"
@@ -164,9 +163,9 @@ def stage_rows(report: Report, loops: Loops, seeds: range) -> None:
             share = float(np.sum(errors[:, near] ** 2) / np.sum(errors**2))
             note = f"{share:.0%} of the mean square is within 0.1 s of a reversal, {np.mean(near):.0%} of the time"
             report.line(f"   {name}, away from reversals", outside, note=note)
-        for v_friction in OTHER_V_S:
+        for v_friction in OTHER_V_FRICTION:
             used = with_settings(machines[axis], v_friction=v_friction)
-            warm = mean_rms([LibraryLoops().run(used, r, SepState.HYBRID, s, 2)[1] for s in seeds])
+            warm = mean_rms([LibraryLoops().run(used, r, "hybrid", s, 2)[1] for s in seeds])
             report.line(
                 f"   v_friction = {1e3 * v_friction:g} mm/s, the friction's is 2: hybrid warm", warm, note="library"
             )
@@ -188,7 +187,7 @@ def after_reversals(r: Array) -> Any:
 
 
 def peer_rows(report: Report, cold: float, warm: float) -> None:
-    """Row 4: what users have today; the true position does not depend on the noise, except for the hybrid's."""
+    """Row 4: peers; the true position does not depend on the noise, except for the hybrid's."""
     report.title("4  peers on the staircase drive")
     machine, r = load_machine("spring_mass_damper"), staircase()
     discrete = machine.new_predictor().discrete
@@ -199,7 +198,7 @@ def peer_rows(report: Report, cold: float, warm: float) -> None:
         commands[f"input shaping, {kind.upper()}, early by its mean delay"] = shape(r, shaper, advance=True)
     commands["zero-phase-error tracking control"] = zero_phase_command(r, discrete)
     published = as_published(with_the_papers_settings(machine))
-    loop = LibraryLoops().run(published, r, SepState.PHYSICS, 0)[0]
+    loop = LibraryLoops().run(published, r, "physics", 0)[0]
     commands["filtered basis functions, physics model"] = loop.x_dm
     for name, command in commands.items():
         reached = loop.x if command is loop.x_dm else simulate(machine.new_plant(), command, machine.T_s)
@@ -211,7 +210,7 @@ def peer_rows(report: Report, cold: float, warm: float) -> None:
 
 
 def robustness_rows(report: Report, loops: Loops, seeds: range) -> None:
-    """Row 5: what goes wrong in practice."""
+    """Row 5: disturbances in practice."""
     recommended, r = load_machine("spring_mass_damper"), staircase()
     usual_limits, change_max = recommended.command_limits()
     for title, machine in (
@@ -223,8 +222,8 @@ def robustness_rows(report: Report, loops: Loops, seeds: range) -> None:
             # A plant FMU's parameters are fixed during a run.
             by = loops if case.change is None else LibraryLoops()
             note = "library" if by is not loops else ""
-            physics = mean_rms([by.run(machine, r, SepState.PHYSICS, s, 1, case)[0] for s in seeds])
-            pairs = [by.run(machine, r, SepState.HYBRID, s, 2, case) for s in seeds]
+            physics = mean_rms([by.run(machine, r, "physics", s, 1, case)[0] for s in seeds])
+            pairs = [by.run(machine, r, "hybrid", s, 2, case) for s in seeds]
             found = [loop for pair in pairs for loop in pair]
             beyond = max(excess(loop, (case.limits or usual_limits, change_max), machine.T_s) for loop in found)
             sound = beyond <= 1e-9 and all(np.isfinite(loop.x_dm).all() for loop in found)
@@ -239,7 +238,7 @@ def robustness_rows(report: Report, loops: Loops, seeds: range) -> None:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=5, help="noise seeds to average over")
-    parser.add_argument("--fmu", choices=("native", "python", "none"), default=FMU_BACKEND, help="flavour of the FMUs")
+    parser.add_argument("--fmu", choices=("native", "python", "none"), default=FMU_FLAVOUR, help="flavour of the FMUs")
     parser.add_argument("--first-seed", type=int, default=0, help="the first of them")
     options = parser.parse_args()
     seeds, report = range(options.first_seed, options.first_seed + options.seeds), Report()

@@ -1,4 +1,4 @@
-"""Build and call ``main.c``: the C core for long, with the allocator's calls counted."""
+"""Build and calls of ``main.c``, which runs the C core for long and counts the allocator's calls."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridsep.fmi.native_backend import fmi_headers, sources
+from hybridsep.fmi.native_flavour import fmi_headers, sources
 from hybridsep.machine import load_machine
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ class Host:
     compiler : list of str
         Command of a C compiler for glibc's Linux, whose allocator the program can stand in for.
     flags : list of str
-        What it is compiled with.
+        Compiler options.
     """
 
     def __init__(self, folder: Path, compiler: list[str], flags: list[str]) -> None:

@@ -1,4 +1,4 @@
-"""Fold a hundred million samples through the C core and look at its digits and its memory.
+"""Long run of the C core: accuracy and memory over 10⁸ samples.
 
 Folds a block of feature rows of the staircase over and over into the C regression, n = 55, and compares the weights
 with the exact ones: repeating rows m times is the same as taking them times √m, so one QR in extended precision gives

@@ -1,4 +1,4 @@
-"""How long one step of the native SepCompensator takes in closed loop, beside HybridPredictor in the same run.
+"""Step time of the native SepCompensator in closed loop, beside HybridPredictor in the same run.
 
 Builds two C hosts (``main.c``): the compensator with the drive of eq. (13), and the predictor over the drive's log,
 both with the paper's settings. Times every step of both by turns, counts instructions step by step where valgrind is

@@ -1,4 +1,4 @@
-"""The C host that times a model step by step: its build, its runs, its instructions."""
+"""C host that times a model step by step: build, runs, instruction counts."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""How long one step of the native HybridPredictor takes, and how evenly, beside blocked LAPACK in the same run.
+"""Step time of the native HybridPredictor and its tail, beside blocked LAPACK in the same run.
 
 Builds a C host around the model (``main.c``), times every step of it, times LAPACK's ``dtpqrt`` on the same rows
-batch by batch, counts instructions step by step where valgrind is installed, prints the ratios, draws the
+window by window, counts instructions step by step where valgrind is installed, prints the ratios, draws the
 distribution, and ends with 1 if a limit is missed.
 """
 
@@ -20,8 +20,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from hybridsep.base.settings import PredictorSettings
-
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # benchmarks are no part of the package
 
@@ -30,6 +28,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.step_time.host import PREDICTOR, Array, Host, build, drive_log, instructions
+from hybridsep.base.settings import PredictorSettings
 from hybridsep.evaluate.canvas import save_figure
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.look_ahead import LookAhead
@@ -49,7 +48,7 @@ TAIL_OVER_MEDIAN_MAX = 15.0
 
 
 def lapack_ns_per_sample(n: int) -> float:
-    """Return the time of RidgeRegression's one dtpqrt call a batch, per sample, ns; the median of 300 batches."""
+    """Return the time of RidgeRegression's one dtpqrt call a window, per sample, ns; the median of 300 windows."""
     regression = RidgeRegression(n, LAM)
     rng = np.random.default_rng(0)
     rows = np.asfortranarray(np.cumsum(rng.normal(0.0, 1e-6, (NP, n + 1)), axis=0))
@@ -63,7 +62,7 @@ def lapack_ns_per_sample(n: int) -> float:
 
 
 def python_ns(p: int, q: int) -> Array:
-    """Return the times of the library's look-ahead, which the pythonfmu flavour steps, (6000,), ns."""
+    """Return the times of the library's look-ahead, which the Python flavour steps, (6000,), ns."""
     x_d, x = drive_log()
     model = ModalModel.spring_mass_damper(m=1.0, c=15.7, k=24674.0)
     ahead = LookAhead(HybridPredictor(model, PredictorSettings(Np=NP, p=p, q=q, lam=LAM)), 0.0)

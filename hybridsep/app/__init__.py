@@ -1,1 +1,1 @@
-"""The command line and the demonstration."""
+"""Command line and demonstration."""

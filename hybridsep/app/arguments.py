@@ -1,4 +1,4 @@
-"""Checks of arguments that several commands have."""
+"""Checks of arguments common to several commands."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["check_ending", "check_interval"]
 
 
 def check_interval(name: str, T_s: float, axis: Machine) -> None:
-    """Say that a file is sampled at another interval than the machine, if it is."""
+    """Raise ParameterError if a file's sampling interval is not the machine's."""
     if abs(T_s - axis.T_s) <= 0.01 * axis.T_s:
         return
     hint = "resample the file or correct T_s"
@@ -23,6 +23,6 @@ def check_interval(name: str, T_s: float, axis: Machine) -> None:
 
 
 def check_ending(path: Path | None, option: str, endings: Sequence[str]) -> None:
-    """Say that a file has another ending than those that can be written, if it is given."""
+    """Raise ParameterError if a path, where given, ends in none of the endings."""
     if path is not None and path.suffix.lower() not in endings:
         raise ParameterError(f"{option} must end in {' or '.join(endings)}, got {path.name!r}")

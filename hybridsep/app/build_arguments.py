@@ -1,4 +1,4 @@
-"""Checks of the arguments of ``hybridsep build``, all of them before any work, and what follows from them."""
+"""Checks of the arguments of ``hybridsep build`` before any work, and the list of FMUs to build."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ Job = tuple[Machine, str, str]
 """An FMU to build: its machine, name and model."""
 
 
-def jobs_of(fmus: Sequence[str], machines: Sequence[str], backend: str, targets: Sequence[str]) -> list[Job]:
+def jobs_of(fmus: Sequence[str], machines: Sequence[str], flavour: str, targets: Sequence[str]) -> list[Job]:
     """Return the FMUs to build, all of the machines' if none is named."""
     jobs = [
         (axis, name, model)
         for axis in map(load_machine, machines or machine_names())
-        for name, model in fmu_names(axis, backend).items()
+        for name, model in fmu_names(axis, flavour).items()
     ]
     if unknown := sorted(set(fmus) - {name for _, name, _ in jobs}):
         raise ParameterError(f"no FMU {', '.join(unknown)}; there are {', '.join(name for _, name, _ in jobs)}")
-    if targets and backend != "native":
-        raise ParameterError(f"--target is for native FMUs; with --backend {backend} leave it out")
-    if backend == "native":
+    if targets and flavour != "native":
+        raise ParameterError(f"--target is for native FMUs; with --flavour {flavour} leave it out")
+    if flavour == "native":
         compilers(targets or ("host",))
     return [job for job in jobs if not fmus or job[1] in fmus]
 
@@ -40,7 +40,7 @@ def jobs_of(fmus: Sequence[str], machines: Sequence[str], backend: str, targets:
 def extras_of(
     jobs: Sequence[Job], weights: Path | None, trajectory: Path | None, unit: str, T_s: float | None
 ) -> dict[str, dict[str, Any]]:
-    """Return by model what one of the FMUs gets besides its machine: weights, samples of a trajectory."""
+    """Return weights or samples of a trajectory for one of the FMUs: model → keywords of ``build_fmu``."""
     extras: dict[str, dict[str, Any]] = {}
     check_reading(unit, T_s)
     if weights is not None:
@@ -56,7 +56,7 @@ def extras_of(
 
 
 def _one_of(jobs: Sequence[Job], models: Sequence[str], option: str) -> tuple[Machine, str]:
-    """Return machine and model of the only FMU of these models that is built, which an option is meant for."""
+    """Return machine and model of the one FMU of these models to which an option applies."""
     found = [job for job in jobs if job[2] in models]
     if len(found) != 1:
         names = ", ".join(name for _, name, _ in found) or "none"

@@ -1,4 +1,4 @@
-"""FMUs that a command builds for itself, for this computer alone."""
+"""FMUs built for a command's own use, for this platform alone."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from ..fmi.archive import build_fmu, fmu_names
 from ..fmi.compiler import can_compile
 from ..machine import Machine
 
-__all__ = ["build_for_host", "build_pair", "default_backend"]
+__all__ = ["build_for_host", "build_pair", "default_flavour"]
 
 
-def default_backend() -> str:
+def default_flavour() -> str:
     """Return the flavour of the demo's FMUs: native where there is a C compiler, Python otherwise."""
     return "native" if can_compile() else "python"
 
 
-def build_for_host(machine: Machine, model: str, out: Path, backend: str, *, weights: Path | None = None) -> Path:
-    """Build one of a machine's FMUs for this computer."""
-    names = {built: name for name, built in fmu_names(machine, backend).items()}
-    return build_fmu(machine, names[model], out, backend, targets=("host",), weights=weights)
+def build_for_host(machine: Machine, model: str, out: Path, flavour: str, *, weights: Path | None = None) -> Path:
+    """Build one of a machine's FMUs for this platform."""
+    names = {built: name for name, built in fmu_names(machine, flavour).items()}
+    return build_fmu(machine, names[model], out, flavour, targets=("host",), weights=weights)
 
 
-def build_pair(machine: Machine, out: Path, backend: str) -> tuple[Path, Path]:
+def build_pair(machine: Machine, out: Path, flavour: str) -> tuple[Path, Path]:
     """Build a machine's predictor and plant FMU."""
     return (
-        build_for_host(machine, "HybridPredictor", out, backend),
-        build_for_host(machine, "FeedDrive", out, backend),
+        build_for_host(machine, "HybridPredictor", out, flavour),
+        build_for_host(machine, "FeedDrive", out, flavour),
     )

@@ -1,4 +1,4 @@
-"""The command line: ``hybridsep demo | build | cosim | backtest``."""
+"""Command line ``hybridsep demo | build | cosim | backtest``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``hybridsep build``."""
+"""Command ``hybridsep build``."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
-from ..fmi.backends import BACKENDS
 from ..fmi.compiler import TARGET_NAMES
+from ..fmi.flavours import FLAVOURS
 from .failures import loading
-from .options import BackendOption, ForceOption, JsonOption, TsOption, UnitOption, WeightsOption
+from .options import FlavourOption, ForceOption, JsonOption, TsOption, UnitOption, WeightsOption
 
 __all__ = ["build"]
 
@@ -23,7 +23,7 @@ def build(
         list[str] | None,
         typer.Option("--machine", "-m", help="Machine file (.toml) or name; may be repeated; all if left out."),
     ] = None,
-    backend: BackendOption = BACKENDS[0],
+    flavour: FlavourOption = FLAVOURS[0],
     target: Annotated[
         list[str] | None,
         typer.Option(
@@ -51,7 +51,7 @@ def build(
         from .progress import progress_bar
         from .tables import console, print_json
 
-    jobs = jobs_of(fmus or [], machine or [], backend, target or [])
+    jobs = jobs_of(fmus or [], machine or [], flavour, target or [])
     extras = extras_of(jobs, weights, trajectory, unit, T_s)
     inputs = {f"machine file {source}": machine_path(source) for source in machine or []}
     check_outputs(
@@ -63,7 +63,7 @@ def build(
     with progress_bar(as_json) as advance:
         for i, (axis, name, model) in enumerate(jobs):
             advance(name, i / len(jobs))
-            paths.append(build_fmu(axis, name, out, backend, targets=target or None, **extras.get(model, {})))
+            paths.append(build_fmu(axis, name, out, flavour, targets=target or None, **extras.get(model, {})))
         advance("done", 1.0)
     if as_json:
         print_json([str(path) for path in paths])

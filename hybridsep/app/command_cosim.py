@@ -10,12 +10,12 @@ import typer
 
 from ..base.data_files import DEFAULT_MACHINE
 from ..base.settings import PARAMETERS, check
-from ..fmi.backends import BACKENDS
+from ..fmi.flavours import FLAVOURS
 from .failures import loading
 from .options import (
     COMPENSATIONS,
     TRAJECTORIES,
-    BackendOption,
+    FlavourOption,
     ForceOption,
     JsonOption,
     MachineOption,
@@ -52,7 +52,7 @@ def cosim(
     seed: Annotated[int | None, typer.Option(help=parameter_help(PARAMETERS["seed"]))] = None,
     *,
     parameters: dict[str, Any],
-    backend: BackendOption = BACKENDS[0],
+    flavour: FlavourOption = FLAVOURS[0],
     out: Annotated[Path | None, typer.Option(help="File for all signals, .csv or .npz.")] = None,
     figure: Annotated[
         Path | None,
@@ -89,7 +89,7 @@ def cosim(
         check("seed", seed)
     if best is not None:
         values["compensate"] = int(best)
-    check_pair(axis, model, predictor, plant, weights, backend)
+    check_pair(axis, model, predictor, plant, weights, flavour)
     results = (("--out", out, RUN), ("--figure", figure, FIGURE))
     outputs = [Output(option, path, kind) for option, path, kind in results if path is not None]
     file = None if trajectory in TRAJECTORIES else trajectory
@@ -98,8 +98,8 @@ def cosim(
     title = f"{' and '.join(path.name for path in (predictor, plant) if path is not None) or axis.title}, {trajectory}"
     with tempfile.TemporaryDirectory() as place, progress_bar(as_json) as advance:
         folder = Path(place)
-        ahead = predictor or build_for_host(axis, model, folder, backend, weights=weights)
-        drive = plant or build_for_host(axis, "FeedDrive", folder, backend)
+        ahead = predictor or build_for_host(axis, model, folder, flavour, weights=weights)
+        drive = plant or build_for_host(axis, "FeedDrive", folder, flavour)
         run = cosimulate(
             ahead,
             drive,

@@ -1,4 +1,4 @@
-"""``hybridsep demo``."""
+"""Command ``hybridsep demo``."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..fmi.backends import BACKENDS
+from ..fmi.flavours import FLAVOURS
 from .failures import loading
 from .options import ForceOption, JsonOption
 
@@ -18,27 +18,27 @@ def demo(
     out: Annotated[Path, typer.Option(help="Folder for FMUs, figures, results and summary.json.")] = Path("demo"),
     emps: Annotated[Path | None, typer.Option(help="A DATA_EMPS.mat: replay this recorded axis too.")] = None,
     seeds: Annotated[int, typer.Option(min=1, help="Noise seeds the staircase is averaged over.")] = 10,
-    backend: Annotated[
+    flavour: Annotated[
         str | None,
-        typer.Option(help=f"Flavour of the FMUs: {', '.join(BACKENDS)}; native where there is a C compiler."),
+        typer.Option(help=f"Flavour of the FMUs: {', '.join(FLAVOURS)}; native where there is a C compiler."),
     ] = None,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Build the FMUs, co-simulate the paper's staircase and spiral, draw and score them."""
     with loading():
-        from .builds import default_backend
+        from .builds import default_flavour
         from .demo import demo as run_demo
         from .demo import demo_files
         from .overwrite import BY_ENDING, Output, check_outputs
         from .progress import progress_bar
         from .tables import console, print_compensation, print_json, print_predictions
 
-    backend = backend or default_backend()
-    files = demo_files(out, backend, emps=emps is not None)
+    flavour = flavour or default_flavour()
+    files = demo_files(out, flavour, emps=emps is not None)
     check_outputs((Output("--out", path, BY_ENDING[path.suffix]) for path in files), {"recording": emps}, force=force)
     with progress_bar(as_json) as advance:
-        summary = run_demo(out, emps=emps, seeds=seeds, backend=backend, progress=advance)
+        summary = run_demo(out, emps=emps, seeds=seeds, flavour=flavour, progress=advance)
     if as_json:
         print_json(summary)
         return

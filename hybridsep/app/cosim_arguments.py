@@ -1,4 +1,4 @@
-"""Checks of the arguments of ``hybridsep cosim``, all of them before any work, and what follows from them."""
+"""Checks of the arguments of ``hybridsep cosim`` before any work, and the values for the FMUs."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def check_pair(
     predictor: Path | None,
     plant: Path | None,
     weights: Path | None,
-    backend: str,
+    flavour: str,
 ) -> None:
     """Check a co-simulation's two FMUs: those that are given, and that the others can be built.
 
@@ -81,9 +81,9 @@ def check_pair(
         Archives; built if left out.
     weights : Path, optional
         For a look-ahead that is built.
-    backend : {"native", "python"}
+    flavour : {"native", "python"}
     """
-    models = fmu_names(axis, backend).values()
+    models = fmu_names(axis, flavour).values()
     if plant is None and "FeedDrive" not in models:
         raise ParameterError(f"machine {axis.name} has no plant; name a plant FMU with --plant")
     if predictor is None and model not in models:
@@ -99,5 +99,5 @@ def check_pair(
         check_plant(plant)
     if weights is not None:
         load_trained(weights, axis, model)
-    if backend == "native" and None in (predictor, plant):
+    if flavour == "native" and None in (predictor, plant):
         compilers(("host",))

@@ -1,4 +1,4 @@
-"""The main job, end to end: build the FMUs, co-simulate the paper's cases, score them, draw them."""
+"""Demonstration: builds the FMUs, co-simulates the paper's cases, scores and draws them."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from pathlib import Path
 from ..base.output import written_text
 from ..fmi.archive import fmu_names
 from ..machine import load_machine
-from .builds import default_backend
+from .builds import default_flavour
 from .demo_cases import MACHINES, Summary, read_recorded, recorded_case, spiral_case, staircase_case
-from .demo_compensation import KINDS
+from .demo_compensation import COMPENSATED
 from .printed import PRINTED
 
 __all__ = ["demo", "demo_files"]
@@ -21,7 +21,7 @@ SEEDS = 10
 Progress = Callable[[str, float], object]
 
 
-def demo_files(out: str | Path, backend: str, *, emps: bool) -> list[Path]:
+def demo_files(out: str | Path, flavour: str, *, emps: bool) -> list[Path]:
     """Return all files that :func:`demo` writes, with or without the recorded axis."""
     out = Path(out)
     files = [
@@ -30,7 +30,7 @@ def demo_files(out: str | Path, backend: str, *, emps: bool) -> list[Path]:
     for case, name in MACHINES.items():
         files += [out / f"{case}{what}{end}" for what in ("", "_compensated") for end in (".csv", ".png")]
         files.append(out / f"{name}.state")
-        for fmu, model in fmu_names(load_machine(name), backend).items():
+        for fmu, model in fmu_names(load_machine(name), flavour).items():
             if model in ("HybridPredictor", "SepCompensator", "FeedDrive"):
                 files.append(out / "fmus" / f"{fmu}.fmu")
             if model == "SepCompensator":
@@ -43,7 +43,7 @@ def demo(
     *,
     emps: str | Path | None = None,
     seeds: int = SEEDS,
-    backend: str | None = None,
+    flavour: str | None = None,
     progress: Progress = lambda message, fraction: None,
 ) -> Summary:
     """Build the FMUs, co-simulate the staircase and the spiral, write figures and ``summary.json``.
@@ -58,7 +58,7 @@ def demo(
         A ``DATA_EMPS.mat`` to replay too.
     seeds : int
         Noise seeds the staircase is averaged over, ≥ 1.
-    backend : {"native", "python"}, optional
+    flavour : {"native", "python"}, optional
         Flavour of the FMUs; native where there is a C compiler, if left out.
     progress : callable
         Called with a message and the fraction done.
@@ -77,11 +77,11 @@ def demo(
     LogError
         If ``emps`` cannot be read; nothing has been done then.
     """
-    backend = backend or default_backend()
-    recorded = None if emps is None else read_recorded(emps)  # a file that cannot be read must not end four minutes
+    flavour = flavour or default_flavour()
+    recorded = None if emps is None else read_recorded(emps)  # first: a refusal must not come after minutes of work
     out = Path(out)
     out.mkdir(parents=True, exist_ok=True)
-    total = seeds + 6 + 3 * len(KINDS) + (recorded is not None)
+    total = seeds + 6 + 3 * len(COMPENSATED) + (recorded is not None)
     done = 0
 
     def advance(message: str) -> None:
@@ -90,8 +90,8 @@ def demo(
         done += 1
 
     summary: Summary = {
-        "staircase": staircase_case(out, seeds, backend, advance),
-        **spiral_case(out, backend, advance),
+        "staircase": staircase_case(out, seeds, flavour, advance),
+        **spiral_case(out, flavour, advance),
     }
     if recorded is not None:
         advance("EMPS, a recorded axis")

@@ -1,4 +1,4 @@
-"""The demonstration's cases: the paper's staircase and spiral, and a recorded axis."""
+"""Cases of the demonstration: the paper's staircase and spiral, and a recorded axis."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ..logs.log import Log, read_log
 from ..machine import load_machine
 from ..plants.trajectory import spiral, staircase
 from .builds import build_pair
-from .demo_compensation import KINDS, Runs, compensate, contour_errors, mean_summary
+from .demo_compensation import COMPENSATED, Runs, compensate, contour_errors, mean_summary
 
 __all__ = ["MACHINES", "Summary", "read_recorded", "recorded_case", "spiral_case", "staircase_case"]
 
@@ -30,11 +30,11 @@ MACHINES = {"staircase": "spring_mass_damper", "spiral_x": "als25010_x", "spiral
 """The machine of each case."""
 
 
-def staircase_case(out: Path, seeds: int, backend: str, advance: Callable[[str], None]) -> dict[str, Any]:
+def staircase_case(out: Path, seeds: int, flavour: str, advance: Callable[[str], None]) -> dict[str, Any]:
     """Predict and compensate on the staircase."""
     machine = load_machine(MACHINES["staircase"])
     command = staircase(machine.T_s)
-    fmus = build_pair(machine, out / "fmus", backend)
+    fmus = build_pair(machine, out / "fmus", flavour)
     runs = []
     for seed in range(seeds):
         advance(f"staircase, FMU against FMU, noise seed {seed}")
@@ -43,7 +43,7 @@ def staircase_case(out: Path, seeds: int, backend: str, advance: Callable[[str],
     title = "Staircase (cf. the paper's Fig. 4), FMU against FMU, noise seed 0"
     prediction_figure(runs[0], title, out / "staircase.png")
     compensated, compensation = compensate(
-        machine, fmus[1], command, out, backend, seeds=range(seeds), advance=partial(_say, advance, "staircase")
+        machine, fmus[1], command, out, flavour, seeds=range(seeds), advance=partial(_announce, advance, "staircase")
     )
     compensated["hybrid_warm"].save(out / "staircase_compensated.csv")
     title = "Staircase, compensated: FMU against FMU, noise seed 0"
@@ -57,14 +57,14 @@ def staircase_case(out: Path, seeds: int, backend: str, advance: Callable[[str],
     }
 
 
-def spiral_case(out: Path, backend: str, advance: Callable[[str], None]) -> Summary:
+def spiral_case(out: Path, flavour: str, advance: Callable[[str], None]) -> Summary:
     """Predict and compensate on the spiral, both axes."""
     summary: Summary = {}
     axes: dict[str, Run] = {}
     compensated: dict[str, Runs] = {}
     for axis, command in zip(("x", "y"), spiral(), strict=True):
         machine, label = load_machine(MACHINES[f"spiral_{axis}"]), f"spiral, {axis.upper()} axis"
-        fmus = build_pair(machine, out / "fmus", backend)
+        fmus = build_pair(machine, out / "fmus", flavour)
         advance(label)
         axes[axis] = run = cosimulate(*fmus, command)
         case = summary[f"spiral_{axis}"] = {**run.summary(), "physics_tuned_to_printed": True, **_worse(run)}
@@ -75,14 +75,14 @@ def spiral_case(out: Path, backend: str, advance: Callable[[str], None]) -> Summ
         title = f"Spiral, {axis.upper()} axis (cf. the paper's Fig. 8), FMU against FMU"
         prediction_figure(run, title, out / f"spiral_{axis}.png")
         compensated[axis], case["compensation"] = compensate(
-            machine, fmus[1], command, out, backend, advance=partial(_say, advance, label)
+            machine, fmus[1], command, out, flavour, advance=partial(_announce, advance, label)
         )
         compensated[axis]["hybrid_warm"].save(out / f"spiral_{axis}_compensated.csv")
         title = f"Spiral, {axis.upper()} axis, compensated: FMU against FMU"
         tracking_figure(compensated[axis], title, out / f"spiral_{axis}_compensated.png")
     spiral_figure(axes["x"], axes["y"], out / "spiral.png")
     errors = contour_errors(compensated["x"], compensated["y"])
-    pairs = {kind: (compensated["x"][kind], compensated["y"][kind]) for kind in KINDS}
+    pairs = {kind: (compensated["x"][kind], compensated["y"][kind]) for kind in COMPENSATED}
     contour_figure(pairs, errors, "Spiral, X and Y compensated: contour error", out / "spiral_contour.png")
     for case in summary.values():
         for kind, error in errors.items():
@@ -125,13 +125,13 @@ def recorded_case(log: Log, out: Path) -> dict[str, Any]:
     return {**found.summary(), **_worse(run)}
 
 
-def _say(advance: Callable[[str], None], case: str, kind: str) -> None:
-    """Say which kind of compensation of a case is run next."""
-    advance(f"{case}, {kind}")
+def _announce(advance: Callable[[str], None], case: str, run: str) -> None:
+    """Report the compensated run of a case that is next."""
+    advance(f"{case}, {run}")
 
 
 def _worse(run: Run) -> dict[str, Any]:
-    """Return in which batches the hybrid is worse than the physics model, and in how many worse than hold."""
+    """Return the windows in which the hybrid is worse than the physics model, and how many in which worse than hold."""
     errors = run.batch_rms()
     worse = np.flatnonzero(errors["x_h"] > errors["x_pb"])
     step = run.Np * run.T_s

@@ -1,4 +1,4 @@
-"""The demonstration's compensated cases: a compensator FMU in place of the predictor FMU, cold and warm."""
+"""Compensated runs of the demonstration: a compensator FMU in place of the predictor FMU, cold and warm."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..base.metrics import contour_error
+from ..base.settings import PARAMETERS
 from ..base.signals import Array
-from ..compensate.plan import SepState
 from ..cosim.loop import cosimulate
 from ..cosim.run import Run
 from ..machine import Machine
@@ -18,18 +18,13 @@ from ..plants.encoder import Encoder
 from ..plants.trajectory import archimedean_spiral
 from .builds import build_for_host
 
-__all__ = ["KINDS", "Runs", "compensate", "contour_errors", "mean_summary", "train"]
+__all__ = ["COMPENSATED", "Runs", "compensate", "contour_errors", "mean_summary", "train"]
 
 TRAINING_SEED = 1000
-"""Noise seed of the run that a warm compensator has learned from; no case is run with it."""
+"""Noise seed of the training run of a warm compensator; no case uses it."""
 
-KINDS = {
-    "none": SepState.OFF,
-    "physics": SepState.PHYSICS,
-    "hybrid_cold": SepState.HYBRID,
-    "hybrid_warm": SepState.HYBRID,
-}
-"""Kinds of compensation, under the keys of :data:`hybridsep.evaluate.canvas.CASES`, and the best model of each."""
+COMPENSATED = {"none": "off", "physics": "physics", "hybrid_cold": "hybrid", "hybrid_warm": "hybrid"}
+"""Compensated runs of a case, by the keys of :data:`hybridsep.evaluate.canvas.CASES`: value of ``compensate``."""
 
 Runs = dict[str, Run]
 
@@ -39,7 +34,7 @@ def compensate(
     plant: Path,
     command: Array,
     out: Path,
-    backend: str,
+    flavour: str,
     *,
     seeds: Sequence[int] = (0,),
     advance: Callable[[str], object] = lambda message: None,
@@ -55,33 +50,33 @@ def compensate(
         Commanded positions.
     out : Path
         Folder: the FMU goes to ``fmus``, the trained one to ``fmus/warm``, what it learned from to ``<machine>.state``.
-    backend : {"native", "python"}
+    flavour : {"native", "python"}
         Flavour of the FMU.
     seeds : sequence of int
         Noise seeds.
     advance : callable
-        Called with the name of each kind of compensation before it is run.
+        Called with the name of each compensated run before it.
 
     Returns
     -------
     runs : dict
-        The first seed's, by the keys of :data:`KINDS`.
+        The first seed's, by the keys of :data:`COMPENSATED`.
     summary : dict
         The same keys → means over the seeds of :meth:`Run.summary`, with the spread
         ``tracking_rms_um_std``.
     """
-    cold = build_for_host(machine, "SepCompensator", out / "fmus", backend)
+    cold = build_for_host(machine, "SepCompensator", out / "fmus", flavour)
     weights = out / f"{machine.name}.state"
     train(machine, command, weights)
-    warm = build_for_host(machine, "SepCompensator", out / "fmus" / "warm", backend, weights=weights)
+    warm = build_for_host(machine, "SepCompensator", out / "fmus" / "warm", flavour, weights=weights)
     runs: Runs = {}
     summary: dict[str, Any] = {}
-    for key, best in KINDS.items():
+    for key, choice in COMPENSATED.items():
         advance(key.replace("_", " "))
+        values = {"compensate": PARAMETERS["compensate"].to_fmi(choice)}
         fmu = warm if key == "hybrid_warm" else cold
         of_seeds = [
-            cosimulate(fmu, plant, command, controller_values={"compensate": int(best)}, plant_values={"seed": seed})
-            for seed in seeds
+            cosimulate(fmu, plant, command, controller_values=values, plant_values={"seed": seed}) for seed in seeds
         ]
         runs[key] = of_seeds[0]
         summary[key] = mean_summary([run.summary() for run in of_seeds], spread="tracking_rms_um")
@@ -98,7 +93,7 @@ def train(machine: Machine, command: Array, path: Path) -> None:
 
 
 def contour_errors(x: Runs, y: Runs) -> dict[str, Array]:
-    """Return how far the paper's spiral is missed, ``(n,)``, m, of the runs of X and Y with the same key."""
+    """Return the contour errors on the paper's spiral, ``(n,)``, m, of the runs of X and Y with the same key."""
     path = archimedean_spiral(0.030, 5.0)
     return {key: contour_error(np.column_stack((x[key].x, y[key].x)), *path) for key in x}
 

@@ -1,4 +1,4 @@
-"""What ends a command: every failure as one line on standard error, and an exit status.
+"""Failures of a command, reported as one line on standard error and an exit status.
 
 Status 2 for an error, 130 after Ctrl-C, 1 where the reader of standard output has gone.
 """
@@ -28,7 +28,7 @@ errors_console = Console(stderr=True)
 _PLAIN = str.maketrans(
     {"µ": "u", "→": "->", "–": "-", "−": "-", "…": "...", "²": "2", "³": "3", "·": "*", "λ": "lambda"}
 )
-"""Characters of our texts, for a terminal that does not know them."""
+"""Substitutes for characters that a terminal's encoding lacks."""
 
 
 class _Interrupted(BaseException):
@@ -36,7 +36,7 @@ class _Interrupted(BaseException):
 
 
 _leave: Callable[..., object] | None = None
-"""Handler of Ctrl-C that ends the process at once; None where Ctrl-C is somebody else's."""
+"""Handler of Ctrl-C that ends the process at once; None where the calling program handles Ctrl-C itself."""
 
 
 @contextmanager
@@ -67,7 +67,7 @@ def run(app: Callable[[], object], leave: Callable[..., object] | None = None) -
     global _leave
     _leave = leave
     for stream in (sys.stdout, sys.stderr):
-        with suppress(AttributeError):  # a stream in a program that has its own
+        with suppress(AttributeError):  # a replaced stream, which cannot be reconfigured
             stream.reconfigure(errors=_PLAIN_ERRORS)  # type: ignore[union-attr]
     try:
         with interrupts_between_calls(_Interrupted):
@@ -113,8 +113,8 @@ def _fail(message: str) -> int:
 
 
 def _abandon_stdout() -> None:
-    """Let what is still buffered go nowhere, so that the end of the process does not fail as well."""
-    with suppress(OSError, ValueError):  # a stream without a descriptor has no such end
+    """Redirect standard output to the null device, so that flushing it at exit cannot fail."""
+    with suppress(OSError, ValueError):  # a stream without a descriptor is not flushed at exit
         descriptor = os.open(os.devnull, os.O_WRONLY)
         os.dup2(descriptor, sys.stdout.fileno())
         os.close(descriptor)

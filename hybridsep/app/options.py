@@ -10,12 +10,12 @@ from typing import Annotated
 
 import typer
 
-from ..fmi.backends import BACKENDS
+from ..fmi.flavours import FLAVOURS
 
 __all__ = [
     "COMPENSATIONS",
     "TRAJECTORIES",
-    "BackendOption",
+    "FlavourOption",
     "ForceOption",
     "JsonOption",
     "MachineOption",
@@ -39,7 +39,7 @@ ForceOption = Annotated[
 MachineOption = Annotated[
     str, typer.Option("--machine", "-m", help="Machine file (.toml), or the name of one that comes with the library.")
 ]
-BackendOption = Annotated[str, typer.Option(help=f"Flavour of the FMUs: {', '.join(BACKENDS)}.")]
+FlavourOption = Annotated[str, typer.Option(help=f"Flavour of the FMUs: {', '.join(FLAVOURS)}.")]
 TsOption = Annotated[
     float | None, typer.Option("--T_s", "--Ts", help="Sampling interval [s], for a file without a time column.")
 ]

@@ -1,4 +1,4 @@
-"""What a file that is written may replace: nothing that is read, and only a file of its own kind unless forced."""
+"""Checks of output files: an input is never overwritten, an existing file only by one of its kind unless forced."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from ..cosim.run import COMPENSATOR, PREDICTOR
 __all__ = ["BATCHES", "BATCH_COLUMNS", "BY_ENDING", "FIGURE", "FMU", "RUN", "Kind", "Output", "check_outputs"]
 
 BATCH_COLUMNS = ("t", "rms_pb", "rms_hold", "rms_h")
-"""The CSV of ``hybridsep backtest``."""
+"""Columns of the CSV of ``hybridsep backtest``."""
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of files that the command line writes.
+    """Kind of files that the command line writes.
 
     Attributes
     ----------
     name : str
-        As messages call it.
+        Name in messages.
     recognises : callable
         Whether an existing file is of that kind.
     """
@@ -40,7 +40,7 @@ class Output:
     Attributes
     ----------
     option : str
-        What the user named it with.
+        Option that named it.
     path : Path
     kind : Kind
     """
@@ -59,7 +59,7 @@ def _begins_with(start: bytes) -> Callable[[Path], bool]:
 
 
 def _has_columns(*tables: tuple[str, ...]) -> Callable[[Path], bool]:
-    """Return what recognises a CSV or an ``.npz`` with the columns of one of the tables."""
+    """Return a test for a CSV or an ``.npz`` with the columns of one of the tables."""
     headers = [",".join(columns).encode() for columns in tables]
     members = [[f"{name}.npy" for name in columns] for columns in tables]
 
@@ -92,17 +92,17 @@ STATE = Kind("saved predictor", _begins_with(b"HSEP"))
 SUMMARY = Kind("summary of hybridsep demo", _begins_with(b'{\n  "staircase": {'))
 
 BY_ENDING = {".csv": RUN, ".npz": RUN, ".png": FIGURE, ".fmu": FMU, ".state": STATE, ".json": SUMMARY}
-"""The kinds of files that have names of the library's own."""
+"""Kinds of the files that the library names itself."""
 
 
 def check_outputs(outputs: Iterable[Output], inputs: Mapping[str, str | Path | None], *, force: bool = False) -> None:
-    """Make the folders of files that will be written, or say why one of them may not be.
+    """Make the folders of files that will be written, or raise ParameterError if one may not be written.
 
     Parameters
     ----------
     outputs : iterable of Output
     inputs : mapping
-        What the user calls a file that is read → its path; None if it is not given.
+        Role of a file that is read → its path; None if it is not given.
     force : bool
         Whether an existing file of another kind may be overwritten; an input never is.
 
@@ -146,4 +146,4 @@ def _recognised(output: Output) -> bool:
     try:
         return output.kind.recognises(output.path)
     except (zipfile.BadZipFile, OSError, ValueError, KeyError, RuntimeError, NotImplementedError):
-        return False  # damaged, or not readable: whatever it is, it is not known to be ours
+        return False  # damaged or unreadable: not known to be ours

@@ -1,4 +1,4 @@
-"""Figures that the paper prints for the demonstration's cases."""
+"""Printed figures of the paper for the demonstration's cases."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the command line prints: tables for people, JSON for programs."""
+"""Output of the command line: tables, or JSON."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PAPER_COLUMN = "paper: physics → hybrid, reduction, as printed there"
 
 
 def print_predictions(summary: Mapping[str, Mapping[str, Any]]) -> None:
-    """Print what the demo's predictors came to."""
+    """Print the prediction errors of the demo."""
     table = Table(
         title="Prediction error, RMS in µm against the measured position",
         caption=PAPER_COLUMN,
@@ -44,7 +44,7 @@ def print_predictions(summary: Mapping[str, Mapping[str, Any]]) -> None:
     )
     for name, case in summary.items():
         n, worse = case["n_batches"], case["batches_hybrid_worse"]
-        text = f"{name}: of {n} batches the hybrid is worse than physics in {len(worse)}"
+        text = f"{name}: of {n} windows the hybrid is worse than physics in {len(worse)}"
         times = ", ".join(f"{batch['t_s']:g}" for batch in worse)
         console.print(
             f"{text}{f' (from {times} s on)' if worse else ''}, worse than hold in {case['n_batches_worse_than_hold']}",
@@ -53,7 +53,7 @@ def print_predictions(summary: Mapping[str, Mapping[str, Any]]) -> None:
 
 
 def print_compensation(summary: Mapping[str, Mapping[str, Any]]) -> None:
-    """Print what the demo's compensators came to."""
+    """Print the tracking errors of the demo's compensated runs."""
     kinds = list(summary["staircase"]["compensation"])
     table = Table(
         title="\nTracking error with compensation, RMS in µm of the true position",
@@ -78,7 +78,7 @@ def _figures(case: Mapping[str, Any]) -> list[str]:
 
 
 def _printed(case: Mapping[str, float]) -> str:
-    """Return what the paper prints of a case."""
+    """Return the paper's figures of a case as text, empty if there are none."""
     if not case:
         return ""
     return f"{case['rms_pb_um']:g}→{case['rms_h_um']:g}, {case['reduction_percent']:g} %"
@@ -110,13 +110,13 @@ def print_scores(summary: Mapping[str, float | int], as_json: bool, title: str) 
 
 
 def print_run(run: Run, as_json: bool, title: str) -> None:
-    """Print the figures of a run: of its predictions, or of its tracking."""
+    """Print the figures of a run: its prediction errors, or its tracking errors."""
     show = print_scores if run.kind == PREDICTOR else _print_tracking
     show(run.summary(), as_json, title)
 
 
 def _print_tracking(summary: Mapping[str, float | int], as_json: bool, title: str) -> None:
-    """Print what a compensated run came to."""
+    """Print tracking errors, change of the command and its peaks."""
     if as_json:
         print_json(summary)
         return
@@ -140,7 +140,7 @@ def _print_tracking(summary: Mapping[str, float | int], as_json: bool, title: st
 
 
 def print_json(result: Any) -> None:
-    """Print JSON; figures that do not exist, such as scores over no sample, are null."""
+    """Print JSON; figures that are not finite, such as scores over no sample, are null."""
     typer.echo(json.dumps(_finite(result), indent=2))
 
 

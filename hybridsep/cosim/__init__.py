@@ -1,1 +1,1 @@
-"""FMUs loaded with fmpy and stepped together."""
+"""Co-simulation of a controller and a drive, FMUs or objects of the library."""

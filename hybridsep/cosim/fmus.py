@@ -1,4 +1,4 @@
-"""FMUs in the loop, through fmpy: a predictor or compensator FMU, and a plant FMU."""
+"""FMU adapters of the co-simulation loop: a predictor or compensator, and a plant."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["FmuController", "FmuDrive", "check_controller", "check_plant"]
 
 
 class _OpenedFmu(AbstractContextManager["_OpenedFmu"]):
-    """An archive whose instance lives as long as the context.
+    """FMU whose instance lives as long as the context.
 
     Parameters
     ----------
@@ -114,12 +114,12 @@ class FmuDrive(_OpenedFmu):
 
 
 def check_controller(path: str | Path, kind: Kind) -> None:
-    """Raise FmuError if an archive is no FMU, or lacks what a kind of controllers has."""
+    """Raise FmuError if an archive is no FMU, or lacks variables of a kind of controllers."""
     _check_variables(path, kind.name, ("x_d_ahead", "x_meas"), (*kind.outputs, kind.state))
 
 
 def check_plant(path: str | Path) -> None:
-    """Raise FmuError if an archive is no FMU, or lacks what a plant has."""
+    """Raise FmuError if an archive is no FMU, or lacks variables of a plant."""
     _check_variables(path, "plant", ("x_d",), ("x", "x_meas"))
 
 

@@ -1,4 +1,4 @@
-"""One instance of an FMI 2.0 co-simulation FMU, by variable names; a thin layer over fmpy."""
+"""Instance of an FMI 2.0 co-simulation FMU with access by variable name, a thin layer over fmpy."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from ..fmi.pythonfmu_limits import check_unpacked
 __all__ = ["FmuInstance", "read_description"]
 
 _ACCESS = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}
-"""Which of the FMU's functions reads and writes a type."""
+"""FMI type → the type whose functions get and set it."""
 
 
 def read_description(path: str | Path) -> Any:
@@ -97,7 +97,7 @@ class FmuInstance:
     variables : dict
         fmpy's scalar variables by name.
     log : list of (status, message)
-        What the FMU said through its logger; at most the last 1000 messages.
+        Messages of the FMU's logger; at most the last 1000.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The library's own controllers and plants in the loop."""
+"""Library adapters of the co-simulation loop: a predictor or compensator, and a plant."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The loop of a controller and a drive: how they are wired, stepped and recorded, FMUs and the library's objects alike.
+"""Co-simulation loop of a controller and a drive, FMUs and the library's objects alike.
 
 The Jacobi wiring: at ``t_k`` the drive gets the command that the controller gives it, the controller gets ``x_meas``
 and ``x_d_ahead = r(k)``; then both step. The controller delays the trajectory, so ``r`` is held at its end for as many
@@ -44,12 +44,12 @@ class Controller(Protocol):
     Attributes
     ----------
     name : str
-        As error messages call it.
+        Name in error messages.
     kind : Kind
     T_s : float
         Sampling interval, s; like the next two, known after :meth:`initialise`.
     Np, delay : int
-        Samples in a batch; samples by which it delays the trajectory.
+        Samples in a window; samples by which it delays the trajectory.
     """
 
     name: str
@@ -74,11 +74,11 @@ class Drive(Protocol):
     Attributes
     ----------
     name : str
-        As error messages call it.
+        Name in error messages.
     T_s : float, optional
         Sampling interval, s, known after :meth:`initialise`; None if it can be any.
     plant : object
-        What is disturbed; known after :meth:`initialise`.
+        Passed to ``disturb``; known after :meth:`initialise`.
     """
 
     name: str
@@ -227,7 +227,7 @@ def _controller(
     t_init: float | None,
     start_time: float,
 ) -> Controller:
-    """Return what the loop steps in a controller's place."""
+    """Return the loop's adapter of a controller."""
     if isinstance(controller, (str, Path)):
         from .fmus import FmuController  # fmpy is loaded where an FMU is
 
@@ -240,7 +240,7 @@ def _controller(
 def _drive(
     plant: str | Path | Plant, values: Mapping[str, Any] | None, encoder: Encoder | None, start_time: float
 ) -> Drive:
-    """Return what the loop steps in a plant's place."""
+    """Return the loop's adapter of a plant."""
     if isinstance(plant, (str, Path)):
         from .fmus import FmuDrive
 
@@ -251,6 +251,6 @@ def _drive(
 
 
 def _refuse(given: object, message: str) -> None:
-    """Raise ParameterError if an argument is given that has no use."""
+    """Raise ParameterError if an argument is given that does not apply."""
     if given is not None:
         raise ParameterError(message)

@@ -1,4 +1,4 @@
-"""Record of a run: what a controller and a drive did over a trajectory, sample by sample, its figures and its file."""
+"""Record of a run of a controller and a drive over a trajectory: signals, figures, file."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ RESULT_SUFFIXES = (".csv", ".npz")
 
 @dataclass(frozen=True)
 class Kind:
-    """Kind of a controller: what the loop asks of it, and what its runs save.
+    """Kind of a controller: its outputs in the loop and the columns of its runs' files.
 
     Attributes
     ----------
     name : str
-        As error messages call it.
+        Name in error messages.
     outputs : tuple of str
         Its positions, m; the first one goes to the drive.
     state : str
         Its Integer or Boolean output that says which model predicts.
     lowest : SepState
-        What that output means by 0.
+        State that stands for 0 of that output.
     delay : str
-        The parameter that says by how many samples it delays the trajectory.
+        Its parameter with the number of samples by which it delays the trajectory.
     columns : tuple of str
-        Attributes of :class:`Run` that a file of a run has.
+        Attributes of :class:`Run` that are saved.
     """
 
     name: str
@@ -82,7 +82,7 @@ class Run:
     t : (n,) array, s
         Communication points.
     x_d, x_dm : (n,) array, m
-        Commanded position and what the drive got in its place; the same where the loop is open.
+        Commanded position and the modified command; the same where the loop is open.
     x, x_meas : (n,) array, m
         True and measured position; the true one of a recorded axis is NaN.
     x_pb, x_h : (n,) array, m
@@ -92,7 +92,7 @@ class Run:
     T_s : float
         Sampling interval, s.
     Np : int
-        Samples in a batch.
+        Samples in a window.
     """
 
     kind: Kind
@@ -119,7 +119,7 @@ class Run:
 
     @property
     def change(self) -> Array:
-        """How the command was modified, ``x_dm − x_d``, ``(n,)``, m."""
+        """Change of the command, ``x_dm − x_d``, ``(n,)``, m."""
         return np.asarray(self.x_dm - self.x_d, dtype=np.float64)
 
     @property
@@ -133,7 +133,7 @@ class Run:
         return rms(self.error)
 
     def summary(self) -> dict[str, float | int]:
-        """Return the figures of the run's kind: of its predictions, or of its tracking."""
+        """Return the figures of the run's kind: prediction errors, or tracking errors."""
         return self.prediction_figures() if self.kind == PREDICTOR else self.tracking_figures()
 
     def prediction_figures(self) -> dict[str, float | int]:
@@ -152,7 +152,7 @@ class Run:
         }
 
     def tracking_figures(self) -> dict[str, float | int]:
-        """Return what compensation came to over the whole trajectory.
+        """Return tracking errors, change of the command and shares of the models over the whole trajectory.
 
         Returns
         -------
@@ -176,7 +176,7 @@ class Run:
         return {**figures, "n_samples": len(self.t)}
 
     def batch_rms(self) -> dict[str, Array]:
-        """Return the RMS errors batch by batch, m, ``(n_batches,)`` each, of ``x_pb``, ``x_hold`` and ``x_h``."""
+        """Return the RMS errors of each window, m, ``(n_batches,)``, of ``x_pb``, ``x_hold`` and ``x_h``."""
         return {name: batch_rms(self.x_meas - getattr(self, name), self.Np) for name in ("x_pb", "x_hold", "x_h")}
 
     def save(self, path: str | Path) -> None:

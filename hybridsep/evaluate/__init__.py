@@ -1,1 +1,1 @@
-"""What predictors and compensators are worth: backtests, closed loops, figures."""
+"""Evaluation of predictors and compensators: backtests, scores, plots."""

@@ -1,7 +1,7 @@
-"""Causal replay over a recorded log: each batch is predicted first, then revealed and learned.
+"""Causal replay over a recorded log: each window is predicted first, then revealed and learned.
 
 Three predictors are scored against the measured position: the physics model ``x_pb``, the hold baseline ``x_hold``
-(``x_pb`` plus the last measured residual, held over the batch) and the hybrid ``x_h`` of eq. (4). During the warm-up
+(``x_pb`` plus the last measured residual, held over the window) and the hybrid ``x_h`` of eq. (4). During the warm-up
 all three publish ``x_pb``.
 """
 
@@ -26,22 +26,22 @@ __all__ = ["Backtest", "Batch", "backtest", "backtest_stream"]
 
 
 class Batch(NamedTuple):
-    """One batch of a replay, after it was revealed.
+    """Window of a replay, after it was revealed.
 
     Attributes
     ----------
     j : int
-        Number of the batch in this replay, from 0.
+        Its number in this replay, from 0.
     k : int
-        Number of its first sample in this replay, from 0.
+        Index of its first sample in this replay, from 0.
     n_warm_up : int
         Its leading samples that belong to the warm-up.
     x_d, x : (n,) array, m
         Commanded and measured positions.
     x_pb, x_hold, x_h : (n,) array, m
-        What was predicted before any of ``x`` was known.
+        Predictions made before any of ``x`` was known.
     rms_pb, rms_hold, rms_h : float
-        RMS of ``x`` minus each prediction over the batch, m.
+        RMS of ``x`` minus each prediction over the window, m.
     """
 
     j: int
@@ -59,16 +59,16 @@ class Batch(NamedTuple):
 
 @dataclass(frozen=True)
 class Backtest(Scores):
-    """What a replay over arrays came to, with all that was predicted.
+    """Result of a replay over arrays: scores and predictions.
 
     Attributes
     ----------
     x_pb, x_hold, x_h : (n,) array, m
-        Predictions, each made before its batch was revealed.
+        Predictions, each made before its window was revealed.
     active : (n,) array of bool
         Whether the hybrid is published, that is, after the warm-up.
     batch_rms_pb, batch_rms_hold, batch_rms_h : (n_batches,) array, m
-        RMS errors batch by batch.
+        RMS errors of each window.
     """
 
     x_pb: Array
@@ -86,7 +86,7 @@ OnBatch = Callable[[Batch], object]
 def backtest(predictor: HybridPredictor, x_d: ArrayLike, x: ArrayLike, *, on_batch: OnBatch | None = None) -> Backtest:
     """Replay a log that is in memory.
 
-    The predictor goes on from where it is; a second run with the weights kept is asked for by its ``restart``.
+    The predictor goes on from its present state; call its ``restart`` before for another run with the weights kept.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def backtest(predictor: HybridPredictor, x_d: ArrayLike, x: ArrayLike, *, on_bat
     x_d, x : (n,) array_like, m
         Commanded and measured positions, ``n ≥ 1``.
     on_batch : callable, optional
-        Given each :class:`Batch` when it is finished.
+        Called with each :class:`Batch` when it is finished.
 
     Returns
     -------
@@ -149,7 +149,7 @@ def backtest_stream(
     chunks : iterable of pairs ``(x_d, x)`` of (m,) array_like, m
         Commanded and measured positions in chunks of any sizes; they are predicted ``Np`` samples at a time.
     on_batch : callable, optional
-        Given each :class:`Batch` when it is finished.
+        Called with each :class:`Batch` when it is finished.
 
     Returns
     -------
@@ -158,12 +158,12 @@ def backtest_stream(
     Raises
     ------
     SignalError
-        If a chunk's samples cannot be used, there are none at all, or a prediction diverges. What came before it is
+        If a chunk's samples cannot be used, there are none at all, or a prediction diverges. The windows before are
         learned.
     """
     overall, after = RunningErrors(3), RunningErrors(3)
     j = 0
-    for x_d, x in _batches(chunks, predictor.Np):
+    for x_d, x in _windows(chunks, predictor.Np):
         residual = predictor.last_residual()
         prediction = predictor.predict(x_d)
         n, warm = len(x), prediction.n_warm_up
@@ -192,15 +192,15 @@ def backtest_stream(
 
 
 def _measure(error: Array, k: int) -> tuple[list[float], list[float]]:
-    """Return the sums of squares and the largest absolute values of the three errors of a batch from sample k on."""
+    """Return sums of squares and largest magnitudes of the three errors of the window from sample ``k`` on."""
     peaks: list[float] = np.abs(error).max(axis=1).tolist()
     if not all(peak <= PREDICTION_MAX for peak in peaks):
-        raise SignalError(f"x_h diverges in the batch from sample {k} on; raise lambda or lower p")
+        raise SignalError(f"x_h diverges in the window from sample {k} on; raise lambda or lower p")
     return [float(row.dot(row)) for row in error], peaks
 
 
-def _batches(chunks: Iterable[tuple[ArrayLike, ArrayLike]], Np: int) -> Iterator[tuple[Array, Array]]:
-    """Cut chunks of any sizes into batches of ``Np`` samples; the last one may be shorter."""
+def _windows(chunks: Iterable[tuple[ArrayLike, ArrayLike]], Np: int) -> Iterator[tuple[Array, Array]]:
+    """Cut chunks of any sizes into windows of ``Np`` samples; the last one may be shorter."""
     waiting, filled, k = np.empty((2, Np)), 0, 0
     for chunk in chunks:
         x_d, x = _checked(chunk, k)
@@ -224,7 +224,7 @@ def _batches(chunks: Iterable[tuple[ArrayLike, ArrayLike]], Np: int) -> Iterator
 
 
 def _checked(chunk: tuple[ArrayLike, ArrayLike], k: int) -> tuple[Array, Array]:
-    """Return a chunk's samples, or say what is wrong with the chunk that begins at sample ``k``."""
+    """Return a chunk's samples; SignalError names the chunk by its first sample ``k``."""
     place = f" of the chunk from sample {k} on" if k else ""
     try:
         first, second = chunk

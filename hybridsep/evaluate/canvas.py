@@ -1,4 +1,4 @@
-"""Canvas of the figures: drawn without a display and written as PNG, and the colour of each model."""
+"""Canvas and colours of the figures, drawn without a display and written as PNG."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ CASES = {
     "hybrid_warm": ("hybrid, warm", HYBRID),
     "hybrid": ("hybrid", HYBRID),
 }
-"""Kinds of compensation in the order of what they are worth: key → label, colour."""
+"""Compensated runs in the order of their expected error, largest first: key → label, colour."""
 
 
 def finish_panels(panels: Iterable[Axes]) -> None:

@@ -1,4 +1,4 @@
-"""Figures along a planar path, both axes together: where the models err, and where the contour is missed."""
+"""Figures along a planar path, both axes together: prediction errors and contour errors."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["contour_figure", "spiral_figure"]
 
 
 def spiral_figure(x: Run, y: Run, path: str | Path) -> None:
-    """Draw the spiral's path and where along it each model errs, both axes together, to a PNG."""
+    """Draw each model's prediction error along the spiral, both axes together, to a PNG."""
     figure = Figure(figsize=(11.0, 4.6), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
     figure.suptitle("Spiral: distance between the measured and the predicted point")
@@ -42,7 +42,7 @@ def spiral_figure(x: Run, y: Run, path: str | Path) -> None:
 def contour_figure(
     runs: Mapping[str, tuple[Run, Run]], errors: Mapping[str, Array], title: str, path: str | Path
 ) -> None:
-    """Draw where along a planar path the contour is missed, one panel for each kind of compensation, to a PNG.
+    """Draw the contour error along a planar path, one panel for each compensated run, to a PNG.
 
     Parameters
     ----------

@@ -44,14 +44,14 @@ class Score:
 
 @dataclass(frozen=True)
 class Scores:
-    """What a replay came to.
+    """Scores of a replay.
 
     Attributes
     ----------
     overall, after_warm_up : Score
         Over all samples, and over those after the warm-up.
     n_batches : int
-        Batches replayed, the last one may be incomplete.
+        Windows replayed, the last one may be incomplete.
     """
 
     overall: Score

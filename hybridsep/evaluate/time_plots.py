@@ -19,11 +19,11 @@ from .canvas import CASES, HOLD, HYBRID, PHYSICS, finish_panels, save_figure
 __all__ = ["prediction_figure", "tracking_figure"]
 
 _SPANS = {SepState.OFF: ("not compensated", HOLD), SepState.PHYSICS: ("planned by the physics model", PHYSICS)}
-"""How spans are shaded that a run's best model did not plan."""
+"""Shading of spans that a lesser model planned than others of the run."""
 
 
 def prediction_figure(run: Run, title: str, path: str | Path) -> None:
-    """Draw the command, the two models' prediction errors and the RMS of each batch to a PNG.
+    """Draw the command, the two models' prediction errors and the RMS of each window to a PNG.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def prediction_figure(run: Run, title: str, path: str | Path) -> None:
         The PNG.
     """
     figure = Figure(figsize=(9.0, 8.0), layout="constrained")
-    command, error, batches = figure.subplots(3, 1, sharex=True, height_ratios=[1.0, 2.0, 1.4])
+    command, error, windows = figure.subplots(3, 1, sharex=True, height_ratios=[1.0, 2.0, 1.4])
     figure.suptitle(title)
     t = run.t - run.t[0]
     command.plot(t, 1e3 * run.x_d, color="black", linewidth=1.2)
@@ -45,7 +45,7 @@ def prediction_figure(run: Run, title: str, path: str | Path) -> None:
     error.plot(t, hybrid, color=HYBRID, linewidth=0.8, label="linear hybrid model, after the warm-up")
     if not run.active.all():
         t_init = float(t[np.argmax(run.active)])
-        for axes in (error, batches):
+        for axes in (error, windows):
             axes.axvline(t_init, color="black", linewidth=0.8, linestyle=":")
         error.annotate(
             "t_init", (t_init, 0.02), xycoords=("data", "axes fraction"), xytext=(4, 0), textcoords="offset points"
@@ -53,14 +53,14 @@ def prediction_figure(run: Run, title: str, path: str | Path) -> None:
     error.set_ylabel("prediction error\nx − x̂ [µm]")
     error.margins(y=0.15)
     error.legend(loc="upper right", ncols=2, frameon=False)
-    _draw_batches(batches, run)
-    batches.set_xlabel("time [s]")
-    finish_panels((command, error, batches))
+    _draw_windows(windows, run)
+    windows.set_xlabel("time [s]")
+    finish_panels((command, error, windows))
     save_figure(figure, path)
 
 
-def _draw_batches(axes: Axes, run: Run) -> None:
-    """Draw the RMS error of each batch and mark the batches where the hybrid is worse than the physics model."""
+def _draw_windows(axes: Axes, run: Run) -> None:
+    """Draw the RMS error of each window and mark the windows where the hybrid is worse than the physics model."""
     errors = {name: 1e6 * values for name, values in run.batch_rms().items()}
     edges = np.append(np.arange(len(errors["x_pb"])) * run.Np, len(run.t)) * run.T_s
     for name, color, label in (
@@ -73,7 +73,7 @@ def _draw_batches(axes: Axes, run: Run) -> None:
     for begin, end in zip(edges[:-1][worse], edges[1:][worse], strict=True):
         axes.axvspan(begin, end, color=PHYSICS, alpha=0.15, linewidth=0)
     axes.set_ylim(0.0, 1.35 * max(float(values.max()) for values in errors.values()))
-    axes.set_ylabel("RMS of each\nbatch [µm]")
+    axes.set_ylabel("RMS of each\nwindow [µm]")
     axes.legend(loc="upper right", ncols=3, frameon=False, title="shaded: hybrid worse than physics", title_fontsize=8)
 
 
@@ -83,8 +83,8 @@ def tracking_figure(runs: Mapping[str, Run], title: str, path: str | Path) -> No
     Parameters
     ----------
     runs : mapping
-        Keys of :data:`~hybridsep.evaluate.canvas.CASES` → runs over the same command. Where it is one run only, the
-        spans are shaded that its best model did not plan.
+        Keys of :data:`~hybridsep.evaluate.canvas.CASES` → runs over the same command. Of one run alone,
+        the spans are shaded that a lesser model planned.
     title : str
         Heading.
     path : str or Path
@@ -131,7 +131,7 @@ def _draw_signals(axes: Axes, signals: Mapping[str, Array], runs: Mapping[str, R
 
 
 def _shade(panels: Sequence[Axes], run: Run) -> list[Patch]:
-    """Shade the spans that another model than the run's best one planned; return what the legend says of them."""
+    """Shade the spans that a lesser model planned than others of the run; return their legend entries."""
     patches = []
     edges_of_samples = np.append(run.t, run.t[-1] + run.T_s) - run.t[0]
     for state, (label, color) in _SPANS.items():

@@ -1,1 +1,1 @@
-"""FMUs: one variable table each, from which the modelDescription, the slave and the documentation follow."""
+"""FMUs, each from one variable table: modelDescription, slave and documentation."""

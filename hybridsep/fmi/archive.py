@@ -1,7 +1,7 @@
-"""Build FMUs: the same sources and the same machine give the same bytes.
+"""FMU archives, reproducible byte for byte from the sources and the machine.
 
-What an FMU carries besides its interface is the backend's: :mod:`hybridsep.fmi.native_backend` compiles the C sources,
-:mod:`hybridsep.fmi.python_backend` wraps this library.
+The content follows from the flavour: :mod:`hybridsep.fmi.native_flavour` compiles the C sources,
+:mod:`hybridsep.fmi.python_flavour` wraps this library.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from ..base.errors import FmuError
 from ..base.output import written_whole
 from ..machine import Machine
 from ..machine_sections import FeedDriveSection
-from . import native_backend, python_backend
-from .backends import BACKENDS
+from . import native_flavour, python_flavour
+from .flavours import FLAVOURS
 from .warm_start import load_trained
 
 __all__ = ["build_fmu", "fmu_description", "fmu_names"]
@@ -31,7 +31,7 @@ _SAMPLES_TRAJECTORY = 3
 _ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 
 
-def fmu_names(machine: Machine, backend: str = BACKENDS[0]) -> dict[str, str]:
+def fmu_names(machine: Machine, flavour: str = FLAVOURS[0]) -> dict[str, str]:
     """Return the FMUs a machine has: archive stem → model (``HybridPredictor``, ``FeedDrive``, …).
 
     A ``SepCompensator`` needs the machine's ``[drive_limits]``, a ``FeedDrive`` its ``[plant]``.
@@ -40,26 +40,26 @@ def fmu_names(machine: Machine, backend: str = BACKENDS[0]) -> dict[str, str]:
     Raises
     ------
     FmuError
-        If the backend is unknown.
+        If the flavour is unknown.
     """
-    if backend not in BACKENDS:
-        raise FmuError(f"backend must be one of {', '.join(BACKENDS)}, got {backend!r}")
+    if flavour not in FLAVOURS:
+        raise FmuError(f"flavour must be one of {', '.join(FLAVOURS)}, got {flavour!r}")
     suffix = "" if machine.name == DEFAULT_MACHINE else f"_{machine.name}"
     models = ["HybridPredictor"]
     if machine.drive_limits is not None:
         models.append("SepCompensator")
     if machine.plant is not None:
         models.append("FeedDrive")
-    if machine.name == DEFAULT_MACHINE and backend == "native":
+    if machine.name == DEFAULT_MACHINE and flavour == "native":
         models.append("ReferenceTrajectory")
-    return {f"{model}{_SUFFIX[backend]}{suffix}": model for model in models}
+    return {f"{model}{_SUFFIX[flavour]}{suffix}": model for model in models}
 
 
 def build_fmu(
     machine: Machine,
     name: str,
     out: str | Path,
-    backend: str = BACKENDS[0],
+    flavour: str = FLAVOURS[0],
     *,
     targets: Sequence[str] | None = None,
     samples: ArrayLike | None = None,
@@ -75,15 +75,15 @@ def build_fmu(
         One of :func:`fmu_names`.
     out : str or Path
         Folder for the archive; made if needed.
-    backend : {"native", "python"}
-        Flavour.
+    flavour : {"native", "python"}
+        Flavour of the FMU.
     targets : sequence of str, optional
-        What a native FMU gets binaries for: of :data:`hybridsep.fmi.compiler.TARGET_NAMES`, ``"host"`` being this
+        Platforms of a native FMU's binaries: of :data:`hybridsep.fmi.compiler.TARGET_NAMES`, ``"host"`` being this
         machine. If left out: all platforms where ``ziglang`` is installed, this machine otherwise.
     samples : (n,) array_like, m, optional
         Trajectory 3 of ReferenceTrajectory, at the machine's ``T_s``; played unless another one is chosen.
     weights : str or Path, optional
-        What :meth:`HybridPredictor.save` wrote, trained with the settings of this FMU, for a SepCompensator best in
+        File of :meth:`HybridPredictor.save`, trained with the settings of this FMU, for a SepCompensator best in
         closed loop (``compensator.predictor.save(...)``): the FMU starts with these weights, without a warm-up.
 
     Returns
@@ -100,7 +100,7 @@ def build_fmu(
     StateError
         If ``weights`` is no saved predictor, or one of another machine or other settings.
     """
-    names = fmu_names(machine, backend)
+    names = fmu_names(machine, flavour)
     if name not in names:
         raise FmuError(f"machine {machine.name} has no FMU {name!r}; it has {', '.join(names)}")
     model = names[name]
@@ -117,10 +117,10 @@ def build_fmu(
         description["parameters"] = {**description["parameters"], "trajectory": _SAMPLES_TRAJECTORY}
     if trained is not None:
         description["parameters"] = {**description["parameters"], "t_init": 0.0}
-    if backend == "native":
-        files = native_backend.files(machine, description, targets=targets, samples=samples, trained=trained)
+    if flavour == "native":
+        files = native_flavour.files(machine, description, targets=targets, samples=samples, trained=trained)
     else:
-        files = python_backend.files(machine, description, trained=trained)
+        files = python_flavour.files(machine, description, trained=trained)
     path = Path(out) / f"{name}.fmu"
     path.parent.mkdir(parents=True, exist_ok=True)
     _write_archive(path, files)
@@ -128,7 +128,7 @@ def build_fmu(
 
 
 def fmu_description(machine: Machine, model: str, name: str) -> dict[str, Any]:
-    """Return what an FMU is made from: model, name, start values and modes."""
+    """Return the description from which an FMU is made: model, name, start values and modes."""
     if model in ("HybridPredictor", "SepCompensator"):
         physics = [{"f_n": m.f_n, "zeta": m.zeta, "alpha": m.alpha, "beta": m.beta} for m in machine.model.modes]
         values = machine.fmi_parameters() if model == "HybridPredictor" else machine.fmi_compensator_parameters()

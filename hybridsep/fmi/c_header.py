@@ -1,6 +1,6 @@
-"""``hsep_fmu.h``: the variable table of one FMU as C, with its value references.
+"""C header ``hsep_fmu.h`` of one FMU: its variable table and value references.
 
-The header is all that differs between the native FMUs' sources. It is made from the same table as the
+The native FMUs' sources differ in this header alone. It is made from the same table as the
 modelDescription, so the two cannot disagree.
 """
 

@@ -1,4 +1,4 @@
-"""From one C file to the shared libraries of an archive, on this machine for every platform.
+"""Compilation of an FMU's C file to shared libraries, on this machine for every platform.
 
 Two toolchains: the host's own C compiler for the host, and the ``ziglang`` wheel (``python -m ziglang cc``) for all.
 Both give the same bytes for the same sources: they compile in a folder of their own, by relative names, without build
@@ -61,7 +61,7 @@ class Target:
         Where importers look for the library, below ``binaries/``.
     suffix : str
     flags : tuple of str
-        What this platform needs besides :func:`compile_flags`.
+        Options besides :func:`compile_flags`.
     """
 
     triple: str
@@ -95,7 +95,7 @@ _FMI2_PLATFORMS = {
 """FMI 2.0's names of platforms, which users know."""
 
 TARGET_NAMES = ("host", *TARGETS, *_FMI2_PLATFORMS)
-"""All that may be asked for."""
+"""Allowed targets."""
 
 
 def host_target() -> str:
@@ -159,7 +159,7 @@ def binaries(sources: Mapping[str, bytes], name: str, targets: Sequence[str]) ->
 
 
 def compile_flags(command: Sequence[str]) -> list[str]:
-    """Return what the sources are compiled with on every platform by this compiler.
+    """Return this compiler's options for the sources, the same for every platform.
 
     Parameters
     ----------
@@ -214,7 +214,7 @@ def _host_compiler() -> list[str]:
         return _zig(TARGETS[host_target()].triple)
     raise FmuError(
         "no C compiler: none of $CC, cc, gcc, clang; install one, or pip install ziglang, or build with "
-        "--backend python"
+        "--flavour python"
     )
 
 

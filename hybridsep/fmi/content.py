@@ -1,4 +1,4 @@
-"""What both backends say about an FMU: what its models are, and the GUID that follows from its content."""
+"""Title and GUID of an FMU, for both flavours."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _TITLES = {
 
 
 def fmu_title(machine: Machine, model: str) -> str:
-    """Return what an FMU is, in one phrase; ReferenceTrajectory is the same for every machine."""
+    """Return an FMU's title; ReferenceTrajectory's is the same for every machine."""
     return _TITLES[model] if model == "ReferenceTrajectory" else f"{machine.title}: {_TITLES[model]}"
 
 
@@ -30,9 +30,9 @@ def content_guid(files: Mapping[str, bytes], description: Mapping[str, object]) 
     Parameters
     ----------
     files : mapping
-        Archive name → content; what is made from the others, binaries and reference results, stays out.
+        Archive name → content, without the binaries and reference results made from it.
     description : mapping
-        What the FMU is made from.
+        Model, name, start values and modes.
     """
     digest = hashlib.sha256(json.dumps(description, sort_keys=True).encode())
     for arcname in sorted(files):

@@ -1,4 +1,4 @@
-"""Default experiment of an FMU: what a tool runs that is not told how long."""
+"""Stop time of an FMU's default experiment."""
 
 from __future__ import annotations
 

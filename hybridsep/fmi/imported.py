@@ -1,4 +1,4 @@
-"""The modules of this package that a pythonfmu slave imports, found in the source without running it."""
+"""Static search for the modules of this package that a pythonfmu slave imports."""
 
 from __future__ import annotations
 

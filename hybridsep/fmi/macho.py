@@ -1,4 +1,4 @@
-"""Join Mach-O libraries for several processors into one universal file.
+"""Universal Mach-O file of libraries for several processors.
 
 A universal file is a big-endian header and the libraries themselves, unchanged, each at a place that its processor's
 pages divide. The header: the number 0xCAFEBABE and the count, then for each library its processor (type and subtype, as

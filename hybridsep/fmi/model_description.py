@@ -33,7 +33,7 @@ _DISPLAY_UNITS = {"m": {"mm": 1e3, "um": 1e6}, "m/s": {"mm/s": 1e3}, "s": {"ms":
 
 @dataclass(frozen=True)
 class FmuInfo:
-    """What the modelDescription says besides the variables.
+    """Content of the modelDescription besides the variables.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class FmuInfo:
         Whether the FMU needs more than its own binary, here a Python.
     generation_tool, version : str
     source_files : tuple of str
-        What is to be compiled, below ``sources/``; empty if the FMU brings none. An FMU of C sources takes its memory
+        Files to compile, below ``sources/``; empty if there are none. An FMU of C sources takes its memory
         from the importer's functions.
     interpolates : bool
         Whether inputs may have a time derivative.
@@ -201,7 +201,7 @@ def _scalar_variable(parent: ET.Element, reference: int, variable: Variable) -> 
 
 
 def _structure(root: ET.Element, table: Sequence[Variable]) -> None:
-    """Say that no output depends on an input of the same instant, and what they depend on at the start."""
+    """Add ModelStructure: outputs without direct feedthrough, and their dependencies at initialization."""
     place = {variable.name: str(i) for i, variable in enumerate(table, start=1)}
     outputs = [variable for variable in table if variable.causality == "output"]
     structure = ET.SubElement(root, "ModelStructure")

@@ -1,4 +1,4 @@
-"""Pages and picture that a tool shows for an FMU: ``documentation/index.html`` from templates, ``model.png``."""
+"""Documentation page and icon of an FMU: ``documentation/index.html`` from templates, ``model.png``."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ __all__ = ["filled", "icon", "index_page"]
 _HERE = Path(__file__).parent
 
 _PARTNERS = {"SepCompensator": ("SepCompensator", "x_dm")}
-"""What sits between trajectory and drive, and its output to the drive; otherwise the predictor and its x_d."""
+"""FMU between trajectory and drive on the wiring diagram, and its output to the drive; else HybridPredictor, x_d."""
 
 _AGREEMENT_DIGITS = {"SepCompensator": 9}
-"""Else 11; a plan under limits comes from an iteration, which passes differences of rounding on."""
+"""Decimals, m, to which the reference agrees; else 11. The iteration for a bounded plan amplifies rounding."""
 
 _SOURCES = {
     "ReferenceTrajectory": (
@@ -29,11 +29,11 @@ _SOURCES = {
         "hybridsep computes the samples, one every T_s; the figures do not print the spiral's size",
     )
 }
-"""Of what does not come from the machine."""
+"""Sources of models that do not depend on the machine."""
 
 
 def icon(model: str) -> bytes:
-    """Return the PNG of a model, a small picture of what it does."""
+    """Return the PNG of a model's icon."""
     return (_HERE / "icons" / f"{model}.png").read_bytes()
 
 
@@ -46,20 +46,20 @@ def filled(template: str, **values: object) -> str:
 def index_page(
     machine: Machine, description: Mapping[str, object], needs: str, *, reference: bool = False, limits: str = ""
 ) -> bytes:
-    """Return the page a tool shows for an FMU.
+    """Return the documentation page of an FMU.
 
     Parameters
     ----------
     machine : Machine
-        Where its numbers come from.
+        Its sources are listed.
     description : mapping
         ``model``, ``name``, ``parameters`` and ``modes``.
     needs : str
-        One sentence: what the FMU needs to run.
+        Requirements of the FMU, one sentence.
     reference : bool
         Whether the archive has a reference result.
     limits : str
-        A section on what the FMU's flavour cannot do, HTML.
+        Section on the limits of the FMU's flavour, HTML.
     """
     model, name = str(description["model"]), str(description["name"])
     rows = "\n".join(

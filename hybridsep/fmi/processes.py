@@ -1,4 +1,4 @@
-"""Child processes of several threads that end together: when one of them fails, or the user interrupts."""
+"""Child processes of several threads, terminated together when one fails or the user interrupts."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""What pythonfmu's binary does not check before it calls Python: told on the FMU's page, checked where we import.
+"""Limits of pythonfmu's binary: arguments that it does not check; listed on the FMU's page, checked by our importer.
 
-The binary is pythonfmu's and travels as it is; ``slave.py`` sees only what it passes on.
+The binary is packed unchanged; ``slave.py`` sees only the calls that it passes on.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from ..base.errors import FmuError
 __all__ = ["check_unpacked", "checked_version"]
 
 SERIES = "0.7."
-"""Whose reference counting ``slave.py`` balances, and of which the limits in ``templates`` were measured."""
+"""Series whose reference counting ``slave.py`` balances and whose limits are listed in ``templates``."""
 
 
 def checked_version() -> str:

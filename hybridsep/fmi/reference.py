@@ -1,4 +1,4 @@
-"""``documentation/reference/``: an input and the result it must give, for whoever imports the FMU.
+"""Reference results in ``documentation/reference/``: inputs and expected outputs for importers.
 
 The files are named and written as the FMI cross-check has them: ``<name>_in.csv`` with the inputs at each
 communication point, ``<name>_ref.csv`` with the outputs there, ``<name>_ref.opt`` with the times of the run. All
@@ -32,14 +32,14 @@ _SAMPLES = 600
 """Length of a run; a look-ahead's is longer if its fill and warm-up are."""
 
 _COMPENSATED_SAMPLES = 1500
-"""The same of a compensator: into the second move, when the hybrid model is trusted on all machines."""
+"""Length of a compensator's run: into the second move, when the hybrid model is trusted on all machines."""
 
 _SAMPLES_MAX = 3000
 _WINDOW_MAX = 1000
-"""An FMU with a longer look-ahead gets no reference: no short run shows a prediction."""
+"""Longest look-ahead with a reference, samples: with a longer one no short run contains a prediction."""
 
 _RESOLUTION = 9
-"""Decimals of an input, m: what the CSV says is what the result was computed from."""
+"""Decimals of an input, m; the result is computed from the rounded values."""
 
 _RESULT_RESOLUTION = 13
 _REL_TOL = 1e-4
@@ -65,7 +65,7 @@ def reference_files(
     samples : (n,) array_like, m, optional
         Trajectory 3 of ReferenceTrajectory.
     trained : HybridPredictor, optional
-        What a HybridPredictor or SepCompensator starts warm with.
+        Trained predictor with which a HybridPredictor or SepCompensator starts warm.
     """
     table, T_s, parameters = variables_of(description), machine.T_s, description["parameters"]
     names = [variable.name for variable in table if variable.causality == "output"]
@@ -97,7 +97,7 @@ def _look_ahead_run(
 ) -> tuple[Columns, Columns]:
     """Run a look-ahead over the staircase, with the machine's plant behind it, through two windows of prediction.
 
-    It is the compensator's if ``names``, the outputs, have a modified command, which then is what the drive gets.
+    If the outputs ``names`` have a modified command, the look-ahead is the compensator's and the drive gets ``x_dm``.
     """
     sent = "x_dm" if "x_dm" in names else "x_d"
     compensator = _compensator(machine, t_init) if sent == "x_dm" else None
@@ -162,7 +162,7 @@ def _plant_run(machine: Machine) -> tuple[Columns, Columns]:
 
 
 def _command(machine: Machine, n: int) -> Array:
-    """Return the staircase's first ``n`` samples, m, as the CSV says them."""
+    """Return the staircase's first ``n`` samples, m, rounded as in the CSV."""
     limits = {} if machine.limits is None else {"limits": machine.trajectory_limits()}
     command = np.round(staircase(machine.T_s, **limits)[:n], _RESOLUTION)
     return np.asarray(np.pad(command, (0, n - len(command)), mode="edge"))

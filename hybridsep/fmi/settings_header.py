@@ -1,6 +1,6 @@
-"""``hsep_settings.h``: the settings of predictor and compensator for the C core.
+"""C header ``hsep_settings.h``: the settings of predictor and compensator for the C core.
 
-``python -m hybridsep.fmi.settings_header`` writes it anew after a change of :mod:`hybridsep.base.settings`.
+``python -m hybridsep.fmi.settings_header`` regenerates it after a change of :mod:`hybridsep.base.settings`.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ typedef struct {{
 
 
 def settings_header_path() -> Path:
-    """Return where the header is."""
+    """Return the header's path."""
     return data_folder("fmu_src") / "c" / "core" / "predict" / "hsep_settings.h"
 
 

@@ -1,9 +1,9 @@
-"""What every pythonfmu slave of this project shares: the variable table, the call order, states and errors.
+"""Base class of the pythonfmu slaves: variable table, call order, states and errors.
 
 pythonfmu has no ``fmi2Error``: a step that returns False becomes ``fmi2Discard``, an exception ``fmi2Fatal``. A step
-that cannot be done is therefore refused with a logged message and False, and has changed nothing; what has no such
-way out (a bad parameter at the end of initialization, a call that is not allowed now) is an exception, whose message
-pythonfmu logs.
+that cannot be done is therefore refused with a logged message and False, and has changed nothing; any other error (a
+bad parameter at the end of initialization, a call that is not allowed now) is an exception, whose message pythonfmu
+logs.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from .variables import Variable, variables_of
 __all__ = ["DESCRIPTION_FILE", "TableSlave"]
 
 DESCRIPTION_FILE = "machine.json"
-"""In the resources: model, start values of the parameters, modes and number of the FMU's content."""
+"""In the resources: model, start values of the parameters, modes and GUID of the FMU's content."""
 
 _LAST_READ: dict[str, dict[str, Any]] = {}
 """Descriptions by their resources' folder, for a reset: pythonfmu 0.7 does not survive a slave that fails then."""
@@ -61,7 +61,7 @@ def _surviving(method: _Method) -> _Method:
 
 
 def _read_description(resources: str) -> dict[str, Any]:
-    """Return what the archive says the FMU is."""
+    """Return the FMU's description from the archive."""
     path = Path(resources) / DESCRIPTION_FILE
     try:
         _LAST_READ[resources] = json.loads(path.read_text(encoding="utf-8"))
@@ -72,7 +72,7 @@ def _read_description(resources: str) -> dict[str, Any]:
 
 
 class TableSlave(Fmi2Slave):  # type: ignore[misc]
-    """A slave whose variables come from its table and whose arithmetic is in the library.
+    """Slave whose variables come from its table and whose arithmetic is in the library.
 
     The machine's data are read from the instance's own resources: two FMUs that carry the same library share its
     modules within one process, so nothing of a machine may live at module level.
@@ -90,7 +90,7 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
         for variable in self.table:
             self.register_variable(self._as_pythonfmu(variable), nested=False)
 
-    # What a slave adds -----------------------------------------------------------------------------------------
+    # Implemented by each slave -----------------------------------------------------------------------------------
 
     @abstractmethod
     def initialise(self) -> None:

@@ -1,4 +1,4 @@
-"""The interface of an FMU as rows for people: the README, the FMU's own page and the command line show them."""
+"""Interface table of an FMU for the README and the FMU's documentation page."""
 
 from __future__ import annotations
 

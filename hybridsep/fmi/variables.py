@@ -1,7 +1,7 @@
-"""The variables of each FMU, in one table each.
+"""Variable table of each FMU.
 
-The modelDescription, the value references, the Python slave and the interface tables of the documentation all
-follow from these tables. This module travels inside the FMUs: it needs nothing but the standard library.
+The modelDescription, the value references, the Python slave and the interface tables of the documentation follow from
+it. This module is packed into the FMUs: it needs nothing but the standard library.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ __all__ = [
 Value = float | int | bool
 
 PREDICTOR_SETTINGS = (*(name for name in PredictorSettings.fmi_parameters() if name != "v_friction"), "dead_time")
-"""Parameters of a HybridPredictor, which does not see the reference behind its window."""
+"""Parameters of a HybridPredictor, which has no reference beyond its window and so no features of it."""
 
 COMPENSATOR_SETTINGS = ("v_friction", *CompensatorSettings.fmi_parameters())
-"""Parameters that a SepCompensator has besides."""
+"""Parameters of a SepCompensator besides those of its predictor."""
 
 _SEP_MODELS = CompensatorSettings.parameters()["compensate"].choices
 _KINDS = {int: "Integer", float: "Real", bool: "Boolean", str: "Enumeration"}
@@ -48,18 +48,18 @@ class Variable:
     causality : {"input", "output", "parameter", "local"}
     variability : {"fixed", "tunable", "continuous", "discrete"}
     start : float, int, bool or None
-        Start value; None for what is calculated.
+        Start value; None if it is calculated.
     unit, display_unit : str or None
         Of a Real; ``"1"`` is written without a unit.
     minimum, maximum : float or None
         Closed bounds, as ``min``/``max`` show them.
     nonzero : float
-        Least value that is not 0; FMI cannot say it, the check does.
+        Least value that is not 0; checked, as ``min`` cannot express it.
     nominal : float or None
     items : tuple of str
         Names of an Enumeration's values, which count from 0.
     learned : bool
-        Whether a parameter shapes what is learned: a warm start needs the same.
+        Whether a warm start needs the value with which the weights were learned.
     initially_from : tuple of str
         Inputs and parameters an output depends on during initialization; none at any later point.
     """
@@ -167,14 +167,14 @@ def predictor_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping
         _position("x_meas", "input", "measured position now", start=0.0),
         _position("x_d", "output", "commanded position now: x_d_ahead, Np samples later", initially_from=ahead),
         _position(
-            "x_pb", "output", "physics-based prediction for now, made when the batch began", initially_from=ahead
+            "x_pb", "output", "physics-based prediction for now, made when the window began", initially_from=ahead
         ),
-        _position("x_h", "output", "hybrid prediction for now, made when the batch began", initially_from=ahead),
+        _position("x_h", "output", "hybrid prediction for now, made when the window began", initially_from=ahead),
         _position("e_servo", "output", "predicted servo error x_d - x_h", display_unit="um"),
         Variable("hybrid_active", "Boolean", "output", "discrete", "whether x_h is the hybrid prediction now"),
         _position("rms_pb", "output", "running RMS of x_meas - x_pb since t_init", display_unit="um"),
         _position("rms_h", "output", "running RMS of x_meas - x_h since t_init", display_unit="um"),
-        Variable("batch", "Integer", "output", "discrete", "number of the batch, floor(k / Np); 0 is the first fill"),
+        Variable("batch", "Integer", "output", "discrete", "number of the window, floor(k / Np); 0 is the first fill"),
     ]
     table += [_parameter(name, parameters[name]) for name in PREDICTOR_SETTINGS]
     table += _modes(modes)

@@ -1,4 +1,4 @@
-"""Check that a saved predictor belongs to a machine before its weights go into one of the machine's FMUs."""
+"""Warm-start check of a saved predictor against the machine whose FMU gets its weights."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def load_trained(path: str | Path, machine: Machine, model: str) -> HybridPredic
     ----------
     path : str or Path
     machine : Machine
-        What it must have been trained for: its ``Np``, ``p``, ``q``, ``lambda``, ``T_s``, ``input_hold``,
+        Machine that it must have been trained for: ``Np``, ``p``, ``q``, ``lambda``, ``T_s``, ``input_hold``,
         ``dead_time``, ``v_friction`` and modes.
     model : {"HybridPredictor", "SepCompensator"}
         Which of the machine's two sets of ``Np``, ``p``, ``q`` and ``lambda`` is meant.
@@ -54,5 +54,5 @@ def load_trained(path: str | Path, machine: Machine, model: str) -> HybridPredic
 
 
 def _parameters(predictor: HybridPredictor) -> dict[str, object]:
-    """Return all that must agree, under the names of the machine file."""
+    """Return the settings that must agree, by their names in the machine file."""
     return {"Np": predictor.Np, **learned_settings(predictor), "input_hold": predictor.settings.input_hold}

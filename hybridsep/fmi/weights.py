@@ -1,9 +1,9 @@
-"""``resources/weights.bin``: what a trained predictor has learned, for an FMU that starts warm.
+"""Weights file ``resources/weights.bin`` of an FMU that starts warm: the factor of a trained predictor.
 
 Layout, little-endian: ``HSEPWGT3``; the numbers of settings, of modes and of learned samples as u64; each setting that
 shapes the features and the factor (with others the weights mean something else), its name in 24 bytes and its value as
-float64; the upper triangle of the factor ``[R z; 0 ρ]`` by rows; the CRC-32 of all before as u64. This module travels
-inside the pythonfmu FMUs; the C model reads the same file.
+float64; the upper triangle of the factor ``[R z; 0 ρ]`` by rows; the CRC-32 of all before as u64. This module is
+packed into the pythonfmu FMUs; the C model reads the same file.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _DAMAGED = f"{WEIGHTS_FILE} must be a factor of learned rows; it is damaged or t
 
 
 def learned_settings(predictor: HybridPredictor) -> dict[str, float]:
-    """Return all settings that what is learned depends on, by their names in the FMU."""
+    """Return all settings on which the weights depend, by their names in the FMU."""
     numbers = predictor.settings.to_fmi()
     learned = [name for name, parameter in PredictorSettings.fmi_parameters().items() if parameter.learned]
     values: dict[str, float] = {name: numbers[name] for name in learned}
@@ -40,7 +40,7 @@ def learned_settings(predictor: HybridPredictor) -> dict[str, float]:
 
 
 def weights_file(predictor: HybridPredictor) -> bytes:
-    """Return the file's content for what a predictor has learned."""
+    """Return the file's content for a trained predictor."""
     settings = learned_settings(predictor)
     content = _HEAD.pack(_MAGIC, len(settings), len(predictor.model.modes), predictor.regression.n_samples)
     content += b"".join(_SETTING.pack(name.encode(), value) for name, value in settings.items())
@@ -50,7 +50,7 @@ def weights_file(predictor: HybridPredictor) -> bytes:
 
 
 def restore_weights(predictor: HybridPredictor, content: bytes) -> None:
-    """Give a predictor what the file's content says.
+    """Restore a predictor's factor from the file's content.
 
     Raises
     ------
@@ -93,7 +93,7 @@ def restore_weights(predictor: HybridPredictor, content: bytes) -> None:
 
 
 def _differences(name: str, then: float, now: float) -> list[str]:
-    """Return what is wrong if a setting has changed since it was learned with: nothing or one message."""
+    """Return the message, if any, about a setting with another value than in training."""
     if then == now:
         return []
     whole = isinstance(now, int)

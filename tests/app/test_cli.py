@@ -1,4 +1,4 @@
-"""The command line as a user meets it: results, JSON, help and errors."""
+"""Command line: results, JSON, help and errors."""
 
 from __future__ import annotations
 
@@ -61,10 +61,10 @@ def test_json_has_null_where_there_is_no_figure(hybridsep: Run, tmp_path: Path) 
 
 
 def test_build(hybridsep: Run, tmp_path: Path) -> None:
-    status, out, _ = hybridsep("build", "FeedDrivePy", "--backend", "python", "--out", tmp_path, "--json")
+    status, out, _ = hybridsep("build", "FeedDrivePy", "--flavour", "python", "--out", tmp_path, "--json")
     assert status == 0
     assert json.loads(out) == [str(tmp_path / "FeedDrivePy.fmu")]
-    status, out, _ = hybridsep("build", "-m", "emps", "--backend", "python", "--out", tmp_path)
+    status, out, _ = hybridsep("build", "-m", "emps", "--flavour", "python", "--out", tmp_path)
     assert status == 0
     assert "HybridPredictorPy_emps.fmu" in out
     assert sorted(path.name for path in tmp_path.iterdir()) == ["FeedDrivePy.fmu", "HybridPredictorPy_emps.fmu"]
@@ -75,7 +75,7 @@ def test_cosim_over_a_file(hybridsep: Run, tmp_path: Path) -> None:
     np.savetxt(
         path, np.column_stack((np.arange(1500) * 1e-3, commanded()[:1500])), delimiter=",", header="t,x_d", comments=""
     )
-    options = ("--backend", "python", "--seed", 2, "--out", tmp_path / "run.npz")
+    options = ("--flavour", "python", "--seed", 2, "--out", tmp_path / "run.npz")
     status, out, _ = hybridsep("cosim", "--trajectory", path, *options, "--json")
     assert status == 0
     assert json.loads(out)["n_samples"] == 1500
@@ -86,7 +86,7 @@ def test_cosim_over_a_file(hybridsep: Run, tmp_path: Path) -> None:
 
 
 def test_cosim_with_compensation(hybridsep: Run, tmp_path: Path) -> None:
-    options = ("--backend", "python", "--out", tmp_path / "run.csv", "--figure", tmp_path / "run.png")
+    options = ("--flavour", "python", "--out", tmp_path / "run.csv", "--figure", tmp_path / "run.png")
     figures = {}
     for kind in ("none", "physics", "hybrid"):
         status, out, _ = hybridsep("cosim", "--compensate", kind, *options, "--json")
@@ -99,14 +99,14 @@ def test_cosim_with_compensation(hybridsep: Run, tmp_path: Path) -> None:
     assert (tmp_path / "run.csv").read_text().startswith("t,x_d,x_dm,x,")
     assert (tmp_path / "run.png").read_bytes().startswith(b"\x89PNG")
     fmus = ("--predictor", tmp_path / "SepCompensatorPy.fmu", "--plant", tmp_path / "FeedDrivePy.fmu")
-    assert hybridsep("build", "SepCompensatorPy", "FeedDrivePy", "--backend", "python", "--out", tmp_path)[0] == 0
+    assert hybridsep("build", "SepCompensatorPy", "FeedDrivePy", "--flavour", "python", "--out", tmp_path)[0] == 0
     status, out, _ = hybridsep("cosim", "--compensate", "hybrid", *fmus)
     assert status == 0
     assert f"{figures['hybrid']:.2f}" in out
     assert "planned by the hybrid 98.3%" in out
     # Preview and knots follow a window of another length.
     sizes = ("--Np", 25, "--p", 20, "--q", 3)
-    assert hybridsep("cosim", "--compensate", "physics", "--backend", "python", *sizes)[0] == 0
+    assert hybridsep("cosim", "--compensate", "physics", "--flavour", "python", *sizes)[0] == 0
 
 
 def test_weights_for_a_compensator(hybridsep: Run, tmp_path: Path) -> None:
@@ -114,7 +114,7 @@ def test_weights_for_a_compensator(hybridsep: Run, tmp_path: Path) -> None:
     compensator = machine.new_compensator()
     cosimulate(compensator, machine.new_plant(), staircase(), encoder=Encoder(5e-6, 1))
     compensator.predictor.save(weights)
-    options = ("--backend", "python", "--weights", weights)
+    options = ("--flavour", "python", "--weights", weights)
     status, out, _ = hybridsep("cosim", "--compensate", "hybrid", *options, "--json")
     assert status == 0
     assert json.loads(out)["tracking_rms_um"] < 2.5
@@ -135,7 +135,7 @@ def test_weights_for_a_compensator(hybridsep: Run, tmp_path: Path) -> None:
 
 def test_figure_of_a_prediction(hybridsep: Run, tmp_path: Path) -> None:
     figure = tmp_path / "made" / "run.png"
-    assert hybridsep("cosim", "--backend", "python", "--figure", figure)[0] == 0
+    assert hybridsep("cosim", "--flavour", "python", "--figure", figure)[0] == 0
     assert figure.read_bytes().startswith(b"\x89PNG")
 
 
@@ -163,9 +163,9 @@ def test_help_shows_units_and_ranges(hybridsep: Run) -> None:
             "unit must be one of m, mm, um, got 'inch'",
         ),
         (["backtest", "nothing.csv", "-m", "spring_mass_damper"], "nothing.csv"),
-        (["build", "Robot", "--backend", "python"], "no FMU Robot; there are HybridPredictorPy_als25010_x"),
-        (["build", "--backend", "cobol"], "backend must be one of"),
-        (["cosim", "-m", "emps", "--backend", "python"], "machine emps has no plant; name a plant FMU with --plant"),
+        (["build", "Robot", "--flavour", "python"], "no FMU Robot; there are HybridPredictorPy_als25010_x"),
+        (["build", "--flavour", "cobol"], "flavour must be one of"),
+        (["cosim", "-m", "emps", "--flavour", "python"], "machine emps has no plant; name a plant FMU with --plant"),
         (["cosim", "--trajectory", "zigzag"], "zigzag"),
         (["cosim", "--out", "run.xlsx"], "--out must end in .csv or .npz, got 'run.xlsx'"),
         (["cosim", "--Np", "10"], "p must be 1 … Np = 10, got 50"),
@@ -176,7 +176,7 @@ def test_help_shows_units_and_ranges(hybridsep: Run) -> None:
             "machine emps has no [drive_limits], which a compensator must keep",
         ),
         (
-            ["cosim", "--compensate", "hybrid", "--predictor", "none.fmu", "--backend", "python"],
+            ["cosim", "--compensate", "hybrid", "--predictor", "none.fmu", "--flavour", "python"],
             "no FMU at none.fmu; build it first",
         ),
         (["cosim", "--weights", "w.state", "--predictor", "p.fmu"], "--weights go into an FMU that is built here"),
@@ -184,7 +184,7 @@ def test_help_shows_units_and_ranges(hybridsep: Run) -> None:
         (["cosim", "--seed", "99999999999"], "seed must be 0 … 2147483647, got 99999999999"),
         (["cosim", "--out", "{log}/run.csv"], "cannot read or write"),
         (["backtest", "{log}", "-m", "spring_mass_damper", "--out", "."], "--out must be a file, got the folder ."),
-        (["build", "FeedDrivePy", "--backend", "python", "--out", "{log}"], "cannot read or write"),
+        (["build", "FeedDrivePy", "--flavour", "python", "--out", "{log}"], "cannot read or write"),
     ],
 )
 def test_errors_are_one_line_and_status_2(hybridsep: Run, tmp_path: Path, arguments: list[str], message: str) -> None:
@@ -248,7 +248,7 @@ def test_the_compensators_parameters_are_options_and_need_a_compensator(hybridse
         "--v_friction",
         0,
     )
-    run = ("cosim", "--trajectory", command, "--backend", "python", "--json")
+    run = ("cosim", "--trajectory", command, "--flavour", "python", "--json")
     status, out, _ = hybridsep(*run, "--compensate", "physics", *given)
     assert status == 0
     assert json.loads(out)["share_physics"] == 1.0

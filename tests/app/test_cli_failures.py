@@ -1,4 +1,4 @@
-"""Failures of the command line: one line on standard error and a status, whatever goes wrong."""
+"""Failures of the command line: one line on standard error and an exit status."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def test_hostile_machine_files(hybridsep: Run, tmp_path: Path, old: str, new: st
     assert MACHINE_FILE.count(old) == 1
     machine = tmp_path / "machine.toml"
     machine.write_text(MACHINE_FILE.replace(old, new), encoding="utf-8")
-    assert message in refusal(hybridsep, "cosim", "-m", machine, "--backend", "python")
+    assert message in refusal(hybridsep, "cosim", "-m", machine, "--flavour", "python")
 
 
 @pytest.mark.parametrize("t", [[0.0, 5e-324, 1e-323, 1.5e-323], [0.0, 1e-310, 2e-310], [-1e308, 0.0, 1e308]])
@@ -242,7 +242,7 @@ def test_ctrl_c_during_the_demo(tmp_path: Path) -> None:
     """The demo's FMUs are Python ones: a KeyboardInterrupt inside them would be fmi2Fatal."""
     out = tmp_path / "demo"
     last = out / "staircase.csv"
-    status, err = interrupted(["demo", "--backend", "python", "--seeds", 1, "--out", out], last.exists)
+    status, err = interrupted(["demo", "--flavour", "python", "--seeds", 1, "--out", out], last.exists)
     assert (status, err.strip()) == (130, SAID)
     assert not [path for path in out.rglob("*") if path.name.startswith(".")]
     lines = last.read_text().splitlines()

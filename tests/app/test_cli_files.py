@@ -1,4 +1,4 @@
-"""The user's files: no command overwrites what it reads, or a file of another kind; arguments come before any work."""
+"""Output files of the command line: no input or file of another kind is overwritten; arguments are checked first."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def test_cosim_does_not_overwrite_what_it_reads(
     trajectory = command_file(tmp_path)
     before = trajectory.read_bytes()
     out = linked(link, trajectory, ".csv")
-    arguments = ("--trajectory", trajectory, "--backend", "python", "--out", out)
+    arguments = ("--trajectory", trajectory, "--flavour", "python", "--out", out)
     assert f"--out {out} is the same file as the trajectory {trajectory}" in refusal(hybridsep, "cosim", *arguments)
     assert trajectory.read_bytes() == before
     outputs = ("--out", tmp_path / "run.npz", "--figure", tmp_path / "run.png")
@@ -91,7 +91,7 @@ def test_build_does_not_overwrite_its_machine(hybridsep: Run, tmp_path: Path) ->
     machine = own_machine(tmp_path)
     before = machine.read_bytes()
     (tmp_path / "FeedDrivePy.fmu").symlink_to(machine)
-    arguments = ("FeedDrivePy", "-m", machine, "--backend", "python", "--out", tmp_path)
+    arguments = ("FeedDrivePy", "-m", machine, "--flavour", "python", "--out", tmp_path)
     assert f"FeedDrivePy.fmu is the same file as the machine file {machine}" in refusal(hybridsep, "build", *arguments)
     assert machine.read_bytes() == before
 
@@ -130,11 +130,11 @@ def test_cosim_and_build_ask_too(hybridsep: Run, tmp_path: Path) -> None:
     picture.write_bytes(b"\xff\xd8 a photograph with the wrong name")
     write(tmp_path / "arrays.npz", columns()).rename(archive)
     kept = {path: path.read_bytes() for path in (log, picture, archive)}
-    common = ("cosim", "--trajectory", trajectory, "--backend", "python")
+    common = ("cosim", "--trajectory", trajectory, "--flavour", "python")
     assert "is no result of hybridsep cosim" in refusal(hybridsep, *common, "--out", log)
     assert "--figure" in (err := refusal(hybridsep, *common, "--figure", picture))
     assert "is no PNG" in err
-    build = ("build", "FeedDrivePy", "--backend", "python", "--out", tmp_path)
+    build = ("build", "FeedDrivePy", "--flavour", "python", "--out", tmp_path)
     assert "is no FMU of hybridsep" in refusal(hybridsep, *build)
     assert {path: path.read_bytes() for path in kept} == kept
     for _ in range(2):
@@ -171,7 +171,7 @@ def test_kinds_are_recognised_and_others_are_not(tmp_path: Path, python_fmu: Cal
     [
         (["demo", "--emps", "missing.mat"], "missing.mat: there is no such file"),
         (["demo", "--emps", "{log}"], "log.csv: column 'qg' (x_d) is missing"),
-        (["demo", "--backend", "cobol"], "backend must be one of native, python, got 'cobol'"),
+        (["demo", "--flavour", "cobol"], "flavour must be one of native, python, got 'cobol'"),
         (["build", "--target", "sparc"], "no target sparc; there are host"),
         (["build", "HybridPredictor", "--weights", "{log}"], "a saved state of kind 'predictor' was expected"),
         (["build", "FeedDrive", "--unit", "inch"], "unit must be one of m, mm, um, got 'inch'"),

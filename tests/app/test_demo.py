@@ -1,4 +1,4 @@
-"""The main job: FMUs, figures, summary, and that the README's results are what it makes."""
+"""Demonstration: FMUs, figures, summary, and the README's results against them."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ import pytest
 from places import EMPS, ROOT
 
 from hybridsep.app.demo import demo, demo_files
+from hybridsep.app.demo_compensation import COMPENSATED
 from hybridsep.app.overwrite import BY_ENDING
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 PNG = b"\x89PNG\r\n\x1a\n"
 CASES = ("staircase", "spiral_x", "spiral_y")
-KINDS = ("none", "physics", "hybrid_cold", "hybrid_warm")
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Demonstration:
     fractions: list[float]
 
     def compensation(self, case: str, figure: str) -> list[float]:
-        return [self.summary[case]["compensation"][kind][figure] for kind in KINDS]
+        return [self.summary[case]["compensation"][kind][figure] for kind in COMPENSATED]
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,7 @@ def shown(tmp_path_factory: pytest.TempPathFactory) -> Demonstration:
     out = tmp_path_factory.mktemp("demo")
     fractions: list[float] = []
     emps = EMPS if EMPS.exists() else None
-    summary = demo(out, backend="python", emps=emps, progress=lambda message, fraction: fractions.append(fraction))
+    summary = demo(out, flavour="python", emps=emps, progress=lambda message, fraction: fractions.append(fraction))
     return Demonstration(out, summary, fractions)
 
 
@@ -118,7 +118,7 @@ def test_compensation_in_the_readme(shown: Demonstration, case: str, figure: str
 
 def test_build_fmu_is_a_front_of_the_command_line(tmp_path: Path) -> None:
     command = [sys.executable, str(ROOT / "build_fmu.py"), "--machine", str(ROOT / "models" / "als25010_x.toml")]
-    subprocess.run([*command, "--backend", "python", "--out", str(tmp_path)], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([*command, "--flavour", "python", "--out", str(tmp_path)], check=True, stdout=subprocess.DEVNULL)
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         "FeedDrivePy_als25010_x.fmu",
         "HybridPredictorPy_als25010_x.fmu",

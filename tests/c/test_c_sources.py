@@ -16,7 +16,7 @@ import staircase_data as staircase
 from c_core import write_trajectory
 from places import ROOT
 
-from hybridsep.fmi.native_backend import all_c
+from hybridsep.fmi.native_flavour import all_c
 
 
 def test_the_c_files_are_formatted() -> None:

@@ -21,8 +21,8 @@ from hybridsep.predict.predictor import HybridPredictor
 
 
 def test_figures_with_the_papers_settings() -> None:
-    assert 1e6 * closed(compensator(SepState.OFF)).tracking_rms == pytest.approx(88.5, abs=0.2)
-    assert 1e6 * closed(compensator(SepState.PHYSICS)).tracking_rms == pytest.approx(20.2, abs=0.2)
+    assert 1e6 * closed(compensator("off")).tracking_rms == pytest.approx(88.5, abs=0.2)
+    assert 1e6 * closed(compensator("physics")).tracking_rms == pytest.approx(20.2, abs=0.2)
     sep = compensator()
     assert 1e6 * closed(sep).tracking_rms == pytest.approx(6.34, abs=0.3)
     warm = closed(sep, 1000, t_init=0.0)
@@ -69,7 +69,7 @@ def test_trouble_never_makes_it_worse_than_physics(settings_: dict[str, Any], tr
     }
     more = troubles[trouble]
     limits = PAPER_LIMITS if trouble == "limits" else DRIVE_LIMITS
-    physics = closed(compensator(SepState.PHYSICS, limits, **settings_), **more)
+    physics = closed(compensator("physics", limits, **settings_), **more)
     hybrid = closed(compensator(limits=limits, **settings_), **more)
     assert hybrid.tracking_rms <= 1.05 * physics.tracking_rms
     assert np.isfinite(hybrid.x_dm).all()

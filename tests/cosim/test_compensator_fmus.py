@@ -1,4 +1,4 @@
-"""Compensator FMU against plant FMU: what it gains, the drive's limits, the library's numbers, files and figures."""
+"""Compensator FMU against plant FMU: tracking errors, limits, agreement with the library, files and figures."""
 
 from __future__ import annotations
 
@@ -12,21 +12,20 @@ import pytest
 
 from hybridsep import build_fmu, fmu_names, load_machine
 from hybridsep.base.errors import FmuError, SignalError
-from hybridsep.base.settings import CompensatorSettings, PredictorSettings
-from hybridsep.compensate.compensator import SepState
+from hybridsep.base.settings import PARAMETERS, CompensatorSettings, PredictorSettings
 from hybridsep.cosim.fmus import check_controller
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.cosim.run import COMPENSATOR, Run
 from hybridsep.evaluate.path_plots import contour_figure
 from hybridsep.evaluate.time_plots import tracking_figure
-from hybridsep.fmi.backends import BACKENDS
+from hybridsep.fmi.flavours import FLAVOURS
 from hybridsep.machine import Machine
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.trajectory import spiral, staircase
 
 MACHINE = load_machine("spring_mass_damper")
 PAPER = {"Np": 100, "p": 50, "q": 3, "lambda": 1e-12, "t_init": 0.3, "v_friction": 0.0}
-KINDS = {"none": SepState.OFF, "physics": SepState.PHYSICS, "hybrid": SepState.HYBRID}
+COMPENSATE = PARAMETERS["compensate"]
 TOLERANCE = 1e-9  # m, between library and FMU
 PNG = b"\x89PNG\r\n\x1a\n"
 
@@ -34,12 +33,12 @@ Fmu = Callable[[str], Path]
 Pair = tuple[Path, Path]
 
 
-def build(machine: Machine, backend: str, model: str, out: Path, weights: Path | None = None) -> Path:
-    name = next(name for name, built in fmu_names(machine, backend).items() if built == model)
-    return build_fmu(machine, name, out, backend, targets=("host",), weights=weights)
+def build(machine: Machine, flavour: str, model: str, out: Path, weights: Path | None = None) -> Path:
+    name = next(name for name, built in fmu_names(machine, flavour).items() if built == model)
+    return build_fmu(machine, name, out, flavour, targets=("host",), weights=weights)
 
 
-@pytest.fixture(scope="module", params=BACKENDS)
+@pytest.fixture(scope="module", params=FLAVOURS)
 def flavour(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
@@ -54,8 +53,8 @@ def pair(flavour: str, tmp_path_factory: pytest.TempPathFactory) -> Pair:
 def runs(pair: Pair) -> dict[str, Run]:
     """The staircase with the paper's settings."""
     return {
-        kind: cosimulate(*pair, staircase(), controller_values={**PAPER, "compensate": int(best)})
-        for kind, best in KINDS.items()
+        choice: cosimulate(*pair, staircase(), controller_values={**PAPER, "compensate": COMPENSATE.to_fmi(choice)})
+        for choice in COMPENSATE.choices
     }
 
 
@@ -76,34 +75,34 @@ def assert_same(run: Run, loop: Run) -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "least", "most"), [("none", 87.0, 90.0), ("physics", 0.0, 20.5), ("hybrid", 0.0, 6.6)]
+    ("choice", "least", "most"), [("off", 87.0, 90.0), ("physics", 0.0, 20.5), ("hybrid", 0.0, 6.6)]
 )
-def test_staircase_tracking_error(runs: dict[str, Run], kind: str, least: float, most: float) -> None:
+def test_staircase_tracking_error(runs: dict[str, Run], choice: str, least: float, most: float) -> None:
     """µm of the true position, p = 50, q = 3, one noise seed."""
-    assert least <= runs[kind].summary()["tracking_rms_um"] <= most
+    assert least <= runs[choice].summary()["tracking_rms_um"] <= most
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_the_drives_limits_are_kept(runs: dict[str, Run], kind: str) -> None:
+@pytest.mark.parametrize("choice", COMPENSATE.choices)
+def test_the_drives_limits_are_kept(runs: dict[str, Run], choice: str) -> None:
     limits, change_max = MACHINE.command_limits()
     assert limits is not None
     assert change_max is not None
-    run = runs[kind]
+    run = runs[choice]
     for order, limit in enumerate((limits.velocity, limits.acceleration, limits.jerk), start=1):
         assert np.abs(np.diff(run.x_dm, order)).max() <= limit * MACHINE.T_s**order * (1 + 1e-9)
     assert np.abs(run.change).max() <= change_max
-    assert run.summary()["change_max_um"] > 100.0 or kind == "none"
+    assert run.summary()["change_max_um"] > 100.0 or choice == "off"
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_fmus_equal_the_library(runs: dict[str, Run], kind: str) -> None:
-    values = {**MACHINE.fmi_compensator_parameters(), **PAPER, "compensate": int(KINDS[kind])}
+@pytest.mark.parametrize("choice", COMPENSATE.choices)
+def test_fmus_equal_the_library(runs: dict[str, Run], choice: str) -> None:
+    values = {**MACHINE.fmi_compensator_parameters(), **PAPER, "compensate": COMPENSATE.to_fmi(choice)}
     settings = CompensatorSettings.from_fmi(values)
     compensator = MACHINE.new_compensator(settings, predictor=PredictorSettings.from_fmi(values))
     loop = cosimulate(compensator, MACHINE.new_plant(), staircase(), encoder=Encoder(5e-6, 0))
-    assert_same(runs[kind], loop)
-    np.testing.assert_array_equal(runs[kind].x_d, staircase())
-    assert runs[kind].t[0] == pytest.approx(0.2)
+    assert_same(runs[choice], loop)
+    np.testing.assert_array_equal(runs[choice].x_d, staircase())
+    assert runs[choice].t[0] == pytest.approx(0.2)
 
 
 def test_recommended_settings_cold_and_warm(flavour: str, pair: Pair, tmp_path: Path) -> None:

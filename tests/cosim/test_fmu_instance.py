@@ -1,4 +1,4 @@
-"""The importer's instances: closing, loading in threads, and the working directory of the process."""
+"""FMU instances: closing, loading in threads, and the working directory of the process."""
 
 from __future__ import annotations
 

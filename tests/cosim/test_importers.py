@@ -1,4 +1,4 @@
-"""Importers of other projects run the closed system of native FMUs, and another project's checker finds nothing."""
+"""Closed system of native FMUs in other projects' importers, and another project's checker."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A thousand native HybridPredictors in one process: what one costs, that none sees another, that none is left over."""
+"""A thousand native HybridPredictors in one process: memory of each, isolation, no leaks."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def test_memory_is_that_of_the_arrays_and_cycles_leave_none(
 
 
 def test_an_instance_asks_for_little_more_than_its_arrays(fmu: Library) -> None:
-    """What it allocates, byte by byte, wherever the process puts it; all of it comes back."""
+    """Allocated bytes of an instance, all of them freed with it."""
     component = started(fmu, b"an instance", 0.0)
     assert array_bytes() < sum(fmu.blocks.values()) < OVERHEAD * array_bytes()
     allocations = fmu.allocations

@@ -1,4 +1,4 @@
-"""The one loop: library objects and FMUs in it, together too, its hooks, and arguments that have no use."""
+"""Co-simulation loop: library objects and FMUs, alone and together, hooks, arguments that do not apply."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""FMU against FMU: the error reduction the project is for, the wiring, and the files it writes."""
+"""Predictor FMU against plant FMU: error reduction, wiring, files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Section 3.1 of the paper: what past residuals determine, and what they cannot."""
+"""Section 3.1 of the paper: disturbances that past residuals determine, and the innovation of others."""
 
 from __future__ import annotations
 

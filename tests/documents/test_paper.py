@@ -1,4 +1,4 @@
-"""What docs/paper.md says of the paper: readings of its equations, where the hybrid is worse, commands that exist."""
+"""Claims of docs/paper.md: readings of the equations, cases where the hybrid is worse, commands."""
 
 from __future__ import annotations
 

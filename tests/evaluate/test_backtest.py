@@ -1,4 +1,4 @@
-"""The causal replay: its scores, its batches, and that it never looks ahead."""
+"""Causal replay: scores, windows, and no look-ahead."""
 
 from __future__ import annotations
 
@@ -82,11 +82,11 @@ def test_scores_are_those_of_the_predictions() -> None:
     np.testing.assert_array_equal(result.active, np.arange(1010) >= 50)
     for name in ("pb", "hold", "h"):
         error = x - getattr(result, f"x_{name}")
-        batches = [rms(error[i : i + 20]) for i in range(0, 1010, 20)]
+        windows = [rms(error[i : i + 20]) for i in range(0, 1010, 20)]
         for score, part in ((result.overall, error), (result.after_warm_up, error[50:])):
             assert getattr(score, f"rms_{name}") == pytest.approx(rms(part), rel=1e-12)
             assert getattr(score, f"max_{name}") == np.abs(part).max()
-        np.testing.assert_allclose(getattr(result, f"batch_rms_{name}"), batches, rtol=1e-12)
+        np.testing.assert_allclose(getattr(result, f"batch_rms_{name}"), windows, rtol=1e-12)
         assert result.summary()[f"rms_{name}_um"] == pytest.approx(1e6 * rms(error), rel=1e-12)
         assert result.summary()[f"max_{name}_um_after_warm_up"] == 1e6 * np.abs(error[50:]).max()
     expected = 100 * (1 - result.overall.rms_h / result.overall.rms_pb)
@@ -135,7 +135,7 @@ def test_perfect_physics_leaves_nothing_to_reduce() -> None:
 
 @given(k=st.integers(60, 1009), step=st.floats(-1e-3, 1e-3))
 @settings(max_examples=25)
-def test_no_prediction_depends_on_what_is_measured_in_its_batch_or_later(k: int, step: float) -> None:
+def test_no_prediction_depends_on_what_is_measured_in_its_window_or_later(k: int, step: float) -> None:
     x_d, x = log()
     x_other = x.copy()
     x_other[k:] += step

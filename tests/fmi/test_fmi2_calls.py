@@ -1,4 +1,4 @@
-"""The FMI 2.0 functions of a native FMU, called one by one: what is legal when, instantiation, logging."""
+"""The FMI 2.0 functions of a native FMU, called one by one: legal call sequences, instantiation, logging."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from c_core import (
     sanitising_compiler,
 )
 
-from hybridsep.fmi.native_backend import sources
+from hybridsep.fmi.native_flavour import sources
 from hybridsep.machine import load_machine
 
 FUZZED = {
@@ -32,7 +32,7 @@ FUZZED = {
 }
 
 
-"""How many seconds each model is called at random."""
+"""Duration of the random calls of each model, s."""
 
 
 SANITIZERS = ("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")

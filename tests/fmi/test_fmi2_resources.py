@@ -1,4 +1,4 @@
-"""The resources of a native FMU: where it looks for them, and files that change."""
+"""Resources of a native FMU: their location, and files that change."""
 
 from __future__ import annotations
 

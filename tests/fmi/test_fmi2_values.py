@@ -1,4 +1,4 @@
-"""Variables, parameters and steps of a native FMU through its FMI 2.0 functions: what is refused, and how."""
+"""Variables, parameters and steps of a native FMU through its FMI 2.0 functions, with the calls that are refused."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The binaries for other platforms give what x86-64 Linux gives, where Wine and qemu are there to run them."""
+"""Binaries for other platforms against x86-64 Linux, under Wine and qemu where installed."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from hybridsep.cosim.importer import FmuInstance
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.cosim.run import Run
 from hybridsep.fmi.archive import build_fmu, fmu_names
-from hybridsep.fmi.backends import BACKENDS
+from hybridsep.fmi.flavours import FLAVOURS
 from hybridsep.machine import Machine, load_machine
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.trajectory import spiral, staircase
@@ -48,8 +48,8 @@ def assert_equal(run: Run, expected: dict[str, Array]) -> None:
         np.testing.assert_allclose(getattr(run, name), samples, rtol=0, atol=TOLERANCE, err_msg=name)
 
 
-@pytest.mark.parametrize("plant", BACKENDS)
-@pytest.mark.parametrize("predictor", BACKENDS)
+@pytest.mark.parametrize("plant", FLAVOURS)
+@pytest.mark.parametrize("predictor", FLAVOURS)
 def test_every_pairing_agrees_with_the_library_on_the_staircase(fmus: BuiltFmus, predictor: str, plant: str) -> None:
     machine = load_machine("spring_mass_damper")
     suffix = {"native": "", "python": "Py"}
@@ -58,8 +58,8 @@ def test_every_pairing_agrees_with_the_library_on_the_staircase(fmus: BuiltFmus,
     assert run.summary()["reduction_percent"] > 50
 
 
-@pytest.mark.parametrize("plant", BACKENDS)
-@pytest.mark.parametrize("predictor", BACKENDS)
+@pytest.mark.parametrize("plant", FLAVOURS)
+@pytest.mark.parametrize("predictor", FLAVOURS)
 @pytest.mark.parametrize("axis", [0, 1])
 def test_every_pairing_agrees_with_the_library_on_the_spiral(
     fmus: BuiltFmus, predictor: str, plant: str, axis: int

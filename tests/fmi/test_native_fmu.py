@@ -1,4 +1,4 @@
-"""The native FMUs as archives: what is in them, what they are compiled to, and from what."""
+"""Archives of the native FMUs: content, binaries, sources."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from fmpy.validation import validate_fmu
 from hybridsep.base.errors import FmuError
 from hybridsep.cosim.importer import FmuInstance
 from hybridsep.fmi.archive import build_fmu, fmu_names
-from hybridsep.fmi.backends import BACKENDS
 from hybridsep.fmi.compiler import ALL_TARGETS, TARGETS, compile_flags, host_target
+from hybridsep.fmi.flavours import FLAVOURS
 from hybridsep.fmi.macho import universal
 from hybridsep.fmi.variables import Variable, variables_of
 from hybridsep.machine import load_machine
@@ -33,7 +33,7 @@ etree: Any = import_module("lxml.etree")  # comes with fmpy, has no types
 
 
 def test_native_is_the_default_and_names_follow_the_machine() -> None:
-    assert BACKENDS[0] == "native"
+    assert FLAVOURS[0] == "native"
     assert [
         name for machine in map(load_machine, ("spring_mass_damper", "als25010_x")) for name in fmu_names(machine)
     ] == [

@@ -1,4 +1,4 @@
-"""The pythonfmu FMUs through fmpy: what is refused, how it is said, and that nothing else is harmed."""
+"""Errors of the pythonfmu FMUs through fmpy: refusals, their messages, and no other effect."""
 
 from __future__ import annotations
 
@@ -63,5 +63,5 @@ def test_what_is_no_fmu(tmp_path: Path) -> None:
     machine = load_machine("emps")
     with pytest.raises(FmuError, match=r"machine emps has no FMU 'FeedDrivePy_emps'; it has HybridPredictorPy_emps"):
         build_fmu(machine, "FeedDrivePy_emps", tmp_path, "python")
-    with pytest.raises(FmuError, match=r"backend must be one of .*, got 'fortran'"):
+    with pytest.raises(FmuError, match=r"flavour must be one of .*, got 'fortran'"):
         fmu_names(machine, "fortran")

@@ -1,4 +1,4 @@
-"""The compensator as a pythonfmu FMU: interface, reference result, weights that do not fit, what travels with it."""
+"""The compensator as a pythonfmu FMU: interface, reference result, weights of other settings, packed modules."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Calls that pythonfmu's binary does not expect: what our slave catches, and what the FMU's page owns up to."""
+"""Calls that pythonfmu's binary does not check: those the slave refuses, and those listed on the FMU's page."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The reference input and result that each native archive carries, played by fmpy as its users would."""
+"""Reference input and result of each native archive, simulated by fmpy."""
 
 from __future__ import annotations
 

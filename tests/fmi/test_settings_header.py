@@ -1,4 +1,4 @@
-"""The C core's settings are those that are declared."""
+"""Settings header of the C core against the declarations."""
 
 from __future__ import annotations
 

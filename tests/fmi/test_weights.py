@@ -25,7 +25,7 @@ from hybridsep.base.errors import FmuError, StateError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.cosim.importer import FmuInstance
 from hybridsep.fmi.archive import build_fmu, fmu_names
-from hybridsep.fmi.backends import BACKENDS
+from hybridsep.fmi.flavours import FLAVOURS
 from hybridsep.fmi.weights import WEIGHTS_FILE, learned_settings, restore_weights, weights_file
 from hybridsep.machine import load_machine
 from hybridsep.model.physics import ModalModel, Mode
@@ -42,14 +42,14 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def build(backend: str, out: Path, weights: Path | None = None, model: str = "HybridPredictor") -> Path:
-    name = next(name for name, built in fmu_names(MACHINE, backend).items() if built == model)
-    return build_fmu(MACHINE, name, out, backend, targets=("host",), weights=weights)
+def build(flavour: str, out: Path, weights: Path | None = None, model: str = "HybridPredictor") -> Path:
+    name = next(name for name, built in fmu_names(MACHINE, flavour).items() if built == model)
+    return build_fmu(MACHINE, name, out, flavour, targets=("host",), weights=weights)
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
-def test_the_weights_are_in_the_resources_and_in_the_guid(backend: str, tmp_path: Path, trained: Path) -> None:
-    paths = [build(backend, tmp_path / str(i), weights) for i, weights in enumerate((trained, trained, None))]
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_the_weights_are_in_the_resources_and_in_the_guid(flavour: str, tmp_path: Path, trained: Path) -> None:
+    paths = [build(flavour, tmp_path / str(i), weights) for i, weights in enumerate((trained, trained, None))]
     assert paths[0].read_bytes() == paths[1].read_bytes()
     with zipfile.ZipFile(paths[0]) as archive:
         assert archive.read("resources/weights.bin") == weights_file(HybridPredictor.load(trained))
@@ -267,7 +267,7 @@ def test_build_takes_a_trajectory(monkeypatch: pytest.MonkeyPatch, tmp_path: Pat
         (("-m", "emps", "--weights", "TRAINED"), "trained.state was not trained for machine emps: it has "),
         (("FeedDrive", "--trajectory", "x.csv"), "--trajectory is for one ReferenceTrajectory, this would build none"),
         (("FeedDrive", "--target", "sparc"), "no target sparc; there are host, x86_64-linux, "),
-        (("--backend", "python", "--target", "host"), "--target is for native FMUs; with --backend python leave it"),
+        (("--flavour", "python", "--target", "host"), "--target is for native FMUs; with --flavour python leave it"),
     ],
 )
 def test_build_says_what_it_cannot_use(
@@ -291,6 +291,6 @@ def test_without_a_compiler_build_says_what_to_do(
     monkeypatch.delenv("CC", raising=False)
     assert hybridsep(monkeypatch, "build", "FeedDrive", "--target", "host", "--out", tmp_path) == 2
     error = capsys.readouterr().err
-    assert "install one, or pip install ziglang, or build with --backend python" in error
+    assert "install one, or pip install ziglang, or build with --flavour python" in error
     assert hybridsep(monkeypatch, "build", "FeedDrive", "--target", "win64", "--out", tmp_path) == 2
     assert "pip install ziglang, or ask for the target host" in capsys.readouterr().err

@@ -37,7 +37,7 @@ def test_a_direct_prediction_that_diverges_is_refused() -> None:
 def test_a_replay_that_diverges_is_refused() -> None:
     x_d = np.full(250, 1e-3)
     x_d[0] = 0.0
-    with pytest.raises(SignalError, match="x_h diverges in the batch from sample 0 on; raise lambda or lower p"):
+    with pytest.raises(SignalError, match="x_h diverges in the window from sample 0 on; raise lambda or lower p"):
         backtest(runaway_predictor(), x_d, np.zeros(250))
 
 

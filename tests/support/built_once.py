@@ -1,4 +1,4 @@
-"""What is built once in a test session, whichever of xdist's workers asks for it first."""
+"""Files built once in a test session, by whichever of xdist's workers asks first."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from collections.abc import Callable
 from pathlib import Path
 
 from hybridsep import build_fmu, fmu_names, load_machine, machine_names
-from hybridsep.fmi.backends import BACKENDS
+from hybridsep.fmi.flavours import FLAVOURS
 from hybridsep.machine import Machine
 
 _FMUS = {
-    name: (machine, backend)
+    name: (machine, flavour)
     for machine in map(load_machine, machine_names())
-    for backend in BACKENDS
-    for name in fmu_names(machine, backend)
+    for flavour in FLAVOURS
+    for name in fmu_names(machine, flavour)
 }
 
-NATIVE = [name for name, (_, backend) in _FMUS.items() if backend == "native"]
-PYTHON = [name for name, (_, backend) in _FMUS.items() if backend == "python"]
+NATIVE = [name for name, (_, flavour) in _FMUS.items() if flavour == "native"]
+PYTHON = [name for name, (_, flavour) in _FMUS.items() if flavour == "python"]
 """Names of all FMUs of all machines."""
 
 
@@ -67,14 +67,14 @@ class BuiltFmus:
         weights : Path, optional
             Saved predictor that it starts warm with.
         """
-        own, backend = _FMUS[name]
+        own, flavour = _FMUS[name]
         machine = machine or own
         content = machine.model_dump_json().encode() + (weights.read_bytes() if weights else b"")
         folder = self.folder / hashlib.sha256(content).hexdigest()[:16]
-        targets = ("host",) if backend == "native" else None
+        targets = ("host",) if flavour == "native" else None
 
         def build(unfinished: Path) -> None:
-            made = build_fmu(machine, name, unfinished.with_suffix(".d"), backend, targets=targets, weights=weights)
+            made = build_fmu(machine, name, unfinished.with_suffix(".d"), flavour, targets=targets, weights=weights)
             os.replace(made, unfinished)  # noqa: PTH105
 
         return built_once(folder / f"{name}.fmu", build)

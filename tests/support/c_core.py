@@ -75,7 +75,7 @@ DESCRIPTIONS: dict[str, dict[str, Any]] = {
     "compensator_2": {"model": "SepCompensator", "parameters": COMPENSATOR, "modes": STAGE_MODES},
     "trajectory": {"model": "ReferenceTrajectory", "parameters": {"trajectory": 3, "T_s": 1e-3}, "modes": []},
 }
-"""What is built here: as an FMU's machine.json describes it."""
+"""Models built here, described as in an FMU's machine.json."""
 
 
 def compiler() -> list[str]:

@@ -9,7 +9,7 @@ from staircase_data import commanded
 
 from hybridsep.base.settings import CompensatorSettings, Limits, PredictorSettings
 from hybridsep.base.signals import Array
-from hybridsep.compensate.compensator import SepCompensator, SepState
+from hybridsep.compensate.compensator import SepCompensator
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.cosim.run import Run
 from hybridsep.machine import load_machine
@@ -29,7 +29,7 @@ TS = 1e-3
 
 
 def compensator(
-    best: SepState = SepState.HYBRID,
+    compensate: str = "hybrid",
     limits: Limits | None = DRIVE_LIMITS,
     *,
     no_reversal: bool = True,
@@ -38,7 +38,7 @@ def compensator(
     predictor = HybridPredictor(MODEL, PredictorSettings(**changes))
     return SepCompensator(
         predictor,
-        CompensatorSettings(preview=200, limits=limits, compensate=best.name.lower(), no_reversal=no_reversal),
+        CompensatorSettings(preview=200, limits=limits, compensate=compensate, no_reversal=no_reversal),
     )
 
 

@@ -87,7 +87,7 @@ class Loop:
 
 
 Sensor = Callable[[int, float, float], float]
-"""What a sensor shows at sample k of the measured position, given what it showed last, m."""
+"""Sensor model: output at sample k from the measured position and its last output, m."""
 
 
 def _faithful(k: int, x_meas: float, last: float) -> float:

@@ -93,7 +93,7 @@ class ClosedSystem:
 
     @property
     def n_positions(self) -> int:
-        """How many of the columns move with the trajectory."""
+        """Number of columns that move with the trajectory."""
         return len(self.observed) - len(self.reported)
 
     @property
@@ -268,7 +268,7 @@ IMPORTERS: dict[str, tuple[Callable[[ClosedSystem, Path], Array], set[tuple[str,
     "ecos": (with_ecos, _DESKTOP),  # ecospy 0.7.2's wheel is for any platform, its libraries are for these
     "fmucontainer": (with_fmucontainer, _DESKTOP | {("Darwin", "arm64")}),  # likewise fmu-manipulation-toolbox 2.0's
 }
-"""How each importer runs the system, and the platforms it has a library for; None for all."""
+"""Importers: function that runs the system, and platforms with a library; None for all."""
 
 
 def exists_here(importer: str) -> bool:

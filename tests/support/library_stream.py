@@ -33,7 +33,7 @@ def start_values(model: str) -> dict[str, Any]:
 
 
 class LibraryStream:
-    """What the library's streams share."""
+    """Base of the library's streams."""
 
     def __init__(self, model: str) -> None:
         self.model, self._kind = model, kind_of(model)

@@ -123,7 +123,7 @@ def ridge_exact(rows: Array, target: Array, lam: float, digits: int = 60) -> Arr
 
 @dataclass
 class OracleRun:
-    """What the oracle computed for a whole run, one entry per sample, m; ``weights`` one per batch."""
+    """Result of the oracle for a whole run, one entry per sample, m; ``weights`` one per window."""
 
     x_pb: list[float] = field(default_factory=list)
     x_h: list[float] = field(default_factory=list)

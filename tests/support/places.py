@@ -1,4 +1,4 @@
-"""Where this checkout and the recordings beside it are."""
+"""Paths of this checkout and of the recordings beside it."""
 
 from __future__ import annotations
 

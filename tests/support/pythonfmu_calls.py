@@ -77,7 +77,7 @@ KILLING: dict[str, tuple[str, Callable[[Importer], object]]] = {
     "no place for a state": ("place for a state", lambda it: it.library.GetFMUstate(it.initialised(), None)),
     "no categories": ("log categories", lambda it: it.library.SetDebugLogging(it.instantiate(), 1, 1, None)),
 }
-"""What the page says of it, and the call."""
+"""Text on the page and the call."""
 
 
 def foreign_guid(importer: Importer) -> None:

@@ -45,12 +45,12 @@ OUTPUTS = {
     "FeedDrive": ["x", "x_meas"],
     "ReferenceTrajectory": ["r"],
 }
-"""Of each FMU: positions, m."""
+"""Outputs of each FMU that are compared: positions, m."""
 
 
 @dataclass(frozen=True)
 class Platform:
-    """How a binary of another platform is run.
+    """Runner of another platform's binaries.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class Platform:
 
     @property
     def absolute(self) -> str:
-        """What an absolute path begins with there."""
+        """Prefix of an absolute path there."""
         return "Z:" if self.runner and self.target.endswith("windows") else ""
 
 

@@ -1,9 +1,9 @@
-"""The FMUs that run anywhere: C99 sources, compiled for every platform, with nothing else needed.
+"""Native flavour of the FMUs: C99 sources compiled for every platform, without dependencies.
 
 The archive holds the sources as well: ``sources/all.c`` includes all the others, and compiles without warnings. As FMI
-2.0, section 2.3, has it, the three FMI headers come from whoever compiles. Whether the names of the FMI functions begin
-with the model identifier is decided by them: the standard's headers put it there, for several FMUs in one program;
-headers that make shared libraries (fmpy's) do not.
+2.0, section 2.3, has it, the three FMI headers come from whoever compiles. They decide whether the names of the FMI
+functions begin with the model identifier: the standard's headers put it there, for several FMUs in one program; headers
+for shared libraries (fmpy's) do not.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def files(
     targets, samples
         As in :func:`hybridsep.fmi.archive.build_fmu`.
     trained : HybridPredictor, optional
-        What a HybridPredictor or SepCompensator starts warm with.
+        Trained predictor with which a HybridPredictor or SepCompensator starts warm.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def files(
 
 
 def sources(description: Mapping[str, object], guid: str) -> dict[str, bytes]:
-    """Return what is compiled with :func:`fmi_headers`: file name → content, with the generated ``hsep_fmu.h``.
+    """Return the C sources with the generated ``hsep_fmu.h``, without :func:`fmi_headers`: file name → content.
 
     Parameters
     ----------

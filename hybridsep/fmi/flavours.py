@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["BACKENDS"]
+__all__ = ["FLAVOURS"]
 
-BACKENDS = ("native", "python")
+FLAVOURS = ("native", "python")
 """The default first."""

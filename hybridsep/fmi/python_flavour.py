@@ -1,7 +1,7 @@
-"""The FMUs anyone can edit: a pythonfmu slave over this library.
+"""Python flavour of the FMUs: a pythonfmu slave over this library, to read and edit.
 
 Such an FMU carries the slave, the part of this library that it needs, pythonfmu itself and pythonfmu's binaries.
-The library travels under a name with a number of its content (``hybridsep_1a2b…``), because two FMUs in one process
+The library is packed under a name with a hash of its content (``hybridsep_1a2b…``), because two FMUs in one process
 share every module of the same name, and the one loaded first would silently serve both.
 """
 
@@ -48,7 +48,7 @@ def files(
     description : mapping
         ``model``, ``name``, ``parameters`` and ``modes``.
     trained : HybridPredictor, optional
-        What a HybridPredictor or SepCompensator starts warm with.
+        Trained predictor with which a HybridPredictor or SepCompensator starts warm.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def files(
 
 
 def _resources(model: str) -> dict[str, bytes]:
-    """Return the Python side of an FMU: slave, library and pythonfmu, under names of their content."""
+    """Return the Python side of an FMU: slave, library and pythonfmu, under names with a hash of their content."""
     slave = data_folder("fmu_src") / "python" / _SLAVES[model]
     library = imported_modules(slave)
     digest = hashlib.sha256(slave.read_bytes())
