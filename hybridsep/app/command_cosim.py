@@ -13,7 +13,6 @@ from ..base.settings import PARAMETERS, check
 from ..fmi.flavours import FLAVOURS
 from .failures import loading
 from .options import (
-    COMPENSATIONS,
     TRAJECTORIES,
     FlavourOption,
     ForceOption,
@@ -39,7 +38,7 @@ def cosim(
     compensate: Annotated[
         str | None,
         typer.Option(
-            help=f"Compensate the servo error with the best model given: {', '.join(COMPENSATIONS)}. The drive gets "
+            help=f"{PARAMETERS['compensate'].help}. The drive gets "
             "the command that a SepCompensator FMU has modified; if left out, a HybridPredictor only predicts."
         ),
     ] = None,
@@ -68,7 +67,7 @@ def cosim(
         from ..machine import load_machine, machine_path
         from .arguments import check_ending
         from .builds import build_for_host
-        from .cosim_arguments import best_model, check_pair, checked_group, fitting, read_command
+        from .cosim_arguments import check_pair, checked_group, fitting, read_command
         from .overwrite import FIGURE, RUN, Output, check_outputs
         from .progress import progress_bar
         from .tables import print_run
@@ -79,16 +78,17 @@ def cosim(
     axis = load_machine(machine)
     check_ending(out, "--out", RESULT_SUFFIXES)
     check_ending(figure, "--figure", (".png",))
-    best = None if compensate is None else best_model(compensate)
-    model = "HybridPredictor" if best is None else "SepCompensator"
+    if compensate is not None:
+        check("compensate", compensate, label="--compensate")
+    model = "HybridPredictor" if compensate is None else "SepCompensator"
     command = read_command(trajectory, axis, unit, T_s)
     values = checked_group(parameters, model)
     if predictor is None:
         values = fitting(axis, model, values)
     if seed is not None:
         check("seed", seed)
-    if best is not None:
-        values["compensate"] = int(best)
+    if compensate is not None:
+        values["compensate"] = PARAMETERS["compensate"].to_fmi(compensate)
     check_pair(axis, model, predictor, plant, weights, flavour)
     results = (("--out", out, RUN), ("--figure", figure, FIGURE))
     outputs = [Output(option, path, kind) for option, path, kind in results if path is not None]

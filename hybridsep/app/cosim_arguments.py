@@ -8,7 +8,6 @@ from typing import Any
 
 from ..base.errors import ParameterError
 from ..base.signals import Array
-from ..compensate.plan import SepState
 from ..cosim.fmus import check_controller, check_plant
 from ..cosim.run import COMPENSATOR, PREDICTOR
 from ..fmi.archive import fmu_names
@@ -18,10 +17,10 @@ from ..logs.log import check_reading
 from ..machine import Machine
 from ..plants.trajectory import PAPER_LIMITS, read_trajectory, spiral, staircase
 from .arguments import check_interval
-from .options import COMPENSATIONS, TRAJECTORIES
+from .options import TRAJECTORIES
 from .parameter_options import COMPENSATOR_ENTRIES
 
-__all__ = ["best_model", "check_pair", "checked_group", "fitting", "read_command"]
+__all__ = ["check_pair", "checked_group", "fitting", "read_command"]
 
 
 def read_command(trajectory: str, axis: Machine, unit: str, T_s: float | None) -> Array:
@@ -35,13 +34,6 @@ def read_command(trajectory: str, axis: Machine, unit: str, T_s: float | None) -
     command, found = read_trajectory(trajectory, unit=unit, T_s=T_s)
     check_interval(trajectory, found, axis)
     return command
-
-
-def best_model(compensate: str) -> SepState:
-    """Return the best model to compensate with, as ``--compensate`` names it."""
-    if compensate not in COMPENSATIONS:
-        raise ParameterError(f"--compensate must be one of {', '.join(COMPENSATIONS)}, got {compensate!r}")
-    return SepState(COMPENSATIONS.index(compensate))
 
 
 def checked_group(values: Mapping[str, Any], model: str) -> dict[str, Any]:

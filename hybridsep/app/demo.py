@@ -68,7 +68,7 @@ def demo(
     dict
         As written to ``summary.json``: for each case ``rms_pb_um``, ``rms_hold_um``, ``rms_h_um``,
         ``reduction_percent``, ``printed`` and more; RMS in µm against the measured position. ``compensation`` says for
-        ``none``, ``physics``, ``hybrid_cold`` and ``hybrid_warm`` what
+        ``off``, ``physics``, ``hybrid_cold`` and ``hybrid_warm`` what
         :func:`hybridsep.app.demo_compensation.compensate` found, for the spiral's axes with the contour error of both
         together, ``contour_rms_um`` and ``contour_max_um``.
 

@@ -23,7 +23,7 @@ __all__ = ["COMPENSATED", "Runs", "compensate", "contour_errors", "mean_summary"
 TRAINING_SEED = 1000
 """Noise seed of the training run of a warm compensator; no case uses it."""
 
-COMPENSATED = {"none": "off", "physics": "physics", "hybrid_cold": "hybrid", "hybrid_warm": "hybrid"}
+COMPENSATED = {"off": "off", "physics": "physics", "hybrid_cold": "hybrid", "hybrid_warm": "hybrid"}
 """Compensated runs of a case, by the keys of :data:`hybridsep.evaluate.canvas.CASES`: value of ``compensate``."""
 
 Runs = dict[str, Run]

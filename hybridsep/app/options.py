@@ -13,7 +13,6 @@ import typer
 from ..fmi.flavours import FLAVOURS
 
 __all__ = [
-    "COMPENSATIONS",
     "TRAJECTORIES",
     "FlavourOption",
     "ForceOption",
@@ -24,9 +23,6 @@ __all__ = [
     "WeightsOption",
 ]
 
-
-COMPENSATIONS = ("none", "physics", "hybrid")
-"""What ``--compensate`` takes: the best model to use, in the order of :class:`~hybridsep.compensate.plan.SepState`."""
 
 TRAJECTORIES = ("staircase", "spiral_x", "spiral_y")
 """What ``--trajectory`` takes besides a file."""

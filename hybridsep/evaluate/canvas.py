@@ -16,7 +16,7 @@ __all__ = ["CASES", "HOLD", "HYBRID", "PHYSICS", "finish_panels", "save_figure"]
 PHYSICS, HOLD, HYBRID = "#d95f02", "#7f7f7f", "#1b6ca8"
 
 CASES = {
-    "none": ("no compensation", HOLD),
+    "off": ("no compensation", HOLD),
     "physics": ("physics model", PHYSICS),
     "hybrid_cold": ("hybrid, cold", "#74b3e0"),
     "hybrid_warm": ("hybrid, warm", HYBRID),

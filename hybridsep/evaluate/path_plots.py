@@ -59,7 +59,7 @@ def contour_figure(
     figure = Figure(figsize=(8.8, 3.8 * rows + 0.5), layout="constrained")
     panels = figure.subplots(rows, 2, sharex=True, sharey=True, squeeze=False)
     figure.suptitle(title)
-    limit = 1e6 * max(float(np.percentile(error, 98)) for key, error in errors.items() if key != "none")
+    limit = 1e6 * max(float(np.percentile(error, 98)) for key, error in errors.items() if key != "off")
     for axes, (key, (x, y)) in zip(panels.flat, runs.items(), strict=False):
         micro = 1e6 * errors[key]
         points = _draw_path(axes, x, y, micro, limit, size=5)

@@ -90,7 +90,7 @@ def tracking_figure(runs: Mapping[str, Run], title: str, path: str | Path) -> No
     path : str or Path
         The PNG.
     """
-    compensated = {key: run for key, run in runs.items() if key != "none"}
+    compensated = {key: run for key, run in runs.items() if key != "off"}
     enlarged = 0 < len(compensated) < len(runs)
     ratios = [1.0, 1.6, *([1.8] if enlarged else []), 1.5]
     figure = Figure(figsize=(9.0, 1.8 + 1.15 * sum(ratios)), layout="constrained")

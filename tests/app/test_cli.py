@@ -88,13 +88,13 @@ def test_cosim_over_a_file(hybridsep: Run, tmp_path: Path) -> None:
 def test_cosim_with_compensation(hybridsep: Run, tmp_path: Path) -> None:
     options = ("--flavour", "python", "--out", tmp_path / "run.csv", "--figure", tmp_path / "run.png")
     figures = {}
-    for kind in ("none", "physics", "hybrid"):
+    for kind in ("off", "physics", "hybrid"):
         status, out, _ = hybridsep("cosim", "--compensate", kind, *options, "--json")
         assert status == 0
         summary = json.loads(out)
-        assert summary[{"none": "share_off"}.get(kind, f"share_{kind}")] > 0.9
+        assert summary[f"share_{kind}"] > 0.9
         figures[kind] = summary["tracking_rms_um"]
-    assert 87.0 < figures["none"] < 90.0
+    assert 87.0 < figures["off"] < 90.0
     assert figures["hybrid"] < 6.9 < 19.0 < figures["physics"] < 20.5
     assert (tmp_path / "run.csv").read_text().startswith("t,x_d,x_dm,x,")
     assert (tmp_path / "run.png").read_bytes().startswith(b"\x89PNG")
@@ -169,7 +169,7 @@ def test_help_shows_units_and_ranges(hybridsep: Run) -> None:
         (["cosim", "--trajectory", "zigzag"], "zigzag"),
         (["cosim", "--out", "run.xlsx"], "--out must end in .csv or .npz, got 'run.xlsx'"),
         (["cosim", "--Np", "10"], "p must be 1 … Np = 10, got 50"),
-        (["cosim", "--compensate", "magic"], "--compensate must be one of none, physics, hybrid, got 'magic'"),
+        (["cosim", "--compensate", "magic"], "--compensate must be one of off, physics, hybrid, got 'magic'"),
         (["cosim", "--compensate", "hybrid", "--p", "51"], "p must be 1 … Np = 50, got 51"),
         (
             ["cosim", "--compensate", "hybrid", "-m", "emps", "--plant", "plant.fmu"],

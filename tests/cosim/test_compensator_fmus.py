@@ -199,9 +199,9 @@ def test_what_is_refused(python_pair: Pair, python_fmu: Fmu) -> None:
 
 
 def test_figures(short: Run, tmp_path: Path) -> None:
-    several = {"none": short, "physics": short, "hybrid_cold": short, "hybrid_warm": short}
+    several = {"off": short, "physics": short, "hybrid_cold": short, "hybrid_warm": short}
     tracking_figure(several, "several", tmp_path / "several.png")
-    for kind in ("none", "physics", "hybrid"):
+    for kind in COMPENSATE.choices:
         tracking_figure({kind: short}, kind, tmp_path / f"{kind}.png")
     pairs = {kind: (run, run) for kind, run in several.items()}
     errors = {kind: np.abs(run.error) for kind, run in several.items()}
