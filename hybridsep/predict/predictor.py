@@ -152,10 +152,10 @@ class HybridPredictor:
             raise SignalError(f"x must have 1 … {len(waiting.x_d)} samples, as predicted, got {len(measured)}")
         m = len(measured)
         e_pb = measured - waiting.start - waiting.x_pb[:m]
-        scheduled = self.reference_features.features(waiting.signs, m)
+        from_reference = self.reference_features.features(waiting.signs, m)
         for i in range(0, m, self.Np):
             stop = min(i + self.Np, m)
-            self._take_in(waiting.x_pb[i:stop], e_pb[i:stop], scheduled[i:stop], learn)
+            self._take_in(waiting.x_pb[i:stop], e_pb[i:stop], from_reference[i:stop], learn)
         self.reference_features.advance(waiting.signs, waiting.reference, m)
         _, self.state = self.discrete.forced_response(self.state, waiting.x_d[:m])
         self.start = waiting.start
@@ -166,7 +166,7 @@ class HybridPredictor:
         """Return the model of the next ``n`` samples (``Np`` if left out) as an affine map of their commands; eq. (3).
 
         It is the hybrid model whether or not the warm-up is over. ``reference``, ``(n,)``, m, is the path that the
-        reference-scheduled features follow from; a path at rest if left out.
+        features of the reference follow from; a path at rest if left out.
 
         Raises
         ------
@@ -186,8 +186,8 @@ class HybridPredictor:
         g_h = g_pb + lfilter(w_x, denominator, g_pb)
         free_pb, _ = self.discrete.forced_response(self.state, np.zeros(length))
         path = np.full(length, start) if reference is None else as_samples(reference, "reference", length)
-        scheduled = self.reference_features.features(self.reference_features.signs(path, start), length)
-        free = free_pb + self._free_run(free_pb, scheduled)
+        from_reference = self.reference_features.features(self.reference_features.signs(path, start), length)
+        free = free_pb + self._free_run(free_pb, from_reference)
         return WindowOperator(
             g_h=g_h,
             free=free + start * (1.0 - np.cumsum(g_h)),

@@ -29,7 +29,7 @@ TS = 1e-3
 
 
 def compensator(
-    best: SepState = SepState.HYBRID,
+    compensate: SepState = SepState.HYBRID,
     limits: Limits | None = DRIVE_LIMITS,
     *,
     no_reversal: bool = True,
@@ -38,7 +38,7 @@ def compensator(
     predictor = HybridPredictor(MODEL, PredictorSettings(**changes))
     return SepCompensator(
         predictor,
-        CompensatorSettings(preview=200, limits=limits, compensate=best.name.lower(), no_reversal=no_reversal),
+        CompensatorSettings(preview=200, limits=limits, compensate=compensate.name.lower(), no_reversal=no_reversal),
     )
 
 

@@ -22,7 +22,7 @@ static double compensator_lay_out(hsep_compensator *self, const hsep_compensator
     const hsep_predictor_parameters *predictor = &parameters->predictor;
     const double preview = (double)predictor->preview;
     double end = HSEP_WORDS(hsep_compensator);
-    self->best = (uint64_t)parameters->best;
+    self->compensate = (uint64_t)parameters->compensate;
     self->x_dm = hsep_take(&end, (double)predictor->settings.Np);
     self->trial_x = hsep_take(&end, preview + (double)predictor->settings.q);
     self->trial_e = hsep_take(&end, preview + (double)predictor->settings.p);
@@ -129,7 +129,7 @@ static int compensator_trusts(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     const hsep_recursion recursion = hsep_predictor_recursion(predictor, 0);
-    return self->best == HSEP_SEP_HYBRID && (double)predictor->k >= predictor->n_init &&
+    return self->compensate == HSEP_SEP_HYBRID && (double)predictor->k >= predictor->n_init &&
            hsep_predictor_regression(predictor)->n_samples > 0 && self->trust.excess <= 0.0 &&
            hsep_recursion_stable(&recursion, hsep_at(self, self->trial_e));
 }
@@ -191,7 +191,7 @@ HSEP_API void hsep_compensator_begin(hsep_compensator *self)
         compensator_filter_spline(self);
         status = compensator_try(self, HSEP_SEP_HYBRID);
     }
-    if (status == HSEP_PLAN_FAILED && self->best != HSEP_SEP_OFF) {
+    if (status == HSEP_PLAN_FAILED && self->compensate != HSEP_SEP_OFF) {
         status = compensator_try(self, HSEP_SEP_PHYSICS);
     }
     predictor->n_physics = self->state == HSEP_SEP_HYBRID ? 0 : predictor->Np;

@@ -28,19 +28,19 @@
 
 #include <stdint.h>
 
-/* What a window's command was planned with; of a parameter: the best there may be. */
+/* Model that plans the commands of a window; of the parameter compensate, the best one allowed. */
 typedef enum { HSEP_SEP_OFF = 0, HSEP_SEP_PHYSICS = 1, HSEP_SEP_HYBRID = 2 } hsep_sep_state;
 
 typedef struct {
     hsep_predictor_parameters predictor; /* planned */
     hsep_planner_parameters planner;     /* Np and preview as the predictor's */
-    hsep_sep_state best;
+    hsep_sep_state compensate;
 } hsep_compensator_parameters;
 
 typedef struct {
-    uint64_t best;
-    uint64_t state;   /* hsep_sep_state of the window */
-    uint64_t solving; /* whether its plan is being solved */
+    uint64_t compensate; /* hsep_sep_state, the best model allowed */
+    uint64_t state;      /* hsep_sep_state of the window */
+    uint64_t solving;    /* whether its plan is being solved */
     hsep_trust trust;
     /* Offsets in doubles from the beginning of the struct */
     uint64_t x_dm;      /* (Np,) m, the window: modified commands */

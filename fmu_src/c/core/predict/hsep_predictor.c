@@ -1,7 +1,7 @@
 #include "hsep_predictor.h"
 
 #include "hsep_range.h"
-#include "hsep_schedule.h"
+#include "hsep_reference_features.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -22,10 +22,10 @@ static double predictor_lay_out(hsep_predictor *self, const hsep_predictor_param
 {
     const double Np = (double)parameters->settings.Np, preview = (double)parameters->preview;
     const double p = (double)parameters->settings.p, q = (double)parameters->settings.q;
-    const int scheduled = parameters->v_friction > 0.0;
+    const int has_reference = parameters->v_friction > 0.0;
     double end = HSEP_WORDS(hsep_predictor);
     hsep_features_lay_out(
-        &self->features, parameters->settings.p, parameters->settings.q, scheduled ? HSEP_SCHEDULED : 0);
+        &self->features, parameters->settings.p, parameters->settings.q, has_reference ? HSEP_N_REFERENCE : 0);
     const double regression = hsep_regression_size(self->features.n);
     self->Np = parameters->settings.Np;
     self->preview = parameters->preview;
@@ -40,8 +40,8 @@ static double predictor_lay_out(hsep_predictor *self, const hsep_predictor_param
     self->past_e = hsep_take(&end, Np + p);
     self->e_h = parameters->planned ? hsep_take(&end, Np + p) : self->past_e;
     self->weights = hsep_take(&end, (double)self->features.n);
-    self->signs = hsep_take(&end, scheduled ? preview + 2.0 * HSEP_SCHEDULE_REACH : 0.0);
-    self->drive = hsep_take(&end, scheduled ? preview : 0.0);
+    self->signs = hsep_take(&end, has_reference ? preview + 2.0 * HSEP_REFERENCE_REACH : 0.0);
+    self->drive = hsep_take(&end, has_reference ? preview : 0.0);
     self->physics = hsep_take_block(&end, hsep_physics_size(parameters->n_modes, parameters->settings.dead_time));
     self->regression = hsep_take_block(&end, regression);
     self->saved = parameters->unlearns ? hsep_take_block(&end, regression) : 0;
@@ -102,8 +102,8 @@ HSEP_API hsep_recursion hsep_predictor_recursion(const hsep_predictor *self, int
 
 HSEP_API const double *hsep_predictor_drive(const hsep_predictor *self, uint64_t n)
 {
-    const int scheduled = self->features.n > self->features.scheduled;
-    return scheduled ? hsep_at_const(self, self->drive) + (self->preview - n) : NULL;
+    const int has_reference = self->features.n > self->features.reference;
+    return has_reference ? hsep_at_const(self, self->drive) + (self->preview - n) : NULL;
 }
 
 /* Before a row is learned: whether it is. A measurement that is held while the drive moves is missing. */
@@ -125,8 +125,8 @@ static void predictor_learn(hsep_predictor *self, uint64_t i)
     row[HSEP_BIAS] = 1.0;
     memcpy(row + f->x, x, (size_t)(f->q + 1) * sizeof(double));
     memcpy(row + f->e, e + 1, (size_t)f->p * sizeof(double));
-    if (f->n > f->scheduled) {
-        hsep_schedule_features(hsep_at(self, self->signs), i, row + f->scheduled);
+    if (f->n > f->reference) {
+        hsep_reference_features_at(hsep_at(self, self->signs), i, row + f->reference);
     }
     row[f->n] = e[0];
     hsep_regression_fold(hsep_predictor_regression(self));
@@ -173,8 +173,8 @@ HSEP_API int hsep_predictor_finish(hsep_predictor *self)
     if (self->missing) {
         predictor_unlearn(self);
     }
-    if (f->n > f->scheduled) {
-        hsep_schedule_next(hsep_at(self, self->signs), Np);
+    if (f->n > f->reference) {
+        hsep_reference_features_advance(hsep_at(self, self->signs), Np);
     }
     self->x_d_last = hsep_at(self, self->x_d)[Np - 1];
     memcpy(past_x + Np, past_x, (size_t)f->q * sizeof(double)); /* q < Np, p <= Np: they do not overlap */
@@ -183,16 +183,16 @@ HSEP_API int hsep_predictor_finish(hsep_predictor *self)
 }
 
 /* Take in the reference of the window that begins: the signs of its velocity, and what they add to the residuals. */
-static void predictor_schedule(hsep_predictor *self)
+static void predictor_reference(hsep_predictor *self)
 {
-    const double *w = hsep_at(self, self->weights) + self->features.scheduled;
+    const double *w = hsep_at(self, self->weights) + self->features.reference;
     double *signs = hsep_at(self, self->signs), *drive = hsep_at(self, self->drive);
-    double features[HSEP_SCHEDULED];
-    hsep_schedule_signs(signs, hsep_at(self, self->x_d), self->preview, self->x_d_last, self->sign_step);
+    double features[HSEP_N_REFERENCE];
+    hsep_reference_features_signs(signs, hsep_at(self, self->x_d), self->preview, self->x_d_last, self->sign_step);
     for (uint64_t k = 0; k < self->preview; k++) {
         double sum = 0.0;
-        hsep_schedule_features(signs, k, features);
-        for (int i = 0; i < HSEP_SCHEDULED; i++) {
+        hsep_reference_features_at(signs, k, features);
+        for (int i = 0; i < HSEP_N_REFERENCE; i++) {
             sum += features[i] * w[i];
         }
         drive[self->preview - 1 - k] = sum;
@@ -203,8 +203,8 @@ static void predictor_schedule(hsep_predictor *self)
 static void predictor_solve(hsep_predictor *self)
 {
     hsep_regression_solve(hsep_predictor_regression(self), hsep_at(self, self->weights));
-    if (self->features.n > self->features.scheduled) {
-        predictor_schedule(self);
+    if (self->features.n > self->features.reference) {
+        predictor_reference(self);
     }
 }
 

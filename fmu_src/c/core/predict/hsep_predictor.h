@@ -10,8 +10,8 @@
  * hsep_predictor_finish and _begin; once commands are decided, hsep_predictor_publish.
  *
  * Cost of a sample, with n features: that of hsep_regression_fold(n), and alone 9 multiply-adds a mode; at the end of a
- * window (Np (p + q + 2) + n^2 / 2) multiply-adds on top, the tanh of hsep_schedule_signs(preview) and, where windows
- * are unlearned, a copy of the regression. Never more, at no sample number.
+ * window (Np (p + q + 2) + n^2 / 2) multiply-adds on top, the tanh of hsep_reference_features_signs(preview) and,
+ * where windows are unlearned, a copy of the regression. Never more, at no sample number.
  *
  * Memory is one block: the struct, then what its offsets tell; no pointers, so a copy of the block is the state.
  * Reentrant; allocates nothing. Once the parameters are in range nothing here fails but the prediction of a window:
@@ -68,7 +68,7 @@ typedef struct {
     uint64_t past_e;   /* (Np + p,) m, e_pb likewise, as measured */
     uint64_t e_h;      /* (Np + p,) m, e_pb as predicted, behind it the measured ones; alone it is past_e */
     uint64_t weights;  /* (n,) w */
-    uint64_t signs;    /* (preview + 2 HSEP_SCHEDULE_REACH,) of the reference's velocity; if it has features */
+    uint64_t signs;    /* (preview + 2 HSEP_REFERENCE_REACH,) of the reference's velocity; if it has features */
     uint64_t drive;    /* (preview,) m, what they add to the residuals, newest first */
     uint64_t physics, regression;
     uint64_t saved; /* the regression as it was before this window; 0: no window is unlearned */
