@@ -24,7 +24,7 @@ from ..base.signals import Array, as_published, as_samples
 from ..base.state import pack, unpack
 from ..predict.predictor import HybridPredictor
 from ..predict.window import Prediction, PublishedWindow
-from .bounded import DriveBounds, solve
+from .constraints import DriveBounds, solve
 from .plan import PendingPlan, SepState
 from .sensor import SensorWatch
 from .splines import N_DECIDED, SplineBasis, direct_samples
