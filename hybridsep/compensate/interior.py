@@ -78,9 +78,9 @@ def minimise(P: Array, v: Array, rows: Array, low: Array, high: Array, start: Ar
     for _ in range(STEPS_MAX):
         mu = float(s @ z) / len(s)
         r_p = B @ x - b - s
-        Px, Bz = P @ x, B.T @ z
-        r_d = v - Px + Bz
-        largest = max(float(np.max(np.abs(term))) for term in (v, Px, Bz))
+        gradient, force = P @ x, B.T @ z
+        r_d = v - gradient + force
+        largest = max(float(np.max(np.abs(term))) for term in (v, gradient, force))
         feasible = np.max(np.abs(r_p)) < PRIMAL_RESIDUAL and np.max(np.abs(r_d)) < _DUAL_RESIDUAL * largest
         if mu < _MU * share and feasible:
             break
@@ -96,9 +96,8 @@ def minimise(P: Array, v: Array, rows: Array, low: Array, high: Array, start: Ar
         sigma = (mu_aff / mu) ** 3
         sigma_mu = max(sigma * mu, 0.1 * _MU * share)
         dx, ds, dz = newton.direction(sigma_mu - s * z - ds * dz)  # corrector
-        alpha_p, alpha_d = (
-            1.0 if alpha >= 1.0 else _TAU * alpha for alpha in (_step_length(s, ds), _step_length(z, dz))
-        )
+        lengths = _step_length(s, ds), _step_length(z, dz)
+        alpha_p, alpha_d = (1.0 if alpha >= 1.0 else _TAU * alpha for alpha in lengths)
         x, s, z = x + alpha_p * dx, s + alpha_p * ds, z + alpha_d * dz
     return np.asarray(x)
 

@@ -15,14 +15,14 @@ _NOISE_SHARE = 0.5
 """Tolerance on the excess, as a share of the noise variance: at rest noise alone decides which model seems better."""
 
 _WORST = 2.0
-"""Bound on one window's mean square error, relative to physics model and noise: a diverging window, whose error has no
-bound, is forgotten within some ten windows."""
+"""Bound on one window's mean square error, relative to that of physics model and noise: one window that diverges must
+not outweigh all that follow it."""
 
 
 def has_stable_poles(w_e: Array) -> bool:
-    """Return whether the learned recursion is stable: all roots of ``z^p − w_e,1 z^(p−1) − … − w_e,p`` are inside the unit circle.
+    """Return whether all roots of ``z^p − w_e,1 z^(p−1) − … − w_e,p`` are inside the unit circle.
 
-    The Schur-Cohn test by step-down recursion (E. I. Jury, *Theory and Application of the z-Transform Method*, Wiley
+    The Schur-Cohn stability test by step-down recursion (E. I. Jury, *Theory and Application of the z-Transform Method*, Wiley
     1964; the inverse of the Levinson recursion): ``p²/2`` multiplications and no eigenvalues. Each step takes the
     polynomial to one of a degree less; all roots are inside if and only if every reflection coefficient is below 1 in
     magnitude.
