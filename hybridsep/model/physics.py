@@ -181,19 +181,19 @@ class ModalModel:
         """
         return DiscreteModel(self.state_space(), self.dead_time, T_s, input_hold, block)
 
-    def frequency_response(self, f: ArrayLike, T_s: float | None = None) -> NDArray[np.complex128]:
-        """Return ``G_pb(j 2π f)``.
+    def frequency_response(self, omega: ArrayLike, T_s: float | None = None) -> NDArray[np.complex128]:
+        """Return ``G_pb(j ω)``.
 
         Parameters
         ----------
-        f : array_like, Hz
-            Frequencies, any shape.
+        omega : array_like, rad/s
+            Angular frequencies, any shape.
         T_s : float, optional
             Sampling interval, s; needed when there is a dead time, which is counted in samples.
 
         Returns
         -------
-        array of complex, shape of ``f``, m/m
+        array of complex, shape of ``omega``, m/m
 
         Raises
         ------
@@ -202,7 +202,7 @@ class ModalModel:
         """
         if self.dead_time and T_s is None:
             raise ParameterError(f"T_s is needed: dead_time = {self.dead_time} is counted in samples")
-        s = 2j * np.pi * np.asarray(f, dtype=np.float64)
+        s = 1j * np.asarray(omega, dtype=np.float64)
         # Eq. (15)
         G = sum(
             (mode.alpha + mode.beta * s) / (s**2 + 2 * mode.zeta * mode.omega * s + mode.omega**2)
