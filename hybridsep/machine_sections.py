@@ -110,10 +110,10 @@ _FROM_ELSEWHERE = ("T_s", "input_hold", "v_friction")
 
 
 class Entries(Section):
-    """A section whose entries are settings."""
+    """A section whose entries may be left out."""
 
     def given(self) -> dict[str, Any]:
-        """Return the entries that the file has or that have a default, by the names of the settings' fields."""
+        """Return the entries that the file has or that have a default, by the names of their fields."""
         return self.model_dump(exclude_none=True)
 
 
@@ -185,9 +185,9 @@ class DriveLimitsSection(LimitsSection):
     change_max: Number = PARAMETERS["change_max"].default
 
 
-class LogSection(Section):
-    """Names of a recorded log's columns."""
+class LogSection(Entries):
+    """Names of a recorded log's columns; those of :func:`hybridsep.logs.log.open_log` where they are left out."""
 
-    t: str = "t"
-    x_d: str = "x_d"
-    x: str = "x"
+    t: str | None = None
+    x_d: str | None = None
+    x: str | None = None

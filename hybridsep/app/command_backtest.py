@@ -27,7 +27,9 @@ __all__ = ["backtest"]
 
 
 def backtest(
-    log: Annotated[Path, typer.Argument(help="CSV with the columns t, x_d, x, or .npz or .mat with named columns.")],
+    log: Annotated[
+        Path, typer.Argument(help="CSV with the columns t, x_d, x_meas or x, or .npz or .mat with named columns.")
+    ],
     machine: MachineOption,
     unit: UnitOption = "m",
     T_s: TsOption = None,
@@ -54,10 +56,10 @@ def backtest(
         from .tables import print_scores
 
     axis = load_machine(machine)
-    given = {"t": t, "x_d": x_d, "x": x}
-    names = {role: given[role] or column for role, column in axis.log.model_dump().items()}
+    given = {role: column for role, column in (("t", t), ("x_d", x_d), ("x", x)) if column}
+    names = {**axis.log.given(), **given}
     if T_s is not None and t is None:
-        del names["t"]  # there may be none
+        names.pop("t", None)  # there may be none
     changes = {"Np": Np, "p": p, "q": q, "lambda": lam, "t_init": t_init}
     entries = {name: value for name, value in changes.items() if value is not None}
     predictor = axis.changed("predictor", entries).new_predictor()

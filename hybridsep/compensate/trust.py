@@ -22,8 +22,8 @@ not outweigh all that follow it."""
 def has_stable_poles(w_e: Array) -> bool:
     """Return whether all roots of ``z^p − w_e,1 z^(p−1) − … − w_e,p`` are inside the unit circle.
 
-    The Schur-Cohn stability test by step-down recursion (E. I. Jury, *Theory and Application of the z-Transform Method*, Wiley
-    1964; the inverse of the Levinson recursion): ``p²/2`` multiplications and no eigenvalues. Each step takes the
+    Schur-Cohn stability test by step-down recursion (E. I. Jury, *Theory and Application of the z-Transform Method*,
+    Wiley 1964; the inverse of the Levinson recursion): ``p²/2`` multiplications and no eigenvalues. Each step takes the
     polynomial to one of a degree less; all roots are inside if and only if every reflection coefficient is below 1 in
     magnitude.
 

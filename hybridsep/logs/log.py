@@ -36,6 +36,9 @@ _SOURCES: Mapping[str, type[Source]] = {
     ".mat": MatSource,
 }
 _ROLES = ("t", "x_d", "x")
+_MEASURED = "x_meas"
+"""Measured position in a file that calls the true one x; read before x unless a name is given."""
+
 _BLOCK = 10_000
 
 
@@ -47,7 +50,7 @@ class Log:
     ----------
     t : (n,) array, s
         Times as recorded, or ``k·T_s`` if the file has no time column.
-    x_d, x : (n,) array, m
+    x_d, x_meas : (n,) array, m
         Commanded and measured positions.
     T_s : float
         Sampling interval, s.
@@ -57,7 +60,7 @@ class Log:
 
     t: Array
     x_d: Array
-    x: Array
+    x_meas: Array
     T_s: float
     path: Path
 
@@ -100,7 +103,7 @@ class LogReader:
         self.T_s = float(given or found or 0.0)  # one of them is there, both are > 0
 
     def chunks(self, n: int = _BLOCK) -> Iterator[tuple[Array, Array]]:
-        """Give the log from its beginning as pairs ``(x_d, x)``, m, of at most ``n`` samples each.
+        """Give the log from its beginning as pairs ``(x_d, x_meas)``, m, of at most ``n`` samples each.
 
         Raises
         ------
@@ -109,7 +112,7 @@ class LogReader:
         """
         if n < 1:
             raise LogError(f"{self.path}: a chunk must have n ≥ 1 samples, got {n}")
-        return ((x_d, x) for x_d, x in self._positions(n, ("x_d", "x")))
+        return ((x_d, x_meas) for x_d, x_meas in self._positions(n, ("x_d", "x")))
 
     def read(self) -> Log:
         """Return the whole log."""
@@ -117,8 +120,8 @@ class LogReader:
         columns = [np.concatenate(parts) for parts in zip(*self._positions(_BLOCK, roles), strict=True)]
         if len(columns) == 2:
             columns.append(np.arange(self.n_samples, dtype=np.float64) * self.T_s)
-        x_d, x, t = columns
-        return Log(t, x_d, x, self.T_s, self.path)
+        x_d, x_meas, t = columns
+        return Log(t, x_d, x_meas, self.T_s, self.path)
 
     def _positions(self, n: int, roles: tuple[str, ...]) -> Iterator[tuple[Array, ...]]:
         """Give the columns ``roles``, the first two being positions, checked and in SI units."""
@@ -127,7 +130,7 @@ class LogReader:
         for block in self._source.blocks(names, n):
             for name, column in zip(names, block.columns, strict=True):
                 self._check_finite(block, name, column)
-            x_d, x = block.columns[0] * metres, block.columns[1] * metres
+            x_d, x_meas = block.columns[0] * metres, block.columns[1] * metres
             lowest, highest = min(lowest, float(x_d.min())), max(highest, float(x_d.max()))
             if highest - lowest > SPAN_MAX:
                 smaller = "um" if self._unit != "m" else "mm"
@@ -136,7 +139,7 @@ class LogReader:
                     f"{SPAN_MAX:g} m; if the log is in {smaller}, say unit='{smaller}' (--unit {smaller})"
                 )
             count += len(x_d)
-            yield (x_d, x, *block.columns[2:])
+            yield (x_d, x_meas, *block.columns[2:])
         if count != self.n_samples:
             raise LogError(f"{self.path}: the file had {self.n_samples} samples when opened, now it has {count}")
 
@@ -180,7 +183,8 @@ def open_log(
     path : str or Path
         ``.csv`` (also ``.tsv``, ``.txt``; comma, semicolon, tab or blanks between columns), ``.npz`` or ``.mat``.
     columns : mapping, optional
-        The file's names of ``"t"``, ``"x_d"`` and ``"x"`` where they are others, such as ``{"x_d": "qg", "x": "qm"}``.
+        The file's names of ``"t"``, ``"x_d"`` and ``"x"``, the measured position, where they are others, such as
+        ``{"x_d": "qg", "x": "qm"}``. Without a name for ``"x"``, ``x_meas`` is read where the file has it.
     unit : {"m", "mm", "um"}
         Unit of the file's positions.
     T_s : float, optional
@@ -223,7 +227,10 @@ def _column_names(source: Source, columns: Mapping[str, str] | None, *, time_nee
     for role in columns or ():
         if role not in _ROLES:
             raise LogError(f"{source.path}: columns may name {', '.join(_ROLES)}, got {role!r}")
-    names = {role: role for role in _ROLES} | dict(columns or {})
+    names = {role: role for role in _ROLES}
+    if _MEASURED in source.names:
+        names["x"] = _MEASURED
+    names |= dict(columns or {})
     if names["t"] not in source.names and "t" not in (columns or {}) and not time_needed:
         del names["t"]
     for role, name in names.items():
