@@ -158,7 +158,7 @@ class Machine(Section):
         """
         if self.plant is None:
             raise MachineError(
-                f"machine {self.name} has no [plant] section; only a recorded log can show its nonlinearity"
+                f"machine {self.name} has no [plant] section: it cannot be simulated, only its log replayed"
             )
         values = {**self.plant.model_dump(exclude={"kind", "noise_std", "seed"}), **changes}
         if isinstance(self.plant, FeedDriveSection):

@@ -265,7 +265,7 @@ class SepCompensator:
         if saved.field("pending") is not None:
             state, n_warm_up = saved.numbers("pending", 2)
             if state not in tuple(SepState) or n_warm_up not in range(Np + 1) or restored.n_pending != Np:
-                raise saved.error("the window that waits must be planned and predicted")
+                raise saved.error("the pending window must be planned and predicted")
             # A hybrid prediction that plans nothing may diverge.
             prediction = Prediction(saved.array("x_pb", Np), saved.array("e_h", Np, finite=False), int(n_warm_up))
             compensator._pending = PendingPlan(

@@ -46,7 +46,7 @@ def modes_of(
             f"{len(numerator) - 1} over a denominator of degree {len(denominator) - 1}"
         )
     if not numerator.size:
-        raise ModelError("G_pb must move the drive, got a transfer function of zero")
+        raise ModelError("G_pb must not be zero, got a zero transfer function")
     poles = np.roots(denominator).astype(np.complex128)
     unstable = poles[poles.real >= 0]
     if unstable.size:

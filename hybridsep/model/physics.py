@@ -112,7 +112,9 @@ class ModalModel:
         try:
             mode = Mode(f_n=omega / (2 * np.pi), zeta=c / m / (2 * omega), alpha=k / m, beta=c / m)
         except ParameterError as error:
-            raise ParameterError(f"m = {m:g} kg, c = {c:g} N.s/m, k = {k:g} N/m make no drive: {error}") from None
+            raise ParameterError(
+                f"m = {m:g} kg, c = {c:g} N.s/m, k = {k:g} N/m give a mode out of range: {error}"
+            ) from None
         return cls((mode,), dead_time)
 
     @classmethod

@@ -76,7 +76,7 @@ class FeedDrive:
             x += dt / 6 * (p1 + 2 * p2 + 2 * p3 + p4)
             u += dt / 6 * (q1 + 2 * q2 + 2 * q3 + q4)
         if not (abs(x) < STATE_MAX and abs(u) < STATE_MAX):
-            raise SignalError(f"the drive's state left the range of numbers (x = {x}, command {x_d} m)")
+            raise SignalError(f"the drive's state overflowed (x = {x}, command {x_d} m)")
         self._x, self._u, self._x_d = x, u, r
 
     def state(self) -> list[float]:

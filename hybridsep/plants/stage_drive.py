@@ -84,7 +84,7 @@ class StageDrive:
             if i < step.n_latched:
                 last_x_d, v_d = r, (r - last_x_d) / self.T_s
         if not all(abs(s) < STATE_MAX for s in z):
-            raise SignalError(f"the stage's state left the range of numbers (command {x_d} m)")
+            raise SignalError(f"the stage's state overflowed (command {x_d} m)")
         self._z, self._v = z, self._position(self._derivative(z, self._pushed(r, v_d)))
         self._last_x_d, self._v_d, self._clock = last_x_d, v_d, step.after
 

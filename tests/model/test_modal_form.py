@@ -128,7 +128,7 @@ REFUSED: list[tuple[Any, str]] = [
     (control.tf([1.0], np.polymul([1.0, 1.0, 3.0], [1.0, 1.0, 3.0])), "G_pb has repeated modes"),
     *((control.tf([1.0], np.poly([-3.0] * n)), "G_pb has repeated modes") for n in (3, 4, 5, 6, 8)),
     *((control.tf([1.0], np.real(np.poly([-1 + 5j, -1 - 5j] * n))), "G_pb has repeated modes") for n in (3, 4, 6, 8)),
-    (control.tf([0.0], [1.0, 1.0]), "a transfer function of zero"),
+    (control.tf([0.0], [1.0, 1.0]), "G_pb must not be zero, got a zero transfer function"),
     (control.tf([math.nan], [1.0, 1.0]), "must have finite coefficients"),
     (control.tf([1.0], [1.0, math.inf, 1.0]), "must have finite coefficients"),
     (control.ss([[math.nan]], [[1.0]], [[1.0]], [[0.0]]), "must have finite coefficients"),

@@ -48,7 +48,6 @@ HSEP_API hsep_status hsep_drive_lost(double x, double x_d, char message[])
 {
     char number[HSEP_NUMBER_SIZE];
     hsep_message_add(
-        message, "the drive's state left the range of numbers (x = %s, command %g m)",
-        hsep_number(number, x, HSEP_REAL), x_d);
+        message, "the drive's state overflowed (x = %s, command %g m)", hsep_number(number, x, HSEP_REAL), x_d);
     return HSEP_REFUSED;
 }

@@ -63,8 +63,8 @@ HSEP_API hsep_status hsep_model_initialise(
 /* Do one communication step from t by h with the inputs in values; outputs and locals go to values.
  * Fails, with state and values unchanged, if an input is not finite or t and h do not fit. Fails, with the values
  * unchanged, if an output would not be a finite number, because what was learned diverges: the look-ahead cannot go on
- * then, every later step fails likewise, and only another state or an initialization helps. A drive's step that would
- * lead out of the range of numbers leaves the state unchanged.
+ * then, every later step fails likewise, and only another state or an initialization helps. A drive's step in
+ * which the state overflows leaves it unchanged.
  * Warns if inputs are read at an instant that is no communication point.
  * Cost: bounded by the parameters and h/T_s, the same at the first and at the 10^9th call; allocates nothing. */
 HSEP_API hsep_status

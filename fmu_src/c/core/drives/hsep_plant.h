@@ -36,7 +36,7 @@ typedef struct {
 HSEP_API void hsep_feed_drive_reset(hsep_feed_drive *self, double start);
 
 /* Advance by h, s, at most hsep_plant_step_max, with the command x_d, m, held. Fails, and returns 0 with the state
- * unchanged, if the state would leave the range of numbers; *x then tells the position reached, m. */
+ * unchanged, if the state overflows; *x then tells the position reached, m. */
 HSEP_API int hsep_feed_drive_step(hsep_feed_drive *self, double x_d, double h, double *x);
 
 HSEP_API double hsep_feed_drive_rate(const hsep_feed_drive *self); /* of the linear part, 1/s */
@@ -78,7 +78,7 @@ HSEP_API void hsep_stage_init(
     hsep_stage *self, const hsep_mode modes[], uint64_t n_modes, double f, double kappa, double T_s, double start);
 
 /* Advance by h, s, at most hsep_plant_step_max, with the command x_d, m, held. work: (HSEP_STAGE_WORK n_modes,).
- * Fails, and returns 0 with the state unchanged, if the state would leave the range of numbers. */
+ * Fails, and returns 0 with the state unchanged, if the state overflows. */
 HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work[]);
 
 HSEP_API double hsep_stage_rate(const hsep_stage *self); /* of the fastest mode, 1/s */
