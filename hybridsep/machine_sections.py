@@ -43,11 +43,11 @@ Whole = Annotated[int, BeforeValidator(_checked)]
 Limit = Annotated[float, BeforeValidator(_checked_limit)]
 
 Line = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f\x{FFFE}\x{FFFF}]+$")]
-"""One line of printable text, of characters that XML 1.0 allows: the modelDescription and the FMU's page have it."""
+"""One line of printable text, of characters that XML 1.0 allows, for modelDescription and documentation."""
 
 
 class Section(BaseModel):
-    """Entries of a table of the file; unknown ones are refused."""
+    """Table of a machine file; unknown entries are refused."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -85,15 +85,15 @@ class Physics(Section):
 
 
 def _settings_section(settings: type[Settings], without: tuple[str, ...], *, inherits: bool = False) -> dict[str, Any]:
-    """Return the entries of a section, by the names of the fields of settings.
+    """Return pydantic fields for a section, by the names of the settings' fields.
 
     Parameters
     ----------
     settings : type of Settings
     without : tuple of str
-        Fields that come from elsewhere.
+        Fields set elsewhere in the file.
     inherits : bool
-        Whether an entry that is left out is another section's.
+        Whether a missing entry is taken from another section.
     """
     entries: dict[str, Any] = {}
     for field, parameter in ((field, settings.parameters().get(field.name)) for field in fields(settings)):
@@ -180,7 +180,7 @@ class LimitsSection(Section):
 
 
 class DriveLimitsSection(LimitsSection):
-    """What the drive itself allows of a modified command, wider than the trajectory's limits."""
+    """Limits of the drive for the modified command, wider than the trajectory's."""
 
     change_max: Number = PARAMETERS["change_max"].default
 

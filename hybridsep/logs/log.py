@@ -1,4 +1,4 @@
-"""Reading a log: whole (:func:`read_log`) or chunk by chunk (:func:`open_log`), with the same checks."""
+"""Readers of logs: whole (:func:`read_log`) or chunk by chunk (:func:`open_log`), with the same checks."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from .time_axis import TimeAxis
 __all__ = ["UNITS", "Log", "LogReader", "check_reading", "open_log", "read_log"]
 
 UNITS: Mapping[str, float] = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
-"""Metres in each unit a log's positions may have."""
+"""Units of a log's positions, in metres."""
 
 SPAN_MAX = 100.0
-"""Longest plausible travel of an axis, m; a longer one is a log in a smaller unit."""
+"""Largest plausible travel of an axis, m; a larger one indicates a log in a smaller unit."""
 
 TS_TOLERANCE = 0.01
-"""Largest relative difference between a given ``T_s`` and the time column's."""
+"""Largest relative difference between a given ``T_s`` and the time column's: more than any clock's drift."""
 
 _SOURCES: Mapping[str, type[Source]] = {
     ".csv": TextSource,
@@ -66,17 +66,17 @@ class Log:
 
 
 class LogReader:
-    """A log that is read chunk by chunk; made by :func:`open_log`.
+    """Chunk-wise reader of a log; returned by :func:`open_log`.
 
-    Opening goes once over the time column (over ``x_d`` if there is none), so that ``T_s`` is the mean over the whole
-    file and a bad time axis is reported before anything is predicted from it. No file stays open between calls.
+    Opening scans the time column (``x_d`` if there is none), so that ``T_s`` is the mean over the whole file and an
+    invalid time axis is reported before any prediction. No file stays open between calls.
 
     Attributes
     ----------
     path : Path
         The file.
     T_s : float
-        Sampling interval, s: the given one, or the mean of the time column's, rounded to what it determines.
+        Sampling interval, s: the given one, or the mean of the time column's, rounded to its significant digits.
     n_samples : int
         Samples in the log.
     """
@@ -103,12 +103,12 @@ class LogReader:
         self.T_s = float(given or found or 0.0)  # one of them is there, both are > 0
 
     def chunks(self, n: int = _BLOCK) -> Iterator[tuple[Array, Array]]:
-        """Give the log from its beginning as pairs ``(x_d, x_meas)``, m, of at most ``n`` samples each.
+        """Iterate over the log as pairs ``(x_d, x_meas)``, m, of at most ``n`` samples each.
 
         Raises
         ------
         LogError
-            When the samples that are next cannot be used.
+            When the next samples are invalid.
         """
         if n < 1:
             raise LogError(f"{self.path}: a chunk must have n ≥ 1 samples, got {n}")
@@ -124,7 +124,7 @@ class LogReader:
         return Log(t, x_d, x_meas, self.T_s, self.path)
 
     def _positions(self, n: int, roles: tuple[str, ...]) -> Iterator[tuple[Array, ...]]:
-        """Give the columns ``roles``, the first two being positions, checked and in SI units."""
+        """Iterate over the columns ``roles``, the first two being positions, checked and in SI units."""
         names, metres = [self._names[role] for role in roles], UNITS[self._unit]
         lowest, highest, count = np.inf, -np.inf, 0
         for block in self._source.blocks(names, n):
@@ -144,7 +144,7 @@ class LogReader:
             raise LogError(f"{self.path}: the file had {self.n_samples} samples when opened, now it has {count}")
 
     def _scan(self) -> tuple[int, float | None]:
-        """Go over one column; return the number of samples and, if it is the time, the sampling interval."""
+        """Scan one column; return the number of samples and, if it is the time, the sampling interval."""
         role = "t" if "t" in self._names else "x_d"
         axis, count = TimeAxis(self.path, self._names[role]), 0
         for block in self._source.blocks([self._names[role]], _BLOCK):
@@ -164,7 +164,7 @@ class LogReader:
 
 
 def check_reading(unit: str, T_s: float | None) -> float | None:
-    """Return the sampling interval that was given, or raise LogError or ParameterError if it or the unit is none."""
+    """Return the given sampling interval, validated; LogError for an unknown unit."""
     if unit not in UNITS:
         raise LogError(f"unit must be one of {', '.join(UNITS)}, got {unit!r}")
     return None if T_s is None else float(check("T_s", T_s, label="T_s"))
@@ -175,8 +175,8 @@ def open_log(
 ) -> LogReader:
     """Open a log for reading in bounded memory.
 
-    CSV files are streamed by lines and ``.npz`` files member by member; a ``.mat`` file is loaded whole, as SciPy
-    can do nothing else, so that its size is limited by the memory.
+    CSV files are streamed by lines and ``.npz`` files by members; a ``.mat`` file is loaded whole by SciPy, so that its
+    size is limited by the memory.
 
     Parameters
     ----------
@@ -223,7 +223,7 @@ def _open_source(path: Path) -> Source:
 
 
 def _column_names(source: Source, columns: Mapping[str, str] | None, *, time_needed: bool) -> dict[str, str]:
-    """Return the file's name of each column that will be read."""
+    """Return the file's names of the columns to read, by role."""
     for role in columns or ():
         if role not in _ROLES:
             raise LogError(f"{source.path}: columns may name {', '.join(_ROLES)}, got {role!r}")

@@ -1,4 +1,4 @@
-"""The nonlinear spring-mass-damper drive, eqs. (12) and (13)."""
+"""Nonlinear spring-mass-damper drive, eqs. (12) and (13)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["FeedDrive"]
 
 
 class FeedDrive:
-    """The spring-mass-damper drive with quadratic damping and stiffness, eq. (13).
+    """Spring-mass-damper drive with quadratic damping and stiffness, eq. (13).
 
     ``m ẍ + c ẋ + k x + H_NL = c ẋ_d + k x_d`` with ``H_NL = c_nl·ẋ|ẋ| + k_nl·x|x|``, in the states
     ``x`` and ``u = ẋ − (c/m) x_d``, which need no derivative of the command.
@@ -39,7 +39,7 @@ class FeedDrive:
         self.reset()
 
     def reset(self, start: float = 0.0) -> None:
-        """Put the drive to rest at ``start``, m."""
+        """Reset the drive to rest at ``start``, m."""
         self._start, self._x, self._u, self._x_d = start, 0.0, 0.0, 0.0
 
     @property
@@ -84,5 +84,5 @@ class FeedDrive:
         return [self._start, self._x, self._u, self._x_d]
 
     def restore(self, state: list[float]) -> None:
-        """Take over what :meth:`state` returned."""
+        """Restore a :meth:`state`."""
         self._start, self._x, self._u, self._x_d = state

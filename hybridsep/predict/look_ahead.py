@@ -201,7 +201,7 @@ class LookAhead:
             self._begin_window()
 
     def check(self, x_d_ahead: float, x_meas: float, k: int | None = None) -> None:
-        """Raise SignalError if a window has diverged or the inputs of sample ``k``, the next one by default, are invalid."""
+        """Raise SignalError if a window has diverged or an input of sample ``k``, by default the next, is invalid."""
         if self.diverged:
             raise SignalError(self.diverged)
         sample = self.k if k is None else k

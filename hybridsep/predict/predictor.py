@@ -162,7 +162,7 @@ class HybridPredictor:
         self.pending = None
 
     def operator(self, n: int | None = None, *, reference: ArrayLike | None = None) -> WindowOperator:
-        """Return the lifted prediction of the next ``n`` samples (``Np`` if left out), affine in their commands; eq. (3).
+        """Return the lifted prediction of the next ``n`` (default ``Np``) samples, affine in their commands; eq. (3).
 
         It is the hybrid model, during the warm-up too. ``reference``, ``(n,)``, m, is the unmodified command, for the
         features of the reference; at rest if left out.
