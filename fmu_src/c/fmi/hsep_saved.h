@@ -1,4 +1,4 @@
-/* The complete state of an instance as one block of bytes: saved, restored, serialised by copying it.
+/* Complete state of an instance as one block of bytes, saved, restored and serialised by copying.
  *
  * header | values, HSEP_N_VALUES doubles | the model's state, as hsep_model_size tells
  *

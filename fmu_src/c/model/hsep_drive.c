@@ -44,7 +44,7 @@ HSEP_API double hsep_drive_first_measurement(double noise_std, double seed, doub
     return isfinite(measured) ? measured : x;
 }
 
-HSEP_API hsep_status hsep_drive_lost(double x, double x_d, char message[])
+HSEP_API hsep_status hsep_drive_overflowed(double x, double x_d, char message[])
 {
     char number[HSEP_NUMBER_SIZE];
     hsep_message_add(

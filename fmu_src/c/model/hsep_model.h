@@ -1,4 +1,4 @@
-/* What a model is to an adapter: sizes, an initialization, a step and values.
+/* Interface between a model and an adapter: sizes, initialization, step and values.
  *
  * An adapter (FMI 2.0 now, another one beside it later) owns one array of HSEP_N_VALUES values, one place per variable
  * of the generated table (hsep_fmu.h), then the time derivatives of the first HSEP_N_INTERPOLATED of them, inputs that
@@ -62,8 +62,8 @@ HSEP_API hsep_status hsep_model_initialise(
 
 /* Do one communication step from t by h with the inputs in values; outputs and locals go to values.
  * Fails, with state and values unchanged, if an input is not finite or t and h do not fit. Fails, with the values
- * unchanged, if an output would not be a finite number, because what was learned diverges: the look-ahead cannot go on
- * then, every later step fails likewise, and only another state or an initialization helps. A drive's step in
+ * unchanged, if an output would not be a finite number, because the learned recursion diverges: every later step fails
+ * then, until another state is set or the model is initialised. A drive's step in
  * which the state overflows leaves it unchanged.
  * Warns if inputs are read at an instant that is no communication point.
  * Cost: bounded by the parameters and h/T_s, the same at the first and at the 10^9th call; allocates nothing. */

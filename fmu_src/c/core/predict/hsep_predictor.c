@@ -106,7 +106,7 @@ HSEP_API const double *hsep_predictor_drive(const hsep_predictor *self, uint64_t
     return has_reference ? hsep_at_const(self, self->drive) + (self->preview - n) : NULL;
 }
 
-/* Before a row is learned: whether it is. A measurement that is held while the drive moves is missing. */
+/* Guard before a row is learned: return whether it is. A measurement held while the drive moves is missing. */
 static int predictor_guard(hsep_predictor *self, double x_meas, double x_pb)
 {
     if (self->saved && hsep_sensor_misses(&self->sensor, x_meas, x_pb)) {
@@ -152,7 +152,7 @@ HSEP_API int hsep_predictor_take_in(hsep_predictor *self, double x_d_ahead, doub
     return i + 1 == self->Np;
 }
 
-/* Take back what was learned of the window; what was predicted stands for what was not measured. */
+/* Unlearn the window: restore the regression, and replace the residuals by their predictions. */
 static void predictor_unlearn(hsep_predictor *self)
 {
     const double *e_h = hsep_at(self, self->e_h);
@@ -182,7 +182,7 @@ HSEP_API int hsep_predictor_finish(hsep_predictor *self)
     return self->learning && !self->missing;
 }
 
-/* Take in the reference of the window that begins: the signs of its velocity, and what they add to the residuals. */
+/* Features of the reference over the window that begins, and their part of the residuals. */
 static void predictor_reference(hsep_predictor *self)
 {
     const double *w = hsep_at(self, self->weights) + self->features.reference;
@@ -199,7 +199,7 @@ static void predictor_reference(hsep_predictor *self)
     }
 }
 
-/* The weights of the window that begins, and what follows from them; eq. (6). */
+/* Weights for the window that begins, eq. (6), and the part of the features of the reference. */
 static void predictor_solve(hsep_predictor *self)
 {
     hsep_regression_solve(hsep_predictor_regression(self), hsep_at(self, self->weights));
@@ -220,7 +220,7 @@ HSEP_API void hsep_predictor_begin(hsep_predictor *self)
     }
     predictor_solve(self);
     self->n_published = 0;
-    self->learning = !self->missing && self->k >= self->preview; /* over the first fill there is nothing to learn */
+    self->learning = !self->missing && self->k >= self->preview; /* the first fill is not learned */
     self->missing = 0;
     if (self->saved) {
         memcpy(
@@ -229,7 +229,7 @@ HSEP_API void hsep_predictor_begin(hsep_predictor *self)
     }
 }
 
-/* Before the samples first ... last - 1 of a window are published: whether they diverge. */
+/* Guard before the samples first ... last - 1 are published: set divergence if one is out of range. */
 static void predictor_bound(hsep_predictor *self, uint64_t first, uint64_t last)
 {
     const double *x_pb = hsep_at(self, self->x_pb) + first, *x_h = hsep_at(self, self->x_h) + first;
@@ -260,17 +260,17 @@ HSEP_API int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, doubl
     const uint64_t Np = self->Np;
     const double relative = x_d_ahead - self->start;
     double *past_x = hsep_at(self, self->past_x), *ahead_pb = hsep_at(self, self->ahead_pb);
-    hsep_physics_respond(hsep_predictor_physics(self), &relative, ahead_pb + self->k % Np, 1);
+    hsep_physics_forced_response(hsep_predictor_physics(self), &relative, ahead_pb + self->k % Np, 1);
     if (!hsep_predictor_take_in(self, x_d_ahead, x_meas)) {
         return 0;
     }
     (void)hsep_predictor_finish(self);
-    if (self->k == self->preview) { /* what was measured over the first fill is not used */
+    if (self->k == self->preview) { /* the first fill was not predicted */
         memset(hsep_at(self, self->past_e), 0, (size_t)(Np + self->features.p) * sizeof(double));
     }
     hsep_predictor_begin(self);
     for (uint64_t i = 0; i < Np; i++) {
-        past_x[Np - 1 - i] = ahead_pb[i]; /* Eq. (2), answered command by command as they came */
+        past_x[Np - 1 - i] = ahead_pb[i]; /* Eq. (2), computed as the commands came */
     }
     const double warm_up = self->n_init - (double)self->k;
     self->n_physics = warm_up >= (double)Np ? Np : warm_up > 0.0 ? (uint64_t)warm_up : 0;

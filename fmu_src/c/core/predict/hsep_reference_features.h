@@ -12,17 +12,17 @@
 #include <stdint.h>
 
 #define HSEP_N_REFERENCE 13     /* features */
-#define HSEP_REFERENCE_REACH 40 /* samples by which the farthest of them are shifted */
+#define HSEP_REFERENCE_REACH 40 /* largest shift, samples */
 
-/* Fill the signs of n samples of the reference, m, and what follows them, which is at rest. last: the reference one
- * sample before, m; step: v_friction T_s, m. Cost: n tanh. */
+/* Fill psi over n samples of the reference, m, and zeros after them. last: the reference one sample before,
+ * m; step: v_friction T_s, m. Cost: n tanh. */
 HSEP_API void hsep_reference_features_signs(
     double signs[], const double reference[], uint64_t n, double last, double step);
 
 /* The features of sample k, m. */
 HSEP_API void hsep_reference_features_at(const double signs[], uint64_t k, double features[HSEP_N_REFERENCE]);
 
-/* Move on by n samples. */
+/* Advance by n samples. */
 HSEP_API void hsep_reference_features_advance(double signs[], uint64_t n);
 
 #endif
