@@ -1,11 +1,11 @@
-/* The C core in one header, for C99 and C++11.
+/* Public header of the C core, for C99 and C++11.
  *
- * The objects are blocks of memory that the caller provides, aligned for double, as large as their hsep_*_size tells:
+ * The objects are blocks of memory that the caller provides, aligned for double, of the size that hsep_*_size returns:
  * plain data without pointers, so a copy of a block is a saved state, and hsep_*_valid judges bytes from elsewhere.
  *
  * Real-time contract. All functions are reentrant: threads may use different blocks at once, one block is used by one
  * thread at a time. None allocates, locks, or throws; none but those of hsep_model.h that say so touch a file.
- * Parameters must be in the ranges that their structs tell, which hsep_model_size checks; arguments must be finite.
+ * Parameters must be in the ranges given at their structs, which hsep_model_size checks; arguments must be finite.
  *
  *   function                          | bounded cost                                    | what may fail
  *   hsep_*_size                       | constant                                        | nothing

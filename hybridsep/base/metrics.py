@@ -80,7 +80,7 @@ class RunningErrors:
 
 
 def hold(x_pb: Array, x_meas: Array, active: NDArray[np.bool_], Np: int) -> Array:
-    """Return the hold baseline: ``x_pb`` plus the last residual before each batch; ``x_pb`` in the warm-up.
+    """Return the hold baseline: ``x_pb`` plus the last residual before each window; ``x_pb`` in the warm-up.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def hold(x_pb: Array, x_meas: Array, active: NDArray[np.bool_], Np: int) -> Arra
     active : (n,) array of bool
         Whether the warm-up is over.
     Np : int
-        Samples in a batch.
+        Samples in a window.
     """
     last = np.arange(len(x_meas)) // Np * Np - 1
     residual = np.where(last >= 0, (x_meas - x_pb)[last], 0.0)
@@ -97,7 +97,7 @@ def hold(x_pb: Array, x_meas: Array, active: NDArray[np.bool_], Np: int) -> Arra
 
 
 def batch_rms(error: Array, Np: int) -> Array:
-    """Return the RMS per batch, ``(n_batches,)``, of an error ``(n,)``; the last batch may be shorter."""
+    """Return the RMS per batch, ``(n_batches,)``, of an error ``(n,)``; the last may be shorter."""
     starts = np.arange(0, len(error), Np)
     lengths = np.diff(np.append(starts, len(error)))
     return np.sqrt(np.add.reduceat(error**2, starts) / lengths)

@@ -153,7 +153,7 @@ class PredictorSettings(Settings):
         (:mod:`~hybridsep.predict.reference_features`); 0, as in the paper: none.
     """
 
-    Np: int = whole(100, 1, 100_000, "samples in a look-ahead window (a batch)")
+    Np: int = whole(100, 1, 100_000, "samples in a look-ahead window")
     p: int = whole(50, 1, 5000, "past residuals e_pb in the features", learned=True)
     q: int = whole(3, 0, 5000, "past physics-based predictions x_pb in the features", learned=True)
     lam: float = real(1e-12, 1e-40, 1e12, "m2", "ridge penalty on the weights", name="lambda", learned=True)

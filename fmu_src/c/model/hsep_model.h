@@ -2,8 +2,8 @@
  *
  * An adapter (FMI 2.0 now, another one beside it later) owns one array of HSEP_N_VALUES values, one place per variable
  * of the generated table (hsep_fmu.h), then the time derivatives of the first HSEP_N_INTERPOLATED of them, inputs that
- * may change within a step, which it sets to 0 after each step; and one block of memory, the state, whose size the
- * model tells from the parameters. The state is plain data without pointers: saving, restoring and serialising it is
+ * may change within a step, which it sets to 0 after each step; and one block of memory, the state, whose size
+ * follows from the parameters. The state is plain data without pointers: saving, restoring and serialising it is
  * one copy of its bytes. Outputs change only where their sample does, so what an adapter saves is the state together
  * with the values. Numbers lie in memory and in files as a little-endian machine has them.
  *
@@ -21,7 +21,7 @@
 typedef enum {
     HSEP_OK = 0,
     HSEP_REFUSED = 1, /* the call cannot be done; the state is unchanged unless said otherwise, the message says why */
-    HSEP_WARNED = 2   /* the call is done; the message says what to beware of */
+    HSEP_WARNED = 2   /* the call is done; the message is a warning */
 } hsep_status;
 
 typedef enum { HSEP_REAL, HSEP_INTEGER, HSEP_BOOLEAN, HSEP_STRING } hsep_kind;
@@ -48,7 +48,7 @@ typedef struct {
     const char *resources; /* folder with a trailing slash, decoded; NULL if there is none */
 } hsep_context;
 
-/* Check the parameters in values, alone and together, and tell how many bytes of state they need.
+/* Check the parameters in values, alone and together, and return the size of the state, bytes.
  * Fails with a message that names every parameter that is out of its range, the range and what came.
  * ReferenceTrajectory looks up the number of samples in its resource for that. */
 HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[]);
