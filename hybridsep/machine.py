@@ -1,7 +1,6 @@
-"""Machine files: everything the library, the FMUs and the command line need to know of one axis, as TOML.
+"""Machine files: TOML description of one axis for the library, the FMUs and the command line, in SI units.
 
-Values are SI. A file that is inconsistent is refused with a message that names the file, the entry, what was expected
-and what came.
+An invalid file is refused with a message that names the file, the entry, what was expected and what was found.
 """
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ __all__ = ["Machine", "load_machine", "machine_names", "machine_path"]
 
 
 class Machine(Section):
-    """One axis: what it is, its physics model, the predictor's parameters and, where there is one, its plant."""
+    """One axis: identification, physics model, settings and, where there is one, simulated plant."""
 
     name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")
     title: Line
@@ -68,18 +67,18 @@ class Machine(Section):
         if self.plant is not None and self.physics.dead_time:
             raise ValueError("a machine with a plant must have physics.dead_time = 0: the plants have none")
         if self.plant is not None:
-            self.new_plant()  # says what is out of range together
+            self.new_plant()  # raises if the combination is out of range
         return self
 
     @model_validator(mode="after")
     def _physics_makes_modes(self) -> Machine:
-        _ = self.model  # says which mode of m, c and k is out of range
+        _ = self.model  # raises if the mode of m, c and k is out of range
         return self
 
     @model_validator(mode="after")
     def _compensator_fits(self) -> Machine:
         if self.drive_limits is None and "compensator" not in self.model_fields_set:
-            return self  # no compensator is meant
+            return self  # no compensator is configured
         problems, Np = [], self._entry("Np")
         for fit in (lambda: self.compensator_predictor, lambda: self._compensation().for_window(Np)):
             try:
@@ -114,16 +113,16 @@ class Machine(Section):
 
     @property
     def compensator_settings(self) -> CompensatorSettings:
-        """Settings of the compensator, within the ``[drive_limits]`` if there are some."""
+        """Settings of the compensator, with the ``[drive_limits]`` if there are any."""
         return self._compensation().for_window(self.compensator_predictor.Np)
 
     def changed(self, section: Literal["predictor", "compensator"], values: Mapping[str, Any]) -> Machine:
-        """Return this machine with other entries of a section, by their names in the file.
+        """Return a copy with other entries of a section, by their names in the file.
 
         Raises
         ------
         ParameterError
-            If they are out of range or do not fit together.
+            If they are out of range or inconsistent.
         """
         table = self.model_dump(by_alias=True, exclude_unset=True)
         table[section] = {**table.get(section, {}), **values}
@@ -154,11 +153,11 @@ class Machine(Section):
         Raises
         ------
         MachineError
-            If the file describes none: a recorded axis has only its log.
+            If the file has no ``[plant]``, as for a recorded axis.
         """
         if self.plant is None:
             raise MachineError(
-                f"machine {self.name} has no [plant] section; only a recorded log can show its nonlinearity"
+                f"machine {self.name} has no [plant] section: it cannot be simulated, only its log replayed"
             )
         values = {**self.plant.model_dump(exclude={"kind", "noise_std", "seed"}), **changes}
         if isinstance(self.plant, FeedDriveSection):
@@ -169,7 +168,7 @@ class Machine(Section):
     def fmi_parameters(self) -> dict[str, float | int | bool]:
         """Return the start values of the predictor FMU's scalar parameters, under their FMI names."""
         values = {**self.predictor_settings.to_fmi(), "dead_time": self.physics.dead_time}
-        del values["v_friction"]  # a predictor alone does not see the reference behind its window
+        del values["v_friction"]  # a predictor alone has no preview of the reference
         return values
 
     def fmi_compensator_parameters(self) -> dict[str, float | int | bool]:
@@ -178,7 +177,7 @@ class Machine(Section):
         Raises
         ------
         MachineError
-            If the file has no ``[drive_limits]``: without them there is no such FMU.
+            If the file has no ``[drive_limits]``.
         """
         if self.drive_limits is None:
             raise MachineError(f"machine {self.name} has no [drive_limits] section, which a compensator FMU needs")
@@ -190,7 +189,7 @@ class Machine(Section):
         return {"T_s": self.T_s, "input_hold": self.physics.input_hold}
 
     def _entry(self, name: str) -> Any:
-        """Return an entry of the compensator's section, or the predictor's where it has none."""
+        """Return an entry of the compensator's section, by default the predictor's."""
         own = getattr(self.compensator, name)
         return getattr(self.predictor, name) if own is None else own
 
@@ -213,19 +212,19 @@ class Machine(Section):
         return Limits(**self.limits.model_dump())
 
     def command_limits(self) -> tuple[Limits | None, float | None]:
-        """Return the drive's own limits and the bound on a command's change, m; None without ``[drive_limits]``."""
+        """Return the drive's limits and the bound on the change of the command, m; None without ``[drive_limits]``."""
         if self.drive_limits is None:
             return None, None
         return Limits(**self.drive_limits.model_dump(exclude={"change_max"})), self.drive_limits.change_max
 
 
 def machine_names() -> list[str]:
-    """Return the names of the machines that come with the library."""
+    """Return the names of the bundled machines."""
     return sorted(path.stem for path in data_folder("models").glob("*.toml"))
 
 
 def machine_path(machine: str | Path) -> Path:
-    """Return the machine file of a path or of a name that comes with the library.
+    """Return the machine file of a path or of a bundled machine's name.
 
     Raises
     ------
@@ -246,7 +245,7 @@ def load_machine(machine: str | Path) -> Machine:
     Parameters
     ----------
     machine : str or Path
-        Path of a ``.toml`` file, or the name of one that comes with the library.
+        Path of a ``.toml`` file, or name of a bundled machine.
 
     Raises
     ------
@@ -265,7 +264,7 @@ def load_machine(machine: str | Path) -> Machine:
 
 
 def _validated(content: Mapping[str, Any]) -> Machine:
-    """Return the machine that a file's content describes; ParameterError if it describes none."""
+    """Return the machine of a file's content; ParameterError if it is invalid."""
     try:
         return Machine(**content)
     except ValidationError as error:
@@ -275,7 +274,7 @@ def _validated(content: Mapping[str, Any]) -> Machine:
 
 
 def _describe(problem: Any) -> str:
-    """Say one of pydantic's findings in our words: where, what was expected, what came."""
+    """Return the message for one of pydantic's errors: entry, what was expected, what was found."""
     steps = [step for step in problem["loc"] if step not in ("feed_drive", "stage")]
     where = ""
     for step in steps:

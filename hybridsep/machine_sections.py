@@ -43,11 +43,11 @@ Whole = Annotated[int, BeforeValidator(_checked)]
 Limit = Annotated[float, BeforeValidator(_checked_limit)]
 
 Line = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f\x{FFFE}\x{FFFF}]+$")]
-"""One line of printable text, of characters that XML 1.0 allows: the modelDescription and the FMU's page have it."""
+"""One line of printable text, of characters that XML 1.0 allows, for modelDescription and documentation."""
 
 
 class Section(BaseModel):
-    """Entries of a table of the file; unknown ones are refused."""
+    """Table of a machine file; unknown entries are refused."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -85,13 +85,13 @@ class Physics(Section):
 
 
 def _settings_section(settings: type[Settings], *, inherits: bool = False) -> dict[str, Any]:
-    """Return the entries of a section, by the names of the fields of settings.
+    """Return pydantic fields for a section, by the names of the settings' fields.
 
     Parameters
     ----------
     settings : type of Settings
     inherits : bool
-        Whether an entry that is left out is another section's.
+        Whether a missing entry is taken from another section.
     """
     entries: dict[str, Any] = {}
     for field, parameter in ((field, settings.parameters().get(field.name)) for field in fields(settings)):
@@ -105,10 +105,10 @@ def _settings_section(settings: type[Settings], *, inherits: bool = False) -> di
 
 
 class Entries(Section):
-    """A section whose entries are settings."""
+    """A section whose entries may be left out."""
 
     def given(self) -> dict[str, Any]:
-        """Return the entries that the file has or that have a default, by the names of the settings' fields."""
+        """Return the entries that the file has or that have a default, by the names of their fields."""
         return self.model_dump(exclude_none=True)
 
 
@@ -175,14 +175,14 @@ class LimitsSection(Section):
 
 
 class DriveLimitsSection(LimitsSection):
-    """What the drive itself allows of a modified command, wider than the trajectory's limits."""
+    """Limits of the drive for the modified command, wider than the trajectory's."""
 
     change_max: Number = PARAMETERS["change_max"].default
 
 
-class LogSection(Section):
-    """Names of a recorded log's columns."""
+class LogSection(Entries):
+    """Names of a recorded log's columns; those of :func:`hybridsep.logs.log.open_log` where they are left out."""
 
-    t: str = "t"
-    x_d: str = "x_d"
-    x: str = "x"
+    t: str | None = None
+    x_d: str | None = None
+    x: str | None = None

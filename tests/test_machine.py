@@ -1,4 +1,4 @@
-"""Machine files: those that come with the library hold together, and bad ones are refused by name."""
+"""Machine files: those that come with the library are consistent, and bad ones are refused by name."""
 
 from __future__ import annotations
 

@@ -89,7 +89,7 @@ static double measured(position_source *source, const double values[], size_t k)
     double reached = 0.0;
     (void)k;
     if (!hsep_feed_drive_step(&source->drive, values[HSEP_VR_x_dm], values[HSEP_VR_T_s], &reached)) {
-        fail("the drive's state has overflowed");
+        fail("the drive's state overflowed");
     }
     return x_meas;
 #else

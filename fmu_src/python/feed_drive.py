@@ -1,4 +1,4 @@
-"""The nonlinear drives as a pythonfmu slave: eq. (13), or the stage where the FMU has modes."""
+"""pythonfmu slave of the nonlinear drives: eq. (13), or the stage where the FMU has modes."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from hybridsep.plants.stage_drive import StageDrive
 
 
 class FeedDrivePy(slave.TableSlave):
-    """Follows the command that is constant over a step; its encoder draws anew at each communication point."""
+    """Drive with the command held over a step, and an encoder sampled at each communication point."""
 
     def initialise(self) -> None:
-        """Make the plant, at rest at the start value of x_d, and its encoder."""
+        """Create the plant, at rest at the start value of x_d, and its encoder."""
         _check_position("the start value of x_d", self.values["x_d"])
         self.encoder = Encoder(self.values["noise_std"], self.values["seed"])
         self.plant = self._new_plant()
@@ -49,12 +49,12 @@ class FeedDrivePy(slave.TableSlave):
         return {"x": self.plant.x, "v": self.plant.v, "x_meas": self.x_meas}[name]
 
     def core_state(self) -> tuple[dict[str, Any], bytes]:
-        """Return the plant's state and how far the noise has been drawn."""
+        """Return the plant's state and the number of noise samples drawn."""
         meta = {"plant": self.plant.state(), "n_draws": self.encoder.n_draws, "x_meas": self.x_meas}
         return meta, b""
 
     def restore_core(self, meta: Mapping[str, Any], blob: bytes) -> None:
-        """Take over a plant's state and a place in the noise."""
+        """Restore the plant's state and the position in the noise sequence."""
         saved = Saved("drive", meta, {}, {})
         plant, encoder = self._new_plant(), Encoder(self.values["noise_std"], self.values["seed"])
         plant.restore(saved.numbers("plant", len(plant.state())))

@@ -1,4 +1,4 @@
-"""The hybrid predictor as a pythonfmu slave: values in, values out, the arithmetic is in the library."""
+"""pythonfmu slave of the hybrid predictor; the arithmetic is in the library."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from hybridsep.predict.predictor import HybridPredictor
 
 
 class HybridPredictorPy(look_ahead_slave.LookAheadSlave):
-    """Sits between the interpolator and the drive: delays the command by Np samples and predicts what follows."""
+    """Look-ahead buffer between interpolator and drive: delays the command by Np samples and predicts the position."""
 
     model_type = HybridPredictor
 
     def new_model(self) -> HybridPredictor:
-        """Make the predictor from the parameters as they are now, with what the resources say was learned."""
+        """Create the predictor from the current parameters, warm-started from the resources if they hold weights."""
         model = ModalModel([Mode(**mode) for mode in modes_from(self.values)], self.values["dead_time"])
         predictor = HybridPredictor(model, PredictorSettings.from_fmi(self.values))
         trained = Path(self.resources) / WEIGHTS_FILE
@@ -48,6 +48,6 @@ class HybridPredictorPy(look_ahead_slave.LookAheadSlave):
 
 
 def _window_index(name: str) -> tuple[str, int]:
-    """Split ``x_d_window[3]`` into the window's name and the place 2; a plain name is at place 0."""
+    """Split ``x_d_window[3]`` into name and zero-based index 2; a scalar has index 0."""
     window, _, place = name.partition("[")
     return window, int(place[:-1]) - 1 if place else 0

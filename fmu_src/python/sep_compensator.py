@@ -1,4 +1,4 @@
-"""The compensator as a pythonfmu slave: values in, values out, the arithmetic is in the library."""
+"""pythonfmu slave of the compensator; the arithmetic is in the library."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from hybridsep.predict.predictor import HybridPredictor
 
 
 class SepCompensatorPy(look_ahead_slave.LookAheadSlave):
-    """Sits between the interpolator and the drive: delays the command by the preview and modifies it."""
+    """Look-ahead buffer between interpolator and drive: delays the command by the preview and modifies it."""
 
     model_type = SepCompensator
 
     def initial_value(self, name: str) -> float | int | bool:
-        """Return the value at ``t_0``, when the first window has been planned already.
+        """Return the value at ``t_0``, where the first window is already planned.
 
-        While the parameters do not fit together yet, the drive rests at ``x_d_ahead`` and nothing compensates; what is
-        wrong with them is said when the initialization ends.
+        While the parameters are inconsistent, the drive is at rest at ``x_d_ahead`` without compensation; the error is
+        reported when the initialization ends.
         """
         try:
             return _output(self.new_look_ahead(), name)
@@ -36,7 +36,7 @@ class SepCompensatorPy(look_ahead_slave.LookAheadSlave):
         return _output(self.look_ahead, name)
 
     def new_model(self) -> SepCompensator:
-        """Make the compensator from the parameters as they are now, with what the resources say was learned."""
+        """Create the compensator from the current parameters, warm-started from the resources if they hold weights."""
         model = ModalModel([Mode(**mode) for mode in modes_from(self.values)], self.values["dead_time"])
         settings = CompensatorSettings.from_fmi(self.values)
         predictor = HybridPredictor(model, PredictorSettings.from_fmi(self.values))

@@ -18,7 +18,9 @@ __all__ = ["backtest"]
 
 @takes_parameters(PREDICTOR_ENTRIES)
 def backtest(
-    log: Annotated[Path, typer.Argument(help="CSV with the columns t, x_d, x, or .npz or .mat with named columns.")],
+    log: Annotated[
+        Path, typer.Argument(help="CSV with the columns t, x_d, x_meas or x, or .npz or .mat with named columns.")
+    ],
     machine: MachineOption,
     unit: UnitOption = "m",
     T_s: TsOption = None,
@@ -42,10 +44,10 @@ def backtest(
         from .tables import print_scores
 
     axis = load_machine(machine)
-    given = {"t": t, "x_d": x_d, "x": x}
-    names = {role: given[role] or column for role, column in axis.log.model_dump().items()}
+    given = {role: column for role, column in (("t", t), ("x_d", x_d), ("x", x)) if column}
+    names = {**axis.log.given(), **given}
     if T_s is not None and t is None:
-        del names["t"]  # there may be none
+        names.pop("t", None)  # there may be none
     predictor = axis.changed("predictor", parameters).new_predictor()
     reader = open_log(log, columns=names, unit=unit, T_s=T_s)
     check_interval(log.name, reader.T_s, axis)

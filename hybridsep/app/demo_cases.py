@@ -101,20 +101,20 @@ def read_recorded(path: str | Path) -> Log:
     LogError
         If the file cannot be read as a ``DATA_EMPS.mat``.
     """
-    return read_log(path, columns=load_machine("emps").log.model_dump())
+    return read_log(path, columns=load_machine("emps").log.given())
 
 
 def recorded_case(log: Log, out: Path) -> dict[str, Any]:
     """Replay the EMPS recording with its published constants."""
     predictor = load_machine("emps").new_predictor()
-    found = backtest(predictor, log.x_d, log.x)
+    found = backtest(predictor, log.x_d, log.x_meas)
     run = Run(
         kind=PREDICTOR,
-        t=np.asarray(np.arange(len(log.x)) * log.T_s, dtype=np.float64),
+        t=np.asarray(np.arange(len(log.x_meas)) * log.T_s, dtype=np.float64),
         x_d=log.x_d,
         x_dm=log.x_d,
-        x=np.full(len(log.x), np.nan),
-        x_meas=log.x,
+        x=np.full(len(log.x_meas), np.nan),
+        x_meas=log.x_meas,
         x_pb=found.x_pb,
         x_h=found.x_h,
         state=np.where(found.active, SepState.HYBRID, SepState.PHYSICS),

@@ -1,1 +1,1 @@
-"""Foundations without control engineering: errors, parameters, signals, files, states, time."""
+"""Foundations: errors, parameters, settings, signals, files, saved states, time."""

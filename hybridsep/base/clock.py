@@ -17,10 +17,10 @@ from .errors import FmuError, ParameterError, StateError
 __all__ = ["STEP_MAX", "ClockStep", "SampleClock", "check_step_size"]
 
 STEP_MAX = 100.0
-"""Longest communication step, s: a step's cost grows with it."""
+"""Longest communication step, s, which bounds the cost of one step: 10⁷ samples at the shortest ``T_s``."""
 
 _TOLERANCE = 1e-6  # of T_s
-_SPACINGS = 8.0  # of doubles at t: a few roundings of the importer's arithmetic
+_SPACINGS = 8.0  # ulp(t): a few roundings of the importer's arithmetic
 _SPLIT = 134217729.0  # 2^27 + 1, splits a double into two halves (Veltkamp 1968)
 
 
@@ -32,13 +32,13 @@ class SampleClock(NamedTuple):
     start, T_s : float
         Start time and sampling interval, s.
     k : int
-        The last instant that was reached is ``t_k``.
+        Index of the last instant reached, ``t_k``.
     since : float
         Time since ``t_k``, s; slightly below 0 where a step ended within δ before ``t_k``.
     carry : float
-        What the sum in ``since`` has lost to rounding, s.
+        Accumulated rounding error of ``since``, s.
     end : float
-        Where the last step ended in the importer's time, s.
+        End of the last step in the importer's time, s.
     latched : bool
         Whether the inputs of sample ``k`` have been read.
     """
@@ -58,13 +58,13 @@ class SampleClock(NamedTuple):
         Raises
         ------
         FmuError
-            If ``start`` is not finite, or so large that doubles near it cannot tell a quarter of ``T_s``.
+            If ``start`` is not finite, or so large that doubles near it do not resolve a quarter of ``T_s``.
         """
         if not math.isfinite(start):
             raise FmuError(f"the start time must be finite, got {start} s")
         if not _resolution(start) <= 0.25 * T_s:
             raise FmuError(
-                f"the start time must be small enough to count samples of T_s = {T_s:g} s from, got {start:g} s"
+                f"the start time must be small enough to resolve samples of T_s = {T_s:g} s, got {start:g} s"
             )
         return cls(start, T_s, 0, 0.0, 0.0, start, False)
 
@@ -84,7 +84,7 @@ class SampleClock(NamedTuple):
         T_s = self.T_s
         since, carry = _add(self.since, self.carry, h)
         now = self.start + (self.k * T_s + since)
-        # Times so long that doubles no longer tell a quarter of T_s are beyond any run.
+        # At times so large that doubles no longer resolve T_s / 4, δ is T_s / 4.
         delta = min(max(_TOLERANCE * T_s, _resolution(now)), 0.25 * T_s)
         n = math.floor((since + delta) / T_s)
         since, carry = _take(since, carry, n, T_s)
@@ -101,12 +101,12 @@ class SampleClock(NamedTuple):
 
     @classmethod
     def from_state(cls, state: Sequence[float]) -> SampleClock:
-        """Return the clock that :meth:`state` described.
+        """Return the clock of a :meth:`state`.
 
         Raises
         ------
         StateError
-            If it counts outside its bounds.
+            If a field is out of range.
         """
         start, T_s, k, since, carry, end, latched = map(float, state)
         fits = all(map(math.isfinite, (start, T_s, end))) and T_s > 0 and abs(since) <= T_s
@@ -116,18 +116,18 @@ class SampleClock(NamedTuple):
 
 
 class ClockStep(NamedTuple):
-    """One communication step in samples.
+    """One communication step, in samples.
 
     Attributes
     ----------
     after : SampleClock
-        The clock at the step's end.
+        Clock at the end of the step.
     n_samples : int
-        Samples that the step executes.
+        Samples executed in the step.
     n_latched : int
-        Instants whose inputs are read in it.
+        Instants at which inputs are latched in the step.
     first : float
-        Time from the step's start to the first of them, s; may be slightly below 0.
+        Time from the start of the step to the first of them, s; may be slightly below 0.
     """
 
     after: SampleClock
@@ -137,18 +137,18 @@ class ClockStep(NamedTuple):
 
 
 def check_step_size(h: float) -> None:
-    """Raise ParameterError if ``h``, s, is no size of a communication step."""
+    """Raise ParameterError if ``h``, s, is not a valid communication step size."""
     if not 0 < h <= STEP_MAX:
         raise ParameterError(f"the communication step size must be > 0 and ≤ {STEP_MAX:g} s, got {float(h)!r}")
 
 
 def _resolution(t: float) -> float:
-    """Return how well ``t``, s, is known: a few spacings of doubles."""
+    """Return the resolution of a time ``t``, s: a few spacings of doubles."""
     return _SPACINGS * math.ulp(t)
 
 
 def _add(since: float, carry: float, time: float) -> tuple[float, float]:
-    """Add to ``since + carry`` without losing digits: Knuth's two-sum, then renormalised."""
+    """Return ``since + carry + time``, compensated: Knuth's two-sum, then renormalised."""
     total = since + time
     part = total - since
     lost = (since - (total - part)) + (time - part) + carry
@@ -157,7 +157,7 @@ def _add(since: float, carry: float, time: float) -> tuple[float, float]:
 
 
 def _take(since: float, carry: float, n: int, T_s: float) -> tuple[float, float]:
-    """Take ``n·T_s`` from ``since + carry``, in two products that are exact for ``n`` below 2²⁷."""
+    """Return ``since + carry − n·T_s``, by two products that are exact for ``n`` below 2²⁷."""
     scaled = _SPLIT * T_s
     high = scaled - (scaled - T_s)
     return _add(*_add(since, carry, -n * high), -n * (T_s - high))

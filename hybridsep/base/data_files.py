@@ -1,4 +1,4 @@
-"""Where the FMU sources and the machine files are: beside the package in a checkout, inside it in a wheel."""
+"""Location of FMU sources and machine files: beside the package in a checkout, inside it in a wheel."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from pathlib import Path
 __all__ = ["DEFAULT_MACHINE", "data_folder"]
 
 DEFAULT_MACHINE = "spring_mass_damper"
-"""The machine file of the paper's staircase, whose FMUs have no suffix."""
+"""Machine file of the paper's staircase; its FMUs have no suffix."""
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 
 
 def data_folder(name: str) -> Path:
-    """Return the folder ``fmu_src/python`` or ``models``, wherever this installation keeps it."""
+    """Return the folder ``fmu_src/…`` or ``models`` of this installation."""
     installed = _PACKAGE / "_data" / name
     return installed if installed.is_dir() else _PACKAGE.parent / name

@@ -1,12 +1,12 @@
-"""The exceptions of this library.
+"""Exception hierarchy of the library.
 
 ::
 
     HybridSepError
-    ├── ParameterError   a parameter out of its range, or several that do not fit together
+    ├── ParameterError   a parameter out of its range, or several that are inconsistent
     ├── SignalError      samples that cannot be used: NaN, wrong shape, wrong length
     ├── LogError         a recorded log that cannot be read: columns, time axis, format
-    ├── MachineError     a machine file that cannot be read or does not hold together
+    ├── MachineError     a machine file that cannot be read or is inconsistent
     ├── ModelError       a linear model that is unstable, improper or of an unsupported kind
     ├── StateError       a saved state that is foreign, truncated or of another version
     └── FmuError         an FMU that cannot be built, or a call that FMI does not allow now
@@ -30,20 +30,20 @@ __all__ = [
 
 
 def brief(value: object) -> str:
-    """Return ``repr(value)`` for a message, in at most 80 characters whatever the value is."""
+    """Return ``repr(value)`` for a message, in at most 80 characters."""
     try:
         text = repr(float(value) if isinstance(value, float) else value)  # NumPy's floats name their type
     except (ValueError, RecursionError):  # an integer of more than 4300 digits; lists in lists in lists
-        return f"something of type {type(value).__name__} that is too long to show"
+        return f"a value of type {type(value).__name__} that is too long to show"
     return text if len(text) <= 80 else f"{text[:60]}… ({len(text)} characters)"
 
 
 class HybridSepError(Exception):
-    """Base of every error this library raises on purpose."""
+    """Base class of the library's errors."""
 
 
 class ParameterError(HybridSepError, ValueError):
-    """A parameter is out of its range, or several do not fit together."""
+    """A parameter is out of its range, or several are inconsistent."""
 
 
 class SignalError(HybridSepError, ValueError):
@@ -55,7 +55,7 @@ class LogError(HybridSepError, ValueError):
 
 
 class MachineError(HybridSepError, ValueError):
-    """A machine file cannot be read or its content does not hold together."""
+    """A machine file cannot be read or is inconsistent."""
 
 
 class ModelError(HybridSepError, ValueError):

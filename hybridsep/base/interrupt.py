@@ -1,4 +1,4 @@
-"""Ctrl-C that waits for the end of an FMI call, at most one step.
+"""Deferral of Ctrl-C to the end of an FMI call, at most one step.
 
 Inside a pythonfmu FMU an exception becomes ``fmi2Fatal``, inside a callback it is lost, and fmpy would leave the
 working directory changed. A second Ctrl-C does not wait.
@@ -21,9 +21,9 @@ Result = TypeVar("Result")
 
 
 class _Calls(threading.local):
-    """Of each thread: how deep it is in FMI calls, and what to raise after them.
+    """Nesting depth of FMI calls per thread, and the exception pending after them.
 
-    Signals are handled in the main thread, so no other thread's calls ever wait for anything.
+    Signals are handled in the main thread, so an exception is never pending in another one.
     """
 
     depth = 0
@@ -34,7 +34,7 @@ _calls = _Calls()
 
 
 def uninterrupted(function: Callable[P, Result]) -> Callable[P, Result]:
-    """Return the function so that a Ctrl-C during it is raised at its end, under :func:`interrupts_between_calls`."""
+    """Decorate a function: within :func:`interrupts_between_calls`, Ctrl-C during a call is raised at its end."""
 
     @wraps(function)
     def call(*arguments: P.args, **keywords: P.kwargs) -> Result:
@@ -52,7 +52,7 @@ def uninterrupted(function: Callable[P, Result]) -> Callable[P, Result]:
 
 @contextmanager
 def interrupts_between_calls(stop: type[BaseException] = KeyboardInterrupt) -> Iterator[None]:
-    """Raise ``stop`` on Ctrl-C, but not inside a function that is :func:`uninterrupted`.
+    """Raise ``stop`` on Ctrl-C, deferred to the end of an :func:`uninterrupted` function.
 
     Does nothing outside the main thread, or where Ctrl-C is handled in another way already.
     """

@@ -24,7 +24,7 @@ __all__ = [
 ]
 
 _NODES = 20_000
-"""Points of a path among which the nearest one is looked up before it is refined."""
+"""Points of a path for the search of the nearest one, before refinement; 24 µm apart on the paper's spiral."""
 
 
 def rms(error: ArrayLike) -> float:
@@ -38,19 +38,19 @@ def largest(error: ArrayLike) -> float:
 
 
 def reduction_percent(rms_h: float, rms_pb: float) -> float:
-    """Return by how much the hybrid's RMS is below the physics model's, percent of the latter."""
+    """Return the reduction of the RMS error from the physics model to the hybrid, %."""
     if rms_pb == 0.0:
         return 0.0 if rms_h == 0.0 else -math.inf
     return 100.0 * (1.0 - rms_h / rms_pb)
 
 
 class RunningErrors:
-    """RMS and largest magnitude of several errors whose samples arrive in blocks.
+    """Running RMS and largest magnitude of several error signals that arrive in blocks.
 
     Parameters
     ----------
     m : int
-        How many errors.
+        Number of error signals.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class RunningErrors:
         self._squares, self._peaks = [0.0] * m, [0.0] * m
 
     def add(self, n: int, squares: Iterable[float], peaks: Iterable[float]) -> None:
-        """Take in the sums of squares and the largest magnitudes of ``n`` samples more."""
+        """Add the sums of squares and the largest magnitudes of ``n`` samples."""
         self.n += n
         self._squares = [total + square for total, square in zip(self._squares, squares, strict=True)]
         self._peaks = [max(largest_yet, peak) for largest_yet, peak in zip(self._peaks, peaks, strict=True)]
@@ -80,7 +80,7 @@ class RunningErrors:
 
 
 def hold(x_pb: Array, x_meas: Array, active: NDArray[np.bool_], Np: int) -> Array:
-    """Return the hold baseline: the last residual before each batch, held over it, and ``x_pb`` in the warm-up.
+    """Return the hold baseline: ``x_pb`` plus the last residual before each window; ``x_pb`` in the warm-up.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def hold(x_pb: Array, x_meas: Array, active: NDArray[np.bool_], Np: int) -> Arra
     active : (n,) array of bool
         Whether the warm-up is over.
     Np : int
-        Samples in a batch.
+        Samples in a window.
     """
     last = np.arange(len(x_meas)) // Np * Np - 1
     residual = np.where(last >= 0, (x_meas - x_pb)[last], 0.0)
@@ -97,20 +97,20 @@ def hold(x_pb: Array, x_meas: Array, active: NDArray[np.bool_], Np: int) -> Arra
 
 
 def batch_rms(error: Array, Np: int) -> Array:
-    """Return the RMS batch by batch, ``(n_batches,)``, of an error ``(n,)``; the last batch may be shorter."""
+    """Return the RMS per batch, ``(n_batches,)``, of an error ``(n,)``; the last may be shorter."""
     starts = np.arange(0, len(error), Np)
     lengths = np.diff(np.append(starts, len(error)))
     return np.sqrt(np.add.reduceat(error**2, starts) / lengths)
 
 
 def peak_derivatives(x: Array, T_s: float) -> tuple[float, float, float]:
-    """Return the largest velocity, acceleration and jerk in the differences of positions ``(n,)``, m/s, m/s², m/s³."""
+    """Return the peak velocity, acceleration and jerk, m/s, m/s², m/s³, by differences of positions ``(n,)``, m."""
     velocity, acceleration, jerk = (largest(np.diff(x, order)) / T_s**order for order in (1, 2, 3))
     return velocity, acceleration, jerk
 
 
 def shares(states: NDArray[np.int64], kinds: type[IntEnum]) -> dict[str, float]:
-    """Return what share of the samples is in each state, 0 … 1, by its name in lower case."""
+    """Return the share of samples in each state, 0 … 1, by its name in lower case."""
     return {kind.name.lower(): float(np.mean(states == kind)) for kind in kinds}
 
 

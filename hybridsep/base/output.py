@@ -1,7 +1,7 @@
-"""Files that appear whole: written beside their target, flushed to the disk, and moved over it.
+"""Atomic file output: written beside the target, flushed to the disk, and moved over it.
 
-Until the last byte is on the disk the target is what it was before, so that a full disk, an exception, Ctrl-C or the
-end of the process cost the new file only. A process that is killed leaves ``.hybridsep-….tmp`` in the target's folder.
+The target is unchanged until the last byte is on the disk, so that a full disk, an exception, Ctrl-C or the end of the
+process loses the new file only. A killed process leaves ``.hybridsep-….tmp`` in the target's folder.
 """
 
 from __future__ import annotations
@@ -22,11 +22,10 @@ __all__ = ["named_errors", "written_text", "written_whole"]
 
 @contextmanager
 def written_whole(path: str | Path) -> Iterator[IO[bytes]]:
-    """Give a binary file to write; when the block ends without an exception, it takes the place of ``path``.
+    """Open a binary file that replaces ``path`` when the block ends without an exception.
 
-    A symbolic link stays, the file that it leads to is replaced. The new file takes over the permissions and, where
-    that is allowed, the owner of the old one; other hard links keep the old content. A device or a pipe cannot be
-    replaced and is written directly.
+    A symbolic link is followed. The new file takes over the permissions and, where allowed, the owner of the old one;
+    other hard links keep the old content. A device or a pipe cannot be replaced and is written directly.
 
     Raises
     ------
@@ -62,7 +61,7 @@ def written_whole(path: str | Path) -> Iterator[IO[bytes]]:
 
 @contextmanager
 def named_errors(path: str | Path) -> Iterator[None]:
-    """Give an OSError that has no file name, such as a write on a full disk has none, this one."""
+    """Add the file name to an OSError that has none, as from a write to a full disk."""
     try:
         yield
     except OSError as error:
@@ -73,7 +72,7 @@ def named_errors(path: str | Path) -> Iterator[None]:
 
 @contextmanager
 def written_text(path: str | Path) -> Iterator[IO[str]]:
-    """Give a UTF-8 text file to write, line ends as they come, which appears like that of :func:`written_whole`."""
+    """Open a UTF-8 text file, line ends untranslated, as :func:`written_whole` does."""
     with written_whole(path) as file:
         text = io.TextIOWrapper(file, encoding="utf-8", newline="")
         yield text
@@ -81,7 +80,7 @@ def written_text(path: str | Path) -> Iterator[IO[str]]:
 
 
 def _take_over(descriptor: int, before: os.stat_result) -> None:
-    """Give a new file the owner and the permissions of the one that it replaces."""
+    """Copy owner and permissions of the file that is replaced to the new one."""
     if sys.platform != "win32":
         with suppress(PermissionError):
             os.fchown(descriptor, before.st_uid, before.st_gid)

@@ -1,4 +1,4 @@
-"""What a parameter is: its type, range, unit, default and meaning, and how a value is checked against them."""
+"""Declaration of a parameter: type, range, unit, default and description, and the check of a value."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ class Parameter:
     unit : str
         SI unit in FMI's notation; ``"1"`` for a number.
     description : str
-        One line for people.
+        One line.
     default : int, float, bool, str or None
-        Value when nothing is said.
+        Value where none is given.
     minimum, maximum : float
-        Closed bounds; of the number that stands for it in the FMU.
+        Closed bounds of the value in the FMU.
     display_unit : str or None
-        Unit a tool shows it in.
+        Unit in which tools show it.
     nonzero : float
-        Least value that is not 0, where 0 turns something off and others are divided by; 0 if there is none.
+        Smallest non-zero magnitude, where 0 turns a feature off; 0 if there is none.
     choices : tuple of str
-        Values by their number in the FMU, an Enumeration there.
+        Items in the order of their values in the FMU, where it is an Enumeration.
     learned : bool
-        Whether it shapes the features or the factor, so that what was learned with another value means something else.
+        Whether weights learned with one value are invalid for another: it shapes the features or the factor.
     """
 
     name: str
@@ -53,7 +53,7 @@ class Parameter:
 
     @property
     def range_text(self) -> str:
-        """The allowed range as people write it, for example ``"1 … 10000"``."""
+        """Allowed range as text, for example ``"1 … 10000"``."""
         if self.choices:
             return " or ".join(self.choices)
         least = f"0 or {self.nonzero:g}" if self.nonzero else f"{self.minimum:g}"
@@ -70,19 +70,19 @@ class Parameter:
         return self.minimum <= number <= self.maximum and not 0 < abs(number) < self.nonzero
 
     def checked(self, value: Any, label: str | None = None) -> Any:
-        """Return a value as the parameter's own type.
+        """Return a value in the parameter's type.
 
         Parameters
         ----------
         value : Any
-            What the user gave; of a choice its name.
+            Value given; of a choice its name.
         label : str, optional
             Name to use in the message, for example ``"mode[2].zeta"``.
 
         Raises
         ------
         ParameterError
-            If the value is of another kind, not finite, or out of range.
+            If the value is of another type, not finite, or out of range.
         """
         shown = label or self.name
         if self.kind is str:
@@ -102,11 +102,11 @@ class Parameter:
         return self.kind(number)
 
     def to_fmi(self, value: Any) -> Any:
-        """Return the value that stands for it in an FMU."""
+        """Return the value of its variable in an FMU."""
         return self.choices.index(value) if self.choices else value
 
     def from_fmi(self, value: Any) -> Any:
-        """Return the value that a value in an FMU stands for; ParameterError if there is none."""
+        """Return the parameter's value from that of an FMU's variable; ParameterError if there is none."""
         if not self.choices:
             return value
         number = self._number(value, self.name)

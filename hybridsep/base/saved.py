@@ -1,4 +1,4 @@
-"""Fields of a saved state, each checked when it is read: a checksum can be repaired, so nothing is taken on trust."""
+"""Checked access to the fields of a saved state; a checksum can be forged, so every field is validated."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from .signals import PREDICTION_MAX, Array
 __all__ = ["COUNT_MAX", "Saved"]
 
 COUNT_MAX = 2**53
-"""Largest whole number in a state: what is counted exactly in a double."""
+"""Largest whole number in a state: the last up to which doubles count exactly."""
 
 
 @dataclass(frozen=True)
 class Saved:
-    """What :func:`hybridsep.state.unpack` found in a blob.
+    """Content of a blob, from :func:`hybridsep.base.state.unpack`.
 
     Every method raises StateError if the field is missing, of another type or out of its range.
 
@@ -32,7 +32,7 @@ class Saved:
         Scalars.
     arrays : mapping
     parts : mapping
-        Blobs of what the state is made of.
+        Nested blobs.
     """
 
     kind: str
@@ -42,14 +42,14 @@ class Saved:
 
     @contextmanager
     def consistent(self) -> Iterator[None]:
-        """Turn what constructors and checks say of the fields into StateError."""
+        """Convert ParameterError and SignalError from constructors to StateError."""
         try:
             yield
         except (ParameterError, SignalError) as error:
             raise self.error(str(error)) from error
 
     def error(self, problem: str) -> StateError:
-        """Return the error that says what is wrong."""
+        """Return a StateError for an inconsistent field."""
         return StateError(f"the saved {self.kind} is inconsistent: {problem}")
 
     def field(self, name: str) -> Any:
@@ -96,7 +96,7 @@ class Saved:
     def array(self, name: str, *shape: int | None, finite: bool = True) -> Array:
         """Return an array of a shape; None stands for any length.
 
-        Its numbers are finite and of a size that can be squared, unless ``finite`` is False.
+        Its entries are finite and their squares do not overflow, unless ``finite`` is False.
         """
         if name not in self.arrays:
             raise self.error(f"{name} is missing")
@@ -119,7 +119,7 @@ class Saved:
         return [Saved(self.kind, {name: value}, {}, {}).real(name) for value in values]
 
     def part(self, name: str) -> bytes:
-        """Return the blob of a part."""
+        """Return a nested blob."""
         if name not in self.parts:
             raise self.error(f"{name} is missing")
         return self.parts[name]

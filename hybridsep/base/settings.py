@@ -1,12 +1,12 @@
-"""Every parameter, declared once: settings of the predictor and the compensator, and the numbers of machines.
+"""Declarations of all parameters: settings of predictor and compensator, and quantities of machines.
 
 The library's checks, the machine files' entries, the FMUs' variables, the saved states, the check of a warm start, the
-command line's help and the C core's settings all come from here. Section 2 of the paper's method fixes the limits that
-tie several together: ``0 ≤ q < Np`` and ``1 ≤ p ≤ Np``.
+command line's help and the C core's settings are derived from here. Joint constraints are those of section 2 of the
+paper: ``0 ≤ q < Np`` and ``1 ≤ p ≤ Np``.
 
-The ranges of physical quantities are a few powers of ten wider than any feed drive needs, and so narrow that no
-arithmetic on them overflows: the largest response to a position of 1 km, of the slowest mode with the largest gain and
-the least damping, is below 1e30 m, and the least limit, counted in samples, that anything is divided by is 1e-21 m.
+The ranges of physical quantities are a few powers of ten wider than any feed drive needs, and narrow enough that no
+arithmetic on them overflows: the largest response to a position of 1 km, by the slowest mode with the largest gain and
+the least damping, is below 1e30 m, and the smallest divisor, a limit as a difference of samples, is 1e-21 m.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ _SettingsType = TypeVar("_SettingsType", bound="Settings")
 
 @dataclass(frozen=True)
 class Settings:
-    """Parameters that belong together, each checked when it is given.
+    """Group of parameters, validated on construction.
 
     Raises
     ------
     ParameterError
-        Naming every parameter that is out of its range, or what does not fit together.
+        Naming every parameter that is out of range, or the joint constraints that are violated.
     """
 
     OPTIONAL: ClassVar[tuple[str, ...]] = ()
@@ -73,22 +73,22 @@ class Settings:
 
     @classmethod
     def fmi_parameters(cls) -> dict[str, Parameter]:
-        """Return the parameters, those of settings within these too, by their names in FMUs."""
+        """Return the parameters, nested settings included, by their names in FMUs."""
         return {parameter.name: parameter for parameter in cls.parameters().values()}
 
     @classmethod
     def from_fmi(cls: type[_SettingsType], values: Mapping[str, Any]) -> _SettingsType:
-        """Return the settings that an FMU's values describe.
+        """Return the settings from the values of an FMU's variables.
 
         Parameters
         ----------
         values : mapping
-            By the names of the variables; may hold more, and what it lacks has its default.
+            By variable name; others are ignored, missing ones have their defaults.
 
         Raises
         ------
         ParameterError
-            Naming every value that is out of its range.
+            Naming every value that is out of range.
         """
         given, problems = {}, []
         for name, parameter in cls.fmi_parameters().items():
@@ -107,7 +107,7 @@ class Settings:
         return cls(**{name: values[parameter.name] for name, parameter in parameters if parameter.name in values})
 
     def to_fmi(self) -> dict[str, float | int | bool]:
-        """Return the values of an FMU's variables; None, for what an FMU must have, is left out."""
+        """Return the values of an FMU's variables, without fields that are None."""
         found = {parameter.name: (parameter, getattr(self, name)) for name, parameter in self.parameters().items()}
         return {name: parameter.to_fmi(value) for name, (parameter, value) in found.items() if value is not None}
 
@@ -117,19 +117,19 @@ class Settings:
 
     @classmethod
     def from_table(cls: type[_SettingsType], table: Mapping[str, Any]) -> _SettingsType:
-        """Return what :meth:`as_table` described; ParameterError if an entry is missing, unknown or out of range."""
+        """Return the settings of :meth:`as_table`; ParameterError if an entry is missing, unknown or out of range."""
         names = [field.name for field in fields(cls)]
         if sorted(table) != sorted(names):
             raise ParameterError(f"settings must be {', '.join(names)}, got {', '.join(map(str, table))}")
         return cls(**table)
 
     def _misfits(self) -> list[str]:
-        """Say what does not fit together; nothing if all does."""
+        """Return a message for each joint constraint that is violated."""
         return []
 
     @classmethod
     def _label(cls, name: str) -> str | None:
-        """Return what a field is called in messages; None for its parameter's name."""
+        """Return the name of a field in messages; None for its parameter's name."""
         return None
 
 
@@ -140,7 +140,7 @@ class PredictorSettings(Settings):
     Attributes
     ----------
     Np : int
-        Samples in a window (a batch).
+        Samples in a look-ahead window.
     p, q : int
         Lags of ``e_pb`` and of ``x_pb`` in φ, ``1 ≤ p ≤ Np`` and ``0 ≤ q < Np``.
     lam : float
@@ -150,15 +150,15 @@ class PredictorSettings(Settings):
     t_init : float
         Warm-up, s: for ``t < t_init``, ``x_h = x_pb`` is published.
     input_hold : {"zoh", "foh"}
-        How ``x_d`` runs between samples in the physics model.
+        Zero-order or first-order hold of ``x_d`` in the physics model.
     v_friction : float
-        Velocity over which the drive's friction changes its sign, m/s: φ has further features then, of the reference
-        alone (:mod:`~hybridsep.predict.reference_features`). 0, as in the paper: none.
+        Velocity scale of the friction's change of sign, m/s, for additional features of the reference
+        (:mod:`~hybridsep.predict.reference_features`); 0, as in the paper: none.
     """
 
     ELSEWHERE: ClassVar[tuple[str, ...]] = ("T_s", "input_hold", "v_friction")
 
-    Np: int = whole(100, 1, 100_000, "samples in a look-ahead window (a batch)")
+    Np: int = whole(100, 1, 100_000, "samples in a look-ahead window")
     p: int = whole(50, 1, 5000, "past residuals e_pb in the features", learned=True)
     q: int = whole(3, 0, 5000, "past physics-based predictions x_pb in the features", learned=True)
     lam: float = real(1e-12, 1e-40, 1e12, "m2", "ridge penalty on the weights", name="lambda", learned=True)
@@ -187,7 +187,7 @@ class PredictorSettings(Settings):
 
 @dataclass(frozen=True)
 class Limits(Settings):
-    """What a move may demand.
+    """Kinematic limits.
 
     Attributes
     ----------
@@ -215,25 +215,25 @@ class Limits(Settings):
 
 @dataclass(frozen=True, kw_only=True)
 class CompensatorSettings(Settings):
-    """Parameters that a compensator has besides its predictor's.
+    """Parameters of the compensator, besides its predictor's.
 
     Attributes
     ----------
     preview : int, optional
         Samples planned ahead, at least ``Np + 4·spacing + 3``; ``2·Np`` or 200, whichever is more, if left out.
     spacing : int, optional
-        Samples between knots, a divisor of ``Np``: the finer, the faster the change of the command may vary.
+        Samples between knots, a divisor of ``Np``: it sets the bandwidth of the change of the command.
     jerk_weight : float
         Weight of the sum of squares of the change's third differences, against that of the tracking error.
     limits : Limits, optional
-        The drive's own limits, which ``x_dm`` keeps in its differences; none if left out.
+        The drive's limits, which the differences of ``x_dm`` keep; none if left out.
     change_max : float, optional
         Bound on the magnitude of the change, m; none if None.
     no_reversal : bool
-        Whether ``x_dm`` never turns while ``x_d`` moves: friction would turn with it. Needs ``limits``; without them it
-        has no effect, and a predictor with ``v_friction > 0`` may then be worse than without.
+        Whether the velocity of ``x_dm`` keeps the sign of that of ``x_d``: otherwise friction changes its sign too. It
+        has no effect without ``limits``, and a predictor with ``v_friction > 0`` may then be worse than without.
     compensate : {"off", "physics", "hybrid"}
-        Best model to use; ``"off"`` leaves the command as it is.
+        Best model allowed; ``"off"`` leaves the command unmodified.
     """
 
     OPTIONAL: ClassVar[tuple[str, ...]] = ("preview", "spacing", "change_max")
@@ -252,7 +252,7 @@ class CompensatorSettings(Settings):
     compensate: str = choice("hybrid", ("off", "physics", "hybrid"), "best model to compensate with")
 
     def for_window(self, Np: int) -> CompensatorSettings:
-        """Return these settings for windows of ``Np`` samples, with what was left out.
+        """Return these settings for windows of ``Np`` samples, defaults filled in.
 
         Raises
         ------
@@ -277,7 +277,7 @@ class CompensatorSettings(Settings):
 
     @classmethod
     def fmi_parameters(cls) -> dict[str, Parameter]:
-        """Return the parameters, those of the limits too, by their names in FMUs."""
+        """Return the parameters, those of the limits included, by their names in FMUs."""
         own = list(super().fmi_parameters().items())
         place = [name for name, _ in own].index("change_max")
         return dict((*own[:place], *Limits.fmi_parameters().items(), *own[place:]))
@@ -287,12 +287,12 @@ class CompensatorSettings(Settings):
         return replace(super()._from_checked(values), limits=Limits._from_checked(values))
 
     def to_fmi(self) -> dict[str, float | int | bool]:
-        """Return the values of an FMU's variables; None, for what an FMU must have, is left out."""
+        """Return the values of an FMU's variables, without fields that are None."""
         return {**super().to_fmi(), **({} if self.limits is None else self.limits.to_fmi())}
 
     @classmethod
     def from_table(cls, table: Mapping[str, Any]) -> CompensatorSettings:
-        """Return what :meth:`as_table` described."""
+        """Return the settings of :meth:`as_table`."""
         limits = table.get("limits")
         return super().from_table({**table, "limits": None if limits is None else Limits.from_table(limits)})
 
@@ -318,7 +318,7 @@ _OTHERS = (
     # The source of commands.
     choice("staircase", ("staircase", "spiral_x", "spiral_y", "samples"), "what is played", name="trajectory"),
 )
-"""Arguments of models, plants and trajectories."""
+"""Parameters of models, plants and trajectories."""
 
 PARAMETERS: Mapping[str, Parameter] = {
     **PredictorSettings.fmi_parameters(),
@@ -329,14 +329,14 @@ PARAMETERS: Mapping[str, Parameter] = {
 
 
 def check(name: str, value: Any, *, label: str | None = None) -> Any:
-    """Return ``value`` as the own type of a parameter of :data:`PARAMETERS`.
+    """Return ``value`` in the type of a parameter of :data:`PARAMETERS`.
 
     Parameters
     ----------
     name : str
-        In FMUs.
+        Name in FMUs.
     value : Any
-        What the user gave.
+        Value given.
     label : str, optional
         Name to use in the message, for example ``"mode[2].zeta"``.
 
@@ -349,5 +349,5 @@ def check(name: str, value: Any, *, label: str | None = None) -> Any:
 
 
 def samples_before(t: float, T_s: float) -> int:
-    """Return how many samples ``0, T_s, …`` come before ``t``, both in s, so that rounding of times cannot tell."""
+    """Return the number of samples ``0, T_s, …`` before ``t``, s, insensitive to rounding of times."""
     return max(0, math.ceil(t / T_s - 1e-6))

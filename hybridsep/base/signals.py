@@ -1,4 +1,4 @@
-"""Checks on samples, the same for every entry of the library."""
+"""Validation of sampled signals."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ __all__ = ["POSITION_MAX", "PREDICTION_MAX", "Array", "as_published", "as_sample
 Array = NDArray[np.float64]
 
 POSITION_MAX = 1e3
-"""Largest magnitude taken for a position, m; what is larger is no position of an axis, or is in another unit."""
+"""Largest magnitude of a position, m: beyond any axis; a larger value is an error or in another unit."""
 
 PREDICTION_MAX = 1e100
-"""Largest magnitude of a published prediction, m: beyond it the learned recursion diverges. Sums of squares of what is
-smaller never overflow."""
+"""Largest magnitude of a published prediction, m, beyond which the learned recursion counts as diverging: sums of
+squares of smaller values cannot overflow."""
 
 
 def as_samples(values: ArrayLike, name: str, length: int | None = None) -> Array:
-    """Return ``values`` as a contiguous float64 vector, or say what is wrong with them.
+    """Return ``values`` as a contiguous float64 vector, validated.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def as_samples(values: ArrayLike, name: str, length: int | None = None) -> Array
 
 
 def as_published(window: Array, name: str) -> Array:
-    """Return a window of predictions, or say that it cannot be published.
+    """Return a window of predictions if it is bounded.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def as_published(window: Array, name: str) -> Array:
     """
     if not np.abs(window).max() <= PREDICTION_MAX:  # NaN too
         raise SignalError(
-            f"{name} must stay within ±{PREDICTION_MAX:g} m: what was learned makes it diverge; "
-            "raise lambda, lower p or restart"
+            f"{name} must stay within ±{PREDICTION_MAX:g} m: the learned recursion diverges; "
+            "raise lambda, lower p or reset"
         )
     return window

@@ -1,4 +1,4 @@
-"""Saved states: plain data in a sized, versioned, checked blob.
+"""Serialisation of states: plain data in a sized, versioned, checksummed blob.
 
 Layout, little-endian: magic ``HSEP``, u32 format version, u32 header length, header (JSON: kind, meta, array names
 and shapes), the arrays as float64, the parts, u32 CRC-32 of all before. The same state always gives the same
@@ -26,7 +26,7 @@ VERSION = 1
 _PREFIX = struct.Struct("<4sII")
 _CRC = struct.Struct("<I")
 _LENGTH_MAX = 2**31 - 1
-"""Of an array in one direction: more is no length of an array that is empty in another one."""
+"""Largest dimension of an array, so that the product with a zero dimension stays a valid shape."""
 
 
 def pack(
@@ -47,7 +47,7 @@ def pack(
 
 
 def unpack(kind: str, blob: bytes) -> tuple[dict[str, Any], dict[str, Array], dict[str, bytes]]:
-    """Return ``(meta, arrays, parts)`` of a blob that :func:`pack` made.
+    """Return ``(meta, arrays, parts)`` of a blob made by :func:`pack`.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def unpack(kind: str, blob: bytes) -> tuple[dict[str, Any], dict[str, Array], di
         If the blob is not one, is truncated or damaged, or is of another kind or version.
     """
     if len(blob) < _PREFIX.size + _CRC.size or blob[:4] != MAGIC:
-        raise StateError(f"a saved state of kind {kind!r} was expected, got {len(blob)} bytes of something else")
+        raise StateError(f"a saved state of kind {kind!r} was expected, got {len(blob)} bytes of another format")
     _, version, length = _PREFIX.unpack_from(blob)
     if version != VERSION:
         raise StateError(f"the saved state has format version {version}, this library reads version {VERSION}")
@@ -78,7 +78,7 @@ def unpack(kind: str, blob: bytes) -> tuple[dict[str, Any], dict[str, Array], di
 
 
 def _cut(body: memoryview, header: Any) -> tuple[dict[str, Array], dict[str, bytes]]:
-    """Cut what follows the header into arrays and parts, which must be all of it; TypeError or ValueError if not."""
+    """Split the body into arrays and parts, with no byte left over; TypeError or ValueError otherwise."""
     arrays, parts, offset = {}, {}, 0
     for name, shape in header["arrays"]:
         lengths = [_length(n, _LENGTH_MAX) for n in shape]
@@ -89,12 +89,12 @@ def _cut(body: memoryview, header: Any) -> tuple[dict[str, Array], dict[str, byt
         end = offset + _length(count, len(body) - offset)
         parts[str(name)], offset = bytes(body[offset:end]), end
     if offset != len(body):
-        raise ValueError(f"{len(body) - offset} bytes belong to nothing")
+        raise ValueError(f"{len(body) - offset} bytes are left over")
     return arrays, parts
 
 
 def _length(n: Any, most: int) -> int:
-    """Return a length that came from a header."""
+    """Return a length from a header, validated."""
     if type(n) is not int or not 0 <= n <= most:
         raise ValueError(f"a length must be a whole number, 0 … {most}")
     return n

@@ -1,7 +1,7 @@
-"""One BLAS thread while many small matrices are multiplied and factorised.
+"""Limit of one BLAS thread for sequences of small matrix operations.
 
-Threads make them slower, most of all where the cores are busy, and change the order of summation, so that results
-depended on the number of cores; ``benchmarks/blas_threads.py`` measures both.
+More threads are slower, above all on busy cores, and change the order of summation, so that results would depend on
+the number of cores; ``benchmarks/blas_threads.py`` measures both.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def _libraries() -> ThreadpoolController:
 
 
 class _OneThread(ContextDecorator):
-    """Context manager and decorator; the number of threads belongs to the process, so all that are open are one."""
+    """Reentrant context manager and decorator; uses are counted, as the number of threads belongs to the process."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -45,4 +45,4 @@ class _OneThread(ContextDecorator):
 
 
 one_blas_thread = _OneThread()
-"""Around a whole run, never around a sample: it costs some 50 µs. What was set before is restored."""
+"""For a whole run, not for a sample: it costs some 50 µs. The previous limit is restored."""

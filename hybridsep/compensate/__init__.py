@@ -1,1 +1,1 @@
-"""Servo error pre-compensation: commands planned on the hybrid prediction."""
+"""Servo error pre-compensation: modified commands planned on the hybrid model."""

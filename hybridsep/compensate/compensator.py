@@ -1,15 +1,14 @@
 """Servo error pre-compensation (SEP) on the predictor's lifted model.
 
-Over a preview window the predicted position is affine in the command, ``x_h = G_h x_dm + free`` (eq. (3)), so the
+Over a preview the predicted position is affine in the command, ``x_h = G_h x_dm + free`` (eq. (3)), so the
 modified command ``x_dm = x_d + δ`` that makes ``x_h`` follow ``x_d`` is a least-squares problem. ``δ`` is a sum of
 cubic B-splines, each filtered through the current model (the filtered-basis-functions method: Ramani, Duan, Okwudire
-and Ulsoy, J. Dyn. Sys. Meas. Control 139 (2017)), with limited preview: of a plan over ``preview`` samples only the
-splines that begin in the first window are decided, then the next plan is made from what has been measured.
+and Ulsoy, J. Dyn. Sys. Meas. Control 139 (2017)), with limited preview (receding horizon): of a plan over ``preview``
+samples only the splines that begin in the first window are applied, then the next plan follows from new measurements.
 
-Position, velocity and acceleration of ``δ`` are continuous by construction, also from window to window and from model
-to model. Every spline ends within its plan, so a plan always leads back to ``x_d`` and its rest keeps the limits. It
-is where the next plan starts from: there is always a plan within the limits, and where none can be computed the rest
-of the last one is followed to its end.
+Position, velocity and acceleration of ``δ`` are continuous by construction, also between windows and between models.
+Every spline ends within its plan, so a plan returns to ``x_d`` and its remainder keeps the limits. The next plan starts
+from that remainder: there is always a feasible plan, and where no other can be computed the remainder is followed.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from ..base.signals import Array, as_published, as_samples
 from ..base.state import pack, unpack
 from ..predict.predictor import HybridPredictor
 from ..predict.window import Prediction, PublishedWindow
-from .bounded import DriveBounds, solve
+from .constraints import DriveBounds, solve
 from .plan import PendingPlan, SepState
 from .sensor import SensorWatch
 from .splines import N_DECIDED, SplineBasis, direct_samples
@@ -35,22 +34,22 @@ __all__ = ["RECOMMENDED", "SepCompensator", "SepState", "direct_samples"]
 _KIND = "compensator"
 
 _PINNED = 8
-"""Samples at the beginning of a window in which a bounded plan follows the last one: the time to solve it."""
+"""Leading samples of a window in which a bounded plan follows the last one: real-time solvers take 3 steps in each."""
 
 RECOMMENDED = PredictorSettings(Np=50, p=50, q=40, lam=1e-8, t_init=0.1, v_friction=2e-3)
-"""Settings of the predictor with which compensation was best on the staircase drive, with the defaults below."""
+"""Predictor settings with the smallest tracking error on the staircase drive, with the compensator's defaults."""
 
 
 class SepCompensator:
-    """Plans modified commands window by window and goes on learning in closed loop.
+    """Receding-horizon compensator that keeps learning in closed loop.
 
-    Call :meth:`plan` with the commanded positions ahead, send its ``x_dm`` to the drive, call :meth:`update` with what
-    was measured, window after window.
+    For each window, call :meth:`plan` with the commanded positions ahead, send its ``x_dm`` to the drive, then call
+    :meth:`update` with the measured positions.
 
     Parameters
     ----------
     predictor : HybridPredictor
-        At the beginning of a run; it learns from the commands that the drive really gets.
+        At the beginning of a run; it learns from the modified commands.
     settings : CompensatorSettings, optional
         The defaults if left out.
 
@@ -77,16 +76,16 @@ class SepCompensator:
         self.restart(predictor.start, t_init=predictor.settings.t_init)
 
     def restart(self, start: float | None = None, *, t_init: float = 0.0, lead_in: int = 0) -> None:
-        """Begin another run, at rest at ``start``, with what is learned kept (a warm start).
+        """Begin another run, at rest at ``start``; what was learned is kept (warm start).
 
         Parameters
         ----------
         start : float, optional
-            Where the drive rests, m; the first command if left out.
+            Initial position, m; the first command if left out.
         t_init : float
-            Warm-up, s, counted from the end of the lead-in, in which the physics model plans.
+            Warm-up, s, from the end of the lead-in, in which the physics model is used.
         lead_in : int
-            Samples at rest before the trajectory, which are not learned.
+            Samples at rest before the trajectory, not learned.
         """
         predictor = self.predictor
         predictor.restart(start, t_init=t_init + lead_in * predictor.T_s if t_init > 0 else 0.0)
@@ -94,7 +93,7 @@ class SepCompensator:
         self._trust.restart()
         self._sensor = SensorWatch()
         self._measured_before = True
-        # Coefficients of the rest of the last plan; the last three values of δ and of x_d
+        # Coefficients of the remainder of the last plan; last three values of δ and of x_d
         self._rest = np.zeros(N_DECIDED + self._basis.n_free)
         self._delta_before = np.zeros(3)
         self._x_d_before = np.full(3, np.nan)
@@ -108,7 +107,7 @@ class SepCompensator:
         Parameters
         ----------
         x_d : (preview,) array_like, m
-            Commanded positions of the next ``preview`` samples.
+            Commanded positions of the preview.
 
         Returns
         -------
@@ -140,13 +139,13 @@ class SepCompensator:
     def update(self, x: ArrayLike) -> None:
         """Learn from the measurement of the planned window.
 
-        A window without measurement (NaN, or a value that is held while the drive moves) is not learned: the residuals
-        are what was predicted of them, and learning starts again when a whole window has been measured.
+        A window with missing samples (NaN, or a value held while the drive moves) is not learned: its residuals are
+        replaced by their predictions, and learning resumes after a completely measured window.
 
         Parameters
         ----------
         x : (Np,) array_like, m
-            Measured positions; NaN where there is none.
+            Measured positions; NaN where missing.
 
         Raises
         ------
@@ -165,9 +164,9 @@ class SepCompensator:
             own = x_pb + e_h if pending.state is SepState.HYBRID else x_pb
             predictor.update(own, learn=False)
         else:
-            # Some residuals of the window after a gap still have their own predictions as lags.
+            # After a gap, the lags of the first window are still predictions.
             learn = self._measured_before and predictor.k >= self.lead_in
-            # What is predicted from a few rows before the warm-up is over moves nothing: it is not judged.
+            # Predictions from few rows, before the warm-up is over, are not used: they are not judged.
             judge = learn and predictor.k >= predictor.n_init
             predictor.update(measured, learn=learn)
             if judge:
@@ -184,17 +183,17 @@ class SepCompensator:
 
     @property
     def is_planned(self) -> bool:
-        """Whether a planned window waits for its measurement."""
+        """Whether a planned window is pending measurement."""
         return self._pending is not None
 
     def _best_plan(self, command: Array) -> tuple[SepState, Array]:
-        """Return the model and the coefficients of the best plan there is, the decided ones first."""
+        """Return the model and the coefficients of the best available plan, the decided ones first."""
         rest = self._rest
         candidates = self._candidates()
         if not candidates:
             return SepState.OFF, rest
         bounds = self._bounds.bounds(command, self._x_d_before, self._delta_before, rest)
-        with np.errstate(all="ignore"):  # a hybrid model that is not asked for may be unstable
+        with np.errstate(all="ignore"):  # a hybrid model that is no candidate may be unstable
             operator = self.predictor.operator(self.preview, reference=command)  # Eq. (3)
         for state in candidates:
             hybrid = state is SepState.HYBRID
@@ -208,7 +207,7 @@ class SepCompensator:
         return SepState.OFF, rest
 
     def _candidates(self) -> list[SepState]:
-        """Return the models to try, best first."""
+        """Return the candidate models, best first."""
         predictor = self.predictor
         hybrid = (
             self.compensate is SepState.HYBRID
@@ -221,7 +220,7 @@ class SepCompensator:
         return candidates + ([SepState.PHYSICS] if self.compensate is not SepState.OFF else [])
 
     def to_bytes(self) -> bytes:
-        """Return parameters and state, the predictor's and a planned window included, as a versioned blob."""
+        """Return parameters and state, predictor and pending window included, as a versioned blob."""
         pending = self._pending
         meta = {
             "settings": self.settings.as_table(),
@@ -243,7 +242,7 @@ class SepCompensator:
 
     @classmethod
     def from_bytes(cls, blob: bytes) -> SepCompensator:
-        """Return the compensator that :meth:`to_bytes` described.
+        """Return the compensator of :meth:`to_bytes`.
 
         Raises
         ------
@@ -255,7 +254,7 @@ class SepCompensator:
         restored = HybridPredictor.from_bytes(saved.part("predictor"))
         with saved.consistent():
             compensator = cls(predictor, CompensatorSettings.from_table(saved.table("settings")))
-        compensator.predictor = restored  # the constructor has begun a new run on the other one
+        compensator.predictor = restored  # the constructor has restarted the other one
         compensator.lead_in = saved.whole("lead_in")
         compensator._trust.excess, compensator._measured_before = saved.real("excess"), saved.flag("measured_before")
         n, Np = len(compensator._rest), predictor.Np
@@ -265,8 +264,8 @@ class SepCompensator:
         if saved.field("pending") is not None:
             state, n_warm_up = saved.numbers("pending", 2)
             if state not in tuple(SepState) or n_warm_up not in range(Np + 1) or restored.n_pending != Np:
-                raise saved.error("the window that waits must be planned and predicted")
-            # A hybrid prediction that plans nothing may diverge.
+                raise saved.error("the pending window must be planned and predicted")
+            # A hybrid prediction that is not used may diverge.
             prediction = Prediction(saved.array("x_pb", Np), saved.array("e_h", Np, finite=False), int(n_warm_up))
             compensator._pending = PendingPlan(
                 saved.array("coefficients", n),

@@ -1,4 +1,4 @@
-"""What the compensator says of a window, and what it keeps of it until it is measured."""
+"""Plan of a window, and the model that it is based on."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["PendingPlan", "SepState"]
 
 
 class SepState(IntEnum):
-    """What a window's command was planned with."""
+    """Model that the commands of a window are planned with."""
 
     OFF = 0
     PHYSICS = 1
@@ -21,7 +21,19 @@ class SepState(IntEnum):
 
 @dataclass(frozen=True)
 class PendingPlan:
-    """The planned window, waiting to be measured."""
+    """Planned window pending measurement.
+
+    Attributes
+    ----------
+    coefficients : (3 + n_free,) array, m
+        Coefficients of the splines, the decided ones first.
+    delta, x_d : (Np,) arrays, m
+        Change of the command, and commanded position.
+    prediction : Prediction
+        Under the modified command.
+    state : SepState
+        Model of the plan.
+    """
 
     coefficients: Array
     delta: Array

@@ -1,4 +1,4 @@
-"""Whether a window was measured at all."""
+"""Detection of missing and held measurements."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from ..base.signals import Array
 __all__ = ["SensorWatch"]
 
 _REPEATS = 3
-"""So many equal values in a row may be a measurement that is held."""
+"""Equal consecutive values from which a measurement may be held: two may occur by chance at slow motion."""
 
 _STEPS = 5.0
-"""… if the drive has moved by so many of the sensor's smallest steps meanwhile,"""
+"""Predicted motion, in resolution steps of the sensor, within which equal values are plausible."""
 
 _FIRST_STEP = 1e-5
-"""What is taken for the smallest step, m, of a sensor that has not changed yet."""
+"""Resolution step assumed before the sensor has changed its value, m: that of a coarse encoder."""
 
 _STILL = 1e-8
-"""and by more than this, m."""
+"""Predicted motion below which the drive counts as at rest, m, whatever the resolution."""
 
 
 class SensorWatch:
-    """Tells samples without measurement: NaN, or a value that is held while the command moves the drive.
+    """Detector of samples without measurement: NaN, or a value held while the command moves the drive.
 
-    The sensor's step is the smallest change it has ever shown. Nothing else is remembered of a run of equal values
-    than its length and the range of predicted positions over it, so a value that is held over many windows is
-    recognised in each of them, at rest too, once the drive has moved.
+    The sensor's resolution step is estimated as the smallest change so far. Of a run of equal values only its length
+    and the range of predicted positions are kept, so a value held over many windows is detected in each of them, also
+    at rest once the drive has moved.
     """
 
     def __init__(self) -> None:
@@ -38,14 +38,14 @@ class SensorWatch:
         self.step = math.inf
 
     def misses(self, x: Array, x_pb: Array) -> bool:
-        """Return whether a window has samples without measurement.
+        """Return whether a window has missing samples.
 
         Parameters
         ----------
         x : (Np,) array, m
-            Measured positions, NaN for none.
+            Measured positions, NaN where missing.
         x_pb : (Np,) array, m
-            Physics-based prediction of them.
+            Their physics-based prediction.
         """
         missing = False
         for value, position in zip(x.tolist(), x_pb.tolist(), strict=True):
@@ -69,6 +69,6 @@ class SensorWatch:
         return [self.value, float(self.repeats), self.low, self.high, self.step]
 
     def restore(self, state: Array) -> None:
-        """Take over what :meth:`state` returned."""
+        """Restore a :meth:`state`."""
         self.value, repeats, self.low, self.high, self.step = np.asarray(state).tolist()
         self.repeats = int(repeats)

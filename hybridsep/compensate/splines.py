@@ -1,9 +1,9 @@
-"""The change of the command as a sum of cubic B-splines, and what a plan of them costs.
+"""Cubic B-spline basis of the change of the command, and the quadratic cost of a plan.
 
-``δ(k) = Σ_j c_j B(k/spacing − j)`` on a uniform knot grid that runs on from window to window. ``B`` is non-zero over
-four knot intervals, so the three splines that began before a plan still act in it, with coefficients that are already
-decided. The last spline ends four samples before the plan does: what follows the plan is ``x_d`` itself, in position
-and in its first three differences.
+``δ(k) = Σ_j c_j B(k/spacing − j)`` on a uniform knot grid that continues from window to window. ``B`` is non-zero over
+four knot intervals, so three splines that began before a plan overlap it, with coefficients that are already decided.
+The last spline ends four samples before the plan does: after the plan the command is ``x_d`` itself, in position and
+in its first three differences.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from ..base.signals import Array
 __all__ = ["N_DECIDED", "PlanCost", "SplineBasis", "direct_samples"]
 
 N_DECIDED = 3
-"""Cubic splines that began before a plan and still act in it."""
+"""Cubic splines that began before a plan and overlap it."""
 
 _END = 3
-"""Samples at the end of a plan that stay without change, for the third difference."""
+"""Samples without change at the end of a plan, so that the third difference is zero after it."""
 
 
 @dataclass(frozen=True)
 class PlanCost:
-    """``½ cᵀ P c − vᵀ c``, half the plan's sum of squares but for a constant.
+    """Quadratic cost ``½ cᵀ P c − vᵀ c`` of a plan: half its sum of squares up to a constant.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class PlanCost:
 
 
 class SplineBasis:
-    """Splines of one plan.
+    """B-spline basis of one plan.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class SplineBasis:
         self.preview, self.spacing = preview, spacing
         self.n_free = (preview - width - _END) // spacing + 1
         spline = np.asarray(BSpline.basis_element(np.arange(5))(np.arange(width) / spacing))
-        # Splines at −3, −2, −1 spacings, of which the plan sees the rest, and the free ones
+        # Tails of the splines at −3, −2, −1 spacings, then the free splines
         tails = [_padded(spline[i * spacing :], preview) for i in (3, 2, 1)]
         self._spline = _padded(spline, preview)
         self.values: Array = np.column_stack((*tails, _shifts(self._spline, self.n_free, spacing)))
@@ -67,14 +67,14 @@ class SplineBasis:
         self.third: Array = np.diff(extended, 3, axis=0)
 
     def filtered(self, g: Array) -> Array:
-        """Return the free splines behind the filter with impulse response ``g``, ``(preview, n_free)``."""
-        # Linear and time-invariant: one spline is filtered, the others are its shifts.
+        """Return the free splines filtered by the impulse response ``g``, ``(preview, n_free)``."""
+        # Time-invariance: one spline is filtered, the others are its shifts
         return _shifts(np.asarray(lfilter(g, [1.0], self._spline)), self.n_free, self.spacing)
 
     def cost(
         self, g: Array, free: Array, x_d: Array, decided: Array, before: Array, jerk_weight: float, ridge: float = 1e-12
     ) -> PlanCost:
-        """Return ``‖x_d − G (x_d + δ) − free‖² + jerk_weight·‖D³ δ‖²`` over the free coefficients.
+        """Return ``‖x_d − G (x_d + δ) − free‖² + jerk_weight·‖D³ δ‖²`` as a function of the free coefficients.
 
         Parameters
         ----------
@@ -83,16 +83,16 @@ class SplineBasis:
         x_d : (preview,) array, m
             Commanded positions.
         decided : (3,) array, m
-            Coefficients that are already decided.
+            Decided coefficients.
         before : (3,) array, m
-            The last three values of δ.
+            Last three values of δ.
         jerk_weight : float
             Weight of the third differences.
         ridge : float
-            Added to the diagonal, relative to its largest entry.
+            Regularisation of the diagonal, relative to its largest entry.
         """
         delta = self.values[:, :N_DECIDED] @ decided
-        # Eq. (3) with what cannot be changed any more: x_d − G (x_d + δ_decided) − free
+        # Eq. (3) with the decided part of δ: x_d − G (x_d + δ_decided) − free
         target = x_d - free - np.asarray(lfilter(g, [1.0], x_d + delta))
         third_decided = np.diff(np.concatenate((before, delta)), 3)
         W, D = self.filtered(g), self.third[:, N_DECIDED:]
@@ -102,9 +102,9 @@ class SplineBasis:
 
 
 def direct_samples(g: ArrayLike, free: ArrayLike, x_d: ArrayLike, before: ArrayLike, jerk_weight: float) -> Array:
-    """Return the best change δ with every sample free: the form that splines of small spacing approach.
+    """Return the optimal change δ with every sample free, the limit of a basis of small spacing.
 
-    The minimum of ``‖x_d − G (x_d + δ) − free‖² + jerk_weight·‖D³ δ‖²`` by least squares on the full matrices.
+    The minimiser of ``‖x_d − G (x_d + δ) − free‖² + jerk_weight·‖D³ δ‖²`` by least squares on the full matrices.
 
     Parameters
     ----------

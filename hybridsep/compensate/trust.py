@@ -1,4 +1,4 @@
-"""When the hybrid model may move the machine."""
+"""Supervision of the hybrid model: stability test, and excess prediction error with exponential forgetting."""
 
 from __future__ import annotations
 
@@ -9,20 +9,21 @@ from ..base.signals import Array
 __all__ = ["Trust", "has_stable_poles"]
 
 _FORGET = 0.9
-"""Share of the past windows' errors that is kept with each window."""
+"""Forgetting factor per window: a memory of about ten windows."""
 
 _NOISE_SHARE = 0.5
-"""Share of the noise variance by which the hybrid may seem worse: at rest both models predict the same noise."""
+"""Tolerance on the excess, as a share of the noise variance: at rest noise alone decides which model seems better."""
 
 _WORST = 2.0
-"""How much worse than the physics model one window may count: a bad start must not be remembered for ever."""
+"""Bound on one window's mean square error, relative to that of physics model and noise: one window that diverges must
+not outweigh all that follow it."""
 
 
 def has_stable_poles(w_e: Array) -> bool:
     """Return whether all roots of ``z^p − w_e,1 z^(p−1) − … − w_e,p`` are inside the unit circle.
 
-    The Schur-Cohn test by step-down recursion (E. I. Jury, *Theory and Application of the z-Transform Method*, Wiley
-    1964; the inverse of the Levinson recursion): ``p²/2`` multiplications and no eigenvalues. Each step takes the
+    Schur-Cohn stability test by step-down recursion (E. I. Jury, *Theory and Application of the z-Transform Method*,
+    Wiley 1964; the inverse of the Levinson recursion): ``p²/2`` multiplications and no eigenvalues. Each step takes the
     polynomial to one of a degree less; all roots are inside if and only if every reflection coefficient is below 1 in
     magnitude.
 
@@ -43,27 +44,26 @@ def has_stable_poles(w_e: Array) -> bool:
 
 
 class Trust:
-    """Compares what the two models predicted with what was measured, with exponential forgetting.
+    """Excess prediction error of the hybrid model over the physics model, with exponential forgetting.
 
-    The hybrid model is trusted while the mean square of its errors exceeds that of the physics model by no more than
-    half the noise variance, which the regression's own residuals show. Without that floor the noise of a drive at
-    rest would decide.
+    The hybrid model is trusted while its mean square prediction error exceeds the physics model's by at most half the
+    noise variance, which is estimated from the regression's residuals.
     """
 
     def __init__(self) -> None:
         self.excess = 0.0
 
     def observe(self, e_pb: Array, e_h: Array, noise_variance: float) -> None:
-        """Take in a measured window.
+        """Update the excess with a measured window.
 
         Parameters
         ----------
         e_pb : (Np,) array, m
             Measured residuals of the physics model.
         e_h : (Np,) array, m
-            What the hybrid model predicted of them.
+            Their predictions by the hybrid model.
         noise_variance : float
-            Variance of what no model explains, m².
+            Variance of the measurement noise, m².
         """
         physics = float(np.mean(e_pb**2))
         with np.errstate(over="ignore", invalid="ignore"):
@@ -74,7 +74,7 @@ class Trust:
         self.excess = _FORGET * self.excess + (1 - _FORGET) * worse
 
     def restart(self) -> None:
-        """Give the hybrid model the benefit of the doubt again."""
+        """Trust the hybrid model again in a new run; what it has gained over the physics model is kept."""
         self.excess = min(self.excess, 0.0)
 
     @property

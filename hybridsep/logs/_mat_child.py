@@ -1,8 +1,8 @@
-"""The process that reads a ``.mat`` file for :mod:`hybridsep.logs.mat`: a crash of SciPy's reader ends this one only.
+"""Child process that reads a ``.mat`` file for :mod:`hybridsep.logs.mat`, to contain crashes of SciPy's reader.
 
 Run as ``python -I _mat_child.py PATHS FILE FOLDER``: PATHS is the parent's ``sys.path`` as JSON. Arrays of numbers go
 to ``FOLDER/<i>.npy``, and a JSON object to standard output: ``hdf5``, true for a file of version 7.3; or ``damage``,
-what SciPy says of it; or ``variables``, name → type and, where it is an array, dtype, shape and, where it is saved, the
+SciPy's message; or ``variables``, name → type and, where it is an array, dtype, shape and, where it is saved, the
 number ``i``.
 """
 
@@ -15,7 +15,7 @@ from typing import Any
 
 
 def main(paths: str, file: str, folder: str) -> dict[str, Any]:
-    """Read the file; return what the parent is told."""
+    """Read the file; return the object for the parent."""
     sys.path[:] = json.loads(paths)
     import numpy as np
     from scipy import io

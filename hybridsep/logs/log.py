@@ -1,4 +1,4 @@
-"""Reading a log: whole (:func:`read_log`) or chunk by chunk (:func:`open_log`), with the same checks."""
+"""Readers of logs: whole (:func:`read_log`) or chunk by chunk (:func:`open_log`), with the same checks."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from .time_axis import TimeAxis
 __all__ = ["UNITS", "Log", "LogReader", "check_reading", "open_log", "read_log"]
 
 UNITS: Mapping[str, float] = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
-"""Metres in each unit a log's positions may have."""
+"""Units of a log's positions, in metres."""
 
 SPAN_MAX = 100.0
-"""Longest plausible travel of an axis, m; a longer one is a log in a smaller unit."""
+"""Largest plausible travel of an axis, m; a larger one indicates a log in a smaller unit."""
 
 TS_TOLERANCE = 0.01
-"""Largest relative difference between a given ``T_s`` and the time column's."""
+"""Largest relative difference between a given ``T_s`` and the time column's: more than any clock's drift."""
 
 _SOURCES: Mapping[str, type[Source]] = {
     ".csv": TextSource,
@@ -36,6 +36,9 @@ _SOURCES: Mapping[str, type[Source]] = {
     ".mat": MatSource,
 }
 _ROLES = ("t", "x_d", "x")
+_MEASURED = "x_meas"
+"""Measured position in a file that calls the true one x; read before x unless a name is given."""
+
 _BLOCK = 10_000
 
 
@@ -47,7 +50,7 @@ class Log:
     ----------
     t : (n,) array, s
         Times as recorded, or ``k·T_s`` if the file has no time column.
-    x_d, x : (n,) array, m
+    x_d, x_meas : (n,) array, m
         Commanded and measured positions.
     T_s : float
         Sampling interval, s.
@@ -57,23 +60,23 @@ class Log:
 
     t: Array
     x_d: Array
-    x: Array
+    x_meas: Array
     T_s: float
     path: Path
 
 
 class LogReader:
-    """A log that is read chunk by chunk; made by :func:`open_log`.
+    """Chunk-wise reader of a log; returned by :func:`open_log`.
 
-    Opening goes once over the time column (over ``x_d`` if there is none), so that ``T_s`` is the mean over the whole
-    file and a bad time axis is reported before anything is predicted from it. No file stays open between calls.
+    Opening scans the time column (``x_d`` if there is none), so that ``T_s`` is the mean over the whole file and an
+    invalid time axis is reported before any prediction. No file stays open between calls.
 
     Attributes
     ----------
     path : Path
         The file.
     T_s : float
-        Sampling interval, s: the given one, or the mean of the time column's, rounded to what it determines.
+        Sampling interval, s: the given one, or the mean of the time column's, rounded to its significant digits.
     n_samples : int
         Samples in the log.
     """
@@ -100,16 +103,16 @@ class LogReader:
         self.T_s = float(given or found or 0.0)  # one of them is there, both are > 0
 
     def chunks(self, n: int = _BLOCK) -> Iterator[tuple[Array, Array]]:
-        """Give the log from its beginning as pairs ``(x_d, x)``, m, of at most ``n`` samples each.
+        """Iterate over the log as pairs ``(x_d, x_meas)``, m, of at most ``n`` samples each.
 
         Raises
         ------
         LogError
-            When the samples that are next cannot be used.
+            When the next samples are invalid.
         """
         if n < 1:
             raise LogError(f"{self.path}: a chunk must have n ≥ 1 samples, got {n}")
-        return ((x_d, x) for x_d, x in self._positions(n, ("x_d", "x")))
+        return ((x_d, x_meas) for x_d, x_meas in self._positions(n, ("x_d", "x")))
 
     def read(self) -> Log:
         """Return the whole log."""
@@ -117,17 +120,17 @@ class LogReader:
         columns = [np.concatenate(parts) for parts in zip(*self._positions(_BLOCK, roles), strict=True)]
         if len(columns) == 2:
             columns.append(np.arange(self.n_samples, dtype=np.float64) * self.T_s)
-        x_d, x, t = columns
-        return Log(t, x_d, x, self.T_s, self.path)
+        x_d, x_meas, t = columns
+        return Log(t, x_d, x_meas, self.T_s, self.path)
 
     def _positions(self, n: int, roles: tuple[str, ...]) -> Iterator[tuple[Array, ...]]:
-        """Give the columns ``roles``, the first two being positions, checked and in SI units."""
+        """Iterate over the columns ``roles``, the first two being positions, checked and in SI units."""
         names, metres = [self._names[role] for role in roles], UNITS[self._unit]
         lowest, highest, count = np.inf, -np.inf, 0
         for block in self._source.blocks(names, n):
             for name, column in zip(names, block.columns, strict=True):
                 self._check_finite(block, name, column)
-            x_d, x = block.columns[0] * metres, block.columns[1] * metres
+            x_d, x_meas = block.columns[0] * metres, block.columns[1] * metres
             lowest, highest = min(lowest, float(x_d.min())), max(highest, float(x_d.max()))
             if highest - lowest > SPAN_MAX:
                 smaller = "um" if self._unit != "m" else "mm"
@@ -136,12 +139,12 @@ class LogReader:
                     f"{SPAN_MAX:g} m; if the log is in {smaller}, say unit='{smaller}' (--unit {smaller})"
                 )
             count += len(x_d)
-            yield (x_d, x, *block.columns[2:])
+            yield (x_d, x_meas, *block.columns[2:])
         if count != self.n_samples:
             raise LogError(f"{self.path}: the file had {self.n_samples} samples when opened, now it has {count}")
 
     def _scan(self) -> tuple[int, float | None]:
-        """Go over one column; return the number of samples and, if it is the time, the sampling interval."""
+        """Scan one column; return the number of samples and, if it is the time, the sampling interval."""
         role = "t" if "t" in self._names else "x_d"
         axis, count = TimeAxis(self.path, self._names[role]), 0
         for block in self._source.blocks([self._names[role]], _BLOCK):
@@ -161,7 +164,7 @@ class LogReader:
 
 
 def check_reading(unit: str, T_s: float | None) -> float | None:
-    """Return the sampling interval that was given, or raise LogError or ParameterError if it or the unit is none."""
+    """Return the given sampling interval, validated; LogError for an unknown unit."""
     if unit not in UNITS:
         raise LogError(f"unit must be one of {', '.join(UNITS)}, got {unit!r}")
     return None if T_s is None else float(check("T_s", T_s, label="T_s"))
@@ -172,15 +175,16 @@ def open_log(
 ) -> LogReader:
     """Open a log for reading in bounded memory.
 
-    CSV files are streamed by lines and ``.npz`` files member by member; a ``.mat`` file is loaded whole, as SciPy
-    can do nothing else, so that its size is limited by the memory.
+    CSV files are streamed by lines and ``.npz`` files by members; a ``.mat`` file is loaded whole by SciPy, so that its
+    size is limited by the memory.
 
     Parameters
     ----------
     path : str or Path
         ``.csv`` (also ``.tsv``, ``.txt``; comma, semicolon, tab or blanks between columns), ``.npz`` or ``.mat``.
     columns : mapping, optional
-        The file's names of ``"t"``, ``"x_d"`` and ``"x"`` where they are others, such as ``{"x_d": "qg", "x": "qm"}``.
+        The file's names of ``"t"``, ``"x_d"`` and ``"x"``, the measured position, where they are others, such as
+        ``{"x_d": "qg", "x": "qm"}``. Without a name for ``"x"``, ``x_meas`` is read where the file has it.
     unit : {"m", "mm", "um"}
         Unit of the file's positions.
     T_s : float, optional
@@ -219,11 +223,14 @@ def _open_source(path: Path) -> Source:
 
 
 def _column_names(source: Source, columns: Mapping[str, str] | None, *, time_needed: bool) -> dict[str, str]:
-    """Return the file's name of each column that will be read."""
+    """Return the file's names of the columns to read, by role."""
     for role in columns or ():
         if role not in _ROLES:
             raise LogError(f"{source.path}: columns may name {', '.join(_ROLES)}, got {role!r}")
-    names = {role: role for role in _ROLES} | dict(columns or {})
+    names = {role: role for role in _ROLES}
+    if _MEASURED in source.names:
+        names["x"] = _MEASURED
+    names |= dict(columns or {})
     if names["t"] not in source.names and "t" not in (columns or {}) and not time_needed:
         del names["t"]
     for role, name in names.items():

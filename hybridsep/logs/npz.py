@@ -1,4 +1,4 @@
-"""NumPy ``.npz`` files, streamed: each member's header first, then its values block by block."""
+"""Streaming reader of NumPy ``.npz`` files: each member's header, then its values block by block."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .source import Block, check_column, check_lengths, sample_number
 __all__ = ["NpzSource"]
 
 _DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError, ValueError, MemoryError)
-"""What reading a damaged archive raises."""
+"""Exceptions raised by damaged archives."""
 
 
 class NpzSource:
@@ -37,7 +37,7 @@ class NpzSource:
         self.names = [member.removesuffix(".npy") for member in members if member.endswith(".npy")]
 
     def blocks(self, names: Sequence[str], n: int) -> Iterator[Block]:
-        """Give the columns ``names`` from their beginning, at most ``n`` samples at a time."""
+        """Iterate over the columns ``names`` in blocks of at most ``n`` samples."""
         with ExitStack() as stack:
             archive = stack.enter_context(zipfile.ZipFile(self.path))
             streams, dtypes, lengths = [], [], {}

@@ -1,4 +1,4 @@
-"""What every log format gives: named columns, block by block."""
+"""Interface of log formats: named columns in blocks of samples."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ __all__ = ["Block", "Source", "check_column", "check_lengths", "sample_number"]
 
 @dataclass(frozen=True)
 class Block:
-    """Some consecutive samples.
+    """Block of consecutive samples.
 
     Attributes
     ----------
     columns : list of (m,) array
-        One for each name asked for, as the file has them, not checked for NaN; ``m ≥ 1``.
+        One for each requested name, as in the file, not checked for NaN; ``m ≥ 1``.
     where : callable
-        Names sample ``i`` of the block as a user counts it: a line of the file, or a sample of the log.
+        Location of sample ``i`` of the block for messages: a line of the file, or a sample of the log.
     """
 
     columns: list[Array]
@@ -32,16 +32,16 @@ class Block:
 
 
 class Source(Protocol):
-    """An open log format.
+    """Open log file.
 
     Attributes
     ----------
     path : Path
         The file.
     names : list of str
-        The columns that are there.
+        Available columns.
     advice : str
-        What to add to a message about a missing column.
+        Addition to the message about a missing column.
     """
 
     path: Path
@@ -51,22 +51,22 @@ class Source(Protocol):
     def __init__(self, path: Path) -> None: ...
 
     def blocks(self, names: Sequence[str], n: int) -> Iterator[Block]:
-        """Give the columns ``names`` from their beginning, at most ``n`` samples at a time."""
+        """Iterate over the columns ``names`` in blocks of at most ``n`` samples."""
         ...
 
 
 def sample_number(offset: int) -> Callable[[int], str]:
-    """Return what names sample ``i`` of a block that begins ``offset`` samples into the log, counted from 1."""
+    """Return the location, for messages, of samples in a block that begins at ``offset``; counted from 1."""
     return lambda i: f"sample {offset + i + 1} (the first is 1)"
 
 
 def check_column(path: Path, name: str, shape: tuple[int, ...], dtype: np.dtype[Any]) -> int:
-    """Return the number of samples of an array of that shape and type, or say why it is no column."""
+    """Return the number of samples of a column of that shape and type; LogError if it is not one."""
     if dtype.kind == "c":
         raise LogError(f"{path}: column {name!r} must be real, got complex numbers ({dtype})")
     if dtype.kind not in "fiu":
         raise LogError(f"{path}: column {name!r} must be numbers, got {dtype}")
-    # A column or a row of a matrix is as good as a vector.
+    # Row and column vectors are accepted.
     lengths = [length for length in shape if length != 1]
     if len(shape) not in (1, 2) or (len(lengths) > 1 and 0 not in shape):
         raise LogError(f"{path}: column {name!r} must have shape (n,), (n, 1) or (1, n), got {shape}")
@@ -74,7 +74,7 @@ def check_column(path: Path, name: str, shape: tuple[int, ...], dtype: np.dtype[
 
 
 def check_lengths(path: Path, lengths: dict[str, int]) -> None:
-    """Say which columns differ in length, if they do."""
+    """Raise LogError if columns differ in length."""
     if len(set(lengths.values())) > 1:
         text = ", ".join(f"{name!r} has {length}" for name, length in lengths.items())
         raise LogError(f"{path}: all columns must have the same number of samples, got: {text}")

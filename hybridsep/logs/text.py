@@ -1,4 +1,4 @@
-"""CSV and its relatives, streamed by lines: one line of column names, then numbers."""
+"""Streaming reader of delimited text: one line of column names, then numbers."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from .source import Block
 __all__ = ["TextSource"]
 
 _DELIMITERS = (";", "\t", ",")
-"""Tried in this order in the line of names; blanks if there is none."""
+"""Delimiters by precedence in the line of names; blanks if none occurs."""
 
 
 class TextSource:
-    """A text file with a line of column names; comma, semicolon, tab or blanks between the columns."""
+    """Text file with a line of column names, delimited by comma, semicolon, tab or blanks."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -38,7 +38,7 @@ class TextSource:
         self.advice = f"; line {self._header_line} must hold the column names, it holds numbers" if no_names else ""
 
     def blocks(self, names: Sequence[str], n: int) -> Iterator[Block]:
-        """Give the columns ``names`` from their beginning, at most ``n`` samples at a time."""
+        """Iterate over the columns ``names`` in blocks of at most ``n`` samples."""
         use = [self.names.index(name) for name in names]
         try:
             with self._open() as file:
@@ -73,14 +73,14 @@ class TextSource:
         try:
             values = np.loadtxt(lines, delimiter=mark, usecols=use, comments=None, quotechar='"', ndmin=2)
         except ValueError:
-            # Line by line, slowly, for the message; or for a spelling that only Python's float() knows.
+            # Line by line, for the message, or for a notation that only Python's float() accepts.
             rows = [self._convert(text, number, use) for text, number in zip(lines, numbers, strict=True)]
             values = np.array(rows)
         columns: list[Array] = [np.ascontiguousarray(column) for column in values.T]
         return Block(columns, lambda i: f"line {numbers[i]}")
 
     def _convert(self, text: str, number: int, use: list[int]) -> list[float]:
-        """Return the numbers of one line in the columns ``use``, as far as the line goes."""
+        """Return the numbers of one line in those of the columns ``use`` that it has."""
         fields, row = self._split(text), []
         for i in use:
             if i < len(fields) and not _is_number(fields[i]):
@@ -95,7 +95,7 @@ class TextSource:
 
 
 def _first_line(file: IO[str]) -> tuple[str, int]:
-    """Return the first line that is not blank, without its end, and its number; an empty one if there is none."""
+    """Return the first non-blank line, without its line end, and its number; empty if there is none."""
     number = 0
     for number, line in enumerate(file, 1):
         if line.strip():

@@ -1,4 +1,4 @@
-"""The time column of a log, checked block by block: increasing, uniform, and its sampling interval."""
+"""Validation of a log's time column, block by block: monotonicity, uniformity, sampling interval."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ __all__ = ["TOLERANCE", "TimeAxis"]
 TOLERANCE = 0.05
 """Largest relative deviation of an interval from the median one.
 
-A recorder's clock jitters by a few per cent at most and a lost sample doubles an interval. At a feed rate of 80 mm/s
-and 1 kHz, 5 % of an interval are 4 µm of travel, what an encoder's noise amounts to.
+A recorder's clock jitters by a few per cent at most; a lost sample doubles an interval. At a feed rate of 80 mm/s
+and 1 kHz, 5 % of an interval are 4 µm of travel, comparable to encoder noise.
 """
 
 _ROUNDING = 1e-8
-"""Relative rounding of the interval that is always allowed, so that 0.001000000003 s are 0.001 s."""
+"""Relative tolerance when the interval is rounded: 0.001000000003 s becomes 0.001 s."""
 
 
 class TimeAxis:
-    """Checks a time axis that arrives in blocks, in constant memory.
+    """Time axis that arrives in blocks, checked in constant memory.
 
     Every interval is compared with the median interval of the first block.
 
@@ -43,14 +43,14 @@ class TimeAxis:
         self._first = self._last = self._median = self._jitter = 0.0
 
     def extend(self, block: Block) -> None:
-        """Take in the next times, s, the only column of the block.
+        """Check the next times, s, the only column of the block.
 
         Raises
         ------
         LogError
-            If a time does not follow the one before it by the median interval.
+            If an interval is not the median one within :data:`TOLERANCE`.
         """
-        with np.errstate(over="ignore", invalid="ignore"):  # what overflows is no interval, which is said at the end
+        with np.errstate(over="ignore", invalid="ignore"):  # an interval that overflows is reported at the end
             self._extend(block)
 
     def _extend(self, block: Block) -> None:
@@ -71,18 +71,18 @@ class TimeAxis:
         self._last = float(t[-1])
 
     def interval(self) -> float:
-        """Return the mean interval, s, rounded to the digits that the jitter leaves certain; needs two samples.
+        """Return the mean interval, s, rounded to its significant digits under the jitter; needs two samples.
 
         Raises
         ------
         LogError
-            If it is too short or too long to be divided by.
+            If the interval or its reciprocal underflows.
         """
         mean = (self._last - self._first) / (self._n - 1)
         if not sys.float_info.min <= mean <= 1 / sys.float_info.min:
             raise LogError(f"{self._path}: time {self._name!r} must be in seconds, got an interval of {mean:g} s")
         tolerance = _ROUNDING + min(1e-4, self._jitter / (self._n - 1))
-        # The shortest interval or the shortest rate that is near enough: 0.001 s, or 1/3000 s; ten digits always are.
+        # The interval or rate with the fewest digits within the tolerance: 0.001 s, or 1/3000 s; ten digits always are
         candidates = (
             candidate
             for digits in range(10)

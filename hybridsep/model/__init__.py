@@ -1,1 +1,1 @@
-"""The linear physics model of a drive, eqs. (2) and (15)."""
+"""Physics-based linear model of a drive, eqs. (2) and (15)."""

@@ -1,4 +1,4 @@
-"""The physics model between two samples of a command that is held or interpolated, eq. (2); exact at the samples."""
+"""Discrete-time physics model under a zero- or first-order hold, exact at the samples; eq. (2)."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from ..base.signals import Array
 __all__ = ["BLOCK_MAX", "DiscreteModel"]
 
 BLOCK_MAX = 256
-"""Longest stretch answered by one pair of lifted matrices; longer windows go block by block."""
+"""Largest size of the lifted matrices, for memory's sake; longer windows are split into blocks."""
 
 StateSpace = tuple[Array, Array, Array]
 
 
 class DiscreteModel:
-    """``x_pb = G_pb x_d`` at the samples, eq. (2), with a state that is carried from window to window.
+    """Discrete-time model ``x_pb = G_pb x_d``, eq. (2); its state is carried from window to window.
 
-    ``s(k+1) = A s(k) + b u(k)``, ``x_pb(k) = c s(k) + d u(k)``, ``u`` being ``x_d`` after the dead time. Windows are
-    answered by the lifted form of that recursion, ``x_pb = O s + T u`` with ``T`` lower-triangular Toeplitz.
+    ``s(k+1) = A s(k) + b u(k)``, ``x_pb(k) = c s(k) + d u(k)``, ``u`` being ``x_d`` after the dead time, in its
+    lifted form over a window: ``x_pb = O s + T u`` with ``T`` lower-triangular Toeplitz.
 
-    Positions are relative to the point where the drive was at rest; the state is plain data, ``(n_state,)``.
+    Positions are relative to the initial position; the state is plain data, ``(n_state,)``.
 
     Parameters
     ----------
@@ -33,9 +33,9 @@ class DiscreteModel:
     T_s : float
         Sampling interval, s.
     input_hold : {"zoh", "foh"}
-        How ``x_d`` runs between samples.
+        Zero-order or first-order hold of ``x_d``.
     block : int
-        Longest window answered in one piece.
+        Longest window computed in one piece.
 
     Raises
     ------
@@ -56,7 +56,7 @@ class DiscreteModel:
 
     @property
     def n_state(self) -> int:
-        """Length of the state: two for each mode, and the commands still in the dead time."""
+        """Length of the state: two per mode, and the commands within the dead time."""
         return self._n + self.dead_time
 
     def rest(self) -> Array:
@@ -64,7 +64,7 @@ class DiscreteModel:
         return np.zeros(self.n_state)
 
     def forced_response(self, state: Array, x_d: Array) -> tuple[Array, Array]:
-        """Return the model's positions over a window and the state at its end; eq. (2).
+        """Return the response over a window, free response included, and the state at its end; eq. (2).
 
         Parameters
         ----------
@@ -77,7 +77,7 @@ class DiscreteModel:
         -------
         x_pb : (n,) array, m
         state : (n_state,) array, m
-            To be given to the next window.
+            Initial state of the next window.
         """
         n = len(x_d)
         s, u, register = state, x_d, state[:0]
@@ -105,7 +105,7 @@ class DiscreteModel:
         return x_pb, self._powers[n] @ s + self._K[:, self._block - n :] @ u
 
     def _tabulate(self) -> None:
-        """Tabulate, for windows of up to ``block`` samples, what ``x_pb`` and the end state are made of."""
+        """Tabulate the lifted matrices for windows of up to ``block`` samples."""
         m, n = self._block, self._n
         self._powers = np.empty((m + 1, n, n))  # A⁰ … Aᵐ
         self._powers[0] = np.eye(n)

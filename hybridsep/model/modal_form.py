@@ -1,4 +1,4 @@
-"""From a rational transfer function to the modes of eq. (15)."""
+"""Modal decomposition of a rational transfer function into eq. (15), by partial fractions."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["modes_of"]
 Array = NDArray[np.float64]
 
 REPEATED = 1e-3
-"""Two poles closer than this, relative to their magnitude, count as one."""
+"""Relative distance below which two poles count as repeated: rounding splits a fivefold one by 7e-4."""
 
 _REPEATED_MODES = "G_pb has repeated modes, which a sum of modes as in eq. (15) cannot express; separate them slightly"
 
@@ -46,13 +46,13 @@ def modes_of(
             f"{len(numerator) - 1} over a denominator of degree {len(denominator) - 1}"
         )
     if not numerator.size:
-        raise ModelError("G_pb must move the drive, got a transfer function of zero")
+        raise ModelError("G_pb must not be zero, got a zero transfer function")
     poles = np.roots(denominator).astype(np.complex128)
     unstable = poles[poles.real >= 0]
     if unstable.size:
         raise ModelError(f"G_pb must be stable, got a pole at {unstable[0]:.6g} rad/s")
 
-    # In units of a middle frequency the polynomials' coefficients stay near one another.
+    # Frequencies normalised by their geometric mean keep the coefficients at a similar magnitude
     scale = float(np.exp(np.mean(np.log(np.abs(poles)))))
     numerator = numerator / denominator[0] * scale ** (np.arange(len(numerator))[::-1] - len(poles) * 1.0)
     quadratics, numerator = _quadratics(poles / scale, numerator)
@@ -71,7 +71,7 @@ def modes_of(
 
 
 def _without_rounding(numerator: Array, system: control.StateSpace, length: int) -> Array:
-    """Drop leading coefficients that a strictly proper state space has only by rounding."""
+    """Drop the leading coefficient that a strictly proper state space has only by rounding."""
     if np.any(system.D):
         return numerator
     padded = np.concatenate((np.zeros(max(0, length - len(numerator))), numerator))
@@ -80,11 +80,11 @@ def _without_rounding(numerator: Array, system: control.StateSpace, length: int)
 
 
 def _quadratics(poles: NDArray[np.complex128], numerator: Array) -> tuple[list[Array], Array]:
-    """Group the poles into real quadratic factors; a lone real pole brings a cancelling twin into the numerator."""
+    """Group the poles into real quadratic factors; an unpaired real pole is doubled and cancelled in the numerator."""
     is_complex = np.abs(poles.imag) > 1e-7 * np.abs(poles)
     quadratics = [np.array([1.0, -2 * pole.real, abs(pole) ** 2]) for pole in poles[is_complex] if pole.imag > 0]
     real = sorted(float(pole.real) for pole in poles[~is_complex])
-    while len(real) > 1:  # the closest two first, so that a double pole stays within one factor
+    while len(real) > 1:  # the closest pair first, so that a double pole stays in one factor
         i = min(range(len(real) - 1), key=lambda i: real[i] / real[i + 1])
         a, b = real.pop(i), real.pop(i)
         quadratics.append(np.array([1.0, -a - b, a * b]))
@@ -110,7 +110,7 @@ def _partial_fractions(quadratics: list[Array], numerator: Array) -> Array:
 
 
 def _require_distinct(quadratics: list[Array]) -> None:
-    """Refuse a pole that is in two factors; a k-fold pole comes out of ``np.roots`` split by about ``ε^(1/k)``."""
+    """Raise ModelError for a pole in two factors; ``np.roots`` splits a k-fold pole by about ``ε^(1/k)``."""
     roots = [np.roots(quadratic) for quadratic in quadratics]
     for i, some in enumerate(roots):
         for others in roots[:i]:
@@ -122,7 +122,7 @@ def _require_distinct(quadratics: list[Array]) -> None:
 def _require_faithful(
     modes: list[tuple[float, float, float, float]], tf: control.TransferFunction, magnitudes: Array
 ) -> None:
-    """Refuse a sum of modes that is not the system any more: what rounding makes of a pole of high multiplicity."""
+    """Raise ModelError if the modes' frequency response is not the system's, as for a pole of high multiplicity."""
     s = 1j * np.geomspace(0.1 * magnitudes.min(), 10 * magnitudes.max(), 100)
     G = np.zeros(len(s), dtype=np.complex128)
     for f_n, zeta, alpha, beta in modes:
@@ -134,7 +134,7 @@ def _require_faithful(
 
 
 def _require_finite(system: control.TransferFunction | control.StateSpace) -> None:
-    """Refuse coefficients that are NaN or infinite."""
+    """Raise ModelError if a coefficient is NaN or infinite."""
     import control
 
     if isinstance(system, control.StateSpace):

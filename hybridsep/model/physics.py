@@ -1,7 +1,6 @@
-"""The physics-based linear model ``G_pb`` of a feed drive, as a sum of modes, eq. (15).
+"""Physics-based linear model ``G_pb`` of a feed drive in modal form, eq. (15).
 
 ``G_pb(s) = Σ_i (α_i + β_i s) / (s² + 2 ζ_i ω_i s + ω_i²)``; the spring-mass-damper of eq. (11) is one such mode.
-:class:`ModalModel` is the continuous model.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["ModalModel", "Mode"]
 
 MODES_MAX = 100
-"""Modes of one model, at most; its tables grow with their square."""
+"""Largest number of modes; the discrete model's tables grow with its square."""
 
 
 @dataclass(frozen=True)
@@ -64,14 +63,14 @@ class Mode:
 
 @dataclass(frozen=True)
 class ModalModel:
-    """A linear, causal, stable drive model: a sum of modes behind a dead time, eq. (15).
+    """Linear, causal, stable drive model: a sum of modes with input dead time, eq. (15).
 
     Parameters
     ----------
     modes : sequence of Mode
         1 … :data:`MODES_MAX`.
     dead_time : int
-        Whole samples by which the command is delayed before it reaches the modes.
+        Input delay, samples.
 
     Raises
     ------
@@ -104,7 +103,7 @@ class ModalModel:
         Raises
         ------
         ParameterError
-            If a value, or the mode that they make, is out of its range.
+            If a value, or the resulting mode, is out of range.
         """
         m, c, k = check("m", m), check("c", c), check("k", k)
         # ω² = k/m, 2ζω = c/m, α = k/m, β = c/m
@@ -112,7 +111,9 @@ class ModalModel:
         try:
             mode = Mode(f_n=omega / (2 * np.pi), zeta=c / m / (2 * omega), alpha=k / m, beta=c / m)
         except ParameterError as error:
-            raise ParameterError(f"m = {m:g} kg, c = {c:g} N.s/m, k = {k:g} N/m make no drive: {error}") from None
+            raise ParameterError(
+                f"m = {m:g} kg, c = {c:g} N.s/m, k = {k:g} N/m give a mode out of range: {error}"
+            ) from None
         return cls((mode,), dead_time)
 
     @classmethod
@@ -140,7 +141,7 @@ class ModalModel:
 
     @property
     def dc_gain(self) -> float:
-        """``G_pb(0)``: where the drive settles per metre of command, 1 for a drive without offset."""
+        """Static gain ``G_pb(0)``; 1 for a drive without steady-state error."""
         return float(sum(mode.alpha / mode.omega**2 for mode in self.modes))
 
     def state_space(self) -> tuple[Array, Array, Array]:
@@ -163,16 +164,16 @@ class ModalModel:
         return block_diag(*blocks), np.array(b), np.array(c)
 
     def discretise(self, T_s: float, input_hold: str = "zoh", block: int = BLOCK_MAX) -> DiscreteModel:
-        """Return the model at the samples ``k·T_s``, exact for a command held or interpolated in between.
+        """Return the discrete-time model, exact at the samples under the hold.
 
         Parameters
         ----------
         T_s : float
             Sampling interval, s.
         input_hold : {"zoh", "foh"}
-            How ``x_d`` runs between samples.
+            Zero-order or first-order hold of ``x_d``.
         block : int
-            Longest window answered in one piece; tables of this length are kept.
+            Longest window computed in one piece, the size of the tables.
 
         Raises
         ------
@@ -181,19 +182,19 @@ class ModalModel:
         """
         return DiscreteModel(self.state_space(), self.dead_time, T_s, input_hold, block)
 
-    def frequency_response(self, f: ArrayLike, T_s: float | None = None) -> NDArray[np.complex128]:
-        """Return ``G_pb(j 2π f)``.
+    def frequency_response(self, omega: ArrayLike, T_s: float | None = None) -> NDArray[np.complex128]:
+        """Return ``G_pb(j ω)``.
 
         Parameters
         ----------
-        f : array_like, Hz
-            Frequencies, any shape.
+        omega : array_like, rad/s
+            Angular frequencies, any shape.
         T_s : float, optional
             Sampling interval, s; needed when there is a dead time, which is counted in samples.
 
         Returns
         -------
-        array of complex, shape of ``f``, m/m
+        array of complex, shape of ``omega``, m/m
 
         Raises
         ------
@@ -202,7 +203,7 @@ class ModalModel:
         """
         if self.dead_time and T_s is None:
             raise ParameterError(f"T_s is needed: dead_time = {self.dead_time} is counted in samples")
-        s = 2j * np.pi * np.asarray(f, dtype=np.float64)
+        s = 1j * np.asarray(omega, dtype=np.float64)
         # Eq. (15)
         G = sum(
             (mode.alpha + mode.beta * s) / (s**2 + 2 * mode.zeta * mode.omega * s + mode.omega**2)

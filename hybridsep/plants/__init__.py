@@ -1,1 +1,1 @@
-"""Simulated drives, their encoders and the trajectories that they follow."""
+"""Simulated drives, encoders and trajectories."""

@@ -1,4 +1,4 @@
-"""The encoder: white Gaussian noise on the true position, the same in every implementation."""
+"""Encoder model: white Gaussian measurement noise, identical in every implementation."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ _MASK: int = 0xFFFF_FFFF_FFFF_FFFF
 
 
 class Encoder:
-    """A position sensor with normal noise that draws the same on every platform.
+    """Position sensor with Gaussian noise from a portable generator.
 
-    SplitMix64 (Steele, Lea and Flood 2014) gives two uniforms a draw, Box and Muller (1958) make one normal of them.
+    SplitMix64 (Steele, Lea and Flood 2014) gives two uniform numbers per sample, the Box-Muller transform (1958) one
+    normal number.
 
     Parameters
     ----------
@@ -43,7 +44,7 @@ class Encoder:
         return x + self.noise_std * math.sqrt(-2 * math.log(u1)) * math.cos(2 * math.pi * u2)
 
     def measure_all(self, x: ArrayLike) -> Array:
-        """Return measurements of the positions ``x``, ``(n,)``, m, one draw each."""
+        """Return measurements of the positions ``x``, ``(n,)``, m."""
         return np.array([self.measure(position) for position in as_samples(x, "x").tolist()])
 
 

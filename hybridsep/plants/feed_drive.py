@@ -1,4 +1,4 @@
-"""The nonlinear spring-mass-damper drive, eqs. (12) and (13)."""
+"""Nonlinear spring-mass-damper drive, eqs. (12) and (13)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["FeedDrive"]
 
 
 class FeedDrive:
-    """The spring-mass-damper drive with quadratic damping and stiffness, eq. (13).
+    """Spring-mass-damper drive with quadratic damping and stiffness, eq. (13).
 
     ``m ẍ + c ẋ + k x + H_NL = c ẋ_d + k x_d`` with ``H_NL = c_nl·ẋ|ẋ| + k_nl·x|x|``, in the states
     ``x`` and ``u = ẋ − (c/m) x_d``, which need no derivative of the command.
@@ -39,7 +39,7 @@ class FeedDrive:
         self.reset()
 
     def reset(self, start: float = 0.0) -> None:
-        """Put the drive to rest at ``start``, m."""
+        """Reset the drive to rest at ``start``, m."""
         self._start, self._x, self._u, self._x_d = start, 0.0, 0.0, 0.0
 
     @property
@@ -76,7 +76,7 @@ class FeedDrive:
             x += dt / 6 * (p1 + 2 * p2 + 2 * p3 + p4)
             u += dt / 6 * (q1 + 2 * q2 + 2 * q3 + q4)
         if not (abs(x) < STATE_MAX and abs(u) < STATE_MAX):
-            raise SignalError(f"the drive's state left the range of numbers (x = {x}, command {x_d} m)")
+            raise SignalError(f"the drive's state overflowed (x = {x}, command {x_d} m)")
         self._x, self._u, self._x_d = x, u, r
 
     def state(self) -> list[float]:
@@ -84,5 +84,5 @@ class FeedDrive:
         return [self._start, self._x, self._u, self._x_d]
 
     def restore(self, state: list[float]) -> None:
-        """Take over what :meth:`state` returned."""
+        """Restore a :meth:`state`."""
         self._start, self._x, self._u, self._x_d = state

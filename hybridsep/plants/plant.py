@@ -1,8 +1,8 @@
-"""What every simulated drive has in common: its interface and the size of its internal integration steps.
+"""Interface of simulated drives, and their internal integration steps.
 
-A drive holds its command over a step, is at rest at ``start`` at first and measures positions from there, as the
-predictor does. Drives are integrated by the classical Runge-Kutta method, in plain floats, without differentiating
-``x_d``; internal steps are at most 0.1 ms and 1/16 of the linear part's fastest time constant.
+The command is held over a step; a drive is initially at rest at ``start``, and its states are relative to it, as in the
+predictor. Integration is by the classical Runge-Kutta method, without differentiating ``x_d``; internal steps are at
+most 0.1 ms and 1/16 of the linear part's fastest time constant.
 """
 
 from __future__ import annotations
@@ -29,22 +29,23 @@ __all__ = [
 ]
 
 INTERNAL_STEP = 1e-4
-"""Longest internal integration step, s."""
+"""Longest internal integration step, s: 0.1 ms, a tenth of the usual sampling interval."""
 
 RATE_MAX = 1e5
-"""Fastest rate of a drive's linear part, 1/s: a time constant of 10 µs takes 1600 internal steps a millisecond."""
+"""Fastest rate of a drive's linear part, 1/s: a time constant of 10 µs takes 1600 internal steps per millisecond."""
 
 STATE_MAX = 1e100
-"""What no state of a drive reaches unless it diverges."""
+"""Largest magnitude of a drive's state; beyond it the state counts as overflowed, before its square does."""
 
 _STEPS_MAX = 1_000_000
+"""Largest number of internal steps in one step, which bounds its cost."""
 
 
 class Plant(Protocol):
-    """A drive that can be stepped."""
+    """Interface of a simulated drive."""
 
     def reset(self, start: float = 0.0) -> None:
-        """Put the drive to rest at ``start``, m."""
+        """Reset the drive to rest at ``start``, m."""
 
     def step(self, x_d: float, h: float) -> None:
         """Advance by ``h`` seconds with the command ``x_d``, m, held."""
@@ -61,11 +62,11 @@ class Plant(Protocol):
         """Return the state as plain numbers."""
 
     def restore(self, state: list[float]) -> None:
-        """Take over what :meth:`state` returned."""
+        """Restore a :meth:`state`."""
 
 
 def simulate(plant: Plant, x_d: ArrayLike, T_s: float, *, start: float | None = None) -> Array:
-    """Return the true positions of a plant that gets each command held over one sampling interval.
+    """Return the response of a plant to a command under a zero-order hold.
 
     Parameters
     ----------
@@ -76,12 +77,12 @@ def simulate(plant: Plant, x_d: ArrayLike, T_s: float, *, start: float | None = 
     T_s : float
         Sampling interval, s.
     start : float, optional
-        Where the drive rests at first, m; the first command if left out.
+        Initial position, m; the first command if left out.
 
     Returns
     -------
     x : (n,) array, m
-        ``x(k)``, reached before ``x_d(k)`` acts.
+        True positions ``x(k)``, before ``x_d(k)`` acts.
     """
     commands = as_samples(x_d, "x_d")
     if len(commands) == 0:
@@ -95,12 +96,12 @@ def simulate(plant: Plant, x_d: ArrayLike, T_s: float, *, start: float | None = 
 
 
 def internal_steps(h: float, rate: float) -> int:
-    """Return how many internal steps a step of ``h`` seconds takes; ``rate``, 1/s, is that of the fastest mode."""
+    """Return the number of internal steps in a step of ``h``, s; ``rate``, 1/s, is that of the fastest mode."""
     return max(1, math.ceil(max(h / INTERNAL_STEP, 16 * h * rate) - 1e-6))
 
 
 def check_step(h: float, rate: float) -> None:
-    """Raise ParameterError if a drive whose fastest rate is ``rate``, 1/s, cannot do a step of ``h`` seconds."""
+    """Raise ParameterError if a step of ``h``, s, is too long for a drive with the fastest rate ``rate``, 1/s."""
     check_step_size(h)
     longest = _STEPS_MAX / 16 / rate
     if h > longest:
@@ -111,6 +112,6 @@ def check_step(h: float, rate: float) -> None:
 
 
 def check_command(x_d: float) -> None:
-    """Raise SignalError if a command is no position, m."""
+    """Raise SignalError if a command, m, is not finite or beyond :data:`POSITION_MAX`."""
     if not abs(x_d) <= POSITION_MAX:  # NaN too
         raise SignalError(f"x_d must be within ±{POSITION_MAX:g} m, got {x_d:g}")

@@ -1,4 +1,4 @@
-"""The stage: the modes of eq. (15) behind a command that friction and cable stiffness offset."""
+"""Linear-motor stage: modal model, eq. (15), with friction and cable stiffness as input disturbances."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from .plant import RATE_MAX, STATE_MAX, check_command, check_step, internal_step
 __all__ = ["FRICTION_VELOCITY", "StageDrive"]
 
 FRICTION_VELOCITY = 2e-3
-"""Velocity over which the stage's friction changes sign, m/s."""
+"""Velocity scale of the friction's change of sign, m/s, a choice of the stand-in: the paper gives none."""
 
 
 class StageDrive:
-    """A linear-motor stage: a modal model whose command is disturbed by friction and cable stiffness.
+    """Linear-motor stage: modal model with friction and cable stiffness as input disturbances.
 
     ``x = G_pb (x_d − d)`` with ``d = f·tanh(v_d / 2 mm/s) + κ·x·|x|``: the carriage's friction follows the commanded
     velocity ``v_d``, the backward difference of ``x_d`` over ``T_s``.
@@ -31,7 +31,7 @@ class StageDrive:
     kappa : float
         Cable stiffness as an offset of the command, 1/m, ≥ 0.
     T_s : float
-        Interval at which the command is sampled, s, over which ``v_d`` is taken.
+        Sampling interval of the command, s, for the difference ``v_d``.
     """
 
     def __init__(self, model: ModalModel, f: float = 0.0, kappa: float = 0.0, T_s: float = 1e-3) -> None:
@@ -52,11 +52,11 @@ class StageDrive:
         self.reset()
 
     def reset(self, start: float = 0.0) -> None:
-        """Put the stage to rest at ``start``, m."""
+        """Reset the stage to rest at ``start``, m."""
         self._start = start
         self._z = [0.0] * (2 * len(self._modes))
         self._last_x_d, self._v_d, self._v = 0.0, 0.0, 0.0
-        self._clock = SampleClock.begin(0.0, self.T_s)  # a time of its own
+        self._clock = SampleClock.begin(0.0, self.T_s)  # time since the reset
 
     @property
     def x(self) -> float:
@@ -75,17 +75,17 @@ class StageDrive:
         step = self._clock.stepped(self._clock.end, h)
         r, z = x_d - self._start, self._z
         last_x_d, v_d, done = self._last_x_d, self._v_d, 0.0
-        # v_d is taken at the instants, in whatever steps they come.
+        # v_d is updated at the sampling instants, whatever the step size.
         for i in range(step.n_latched + 1):
             end = max(done, step.first + i * self.T_s) if i < step.n_latched else h
             if end > done:
-                z = self._integrated(z, self._pushed(r, v_d), end - done)
+                z = self._integrated(z, self._disturbed(r, v_d), end - done)
                 done = end
             if i < step.n_latched:
                 last_x_d, v_d = r, (r - last_x_d) / self.T_s
         if not all(abs(s) < STATE_MAX for s in z):
-            raise SignalError(f"the stage's state left the range of numbers (command {x_d} m)")
-        self._z, self._v = z, self._position(self._derivative(z, self._pushed(r, v_d)))
+            raise SignalError(f"the stage's state overflowed (command {x_d} m)")
+        self._z, self._v = z, self._position(self._derivative(z, self._disturbed(r, v_d)))
         self._last_x_d, self._v_d, self._clock = last_x_d, v_d, step.after
 
     def state(self) -> list[float]:
@@ -93,33 +93,33 @@ class StageDrive:
         return [self._start, self._last_x_d, self._v_d, self._v, *self._clock.state(), *self._z]
 
     def restore(self, state: list[float]) -> None:
-        """Take over what :meth:`state` returned."""
+        """Restore a :meth:`state`."""
         self._start, self._last_x_d, self._v_d, self._v = state[:4]
         self._clock = SampleClock.from_state(state[4:11])
         self._z = list(state[11:])
 
-    def _pushed(self, r: float, v_d: float) -> float:
-        """Return the command after the carriage's friction, which follows the commanded velocity."""
+    def _disturbed(self, r: float, v_d: float) -> float:
+        """Return the command disturbed by friction, a function of the commanded velocity."""
         return r - self.f * math.tanh(v_d / FRICTION_VELOCITY)
 
-    def _integrated(self, z: list[float], pushed: float, time: float) -> list[float]:
-        """Return ``z`` after ``time`` seconds of a held command."""
+    def _integrated(self, z: list[float], disturbed: float, time: float) -> list[float]:
+        """Return ``z`` after ``time``, s, with the command held."""
         n = internal_steps(time, self._rate)
         dt, f = time / n, self._derivative
         for _ in range(n):
-            k1 = f(z, pushed)
-            k2 = f([s + dt / 2 * k for s, k in zip(z, k1, strict=True)], pushed)
-            k3 = f([s + dt / 2 * k for s, k in zip(z, k2, strict=True)], pushed)
-            k4 = f([s + dt * k for s, k in zip(z, k3, strict=True)], pushed)
+            k1 = f(z, disturbed)
+            k2 = f([s + dt / 2 * k for s, k in zip(z, k1, strict=True)], disturbed)
+            k3 = f([s + dt / 2 * k for s, k in zip(z, k2, strict=True)], disturbed)
+            k4 = f([s + dt * k for s, k in zip(z, k3, strict=True)], disturbed)
             z = [s + dt / 6 * (a + 2 * b + 2 * c + d) for s, a, b, c, d in zip(z, k1, k2, k3, k4, strict=True)]
         return z
 
     def _position(self, z: list[float]) -> float:
         return sum(alpha * z[2 * i] + beta * z[2 * i + 1] for i, (_, _, alpha, beta) in enumerate(self._modes))
 
-    def _derivative(self, z: list[float], pushed: float) -> list[float]:
+    def _derivative(self, z: list[float], disturbed: float) -> list[float]:
         x = self._position(z)
-        u = pushed - self.kappa * x * abs(x)
+        u = disturbed - self.kappa * x * abs(x)
         slope = []
         for i, (w2, two_zw, _, _) in enumerate(self._modes):
             # z̈ + 2ζω ż + ω² z = u, eq. (15)

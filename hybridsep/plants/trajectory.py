@@ -1,4 +1,4 @@
-"""Commanded positions: rest-to-rest moves, planar paths and the paper's two test trajectories.
+"""Reference trajectories: rest-to-rest moves, planar paths and the paper's two test trajectories.
 
 Every function returns positions in metres, sampled exactly at ``k·T_s``; jerk-limited, time-optimal moves come from
 ruckig (Berscheid and Kröger, RSS 2021).
@@ -35,7 +35,7 @@ __all__ = [
 Curve = Callable[[Array], Array]
 
 SAMPLES_MAX = 2_000_000
-"""Samples of a trajectory that is made here, at most: over half an hour at 1 kHz."""
+"""Largest number of samples of a generated trajectory: over half an hour at 1 kHz."""
 
 
 PAPER_LIMITS = Limits(velocity=0.08, acceleration=8.0, jerk=1000.0)
@@ -51,22 +51,22 @@ def rest_to_rest(
     dwell: float = 0.0,
     duration: float | None = None,
 ) -> Array:
-    """Return a chain of time-optimal, jerk-limited moves, each from rest to rest.
+    """Return a sequence of time-optimal, jerk-limited rest-to-rest moves.
 
     Parameters
     ----------
     positions : (m + 1,) array_like, m
-        Where the axis starts, then where each of the ``m`` moves ends.
+        Initial position, then the target of each of the ``m`` moves.
     limits : Limits
         Velocity, acceleration and jerk limits.
     T_s : float
         Sampling interval, s.
     start_times : sequence of m floats, optional
-        When each move starts, s; otherwise each starts ``dwell`` after the one before has ended.
+        Start time of each move, s; by default ``dwell`` after the end of the one before.
     dwell : float
         Rest between moves, s, when no start times are given.
     duration : float, optional
-        Length of the result, s; it ends with the last move (and its dwell) if left out.
+        Duration, s; to the end of the last move and its dwell if left out.
 
     Returns
     -------
@@ -201,7 +201,7 @@ def archimedean_spiral(radius: float, turns: float) -> tuple[Curve, Curve, float
 
 
 def along_path(position: Curve, derivative: Curve, end: float, limits: Limits, T_s: float = 1e-3) -> Array:
-    """Run along a planar path from rest to rest, with the limits along the arc.
+    """Return a rest-to-rest motion along a planar path, with limits along the arc.
 
     Parameters
     ----------
@@ -217,12 +217,12 @@ def along_path(position: Curve, derivative: Curve, end: float, limits: Limits, T
     Returns
     -------
     (n, d) array, m
-        Positions at ``k·T_s``; the arc length is inverted to 1e-12 of its whole.
+        Positions at ``k·T_s``; the arc length is inverted to 1e-12 of the total.
     """
     nodes, arc = _arc_length(derivative, end)
     s = rest_to_rest([0.0, arc[-1]], limits, T_s)
     u = np.interp(s, arc, nodes)
-    # Newton on s(u) = s_k, the integral taken by Gauss-Legendre from the panel's left end.
+    # Newton iteration on s(u) = s_k, with Gauss-Legendre quadrature from the panel's left end.
     panel = np.clip(np.searchsorted(arc, s, "right") - 1, 0, len(nodes) - 2)
     for _ in range(8):
         miss = arc[panel] + _panel_lengths(derivative, nodes[panel], u) - s

@@ -1,1 +1,1 @@
-"""The linear hybrid predictor, eqs. (2) to (6), over logs and sample by sample."""
+"""Linear hybrid predictor, eqs. (2) to (6): by windows and sample by sample."""

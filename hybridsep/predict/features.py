@@ -1,4 +1,4 @@
-"""The features φ of eq. (5): which of them stands where in φ and in w, and their values from the past samples."""
+"""Feature vector φ of eq. (5): layout of φ and w, and rows from past samples."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ __all__ = ["FeatureLayout", "PastSamples"]
 
 @dataclass(frozen=True)
 class FeatureLayout:
-    """Places of the groups of features in φ, and of their weights in w.
+    """Slices of φ and w by groups of features.
 
-    ``φ(k) = [1, x_pb(k) … x_pb(k−q), e_pb(k−1) … e_pb(k−p), those of the reference]``; eq. (5). The C core's is
+    ``φ(k) = [1, x_pb(k) … x_pb(k−q), e_pb(k−1) … e_pb(k−p), those of the reference]``; eq. (5). In C:
     ``hsep_features.h``.
 
     Parameters
@@ -43,7 +43,7 @@ class FeatureLayout:
 
     @property
     def e_pb(self) -> slice:
-        """``e_pb(k−1) … e_pb(k−p)``: the weights of the learned recursion."""
+        """``e_pb(k−1) … e_pb(k−p)``, the autoregressive part."""
         return slice(self.x_pb.stop, self.x_pb.stop + self.p)
 
     @property
@@ -58,13 +58,13 @@ class FeatureLayout:
 
 
 class PastSamples:
-    """``x_pb`` and ``e_pb`` of the samples that φ looks back to, and of the window that is taken in behind them.
+    """Past samples of ``x_pb`` and ``e_pb`` that φ refers to, followed by those of the current window.
 
     Parameters
     ----------
     layout : FeatureLayout
     Np : int
-        Most samples that are taken in at once.
+        Largest number of samples appended at once.
 
     Attributes
     ----------
@@ -85,11 +85,11 @@ class PastSamples:
         self._rows = np.empty((Np, layout.n + 1), order="F")
 
     def restart(self) -> None:
-        """Begin at rest."""
+        """Set all past samples to zero, as at rest."""
         self._x[:], self._e[:] = 0.0, 0.0
 
     def append(self, x_pb: Array, e_pb: Array) -> None:
-        """Put ``m ≤ Np`` samples, m, behind the past ones."""
+        """Append ``m ≤ Np`` samples, m, to the past ones."""
         p, q, m = self.layout.p, self.layout.q, len(e_pb)
         self._x[q : q + m], self._e[p : p + m] = x_pb, e_pb
 
@@ -112,6 +112,6 @@ class PastSamples:
         return rows
 
     def advance(self, m: int) -> None:
-        """Let the ``m`` appended samples become past ones."""
+        """Shift by the ``m`` appended samples, which become past ones."""
         p, q = self.layout.p, self.layout.q
         self.x_pb[:], self.e_pb[:] = self._x[m : m + q].copy(), self._e[m : m + p].copy()

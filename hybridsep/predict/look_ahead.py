@@ -1,12 +1,12 @@
-"""The look-ahead buffer between the interpolator and the drive, sample by sample.
+"""Look-ahead buffer between interpolator and drive, sample by sample.
 
-The FMU's timing contract. Sample ``k`` brings ``x_d_ahead = r(k)`` and ``x_meas = x(k)``; after it the outputs are
-those of ``k + 1``, and ``x_d(k) = r(k − delay)``, where ``delay`` is ``Np``, or a planner's preview. When ``k + 1`` is
-a multiple of ``Np``, all commands of the next window (of its preview) and every measurement before it have arrived: the
-weights are solved and the window is predicted, or planned, in that sample.
+Timing contract, that of the FMUs. Sample ``k`` brings ``x_d_ahead = r(k)`` and ``x_meas = x(k)``; after it the outputs
+are those of ``k + 1``, and ``x_d(k) = r(k − delay)``, where ``delay`` is ``Np``, or a planner's preview. When ``k + 1``
+is a multiple of ``Np``, all commands of the next window (of its preview) and every measurement before it have arrived:
+the weights are solved and the window is predicted, or planned, in that sample.
 
 During the first fill (``k < delay``) the commanded position is the start. Without a planner it is neither predicted nor
-learned. A planner plans from the beginning, so that a move that is already in sight can be prepared; what is measured
+learned. A planner plans from the beginning, so that it can act ahead of a move within its preview; what is measured
 over the fill is not learned. ``t_init`` counts from its end.
 """
 
@@ -31,46 +31,46 @@ _KIND = "look-ahead"
 
 
 class Planner(Protocol):
-    """What modifies the commands of a window before they are predicted; it holds the predictor.
+    """Interface of a planner, which modifies the commands of a window before they are predicted; holds the predictor.
 
     Attributes
     ----------
     predictor : HybridPredictor
     preview : int
-        Samples of command that a plan needs, at least ``Np``.
+        Samples of a plan, at least ``Np``.
     """
 
     predictor: HybridPredictor
     preview: int
 
     def restart(self, start: float | None = None, *, t_init: float = 0.0, lead_in: int = 0) -> None:
-        """Begin another run, at rest at ``start``, m, with what is learned kept."""
+        """Begin another run, at rest at ``start``, m; what was learned is kept."""
 
     def plan(self, x_d: Array) -> PublishedWindow:
         """Plan the next window from ``(preview,)`` commands, m."""
 
     def update(self, x: Array) -> None:
-        """Take in what was measured over the planned window, ``(Np,)``, m."""
+        """Learn from the positions measured over the planned window, ``(Np,)``, m."""
 
     @property
     def is_planned(self) -> bool:
-        """Whether a planned window waits for its measurement."""
+        """Whether a planned window is pending measurement."""
 
     def to_bytes(self) -> bytes:
-        """Return parameters and state, the predictor's too."""
+        """Return parameters and state, the predictor's included."""
 
     @classmethod
     def from_bytes(cls, blob: bytes) -> Planner:
-        """Return what :meth:`to_bytes` described."""
+        """Return the planner of :meth:`to_bytes`."""
 
 
 class LookAhead:
-    """Delays commands, predicts the drive's position while they wait, and modifies them if there is a planner.
+    """Delay line of commands, with the position predicted ahead, and the commands modified if there is a planner.
 
     Parameters
     ----------
     model : HybridPredictor or Planner
-        Put to the beginning of a run here, with what it has learned kept.
+        Restarted here: what it has learned is kept.
     start : float
         Position where the drive is at rest, m.
     t_init : float, optional
@@ -79,14 +79,14 @@ class LookAhead:
     Attributes
     ----------
     k : int
-        Sample that comes next, counted from the beginning of the run.
+        Index of the next sample, from the beginning of the run.
     Np, delay : int
         Samples in a window; samples by which commands are delayed.
     model : HybridPredictor or Planner
     window : PublishedWindow
         The window that ``k`` is part of.
     diverged : str
-        Why the window could not be predicted; every further sample is refused then. Empty as long as it could.
+        Message of the window that diverged, after which every sample is refused; empty before.
 
     Raises
     ------
@@ -131,7 +131,7 @@ class LookAhead:
 
     @property
     def x_dm(self) -> float:
-        """Command that the drive gets now, m: ``x_d`` as the planner has modified it."""
+        """Modified command now, m; ``x_d`` without a planner."""
         return self._now(self.window.x_dm)
 
     @property
@@ -141,7 +141,7 @@ class LookAhead:
 
     @property
     def x_h(self) -> float:
-        """Prediction for now by the best model there is, m."""
+        """Prediction for now by the best available model, m."""
         return self._now(self.window.x_h)
 
     @property
@@ -156,7 +156,7 @@ class LookAhead:
 
     @property
     def sep_state(self) -> int:
-        """What the window was planned with; 0 without a planner."""
+        """Model that planned the window (``SepState``); 0 without a planner."""
         return self.window.state
 
     @property
@@ -175,7 +175,7 @@ class LookAhead:
         return self._rms(2)
 
     def sample(self, x_d_ahead: float, x_meas: float) -> None:
-        """Take in sample ``k`` and move on to ``k + 1``.
+        """Process sample ``k`` and advance to ``k + 1``.
 
         Parameters
         ----------
@@ -187,8 +187,8 @@ class LookAhead:
         Raises
         ------
         SignalError
-            If one of them is not finite; nothing is changed then. If the window that begins diverges, all that follows
-            is refused, too.
+            If one of them is not finite; nothing is changed then. If the window that begins diverges,
+            every later sample is refused, too.
         """
         self.check(x_d_ahead, x_meas)
         self._ahead[self.k % self.delay], self._measured[self.k % self.Np] = x_d_ahead, x_meas
@@ -201,10 +201,7 @@ class LookAhead:
             self._begin_window()
 
     def check(self, x_d_ahead: float, x_meas: float, k: int | None = None) -> None:
-        """Raise SignalError if a value cannot be taken in as sample ``k``, the next one if left out.
-
-        Nothing is changed then. Nothing can be taken in once a window has diverged.
-        """
+        """Raise SignalError if a window has diverged or an input of sample ``k``, by default the next, is invalid."""
         if self.diverged:
             raise SignalError(self.diverged)
         sample = self.k if k is None else k
@@ -212,7 +209,7 @@ class LookAhead:
             _check_position(name, value, f" at sample {sample}")
 
     def to_bytes(self) -> bytes:
-        """Return the whole state, the predictor's and the planner's included, as a versioned blob."""
+        """Return the complete state, predictor and planner included, as a versioned blob."""
         meta = {
             "start": self.start,
             "k": self.k,
@@ -228,13 +225,13 @@ class LookAhead:
 
     @classmethod
     def from_bytes(cls, blob: bytes, model_type: type[HybridPredictor] | type[Planner]) -> LookAhead:
-        """Return the look-ahead that :meth:`to_bytes` described.
+        """Return the look-ahead of :meth:`to_bytes`.
 
         Parameters
         ----------
         blob : bytes
         model_type : type
-            That of the look-ahead's predictor or planner.
+            Type of the predictor or planner.
 
         Raises
         ------
@@ -258,7 +255,7 @@ class LookAhead:
             n_warm_up=saved.whole("n_warm_up", Np),
         )
         if not (look_ahead._is_predicted or look_ahead.diverged):
-            raise saved.error("the window that runs must be predicted, and planned if there is a planner")
+            raise saved.error("the current window must be predicted, and planned if there is a planner")
         return look_ahead
 
     @property
@@ -268,14 +265,14 @@ class LookAhead:
         return self.predictor.n_pending == (self.Np if self.k >= self.Np else 0)
 
     def _learn(self) -> None:
-        """Learn the window that has been measured."""
+        """Learn the measured window."""
         if self.planner is not None:
             self.planner.update(self._measured)
         elif self.k > self.Np:  # the first fill was not predicted
             self.predictor.update(self._measured)
 
     def _begin_window(self) -> None:
-        """Go on to the next window; if it diverges, none is shown and no sample is taken in any more."""
+        """Predict or plan the next window; if it diverges, outputs keep the last one and later samples are refused."""
         x_d = np.roll(self._ahead, -(self.k % self.delay))
         try:
             if self.planner is None:
@@ -295,13 +292,13 @@ class LookAhead:
 
 
 def checked_start(start: float) -> float:
-    """Return the position, m, where a drive rests."""
+    """Return the initial position, m, validated."""
     _check_position("the start value of x_d_ahead", start)
     return start
 
 
 def _check_position(name: str, value: float, when: str = "") -> None:
-    """Raise SignalError if a position, m, is not finite, or further out than any machine is."""
+    """Raise SignalError if a position, m, is not finite or beyond :data:`POSITION_MAX`."""
     if not math.isfinite(value):
         raise SignalError(f"{name} must be finite, got {value}{when}")
     if abs(value) > POSITION_MAX:

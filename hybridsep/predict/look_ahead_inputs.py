@@ -1,7 +1,7 @@
-"""Inputs of a look-ahead at the instants that lie in communication steps of any size.
+"""Sampling of a look-ahead's inputs in communication steps of any size.
 
-They are latched at each instant ``t_k`` of a step and executed in the step that reaches ``t_{k+1}``, so that outputs
-change at instants only and never tell the future. ``hsep_inputs.c`` is the same for the native FMUs.
+Inputs are latched at each instant ``t_k`` within a step and executed in the step that reaches ``t_{k+1}``, so that
+outputs change at sampling instants only and stay causal. ``hsep_inputs.c`` is the same for the native FMUs.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ __all__ = ["LookAheadInputs"]
 
 
 class LookAheadInputs:
-    """The clock of a look-ahead, and the inputs of its sample in progress.
+    """Sample clock of a look-ahead, and the latched inputs of its current sample.
 
     Parameters
     ----------
@@ -49,26 +49,26 @@ class LookAheadInputs:
         Returns
         -------
         warning : str
-            Empty, or what to beware of: an instant is no communication point.
+            Empty unless a sampling instant is no communication point.
 
         Raises
         ------
         ParameterError, FmuError, SignalError
-            If the step does not fit, or an input that it latches cannot be taken in; nothing is changed then.
+            If the step is invalid, or an input that it latches; nothing is changed then.
         """
         if look_ahead.diverged:
             raise SignalError(look_ahead.diverged)
         step = self.clock.stepped(t, h)
         if step.n_latched:
             look_ahead.check(x_d_ahead, x_meas, self.clock.k + self.clock.latched)
-        waiting = self.clock.latched
+        pending = self.clock.latched
         for _ in range(step.n_samples):
-            if waiting:  # the sample that an earlier step began
-                waiting = False
+            if pending:  # the sample that an earlier step latched
+                pending = False
             else:
                 self._latched = (x_d_ahead, x_meas)
             look_ahead.sample(*self._latched)
-        if step.after.latched and not waiting:
+        if step.after.latched and not pending:
             self._latched = (x_d_ahead, x_meas)
         inside = step.n_latched > 1 - self.clock.latched  # t_k, where it is not read yet, is the step's start
         self.clock = step.after
@@ -76,17 +76,17 @@ class LookAheadInputs:
             return ""
         late = min(step.first + (step.n_latched - 1) * self.clock.T_s, h)
         return (
-            f"the step from {t:.9g} s by {h:.9g} s passes instants of T_s = {self.clock.T_s:g} s between its ends: "
-            f"x_meas is read up to {late:g} s late, so a closed loop needs steps of T_s"
+            f"the step from {t:.9g} s by {h:.9g} s contains sampling instants of T_s = {self.clock.T_s:g} s between "
+            f"its ends: x_meas is read up to {late:g} s late, so a closed loop needs steps of T_s"
         )
 
     def state(self) -> list[float]:
-        """Return the numbers of the clock, then the inputs."""
+        """Return the fields of the clock, then the inputs."""
         return [*self.clock.state(), *self._latched]
 
     @classmethod
     def from_state(cls, state: Sequence[float]) -> LookAheadInputs:
-        """Return what :meth:`state` described."""
+        """Return the inputs of a :meth:`state`."""
         *clock, x_d_ahead, x_meas = state
         inputs = cls.__new__(cls)
         inputs.clock, inputs._latched = SampleClock.from_state(clock), (x_d_ahead, x_meas)

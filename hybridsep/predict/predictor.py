@@ -1,8 +1,8 @@
-"""The linear hybrid model: predict a look-ahead window, then learn it; eqs. (2) to (6).
+"""Linear hybrid model: prediction of a look-ahead window, and learning from its measurement; eqs. (2) to (6).
 
 ``x_h(k) = x_pb(k) + wᵀφ(k)`` with ``φ(k) = [1, x_pb(k) … x_pb(k−q), e_pb(k−1) … e_pb(k−p)]`` and
-``e_pb = x − x_pb``. Inside a window the residuals that are not measured yet are their own predictions, so a window
-is one free run of an ARX recursion from the last ``p`` measured residuals, and stays affine in the command.
+``e_pb = x − x_pb``. Within a window, residuals not measured yet are replaced by their predictions: a free run of
+an ARX recursion from the last ``p`` measured residuals, affine in the command.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ __all__ = ["HybridPredictor"]
 
 
 class HybridPredictor:
-    """Predicts windows of a drive's position and learns from their measurement; eqs. (2) to (6).
+    """Predictor of a drive's position by windows, learning from their measurement; eqs. (2) to (6).
 
-    Call :meth:`predict` with the commands of the next window, then :meth:`update` with what was measured over it,
-    window after window. Predicting changes nothing that is learned. Memory and cost per window are constant.
+    For each window, call :meth:`predict` with its commands, then :meth:`update` with the measured positions.
+    :meth:`predict` does not change the weights. Memory and cost per window are constant.
 
     Parameters
     ----------
@@ -41,8 +41,8 @@ class HybridPredictor:
     settings : PredictorSettings, optional
         The defaults if left out.
     start : float, optional
-        Position, m, where the drive is at rest before the first sample; the first command if left out. All positions
-        are relative to it inside, because ridge regression is not invariant to an offset.
+        Initial position, m, at rest; the first command if left out. Positions are relative to it internally, because
+        ridge regression is not invariant to an offset.
     """
 
     def __init__(
@@ -60,28 +60,28 @@ class HybridPredictor:
 
     @property
     def n_features(self) -> int:
-        """``n``, of all groups of features."""
+        """Number of features ``n``."""
         return self.layout.n
 
     @property
     def residual_weights(self) -> Array:
-        """Weights of the past residuals, ``(p,)``: those of the learned recursion."""
+        """Autoregressive weights of the learned recursion, ``(p,)``."""
         return self.weights[self.layout.e_pb]
 
     @property
     def weights(self) -> Array:
-        """``w`` of eq. (6) from all measured windows, ``(n,)``."""
+        """``w`` of eq. (6) from all learned samples, ``(n,)``."""
         return self.regression.weights
 
     def restart(self, start: float | None = None, *, t_init: float = 0.0) -> None:
-        """Begin another run, at rest at ``start``, with what is learned kept (a warm start).
+        """Begin another run, at rest at ``start``; what was learned is kept (warm start).
 
         Parameters
         ----------
         start : float, optional
-            Where the drive rests, m; the first command if left out.
+            Initial position, m; the first command if left out.
         t_init : float
-            Warm-up of the new run, s; none unless asked for.
+            Warm-up of the new run, s; none by default.
         """
         rest = None if start is None else float(as_samples([start], "start")[0])
         self.n_init = samples_before(check("t_init", t_init), self.T_s)
@@ -90,10 +90,10 @@ class HybridPredictor:
         self.state = self.discrete.rest()
         self.past.restart()
         self.reference_features.restart()
-        self.waiting: PredictedWindow | None = None
+        self.pending: PredictedWindow | None = None
 
     def predict(self, x_d: ArrayLike, *, reference: ArrayLike | None = None) -> Prediction:
-        """Predict the next window from its commands and all that was measured before; eqs. (2), (4).
+        """Predict the next window from its commands and all earlier measurements; eqs. (2), (4).
 
         May be called again, with other commands or another length, before :meth:`update`; the last call counts.
 
@@ -102,8 +102,7 @@ class HybridPredictor:
         x_d : (n,) array_like, m
             Commanded positions of the next ``n ≥ 1`` samples; usually ``n = Np``.
         reference : (m,) array_like, m, optional
-            Commanded positions before a compensator modified them, ``m ≥ n``: of what follows the window too, as far
-            as it is known. ``x_d`` if left out.
+            Unmodified commanded positions, ``m ≥ n``, beyond the window as far as known; ``x_d`` if left out.
 
         Returns
         -------
@@ -125,12 +124,12 @@ class HybridPredictor:
         if len(path) < n:
             raise SignalError(f"reference must have at least the {n} samples of x_d, got {len(path)}")
         signs = self.reference_features.signs(path, start)
-        self.waiting = PredictedWindow(command, x_pb, start, path, signs)
+        self.pending = PredictedWindow(command, x_pb, start, path, signs)
         e_h = self._free_run(x_pb, self.reference_features.features(signs, n))
         return Prediction(x_pb + start, e_h, min(max(self.n_init - self.k, 0), n))
 
     def update(self, x: ArrayLike, *, learn: bool = True) -> None:
-        """Learn from the measurement of the predicted window, or of its beginning; eq. (6).
+        """Learn from the measurement of the predicted window, or of its first samples; eq. (6).
 
         Parameters
         ----------
@@ -144,39 +143,39 @@ class HybridPredictor:
         SignalError
             If nothing was predicted, ``x`` is longer than the window, or a value is not finite. Nothing is changed.
         """
-        waiting = self.waiting
-        if waiting is None:
+        pending = self.pending
+        if pending is None:
             raise SignalError("update must follow predict: there is no predicted window to measure")
         measured = as_samples(x, "x")
-        if not 1 <= len(measured) <= len(waiting.x_d):
-            raise SignalError(f"x must have 1 … {len(waiting.x_d)} samples, as predicted, got {len(measured)}")
+        if not 1 <= len(measured) <= len(pending.x_d):
+            raise SignalError(f"x must have 1 … {len(pending.x_d)} samples, as predicted, got {len(measured)}")
         m = len(measured)
-        e_pb = measured - waiting.start - waiting.x_pb[:m]
-        scheduled = self.reference_features.features(waiting.signs, m)
+        e_pb = measured - pending.start - pending.x_pb[:m]
+        from_reference = self.reference_features.features(pending.signs, m)
         for i in range(0, m, self.Np):
             stop = min(i + self.Np, m)
-            self._take_in(waiting.x_pb[i:stop], e_pb[i:stop], scheduled[i:stop], learn)
-        self.reference_features.advance(waiting.signs, waiting.reference, m)
-        _, self.state = self.discrete.forced_response(self.state, waiting.x_d[:m])
-        self.start = waiting.start
+            self._take_in(pending.x_pb[i:stop], e_pb[i:stop], from_reference[i:stop], learn)
+        self.reference_features.advance(pending.signs, pending.reference, m)
+        _, self.state = self.discrete.forced_response(self.state, pending.x_d[:m])
+        self.start = pending.start
         self.k += m
-        self.waiting = None
+        self.pending = None
 
     def operator(self, n: int | None = None, *, reference: ArrayLike | None = None) -> WindowOperator:
-        """Return the model of the next ``n`` samples (``Np`` if left out) as an affine map of their commands; eq. (3).
+        """Return the lifted prediction of the next ``n`` (default ``Np``) samples, affine in their commands; eq. (3).
 
-        It is the hybrid model whether or not the warm-up is over. ``reference``, ``(n,)``, m, is the path that the
-        reference-scheduled features follow from; a path at rest if left out.
+        It is the hybrid model, during the warm-up too. ``reference``, ``(n,)``, m, is the unmodified command, for the
+        features of the reference; at rest if left out.
 
         Raises
         ------
         SignalError
-            If ``n < 1``, or the start is not known yet: it is given, or follows from the first predicted window.
+            If ``n < 1``, or the initial position is neither given nor known from a predicted window.
         """
         length = self.Np if n is None else n
         if length < 1:
             raise SignalError(f"n must be ≥ 1, got {length}")
-        start = self.start if self.start is not None or self.waiting is None else self.waiting.start
+        start = self.start if self.start is not None or self.pending is None else self.pending.start
         if start is None:
             raise SignalError("the start is not known yet: give start= or predict the first window before")
         w_x, w_e = self.weights[self.layout.x_pb], self.residual_weights
@@ -186,8 +185,8 @@ class HybridPredictor:
         g_h = g_pb + lfilter(w_x, denominator, g_pb)
         free_pb, _ = self.discrete.forced_response(self.state, np.zeros(length))
         path = np.full(length, start) if reference is None else as_samples(reference, "reference", length)
-        scheduled = self.reference_features.features(self.reference_features.signs(path, start), length)
-        free = free_pb + self._free_run(free_pb, scheduled)
+        from_reference = self.reference_features.features(self.reference_features.signs(path, start), length)
+        free = free_pb + self._free_run(free_pb, from_reference)
         return WindowOperator(
             g_h=g_h,
             free=free + start * (1.0 - np.cumsum(g_h)),
@@ -197,20 +196,20 @@ class HybridPredictor:
 
     @property
     def n_pending(self) -> int:
-        """Samples of the predicted window that waits for its measurement; 0 if there is none."""
-        return 0 if self.waiting is None else len(self.waiting.x_d)
+        """Samples of the predicted window pending measurement; 0 if there is none."""
+        return 0 if self.pending is None else len(self.pending.x_d)
 
     def last_residual(self) -> float:
-        """Return the last measured residual ``e_pb``, m; what the hold baseline keeps over a window."""
+        """Return the last measured residual ``e_pb``, m, which the hold baseline holds over a window."""
         return float(self.past.e_pb[-1])
 
     def to_bytes(self) -> bytes:
-        """Return parameters and state, a window that waits for its measurement too, as a versioned blob."""
+        """Return parameters and state, a pending window included, as a versioned blob."""
         return predictor_blob(self)
 
     @classmethod
     def from_bytes(cls, blob: bytes) -> HybridPredictor:
-        """Return the predictor that :meth:`to_bytes` described.
+        """Return the predictor of :meth:`to_bytes`.
 
         Raises
         ------
@@ -220,7 +219,7 @@ class HybridPredictor:
         return predictor_from(cls, blob)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # Copies and pickles go through the saved state: the lags are views, which a plain copy would cut off.
+        # By the saved state: the lags are views, which a plain copy would detach.
         return HybridPredictor.from_bytes, (self.to_bytes(),)
 
     def save(self, path: str | Path) -> None:
@@ -231,7 +230,7 @@ class HybridPredictor:
 
     @classmethod
     def load(cls, path: str | Path) -> HybridPredictor:
-        """Read what :meth:`save` wrote; call :meth:`restart` on it to start a second run warm.
+        """Return the predictor of :meth:`save`; :meth:`restart` then begins a warm-started run.
 
         Raises
         ------
@@ -241,9 +240,9 @@ class HybridPredictor:
         return cls.from_bytes(Path(path).read_bytes())
 
     def _free_run(self, x_pb: Array, reference: Array) -> Array:
-        """Return ``wᵀφ`` over a window whose residuals are predicted as it goes, ``(n,)``; eq. (4)."""
+        """Return ``wᵀφ`` over a window in free run, ``(n,)``; eq. (4)."""
         w, layout, past = self.weights, self.layout, self.past
-        # What the command drives: w₀ + Σ_i w_x,i x_pb(k−i)
+        # Exogenous part: w₀ + Σ_i w_x,i x_pb(k−i), and the features of the reference
         drive = w[layout.bias] + np.convolve(np.concatenate((past.x_pb, x_pb)), w[layout.x_pb], "valid")
         if layout.n_reference:
             drive += reference @ w[layout.reference]
@@ -255,7 +254,7 @@ class HybridPredictor:
         return np.asarray(e_h)
 
     def _take_in(self, x_pb: Array, e_pb: Array, reference: Array, learn: bool) -> None:
-        """Make one stretch of at most ``Np`` measured samples the past, and learn it if it is to be learned."""
+        """Shift by at most ``Np`` measured samples, learning them if ``learn``."""
         m = len(e_pb)
         self.past.append(x_pb, e_pb)
         if learn:
@@ -263,5 +262,5 @@ class HybridPredictor:
         self.past.advance(m)
 
     def _learn(self, rows: Array) -> None:
-        """Fold rows ``[φ(k) | e_pb(k)]`` into the regression; where a guard may weigh, drop or replace them."""
+        """Update the regression with rows ``[φ(k) | e_pb(k)]``; the place for a guard that weighs or drops rows."""
         self.regression.update_stacked(rows)

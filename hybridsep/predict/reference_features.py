@@ -1,9 +1,8 @@
-"""Features of φ that follow from the reference alone: which way friction will push.
+"""Features of the reference, for friction that changes its sign with the commanded velocity.
 
-Friction changes its sign with the velocity. A model that is linear in the command cannot say so, but the reference, the
-commanded position before it is modified, is known in advance: ``ψ = tanh(v_d/v_friction)`` of its velocity, and of it
-some samples before and after, enter eq. (5) as further features. They are a part of the free response, so the model
-stays linear in what a compensator may change.
+A model that is linear in the command cannot describe that change, but the reference, the unmodified commanded position,
+is known in advance: ``ψ = tanh(v_d/v_friction)`` of its velocity, shifted by some samples to either side, extends φ of
+eq. (5). These features belong to the free response, so the model stays affine in the modified command.
 """
 
 from __future__ import annotations
@@ -15,23 +14,23 @@ from ..base.signals import Array
 __all__ = ["N_REFERENCE", "ReferenceFeatures"]
 
 _SHIFTS = (-40, -30, -20, -15, -10, -5, 0, 5, 10, 15, 20, 30, 40)
-"""Samples by which ψ is shifted in each feature: a reversal's effect is spread, and early where the model is late."""
+"""Shifts of ψ, samples: the drive spreads the effect of a reversal, and ψ leads where a model has too much delay."""
 
 _REACH = _SHIFTS[-1]
 
 _SCALE = 1e-3
-"""Factor of the features, m: with a penalty λ that fits the other features, friction up to this is hardly damped."""
+"""Scale of the features, m: friction errors up to this size are hardly damped by a λ that suits the other features."""
 
 N_REFERENCE = len(_SHIFTS)
 
 
 class ReferenceFeatures:
-    """Makes the features of the reference of consecutive windows.
+    """Features of the reference over consecutive windows.
 
     Parameters
     ----------
     v_friction : float
-        Velocity over which friction changes its sign, m/s; 0 for no features.
+        Velocity scale of the change of sign, m/s; 0 for no features.
     T_s : float
         Sampling interval, s.
     """
@@ -42,19 +41,19 @@ class ReferenceFeatures:
         self.restart()
 
     def restart(self) -> None:
-        """Begin at rest."""
+        """Reset to rest."""
         self.before = np.zeros(_REACH)
         self.last = np.nan
 
     def signs(self, reference: Array, start: float) -> Array:
-        """Return ψ from 40 samples before a window to 40 after what is known of the reference.
+        """Return ψ from 40 samples before a window to 40 after the known reference.
 
         Parameters
         ----------
         reference : (m,) array, m
-            Commanded positions of the window and what follows it; held at its end.
+            Commanded positions of the window and beyond; its last value is held.
         start : float
-            Position of rest, m, which counts as the sample before the first one.
+            Initial position, m, taken for the sample before the first one.
         """
         if not self.n:
             return np.zeros(0)
@@ -69,6 +68,6 @@ class ReferenceFeatures:
         return _SCALE * np.column_stack([signs[_REACH + shift : _REACH + shift + n] for shift in _SHIFTS])
 
     def advance(self, signs: Array, reference: Array, n: int) -> None:
-        """Move on by ``n`` samples of a window."""
+        """Advance by ``n`` samples of a window."""
         if self.n:
             self.before, self.last = signs[n : n + _REACH].copy(), float(reference[n - 1])

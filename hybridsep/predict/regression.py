@@ -2,10 +2,10 @@
 
 ``w(j) = argmin_w Σ_{k < j·Np} [e_pb(k) − wᵀφ(k)]² + λ‖w‖²``
 
-Neighbouring lags of a smooth position are nearly equal: the normal equations' condition number is the square of
-one that is already 1e6 to 1e12, and the textbook covariance update loses the weights or reaches NaN. Here the QR
-factor of all rows so far, ``[√λ·I; Φ] = Q R``, is updated by each batch of rows (Golub and Van Loan, *Matrix
-Computations*, 4th ed., section 6.5) with LAPACK's ``dtpqrt``: exact, of constant cost and of constant size.
+Neighbouring lags of a smooth position are nearly collinear: the condition number of Φ is 1e6 to 1e12, that of the
+normal equations its square, and the textbook covariance update loses the weights or reaches NaN. Here the QR factor of
+all rows so far, ``[√λ·I; Φ] = Q R``, is updated by each block of rows (Golub and Van Loan, *Matrix Computations*, 4th
+ed., section 6.5) with LAPACK's ``dtpqrt``: exact, of constant cost and of constant size.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from ..base.signals import Array, as_samples
 __all__ = ["RidgeRegression"]
 
 _COLUMNS_AT_ONCE = 8
-"""Block size of dtpqrt; measured fastest between 50 and 200 features."""
+"""Block size of dtpqrt, the fastest one measured for 50 to 200 features."""
 
 
 class RidgeRegression:
-    """Ridge regression over a stream of rows; eq. (6).
+    """Recursive ridge regression; eq. (6).
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class RidgeRegression:
 
     @property
     def weights(self) -> Array:
-        """``w = R⁻¹ z``, ``(n,)``, solved when first asked for after an update; not to be changed."""
+        """``w = R⁻¹ z``, ``(n,)``, read-only; solved on first access after an update."""
         if self._weights is None:
             n = self.n_features
             self._weights, _ = lapack.dtrtrs(self._factor[:n, :n], self._factor[:n, n])
@@ -73,14 +73,14 @@ class RidgeRegression:
         return float(self._factor[-1, -1] ** 2)
 
     def update(self, rows: ArrayLike, target: ArrayLike) -> None:
-        """Take in a batch of rows.
+        """Update with a block of rows.
 
         Parameters
         ----------
         rows : (m, n) array_like
-            Features φ, one row a sample.
+            Features φ, one row per sample.
         target : (m,) array_like
-            What ``wᵀφ`` should be.
+            Regressand, approximated by ``wᵀφ``.
 
         Raises
         ------
@@ -99,7 +99,7 @@ class RidgeRegression:
         self.update_stacked(stacked)
 
     def update_stacked(self, stacked: Array) -> None:
-        """Take in rows ``[Φ | target]`` that are known to be finite; they are overwritten.
+        """Update with rows ``[Φ | target]`` that are known to be finite; they are overwritten.
 
         Parameters
         ----------
@@ -115,18 +115,18 @@ class RidgeRegression:
             overwrite_a=1,
             overwrite_b=1,
         )
-        if info != 0:  # only an illegal argument, that is a fault of this file
+        if info != 0:  # an illegal argument, a fault of this module
             raise AssertionError(f"dtpqrt returned info = {info}")
         self.n_samples += len(stacked)
         self._weights = None
 
     def restore(self, factor: Array, n_samples: int) -> None:
-        """Take over a :attr:`factor` and the number of rows it was made of.
+        """Restore a :attr:`factor` and its number of rows.
 
         Raises
         ------
         SignalError
-            If the factor has another size, is not finite or not that of a solvable problem; nothing is changed then.
+            If the factor has another size, is not finite or singular; nothing is changed then.
         """
         if factor.shape != self._factor.shape:
             raise SignalError(f"the factor must have shape {self._factor.shape}, got {factor.shape}")

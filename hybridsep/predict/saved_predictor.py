@@ -1,4 +1,4 @@
-"""The saved state of a predictor: its parameters, what it has learned, and where its run stands."""
+"""Saved state of a predictor: parameters, learned factor, and state of the run."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ _KIND = "predictor"
 
 
 def predictor_blob(predictor: HybridPredictor) -> bytes:
-    """Return parameters and state, a window that waits for its measurement too, as a versioned blob."""
-    waiting, past, reference = predictor.waiting, predictor.past, predictor.reference_features
+    """Return parameters and state, a pending window included, as a versioned blob."""
+    pending, past, reference = predictor.pending, predictor.past, predictor.reference_features
     meta = {
         "settings": predictor.settings.as_table(),
         **{name: getattr(predictor, name) for name in ("k", "n_init", "start")},
         "dead_time": predictor.model.dead_time,
         "n_samples": predictor.regression.n_samples,
-        "pending_start": None if waiting is None else waiting.start,
+        "pending_start": None if pending is None else pending.start,
     }
     modes = np.array([[mode.f_n, mode.zeta, mode.alpha, mode.beta] for mode in predictor.model.modes])
     arrays = {
@@ -42,13 +42,13 @@ def predictor_blob(predictor: HybridPredictor) -> bytes:
         "signs": reference.before,
         "reference": np.array([reference.last]),
     }
-    if waiting is not None:
-        arrays |= {f"pending_{name}": getattr(waiting, name) for name in ("x_d", "x_pb", "reference", "signs")}
+    if pending is not None:
+        arrays |= {f"pending_{name}": getattr(pending, name) for name in ("x_d", "x_pb", "reference", "signs")}
     return pack(_KIND, meta, arrays)
 
 
 def predictor_from(kind: type[HybridPredictor], blob: bytes) -> HybridPredictor:
-    """Return the predictor that :func:`predictor_blob` described.
+    """Return the predictor of a :func:`predictor_blob`.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def predictor_from(kind: type[HybridPredictor], blob: bytes) -> HybridPredictor:
     saved = Saved(_KIND, *unpack(_KIND, blob))
     with saved.consistent():
         settings = PredictorSettings.from_table(saved.table("settings"))
-        # What is allocated follows from numbers that the arrays confirm first.
+        # Sizes are confirmed by the arrays before anything is allocated from them.
         n = FeatureLayout(settings.p, settings.q, N_REFERENCE if settings.v_friction > 0 else 0).n
         factor = saved.array("factor", n + 1, n + 1)
         model = ModalModel([Mode(*row) for row in saved.array("modes", None, 4).tolist()], saved.field("dead_time"))
@@ -75,7 +75,7 @@ def predictor_from(kind: type[HybridPredictor], blob: bytes) -> HybridPredictor:
     if start is not None:
         x_d, reference = saved.array("pending_x_d", None), saved.array("pending_reference", None)
         if not 0 < len(x_d) <= len(reference):
-            raise saved.error("the window that waits must have samples, and a reference at least as long")
+            raise saved.error("the pending window must have samples, and a reference at least as long")
         signs = saved.array("pending_signs", len(features.signs(reference, start)))
-        predictor.waiting = PredictedWindow(x_d, saved.array("pending_x_pb", len(x_d)), start, reference, signs)
+        predictor.pending = PredictedWindow(x_d, saved.array("pending_x_pb", len(x_d)), start, reference, signs)
     return predictor

@@ -1,4 +1,4 @@
-"""What is known of a window before it is measured: its prediction, and the affine map of its commands."""
+"""Look-ahead window: prediction, pending and published data, and its lifted affine operator."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ __all__ = ["PredictedWindow", "Prediction", "PublishedWindow", "WindowOperator"]
 
 @dataclass(frozen=True)
 class Prediction:
-    """What is predicted for one window, before any of it is measured.
+    """Prediction of one window.
 
     Attributes
     ----------
     x_pb : (n,) array, m
         Physics-based prediction, eq. (2).
     e_h : (n,) array, m
-        Predicted residual ``wᵀφ``, also while it is not published yet.
+        Predicted residual ``wᵀφ``, during the warm-up too.
     n_warm_up : int
-        Leading samples that still belong to the warm-up, where ``x_h = x_pb``.
+        Leading samples within the warm-up, where ``x_h = x_pb``.
     """
 
     x_pb: Array
@@ -49,18 +49,18 @@ class Prediction:
 
 @dataclass(frozen=True)
 class PredictedWindow:
-    """The last predicted window, which waits for its measurement.
+    """Predicted window pending measurement.
 
     Attributes
     ----------
     x_d, x_pb : (n,) arrays, m
-        Commands and what the physics model answers, relative to ``start``.
+        Commands and response of the physics model, relative to ``start``.
     start : float
-        Position of rest, m.
+        Initial position, m.
     reference : (≥ n,) array, m
-        Commanded positions before a compensator modified them.
+        Unmodified commanded positions.
     signs : array
-        What the features of the reference are made from.
+        ψ of the reference.
     """
 
     x_d: Array
@@ -72,16 +72,16 @@ class PredictedWindow:
 
 @dataclass(frozen=True)
 class PublishedWindow:
-    """What is sent to the drive over a window, and what it will do.
+    """Commands of a window and the position predicted under them.
 
     Attributes
     ----------
     x_d, x_dm : (Np,) arrays, m
-        Commanded position, and the command that the drive gets: the same unless a planner modifies it.
+        Commanded position, and the modified command sent to the drive; the same without a planner.
     x_pb, x_h : (Np,) arrays, m
-        Physics-based prediction under ``x_dm``, and that of the best model there is.
+        Physics-based prediction under ``x_dm``, and that of the best available model.
     state : int
-        What a planner planned it with (:class:`~hybridsep.compensate.plan.SepState`); 0 without one.
+        Model that planned it (:class:`~hybridsep.compensate.plan.SepState`); 0 without a planner.
     n_warm_up : int
         Leading samples where ``x_h = x_pb``.
     """
@@ -97,13 +97,13 @@ class PublishedWindow:
 
     @classmethod
     def at_rest(cls, start: float, Np: int) -> PublishedWindow:
-        """Return a window of a drive that rests at ``start``, m, in which nothing is predicted."""
+        """Return the window of a drive at rest at ``start``, m, without a prediction."""
         rest = np.full(Np, start)
         return cls(rest, rest, rest, rest, 0, Np)
 
     @classmethod
     def of_prediction(cls, x_d: Array, prediction: Prediction) -> PublishedWindow:
-        """Return the window of commands that are sent as they are; SignalError if its prediction diverges."""
+        """Return the window of unmodified commands; SignalError if its prediction diverges."""
         return cls(x_d, x_d, prediction.x_pb, prediction.x_h, 0, prediction.n_warm_up)
 
 
@@ -118,7 +118,7 @@ class WindowOperator:
     g_h, g_pb : (n,) array, m/m
         First columns of ``G_h`` and ``G_pb``.
     free, free_pb : (n,) array, m
-        Responses to the past: what follows if every command of the window were 0.
+        Free responses, to zero commands over the window.
     """
 
     g_h: Array

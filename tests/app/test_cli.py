@@ -14,7 +14,9 @@ from staircase_data import commanded
 
 from hybridsep import Encoder, __version__, cosimulate, load_machine, staircase
 from hybridsep.app.parameter_options import PREDICTOR_ENTRIES
+from hybridsep.base.data_files import data_folder
 from hybridsep.base.settings import PARAMETERS
+from hybridsep.evaluate.backtest import backtest
 
 
 def test_backtest_of_a_csv(hybridsep: Run, tmp_path: Path) -> None:
@@ -40,6 +42,26 @@ def test_backtest_takes_units_columns_and_parameters(hybridsep: Run, tmp_path: P
     status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--json", *names, *sizes)
     assert status == 0
     assert json.loads(out)["n_batches"] == 50
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".npz"])
+def test_backtest_of_what_cosim_writes(hybridsep: Run, tmp_path: Path, suffix: str) -> None:
+    """The measured position counts, not the true one beside it, unless it is asked for."""
+    machine = load_machine("spring_mass_damper")
+    run = cosimulate(machine.new_predictor(), machine.new_plant(), commanded()[:800], encoder=Encoder(5e-6, 0))
+    run.save(tmp_path / f"run{suffix}")
+    for options, x in (((), run.x_meas), (("--x", "x"), run.x), (("--x", "x_meas"), run.x_meas)):
+        status, out, _ = hybridsep("backtest", tmp_path / f"run{suffix}", "-m", machine.name, "--json", *options)
+        expected = backtest(machine.new_predictor(), run.x_d, x).summary()
+        assert status == 0
+        assert json.loads(out)["rms_h_um"] == pytest.approx(expected["rms_h_um"], rel=1e-6)
+    named = tmp_path / "machine.toml"
+    text = (data_folder("models") / "spring_mass_damper.toml").read_text(encoding="utf-8")
+    named.write_text(text + '\n[log]\nx = "x"\n', encoding="utf-8")
+    status, out, _ = hybridsep("backtest", tmp_path / f"run{suffix}", "-m", named, "--json")
+    true = backtest(machine.new_predictor(), run.x_d, run.x).summary()
+    assert (status, json.loads(out)["rms_h_um"]) == (0, pytest.approx(true["rms_h_um"], rel=1e-6))
+    assert true["rms_h_um"] != pytest.approx(expected["rms_h_um"], rel=1e-3)
 
 
 @pytest.mark.skipif(not EMPS.exists(), reason="needs ../shared/data/emps beside the repository")

@@ -64,9 +64,9 @@ def deep_header(n: int) -> bytes:
     ("old", "new", "message"),
     [
         ("T_s = 0.001", f"T_s = {DIGITS}", "is not valid TOML: Exceeds the limit (4300"),
-        ("T_s = 0.001", f"T_s = 0x{'f' * 5000}", "T_s must be a number, got something of type int that is too long"),
+        ("T_s = 0.001", f"T_s = 0x{'f' * 5000}", "T_s must be a number, got a value of type int that is too long"),
         ("T_s = 0.001", f"T_s = {'[' * 5000}{']' * 5000}", "is not valid TOML: "),
-        ("T_s = 0.001", f"T_s{'.a' * 5000} = 1", "T_s must be a number, got something of type dict that is too long"),
+        ("T_s = 0.001", f"T_s{'.a' * 5000} = 1", "T_s must be a number, got a value of type dict that is too long"),
         ("T_s = 0.001", "T_s = 1e-300", ""),
         ("T_s = 0.001", "T_s = 5e-324", ""),
         ('title = "An axis"', f"title{'.a' * 5000} = 1", "title: "),

@@ -23,13 +23,13 @@ NP, V_S = 8, 2e-3
 class Features(ctypes.Structure):
     """hsep_features."""
 
-    _fields_ = tuple((name, ctypes.c_uint64) for name in ("p", "q", "x", "e", "scheduled", "n"))
+    _fields_ = tuple((name, ctypes.c_uint64) for name in ("p", "q", "x", "e", "reference", "n"))
 
 
-def layout(p: int, q: int, n_scheduled: int) -> Features:
+def layout(p: int, q: int, n_reference: int) -> Features:
     features = Features()
     c_core.library("predictor").hsep_features_lay_out(
-        ctypes.byref(features), *map(ctypes.c_uint64, (p, q, n_scheduled))
+        ctypes.byref(features), *map(ctypes.c_uint64, (p, q, n_reference))
     )
     return features
 
@@ -58,16 +58,16 @@ def test_a_row_of_the_library_has_the_slices_of_the_core(
     for k, row in enumerate(learned[-1], start=2 * NP):
         assert row[0] == 1.0
         assert row[features.x : features.e] == pytest.approx(x_pb[k - q : k + 1][::-1], abs=1e-15)
-        assert row[features.e : features.scheduled] == pytest.approx(e_pb[k - p : k][::-1], abs=1e-15)
-        assert np.all(np.abs(row[features.scheduled : features.n]) <= 1e-3)
+        assert row[features.e : features.reference] == pytest.approx(e_pb[k - p : k][::-1], abs=1e-15)
+        assert np.all(np.abs(row[features.reference : features.n]) <= 1e-3)
         assert row[features.n] == pytest.approx(e_pb[k], abs=1e-15)
-    assert features.n - features.scheduled == (N_REFERENCE if v_friction else 0)
-    assert np.any(learned[-1][:, features.scheduled : features.n]) == bool(v_friction)
+    assert features.n - features.reference == (N_REFERENCE if v_friction else 0)
+    assert np.any(learned[-1][:, features.reference : features.n]) == bool(v_friction)
 
 
 @pytest.mark.parametrize(("p", "q", "n_reference"), [(1, 0, 0), (50, 3, 0), (50, 40, N_REFERENCE)])
 def test_both_layouts_are_the_same(p: int, q: int, n_reference: int) -> None:
     core, library = layout(p, q, n_reference), FeatureLayout(p, q, n_reference)
     assert (core.p, core.q, core.n) == (library.p, library.q, library.n)
-    assert (slice(core.x, core.e), slice(core.e, core.scheduled)) == (library.x_pb, library.e_pb)
-    assert slice(core.scheduled, core.n) == library.reference
+    assert (slice(core.x, core.e), slice(core.e, core.reference)) == (library.x_pb, library.e_pb)
+    assert slice(core.reference, core.n) == library.reference

@@ -57,7 +57,7 @@ class CPhysics:
     def forced_response(self, x_d: Array) -> Array:
         x_pb = np.empty_like(x_d)
         pointers = (x_d.ctypes.data_as(ctypes.c_void_p), x_pb.ctypes.data_as(ctypes.c_void_p))
-        self.library.hsep_physics_respond(self._block, *pointers, ctypes.c_size_t(len(x_d)))
+        self.library.hsep_physics_forced_response(self._block, *pointers, ctypes.c_size_t(len(x_d)))
         return x_pb
 
 

@@ -49,7 +49,7 @@ def test_foreign_truncated_and_damaged_states_are_refused(name: str, tmp_path: P
             "stage_drive": 32 + 24 + 24 + 56 + 24,
             "trajectory": 32 + 56,
         }[name]
-        with pytest.raises(RefusedError, match="does not hold together"):
+        with pytest.raises(RefusedError, match="the state is inconsistent: it is damaged"):
             model.check_state(blob[:middle] + struct.pack("<Q", 2**60) + blob[middle + 8 :])
 
 

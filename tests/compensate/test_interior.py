@@ -8,7 +8,7 @@ from bounded_oracle import clarabel_minimum
 from numpy.typing import NDArray
 from random_loops import random_loop, run_library
 
-from hybridsep.compensate import bounded as _bounded
+from hybridsep.compensate import constraints as _constraints
 from hybridsep.compensate.interior import PRIMAL_RESIDUAL, minimise
 
 Array = NDArray[np.float64]
@@ -25,7 +25,7 @@ def problems_of(monkeypatch: pytest.MonkeyPatch, seed: int, n: int, **fixed: flo
         found.append((problem, x))
         return x
 
-    monkeypatch.setattr(_bounded, "minimise", spy)
+    monkeypatch.setattr(_constraints, "minimise", spy)
     run_library(random_loop(seed, n, "spring_mass_damper", **fixed))
     return found  # type: ignore[return-value]
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from hybridsep.base.settings import Limits
 from hybridsep.base.signals import Array
-from hybridsep.compensate.bounded import DriveBounds
+from hybridsep.compensate.constraints import DriveBounds
 from hybridsep.compensate.splines import N_DECIDED, SplineBasis
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.machine import load_machine

@@ -17,8 +17,8 @@ from staircase_data import commanded
 
 from hybridsep.base.settings import Limits
 from hybridsep.base.signals import Array
-from hybridsep.compensate.bounded import Bounds, DriveBounds, solve
 from hybridsep.compensate.compensator import SepState, direct_samples
+from hybridsep.compensate.constraints import Bounds, DriveBounds, solve
 from hybridsep.compensate.splines import N_DECIDED, PlanCost, SplineBasis
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.plants.encoder import Encoder

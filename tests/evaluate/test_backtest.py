@@ -60,7 +60,7 @@ def rms(error: Array) -> float:
 
 
 def test_recorded_axis(emps: Log) -> None:
-    summary = backtest(emps_predictor(), emps.x_d, emps.x).summary()
+    summary = backtest(emps_predictor(), emps.x_d, emps.x_meas).summary()
     assert summary["rms_pb_um"] == pytest.approx(15.45, abs=0.05)
     assert summary["rms_hold_um"] == pytest.approx(5.93, abs=0.05)
     assert summary["rms_h_um"] <= 5.55
@@ -70,7 +70,7 @@ def test_recorded_axis(emps: Log) -> None:
 
 
 def test_recorded_axis_from_the_file_in_chunks(emps: Log) -> None:
-    whole = backtest(emps_predictor(), emps.x_d, emps.x)
+    whole = backtest(emps_predictor(), emps.x_d, emps.x_meas)
     streamed = backtest_stream(emps_predictor(), open_log(EMPS, columns=EMPS_COLUMNS).chunks(777))
     assert streamed.summary() == whole.summary()
 

@@ -21,7 +21,7 @@ def test_every_format_gives_the_same_log(tmp_path: Path, suffix: str) -> None:
     log = read_log(write(tmp_path / f"log{suffix}", data))
     np.testing.assert_array_equal(log.t, data["t"])
     np.testing.assert_array_equal(log.x_d, data["x_d"])
-    np.testing.assert_array_equal(log.x, data["x"])
+    np.testing.assert_array_equal(log.x_meas, data["x"])
     assert log.T_s == 1e-3
     assert log.path == tmp_path / f"log{suffix}"
 
@@ -45,14 +45,14 @@ def test_named_columns_unit_and_ts(tmp_path: Path, suffix: str) -> None:
     path = write(tmp_path / f"log{suffix}", {"extra": data["t"], "qg": data["x_d"] * 1e3, "qm": data["x"] * 1e3})
     log = read_log(path, columns={"x_d": "qg", "x": "qm"}, unit="mm", T_s=2e-3)
     np.testing.assert_allclose(log.x_d, data["x_d"], rtol=1e-15)
-    np.testing.assert_allclose(log.x, data["x"], rtol=1e-15)
+    np.testing.assert_allclose(log.x_meas, data["x"], rtol=1e-15)
     np.testing.assert_array_equal(log.t, np.arange(50) * 2e-3)
     assert log.T_s == 2e-3
 
 
 def test_micrometres(tmp_path: Path) -> None:
     path = write_csv(tmp_path / "log.csv", "x_d,x\n1,2\n3,4\n")
-    np.testing.assert_allclose(read_log(path, unit="um", T_s=1.0).x, [2e-6, 4e-6])
+    np.testing.assert_allclose(read_log(path, unit="um", T_s=1.0).x_meas, [2e-6, 4e-6])
 
 
 @pytest.mark.parametrize(
@@ -74,7 +74,7 @@ def test_micrometres(tmp_path: Path) -> None:
 )
 def test_spellings_of_csv(tmp_path: Path, text: str) -> None:
     log = read_log(write_csv(tmp_path / "log.csv", text))
-    assert (log.t.tolist(), log.x_d.tolist(), log.x.tolist(), log.T_s) == ([0, 1], [1, 3], [2, 4], 1.0)
+    assert (log.t.tolist(), log.x_d.tolist(), log.x_meas.tolist(), log.T_s) == ([0, 1], [1, 3], [2, 4], 1.0)
 
 
 @pytest.mark.parametrize("suffix", [".npz", ".mat"])
@@ -89,7 +89,28 @@ def test_types_and_orientations(tmp_path: Path, suffix: str, dtype: str, shape: 
 
 def test_compressed_npz(tmp_path: Path) -> None:
     np.savez_compressed(tmp_path / "log.npz", **columns())
-    assert len(read_log(tmp_path / "log.npz").x) == 50
+    assert len(read_log(tmp_path / "log.npz").x_meas) == 50
+
+
+@FORMATS
+@pytest.mark.parametrize(
+    ("measured", "names", "read"),
+    [
+        (("x",), {}, "x"),
+        (("x_meas",), {}, "x_meas"),
+        (("x", "x_meas"), {}, "x_meas"),
+        (("x_meas", "x"), {}, "x_meas"),
+        (("x", "x_meas"), {"x": "x"}, "x"),
+        (("x_meas", "x_enc"), {"x": "x_enc"}, "x_enc"),
+    ],
+)
+def test_which_column_is_the_measured_position(
+    tmp_path: Path, suffix: str, measured: tuple[str, ...], names: dict[str, str], read: str
+) -> None:
+    """Where the true position is x and the measured one x_meas, the latter is meant unless a name is given."""
+    data = {name: columns()[name] for name in ("t", "x_d")} | {name: np.full(50, float(len(name))) for name in measured}
+    path = write(tmp_path / f"log{suffix}", data)
+    np.testing.assert_array_equal(read_log(path, columns=names).x_meas, np.full(50, float(len(read))))
 
 
 # The time axis
@@ -127,5 +148,5 @@ def test_recorded_axis() -> None:
     if not EMPS.is_file():
         pytest.skip("the recorded axis is not here: ../shared/data/emps/DATA_EMPS.mat, beside the repository")
     log = read_log(EMPS, columns={"t": "t", "x_d": "qg", "x": "qm"})
-    assert (len(log.x), log.T_s) == (24_841, 1e-3)
-    assert 1e6 * np.sqrt(np.mean((log.x_d - log.x) ** 2)) == pytest.approx(577.8, abs=0.1)
+    assert (len(log.x_meas), log.T_s) == (24_841, 1e-3)
+    assert 1e6 * np.sqrt(np.mean((log.x_d - log.x_meas) ** 2)) == pytest.approx(577.8, abs=0.1)

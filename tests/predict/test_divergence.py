@@ -15,7 +15,7 @@ from hybridsep.evaluate.backtest import backtest
 from hybridsep.predict.look_ahead import LookAhead
 from hybridsep.predict.window import Prediction
 
-SAID = "x_h must stay within ±1e+100 m: what was learned makes it diverge; raise lambda, lower p or restart"
+SAID = "x_h must stay within ±1e+100 m: the learned recursion diverges; raise lambda, lower p or reset"
 
 
 def test_the_warm_up_hides_what_diverges() -> None:
@@ -53,7 +53,7 @@ def test_a_restored_state_shows_no_output_that_is_not_finite(offset: int) -> Non
         changed[windows[-1]] = value
         if offset == 0:
             model.check_state(model.state.tobytes())
-        with pytest.raises(c_core.RefusedError, match="does not hold together"):
+        with pytest.raises(c_core.RefusedError, match="the state is inconsistent: it is damaged"):
             model.check_state(changed.tobytes())
 
 
@@ -89,9 +89,9 @@ def test_whatever_a_state_holds_outputs_are_finite(name: str) -> None:
                 ends["finite"] += 1
             except c_core.RefusedError as refused:
                 said = str(refused)
-                damaged = any(text in said for text in ("hold together", "other parameters", "another", "version"))
+                damaged = any(text in said for text in ("is inconsistent", "other parameters", "another", "version"))
                 diverges = any(
-                    text in said for text in ("must stay within", "range of numbers", "as fast as", "communication")
+                    text in said for text in ("must stay within", "overflowed", "as fast as", "communication")
                 )
                 ends["damaged" if damaged else "diverges" if diverges else said] += 1
     assert ends.keys() <= {"finite", "damaged", "diverges"}

@@ -236,7 +236,7 @@ REFUSED = [
     ("spring_mass_damper", "m", "5e-324", "physics.spring_mass_damper.m: m must be "),
     ("spring_mass_damper", "c", "1e308", "physics.spring_mass_damper.c: c must be "),
     ("spring_mass_damper", "k", "1e15", "sqrt(k/m) and c/m must be at most 100000 1/s, got 3.16228e+07; lower k or c"),
-    ("spring_mass_damper", "k", "1e-6", "make no drive: f_n must be 0.001 … 100000 Hz, got 0.000159"),
+    ("spring_mass_damper", "k", "1e-6", "give a mode out of range: f_n must be 0.001 … 100000 Hz, got 0.000159"),
     ("spring_mass_damper", "k_nl", "1e300", "plant.k_nl: k_nl must be 0 … 1e+15 N/m2"),
     ("spring_mass_damper", "T_s", "1e-300", "T_s must be 1e-05 … 1 s, got 1e-300"),
     ("spring_mass_damper", "velocity", "1e-300", "limits.velocity: velocity must be 1e-09 … 10000 m/s, got 1e-300"),

@@ -1,4 +1,4 @@
-"""The predictor with reference-scheduled features: truth, operator, states, refusals."""
+"""The predictor with features of the reference: truth, operator, states, refusals."""
 
 from __future__ import annotations
 
@@ -51,14 +51,14 @@ def signals() -> tuple[Array, Array, Array]:
 
 
 def follow(
-    predictor: HybridPredictor, first: int, last: int, *, n: int = 20, ahead: int = 700, scheduled: bool = True
+    predictor: HybridPredictor, first: int, last: int, *, n: int = 20, ahead: int = 700, with_reference: bool = True
 ) -> Array:
     """Predict and measure samples ``first … last − 1`` in windows of ``n``; return x_h."""
     r, x_d, x = signals()
     found = []
     for k in range(first, last, n):
         stop = min(k + n, last)
-        reference = r[k : min(stop + ahead, len(r))] if scheduled else None
+        reference = r[k : min(stop + ahead, len(r))] if with_reference else None
         found.append(predictor.predict(x_d[k:stop], reference=reference).x_h)
         predictor.update(x[k:stop])
     return np.concatenate(found)
@@ -74,8 +74,8 @@ def test_weights_are_the_directly_solved_ridge_problem(ahead: int) -> None:
     x_pb = oracle.physics(*oracle.transfer_function(MODES), (x_d[:600] - start).tolist(), T_s=TS)
     e_pb = (x[:600] - start - np.array(x_pb)).tolist()
     rows = np.array([oracle.features(x_pb, e_pb, k, 5, 3) for k in range(600)])
-    scheduled = [formula(r.tolist(), start, k, 20, min(k + 20 + ahead, 700)) for k in range(0, 600, 20)]
-    rows = np.column_stack((rows, np.concatenate(scheduled)))
+    psi = [formula(r.tolist(), start, k, 20, min(k + 20 + ahead, 700)) for k in range(0, 600, 20)]
+    rows = np.column_stack((rows, np.concatenate(psi)))
     exact = oracle.ridge_extended(rows, np.array(e_pb), predictor.settings.lam).astype(np.float64)
     assert predictor.n_features == len(exact) == 2 + 3 + 5 + N_REFERENCE
     assert np.linalg.norm(predictor.weights - exact) <= 1e-9 * np.linalg.norm(exact)
@@ -144,7 +144,7 @@ def test_the_command_is_its_own_reference_unless_another_is_given() -> None:
 def test_the_features_of_the_paper_know_no_reference() -> None:
     first, second = small(v_friction=0.0), small(v_friction=0.0)
     assert first.n_features == 2 + 3 + 5
-    np.testing.assert_array_equal(follow(first, 0, 300), follow(second, 0, 300, scheduled=False))
+    np.testing.assert_array_equal(follow(first, 0, 300), follow(second, 0, 300, with_reference=False))
     np.testing.assert_array_equal(first.weights, second.weights)
     np.testing.assert_array_equal(first.residual_weights, first.weights[5:])
 

@@ -1,4 +1,4 @@
-"""Reference-scheduled features against their formula."""
+"""Features of the reference against their formula."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from hybridsep.base.signals import Array
 from hybridsep.predict.reference_features import ReferenceFeatures
 
 
-def windows(schedule: ReferenceFeatures, path: Array, start: float, lengths: Sequence[int], ahead: int) -> list[Array]:
+def windows(features: ReferenceFeatures, path: Array, start: float, lengths: Sequence[int], ahead: int) -> list[Array]:
     """Return the features of consecutive windows, of each of which ``ahead`` more samples of the path are known."""
     found, first = [], 0
     for n in lengths:
         known = path[first : first + n + ahead]
-        signs = schedule.signs(known, start)
-        found.append(schedule.features(signs, n))
-        schedule.advance(signs, known, n)
+        signs = features.signs(known, start)
+        found.append(features.features(signs, n))
+        features.advance(signs, known, n)
         first += n
     return found
 
@@ -52,10 +52,10 @@ def test_how_windows_are_cut_changes_nothing_where_the_same_is_known(cuts: list[
 
 
 def test_a_new_run_begins_at_rest() -> None:
-    schedule, path = ReferenceFeatures(V_S, TS), reversing(100, 0.1)
-    (before,) = windows(schedule, path, 0.1, [100], 0)
-    schedule.restart()
-    np.testing.assert_array_equal(windows(schedule, path, 0.1, [100], 0)[0], before)
+    features, path = ReferenceFeatures(V_S, TS), reversing(100, 0.1)
+    (before,) = windows(features, path, 0.1, [100], 0)
+    features.restart()
+    np.testing.assert_array_equal(windows(features, path, 0.1, [100], 0)[0], before)
     assert not windows(ReferenceFeatures(V_S, TS), np.full(100, 0.1), 0.1, [100], 0)[0].any()
 
 

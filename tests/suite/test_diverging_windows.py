@@ -13,7 +13,7 @@ from streams import StreamMaker, on_all
 
 from hybridsep.fmi.weights import weights_file
 
-SAID = re.escape("x_h must stay within ±1e+100 m: what was learned makes it diverge; raise lambda, lower p or restart")
+SAID = re.escape("x_h must stay within ±1e+100 m: the learned recursion diverges; raise lambda, lower p or reset")
 
 
 @on_all((PREDICTOR,))

@@ -65,8 +65,8 @@ def test_any_start_time_gives_the_same(new_stream: StreamMaker) -> None:
 @pytest.mark.parametrize(
     ("start", "message"),
     [
-        (1e13, "small enough to count samples of T_s = 0.001 s from, got 1e+13 s"),
-        (-1e300, "small enough to count samples of T_s = 0.001 s from, got -1e+300 s"),
+        (1e13, "small enough to resolve samples of T_s = 0.001 s, got 1e+13 s"),
+        (-1e300, "small enough to resolve samples of T_s = 0.001 s, got -1e+300 s"),
         *((start, "ime must be finite") for start in (math.inf, -math.inf, math.nan)),
     ],
 )

@@ -125,7 +125,7 @@ def test_one_warning_where_an_instant_is_no_communication_point(new_stream: Stre
         stream.step(i * 8e-3, 8e-3)
     warnings = stream.warnings()
     assert len(warnings) == (3 if (new_stream.implementation, "one warning") in CANNOT else 1)
-    assert "the step from 0 s by 0.008 s passes instants of T_s = 0.001 s" in warnings[0]
+    assert "the step from 0 s by 0.008 s contains sampling instants of T_s = 0.001 s" in warnings[0]
     assert "x_meas is read up to 0.007 s late" in warnings[0]
 
 

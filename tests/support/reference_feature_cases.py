@@ -1,4 +1,4 @@
-"""The formula of the scheduled features, and paths for it."""
+"""The formula of the features of the reference, and paths for it."""
 
 from __future__ import annotations
 

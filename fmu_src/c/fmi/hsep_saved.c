@@ -141,7 +141,8 @@ static const char *saved_fault(const hsep_instance *instance, const hsep_saved *
     const uint32_t phase = header.experiment.phase;
     if (phase != HSEP_STEPPING && phase != HSEP_TERMINATED) {
         const int known = phase == HSEP_INSTANTIATED || phase == HSEP_INITIALIZATION;
-        return known && header.state_size == 0 ? NULL : "it does not hold together";
+        return known && header.state_size == 0 ? NULL
+                                               : "it is inconsistent: its phase is unknown or has no model state";
     }
     if (hsep_model_size(&instance->context, values, &state_size, message) != HSEP_OK) {
         return message;

@@ -1,6 +1,6 @@
-/* The complete state of an instance as one block of bytes: saved, restored, serialised by copying it.
+/* Complete state of an instance as one block of bytes, saved, restored and serialised by copying.
  *
- * header | values, HSEP_N_VALUES doubles | the model's state, as hsep_model_size tells
+ * header | values, HSEP_N_VALUES doubles | the model's state, of hsep_model_size
  *
  * Numbers are in the machine's own representation; a serialised block of another byte order is refused, as is one of
  * another FMU (GUID), another version, another length or with a single bit changed (FNV-1a). What fails returns

@@ -1,4 +1,4 @@
-/* From the URI of an FMU's resources to a folder that fopen understands. */
+/* Conversion of the URI of an FMU's resources to a path for fopen. */
 #ifndef HSEP_URI_H
 #define HSEP_URI_H
 

@@ -124,7 +124,7 @@ fmi2Status fmi2GetDirectionalDerivative(
     return hsep_unsupported(c, HSEP_CALL_GET_DIRECTIONAL_DERIVATIVE, "providesDirectionalDerivative is false");
 }
 
-/* What a slave whose steps are never pending knows of its status: the time it reached and that it has not ended. */
+/* Status of a slave whose steps are never pending: the last communication point, and that it has not terminated. */
 
 /* The status of an answer: fmi2OK with the instance if it is known, and there is a place for it. */
 static fmi2Status hsep_answer(fmi2Component c, hsep_call call, const void *value, int known, hsep_instance **instance)
@@ -138,7 +138,7 @@ static fmi2Status hsep_answer(fmi2Component c, hsep_call call, const void *value
     }
     if (!known) {
         hsep_log(
-            *instance, HSEP_LOG_DISCARD, "%s: there is nothing of this kind to tell, no step is ever pending",
+            *instance, HSEP_LOG_DISCARD, "%s: this status does not exist, because no step is ever pending",
             hsep_calls[call].name);
         return fmi2Discard;
     }

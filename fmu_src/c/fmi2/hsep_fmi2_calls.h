@@ -1,4 +1,4 @@
-/* Which FMI 2.0 call is legal in which state of an instance: the standard's table of the co-simulation state machine.
+/* Legal FMI 2.0 calls in each state of an instance: the standard's table of the co-simulation state machine.
  *
  * Steps are done when fmi2DoStep returns, so the standard's stepInProgress and stepCanceled never occur. A call that is
  * refused (fmi2Error) changes nothing, not even the state of the instance: the importer may free, reset or restore it,

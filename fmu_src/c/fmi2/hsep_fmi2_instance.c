@@ -1,4 +1,4 @@
-/* The life of an instance: instantiation, reset, end. */
+/* Instantiation, reset and release of an instance. */
 #include "hsep_fmi2_instance.h"
 
 #include <stdlib.h>

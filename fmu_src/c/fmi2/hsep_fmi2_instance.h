@@ -1,4 +1,4 @@
-/* An FMI 2.0 instance and how it speaks to the importer. */
+/* FMI 2.0 instance, its log categories and messages. */
 #ifndef HSEP_FMI2_INSTANCE_H
 #define HSEP_FMI2_INSTANCE_H
 

@@ -120,8 +120,7 @@ HSEP_API hsep_status hsep_check_divergence(hsep_divergence divergence, char mess
     message[0] = '\0'; /* a warning of the step no longer matters */
     hsep_message_add(
         message,
-        "%s must stay within " HSEP_PLUS_MINUS "%g m: what was learned makes it diverge; raise lambda, lower p or "
-        "restart",
+        "%s must stay within " HSEP_PLUS_MINUS "%g m: the learned recursion diverges; raise lambda, lower p or reset",
         names[divergence], HSEP_PREDICTION_MAX);
     return HSEP_REFUSED;
 }
@@ -159,7 +158,7 @@ HSEP_API hsep_status hsep_check_clock(hsep_clock *clock, double t_start, double 
     }
     if (!hsep_clock_init(clock, t_start, T_s)) {
         hsep_message_add(
-            message, "the start time must be small enough to count samples of T_s = %g s from, got %g s", T_s, t_start);
+            message, "the start time must be small enough to resolve samples of T_s = %g s, got %g s", T_s, t_start);
         return HSEP_REFUSED;
     }
     return HSEP_OK;

@@ -44,11 +44,10 @@ HSEP_API double hsep_drive_first_measurement(double noise_std, double seed, doub
     return isfinite(measured) ? measured : x;
 }
 
-HSEP_API hsep_status hsep_drive_lost(double x, double x_d, char message[])
+HSEP_API hsep_status hsep_drive_overflowed(double x, double x_d, char message[])
 {
     char number[HSEP_NUMBER_SIZE];
     hsep_message_add(
-        message, "the drive's state left the range of numbers (x = %s, command %g m)",
-        hsep_number(number, x, HSEP_REAL), x_d);
+        message, "the drive's state overflowed (x = %s, command %g m)", hsep_number(number, x, HSEP_REAL), x_d);
     return HSEP_REFUSED;
 }

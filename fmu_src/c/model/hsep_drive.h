@@ -1,4 +1,4 @@
-/* What the models of the drives share: their checks and their measured output. */
+/* Checks and measured output, shared by the models of the drives. */
 #ifndef HSEP_DRIVE_H
 #define HSEP_DRIVE_H
 
@@ -16,7 +16,7 @@ HSEP_API hsep_status hsep_drive_check_start(double x_d, char message[]);
 /* The first measurement of a drive at rest at x, m; x itself if noise_std or seed is out of range. */
 HSEP_API double hsep_drive_first_measurement(double noise_std, double seed, double x);
 
-/* Refuse a step that led out of the range of numbers, to the position x, m. */
-HSEP_API hsep_status hsep_drive_lost(double x, double x_d, char message[]);
+/* Refuse a step in which the state overflowed, at the position x, m. */
+HSEP_API hsep_status hsep_drive_overflowed(double x, double x_d, char message[]);
 
 #endif

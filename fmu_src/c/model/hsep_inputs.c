@@ -50,7 +50,8 @@ HSEP_API hsep_status hsep_inputs_count(
     if (step->counted.inside) {
         hsep_message_add(
             message,
-            "the step from %.9g s by %.9g s passes instants of T_s = %g s between its ends: x_meas is read up to "
+            "the step from %.9g s by %.9g s contains sampling instants of T_s = %g s between its ends: x_meas is read "
+            "up to "
             "%g s late, so a closed loop needs steps of T_s",
             t, h, self->clock.T_s, fmin(after[1], h));
         return HSEP_WARNED;

@@ -1,4 +1,4 @@
-/* The inputs of a look-ahead and when they count: latched at the instants that lie in a step, executed in the step that
+/* Sampling of a look-ahead's inputs: latched at the instants within a communication step, executed in the step that
  * reaches the next instant. Plain data; reentrant.
  *
  *     if (hsep_inputs_count(&inputs, x_d_ahead, x_meas, t, h, &step, message) != HSEP_REFUSED)

@@ -1,9 +1,9 @@
-/* What a model is to an adapter: sizes, an initialization, a step and values.
+/* Interface between a model and an adapter: sizes, initialization, step and values.
  *
  * An adapter (FMI 2.0 now, another one beside it later) owns one array of HSEP_N_VALUES values, one place per variable
  * of the generated table (hsep_fmu.h), then the time derivatives of the first HSEP_N_INTERPOLATED of them, inputs that
- * may change within a step, which it sets to 0 after each step; and one block of memory, the state, whose size the
- * model tells from the parameters. The state is plain data without pointers: saving, restoring and serialising it is
+ * may change within a step, which it sets to 0 after each step; and one block of memory, the state, whose size
+ * follows from the parameters. The state is plain data without pointers: saving, restoring and serialising it is
  * one copy of its bytes. Outputs change only where their sample does, so what an adapter saves is the state together
  * with the values. Numbers lie in memory and in files as a little-endian machine has them.
  *
@@ -21,7 +21,7 @@
 typedef enum {
     HSEP_OK = 0,
     HSEP_REFUSED = 1, /* the call cannot be done; the state is unchanged unless said otherwise, the message says why */
-    HSEP_WARNED = 2   /* the call is done; the message says what to beware of */
+    HSEP_WARNED = 2   /* the call is done; the message is a warning */
 } hsep_status;
 
 typedef enum { HSEP_REAL, HSEP_INTEGER, HSEP_BOOLEAN, HSEP_STRING } hsep_kind;
@@ -48,7 +48,7 @@ typedef struct {
     const char *resources; /* folder with a trailing slash, decoded; NULL if there is none */
 } hsep_context;
 
-/* Check the parameters in values, alone and together, and tell how many bytes of state they need.
+/* Check the parameters in values, alone and together, and return the size of the state, bytes.
  * Fails with a message that names every parameter that is out of its range, the range and what came.
  * ReferenceTrajectory looks up the number of samples in its resource for that. */
 HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[]);
@@ -62,9 +62,9 @@ HSEP_API hsep_status hsep_model_initialise(
 
 /* Do one communication step from t by h with the inputs in values; outputs and locals go to values.
  * Fails, with state and values unchanged, if an input is not finite or t and h do not fit. Fails, with the values
- * unchanged, if an output would not be a finite number, because what was learned diverges: the look-ahead cannot go on
- * then, every later step fails likewise, and only another state or an initialization helps. A drive's step that would
- * lead out of the range of numbers leaves the state unchanged.
+ * unchanged, if an output would not be a finite number, because the learned recursion diverges: every later step fails
+ * then, until another state is set or the model is initialised. A drive's step in
+ * which the state overflows leaves it unchanged.
  * Warns if inputs are read at an instant that is no communication point.
  * Cost: bounded by the parameters and h/T_s, the same at the first and at the 10^9th call; allocates nothing. */
 HSEP_API hsep_status

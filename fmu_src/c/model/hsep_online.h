@@ -1,5 +1,5 @@
-/* What HybridPredictor and SepCompensator, the models with a look-ahead, do each in its own way; model_online.c does
- * the rest for both. One of them is compiled into an FMU, so the functions are bound when it is. */
+/* Interface between model_online.c and HybridPredictor or SepCompensator, the models with a look-ahead. One of them is
+ * compiled into an FMU, so the functions are bound at compile time. */
 #ifndef HSEP_ONLINE_H
 #define HSEP_ONLINE_H
 
@@ -28,13 +28,13 @@ typedef hsep_compensator_parameters hsep_online_parameters; /* the predictor's a
 
 #if defined(HSEP_ONLINE_KIND)
 
-/* Check what no other model has; return how many settings are wrong, each added to message. */
+/* Check the settings of this model alone; return how many settings are wrong, each added to message. */
 HSEP_API int hsep_online_check(const double values[], char message[]);
 
-/* Read what no other model has, after all parameters were checked; the predictor's others are there already. */
+/* Read the settings of this model alone, after all parameters were checked and the common ones read. */
 HSEP_API void hsep_online_read(const double values[], hsep_online_parameters *parameters);
 
-/* Begin, once what was learned is there. */
+/* Begin, after learned weights were loaded. */
 HSEP_API void hsep_online_begin(hsep_online *self);
 
 HSEP_API hsep_predictor *hsep_online_predictor(hsep_online *self);

@@ -81,6 +81,6 @@ HSEP_API hsep_status hsep_state_check(
 
 HSEP_API hsep_status hsep_state_damaged(char message[])
 {
-    hsep_message_add(message, "the state does not hold together: it is damaged");
+    hsep_message_add(message, "the state is inconsistent: it is damaged");
     return HSEP_REFUSED;
 }

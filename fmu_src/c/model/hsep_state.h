@@ -1,4 +1,4 @@
-/* What every model's state begins with: whose it is, of which version and size, and with which parameters. */
+/* Header of every model's state: model, version, size, and hash of the parameters. */
 #ifndef HSEP_STATE_H
 #define HSEP_STATE_H
 

@@ -76,7 +76,7 @@ static void weights_compare(const char *name, double learned, double got, hsep_k
     }
 }
 
-/* Tell which variable has a name, n_variables if none has. */
+/* Index of the variable of a name; n_variables if there is none. */
 static size_t weights_variable(const hsep_context *context, const char *name)
 {
     size_t i = 0;

@@ -1,4 +1,4 @@
-/* What was learned before the simulation.
+/* Warm start from weights that were learned before the simulation.
  *
  * The resource weights.bin, little-endian: "HSEPWGT3"; the numbers of settings, of modes and of learned samples as
  * uint64; each setting that shapes the features and the factor, its name in 24 bytes and its value as a double; the

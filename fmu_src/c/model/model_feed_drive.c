@@ -83,7 +83,7 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
         return HSEP_REFUSED;
     }
     if (!hsep_feed_drive_step(&self->drive, values[HSEP_VR_x_d], h, &x)) {
-        return hsep_drive_lost(x, values[HSEP_VR_x_d], message);
+        return hsep_drive_overflowed(x, values[HSEP_VR_x_d], message);
     }
     const double x_meas = hsep_encoder_measure(&self->encoder, hsep_feed_drive_x(&self->drive));
     feed_drive_write_outputs(self, values, x_meas);

@@ -31,8 +31,8 @@ typedef struct {
     hsep_trajectory trajectory; /* its samples follow */
 } trajectory_state;
 
-/* Check the parameters, open the chosen trajectory's file, read up to its first sample, and tell how many samples there
- * are. The caller closes it; NULL with a message if something does not fit. */
+/* Check the parameters, open the chosen trajectory's file, read up to its first sample, and return the number of
+ * samples. The caller closes it; NULL with a message if something does not fit. */
 static FILE *trajectory_open(const hsep_context *context, const double values[], uint64_t *count, char message[])
 {
     char name[TRAJECTORY_NAME_SIZE], expected[HSEP_NUMBER_SIZE], got[HSEP_NUMBER_SIZE];
@@ -65,7 +65,7 @@ static FILE *trajectory_open(const hsep_context *context, const double values[],
     return NULL;
 }
 
-/* Tell the bytes of a state with so many samples. */
+/* Size of a state with count samples, bytes. */
 static hsep_status trajectory_bytes(uint64_t count, size_t *size, char message[])
 {
     const double before = (double)(sizeof(trajectory_state) - sizeof(hsep_trajectory));

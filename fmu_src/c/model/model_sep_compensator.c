@@ -49,7 +49,7 @@ HSEP_API void hsep_online_read(const double values[], hsep_online_parameters *pa
             {settings.change_max, settings.v_max * T_s, settings.a_max * (T_s * T_s),
              settings.j_max * (T_s * T_s * T_s)},
         .no_reversal = settings.no_reversal != 0};
-    parameters->best = (hsep_sep_state)settings.compensate;
+    parameters->compensate = (hsep_sep_state)settings.compensate;
 }
 
 HSEP_API void hsep_online_begin(hsep_online *self) { hsep_compensator_begin(self); }

@@ -86,7 +86,7 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
         return HSEP_REFUSED;
     }
     if (!hsep_stage_step(&self->stage, values[HSEP_VR_x_d], h, work)) {
-        hsep_message_add(message, "the stage's state left the range of numbers (command %g m)", values[HSEP_VR_x_d]);
+        hsep_message_add(message, "the stage's state overflowed (command %g m)", values[HSEP_VR_x_d]);
         return HSEP_REFUSED;
     }
     const double x_meas = hsep_encoder_measure(&self->encoder, hsep_stage_x(&self->stage));

@@ -22,7 +22,7 @@ static double compensator_lay_out(hsep_compensator *self, const hsep_compensator
     const hsep_predictor_parameters *predictor = &parameters->predictor;
     const double preview = (double)predictor->preview;
     double end = HSEP_WORDS(hsep_compensator);
-    self->best = (uint64_t)parameters->best;
+    self->compensate = (uint64_t)parameters->compensate;
     self->x_dm = hsep_take(&end, (double)predictor->settings.Np);
     self->trial_x = hsep_take(&end, preview + (double)predictor->settings.q);
     self->trial_e = hsep_take(&end, preview + (double)predictor->settings.p);
@@ -47,7 +47,7 @@ HSEP_API void hsep_compensator_init(hsep_compensator *self, const hsep_compensat
     (void)compensator_lay_out(self, parameters);
     hsep_predictor_init(hsep_compensator_predictor(self), predictor, start);
     hsep_planner_init(compensator_planner(self), &parameters->planner, start);
-    /* The spline behind the physics model, at rest: it never changes. */
+    /* The spline filtered by the physics model from rest, which is constant. */
     hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
     double *spline = hsep_at(self, self->spline_pb);
     hsep_physics_init(
@@ -56,7 +56,7 @@ HSEP_API void hsep_compensator_init(hsep_compensator *self, const hsep_compensat
     memcpy(
         spline, hsep_splines_shape(hsep_planner_splines(compensator_planner(self))),
         (size_t)(4 * parameters->planner.spacing) * sizeof(double));
-    hsep_physics_respond(trial, spline, spline, (size_t)predictor->preview);
+    hsep_physics_forced_response(trial, spline, spline, (size_t)predictor->preview);
 }
 
 HSEP_API int hsep_compensator_valid(const void *block, const hsep_compensator_parameters *parameters, uint64_t k)
@@ -76,7 +76,7 @@ HSEP_API int hsep_compensator_valid(const void *block, const hsep_compensator_pa
            hsep_predictor_valid(hsep_at_bytes(block, got.predictor), predictor, k);
 }
 
-/* target := x_d - the model's response to x_d with what is decided of its change; eq. (3) without a matrix. */
+/* target := x_d - the model's response to x_d with the decided part of delta; eq. (3) without a matrix. */
 static void compensator_target(hsep_compensator *self, hsep_sep_state state)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
@@ -90,7 +90,7 @@ static void compensator_target(hsep_compensator *self, hsep_sep_state state)
     memcpy(trial, hsep_predictor_physics(predictor), (size_t)(self->planner - self->trial) * sizeof(double));
     for (uint64_t k = 0; k < preview; k++) {
         const double command = x_d[k] - predictor->start + hsep_planner_decided(planner, k);
-        hsep_physics_respond(trial, &command, &x[preview - 1 - k], 1);
+        hsep_physics_forced_response(trial, &command, &x[preview - 1 - k], 1);
         target[k] = x_d[k] - predictor->start - x[preview - 1 - k];
     }
     if (state == HSEP_SEP_HYBRID) {
@@ -104,7 +104,7 @@ static void compensator_target(hsep_compensator *self, hsep_sep_state state)
     }
 }
 
-/* The spline behind the hybrid model, G_h = (1 + W_x / (1 - W_e)) G_pb as filters. */
+/* The spline filtered by the hybrid model, G_h = (1 + W_x / (1 - W_e)) G_pb as filters. */
 static void compensator_filter_spline(hsep_compensator *self)
 {
     const hsep_predictor *predictor = hsep_compensator_predictor(self);
@@ -129,12 +129,12 @@ static int compensator_trusts(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     const hsep_recursion recursion = hsep_predictor_recursion(predictor, 0);
-    return self->best == HSEP_SEP_HYBRID && (double)predictor->k >= predictor->n_init &&
+    return self->compensate == HSEP_SEP_HYBRID && (double)predictor->k >= predictor->n_init &&
            hsep_predictor_regression(predictor)->n_samples > 0 && self->trust.excess <= 0.0 &&
            hsep_recursion_stable(&recursion, hsep_at(self, self->trial_e));
 }
 
-/* Fix and predict the samples of the window up to last - 1; eqs. (2) and (4). */
+/* Set the commands of the window up to last - 1 and predict its position; eqs. (2) and (4). */
 static void compensator_publish(hsep_compensator *self, uint64_t last)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
@@ -144,7 +144,7 @@ static void compensator_publish(hsep_compensator *self, uint64_t last)
     for (uint64_t k = first; k < last; k++) {
         x_dm[k] = x_d[k] + hsep_planner_delta(compensator_planner(self), k);
         const double command = x_dm[k] - predictor->start;
-        hsep_physics_respond(hsep_predictor_physics(predictor), &command, &past_x[Np - 1 - k], 1);
+        hsep_physics_forced_response(hsep_predictor_physics(predictor), &command, &past_x[Np - 1 - k], 1);
     }
     if (!hsep_within(x_dm + first, last - first, HSEP_PREDICTION_MAX)) {
         predictor->divergence = HSEP_DIVERGES_X_DM;
@@ -152,7 +152,7 @@ static void compensator_publish(hsep_compensator *self, uint64_t last)
     hsep_predictor_publish(predictor, last);
 }
 
-/* Do what has to be done of a bounded plan before the sample that comes next. */
+/* Solver steps of a bounded plan that are due before the next sample. */
 static void compensator_solve(hsep_compensator *self)
 {
     const hsep_predictor *predictor = hsep_compensator_predictor(self);
@@ -168,7 +168,7 @@ static void compensator_solve(hsep_compensator *self)
     }
 }
 
-/* Begin to plan with a model; self->state: with which, if there is a plan. */
+/* Begin a plan with a model; self->state: the model, or off if there is no plan. */
 static hsep_plan_status compensator_try(hsep_compensator *self, hsep_sep_state state)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
@@ -191,7 +191,7 @@ HSEP_API void hsep_compensator_begin(hsep_compensator *self)
         compensator_filter_spline(self);
         status = compensator_try(self, HSEP_SEP_HYBRID);
     }
-    if (status == HSEP_PLAN_FAILED && self->best != HSEP_SEP_OFF) {
+    if (status == HSEP_PLAN_FAILED && self->compensate != HSEP_SEP_OFF) {
         status = compensator_try(self, HSEP_SEP_PHYSICS);
     }
     predictor->n_physics = self->state == HSEP_SEP_HYBRID ? 0 : predictor->Np;
@@ -202,12 +202,12 @@ HSEP_API void hsep_compensator_begin(hsep_compensator *self)
     }
 }
 
-/* Finish a window, judge what the hybrid model predicted of it, and begin the next one. */
+/* Finish a window, update the excess prediction error, and begin the next window. */
 static void compensator_next_window(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     const uint64_t Np = predictor->Np;
-    /* What is predicted from a few rows before the warm-up is over moves nothing: it is not judged. */
+    /* Predictions from few rows, before the warm-up is over, are not used: they are not judged. */
     if (hsep_predictor_finish(predictor) && (double)(predictor->k - Np) >= predictor->n_init) {
         const hsep_regression *regression = hsep_predictor_regression(predictor);
         hsep_trust_observe(

@@ -1,5 +1,5 @@
-/* Servo error pre-compensation, sample by sample: a predictor (hsep_predictor.h) whose commands are modified while they
- * wait; eqs. (2) to (6) and hsep_planner.h.
+/* Servo error pre-compensation, sample by sample: a predictor (hsep_predictor.h) with commands modified by a planner
+ * (hsep_planner.h); eqs. (2) to (6).
  *
  * Sample k brings x_d_ahead = r(k) and x_meas = x(k); after it the outputs are those of k + 1. When k + 1 is a multiple
  * of Np, the whole preview of the next window and every measurement before it have arrived: the weights are solved and
@@ -28,27 +28,27 @@
 
 #include <stdint.h>
 
-/* What a window's command was planned with; of a parameter: the best there may be. */
+/* Model that plans the commands of a window; of the parameter compensate, the best one allowed. */
 typedef enum { HSEP_SEP_OFF = 0, HSEP_SEP_PHYSICS = 1, HSEP_SEP_HYBRID = 2 } hsep_sep_state;
 
 typedef struct {
     hsep_predictor_parameters predictor; /* planned */
     hsep_planner_parameters planner;     /* Np and preview as the predictor's */
-    hsep_sep_state best;
+    hsep_sep_state compensate;
 } hsep_compensator_parameters;
 
 typedef struct {
-    uint64_t best;
-    uint64_t state;   /* hsep_sep_state of the window */
-    uint64_t solving; /* whether its plan is being solved */
+    uint64_t compensate; /* hsep_sep_state, the best model allowed */
+    uint64_t state;      /* hsep_sep_state of the window */
+    uint64_t solving;    /* whether its plan is being solved */
     hsep_trust trust;
     /* Offsets in doubles from the beginning of the struct */
     uint64_t x_dm;      /* (Np,) m, the window: modified commands */
     uint64_t trial_x;   /* (preview + q,) m, x_pb of a trial, newest first */
     uint64_t trial_e;   /* (preview + p,) m, its residuals */
     uint64_t target;    /* (preview,) m */
-    uint64_t spline_pb; /* (preview,) m/m, a spline behind the physics model, */
-    uint64_t spline_h;  /* (preview,) m/m, and behind the hybrid one */
+    uint64_t spline_pb; /* (preview,) m/m, a spline filtered by the physics model, */
+    uint64_t spline_h;  /* (preview,) m/m, and by the hybrid one */
     uint64_t trial;     /* the physics model of a trial */
     uint64_t planner, predictor;
 } hsep_compensator;
@@ -68,21 +68,20 @@ HSEP_API double hsep_compensator_size(const hsep_compensator_parameters *paramet
 HSEP_API void hsep_compensator_init(
     hsep_compensator *self, const hsep_compensator_parameters *parameters, double start);
 
-/* The predictor, to start warm between hsep_compensator_init and _begin. */
+/* The predictor, for a warm start between hsep_compensator_init and _begin. */
 HSEP_API hsep_predictor *hsep_compensator_predictor(hsep_compensator *self);
 
 /* Plan the first window. */
 HSEP_API void hsep_compensator_begin(hsep_compensator *self);
 
-/* Tell whether a block of bytes, in any alignment and hsep_compensator_size(parameters) long, is one that
- * hsep_compensator_init with these parameters began and that is at sample k: its layout is the same and every index
- * lies within it. */
+/* Whether a block, in any alignment and of hsep_compensator_size(parameters) bytes, is a valid state for these
+ * parameters at sample k: its layout is that of hsep_compensator_init, and every index lies within it. */
 HSEP_API int hsep_compensator_valid(const void *block, const hsep_compensator_parameters *parameters, uint64_t k);
 
-/* Take in sample k, both finite, m, and move on to k + 1; return whether a new window has begun. */
+/* Process sample k, both inputs finite, m, and advance to k + 1; return whether a new window has begun. */
 HSEP_API int hsep_compensator_sample(hsep_compensator *self, double x_d_ahead, double x_meas);
 
-/* Tell the outputs of the sample that comes next. Constant cost. */
+/* Read the outputs of the next sample. Constant cost. */
 HSEP_API void hsep_compensator_read(const hsep_compensator *self, hsep_compensator_outputs *outputs);
 
 #endif

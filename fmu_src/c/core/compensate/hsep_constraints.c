@@ -2,9 +2,9 @@
 
 #include <math.h>
 
-static const double constraints_rounding = 1e-9;        /* share of a limit that is taken for rounding */
-static const double constraints_interior_share = 1e-10; /* by which a row at its bound may differ from the last plan */
-static const double constraints_move = 1e-12;           /* m a sample, step of x_d that counts as a move */
+static const double constraints_rounding = 1e-9;        /* tolerance for rounding, share of a limit */
+static const double constraints_interior_share = 1e-10; /* feasible interval of a row at its bound */
+static const double constraints_move = 1e-12;           /* m per sample, smallest step of x_d that counts as motion */
 
 HSEP_API void hsep_constraints_total(hsep_planner *self, const double x_d[])
 {

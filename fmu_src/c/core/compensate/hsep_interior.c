@@ -7,9 +7,9 @@
 #include <stddef.h>
 #include <string.h>
 
-static const double interior_mu = 1e-15;             /* mu at the end, as a share of the cost */
-static const double interior_dual = 1e-9;            /* dual residual at the end, as a share of its largest term */
-static const double interior_regularisation = 1e-14; /* proximal term of z, relative to rows and P */
+static const double interior_mu = 1e-15;               /* mu at the end, as a share of the cost per bound */
+static const double interior_dual_residual_max = 1e-9; /* dual residual at the end, as a share of its largest term */
+static const double interior_regularisation = 1e-14;   /* proximal term of z, relative to rows and P */
 
 /* The arrays behind the struct. */
 typedef struct {
@@ -87,8 +87,8 @@ HSEP_API hsep_problem hsep_interior_problem(hsep_interior *self, const hsep_spli
     return (hsep_problem){.v = a.v, .x = a.x, .low = a.slacks.side[0].b, .high = a.slacks.side[1].b};
 }
 
-/* The rows of P, a triangle, from the first one asked for. */
-static const double *interior_asked(const hsep_interior *self, const hsep_splines *splines, const double P[])
+/* The rows of P, a triangle, from the first free spline. */
+static const double *interior_free_rows(const hsep_interior *self, const hsep_splines *splines, const double P[])
 {
     return P + (self->first * splines->n - self->first * (self->first - 1) / 2);
 }
@@ -112,7 +112,7 @@ HSEP_API void hsep_interior_begin(
     self->steps = 0;
     self->sides = 0.0;
     interior_arrays a = interior_open(self, splines);
-    a.slacks.rho = self->rho = interior_proximal(splines, interior_asked(self, splines, P), a.n);
+    a.slacks.rho = self->rho = interior_proximal(splines, interior_free_rows(self, splines, P), a.n);
     hsep_splines_rows(splines, a.x, first, a.slacks.Ax);
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         self->sides += 2.0 * (double)(a.slacks.range[order].end - a.slacks.range[order].begin);
@@ -167,13 +167,13 @@ static void interior_direction(const interior_arrays *a, const hsep_splines *spl
 HSEP_API int hsep_interior_step(hsep_interior *self, const hsep_splines *splines, const double P[])
 {
     const interior_arrays a = interior_open(self, splines);
-    double primal;
-    P = interior_asked(self, splines, P);
+    double r_p;
+    P = interior_free_rows(self, splines, P);
     hsep_splines_rows(splines, a.x, self->first, a.slacks.Ax);
-    const double mu = hsep_slacks_residuals(&a.slacks, &primal);
-    const double dual = interior_dual_residual(&a, splines, self->first, P);
+    const double mu = hsep_slacks_residuals(&a.slacks, &r_p);
+    const double r_d = interior_dual_residual(&a, splines, self->first, P);
     if (self->steps == HSEP_INTERIOR_STEPS ||
-        (mu < interior_mu * self->cost && primal < HSEP_INTERIOR_PRIMAL && dual < interior_dual)) {
+        (mu < interior_mu * self->cost && r_p < HSEP_INTERIOR_PRIMAL && r_d < interior_dual_residual_max)) {
         return 1;
     }
     self->steps++;
@@ -184,8 +184,8 @@ HSEP_API int hsep_interior_step(hsep_interior *self, const hsep_splines *splines
     }
     /* Newton: P dx - B' dz = r_d,  ds = B dx + r_p + rho dz,  z ds + s dz = r_c (s + rho z) */
     interior_direction(&a, splines, self->first);
-    const double share = hsep_slacks_predicted(&a.slacks) / mu; /* sigma = share^3 */
-    hsep_slacks_correct(&a.slacks, fmax(mu * share * share * share, 0.1 * interior_mu * self->cost));
+    const double ratio = hsep_slacks_predicted(&a.slacks) / mu; /* mu_aff / mu; sigma = ratio^3 */
+    hsep_slacks_correct(&a.slacks, fmax(mu * ratio * ratio * ratio, 0.1 * interior_mu * self->cost));
     interior_direction(&a, splines, self->first);
     const double alpha = hsep_slacks_move(&a.slacks);
     for (uint64_t j = 0; j < a.n; j++) {

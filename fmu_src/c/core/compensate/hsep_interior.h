@@ -1,5 +1,5 @@
-/* A plan within the drive's limits, by Mehrotra's predictor-corrector interior-point method (Mehrotra 1992), one step a
- * call:  min 1/2 x' P x - v' x  with  low <= A x <= high, A being hsep_splines_rows.
+/* Primal-dual interior-point solver for a bounded plan: Mehrotra's predictor-corrector method (1992), one step a call:
+ *  min 1/2 x' P x - v' x  with  low <= A x <= high, A being hsep_splines_rows.
  *
  * Every iterate stays inside the bounds it has reached once, so that what is found after any number of steps keeps
  * them. Memory is one block: the struct, then its arrays as doubles; no pointers. Reentrant; allocates nothing.
@@ -16,9 +16,9 @@
 #define HSEP_INTERIOR_PRIMAL 1e-11 /* share of a bound by which it may be exceeded at the end */
 
 typedef struct {
-    uint64_t first; /* the splines before it are not asked for; x is (n - first,) */
+    uint64_t first; /* the splines before it are fixed; x is (n - first,) */
     uint64_t steps; /* done for this plan */
-    double cost;    /* m2, of the beginning, for each of the bounds */
+    double cost;    /* m2, scale of the cost per bound */
     double sides;   /* number of bounds, low and high ones */
     double rho;     /* 1/m2, proximal regularisation of the multipliers */
     /* followed by arrays, see interior_lay_out */
@@ -37,12 +37,12 @@ typedef struct {
 
 HSEP_API hsep_problem hsep_interior_problem(hsep_interior *self, const hsep_splines *splines);
 
-/* Whether a block, in any alignment, has counts within their bounds. first_max: largest number of splines not asked
- * for. */
+/* Whether a block, in any alignment, has counts within their bounds. first_max: largest number of fixed
+ * splines. */
 HSEP_API int hsep_interior_valid(const void *block, uint64_t first_max);
 
-/* Begin with x and the bounds as they are. P: the triangle of all n rows; cost: size of the cost, m2, > 0, by which the
- * end is recognised. */
+/* Begin with x and the bounds as they are. P: the triangle of all n rows; cost: scale of the cost, m2, > 0, for the
+ * stopping criterion. */
 HSEP_API void hsep_interior_begin(
     hsep_interior *self, const hsep_splines *splines, const double P[], uint64_t first, double cost);
 

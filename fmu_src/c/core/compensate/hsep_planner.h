@@ -1,10 +1,10 @@
-/* Plans of the modified command, x_dm = x_d + delta, over a preview: delta is a sum of cubic B-splines
- * (hsep_splines.h), each filtered through a linear model (the filtered-basis-functions method: Ramani, Duan, Okwudire
- * and Ulsoy 2017), and makes the model's response follow x_d within the drive's limits.
+/* Receding-horizon planner of the modified command, x_dm = x_d + delta, over a preview. delta is a sum of cubic
+ * B-splines (hsep_splines.h), each filtered through a linear model (the filtered-basis-functions method: Ramani, Duan,
+ * Okwudire and Ulsoy 2017), so that the model's response follows x_d within the drive's limits.
  *
- * Of a plan only the splines that begin in the first window are followed; hsep_planner_next moves on by a window, and
- * what is left of the plan is where the next one starts from: it leads back to x_d within the limits. A plan whose free
- * minimum keeps the limits is there at once; another one is solved in steps, of which each costs the same.
+ * Of a plan only the splines that begin in the first window are applied; hsep_planner_next advances by a window, and
+ * the next plan starts from the remainder, which returns to x_d within the limits. A plan whose unconstrained minimum
+ * is feasible is found at once; another one is solved in steps of equal cost.
  *
  * Memory is one block: the struct, then its arrays as doubles; no pointers. Reentrant; allocates nothing.
  */
@@ -24,11 +24,11 @@ typedef struct {
     uint64_t spacing;          /* samples between knots, a divisor of Np */
     double jerk_weight;        /* of the third differences of delta against the tracking error, >= 0 */
     double limit[HSEP_ORDERS]; /* of |delta|, m, and of the differences of x_dm of orders 1 to 3, m; all > 0 */
-    int no_reversal;           /* whether x_dm never turns while x_d moves */
+    int no_reversal;           /* whether x_dm keeps the direction of x_d */
 } hsep_planner_parameters;
 
 typedef enum {
-    HSEP_PLAN_FAILED = 0, /* no finite plan: what is left of the last one is followed */
+    HSEP_PLAN_FAILED = 0, /* no finite plan: the remainder of the last one is followed */
     HSEP_PLAN_DONE,
     HSEP_PLAN_BOUNDED /* hsep_planner_step is to be called until it returns 1 */
 } hsep_plan_status;

@@ -2,9 +2,9 @@
 
 #include <math.h>
 
-static const double slacks_least = 0.3;     /* share, least slack to begin with */
-static const double slacks_first_mu = 10.0; /* mu to begin with, as a share of the cost */
-static const double slacks_tau = 0.995;     /* share of the way to the nearest bound that a step goes */
+static const double slacks_least = 0.3;     /* smallest initial slack, in shares */
+static const double slacks_first_mu = 10.0; /* initial mu, as a share of the cost per bound */
+static const double slacks_tau = 0.995;     /* fraction of the step to the nearest bound */
 
 /* B x - b of a row: A x - low, or high - A x. */
 static inline double slacks_distance(int i, double Ax, double b) { return i == 0 ? Ax - b : b - Ax; }

@@ -1,4 +1,4 @@
-/* The change of the command as a sum of cubic B-splines, delta(k) = sum_j c_j b(k - j spacing), over a plan.
+/* Cubic B-spline basis of the change of the command, delta(k) = sum_j c_j b(k - j spacing), over a plan.
  *
  * Spline j begins at sample j spacing and ends 4 spacings later; the last one ends so that the last four samples of a
  * plan are without change. Splines -3, -2, -1 began before the plan and still act in it. What a drive limits are the

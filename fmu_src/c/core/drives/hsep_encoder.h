@@ -1,5 +1,6 @@
-/* A position sensor with normal noise that draws the same on every platform: SplitMix64 (Steele, Lea and Flood
- * 2014) gives two uniforms a draw, Box and Muller (1958) make one normal of them. Plain data; reentrant. */
+/* Position sensor with Gaussian noise from a portable generator: SplitMix64 (Steele, Lea and Flood
+ * 2014) gives two uniform numbers per sample, the Box-Muller transform (1958) one normal number. Plain data;
+ * reentrant. */
 #ifndef HSEP_ENCODER_H
 #define HSEP_ENCODER_H
 

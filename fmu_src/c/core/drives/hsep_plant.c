@@ -132,12 +132,12 @@ static double plant_position(const hsep_stage *s, const double z[])
     return x;
 }
 
-/* The slope of z, (2 n_modes,), under a command that friction has pushed back already. */
-static void plant_stage_slope(const hsep_stage *s, const double z[], double pushed, double slope[])
+/* The slope of z, (2 n_modes,), under a command disturbed by friction. */
+static void plant_stage_slope(const hsep_stage *s, const double z[], double disturbed, double slope[])
 {
     const hsep_stage_mode *mode = stage_modes(s);
     const double x = plant_position(s, z);
-    const double u = pushed - s->kappa * x * fabs(x);
+    const double u = disturbed - s->kappa * x * fabs(x);
     for (uint64_t i = 0; i < s->n_modes; i++) {
         /* z'' + 2 zeta omega z' + omega^2 z = u, eq. (15) */
         slope[2 * i] = z[2 * i + 1];
@@ -146,13 +146,13 @@ static void plant_stage_slope(const hsep_stage *s, const double z[], double push
 }
 
 /* The command after the carriage's friction, which follows the commanded velocity: d = f tanh(v_d / 2 mm/s). */
-static double plant_pushed(const hsep_stage *s, double r, double v_d)
+static double plant_disturbed(const hsep_stage *s, double r, double v_d)
 {
     return r - s->f * tanh(v_d / plant_friction_velocity);
 }
 
 /* One Runge-Kutta step of z, (size,), with three more vectors of work space behind it. */
-static void plant_stage_internal_step(const hsep_stage *s, double z[], double pushed, double dt)
+static void plant_stage_internal_step(const hsep_stage *s, double z[], double disturbed, double dt)
 {
     static const double weight[4] = {1.0, 2.0, 2.0, 1.0};
     const double reach[4] = {dt / 2.0, dt / 2.0, dt, 0.0}; /* from z to where the next slope is taken */
@@ -163,7 +163,7 @@ static void plant_stage_internal_step(const hsep_stage *s, double z[], double pu
         sum[i] = 0.0;
     }
     for (int stage = 0; stage < 4; stage++) {
-        plant_stage_slope(s, at, pushed, slope);
+        plant_stage_slope(s, at, disturbed, slope);
         for (uint64_t i = 0; i < size; i++) {
             sum[i] += weight[stage] * slope[i];
             at[i] = z[i] + reach[stage] * slope[i];
@@ -187,9 +187,9 @@ HSEP_API double hsep_stage_rate(const hsep_stage *self)
 /* Integrate z over time, s, with the command r, m from the start, and the commanded velocity v_d held. */
 static void plant_stage_integrate(const hsep_stage *s, double z[], double r, double v_d, double time)
 {
-    const double n = plant_internal_steps(time, hsep_stage_rate(s)), pushed = plant_pushed(s, r, v_d);
+    const double n = plant_internal_steps(time, hsep_stage_rate(s)), disturbed = plant_disturbed(s, r, v_d);
     for (double i = 0.0; i < n; i += 1.0) {
-        plant_stage_internal_step(s, z, pushed, time / n);
+        plant_stage_internal_step(s, z, disturbed, time / n);
     }
 }
 
@@ -202,7 +202,7 @@ HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work
     hsep_clock_step step;
     (void)hsep_clock_count(&self->clock, self->clock.end, h, &step);
     memcpy(z, hsep_at(self, self->z), z_size);
-    /* v_d is taken at the instants, in whatever steps they come. */
+    /* v_d is updated at the sampling instants, whatever the step size. */
     for (int64_t i = 0; i <= step.n_latched; i++) {
         const double next = i < step.n_latched ? fmax(done, step.first + (double)i * self->clock.T_s) : h;
         if (next > done) {
@@ -219,7 +219,7 @@ HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work
             return 0;
         }
     }
-    plant_stage_slope(self, z, plant_pushed(self, r, v_d), slope);
+    plant_stage_slope(self, z, plant_disturbed(self, r, v_d), slope);
     self->v = plant_position(self, slope);
     memcpy(hsep_at(self, self->z), z, z_size);
     self->last_x_d = last_x_d;

@@ -1,6 +1,6 @@
 /* Nonlinear feed drives: eq. (13), and a stage with friction and cable stiffness.
  *
- * Both hold the command constant over a step and measure positions from where they rested at first. Classical
+ * The command is held over a step; states are relative to the initial position. Classical
  * Runge-Kutta of order 4 in internal steps of at most 0.1 ms and 1/16 of the linear part's fastest time constant;
  * the command is never differentiated.
  * Cost of a step: 4 slopes for each internal step. Plain data; reentrant; allocates nothing.
@@ -32,11 +32,11 @@ typedef struct {
     double x, u, x_d;  /* m, m/s, and the last command, m, from there */
 } hsep_feed_drive;
 
-/* Put the drive to rest at start, m; its parameters are set by the caller. */
+/* Reset the drive to rest at start, m; its parameters are set by the caller. */
 HSEP_API void hsep_feed_drive_reset(hsep_feed_drive *self, double start);
 
 /* Advance by h, s, at most hsep_plant_step_max, with the command x_d, m, held. Fails, and returns 0 with the state
- * unchanged, if the state would leave the range of numbers; *x then tells the position reached, m. */
+ * unchanged, if the state overflows; *x then tells the position reached, m. */
 HSEP_API int hsep_feed_drive_step(hsep_feed_drive *self, double x_d, double h, double *x);
 
 HSEP_API double hsep_feed_drive_rate(const hsep_feed_drive *self); /* of the linear part, 1/s */
@@ -53,7 +53,7 @@ typedef struct {
 typedef struct {
     double f, kappa;      /* m, 1/m */
     double start;         /* position of rest, m */
-    hsep_clock clock;     /* of the instants at which the command is looked at, in a time of its own */
+    hsep_clock clock;     /* of the instants at which the command is sampled, from the reset */
     double last_x_d, v_d; /* m from start, at the last instant; m/s */
     double v;             /* m/s */
     uint64_t n_modes;
@@ -73,12 +73,12 @@ HSEP_API double hsep_stage_size(uint64_t n_modes); /* bytes of the block, counte
 /* Whether a block, in any alignment, is one that hsep_stage_init with so many modes began, with a valid clock. */
 HSEP_API int hsep_stage_valid(const void *block, uint64_t n_modes);
 
-/* Put the stage to rest at start, m. modes: (n_modes,). */
+/* Reset the stage to rest at start, m. modes: (n_modes,). */
 HSEP_API void hsep_stage_init(
     hsep_stage *self, const hsep_mode modes[], uint64_t n_modes, double f, double kappa, double T_s, double start);
 
 /* Advance by h, s, at most hsep_plant_step_max, with the command x_d, m, held. work: (HSEP_STAGE_WORK n_modes,).
- * Fails, and returns 0 with the state unchanged, if the state would leave the range of numbers. */
+ * Fails, and returns 0 with the state unchanged, if the state overflows. */
 HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work[]);
 
 HSEP_API double hsep_stage_rate(const hsep_stage *self); /* of the fastest mode, 1/s */

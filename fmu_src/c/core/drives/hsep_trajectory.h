@@ -1,4 +1,4 @@
-/* A commanded trajectory that is played sample by sample and held at its last sample. The samples follow the struct
+/* Sampled reference trajectory, held at its last sample. The samples follow the struct
  * in one block, without pointers. Reentrant; constant cost; allocates nothing. */
 #ifndef HSEP_TRAJECTORY_H
 #define HSEP_TRAJECTORY_H

@@ -9,13 +9,13 @@ static const double clock_samples_max = 9007199254740992.0; /* 2^53: counted exa
 
 static double clock_resolution(double t) { return clock_spacings * (nextafter(fabs(t), HUGE_VAL) - fabs(t)); }
 
-/* delta at t, s. Times so long that doubles no longer tell a quarter of T_s are beyond any run. */
+/* delta at t, s; T_s / 4 at times so large that doubles no longer resolve it. */
 static double clock_delta(const hsep_clock *self, double t)
 {
     return fmin(fmax(clock_tolerance * self->T_s, clock_resolution(t)), 0.25 * self->T_s);
 }
 
-/* Add to since + carry without losing digits: Knuth's two-sum, then renormalised. */
+/* Compensated sum since + carry + time: Knuth's two-sum, then renormalised. */
 static void clock_add(hsep_clock *self, double time)
 {
     const double sum = self->since + time, part = sum - self->since;

@@ -1,4 +1,4 @@
-/* From communication steps of any size to samples: the instants are t_k = start + k T_s.
+/* Sample clock: communication steps of any size in samples; the instants are t_k = start + k T_s.
  *
  * The clock keeps its own time, the compensated sum of the step sizes, because the importer's time may be rounded or
  * drift. An instant within delta = max(1e-6 T_s, 8 ulp(t)) of a step's start belongs to that step, where the inputs of
@@ -18,10 +18,10 @@
 typedef struct {
     double start;    /* s */
     double T_s;      /* s */
-    int64_t k;       /* the last instant that was reached is t_k */
+    int64_t k;       /* index of the last instant reached, t_k */
     double since;    /* s, from t_k to now; slightly below 0 where a step ended within delta before t_k */
-    double carry;    /* s, what the sum in since has lost to rounding */
-    double end;      /* s, where the last step ended in the importer's time */
+    double carry;    /* s, accumulated rounding error of since */
+    double end;      /* s, end of the last step in the importer's time */
     int64_t latched; /* whether the inputs of sample k have been read */
 } hsep_clock;
 
@@ -36,14 +36,14 @@ typedef struct {
     int inside;        /* whether one of them is no communication point */
 } hsep_clock_step;
 
-/* Begin at start, s. Fails, and returns 0, if doubles near start cannot tell a quarter of T_s. */
+/* Begin at start, s. Fails, and returns 0, if doubles near start do not resolve T_s / 4. */
 HSEP_API int hsep_clock_init(hsep_clock *self, double start, double T_s);
 
 /* Count the step from t by h, s, with 0 < h <= HSEP_CLOCK_STEP_MAX; self is unchanged until the caller takes over
  * step->after. Fails, and returns 0, if t is not where the last step ended. */
 HSEP_API int hsep_clock_count(const hsep_clock *self, double t, double h, hsep_clock_step *step);
 
-/* Whether a clock that was read from a state counts within its bounds. */
+/* Whether the fields of a clock from a state are in range. */
 HSEP_API int hsep_clock_valid(const hsep_clock *self);
 
 #endif

@@ -1,4 +1,4 @@
-/* Range of what is published. Reentrant; allocates nothing. */
+/* Range of published predictions. Reentrant; allocates nothing. */
 #ifndef HSEP_RANGE_H
 #define HSEP_RANGE_H
 
@@ -6,9 +6,9 @@
 #include <stdint.h>
 #include <string.h>
 
-#define HSEP_PREDICTION_MAX 1e100 /* m, of what is published: sums of squares of what is smaller never overflow */
+#define HSEP_PREDICTION_MAX 1e100 /* m: sums of squares of smaller values cannot overflow */
 
-/* Which prediction of a window is beyond it, because what was learned diverges. */
+/* Signal of a window that exceeds it, because the learned recursion diverges. */
 typedef enum { HSEP_CONVERGES = 0, HSEP_DIVERGES_X_PB, HSEP_DIVERGES_X_H, HSEP_DIVERGES_X_DM } hsep_divergence;
 
 /* Whether all entries of a, (n,) doubles in any alignment, are numbers within +- limit. */

@@ -52,8 +52,8 @@ HSEP_API void hsep_regression_fold(hsep_regression *self);
 /* Solve R w = z for w, (n,). Cost: n^2 / 2 multiply-adds. */
 HSEP_API void hsep_regression_solve(const hsep_regression *self, double w[]);
 
-/* Take over row i of a factor [R z; 0 rho], its entries i ... n, which the caller has put where
- * hsep_regression_row tells. All n + 1 rows make a factor. Fails, and returns 0 with the factor unchanged, if an entry
+/* Take over row i of a factor [R z; 0 rho], its entries i ... n, which the caller has put into
+ * hsep_regression_row. All n + 1 rows make a factor. Fails, and returns 0 with the factor unchanged, if an entry
  * is not finite or a diagonal entry of R is 0. Cost: n divisions. */
 HSEP_API int hsep_regression_load(hsep_regression *self, uint64_t i);
 

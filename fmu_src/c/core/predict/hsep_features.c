@@ -1,11 +1,11 @@
 #include "hsep_features.h"
 
-HSEP_API void hsep_features_lay_out(hsep_features *self, uint64_t p, uint64_t q, uint64_t n_scheduled)
+HSEP_API void hsep_features_lay_out(hsep_features *self, uint64_t p, uint64_t q, uint64_t n_reference)
 {
     self->p = p;
     self->q = q;
     self->x = HSEP_BIAS + 1;
     self->e = self->x + q + 1;
-    self->scheduled = self->e + p;
-    self->n = self->scheduled + n_scheduled;
+    self->reference = self->e + p;
+    self->n = self->reference + n_reference;
 }

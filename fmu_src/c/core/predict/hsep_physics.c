@@ -53,16 +53,16 @@ static void physics_expm1(double E[16], double M[16])
     }
 }
 
-HSEP_API void hsep_discretise(hsep_discrete_mode *mode, const hsep_mode *continuous, double Ts, hsep_hold hold)
+HSEP_API void hsep_discretise(hsep_discrete_mode *mode, const hsep_mode *continuous, double T_s, hsep_hold hold)
 {
     const double omega = physics_two_pi * continuous->f_n; /* rad/s */
     /* States (omega^2 z, omega z') with z'' + 2 zeta omega z' + omega^2 z = u, both in m; then u and its ramp
      * (Van Loan 1978): the exponential of the augmented matrix holds Phi, Gamma_1 and Gamma_2. */
     double M[16] = {0.0}, E[16];
-    M[1] = omega * Ts;
-    M[4] = -omega * Ts;
-    M[5] = -2.0 * continuous->zeta * omega * Ts;
-    M[6] = omega * Ts;
+    M[1] = omega * T_s;
+    M[4] = -omega * T_s;
+    M[5] = -2.0 * continuous->zeta * omega * T_s;
+    M[6] = omega * T_s;
     M[11] = 1.0; /* the ramp from u(k) to u(k+1) */
     physics_expm1(E, M);
     mode->A[0] = 1.0 + E[0];
@@ -116,17 +116,17 @@ HSEP_API int hsep_physics_valid(const void *block, uint64_t n_modes, uint64_t de
 }
 
 HSEP_API void hsep_physics_init(
-    hsep_physics *self, const hsep_mode modes[], uint64_t n_modes, uint64_t dead_time, double Ts, hsep_hold hold)
+    hsep_physics *self, const hsep_mode modes[], uint64_t n_modes, uint64_t dead_time, double T_s, hsep_hold hold)
 {
     (void)physics_lay_out(self, n_modes, dead_time);
     self->oldest = 0;
     for (uint64_t i = 0; i < n_modes; i++) {
-        hsep_discretise(&physics_modes(self)[i], &modes[i], Ts, hold);
+        hsep_discretise(&physics_modes(self)[i], &modes[i], T_s, hold);
     }
     memset(hsep_at(self, self->ring), 0, (size_t)dead_time * sizeof(double));
 }
 
-HSEP_API void hsep_physics_respond(hsep_physics *self, const double x_d[], double x_pb[], size_t n)
+HSEP_API void hsep_physics_forced_response(hsep_physics *self, const double x_d[], double x_pb[], size_t n)
 {
     hsep_discrete_mode *modes = physics_modes(self);
     double *ring = hsep_at(self, self->ring);

@@ -1,4 +1,4 @@
-/* The physics-based model G_pb at the samples of a held or interpolated command; eqs. (2) and (15).
+/* Discrete-time physics-based model G_pb under a zero- or first-order hold; eqs. (2) and (15).
  *
  * Memory is one block: the struct, then its arrays as doubles. No pointers, so a copy of the block is the state.
  * Reentrant; allocates nothing; nothing here can fail once the parameters are in range.
@@ -34,32 +34,32 @@ typedef struct {
 typedef struct {
     uint64_t n_modes;
     uint64_t dead_time; /* whole samples by which the command is delayed */
-    uint64_t oldest;    /* place in the dead time's ring of the command that comes out next */
+    uint64_t oldest;    /* index of the next command to leave the dead time's ring */
     /* Offsets in doubles from the beginning of the struct */
     uint64_t modes; /* hsep_discrete_mode[n_modes] */
-    uint64_t ring;  /* (dead_time,) m, commands that have not come out yet */
+    uint64_t ring;  /* (dead_time,) m, commands within the dead time */
 } hsep_physics;
 
 HSEP_ASSERT_WORDS(hsep_mode, 4);
 HSEP_ASSERT_WORDS(hsep_discrete_mode, 11);
 HSEP_ASSERT_WORDS(hsep_physics, 5);
 
-/* Fill a mode for the sampling interval Ts, s, at rest. Exact up to rounding in every damping regime.
- * Cost: about 2 000 multiply-adds, and 64 for each doubling of the norm of the mode times Ts. */
-HSEP_API void hsep_discretise(hsep_discrete_mode *mode, const hsep_mode *continuous, double Ts, hsep_hold hold);
+/* Fill a mode for the sampling interval T_s, s, at rest. Exact up to rounding in every damping regime.
+ * Cost: about 2 000 multiply-adds, and 64 for each doubling of the norm of the mode times T_s. */
+HSEP_API void hsep_discretise(hsep_discrete_mode *mode, const hsep_mode *continuous, double T_s, hsep_hold hold);
 
 /* Bytes of the block, counted in double so that no size can overflow. */
 HSEP_API double hsep_physics_size(uint64_t n_modes, uint64_t dead_time);
 
 /* Fill the block, at rest at position 0. modes: (n_modes,). */
 HSEP_API void hsep_physics_init(
-    hsep_physics *self, const hsep_mode modes[], uint64_t n_modes, uint64_t dead_time, double Ts, hsep_hold hold);
+    hsep_physics *self, const hsep_mode modes[], uint64_t n_modes, uint64_t dead_time, double T_s, hsep_hold hold);
 
 /* Whether a block, in any alignment, is one that hsep_physics_init with these parameters began. */
 HSEP_API int hsep_physics_valid(const void *block, uint64_t n_modes, uint64_t dead_time);
 
-/* Answer n commands x_d, (n,), m, relative to the position of rest, with x_pb, (n,), m; eq. (2).
+/* Response x_pb, (n,), m, to n commands x_d, (n,), m, relative to the initial position; eq. (2).
  * The state is carried from call to call. Cost: 9 multiply-adds a mode and sample. */
-HSEP_API void hsep_physics_respond(hsep_physics *self, const double x_d[], double x_pb[], size_t n);
+HSEP_API void hsep_physics_forced_response(hsep_physics *self, const double x_d[], double x_pb[], size_t n);
 
 #endif

@@ -1,7 +1,7 @@
 #include "hsep_predictor.h"
 
 #include "hsep_range.h"
-#include "hsep_schedule.h"
+#include "hsep_reference_features.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -22,10 +22,10 @@ static double predictor_lay_out(hsep_predictor *self, const hsep_predictor_param
 {
     const double Np = (double)parameters->settings.Np, preview = (double)parameters->preview;
     const double p = (double)parameters->settings.p, q = (double)parameters->settings.q;
-    const int scheduled = parameters->v_friction > 0.0;
+    const int has_reference = parameters->v_friction > 0.0;
     double end = HSEP_WORDS(hsep_predictor);
     hsep_features_lay_out(
-        &self->features, parameters->settings.p, parameters->settings.q, scheduled ? HSEP_SCHEDULED : 0);
+        &self->features, parameters->settings.p, parameters->settings.q, has_reference ? HSEP_N_REFERENCE : 0);
     const double regression = hsep_regression_size(self->features.n);
     self->Np = parameters->settings.Np;
     self->preview = parameters->preview;
@@ -40,8 +40,8 @@ static double predictor_lay_out(hsep_predictor *self, const hsep_predictor_param
     self->past_e = hsep_take(&end, Np + p);
     self->e_h = parameters->planned ? hsep_take(&end, Np + p) : self->past_e;
     self->weights = hsep_take(&end, (double)self->features.n);
-    self->signs = hsep_take(&end, scheduled ? preview + 2.0 * HSEP_SCHEDULE_REACH : 0.0);
-    self->drive = hsep_take(&end, scheduled ? preview : 0.0);
+    self->signs = hsep_take(&end, has_reference ? preview + 2.0 * HSEP_REFERENCE_REACH : 0.0);
+    self->drive = hsep_take(&end, has_reference ? preview : 0.0);
     self->physics = hsep_take_block(&end, hsep_physics_size(parameters->n_modes, parameters->settings.dead_time));
     self->regression = hsep_take_block(&end, regression);
     self->saved = parameters->unlearns ? hsep_take_block(&end, regression) : 0;
@@ -102,11 +102,11 @@ HSEP_API hsep_recursion hsep_predictor_recursion(const hsep_predictor *self, int
 
 HSEP_API const double *hsep_predictor_drive(const hsep_predictor *self, uint64_t n)
 {
-    const int scheduled = self->features.n > self->features.scheduled;
-    return scheduled ? hsep_at_const(self, self->drive) + (self->preview - n) : NULL;
+    const int has_reference = self->features.n > self->features.reference;
+    return has_reference ? hsep_at_const(self, self->drive) + (self->preview - n) : NULL;
 }
 
-/* Before a row is learned: whether it is. A measurement that is held while the drive moves is missing. */
+/* Guard before a row is learned: return whether it is. A measurement held while the drive moves is missing. */
 static int predictor_guard(hsep_predictor *self, double x_meas, double x_pb)
 {
     if (self->saved && hsep_sensor_misses(&self->sensor, x_meas, x_pb)) {
@@ -125,8 +125,8 @@ static void predictor_learn(hsep_predictor *self, uint64_t i)
     row[HSEP_BIAS] = 1.0;
     memcpy(row + f->x, x, (size_t)(f->q + 1) * sizeof(double));
     memcpy(row + f->e, e + 1, (size_t)f->p * sizeof(double));
-    if (f->n > f->scheduled) {
-        hsep_schedule_features(hsep_at(self, self->signs), i, row + f->scheduled);
+    if (f->n > f->reference) {
+        hsep_reference_features_at(hsep_at(self, self->signs), i, row + f->reference);
     }
     row[f->n] = e[0];
     hsep_regression_fold(hsep_predictor_regression(self));
@@ -152,7 +152,7 @@ HSEP_API int hsep_predictor_take_in(hsep_predictor *self, double x_d_ahead, doub
     return i + 1 == self->Np;
 }
 
-/* Take back what was learned of the window; what was predicted stands for what was not measured. */
+/* Unlearn the window: restore the regression, and replace the residuals by their predictions. */
 static void predictor_unlearn(hsep_predictor *self)
 {
     const double *e_h = hsep_at(self, self->e_h);
@@ -173,8 +173,8 @@ HSEP_API int hsep_predictor_finish(hsep_predictor *self)
     if (self->missing) {
         predictor_unlearn(self);
     }
-    if (f->n > f->scheduled) {
-        hsep_schedule_next(hsep_at(self, self->signs), Np);
+    if (f->n > f->reference) {
+        hsep_reference_features_advance(hsep_at(self, self->signs), Np);
     }
     self->x_d_last = hsep_at(self, self->x_d)[Np - 1];
     memcpy(past_x + Np, past_x, (size_t)f->q * sizeof(double)); /* q < Np, p <= Np: they do not overlap */
@@ -182,29 +182,29 @@ HSEP_API int hsep_predictor_finish(hsep_predictor *self)
     return self->learning && !self->missing;
 }
 
-/* Take in the reference of the window that begins: the signs of its velocity, and what they add to the residuals. */
-static void predictor_schedule(hsep_predictor *self)
+/* Features of the reference over the window that begins, and their part of the residuals. */
+static void predictor_reference(hsep_predictor *self)
 {
-    const double *w = hsep_at(self, self->weights) + self->features.scheduled;
+    const double *w = hsep_at(self, self->weights) + self->features.reference;
     double *signs = hsep_at(self, self->signs), *drive = hsep_at(self, self->drive);
-    double features[HSEP_SCHEDULED];
-    hsep_schedule_signs(signs, hsep_at(self, self->x_d), self->preview, self->x_d_last, self->sign_step);
+    double features[HSEP_N_REFERENCE];
+    hsep_reference_features_signs(signs, hsep_at(self, self->x_d), self->preview, self->x_d_last, self->sign_step);
     for (uint64_t k = 0; k < self->preview; k++) {
         double sum = 0.0;
-        hsep_schedule_features(signs, k, features);
-        for (int i = 0; i < HSEP_SCHEDULED; i++) {
+        hsep_reference_features_at(signs, k, features);
+        for (int i = 0; i < HSEP_N_REFERENCE; i++) {
             sum += features[i] * w[i];
         }
         drive[self->preview - 1 - k] = sum;
     }
 }
 
-/* The weights of the window that begins, and what follows from them; eq. (6). */
+/* Weights for the window that begins, eq. (6), and the part of the features of the reference. */
 static void predictor_solve(hsep_predictor *self)
 {
     hsep_regression_solve(hsep_predictor_regression(self), hsep_at(self, self->weights));
-    if (self->features.n > self->features.scheduled) {
-        predictor_schedule(self);
+    if (self->features.n > self->features.reference) {
+        predictor_reference(self);
     }
 }
 
@@ -220,7 +220,7 @@ HSEP_API void hsep_predictor_begin(hsep_predictor *self)
     }
     predictor_solve(self);
     self->n_published = 0;
-    self->learning = !self->missing && self->k >= self->preview; /* over the first fill there is nothing to learn */
+    self->learning = !self->missing && self->k >= self->preview; /* the first fill is not learned */
     self->missing = 0;
     if (self->saved) {
         memcpy(
@@ -229,7 +229,7 @@ HSEP_API void hsep_predictor_begin(hsep_predictor *self)
     }
 }
 
-/* Before the samples first ... last - 1 of a window are published: whether they diverge. */
+/* Guard before the samples first ... last - 1 are published: set divergence if one is out of range. */
 static void predictor_bound(hsep_predictor *self, uint64_t first, uint64_t last)
 {
     const double *x_pb = hsep_at(self, self->x_pb) + first, *x_h = hsep_at(self, self->x_h) + first;
@@ -260,17 +260,17 @@ HSEP_API int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, doubl
     const uint64_t Np = self->Np;
     const double relative = x_d_ahead - self->start;
     double *past_x = hsep_at(self, self->past_x), *ahead_pb = hsep_at(self, self->ahead_pb);
-    hsep_physics_respond(hsep_predictor_physics(self), &relative, ahead_pb + self->k % Np, 1);
+    hsep_physics_forced_response(hsep_predictor_physics(self), &relative, ahead_pb + self->k % Np, 1);
     if (!hsep_predictor_take_in(self, x_d_ahead, x_meas)) {
         return 0;
     }
     (void)hsep_predictor_finish(self);
-    if (self->k == self->preview) { /* what was measured over the first fill is not used */
+    if (self->k == self->preview) { /* the first fill was not predicted */
         memset(hsep_at(self, self->past_e), 0, (size_t)(Np + self->features.p) * sizeof(double));
     }
     hsep_predictor_begin(self);
     for (uint64_t i = 0; i < Np; i++) {
-        past_x[Np - 1 - i] = ahead_pb[i]; /* Eq. (2), answered command by command as they came */
+        past_x[Np - 1 - i] = ahead_pb[i]; /* Eq. (2), computed as the commands came */
     }
     const double warm_up = self->n_init - (double)self->k;
     self->n_physics = warm_up >= (double)Np ? Np : warm_up > 0.0 ? (uint64_t)warm_up : 0;

@@ -1,21 +1,21 @@
-/* The hybrid predictor online, sample by sample and window by window; eqs. (2) to (6).
+/* Hybrid predictor, sample by sample; eqs. (2) to (6).
  *
  * It is the look-ahead buffer between the interpolator and the drive: sample k brings x_d_ahead = r(k) and x_meas =
  * x(k); after it the outputs are those of k + 1, and x_d(k) = r(k - preview). When k + 1 is a multiple of Np, the next
  * window and every measurement before it have arrived: the weights are solved and the window is predicted in that
  * sample. Over the first fill (k < preview) the commanded position is the start; what is measured then is not learned.
  *
- * Alone (hsep_predictor_sample, preview = Np) it answers the commands that came. Where a compensator decides the
- * commands of a window, it calls the parts in that order: hsep_predictor_take_in at each sample; at the end of a window
- * hsep_predictor_finish and _begin; once commands are decided, hsep_predictor_publish.
+ * Alone (hsep_predictor_sample, preview = Np) it predicts under the commands as they came. A compensator, which decides
+ * the commands of a window, calls the parts in this order: hsep_predictor_take_in at each sample; at the end of a
+ * window hsep_predictor_finish and _begin; once commands are decided, hsep_predictor_publish.
  *
  * Cost of a sample, with n features: that of hsep_regression_fold(n), and alone 9 multiply-adds a mode; at the end of a
- * window (Np (p + q + 2) + n^2 / 2) multiply-adds on top, the tanh of hsep_schedule_signs(preview) and, where windows
- * are unlearned, a copy of the regression. Never more, at no sample number.
+ * window (Np (p + q + 2) + n^2 / 2) multiply-adds on top, the tanh of hsep_reference_features_signs(preview) and,
+ * where windows are unlearned, a copy of the regression. Never more, at no sample number.
  *
  * Memory is one block: the struct, then what its offsets tell; no pointers, so a copy of the block is the state.
  * Reentrant; allocates nothing. Once the parameters are in range nothing here fails but the prediction of a window:
- * what was learned may diverge, then the outputs are of no use from then on, and divergence says so.
+ * the learned recursion may diverge; then divergence is set and the outputs are invalid from there on.
  */
 #ifndef HSEP_PREDICTOR_H
 #define HSEP_PREDICTOR_H
@@ -33,11 +33,11 @@
 
 typedef struct {
     hsep_predictor_settings settings;
-    double v_friction;      /* m/s, over which friction changes its sign; 0: no features of the reference */
+    double v_friction;      /* m/s, scale of friction's change of sign; 0: no features of the reference */
     uint64_t preview;       /* samples from r(k) to the drive, >= Np; Np alone */
-    double n_init;          /* samples of warm-up from the beginning, that are not judged; whole, >= 0 */
+    double n_init;          /* samples of warm-up from the beginning; whole, >= 0 */
     int planned;            /* whether a compensator decides the commands of a window when it begins */
-    int unlearns;           /* whether a window with a sample that was not measured is unlearned */
+    int unlearns;           /* whether a window with a missing sample is unlearned */
     uint64_t n_modes;       /* >= 1 */
     const hsep_mode *modes; /* (n_modes,) */
 } hsep_predictor_parameters;
@@ -49,27 +49,27 @@ typedef struct {
     double sign_step;            /* v_friction T_s, m */
     double start;                /* position of rest, m */
     double x_d_last;             /* m, the commanded position before the window */
-    uint64_t k;                  /* the sample that comes next */
+    uint64_t k;                  /* index of the next sample */
     uint64_t n_published;        /* samples of the window that are predicted */
     uint64_t n_physics;          /* leading samples of the window where x_h = x_pb */
-    uint64_t learning;           /* whether the window is learned, if it is measured */
-    uint64_t missing;            /* whether a sample of it was not measured */
+    uint64_t learning;           /* whether the window is learned if it is measured */
+    uint64_t missing;            /* whether a sample of it is missing */
     uint64_t n_measured;         /* samples since t_init */
     double sum_e, sum_pb, sum_h; /* m2, sums of squared servo and prediction errors over them */
-    uint64_t divergence;         /* hsep_divergence of the first window that could not be predicted; stays */
+    uint64_t divergence;         /* hsep_divergence of the first window that diverged; latched */
     hsep_sensor sensor;
     /* Offsets in doubles from the beginning of the struct */
     uint64_t ahead;    /* (preview,) m, ring of the commands that came last */
     uint64_t x_d;      /* (preview,) m, commands of the window and what follows it */
     uint64_t x_pb;     /* (Np,) m, the window: physics-based predictions, */
     uint64_t x_h;      /* (Np,) m, hybrid predictions */
-    uint64_t ahead_pb; /* (Np,) m, what the physics model answers to ahead, relative to start; alone */
+    uint64_t ahead_pb; /* (Np,) m, response of the physics model to ahead, relative to start; alone */
     uint64_t past_x;   /* (Np + q,) m, x_pb of this window and of the q samples before it, newest first */
     uint64_t past_e;   /* (Np + p,) m, e_pb likewise, as measured */
     uint64_t e_h;      /* (Np + p,) m, e_pb as predicted, behind it the measured ones; alone it is past_e */
     uint64_t weights;  /* (n,) w */
-    uint64_t signs;    /* (preview + 2 HSEP_SCHEDULE_REACH,) of the reference's velocity; if it has features */
-    uint64_t drive;    /* (preview,) m, what they add to the residuals, newest first */
+    uint64_t signs;    /* (preview + 2 HSEP_REFERENCE_REACH,) psi of the reference, if it has features */
+    uint64_t drive;    /* (preview,) m, their part of the residuals, newest first */
     uint64_t physics, regression;
     uint64_t saved; /* the regression as it was before this window; 0: no window is unlearned */
 } hsep_predictor;
@@ -89,30 +89,29 @@ HSEP_API double hsep_predictor_size(const hsep_predictor_parameters *parameters)
 /* Fill the block for a drive at rest at start, m. */
 HSEP_API void hsep_predictor_init(hsep_predictor *self, const hsep_predictor_parameters *parameters, double start);
 
-/* Tell whether a block of bytes, in any alignment and hsep_predictor_size(parameters) long, is one that
- * hsep_predictor_init with these parameters began and that is at sample k: its layout is the same and every index lies
- * within it. */
+/* Whether a block, in any alignment and of hsep_predictor_size(parameters) bytes, is a valid state for these parameters
+ * at sample k: its layout is that of hsep_predictor_init, and every index lies within it. */
 HSEP_API int hsep_predictor_valid(const void *block, const hsep_predictor_parameters *parameters, uint64_t k);
 
-/* Where the factor is, to start warm by hsep_regression_load before the first sample. */
+/* The regression, for a warm start by hsep_regression_load before the first sample. */
 HSEP_API hsep_regression *hsep_predictor_regression(hsep_predictor *self);
 
 HSEP_API hsep_physics *hsep_predictor_physics(hsep_predictor *self);
 
-/* Take in sample k, both finite, m, and move on to k + 1; return whether a new window has begun. */
+/* Process sample k, both inputs finite, m, and advance to k + 1; return whether a new window has begun. */
 HSEP_API int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, double x_meas);
 
-/* Tell the outputs of the sample that comes next. Constant cost. */
+/* Read the outputs of the next sample. Constant cost. */
 HSEP_API void hsep_predictor_read(const hsep_predictor *self, hsep_predictor_outputs *outputs);
 
-/* Take in sample k, learn and judge it, and move on to k + 1; return whether the window has ended. */
+/* Process sample k: learn it, update the error sums, advance to k + 1; return whether the window has ended. */
 HSEP_API int hsep_predictor_take_in(hsep_predictor *self, double x_d_ahead, double x_meas);
 
-/* Finish a window: what is measured of it, or what was predicted if it was not, is the past of the next one. Return
+/* Finish a window: its residuals, as measured, or as predicted where missing, become the past of the next one. Return
  * whether it was learned. */
 HSEP_API int hsep_predictor_finish(hsep_predictor *self);
 
-/* Begin a window: its commands, the weights from all that was learned, and what the reference alone adds. */
+/* Begin a window: commands, weights, and the part of the features of the reference. */
 HSEP_API void hsep_predictor_begin(hsep_predictor *self);
 
 /* Predict the samples of the window up to last - 1, whose x_pb are in past_x; eq. (4). */
@@ -121,7 +120,7 @@ HSEP_API void hsep_predictor_publish(hsep_predictor *self, uint64_t last);
 /* The learned recursion, with its bias or without. */
 HSEP_API hsep_recursion hsep_predictor_recursion(const hsep_predictor *self, int with_bias);
 
-/* What the reference adds to the residuals of n samples from the window's beginning, newest first; NULL for nothing. */
+/* Part of the features of the reference in the residuals of the next n samples, newest first; NULL for none. */
 HSEP_API const double *hsep_predictor_drive(const hsep_predictor *self, uint64_t n);
 
 #endif

@@ -2,10 +2,10 @@
 
 #include <math.h>
 
-static const double sensor_repeats = 3.0;     /* so many equal values in a row may be held */
-static const double sensor_steps = 5.0;       /* if the drive has moved by so many of the sensor's steps, */
-static const double sensor_first_step = 1e-5; /* m, taken for the step of a sensor that has not changed yet, */
-static const double sensor_still = 1e-8;      /* m, and by more than this */
+static const double sensor_repeats = 3.0; /* equal consecutive values from which one may be held */
+static const double sensor_steps = 5.0;   /* predicted motion, in resolution steps, within which they are plausible */
+static const double sensor_first_step = 1e-5; /* m, resolution step assumed before the first change */
+static const double sensor_still = 1e-8;      /* m, motion below which the drive counts as at rest */
 
 HSEP_API void hsep_sensor_init(hsep_sensor *self)
 {

@@ -7,7 +7,7 @@
 
 /* clang-format off */
 #define HSEP_PREDICTOR_SETTINGS(SETTING) \
-    /* samples in a look-ahead window (a batch) */ \
+    /* samples in a look-ahead window */ \
     SETTING(uint64_t, Np) \
     /* past residuals e_pb in the features */ \
     SETTING(uint64_t, p) \

@@ -1,8 +1,8 @@
 #include "hsep_trust.h"
 
-static const double trust_forget = 0.9;      /* share of the past windows that is kept with each window */
-static const double trust_noise_share = 0.5; /* at rest both models predict the same noise: it must not decide */
-static const double trust_worst = 2.0;       /* a bad start must not be remembered for ever */
+static const double trust_forget = 0.9;      /* forgetting factor per window: a memory of about ten */
+static const double trust_noise_share = 0.5; /* tolerance, of the noise variance: at rest noise alone would decide */
+static const double trust_worst = 2.0; /* bound on one window's mean square error, relative to physics and noise */
 
 HSEP_API void hsep_trust_observe(
     hsep_trust *self, const double e_pb[], const double e_h[], uint64_t n, double noise_variance)

@@ -1,5 +1,5 @@
-/* When the hybrid model may move the machine: while the mean square of its errors, with exponential forgetting, exceeds
- * that of the physics model by no more than half the noise variance. Plain data; reentrant. */
+/* Excess prediction error of the hybrid model over the physics model, with exponential forgetting. The hybrid model is
+ * trusted while it is at most half the noise variance. Plain data; reentrant. */
 #ifndef HSEP_TRUST_H
 #define HSEP_TRUST_H
 
@@ -14,8 +14,8 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_trust, 1);
 
-/* Take in a measured window. e_pb: measured residuals of the physics model, e_h: what the hybrid model predicted of
- * them, both (n,), m; noise_variance: of what no model explains, m2. */
+/* Update the excess with a measured window. e_pb: measured residuals of the physics model, e_h: their predictions by
+ * the hybrid model, both (n,), m; noise_variance: of the measurement, m2. */
 HSEP_API void hsep_trust_observe(
     hsep_trust *self, const double e_pb[], const double e_h[], uint64_t n, double noise_variance);
 

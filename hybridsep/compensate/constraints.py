@@ -1,8 +1,7 @@
-"""The drive's limits on a plan: linear bounds on its coefficients, and the quadratic programme under them.
+"""Drive limits as linear inequality constraints on a plan's coefficients, and the quadratic programme under them.
 
-Everything is measured in shares of a limit. What the rest of the last plan demands is always allowed: it was within
-the limits when it was made, so a plan that keeps the limits exists at any time, unless ``x_d`` itself exceeds them,
-and then the change does not make it worse.
+Rows are normalised by their limits. The remainder of the last plan is always feasible: it kept the limits when it was
+made. Where ``x_d`` itself exceeds a limit, the bound is relaxed to what that remainder takes.
 """
 
 from __future__ import annotations
@@ -20,24 +19,25 @@ from .splines import N_DECIDED, PlanCost, SplineBasis
 __all__ = ["Bounds", "DriveBounds", "solve"]
 
 _ROUNDING = 1e-9
-"""Share of a limit that is taken for rounding."""
+"""Tolerance for rounding, as a share of a limit: bounds are tightened by it; rows that change by less do not bind."""
 
 _INTERIOR = 1e-10
-"""Share of a limit by which a plan may differ where the last one is at its bound: bounds need an interior."""
+"""Width of the feasible interval, as a share of a limit, where the last plan lies on a bound: an interior-point method
+needs an interior."""
 
 _MOVES = 1e-12
-"""Step of the commanded position, m a sample, that counts as a move."""
+"""Smallest step of the commanded position that counts as motion, m per sample: above its rounding."""
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """``low ≤ rows @ c ≤ high`` in shares of the limits, ``(m,)``.
+    """Linear inequality constraints ``low ≤ rows @ c ≤ high`` on the coefficients, normalised by the limits.
 
     Attributes
     ----------
     rows : (m, n) array, 1/m
     low, high : (m,) arrays
-        Never to be exceeded.
+        Hard bounds.
     """
 
     rows: Array
@@ -45,20 +45,20 @@ class Bounds:
     high: Array
 
     def allow(self, c: Array) -> bool:
-        """Return whether the coefficients keep the bounds."""
+        """Return whether the coefficients are feasible."""
         values = self.rows @ c
         return bool(np.all(values >= self.low) and np.all(values <= self.high))
 
     def step(self, rest: Array, c: Array) -> float:
-        """Return the largest share, 0 … 1, of the way from ``rest``, which keeps the bounds, to ``c``."""
-        here, way = self.rows @ rest, self.rows @ (c - rest)
-        room = np.where(way > 0, self.high - here, here - self.low)
-        beyond = np.abs(way) > np.maximum(room, _ROUNDING)
-        return float(np.min(room[beyond] / np.abs(way[beyond]), initial=1.0))
+        """Return the largest feasible step length, 0 … 1, from the feasible ``rest`` towards ``c``."""
+        here, step = self.rows @ rest, self.rows @ (c - rest)
+        margin = np.where(step > 0, self.high - here, here - self.low)
+        beyond = np.abs(step) > np.maximum(margin, _ROUNDING)
+        return float(np.min(margin[beyond] / np.abs(step[beyond]), initial=1.0))
 
 
 class DriveBounds:
-    """Limits on the differences of ``x_dm`` and on the change.
+    """Limits on velocity, acceleration and jerk of ``x_dm``, taken as differences, and on ``|δ|``.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class DriveBounds:
         *,
         no_reversal: bool = False,
     ) -> None:
-        self._keep_direction = no_reversal
+        self._no_reversal = no_reversal
         self._scales: list[tuple[int, float]] = []
         if limits is not None:
             bounds = limits.velocity * T_s, limits.acceleration * T_s**2, limits.jerk * T_s**3
@@ -116,7 +116,7 @@ class DriveBounds:
         at_rest = self._free @ rest[N_DECIDED:]
         most = np.full(len(offset), 1.0 - _ROUNDING)
         least = -most
-        if self._keep_direction:
+        if self._no_reversal:
             steps, n = np.diff(x_d, prepend=x_d_before[-1]), len(x_d)
             for i, (order, _) in enumerate(self._scales):
                 if order == 1:
@@ -127,24 +127,24 @@ class DriveBounds:
 
 
 def solve(cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int) -> Array | None:
-    """Return the coefficients that cost least within the bounds.
+    """Return the minimiser of the cost within the bounds.
 
-    The free minimum if it keeps the bounds. Otherwise the first ``n_pinned`` coefficients stay as they are in ``rest``,
-    which gives a real-time implementation the samples that they act in to find the others, step by step.
+    The unconstrained minimiser if it is feasible. Otherwise the first ``n_pinned`` coefficients stay as they are in
+    ``rest``: a real-time implementation solves for the others while those act.
 
     Parameters
     ----------
     cost : PlanCost
     bounds : Bounds
     rest : (n,) array, m
-        Coefficients that keep the bounds.
+        Feasible coefficients.
     n_pinned : int
         Coefficients that a bounded plan does not change, < n.
 
     Returns
     -------
     c : (n,) array, m, or None
-        None if there is no finite answer.
+        None if there is no finite minimiser.
     """
     try:
         c = np.asarray(cho_solve(cho_factor(cost.P), cost.v))
