@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from hybridsep.base.errors import FmuError, SignalError
+from hybridsep.base.errors import FmuError
 from hybridsep.base.saved import Saved
-from hybridsep.base.signals import POSITION_MAX
+from hybridsep.base.signals import check_position
 from hybridsep.fmi import slave
 from hybridsep.fmi.variables import modes_from
 from hybridsep.model.physics import ModalModel, Mode
@@ -23,7 +23,7 @@ class FeedDrivePy(slave.TableSlave):
 
     def initialise(self) -> None:
         """Create the plant, at rest at the start value of x_d, and its encoder."""
-        _check_position("the start value of x_d", self.values["x_d"])
+        check_position("the start value of x_d", self.values["x_d"])
         self.encoder = Encoder(self.values["noise_std"], self.values["seed"])
         self.plant = self._new_plant()
         self.plant.reset(self.values["x_d"])
@@ -33,7 +33,7 @@ class FeedDrivePy(slave.TableSlave):
         """Step the plant and measure it."""
         if not math.isfinite(t):
             raise FmuError(f"the communication point must be finite, got {t} s")
-        _check_position("x_d", self.values["x_d"], f" at t = {t:g} s")
+        check_position("x_d", self.values["x_d"], f" at t = {t:g} s")
         self.plant.step(self.values["x_d"], h)
         self.x_meas = self.encoder.measure(self.plant.x)
 
@@ -67,11 +67,3 @@ class FeedDrivePy(slave.TableSlave):
         if modes:
             return StageDrive(ModalModel([Mode(**mode) for mode in modes]), values["f"], values["kappa"], values["T_s"])
         return FeedDrive(*(values[name] for name in ("m", "c", "k", "c_nl", "k_nl")))
-
-
-def _check_position(name: str, value: float, when: str = "") -> None:
-    """Raise SignalError if a position, m, is not finite, or further out than any machine is."""
-    if not math.isfinite(value):
-        raise SignalError(f"{name} must be finite, got {value}{when}")
-    if abs(value) > POSITION_MAX:
-        raise SignalError(f"{name} must be within ±{POSITION_MAX:g} m, got {value:g}{when}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import SignalError
 
-__all__ = ["POSITION_MAX", "PREDICTION_MAX", "Array", "as_published", "as_samples"]
+__all__ = ["POSITION_MAX", "PREDICTION_MAX", "Array", "as_published", "as_samples", "check_position"]
 
 Array = NDArray[np.float64]
 
@@ -55,6 +56,14 @@ def as_samples(values: ArrayLike, name: str, length: int | None = None) -> Array
         i = int(np.argmax(np.abs(samples)))
         raise SignalError(f"{name} must be within ±{POSITION_MAX:g} m, got {samples[i]:g} at sample {i}")
     return samples  # type: ignore[no-any-return]
+
+
+def check_position(name: str, value: float, when: str = "") -> None:
+    """Raise SignalError if a position, m, is not finite or beyond :data:`POSITION_MAX`; ``when`` ends the message."""
+    if not math.isfinite(value):
+        raise SignalError(f"{name} must be finite, got {value}{when}")
+    if abs(value) > POSITION_MAX:
+        raise SignalError(f"{name} must be within ±{POSITION_MAX:g} m, got {value:g}{when}")
 
 
 def as_published(window: Array, name: str) -> Array:

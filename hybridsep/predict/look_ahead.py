@@ -20,12 +20,12 @@ import numpy as np
 from ..base.errors import SignalError
 from ..base.saved import Saved
 from ..base.settings import samples_before
-from ..base.signals import POSITION_MAX, Array
+from ..base.signals import Array, check_position
 from ..base.state import pack, unpack
 from .predictor import HybridPredictor
 from .window import PublishedWindow
 
-__all__ = ["LookAhead", "Planner", "checked_start"]
+__all__ = ["LookAhead", "Planner"]
 
 _KIND = "look-ahead"
 
@@ -99,7 +99,8 @@ class LookAhead:
     def __init__(self, model: HybridPredictor | Planner, start: float, *, t_init: float | None = None) -> None:
         self._hold(model)
         warm_up = self.predictor.settings.t_init if t_init is None else t_init
-        self.start = checked_start(start)
+        check_position("the start value of x_d_ahead", start)
+        self.start = start
         self.k = 0
         self._first_scored = self.delay + samples_before(warm_up, self.predictor.T_s)
         self._n_scored, self._sums = 0, np.zeros(3)
@@ -206,7 +207,7 @@ class LookAhead:
             raise SignalError(self.diverged)
         sample = self.k if k is None else k
         for name, value in (("x_d_ahead", x_d_ahead), ("x_meas", x_meas)):
-            _check_position(name, value, f" at sample {sample}")
+            check_position(name, value, f" at sample {sample}")
 
     def to_bytes(self) -> bytes:
         """Return the complete state, predictor and planner included, as a versioned blob."""
@@ -243,7 +244,8 @@ class LookAhead:
         look_ahead._hold(model_type.from_bytes(saved.part("model")))
         Np = look_ahead.Np
         with saved.consistent():
-            look_ahead.start = checked_start(saved.real("start"))
+            look_ahead.start = saved.real("start")
+            check_position("start", look_ahead.start)
         look_ahead.k = saved.whole("k")
         look_ahead._first_scored, look_ahead._n_scored = saved.whole("first_scored"), saved.whole("n_scored")
         look_ahead.diverged = saved.text("diverged")
@@ -289,17 +291,3 @@ class LookAhead:
 
     def _rms(self, i: int) -> float:
         return math.sqrt(self._sums[i] / self._n_scored) if self._n_scored else 0.0
-
-
-def checked_start(start: float) -> float:
-    """Return the initial position, m, validated."""
-    _check_position("the start value of x_d_ahead", start)
-    return start
-
-
-def _check_position(name: str, value: float, when: str = "") -> None:
-    """Raise SignalError if a position, m, is not finite or beyond :data:`POSITION_MAX`."""
-    if not math.isfinite(value):
-        raise SignalError(f"{name} must be finite, got {value}{when}")
-    if abs(value) > POSITION_MAX:
-        raise SignalError(f"{name} must be within ±{POSITION_MAX:g} m, got {value:g}{when}")

@@ -13,6 +13,7 @@ import elf
 import numpy as np
 import pytest
 import staircase_data as staircase
+from c_compiler import C_SOURCES, build_folder, include_flags, needs_sanitisers, run_compiler, sanitising_compiler
 from c_core import write_trajectory
 from places import ROOT
 
@@ -48,7 +49,7 @@ def test_the_core_needs_libm_alone() -> None:
         "fmax",
         "fmin",
     }
-    core = {path.stem for path in (c_core.C_SOURCES / "core").rglob("*.c")}
+    core = {path.stem for path in (C_SOURCES / "core").rglob("*.c")}
     for built in c_core.object_files():
         if Path(built).stem not in core:
             continue
@@ -60,12 +61,12 @@ def test_the_core_needs_libm_alone() -> None:
 
 @pytest.mark.parametrize("name", list(c_core.DESCRIPTIONS))
 def test_everything_compiles_as_one_file(name: str) -> None:
-    folder = c_core.build_folder() / f"all_{name}"
+    folder = build_folder() / f"all_{name}"
     c_core.write_header(name, folder)
     everything = folder / "all.c"
     everything.write_text(all_c(c_core.sources()))
     for level in ("-O0", "-O3"):
-        c_core.run_compiler([level, f"-I{folder}", *c_core.include_flags(), "-c", everything, "-o", folder / "all.o"])
+        run_compiler([level, f"-I{folder}", *include_flags(), "-c", everything, "-o", folder / "all.o"])
 
 
 def cpp_compiler() -> list[str]:
@@ -77,9 +78,9 @@ def cpp_compiler() -> list[str]:
 @pytest.mark.skipif(not cpp_compiler(), reason="no C++ compiler here; install g++, clang++ or the ziglang package")
 def test_one_header_serves_c_plus_plus() -> None:
     """Compiled as C++11, it links with the core that C compiled, and predicts a window."""
-    program = c_core.build_folder() / "header"
+    program = build_folder() / "header"
     source = ROOT / "tests" / "c" / "header.cpp"
-    flags = ["-std=c++11", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", *c_core.include_flags()]
+    flags = ["-std=c++11", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", *include_flags()]
     arguments = [*cpp_compiler(), *flags, str(source), *c_core.object_files(), "-lm", "-o", str(program)]
     built = subprocess.run(arguments, capture_output=True, text=True, check=False)
     assert built.returncode == 0, built.stderr
@@ -87,7 +88,7 @@ def test_one_header_serves_c_plus_plus() -> None:
     assert done.stdout == "9 1\n"
 
 
-@c_core.needs_sanitisers
+@needs_sanitisers
 @pytest.mark.parametrize(
     ("name", "arguments"),
     [
@@ -108,14 +109,14 @@ def test_one_header_serves_c_plus_plus() -> None:
     ],
 )
 def test_the_sanitisers_find_nothing(name: str, arguments: list[list[str]], tmp_path: Path) -> None:
-    folder = c_core.build_folder() / f"sanitise_{name}"
+    folder = build_folder() / f"sanitise_{name}"
     c_core.write_header(name, folder)
     flags = ["-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer"]
     driver = ROOT / "tests" / "c" / "sanitise.c"
     program = folder / "sanitise"
-    c_core.run_compiler(
-        [*flags, f"-I{folder}", *c_core.include_flags(), *c_core.sources(), driver, "-lm", "-o", program],
-        command=c_core.sanitising_compiler(),
+    run_compiler(
+        [*flags, f"-I{folder}", *include_flags(), *c_core.sources(), driver, "-lm", "-o", program],
+        command=sanitising_compiler(),
     )
     write_trajectory(tmp_path, staircase.commanded()[:600])
     for pairs in arguments:
@@ -123,7 +124,7 @@ def test_the_sanitisers_find_nothing(name: str, arguments: list[list[str]], tmp_
         assert done.returncode == 0, done.stderr
 
 
-@c_core.needs_sanitisers
+@needs_sanitisers
 @pytest.mark.parametrize(
     ("n_samples", "said"),
     [
@@ -135,15 +136,15 @@ def test_the_sanitisers_find_nothing(name: str, arguments: list[list[str]], tmp_
     ],
 )
 def test_a_trajectory_that_changes_while_it_is_read(n_samples: int, said: str, tmp_path: Path) -> None:
-    folder = c_core.build_folder() / "changing_resource"
+    folder = build_folder() / "changing_resource"
     c_core.write_header("trajectory", folder)
     program = folder / "changing_resource"
     if not program.exists():
         driver = ROOT / "tests" / "c" / "changing_resource.c"
         flags = ["-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", f"-I{folder}"]
-        c_core.run_compiler(
-            [*flags, *c_core.include_flags(), *c_core.sources(), driver, "-lm", "-o", program],
-            command=c_core.sanitising_compiler(),
+        run_compiler(
+            [*flags, *include_flags(), *c_core.sources(), driver, "-lm", "-o", program],
+            command=sanitising_compiler(),
         )
     write_trajectory(tmp_path, np.full(n_samples, 0.2))
     file = (tmp_path / "trajectory_3.bin").rename(tmp_path / "other.bin")

@@ -6,11 +6,11 @@ import subprocess
 import zipfile
 from pathlib import Path
 
-import c_core
 import elf
 import fmpy
 import numpy as np
 import pytest
+from c_compiler import FMI_HEADERS, compiler, run_compiler
 from places import ROOT
 
 from hybridsep.base.signals import Array
@@ -45,7 +45,7 @@ def headers(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The standard's headers: fmpy's, with the prefix that fmpy took out of them."""
     folder = tmp_path_factory.mktemp("headers")
     for name in ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"):
-        text = (c_core.FMI_HEADERS / name).read_text()
+        text = (FMI_HEADERS / name).read_text()
         if name == "fmi2Functions.h":
             assert WITHOUT_PREFIX in text
             text = text.replace(WITHOUT_PREFIX, WITH_PREFIX)
@@ -57,9 +57,9 @@ def compile_all(fmu: Path, headers: Path, out: Path, *flags: str) -> Path:
     """Return the object file of an FMU's sources."""
     built = out / f"{fmu.stem}.o"
     sources = fmu.with_suffix("") / "sources"
-    c_core.run_compiler(
+    run_compiler(
         [
-            *compile_flags(c_core.compiler()),
+            *compile_flags(compiler()),
             *flags,
             f"-I{sources}",
             f"-I{headers}",
@@ -126,7 +126,7 @@ def test_three_fmus_run_in_one_program(fmus: dict[str, Path], headers: Path, tmp
     (tmp_path / "wiring.h").write_text(wiring(fmus))
     program = tmp_path / "three_fmus"
     host = ROOT / "tests" / "c" / "three_fmus.c"
-    c_core.run_compiler([f"-I{tmp_path}", f"-I{headers}", host, *objects, "-lm", "-o", program])
+    run_compiler([f"-I{tmp_path}", f"-I{headers}", host, *objects, "-lm", "-o", program])
     resources = (fmus["ReferenceTrajectory"].with_suffix("") / "resources").as_uri()
     done = subprocess.run([program, str(STEPS), resources], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

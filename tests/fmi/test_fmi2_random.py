@@ -12,13 +12,7 @@ from pathlib import Path
 
 import fuzz_fmi2
 import pytest
-from c_core import (
-    FMI_HEADERS,
-    address_sanitizer,
-    needs_sanitisers,
-    run_compiler,
-    sanitising_compiler,
-)
+from c_compiler import FMI_HEADERS, address_sanitizer, needs_sanitisers, run_compiler, sanitising_compiler
 
 from hybridsep.fmi.native_flavour import sources
 from hybridsep.machine import load_machine

@@ -8,11 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from c_core import (
-    C_SOURCES,
-    include_flags,
-    run_compiler,
-)
+from c_compiler import C_SOURCES, include_flags, run_compiler
 from fmi2_driving import library_of
 from fmi2_library import ERROR, OK, Allocate, Callbacks
 

@@ -3,42 +3,37 @@
 from __future__ import annotations
 
 import ctypes
-import os
-import shlex
-import shutil
 import struct
-import subprocess
-import sys
-import tempfile
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from functools import cache
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import fmpy
 import numpy as np
 import pytest
+from c_compiler import C_SOURCES, build_folder, include_flags, run_compiler
 from numpy.typing import NDArray
 from places import ROOT
 
+from hybridsep.base.settings import PARAMETERS
 from hybridsep.fmi.c_header import c_header
-from hybridsep.fmi.variables import INTERPOLATED, variables_of
+from hybridsep.fmi.variables import COMPENSATOR_SETTINGS, INTERPOLATED, PREDICTOR_SETTINGS, variables_of
 from hybridsep.machine import load_machine
 
 Array = NDArray[np.float64]
 
 TS = 1e-3  # s
 
-C_SOURCES = ROOT / "fmu_src" / "c"
-FMI_HEADERS = Path(fmpy.__file__).parent / "c-code"
-"""fmpy's, for shared libraries: the names of the FMI functions are the plain ones."""
-
 EXPOSE = ROOT / "tests" / "c" / "expose.c"
-FLAGS = ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wcast-qual", "-pedantic", "-Werror", "-ffp-contract=off"]
 MESSAGE_SIZE = 512
+
+
+def defaults(names: Sequence[str]) -> dict[str, float]:
+    """Return the default values of parameters as an FMU has them."""
+    return {name: PARAMETERS[name].to_fmi(PARAMETERS[name].default) + 0 for name in names}
+
 
 SPRING_MASS_DAMPER = {"f_n": np.sqrt(24674.0) / (2 * np.pi), "zeta": 15.7 / (2 * np.sqrt(24674.0))} | {
     "alpha": 24674.0,
@@ -48,23 +43,11 @@ SPRING_MASS_DAMPER = {"f_n": np.sqrt(24674.0) / (2 * np.pi), "zeta": 15.7 / (2 *
 
 STAGE_MODES = [asdict(mode) for mode in load_machine("als25010_x").model.modes]
 """The stage's X axis, Table 1."""
-PREDICTOR = {"Np": 100, "p": 50, "q": 3, "lambda": 1e-12, "T_s": 1e-3, "t_init": 0.3, "input_hold": 0, "dead_time": 0}
+PREDICTOR = defaults(PREDICTOR_SETTINGS)
 FEED_DRIVE = {"m": 1.0, "c": 15.7, "k": 24674.0, "c_nl": 100.0, "k_nl": 1000.0, "noise_std": 5e-6, "seed": 0}
 STAGE_DRIVE = {"f": 1.4211e-5, "kappa": 0.0213165, "T_s": 1e-3, "noise_std": 1e-6, "seed": 7}
 
-COMPENSATOR = {
-    **PREDICTOR,
-    "preview": 200,
-    "spacing": 2,
-    "jerk_weight": 1.0,
-    "v_max": 0.1,
-    "a_max": 16.0,
-    "j_max": 5000.0,
-    "change_max": 1e-3,
-    "v_friction": 2e-3,
-    "no_reversal": 1,
-    "compensate": 2,
-}
+COMPENSATOR = {**PREDICTOR, **defaults(COMPENSATOR_SETTINGS)}
 
 DESCRIPTIONS: dict[str, dict[str, Any]] = {
     "predictor": {"model": "HybridPredictor", "parameters": PREDICTOR, "modes": [SPRING_MASS_DAMPER]},
@@ -78,78 +61,9 @@ DESCRIPTIONS: dict[str, dict[str, Any]] = {
 """Models built here, described as in an FMU's machine.json."""
 
 
-def compiler() -> list[str]:
-    """Return the command of a C compiler, or say that there is none."""
-    if os.environ.get("CC"):
-        return shlex.split(os.environ["CC"])
-    for name in ("cc", "gcc", "clang"):
-        if path := shutil.which(name):
-            return [path]
-    if find_spec("ziglang"):
-        return [sys.executable, "-m", "ziglang", "cc"]
-    raise RuntimeError("the C core needs a C compiler: set CC, or install cc, gcc, clang or the ziglang package")
-
-
-@cache
-def sanitising_compiler() -> list[str]:
-    """Return the command of a C compiler that brings the address sanitizer as a library of its own; empty if none."""
-    for command in (compiler(), ["gcc"], ["cc"]):
-        if shutil.which(command[0]) and address_sanitizer(command) and _catches_overflows(command):
-            return command
-    return []
-
-
-def _catches_overflows(command: Sequence[str]) -> bool:
-    """Return whether a compiler's address sanitizer sees a write behind a block; a library found may not be its own."""
-    source, program = build_folder() / "overflow.c", build_folder() / "overflow"
-    source.write_text(
-        "#include <stdlib.h>\nint main(int n, char **a) { char *b = malloc(8); b[7 + n] = **a; free(b); }\n"
-    )
-    built = subprocess.run([*command, "-fsanitize=address", source, "-o", program], capture_output=True, check=False)
-    if built.returncode:
-        return False
-    done = subprocess.run([program], capture_output=True, check=False)
-    return done.returncode != 0 and b"AddressSanitizer" in done.stderr
-
-
-def address_sanitizer(command: Sequence[str]) -> str:
-    """Return the path of a compiler's libasan; empty if it has none."""
-    asked = subprocess.run([*command, "-print-file-name=libasan.so"], capture_output=True, text=True, check=False)
-    path = asked.stdout.strip()
-    return path if Path(path).is_absolute() and Path(path).exists() else ""
-
-
 def sources() -> list[str]:
     """Return every C file of core and models."""
     return sorted(str(path) for folder in ("core", "model") for path in (C_SOURCES / folder).rglob("*.c"))
-
-
-def run_compiler(arguments: Sequence[str | Path], *, command: Sequence[str] = ()) -> None:
-    """Compile, with the host's compiler if no other is asked for, or raise with what it said."""
-    done = subprocess.run(
-        [*(command or compiler()), *FLAGS, *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=build_folder(),
-    )
-    if done.returncode:
-        raise RuntimeError(f"the C compiler failed:\n{done.stderr}")
-
-
-@cache
-def _temporary() -> tempfile.TemporaryDirectory[str]:
-    return tempfile.TemporaryDirectory(prefix="hsep_c_core_")
-
-
-def build_folder() -> Path:
-    """Return this process's folder for what is built; it goes when the process ends."""
-    return Path(_temporary().name)
-
-
-needs_sanitisers = pytest.mark.skipif(
-    not sanitising_compiler(), reason="no C compiler here brings the address sanitizer; install gcc with libasan"
-)
 
 
 @cache
@@ -163,11 +77,6 @@ def object_files() -> list[str]:
             objects.append(str(folder / f"{Path(source).stem}.o"))
             run_compiler(["-O2", "-fPIC", *include_flags(), "-c", source, "-o", objects[-1]])
     return objects
-
-
-def include_flags() -> list[str]:
-    """Return the options with which a file finds every header by its name."""
-    return [f"-I{folder}" for folder in sorted({path.parent for path in C_SOURCES.rglob("*.h")})]
 
 
 def write_header(name: str, folder: Path) -> None:
@@ -304,8 +213,8 @@ def write_weights(folder: Path, name: str, factor: Array, n_samples: int, **sett
     """Write ``weights.bin``, as the C model describes it, into a resources folder; ``settings`` replace the table's."""
     values = {"v_friction": 0.0, **DESCRIPTIONS[name]["parameters"], **settings}
     modes = DESCRIPTIONS[name]["modes"]
-    names = ("p", "q", "lambda", "T_s", "input_hold", "v_friction", "dead_time")
-    learned = {key: values[key] for key in names}
+    names = (*PREDICTOR_SETTINGS, "v_friction")
+    learned = {key: values[key] for key in names if PARAMETERS[key].learned}
     learned |= {f"mode[{i}].{key}": value for i, mode in enumerate(modes, start=1) for key, value in mode.items()}
     content = b"HSEPWGT3" + struct.pack("<3Q", len(learned), len(modes), n_samples)
     content += b"".join(struct.pack("<24sd", key.encode(), value) for key, value in learned.items())

@@ -1,0 +1,162 @@
+"""Ctrl-C at any moment: one line, exit status 130, nothing half written."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.signal
+from command_line import Run
+
+from hybridsep import cosimulate
+from hybridsep.base.interrupt import interrupts_between_calls, uninterrupted
+from hybridsep.fmi.processes import Processes
+
+MACHINE = "spring_mass_damper"
+POSIX = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals and devices")
+MAIN = [sys.executable, "-c", "import sys; from hybridsep_main import main; sys.exit(main())"]
+
+
+SAID = "interrupted: nothing is half written, files are either as they were or complete"
+
+
+def interrupted(arguments: list[object], moment: Callable[[], object]) -> tuple[int, str]:
+    """Send Ctrl-C to a command once ``moment()`` is true; return its status and its standard error."""
+    process = subprocess.Popen(
+        [*MAIN, *map(str, arguments)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        # A background job of a shell ignores Ctrl-C, and so would its children.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    while not moment() and process.poll() is None:
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    sent = time.monotonic()
+    _, err = process.communicate(timeout=60)
+    assert time.monotonic() - sent < 10.0  # a second where nothing else runs: benchmarks/interruptions.py
+    return process.returncode, err
+
+
+@POSIX
+def test_ctrl_c_while_the_library_is_loaded() -> None:
+    begun = time.monotonic()
+    status, err = interrupted(["demo"], lambda: time.monotonic() > begun + 0.5)
+    assert (status, err) == (130, "interrupted\n")
+
+
+@POSIX
+def test_ctrl_c_during_the_demo(tmp_path: Path) -> None:
+    """The demo's FMUs are Python ones: a KeyboardInterrupt inside them would be fmi2Fatal."""
+    out = tmp_path / "demo"
+    last = out / "staircase.csv"
+    status, err = interrupted(["demo", "--flavour", "python", "--seeds", 1, "--out", out], last.exists)
+    assert (status, err.strip()) == (130, SAID)
+    assert not [path for path in out.rglob("*") if path.name.startswith(".")]
+    lines = last.read_text().splitlines()
+    assert len({line.count(",") for line in lines}) == 1
+    assert len(lines) == 6002
+
+
+@POSIX
+@pytest.mark.skipif(find_spec("ziglang") is None, reason="needs ziglang")
+def test_ctrl_c_during_a_build_ends_the_compilers(tmp_path: Path) -> None:
+    """All platforms: about ten seconds of compiling, two of them at a time."""
+    out, temporary = tmp_path / "dist", tmp_path / "temporary"
+    temporary.mkdir()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("TMPDIR", str(temporary))
+        status, err = interrupted(["build", "HybridPredictor", "--out", out], lambda: list(temporary.rglob("all.c")))
+    assert (status, err.strip()) == (130, SAID)
+    assert list(out.iterdir()) == []
+    assert list(temporary.rglob("all.c")) == []
+
+
+@POSIX
+def test_processes_stop_together(tmp_path: Path) -> None:
+    processes = Processes()
+    sleeper = [sys.executable, "-c", "import time; time.sleep(600)"]
+    with ThreadPoolExecutor(2) as pool:
+        running = [pool.submit(processes.run, sleeper, tmp_path) for _ in range(2)]
+        while len(processes._running) < 2:
+            time.sleep(0.01)
+        processes.stop()
+        assert [future.result()[0] for future in running] == [-signal.SIGTERM] * 2
+    with pytest.raises(InterruptedError):
+        processes.run(sleeper, tmp_path)
+
+
+@POSIX
+def test_ctrl_c_in_the_middle_of_a_step_of_a_python_fmu(
+    hybridsep: Run, tmp_path: Path, python_fmu: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "run.csv"
+    out.write_bytes(b"t,x_d,x,x_meas,x_pb,x_hold,x_h,active\r\n")
+    before, calls, original = out.read_bytes(), 0, scipy.signal.lfilter
+
+    def lfilter(*arguments: Any, **keywords: Any) -> Any:
+        """Send Ctrl-C from inside the FMU, whose prediction of a window calls this."""
+        nonlocal calls
+        calls += 1
+        if calls == 5:
+            os.kill(os.getpid(), signal.SIGINT)
+        return original(*arguments, **keywords)
+
+    ahead, plant = python_fmu("HybridPredictorPy"), python_fmu("FeedDrivePy")
+    monkeypatch.setattr("scipy.signal.lfilter", lfilter)
+    for name, module in list(sys.modules.items()):  # libraries of FMUs that another test has loaded
+        if name.startswith("hybridsep_") and hasattr(module, "lfilter"):
+            monkeypatch.setattr(module, "lfilter", lfilter)
+    status, _, err = hybridsep("cosim", "--predictor", ahead, "--plant", plant, "--out", out)
+    assert (status, calls) == (130, 5)
+    assert err.strip() == SAID
+    assert out.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [out]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@POSIX
+def test_ctrl_c_from_a_script_is_a_keyboard_interrupt(python_fmu: Callable[[str], Path]) -> None:
+    fmus = python_fmu("HybridPredictorPy"), python_fmu("FeedDrivePy")
+
+    def interrupt(k: int, n: int) -> None:
+        if k > n // 2:
+            signal.raise_signal(signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        cosimulate(*fmus, np.zeros(500), progress=interrupt)
+    assert cosimulate(*fmus, np.zeros(500)).summary()["n_samples"] == 500
+
+
+def test_a_call_ends_before_ctrl_c_is_raised() -> None:
+    steps: list[str] = []
+
+    @uninterrupted
+    def call() -> None:
+        signal.raise_signal(signal.SIGINT)
+        steps.append("ended")
+
+    @uninterrupted
+    def insist() -> None:
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
+        steps.append("not reached")
+
+    for function in (call, insist):
+        with pytest.raises(KeyboardInterrupt), interrupts_between_calls():
+            function()
+    assert steps == ["ended"]
+    with interrupts_between_calls():
+        uninterrupted(steps.clear)()
+    assert steps == []
