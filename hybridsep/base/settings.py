@@ -16,7 +16,7 @@ from collections.abc import Mapping
 from dataclasses import MISSING, asdict, dataclass, fields, replace
 from typing import Any, ClassVar, TypeVar
 
-from .errors import ParameterError
+from .errors import ParameterError, brief
 from .parameters import Parameter, choice, flag, real, whole
 
 __all__ = [
@@ -119,8 +119,8 @@ class Settings:
     def from_table(cls: type[_SettingsType], table: Mapping[str, Any]) -> _SettingsType:
         """Return the settings of :meth:`as_table`; ParameterError if an entry is missing, unknown or out of range."""
         names = [field.name for field in fields(cls)]
-        if sorted(table) != sorted(names):
-            raise ParameterError(f"settings must be {', '.join(names)}, got {', '.join(map(str, table))}")
+        if not isinstance(table, Mapping) or sorted(table) != sorted(names):
+            raise ParameterError(f"settings must be {', '.join(names)}, got {brief(table)}")
         return cls(**table)
 
     def _misfits(self) -> list[str]:
@@ -293,8 +293,8 @@ class CompensatorSettings(Settings):
     @classmethod
     def from_table(cls, table: Mapping[str, Any]) -> CompensatorSettings:
         """Return the settings of :meth:`as_table`."""
-        limits = table.get("limits")
-        return super().from_table({**table, "limits": None if limits is None else Limits.from_table(limits)})
+        settings = super().from_table(table)
+        return settings if settings.limits is None else replace(settings, limits=Limits.from_table(table["limits"]))
 
 
 _OTHERS = (

@@ -260,7 +260,8 @@ class SepCompensator:
         n, Np = len(compensator._rest), predictor.Np
         compensator._rest, compensator._delta_before = saved.array("rest", n), saved.array("delta_before", 3)
         compensator._x_d_before = saved.array("x_d_before", 3, finite=False)
-        compensator._sensor.restore(saved.array("sensor", 5, finite=False))
+        with saved.consistent():
+            compensator._sensor.restore(saved.array("sensor", 5, finite=False))
         if saved.field("pending") is not None:
             state, n_warm_up = saved.numbers("pending", 2)
             if state not in tuple(SepState) or n_warm_up not in range(Np + 1) or restored.n_pending != Np:

@@ -6,6 +6,8 @@ import math
 
 import numpy as np
 
+from ..base.errors import SignalError
+from ..base.saved import COUNT_MAX
 from ..base.signals import Array
 
 __all__ = ["SensorWatch"]
@@ -69,6 +71,8 @@ class SensorWatch:
         return [self.value, float(self.repeats), self.low, self.high, self.step]
 
     def restore(self, state: Array) -> None:
-        """Restore a :meth:`state`."""
+        """Restore a :meth:`state`; SignalError if it is none."""
         self.value, repeats, self.low, self.high, self.step = np.asarray(state).tolist()
+        if not (0 <= repeats <= COUNT_MAX and self.low <= self.high and self.step > 0 and not math.isinf(self.value)):
+            raise SignalError("the sensor's state must be a value, a count, a range of positions and a step")
         self.repeats = int(repeats)

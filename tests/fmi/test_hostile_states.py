@@ -130,7 +130,10 @@ def mutated(blob: bytes, chance: random.Random) -> bytes:
         return sealed(json.dumps(header).encode(), body[:place] + part)
     kind = chance.randrange(6)
     if kind == 0:
-        header["meta"][chance.choice(list(header["meta"]))] = chance.choice(HOSTILE)
+        table = header["meta"]
+        if "settings" in table and chance.random() < 0.5:
+            table = table["settings"]
+        table[chance.choice(list(table))] = chance.choice(HOSTILE)
     elif kind == 1:
         del header["meta"][chance.choice(list(header["meta"]))]
     elif kind == 2:
@@ -193,7 +196,10 @@ def test_what_is_allocated_follows_from_the_size_of_the_state() -> None:
     tracemalloc.start()
     try:
         for changes in ({"Np": 100_000, "p": 5000, "q": 5000}, {"dead_time": 10**9}, {"Np": 10**12}):
-            changed = {**header, "meta": {**header["meta"], **changes}}
+            meta = header["meta"]
+            inside = {name: value for name, value in changes.items() if name in meta["settings"]}
+            meta = {**meta, **changes, "settings": {**meta["settings"], **inside}}
+            changed = {**header, "meta": {name: meta[name] for name in header["meta"]}}
             with pytest.raises(StateError, match="the saved predictor is inconsistent"):
                 HybridPredictor.from_bytes(sealed(json.dumps(changed).encode(), body))
         modes = {**header, "arrays": [["modes", [50_000, 4]], *(a for a in header["arrays"] if a[0] != "modes")]}

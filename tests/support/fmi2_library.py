@@ -87,7 +87,8 @@ class Library:
         self.guid = str(root.get("guid"))
         variables = root.findall("ModelVariables/ScalarVariable")
         self.references = {str(v.get("name")): int(str(v.get("valueReference"))) for v in variables}
-        self.kinds = {str(v.get("name")): v[0].tag for v in variables}
+        tags = {str(v.get("name")): v[0].tag for v in variables}
+        self.kinds = {name: "Integer" if tag == "Enumeration" else tag for name, tag in tags.items()}
         self.causalities = {str(v.get("name")): str(v.get("causality")) for v in variables}
         self.messages: list[tuple[int, str, str]] = []
         self.blocks: dict[int, int] = {}
