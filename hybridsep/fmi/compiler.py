@@ -26,6 +26,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from ..base.errors import FmuError
+from ..base.interrupt import uninterrupted
 from ..base.output import named_errors
 from .macho import universal
 from .processes import Processes
@@ -143,7 +144,9 @@ def binaries(sources: Mapping[str, bytes], name: str, targets: Sequence[str]) ->
     keys = {target: host_target() if target == "host" else target for target in commands}
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         try:
-            built = dict(zip(keys.values(), pool.map(build, keys), strict=True))
+            # The pool waits for no thread whose start Ctrl-C has cut off.
+            libraries = uninterrupted(pool.map)(build, keys)
+            built = dict(zip(keys.values(), libraries, strict=True))
         except BaseException:
             processes.stop()
             raise
