@@ -53,7 +53,8 @@ def interrupted(arguments: list[object], moment: Callable[[], object]) -> tuple[
 def test_ctrl_c_while_the_library_is_loaded() -> None:
     begun = time.monotonic()
     status, err = interrupted(["demo"], lambda: time.monotonic() > begun + 0.5)
-    assert (status, err) == (130, "interrupted\n")
+    assert status == 130
+    assert err in ("interrupted\n", f"{SAID}\n")  # the longer one between loading two parts of it
 
 
 @POSIX
