@@ -14,7 +14,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from .base.data_files import data_folder
 from .base.errors import MachineError, ParameterError, brief
-from .base.settings import PARAMETERS, CompensatorSettings, Limits, PredictorSettings
+from .base.settings import PARAMETERS, CompensatorSettings, Limits, PredictorSettings, Settings
 from .compensate.compensator import SepCompensator
 from .machine_sections import (
     CompensatorSection,
@@ -107,9 +107,8 @@ class Machine(Section):
     @property
     def compensator_predictor(self) -> PredictorSettings:
         """Settings of the compensator's own predictor: those of the predictor where the section has no others."""
-        own = self.compensator.given()
-        entries = {name: value for name, value in own.items() if name in PredictorSettings.parameters()}
-        return PredictorSettings(**{**self.predictor.given(), **entries}, **self._sampling)
+        own = self._compensator_entries(PredictorSettings)
+        return PredictorSettings(**{**self.predictor.given(), **own}, **self._sampling)
 
     @property
     def compensator_settings(self) -> CompensatorSettings:
@@ -168,8 +167,7 @@ class Machine(Section):
     def fmi_parameters(self) -> dict[str, float | int | bool]:
         """Return the start values of the predictor FMU's scalar parameters, under their FMI names."""
         values = {**self.predictor_settings.to_fmi(), "dead_time": self.physics.dead_time}
-        del values["v_friction"]  # a predictor alone has no preview of the reference
-        return values
+        return {name: value for name, value in values.items() if name not in PredictorSettings.NEEDS_PREVIEW}
 
     def fmi_compensator_parameters(self) -> dict[str, float | int | bool]:
         """Return the start values of the compensator FMU's scalar parameters, under their FMI names.
@@ -194,10 +192,14 @@ class Machine(Section):
         return getattr(self.predictor, name) if own is None else own
 
     def _compensation(self) -> CompensatorSettings:
-        own = self.compensator.given()
-        entries = {name: value for name, value in own.items() if name in CompensatorSettings.parameters()}
         limits, change_max = self.command_limits()
-        return CompensatorSettings(**entries, limits=limits, change_max=change_max)
+        own = self._compensator_entries(CompensatorSettings)
+        return CompensatorSettings(**own, limits=limits, change_max=change_max)
+
+    def _compensator_entries(self, kind: type[Settings]) -> dict[str, Any]:
+        """Return the entries of the compensator's section that are fields of one class of settings."""
+        names = kind.parameters()
+        return {name: value for name, value in self.compensator.given().items() if name in names}
 
     def trajectory_limits(self) -> Limits:
         """Return the limits of the reference trajectory.

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, create_model, model_validator
 
-from .base.settings import PARAMETERS, CompensatorSettings, PredictorSettings, Settings, check
+from .base.parameters import Parameter
+from .base.settings import PARAMETERS, CompensatorSettings, Limits, PredictorSettings, Settings, check
 
 __all__ = [
     "CompensatorSection",
@@ -28,14 +29,13 @@ __all__ = [
 
 def _checked(value: Any, info: ValidationInfo) -> Any:
     """Check a field against the parameter of the same (FMI) name."""
-    name = str(info.field_name)
-    return check({"lam": "lambda"}.get(name, name), value)
+    return check(str(info.field_name), value)
 
 
 def _checked_limit(value: Any, info: ValidationInfo) -> Any:
     """Check one of a drive's or a trajectory's limits against the range of the compensator's."""
     name = str(info.field_name)
-    return check({"velocity": "v_max", "acceleration": "a_max", "jerk": "j_max"}[name], value, label=name)
+    return Limits.parameters()[name].checked(value, name)
 
 
 Number = Annotated[float, BeforeValidator(_checked)]
@@ -84,6 +84,13 @@ class Physics(Section):
         return self
 
 
+def _validator(parameter: Parameter) -> BeforeValidator:
+    def checked(value: Any) -> Any:
+        return parameter.checked(value)
+
+    return BeforeValidator(checked)
+
+
 def _settings_section(settings: type[Settings], *, inherits: bool = False) -> dict[str, Any]:
     """Return pydantic fields for a section, by the names of the settings' fields.
 
@@ -98,7 +105,7 @@ def _settings_section(settings: type[Settings], *, inherits: bool = False) -> di
         if parameter is not None and field.name not in settings.ELSEWHERE:
             default = None if inherits else field.default
             kind: Any = parameter.kind if default is not None else parameter.kind | None
-            kind = Annotated[kind, BeforeValidator(_checked)]
+            kind = Annotated[kind, _validator(parameter)]
             alias = None if parameter.name == field.name else parameter.name
             entries[field.name] = (kind, Field(default=default, alias=alias))
     return entries
@@ -141,7 +148,7 @@ else:
         **{
             **_settings_section(PredictorSettings, inherits=True),
             **_settings_section(CompensatorSettings),
-            "v_friction": (Number, PARAMETERS["v_friction"].default),
+            **{name: (Number, PARAMETERS[name].default) for name in PredictorSettings.NEEDS_PREVIEW},
         },
     )
 

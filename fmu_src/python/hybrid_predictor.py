@@ -2,13 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-from hybridsep.base.settings import PredictorSettings
 from hybridsep.fmi import look_ahead_slave
-from hybridsep.fmi.variables import modes_from
-from hybridsep.fmi.weights import WEIGHTS_FILE, restore_weights
-from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
 
 
@@ -19,12 +13,7 @@ class HybridPredictorPy(look_ahead_slave.LookAheadSlave):
 
     def new_model(self) -> HybridPredictor:
         """Create the predictor from the current parameters, warm-started from the resources if they hold weights."""
-        model = ModalModel([Mode(**mode) for mode in modes_from(self.values)], self.values["dead_time"])
-        predictor = HybridPredictor(model, PredictorSettings.from_fmi(self.values))
-        trained = Path(self.resources) / WEIGHTS_FILE
-        if trained.exists():
-            restore_weights(predictor, trained.read_bytes())
-        return predictor
+        return self.new_predictor(self.physics_model())
 
     def initial_value(self, name: str) -> float | int | bool:
         """Return the value at ``t_0``: the drive rests at the start value of ``x_d_ahead``."""

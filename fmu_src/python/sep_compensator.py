@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from hybridsep.base.errors import HybridSepError
-from hybridsep.base.settings import CompensatorSettings, PredictorSettings
+from hybridsep.base.settings import CompensatorSettings
 from hybridsep.compensate.compensator import SepCompensator
 from hybridsep.fmi import look_ahead_slave
-from hybridsep.fmi.variables import modes_from
-from hybridsep.fmi.weights import WEIGHTS_FILE, restore_weights
-from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.look_ahead import LookAhead
-from hybridsep.predict.predictor import HybridPredictor
 
 
 class SepCompensatorPy(look_ahead_slave.LookAheadSlave):
@@ -37,13 +31,8 @@ class SepCompensatorPy(look_ahead_slave.LookAheadSlave):
 
     def new_model(self) -> SepCompensator:
         """Create the compensator from the current parameters, warm-started from the resources if they hold weights."""
-        model = ModalModel([Mode(**mode) for mode in modes_from(self.values)], self.values["dead_time"])
-        settings = CompensatorSettings.from_fmi(self.values)
-        predictor = HybridPredictor(model, PredictorSettings.from_fmi(self.values))
-        trained = Path(self.resources) / WEIGHTS_FILE
-        if trained.exists():
-            restore_weights(predictor, trained.read_bytes())
-        return SepCompensator(predictor, settings)
+        model, settings = self.physics_model(), CompensatorSettings.from_fmi(self.values)
+        return SepCompensator(self.new_predictor(model), settings)
 
 
 def _output(look_ahead: LookAhead, name: str) -> float | int:

@@ -22,7 +22,10 @@ def _entries(settings: type[Settings]) -> dict[str, Parameter]:
 PREDICTOR_ENTRIES = _entries(PredictorSettings)
 """Parameters that the section ``[predictor]`` of a machine file may have, by the names of the settings' fields."""
 
-COMPENSATOR_ENTRIES = {**_entries(CompensatorSettings), "v_friction": PARAMETERS["v_friction"]}
+COMPENSATOR_ENTRIES = {
+    **_entries(CompensatorSettings),
+    **{name: PARAMETERS[name] for name in PredictorSettings.NEEDS_PREVIEW},
+}
 """Parameters that the section ``[compensator]`` may have besides."""
 
 

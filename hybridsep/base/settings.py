@@ -156,7 +156,10 @@ class PredictorSettings(Settings):
         (:mod:`~hybridsep.predict.reference_features`); 0, as in the paper: none.
     """
 
-    ELSEWHERE: ClassVar[tuple[str, ...]] = ("T_s", "input_hold", "v_friction")
+    NEEDS_PREVIEW: ClassVar[tuple[str, ...]] = ("v_friction",)
+    """Fields of a predictor that a compensator holds: alone it has no reference beyond its window."""
+
+    ELSEWHERE: ClassVar[tuple[str, ...]] = ("T_s", "input_hold", *NEEDS_PREVIEW)
 
     Np: int = whole(100, 1, 100_000, "samples in a look-ahead window")
     p: int = whole(50, 1, 5000, "past residuals e_pb in the features", learned=True)

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, ClassVar
 
 from ..base.saved import Saved
+from ..base.settings import PredictorSettings
+from ..model.physics import ModalModel, Mode
 from ..predict.look_ahead import LookAhead, Planner
 from ..predict.look_ahead_inputs import LookAheadInputs
 from ..predict.predictor import HybridPredictor
 from .slave import TableSlave
+from .variables import modes_from
+from .weights import WEIGHTS_FILE, restore_weights
 
 __all__ = ["LookAheadSlave"]
 
@@ -29,6 +34,18 @@ class LookAheadSlave(TableSlave):
     @abstractmethod
     def new_model(self) -> HybridPredictor | Planner:
         """Make the predictor or planner from the parameters as they are now, with what the resources have learned."""
+
+    def physics_model(self) -> ModalModel:
+        """Return the physics model of the current parameters."""
+        return ModalModel([Mode(**mode) for mode in modes_from(self.values)], self.values["dead_time"])
+
+    def new_predictor(self, model: ModalModel) -> HybridPredictor:
+        """Return a predictor of the current parameters, warm-started from the resources if they hold weights."""
+        predictor = HybridPredictor(model, PredictorSettings.from_fmi(self.values))
+        trained = Path(self.resources) / WEIGHTS_FILE
+        if trained.exists():
+            restore_weights(predictor, trained.read_bytes())
+        return predictor
 
     def new_look_ahead(self) -> LookAhead:
         """Make the look-ahead from the parameters as they are now."""

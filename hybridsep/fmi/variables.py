@@ -27,10 +27,13 @@ __all__ = [
 
 Value = float | int | bool
 
-PREDICTOR_SETTINGS = (*(name for name in PredictorSettings.fmi_parameters() if name != "v_friction"), "dead_time")
-"""Parameters of a HybridPredictor, which has no reference beyond its window and so no features of it."""
+PREDICTOR_SETTINGS = (
+    *(name for name in PredictorSettings.fmi_parameters() if name not in PredictorSettings.NEEDS_PREVIEW),
+    "dead_time",
+)
+"""Parameters of a HybridPredictor."""
 
-COMPENSATOR_SETTINGS = ("v_friction", *CompensatorSettings.fmi_parameters())
+COMPENSATOR_SETTINGS = (*PredictorSettings.NEEDS_PREVIEW, *CompensatorSettings.fmi_parameters())
 """Parameters of a SepCompensator besides those of its predictor."""
 
 _SEP_MODELS = CompensatorSettings.parameters()["compensate"].choices

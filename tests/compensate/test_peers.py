@@ -7,9 +7,7 @@ import pytest
 from compensator_cases import MODEL, TS, move
 
 from benchmarks.compensation.peers import input_shaper, shape, zero_phase_command
-from hybridsep.base.metrics import contour_error
 from hybridsep.machine import load_machine
-from hybridsep.plants.trajectory import archimedean_spiral
 
 
 @pytest.mark.parametrize("kind", ["zv", "zvd"])
@@ -40,13 +38,3 @@ def test_zero_phase_error_tracking_follows_on_its_model(name: str) -> None:
     error = np.std(plain - x_d)
     assert np.max(np.abs(reached - expected)) < 1e-4 * error
     assert np.std(reached - x_d) < 0.102 * error
-
-
-def test_contour_error_is_the_distance_to_the_path() -> None:
-    position, derivative, end = archimedean_spiral(0.03, 5.0)
-    u = np.linspace(1.0, end - 1.0, 301)
-    slope = derivative(u)
-    normal = np.column_stack((-slope[:, 1], slope[:, 0])) / np.linalg.norm(slope, axis=1)[:, None]
-    distance = 1e-4 * np.sin(7 * u)
-    found = contour_error(position(u) + distance[:, None] * normal, position, derivative, end)
-    np.testing.assert_allclose(found, np.abs(distance), rtol=0, atol=1e-9)
