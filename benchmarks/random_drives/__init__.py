@@ -1,0 +1,1 @@
+"""Random nonlinear feed drives, and the predictor replayed on each of them."""

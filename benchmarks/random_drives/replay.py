@@ -1,0 +1,155 @@
+"""Replay of a predictor over a random drive, with a sound or a faulty sensor."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from benchmarks.random_drives.faults import FAULTS
+from benchmarks.random_drives.generator import T_S, Drive
+from hybridsep.base.errors import SignalError
+from hybridsep.base.metrics import rms
+from hybridsep.base.settings import PredictorSettings
+from hybridsep.base.signals import Array
+from hybridsep.evaluate.backtest import backtest
+from hybridsep.model.physics import ModalModel
+from hybridsep.predict.predictor import HybridPredictor
+
+__all__ = ["DIVERGED", "PREDICTORS", "FaultyReplay", "Replay", "Replayed", "library_replay", "replay", "replay_faults"]
+
+DIVERGED = 1.0
+"""Largest prediction error, m, beyond which a prediction counts as diverged: beyond any of the strokes."""
+
+Replayed = Callable[[str, ModalModel, Array, Array], Array]
+"""Replay of a predictor of :data:`PREDICTORS`, with the physics model, over commanded and measured positions, (n,), m.
+It returns x_h, (n,), m, each window predicted before its measurement is known; SignalError if it refuses a sample."""
+
+PREDICTORS: dict[str, Callable[[ModalModel], HybridPredictor]] = {
+    "paper": lambda model: HybridPredictor(model, PredictorSettings(t_init=0.3)),
+    "default": HybridPredictor,
+}
+
+
+def library_replay(predictor: str, model: ModalModel, x_d: Array, x_meas: Array) -> Array:
+    """Return ``x_h`` of the library's predictor, ``(n,)``, m."""
+    return backtest(PREDICTORS[predictor](model), x_d, x_meas).x_h
+
+
+@dataclass(frozen=True)
+class Replay:
+    """Result of one drive.
+
+    Attributes
+    ----------
+    index : int
+    kind, text : str
+        Kind of the trajectory; description of the drive.
+    rms_pb, rms_hold, rms_h : float
+        RMS errors against the measured position over the whole run, m; ``rms_h`` is infinite where the replay ended
+        with an error.
+    largest : float
+        Largest error of ``x_h``, m.
+    """
+
+    index: int
+    kind: str
+    text: str
+    rms_pb: float
+    rms_hold: float
+    rms_h: float
+    largest: float
+
+    @property
+    def ratio(self) -> float:
+        """RMS relative to the physics model's."""
+        return self.rms_h / self.rms_pb
+
+    @property
+    def hold_ratio(self) -> float:
+        """RMS relative to the hold's."""
+        return self.rms_h / self.rms_hold
+
+    @property
+    def diverged(self) -> bool:
+        """Whether the prediction left the axis."""
+        return not self.largest <= DIVERGED
+
+
+@dataclass(frozen=True)
+class FaultyReplay:
+    """Result of one drive with a faulty sensor, after the fault.
+
+    Attributes
+    ----------
+    index : int
+    fault : str
+    ratio : float
+        RMS against the sound measurement relative to the physics model's (with jitter: to the run without); infinite
+        where the replay ended with an error.
+    change : float
+        Largest ``|x_h − x_pb|`` over the whole run relative to the largest residual of the sound measurement.
+    refused : bool
+        Whether the replay ended with an error.
+    """
+
+    index: int
+    fault: str
+    ratio: float
+    change: float
+    refused: bool
+
+
+def physics(drive: Drive) -> Array:
+    """Return ``x_pb`` from rest, ``(n,)``, m."""
+    discrete = drive.model.discretise(T_S)
+    return drive.x_d[0] + discrete.forced_response(discrete.rest(), drive.x_d - drive.x_d[0])[0]
+
+
+def hold(x_pb: Array, x_meas: Array, Np: int) -> Array:
+    """Return ``x_pb`` plus the last residual measured before each window, ``(n,)``, m."""
+    last = np.concatenate(([0.0], (x_meas - x_pb)[Np - 1 :: Np]))
+    return x_pb + np.repeat(last, Np)[: len(x_pb)]
+
+
+def replay(drive: Drive, predictor: str, run: Replayed = library_replay) -> Replay:
+    """Return the result of a predictor on a drive."""
+    x_pb = physics(drive)
+    x_hold = hold(x_pb, drive.x_meas, PredictorSettings().Np)
+    try:
+        error = drive.x_meas - run(predictor, drive.model, drive.x_d, drive.x_meas)
+        rms_h, largest = rms(error), float(np.abs(error).max())
+    except SignalError:
+        rms_h = largest = math.inf
+    rms_pb, rms_hold = rms(drive.x_meas - x_pb), rms(drive.x_meas - x_hold)
+    return Replay(drive.index, drive.kind, drive.text, rms_pb, rms_hold, rms_h, largest)
+
+
+def replay_faults(drive: Drive, seed: int, predictor: str, run: Replayed = library_replay) -> list[FaultyReplay]:
+    """Return the results of a predictor on a drive with each of the faults."""
+    x_pb = physics(drive)
+    return [_replay_fault(drive, x_pb, number, seed, predictor, run) for number in range(len(FAULTS))]
+
+
+def _replay_fault(drive: Drive, x_pb: Array, number: int, seed: int, predictor: str, run: Replayed) -> FaultyReplay:
+    name = list(FAULTS)[number]
+    settings = PredictorSettings()
+    rng = np.random.default_rng((seed, drive.index, number))
+    measured, last = FAULTS[name](drive.x_meas, T_S, rng)
+    sound, against = drive.x_meas, x_pb
+    first = last + 1 + settings.p + 2 * settings.Np
+    if name == "offset step":
+        sound, first = measured, last + round(1.0 / T_S)
+    try:
+        x_h = run(predictor, drive.model, drive.x_d, measured)
+        if name == "5 % jitter":
+            first, sound = 0, measured
+            against = drive.x_meas - run(predictor, drive.model, drive.x_d, drive.x_meas)
+            against = measured - against  # the same error, of the run without jitter
+    except SignalError:
+        return FaultyReplay(drive.index, name, math.inf, math.inf, True)
+    ratio = rms((sound - x_h)[first:]) / rms((sound - against)[first:])
+    change = float(np.abs(x_h - x_pb).max() / np.abs(sound - x_pb).max())
+    return FaultyReplay(drive.index, name, ratio, change, False)

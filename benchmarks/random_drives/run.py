@@ -1,0 +1,66 @@
+"""Benchmark of trust: the predictor replayed on random nonlinear drives whose physics model is 20 % wrong.
+
+    python -m benchmarks.random_drives.run [--seed 1] [--n 1000] [--faults] [--predictor default|paper] [--cache FILE]
+
+RMS against the measured position over the whole run, relative to the physics model alone and to the hold (the physics
+model plus the last measured residual, in every window from the first).
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # benchmarks are no part of the package
+
+from benchmarks.random_drives.cache import read_positions, write_positions
+from benchmarks.random_drives.generator import SEED, drives_at, true_positions
+from benchmarks.random_drives.replay import PREDICTORS, FaultyReplay, Replay, replay, replay_faults
+from benchmarks.random_drives.report import print_faults, print_replays
+from hybridsep.base.signals import Array
+
+AT_ONCE = 125
+"""Drives in a task of a process."""
+
+Results = tuple[list[Replay], list[FaultyReplay]]
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the benchmark."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seed", type=int, default=SEED)
+    parser.add_argument("--n", type=int, default=1000, help="number of drives")
+    parser.add_argument("--faults", action="store_true", help="with each fault of the sensor too")
+    parser.add_argument("--predictor", choices=tuple(PREDICTORS), default="default")
+    parser.add_argument("--cache", type=Path, help="file (.npz) of simulated positions, written if there is none")
+    parser.add_argument("--processes", type=int, default=os.cpu_count())
+    chosen = parser.parse_args(arguments)
+    groups = [range(i, min(i + AT_ONCE, chosen.n)) for i in range(0, chosen.n, AT_ONCE)]
+    with ProcessPoolExecutor(chosen.processes) as pool:
+        x = read_positions(chosen.cache, chosen.seed, chosen.n) if chosen.cache else None
+        if x is None:
+            x = [one for group in pool.map(partial(true_positions, seed=chosen.seed), groups) for one in group]
+            if chosen.cache:
+                write_positions(chosen.cache, chosen.seed, x)
+        task = partial(_results, seed=chosen.seed, predictor=chosen.predictor, faults=chosen.faults)
+        results = list(pool.map(task, groups, [x[group.start : group.stop] for group in groups]))
+    print_replays([replayed for group, _ in results for replayed in group], chosen.predictor)
+    if chosen.faults:
+        print_faults([replayed for _, group in results for replayed in group])
+
+
+def _results(indices: range, x: Sequence[Array], *, seed: int, predictor: str, faults: bool) -> Results:
+    """Return the results of drives whose true positions are known."""
+    drives = drives_at(indices, x, seed)
+    faulty = [one for drive in drives for one in replay_faults(drive, seed, predictor)] if faults else []
+    return [replay(drive, predictor) for drive in drives], faulty
+
+
+if __name__ == "__main__":
+    main()
