@@ -12,15 +12,16 @@ from hybridsep.base.settings import Limits
 from hybridsep.base.signals import Array
 from hybridsep.plants.trajectory import along_path, archimedean_spiral, rest_to_rest
 
-__all__ = ["KINDS", "random_command"]
+__all__ = ["KINDS", "T_S", "random_command"]
 
 T_S = 1e-3
+"""Sampling interval, s."""
 
 V_MAX = 0.2
 """Largest velocity, m/s."""
 
 Move = tuple[float, float]
-"""Distance, m, and the rest after it, s."""
+"""Distance, m, and rest after it, s."""
 
 
 def random_command(draws: Draws) -> tuple[str, Array]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from hybridsep.base.signals import Array
 
-__all__ = ["FAULTS", "Fault"]
+__all__ = ["FAULTS", "JITTER", "OFFSET_STEP", "Fault"]
 
 Fault = Callable[[Array, float, np.random.Generator], tuple[Array, int]]
 """From measured positions, (n,), m, the sampling interval, s, and random numbers, to faulty positions and the index of
@@ -70,14 +70,16 @@ def jitter(x_meas: Array, T_s: float, rng: np.random.Generator) -> tuple[Array, 
     return np.interp(instants, np.arange(n), x_meas), n - 1
 
 
+OFFSET_STEP, JITTER = "offset step", "5 % jitter"
+
 FAULTS: dict[str, Fault] = {
     "outliers of 10 µm to 1 m": outliers,
     "held 50 ms in motion": held,
     "reads 0 for 50 ms": zeros,
     "stuck for 0.5 s": stuck,
-    "offset step": offset_step,
+    OFFSET_STEP: offset_step,
     "1 % missing": missing,
-    "5 % jitter": jitter,
+    JITTER: jitter,
 }
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.random_drives.commands import random_command
+from benchmarks.random_drives.commands import T_S, random_command
 from benchmarks.random_drives.disturbances import Disturbances, random_disturbances
 from benchmarks.random_drives.draws import Draws
 from benchmarks.random_drives.modes import ModalDrive, nominal_drive, random_modes
@@ -15,15 +15,12 @@ from benchmarks.random_drives.simulation import simulate
 from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel
 
-__all__ = ["SEED", "T_S", "Drive", "drives_at", "random_drive", "random_drives", "true_positions"]
-
-T_S = 1e-3
-"""Sampling interval, s."""
+__all__ = ["CHUNK", "SEED", "Drive", "drives_at", "random_drive", "random_drives", "true_positions"]
 
 SEED = 1
 """Seed of the 1 000 drives that figures are given for."""
 
-CHUNK = 250
+CHUNK = 125
 """Drives simulated at once: their states stay in the processor's cache."""
 
 

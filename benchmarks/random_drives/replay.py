@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.random_drives.faults import FAULTS
-from benchmarks.random_drives.generator import T_S, Drive
+from benchmarks.random_drives.commands import T_S
+from benchmarks.random_drives.faults import FAULTS, JITTER, OFFSET_STEP
+from benchmarks.random_drives.generator import Drive
 from hybridsep.base.errors import SignalError
 from hybridsep.base.metrics import rms
 from hybridsep.base.settings import PredictorSettings
@@ -102,22 +103,10 @@ class FaultyReplay:
     refused: bool
 
 
-def physics(drive: Drive) -> Array:
-    """Return ``x_pb`` from rest, ``(n,)``, m."""
-    discrete = drive.model.discretise(T_S)
-    return drive.x_d[0] + discrete.forced_response(discrete.rest(), drive.x_d - drive.x_d[0])[0]
-
-
-def hold(x_pb: Array, x_meas: Array, Np: int) -> Array:
-    """Return ``x_pb`` plus the last residual measured before each window, ``(n,)``, m."""
-    last = np.concatenate(([0.0], (x_meas - x_pb)[Np - 1 :: Np]))
-    return x_pb + np.repeat(last, Np)[: len(x_pb)]
-
-
 def replay(drive: Drive, predictor: str, run: Replayed = library_replay) -> Replay:
     """Return the result of a predictor on a drive."""
-    x_pb = physics(drive)
-    x_hold = hold(x_pb, drive.x_meas, PredictorSettings().Np)
+    x_pb = _physics(drive)
+    x_hold = _hold(x_pb, drive.x_meas, PredictorSettings().Np)
     try:
         error = drive.x_meas - run(predictor, drive.model, drive.x_d, drive.x_meas)
         rms_h, largest = rms(error), float(np.abs(error).max())
@@ -128,28 +117,40 @@ def replay(drive: Drive, predictor: str, run: Replayed = library_replay) -> Repl
 
 
 def replay_faults(drive: Drive, seed: int, predictor: str, run: Replayed = library_replay) -> list[FaultyReplay]:
-    """Return the results of a predictor on a drive with each of the faults."""
-    x_pb = physics(drive)
-    return [_replay_fault(drive, x_pb, number, seed, predictor, run) for number in range(len(FAULTS))]
-
-
-def _replay_fault(drive: Drive, x_pb: Array, number: int, seed: int, predictor: str, run: Replayed) -> FaultyReplay:
-    name = list(FAULTS)[number]
+    """Return the results of a predictor on a drive with each of the faults, which follow from ``seed``."""
+    x_pb = _physics(drive)
     settings = PredictorSettings()
-    rng = np.random.default_rng((seed, drive.index, number))
-    measured, last = FAULTS[name](drive.x_meas, T_S, rng)
-    sound, against = drive.x_meas, x_pb
-    first = last + 1 + settings.p + 2 * settings.Np
-    if name == "offset step":
-        sound, first = measured, last + round(1.0 / T_S)
-    try:
-        x_h = run(predictor, drive.model, drive.x_d, measured)
-        if name == "5 % jitter":
-            first, sound = 0, measured
-            against = drive.x_meas - run(predictor, drive.model, drive.x_d, drive.x_meas)
-            against = measured - against  # the same error, of the run without jitter
-    except SignalError:
-        return FaultyReplay(drive.index, name, math.inf, math.inf, True)
-    ratio = rms((sound - x_h)[first:]) / rms((sound - against)[first:])
-    change = float(np.abs(x_h - x_pb).max() / np.abs(sound - x_pb).max())
-    return FaultyReplay(drive.index, name, ratio, change, False)
+    replays = []
+    for number, (name, fault) in enumerate(FAULTS.items()):
+        measured, last = fault(drive.x_meas, T_S, np.random.default_rng((seed, drive.index, number)))
+        # What a prediction should agree with, and from which sample on
+        sound, first = drive.x_meas, last + 1 + settings.p + 2 * settings.Np
+        if name == OFFSET_STEP:
+            sound, first = measured, last + round(1.0 / T_S)
+        if name == JITTER:
+            sound, first = measured, 0
+        try:
+            x_h = run(predictor, drive.model, drive.x_d, measured)
+            peer = sound - x_pb
+            if name == JITTER:
+                peer = drive.x_meas - run(predictor, drive.model, drive.x_d, drive.x_meas)
+        except SignalError:
+            replays.append(FaultyReplay(drive.index, name, math.inf, math.inf, refused=True))
+            continue
+        ratio = rms((sound - x_h)[first:]) / rms(peer[first:])
+        change = float(np.abs(x_h - x_pb).max() / np.abs(sound - x_pb).max())
+        replays.append(FaultyReplay(drive.index, name, ratio, change, refused=False))
+    return replays
+
+
+def _physics(drive: Drive) -> Array:
+    """Return ``x_pb`` from rest, ``(n,)``, m."""
+    discrete = drive.model.discretise(T_S)
+    start = drive.x_d[0]
+    return np.asarray(start + discrete.forced_response(discrete.rest(), drive.x_d - start)[0])
+
+
+def _hold(x_pb: Array, x_meas: Array, Np: int) -> Array:
+    """Return ``x_pb`` plus the last residual measured before each window, ``(n,)``, m."""
+    last = np.concatenate(([0.0], (x_meas - x_pb)[Np - 1 :: Np]))
+    return np.asarray(x_pb + np.repeat(last, Np)[: len(x_pb)])

@@ -25,9 +25,8 @@ def print_replays(replays: Sequence[Replay], predictor: str) -> None:
     for name in ("rms_pb", "rms_hold", "rms_h"):
         values = _quantiles([getattr(r, name) for r in replays], quantiles)
         print(f"  {name:9}" + "".join(f"{UM * value:12.4g}" for value in values))
-    print(
-        f"{'ratio to':28}{'median':>9}{'90 %':>9}{'95 %':>9}{'99 %':>9}{'99.5 %':>9}{'max':>9}{'> 1.02':>9}{'> 1.10':>9}"
-    )
+    columns = ("median", "90 %", "95 %", "99 %", "99.5 %", "max", "> 1.02", "> 1.10")
+    print(f"{'ratio to':28}" + "".join(f"{column:>9}" for column in columns))
     _print_ratios("physics", [r.ratio for r in replays])
     _print_ratios("hold", [r.hold_ratio for r in replays])
     for kind in sorted({r.kind for r in replays}):

@@ -20,13 +20,10 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # benchmarks are no part of the package
 
 from benchmarks.random_drives.cache import read_positions, write_positions
-from benchmarks.random_drives.generator import SEED, drives_at, true_positions
+from benchmarks.random_drives.generator import CHUNK, SEED, drives_at, true_positions
 from benchmarks.random_drives.replay import PREDICTORS, FaultyReplay, Replay, replay, replay_faults
 from benchmarks.random_drives.report import print_faults, print_replays
 from hybridsep.base.signals import Array
-
-AT_ONCE = 125
-"""Drives in a task of a process."""
 
 Results = tuple[list[Replay], list[FaultyReplay]]
 
@@ -41,7 +38,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--cache", type=Path, help="file (.npz) of simulated positions, written if there is none")
     parser.add_argument("--processes", type=int, default=os.cpu_count())
     chosen = parser.parse_args(arguments)
-    groups = [range(i, min(i + AT_ONCE, chosen.n)) for i in range(0, chosen.n, AT_ONCE)]
+    size = min(CHUNK, -(-chosen.n // chosen.processes))
+    groups = [range(i, min(i + size, chosen.n)) for i in range(0, chosen.n, size)]
     with ProcessPoolExecutor(chosen.processes) as pool:
         x = read_positions(chosen.cache, chosen.seed, chosen.n) if chosen.cache else None
         if x is None:

@@ -7,18 +7,18 @@ a drive is the same to the last bit whichever others are simulated with it.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import fields
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from benchmarks.random_drives.commands import T_S
 from benchmarks.random_drives.disturbances import Disturbances
 from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel
 
 __all__ = ["SUB_STEPS", "simulate"]
 
-T_S = 1e-3
 SUB_STEPS = 8
 """Internal steps in a sampling interval."""
 
@@ -53,22 +53,20 @@ def simulate(
     for i, command in enumerate(commands):
         u[: len(command), i] = command - command[0]
         u[len(command) :, i] = command[-1] - command[0]
-    values = {name: np.array([getattr(d, name) for d in disturbances]) for name in _NUMBERS}
+    names = [field.name for field in fields(Disturbances)]
+    values = {name: np.array([getattr(one, name) for one in disturbances]) for name in names}
     start = values["play_start"] / 2
     u = _after_play(u, values["command_play"], start) + _drift(n, values)
     x = _after_play(_motion(models, values, u, sub_steps), values["play"], start)
     return [command[0] + x[: len(command), i] for i, command in enumerate(commands)]
 
 
-_NUMBERS = tuple(Disturbances.__dataclass_fields__)
-
-
 def _drift(n: int, values: dict[str, Array]) -> Array:
     """Return the thermal drift, ``(n, m)``, m."""
-    # One scalar function per drive and time: the vector functions may differ in the last bit by place.
-    decay = [[float(np.exp(-T_S / tau))] for tau in values["time_constant"]]
-    powers = np.cumprod(np.broadcast_to(np.array(decay), (len(decay), n)), axis=1).T
-    return values["drift"] * (1 - powers)
+    # A vector function's last bit may depend on the place in the vector.
+    decay = np.array([[float(np.exp(-T_S / time_constant))] for time_constant in values["time_constant"]])
+    powers = np.cumprod(np.broadcast_to(decay, (len(decay), n)), axis=1).T
+    return np.asarray(values["drift"] * (1 - powers))
 
 
 def _after_play(x: Array, width: Array, start: Array) -> Array:
@@ -80,7 +78,7 @@ def _after_play(x: Array, width: Array, start: Array) -> Array:
     for k in range(len(x)):
         y = np.minimum(np.maximum(y, x[k] - half), x[k] + half)
         behind[k] = y
-    return behind - start * width
+    return np.asarray(behind - start * width)
 
 
 def _motion(models: Sequence[ModalModel], values: dict[str, Array], u: Array, sub_steps: int) -> Array:
@@ -96,7 +94,7 @@ def _motion(models: Sequence[ModalModel], values: dict[str, Array], u: Array, su
     c_1, c_2 = np.ascontiguousarray(C[:, 0]), np.ascontiguousarray(C[:, 1])
     z_1, z_2 = np.zeros((2, MODES_MAX, m)), np.zeros((2, MODES_MAX, m))
     inputs = np.zeros((2, 1, m))
-    offsets = Offsets(values, sub_steps)
+    offsets = _Offsets(values, sub_steps)
     x, x_last = np.zeros(m), np.zeros(m)
     out = np.empty((n, m))
     for k in range(n):
@@ -140,7 +138,7 @@ def _tables(model: ModalModel, h: float) -> tuple[Array, Array, Array, Array]:
     return step, gain, command, force / force.sum()
 
 
-class Offsets:
+class _Offsets:
     """Friction, cubic stiffness and cogging as an offset of the command, ``(m,)``, m, in steps.
 
     Each is taken half a step ahead of the position, which is the mean over the step that it is held for: a stiffness
@@ -182,11 +180,11 @@ class Offsets:
         y = np.minimum(np.maximum(y, -CUBIC_MAX), CUBIC_MAX)
         offset = self.stiffness * bristle
         offset += self.v["cubic"] * (y * y * y)
-        offset += self.v["cogging"] * periodic(ahead * self.per_pitch + self.v["phase"])
+        offset += self.v["cogging"] * _sine(ahead * self.per_pitch + self.v["phase"])
         return np.asarray(-offset - self.at_rest)
 
 
-def periodic(turns: Array) -> NDArray[np.float64]:
+def _sine(turns: Array) -> Array:
     """Return a sine to 0.1 % from elementary operations: parabolas, corrected."""
     r = turns - np.rint(turns)
     y = 8 * r - 16 * r * np.abs(r)

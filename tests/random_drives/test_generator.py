@@ -1,0 +1,167 @@
+"""Random drives: fixed by seed and index, exact where they are linear, at rest where they should be."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.signal import cont2discrete, dlsim
+
+from benchmarks.random_drives.cache import read_positions, write_positions
+from benchmarks.random_drives.commands import KINDS
+from benchmarks.random_drives.disturbances import Disturbances
+from benchmarks.random_drives.generator import Drive, Recipe, drives_at, random_drive, random_drives
+from benchmarks.random_drives.simulation import simulate
+from hybridsep.model.physics import ModalModel, Mode
+from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest
+
+Array = NDArray[np.float64]
+
+SEED = 1
+N = 200
+
+EXPECTED_KINDS = ["cycles", "sweep", "sweep", "cycles", "sweep", "random moves"]
+EXPECTED_RMS = [202.24473013, 43.18049024, 38.69016055, 51.24528299, 154.60366413, 6.82204196]
+"""Servo errors of the first drives, µm, against the measured position."""
+
+
+@pytest.fixture(scope="module")
+def drives() -> list[Drive]:
+    return random_drives(range(6), SEED)
+
+
+@pytest.fixture(scope="module")
+def recipes() -> list[Recipe]:
+    return [Recipe.draw(index, SEED) for index in range(N)]
+
+
+def simulated(recipes: list[Recipe], commands: list[Array], **changes: Any) -> list[Array]:
+    disturbances = [replace(recipe.disturbances, **changes) for recipe in recipes]
+    return simulate([recipe.true.model for recipe in recipes], disturbances, commands)
+
+
+def test_shape(drives: list[Drive]) -> None:
+    for drive in drives:
+        assert 6000 <= len(drive.x_d) <= 10000
+        for signal in (drive.x_d, drive.x, drive.x_meas):
+            assert signal.shape == drive.x_d.shape
+            assert np.isfinite(signal).all()
+        assert drive.x[0] == drive.x_d[0]
+        assert drive.x_d[1] == drive.x_d[0]
+
+
+def test_a_drive_does_not_depend_on_the_others(drives: list[Drive]) -> None:
+    alone = random_drive(4, SEED)
+    for name in ("x_d", "x", "x_meas"):
+        assert np.array_equal(getattr(alone, name), getattr(drives[4], name))
+    assert (alone.model, alone.text) == (drives[4].model, drives[4].text)
+
+
+def test_a_position_does_not_depend_on_the_number_of_others(recipes: list[Recipe]) -> None:
+    commands = [recipe.x_d[: 300 + recipe.index] for recipe in recipes]
+    together = simulated(recipes, commands)
+    for first, end in ((3, 4), (0, 7), (101, 134)):
+        for x, y in zip(simulated(recipes[first:end], commands[first:end]), together[first:end], strict=True):
+            assert np.array_equal(x, y)
+
+
+def test_the_drives_stay_what_they_are(drives: list[Drive]) -> None:
+    """Figures are given for the drives of a seed, so a change of the generator must not pass unseen."""
+    assert [drive.kind for drive in drives] == EXPECTED_KINDS
+    found = [1e6 * float(np.sqrt(np.mean((drive.x_meas - drive.x_d) ** 2))) for drive in drives]
+    assert found == pytest.approx(EXPECTED_RMS, rel=1e-6)
+
+
+def test_other_seeds_are_other_drives(recipes: list[Recipe]) -> None:
+    assert recipes[0].true != Recipe.draw(0, SEED + 1).true
+
+
+def test_a_linear_drive_is_its_modal_model(recipes: list[Recipe]) -> None:
+    some = recipes[:12]
+    commands = [recipe.x_d[:1500] for recipe in some]
+    x = simulate([recipe.true.model for recipe in some], [Disturbances()] * len(some), commands)
+    for recipe, x_d, position in zip(some, commands, x, strict=True):
+        response = np.zeros_like(x_d)
+        for mode in recipe.true.model.modes:
+            A = np.array([[0.0, 1.0], [-(mode.omega**2), -2 * mode.zeta * mode.omega]])
+            output = np.array([[mode.alpha, mode.beta]])
+            system = cont2discrete((A, np.array([[0.0], [1.0]]), output, np.zeros((1, 1))), 1e-3, "zoh")
+            response += dlsim(system, x_d - x_d[0])[1].ravel()
+        assert np.ptp(response) > 1e-5
+        assert np.abs(position - x_d[0] - response).max() < 1e-9
+
+
+def test_every_drive_comes_to_rest(recipes: list[Recipe]) -> None:
+    """No nonlinearity feeds energy into a drive: after a move it vibrates no more than the linear one."""
+    x_d = rest_to_rest([0.0, 0.01], PAPER_LIMITS, duration=1.0)
+    commands = [x_d] * N
+    x = simulated(recipes, commands, drift=0.0)
+    linear = simulated(recipes, commands, drift=0.0, coulomb=0.0, cubic=0.0, cogging=0.0, play=0.0, command_play=0.0)
+    for index in range(N):
+        assert np.ptp(x[index][-200:]) <= 1.5 * np.ptp(linear[index][-200:]) + 1e-9, recipes[index]
+
+
+def test_friction_takes_energy_out_of_a_vibration() -> None:
+    model = ModalModel.spring_mass_damper(m=1.0, c=1.0, k=10000.0)
+    step = np.concatenate(([0.0], np.full(999, 1e-3)))
+    friction = Disturbances(coulomb=5e-5, static=1.3, presliding=2e-5)
+    free, damped = simulate([model] * 2, [Disturbances(), friction], [step, step])
+    assert np.ptp(damped[-100:]) < 0.2 * np.ptp(free[-100:])
+    assert abs(damped[-100:].mean() - 1e-3) <= 1.3 * friction.coulomb + 1e-9  # it sticks within the friction
+
+
+def test_sub_steps_are_short_enough(recipes: list[Recipe]) -> None:
+    some = recipes[:40]
+    commands = [recipe.x_d[400:800] for recipe in some]
+    models, disturbances = [recipe.true.model for recipe in some], [recipe.disturbances for recipe in some]
+    coarse, fine = (simulate(models, disturbances, commands, sub_steps) for sub_steps in (8, 24))
+    linear = simulate(models, [Disturbances()] * len(some), commands)
+    for x, y, z in zip(coarse, fine, linear, strict=True):
+        assert np.sqrt(np.mean((x - y) ** 2)) <= 0.03 * np.sqrt(np.mean((y - z) ** 2)) + 1e-11
+
+
+def test_backlash_is_a_play_of_the_output() -> None:
+    model = ModalModel([Mode(f_n=20.0, zeta=1.0, alpha=(40 * np.pi) ** 2)])  # without overshoot
+    there_and_back = rest_to_rest([0.0, 0.01, 0.0], PAPER_LIMITS, dwell=0.5)
+    tight, loose = simulate(
+        [model] * 2, [Disturbances(), Disturbances(play=1e-4, play_start=0.0)], [there_and_back] * 2
+    )
+    half = len(tight) // 2
+    assert tight[half] - loose[half] == pytest.approx(5e-5, abs=1e-7)
+    assert tight[-1] - loose[-1] == pytest.approx(-5e-5, abs=1e-7)
+
+
+def test_distributions(recipes: list[Recipe]) -> None:
+    assert {recipe.kind for recipe in recipes} == set(KINDS)
+    for recipe in recipes:
+        assert 1 <= len(recipe.true.modes) <= 4
+        assert abs(recipe.true.gain - 1) <= 0.0201
+        assert abs(recipe.nominal.gain / recipe.true.gain - 1) <= 0.2001
+        assert 1e-3 * 0.3 < np.ptp(recipe.x_d) < 0.5
+        assert np.abs(np.diff(recipe.x_d)).max() <= 0.2e-3 * 1.01
+        for mode in recipe.true.modes:
+            assert 5 <= mode.f_n <= 200
+            assert 0.02 <= mode.zeta <= 0.8
+        for mode, true in zip(recipe.nominal.modes, recipe.true.modes, strict=False):
+            if len(recipe.nominal.modes) == len(recipe.true.modes):
+                assert abs(mode.f_n / true.f_n - 1) <= 0.2
+                assert abs(mode.zeta / true.zeta - 1) <= 0.2
+    kinds = [kind for recipe in recipes for kind in recipe.disturbances.kinds]
+    assert set(kinds) == {"friction", "backlash", "cubic", "cogging", "drift"}
+    assert any(not recipe.disturbances.kinds for recipe in recipes)
+    assert 0.2 < np.mean([recipe.true.in_antiphase for recipe in recipes]) < 0.5
+
+
+def test_positions_are_kept_in_a_file(drives: list[Drive], tmp_path_factory: pytest.TempPathFactory) -> None:
+    path = tmp_path_factory.mktemp("drives") / "positions.npz"
+    assert read_positions(path, SEED, 3) is None
+    write_positions(path, SEED, [drive.x for drive in drives])
+    assert read_positions(path, SEED + 1, 3) is None
+    assert read_positions(path, SEED, len(drives) + 1) is None
+    x = read_positions(path, SEED, 3)
+    assert x is not None
+    for drive, again in zip(drives, drives_at(range(3), x, SEED), strict=False):
+        assert np.array_equal(drive.x_meas, again.x_meas)
