@@ -14,6 +14,7 @@ import sys
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -40,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     chosen = parser.parse_args(arguments)
     size = min(CHUNK, -(-chosen.n // chosen.processes))
     groups = [range(i, min(i + size, chosen.n)) for i in range(0, chosen.n, size)]
-    with ProcessPoolExecutor(chosen.processes) as pool:
+    with ProcessPoolExecutor(chosen.processes, get_context("spawn")) as pool:
         x = read_positions(chosen.cache, chosen.seed, chosen.n) if chosen.cache else None
         if x is None:
             x = [one for group in pool.map(partial(true_positions, seed=chosen.seed), groups) for one in group]

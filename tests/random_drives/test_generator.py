@@ -23,14 +23,17 @@ Array = NDArray[np.float64]
 SEED = 1
 N = 200
 
-EXPECTED_KINDS = ["cycles", "sweep", "sweep", "cycles", "sweep", "random moves"]
-EXPECTED_RMS = [202.24473013, 43.18049024, 38.69016055, 51.24528299, 154.60366413, 6.82204196]
-"""Servo errors of the first drives, µm, against the measured position."""
+SHORTEST = (3, 18, 57)
+"""Drives of about 6 s, which take the least time."""
+
+EXPECTED_KINDS = ["cycles", "cycles", "spiral"]
+EXPECTED_RMS = [51.24528299, 580.85925701, 30.61436502]
+"""Their servo errors, µm, against the measured position."""
 
 
 @pytest.fixture(scope="module")
 def drives() -> list[Drive]:
-    return random_drives(range(6), SEED)
+    return random_drives(SHORTEST, SEED)
 
 
 @pytest.fixture(scope="module")
@@ -54,14 +57,14 @@ def test_shape(drives: list[Drive]) -> None:
 
 
 def test_a_drive_does_not_depend_on_the_others(drives: list[Drive]) -> None:
-    alone = random_drive(4, SEED)
+    alone = random_drive(57, SEED)
     for name in ("x_d", "x", "x_meas"):
-        assert np.array_equal(getattr(alone, name), getattr(drives[4], name))
-    assert (alone.model, alone.text) == (drives[4].model, drives[4].text)
+        assert np.array_equal(getattr(alone, name), getattr(drives[2], name))
+    assert (alone.model, alone.text) == (drives[2].model, drives[2].text)
 
 
 def test_a_position_does_not_depend_on_the_number_of_others(recipes: list[Recipe]) -> None:
-    commands = [recipe.x_d[: 300 + recipe.index] for recipe in recipes]
+    commands = [recipe.x_d[: 200 + recipe.index] for recipe in recipes]
     together = simulated(recipes, commands)
     for first, end in ((3, 4), (0, 7), (101, 134)):
         for x, y in zip(simulated(recipes[first:end], commands[first:end]), together[first:end], strict=True):
@@ -157,11 +160,11 @@ def test_distributions(recipes: list[Recipe]) -> None:
 
 def test_positions_are_kept_in_a_file(drives: list[Drive], tmp_path_factory: pytest.TempPathFactory) -> None:
     path = tmp_path_factory.mktemp("drives") / "positions.npz"
-    assert read_positions(path, SEED, 3) is None
+    assert read_positions(path, SEED, 2) is None
     write_positions(path, SEED, [drive.x for drive in drives])
-    assert read_positions(path, SEED + 1, 3) is None
+    assert read_positions(path, SEED + 1, 2) is None
     assert read_positions(path, SEED, len(drives) + 1) is None
-    x = read_positions(path, SEED, 3)
+    x = read_positions(path, SEED, 2)
     assert x is not None
-    for drive, again in zip(drives, drives_at(range(3), x, SEED), strict=False):
+    for drive, again in zip(drives, drives_at(SHORTEST[:2], x, SEED), strict=False):
         assert np.array_equal(drive.x_meas, again.x_meas)

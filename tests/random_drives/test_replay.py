@@ -22,7 +22,7 @@ from hybridsep.predict.predictor import HybridPredictor
 @pytest.fixture(scope="module")
 def drive() -> Drive:
     recipe = Recipe.draw(0, 1)
-    short = replace(recipe, x_d=recipe.x_d[:4000], noise=recipe.noise[:4000])
+    short = replace(recipe, x_d=recipe.x_d[:3000], noise=recipe.noise[:3000])
     return short.drive(*simulate([short.true.model], [short.disturbances], [short.x_d]))
 
 
