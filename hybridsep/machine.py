@@ -108,7 +108,8 @@ class Machine(Section):
     def compensator_predictor(self) -> PredictorSettings:
         """Settings of the compensator's own predictor: those of the predictor where the section has no others."""
         own = self._compensator_entries(PredictorSettings)
-        return PredictorSettings(**{**self.predictor.given(), **own}, **self._sampling)
+        given = {name: value for name, value in self.predictor.given().items() if name not in PredictorSettings.ALONE}
+        return PredictorSettings(**{**given, **own}, **self._sampling)
 
     @property
     def compensator_settings(self) -> CompensatorSettings:
@@ -180,6 +181,7 @@ class Machine(Section):
         if self.drive_limits is None:
             raise MachineError(f"machine {self.name} has no [drive_limits] section, which a compensator FMU needs")
         predictor = self.compensator_predictor.to_fmi()
+        predictor = {name: value for name, value in predictor.items() if name not in PredictorSettings.ALONE}
         return {**predictor, **self.compensator_settings.to_fmi(), "dead_time": self.physics.dead_time}
 
     @property

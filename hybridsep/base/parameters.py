@@ -33,6 +33,8 @@ class Parameter:
         Unit in which tools show it.
     nonzero : float
         Smallest non-zero magnitude, where 0 turns a feature off; 0 if there is none.
+    automatic : float or None
+        Value out of the range that stands for an automatic choice.
     choices : tuple of str
         Items in the order of their values in the FMU, where it is an Enumeration.
     learned : bool
@@ -48,6 +50,7 @@ class Parameter:
     maximum: float
     display_unit: str | None = None
     nonzero: float = 0.0
+    automatic: float | None = None
     choices: tuple[str, ...] = ()
     learned: bool = False
 
@@ -57,6 +60,8 @@ class Parameter:
         if self.choices:
             return " or ".join(self.choices)
         least = f"0 or {self.nonzero:g}" if self.nonzero else f"{self.minimum:g}"
+        if self.automatic is not None:
+            least = f"{self.automatic:g} (automatic) or {least}"
         return f"{least} … {self.maximum:.10g}"
 
     @property
@@ -67,7 +72,8 @@ class Parameter:
 
     def allows(self, number: float) -> bool:
         """Return whether a number is in the range."""
-        return self.minimum <= number <= self.maximum and not 0 < abs(number) < self.nonzero
+        in_range = self.minimum <= number <= self.maximum and not 0 < abs(number) < self.nonzero
+        return in_range or number == self.automatic
 
     def checked(self, value: Any, label: str | None = None) -> Any:
         """Return a value in the parameter's type.

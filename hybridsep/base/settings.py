@@ -148,9 +148,16 @@ class PredictorSettings(Settings):
     T_s : float
         Sampling interval, s.
     t_init : float
-        Warm-up, s: for ``t < t_init``, ``x_h = x_pb`` is published.
+        Warm-up, s: for ``t < t_init``, ``x_h = x_pb`` is published. −1: automatic, :attr:`warm_up`.
     input_hold : {"zoh", "foh"}
         Zero-order or first-order hold of ``x_d`` in the physics model.
+    trust : bool
+        Whether the residual is predicted by :class:`~hybridsep.predict.trusted.TrustedModel`; else it is the paper's.
+    effect, noise_std : float
+        With trust: prior standard deviation of the effect of a feature, and that of the measurement noise, m; 0: from
+        the residuals.
+    forgetting : float
+        With trust: time constant with which samples lose their weight, s; 0: never.
     v_friction : float
         Velocity scale of the friction's change of sign, m/s, for additional features of the reference
         (:mod:`~hybridsep.predict.reference_features`); 0, as in the paper: none.
@@ -159,6 +166,9 @@ class PredictorSettings(Settings):
     NEEDS_PREVIEW: ClassVar[tuple[str, ...]] = ("v_friction",)
     """Fields of a predictor that a compensator holds: alone it has no reference beyond its window."""
 
+    ALONE: ClassVar[tuple[str, ...]] = ("trust", "effect", "noise_std", "forgetting")
+    """Fields of a predictor that no compensator holds: a plan needs a model that is affine in the commands."""
+
     ELSEWHERE: ClassVar[tuple[str, ...]] = ("T_s", "input_hold", *NEEDS_PREVIEW)
 
     Np: int = whole(100, 1, 100_000, "samples in a look-ahead window")
@@ -166,9 +176,30 @@ class PredictorSettings(Settings):
     q: int = whole(3, 0, 5000, "past physics-based predictions x_pb in the features", learned=True)
     lam: float = real(1e-12, 1e-40, 1e12, "m2", "ridge penalty on the weights", name="lambda", learned=True)
     T_s: float = real(1e-3, 1e-5, 1.0, "s", "sampling interval", display_unit="ms", learned=True)
-    t_init: float = real(0.3, 0.0, 1e6, "s", "warm-up: until then x_h = x_pb, while learning goes on")
+    t_init: float = real(
+        *(-1.0, 0.0, 1e6, "s", "warm-up: until then x_h = x_pb, while learning goes on"), automatic=-1.0
+    )
     input_hold: str = choice(
         "zoh", ("zoh", "foh"), "how x_d runs between samples, zero-order or first-order hold", learned=True
+    )
+    trust: bool = flag(
+        False,
+        "whether the residual model is trusted only as far as its variance allows; false: the paper's",
+        learned=True,
+    )
+    effect: float = real(
+        *(0.0, 0.0, 10.0, "m", "prior standard deviation of a feature's effect, with trust; 0: from the residuals"),
+        display_unit="um",
+        nonzero=1e-15,
+    )
+    noise_std: float = real(
+        *(0.0, 0.0, 1.0, "m", "standard deviation of the measurement noise, with trust; 0: estimated"),
+        display_unit="um",
+        nonzero=1e-15,
+    )
+    forgetting: float = real(
+        *(0.0, 0.0, 1e9, "s", "time after which samples have lost 63 % of their weight, with trust; 0: never"),
+        nonzero=1e-3,
     )
     v_friction: float = real(
         *(2e-3, 0.0, 1e4, "m/s"),
@@ -178,6 +209,12 @@ class PredictorSettings(Settings):
         learned=True,
         unless_given=0.0,
     )
+
+    @property
+    def warm_up(self) -> float:
+        """Warm-up, s: ``t_init``, or where that is automatic none with trust and 0.3 s without."""
+        automatic = 0.0 if self.trust else 0.3
+        return automatic if self.t_init < 0.0 else self.t_init
 
     def _misfits(self) -> list[str]:
         problems = []

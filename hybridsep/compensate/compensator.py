@@ -73,7 +73,7 @@ class SepCompensator:
             self._basis, predictor.T_s, settings.limits, settings.change_max, no_reversal=settings.no_reversal
         )
         self._trust = Trust()
-        self.restart(predictor.start, t_init=predictor.settings.t_init)
+        self.restart(predictor.start, t_init=predictor.settings.warm_up)
 
     def restart(self, start: float | None = None, *, t_init: float = 0.0, lead_in: int = 0) -> None:
         """Begin another run, at rest at ``start``; what was learned is kept (warm start).

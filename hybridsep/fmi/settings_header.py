@@ -5,19 +5,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 from ..base.data_files import data_folder
-from ..base.settings import PARAMETERS
-from .variables import COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS
+from ..base.parameters import Parameter
+from .variables import COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS, TRUST_SETTINGS
 
 __all__ = ["settings_header", "settings_header_path"]
 
 
 def settings_header() -> str:
     """Return the header."""
-    lists = (("PREDICTOR", PREDICTOR_SETTINGS), ("COMPENSATOR", COMPENSATOR_SETTINGS))
+    lists = (("PREDICTOR", PREDICTOR_SETTINGS), ("TRUST", TRUST_SETTINGS), ("COMPENSATOR", COMPENSATOR_SETTINGS))
     return f"""/* Settings as they are declared in hybridsep/base/settings.py, from which this file is generated.
  * Whole numbers, truth values and choices are uint64_t. */
 #ifndef HSEP_SETTINGS_H
@@ -35,6 +35,10 @@ typedef struct {{
 }} hsep_predictor_settings;
 
 typedef struct {{
+    HSEP_TRUST_SETTINGS(HSEP_SETTING)
+}} hsep_trust_settings;
+
+typedef struct {{
     HSEP_COMPENSATOR_SETTINGS(HSEP_SETTING)
 }} hsep_compensator_settings;
 
@@ -47,10 +51,9 @@ def settings_header_path() -> Path:
     return data_folder("fmu_src") / "c" / "core" / "predict" / "hsep_settings.h"
 
 
-def _list(name: str, settings: Sequence[str]) -> str:
+def _list(name: str, settings: Mapping[str, Parameter]) -> str:
     rows: list[str] = []
-    for setting in settings:
-        parameter = PARAMETERS[setting]
+    for setting, parameter in settings.items():
         kind = "double" if parameter.kind is float else "uint64_t"
         unit = "" if parameter.unit == "1" else f", {parameter.unit}"
         items = ", ".join(f"{number} {item}" for number, item in enumerate(parameter.choices))

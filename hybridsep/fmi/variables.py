@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from ..base.parameters import Parameter
 from ..base.settings import PARAMETERS, CompensatorSettings, PredictorSettings, check
 
 __all__ = [
@@ -16,6 +17,7 @@ __all__ = [
     "INTERPOLATED",
     "MODELS",
     "PREDICTOR_SETTINGS",
+    "TRUST_SETTINGS",
     "Variable",
     "compensator_variables",
     "modes_from",
@@ -27,13 +29,25 @@ __all__ = [
 
 Value = float | int | bool
 
-PREDICTOR_SETTINGS = (
-    *(name for name in PredictorSettings.fmi_parameters() if name not in PredictorSettings.NEEDS_PREVIEW),
-    "dead_time",
-)
-"""Parameters of a HybridPredictor."""
+_PREDICTOR = PredictorSettings.fmi_parameters()
 
-COMPENSATOR_SETTINGS = (*PredictorSettings.NEEDS_PREVIEW, *CompensatorSettings.fmi_parameters())
+PREDICTOR_SETTINGS: Mapping[str, Parameter] = {
+    **{
+        name: parameter
+        for name, parameter in _PREDICTOR.items()
+        if name not in (*PredictorSettings.NEEDS_PREVIEW, *PredictorSettings.ALONE)
+    },
+    "dead_time": PARAMETERS["dead_time"],
+}
+"""Parameters of a HybridPredictor and of the predictor that a SepCompensator holds."""
+
+TRUST_SETTINGS: Mapping[str, Parameter] = {name: _PREDICTOR[name] for name in PredictorSettings.ALONE}
+"""Parameters of a HybridPredictor alone."""
+
+COMPENSATOR_SETTINGS: Mapping[str, Parameter] = {
+    **{name: _PREDICTOR[name] for name in PredictorSettings.NEEDS_PREVIEW},
+    **CompensatorSettings.fmi_parameters(),
+}
 """Parameters of a SepCompensator besides those of its predictor."""
 
 _SEP_MODELS = CompensatorSettings.parameters()["compensate"].choices
@@ -58,6 +72,8 @@ class Variable:
         Closed bounds, as ``min``/``max`` show them.
     nonzero : float
         Least value that is not 0; checked, as ``min`` cannot express it.
+    automatic : float or None
+        Value beside the range that stands for an automatic choice.
     nominal : float or None
     items : tuple of str
         Names of an Enumeration's values, which count from 0.
@@ -78,6 +94,7 @@ class Variable:
     minimum: float | None = None
     maximum: float | None = None
     nonzero: float = 0.0
+    automatic: float | None = None
     nominal: float | None = None
     initially_from: tuple[str, ...] = ()
     items: tuple[str, ...] = ()
@@ -108,10 +125,9 @@ def _position(
     )
 
 
-def _parameter(name: str, start: Value, *, label: str | None = None) -> Variable:
-    parameter = PARAMETERS[name]
+def _parameter(parameter: Parameter, start: Value, *, label: str | None = None) -> Variable:
     return Variable(
-        label or name,
+        label or parameter.name,
         _KINDS[parameter.kind],
         "parameter",
         "fixed",
@@ -122,14 +138,19 @@ def _parameter(name: str, start: Value, *, label: str | None = None) -> Variable
         minimum=parameter.minimum,
         maximum=parameter.maximum,
         nonzero=parameter.nonzero,
+        automatic=parameter.automatic,
         items=parameter.choices,
         learned=parameter.learned,
     )
 
 
+def _parameters(table: Mapping[str, Parameter], starts: Mapping[str, Value]) -> list[Variable]:
+    return [_parameter(parameter, starts[name]) for name, parameter in table.items()]
+
+
 def _modes(modes: Sequence[Mapping[str, float]]) -> list[Variable]:
     return [
-        _parameter(name, mode[name], label=f"mode[{i}].{name}")
+        _parameter(PARAMETERS[name], mode[name], label=f"mode[{i}].{name}")
         for i, mode in enumerate(modes, start=1)
         for name in ("f_n", "zeta", "alpha", "beta")
     ]
@@ -179,7 +200,7 @@ def predictor_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping
         _position("rms_h", "output", "running RMS of x_meas - x_h since t_init", display_unit="um"),
         Variable("batch", "Integer", "output", "discrete", "number of the window, floor(k / Np); 0 is the first fill"),
     ]
-    table += [_parameter(name, parameters[name]) for name in PREDICTOR_SETTINGS]
+    table += _parameters({**PREDICTOR_SETTINGS, **TRUST_SETTINGS}, parameters)
     table += _modes(modes)
     for name, meaning in (
         ("x_d", "commanded positions"),
@@ -226,7 +247,7 @@ def compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mappi
         _position("rms_pb", "output", "running RMS of x_meas - x_pb since t_init", display_unit="um"),
         _position("rms_h", "output", "running RMS of x_meas - x_h since t_init", display_unit="um"),
         Variable("batch", "Integer", "output", "discrete", "number of the window, floor(k / Np)"),
-        *(_parameter(name, parameters[name]) for name in (*PREDICTOR_SETTINGS, *COMPENSATOR_SETTINGS)),
+        *_parameters({**PREDICTOR_SETTINGS, **COMPENSATOR_SETTINGS}, parameters),
         *_modes(modes),
     ]
 
@@ -256,7 +277,7 @@ def plant_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping[str
             "x_meas", "output", "measured position, with encoder noise", initially_from=("x_d", "noise_std", "seed")
         ),
         *_modes(modes),
-        *(_parameter(name, parameters[name]) for name in names),
+        *(_parameter(PARAMETERS[name], parameters[name]) for name in names),
     ]
 
 
@@ -274,7 +295,7 @@ def trajectory_variables(parameters: Mapping[str, Value], modes: Sequence[Mappin
     return [
         _position("r", "output", meaning, initially_from=("trajectory",)),
         *_modes(modes),
-        *(_parameter(name, parameters[name]) for name in ("trajectory", "T_s")),
+        *(_parameter(PARAMETERS[name], parameters[name]) for name in ("trajectory", "T_s")),
     ]
 
 

@@ -59,24 +59,24 @@ class DiscreteModel:
         """Length of the state: two per mode, and the commands within the dead time."""
         return self._n + self.dead_time
 
-    def rest(self) -> Array:
-        """Return the state of a drive at rest at position 0, ``(n_state,)``."""
-        return np.zeros(self.n_state)
+    def rest(self, *m: int) -> Array:
+        """Return the state of a drive at rest at position 0, ``(n_state,)``, or that of ``m`` drives."""
+        return np.zeros((self.n_state, *m))
 
     def forced_response(self, state: Array, x_d: Array) -> tuple[Array, Array]:
         """Return the response over a window, free response included, and the state at its end; eq. (2).
 
         Parameters
         ----------
-        state : (n_state,) array, m
+        state : (n_state,) or (n_state, m) array, m
             From :meth:`rest` or an earlier call; not changed.
-        x_d : (n,) array, m
-            Commanded positions, any length.
+        x_d : (n,) or (n, m) array, m
+            Commanded positions, any length; each column is a signal of its own.
 
         Returns
         -------
-        x_pb : (n,) array, m
-        state : (n_state,) array, m
+        x_pb : (n,) or (n, m) array, m
+        state : (n_state,) or (n_state, m) array, m
             Initial state of the next window.
         """
         n = len(x_d)
@@ -87,7 +87,7 @@ class DiscreteModel:
         if n <= self._block:
             x_pb, s = self._block_response(s, u)
         else:
-            x_pb = np.empty(n)
+            x_pb = np.empty(x_d.shape)
             for i in range(0, n, self._block):
                 stop = min(i + self._block, n)
                 x_pb[i:stop], s = self._block_response(s, u[i:stop])

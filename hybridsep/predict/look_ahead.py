@@ -98,7 +98,7 @@ class LookAhead:
 
     def __init__(self, model: HybridPredictor | Planner, start: float, *, t_init: float | None = None) -> None:
         self._hold(model)
-        warm_up = self.predictor.settings.t_init if t_init is None else t_init
+        warm_up = self.predictor.settings.warm_up if t_init is None else t_init
         check_position("the start value of x_d_ahead", start)
         self.start = start
         self.k = 0

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.signal import lfilter
 
-from ..base.errors import SignalError
+from ..base.errors import ParameterError, SignalError
 from ..base.output import written_whole
 from ..base.settings import PredictorSettings, check, samples_before
 from ..base.signals import Array, as_samples
@@ -23,6 +23,7 @@ from .features import FeatureLayout, PastSamples
 from .reference_features import ReferenceFeatures
 from .regression import RidgeRegression
 from .saved_predictor import predictor_blob, predictor_from
+from .trusted import TrustedModel
 from .window import PredictedWindow, Prediction, WindowOperator
 
 __all__ = ["HybridPredictor"]
@@ -55,13 +56,19 @@ class HybridPredictor:
         self.reference_features = ReferenceFeatures(settings.v_friction, self.T_s)
         self.layout = FeatureLayout(settings.p, settings.q, self.reference_features.n)
         self.past = PastSamples(self.layout, self.Np)
-        self.regression = RidgeRegression(self.layout.n, settings.lam)
-        self.restart(start, t_init=settings.t_init)
+        self.trusted = TrustedModel(settings, self.discrete) if settings.trust else None
+        self._regression = RidgeRegression(self.layout.n, settings.lam)
+        self.restart(start, t_init=settings.warm_up)
 
     @property
     def n_features(self) -> int:
         """Number of features ``n``."""
         return self.layout.n
+
+    @property
+    def regression(self) -> RidgeRegression:
+        """Regression of all learned samples; with trust that of :class:`TrustedModel`."""
+        return self._regression if self.trusted is None else self.trusted.regression
 
     @property
     def residual_weights(self) -> Array:
@@ -89,6 +96,8 @@ class HybridPredictor:
         self.k = 0
         self.state = self.discrete.rest()
         self.past.restart()
+        if self.trusted is not None:
+            self.trusted.restart()
         self.reference_features.restart()
         self.pending: PredictedWindow | None = None
 
@@ -124,8 +133,10 @@ class HybridPredictor:
         if len(path) < n:
             raise SignalError(f"reference must have at least the {n} samples of x_d, got {len(path)}")
         signs = self.reference_features.signs(path, start)
-        self.pending = PredictedWindow(command, x_pb, start, path, signs)
-        e_h = self._free_run(x_pb, self.reference_features.features(signs, n))
+        forecast = None if self.trusted is None else self.trusted.forecast(command, x_pb)
+        self.pending = PredictedWindow(command, x_pb, start, path, signs, forecast)
+        features = self.reference_features.features(signs, n)
+        e_h = self._free_run(x_pb, features) if forecast is None else forecast.e_h
         return Prediction(x_pb + start, e_h, min(max(self.n_init - self.k, 0), n))
 
     def update(self, x: ArrayLike, *, learn: bool = True) -> None:
@@ -151,10 +162,13 @@ class HybridPredictor:
             raise SignalError(f"x must have 1 … {len(pending.x_d)} samples, as predicted, got {len(measured)}")
         m = len(measured)
         e_pb = measured - pending.start - pending.x_pb[:m]
-        from_reference = self.reference_features.features(pending.signs, m)
-        for i in range(0, m, self.Np):
-            stop = min(i + self.Np, m)
-            self._take_in(pending.x_pb[i:stop], e_pb[i:stop], from_reference[i:stop], learn)
+        if self.trusted is not None and pending.forecast is not None:
+            self.trusted.learn(pending.forecast, e_pb, fold=learn)
+        else:
+            from_reference = self.reference_features.features(pending.signs, m)
+            for i in range(0, m, self.Np):
+                stop = min(i + self.Np, m)
+                self._take_in(pending.x_pb[i:stop], e_pb[i:stop], from_reference[i:stop], learn)
         self.reference_features.advance(pending.signs, pending.reference, m)
         _, self.state = self.discrete.forced_response(self.state, pending.x_d[:m])
         self.start = pending.start
@@ -169,9 +183,13 @@ class HybridPredictor:
 
         Raises
         ------
+        ParameterError
+            With trust: its model is not affine in the commands.
         SignalError
             If ``n < 1``, or the initial position is neither given nor known from a predicted window.
         """
+        if self.trusted is not None:
+            raise ParameterError("the operator is that of the paper's model: it needs trust = false")
         length = self.Np if n is None else n
         if length < 1:
             raise SignalError(f"n must be ≥ 1, got {length}")
@@ -201,7 +219,7 @@ class HybridPredictor:
 
     def last_residual(self) -> float:
         """Return the last measured residual ``e_pb``, m, which the hold baseline holds over a window."""
-        return float(self.past.e_pb[-1])
+        return float(self.past.e_pb[-1] if self.trusted is None else self.trusted.past[0])
 
     def to_bytes(self) -> bytes:
         """Return parameters and state, a pending window included, as a versioned blob."""

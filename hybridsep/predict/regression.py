@@ -11,6 +11,7 @@ ed., section 6.5) with LAPACK's ``dtpqrt``: exact, of constant cost and of const
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,10 +21,32 @@ from ..base.errors import ParameterError, SignalError
 from ..base.settings import check
 from ..base.signals import Array, as_samples
 
-__all__ = ["RidgeRegression"]
+__all__ = ["PenalisedSolution", "RidgeRegression"]
 
 _COLUMNS_AT_ONCE = 8
 """Block size of dtpqrt, the fastest one measured for 50 to 200 features."""
+
+
+class PenalisedSolution(NamedTuple):
+    """Weights of some features under penalties of their own.
+
+    Attributes
+    ----------
+    weights : (m,) array
+    triangle : (m, m) array
+        ``R`` with ``RᵀR = ΦᵀΦ + diag(penalties)``.
+    residual_sum : float
+        ``Σ (target − wᵀφ)²`` over the rows so far, without the penalties.
+    """
+
+    weights: Array
+    triangle: Array
+    residual_sum: float
+
+    def leverage(self, rows: Array) -> Array:
+        """Return ``φᵀ(RᵀR)⁻¹φ`` of rows φ, ``(k, m)``: the variance of ``wᵀφ`` relative to that of the noise."""
+        solved, _ = lapack.dtrtrs(self.triangle, rows.T, trans=1)
+        return np.asarray(np.einsum("ij,ij->j", solved, solved))
 
 
 class RidgeRegression:
@@ -119,6 +142,34 @@ class RidgeRegression:
             raise AssertionError(f"dtpqrt returned info = {info}")
         self.n_samples += len(stacked)
         self._weights = None
+
+    def discount(self, weight: float) -> None:
+        """Weigh all rows so far by ``weight``, 0 < weight ≤ 1, in the sum of squares; λ with them."""
+        self._factor *= math.sqrt(weight)
+        self._weights = None
+
+    def penalised(self, penalties: Array) -> PenalisedSolution:
+        """Solve for the weights of the first ``m`` features, each with a penalty of its own.
+
+        They minimise ``Σ (target − wᵀφ)² + Σ_i penalties_i w_i²`` over the rows so far: the triangle of all features
+        holds that of the first ones, so a QR update with ``m`` rows of penalties suffices.
+
+        Parameters
+        ----------
+        penalties : (m,) array
+            Positive, ``1 ≤ m ≤ n_features``; they add to λ.
+        """
+        n, m = self.n_features, len(penalties)
+        factor = np.zeros((m + 1, m + 1), order="F")
+        factor[:m, :m], factor[:m, m] = self._factor[:m, :m], self._factor[:m, n]
+        rows = np.zeros((m, m + 1), order="F")
+        np.fill_diagonal(rows, np.sqrt(penalties))
+        lapack.dtpqrt(0, min(_COLUMNS_AT_ONCE, m + 1), factor, rows, overwrite_a=1, overwrite_b=1)
+        triangle = factor[:m, :m]
+        weights, _ = lapack.dtrtrs(triangle, factor[:m, m])
+        residuals = self._factor[:, n].copy()
+        residuals[:m] -= self._factor[:m, :m] @ weights
+        return PenalisedSolution(weights, triangle, float(residuals @ residuals))
 
     def restore(self, factor: Array, n_samples: int) -> None:
         """Restore a :attr:`factor` and its number of rows.

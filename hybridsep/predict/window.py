@@ -11,6 +11,7 @@ from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
 from ..base.signals import Array, as_published, as_samples
+from .trusted import Forecast
 
 __all__ = ["PredictedWindow", "Prediction", "PublishedWindow", "WindowOperator"]
 
@@ -61,6 +62,8 @@ class PredictedWindow:
         Unmodified commanded positions.
     signs : array
         ψ of the reference.
+    forecast : Forecast, optional
+        Prediction of the residual, with trust.
     """
 
     x_d: Array
@@ -68,6 +71,7 @@ class PredictedWindow:
     start: float
     reference: Array
     signs: Array
+    forecast: Forecast | None = None
 
 
 @dataclass(frozen=True)

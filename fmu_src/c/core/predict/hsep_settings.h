@@ -24,6 +24,16 @@
     /* whole samples of dead time in the physics model */ \
     SETTING(uint64_t, dead_time)
 
+#define HSEP_TRUST_SETTINGS(SETTING) \
+    /* whether the residual model is trusted only as far as its variance allows; false: the paper's */ \
+    SETTING(uint64_t, trust) \
+    /* prior standard deviation of a feature's effect, with trust; 0: from the residuals, m */ \
+    SETTING(double, effect) \
+    /* standard deviation of the measurement noise, with trust; 0: estimated, m */ \
+    SETTING(double, noise_std) \
+    /* time after which samples have lost 63 % of their weight, with trust; 0: never, s */ \
+    SETTING(double, forgetting)
+
 #define HSEP_COMPENSATOR_SETTINGS(SETTING) \
     /* velocity over which friction changes its sign, for features of the reference; 0: none of them, m/s */ \
     SETTING(double, v_friction) \
@@ -53,6 +63,10 @@
 typedef struct {
     HSEP_PREDICTOR_SETTINGS(HSEP_SETTING)
 } hsep_predictor_settings;
+
+typedef struct {
+    HSEP_TRUST_SETTINGS(HSEP_SETTING)
+} hsep_trust_settings;
 
 typedef struct {
     HSEP_COMPENSATOR_SETTINGS(HSEP_SETTING)

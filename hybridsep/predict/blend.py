@@ -1,0 +1,80 @@
+"""Convex blend of candidate predictions, weighted by their errors in the windows so far."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+
+from ..base.signals import Array
+
+__all__ = ["Blend", "simplex_minimum"]
+
+_MEMORY = 0.97
+"""Factor by which evidence fades from window to window."""
+
+_CONFIDENCE = 0.3
+"""Evidence that the first weights count for, in windows of the largest mean square error."""
+
+
+class Blend:
+    """Weights ``π ≥ 0``, ``Σπ ≤ 1`` of candidates; the rest is the prediction 0, the physics model's.
+
+    They minimise the squared error of the blend over the windows so far, exponentially forgotten, with a ridge about
+    their first values.
+
+    Parameters
+    ----------
+    first : sequence of float
+        Weights before there is evidence.
+    """
+
+    def __init__(self, first: tuple[float, ...]) -> None:
+        self.first = np.array(first)
+        n = len(first)
+        self.gram, self.cross = np.zeros((n, n)), np.zeros(n)
+        self.weights = self.first.copy()
+
+    def update(self, candidates: Array, target: Array, scale: float) -> None:
+        """Update the weights with a measured window.
+
+        Parameters
+        ----------
+        candidates : (n_candidates, n) array, m
+            Predictions made before the window was measured.
+        target : (n,) array, m
+            What was measured.
+        scale : float
+            Largest mean square of a measured window, m².
+        """
+        self.gram = _MEMORY * self.gram + candidates @ candidates.T
+        self.cross = _MEMORY * self.cross + candidates @ target
+        ridge = _CONFIDENCE * scale * len(target)
+        if ridge > 0.0:
+            hessian = self.gram + ridge * np.eye(len(self.first))
+            self.weights = simplex_minimum(hessian, self.cross + ridge * self.first)
+
+
+def simplex_minimum(hessian: Array, linear: Array) -> Array:
+    """Return the ``π ≥ 0``, ``Σπ ≤ 1`` that minimises ``½ πᵀHπ − lᵀπ``, ``(n,)``, by its active set.
+
+    Parameters
+    ----------
+    hessian : (n, n) array
+        Positive definite; ``n`` is small: ``2ⁿ`` sets are tried.
+    linear : (n,) array
+    """
+    n = len(linear)
+    best, least = np.zeros(n), 0.0
+    for size in range(1, n + 1):
+        for support in combinations(range(n), size):
+            H, free = hessian[np.ix_(support, support)], linear[list(support)]
+            inverse = np.linalg.solve(H, np.column_stack((free, np.ones(size))))
+            found = inverse[:, 0]
+            if found.sum() > 1.0:  # then Σπ = 1 is active
+                found = found - (found.sum() - 1.0) / inverse[:, 1].sum() * inverse[:, 1]
+            cost = float(0.5 * found @ H @ found - free @ found)
+            if (found >= 0.0).all() and cost < least:
+                best, least = np.zeros(n), cost
+                best[list(support)] = found
+    return best

@@ -1,0 +1,157 @@
+"""Candidate model of the residual: the static features with some lags, trusted as far as its own variance allows."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.signal import lfilter
+
+from ..base.signals import Array
+from .regression import RidgeRegression
+
+__all__ = ["Candidate", "CandidatePrediction", "ResidualScale"]
+
+_CAUTION = 2.0
+"""Factor on the predicted variance when a prediction is shrunk by it: its distribution has long tails."""
+
+_BOUND = 10.0
+"""Largest lag within a window, relative to the largest residual: what is beyond has diverged."""
+
+_DIVERGED = 1e6
+"""Bound on the impulse response of a recursion, and on the variance relative to the square of the largest residual."""
+
+_FIRST_CORRELATION, _CORRELATION_MAX, _CORRELATION_RATE = 10.0, 1e4, 0.1
+
+_PENALTY_CORRELATION_MAX = 100.0
+"""Correlation beyond which the penalty does not grow: with more, a wrong model would learn nothing at all."""
+
+
+class ResidualScale(NamedTuple):
+    """Size of the residuals so far.
+
+    Attributes
+    ----------
+    recent, largest_square : float, m²
+        Recent mean square, and the largest one of a window.
+    largest : float, m
+        Largest magnitude.
+    """
+
+    recent: float = 0.0
+    largest_square: float = 0.0
+    largest: float = 0.0
+
+
+class CandidatePrediction(NamedTuple):
+    """Residual predicted over a window by one candidate.
+
+    Attributes
+    ----------
+    e_h : (n,) array, m
+        Shrunk by its variance.
+    unshrunk : (n,) array, m
+    noise_variance : float, m²
+        Mean square of the rows so far about this candidate.
+    """
+
+    e_h: Array
+    unshrunk: Array
+    noise_variance: float
+
+
+class Candidate:
+    """Model of the residual, and what is known of its errors.
+
+    Parameters
+    ----------
+    n_static : int
+        Static features, the first ones of a row.
+    lag_scales : (p,) array
+        Prior standard deviations of the weights of ``e_pb(k−1) … e_pb(k−p)``; empty for a model without lags.
+
+    Attributes
+    ----------
+    noise_variance : float, m²
+        Of a row about the model; 0 until a window is measured.
+    correlation : float
+        Rows that count as one: where a disturbance has no feature, the errors of neighbouring rows are alike.
+    """
+
+    def __init__(self, n_static: int, lag_scales: Array) -> None:
+        self.n_static, self.lag_scales = n_static, lag_scales
+        self.noise_variance, self.correlation = 0.0, _FIRST_CORRELATION
+
+    def predict(
+        self,
+        regression: RidgeRegression,
+        static_scales: Array,
+        rows: Array,
+        past: Array,
+        scale: ResidualScale,
+        least_variance: float,
+    ) -> CandidatePrediction:
+        """Predict the residual over a window in free run.
+
+        Weights have normal priors, so the variance of ``wᵀφ`` is known; it is carried through the recursion's impulse
+        response. A prediction ``e`` of variance ``τ²`` is shrunk to ``e·v/(v + 2τ²)``, ``v`` being the recent mean
+        square of the residual: at a first motion, a first reversal or in a region not seen yet the physics model
+        remains.
+
+        Parameters
+        ----------
+        regression : RidgeRegression
+            Factor of all rows.
+        static_scales : (n_static,) array
+            Prior standard deviations of the weights of the static features.
+        rows : (n, n_static) array
+            Static features of the window.
+        past : (p,) array, m
+            Last residuals, newest first.
+        scale : ResidualScale
+        least_variance : float
+            Least variance of the noise, m².
+        """
+        p, largest = len(self.lag_scales), scale.largest
+        variance = max(self.noise_variance, least_variance) * min(self.correlation, _PENALTY_CORRELATION_MAX)
+        priors = np.concatenate((static_scales, self.lag_scales))
+        solution = regression.penalised(variance / priors**2)
+        drive = rows @ solution.weights[: self.n_static]
+        response = np.zeros(0)
+        if p:
+            drive, response = _recursion(solution.weights[self.n_static :], drive, past)
+        finite = np.isfinite(drive)
+        e = np.clip(np.where(finite, drive, 0.0), -_BOUND * largest, _BOUND * largest)
+        phi = np.hstack((rows, _lags(past, e))) if p else rows
+        spread = variance * solution.leverage(phi)
+        most = _DIVERGED * largest**2
+        if p:
+            spread = np.minimum(lfilter(response**2, [1.0], spread), most)
+        spread = np.where(finite, spread, most)
+        shrunk = e * (scale.recent / (scale.recent + _CAUTION * spread))
+        return CandidatePrediction(shrunk, e, solution.residual_sum)
+
+    def judge(self, unshrunk: Array, measured: Array) -> None:
+        """Estimate the correlation from the errors of a window, ``(n,)``, m, that has been measured."""
+        n, mean = len(measured), float(np.mean(measured - unshrunk))
+        seen = n * mean**2 / self.noise_variance if self.noise_variance > 0.0 else _CORRELATION_MAX
+        change = _CORRELATION_RATE * (min(seen, _CORRELATION_MAX) - self.correlation)
+        self.correlation = max(self.correlation + change, 1.0)
+
+
+def _recursion(w_e: Array, drive: Array, past: Array) -> tuple[Array, Array]:
+    """Return the free run ``e(k) = drive(k) + Σ_i w_e,i e(k−i)``, and the recursion's impulse response; eq. (4)."""
+    denominator = np.concatenate(([1.0], -w_e))
+    state = np.correlate(w_e, past, "full")[len(past) - 1 :]
+    impulse = np.zeros(len(drive))
+    impulse[0] = 1.0
+    with np.errstate(all="ignore"):  # an unstable recursion is recognised by what it gives
+        e, _ = lfilter([1.0], denominator, drive, zi=state)
+        response = lfilter([1.0], denominator, impulse)
+    return e, np.clip(np.nan_to_num(response, nan=_DIVERGED), -_DIVERGED, _DIVERGED)
+
+
+def _lags(past: Array, e: Array) -> Array:
+    """Return the lags ``e(k−1) … e(k−p)`` over a window, ``(n, p)``."""
+    series = np.concatenate((past[::-1], e[:-1]))
+    return np.lib.stride_tricks.sliding_window_view(series, len(past))[:, ::-1]

@@ -1,0 +1,121 @@
+"""Features without lags: the physics-based prediction, and disturbances filtered by the physics model.
+
+What the physics model misses acts where the command does, so ``e_pb = G_pb d(x, v)``. A feature is ``G_pb`` applied to
+a candidate disturbance ``d``: friction ``tanh(v/v_i)`` over a spread of velocities ``v_i``, stiffness ``x·|x|`` and
+damping ``v·|v|``. First differences of the features take up errors of ``G_pb`` in phase. As nothing here depends on the
+learned weights, no recursion can become unstable.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..base.signals import Array
+from ..model.discrete import DiscreteModel
+
+__all__ = ["N_DISTURBANCES", "StaticFeatures", "StaticState"]
+
+_FRICTION_SPREAD = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
+"""Velocities ``v_i`` of the friction's change of sign, relative to the velocity scale."""
+
+N_DISTURBANCES = len(_FRICTION_SPREAD) + 2
+
+_DIFFERENCES = 3
+"""Largest order of a difference of ``x_pb``: velocity, acceleration and jerk."""
+
+
+_DIFFERENCE_SHARE = 0.03
+"""Effect of a disturbance's first difference relative to its own: they only correct its timing."""
+
+
+class StaticState(NamedTuple):
+    """State of the features between two windows; positions relative to the start.
+
+    Attributes
+    ----------
+    filters : (n_state, N_DISTURBANCES) array
+        State of ``G_pb`` for each disturbance.
+    filtered : (N_DISTURBANCES,) array
+        Last filtered disturbances.
+    x_d : float, m
+        Last command.
+    x_pb : (4,) array, m
+        Last physics-based predictions, oldest first.
+    """
+
+    filters: Array
+    filtered: Array
+    x_d: float
+    x_pb: Array
+
+
+class StaticFeatures:
+    """Features without lags, over consecutive windows.
+
+    Parameters
+    ----------
+    discrete : DiscreteModel
+        ``G_pb``.
+    q : int
+        Largest lag of ``x_pb``, as that many differences, at most three.
+
+    Attributes
+    ----------
+    n : int
+        Number of features.
+    shares : (n,) array
+        Effect that a feature may have, relative to the largest.
+    """
+
+    def __init__(self, discrete: DiscreteModel, q: int) -> None:
+        self.discrete = discrete
+        self.n_differences = min(q, _DIFFERENCES)
+        self.n = 2 + self.n_differences + 2 * N_DISTURBANCES
+        self.shares = np.ones(self.n)
+        self.shares[-N_DISTURBANCES:] = _DIFFERENCE_SHARE
+
+    def rest(self) -> StaticState:
+        """Return the state at rest."""
+        return StaticState(
+            self.discrete.rest(N_DISTURBANCES), np.zeros(N_DISTURBANCES), 0.0, np.zeros(_DIFFERENCES + 1)
+        )
+
+    def peak_velocity(self, state: StaticState, x_d: Array) -> float:
+        """Return the largest magnitude of the commanded velocity over a window, m/s."""
+        return float(np.abs(np.diff(x_d, prepend=state.x_d)).max()) / self.discrete.T_s
+
+    def rows(
+        self, state: StaticState, x_d: Array, x_pb: Array, x: Array, velocity_scale: float
+    ) -> tuple[Array, StaticState]:
+        """Return the features of a window, ``(n, self.n)``, and the state after it.
+
+        Columns: 1; ``x_pb`` and its differences; the filtered disturbances; their first differences.
+
+        Parameters
+        ----------
+        state : StaticState
+            Not changed.
+        x_d, x_pb, x : (n,) array, m
+            Commands, physics-based prediction, and the position that the stiffness acts at.
+        velocity_scale : float
+            Velocity, m/s, that the friction's change of sign is relative to; 0 before any motion.
+        """
+        T_s, m = self.discrete.T_s, self.n_differences
+        v_d = np.diff(x_d, prepend=state.x_d) / T_s
+        past = np.concatenate((state.x_pb, x_pb))
+        v_pb = np.diff(past)[_DIFFERENCES:] / T_s
+        disturbances = np.empty((len(x_d), N_DISTURBANCES))
+        spread = (velocity_scale or 1.0) * np.array(_FRICTION_SPREAD)
+        disturbances[:, :-2] = np.tanh(v_d[:, None] / spread)
+        disturbances[:, -2] = x * np.abs(x)
+        disturbances[:, -1] = v_pb * np.abs(v_pb)
+        filtered, filters = self.discrete.forced_response(state.filters, disturbances)
+        rows = np.empty((len(x_d), self.n))
+        rows[:, 0] = 1.0
+        for i in range(m + 1):
+            rows[:, 1 + i] = np.diff(past, i)[_DIFFERENCES + 1 - i :]
+        rows[:, 2 + m : 2 + m + N_DISTURBANCES] = filtered
+        rows[:, 2 + m + N_DISTURBANCES :] = np.diff(filtered, axis=0, prepend=state.filtered[None])
+        return rows, StaticState(filters, filtered[-1].copy(), float(x_d[-1]), past[-_DIFFERENCES - 1 :].copy())

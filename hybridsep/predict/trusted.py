@@ -1,0 +1,204 @@
+"""Residual model that can be trusted: features with priors, candidates shrunk by their variance, and their blend.
+
+Where the paper's regression has one bare penalty λ on every weight, here each weight has a prior from the effect that
+its feature may have, and λ is the variance of the noise, estimated from the residuals. Nothing has a scale of its own:
+results for positions in another unit are the same in that unit.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.settings import PredictorSettings
+from ..base.signals import Array
+from ..model.discrete import DiscreteModel
+from .blend import Blend
+from .candidates import Candidate, CandidatePrediction, ResidualScale
+from .disturbances import StaticFeatures, StaticState
+from .regression import RidgeRegression
+
+__all__ = ["Forecast", "TrustedModel"]
+
+_LAST_LAG = 0.005
+"""Prior variance of the weight of the last lag relative to that of the first."""
+
+_BOUND = 1.2
+"""Largest prediction relative to the largest residual so far."""
+
+_RECENT = 0.9
+"""Factor by which the mean square of the residual fades from window to window."""
+
+_GROWTH = 30.0
+"""Growth of the commanded velocity from which on what was learned at lower ones counts for nothing."""
+
+_LEAST_NOISE = 1e-4
+"""Bound on λ relative to the largest mean square of the residual: a larger λ would prevent any learning."""
+
+_NO_PENALTY = 1e-40
+"""λ of the factor itself, m²: penalties come with each solution."""
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """Window predicted before it is measured.
+
+    Attributes
+    ----------
+    x_d, x_pb : (n,) array, m
+        Commands and physics-based prediction, relative to the start.
+    e_h : (n,) array, m
+        Predicted residual.
+    hold : float, m
+        Last residual, the prediction of the hold candidate.
+    predictions : tuple of CandidatePrediction
+        Of the learned candidates; empty before anything is learned.
+    largest : (n_static,) array
+        Largest magnitudes of the static features, this window included.
+    velocity_scale : float, m/s
+        Velocity scale of the friction features.
+    """
+
+    x_d: Array
+    x_pb: Array
+    e_h: Array
+    hold: float
+    predictions: tuple[CandidatePrediction, ...]
+    largest: Array
+    velocity_scale: float
+
+
+class TrustedModel:
+    """Model of the residual ``e_pb``, learned online; it stays the physics model where it does not know better.
+
+    Parameters
+    ----------
+    settings : PredictorSettings
+        ``p`` and ``q`` are the largest lags, ``lam`` the least variance of the noise.
+    discrete : DiscreteModel
+        ``G_pb``.
+    """
+
+    def __init__(self, settings: PredictorSettings, discrete: DiscreteModel) -> None:
+        self.settings = settings
+        self.static = StaticFeatures(discrete, settings.q)
+        p = settings.p
+        self.regression = RidgeRegression(self.static.n + p, _NO_PENALTY)
+        lag_scales = np.sqrt(_LAST_LAG ** (np.arange(p) / p))
+        self.candidates = (Candidate(self.static.n, lag_scales[:0]), Candidate(self.static.n, lag_scales))
+        self.blend = Blend((0.0, 0.5, 0.5))  # hold, without lags, with lags
+        self.n_rows = 0.0
+        self.largest = np.zeros(self.static.n)
+        self.velocity_scale = 0.0
+        self.scale = ResidualScale()
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin another run, at rest; what was learned is kept."""
+        self.state: StaticState = self.static.rest()
+        self.past = np.zeros(self.settings.p)
+
+    def forecast(self, x_d: Array, x_pb: Array) -> Forecast:
+        """Predict the residual over the next window; nothing is changed.
+
+        Parameters
+        ----------
+        x_d, x_pb : (n,) array, m
+            Commands and physics-based prediction, relative to the start.
+        """
+        peak = self.static.peak_velocity(self.state, x_d)
+        outgrown = peak > _GROWTH * self.velocity_scale
+        velocity_scale = peak if outgrown else self.velocity_scale
+        rows, _ = self.static.rows(self.state, x_d, x_pb, x_pb, velocity_scale)
+        before = np.zeros(self.static.n) if outgrown else self.largest
+        largest = np.maximum(before, np.abs(rows).max(axis=0))
+        hold = float(self.past[0])
+        predictions: tuple[CandidatePrediction, ...] = ()
+        if self.n_rows > 0.0 and not outgrown and self.scale.largest_square > 0.0:
+            # The stiffness acts at the position, which the physics model alone does not give well enough.
+            x = x_pb + self._predict(self.candidates[0], rows, largest).e_h
+            rows, _ = self.static.rows(self.state, x_d, x_pb, x, velocity_scale)
+            predictions = tuple(self._predict(candidate, rows, largest) for candidate in self.candidates)
+        e_h = self.blend.weights @ self._candidates(hold, predictions, len(x_d))
+        return Forecast(x_d, x_pb, e_h, hold, predictions, largest, velocity_scale)
+
+    def learn(self, forecast: Forecast, measured: Array, *, fold: bool = True) -> None:
+        """Learn from the measurement of a window.
+
+        Parameters
+        ----------
+        forecast : Forecast
+            The last one.
+        measured : (m,) array, m
+            Measured residuals ``e_pb`` of its first ``m`` samples.
+        fold : bool
+            Whether they are learned; the next window starts from them in any case.
+        """
+        m = len(measured)
+        if forecast.velocity_scale != self.velocity_scale:  # outgrown
+            self.regression = RidgeRegression(self.regression.n_features, _NO_PENALTY)
+            self.n_rows = 0.0
+        self.largest, self.velocity_scale = forecast.largest, forecast.velocity_scale
+        x_d, x_pb = forecast.x_d[:m], forecast.x_pb[:m]
+        rows, self.state = self.static.rows(self.state, x_d, x_pb, x_pb + measured, self.velocity_scale)
+        if fold:
+            self._fold(rows, measured)
+            self._assess(forecast, measured)
+        self.past = np.concatenate((measured[::-1], self.past))[: self.settings.p]
+
+    def _assess(self, forecast: Forecast, measured: Array) -> None:
+        """Judge the candidates and their blend by the measurement of their window."""
+        m = len(measured)
+        self._judge(forecast, measured)
+        largest, mean_square = float(np.abs(measured).max()), float(np.mean(measured**2))
+        recent = _RECENT * self.scale.recent + (1.0 - _RECENT) * mean_square if self.scale.recent else mean_square
+        self.scale = ResidualScale(
+            recent, max(self.scale.largest_square, mean_square), max(self.scale.largest, largest)
+        )
+        candidates = self._candidates(forecast.hold, forecast.predictions, m)
+        self.blend.update(candidates, measured, self.scale.largest_square)
+
+    def _predict(self, candidate: Candidate, rows: Array, largest: Array) -> CandidatePrediction:
+        """Return the prediction of a candidate, bounded by the residuals so far."""
+        scale = self.scale
+        effect = self.settings.effect or math.sqrt(scale.largest_square)
+        least = min(self.settings.lam, _LEAST_NOISE * scale.largest_square)
+        static_scales = effect * self.static.shares / np.maximum(largest, 1e-150)
+        found = candidate.predict(self.regression, static_scales, rows, self.past, scale, least)
+        bound = _BOUND * scale.largest
+        return found._replace(e_h=np.clip(found.e_h, -bound, bound), noise_variance=found.noise_variance / self.n_rows)
+
+    @staticmethod
+    def _candidates(hold: float, predictions: tuple[CandidatePrediction, ...], m: int) -> Array:
+        """Return the predictions that are blended, ``(3, m)``, m: hold, and the learned candidates, 0 at first."""
+        learned = [prediction.e_h[:m] for prediction in predictions] or [np.zeros(m)] * 2
+        return np.stack((np.full(m, hold), *learned))
+
+    def _judge(self, forecast: Forecast, measured: Array) -> None:
+        """Estimate the errors of the candidates from the measurement of their window."""
+        m, given = len(measured), self.settings.noise_std**2
+        if not forecast.predictions:
+            # Third differences leave white noise, 20 times its variance, and little else.
+            first = float(np.mean(np.diff(measured, 3) ** 2)) / 20.0 if m > 10 else float(np.mean(measured**2))
+            for candidate in self.candidates:
+                candidate.noise_variance = given or first
+        for candidate, prediction in zip(self.candidates, forecast.predictions, strict=False):
+            candidate.judge(prediction.unshrunk[:m], measured)
+            candidate.noise_variance = given or prediction.noise_variance
+
+    def _fold(self, static: Array, measured: Array) -> None:
+        """Update the regression with a window's rows ``[static features | lags | e_pb]``."""
+        m, p = static.shape[0], self.settings.p
+        series = np.concatenate((self.past[::-1], measured))
+        rows = np.empty((m, self.regression.n_features + 1), order="F")
+        rows[:, : self.static.n] = static
+        rows[:, self.static.n : -1] = np.lib.stride_tricks.sliding_window_view(series, p)[:m, ::-1]
+        rows[:, -1] = measured
+        if self.settings.forgetting > 0.0:
+            kept = math.exp(-m * self.settings.T_s / self.settings.forgetting)
+            self.regression.discount(kept)
+            self.n_rows *= kept
+        self.regression.update_stacked(rows)
+        self.n_rows += m
