@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from ..compensate.compensator import SepCompensator
-from ..compensate.plan import SepState
 from ..plants.encoder import Encoder
 from ..plants.plant import Plant
 from ..predict.look_ahead import LookAhead
@@ -42,10 +41,8 @@ class LibraryController:
 
     def outputs(self) -> tuple[tuple[float, ...], int]:
         """Return the positions of the kind's outputs, m, and the state, now."""
-        ahead = self._look_ahead
-        if self.kind is COMPENSATOR:
-            return (ahead.x_dm, ahead.x_d, ahead.x_pb, ahead.x_h), ahead.sep_state
-        return (ahead.x_d, ahead.x_pb, ahead.x_h), SepState.HYBRID if ahead.hybrid_active else SepState.PHYSICS
+        ahead, kind = self._look_ahead, self.kind
+        return tuple(getattr(ahead, name) for name in kind.outputs), kind.lowest + int(getattr(ahead, kind.state))
 
     def step(self, k: int, x_d_ahead: float, x_meas: float) -> None:
         """Take in sample ``k``, m, and move on to the next."""

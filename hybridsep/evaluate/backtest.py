@@ -201,26 +201,18 @@ def _measure(error: Array, k: int) -> tuple[list[float], list[float]]:
 
 def _windows(chunks: Iterable[tuple[ArrayLike, ArrayLike]], Np: int) -> Iterator[tuple[Array, Array]]:
     """Cut chunks of any sizes into windows of ``Np`` samples; the last one may be shorter."""
-    waiting, filled, k = np.empty((2, Np)), 0, 0
+    waiting, k = np.empty((2, 0)), 0
     for chunk in chunks:
-        x_d, x = _checked(chunk, k)
-        n, i = len(x), 0
-        if filled:
-            i = min(Np - filled, n)
-            waiting[0, filled : filled + i], waiting[1, filled : filled + i] = x_d[:i], x[:i]
-            filled += i
-            if filled == Np:
-                yield waiting[0], waiting[1]
-                waiting, filled = np.empty((2, Np)), 0
-        while n - i >= Np:
-            yield x_d[i : i + Np], x[i : i + Np]
-            i += Np
-        if i < n:
-            filled = n - i
-            waiting[0, :filled], waiting[1, :filled] = x_d[i:], x[i:]
-        k += n
-    if filled:
-        yield waiting[0, :filled], waiting[1, :filled]
+        samples = np.asarray(_checked(chunk, k))
+        k += samples.shape[1]
+        if waiting.size:
+            samples = np.concatenate((waiting, samples), axis=1)
+        whole = samples.shape[1] // Np * Np
+        for i in range(0, whole, Np):
+            yield samples[0, i : i + Np], samples[1, i : i + Np]
+        waiting = samples[:, whole:]
+    if waiting.size:
+        yield waiting[0], waiting[1]
 
 
 def _checked(chunk: tuple[ArrayLike, ArrayLike], k: int) -> tuple[Array, Array]:
