@@ -108,31 +108,24 @@ def backtest(predictor: HybridPredictor, x_d: ArrayLike, x: ArrayLike, *, on_bat
     """
     command = as_samples(x_d, "x_d")
     measured = as_samples(x, "x", len(command))
-    n = len(command)
-    predicted = np.empty((3, n))
-    active = np.zeros(n, dtype=np.bool_)
-    batch_rms = np.empty((3, -(-n // predictor.Np)))
+    batches: list[Batch] = []
 
     def keep(batch: Batch) -> None:
-        k, end = batch.k, batch.k + len(batch.x)
-        predicted[0, k:end], predicted[1, k:end], predicted[2, k:end] = batch.x_pb, batch.x_hold, batch.x_h
-        active[k + batch.n_warm_up : end] = True
-        batch_rms[:, batch.j] = batch.rms_pb, batch.rms_hold, batch.rms_h
+        batches.append(batch)
         if on_batch is not None:
             on_batch(batch)
+
+    def joined(name: str) -> Array:
+        return np.concatenate([np.atleast_1d(getattr(batch, name)) for batch in batches])
 
     scores = backtest_stream(predictor, [(command, measured)], on_batch=keep)
     return Backtest(
         scores.overall,
         scores.after_warm_up,
         scores.n_batches,
-        x_pb=predicted[0],
-        x_hold=predicted[1],
-        x_h=predicted[2],
-        active=active,
-        batch_rms_pb=batch_rms[0],
-        batch_rms_hold=batch_rms[1],
-        batch_rms_h=batch_rms[2],
+        active=np.concatenate([np.arange(len(batch.x)) >= batch.n_warm_up for batch in batches]),
+        **{name: joined(name) for name in ("x_pb", "x_hold", "x_h")},
+        **{f"batch_{name}": joined(name) for name in ("rms_pb", "rms_hold", "rms_h")},
     )
 
 
