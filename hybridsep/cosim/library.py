@@ -1,4 +1,7 @@
-"""Library adapters of the co-simulation loop: a predictor or compensator, and a plant."""
+"""Library adapters of the co-simulation loop: a predictor or compensator, and a plant.
+
+The adapters of FMUs (``fmus.py``) have the same attributes and methods.
+"""
 
 from __future__ import annotations
 
@@ -22,6 +25,16 @@ class LibraryController:
     controller : HybridPredictor or SepCompensator
     t_init : float, optional
         Warm-up, s; its own if left out.
+
+    Attributes
+    ----------
+    name : str
+        Name in error messages.
+    kind : Kind
+    T_s : float
+        Sampling interval, s; an FMU's, like the next two, is known after :meth:`initialise`.
+    Np, delay : int
+        Samples in a window; samples by which it delays the trajectory.
     """
 
     name: str = "the controller"
@@ -50,7 +63,17 @@ class LibraryController:
 
 
 class LibraryDrive:
-    """A plant and its encoder."""
+    """A plant and its encoder.
+
+    Attributes
+    ----------
+    name : str
+        Name in error messages.
+    T_s : float, optional
+        Sampling interval, s; None if it can be any.
+    plant : object
+        Passed to ``disturb``.
+    """
 
     name: str = "the plant"
     T_s: float | None = None

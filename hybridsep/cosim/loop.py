@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,9 +24,12 @@ from ..plants.encoder import Encoder
 from ..plants.plant import Plant
 from ..predict.predictor import HybridPredictor
 from .library import LibraryController, LibraryDrive
-from .run import Kind, Run
+from .run import Run
 
-__all__ = ["Controller", "Disturb", "Drive", "Progress", "Sensor", "cosimulate"]
+if TYPE_CHECKING:
+    from .fmus import FmuController, FmuDrive
+
+__all__ = ["Disturb", "Progress", "Sensor", "cosimulate"]
 
 Sensor = Callable[[int, float], float]
 """Called as ``sensor(k, x_meas)``, ``k`` counted from the end of the fill; returns what arrives in its place."""
@@ -36,63 +39,6 @@ Disturb = Callable[[int, Any], object]
 
 Progress = Callable[[int, int], object]
 """Called with samples done and samples in all, about a hundred times."""
-
-
-class Controller(Protocol):
-    """A look-ahead between interpolator and drive.
-
-    Attributes
-    ----------
-    name : str
-        Name in error messages.
-    kind : Kind
-    T_s : float
-        Sampling interval, s; like the next two, known after :meth:`initialise`.
-    Np, delay : int
-        Samples in a window; samples by which it delays the trajectory.
-    """
-
-    name: str
-    kind: Kind
-    T_s: float
-    Np: int
-    delay: int
-
-    def initialise(self, start: float) -> None:
-        """Begin a run at rest at ``start``, m."""
-
-    def outputs(self) -> tuple[tuple[float, ...], int]:
-        """Return the positions of the kind's outputs, m, and the state, now."""
-
-    def step(self, k: int, x_d_ahead: float, x_meas: float) -> None:
-        """Take in sample ``k``, m, and move on to the next."""
-
-
-class Drive(Protocol):
-    """A plant with its encoder.
-
-    Attributes
-    ----------
-    name : str
-        Name in error messages.
-    T_s : float, optional
-        Sampling interval, s, known after :meth:`initialise`; None if it can be any.
-    plant : object
-        Passed to ``disturb``; known after :meth:`initialise`.
-    """
-
-    name: str
-    T_s: float | None
-    plant: Any
-
-    def initialise(self, start: float) -> None:
-        """Begin a run at rest at ``start``, m."""
-
-    def outputs(self) -> tuple[float, float]:
-        """Return the true and the measured position now, m."""
-
-    def step(self, k: int, x_d: float, h: float) -> None:
-        """Advance from sample ``k`` by ``h`` seconds with the command ``x_d``, m, held."""
 
 
 def cosimulate(
@@ -188,7 +134,7 @@ def _controller(
     values: Mapping[str, Any] | None,
     t_init: float | None,
     start_time: float,
-) -> Controller:
+) -> FmuController | LibraryController:
     """Return the loop's adapter of a controller."""
     if isinstance(controller, (str, Path)):
         from .fmus import FmuController  # fmpy is loaded where an FMU is
@@ -201,7 +147,7 @@ def _controller(
 
 def _drive(
     plant: str | Path | Plant, values: Mapping[str, Any] | None, encoder: Encoder | None, start_time: float
-) -> Drive:
+) -> FmuDrive | LibraryDrive:
     """Return the loop's adapter of a plant."""
     if isinstance(plant, (str, Path)):
         from .fmus import FmuDrive
