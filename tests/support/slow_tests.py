@@ -12,8 +12,6 @@ SLOW = (
     r"fmi/test_weights\.py::test_no_mutation",
     r"fmi/test_weights\.py::test_the_weights_are_in_the_resources_and_in_the_guid\[native",
     r"fmi/test_native_fmu\.py::test_(archives_are_reproducible|another_machine_has_another_guid)",
-    r"fmi/test_(native|python)_fmu\.py::\w+\[\w+_(als25010_y|emps)",
-    r"fmi/test_(native|python)_fmu\.py::\w+\[(HybridPredictor|SepCompensator)(Py)?_als25010_x",
     r"suite/test_warm_start\.py::\w+\[native",
     r"fmi/test_python_sep_fmu\.py::test_each_fmu_carries_what_it_needs",
     r"fmi/test_fmi2_random\.py",
@@ -21,6 +19,10 @@ SLOW = (
     r"c/test_c_memory\.py",
     r"c/test_c_sources\.py",
     r"c/test_static_linking\.py",
+    # Other machines' FMUs, which differ from the default one's in their modes and settings; of the stage, the X drive stays
+    r"fmi/test_(native|python)_fmu\.py::\w+\[\w+_(als25010_y|emps)",
+    r"fmi/test_(native|python)_fmu\.py::\w+\[(HybridPredictor|SepCompensator)(Py)?_als25010_x",
+    r"suite/test_\w+\.py::.*(HybridPredictor|SepCompensator|FMU-FeedDrive)_als25010_x\]",
     # Whole trajectories, or every parameter
     r"fmi/test_native_cosimulation\.py::(?!test_every_pairing_agrees_with_the_library_on_the_staircase\[native-native)",
     r"fmi/test_reference_result\.py",
@@ -36,8 +38,6 @@ SLOW = (
     r"predict/test_predictor_with_reference_features\.py::test_friction_is_predicted_better",
     r"test_machine\.py::test_the_stages_friction_is_calibrated",
     r"predict/test_regression\.py::test_weights_after_the_staircase_against_extended_precision\[100",
-    # FMUs of the stage, whose suite differs from the default machine's in its modes alone
-    r"suite/test_\w+\.py::.*_als25010_x\]",
     r"suite/test_rollback\.py::test_a_state_goes_on_in_a_second_instance\[(19|21|57|203)-",
     r"suite/test_agreement\.py::test_plants_move_as_the_librarys_do\[0\.00(25|025)-",
     r"suite/test_agreement\.py::test_every_parameter",
