@@ -19,7 +19,7 @@ SLOW = (
     r"c/test_c_memory\.py",
     r"c/test_c_sources\.py",
     r"c/test_static_linking\.py",
-    # Other machines' FMUs, which differ from the default one's in their modes and settings; of the stage, the X drive stays
+    # FMUs of other machines, which differ from the default one's in modes and settings; of the stage, the X drive stays
     r"fmi/test_(native|python)_fmu\.py::\w+\[\w+_(als25010_y|emps)",
     r"fmi/test_(native|python)_fmu\.py::\w+\[(HybridPredictor|SepCompensator)(Py)?_als25010_x",
     r"suite/test_\w+\.py::.*(HybridPredictor|SepCompensator|FMU-FeedDrive)_als25010_x\]",
