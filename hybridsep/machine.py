@@ -68,10 +68,6 @@ class Machine(Section):
             raise ValueError("a machine with a plant must have physics.dead_time = 0: the plants have none")
         if self.plant is not None:
             self.new_plant()  # raises if the combination is out of range
-        return self
-
-    @model_validator(mode="after")
-    def _physics_makes_modes(self) -> Machine:
         _ = self.model  # raises if the mode of m, c and k is out of range
         return self
 

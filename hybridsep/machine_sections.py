@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, create_model, model_validator
 
 from .base.parameters import Parameter
-from .base.settings import PARAMETERS, CompensatorSettings, Limits, PredictorSettings, Settings, check
+from .base.settings import PARAMETERS, CompensatorSettings, Limits, PredictorSettings, Settings
 
 __all__ = [
     "CompensatorSection",
@@ -27,20 +27,18 @@ __all__ = [
 ]
 
 
+_DECLARED = {**PARAMETERS, **Limits.parameters()}
+"""Parameters by the names of their entries; a drive's and a trajectory's limits have the range of the compensator's."""
+
+
 def _checked(value: Any, info: ValidationInfo) -> Any:
-    """Check a field against the parameter of the same (FMI) name."""
-    return check(str(info.field_name), value)
-
-
-def _checked_limit(value: Any, info: ValidationInfo) -> Any:
-    """Check one of a drive's or a trajectory's limits against the range of the compensator's."""
+    """Check an entry against the parameter of its name."""
     name = str(info.field_name)
-    return Limits.parameters()[name].checked(value, name)
+    return _DECLARED[name].checked(value, name)
 
 
 Number = Annotated[float, BeforeValidator(_checked)]
 Whole = Annotated[int, BeforeValidator(_checked)]
-Limit = Annotated[float, BeforeValidator(_checked_limit)]
 
 Line = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f\x{FFFE}\x{FFFF}]+$")]
 """One line of printable text, of characters that XML 1.0 allows, for modelDescription and documentation."""
@@ -180,9 +178,9 @@ class StageSection(Section):
 class LimitsSection(Section):
     """Velocity, acceleration and jerk of the reference trajectory, m/s, m/s², m/s³."""
 
-    velocity: Limit
-    acceleration: Limit
-    jerk: Limit
+    velocity: Number
+    acceleration: Number
+    jerk: Number
 
 
 class DriveLimitsSection(LimitsSection):

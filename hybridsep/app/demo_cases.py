@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +42,7 @@ def staircase_case(out: Path, seeds: int, flavour: str, advance: Callable[[str],
     title = "Staircase (cf. the paper's Fig. 4), FMU against FMU, noise seed 0"
     prediction_figure(runs[0], title, out / "staircase.png")
     compensated, compensation = compensate(
-        machine, fmus[1], command, out, flavour, seeds=range(seeds), advance=partial(_announce, advance, "staircase")
+        machine, fmus[1], command, out, flavour, seeds=range(seeds), label="staircase", advance=advance
     )
     compensated["hybrid_warm"].save(out / "staircase_compensated.csv")
     title = "Staircase, compensated: FMU against FMU, noise seed 0"
@@ -75,7 +74,7 @@ def spiral_case(out: Path, flavour: str, advance: Callable[[str], None]) -> Summ
         title = f"Spiral, {axis.upper()} axis (cf. the paper's Fig. 8), FMU against FMU"
         prediction_figure(run, title, out / f"spiral_{axis}.png")
         compensated[axis], case["compensation"] = compensate(
-            machine, fmus[1], command, out, flavour, advance=partial(_announce, advance, label)
+            machine, fmus[1], command, out, flavour, label=label, advance=advance
         )
         compensated[axis]["hybrid_warm"].save(out / f"spiral_{axis}_compensated.csv")
         title = f"Spiral, {axis.upper()} axis, compensated: FMU against FMU"
@@ -123,11 +122,6 @@ def recorded_case(log: Log, out: Path) -> dict[str, Any]:
     )
     prediction_figure(run, "EMPS, a recorded axis: causal replay", out / "emps.png")
     return {**found.summary(), **_worse(run)}
-
-
-def _announce(advance: Callable[[str], None], case: str, run: str) -> None:
-    """Report the compensated run of a case that is next."""
-    advance(f"{case}, {run}")
 
 
 def _worse(run: Run) -> dict[str, Any]:

@@ -37,6 +37,7 @@ def compensate(
     flavour: str,
     *,
     seeds: Sequence[int] = (0,),
+    label: str = "",
     advance: Callable[[str], object] = lambda message: None,
 ) -> tuple[Runs, dict[str, Any]]:
     """Run a machine's compensator FMU against a plant FMU: none, physics, hybrid cold and warm.
@@ -54,8 +55,10 @@ def compensate(
         Flavour of the FMU.
     seeds : sequence of int
         Noise seeds.
+    label : str
+        Name of the case.
     advance : callable
-        Called with the name of each compensated run before it.
+        Called with it and the name of each compensated run before that.
 
     Returns
     -------
@@ -72,7 +75,7 @@ def compensate(
     runs: Runs = {}
     summary: dict[str, Any] = {}
     for key, choice in COMPENSATED.items():
-        advance(key.replace("_", " "))
+        advance(f"{label}, {key.replace('_', ' ')}")
         values = {"compensate": PARAMETERS["compensate"].to_fmi(choice)}
         fmu = warm if key == "hybrid_warm" else cold
         of_seeds = [

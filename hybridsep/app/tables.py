@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -24,14 +24,8 @@ PAPER_COLUMN = "paper: physics → hybrid, reduction, as printed there"
 
 def print_predictions(summary: Mapping[str, Mapping[str, Any]]) -> None:
     """Print the prediction errors of the demo."""
-    table = Table(
-        title="Prediction error, RMS in µm against the measured position",
-        caption=PAPER_COLUMN,
-        box=box.SIMPLE,
-        pad_edge=False,
-    )
-    for column in ("case", "physics", "hold", "hybrid", "reduction", "paper"):
-        table.add_column(column, justify="left" if column == "case" else "right", no_wrap=True)
+    title = "Prediction error, RMS in µm against the measured position"
+    table = _table_of_cases(title, PAPER_COLUMN, ("physics", "hold", "hybrid", "reduction", "paper"))
     for name, case in summary.items():
         table.add_row(name, *_figures(case), _printed(PRINTED[name]))
         for part in ("friction_alone", "stiffness_alone"):
@@ -55,20 +49,24 @@ def print_predictions(summary: Mapping[str, Mapping[str, Any]]) -> None:
 def print_compensation(summary: Mapping[str, Mapping[str, Any]]) -> None:
     """Print the tracking errors of the demo's compensated runs."""
     kinds = list(summary["staircase"]["compensation"])
-    table = Table(
-        title="\nTracking error with compensation, RMS in µm of the true position",
-        caption="warm: weights of an earlier run; contour: X and Y",
-        box=box.SIMPLE,
-        pad_edge=False,
-    )
-    for column in ("case", *(kind.replace("_", " ") for kind in kinds)):
-        table.add_column(column, justify="left" if column == "case" else "right", no_wrap=True)
+    title = "\nTracking error with compensation, RMS in µm of the true position"
+    caption = "warm: weights of an earlier run; contour: X and Y"
+    table = _table_of_cases(title, caption, [kind.replace("_", " ") for kind in kinds])
     rows = {name: (name, "tracking_rms_um") for name, case in summary.items() if "compensation" in case}
     rows["spiral, contour"] = ("spiral_x", "contour_rms_um")
     for label, (name, figure) in rows.items():
         compensation = summary[name]["compensation"]
         table.add_row(label, *(_figure(compensation[kind][figure]) for kind in kinds))
     console.print(table)
+
+
+def _table_of_cases(title: str, caption: str, columns: Iterable[str]) -> Table:
+    """Return an empty table of the demo's cases, in the first column, and their figures."""
+    table = Table("case", title=title, caption=caption, box=box.SIMPLE, pad_edge=False)
+    table.columns[0].no_wrap = True
+    for column in columns:
+        table.add_column(column, justify="right", no_wrap=True)
+    return table
 
 
 def _figures(case: Mapping[str, Any]) -> list[str]:
@@ -102,8 +100,7 @@ def print_scores(summary: Mapping[str, float | int], as_json: bool, title: str) 
         for quantity in ("rms", "max"):
             figures = [summary.get(f"{quantity}_{name}_um{suffix}") for name in ("pb", "hold", "h")]
             if all(figure is not None for figure in figures):
-                reduction = summary[f"reduction_percent{suffix}"] if quantity == "rms" else None
-                shown = _figure(reduction, " %") if quantity == "rms" else ""
+                shown = _figure(summary[f"reduction_percent{suffix}"], " %") if quantity == "rms" else ""
                 label_text = f"{quantity.upper() if quantity == 'rms' else quantity}{label}"
                 table.add_row(label_text, *map(_figure, figures), shown)
     console.print(table)

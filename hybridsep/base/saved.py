@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -13,6 +13,8 @@ from .errors import ParameterError, SignalError, StateError
 from .signals import PREDICTION_MAX, Array
 
 __all__ = ["COUNT_MAX", "Saved"]
+
+Value = TypeVar("Value")
 
 COUNT_MAX = 2**53
 """Largest whole number in a state: the last up to which doubles count exactly."""
@@ -54,9 +56,7 @@ class Saved:
 
     def field(self, name: str) -> Any:
         """Return a scalar of any type, which the caller checks."""
-        if name not in self.meta:
-            raise self.error(f"{name} is missing")
-        return self.meta[name]
+        return self._found(self.meta, name)
 
     def whole(self, name: str, most: int = COUNT_MAX) -> int:
         """Return a whole number from 0 to ``most``."""
@@ -74,33 +74,22 @@ class Saved:
 
     def flag(self, name: str) -> bool:
         """Return a truth value."""
-        value = self.field(name)
-        if type(value) is not bool:
-            raise self.error(f"{name} must be true or false")
-        return value
+        return self._typed(name, bool, "true or false")
 
     def text(self, name: str) -> str:
         """Return a text."""
-        value = self.field(name)
-        if type(value) is not str:
-            raise self.error(f"{name} must be a text")
-        return value
+        return self._typed(name, str, "a text")
 
     def table(self, name: str) -> dict[str, Any]:
         """Return a mapping of names to scalars."""
-        value = self.field(name)
-        if type(value) is not dict:
-            raise self.error(f"{name} must be a table")
-        return value
+        return self._typed(name, dict, "a table")
 
     def array(self, name: str, *shape: int | None, finite: bool = True) -> Array:
         """Return an array of a shape; None stands for any length.
 
         Its entries are finite and their squares do not overflow, unless ``finite`` is False.
         """
-        if name not in self.arrays:
-            raise self.error(f"{name} is missing")
-        array = self.arrays[name]
+        array = self._found(self.arrays, name)
         fits = array.ndim == len(shape) and all(
             there in (length, None) for there, length in zip(shape, array.shape, strict=True)
         )
@@ -120,10 +109,19 @@ class Saved:
 
     def part(self, name: str) -> bytes:
         """Return a nested blob."""
-        if name not in self.parts:
-            raise self.error(f"{name} is missing")
-        return self.parts[name]
+        return self._found(self.parts, name)
 
     def number_or_none(self, name: str) -> float | None:
         """Return a finite number, or None."""
         return None if self.field(name) is None else self.real(name)
+
+    def _found(self, fields: Mapping[str, Value], name: str) -> Value:
+        if name not in fields:
+            raise self.error(f"{name} is missing")
+        return fields[name]
+
+    def _typed(self, name: str, kind: type[Value], expected: str) -> Value:
+        value = self.field(name)
+        if type(value) is not kind:
+            raise self.error(f"{name} must be {expected}")
+        return value

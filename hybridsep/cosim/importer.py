@@ -9,10 +9,9 @@ import sys
 import threading
 import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from tempfile import gettempdir, mkdtemp
-from types import TracebackType
 from typing import Any
 
 import fmpy
@@ -78,7 +77,7 @@ def _working_directory() -> Iterator[Path]:
             os.chdir(folder)
 
 
-class FmuInstance:
+class FmuInstance(AbstractContextManager["FmuInstance"]):
     """An instance of a co-simulation FMU; use it as a context manager, or close it.
 
     Instances may live in several threads, each used by one thread at a time: they are loaded one after the other and
@@ -164,12 +163,7 @@ class FmuInstance:
             raise FmuError(f"{self.path.name}: the instance is closed; make a new FmuInstance")
         return self._slave
 
-    def __enter__(self) -> FmuInstance:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     @uninterrupted

@@ -1,11 +1,13 @@
-"""Library adapters of the co-simulation loop: a predictor or compensator, and a plant."""
+"""Library adapters of the co-simulation loop: a predictor or compensator, and a plant.
+
+The adapters of FMUs (``fmus.py``) have the same attributes and methods.
+"""
 
 from __future__ import annotations
 
 from typing import Any
 
 from ..compensate.compensator import SepCompensator
-from ..compensate.plan import SepState
 from ..plants.encoder import Encoder
 from ..plants.plant import Plant
 from ..predict.look_ahead import LookAhead
@@ -23,6 +25,16 @@ class LibraryController:
     controller : HybridPredictor or SepCompensator
     t_init : float, optional
         Warm-up, s; its own if left out.
+
+    Attributes
+    ----------
+    name : str
+        Name in error messages.
+    kind : Kind
+    T_s : float
+        Sampling interval, s; an FMU's, like the next two, is known after :meth:`initialise`.
+    Np, delay : int
+        Samples in a window; samples by which it delays the trajectory.
     """
 
     name: str = "the controller"
@@ -42,10 +54,8 @@ class LibraryController:
 
     def outputs(self) -> tuple[tuple[float, ...], int]:
         """Return the positions of the kind's outputs, m, and the state, now."""
-        ahead = self._look_ahead
-        if self.kind is COMPENSATOR:
-            return (ahead.x_dm, ahead.x_d, ahead.x_pb, ahead.x_h), ahead.sep_state
-        return (ahead.x_d, ahead.x_pb, ahead.x_h), SepState.HYBRID if ahead.hybrid_active else SepState.PHYSICS
+        ahead, kind = self._look_ahead, self.kind
+        return tuple(getattr(ahead, name) for name in kind.outputs), kind.lowest + int(getattr(ahead, kind.state))
 
     def step(self, k: int, x_d_ahead: float, x_meas: float) -> None:
         """Take in sample ``k``, m, and move on to the next."""
@@ -53,7 +63,17 @@ class LibraryController:
 
 
 class LibraryDrive:
-    """A plant and its encoder."""
+    """A plant and its encoder.
+
+    Attributes
+    ----------
+    name : str
+        Name in error messages.
+    T_s : float, optional
+        Sampling interval, s; None if it can be any.
+    plant : object
+        Passed to ``disturb``.
+    """
 
     name: str = "the plant"
     T_s: float | None = None

@@ -10,23 +10,26 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..base.errors import FmuError, ParameterError
 from ..base.interrupt import interrupts_between_calls
-from ..base.signals import Array, as_samples
+from ..base.signals import as_samples
 from ..base.threads import one_blas_thread
 from ..compensate.compensator import SepCompensator
 from ..plants.encoder import Encoder
 from ..plants.plant import Plant
 from ..predict.predictor import HybridPredictor
 from .library import LibraryController, LibraryDrive
-from .run import Kind, Run
+from .run import Run
 
-__all__ = ["Controller", "Disturb", "Drive", "Progress", "Sensor", "cosimulate", "record"]
+if TYPE_CHECKING:
+    from .fmus import FmuController, FmuDrive
+
+__all__ = ["Disturb", "Progress", "Sensor", "cosimulate"]
 
 Sensor = Callable[[int, float], float]
 """Called as ``sensor(k, x_meas)``, ``k`` counted from the end of the fill; returns what arrives in its place."""
@@ -36,63 +39,6 @@ Disturb = Callable[[int, Any], object]
 
 Progress = Callable[[int, int], object]
 """Called with samples done and samples in all, about a hundred times."""
-
-
-class Controller(Protocol):
-    """A look-ahead between interpolator and drive.
-
-    Attributes
-    ----------
-    name : str
-        Name in error messages.
-    kind : Kind
-    T_s : float
-        Sampling interval, s; like the next two, known after :meth:`initialise`.
-    Np, delay : int
-        Samples in a window; samples by which it delays the trajectory.
-    """
-
-    name: str
-    kind: Kind
-    T_s: float
-    Np: int
-    delay: int
-
-    def initialise(self, start: float) -> None:
-        """Begin a run at rest at ``start``, m."""
-
-    def outputs(self) -> tuple[tuple[float, ...], int]:
-        """Return the positions of the kind's outputs, m, and the state, now."""
-
-    def step(self, k: int, x_d_ahead: float, x_meas: float) -> None:
-        """Take in sample ``k``, m, and move on to the next."""
-
-
-class Drive(Protocol):
-    """A plant with its encoder.
-
-    Attributes
-    ----------
-    name : str
-        Name in error messages.
-    T_s : float, optional
-        Sampling interval, s, known after :meth:`initialise`; None if it can be any.
-    plant : object
-        Passed to ``disturb``; known after :meth:`initialise`.
-    """
-
-    name: str
-    T_s: float | None
-    plant: Any
-
-    def initialise(self, start: float) -> None:
-        """Begin a run at rest at ``start``, m."""
-
-    def outputs(self) -> tuple[float, float]:
-        """Return the true and the measured position now, m."""
-
-    def step(self, k: int, x_d: float, h: float) -> None:
-        """Advance from sample ``k`` by ``h`` seconds with the command ``x_d``, m, held."""
 
 
 def cosimulate(
@@ -162,63 +108,25 @@ def cosimulate(
         delay, T_s = ahead.delay, ahead.T_s
         if drive.T_s is not None and abs(drive.T_s - T_s) > 1e-6 * T_s:
             raise FmuError(f"{drive.name} has T_s = {drive.T_s:g} s, but {ahead.name} has {T_s:g} s; they must agree")
-        signals, state = record(
-            ahead, drive, command, len(command) + delay, sensor=sensor, disturb=disturb, progress=progress
-        )
-    found = {name: samples[delay:] for name, samples in signals.items()}
+        kind, n = ahead.kind, len(command) + delay
+        signals, state = np.empty((n, len(kind.outputs) + 2)), np.empty(n, dtype=np.int64)
+        every = max(1, n // 100)
+        for k in range(n):
+            if disturb is not None:
+                disturb(k - delay, drive.plant)
+            outputs, state[k] = ahead.outputs()
+            x, x_meas = drive.outputs()
+            if sensor is not None:
+                x_meas = sensor(k - delay, x_meas)
+            signals[k] = *outputs, x, x_meas
+            drive.step(k, outputs[0], T_s)
+            ahead.step(k, float(command[min(k, len(command) - 1)]), x_meas)
+            if progress is not None and (k % every == 0 or k == n - 1):
+                progress(k + 1, n)
+    found = dict(zip((*kind.outputs, "x", "x_meas"), signals[delay:].T.copy(), strict=True))
     found.setdefault("x_dm", found["x_d"])
-    t = np.asarray(start_time + np.arange(delay, len(state)) * T_s, dtype=np.float64)
-    return Run(kind=ahead.kind, t=t, **found, state=state[delay:], T_s=T_s, Np=ahead.Np)
-
-
-def record(
-    controller: Controller,
-    drive: Drive,
-    command: Array,
-    n: int,
-    *,
-    sensor: Sensor | None = None,
-    disturb: Disturb | None = None,
-    progress: Progress | None = None,
-) -> tuple[dict[str, Array], NDArray[np.int64]]:
-    """Step a controller and a drive, both initialised, for ``n`` samples.
-
-    Parameters
-    ----------
-    controller : Controller
-    drive : Drive
-    command : (m,) array, m
-        Commanded positions; held at the end.
-    n : int
-        Samples.
-    sensor, disturb, progress : callable, optional
-        As :func:`cosimulate` takes them.
-
-    Returns
-    -------
-    signals : dict of (n,) arrays, m
-        The kind's outputs, and the drive's ``x`` and ``x_meas`` as the controller got it.
-    state : (n,) array of int
-        :class:`~hybridsep.compensate.plan.SepState`.
-    """
-    kind, delay, T_s = controller.kind, controller.delay, controller.T_s
-    signals = np.empty((n, len(kind.outputs) + 2))
-    state = np.empty(n, dtype=np.int64)
-    every = max(1, n // 100)
-    for k in range(n):
-        if disturb is not None:
-            disturb(k - delay, drive.plant)
-        outputs, state[k] = controller.outputs()
-        x, x_meas = drive.outputs()
-        if sensor is not None:
-            x_meas = sensor(k - delay, x_meas)
-        signals[k] = *outputs, x, x_meas
-        drive.step(k, outputs[0], T_s)
-        controller.step(k, float(command[min(k, len(command) - 1)]), x_meas)
-        if progress is not None and (k % every == 0 or k == n - 1):
-            progress(k + 1, n)
-    names = (*kind.outputs, "x", "x_meas")
-    return dict(zip(names, signals.T.copy(), strict=True)), state
+    t = np.asarray(start_time + np.arange(delay, n) * T_s, dtype=np.float64)
+    return Run(kind=kind, t=t, **found, state=state[delay:], T_s=T_s, Np=ahead.Np)
 
 
 def _controller(
@@ -226,7 +134,7 @@ def _controller(
     values: Mapping[str, Any] | None,
     t_init: float | None,
     start_time: float,
-) -> Controller:
+) -> FmuController | LibraryController:
     """Return the loop's adapter of a controller."""
     if isinstance(controller, (str, Path)):
         from .fmus import FmuController  # fmpy is loaded where an FMU is
@@ -239,7 +147,7 @@ def _controller(
 
 def _drive(
     plant: str | Path | Plant, values: Mapping[str, Any] | None, encoder: Encoder | None, start_time: float
-) -> Drive:
+) -> FmuDrive | LibraryDrive:
     """Return the loop's adapter of a plant."""
     if isinstance(plant, (str, Path)):
         from .fmus import FmuDrive

@@ -108,31 +108,24 @@ def backtest(predictor: HybridPredictor, x_d: ArrayLike, x: ArrayLike, *, on_bat
     """
     command = as_samples(x_d, "x_d")
     measured = as_samples(x, "x", len(command))
-    n = len(command)
-    predicted = np.empty((3, n))
-    active = np.zeros(n, dtype=np.bool_)
-    batch_rms = np.empty((3, -(-n // predictor.Np)))
+    batches: list[Batch] = []
 
     def keep(batch: Batch) -> None:
-        k, end = batch.k, batch.k + len(batch.x)
-        predicted[0, k:end], predicted[1, k:end], predicted[2, k:end] = batch.x_pb, batch.x_hold, batch.x_h
-        active[k + batch.n_warm_up : end] = True
-        batch_rms[:, batch.j] = batch.rms_pb, batch.rms_hold, batch.rms_h
+        batches.append(batch)
         if on_batch is not None:
             on_batch(batch)
+
+    def joined(name: str) -> Array:
+        return np.concatenate([np.atleast_1d(getattr(batch, name)) for batch in batches])
 
     scores = backtest_stream(predictor, [(command, measured)], on_batch=keep)
     return Backtest(
         scores.overall,
         scores.after_warm_up,
         scores.n_batches,
-        x_pb=predicted[0],
-        x_hold=predicted[1],
-        x_h=predicted[2],
-        active=active,
-        batch_rms_pb=batch_rms[0],
-        batch_rms_hold=batch_rms[1],
-        batch_rms_h=batch_rms[2],
+        active=np.concatenate([np.arange(len(batch.x)) >= batch.n_warm_up for batch in batches]),
+        **{name: joined(name) for name in ("x_pb", "x_hold", "x_h")},
+        **{f"batch_{name}": joined(name) for name in ("rms_pb", "rms_hold", "rms_h")},
     )
 
 
@@ -201,26 +194,18 @@ def _measure(error: Array, k: int) -> tuple[list[float], list[float]]:
 
 def _windows(chunks: Iterable[tuple[ArrayLike, ArrayLike]], Np: int) -> Iterator[tuple[Array, Array]]:
     """Cut chunks of any sizes into windows of ``Np`` samples; the last one may be shorter."""
-    waiting, filled, k = np.empty((2, Np)), 0, 0
+    waiting, k = np.empty((2, 0)), 0
     for chunk in chunks:
-        x_d, x = _checked(chunk, k)
-        n, i = len(x), 0
-        if filled:
-            i = min(Np - filled, n)
-            waiting[0, filled : filled + i], waiting[1, filled : filled + i] = x_d[:i], x[:i]
-            filled += i
-            if filled == Np:
-                yield waiting[0], waiting[1]
-                waiting, filled = np.empty((2, Np)), 0
-        while n - i >= Np:
-            yield x_d[i : i + Np], x[i : i + Np]
-            i += Np
-        if i < n:
-            filled = n - i
-            waiting[0, :filled], waiting[1, :filled] = x_d[i:], x[i:]
-        k += n
-    if filled:
-        yield waiting[0, :filled], waiting[1, :filled]
+        samples = np.asarray(_checked(chunk, k))
+        k += samples.shape[1]
+        if waiting.size:
+            samples = np.concatenate((waiting, samples), axis=1)
+        whole = samples.shape[1] // Np * Np
+        for i in range(0, whole, Np):
+            yield samples[0, i : i + Np], samples[1, i : i + Np]
+        waiting = samples[:, whole:]
+    if waiting.size:
+        yield waiting[0], waiting[1]
 
 
 def _checked(chunk: tuple[ArrayLike, ArrayLike], k: int) -> tuple[Array, Array]:

@@ -24,12 +24,8 @@ def spiral_figure(x: Run, y: Run, path: str | Path) -> None:
     figure = Figure(figsize=(11.0, 4.6), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
     figure.suptitle("Spiral: distance between the measured and the predicted point")
-    limit = 0.0
-    errors = []
-    for name in ("x_pb", "x_h"):
-        distance = 1e6 * np.hypot(x.x_meas - getattr(x, name), y.x_meas - getattr(y, name))
-        errors.append(distance)
-        limit = max(limit, float(np.percentile(distance, 99)))
+    errors = [1e6 * np.hypot(x.x_meas - getattr(x, name), y.x_meas - getattr(y, name)) for name in ("x_pb", "x_h")]
+    limit = max(float(np.percentile(distance, 99)) for distance in errors)
     for axes, distance, label in zip(panels, errors, ("physics-based model", "linear hybrid model"), strict=True):
         points = _draw_path(axes, x, y, distance, limit, size=3)
         axes.set_title(f"{label}, RMS {rms(distance):.1f} µm", fontsize=10)

@@ -18,7 +18,6 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
@@ -26,10 +25,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from ..base.errors import FmuError
-from ..base.interrupt import uninterrupted
 from ..base.output import named_errors
 from .macho import universal
-from .processes import Processes
+from .processes import run_together
 
 __all__ = [
     "ALL_TARGETS",
@@ -136,20 +134,8 @@ def binaries(sources: Mapping[str, bytes], name: str, targets: Sequence[str]) ->
     FmuError
         If a target is unknown, there is no compiler, or it refuses.
     """
-    commands, processes = compilers(targets), Processes()
-
-    def build(target: str) -> bytes:
-        return _compile(processes, commands[target], TARGETS[keys[target]], sources, name)
-
-    keys = {target: host_target() if target == "host" else target for target in commands}
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        try:
-            # The pool waits for no thread whose start Ctrl-C has cut off.
-            libraries = uninterrupted(pool.map)(build, keys)
-            built = dict(zip(keys.values(), libraries, strict=True))
-        except BaseException:
-            processes.stop()
-            raise
+    commands = {host_target() if key == "host" else key: command for key, command in compilers(targets).items()}
+    built = _compiled(commands, sources, name)
     placed = {
         f"{place}/{name}{TARGETS[key].suffix}": library
         for key, library in built.items()
@@ -227,20 +213,20 @@ def _zig(triple: str) -> list[str]:
     return [sys.executable, "-m", "ziglang", "cc", "-target", triple, "-fno-sanitize=undefined"]
 
 
-def _compile(
-    processes: Processes, command: Sequence[str], target: Target, sources: Mapping[str, bytes], name: str
-) -> bytes:
-    """Compile and link ``all.c`` into a stripped shared library."""
+def _compiled(commands: Mapping[str, Sequence[str]], sources: Mapping[str, bytes], name: str) -> dict[str, bytes]:
+    """Compile and link ``all.c`` into a stripped shared library for each target, by its compiler's command."""
     with TemporaryDirectory() as place:
-        folder = Path(place)
-        with named_errors(folder):
-            for file, text in sources.items():
-                (folder / file).write_bytes(text)
-        library = f"{name}{target.suffix}"
-        flags = [*compile_flags(command), "-g0", "-s", "-shared", "-I."]
-        arguments = [*command, *flags, "all.c", "-o", library, *target.flags]
-        status, complaint = processes.run(arguments, folder)
-        if status != 0:
-            said = f"{' '.join(arguments)}\n{complaint.strip()}"
-            raise FmuError(f"{name} cannot be compiled for {target.triple}: {said}")
-        return (folder / library).read_bytes()
+        jobs = []
+        for key, command in commands.items():
+            folder, target = Path(place) / key, TARGETS[key]
+            with named_errors(folder):
+                folder.mkdir()
+                for file, text in sources.items():
+                    (folder / file).write_bytes(text)
+            flags = [*compile_flags(command), "-g0", "-s", "-shared", "-I."]
+            jobs.append(([*command, *flags, "all.c", "-o", f"{name}{target.suffix}", *target.flags], folder))
+        for key, (arguments, _), (status, complaint) in zip(commands, jobs, run_together(jobs), strict=False):
+            if status != 0:
+                said = f"{' '.join(arguments)}\n{complaint.strip()}"
+                raise FmuError(f"{name} cannot be compiled for {TARGETS[key].triple}: {said}")
+        return {key: (Path(place) / key / f"{name}{TARGETS[key].suffix}").read_bytes() for key in commands}

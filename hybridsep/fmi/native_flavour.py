@@ -24,12 +24,10 @@ from ..plants.trajectory import spiral, staircase
 from ..predict.predictor import HybridPredictor
 from .c_header import c_header
 from .compiler import ALL_TARGETS, binaries
-from .content import content_guid, fmu_title
-from .experiment import stop_time
-from .model_description import FmuInfo, build_description, model_description
+from .content import content_guid
+from .model_description import build_description, model_description
 from .pages import icon, index_page
 from .reference import reference_files
-from .variables import INTERPOLATED, variables_of
 from .weights import WEIGHTS_FILE, weights_file
 
 __all__ = ["all_c", "files", "fmi_headers", "sources"]
@@ -78,20 +76,9 @@ def files(
     guid = content_guid(content, description)
     content |= reference  # computed by this machine's LAPACK: it stays out of the GUID, as the binaries do
     content["sources/hsep_fmu.h"] = c_header(description, guid).encode()
-    content["sources/buildDescription.xml"] = build_description(name, ["all.c"])
-    info = FmuInfo(
-        name=name,
-        description=fmu_title(machine, model),
-        guid=guid,
-        step_size=machine.T_s,
-        stop_time=stop_time(machine, description, samples),
-        needs_execution_tool=False,
-        generation_tool=f"hybridsep {__version__}",
-        version=__version__,
-        source_files=("all.c",),
-        interpolates=bool(INTERPOLATED[model]),
-    )
-    content["modelDescription.xml"] = model_description(info, variables_of(description))
+    content["sources/buildDescription.xml"] = build_description(name)
+    tool = f"hybridsep {__version__}"
+    content["modelDescription.xml"] = model_description(machine, description, guid, tool, native=True, samples=samples)
     if targets is None:
         targets = ALL_TARGETS if find_spec("ziglang") is not None else ("host",)
     folder = "sources/"

@@ -1,4 +1,4 @@
-"""Child processes of several threads, terminated together when one fails or the user interrupts."""
+"""Commands that run side by side as child processes, and end together."""
 
 from __future__ import annotations
 
@@ -6,55 +6,62 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-__all__ = ["Processes"]
+from ..base.interrupt import uninterrupted
+
+__all__ = ["run_together"]
 
 
-class Processes:
-    """Runs commands for several threads at once; :meth:`stop` ends those that run and lets no other begin."""
+def run_together(commands: Sequence[tuple[Sequence[str], Path]]) -> list[tuple[int, str]]:
+    """Run commands, each in its folder, as many at a time as there are processors.
 
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._running: set[subprocess.Popen[str]] = set()
-        self._stopped = False
-
-    def run(self, command: Sequence[str], folder: Path) -> tuple[int, str]:
-        """Run a command in a folder; return its exit status and its standard error."""
-        with self._lock:
-            if self._stopped:
-                raise InterruptedError("stopped before it began")
-            process = subprocess.Popen(
-                command,
-                cwd=folder,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.PIPE,
-                text=True,
-                errors="replace",
-                start_new_session=True,  # a compiler has children of its own, which end with the group
-            )
-            self._running.add(process)
-        _, complaint = process.communicate()
-        with self._lock:
-            self._running.discard(process)
-        return process.returncode, complaint
-
-    def stop(self) -> None:
-        """End the processes that run; each :meth:`run` then returns."""
-        with self._lock:
-            self._stopped = True
-            for process in self._running:
-                if process.poll() is None:
-                    _terminate(process)
+    Returns
+    -------
+    list of (int, str)
+        Exit status and standard error of each, up to the first that fails; then, as at Ctrl-C, the others are ended.
+    """
+    at_a_time, results = os.cpu_count() or 1, []
+    running: list[subprocess.Popen[str]] = []
+    try:
+        for i in range(0, len(commands), at_a_time):
+            for command, folder in commands[i : i + at_a_time]:
+                _start(command, folder, running)
+            for process in running[i:]:
+                _, complaint = process.communicate()
+                results.append((process.returncode, complaint))
+                if process.returncode != 0:
+                    return results
+        return results
+    finally:
+        for process in running:
+            if process.poll() is None:
+                _end(process)
 
 
-def _terminate(process: subprocess.Popen[str]) -> None:
+@uninterrupted
+def _start(command: Sequence[str], folder: Path, running: list[subprocess.Popen[str]]) -> None:
+    """Start a process and add it to those that run."""
+    running.append(
+        subprocess.Popen(
+            command,
+            cwd=folder,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            errors="replace",
+            start_new_session=True,  # a compiler has children of its own, which end with the group
+        )
+    )
+
+
+def _end(process: subprocess.Popen[str]) -> None:
     if sys.platform == "win32":
         process.terminate()
     else:
         with suppress(ProcessLookupError):  # it has just ended
             os.killpg(process.pid, signal.SIGTERM)
+    process.communicate()

@@ -19,13 +19,11 @@ from ..base.data_files import data_folder
 from ..base.version import __version__
 from ..machine import Machine
 from ..predict.predictor import HybridPredictor
-from .content import content_guid, fmu_title
-from .experiment import stop_time
+from .content import content_guid
 from .imported import imported_modules
-from .model_description import FmuInfo, model_description
+from .model_description import model_description
 from .pages import filled, index_page
 from .pythonfmu_limits import checked_version
-from .variables import variables_of
 from .weights import WEIGHTS_FILE, weights_file
 
 __all__ = ["files"]
@@ -68,17 +66,8 @@ def files(
         content[f"binaries/{Path(source).parent}/{name}{binary.suffix}"] = binary.read_bytes()
     guid = content_guid(content, description)
     content["resources/machine.json"] = json.dumps({**description, "content": guid}, indent=1, sort_keys=True).encode()
-    info = FmuInfo(
-        name=name,
-        description=fmu_title(machine, model),
-        guid=guid,
-        step_size=machine.T_s,
-        stop_time=stop_time(machine, description),
-        needs_execution_tool=True,
-        generation_tool=f"hybridsep {__version__} with pythonfmu {version}",
-        version=__version__,
-    )
-    content["modelDescription.xml"] = model_description(info, variables_of(description))
+    tool = f"hybridsep {__version__} with pythonfmu {version}"
+    content["modelDescription.xml"] = model_description(machine, description, guid, tool, native=False)
     return content
 
 

@@ -99,16 +99,17 @@ def _look_ahead_run(
 
     If the outputs ``names`` have a modified command, the look-ahead is the compensator's and the drive gets ``x_dm``.
     """
-    sent = "x_dm" if "x_dm" in names else "x_d"
-    compensator = _compensator(machine, t_init) if sent == "x_dm" else None
-    settings = replace(machine.predictor_settings, t_init=t_init)
-    predictor = machine.new_predictor(settings) if compensator is None else compensator.predictor
+    model: HybridPredictor | SepCompensator
+    if "x_dm" in names:
+        model = machine.new_compensator(predictor=replace(machine.compensator_predictor, t_init=t_init))
+        predictor, sent, least, warm_up = model.predictor, "x_dm", _COMPENSATED_SAMPLES, model.preview
+    else:
+        model = predictor = machine.new_predictor(replace(machine.predictor_settings, t_init=t_init))
+        sent, least, warm_up = "x_d", _SAMPLES, 0
     if trained is not None:
         restore_weights(predictor, weights_file(trained))
-    look_ahead = LookAhead(predictor, 0.0) if compensator is None else LookAhead(compensator, 0.0)
-    warm_up = max(predictor.n_init, 0 if compensator is None else compensator.preview)
-    least = _SAMPLES if compensator is None else _COMPENSATED_SAMPLES
-    n = min(max(least, 3 * predictor.Np + warm_up), _SAMPLES_MAX)
+    look_ahead = LookAhead(model, 0.0)
+    n = min(max(least, 3 * predictor.Np + max(predictor.n_init, warm_up)), _SAMPLES_MAX)
     command = _command(machine, n + 1)
     measure = _drive(machine, predictor)
     inputs: Columns = {"x_d_ahead": command.tolist(), "x_meas": []}
@@ -119,10 +120,6 @@ def _look_ahead_run(
         inputs["x_meas"].append(round(measure(getattr(look_ahead, sent)), _RESOLUTION))
         look_ahead.sample(inputs["x_d_ahead"][k], inputs["x_meas"][k])
     return inputs, outputs
-
-
-def _compensator(machine: Machine, t_init: float) -> SepCompensator:
-    return machine.new_compensator(predictor=replace(machine.compensator_predictor, t_init=t_init))
 
 
 def _drive(machine: Machine, predictor: HybridPredictor) -> Callable[[float], float]:

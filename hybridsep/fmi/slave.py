@@ -227,18 +227,14 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
     def _setter(self, variable: Variable) -> Callable[[Any], None]:
         name, causality = variable.name, variable.causality
 
-        def refuse(value: Any) -> None:
-            raise FmuError(f"{name} is an {causality} variable and cannot be set")
-
-        def set_parameter(value: Any) -> None:
-            if self.running:
+        def assign(value: Any) -> None:
+            if causality not in ("input", "parameter"):
+                raise FmuError(f"{name} is an {causality} variable and cannot be set")
+            if causality == "parameter" and self.running:
                 raise FmuError(f"{name} is a fixed parameter and cannot be set after initialization, got {value!r}")
             self.values[name] = value
 
-        def set_input(value: Any) -> None:
-            self.values[name] = value
-
-        return {"input": set_input, "parameter": set_parameter}.get(causality, refuse)
+        return assign
 
 
 for _name in (

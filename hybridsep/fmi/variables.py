@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from ..base.parameters import Parameter
 from ..base.settings import PARAMETERS, CompensatorSettings, PredictorSettings, check
@@ -101,28 +102,11 @@ class Variable:
     learned: bool = False
 
 
-def _position(
-    name: str,
-    causality: str,
-    description: str,
-    *,
-    start: float | None = None,
-    display_unit: str = "mm",
-    variability: str = "discrete",
-    initially_from: tuple[str, ...] = (),
-) -> Variable:
-    return Variable(
-        name,
-        "Real",
-        causality,
-        "continuous" if causality == "input" else variability,
-        description,
-        start=start,
-        unit="m",
-        display_unit=display_unit,
-        nominal=1e-3 if display_unit == "mm" else 1e-6,
-        initially_from=initially_from,
-    )
+def _position(name: str, causality: str, description: str, *, display_unit: str = "mm", **more: Any) -> Variable:
+    """Return a position, m; ``more`` are attributes of :class:`Variable`."""
+    more.setdefault("variability", "continuous" if causality == "input" else "discrete")
+    more |= {"unit": "m", "display_unit": display_unit, "nominal": 1e-3 if display_unit == "mm" else 1e-6}
+    return Variable(name, "Real", causality, description=description, **more)
 
 
 def _parameter(parameter: Parameter, start: Value, *, label: str | None = None) -> Variable:

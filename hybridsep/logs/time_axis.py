@@ -42,6 +42,7 @@ class TimeAxis:
         self._n = 0
         self._first = self._last = self._median = self._jitter = 0.0
 
+    @np.errstate(over="ignore", invalid="ignore")  # an interval that overflows is reported at the end
     def extend(self, block: Block) -> None:
         """Check the next times, s, the only column of the block.
 
@@ -50,10 +51,6 @@ class TimeAxis:
         LogError
             If an interval is not the median one within :data:`TOLERANCE`.
         """
-        with np.errstate(over="ignore", invalid="ignore"):  # an interval that overflows is reported at the end
-            self._extend(block)
-
-    def _extend(self, block: Block) -> None:
         t = block.columns[0]
         if self._n == 0:
             self._first = self._last = float(t[0])

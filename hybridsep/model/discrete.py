@@ -95,9 +95,7 @@ class DiscreteModel:
 
     def impulse_response(self, n: int) -> Array:
         """Return the first column of the lower-triangular Toeplitz ``G_pb`` of a window, ``(n,)``, m/m."""
-        impulse = np.zeros(n)
-        impulse[0] = 1.0
-        return self.forced_response(self.rest(), impulse)[0]
+        return self.forced_response(self.rest(), np.eye(1, n)[0])[0]
 
     def _block_response(self, s: Array, u: Array) -> tuple[Array, Array]:
         n = len(u)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import reduce
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -100,10 +102,7 @@ def _partial_fractions(quadratics: list[Array], numerator: Array) -> Array:
     _require_distinct(quadratics)
     columns = []
     for i in range(m):
-        rest = np.array([1.0])
-        for j, quadratic in enumerate(quadratics):
-            if j != i:
-                rest = np.asarray(np.polymul(rest, quadratic), dtype=np.float64)
+        rest = reduce(np.polymul, quadratics[:i] + quadratics[i + 1 :], np.array([1.0]))
         columns += [_padded(rest, 2 * m), _padded(np.polymul(rest, [1.0, 0.0]), 2 * m)]
     solution: Array = np.linalg.solve(np.array(columns).T, _padded(numerator, 2 * m))
     return solution.reshape(m, 2)
@@ -111,12 +110,9 @@ def _partial_fractions(quadratics: list[Array], numerator: Array) -> Array:
 
 def _require_distinct(quadratics: list[Array]) -> None:
     """Raise ModelError for a pole in two factors; ``np.roots`` splits a k-fold pole by about ``ε^(1/k)``."""
-    roots = [np.roots(quadratic) for quadratic in quadratics]
-    for i, some in enumerate(roots):
-        for others in roots[:i]:
-            gap = np.abs(some[:, None] - others[None, :])
-            if np.any(gap < REPEATED * np.abs(others)):
-                raise ModelError(_REPEATED_MODES)
+    for others, some in combinations(map(np.roots, quadratics), 2):
+        if np.any(np.abs(some[:, None] - others[None, :]) < REPEATED * np.abs(others)):
+            raise ModelError(_REPEATED_MODES)
 
 
 def _require_faithful(

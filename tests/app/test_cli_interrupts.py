@@ -8,7 +8,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,7 @@ from command_line import Run
 
 from hybridsep import cosimulate
 from hybridsep.base.interrupt import interrupts_between_calls, uninterrupted
-from hybridsep.fmi.processes import Processes
+from hybridsep.fmi.processes import run_together
 
 MACHINE = "spring_mass_damper"
 POSIX = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals and devices")
@@ -85,17 +84,16 @@ def test_ctrl_c_during_a_build_ends_the_compilers(tmp_path: Path) -> None:
 
 
 @POSIX
-def test_processes_stop_together(tmp_path: Path) -> None:
-    processes = Processes()
-    sleeper = [sys.executable, "-c", "import time; time.sleep(600)"]
-    with ThreadPoolExecutor(2) as pool:
-        running = [pool.submit(processes.run, sleeper, tmp_path) for _ in range(2)]
-        while len(processes._running) < 2:
-            time.sleep(0.01)
-        processes.stop()
-        assert [future.result()[0] for future in running] == [-signal.SIGTERM] * 2
-    with pytest.raises(InterruptedError):
-        processes.run(sleeper, tmp_path)
+def test_commands_end_with_the_first_that_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    failing = "import pathlib, sys, time\nwhile not pathlib.Path('pid').is_symlink(): time.sleep(0.01)\nsys.exit('no')"
+    sleeping = "import os, time; os.symlink(str(os.getpid()), 'pid'); time.sleep(600)"
+    never = "open('never', 'x')"
+    commands = [([sys.executable, "-c", code], tmp_path) for code in (failing, sleeping, never)]
+    assert run_together(commands) == [(1, "no\n")]
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(str((tmp_path / "pid").readlink())), 0)
+    assert [path.name for path in tmp_path.iterdir()] == ["pid"]
 
 
 @POSIX

@@ -1,4 +1,4 @@
-"""Executed README: CI's commands, code blocks, machine file, interface tables."""
+"""Executed README: CI's commands, code blocks, machine file."""
 
 from __future__ import annotations
 
@@ -11,9 +11,6 @@ from pathlib import Path
 
 import pytest
 from places import ROOT
-
-from hybridsep.fmi.tables import interface_table
-from hybridsep.fmi.variables import MODELS
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
@@ -68,27 +65,6 @@ def test_the_machine_file_in_the_readme_is_valid(tmp_path: Path) -> None:
     path = tmp_path / "my_axis.toml"
     path.write_text(block, encoding="utf-8")
     assert load_machine(path).model.dc_gain == pytest.approx(1.0, abs=1e-3)
-
-
-@pytest.mark.parametrize("model", ["HybridPredictor", "SepCompensator", "FeedDrive"])
-def test_interface_tables_are_the_fmus(model: str) -> None:
-    from hybridsep import load_machine
-
-    machine = load_machine("spring_mass_damper")
-    mode = machine.model.modes[0]
-    if model != "FeedDrive":
-        modes = [{"f_n": mode.f_n, "zeta": mode.zeta, "alpha": mode.alpha, "beta": mode.beta}]
-        predicts = model == "HybridPredictor"
-        values = machine.fmi_parameters() if predicts else machine.fmi_compensator_parameters()
-        table = MODELS[model](values, modes)
-    else:
-        assert machine.plant is not None
-        assert machine.physics.spring_mass_damper is not None
-        values = machine.plant.model_dump(exclude={"kind"}) | machine.physics.spring_mass_damper.model_dump()
-        table = MODELS[model](values, [])
-    for name, *cells in interface_table(table):
-        row = f"| `{name}` | " + " | ".join(cell.replace("|", r"\|") for cell in cells) + " |"
-        assert row in README, row
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import struct
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from functools import cache
 from pathlib import Path
@@ -17,9 +17,10 @@ from c_compiler import C_SOURCES, build_folder, include_flags, run_compiler
 from numpy.typing import NDArray
 from places import ROOT
 
+from hybridsep.base.parameters import Parameter
 from hybridsep.base.settings import PARAMETERS
 from hybridsep.fmi.c_header import c_header
-from hybridsep.fmi.variables import COMPENSATOR_SETTINGS, INTERPOLATED, PREDICTOR_SETTINGS, variables_of
+from hybridsep.fmi.variables import COMPENSATOR_SETTINGS, INTERPOLATED, PREDICTOR_SETTINGS, TRUST_SETTINGS, variables_of
 from hybridsep.machine import load_machine
 
 Array = NDArray[np.float64]
@@ -30,9 +31,9 @@ EXPOSE = ROOT / "tests" / "c" / "expose.c"
 MESSAGE_SIZE = 512
 
 
-def defaults(names: Sequence[str]) -> dict[str, float]:
+def defaults(table: Mapping[str, Parameter]) -> dict[str, float]:
     """Return the default values of parameters as an FMU has them."""
-    return {name: PARAMETERS[name].to_fmi(PARAMETERS[name].default) + 0 for name in names}
+    return {name: parameter.to_fmi(parameter.default) + 0 for name, parameter in table.items()}
 
 
 SPRING_MASS_DAMPER = {"f_n": np.sqrt(24674.0) / (2 * np.pi), "zeta": 15.7 / (2 * np.sqrt(24674.0))} | {
@@ -43,11 +44,11 @@ SPRING_MASS_DAMPER = {"f_n": np.sqrt(24674.0) / (2 * np.pi), "zeta": 15.7 / (2 *
 
 STAGE_MODES = [asdict(mode) for mode in load_machine("als25010_x").model.modes]
 """The stage's X axis, Table 1."""
-PREDICTOR = defaults(PREDICTOR_SETTINGS)
+PREDICTOR = defaults({**PREDICTOR_SETTINGS, **TRUST_SETTINGS})
 FEED_DRIVE = {"m": 1.0, "c": 15.7, "k": 24674.0, "c_nl": 100.0, "k_nl": 1000.0, "noise_std": 5e-6, "seed": 0}
 STAGE_DRIVE = {"f": 1.4211e-5, "kappa": 0.0213165, "T_s": 1e-3, "noise_std": 1e-6, "seed": 7}
 
-COMPENSATOR = {**PREDICTOR, **defaults(COMPENSATOR_SETTINGS)}
+COMPENSATOR = defaults({**PREDICTOR_SETTINGS, **COMPENSATOR_SETTINGS})
 
 DESCRIPTIONS: dict[str, dict[str, Any]] = {
     "predictor": {"model": "HybridPredictor", "parameters": PREDICTOR, "modes": [SPRING_MASS_DAMPER]},

@@ -42,8 +42,7 @@ hsep_instance_name(hsep_instance *instance, const char *call, const char *name, 
         instance->resources = hsep_new(instance, HSEP_FOLDER_SIZE(strlen(resources)));
     }
     if (instance->name == NULL || (resources != NULL && instance->resources == NULL)) {
-        hsep_message_add(message, "%s: no memory for the instance's name and resources", call);
-        return HSEP_REFUSED;
+        return hsep_message_add(message, "%s: no memory for the instance's name and resources", call);
     }
     (void)strcpy(instance->name, name);
     if (resources != NULL && !hsep_uri_folder(resources, INSTANCE_WINDOWS, instance->resources)) {
@@ -77,8 +76,7 @@ HSEP_API hsep_status hsep_instance_initialise(hsep_instance *instance, const cha
     }
     instance->state = hsep_new(instance, size);
     if (instance->state == NULL) {
-        hsep_message_add(message, "%s: no memory for a state of %lu bytes", call, (unsigned long)size);
-        return HSEP_REFUSED;
+        return hsep_message_add(message, "%s: no memory for a state of %lu bytes", call, (unsigned long)size);
     }
     instance->state_size = size;
     if (hsep_model_initialise(
@@ -94,10 +92,9 @@ HSEP_API hsep_status hsep_instance_initialise(hsep_instance *instance, const cha
 HSEP_API hsep_status hsep_instance_step(hsep_instance *instance, const char *call, double t, double h, char message[])
 {
     if (instance->experiment.has_stop_time && t >= instance->experiment.stop_time - instance_stop_tolerance * h) {
-        hsep_message_add(
+        return hsep_message_add(
             message, "%s: a step must begin before the stop time %.9g s, got one from %.9g s", call,
             instance->experiment.stop_time, t);
-        return HSEP_REFUSED;
     }
     const hsep_status status = hsep_model_step(&instance->context, instance->state, instance->values, t, h, message);
     if (status != HSEP_REFUSED) {

@@ -70,14 +70,12 @@ HSEP_API hsep_status hsep_restore(hsep_instance *instance, const hsep_saved *sav
     hsep_header header;
     memcpy(&header, block, sizeof header);
     if (strcmp(header.guid, HSEP_GUID) != 0) {
-        hsep_message_add(message, "the state belongs to the FMU %s, not to %s", header.guid, HSEP_GUID);
-        return HSEP_REFUSED;
+        return hsep_message_add(message, "the state belongs to the FMU %s, not to %s", header.guid, HSEP_GUID);
     }
     if (header.state_size != instance->state_size) {
         void *state = header.state_size > 0 ? hsep_new(instance, (size_t)header.state_size) : NULL;
         if (header.state_size > 0 && state == NULL) {
-            hsep_message_add(message, "no memory for %lu bytes", (unsigned long)header.state_size);
-            return HSEP_REFUSED;
+            return hsep_message_add(message, "no memory for %lu bytes", (unsigned long)header.state_size);
         }
         hsep_instance_drop_state(instance);
         instance->state = state;
@@ -161,9 +159,8 @@ hsep_deserialise(const hsep_instance *instance, const void *bytes, size_t size, 
 {
     char detail[HSEP_MESSAGE_SIZE] = "";
     if (size < HSEP_FIXED_SIZE) {
-        hsep_message_add(
+        return hsep_message_add(
             message, "a state has at least %lu bytes, got %lu", (unsigned long)HSEP_FIXED_SIZE, (unsigned long)size);
-        return HSEP_REFUSED;
     }
     hsep_saved *saved = saved_new(instance, size, message);
     if (saved == NULL) {
@@ -173,8 +170,7 @@ hsep_deserialise(const hsep_instance *instance, const void *bytes, size_t size, 
     const char *fault = saved_fault(instance, saved, size, detail);
     if (fault != NULL) {
         hsep_free_saved(saved);
-        hsep_message_add(message, "the state cannot be used: %s", fault);
-        return HSEP_REFUSED;
+        return hsep_message_add(message, "the state cannot be used: %s", fault);
     }
     saved_replace(place, saved);
     return HSEP_OK;

@@ -11,22 +11,19 @@ HSEP_API hsep_status
 hsep_values_check(const char *call, hsep_kind kind, const unsigned vr[], size_t n, const void *value, char message[])
 {
     if (n > 0 && (vr == NULL || value == NULL)) {
-        hsep_message_add(
+        return hsep_message_add(
             message, "%s: %s is NULL, but nvr is %lu", call, vr == NULL ? "vr" : "value", (unsigned long)n);
-        return HSEP_REFUSED;
     }
     for (size_t i = 0; i < n; i++) {
         if (vr[i] >= HSEP_N_VARIABLES) {
-            hsep_message_add(
+            return hsep_message_add(
                 message, "%s: value reference must be 0 ... %d, got %u", call, HSEP_N_VARIABLES - 1, vr[i]);
-            return HSEP_REFUSED;
         }
         const hsep_variable *variable = &hsep_variables[vr[i]];
         if (variable->kind != kind) {
-            hsep_message_add(
+            return hsep_message_add(
                 message, "%s: %s (value reference %u) is of type %s, not %s", call, variable->name, vr[i],
                 values_kinds[variable->kind], values_kinds[kind]);
-            return HSEP_REFUSED;
         }
     }
     return HSEP_OK;
@@ -38,17 +35,15 @@ HSEP_API hsep_status hsep_values_check_set(
     for (size_t i = 0; i < n; i++) {
         const hsep_variable *variable = &hsep_variables[vr[i]];
         if (variable->causality != HSEP_INPUT && variable->causality != HSEP_PARAMETER) {
-            hsep_message_add(
+            return hsep_message_add(
                 message, "%s: %s is %s and cannot be set", call, variable->name,
                 values_causalities[variable->causality]);
-            return HSEP_REFUSED;
         }
         if (variable->causality == HSEP_PARAMETER && !variable->tunable &&
             instance->experiment.phase == HSEP_STEPPING) {
-            hsep_message_add(
+            return hsep_message_add(
                 message, "%s: %s is a fixed parameter and cannot be set after the initialization; call %s first", call,
                 variable->name, reset);
-            return HSEP_REFUSED;
         }
     }
     return HSEP_OK;

@@ -9,7 +9,7 @@
 static const double check_warm_up_tolerance = 1e-6; /* samples */
 static const double check_position_max = 1e3;       /* m */
 
-HSEP_API void hsep_message_add(char message[], const char *format, ...)
+HSEP_API hsep_status hsep_message_add(char message[], const char *format, ...)
 {
     size_t used = strlen(message);
     if (used > 0 && used + 2 < HSEP_MESSAGE_SIZE) {
@@ -33,6 +33,7 @@ HSEP_API void hsep_message_add(char message[], const char *format, ...)
             message[end - 1] = '\0';
         }
     }
+    return HSEP_REFUSED;
 }
 
 HSEP_API const char *hsep_number(char text[HSEP_NUMBER_SIZE], double value, hsep_kind kind)
@@ -118,11 +119,10 @@ HSEP_API hsep_status hsep_check_divergence(hsep_divergence divergence, char mess
         return HSEP_OK;
     }
     message[0] = '\0'; /* a warning of the step no longer matters */
-    hsep_message_add(
+    return hsep_message_add(
         message,
         "%s must stay within " HSEP_PLUS_MINUS "%g m: the learned recursion diverges; raise lambda, lower p or reset",
         names[divergence], HSEP_PREDICTION_MAX);
-    return HSEP_REFUSED;
 }
 
 HSEP_API hsep_status hsep_check_position(const char *name, double value, const char *where, double at, char message[])
@@ -147,8 +147,8 @@ HSEP_API hsep_status hsep_check_start_time(double t_start, char message[])
     if (isfinite(t_start)) {
         return HSEP_OK;
     }
-    hsep_message_add(message, "the start time must be finite, got %s s", hsep_number(number, t_start, HSEP_REAL));
-    return HSEP_REFUSED;
+    return hsep_message_add(
+        message, "the start time must be finite, got %s s", hsep_number(number, t_start, HSEP_REAL));
 }
 
 HSEP_API hsep_status hsep_check_clock(hsep_clock *clock, double t_start, double T_s, char message[])
@@ -157,9 +157,8 @@ HSEP_API hsep_status hsep_check_clock(hsep_clock *clock, double t_start, double 
         return HSEP_REFUSED;
     }
     if (!hsep_clock_init(clock, t_start, T_s)) {
-        hsep_message_add(
+        return hsep_message_add(
             message, "the start time must be small enough to resolve samples of T_s = %g s, got %g s", T_s, t_start);
-        return HSEP_REFUSED;
     }
     return HSEP_OK;
 }
@@ -170,10 +169,9 @@ HSEP_API hsep_status hsep_check_step_size(double h, char message[])
     if (h > 0.0 && h <= HSEP_CLOCK_STEP_MAX) {
         return HSEP_OK;
     }
-    hsep_message_add(
+    return hsep_message_add(
         message, "the communication step size must be > 0 and " HSEP_AT_MOST " %g s, got %s", HSEP_CLOCK_STEP_MAX,
         hsep_number(number, h, HSEP_REAL));
-    return HSEP_REFUSED;
 }
 
 HSEP_API hsep_status hsep_check_step(const hsep_clock *clock, double t, double h, hsep_clock_step *step, char message[])
@@ -183,10 +181,9 @@ HSEP_API hsep_status hsep_check_step(const hsep_clock *clock, double t, double h
         return HSEP_REFUSED;
     }
     if (!hsep_clock_count(clock, t, h, step)) {
-        hsep_message_add(
+        return hsep_message_add(
             message, "the communication point must be %s s, where the last step ended, got %s s",
             hsep_number(expected, clock->end, HSEP_REAL), hsep_number(got, t, HSEP_REAL));
-        return HSEP_REFUSED;
     }
     return HSEP_OK;
 }

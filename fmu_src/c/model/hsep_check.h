@@ -19,8 +19,8 @@
 #define HSEP_DOT "\xc2\xb7"
 #define HSEP_PLUS_MINUS "\xc2\xb1"
 
-/* Add a problem, formatted as by printf, to a message; "; " goes between two. */
-HSEP_API void hsep_message_add(char message[], const char *format, ...);
+/* Add a problem, formatted as by printf, to a message; "; " goes between two. Return HSEP_REFUSED. */
+HSEP_API hsep_status hsep_message_add(char message[], const char *format, ...);
 
 /* Write the shortest decimal number that reads back as value, whole ones of a real with ".0"; return text. */
 HSEP_API const char *hsep_number(char text[HSEP_NUMBER_SIZE], double value, hsep_kind kind);

@@ -1,22 +1,45 @@
-/* Checks and measured output, shared by the models of the drives. */
+/* Interface between model_drive.c and the two drives, the nonlinear one of eq. (13) and the stage. One of them is
+ * compiled into an FMU, so the functions are bound at compile time. */
 #ifndef HSEP_DRIVE_H
 #define HSEP_DRIVE_H
 
 #include "hsep_api.h"
-#include "hsep_encoder.h"
-#include "hsep_model.h"
+#include "hsep_fmu.h"
+#include "hsep_plant.h"
 
-/* Check the command x_d, m, and the step from t by h, s, of a drive whose fastest rate is that, 1/s; a step is at most
- * 100 s and hsep_plant_step_max long, which bounds its cost. */
-HSEP_API hsep_status hsep_drive_check(double x_d, double t, double h, double rate, char message[]);
+#include <stddef.h>
 
-/* Check the start value of the command. */
-HSEP_API hsep_status hsep_drive_check_start(double x_d, char message[]);
+#if defined(HSEP_MODEL_FEED_DRIVE)
 
-/* The first measurement of a drive at rest at x, m; x itself if noise_std or seed is out of range. */
-HSEP_API double hsep_drive_first_measurement(double noise_std, double seed, double x);
+#define HSEP_DRIVE_KIND UINT64_C(0x4556495244444546) /* any number that no other model has */
+#define HSEP_DRIVE(function) hsep_feed_drive_##function
+typedef hsep_feed_drive hsep_drive;
 
-/* Refuse a step in which the state overflowed, at the position x, m. */
-HSEP_API hsep_status hsep_drive_overflowed(double x, double x_d, char message[]);
+#elif defined(HSEP_MODEL_STAGE_DRIVE)
+
+#define HSEP_DRIVE_KIND UINT64_C(0x4556495244475453) /* any number that no other model has */
+#define HSEP_DRIVE(function) hsep_stage_##function
+typedef hsep_stage hsep_drive;
+
+#endif
+
+#if defined(HSEP_DRIVE_KIND)
+
+/* Check the parameters of this drive together, after each alone; *bytes: of its block, counted in double. */
+HSEP_API hsep_status hsep_drive_check(const double values[], double *bytes, char message[]);
+
+/* Reset the drive, of these parameters, to rest at the start value of x_d. */
+HSEP_API void hsep_drive_begin(hsep_drive *self, const double values[]);
+
+/* Advance by h, s, with the command x_d, m, held. Fails, with the state unchanged, if the state overflows. */
+HSEP_API hsep_status hsep_drive_step(hsep_drive *self, double x_d, double h, char message[]);
+
+/* True velocity under the last step's command, m/s. */
+HSEP_API double hsep_drive_velocity(const hsep_drive *self);
+
+/* Whether a block, in any alignment and of so many bytes, is a state of the drive for these parameters. */
+HSEP_API int hsep_drive_valid(const void *block, size_t bytes, const double values[]);
+
+#endif
 
 #endif

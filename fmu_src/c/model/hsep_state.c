@@ -9,9 +9,8 @@
 HSEP_API hsep_status hsep_state_size(double bytes, size_t *size, char message[])
 {
     if (!(bytes < 0.5 * (double)SIZE_MAX)) {
-        hsep_message_add(
+        return hsep_message_add(
             message, "the state must fit into memory, got %.4g bytes for these parameters; lower Np, p or q", bytes);
-        return HSEP_REFUSED;
     }
     *size = (size_t)bytes;
     return HSEP_OK;
@@ -43,12 +42,11 @@ HSEP_API hsep_status hsep_state_begin(
     size_t size, char message[])
 {
     if (needed != size) {
-        hsep_message_add(
+        return hsep_message_add(
             message,
             "the state must have %.0f bytes, got memory for %.0f; its file in the resources has changed meanwhile: "
             "initialise again",
             (double)needed, (double)size);
-        return HSEP_REFUSED;
     }
     *header = (hsep_state_header){kind, HSEP_STATE_VERSION, size, state_hash(context, values)};
     return HSEP_OK;
@@ -60,10 +58,9 @@ HSEP_API hsep_status hsep_state_check(
 {
     hsep_state_header header;
     if (size < sizeof header || size != expected) {
-        hsep_message_add(
+        return hsep_message_add(
             message, "the state must have %.0f bytes, got %.0f; it is truncated or of another FMU", (double)expected,
             (double)size);
-        return HSEP_REFUSED;
     }
     memcpy(&header, state, sizeof header);
     if (header.kind != kind) {
@@ -81,6 +78,5 @@ HSEP_API hsep_status hsep_state_check(
 
 HSEP_API hsep_status hsep_state_damaged(char message[])
 {
-    hsep_message_add(message, "the state is inconsistent: it is damaged");
-    return HSEP_REFUSED;
+    return hsep_message_add(message, "the state is inconsistent: it is damaged");
 }

@@ -111,10 +111,9 @@ HSEP_API hsep_status hsep_model_initialise(
     fclose(file);
     for (uint64_t k = 0; k < count; k++) {
         if (k >= n_read || !isfinite(samples[k])) {
-            hsep_message_add(
+            return hsep_message_add(
                 message, "trajectory_%.0f.bin must be finite, got %s at sample %.0f", values[HSEP_VR_trajectory],
                 k < n_read ? hsep_number(number, samples[k], HSEP_REAL) : "nothing", (double)k);
-            return HSEP_REFUSED;
         }
     }
     values[HSEP_VR_r] = hsep_trajectory_position(&self->trajectory, 0);

@@ -1,0 +1,92 @@
+"""Generated parts of the repository: the settings of the C core and the interface tables of ``README.md``.
+
+``python generate.py`` writes them anew after a change of a parameter or a variable; ``tests/test_generated.py`` tells
+when one is out of date.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from hybridsep import load_machine
+from hybridsep.base.data_files import DEFAULT_MACHINE
+from hybridsep.base.parameters import Parameter
+from hybridsep.fmi.archive import fmu_description
+from hybridsep.fmi.tables import interface_table
+from hybridsep.fmi.variables import COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS, TRUST_SETTINGS, variables_of
+
+ROOT = Path(__file__).resolve().parent
+SETTINGS_HEADER = ROOT / "fmu_src" / "c" / "core" / "predict" / "hsep_settings.h"
+README = ROOT / "README.md"
+
+TABLES = ("HybridPredictor", "FeedDrive", "SepCompensator")
+"""FMUs of the default machine, in the order of their tables in the README."""
+
+_HEAD = "| name | causality | type, unit | start | meaning |\n|---|---|---|---|---|\n"
+
+
+def generated() -> dict[Path, str]:
+    """Return the files that are generated, and those with generated parts, as they must be."""
+    return {SETTINGS_HEADER: settings_header(), README: readme(README.read_text(encoding="utf-8"))}
+
+
+def settings_header() -> str:
+    """Return the C header of the settings of predictor and compensator."""
+    lists = (("PREDICTOR", PREDICTOR_SETTINGS), ("TRUST", TRUST_SETTINGS), ("COMPENSATOR", COMPENSATOR_SETTINGS))
+    return f"""/* Settings as they are declared in hybridsep/base/settings.py, from which this file is generated.
+ * Whole numbers, truth values and choices are uint64_t. */
+#ifndef HSEP_SETTINGS_H
+#define HSEP_SETTINGS_H
+
+#include <stdint.h>
+
+/* clang-format off */
+{"".join(_list(name, settings) for name, settings in lists)}/* clang-format on */
+
+#define HSEP_SETTING(type, name) type name;
+
+typedef struct {{
+    HSEP_PREDICTOR_SETTINGS(HSEP_SETTING)
+}} hsep_predictor_settings;
+
+typedef struct {{
+    HSEP_TRUST_SETTINGS(HSEP_SETTING)
+}} hsep_trust_settings;
+
+typedef struct {{
+    HSEP_COMPENSATOR_SETTINGS(HSEP_SETTING)
+}} hsep_compensator_settings;
+
+#endif
+"""
+
+
+def readme(text: str) -> str:
+    """Return the README with the rows of its interface tables replaced by those of the FMUs."""
+    machine = load_machine(DEFAULT_MACHINE)
+    parts = text.split(_HEAD)
+    for i, model in enumerate(TABLES, start=1):
+        _, behind = parts[i].split("\n\n", 1)
+        table = interface_table(variables_of(fmu_description(machine, model, model)))
+        rows = [
+            f"| `{name}` | " + " | ".join(cell.replace("|", r"\|") for cell in cells) + " |" for name, *cells in table
+        ]
+        parts[i] = "\n".join(rows) + "\n\n" + behind
+    return _HEAD.join(parts)
+
+
+def _list(name: str, settings: Mapping[str, Parameter]) -> str:
+    rows: list[str] = []
+    for setting, parameter in settings.items():
+        kind = "double" if parameter.kind is float else "uint64_t"
+        unit = "" if parameter.unit == "1" else f", {parameter.unit}"
+        items = ", ".join(f"{number} {item}" for number, item in enumerate(parameter.choices))
+        meaning = parameter.description.replace("·", " ") + (f": {items}" if items else unit)
+        rows += [f"    /* {meaning} */", f"    SETTING({kind}, {setting})"]
+    return f"#define HSEP_{name}_SETTINGS(SETTING) \\\n" + " \\\n".join(rows) + "\n\n"
+
+
+if __name__ == "__main__":
+    for path, content in generated().items():
+        path.write_text(content, encoding="utf-8")
