@@ -10,7 +10,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import SignalError
 
-__all__ = ["POSITION_MAX", "PREDICTION_MAX", "Array", "as_published", "as_samples", "check_position"]
+__all__ = [
+    "POSITION_MAX",
+    "PREDICTION_MAX",
+    "Array",
+    "as_measured",
+    "as_published",
+    "as_samples",
+    "check_position",
+]
 
 Array = NDArray[np.float64]
 
@@ -56,6 +64,13 @@ def as_samples(values: ArrayLike, name: str, length: int | None = None) -> Array
         i = int(np.argmax(np.abs(samples)))
         raise SignalError(f"{name} must be within ±{POSITION_MAX:g} m, got {samples[i]:g} at sample {i}")
     return samples  # type: ignore[no-any-return]
+
+
+def as_measured(values: ArrayLike, name: str, length: int | None = None) -> Array:
+    """Return measured positions as :func:`as_samples` does, NaN where they are missing."""
+    samples: Any = np.asarray(values)
+    missing = np.isnan(samples) if samples.dtype.kind == "f" else np.zeros(samples.shape, dtype=np.bool_)
+    return np.where(missing, np.nan, as_samples(np.where(missing, 0.0, samples), name, length))
 
 
 def check_position(name: str, value: float, when: str = "") -> None:

@@ -17,7 +17,7 @@ from scipy.signal import lfilter
 from ..base.errors import ParameterError, SignalError
 from ..base.output import written_whole
 from ..base.settings import PredictorSettings, check, samples_before
-from ..base.signals import Array, as_samples
+from ..base.signals import Array, as_measured, as_samples
 from ..model.physics import ModalModel
 from .features import FeatureLayout, PastSamples
 from .reference_features import ReferenceFeatures
@@ -157,14 +157,14 @@ class HybridPredictor:
         pending = self.pending
         if pending is None:
             raise SignalError("update must follow predict: there is no predicted window to measure")
-        measured = as_samples(x, "x")
+        measured = as_samples(x, "x") if self.trusted is None else as_measured(x, "x")
         if not 1 <= len(measured) <= len(pending.x_d):
             raise SignalError(f"x must have 1 … {len(pending.x_d)} samples, as predicted, got {len(measured)}")
         m = len(measured)
-        e_pb = measured - pending.start - pending.x_pb[:m]
         if self.trusted is not None and pending.forecast is not None:
-            self.trusted.learn(pending.forecast, e_pb, fold=learn)
+            self.trusted.learn(pending.forecast, measured - pending.start, fold=learn)
         else:
+            e_pb = measured - pending.start - pending.x_pb[:m]
             from_reference = self.reference_features.features(pending.signs, m)
             for i in range(0, m, self.Np):
                 stop = min(i + self.Np, m)

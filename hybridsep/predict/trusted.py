@@ -11,6 +11,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.settings import PredictorSettings
 from ..base.signals import Array
@@ -18,6 +19,7 @@ from ..model.discrete import DiscreteModel
 from .blend import Blend
 from .candidates import Candidate, CandidatePrediction, ResidualScale
 from .disturbances import StaticFeatures, StaticState
+from .guard import SensorGuard
 from .regression import RidgeRegression
 
 __all__ = ["Forecast", "TrustedModel"]
@@ -36,6 +38,9 @@ _GROWTH = 30.0
 
 _LEAST_NOISE = 1e-4
 """Bound on λ relative to the largest mean square of the residual: a larger λ would prevent any learning."""
+
+_BRIDGED = 3
+"""Lags of a row that may stand for samples without a measurement."""
 
 _NO_PENALTY = 1e-40
 """λ of the factor itself, m²: penalties come with each solution."""
@@ -93,12 +98,16 @@ class TrustedModel:
         self.largest = np.zeros(self.static.n)
         self.velocity_scale = 0.0
         self.scale = ResidualScale()
+        self.guard = SensorGuard(2 * settings.Np)
+        self.n_rejected = 0
         self.restart()
 
     def restart(self) -> None:
         """Begin another run, at rest; what was learned is kept."""
         self.state: StaticState = self.static.rest()
         self.past = np.zeros(self.settings.p)
+        self.past_bridged: NDArray[np.bool_] = np.zeros(self.settings.p, dtype=np.bool_)
+        self.guard.restart()
 
     def forecast(self, x_d: Array, x_pb: Array) -> Forecast:
         """Predict the residual over the next window; nothing is changed.
@@ -124,41 +133,48 @@ class TrustedModel:
         e_h = self.blend.weights @ self._candidates(hold, predictions, len(x_d))
         return Forecast(x_d, x_pb, e_h, hold, predictions, largest, velocity_scale)
 
-    def learn(self, forecast: Forecast, measured: Array, *, fold: bool = True) -> None:
+    def learn(self, forecast: Forecast, x: Array, *, fold: bool = True) -> None:
         """Learn from the measurement of a window.
 
         Parameters
         ----------
         forecast : Forecast
             The last one.
-        measured : (m,) array, m
-            Measured residuals ``e_pb`` of its first ``m`` samples.
+        x : (m,) array, m
+            Measured positions of its first ``m`` samples, relative to the start; NaN where missing.
         fold : bool
             Whether they are learned; the next window starts from them in any case.
         """
-        m = len(measured)
+        m, p = len(x), self.settings.p
         if forecast.velocity_scale != self.velocity_scale:  # outgrown
             self.regression = RidgeRegression(self.regression.n_features, _NO_PENALTY)
             self.n_rows = 0.0
         self.largest, self.velocity_scale = forecast.largest, forecast.velocity_scale
         x_d, x_pb = forecast.x_d[:m], forecast.x_pb[:m]
-        rows, self.state = self.static.rows(self.state, x_d, x_pb, x_pb + measured, self.velocity_scale)
-        if fold:
-            self._fold(rows, measured)
-            self._assess(forecast, measured)
-        self.past = np.concatenate((measured[::-1], self.past))[: self.settings.p]
+        accepted = self.guard.accepts(x, x_pb, self.scale.largest)
+        e = _bridged(float(self.past[0]), x - x_pb, accepted)
+        rows, self.state = self.static.rows(self.state, x_d, x_pb, x_pb + e, self.velocity_scale)
+        bridged: NDArray[np.bool_] = np.concatenate((self.past_bridged, ~accepted))
+        if fold and accepted.any():
+            n_bridged = np.convolve(bridged[:-1].astype(np.float64), np.ones(p), "valid")
+            self._fold(rows, e, accepted & (n_bridged <= _BRIDGED))
+            self._assess(forecast, e, accepted)
+        self.n_rejected += m - int(accepted.sum())
+        self.past = np.concatenate((e[::-1], self.past))[:p]
+        self.past_bridged = bridged[-p:]
 
-    def _assess(self, forecast: Forecast, measured: Array) -> None:
+    def _assess(self, forecast: Forecast, measured: Array, accepted: NDArray[np.bool_]) -> None:
         """Judge the candidates and their blend by the measurement of their window."""
         m = len(measured)
-        self._judge(forecast, measured)
-        largest, mean_square = float(np.abs(measured).max()), float(np.mean(measured**2))
+        self._judge(forecast, measured, accepted)
+        sound = measured[accepted]
+        largest, mean_square = float(np.abs(sound).max()), float(np.mean(sound**2))
         recent = _RECENT * self.scale.recent + (1.0 - _RECENT) * mean_square if self.scale.recent else mean_square
         self.scale = ResidualScale(
             recent, max(self.scale.largest_square, mean_square), max(self.scale.largest, largest)
         )
         candidates = self._candidates(forecast.hold, forecast.predictions, m)
-        self.blend.update(candidates, measured, self.scale.largest_square)
+        self.blend.update(candidates[:, accepted], sound, self.scale.largest_square)
 
     def _predict(self, candidate: Candidate, rows: Array, largest: Array) -> CandidatePrediction:
         """Return the prediction of a candidate, bounded by the residuals so far."""
@@ -176,7 +192,7 @@ class TrustedModel:
         learned = [prediction.e_h[:m] for prediction in predictions] or [np.zeros(m)] * 2
         return np.stack((np.full(m, hold), *learned))
 
-    def _judge(self, forecast: Forecast, measured: Array) -> None:
+    def _judge(self, forecast: Forecast, measured: Array, accepted: NDArray[np.bool_]) -> None:
         """Estimate the errors of the candidates from the measurement of their window."""
         m, given = len(measured), self.settings.noise_std**2
         if not forecast.predictions:
@@ -185,10 +201,10 @@ class TrustedModel:
             for candidate in self.candidates:
                 candidate.noise_variance = given or first
         for candidate, prediction in zip(self.candidates, forecast.predictions, strict=False):
-            candidate.judge(prediction.unshrunk[:m], measured)
+            candidate.judge(prediction.unshrunk[:m][accepted], measured[accepted])
             candidate.noise_variance = given or prediction.noise_variance
 
-    def _fold(self, static: Array, measured: Array) -> None:
+    def _fold(self, static: Array, measured: Array, learned: NDArray[np.bool_]) -> None:
         """Update the regression with a window's rows ``[static features | lags | e_pb]``."""
         m, p = static.shape[0], self.settings.p
         series = np.concatenate((self.past[::-1], measured))
@@ -200,5 +216,12 @@ class TrustedModel:
             kept = math.exp(-m * self.settings.T_s / self.settings.forgetting)
             self.regression.discount(kept)
             self.n_rows *= kept
-        self.regression.update_stacked(rows)
-        self.n_rows += m
+        self.regression.update_stacked(np.asfortranarray(rows[learned]))
+        self.n_rows += int(learned.sum())
+
+
+def _bridged(last: float, measured: Array, accepted: NDArray[np.bool_]) -> Array:
+    """Return residuals with those not accepted interpolated between accepted ones; ``last`` is before the first."""
+    known = np.flatnonzero(accepted)
+    places, values = np.concatenate(([-1], known)), np.concatenate(([last], measured[known]))
+    return np.asarray(np.interp(np.arange(len(measured)), places, values))

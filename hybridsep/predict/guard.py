@@ -1,0 +1,144 @@
+"""Guard against wrong measurements: missing, held, jumping or isolated values are not learned.
+
+Every threshold is relative to what the sensor has shown so far, or to the motion that the physics model predicts, so
+the guard has no scale of its own.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.signals import Array
+
+__all__ = ["SensorGuard"]
+
+_REPEATS = 3
+"""Equal consecutive values from which a measurement may be held: two may occur by chance at slow motion."""
+
+_STEPS = 5.0
+"""Predicted motion, in resolution steps of the sensor, within which equal values are plausible."""
+
+_SPREADS, _RESOLUTION, _SMALL = 12.0, 3.0, 0.01
+"""Plausible deviation: in mean deviations, in resolution steps, and relative to the largest residual."""
+
+_PACE = 2.0
+"""Plausible change of the residual from sample to sample, relative to the predicted motion."""
+
+_NEIGHBOURS = 2
+"""Samples to either side that an isolated value is compared with."""
+
+_RISE, _FALL = 0.2, 0.02
+"""Rates at which the mean deviation follows that of a window."""
+
+
+class SensorGuard:
+    """Judges each sample of a window from its residual.
+
+    Parameters
+    ----------
+    patience : int
+        Jumping samples in a row after which the new level is believed.
+
+    Attributes
+    ----------
+    last : float, m
+        Last accepted residual.
+    gap : int
+        Samples since then.
+    value, repeats, low, high : float, int, float, float
+        Last value, how often it came, and the range of predicted positions meanwhile, m.
+    step : float, m
+        Resolution of the sensor: its least change so far; infinite before there is one.
+    spread : float, m
+        Mean deviation of a residual from the median of its neighbours; −1 before the first window.
+    pace : float, m
+        Largest predicted motion of a sample in the last window.
+    jumps : int
+        Jumping samples in a row.
+    """
+
+    def __init__(self, patience: int) -> None:
+        self.patience = patience
+        self.step, self.spread = math.inf, -1.0
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin another run; what is known of the sensor is kept."""
+        self.last, self.gap, self.jumps = 0.0, 0, 0
+        self.value, self.repeats, self.low, self.high = math.nan, 0, 0.0, 0.0
+        self.pace = 0.0
+        self.before = np.zeros(_NEIGHBOURS)
+        self.last_x_pb = math.nan
+
+    def accepts(self, x: Array, x_pb: Array, largest: float) -> NDArray[np.bool_]:
+        """Return whether each sample of a window is plausible, ``(n,)`` bool.
+
+        Parameters
+        ----------
+        x : (n,) array, m
+            Measured positions, NaN where missing.
+        x_pb : (n,) array, m
+            Their physics-based prediction.
+        largest : float, m
+            Largest accepted residual so far.
+        """
+        residuals = x - x_pb
+        deviation = self._deviations(residuals)
+        first = x_pb[0] if math.isnan(self.last_x_pb) else self.last_x_pb
+        pace = float(np.abs(np.diff(x_pb, prepend=first)).max())
+        step = 0.0 if math.isinf(self.step) else self.step
+        plausible = _SPREADS * self.spread + _RESOLUTION * step + _SMALL * largest
+        per_sample = _PACE * max(pace, self.pace)
+        accepted = np.isfinite(x)
+        for k, (value, position, e) in enumerate(zip(x.tolist(), x_pb.tolist(), residuals.tolist(), strict=True)):
+            self.gap += 1
+            if not accepted[k]:
+                continue
+            if self._held(value, position):
+                accepted[max(k - self.repeats + 1, 0) : k + 1] = False
+                continue
+            if self.spread >= 0.0:
+                jumping = abs(e - self.last) > plausible + self.gap * per_sample
+                self.jumps = self.jumps + 1 if jumping else 0
+                if (jumping and self.jumps <= self.patience) or deviation[k] > plausible:
+                    accepted[k] = False
+                    continue
+            self.last, self.gap, self.jumps = e, 0, 0
+        self._follow(deviation[accepted])
+        self.pace, self.last_x_pb = pace, float(x_pb[-1])
+        self.before = np.concatenate((self.before, residuals))[-_NEIGHBOURS:]
+        return accepted
+
+    def _deviations(self, residuals: Array) -> Array:
+        """Return the deviation of each residual from the median of its neighbours and itself, ``(n,)``, m."""
+        padded = np.concatenate((self.before, residuals, np.full(_NEIGHBOURS, np.nan)))
+        windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * _NEIGHBOURS + 1)
+        known = np.isfinite(windows)
+        ordered = np.sort(np.where(known, windows, np.inf), axis=1)
+        count = known.sum(axis=1)
+        rows = np.arange(len(residuals))
+        median = 0.5 * (
+            ordered[rows, np.maximum(count - 1, 0) // 2] + ordered[rows, np.minimum(count // 2, 2 * _NEIGHBOURS)]
+        )
+        return np.where(np.isfinite(residuals), np.abs(residuals - median), 0.0)
+
+    def _held(self, value: float, position: float) -> bool:
+        """Return whether the value is held while the drive should move."""
+        if value != self.value:
+            if not math.isnan(self.value):
+                self.step = min(self.step, abs(value - self.value))
+            self.value, self.repeats, self.low, self.high = value, 0, position, position
+        self.repeats += 1
+        self.low, self.high = min(self.low, position), max(self.high, position)
+        return self.repeats >= _REPEATS and self.high - self.low > _STEPS * self.step
+
+    def _follow(self, deviations: Array) -> None:
+        """Follow the mean deviation of the accepted samples."""
+        if not len(deviations):
+            return
+        mean = float(deviations.mean())
+        rate = 1.0 if self.spread < 0.0 else _RISE if mean > self.spread else _FALL
+        self.spread = mean if self.spread < 0.0 else self.spread + rate * (mean - self.spread)
