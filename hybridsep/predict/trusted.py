@@ -99,7 +99,6 @@ class TrustedModel:
         self.velocity_scale = 0.0
         self.scale = ResidualScale()
         self.guard = SensorGuard(2 * settings.Np)
-        self.n_rejected = 0
         self.restart()
 
     def restart(self) -> None:
@@ -108,6 +107,7 @@ class TrustedModel:
         self.past = np.zeros(self.settings.p)
         self.past_bridged: NDArray[np.bool_] = np.zeros(self.settings.p, dtype=np.bool_)
         self.guard.restart()
+        self.n_rejected = 0
 
     def forecast(self, x_d: Array, x_pb: Array) -> Forecast:
         """Predict the residual over the next window; nothing is changed.

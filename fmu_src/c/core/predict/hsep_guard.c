@@ -1,0 +1,126 @@
+#include "hsep_guard.h"
+
+#include <math.h>
+
+#define GUARD_WINDOW (2 * HSEP_GUARD_NEIGHBOURS + 1)
+
+static const uint64_t guard_repeats = 3; /* equal consecutive values from which one may be held */
+static const double guard_steps = 5.0;   /* predicted motion, in resolution steps, within which they are plausible */
+/* Plausible deviation: in mean deviations, in resolution steps, and relative to the largest residual. */
+static const double guard_spreads = 12.0, guard_resolution = 3.0, guard_small = 0.01;
+static const double guard_pace = 2.0;                    /* plausible change, relative to the predicted motion */
+static const double guard_rise = 0.2, guard_fall = 0.02; /* rates at which the mean deviation follows a window's */
+
+HSEP_API void hsep_guard_init(hsep_guard *self, uint64_t patience)
+{
+    *self = (hsep_guard){.patience = patience, .value = NAN, .step = HUGE_VAL, .spread = -1.0, .x_pb = NAN};
+}
+
+/* Residual i of the window, or one before it; NaN behind it. */
+static double guard_residual(const hsep_guard *self, const double x[], const double x_pb[], uint64_t n, int64_t i)
+{
+    if (i < 0) {
+        return self->before[HSEP_GUARD_NEIGHBOURS + i];
+    }
+    return (uint64_t)i < n ? x[i] - x_pb[i] : NAN;
+}
+
+/* Deviation of residual i from the median of its neighbours and itself, as far as they are known. */
+static double guard_deviation(const hsep_guard *self, const double x[], const double x_pb[], uint64_t n, uint64_t i)
+{
+    const double residual = x[i] - x_pb[i];
+    double ordered[GUARD_WINDOW];
+    int count = 0;
+    if (!isfinite(residual)) {
+        return 0.0;
+    }
+    for (int64_t j = -HSEP_GUARD_NEIGHBOURS; j <= HSEP_GUARD_NEIGHBOURS; j++) {
+        const double other = guard_residual(self, x, x_pb, n, (int64_t)i + j);
+        if (isfinite(other)) {
+            int place = count++;
+            for (; place > 0 && ordered[place - 1] > other; place--) {
+                ordered[place] = ordered[place - 1];
+            }
+            ordered[place] = other;
+        }
+    }
+    return fabs(residual - 0.5 * (ordered[(count - 1) / 2] + ordered[count / 2]));
+}
+
+/* Return whether a value is held while the drive should move. */
+static int guard_held(hsep_guard *self, double x, double x_pb)
+{
+    if (!(x == self->value)) {
+        if (!isnan(self->value)) {
+            self->step = fmin(self->step, fabs(x - self->value));
+        }
+        self->value = x;
+        self->repeats = 0;
+        self->low = self->high = x_pb;
+    }
+    self->repeats++;
+    self->low = fmin(self->low, x_pb);
+    self->high = fmax(self->high, x_pb);
+    return self->repeats >= guard_repeats && self->high - self->low > guard_steps * self->step;
+}
+
+/* Let the mean deviation follow that of the accepted samples. */
+static void guard_follow(hsep_guard *self, const double deviation[], const double accepted[], uint64_t n)
+{
+    double sum = 0.0, count = 0.0;
+    for (uint64_t k = 0; k < n; k++) {
+        sum += accepted[k] > 0.0 ? deviation[k] : 0.0;
+        count += accepted[k];
+    }
+    if (count > 0.0) {
+        const double mean = sum / count;
+        const double rate = mean > self->spread ? guard_rise : guard_fall;
+        self->spread = self->spread < 0.0 ? mean : self->spread + rate * (mean - self->spread);
+    }
+}
+
+HSEP_API void hsep_guard_accept(
+    hsep_guard *self, const double x[], const double x_pb[], uint64_t n, double largest, double deviation[],
+    double accepted[])
+{
+    double pace = 0.0, last = isnan(self->x_pb) ? x_pb[0] : self->x_pb;
+    for (uint64_t k = 0; k < n; k++) {
+        pace = fmax(pace, fabs(x_pb[k] - last));
+        last = x_pb[k];
+        deviation[k] = guard_deviation(self, x, x_pb, n, k);
+    }
+    const double step = self->step < HUGE_VAL ? self->step : 0.0;
+    const double plausible = guard_spreads * self->spread + guard_resolution * step + guard_small * largest;
+    const double per_sample = guard_pace * fmax(pace, self->pace);
+    const int known = self->spread >= 0.0;
+    for (uint64_t k = 0; k < n; k++) {
+        const double residual = x[k] - x_pb[k];
+        self->gap++;
+        accepted[k] = 0.0;
+        if (!isfinite(x[k])) {
+            continue;
+        }
+        if (guard_held(self, x[k], x_pb[k])) {
+            for (uint64_t j = k + 1 > self->repeats ? k + 1 - self->repeats : 0; j < k; j++) {
+                accepted[j] = 0.0;
+            }
+            continue;
+        }
+        if (known) {
+            const int jumping = fabs(residual - self->last) > plausible + (double)self->gap * per_sample;
+            self->jumps = jumping ? self->jumps + 1 : 0;
+            if ((jumping && self->jumps <= self->patience) || deviation[k] > plausible) {
+                continue;
+            }
+        }
+        accepted[k] = 1.0;
+        self->last = residual;
+        self->gap = self->jumps = 0;
+    }
+    guard_follow(self, deviation, accepted, n);
+    for (uint64_t j = 0; j < HSEP_GUARD_NEIGHBOURS; j++) {
+        self->before[j] = guard_residual(self, x, x_pb, n, (int64_t)n - HSEP_GUARD_NEIGHBOURS + (int64_t)j);
+    }
+    self->pace = pace;
+    self->x_pb = last;
+}

@@ -1,0 +1,42 @@
+/* Guard against wrong measurements: missing, held, jumping or isolated values are not learned.
+ *
+ * Every threshold is relative to what the sensor has shown so far, or to the motion that the physics model predicts, so
+ * the guard has no scale of its own. Plain data; reentrant; allocates nothing.
+ */
+#ifndef HSEP_GUARD_H
+#define HSEP_GUARD_H
+
+#include "hsep_api.h"
+#include "hsep_layout.h"
+
+#include <stdint.h>
+
+#define HSEP_GUARD_NEIGHBOURS 2 /* samples to either side that an isolated value is compared with */
+
+typedef struct {
+    uint64_t patience; /* jumping samples in a row after which the new level is believed */
+    uint64_t gap;      /* samples since the last accepted one */
+    uint64_t repeats;  /* length of the run of equal values */
+    uint64_t jumps;    /* jumping samples in a row */
+    double last;       /* m, the last accepted residual */
+    double value;      /* m, the last measurement; NaN before the first */
+    double low, high;  /* m, range of predicted positions over the run of equal values */
+    double step;       /* m, the smallest change so far; infinite before the first */
+    double spread;     /* m, mean deviation from the neighbours' median; -1 before the first window */
+    double pace;       /* m, largest predicted motion of a sample in the last window */
+    double x_pb;       /* m, the last prediction; NaN before the first */
+    double before[HSEP_GUARD_NEIGHBOURS]; /* m, the last residuals, oldest first */
+} hsep_guard;
+
+HSEP_ASSERT_WORDS(hsep_guard, 12 + HSEP_GUARD_NEIGHBOURS);
+
+HSEP_API void hsep_guard_init(hsep_guard *self, uint64_t patience);
+
+/* Judge the samples of a window: accepted, (n,), becomes 1 where a sample is plausible and 0 elsewhere.
+ * x: (n,) m, measured, NaN where missing; x_pb: (n,) m; largest: m, the largest accepted residual so far;
+ * deviation: (n,) work. Cost: about 60 operations a sample, and n more where a run of held values ends. */
+HSEP_API void hsep_guard_accept(
+    hsep_guard *self, const double x[], const double x_pb[], uint64_t n, double largest, double deviation[],
+    double accepted[]);
+
+#endif

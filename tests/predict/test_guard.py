@@ -1,0 +1,116 @@
+"""The guard against wrong measurements: what it rejects, and that it accepts what is sound."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from hybridsep.base.errors import SignalError
+from hybridsep.base.metrics import rms
+from hybridsep.base.settings import PredictorSettings
+from hybridsep.model.physics import ModalModel
+from hybridsep.plants.trajectory import staircase
+from hybridsep.predict.guard import SensorGuard
+from hybridsep.predict.predictor import HybridPredictor
+
+Array = NDArray[np.float64]
+
+NP = 100
+
+
+def motion(n: int = 3000) -> tuple[Array, Array]:
+    """Return predicted and measured positions, m, of a drive that goes to and fro, with 1 µm of noise."""
+    t = 1e-3 * np.arange(n)
+    x_pb = 0.01 * (1.0 - np.cos(2.0 * np.pi * t))
+    lag = 5e-5 * np.sin(2.0 * np.pi * t) + 2e-5 * np.tanh(np.sin(2.0 * np.pi * t) / 0.01)
+    return x_pb, x_pb + lag + np.random.default_rng(1).normal(0.0, 1e-6, n)
+
+
+def accepted(x: Array, x_pb: Array, *, scale: float = 1.0) -> NDArray[np.bool_]:
+    guard, largest, found = SensorGuard(2 * NP), 0.0, []
+    for i in range(0, len(x), NP):
+        window = slice(i, i + NP)
+        found.append(guard.accepts(scale * x[window], scale * x_pb[window], largest))
+        errors = scale * np.abs(x[window] - x_pb[window])[found[-1]]
+        largest = max(largest, float(errors.max(initial=0.0)))
+    return np.concatenate(found)
+
+
+@pytest.mark.parametrize("resolution", [0.0, 1e-6, 1e-5])
+def test_sound_measurements_are_accepted(resolution: float) -> None:
+    x_pb, x = motion()
+    x = resolution * np.rint(x / resolution) if resolution else x
+    assert np.mean(accepted(x, x_pb)) > 0.995
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+def test_judgement_does_not_depend_on_units(scale: float) -> None:
+    x_pb, x = motion()
+    x[1234] += 1e-4
+    assert accepted(x, x_pb, scale=scale).tolist() == accepted(x, x_pb).tolist()
+
+
+@pytest.mark.parametrize("height", [5e-5, 1e-3, -1.0, 1e2])
+def test_an_isolated_value_is_rejected_alone(height: float) -> None:
+    x_pb, x = motion()
+    places = [350, 1234, 1799, 1800, 2500]  # in motion, at the edges of a window, near a turn
+    x[places] += height
+    rejected = np.flatnonzero(~accepted(x, x_pb))
+    assert set(places) <= set(rejected.tolist())
+    assert len(rejected) <= len(places) + 10
+
+
+def test_a_held_value_is_rejected_until_it_moves_again() -> None:
+    x_pb, x = motion()
+    x[1230:1290] = x[1229]
+    rejected = np.flatnonzero(~accepted(x, x_pb))
+    assert set(range(1230, 1290)) <= set(rejected.tolist())
+    assert len(rejected) <= 70
+
+
+def test_zeros_for_a_while_are_rejected() -> None:
+    x_pb, x = motion()
+    x[1330:1380] = 0.0
+    rejected = np.flatnonzero(~accepted(x, x_pb))
+    assert set(range(1330, 1380)) <= set(rejected.tolist())
+    assert len(rejected) <= 60
+
+
+def test_a_new_level_is_believed_in_the_end() -> None:
+    x_pb, x = np.zeros(3000), np.random.default_rng(2).normal(0.0, 1e-6, 3000)
+    x[1000:] += 1e-3
+    found = accepted(x, x_pb)
+    assert not found[1000:1200].any()
+    assert found[1205:].all()
+
+
+def test_missing_samples_are_counted_and_bridged() -> None:
+    model = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
+    x_d = staircase()[:2000]
+    predictor = HybridPredictor(model, PredictorSettings(trust=True))
+    x_pb, _ = predictor.discrete.forced_response(predictor.discrete.rest(), x_d)
+    e_pb = 0.5 * np.diff(x_pb, prepend=0.0)  # a residual that a feature describes exactly
+    gaps = np.random.default_rng(3).random(2000) < 0.01
+    errors = []
+    for i in range(0, 2000, NP):
+        window = slice(i, i + NP)
+        errors.append(e_pb[window] - predictor.predict(x_d[window]).e_h)
+        predictor.update(np.where(gaps[window], np.nan, (x_pb + e_pb)[window]))
+    assert predictor.trusted is not None
+    assert gaps.sum() <= predictor.trusted.n_rejected <= gaps.sum() + 20
+    assert rms(np.concatenate(errors[10:])) < 0.05 * rms(e_pb[1000:])
+
+
+def test_without_trust_a_missing_sample_is_an_error() -> None:
+    predictor = HybridPredictor(ModalModel.spring_mass_damper(1.0, 15.7, 24674.0), PredictorSettings(trust=False))
+    predictor.predict(np.zeros(NP))
+    with pytest.raises(SignalError, match="must be finite, got nan at sample 3"):
+        predictor.update(np.where(np.arange(NP) == 3, np.nan, 0.0))
+
+
+def test_infinite_measurements_stay_errors_with_trust() -> None:
+    predictor = HybridPredictor(ModalModel.spring_mass_damper(1.0, 15.7, 24674.0), PredictorSettings(trust=True))
+    predictor.predict(np.zeros(NP))
+    with pytest.raises(SignalError, match="must be finite, got inf at sample 3"):
+        predictor.update(np.where(np.arange(NP) == 3, np.inf, 0.0))
