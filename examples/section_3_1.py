@@ -6,7 +6,8 @@ Run it with ``python examples/section_3_1.py``.
 from __future__ import annotations
 
 import numpy as np
-from mechanism import Drive, decay, demonstrate
+from mechanism import Drive, decay
+from mechanism_cases import demonstrate
 from rich import box
 from rich.console import Console
 from rich.table import Table

@@ -11,7 +11,6 @@ from mechanism import (
     characteristic,
     coulomb,
     decay,
-    demonstrate,
     innovation,
     lifted,
     linear_mode,
@@ -26,6 +25,7 @@ from mechanism import (
     split,
     squared_command,
 )
+from mechanism_cases import demonstrate
 from numpy.typing import NDArray
 
 from hybridsep.model.physics import ModalModel, Mode
