@@ -53,11 +53,14 @@ class CandidatePrediction(NamedTuple):
     unshrunk : (n,) array, m
     noise_variance : float, m²
         Mean square of the rows so far about this candidate.
+    expected : float, m²
+        Expected mean square of the error of ``unshrunk``.
     """
 
     e_h: Array
     unshrunk: Array
     noise_variance: float
+    expected: float
 
 
 class Candidate:
@@ -129,7 +132,7 @@ class Candidate:
             spread = np.minimum(lfilter(response**2, [1.0], spread), most)
         spread = np.where(finite, spread, most)
         shrunk = e * (scale.recent / (scale.recent + _CAUTION * spread))
-        return CandidatePrediction(shrunk, e, solution.residual_sum)
+        return CandidatePrediction(shrunk, e, solution.residual_sum, variance + float(spread.mean()))
 
     def judge(self, unshrunk: Array, measured: Array) -> None:
         """Estimate the correlation from the errors of a window, ``(n,)``, m, that has been measured."""

@@ -39,6 +39,13 @@ _GROWTH = 30.0
 _LEAST_NOISE = 1e-4
 """Bound on λ relative to the largest mean square of the residual: a larger λ would prevent any learning."""
 
+_CARRIED = 10.0
+"""Largest weight of earlier runs when another begins, in windows: a machine may have changed meanwhile."""
+
+_SURPRISE, _SURPRISED = 10.0, 0.1
+"""Mean square error of a window, relative to the expected one, above which the machine has changed; and what then
+remains at least of the weight of all samples before, in windows."""
+
 _BRIDGED = 3
 """Lags of a row that may stand for samples without a measurement."""
 
@@ -108,6 +115,7 @@ class TrustedModel:
         self.past_bridged: NDArray[np.bool_] = np.zeros(self.settings.p, dtype=np.bool_)
         self.guard.restart()
         self.n_rejected = 0
+        self._discount(_CARRIED * self.settings.Np / max(self.n_rows, _CARRIED * self.settings.Np))
 
     def forecast(self, x_d: Array, x_pb: Array) -> Forecast:
         """Predict the residual over the next window; nothing is changed.
@@ -195,6 +203,11 @@ class TrustedModel:
     def _judge(self, forecast: Forecast, measured: Array, accepted: NDArray[np.bool_]) -> None:
         """Estimate the errors of the candidates from the measurement of their window."""
         m, given = len(measured), self.settings.noise_std**2
+        if forecast.predictions:
+            best = forecast.predictions[-1]
+            surprise = float(np.mean((measured - best.unshrunk[:m])[accepted] ** 2)) / best.expected
+            if surprise > _SURPRISE:
+                self._discount(min(max((_SURPRISE / surprise) ** 2, _SURPRISED * self.settings.Np / self.n_rows), 1.0))
         if not forecast.predictions:
             # Third differences leave white noise, 20 times its variance, and little else.
             first = float(np.mean(np.diff(measured, 3) ** 2)) / 20.0 if m > 10 else float(np.mean(measured**2))
@@ -203,6 +216,11 @@ class TrustedModel:
         for candidate, prediction in zip(self.candidates, forecast.predictions, strict=False):
             candidate.judge(prediction.unshrunk[:m][accepted], measured[accepted])
             candidate.noise_variance = given or prediction.noise_variance
+
+    def _discount(self, kept: float) -> None:
+        """Weigh all samples so far by ``kept``."""
+        self.regression.discount(kept)
+        self.n_rows *= kept
 
     def _fold(self, static: Array, measured: Array, learned: NDArray[np.bool_]) -> None:
         """Update the regression with a window's rows ``[static features | lags | e_pb]``."""
@@ -213,9 +231,7 @@ class TrustedModel:
         rows[:, self.static.n : -1] = np.lib.stride_tricks.sliding_window_view(series, p)[:m, ::-1]
         rows[:, -1] = measured
         if self.settings.forgetting > 0.0:
-            kept = math.exp(-m * self.settings.T_s / self.settings.forgetting)
-            self.regression.discount(kept)
-            self.n_rows *= kept
+            self._discount(math.exp(-m * self.settings.T_s / self.settings.forgetting))
         self.regression.update_stacked(np.asfortranarray(rows[learned]))
         self.n_rows += int(learned.sum())
 
