@@ -21,8 +21,9 @@ _REPEATS = 3
 _STEPS = 5.0
 """Predicted motion, in resolution steps of the sensor, within which equal values are plausible."""
 
-_SPREADS, _RESOLUTION, _SMALL = 12.0, 3.0, 0.01
-"""Plausible deviation: in mean deviations, in resolution steps, and relative to the largest residual."""
+_SPREADS, _RESOLUTION, _SMALL, _RIPPLE = 12.0, 3.0, 0.01, 0.1
+"""Plausible deviation: in mean deviations, in resolution steps, and relative to the largest residual and to the
+predicted motion of a sample: a drive at rest does not show the ripple that it has in motion."""
 
 _PACE = 2.0
 """Plausible change of the residual from sample to sample, relative to the predicted motion."""
@@ -30,7 +31,7 @@ _PACE = 2.0
 _NEIGHBOURS = 2
 """Samples to either side that an isolated value is compared with."""
 
-_RISE, _FALL = 0.2, 0.02
+_RISE, _FALL = 0.5, 0.02
 """Rates at which the mean deviation follows that of a window."""
 
 
@@ -90,24 +91,24 @@ class SensorGuard:
         first = x_pb[0] if math.isnan(self.last_x_pb) else self.last_x_pb
         pace = float(np.abs(np.diff(x_pb, prepend=first)).max())
         step = 0.0 if math.isinf(self.step) else self.step
-        plausible = _SPREADS * self.spread + _RESOLUTION * step + _SMALL * largest
-        per_sample = _PACE * max(pace, self.pace)
+        motion = max(pace, self.pace)
+        plausible = _SPREADS * self.spread + _RESOLUTION * step + _SMALL * largest + _RIPPLE * motion
         accepted = np.isfinite(x)
         for k, (value, position, e) in enumerate(zip(x.tolist(), x_pb.tolist(), residuals.tolist(), strict=True)):
             self.gap += 1
             if not accepted[k]:
                 continue
-            if self._held(value, position):
+            if self._held(value, position, plausible):
                 accepted[max(k - self.repeats + 1, 0) : k + 1] = False
                 continue
             if self.spread >= 0.0:
-                jumping = abs(e - self.last) > plausible + self.gap * per_sample
+                jumping = abs(e - self.last) > plausible + self.gap * _PACE * motion
                 self.jumps = self.jumps + 1 if jumping else 0
                 if (jumping and self.jumps <= self.patience) or deviation[k] > plausible:
                     accepted[k] = False
                     continue
             self.last, self.gap, self.jumps = e, 0, 0
-        self._follow(deviation[accepted])
+        self._follow(deviation[np.isfinite(x)], plausible)
         self.pace, self.last_x_pb = pace, float(x_pb[-1])
         self.before = np.concatenate((self.before, residuals))[-_NEIGHBOURS:]
         return accepted
@@ -125,7 +126,7 @@ class SensorGuard:
         )
         return np.where(np.isfinite(residuals), np.abs(residuals - median), 0.0)
 
-    def _held(self, value: float, position: float) -> bool:
+    def _held(self, value: float, position: float, plausible: float) -> bool:
         """Return whether the value is held while the drive should move."""
         if value != self.value:
             if not math.isnan(self.value):
@@ -133,12 +134,14 @@ class SensorGuard:
             self.value, self.repeats, self.low, self.high = value, 0, position, position
         self.repeats += 1
         self.low, self.high = min(self.low, position), max(self.high, position)
-        return self.repeats >= _REPEATS and self.high - self.low > _STEPS * self.step
+        return self.repeats >= _REPEATS and self.high - self.low > max(_STEPS * self.step, plausible)
 
-    def _follow(self, deviations: Array) -> None:
-        """Follow the mean deviation of the accepted samples."""
+    def _follow(self, deviations: Array, plausible: float) -> None:
+        """Follow the mean deviation of the measured samples; one beyond what is plausible counts as that."""
         if not len(deviations):
             return
-        mean = float(deviations.mean())
-        rate = 1.0 if self.spread < 0.0 else _RISE if mean > self.spread else _FALL
-        self.spread = mean if self.spread < 0.0 else self.spread + rate * (mean - self.spread)
+        if self.spread < 0.0:
+            self.spread = float(deviations.mean())
+            return
+        mean = float(np.minimum(deviations, plausible).mean())
+        self.spread += (_RISE if mean > self.spread else _FALL) * (mean - self.spread)

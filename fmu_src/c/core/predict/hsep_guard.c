@@ -6,10 +6,11 @@
 
 static const uint64_t guard_repeats = 3; /* equal consecutive values from which one may be held */
 static const double guard_steps = 5.0;   /* predicted motion, in resolution steps, within which they are plausible */
-/* Plausible deviation: in mean deviations, in resolution steps, and relative to the largest residual. */
-static const double guard_spreads = 12.0, guard_resolution = 3.0, guard_small = 0.01;
+/* Plausible deviation: in mean deviations, in resolution steps, and relative to the largest residual and to the
+ * predicted motion of a sample. */
+static const double guard_spreads = 12.0, guard_resolution = 3.0, guard_small = 0.01, guard_ripple = 0.1;
 static const double guard_pace = 2.0;                    /* plausible change, relative to the predicted motion */
-static const double guard_rise = 0.2, guard_fall = 0.02; /* rates at which the mean deviation follows a window's */
+static const double guard_rise = 0.5, guard_fall = 0.02; /* rates at which the mean deviation follows a window's */
 
 HSEP_API void hsep_guard_init(hsep_guard *self, uint64_t patience)
 {
@@ -48,7 +49,7 @@ static double guard_deviation(const hsep_guard *self, const double x[], const do
 }
 
 /* Return whether a value is held while the drive should move. */
-static int guard_held(hsep_guard *self, double x, double x_pb)
+static int guard_held(hsep_guard *self, double x, double x_pb, double plausible)
 {
     if (!(x == self->value)) {
         if (!isnan(self->value)) {
@@ -61,21 +62,23 @@ static int guard_held(hsep_guard *self, double x, double x_pb)
     self->repeats++;
     self->low = fmin(self->low, x_pb);
     self->high = fmax(self->high, x_pb);
-    return self->repeats >= guard_repeats && self->high - self->low > guard_steps * self->step;
+    return self->repeats >= guard_repeats && self->high - self->low > fmax(guard_steps * self->step, plausible);
 }
 
-/* Let the mean deviation follow that of the accepted samples. */
-static void guard_follow(hsep_guard *self, const double deviation[], const double accepted[], uint64_t n)
+/* Let the mean deviation follow that of the measured samples; one beyond what is plausible counts as that. */
+static void guard_follow(
+    hsep_guard *self, const double x[], const double deviation[], uint64_t n, int known, double plausible)
 {
     double sum = 0.0, count = 0.0;
     for (uint64_t k = 0; k < n; k++) {
-        sum += accepted[k] > 0.0 ? deviation[k] : 0.0;
-        count += accepted[k];
+        if (isfinite(x[k])) {
+            sum += known ? fmin(deviation[k], plausible) : deviation[k];
+            count += 1.0;
+        }
     }
     if (count > 0.0) {
-        const double mean = sum / count;
-        const double rate = mean > self->spread ? guard_rise : guard_fall;
-        self->spread = self->spread < 0.0 ? mean : self->spread + rate * (mean - self->spread);
+        const double mean = sum / count, rate = mean > self->spread ? guard_rise : guard_fall;
+        self->spread = known ? self->spread + rate * (mean - self->spread) : mean;
     }
 }
 
@@ -90,8 +93,9 @@ HSEP_API void hsep_guard_accept(
         deviation[k] = guard_deviation(self, x, x_pb, n, k);
     }
     const double step = self->step < HUGE_VAL ? self->step : 0.0;
-    const double plausible = guard_spreads * self->spread + guard_resolution * step + guard_small * largest;
-    const double per_sample = guard_pace * fmax(pace, self->pace);
+    const double motion = fmax(pace, self->pace);
+    const double plausible =
+        guard_spreads * self->spread + guard_resolution * step + guard_small * largest + guard_ripple * motion;
     const int known = self->spread >= 0.0;
     for (uint64_t k = 0; k < n; k++) {
         const double residual = x[k] - x_pb[k];
@@ -100,14 +104,14 @@ HSEP_API void hsep_guard_accept(
         if (!isfinite(x[k])) {
             continue;
         }
-        if (guard_held(self, x[k], x_pb[k])) {
+        if (guard_held(self, x[k], x_pb[k], plausible)) {
             for (uint64_t j = k + 1 > self->repeats ? k + 1 - self->repeats : 0; j < k; j++) {
                 accepted[j] = 0.0;
             }
             continue;
         }
         if (known) {
-            const int jumping = fabs(residual - self->last) > plausible + (double)self->gap * per_sample;
+            const int jumping = fabs(residual - self->last) > plausible + (double)self->gap * guard_pace * motion;
             self->jumps = jumping ? self->jumps + 1 : 0;
             if ((jumping && self->jumps <= self->patience) || deviation[k] > plausible) {
                 continue;
@@ -117,7 +121,7 @@ HSEP_API void hsep_guard_accept(
         self->last = residual;
         self->gap = self->jumps = 0;
     }
-    guard_follow(self, deviation, accepted, n);
+    guard_follow(self, x, deviation, n, known, plausible);
     for (uint64_t j = 0; j < HSEP_GUARD_NEIGHBOURS; j++) {
         self->before[j] = guard_residual(self, x, x_pb, n, (int64_t)n - HSEP_GUARD_NEIGHBOURS + (int64_t)j);
     }
