@@ -69,7 +69,10 @@ def simplex_minimum(hessian: Array, linear: Array) -> Array:
     for size in range(1, n + 1):
         for support in combinations(range(n), size):
             H, free = hessian[np.ix_(support, support)], linear[list(support)]
-            inverse = np.linalg.solve(H, np.column_stack((free, np.ones(size))))
+            try:
+                inverse = np.linalg.solve(H, np.column_stack((free, np.ones(size))))
+            except np.linalg.LinAlgError:  # singular: a smaller set does as well
+                continue
             found = inverse[:, 0]
             if found.sum() > 1.0:  # then Σπ = 1 is active
                 found = found - (found.sum() - 1.0) / inverse[:, 1].sum() * inverse[:, 1]

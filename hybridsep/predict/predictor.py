@@ -57,18 +57,20 @@ class HybridPredictor:
         self.layout = FeatureLayout(settings.p, settings.q, self.reference_features.n)
         self.past = PastSamples(self.layout, self.Np)
         self.trusted = TrustedModel(settings, self.discrete) if settings.trust else None
-        self._regression = RidgeRegression(self.layout.n, settings.lam)
+        self._regression = None if settings.trust else RidgeRegression(self.layout.n, settings.lam)
         self.restart(start, t_init=settings.warm_up)
 
     @property
     def n_features(self) -> int:
         """Number of features ``n``."""
-        return self.layout.n
+        return self.regression.n_features
 
     @property
     def regression(self) -> RidgeRegression:
         """Regression of all learned samples; with trust that of :class:`TrustedModel`."""
-        return self._regression if self.trusted is None else self.trusted.regression
+        regression = self._regression if self.trusted is None else self.trusted.regression
+        assert regression is not None
+        return regression
 
     @property
     def residual_weights(self) -> Array:

@@ -144,8 +144,13 @@ class RidgeRegression:
         self._weights = None
 
     def discount(self, weight: float) -> None:
-        """Weigh all rows so far by ``weight``, 0 < weight ≤ 1, in the sum of squares; λ with them."""
+        """Weigh all rows so far by ``weight``, 0 ≤ weight ≤ 1, in the sum of squares; λ with them.
+
+        The factor stays regular: its diagonal keeps at least √λ.
+        """
         self._factor *= math.sqrt(weight)
+        diagonal, least = np.einsum("ii->i", self._factor)[:-1], math.sqrt(self.lam)
+        diagonal[np.abs(diagonal) < least] = least
         self._weights = None
 
     def penalised(self, penalties: Array) -> PenalisedSolution:
@@ -183,6 +188,6 @@ class RidgeRegression:
             raise SignalError(f"the factor must have shape {self._factor.shape}, got {factor.shape}")
         if not (np.isfinite(factor).all() and np.diag(factor)[:-1].all()):
             raise SignalError("the factor must be finite, with no 0 on its diagonal")
-        self._factor = np.array(factor, dtype=np.float64, order="F")
+        self._factor = np.array(np.triu(factor), dtype=np.float64, order="F")
         self.n_samples = int(n_samples)
         self._weights = None

@@ -17,7 +17,7 @@ from ..base.signals import Array
 from ..model.discrete import DiscreteModel
 from .blend import Blend
 from .candidates import Candidate, CandidatePrediction, ResidualScale
-from .disturbances import StaticFeatures, StaticState
+from .disturbances import LEAST_VELOCITY, StaticFeatures, StaticState
 from .regression import RidgeRegression
 
 __all__ = ["Forecast", "TrustedModel"]
@@ -109,7 +109,7 @@ class TrustedModel:
             Commands and physics-based prediction, relative to the start.
         """
         peak = self.static.peak_velocity(self.state, x_d)
-        outgrown = peak > _GROWTH * self.velocity_scale
+        outgrown = peak > max(_GROWTH * self.velocity_scale, LEAST_VELOCITY)
         velocity_scale = peak if outgrown else self.velocity_scale
         rows, _ = self.static.rows(self.state, x_d, x_pb, x_pb, velocity_scale)
         before = np.zeros(self.static.n) if outgrown else self.largest
