@@ -27,6 +27,10 @@ _COLUMNS_AT_ONCE = 8
 """Block size of dtpqrt, the fastest one measured for 50 to 200 features."""
 
 
+_LEAST_DIAGONAL = 1e-150
+"""Bound on the factor's diagonal: its square is a normal number."""
+
+
 class PenalisedSolution(NamedTuple):
     """Weights of some features under penalties of their own.
 
@@ -36,7 +40,7 @@ class PenalisedSolution(NamedTuple):
     triangle : (m, m) array
         ``R`` with ``RᵀR = ΦᵀΦ + diag(penalties)``.
     residual_sum : float
-        ``Σ (target − wᵀφ)²`` over the rows so far, without the penalties.
+        ``Σ (target − wᵀφ)² + λ‖w‖²`` over the rows so far, without the penalties.
     """
 
     weights: Array
@@ -146,11 +150,11 @@ class RidgeRegression:
     def discount(self, weight: float) -> None:
         """Weigh all rows so far by ``weight``, 0 ≤ weight ≤ 1, in the sum of squares; λ with them.
 
-        The factor stays regular: its diagonal keeps at least √λ.
+        The factor stays regular, however long a feature is 0.
         """
         self._factor *= math.sqrt(weight)
-        diagonal, least = np.einsum("ii->i", self._factor)[:-1], math.sqrt(self.lam)
-        diagonal[np.abs(diagonal) < least] = least
+        diagonal = np.einsum("ii->i", self._factor)[:-1]
+        diagonal[np.abs(diagonal) < _LEAST_DIAGONAL] = _LEAST_DIAGONAL
         self._weights = None
 
     def penalised(self, penalties: Array) -> PenalisedSolution:

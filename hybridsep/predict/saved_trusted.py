@@ -18,7 +18,7 @@ __all__ = ["restore_trusted", "restored_forecast", "trusted_blob", "trusted_fiel
 
 _KIND = "trusted model"
 
-_ROUNDING = 1e-9
+_ROUNDING = 1e-6
 """Relative tolerance of what rounding may have changed."""
 
 
