@@ -7,6 +7,7 @@ an ARX recursion from the last ``p`` measured residuals, affine in the command.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from scipy.signal import lfilter
 
 from ..base.errors import ParameterError, SignalError
 from ..base.output import written_whole
-from ..base.settings import PredictorSettings, check, samples_before
+from ..base.settings import PredictorSettings, samples_before
 from ..base.signals import Array, as_samples
 from ..model.physics import ModalModel
 from .features import FeatureLayout, PastSamples
@@ -75,7 +76,8 @@ class HybridPredictor:
     @property
     def residual_weights(self) -> Array:
         """Autoregressive weights of the learned recursion, ``(p,)``."""
-        return self.weights[self.layout.e_pb]
+        lags = self.layout.e_pb if self.trusted is None else slice(self.trusted.static.n, None)
+        return self.weights[lags]
 
     @property
     def weights(self) -> Array:
@@ -90,10 +92,10 @@ class HybridPredictor:
         start : float, optional
             Initial position, m; the first command if left out.
         t_init : float
-            Warm-up of the new run, s; none by default.
+            Warm-up of the new run, s; none by default. −1: automatic.
         """
         rest = None if start is None else float(as_samples([start], "start")[0])
-        self.n_init = samples_before(check("t_init", t_init), self.T_s)
+        self.n_init = samples_before(replace(self.settings, t_init=t_init).warm_up, self.T_s)
         self.start = rest
         self.k = 0
         self.state = self.discrete.rest()

@@ -84,6 +84,7 @@ def test_peak_velocity_looks_back_to_the_last_command() -> None:
 
 def test_at_rest_only_the_constant_is_left() -> None:
     static = features("foh", 2, 3)
-    rows, _ = static.rows(static.rest(), *np.zeros((3, 50)), 0.0)
+    still = np.zeros(50)
+    rows, _ = static.rows(static.rest(), still, still, still, 0.0)
     np.testing.assert_array_equal(rows[:, 0], 1.0)
     np.testing.assert_array_equal(rows[:, 1:], 0.0)

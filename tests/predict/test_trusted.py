@@ -134,6 +134,22 @@ def test_what_is_not_learned_is_where_the_next_window_starts() -> None:
     assert predictor.last_residual() == pytest.approx(x[-1] - x_pb[-1], abs=1e-15)
 
 
+def test_a_residual_that_is_not_learned_is_not_held() -> None:
+    """The last candidate holds what was measured, at most 1.2 times the largest residual that was learned."""
+    x_d = cycles(3000)
+    x = physics(x_d) + 1e-5  # an offset, which a hold predicts
+    x += np.cumsum(1e-7 * np.random.default_rng(5).normal(size=3000))
+    predictor = trusted()
+    run(predictor, x_d[:2900], x[:2900])
+    assert predictor.trusted is not None
+    assert predictor.trusted.blend.weights[0] > 0.3
+    largest = predictor.trusted.scale.largest
+    predictor.predict(x_d[2900:2999])
+    predictor.update(x[2900:2999] + 1.0, learn=False)
+    assert predictor.last_residual() > 0.9
+    assert np.abs(predictor.predict(x_d[2999:]).e_h).max() <= 1.2 * largest
+
+
 def test_a_changed_drive_is_relearned_where_samples_lose_their_weight() -> None:
     x_d = cycles(12 * PERIOD)
     x_pb, changed = physics(x_d), 6 * PERIOD
