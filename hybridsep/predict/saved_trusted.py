@@ -64,8 +64,8 @@ def restore_trusted(model: TrustedModel, saved: Saved) -> None:
     with saved.consistent():
         model.regression.restore(saved.array("factor", None, None), saved.whole("n_samples"))
     model.n_rows, model.velocity_scale = saved.real("n_rows"), saved.real("velocity_scale")
-    if not (model.n_rows == 0.0 or 1.0 <= model.n_rows <= model.regression.n_samples):
-        raise saved.error("n_rows must be 0, or from 1 to n_samples")
+    if not 0.0 <= model.n_rows <= model.regression.n_samples:
+        raise saved.error("n_rows must be from 0 to n_samples")
     if not (model.velocity_scale == 0.0 or LEAST_VELOCITY <= model.velocity_scale <= PREDICTION_MAX):
         raise saved.error("velocity_scale must be a velocity, or 0")
     model.largest = _magnitudes(saved, "largest", model.static.n)

@@ -92,7 +92,6 @@ def test_memory_does_not_grow() -> None:
     ("name", "value"),
     [
         ("n_rows", -1.0),
-        ("n_rows", 0.5),
         ("n_rows", 1e6),
         ("n_rows", float("nan")),
         ("n_samples", 1.5),
