@@ -107,7 +107,7 @@ def test_windows_of_other_lengths(n: int, measured: int | None) -> None:
     assert other.k == usual.k == 600
     assert np.abs(x_h - x_pb).max() <= 1.2 * np.abs(x - x_pb).max()
     assert rms((x - x_h)[300:]) < 0.5 * rms((x - x_pb)[300:])
-    if n > 1 and measured != 1:  # a first window of one sample has no velocity: what was learned then is forgotten
+    if n > 1 and measured != 1:  # a first window of one sample has no velocity
         mine, yours = other.regression.factor, usual.regression.factor
         size = np.sqrt(np.diag(yours.T @ yours))
         np.testing.assert_allclose(
