@@ -29,8 +29,9 @@ Replayed = Callable[[str, ModalModel, Array, Array], Array]
 It returns x_h, (n,), m, each window predicted before its measurement is known; SignalError if it refuses a sample."""
 
 PREDICTORS: dict[str, Callable[[ModalModel], HybridPredictor]] = {
-    "paper": lambda model: HybridPredictor(model, PredictorSettings(t_init=0.3)),
     "default": HybridPredictor,
+    "paper": lambda model: HybridPredictor(model, PredictorSettings(trust=False)),
+    "trust": lambda model: HybridPredictor(model, PredictorSettings(trust=True)),
 }
 
 

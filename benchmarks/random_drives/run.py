@@ -1,6 +1,6 @@
 """Benchmark of trust: the predictor replayed on random nonlinear drives whose physics model is 20 % wrong.
 
-    python -m benchmarks.random_drives.run [--seed 1] [--n 1000] [--faults] [--predictor default|paper] [--cache FILE]
+    python -m benchmarks.random_drives.run [--seed 1] [--n 1000] [--faults] [--predictor default] [--cache FILE]
 
 RMS against the measured position over the whole run, relative to the physics model alone and to the hold (the physics
 model plus the last measured residual, in every window from the first).

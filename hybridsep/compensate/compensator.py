@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.errors import SignalError
+from ..base.errors import ParameterError, SignalError
 from ..base.saved import Saved
 from ..base.settings import CompensatorSettings, PredictorSettings
 from ..base.signals import Array, as_published, as_samples
@@ -56,10 +56,15 @@ class SepCompensator:
     Raises
     ------
     ParameterError
-        If ``preview`` or ``spacing`` does not fit the predictor's ``Np``.
+        If ``preview`` or ``spacing`` does not fit the predictor's ``Np``, or the predictor is one with ``trust``.
     """
 
     def __init__(self, predictor: HybridPredictor, settings: CompensatorSettings | None = None) -> None:
+        if predictor.settings.trust:
+            raise ParameterError(
+                "trust must be false in a compensator's predictor: "
+                "it plans with a model that is affine in the commands, which that with trust is not"
+            )
         Np = predictor.Np
         self.predictor = predictor
         self.settings = settings = (settings or CompensatorSettings()).for_window(Np)

@@ -27,10 +27,12 @@ class Blend:
     ----------
     first : sequence of float
         Weights before there is evidence.
+    Np : int
+        Samples of a usual window.
     """
 
-    def __init__(self, first: tuple[float, ...]) -> None:
-        self.first = np.array(first)
+    def __init__(self, first: tuple[float, ...], Np: int) -> None:
+        self.first, self.Np = np.array(first), Np
         n = len(first)
         self.gram, self.cross = np.zeros((n, n)), np.zeros(n)
         self.weights = self.first.copy()
@@ -49,7 +51,7 @@ class Blend:
         """
         self.gram = _MEMORY * self.gram + candidates @ candidates.T
         self.cross = _MEMORY * self.cross + candidates @ target
-        ridge = _CONFIDENCE * scale * len(target)
+        ridge = _CONFIDENCE * scale * self.Np
         if ridge > 0.0:
             hessian = self.gram + ridge * np.eye(len(self.first))
             self.weights = simplex_minimum(hessian, self.cross + ridge * self.first)
@@ -69,7 +71,10 @@ def simplex_minimum(hessian: Array, linear: Array) -> Array:
     for size in range(1, n + 1):
         for support in combinations(range(n), size):
             H, free = hessian[np.ix_(support, support)], linear[list(support)]
-            inverse = np.linalg.solve(H, np.column_stack((free, np.ones(size))))
+            try:
+                inverse = np.linalg.solve(H, np.column_stack((free, np.ones(size))))
+            except np.linalg.LinAlgError:  # singular: a smaller set does as well
+                continue
             found = inverse[:, 0]
             if found.sum() > 1.0:  # then Σπ = 1 is active
                 found = found - (found.sum() - 1.0) / inverse[:, 1].sum() * inverse[:, 1]

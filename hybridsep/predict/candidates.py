@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 from ..base.signals import Array
 from .regression import RidgeRegression
 
-__all__ = ["Candidate", "CandidatePrediction", "ResidualScale"]
+__all__ = ["CORRELATION_MAX", "Candidate", "CandidatePrediction", "ResidualScale"]
 
 _CAUTION = 2.0
 """Factor on the predicted variance when a prediction is shrunk by it: its distribution has long tails."""
@@ -21,7 +21,10 @@ _BOUND = 10.0
 _DIVERGED = 1e6
 """Bound on the impulse response of a recursion, and on the variance relative to the square of the largest residual."""
 
-_FIRST_CORRELATION, _CORRELATION_MAX, _CORRELATION_RATE = 10.0, 1e4, 0.1
+CORRELATION_MAX = 1e4
+"""Bound on the correlation of the rows: as much as there is in a long window of errors that are all alike."""
+
+_FIRST_CORRELATION, _CORRELATION_RATE = 10.0, 0.1
 
 _PENALTY_CORRELATION_MAX = 100.0
 """Correlation beyond which the penalty does not grow: with more, a wrong model would learn nothing at all."""
@@ -137,8 +140,8 @@ class Candidate:
     def judge(self, unshrunk: Array, measured: Array) -> None:
         """Estimate the correlation from the errors of a window, ``(n,)``, m, that has been measured."""
         n, mean = len(measured), float(np.mean(measured - unshrunk))
-        seen = n * mean**2 / self.noise_variance if self.noise_variance > 0.0 else _CORRELATION_MAX
-        change = _CORRELATION_RATE * (min(seen, _CORRELATION_MAX) - self.correlation)
+        seen = n * mean**2 / self.noise_variance if self.noise_variance > 0.0 else CORRELATION_MAX
+        change = _CORRELATION_RATE * (min(seen, CORRELATION_MAX) - self.correlation)
         self.correlation = max(self.correlation + change, 1.0)
 
 

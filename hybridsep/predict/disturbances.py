@@ -15,16 +15,18 @@ import numpy as np
 from ..base.signals import Array
 from ..model.discrete import DiscreteModel
 
-__all__ = ["N_DISTURBANCES", "StaticFeatures", "StaticState"]
+__all__ = ["LEAST_VELOCITY", "N_DISTURBANCES", "StaticFeatures", "StaticState"]
 
 _FRICTION_SPREAD = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
 """Velocities ``v_i`` of the friction's change of sign, relative to the velocity scale."""
 
 N_DISTURBANCES = len(_FRICTION_SPREAD) + 2
 
+LEAST_VELOCITY = 1e-200
+"""Velocity, m/s, below which a command is at rest: ratios of smaller ones may underflow."""
+
 _DIFFERENCES = 3
 """Largest order of a difference of ``x_pb``: velocity, acceleration and jerk."""
-
 
 _DIFFERENCE_SHARE = 0.03
 """Effect of a disturbance's first difference relative to its own: they only correct its timing."""

@@ -11,9 +11,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.errors import SignalError
+from ..base.saved import COUNT_MAX
 from ..base.signals import Array
 
-__all__ = ["SensorGuard"]
+__all__ = ["N_STATE", "SensorGuard"]
 
 _REPEATS = 3
 """Equal consecutive values from which a measurement may be held: two may occur by chance at slow motion."""
@@ -30,6 +32,12 @@ _PACE = 2.0
 
 _NEIGHBOURS = 2
 """Samples to either side that an isolated value is compared with."""
+
+_COUNTS = ("gap", "repeats", "jumps")
+_NUMBERS = ("last", "value", "low", "high", "step", "spread", "pace", "last_x_pb")
+
+N_STATE = len(_COUNTS) + len(_NUMBERS) + _NEIGHBOURS
+"""Numbers of a state."""
 
 _RISE, _FALL = 0.5, 0.02
 """Rates at which the mean deviation follows that of a window."""
@@ -59,6 +67,10 @@ class SensorGuard:
         Largest predicted motion of a sample in the last window.
     jumps : int
         Jumping samples in a row.
+    last_x_pb : float, m
+        Last prediction; NaN before the first.
+    before : (2,) array, m
+        Last residuals, oldest first; NaN where missing.
     """
 
     def __init__(self, patience: int) -> None:
@@ -112,6 +124,30 @@ class SensorGuard:
         self.pace, self.last_x_pb = pace, float(x_pb[-1])
         self.before = np.concatenate((self.before, residuals))[-_NEIGHBOURS:]
         return accepted
+
+    def state(self) -> list[float]:
+        """Return the state as plain numbers."""
+        counts, own = (getattr(self, name) for name in _COUNTS), (getattr(self, name) for name in _NUMBERS)
+        return [*map(float, counts), *own, *self.before.tolist()]
+
+    def restore(self, state: Array) -> None:
+        """Restore a :meth:`state`; SignalError if it is none."""
+        counts, own, before = np.split(state, (len(_COUNTS), len(_COUNTS) + len(_NUMBERS)))
+        sound = (
+            all(0 <= count <= COUNT_MAX and count == int(count) for count in counts)
+            and not np.isinf(np.delete(own, _NUMBERS.index("step"))).any()
+            and not np.isinf(before).any()
+        )
+        values = dict(zip(_NUMBERS, own.tolist(), strict=True))
+        if not (sound and values["low"] <= values["high"] and values["step"] > 0.0 and values["pace"] >= 0.0):
+            raise SignalError("the guard's state must be counts, residuals, a range of positions, a step and a pace")
+        if not (values["spread"] >= 0.0 or values["spread"] == -1.0) or np.isnan(values["last"]):
+            raise SignalError("the guard's last residual must be finite, its spread ≥ 0 or −1")
+        for name, value in values.items():
+            setattr(self, name, value)
+        for name, count in zip(_COUNTS, counts.tolist(), strict=True):
+            setattr(self, name, int(count))
+        self.before = before.copy()
 
     def _deviations(self, residuals: Array) -> Array:
         """Return the deviation of each residual from the median of its neighbours and itself, ``(n,)``, m."""

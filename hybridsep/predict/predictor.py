@@ -7,6 +7,7 @@ an ARX recursion from the last ``p`` measured residuals, affine in the command.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from scipy.signal import lfilter
 
 from ..base.errors import ParameterError, SignalError
 from ..base.output import written_whole
-from ..base.settings import PredictorSettings, check, samples_before
+from ..base.settings import PredictorSettings, samples_before
 from ..base.signals import Array, as_measured, as_samples
 from ..model.physics import ModalModel
 from .features import FeatureLayout, PastSamples
@@ -57,23 +58,26 @@ class HybridPredictor:
         self.layout = FeatureLayout(settings.p, settings.q, self.reference_features.n)
         self.past = PastSamples(self.layout, self.Np)
         self.trusted = TrustedModel(settings, self.discrete) if settings.trust else None
-        self._regression = RidgeRegression(self.layout.n, settings.lam)
+        self._regression = None if settings.trust else RidgeRegression(self.layout.n, settings.lam)
         self.restart(start, t_init=settings.warm_up)
 
     @property
     def n_features(self) -> int:
         """Number of features ``n``."""
-        return self.layout.n
+        return self.regression.n_features
 
     @property
     def regression(self) -> RidgeRegression:
         """Regression of all learned samples; with trust that of :class:`TrustedModel`."""
-        return self._regression if self.trusted is None else self.trusted.regression
+        regression = self._regression if self.trusted is None else self.trusted.regression
+        assert regression is not None
+        return regression
 
     @property
     def residual_weights(self) -> Array:
         """Autoregressive weights of the learned recursion, ``(p,)``."""
-        return self.weights[self.layout.e_pb]
+        lags = self.layout.e_pb if self.trusted is None else slice(self.trusted.static.n, None)
+        return self.weights[lags]
 
     @property
     def weights(self) -> Array:
@@ -88,10 +92,10 @@ class HybridPredictor:
         start : float, optional
             Initial position, m; the first command if left out.
         t_init : float
-            Warm-up of the new run, s; none by default.
+            Warm-up of the new run, s; none by default. −1: automatic.
         """
         rest = None if start is None else float(as_samples([start], "start")[0])
-        self.n_init = samples_before(check("t_init", t_init), self.T_s)
+        self.n_init = samples_before(replace(self.settings, t_init=t_init).warm_up, self.T_s)
         self.start = rest
         self.k = 0
         self.state = self.discrete.rest()

@@ -27,6 +27,10 @@ _COLUMNS_AT_ONCE = 8
 """Block size of dtpqrt, the fastest one measured for 50 to 200 features."""
 
 
+_LEAST_DIAGONAL = 1e-150
+"""Bound on the factor's diagonal: its square is a normal number."""
+
+
 class PenalisedSolution(NamedTuple):
     """Weights of some features under penalties of their own.
 
@@ -36,7 +40,7 @@ class PenalisedSolution(NamedTuple):
     triangle : (m, m) array
         ``R`` with ``RᵀR = ΦᵀΦ + diag(penalties)``.
     residual_sum : float
-        ``Σ (target − wᵀφ)²`` over the rows so far, without the penalties.
+        ``Σ (target − wᵀφ)² + λ‖w‖²`` over the rows so far, without the penalties.
     """
 
     weights: Array
@@ -144,8 +148,13 @@ class RidgeRegression:
         self._weights = None
 
     def discount(self, weight: float) -> None:
-        """Weigh all rows so far by ``weight``, 0 < weight ≤ 1, in the sum of squares; λ with them."""
+        """Weigh all rows so far by ``weight``, 0 ≤ weight ≤ 1, in the sum of squares; λ with them.
+
+        The factor stays regular, however long a feature is 0.
+        """
         self._factor *= math.sqrt(weight)
+        diagonal = np.einsum("ii->i", self._factor)[:-1]
+        diagonal[np.abs(diagonal) < _LEAST_DIAGONAL] = _LEAST_DIAGONAL
         self._weights = None
 
     def penalised(self, penalties: Array) -> PenalisedSolution:
@@ -183,6 +192,6 @@ class RidgeRegression:
             raise SignalError(f"the factor must have shape {self._factor.shape}, got {factor.shape}")
         if not (np.isfinite(factor).all() and np.diag(factor)[:-1].all()):
             raise SignalError("the factor must be finite, with no 0 on its diagonal")
-        self._factor = np.array(factor, dtype=np.float64, order="F")
+        self._factor = np.array(np.triu(factor), dtype=np.float64, order="F")
         self.n_samples = int(n_samples)
         self._weights = None

@@ -12,6 +12,7 @@ from ..base.state import pack, unpack
 from ..model.physics import ModalModel, Mode
 from .features import FeatureLayout
 from .reference_features import N_REFERENCE
+from .saved_trusted import restore_trusted, restored_forecast, trusted_blob, trusted_fields
 from .window import PredictedWindow
 
 if TYPE_CHECKING:
@@ -29,22 +30,26 @@ def predictor_blob(predictor: HybridPredictor) -> bytes:
         "settings": predictor.settings.as_table(),
         **{name: getattr(predictor, name) for name in ("k", "n_init", "start")},
         "dead_time": predictor.model.dead_time,
-        "n_samples": predictor.regression.n_samples,
         "pending_start": None if pending is None else pending.start,
     }
+    learned = {}
+    if predictor.trusted is None:
+        meta["n_samples"] = predictor.regression.n_samples
+        learned["factor"] = predictor.regression.factor
     modes = np.array([[mode.f_n, mode.zeta, mode.alpha, mode.beta] for mode in predictor.model.modes])
     arrays = {
         "modes": modes,
         "state": predictor.state,
         "x_pb": past.x_pb,
         "e_pb": past.e_pb,
-        "factor": predictor.regression.factor,
+        **learned,
         "signs": reference.before,
         "reference": np.array([reference.last]),
     }
     if pending is not None:
         arrays |= {f"pending_{name}": getattr(pending, name) for name in ("x_d", "x_pb", "reference", "signs")}
-    return pack(_KIND, meta, arrays)
+    parts = {} if predictor.trusted is None else {"trusted": trusted_blob(predictor.trusted)}
+    return pack(_KIND, meta, arrays, parts)
 
 
 def predictor_from(kind: type[HybridPredictor], blob: bytes) -> HybridPredictor:
@@ -59,23 +64,35 @@ def predictor_from(kind: type[HybridPredictor], blob: bytes) -> HybridPredictor:
     with saved.consistent():
         settings = PredictorSettings.from_table(saved.table("settings"))
         # Sizes are confirmed by the arrays before anything is allocated from them.
+        x_pb, e_pb = saved.array("x_pb", settings.q), saved.array("e_pb", settings.p)
         n = FeatureLayout(settings.p, settings.q, N_REFERENCE if settings.v_friction > 0 else 0).n
-        factor = saved.array("factor", n + 1, n + 1)
+        factor = None if settings.trust else saved.array("factor", n + 1, n + 1)
         model = ModalModel([Mode(*row) for row in saved.array("modes", None, 4).tolist()], saved.field("dead_time"))
+        trusted = trusted_fields(saved.part("trusted"), settings.p) if settings.trust else None
         predictor = kind(model, settings, start=saved.number_or_none("start"))
-        predictor.regression.restore(factor, saved.whole("n_samples"))
+        if factor is not None:
+            predictor.regression.restore(factor, saved.whole("n_samples"))
     predictor.k, predictor.n_init = saved.whole("k"), saved.whole("n_init")
     predictor.state[:] = saved.array("state", predictor.discrete.n_state)
-    predictor.past.x_pb[:] = saved.array("x_pb", settings.q)
-    predictor.past.e_pb[:] = saved.array("e_pb", settings.p)
+    predictor.past.x_pb[:], predictor.past.e_pb[:] = x_pb, e_pb
     features = predictor.reference_features
     features.before = saved.array("signs", len(features.before))
     features.last = float(saved.array("reference", 1, finite=False)[0])
-    start = saved.number_or_none("pending_start")
-    if start is not None:
-        x_d, reference = saved.array("pending_x_d", None), saved.array("pending_reference", None)
-        if not 0 < len(x_d) <= len(reference):
-            raise saved.error("the pending window must have samples, and a reference at least as long")
-        signs = saved.array("pending_signs", len(features.signs(reference, start)))
-        predictor.pending = PredictedWindow(x_d, saved.array("pending_x_pb", len(x_d)), start, reference, signs)
+    if predictor.trusted is not None and trusted is not None:
+        restore_trusted(predictor.trusted, trusted)
+    if saved.field("pending_start") is not None:
+        predictor.pending = _pending(predictor, saved)
     return predictor
+
+
+def _pending(predictor: HybridPredictor, saved: Saved) -> PredictedWindow:
+    """Return the predicted window; StateError if it is inconsistent."""
+    start = saved.real("pending_start")
+    x_d, reference = saved.array("pending_x_d", None), saved.array("pending_reference", None)
+    if not 0 < len(x_d) <= len(reference):
+        raise saved.error("the pending window must have samples, and a reference at least as long")
+    x_pb = saved.array("pending_x_pb", len(x_d))
+    signs = saved.array("pending_signs", len(predictor.reference_features.signs(reference, start)))
+    model = predictor.trusted
+    forecast = None if model is None else restored_forecast(model, saved, x_d, x_pb)
+    return PredictedWindow(x_d, x_pb, start, reference, signs, forecast)

@@ -18,14 +18,14 @@ from ..base.signals import Array
 from ..model.discrete import DiscreteModel
 from .blend import Blend
 from .candidates import Candidate, CandidatePrediction, ResidualScale
-from .disturbances import StaticFeatures, StaticState
+from .disturbances import LEAST_VELOCITY, StaticFeatures, StaticState
 from .guard import SensorGuard
 from .regression import RidgeRegression
 
 __all__ = ["Forecast", "TrustedModel"]
 
 _LAST_LAG = 0.005
-"""Prior variance of the weight of the last lag relative to that of the first."""
+"""Prior variance of the weight of a lag relative to that of the lag ``p`` before it."""
 
 _BOUND = 1.2
 """Largest prediction relative to the largest residual so far."""
@@ -64,7 +64,7 @@ class Forecast:
     e_h : (n,) array, m
         Predicted residual.
     hold : float, m
-        Last residual, the prediction of the hold candidate.
+        Last residual, bounded: the prediction of the hold candidate.
     predictions : tuple of CandidatePrediction
         Of the learned candidates; empty before anything is learned.
     largest : (n_static,) array
@@ -100,7 +100,7 @@ class TrustedModel:
         self.regression = RidgeRegression(self.static.n + p, _NO_PENALTY)
         lag_scales = np.sqrt(_LAST_LAG ** (np.arange(p) / p))
         self.candidates = (Candidate(self.static.n, lag_scales[:0]), Candidate(self.static.n, lag_scales))
-        self.blend = Blend((0.0, 0.5, 0.5))  # hold, without lags, with lags
+        self.blend = Blend((0.0, 0.5, 0.5), settings.Np)  # hold, without lags, with lags
         self.n_rows = 0.0
         self.largest = np.zeros(self.static.n)
         self.velocity_scale = 0.0
@@ -126,12 +126,13 @@ class TrustedModel:
             Commands and physics-based prediction, relative to the start.
         """
         peak = self.static.peak_velocity(self.state, x_d)
-        outgrown = peak > _GROWTH * self.velocity_scale
+        outgrown = peak > max(_GROWTH * self.velocity_scale, LEAST_VELOCITY)
         velocity_scale = peak if outgrown else self.velocity_scale
         rows, _ = self.static.rows(self.state, x_d, x_pb, x_pb, velocity_scale)
         before = np.zeros(self.static.n) if outgrown else self.largest
         largest = np.maximum(before, np.abs(rows).max(axis=0))
-        hold = float(self.past[0])
+        bound = self._bound  # residuals that were not learned may be larger
+        hold = min(max(float(self.past[0]), -bound), bound)
         predictions: tuple[CandidatePrediction, ...] = ()
         if self.n_rows > 0.0 and not outgrown and self.scale.largest_square > 0.0:
             # The stiffness acts at the position, which the physics model alone does not give well enough.
@@ -184,6 +185,11 @@ class TrustedModel:
         candidates = self._candidates(forecast.hold, forecast.predictions, m)
         self.blend.update(candidates[:, accepted], sound, self.scale.largest_square)
 
+    @property
+    def _bound(self) -> float:
+        """Bound on what is predicted, m."""
+        return _BOUND * self.scale.largest
+
     def _predict(self, candidate: Candidate, rows: Array, largest: Array) -> CandidatePrediction:
         """Return the prediction of a candidate, bounded by the residuals so far."""
         scale = self.scale
@@ -191,8 +197,9 @@ class TrustedModel:
         least = min(self.settings.lam, _LEAST_NOISE * scale.largest_square)
         static_scales = effect * self.static.shares / np.maximum(largest, 1e-150)
         found = candidate.predict(self.regression, static_scales, rows, self.past, scale, least)
-        bound = _BOUND * scale.largest
-        return found._replace(e_h=np.clip(found.e_h, -bound, bound), noise_variance=found.noise_variance / self.n_rows)
+        return found._replace(
+            e_h=np.clip(found.e_h, -self._bound, self._bound), noise_variance=found.noise_variance / self.n_rows
+        )
 
     @staticmethod
     def _candidates(hold: float, predictions: tuple[CandidatePrediction, ...], m: int) -> Array:

@@ -79,6 +79,13 @@ def predictor_state() -> bytes:
     return predictor.to_bytes()
 
 
+def trusted_state() -> bytes:
+    predictor = small_predictor(trust=True)
+    use_predictor(predictor)
+    predictor.predict(np.linspace(0, 1e-3, 8))
+    return predictor.to_bytes()
+
+
 def look_ahead_state() -> bytes:
     look_ahead = LookAhead(small_predictor(), 0.0)
     sampled(look_ahead, 60)
@@ -100,6 +107,7 @@ def compensator_state() -> bytes:
 
 STATES: dict[str, tuple[Callable[[], bytes], Callable[[bytes], Any], Callable[[Any], None]]] = {
     "predictor": (predictor_state, HybridPredictor.from_bytes, use_predictor),
+    "predictor with trust": (trusted_state, HybridPredictor.from_bytes, use_predictor),
     "look-ahead": (look_ahead_state, partial(LookAhead.from_bytes, model_type=HybridPredictor), use_look_ahead),
     "compensator": (compensator_state, SepCompensator.from_bytes, use_compensator),
     "look-ahead of a compensator": (

@@ -113,6 +113,14 @@ def test_the_warm_up_of_a_new_run_is_saved() -> None:
     assert twin.predict(np.zeros(10)).n_warm_up == predictor.predict(np.zeros(10)).n_warm_up == 3
 
 
+def test_an_automatic_warm_up_of_a_new_run_is_that_of_the_settings() -> None:
+    predictor = trained(57, t_init=0.013)
+    predictor.restart(t_init=-1.0)
+    assert predictor.n_init == HybridPredictor(MODEL).n_init == 300
+    predictor.restart()
+    assert predictor.n_init == 0
+
+
 def test_last_residual_is_what_was_measured_last() -> None:
     predictor = trained(50)
     x_d, x = small_signals(60)
@@ -146,7 +154,7 @@ def test_fmi_names() -> None:
         ({"q": 100}, "q must be 0 … Np − 1 = 99, got 100; lower q or raise Np"),
         ({"Np": 0, "lam": -1.0}, "Np must be 1 … 100000, got 0; lambda must be 1e-40 … 1e+12 m2, got -1.0"),
         ({"T_s": 0.0}, "T_s must be 1e-05 … 1 s, got 0.0"),
-        ({"t_init": -0.1}, "t_init must be 0 … 1000000 s, got -0.1"),
+        ({"t_init": -0.1}, "t_init must be -1 (automatic) or 0 … 1000000 s, got -0.1"),
         ({"input_hold": "soh"}, "input_hold must be one of zoh, foh, got 'soh'"),
     ],
 )
@@ -168,7 +176,7 @@ def test_parameters_that_do_not_fit(change: dict[str, Any], message: str) -> Non
         (lambda p: p.operator(0), "n must be ≥ 1, got 0"),
         (lambda p: p.operator(3)([0.0]), "x_d must have 3 samples, got 1"),
         (lambda p: p.restart(math.nan), "start must be finite, got nan at sample 0"),
-        (lambda p: p.restart(0.1, t_init=-1.0), "t_init must be 0 … 1000000 s, got -1.0"),
+        (lambda p: p.restart(0.1, t_init=-2.0), "t_init must be -1 (automatic) or 0 … 1000000 s, got -2.0"),
         (lambda p: p.restart(0.1, t_init=math.nan), "t_init must be finite, got nan"),
     ],
 )

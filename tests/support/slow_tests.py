@@ -36,6 +36,8 @@ SLOW = (
     r"cosim/test_compensator_fmus\.py::test_(the_direction_and|recommended_settings|staircase_tracking|\w+\[python)",
     r"plants/test_plant\.py::test_fast_modes_are_resolved\[5000",
     r"predict/test_predictor_with_reference_features\.py::test_friction_is_predicted_better",
+    r"predict/test_trusted_figures\.py::test_(spiral|recorded)",
+    r"random_drives/test_trusted_drives\.py",
     r"test_machine\.py::test_the_stages_friction_is_calibrated",
     r"predict/test_regression\.py::test_weights_after_the_staircase_against_extended_precision\[100",
     r"suite/test_rollback\.py::test_a_state_goes_on_in_a_second_instance\[(19|21|57|203)-",

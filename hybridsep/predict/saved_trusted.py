@@ -1,0 +1,130 @@
+"""Saved state of the residual model with trust: what it has learned, and the state of its run."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from ..base.saved import Saved
+from ..base.signals import PREDICTION_MAX, Array
+from ..base.state import pack, unpack
+from .blend import Blend
+from .candidates import CORRELATION_MAX, ResidualScale
+from .disturbances import LEAST_VELOCITY, N_DISTURBANCES, StaticState
+from .guard import N_STATE
+from .trusted import Forecast, TrustedModel
+
+__all__ = ["restore_trusted", "restored_forecast", "trusted_blob", "trusted_fields"]
+
+_KIND = "trusted model"
+
+_ROUNDING = 1e-6
+"""Relative tolerance of what rounding may have changed."""
+
+
+def trusted_blob(model: TrustedModel) -> bytes:
+    """Return the complete state as a versioned blob."""
+    state, blend = model.state, model.blend
+    meta = {
+        "n_samples": model.regression.n_samples,
+        **{name: getattr(model, name) for name in ("n_rows", "velocity_scale", "n_rejected")},
+    }
+    arrays = {
+        "factor": model.regression.factor,
+        "largest": model.largest,
+        "scale": np.array(model.scale),
+        "candidates": np.array([[one.noise_variance, one.correlation] for one in model.candidates]),
+        **{name: getattr(blend, name) for name in ("gram", "cross", "weights")},
+        "filters": state.filters,
+        "filtered": state.filtered,
+        "x_d": np.array([state.x_d]),
+        "x_pb": state.x_pb,
+        "past": model.past,
+        "past_bridged": model.past_bridged.astype(np.float64),
+        "guard": np.array(model.guard.state()),
+    }
+    return pack(_KIND, meta, arrays)
+
+
+def trusted_fields(blob: bytes, p: int) -> Saved:
+    """Return the fields of a :func:`trusted_blob`; StateError if its factor is too small for ``p`` lags."""
+    saved = Saved(_KIND, *unpack(_KIND, blob))
+    size = len(saved.array("factor", None, None))
+    if size <= p:
+        raise saved.error(f"factor must have more than p = {p} rows, got {size}")
+    return saved
+
+
+def restore_trusted(model: TrustedModel, saved: Saved) -> None:
+    """Restore the state of :func:`trusted_fields` in a model with the same settings.
+
+    Raises
+    ------
+    StateError
+        If a field is missing or inconsistent; the model must not be used then.
+    """
+    with saved.consistent():
+        model.regression.restore(saved.array("factor", None, None), saved.whole("n_samples"))
+    model.n_rows, model.velocity_scale = saved.real("n_rows"), saved.real("velocity_scale")
+    if not 0.0 <= model.n_rows <= model.regression.n_samples:
+        raise saved.error("n_rows must be from 0 to n_samples")
+    if not (model.velocity_scale == 0.0 or LEAST_VELOCITY <= model.velocity_scale <= PREDICTION_MAX):
+        raise saved.error("velocity_scale must be a velocity, or 0")
+    model.largest = _magnitudes(saved, "largest", model.static.n)
+    model.scale = _scale(saved)
+    for candidate, (variance, correlation) in zip(
+        model.candidates, _magnitudes(saved, "candidates", len(model.candidates), 2).tolist(), strict=True
+    ):
+        if not 1.0 <= correlation <= CORRELATION_MAX:
+            raise saved.error(f"the correlation of a candidate must be 1 … {CORRELATION_MAX:g}, got {correlation}")
+        candidate.noise_variance, candidate.correlation = variance, correlation
+    _restore_blend(model.blend, saved)
+    model.state = StaticState(
+        saved.array("filters", model.static.discrete.n_state, N_DISTURBANCES),
+        saved.array("filtered", N_DISTURBANCES),
+        float(saved.array("x_d", 1)[0]),
+        saved.array("x_pb", len(model.state.x_pb)),
+    )
+    model.past = saved.array("past", len(model.past))
+    model.past_bridged = saved.array("past_bridged", len(model.past)) > 0.0
+    model.n_rejected = saved.whole("n_rejected")
+    with saved.consistent():
+        model.guard.restore(saved.array("guard", N_STATE, finite=False))
+
+
+def restored_forecast(model: TrustedModel, saved: Saved, x_d: Array, x_pb: Array) -> Forecast:
+    """Return the forecast of the pending window, which follows from the state; StateError if it overflows."""
+    with np.errstate(all="ignore"):
+        forecast = model.forecast(x_d, x_pb)
+    if not np.isfinite(forecast.e_h).all():
+        raise saved.error("the prediction of the pending window must be finite")
+    return forecast
+
+
+def _scale(saved: Saved) -> ResidualScale:
+    scale = ResidualScale(*_magnitudes(saved, "scale", len(ResidualScale._fields)).tolist())
+    # A mean square is at most the square of the largest residual, but for rounding and underflow.
+    bounds = (scale.recent, scale.largest_square, scale.largest**2)
+    if any(first > (1.0 + _ROUNDING) * second + 1e-300 for first, second in pairwise(bounds)):
+        raise saved.error("recent, largest_square and largest² of the scale must ascend")
+    return scale
+
+
+def _restore_blend(blend: Blend, saved: Saved) -> None:
+    n = len(blend.first)
+    gram, cross, weights = saved.array("gram", n, n), saved.array("cross", n), _magnitudes(saved, "weights", n)
+    most = _ROUNDING * np.abs(gram).max()
+    if np.abs(gram - gram.T).max() > most or np.linalg.eigvalsh(gram)[0] < -most:
+        raise saved.error("the gram matrix must be symmetric and positive semidefinite")
+    if weights.sum() > 1.0 + _ROUNDING:
+        raise saved.error("the sum of the weights must be at most 1")
+    blend.gram, blend.cross, blend.weights = gram, cross, weights
+
+
+def _magnitudes(saved: Saved, name: str, *shape: int) -> Array:
+    """Return an array of finite numbers ≥ 0."""
+    array = saved.array(name, *shape)
+    if array.min() < 0.0:
+        raise saved.error(f"{name} must be ≥ 0")
+    return array

@@ -1,0 +1,165 @@
+"""Saved state of a predictor with trust: restored bit for bit, or refused."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from trusted_cases import cycles, friction, physics, run, trusted
+
+from hybridsep.base.errors import StateError
+from hybridsep.base.signals import Array
+from hybridsep.base.state import pack, unpack
+from hybridsep.model.physics import ModalModel, Mode
+from hybridsep.predict.predictor import HybridPredictor
+
+WAYS: dict[str, Callable[[HybridPredictor], HybridPredictor]] = {
+    "bytes": lambda predictor: HybridPredictor.from_bytes(predictor.to_bytes()),
+    "copy": copy.copy,
+    "deepcopy": copy.deepcopy,
+    "pickle": lambda predictor: pickle.loads(pickle.dumps(predictor)),
+}
+
+
+def signals(n: int = 1500) -> tuple[Array, Array]:
+    x_d = 0.1 + cycles(n)
+    return x_d, physics(x_d) + friction(x_d) + 1e-6 * np.random.default_rng(3).normal(size=n)
+
+
+def in_mid_run(x: Array | None = None, **changes: Any) -> HybridPredictor:
+    """Return a small predictor after 400 samples, with a predicted window of 30."""
+    x_d, sound = signals()
+    x = sound if x is None else x
+    predictor = trusted(**{"Np": 20, "p": 6, "q": 2, "forgetting": 2.0} | changes)
+    run(predictor, x_d[:400], x[:400], 20)
+    predictor.predict(x_d[400:430])
+    return predictor
+
+
+@pytest.mark.parametrize("pending", [True, False])
+@pytest.mark.parametrize("way", WAYS)
+def test_a_restored_predictor_continues_bit_for_bit(way: str, pending: bool) -> None:
+    x_d, x = signals()
+    x[[390, 395]], x[435:440] = np.nan, x[435] + 1e-2  # what the guard knows is part of the state, too
+    original = in_mid_run(x=x)
+    assert original.trusted is not None
+    assert original.trusted.n_rejected >= 2
+    if not pending:
+        original.update(x[400:430])
+    twin = WAYS[way](original)
+    assert twin.to_bytes() == original.to_bytes()
+    if pending:
+        original.update(x[400:417])
+        twin.update(x[400:417])
+    for first in range(430, 1500, 20):
+        window = slice(first, first + 20)
+        np.testing.assert_array_equal(twin.predict(x_d[window]).x_h, original.predict(x_d[window]).x_h)
+        original.update(x[window])
+        twin.update(x[window])
+    assert twin.to_bytes() == original.to_bytes()
+
+
+@pytest.mark.parametrize("samples", [0, 1])
+def test_before_anything_is_learned(samples: int) -> None:
+    predictor = trusted(q=0)
+    if samples:
+        run(predictor, np.zeros(1), np.zeros(1))
+    predictor.predict(np.linspace(0.0, 1e-3, 100))
+    twin = HybridPredictor.from_bytes(predictor.to_bytes())
+    assert twin.to_bytes() == predictor.to_bytes()
+
+
+def test_with_dead_time_first_order_hold_and_a_restart() -> None:
+    x_d, x = signals()
+    model = ModalModel([Mode(25.0, 0.05, 24674.0, 15.7), Mode(90.0, 1.5, -40.0, 0.1)], 4)
+    predictor = HybridPredictor(model, trusted(input_hold="foh", Np=20, p=20).settings)
+    run(predictor, x_d[:300], x[:300], 20)
+    predictor.restart(0.1)
+    twin = HybridPredictor.from_bytes(predictor.to_bytes())
+    np.testing.assert_array_equal(run(twin, x_d, x, 20), run(predictor, x_d, x, 20))
+
+
+def test_memory_does_not_grow() -> None:
+    x_d, x = signals()
+    predictor = in_mid_run()
+    predictor.update(x[400:430])
+    size = len(predictor.to_bytes())
+    run(predictor, x_d, x, 20)
+    assert abs(len(predictor.to_bytes()) - size) <= 200  # the digits of some numbers, and the pending window
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("n_rows", -1.0),
+        ("n_rows", 1e6),
+        ("n_rows", float("nan")),
+        ("n_samples", 1.5),
+        ("velocity_scale", -1.0),
+        ("velocity_scale", 1e-300),
+        ("velocity_scale", 1e150),
+        ("factor", np.eye(9)),
+        ("factor", np.eye(200)),
+        ("factor", np.zeros((27, 27))),
+        ("largest", -np.ones(20)),
+        ("largest", np.ones(19)),
+        ("scale", np.array([2.0, 1.0, 2.0])),
+        ("scale", np.array([1.0, 5.0, 2.0])),
+        ("scale", np.array([0.0, 0.0, -2.0])),
+        ("scale", np.array([0.0, 0.0, np.inf])),
+        ("candidates", np.array([[1e-12, 0.5], [1e-12, 10.0]])),
+        ("candidates", np.array([[1e-12, 10.0], [1e-12, 1e5]])),
+        ("candidates", np.array([[-1e-12, 10.0], [1e-12, 10.0]])),
+        ("candidates", np.ones((3, 2))),
+        ("gram", -np.eye(3)),
+        ("gram", np.triu(np.ones((3, 3)))),
+        ("gram", np.full((3, 3), np.nan)),
+        ("cross", np.ones(2)),
+        ("weights", np.array([0.5, 0.5, 0.5])),
+        ("weights", np.array([-0.5, 0.5, 0.5])),
+        ("filters", np.zeros((3, 8))),
+        ("filtered", np.full(8, np.inf)),
+        ("x_d", np.array([np.nan])),
+        ("x_pb", np.zeros(3)),
+        ("past", np.zeros(5)),
+        ("past", None),
+        ("n_rows", None),
+    ],
+    ids=str,
+)
+def test_an_inconsistent_model(name: str, value: Any) -> None:
+    meta, arrays, parts = unpack("predictor", in_mid_run().to_bytes())
+    own, inside, _ = unpack("trusted model", parts["trusted"])
+    table: dict[str, Any] = own if name in own else inside
+    assert name in table
+    if value is None:
+        del table[name]
+    else:
+        table[name] = value
+    with pytest.raises(StateError, match=r"^the saved (trusted model|predictor) is inconsistent: "):
+        HybridPredictor.from_bytes(pack("predictor", meta, arrays, {"trusted": pack("trusted model", own, inside)}))
+
+
+def test_a_prediction_that_overflows_is_refused() -> None:
+    meta, arrays, parts = unpack("predictor", in_mid_run().to_bytes())
+    own, inside, _ = unpack("trusted model", parts["trusted"])
+    # The leverage of the lags overflows: they are huge, and nothing is known of their weights.
+    inside["past"], inside["scale"] = np.full(6, 1e100), np.array([1e-200, 1e-200, 1e-100])
+    inside["factor"], inside["candidates"] = 1e-100 * np.eye(27), np.array([[0.0, 1.0], [0.0, 1.0]])
+    forged = pack("predictor", meta, arrays, {"trusted": pack("trusted model", own, inside)})
+    with pytest.raises(StateError, match="the prediction of the pending window must be finite"):
+        HybridPredictor.from_bytes(forged)
+
+
+@pytest.mark.parametrize("change", [{"trust": False}, {"q": 3}, {"p": 7}, {"p": 5}])
+def test_other_settings(change: dict[str, Any]) -> None:
+    meta, arrays, parts = unpack("predictor", in_mid_run().to_bytes())
+    meta["settings"] |= change
+    with pytest.raises(StateError, match=r"^the saved (trusted model|predictor) is inconsistent: "):
+        HybridPredictor.from_bytes(pack("predictor", meta, arrays, parts))
+    with pytest.raises(StateError, match="trusted is missing"):
+        HybridPredictor.from_bytes(pack("predictor", meta | {"settings": in_mid_run().settings.as_table()}, arrays))

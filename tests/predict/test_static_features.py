@@ -1,0 +1,90 @@
+"""Features without lags against the disturbances' formulas, filtered over the whole signal at once."""
+
+from __future__ import annotations
+
+import numpy as np
+import oracle
+import pytest
+
+from hybridsep.base.signals import Array
+from hybridsep.model.physics import ModalModel, Mode
+from hybridsep.predict.disturbances import N_DISTURBANCES, StaticFeatures
+
+TS, N = 1e-3, 800
+MODES = [(25.0, 0.05, 24674.0, 15.7), (90.0, 0.6, -400.0, 3.0)]
+SCALE = 0.05  # m/s
+SPREAD = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
+LENGTHS = (100, 1, 7, 2, 300, 3, 387)
+
+
+def features(hold: str, dead_time: int, q: int) -> StaticFeatures:
+    model = ModalModel([Mode(*one) for one in MODES], dead_time)
+    return StaticFeatures(model.discretise(TS, hold, block=100), q)
+
+
+def signals() -> tuple[Array, Array]:
+    """Return a command that starts, turns and rests, and a position near it, (N,), m."""
+    t = np.arange(N) * TS
+    x_d = np.where(t < 0.6, 0.004 * np.sin(12 * t) ** 3, 0.004 * np.sin(7.2) ** 3)
+    return x_d, 0.98 * x_d + 2e-5 * np.sin(80 * t)
+
+
+def formula(x_d: Array, x_pb: Array, x: Array, hold: str, dead_time: int) -> tuple[Array, Array]:
+    """Return the filtered disturbances and their first differences, (N, 8) each."""
+    numerator, denominator = oracle.transfer_function(MODES)
+    v_d, v_pb = np.diff(x_d, prepend=0.0) / TS, np.diff(x_pb, prepend=0.0) / TS
+    disturbances = [*(np.tanh(v_d / (SCALE * one)) for one in SPREAD), x * abs(x), v_pb * abs(v_pb)]
+    filtered = np.column_stack(
+        [
+            oracle.physics(numerator, denominator, one.tolist(), T_s=TS, hold=hold, dead_time=dead_time)
+            for one in disturbances
+        ]
+    )
+    return filtered, np.diff(filtered, axis=0, prepend=np.zeros((1, len(disturbances))))
+
+
+@pytest.mark.parametrize(("hold", "dead_time", "q"), [("zoh", 0, 3), ("foh", 0, 0), ("zoh", 5, 1), ("foh", 3, 40)])
+def test_each_column_in_windows_of_any_length(hold: str, dead_time: int, q: int) -> None:
+    static = features(hold, dead_time, q)
+    x_d, x = signals()
+    x_pb, _ = static.discrete.forced_response(static.discrete.rest(), x_d)
+    state, rows, first = static.rest(), [], 0
+    for n in LENGTHS:
+        window = slice(first, first + n)
+        before = [np.array(part) for part in state]
+        more, after = static.rows(state, x_d[window], x_pb[window], x[window], SCALE)
+        for part, then in zip(state, before, strict=True):  # the state is not changed
+            np.testing.assert_array_equal(part, then)
+        rows.append(more)
+        state, first = after, first + n
+    assert first == N
+    found = np.concatenate(rows)
+    differences, column = min(q, 3), 1
+    assert found.shape == (N, static.n) == (N, 2 + differences + 2 * N_DISTURBANCES)
+    np.testing.assert_array_equal(found[:, 0], 1.0)
+    padded = np.concatenate((np.zeros(3), x_pb))  # at rest before
+    for order in range(differences + 1):
+        np.testing.assert_allclose(found[:, column], np.diff(padded, order)[3 - order :], rtol=0, atol=1e-15)
+        column += 1
+    filtered, differenced = formula(x_d, x_pb, x, hold, dead_time)
+    size = np.abs(filtered).max(axis=0)
+    assert (size > 0.0).all()
+    np.testing.assert_allclose(found[:, column : column + N_DISTURBANCES] / size, filtered / size, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found[:, column + N_DISTURBANCES :] / size, differenced / size, rtol=0, atol=1e-9)
+
+
+def test_peak_velocity_looks_back_to_the_last_command() -> None:
+    static = features("zoh", 0, 3)
+    x_d, x = signals()
+    _, state = static.rows(static.rest(), x_d[:100], x_d[:100], x[:100], SCALE)
+    assert static.peak_velocity(static.rest(), np.array([2e-6, 1e-6])) == pytest.approx(2e-3)
+    assert static.peak_velocity(state, x_d[99:100]) == 0.0
+    assert static.peak_velocity(state, x_d[99:100] - 3e-6) == pytest.approx(3e-3)
+
+
+def test_at_rest_only_the_constant_is_left() -> None:
+    static = features("foh", 2, 3)
+    still = np.zeros(50)
+    rows, _ = static.rows(static.rest(), still, still, still, 0.0)
+    np.testing.assert_array_equal(rows[:, 0], 1.0)
+    np.testing.assert_array_equal(rows[:, 1:], 0.0)

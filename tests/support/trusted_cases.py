@@ -1,0 +1,55 @@
+"""Drives whose residual is known, and predictors with trust for them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from predictor_cases import MODEL
+
+from hybridsep.base.settings import PredictorSettings
+from hybridsep.base.signals import Array
+from hybridsep.predict.predictor import HybridPredictor
+
+__all__ = ["FRICTION", "PERIOD", "TS", "cycles", "friction", "physics", "run", "trusted"]
+
+TS = 1e-3  # s
+PERIOD = 1000
+"""Samples of a cycle."""
+
+FRICTION = 2e-5
+"""Offset of the command, m, that friction is worth."""
+
+
+def trusted(**changes: Any) -> HybridPredictor:
+    """Return a predictor with trust of the default drive."""
+    return HybridPredictor(MODEL, PredictorSettings(trust=True, **changes))
+
+
+def cycles(n: int, amplitude: float = 5e-3) -> Array:
+    """Return a command to and fro, (n,), m, fastest at the beginning."""
+    return np.asarray(amplitude * np.sin(2 * np.pi * np.arange(n) / PERIOD))
+
+
+def physics(x_d: Array) -> Array:
+    """Return x_pb from rest at the first command, (n,), m."""
+    discrete = MODEL.discretise(TS)
+    return np.asarray(x_d[0] + discrete.forced_response(discrete.rest(), x_d - x_d[0])[0])
+
+
+def friction(x_d: Array, size: float = FRICTION) -> Array:
+    """Return the residual of friction that follows the command's sign: the model's response to it, (n,), m."""
+    discrete = MODEL.discretise(TS)
+    v_d = np.diff(x_d, prepend=x_d[0]) / TS
+    return np.asarray(-size * discrete.forced_response(discrete.rest(), np.tanh(v_d / (0.03 * np.abs(v_d).max())))[0])
+
+
+def run(predictor: HybridPredictor, x_d: Array, x: Array, n: int = 100, measured: int | None = None) -> Array:
+    """Predict windows of ``n`` samples and measure their first ``measured``, all if left out; return x_h of those."""
+    found, k = [], 0
+    while k < len(x_d):
+        window = slice(k, min(k + (measured or n), len(x_d)))
+        found.append(predictor.predict(x_d[k : k + n]).x_h[: window.stop - k])
+        predictor.update(x[window])
+        k = window.stop
+    return np.concatenate(found)
