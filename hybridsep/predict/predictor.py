@@ -7,6 +7,7 @@ an ARX recursion from the last ``p`` measured residuals, affine in the command.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from scipy.signal import lfilter
 
 from ..base.errors import ParameterError, SignalError
 from ..base.output import written_whole
-from ..base.settings import PredictorSettings, check, samples_before
+from ..base.settings import PARAMETERS, PredictorSettings, samples_before
 from ..base.signals import Array, as_measured, as_samples
 from ..model.physics import ModalModel
 from .features import FeatureLayout, PastSamples
@@ -91,7 +92,8 @@ class HybridPredictor:
             Warm-up of the new run, s; none by default.
         """
         rest = None if start is None else float(as_samples([start], "start")[0])
-        self.n_init = samples_before(check("t_init", t_init), self.T_s)
+        warm_up = replace(PARAMETERS["t_init"], automatic=None).checked(t_init)
+        self.n_init = samples_before(warm_up, self.T_s)
         self.start = rest
         self.k = 0
         self.state = self.discrete.rest()

@@ -31,7 +31,7 @@ class Guard(ctypes.Structure):
         c_core.library("predictor").hsep_guard_init(ctypes.byref(guard), ctypes.c_uint64(patience))
         return guard
 
-    def accepts(self, x: Array, x_pb: Array, largest: float) -> Array:
+    def accepts(self, x: Array, x_pb: Array, largest: float) -> NDArray[np.bool_]:
         work, accepted = np.empty(len(x)), np.empty(len(x))
         pointers = [np.ascontiguousarray(array).ctypes.data_as(ctypes.c_void_p) for array in (x, x_pb)]
         c_core.library("predictor").hsep_guard_accept(
