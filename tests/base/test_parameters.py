@@ -240,6 +240,6 @@ def test_a_table_of_settings_has_all_of_them_and_nothing_else() -> None:
     for wrong in ({**table, "more": 1}, {name: value for name, value in table.items() if name != "q"}):
         with pytest.raises(
             ParameterError,
-            match="settings must be Np, p, q, lam, T_s, t_init, input_hold, trust, effect, noise_std, forgetting, v_friction, got",
+            match="settings must be Np, p, q, lam, T_s, .*, v_friction, got",
         ):
             PredictorSettings.from_table(wrong)
