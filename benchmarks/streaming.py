@@ -50,7 +50,7 @@ GROWTH_MAX = 1_000_000
 def make_predictor() -> HybridPredictor:
     """Return n = 55 features on a well-damped drive: 40 Hz at ζ = 0.7 decays by e^−880 in 5 s, that is, to zero."""
     model = ModalModel([Mode(f_n=40.0, zeta=0.7, alpha=(80 * np.pi) ** 2)])
-    return HybridPredictor(model, PredictorSettings(T_s=TS, p=P_LAGS, q=Q_LAGS))
+    return HybridPredictor(model, PredictorSettings(trust=False, T_s=TS, p=P_LAGS, q=Q_LAGS))
 
 
 def minimum_jerk(tau: Array) -> Array:

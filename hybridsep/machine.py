@@ -105,7 +105,7 @@ class Machine(Section):
         """Settings of the compensator's own predictor: those of the predictor where the section has no others."""
         own = self._compensator_entries(PredictorSettings)
         given = {name: value for name, value in self.predictor.given().items() if name not in PredictorSettings.ALONE}
-        return PredictorSettings(**{**given, **own}, **self._sampling)
+        return PredictorSettings(**{**given, **own}, **self._sampling, trust=False)
 
     @property
     def compensator_settings(self) -> CompensatorSettings:

@@ -112,8 +112,12 @@ def test_a_file_with_defaults(tmp_path: Path) -> None:
         "q": 3,
         "lambda": 1e-12,
         "T_s": 0.002,
-        "t_init": 0.3,
+        "t_init": -1.0,
         "input_hold": 0,
+        "trust": True,
+        "effect": 0.0,
+        "noise_std": 0.0,
+        "forgetting": 0.0,
         "dead_time": 0,
     }
     predictor = machine.new_predictor(replace(machine.predictor_settings, p=10))
@@ -175,7 +179,7 @@ def test_what_the_compensator_section_leaves_out_is_the_predictors(tmp_path: Pat
         "q": 3,
         "lambda": 1e-12,
         "T_s": 0.002,
-        "t_init": 0.3,
+        "t_init": -1.0,
         "input_hold": 0,
         "dead_time": 0,
         "preview": 200,
@@ -198,7 +202,7 @@ def test_what_the_compensator_section_leaves_out_is_the_predictors(tmp_path: Pat
     assert {name: found[name] for name in given} == given
     changes = replace(machine.compensator_settings, preview=90, change_max=None, compensate="physics")
     compensator = machine.new_compensator(changes, predictor=replace(machine.compensator_predictor, p=10))
-    settings = PredictorSettings(Np=30, p=10, q=9, lam=1e-9, T_s=0.002, t_init=0.1, v_friction=1e-3)
+    settings = PredictorSettings(trust=False, Np=30, p=10, q=9, lam=1e-9, T_s=0.002, t_init=0.1, v_friction=1e-3)
     assert compensator.predictor.settings == settings
     assert compensator.settings == changes
     assert (changes.spacing, changes.no_reversal, changes.jerk_weight) == (3, False, 0.0)

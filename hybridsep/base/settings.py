@@ -183,7 +183,7 @@ class PredictorSettings(Settings):
         "zoh", ("zoh", "foh"), "how x_d runs between samples, zero-order or first-order hold", learned=True
     )
     trust: bool = flag(
-        False,
+        True,
         "whether the residual model is trusted only as far as its variance allows; false: the paper's",
         learned=True,
     )

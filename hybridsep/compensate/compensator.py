@@ -36,7 +36,7 @@ _KIND = "compensator"
 _PINNED = 8
 """Leading samples of a window in which a bounded plan follows the last one: real-time solvers take 3 steps in each."""
 
-RECOMMENDED = PredictorSettings(Np=50, p=50, q=40, lam=1e-8, t_init=0.1, v_friction=2e-3)
+RECOMMENDED = PredictorSettings(trust=False, Np=50, p=50, q=40, lam=1e-8, t_init=0.1, v_friction=2e-3)
 """Predictor settings with the smallest tracking error on the staircase drive, with the compensator's defaults."""
 
 

@@ -40,7 +40,7 @@ def test_a_row_of_the_library_has_the_slices_of_the_core(
 ) -> None:
     model = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
     predictor = HybridPredictor(
-        model, PredictorSettings(Np=NP, p=p, q=q, lam=1e-8, t_init=0.0, v_friction=v_friction), start=0.0
+        model, PredictorSettings(trust=False, Np=NP, p=p, q=q, lam=1e-8, t_init=0.0, v_friction=v_friction), start=0.0
     )
     learned: list[Array] = []
     monkeypatch.setattr(predictor.regression, "update_stacked", lambda rows: learned.append(rows.copy()))

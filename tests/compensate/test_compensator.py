@@ -118,7 +118,7 @@ def test_a_saved_state_goes_on_bit_for_bit(planned: bool, v_friction: float) -> 
 )
 def test_parameters_out_of_range_are_named(values: dict[str, Any], message: str) -> None:
     with pytest.raises(ParameterError, match=message):
-        SepCompensator(HybridPredictor(MODEL), CompensatorSettings(**values))
+        SepCompensator(HybridPredictor(MODEL, PredictorSettings(trust=False)), CompensatorSettings(**values))
 
 
 def test_a_predictor_with_trust_is_refused() -> None:
@@ -127,7 +127,9 @@ def test_a_predictor_with_trust_is_refused() -> None:
         ParameterError, match=r"^trust must be false in a compensator's predictor: .* affine in the comm"
     ):
         SepCompensator(trusted)
-    meta, arrays, parts = unpack("compensator", SepCompensator(HybridPredictor(MODEL)).to_bytes())
+    meta, arrays, parts = unpack(
+        "compensator", SepCompensator(HybridPredictor(MODEL, PredictorSettings(trust=False))).to_bytes()
+    )
     with pytest.raises(StateError, match="trust must be false"):
         SepCompensator.from_bytes(pack("compensator", meta, arrays, parts | {"predictor": trusted.to_bytes()}))
 

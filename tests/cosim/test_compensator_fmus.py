@@ -98,7 +98,7 @@ def test_the_drives_limits_are_kept(runs: dict[str, Run], choice: str) -> None:
 def test_fmus_equal_the_library(runs: dict[str, Run], choice: str) -> None:
     values = {**MACHINE.fmi_compensator_parameters(), **PAPER, "compensate": COMPENSATE.to_fmi(choice)}
     settings = CompensatorSettings.from_fmi(values)
-    compensator = MACHINE.new_compensator(settings, predictor=PredictorSettings.from_fmi(values))
+    compensator = MACHINE.new_compensator(settings, predictor=PredictorSettings.from_fmi({"trust": False, **values}))
     loop = cosimulate(compensator, MACHINE.new_plant(), staircase(), encoder=Encoder(5e-6, 0))
     assert_same(runs[choice], loop)
     np.testing.assert_array_equal(runs[choice].x_d, staircase())
@@ -225,7 +225,7 @@ def test_the_direction_and_the_features_of_the_reference_can_be_turned_off(flavo
         run = cosimulate(*pair, r, controller_values=values)
         fmi = {**machine.fmi_compensator_parameters(), **values}
         compensator = machine.new_compensator(
-            CompensatorSettings.from_fmi(fmi), predictor=PredictorSettings.from_fmi(fmi)
+            CompensatorSettings.from_fmi(fmi), predictor=PredictorSettings.from_fmi({"trust": False, **fmi})
         )
         loop = cosimulate(compensator, machine.new_plant(), r, encoder=Encoder(1e-6, 0))
         assert_same(run, loop)

@@ -26,7 +26,7 @@ EMPS_COLUMNS = {"t": "t", "x_d": "qg", "x": "qm"}
 
 def predictor(Np: int = 20, p: int = 5, q: int = 2, t_init: float = 0.05) -> HybridPredictor:
     return HybridPredictor(
-        ModalModel([Mode(25.0, 0.7, (50 * np.pi) ** 2)]), PredictorSettings(Np=Np, p=p, q=q, t_init=t_init)
+        ModalModel([Mode(25.0, 0.7, (50 * np.pi) ** 2)]), PredictorSettings(trust=False, Np=Np, p=p, q=q, t_init=t_init)
     )
 
 
@@ -44,7 +44,7 @@ def emps_predictor() -> HybridPredictor:
     omega = math.sqrt(gtau * kv * kp / M)
     mode = Mode(f_n=omega / (2 * np.pi), zeta=(Fv + gtau * kv) / M / (2 * omega), alpha=omega**2)
     return HybridPredictor(
-        ModalModel([mode]), PredictorSettings(Np=100, p=50, q=3, lam=1e-12, input_hold="foh", t_init=1.242)
+        ModalModel([mode]), PredictorSettings(trust=False, Np=100, p=50, q=3, lam=1e-12, input_hold="foh", t_init=1.242)
     )
 
 

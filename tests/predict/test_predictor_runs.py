@@ -19,6 +19,8 @@ from hybridsep.base.settings import PredictorSettings
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
 
+PAPER = PredictorSettings(trust=False)
+
 
 def test_update_with_the_beginning_of_the_window() -> None:
     # Measuring 4 of 10 samples, then predicting from there, is what a window of 4 does.
@@ -46,7 +48,7 @@ def test_a_window_longer_than_a_batch_is_learned_whole() -> None:
 
 def test_start_is_the_first_command_unless_given() -> None:
     x_d, x = small_signals(40, start=0.3)
-    implicit, explicit = HybridPredictor(MODEL), HybridPredictor(MODEL, start=float(x_d[0]))
+    implicit, explicit = HybridPredictor(MODEL, PAPER), HybridPredictor(MODEL, PAPER, start=float(x_d[0]))
     assert implicit.start is None
     for predictor in (implicit, explicit):
         predictor.predict(x_d)
@@ -54,7 +56,7 @@ def test_start_is_the_first_command_unless_given() -> None:
         assert predictor.start == x_d[0]
     assert implicit.to_bytes() == explicit.to_bytes()
     # At rest elsewhere, the drive first has to travel.
-    elsewhere = HybridPredictor(MODEL, start=0.2).predict(np.full(100, 0.3))
+    elsewhere = HybridPredictor(MODEL, PAPER, start=0.2).predict(np.full(100, 0.3))
     assert elsewhere.x_pb[0] == pytest.approx(0.2, abs=1e-15)
     # Half a period of 40 ms later it has overshot by exp(−ζ ω t), ζ ω = c / 2m.
     assert elsewhere.x_pb[20] == pytest.approx(0.3 + 0.1 * math.exp(-staircase.C / 2 * 0.020), abs=1e-3)
@@ -66,7 +68,7 @@ def test_saved_in_mid_run_continues_bit_for_bit(way: str, measured: bool, tmp_pa
     x_d, x = small_signals(120)
     model = ModalModel([Mode(25.0, 0.05, 24674.0, 15.7), Mode(90.0, 1.5, -40.0, 0.1)], 2)
     original = HybridPredictor(
-        model, PredictorSettings(Np=10, p=4, q=2, lam=1e-9, t_init=0.071, input_hold="foh"), start=0.001
+        model, PredictorSettings(trust=False, Np=10, p=4, q=2, lam=1e-9, t_init=0.071, input_hold="foh"), start=0.001
     )
     replay(original, x_d[:63], x[:63])
     if not measured:
@@ -116,7 +118,7 @@ def test_the_warm_up_of_a_new_run_is_saved() -> None:
 def test_an_automatic_warm_up_of_a_new_run_is_that_of_the_settings() -> None:
     predictor = trained(57, t_init=0.013)
     predictor.restart(t_init=-1.0)
-    assert predictor.n_init == HybridPredictor(MODEL).n_init == 300
+    assert predictor.n_init == HybridPredictor(MODEL, PAPER).n_init == 300
     predictor.restart()
     assert predictor.n_init == 0
 
@@ -139,7 +141,7 @@ def test_memory_does_not_grow() -> None:
 
 def test_fmi_names() -> None:
     parameters = {"lambda": 1e-9, "T_s": 5e-4, "input_hold": 1, "Np": 8, "p": 3, "q": 1, "t_init": 0.0}
-    predictor = HybridPredictor(MODEL, PredictorSettings.from_fmi(parameters), start=0.5)
+    predictor = HybridPredictor(MODEL, PredictorSettings.from_fmi({"trust": False, **parameters}), start=0.5)
     assert (predictor.settings.lam, predictor.T_s, predictor.discrete.input_hold) == (1e-9, 5e-4, "foh")
     assert (predictor.Np, predictor.settings.p, predictor.settings.q, predictor.start) == (8, 3, 1, 0.5)
     assert predictor.n_features == len(predictor.weights) == 6

@@ -35,7 +35,7 @@ MODEL = ModalModel([Mode(*numbers) for numbers in MODES])
 def small(**changes: Any) -> HybridPredictor:
     values = {"T_s": TS, "Np": 20, "p": 5, "q": 3, "lam": 1e-9, "t_init": 0.0, "v_friction": V_S} | changes
     start = values.pop("start", None)
-    return HybridPredictor(MODEL, PredictorSettings(**values), start=start)
+    return HybridPredictor(MODEL, PredictorSettings(**{"trust": False, **values}), start=start)
 
 
 @lru_cache(maxsize=1)
