@@ -15,12 +15,22 @@
 
 static const double regression_lambda_min = 1e-290;
 
-/* Entry (i, j), i <= j, of [U z], its row in a tile. */
-static double *regression_entry(hsep_regression *self, uint64_t i, uint64_t j)
+/* Place of entry (i, j), i <= j, of [U z] in the tiles. */
+static uint64_t regression_place(const hsep_regression *self, uint64_t i, uint64_t j)
 {
     const uint64_t I = i / REGRESSION_TILE, J = j / REGRESSION_TILE;
     const uint64_t tile = I * self->n_tiles - I * (I + 1) / 2 + J; /* (n_tiles - I') tiles in each row above */
-    return hsep_at(self, self->tiles) + REGRESSION_STRIDE * tile + 4 * (i % REGRESSION_TILE) + j % REGRESSION_TILE;
+    return REGRESSION_STRIDE * tile + 4 * (i % REGRESSION_TILE) + j % REGRESSION_TILE;
+}
+
+static const double *regression_entry_const(const hsep_regression *self, uint64_t i, uint64_t j)
+{
+    return hsep_at_const(self, self->tiles) + regression_place(self, i, j);
+}
+
+static double *regression_entry(hsep_regression *self, uint64_t i, uint64_t j)
+{
+    return hsep_at(self, self->tiles) + regression_place(self, i, j);
 }
 
 /* Set what follows from the number of features; return the bytes of the block. */
@@ -112,11 +122,12 @@ static void regression_rotate(double *tile, int place, double *x, double pivot, 
     }
 }
 
-HSEP_API void hsep_regression_fold(hsep_regression *self)
+/* Fold the row, whose entries before a tile are 0, into the factor. */
+static void regression_fold_from(hsep_regression *self, uint64_t first)
 {
-    double *inverse_d = hsep_at(self, self->inverse_d);
-    double *x = hsep_regression_row(self);
-    double *tile = hsep_at(self, self->tiles);
+    double *inverse_d = hsep_at(self, self->inverse_d) + REGRESSION_TILE * first;
+    double *x = hsep_regression_row(self) + REGRESSION_TILE * first;
+    double *tile = regression_entry(self, REGRESSION_TILE * first, REGRESSION_TILE * first);
     /* The row still weighs 1/v. With x_j its entry at the pivot, u a row of U and d that row's weight:
      *   v' = v + x_j^2 / d          d' = d v'/v         keep = v / v' = cos^2        gain = x_j / (d v')
      *   x := x - x_j u              u := keep u + gain x = u + gain (x - x_j u)
@@ -124,8 +135,8 @@ HSEP_API void hsep_regression_fold(hsep_regression *self)
      * The last form is the cheapest and its rounding error is that of a Givens rotation divided by the cosine:
      * it is taken where cos^2 >= 1/2, and keep u + gain x, without that factor, elsewhere. */
     double v = 1.0;
-    uint64_t rows = self->n;
-    for (uint64_t left = self->n_tiles; left > 0; left--, x += 4, inverse_d += 4) {
+    uint64_t rows = self->n - REGRESSION_TILE * first;
+    for (uint64_t left = self->n_tiles - first; left > 0; left--, x += 4, inverse_d += 4) {
         const unsigned height = rows < REGRESSION_TILE ? (unsigned)rows : REGRESSION_TILE;
         rows -= height;
         double pivot[4], gain[4], keep[4];
@@ -158,7 +169,21 @@ HSEP_API void hsep_regression_fold(hsep_regression *self)
         }
         tile += REGRESSION_STRIDE * left;
     }
+}
+
+HSEP_API void hsep_regression_fold(hsep_regression *self)
+{
+    regression_fold_from(self, 0);
     self->n_samples++;
+}
+
+HSEP_API void hsep_regression_discount(hsep_regression *self, double weight)
+{
+    double *inverse_d = hsep_at(self, self->inverse_d);
+    for (uint64_t i = 0; i < self->n; i++) {
+        inverse_d[i] = fmin(inverse_d[i] / weight, 1.0 / regression_lambda_min);
+    }
+    self->residual_sum *= weight;
 }
 
 HSEP_API void hsep_regression_solve(const hsep_regression *self, double w[])
@@ -214,4 +239,72 @@ HSEP_API int hsep_regression_load(hsep_regression *self, uint64_t i)
         entry[REGRESSION_ENTRIES] = 0.0;
     }
     return 1;
+}
+
+/* Copy the rows and columns of the first features, as many as to has, with the target beside them. */
+static void regression_copy_leading(const hsep_regression *self, hsep_regression *to)
+{
+    const uint64_t n = to->n;
+    memcpy(hsep_at(to, to->inverse_d), hsep_at_const(self, self->inverse_d), (size_t)n * sizeof(double));
+    for (uint64_t i = 0; i < n; i++) {
+        for (uint64_t j = i + 1; j <= n; j++) {
+            const double *from = regression_entry_const(self, i, j < n ? j : self->n);
+            double *entry = regression_entry(to, i, j);
+            entry[0] = from[0];
+            entry[REGRESSION_ENTRIES] = from[REGRESSION_ENTRIES];
+        }
+    }
+}
+
+HSEP_API double hsep_regression_penalise(
+    const hsep_regression *self, const double penalties[], hsep_regression *solved, double w[])
+{
+    const uint64_t n = self->n, m = solved->n;
+    const double *inverse_d = hsep_at_const(self, self->inverse_d);
+    double *row = hsep_regression_row(solved);
+    regression_copy_leading(self, solved);
+    for (uint64_t i = 0; i < m; i++) {
+        const uint64_t first = i / REGRESSION_TILE;
+        memset(row + REGRESSION_TILE * first, 0, (size_t)(m + 1 - REGRESSION_TILE * first) * sizeof(double));
+        row[i] = sqrt(penalties[i]);
+        regression_fold_from(solved, first);
+    }
+    hsep_regression_solve(solved, w);
+    double sum = self->residual_sum;
+    for (uint64_t i = 0; i < n; i++) { /* [R z; 0 rho] [-w; 1], row after row */
+        double residual = *regression_entry_const(self, i, n) - (i < m ? w[i] : 0.0);
+        for (uint64_t j = i + 1; j < m; j++) {
+            residual -= *regression_entry_const(self, i, j) * w[j];
+        }
+        sum += residual * residual / inverse_d[i];
+    }
+    return sum;
+}
+
+HSEP_API double hsep_regression_leverage(hsep_regression *self)
+{
+    const double *inverse_d = hsep_at(self, self->inverse_d), *tile = hsep_at(self, self->tiles);
+    double *x = hsep_regression_row(self), sum = 0.0;
+    uint64_t rows = self->n;
+    x[rows] = 0.0;
+    /* U' y = phi from the first feature to the last, which takes each of them from the entries behind it. */
+    for (uint64_t left = self->n_tiles; left > 0; left--, x += 4, inverse_d += 4) {
+        const unsigned height = rows < REGRESSION_TILE ? (unsigned)rows : REGRESSION_TILE;
+        rows -= height;
+        for (unsigned r = 0; r < height; r++) {
+            sum += x[r] * x[r] * inverse_d[r];
+            for (unsigned c = r + 1; c < 4; c++) {
+                x[c] -= x[r] * tile[4 * r + c];
+            }
+        }
+        const double y0 = x[0], y1 = x[1], y2 = x[2], y3 = x[3];
+        const double *t = tile + REGRESSION_STRIDE;
+        for (double *to = x + 4; t < tile + REGRESSION_STRIDE * left; t += REGRESSION_STRIDE, to += 4) {
+            for (unsigned c = 0; c < 4; c++) {
+                to[c] -= (y0 * t[c] + y1 * t[4 + c]) + (y2 * t[8 + c] + y3 * t[12 + c]);
+            }
+        }
+        tile += REGRESSION_STRIDE * left;
+    }
+    return sum;
 }
