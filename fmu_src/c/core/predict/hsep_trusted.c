@@ -32,7 +32,7 @@ HSEP_API hsep_regression *hsep_trusted_regression(hsep_trusted *self)
     return (hsep_regression *)hsep_at(self, self->regression);
 }
 
-HSEP_API hsep_candidate *hsep_trusted_candidate(hsep_trusted *self, uint64_t i)
+static hsep_candidate *trusted_candidate(hsep_trusted *self, uint64_t i)
 {
     return (hsep_candidate *)hsep_at(self, self->candidates[i]);
 }
@@ -86,7 +86,7 @@ HSEP_API void hsep_trusted_init(hsep_trusted *self, const hsep_trusted_parameter
     hsep_disturbances_init(trusted_disturbances(self), parameters->settings, parameters->modes, parameters->n_modes);
     hsep_regression_init(hsep_trusted_regression(self), self->n_static + self->p, trusted_no_penalty);
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
-        hsep_candidate_init(hsep_trusted_candidate(self, i), self->Np, self->n_static, trusted_lags(self, i));
+        hsep_candidate_init(trusted_candidate(self, i), self->Np, self->n_static, trusted_lags(self, i));
     }
 }
 
@@ -102,6 +102,49 @@ HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
         const void *candidate = hsep_at_bytes(block, got.candidates[i]);
         sound = sound && hsep_candidate_valid(candidate, got.Np, got.n_static, trusted_lags(&got, i));
+    }
+    return sound;
+}
+
+HSEP_API uint64_t hsep_trusted_n_learned(const hsep_trusted *self)
+{
+    return 2 + 3 + 2 * HSEP_N_CANDIDATES + self->n_static + HSEP_N_BLENDED * (HSEP_N_BLENDED + 2);
+}
+
+HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i)
+{
+    struct {
+        double *first;
+        uint64_t n;
+    } const parts[] = {
+        {&self->n_rows, 1},
+        {&self->velocity_scale, 1},
+        {&self->scale.recent, 1},
+        {&self->scale.largest_square, 1},
+        {&self->scale.largest, 1},
+        {&trusted_candidate(self, 0)->noise_variance, 1},
+        {&trusted_candidate(self, 1)->noise_variance, 1},
+        {&trusted_candidate(self, 0)->correlation, 1},
+        {&trusted_candidate(self, 1)->correlation, 1},
+        {self->blend.weights, HSEP_N_BLENDED},
+        {hsep_at(self, self->largest), self->n_static},
+        {self->blend.gram, HSEP_N_BLENDED * HSEP_N_BLENDED},
+        {self->blend.cross, HSEP_N_BLENDED},
+    };
+    size_t part = 0;
+    for (; i >= parts[part].n; part++) {
+        i -= parts[part].n;
+    }
+    return parts[part].first + i;
+}
+
+HSEP_API int hsep_trusted_sound(hsep_trusted *self)
+{
+    const uint64_t n = hsep_trusted_n_learned(self), n_signed = HSEP_N_BLENDED * (HSEP_N_BLENDED + 1);
+    int sound = trusted_candidate(self, 0)->correlation >= 1.0 && trusted_candidate(self, 1)->correlation >= 1.0;
+    for (uint64_t i = 0; i < n; i++) {
+        const double learned = *hsep_trusted_learned(self, i);
+        sound = sound && isfinite(learned) && (i + n_signed >= n || learned >= 0.0);
     }
     return sound;
 }
@@ -140,16 +183,16 @@ static void trusted_predict(hsep_trusted *self, const double x_pb[], const doubl
         scales[i] = effect * share / fmax(largest[i], trusted_least_magnitude);
     }
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
-        hsep_candidate_solve(hsep_trusted_candidate(self, i), hsep_trusted_regression(self), scales, least);
+        hsep_candidate_solve(trusted_candidate(self, i), hsep_trusted_regression(self), scales, least);
     }
     /* The stiffness acts at the position, which the physics model alone does not give well enough. */
-    hsep_candidate_predict(hsep_trusted_candidate(self, 0), rows, past, &self->scale);
+    hsep_candidate_predict(trusted_candidate(self, 0), rows, past, &self->scale);
     for (uint64_t j = 0; j < self->Np; j++) {
-        x[j] = x_pb[j] + hsep_candidate_prediction(hsep_trusted_candidate(self, 0))[j];
+        x[j] = x_pb[j] + hsep_candidate_prediction(trusted_candidate(self, 0))[j];
     }
     hsep_disturbances_stiffness(trusted_disturbances(self), x, rows);
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
-        hsep_candidate_predict(hsep_trusted_candidate(self, i), rows, past, &self->scale);
+        hsep_candidate_predict(trusted_candidate(self, i), rows, past, &self->scale);
     }
 }
 
@@ -165,7 +208,7 @@ HSEP_API void hsep_trusted_forecast(hsep_trusted *self, const double x_d[], cons
     for (uint64_t j = 0; j < self->Np; j++) {
         e[j] = weights[0] * self->hold;
         for (uint64_t i = 0; self->predicted && i < HSEP_N_CANDIDATES; i++) {
-            e[j] += weights[1 + i] * hsep_candidate_prediction(hsep_trusted_candidate(self, i))[j];
+            e[j] += weights[1 + i] * hsep_candidate_prediction(trusted_candidate(self, i))[j];
         }
     }
 }
@@ -210,7 +253,7 @@ static double trusted_first_variance(const hsep_trusted *self, const double e[])
 static void trusted_judge(hsep_trusted *self, double n_rows, const double e[])
 {
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
-        hsep_candidate *candidate = hsep_trusted_candidate(self, i);
+        hsep_candidate *candidate = trusted_candidate(self, i);
         double variance = 0.0;
         if (self->predicted) {
             hsep_candidate_judge(candidate, e);
@@ -236,7 +279,7 @@ static void trusted_assess(hsep_trusted *self, const double e[])
         scale->recent > 0.0 ? trusted_recent * scale->recent + (1.0 - trusted_recent) * mean_square : mean_square;
     scale->largest_square = fmax(scale->largest_square, mean_square);
     for (uint64_t i = 0; self->predicted && i < HSEP_N_CANDIDATES; i++) {
-        signals[1 + i] = hsep_candidate_prediction(hsep_trusted_candidate(self, i));
+        signals[1 + i] = hsep_candidate_prediction(trusted_candidate(self, i));
     }
     for (uint64_t i = 1; i <= HSEP_N_BLENDED; i++) {
         sum = 0.0;

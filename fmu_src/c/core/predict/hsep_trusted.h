@@ -72,7 +72,14 @@ HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters
 /* The regression of all rows. */
 HSEP_API hsep_regression *hsep_trusted_regression(hsep_trusted *self);
 
-HSEP_API hsep_candidate *hsep_trusted_candidate(hsep_trusted *self, uint64_t i);
+/* The numbers learned besides it, for a warm start before the first window: their count, and the place of one of them.
+ * These are, each >= 0: n_rows, velocity_scale, the scale of the residuals as in its struct, the noise variances of the
+ * candidates, their correlations, the blend's weights and largest; then the blend's gram and cross. */
+HSEP_API uint64_t hsep_trusted_n_learned(const hsep_trusted *self);
+HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i);
+
+/* Whether these numbers are finite and in range. */
+HSEP_API int hsep_trusted_sound(hsep_trusted *self);
 
 /* Predict the residual e, (Np + p,), m, over the next window; behind it the last ones, as measured. x_d: commands,
  * x_pb: physics-based prediction, (Np,), m. Cost: m^3 / 6 multiply-adds for each candidate's m features, three times
