@@ -49,23 +49,14 @@ HSEP_API double *hsep_regression_row(hsep_regression *self);
  * before; in scalar instead of vector instructions for rows that outweigh all before them, as the first ones do. */
 HSEP_API void hsep_regression_fold(hsep_regression *self);
 
+/* Fold the row, whose entries before 4 * first are 0, into the factor, without counting it. */
+HSEP_API void hsep_regression_fold_from(hsep_regression *self, uint64_t first);
+
 /* Solve R w = z for w, (n,). Cost: n^2 / 2 multiply-adds. */
 HSEP_API void hsep_regression_solve(const hsep_regression *self, double w[]);
 
 /* Weigh all rows so far, and lambda with them, by a weight in the sum of squares, 0 <= weight <= 1. */
 HSEP_API void hsep_regression_discount(hsep_regression *self, double weight);
-
-/* Solve for the weights w of the first m features, as many as solved has, each with a penalty of its own:
- *   w = argmin_w sum_k [target(k) - w' phi(k)]^2 + sum_i penalties_i w_i^2 + lambda |w|^2
- * solved: another block, which holds the triangle with these penalties then; what it held before does not matter, and
- * its diagonal is that of hsep_regression_init. Return the first sum, lambda |w|^2 with it.
- * Cost: m^3 / 6 times 2 multiplications and 5 additions. */
-HSEP_API double hsep_regression_penalise(
-    const hsep_regression *self, const double penalties[], hsep_regression *solved, double w[]);
-
-/* phi' (R' R)^-1 phi of the row phi, (n,), in hsep_regression_row, which is used up: the variance of w' phi relative to
- * that of the noise. Cost: n^2 / 2 multiply-adds. */
-HSEP_API double hsep_regression_leverage(hsep_regression *self);
 
 /* Take over row i of a factor [R z; 0 rho], its entries i ... n, which the caller has put into
  * hsep_regression_row. All n + 1 rows make a factor. Fails, and returns 0 with the factor unchanged, if an entry

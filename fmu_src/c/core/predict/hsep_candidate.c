@@ -1,5 +1,6 @@
 #include "hsep_candidate.h"
 
+#include "hsep_penalised.h"
 #include "hsep_vector.h"
 
 #include <math.h>
@@ -86,7 +87,7 @@ HSEP_API void hsep_candidate_solve(
         penalties[i] = self->variance / (penalties[i] * penalties[i]);
     }
     self->residual_sum =
-        hsep_regression_penalise(regression, penalties, candidate_solved(self), hsep_at(self, self->weights));
+        hsep_penalised_solve(regression, penalties, candidate_solved(self), hsep_at(self, self->weights));
 }
 
 static double candidate_bounded(double value, double bound) { return fmax(-bound, fmin(value, bound)); }
@@ -127,7 +128,7 @@ static void candidate_spread(hsep_candidate *self, const double rows[], double m
     for (uint64_t j = Np; j-- > 0; rows += n_static) {
         memcpy(row, rows, (size_t)n_static * sizeof(double));
         memcpy(row + n_static, unshrunk + j + 1, (size_t)p * sizeof(double));
-        spread[j] = self->variance * hsep_regression_leverage(candidate_solved(self));
+        spread[j] = self->variance * hsep_penalised_leverage(candidate_solved(self));
     }
     if (p > 0) {
         memset(response, 0, (size_t)(Np + p) * sizeof(double));

@@ -54,12 +54,12 @@ HSEP_API void hsep_candidate_init(hsep_candidate *self, uint64_t Np, uint64_t n_
 HSEP_API int hsep_candidate_valid(const void *block, uint64_t Np, uint64_t n_static, uint64_t p);
 
 /* Solve for the weights from all rows. static_scales: (n_static,) prior standard deviations of the weights of the
- * features without lags; least_variance: of the noise, m2. Cost: that of hsep_regression_penalise. */
+ * features without lags; least_variance: of the noise, m2. Cost: that of hsep_penalised_solve. */
 HSEP_API void hsep_candidate_solve(
     hsep_candidate *self, const hsep_regression *regression, const double static_scales[], double least_variance);
 
 /* Predict a window in free run. rows: (Np, n_static), sample after sample; past: (p,) m, the last residuals.
- * Cost: Np times that of hsep_regression_leverage, and Np^2 / 2 multiply-adds. */
+ * Cost: Np times that of hsep_penalised_leverage, and Np^2 / 2 multiply-adds. */
 HSEP_API void hsep_candidate_predict(
     hsep_candidate *self, const double rows[], const double past[], const hsep_residual_scale *scale);
 

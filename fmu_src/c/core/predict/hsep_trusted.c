@@ -1,6 +1,5 @@
 #include "hsep_trusted.h"
 
-#include "hsep_disturbances.h"
 #include "hsep_vector.h"
 
 #include <math.h>
@@ -17,143 +16,13 @@ static const double trusted_growth = 30.0;
  * any learning. */
 static const double trusted_least_noise = 1e-4;
 
-/* lambda of the factor itself, m2: penalties come with each solution. */
-static const double trusted_no_penalty = 1e-40;
-
 static const double trusted_least_magnitude = 1e-150; /* of a feature */
-
-static hsep_disturbances *trusted_disturbances(hsep_trusted *self)
-{
-    return (hsep_disturbances *)hsep_at(self, self->disturbances);
-}
-
-HSEP_API hsep_regression *hsep_trusted_regression(hsep_trusted *self)
-{
-    return (hsep_regression *)hsep_at(self, self->regression);
-}
-
-static hsep_candidate *trusted_candidate(hsep_trusted *self, uint64_t i)
-{
-    return (hsep_candidate *)hsep_at(self, self->candidates[i]);
-}
-
-HSEP_API uint64_t hsep_trusted_n(const hsep_predictor_settings *settings)
-{
-    return hsep_disturbances_n(settings->q) + settings->p;
-}
-
-/* Lags of a candidate. */
-static uint64_t trusted_lags(const hsep_trusted *self, uint64_t candidate) { return candidate > 0 ? self->p : 0; }
-
-/* Set what follows from the parameters; return the bytes of the block. */
-static double trusted_lay_out(hsep_trusted *self, const hsep_trusted_parameters *parameters)
-{
-    const hsep_predictor_settings *settings = parameters->settings;
-    const hsep_trust_settings *trust = parameters->trust;
-    const double Np = (double)settings->Np, n_static = (double)hsep_disturbances_n(settings->q);
-    double end = HSEP_WORDS(hsep_trusted);
-    self->Np = settings->Np;
-    self->p = settings->p;
-    self->n_static = hsep_disturbances_n(settings->q);
-    self->least_variance = settings->lambda;
-    self->effect = trust->effect;
-    self->given_variance = trust->noise_std * trust->noise_std;
-    self->kept = trust->forgetting > 0.0 ? exp(-Np * settings->T_s / trust->forgetting) : 1.0;
-    self->largest = hsep_take(&end, n_static);
-    self->forecast_largest = hsep_take(&end, n_static);
-    self->scales = hsep_take(&end, n_static);
-    self->x = hsep_take(&end, Np);
-    self->rows = hsep_take(&end, Np * n_static);
-    self->disturbances = hsep_take_block(&end, hsep_disturbances_size(settings, parameters->n_modes));
-    self->regression = hsep_take_block(&end, hsep_regression_size(hsep_trusted_n(settings)));
-    for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
-        self->candidates[i] =
-            hsep_take_block(&end, hsep_candidate_size(self->Np, self->n_static, trusted_lags(self, i)));
-    }
-    return end * sizeof(double);
-}
-
-HSEP_API double hsep_trusted_size(const hsep_trusted_parameters *parameters)
-{
-    return trusted_lay_out(&(hsep_trusted){0}, parameters);
-}
-
-HSEP_API void hsep_trusted_init(hsep_trusted *self, const hsep_trusted_parameters *parameters)
-{
-    memset(self, 0, (size_t)hsep_trusted_size(parameters));
-    (void)trusted_lay_out(self, parameters);
-    hsep_blend_init(&self->blend);
-    hsep_disturbances_init(trusted_disturbances(self), parameters->settings, parameters->modes, parameters->n_modes);
-    hsep_regression_init(hsep_trusted_regression(self), self->n_static + self->p, trusted_no_penalty);
-    for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
-        hsep_candidate_init(trusted_candidate(self, i), self->Np, self->n_static, trusted_lags(self, i));
-    }
-}
-
-HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters *parameters)
-{
-    hsep_trusted got;
-    memcpy(&got, block, sizeof got);
-    (void)trusted_lay_out(&got, parameters); /* changes nothing where it is sound */
-    int sound =
-        memcmp(&got, block, sizeof got) == 0 && got.predicted <= 1 && got.n_rows >= 0.0 &&
-        hsep_disturbances_valid(hsep_at_bytes(block, got.disturbances), parameters->settings, parameters->n_modes) &&
-        hsep_regression_valid(hsep_at_bytes(block, got.regression), got.n_static + got.p);
-    for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
-        const void *candidate = hsep_at_bytes(block, got.candidates[i]);
-        sound = sound && hsep_candidate_valid(candidate, got.Np, got.n_static, trusted_lags(&got, i));
-    }
-    return sound;
-}
-
-HSEP_API uint64_t hsep_trusted_n_learned(const hsep_trusted *self)
-{
-    return 2 + 3 + 2 * HSEP_N_CANDIDATES + self->n_static + HSEP_N_BLENDED * (HSEP_N_BLENDED + 2);
-}
-
-HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i)
-{
-    struct {
-        double *first;
-        uint64_t n;
-    } const parts[] = {
-        {&self->n_rows, 1},
-        {&self->velocity_scale, 1},
-        {&self->scale.recent, 1},
-        {&self->scale.largest_square, 1},
-        {&self->scale.largest, 1},
-        {&trusted_candidate(self, 0)->noise_variance, 1},
-        {&trusted_candidate(self, 1)->noise_variance, 1},
-        {&trusted_candidate(self, 0)->correlation, 1},
-        {&trusted_candidate(self, 1)->correlation, 1},
-        {self->blend.weights, HSEP_N_BLENDED},
-        {hsep_at(self, self->largest), self->n_static},
-        {self->blend.gram, HSEP_N_BLENDED * HSEP_N_BLENDED},
-        {self->blend.cross, HSEP_N_BLENDED},
-    };
-    size_t part = 0;
-    for (; i >= parts[part].n; part++) {
-        i -= parts[part].n;
-    }
-    return parts[part].first + i;
-}
-
-HSEP_API int hsep_trusted_sound(hsep_trusted *self)
-{
-    const uint64_t n = hsep_trusted_n_learned(self), n_signed = HSEP_N_BLENDED * (HSEP_N_BLENDED + 1);
-    int sound = trusted_candidate(self, 0)->correlation >= 1.0 && trusted_candidate(self, 1)->correlation >= 1.0;
-    for (uint64_t i = 0; i < n; i++) {
-        const double learned = *hsep_trusted_learned(self, i);
-        sound = sound && isfinite(learned) && (i + n_signed >= n || learned >= 0.0);
-    }
-    return sound;
-}
 
 /* Begin the window: its features, at the position x_pb, and their largest magnitudes. Return whether the commanded
  * velocity has outgrown what was learned. */
 static int trusted_begin(hsep_trusted *self, const double x_d[], const double x_pb[])
 {
-    hsep_disturbances *disturbances = trusted_disturbances(self);
+    hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
     const double peak = hsep_disturbances_peak_velocity(disturbances, x_d);
     const int outgrown = peak > trusted_growth * self->velocity_scale;
     double *rows = hsep_at(self, self->rows), *largest = hsep_at(self, self->forecast_largest);
@@ -179,20 +48,20 @@ static void trusted_predict(hsep_trusted *self, const double x_pb[], const doubl
     const double *largest = hsep_at(self, self->forecast_largest);
     double *scales = hsep_at(self, self->scales), *x = hsep_at(self, self->x), *rows = hsep_at(self, self->rows);
     for (uint64_t i = 0; i < self->n_static; i++) {
-        const double share = hsep_disturbances_share(trusted_disturbances(self), i);
+        const double share = hsep_disturbances_share(hsep_trusted_disturbances(self), i);
         scales[i] = effect * share / fmax(largest[i], trusted_least_magnitude);
     }
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
-        hsep_candidate_solve(trusted_candidate(self, i), hsep_trusted_regression(self), scales, least);
+        hsep_candidate_solve(hsep_trusted_candidate(self, i), hsep_trusted_regression(self), scales, least);
     }
     /* The stiffness acts at the position, which the physics model alone does not give well enough. */
-    hsep_candidate_predict(trusted_candidate(self, 0), rows, past, &self->scale);
+    hsep_candidate_predict(hsep_trusted_candidate(self, 0), rows, past, &self->scale);
     for (uint64_t j = 0; j < self->Np; j++) {
-        x[j] = x_pb[j] + hsep_candidate_prediction(trusted_candidate(self, 0))[j];
+        x[j] = x_pb[j] + hsep_candidate_prediction(hsep_trusted_candidate(self, 0))[j];
     }
-    hsep_disturbances_stiffness(trusted_disturbances(self), x, rows);
+    hsep_disturbances_stiffness(hsep_trusted_disturbances(self), x, rows);
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
-        hsep_candidate_predict(trusted_candidate(self, i), rows, past, &self->scale);
+        hsep_candidate_predict(hsep_trusted_candidate(self, i), rows, past, &self->scale);
     }
 }
 
@@ -208,7 +77,7 @@ HSEP_API void hsep_trusted_forecast(hsep_trusted *self, const double x_d[], cons
     for (uint64_t j = 0; j < self->Np; j++) {
         e[j] = weights[0] * self->hold;
         for (uint64_t i = 0; self->predicted && i < HSEP_N_CANDIDATES; i++) {
-            e[j] += weights[1 + i] * hsep_candidate_prediction(trusted_candidate(self, i))[j];
+            e[j] += weights[1 + i] * hsep_candidate_prediction(hsep_trusted_candidate(self, i))[j];
         }
     }
 }
@@ -253,7 +122,7 @@ static double trusted_first_variance(const hsep_trusted *self, const double e[])
 static void trusted_judge(hsep_trusted *self, double n_rows, const double e[])
 {
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
-        hsep_candidate *candidate = trusted_candidate(self, i);
+        hsep_candidate *candidate = hsep_trusted_candidate(self, i);
         double variance = 0.0;
         if (self->predicted) {
             hsep_candidate_judge(candidate, e);
@@ -279,7 +148,7 @@ static void trusted_assess(hsep_trusted *self, const double e[])
         scale->recent > 0.0 ? trusted_recent * scale->recent + (1.0 - trusted_recent) * mean_square : mean_square;
     scale->largest_square = fmax(scale->largest_square, mean_square);
     for (uint64_t i = 0; self->predicted && i < HSEP_N_CANDIDATES; i++) {
-        signals[1 + i] = hsep_candidate_prediction(trusted_candidate(self, i));
+        signals[1 + i] = hsep_candidate_prediction(hsep_trusted_candidate(self, i));
     }
     for (uint64_t i = 1; i <= HSEP_N_BLENDED; i++) {
         sum = 0.0;
@@ -297,11 +166,11 @@ static void trusted_assess(hsep_trusted *self, const double e[])
 
 HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_pb[], const double e[])
 {
-    hsep_disturbances *disturbances = trusted_disturbances(self);
+    hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
     double *x = hsep_at(self, self->x);
     const double n_rows = self->n_rows;                 /* of the prediction */
     if (self->forecast_scale != self->velocity_scale) { /* outgrown */
-        hsep_regression_init(hsep_trusted_regression(self), self->n_static + self->p, trusted_no_penalty);
+        hsep_regression_init(hsep_trusted_regression(self), self->n_static + self->p, HSEP_NO_PENALTY);
         self->n_rows = 0.0;
     }
     self->velocity_scale = self->forecast_scale;

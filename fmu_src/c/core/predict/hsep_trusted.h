@@ -14,6 +14,7 @@
 #include "hsep_api.h"
 #include "hsep_blend.h"
 #include "hsep_candidate.h"
+#include "hsep_disturbances.h"
 #include "hsep_layout.h"
 #include "hsep_physics.h"
 #include "hsep_regression.h"
@@ -21,7 +22,8 @@
 
 #include <stdint.h>
 
-#define HSEP_N_CANDIDATES 2 /* without lags, with lags */
+#define HSEP_N_CANDIDATES 2   /* without lags, with lags */
+#define HSEP_NO_PENALTY 1e-40 /* lambda of the factor itself, m2: penalties come with each solution */
 
 typedef struct {
     const hsep_predictor_settings *settings;
@@ -71,6 +73,9 @@ HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters
 
 /* The regression of all rows. */
 HSEP_API hsep_regression *hsep_trusted_regression(hsep_trusted *self);
+
+HSEP_API hsep_disturbances *hsep_trusted_disturbances(hsep_trusted *self);
+HSEP_API hsep_candidate *hsep_trusted_candidate(hsep_trusted *self, uint64_t i);
 
 /* The numbers learned besides it, for a warm start before the first window: their count, and the place of one of them.
  * These are, each >= 0: n_rows, velocity_scale, the scale of the residuals as in its struct, the noise variances of the
