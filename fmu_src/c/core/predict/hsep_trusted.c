@@ -16,6 +16,9 @@ static const double trusted_growth = 30.0;
  * any learning. */
 static const double trusted_least_noise = 1e-4;
 
+/* Velocity, m/s, below which a command is at rest: ratios of smaller ones may underflow. */
+static const double trusted_least_velocity = 1e-200;
+
 static const double trusted_least_magnitude = 1e-150; /* of a feature */
 
 /* Begin the window: its features, at the position x_pb, and their largest magnitudes. Return whether the commanded
@@ -24,7 +27,7 @@ static int trusted_begin(hsep_trusted *self, const double x_d[], const double x_
 {
     hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
     const double peak = hsep_disturbances_peak_velocity(disturbances, x_d);
-    const int outgrown = peak > trusted_growth * self->velocity_scale;
+    const int outgrown = peak > fmax(trusted_growth * self->velocity_scale, trusted_least_velocity);
     double *rows = hsep_at(self, self->rows), *largest = hsep_at(self, self->forecast_largest);
     self->forecast_scale = outgrown ? peak : self->velocity_scale;
     hsep_disturbances_begin(disturbances, x_d, x_pb, self->forecast_scale, rows);
