@@ -39,6 +39,8 @@ def test_the_core_needs_libm_alone() -> None:
         "bcmp",  # what a compiler makes of memcmp where only equality counts
         "sqrt",
         "log",
+        "exp",
+        "pow",
         "cos",
         "tanh",
         "ldexp",

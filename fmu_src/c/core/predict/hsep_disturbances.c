@@ -115,7 +115,9 @@ HSEP_API void hsep_disturbances_begin(
     for (uint64_t j = self->Np; j-- > 0; rows += self->n) {
         const double v_d = (x_d[j] - self->x_d) / self->T_s, v_pb = (x_pb[j] - self->x_pb[0]) / self->T_s;
         self->x_d = x_d[j];
-        memmove(self->x_pb + 1, self->x_pb, DISTURBANCES_DIFFERENCES * sizeof(double));
+        for (int i = DISTURBANCES_DIFFERENCES; i > 0; i--) {
+            self->x_pb[i] = self->x_pb[i - 1];
+        }
         self->x_pb[0] = x_pb[j];
         disturbances_differences(self, rows);
         for (uint64_t i = 0; i < DISTURBANCES_FRICTION; i++) {
