@@ -8,6 +8,10 @@
 
 static const double regression_lambda_min = 1e-290;
 
+/* Bound on what a weight makes of a diagonal entry of D: far below any penalty, and no square of a row times its
+ * reciprocal overflows. */
+static const double regression_discounted_min = 1e-100;
+
 /* Set what follows from the number of features; return the bytes of the block. */
 static double regression_lay_out(hsep_regression *self, uint64_t n)
 {
@@ -155,7 +159,7 @@ HSEP_API void hsep_regression_discount(hsep_regression *self, double weight)
 {
     double *inverse_d = hsep_at(self, self->inverse_d);
     for (uint64_t i = 0; i < self->n; i++) {
-        inverse_d[i] = fmin(inverse_d[i] / weight, 1.0 / regression_lambda_min);
+        inverse_d[i] = fmin(inverse_d[i] / weight, fmax(inverse_d[i], 1.0 / regression_discounted_min));
     }
     self->residual_sum *= weight;
 }

@@ -80,7 +80,7 @@ HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters
     memcpy(&got, block, sizeof got);
     (void)trusted_lay_out(&got, parameters); /* changes nothing where it is sound */
     int sound =
-        memcmp(&got, block, sizeof got) == 0 && got.predicted <= 1 && got.n_rows >= 0.0 &&
+        memcmp(&got, block, sizeof got) == 0 && got.predicted <= 1 &&
         hsep_disturbances_valid(hsep_at_bytes(block, got.disturbances), parameters->settings, parameters->n_modes) &&
         hsep_regression_valid(hsep_at_bytes(block, got.regression), got.n_static + got.p);
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
