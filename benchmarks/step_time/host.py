@@ -29,6 +29,7 @@ HERE = Path(__file__).parent
 C_SOURCES = HERE.parents[1] / "fmu_src" / "c"
 
 PREDICTOR = {"Np": 100, "p": 50, "q": 3, "lambda": 1e-12, "T_s": 1e-3, "t_init": 0.3, "input_hold": 0, "dead_time": 0}
+PREDICTOR |= {"trust": 0, "effect": 0.0, "noise_std": 0.0, "forgetting": 0.0}
 """The paper's settings."""
 
 

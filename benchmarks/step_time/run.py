@@ -40,11 +40,14 @@ CASES = ((50, 3), (100, 99))
 """p and q: the paper's, n = 55, and the largest, n = 201."""
 
 NP, LAM, REPETITIONS = 100, 1e-12, 5
-COUNTED_STEPS = 360
+COUNTED_STEPS, TRUST_STEPS = 360, 2000
 MEDIAN_OVER_LAPACK_MAX = 5.0
 """Limit at n = 55; the aim is 3."""
 TAIL_OVER_MEDIAN_MAX = 15.0
 """Limit of p99.9 in time and of the most expensive step in instructions, both over the median step."""
+
+TRUST_MOST, TRUST_MEDIAN_OVER_PAPER_MAX = 10e6, 6.0
+"""Limits with trust: instructions of the most expensive step, and of the median one over that of the paper's model."""
 
 
 def lapack_ns_per_sample(n: int) -> float:
@@ -147,6 +150,20 @@ def limits(result: dict[str, Any], counts: Array | None) -> list[tuple[bool, str
     return checks
 
 
+def trust_limits(counts: Array, paper: Array) -> list[tuple[bool, str]]:
+    """Compare the instructions with trust with their limits, and those of the paper's model."""
+    most, median = float(np.max(counts)), float(np.median(counts))
+    ratio = median / float(np.median(paper))
+    return [
+        (most <= TRUST_MOST, f"trust: most expensive step = {most:.0f} instructions, limit ≤ {TRUST_MOST:g}"),
+        (
+            ratio <= TRUST_MEDIAN_OVER_PAPER_MAX,
+            f"trust: median step = {median:.0f} instructions, {ratio:.2f} of the paper's model, "
+            f"limit ≤ {TRUST_MEDIAN_OVER_PAPER_MAX:g}",
+        ),
+    ]
+
+
 def draw(results: list[dict[str, Any]], path: Path) -> None:
     """Draw how many steps took longer than a time, beside the empty loop."""
     import matplotlib as mpl
@@ -182,7 +199,11 @@ def main() -> int:
             if counts is not None:
                 counts = counts[NP:]  # learning has begun
             show(result, counts, console)
-            for held, text in limits(result, counts):
+            checks = limits(result, counts)
+            if counts is not None and (p, q) == CASES[0]:
+                trusted = instructions(host, {"trust": 1}, TRUST_STEPS, folder / "callgrind_trust")
+                checks += trust_limits(trusted[NP:], counts) if trusted is not None else []
+            for held, text in checks:
                 console.print(f"{'held  ' if held else 'MISSED'} {text}", highlight=False)
                 missed += not held
             results.append(result)

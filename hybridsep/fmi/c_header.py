@@ -102,6 +102,7 @@ def _row(variable: Variable) -> str:
         "-HUGE_VAL" if variable.minimum is None else _double(variable.minimum),
         "HUGE_VAL" if variable.maximum is None else _double(variable.maximum),
         _double(variable.nonzero),
+        "HUGE_VAL" if variable.automatic is None else _double(variable.automatic),
         str(int(variable.learned)),
     ]
     return "{" + ", ".join(fields) + "}"

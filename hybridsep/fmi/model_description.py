@@ -132,12 +132,19 @@ def _add_variable(parent: ET.Element, reference: int, variable: Variable) -> Non
         values["unit"] = str(variable.unit)
         if variable.display_unit:
             values["displayUnit"] = variable.display_unit
-    for key, number in (("min", variable.minimum), ("max", variable.maximum), ("nominal", variable.nominal)):
+    for key, number in (("min", _least(variable)), ("max", variable.maximum), ("nominal", variable.nominal)):
         if number is not None and variable.kind != "Boolean":
             values[key] = _text(float(number) if variable.kind == "Real" else int(number))
     if variable.start is not None:
         values["start"] = _text(float(variable.start) if variable.kind == "Real" else variable.start)
     ET.SubElement(element, variable.kind, values)
+
+
+def _least(variable: Variable) -> float | None:
+    """Return the least value, an automatic choice included."""
+    if variable.minimum is None or variable.automatic is None:
+        return variable.minimum
+    return min(variable.minimum, variable.automatic)
 
 
 def _fill_structure(structure: ET.Element, table: Sequence[Variable]) -> None:

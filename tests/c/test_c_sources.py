@@ -39,6 +39,8 @@ def test_the_core_needs_libm_alone() -> None:
         "bcmp",  # what a compiler makes of memcmp where only equality counts
         "sqrt",
         "log",
+        "exp",
+        "pow",
         "cos",
         "tanh",
         "ldexp",
@@ -94,6 +96,8 @@ def test_one_header_serves_c_plus_plus() -> None:
     [
         ("predictor", [[], ["Np=7", "p=7", "q=6"], ["Np=1", "p=1", "q=0"], ["Np=150", "p=2", "q=0", "dead_time=13"]]),
         ("predictor_2", [["input_hold=1", "t_init=0"], ["p=100", "q=99", "lambda=1e-20"]]),
+        ("predictor_2", [["trust=1", *pairs] for pairs in ([], ["Np=7", "p=7", "q=6"], ["Np=1", "p=1", "q=0"])]),
+        ("predictor", [["trust=1", "Np=150", "p=2", "q=0", "dead_time=13", "forgetting=0.001"]]),
         (
             "compensator",
             [

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
+import numpy as np
 import pytest
 import staircase_data as staircase
 from c_core import TS, CModel, RefusedError, write_trajectory
@@ -38,8 +40,8 @@ def test_foreign_truncated_and_damaged_states_are_refused(name: str, tmp_path: P
         model.check_state(b"")
     with pytest.raises(RefusedError, match="belongs to another model"):
         model.check_state(b"\x00" + blob[1:])
-    with pytest.raises(RefusedError, match="must be of version 3, got 4"):
-        model.check_state(blob[:8] + struct.pack("<Q", 4) + blob[16:])
+    with pytest.raises(RefusedError, match="must be of version 4, got 5"):
+        model.check_state(blob[:8] + struct.pack("<Q", 5) + blob[16:])
     with pytest.raises(RefusedError, match="saved with other parameters"):
         model.check_state(blob[:24] + struct.pack("<Q", 2) + blob[32:])
     if name != "feed_drive":  # its state has no numbers that must fit together
@@ -57,3 +59,29 @@ def test_a_state_of_other_parameters_is_refused() -> None:
     blob = CModel("predictor", {"lambda": 1e-9}).initialise().state.tobytes()
     with pytest.raises(RefusedError, match="saved with other parameters"):
         CModel("predictor").initialise().check_state(blob)
+
+
+def test_damaged_states_with_trust_are_refused_or_can_be_used() -> None:
+    values = {"trust": 1.0, "Np": 5, "p": 2, "q": 1, "dead_time": 2}
+    model = CModel("predictor", values).initialise()
+    for k in range(23):
+        model["x_d_ahead"], model["x_meas"] = 1e-3 * np.sin(0.1 * k), 1e-3 * np.sin(0.1 * k - 0.7)
+        model.step(k * TS)
+    state = model.state.copy()
+    refused = 0
+    for place in (*range(4, 100), *range(100, len(state), 11)):  # structs, and some of all arrays
+        for wrong in (2.0**60, -1.0, np.inf, np.nan, float(np.uint64(2**60).view(np.float64))):
+            damaged = state.copy()
+            damaged[place] = wrong
+            try:
+                model.check_state(damaged.tobytes())
+            except RefusedError:
+                refused += 1
+                continue
+            other = CModel("predictor", values)
+            other.state = damaged
+            with suppress(RefusedError):  # what was learned may be nonsense, but no memory is touched
+                for k in range(23, 30):
+                    other.step(k * TS)
+    assert refused > 100
+    model.check_state(state.tobytes())

@@ -108,7 +108,7 @@ def test_weights_and_samples_have_one_model_each(tmp_path: Path, trained: Path) 
 def test_damaged_files_leave_the_predictor_as_it_was(trained: Path) -> None:
     content = weights_file(HybridPredictor.load(trained))
     predictor = MACHINE.new_predictor()
-    first = 32 + 32 * len(learned_settings(predictor))  # of the triangle, behind the head and the settings
+    first = 40 + 32 * len(learned_settings(predictor))  # of the triangle, behind the head and the settings
     zero = sealed(content[:first] + bytes(8) + content[first + 8 : -8])
     infinite = sealed(content[:first] + struct.pack("<d", np.inf) + content[first + 8 : -8])
     longer = sealed(content[:-8] + bytes(8))
@@ -175,9 +175,60 @@ def test_no_mutation_of_the_file_is_accepted_in_c(tmp_path: Path) -> None:
     model.initialise()
 
 
+TRUST = {"p": 4, "q": 2, "Np": 20, "trust": 1}
+
+
+def trained_with_trust() -> HybridPredictor:
+    """Return a predictor of the default machine with short windows that has learned with trust."""
+    settings = replace(MACHINE.predictor_settings, p=4, q=2, Np=20, trust=True)
+    predictor = HybridPredictor(ModalModel([Mode(**c_core.SPRING_MASS_DAMPER)]), settings, start=0.0)
+    for k in range(20):
+        command = 1e-3 * np.sin(0.01 * np.arange(20 * k, 20 * k + 20))
+        predictor.predict(command)
+        predictor.update(0.99 * command)
+    return predictor
+
+
+def test_no_mutation_of_a_file_with_trust_is_accepted(tmp_path: Path) -> None:
+    # Neither what fails the checksum nor, with another checksum, what has wrong numbers.
+    content = weights_file(trained_with_trust())
+    settings = replace(MACHINE.predictor_settings, p=4, q=2, Np=20, trust=True)
+    predictor = HybridPredictor(ModalModel([Mode(**c_core.SPRING_MASS_DAMPER)]), settings)
+    model, file = CModel("predictor", TRUST, tmp_path), tmp_path / WEIGHTS_FILE
+    first = 40 + 32 * len(learned_settings(predictor))
+    body = content[:-8]
+    trusted = predictor.trusted
+    assert trusted is not None
+    n_numbers = 9 + 3 + trusted.static.n + 9 + 3
+    assert struct.unpack_from("<Q", body, 32) == (n_numbers,)
+    nonsense = [
+        *(body[:i] + struct.pack("<d", wrong) + body[i + 8 :] for i in (first, first + 80) for wrong in (-1.0, np.nan)),
+        *(body[:i] + struct.pack("<d", 0.5) + body[i + 8 :] for i in (first + 56, first + 64)),  # correlations
+        *(body[:32] + struct.pack("<Q", n) + body[40:] for n in (0, n_numbers - 1, n_numbers + 1, 2**63)),
+        body[:first] + body[first + 8 :],
+        body[:first] + bytes(8) + body[first:],
+    ]
+    for changed in (*mutations(content, 2000), *map(sealed, nonsense)):
+        with pytest.raises(StateError):
+            restore_weights(predictor, changed)
+        file.write_bytes(changed)
+        assert refusal(model.initialise)
+    assert predictor.regression.n_samples == trusted.n_rows == 0
+    file.write_bytes(content)
+    model.initialise()
+    restore_weights(predictor, content)
+    assert weights_file(predictor) == content
+
+
 def test_both_flavours_say_the_same_of_other_settings(tmp_path: Path) -> None:
     description = c_core.DESCRIPTIONS["predictor_2"]
-    for changes in ({"p": 30, "q": 9}, {"lambda": 1e-8}, {"T_s": 1e-3 / 3}, {"input_hold": 1, "dead_time": 7}):
+    for changes in (
+        {"p": 30, "q": 9},
+        {"lambda": 1e-8},
+        {"T_s": 1e-3 / 3},
+        {"input_hold": 1, "dead_time": 7},
+        {"trust": 1},
+    ):
         learned, now = (
             HybridPredictor(
                 ModalModel([Mode(**mode) for mode in modes], int(values.pop("dead_time"))),

@@ -1,7 +1,8 @@
 """The implementations against the library, output by output and sample by sample, in closed loops of the library.
 
-1e-11 m for a predictor and for a compensator with its usual limits, 1e-9 m for all other parameters of a compensator,
-whose loop amplifies what is rounded apart; a pythonfmu FMU is the library itself and agrees to the last bit.
+1e-12 m for a predictor with trust, 1e-11 m for the paper's and for a compensator with its usual limits, 1e-9 m for all
+other parameters of a compensator, whose loop amplifies what is rounded apart; a pythonfmu FMU is the library itself and
+agrees to the last bit.
 """
 
 from __future__ import annotations
@@ -67,13 +68,44 @@ def test_the_staircase_is_predicted_as_by_the_library(new_stream: StreamMaker, p
         {"p": 10, "q": 2, "t_init": 0.2505, "lambda": 1e-9},
         {"p": 10, "input_hold": 1, "dead_time": 3},
         {"p": 10, "dead_time": 150, "t_init": 1e6},
-        {"T_s": 2e-3, "p": 20},
+        {"T_s": 2e-3, "p": 20, "t_init": -1.0},
         {"mode[1].zeta": 0.3, "mode[2].f_n": 70.0},
     ],
     ids=named,
 )
 def test_every_parameter_predicts_as_in_the_library(new_stream: StreamMaker, values: dict[str, Value]) -> None:
     assert_agreement(new_stream, 1500, values, 1e-11)
+
+
+@on_all((PREDICTOR,), needs="agreement")
+@pytest.mark.parametrize("start", [0.0, 0.1])
+def test_the_staircase_is_predicted_with_trust_as_by_the_library(new_stream: StreamMaker, start: float) -> None:
+    loop = assert_agreement(new_stream, 2550, {"trust": True, "t_init": -1.0}, 1e-12, start=start)
+    assert (loop.column(PREDICTOR, "hybrid_active")[100:] == 1.0).all()  # no warm-up
+    assert loop.column(PREDICTOR, "rms_h")[-1] < 0.5 * loop.column(PREDICTOR, "rms_pb")[-1]
+
+
+@on_all((STAGE_PREDICTOR,), needs="agreement")
+@pytest.mark.parametrize("path", ["staircase", "spiral"])
+@pytest.mark.parametrize(
+    "values",
+    [
+        {},
+        {"Np": 7, "p": 7, "q": 6, "t_init": -1.0},
+        {"Np": 1, "p": 1, "q": 0},
+        {"Np": 30, "p": 1, "q": 0, "t_init": 0.2505},
+        {"p": 10, "input_hold": 1, "dead_time": 3},
+        {"p": 10, "dead_time": 150},
+        {"p": 20, "effect": 1e-4, "noise_std": 1e-6, "forgetting": 0.2},
+        {"p": 20, "q": 2, "lambda": 1e-30, "forgetting": 1e-3, "T_s": 2e-3},
+    ],
+    ids=named,
+)
+def test_every_parameter_predicts_with_trust_as_in_the_library(
+    new_stream: StreamMaker, values: dict[str, Value], path: str
+) -> None:
+    n = 250 if values.get("Np") == 1 else 850
+    assert_agreement(new_stream, n, {"trust": True, **values}, 1e-12, path=path)
 
 
 @on_all((COMPENSATOR,), needs="agreement")
@@ -94,7 +126,7 @@ def test_the_staircase_is_compensated_as_by_the_library(new_stream: StreamMaker,
         {"Np": 50, "p": 50, "q": 40, "lambda": 1e-8, "t_init": 0.1},
         PAPER | TIGHT,  # nearly every plan is bounded
         PAPER | TIGHT | {"Np": 50, "p": 20, "t_init": 0.1},
-        PAPER | {"change_max": 2e-4, "t_init": 0.1},
+        PAPER | {"change_max": 2e-4, "t_init": -1.0},
         PAPER | {"v_friction": 0.0},
         PAPER | {"no_reversal": 0, "t_init": 0.1},
         PAPER | {"compensate": 0},

@@ -69,6 +69,11 @@ def test_rollback_is_exact_with_short_windows(new_stream: StreamMaker) -> None:
     assert_exact(new_stream, SHORT[new_stream.model])
 
 
+@on_all((PREDICTOR,))
+def test_rollback_is_exact_with_trust(new_stream: StreamMaker) -> None:
+    assert_exact(new_stream, SHORT[PREDICTOR] | {"trust": True, "forgetting": 0.3})
+
+
 @on_all((COMPENSATOR,))
 def test_rollback_is_exact_while_a_bounded_plan_is_solved(new_stream: StreamMaker) -> None:
     # It is there 8 samples after its window has begun.
@@ -86,6 +91,32 @@ def test_a_state_goes_on_in_a_second_instance(new_stream: StreamMaker, cut: int)
     assert second.save() == blob
     assert steps(second, cut, cut + 150) == steps(first, cut, cut + 150)
     assert second.save() == first.save()
+
+
+@on_all((PREDICTOR,))
+def test_a_state_with_trust_goes_on_in_a_second_instance(new_stream: StreamMaker) -> None:
+    first, second = new_stream(), new_stream()
+    initialise(first, trust=True)
+    steps(first, 0, 150)
+    blob = first.save()
+    second.restore(blob)  # without trust of its own
+    assert second.save() == blob
+    assert steps(second, 150, 300) == steps(first, 150, 300)
+
+
+@on_all((PREDICTOR,))
+def test_a_reset_ends_trust(new_stream: StreamMaker) -> None:
+    stream, fresh = new_stream(), new_stream()
+    initialise(stream, trust=True)
+    with_trust = steps(stream, 0, 150)
+    stream.reset()
+    for each in (stream, fresh):
+        initialise(each)
+    expected = steps(fresh, 0, 150)
+    assert steps(stream, 0, 150) == expected != with_trust
+    stream.reset()
+    initialise(stream, trust=True)
+    assert steps(stream, 0, 150) == with_trust
 
 
 @on_all((PREDICTOR,))

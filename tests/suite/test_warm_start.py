@@ -4,14 +4,23 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 from driving import closed_loop, replay, steps
 from library_models import trained_predictor
+from library_stream import LookAheadStream
 from stream import COMPENSATOR, LIBRARY, LOOK_AHEADS, OUTPUTS, PREDICTOR, PYTHON, RefusedStreamError, Value
 from streams import StreamMaker, on_all
+
+from hybridsep.evaluate.backtest import backtest
+from hybridsep.fmi.weights import weights_file
+from hybridsep.machine import load_machine
+from hybridsep.plants.plant import simulate
+from hybridsep.plants.trajectory import staircase
 
 Trained = Callable[[str], Path]
 
@@ -126,3 +135,35 @@ def test_what_does_not_shape_the_features_may_be_another(new_stream: StreamMaker
     stream = new_stream(weights=weights(new_stream.model))
     stream.initialise({"Np": 60, "t_init": 0.1})
     steps(stream, 0, 130)
+
+
+@cache
+def learned_with_trust() -> bytes:
+    """Return the ``weights.bin`` of the default machine's predictor with trust after one staircase."""
+    machine = load_machine("spring_mass_damper")
+    predictor = machine.new_predictor(replace(machine.predictor_settings, p=20, trust=True))
+    backtest(predictor, staircase(), simulate(machine.new_plant(), staircase(), machine.T_s))
+    return weights_file(predictor)
+
+
+@on_all((PREDICTOR,))
+def test_what_was_learned_with_trust_is_all_there_again(new_stream: StreamMaker) -> None:
+    learned, values = learned_with_trust(), {"trust": True, "p": 20, "t_init": -1.0}
+    cold, warm = LookAheadStream(PREDICTOR), LookAheadStream(PREDICTOR, learned)
+    stream = new_stream.planted(learned)
+    runs = []
+    for each in (cold, warm, stream):
+        each.initialise(values)
+        runs.append(np.array(steps(each, 0, 650)))
+    tolerance = 0.0 if new_stream.implementation in (LIBRARY, PYTHON) else 1e-12
+    np.testing.assert_allclose(runs[2], runs[1], rtol=0, atol=tolerance)
+    rms_h = OUTPUTS[PREDICTOR].index("rms_h")
+    assert runs[1][-1, rms_h] != runs[0][-1, rms_h]
+
+
+@on_all(LOOK_AHEADS)
+def test_what_was_learned_with_trust_is_for_no_other_model(new_stream: StreamMaker) -> None:
+    stream = new_stream.planted(learned_with_trust())
+    said = "trust must be 1, with which weights.bin was learned, got 0"
+    with pytest.raises(RefusedStreamError, match=re.escape(said)):
+        stream.initialise({"p": 20})

@@ -15,6 +15,7 @@ from staircase_data import commanded
 from stream import COMPENSATOR, LOOK_AHEADS, OUTPUTS, PREDICTOR, TRAJECTORY, Array, Stream, Value, kind_of, machine_of
 
 from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.trajectory import spiral
 
 T_S = 1e-3  # s
 
@@ -103,8 +104,9 @@ def closed_loop(
     weights: Path | None = None,
     size: float = 1.0,
     sensor: Sensor = _faithful,
+    path: str = "staircase",
 ) -> Loop:
-    """Return a closed loop over the staircase; the same is run once.
+    """Return a closed loop over a path; the same is run once.
 
     Parameters
     ----------
@@ -119,16 +121,24 @@ def closed_loop(
     weights : Path, optional
         Saved predictor that the look-ahead starts warm with.
     size : float
-        Of the staircase, as a fraction.
+        Of the path, as a fraction.
     sensor : function
+    path : {"staircase", "spiral"}
+        The spiral is the X axis' part of it.
     """
     given = {**(values or {}), "x_d_ahead": start, "x_meas": start}
-    return _closed_loop(model, n, tuple(given.items()), weights, size, sensor)
+    return _closed_loop(model, n, tuple(given.items()), weights, size, sensor, path)
 
 
 @cache
 def _closed_loop(
-    model: str, n: int, given: tuple[tuple[str, Value], ...], weights: Path | None, size: float, sensor: Sensor
+    model: str,
+    n: int,
+    given: tuple[tuple[str, Value], ...],
+    weights: Path | None,
+    size: float,
+    sensor: Sensor,
+    path: str,
 ) -> Loop:
     machine, values = machine_of(model), dict(given)
     assert machine.plant is not None
@@ -137,7 +147,7 @@ def _closed_loop(
     T_s = float(values.get("T_s", T_S))
     stream.initialise(values)
     plant.reset(start)
-    r, x = size * commanded()[:n] + start, np.empty(n)
+    r, x = size * (commanded() if path == "staircase" else spiral()[0])[:n] + start, np.empty(n)
     outputs = [stream.outputs()]
     for k in range(n):
         x[k] = sensor(k, encoder.measure(plant.x), float(x[k - 1]) if k else start)

@@ -7,6 +7,7 @@
 #include <string.h>
 
 static const double check_warm_up_tolerance = 1e-6; /* samples */
+static const double check_warm_up = 0.3;            /* s, where it is automatic */
 static const double check_position_max = 1e3;       /* m */
 
 HSEP_API hsep_status hsep_message_add(char message[], const char *format, ...)
@@ -61,9 +62,20 @@ static void check_range_text(char text[], size_t size, const hsep_variable *v)
     const int has_unit = v->unit[0] != '\0' && strcmp(v->unit, "1") != 0;
     const char *space = has_unit ? " " : "", *unit = has_unit ? v->unit : "";
     const char *zero = v->nonzero > 0.0 ? "0 or " : "";
+    char automatic[HSEP_NUMBER_SIZE] = "";
+    if (isfinite(v->automatic)) {
+        snprintf(automatic, sizeof automatic, "%g (automatic) or ", v->automatic);
+    }
     snprintf(
-        text, size, "%s%g " HSEP_TO " %.10g%s%s", zero, v->nonzero > 0.0 ? v->nonzero : v->minimum, v->maximum, space,
-        unit);
+        text, size, "%s%s%g " HSEP_TO " %.10g%s%s", automatic, zero, v->nonzero > 0.0 ? v->nonzero : v->minimum,
+        v->maximum, space, unit);
+}
+
+/* Whether a number is in the range of a parameter. */
+static int check_allows(const hsep_variable *v, double value)
+{
+    return value == v->automatic ||
+           (value >= v->minimum && value <= v->maximum && (value == 0.0 || fabs(value) >= v->nonzero));
 }
 
 HSEP_API int hsep_check_parameters(const hsep_context *context, const double values[], char message[])
@@ -81,7 +93,7 @@ HSEP_API int hsep_check_parameters(const hsep_context *context, const double val
             hsep_message_add(message, "%s must be finite, got %s", v->name, number);
         } else if (v->kind == HSEP_INTEGER && value != floor(value)) {
             hsep_message_add(message, "%s must be a whole number, got %s", v->name, number);
-        } else if (value < v->minimum || value > v->maximum || (value != 0.0 && fabs(value) < v->nonzero)) {
+        } else if (!check_allows(v, value)) {
             check_range_text(range, sizeof range, v);
             hsep_message_add(message, "%s must be %s, got %s", v->name, range, number);
         } else {
@@ -105,6 +117,12 @@ HSEP_API int hsep_check_lags(double Np, double p, double q, char message[])
         problems++;
     }
     return problems;
+}
+
+HSEP_API double hsep_warm_up(double t_init, int trust)
+{
+    const double automatic = trust ? 0.0 : check_warm_up;
+    return t_init < 0.0 ? automatic : t_init;
 }
 
 HSEP_API double hsep_warm_up_samples(double t_init, double T_s)

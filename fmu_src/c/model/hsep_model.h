@@ -33,12 +33,13 @@ typedef struct {
     const char *unit; /* "" if it has none */
     hsep_kind kind;
     hsep_causality causality;
-    int tunable;    /* a parameter that may be set while the simulation runs */
-    double start;   /* 0 for what is calculated */
-    double minimum; /* -HUGE_VAL if there is none */
-    double maximum; /* HUGE_VAL if there is none */
-    double nonzero; /* least value that is not 0; 0 if there is none */
-    int learned;    /* a parameter that what was learned depends on */
+    int tunable;      /* a parameter that may be set while the simulation runs */
+    double start;     /* 0 for what is calculated */
+    double minimum;   /* -HUGE_VAL if there is none */
+    double maximum;   /* HUGE_VAL if there is none */
+    double nonzero;   /* least value that is not 0; 0 if there is none */
+    double automatic; /* value beside the range that stands for an automatic choice; HUGE_VAL if there is none */
+    int learned;      /* a parameter that what was learned depends on */
 } hsep_variable;
 
 /* What stays the same for one instance: the generated table and where its resources are. */

@@ -7,15 +7,15 @@
 #include <string.h>
 
 #define WEIGHTS_FILE "weights.bin"
-#define WEIGHTS_MAGIC "HSEPWGT3"
+#define WEIGHTS_MAGIC "HSEPWGT4"
 #define WEIGHTS_CHUNK 512 /* bytes that are summed up at once, a multiple of 8 */
 
 typedef struct {
     char magic[8];
-    uint64_t n_settings, n_modes, n_samples;
+    uint64_t n_settings, n_modes, n_samples, n_trusted;
 } weights_head;
 
-HSEP_ASSERT_WORDS(weights_head, 4);
+HSEP_ASSERT_WORDS(weights_head, 5);
 
 typedef struct {
     char name[24]; /* filled with 0 */
@@ -106,17 +106,31 @@ static int weights_compare_settings(
             weights_compare(setting.name, setting.value, values[place], variable->kind, message);
             n_missing -= variable->learned != 0;
         } else if (strncmp(setting.name, "mode[", 5) != 0) {
-            weights_compare(setting.name, setting.value, 0.0, HSEP_REAL, message);
+            const hsep_kind kind = strcmp(setting.name, "trust") == 0 ? HSEP_BOOLEAN : HSEP_REAL;
+            weights_compare(setting.name, setting.value, 0.0, kind, message);
         }
     }
     return n_missing == 0 || message[0] != '\0';
 }
 
+/* Read what the residual model that can be trusted has learned besides the factor: 0 if it is damaged. */
+static int weights_take_trusted(FILE *file, hsep_trusted *trusted)
+{
+    for (uint64_t i = 0; trusted != NULL && i < hsep_trusted_n_learned(trusted); i++) {
+        if (fread(hsep_trusted_learned(trusted, i), sizeof(double), 1, file) != 1) {
+            return 0;
+        }
+    }
+    return trusted == NULL || hsep_trusted_sound(trusted);
+}
+
 /* Read the file: 0 if it is damaged; with a message, if it was learned with other settings. */
 static int weights_take(
-    FILE *file, const hsep_context *context, const double values[], uint64_t n_modes, hsep_regression *regression,
+    FILE *file, const hsep_context *context, const double values[], uint64_t n_modes, hsep_predictor *predictor,
     char message[])
 {
+    hsep_regression *regression = hsep_predictor_regression(predictor);
+    hsep_trusted *trusted = hsep_predictor_trusted(predictor);
     weights_head head;
     double size = 0.0;
     if (!weights_whole(file, &size) || fread(&head, sizeof head, 1, file) != 1 ||
@@ -127,8 +141,11 @@ static int weights_take(
     if (!weights_compare_settings(file, context, values, head.n_settings, message) || message[0] != '\0') {
         return 0;
     }
-    const double n = (double)regression->n, words = 4.0 * (double)head.n_settings + 0.5 * (n + 1.0) * (n + 2.0) + 1.0;
-    if (size != (double)sizeof head + words * (double)sizeof(double)) {
+    const uint64_t n_trusted = trusted != NULL ? hsep_trusted_n_learned(trusted) : 0;
+    const double n = (double)regression->n, settings = 4.0 * (double)head.n_settings;
+    const double words = settings + (double)n_trusted + 0.5 * (n + 1.0) * (n + 2.0) + 1.0;
+    if (head.n_trusted != n_trusted || size != (double)sizeof head + words * (double)sizeof(double) ||
+        !weights_take_trusted(file, trusted)) {
         return 0;
     }
     for (uint64_t i = 0; i <= regression->n; i++) { /* row after row through the regression's own row */
@@ -143,13 +160,13 @@ static int weights_take(
 }
 
 HSEP_API hsep_status hsep_weights_load(
-    const hsep_context *context, const double values[], uint64_t n_modes, hsep_regression *regression, char message[])
+    const hsep_context *context, const double values[], uint64_t n_modes, hsep_predictor *predictor, char message[])
 {
     FILE *file = hsep_resource_open(context, WEIGHTS_FILE);
     if (file == NULL) {
         return HSEP_OK;
     }
-    const int taken = weights_take(file, context, values, n_modes, regression, message);
+    const int taken = weights_take(file, context, values, n_modes, predictor, message);
     fclose(file);
     if (!taken && message[0] == '\0') {
         hsep_message_add(message, WEIGHTS_FILE " must be a factor of learned rows; it is damaged or truncated");

@@ -15,10 +15,13 @@ HSEP_API int hsep_online_check(const double values[], char message[])
 HSEP_API void hsep_online_read(const double values[], hsep_online_parameters *parameters)
 {
     parameters->preview = parameters->settings.Np;
+#define READ(type, name) parameters->trust.name = (type)values[HSEP_VR_##name];
+    HSEP_TRUST_SETTINGS(READ)
+#undef READ
     /* The warm-up counts from the end of the first fill. */
     const hsep_predictor_settings *settings = &parameters->settings;
-    (void)values;
-    parameters->n_init = (double)settings->Np + hsep_warm_up_samples(settings->t_init, settings->T_s);
+    const double t_init = hsep_warm_up(settings->t_init, parameters->trust.trust != 0);
+    parameters->n_init = (double)settings->Np + hsep_warm_up_samples(t_init, settings->T_s);
 }
 
 HSEP_API void hsep_online_begin(hsep_online *self) { (void)self; }

@@ -74,7 +74,7 @@ HSEP_API hsep_status hsep_model_initialise(
     }
     HSEP_ONLINE(init)(&self->online, &parameters, start);
     hsep_predictor *predictor = hsep_online_predictor(&self->online);
-    if (hsep_weights_load(context, values, HSEP_N_MODES, hsep_predictor_regression(predictor), message) != HSEP_OK) {
+    if (hsep_weights_load(context, values, HSEP_N_MODES, predictor, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     hsep_online_begin(&self->online);

@@ -33,7 +33,7 @@ HSEP_API void hsep_online_read(const double values[], hsep_online_parameters *pa
     HSEP_COMPENSATOR_SETTINGS(READ)
 #undef READ
     hsep_predictor_parameters *predictor = &parameters->predictor;
-    const double T_s = predictor->settings.T_s, t_init = predictor->settings.t_init;
+    const double T_s = predictor->settings.T_s, t_init = hsep_warm_up(predictor->settings.t_init, 0);
     predictor->preview = settings.preview;
     predictor->v_friction = settings.v_friction;
     /* The warm-up counts from the end of the first fill; without one, the first window is planned with what is

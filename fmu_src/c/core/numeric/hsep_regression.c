@@ -1,38 +1,27 @@
 #include "hsep_regression.h"
 
+#include "hsep_tiles.h"
+
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
 
-/* The unit triangle U = D^(-1/2) R with z beside it is kept in tiles of 4 x 4, by rows, row of tiles after row of
- * tiles, from the diagonal tile to the right: a sweep over 4 rows runs through memory once, and a compiler makes
- * vectors of a tile's rows without knowing how long they are. Columns behind the target are 0 for ever.
- * Each tile is followed by its carry: what rounding took from the entries, to be given back with the next row. Without
- * it an entry walks away at random, by half a unit in its last place a row. */
-#define REGRESSION_TILE 4
-#define REGRESSION_ENTRIES 16 /* of a tile */
-#define REGRESSION_STRIDE 32  /* doubles from tile to tile: the entries, then their carries */
-
 static const double regression_lambda_min = 1e-290;
 
-/* Entry (i, j), i <= j, of [U z], its row in a tile. */
-static double *regression_entry(hsep_regression *self, uint64_t i, uint64_t j)
-{
-    const uint64_t I = i / REGRESSION_TILE, J = j / REGRESSION_TILE;
-    const uint64_t tile = I * self->n_tiles - I * (I + 1) / 2 + J; /* (n_tiles - I') tiles in each row above */
-    return hsep_at(self, self->tiles) + REGRESSION_STRIDE * tile + 4 * (i % REGRESSION_TILE) + j % REGRESSION_TILE;
-}
+/* Bound on what a weight makes of a diagonal entry of D: far below any penalty, and no square of a row times its
+ * reciprocal overflows. */
+static const double regression_discounted_min = 1e-100;
 
 /* Set what follows from the number of features; return the bytes of the block. */
 static double regression_lay_out(hsep_regression *self, uint64_t n)
 {
     double end = HSEP_WORDS(hsep_regression);
     self->n = n;
-    self->n_tiles = n / REGRESSION_TILE + 1;
+    self->n_tiles = n / HSEP_TILE + 1;
     const double n_tiles = (double)self->n_tiles;
-    self->inverse_d = hsep_take(&end, REGRESSION_TILE * n_tiles);
-    self->row = hsep_take(&end, REGRESSION_TILE * n_tiles);
-    self->tiles = hsep_take(&end, REGRESSION_STRIDE * 0.5 * n_tiles * (n_tiles + 1.0));
+    self->inverse_d = hsep_take(&end, HSEP_TILE * n_tiles);
+    self->row = hsep_take(&end, HSEP_TILE * n_tiles);
+    self->tiles = hsep_take(&end, HSEP_TILE_STRIDE * 0.5 * n_tiles * (n_tiles + 1.0));
     return end * sizeof(double);
 }
 
@@ -52,7 +41,7 @@ HSEP_API void hsep_regression_init(hsep_regression *self, uint64_t n, double lam
     (void)regression_lay_out(self, n);
     for (uint64_t i = 0; i < n; i++) {
         hsep_at(self, self->inverse_d)[i] = 1.0 / (lambda < regression_lambda_min ? regression_lambda_min : lambda);
-        *regression_entry(self, i, i) = 1.0;
+        *hsep_tile_entry(self, i, i) = 1.0;
     }
 }
 
@@ -70,7 +59,7 @@ static inline void regression_add(double *restrict u, double *restrict carry, do
  * Written out, as regression_add has it, for compilers to make vectors of it. */
 static inline void regression_four(double *restrict u, double *restrict x, double pivot, double gain)
 {
-    double *restrict carry = u + REGRESSION_ENTRIES;
+    double *restrict carry = u + HSEP_TILE_ENTRIES;
     const double u0 = u[0], u1 = u[1], u2 = u[2], u3 = u[3];
     const double x0 = x[0] - pivot * u0, x1 = x[1] - pivot * u1, x2 = x[2] - pivot * u2, x3 = x[3] - pivot * u3;
     const double c0 = gain * x0 + carry[0], c1 = gain * x1 + carry[1];
@@ -88,7 +77,7 @@ static void regression_sweep(
 {
     const double p0 = pivot[0], p1 = pivot[1], p2 = pivot[2], p3 = pivot[3];
     const double g0 = gain[0], g1 = gain[1], g2 = gain[2], g3 = gain[3];
-    for (uint64_t t = 0; t < n; t++, tile += REGRESSION_STRIDE, x += 4) {
+    for (uint64_t t = 0; t < n; t++, tile += HSEP_TILE_STRIDE, x += 4) {
         double y[4] = {x[0], x[1], x[2], x[3]};
         regression_four(tile, y, p0, g0);
         regression_four(tile + 4, y, p1, g1);
@@ -101,7 +90,7 @@ static void regression_sweep(
 /* The same for one entry, or  u := keep u + gain x  of the x before, which loses nothing when keep is small. */
 static void regression_rotate(double *tile, int place, double *x, double pivot, double gain, double keep, int large)
 {
-    double *u = &tile[place], *carry = &tile[REGRESSION_ENTRIES + place];
+    double *u = &tile[place], *carry = &tile[HSEP_TILE_ENTRIES + place];
     const double before = *x;
     *x = before - pivot * *u;
     if (large) {
@@ -112,11 +101,11 @@ static void regression_rotate(double *tile, int place, double *x, double pivot, 
     }
 }
 
-HSEP_API void hsep_regression_fold(hsep_regression *self)
+HSEP_API void hsep_regression_fold_from(hsep_regression *self, uint64_t first)
 {
-    double *inverse_d = hsep_at(self, self->inverse_d);
-    double *x = hsep_regression_row(self);
-    double *tile = hsep_at(self, self->tiles);
+    double *inverse_d = hsep_at(self, self->inverse_d) + HSEP_TILE * first;
+    double *x = hsep_regression_row(self) + HSEP_TILE * first;
+    double *tile = hsep_tile_entry(self, HSEP_TILE * first, HSEP_TILE * first);
     /* The row still weighs 1/v. With x_j its entry at the pivot, u a row of U and d that row's weight:
      *   v' = v + x_j^2 / d          d' = d v'/v         keep = v / v' = cos^2        gain = x_j / (d v')
      *   x := x - x_j u              u := keep u + gain x = u + gain (x - x_j u)
@@ -124,9 +113,9 @@ HSEP_API void hsep_regression_fold(hsep_regression *self)
      * The last form is the cheapest and its rounding error is that of a Givens rotation divided by the cosine:
      * it is taken where cos^2 >= 1/2, and keep u + gain x, without that factor, elsewhere. */
     double v = 1.0;
-    uint64_t rows = self->n;
-    for (uint64_t left = self->n_tiles; left > 0; left--, x += 4, inverse_d += 4) {
-        const unsigned height = rows < REGRESSION_TILE ? (unsigned)rows : REGRESSION_TILE;
+    uint64_t rows = self->n - HSEP_TILE * first;
+    for (uint64_t left = self->n_tiles - first; left > 0; left--, x += 4, inverse_d += 4) {
+        const unsigned height = rows < HSEP_TILE ? (unsigned)rows : HSEP_TILE;
         rows -= height;
         double pivot[4], gain[4], keep[4];
         int large[4], any_large = 0;
@@ -145,10 +134,10 @@ HSEP_API void hsep_regression_fold(hsep_regression *self)
             }
         }
         if (left > 1 && !any_large) { /* only the last row of tiles has a height below 4 */
-            regression_sweep(tile + REGRESSION_STRIDE, x + 4, left - 1, pivot, gain);
+            regression_sweep(tile + HSEP_TILE_STRIDE, x + 4, left - 1, pivot, gain);
         } else if (left > 1) {
             for (uint64_t j = 0; j < 4 * (left - 1); j++) {
-                double *entries = tile + REGRESSION_STRIDE * (j / 4 + 1);
+                double *entries = tile + HSEP_TILE_STRIDE * (j / 4 + 1);
                 for (int r = 0; r < 4; r++) {
                     regression_rotate(entries, 4 * r + (int)(j % 4), &x[4 + j], pivot[r], gain[r], keep[r], large[r]);
                 }
@@ -156,32 +145,46 @@ HSEP_API void hsep_regression_fold(hsep_regression *self)
         } else {
             self->residual_sum += x[height] * (x[height] / v); /* rho'^2 = rho^2 + x_n^2 / v */
         }
-        tile += REGRESSION_STRIDE * left;
+        tile += HSEP_TILE_STRIDE * left;
     }
+}
+
+HSEP_API void hsep_regression_fold(hsep_regression *self)
+{
+    hsep_regression_fold_from(self, 0);
     self->n_samples++;
+}
+
+HSEP_API void hsep_regression_discount(hsep_regression *self, double weight)
+{
+    double *inverse_d = hsep_at(self, self->inverse_d);
+    for (uint64_t i = 0; i < self->n; i++) {
+        inverse_d[i] = fmin(inverse_d[i] / weight, fmax(inverse_d[i], 1.0 / regression_discounted_min));
+    }
+    self->residual_sum *= weight;
 }
 
 HSEP_API void hsep_regression_solve(const hsep_regression *self, double w[])
 {
     const uint64_t n = self->n, n_tiles = self->n_tiles;
-    const double *tile = hsep_at_const(self, self->tiles) + REGRESSION_STRIDE / 2 * n_tiles * (n_tiles + 1);
+    const double *tile = hsep_at_const(self, self->tiles) + HSEP_TILE_STRIDE / 2 * n_tiles * (n_tiles + 1);
     /* U w = z from the last row to the first; z is column n, and what is behind it is 0. */
     for (uint64_t I = n_tiles; I-- > 0;) {
-        const uint64_t first = REGRESSION_TILE * I, height = n - first < REGRESSION_TILE ? n - first : REGRESSION_TILE;
-        tile -= REGRESSION_STRIDE * (n_tiles - I);
+        const uint64_t first = HSEP_TILE * I, height = n - first < HSEP_TILE ? n - first : HSEP_TILE;
+        tile -= HSEP_TILE_STRIDE * (n_tiles - I);
         double sum[4] = {0.0, 0.0, 0.0, 0.0};
-        const double *t = tile + REGRESSION_STRIDE;
-        for (uint64_t j = first + 4; j + 4 <= n; j += 4, t += REGRESSION_STRIDE) { /* tiles that are all features */
+        const double *t = tile + HSEP_TILE_STRIDE;
+        for (uint64_t j = first + 4; j + 4 <= n; j += 4, t += HSEP_TILE_STRIDE) { /* tiles that are all features */
             for (int r = 0; r < 4; r++) {
                 sum[r] += t[4 * r] * w[j] + t[4 * r + 1] * w[j + 1] + t[4 * r + 2] * w[j + 2] + t[4 * r + 3] * w[j + 3];
             }
         }
         for (uint64_t r = height; r-- > 0;) {
             /* w_r = z_r - sum_j>r u_rj w_j: the target's tile has the last features and z, and may be this one. */
-            const double *last = tile + REGRESSION_STRIDE * (n_tiles - 1 - I) + 4 * r;
-            double w_r = last[n % REGRESSION_TILE] - sum[r];
-            for (uint64_t c = 0; height == REGRESSION_TILE && c < n % REGRESSION_TILE; c++) {
-                w_r -= last[c] * w[n - n % REGRESSION_TILE + c];
+            const double *last = tile + HSEP_TILE_STRIDE * (n_tiles - 1 - I) + 4 * r;
+            double w_r = last[n % HSEP_TILE] - sum[r];
+            for (uint64_t c = 0; height == HSEP_TILE && c < n % HSEP_TILE; c++) {
+                w_r -= last[c] * w[n - n % HSEP_TILE + c];
             }
             for (uint64_t c = r + 1; c < height; c++) {
                 w_r -= tile[4 * r + c] * w[first + c];
@@ -209,9 +212,9 @@ HSEP_API int hsep_regression_load(hsep_regression *self, uint64_t i)
     }
     hsep_at(self, self->inverse_d)[i] = 1.0 / fmax(row[0] * row[0], regression_lambda_min);
     for (uint64_t j = i + 1; j <= n; j++) {
-        double *entry = regression_entry(self, i, j);
+        double *entry = hsep_tile_entry(self, i, j);
         entry[0] = row[j - i] / row[0]; /* U = D^(-1/2) R, and z alike */
-        entry[REGRESSION_ENTRIES] = 0.0;
+        entry[HSEP_TILE_ENTRIES] = 0.0;
     }
     return 1;
 }

@@ -49,8 +49,14 @@ HSEP_API double *hsep_regression_row(hsep_regression *self);
  * before; in scalar instead of vector instructions for rows that outweigh all before them, as the first ones do. */
 HSEP_API void hsep_regression_fold(hsep_regression *self);
 
+/* Fold the row, whose entries before 4 * first are 0, into the factor, without counting it. */
+HSEP_API void hsep_regression_fold_from(hsep_regression *self, uint64_t first);
+
 /* Solve R w = z for w, (n,). Cost: n^2 / 2 multiply-adds. */
 HSEP_API void hsep_regression_solve(const hsep_regression *self, double w[]);
+
+/* Weigh all rows so far, and lambda with them, by a weight in the sum of squares, 0 <= weight <= 1. */
+HSEP_API void hsep_regression_discount(hsep_regression *self, double weight);
 
 /* Take over row i of a factor [R z; 0 rho], its entries i ... n, which the caller has put into
  * hsep_regression_row. All n + 1 rows make a factor. Fails, and returns 0 with the factor unchanged, if an entry

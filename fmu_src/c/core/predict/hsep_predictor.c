@@ -7,91 +7,6 @@
 #include <stddef.h>
 #include <string.h>
 
-HSEP_API hsep_physics *hsep_predictor_physics(hsep_predictor *self)
-{
-    return (hsep_physics *)hsep_at(self, self->physics);
-}
-
-HSEP_API hsep_regression *hsep_predictor_regression(hsep_predictor *self)
-{
-    return (hsep_regression *)hsep_at(self, self->regression);
-}
-
-/* Set what follows from the parameters; return the bytes of the block. */
-static double predictor_lay_out(hsep_predictor *self, const hsep_predictor_parameters *parameters)
-{
-    const double Np = (double)parameters->settings.Np, preview = (double)parameters->preview;
-    const double p = (double)parameters->settings.p, q = (double)parameters->settings.q;
-    const int has_reference = parameters->v_friction > 0.0;
-    double end = HSEP_WORDS(hsep_predictor);
-    hsep_features_lay_out(
-        &self->features, parameters->settings.p, parameters->settings.q, has_reference ? HSEP_N_REFERENCE : 0);
-    const double regression = hsep_regression_size(self->features.n);
-    self->Np = parameters->settings.Np;
-    self->preview = parameters->preview;
-    self->n_init = parameters->n_init;
-    self->sign_step = parameters->v_friction * parameters->settings.T_s;
-    self->ahead = hsep_take(&end, preview);
-    self->x_d = hsep_take(&end, preview);
-    self->x_pb = hsep_take(&end, Np);
-    self->x_h = hsep_take(&end, Np);
-    self->ahead_pb = hsep_take(&end, parameters->planned ? 0.0 : Np);
-    self->past_x = hsep_take(&end, Np + q);
-    self->past_e = hsep_take(&end, Np + p);
-    self->e_h = parameters->planned ? hsep_take(&end, Np + p) : self->past_e;
-    self->weights = hsep_take(&end, (double)self->features.n);
-    self->signs = hsep_take(&end, has_reference ? preview + 2.0 * HSEP_REFERENCE_REACH : 0.0);
-    self->drive = hsep_take(&end, has_reference ? preview : 0.0);
-    self->physics = hsep_take_block(&end, hsep_physics_size(parameters->n_modes, parameters->settings.dead_time));
-    self->regression = hsep_take_block(&end, regression);
-    self->saved = parameters->unlearns ? hsep_take_block(&end, regression) : 0;
-    return end * sizeof(double);
-}
-
-HSEP_API double hsep_predictor_size(const hsep_predictor_parameters *parameters)
-{
-    return predictor_lay_out(&(hsep_predictor){0}, parameters);
-}
-
-HSEP_API void hsep_predictor_init(hsep_predictor *self, const hsep_predictor_parameters *parameters, double start)
-{
-    memset(self, 0, (size_t)hsep_predictor_size(parameters));
-    (void)predictor_lay_out(self, parameters);
-    self->start = self->x_d_last = start;
-    self->n_published = self->n_physics = self->Np; /* the first fill is not predicted */
-    hsep_sensor_init(&self->sensor);
-    for (uint64_t i = 0; i < self->preview; i++) {
-        hsep_at(self, self->ahead)[i] = hsep_at(self, self->x_d)[i] = start;
-    }
-    for (uint64_t i = 0; i < self->Np; i++) {
-        hsep_at(self, self->x_pb)[i] = hsep_at(self, self->x_h)[i] = start;
-    }
-    hsep_physics_init(
-        hsep_predictor_physics(self), parameters->modes, parameters->n_modes, parameters->settings.dead_time,
-        parameters->settings.T_s, (hsep_hold)parameters->settings.input_hold);
-    hsep_regression_init(hsep_predictor_regression(self), self->features.n, parameters->settings.lambda);
-}
-
-HSEP_API int hsep_predictor_valid(const void *block, const hsep_predictor_parameters *parameters, uint64_t k)
-{
-    hsep_predictor got;
-    memcpy(&got, block, sizeof got);
-    (void)predictor_lay_out(&got, parameters); /* changes nothing where it is sound */
-    const double sums[3] = {got.sum_e, got.sum_pb, got.sum_h};
-    int sound =
-        memcmp(&got, block, sizeof got) == 0 && got.k == k && got.n_published <= got.Np &&
-        k % got.Np < got.n_published && got.n_physics <= got.Np && got.learning <= 1 && got.missing <= 1 &&
-        (!got.missing || got.saved) && got.divergence <= HSEP_DIVERGES_X_DM &&
-        (got.divergence || hsep_within(hsep_at_bytes(block, got.ahead), got.past_x - got.ahead, HSEP_PREDICTION_MAX)) &&
-        hsep_physics_valid(hsep_at_bytes(block, got.physics), parameters->n_modes, parameters->settings.dead_time) &&
-        hsep_regression_valid(hsep_at_bytes(block, got.regression), got.features.n) &&
-        (!got.saved || hsep_regression_valid(hsep_at_bytes(block, got.saved), got.features.n));
-    for (int i = 0; i < 3; i++) {
-        sound = sound && sums[i] >= 0.0 && isfinite(sums[i]);
-    }
-    return sound;
-}
-
 HSEP_API hsep_recursion hsep_predictor_recursion(const hsep_predictor *self, int with_bias)
 {
     const hsep_features *f = &self->features;
@@ -106,13 +21,14 @@ HSEP_API const double *hsep_predictor_drive(const hsep_predictor *self, uint64_t
     return has_reference ? hsep_at_const(self, self->drive) + (self->preview - n) : NULL;
 }
 
-/* Guard before a row is learned: return whether it is. A measurement held while the drive moves is missing. */
+/* Guard before a row is learned: return whether it is. A measurement held while the drive moves is missing; with trust
+ * a window is learned when it has ended. */
 static int predictor_guard(hsep_predictor *self, double x_meas, double x_pb)
 {
     if (self->saved && hsep_sensor_misses(&self->sensor, x_meas, x_pb)) {
         self->missing = 1;
     }
-    return self->learning && !self->missing;
+    return self->learning && !self->missing && !self->trusted;
 }
 
 /* Fold the row of a sample, at place i of its window, into the regression; eqs. (5) and (6). */
@@ -202,6 +118,9 @@ static void predictor_reference(hsep_predictor *self)
 /* Weights for the window that begins, eq. (6), and the part of the features of the reference. */
 static void predictor_solve(hsep_predictor *self)
 {
+    if (self->trusted) {
+        return;
+    }
     hsep_regression_solve(hsep_predictor_regression(self), hsep_at(self, self->weights));
     if (self->features.n > self->features.reference) {
         predictor_reference(self);
@@ -246,13 +165,36 @@ HSEP_API void hsep_predictor_publish(hsep_predictor *self, uint64_t last)
     const hsep_recursion recursion = hsep_predictor_recursion(self, 1);
     const double *past_x = hsep_at(self, self->past_x);
     double *x_pb = hsep_at(self, self->x_pb), *x_h = hsep_at(self, self->x_h), *e_h = hsep_at(self, self->e_h);
-    hsep_recursion_run(&recursion, past_x, hsep_predictor_drive(self, Np), e_h, Np, first, last); /* Eq. (4) */
+    if (!self->trusted) { /* Eq. (4) */
+        hsep_recursion_run(&recursion, past_x, hsep_predictor_drive(self, Np), e_h, Np, first, last);
+    }
     for (uint64_t i = first; i < last; i++) {
         x_pb[i] = past_x[Np - 1 - i] + self->start;
         x_h[i] = i < self->n_physics ? x_pb[i] : x_pb[i] + e_h[Np - 1 - i]; /* Eq. (4) */
     }
     predictor_bound(self, first, last);
     self->n_published = last;
+}
+
+/* Learn the measured window by the residual model that can be trusted. */
+static void predictor_learn_trusted(hsep_predictor *self)
+{
+    if (self->trusted && self->learning) {
+        hsep_trusted_learn(hsep_predictor_trusted(self), hsep_at(self, self->past_x), hsep_at(self, self->past_e));
+    }
+}
+
+/* Predict the residuals of the window that begins by the residual model that can be trusted. */
+static void predictor_forecast(hsep_predictor *self)
+{
+    double *command = hsep_at(self, self->command);
+    for (uint64_t i = 0; self->trusted && i < self->Np; i++) {
+        command[self->Np - 1 - i] = hsep_at(self, self->x_d)[i] - self->start;
+    }
+    if (self->trusted) {
+        hsep_trusted_forecast(
+            hsep_predictor_trusted(self), command, hsep_at(self, self->past_x), hsep_at(self, self->e_h));
+    }
 }
 
 HSEP_API int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, double x_meas)
@@ -264,6 +206,7 @@ HSEP_API int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, doubl
     if (!hsep_predictor_take_in(self, x_d_ahead, x_meas)) {
         return 0;
     }
+    predictor_learn_trusted(self);
     (void)hsep_predictor_finish(self);
     if (self->k == self->preview) { /* the first fill was not predicted */
         memset(hsep_at(self, self->past_e), 0, (size_t)(Np + self->features.p) * sizeof(double));
@@ -272,6 +215,7 @@ HSEP_API int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, doubl
     for (uint64_t i = 0; i < Np; i++) {
         past_x[Np - 1 - i] = ahead_pb[i]; /* Eq. (2), computed as the commands came */
     }
+    predictor_forecast(self);
     const double warm_up = self->n_init - (double)self->k;
     self->n_physics = warm_up >= (double)Np ? Np : warm_up > 0.0 ? (uint64_t)warm_up : 0;
     hsep_predictor_publish(self, Np);

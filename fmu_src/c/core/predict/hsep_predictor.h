@@ -11,7 +11,8 @@
  *
  * Cost of a sample, with n features: that of hsep_regression_fold(n), and alone 9 multiply-adds a mode; at the end of a
  * window (Np (p + q + 2) + n^2 / 2) multiply-adds on top, the tanh of hsep_reference_features_signs(preview) and,
- * where windows are unlearned, a copy of the regression. Never more, at no sample number.
+ * where windows are unlearned, a copy of the regression. Never more, at no sample number. With trust nothing is folded
+ * but at the end of a window: hsep_trusted_learn and hsep_trusted_forecast.
  *
  * Memory is one block: the struct, then what its offsets tell; no pointers, so a copy of the block is the state.
  * Reentrant; allocates nothing. Once the parameters are in range nothing here fails but the prediction of a window:
@@ -28,18 +29,20 @@
 #include "hsep_regression.h"
 #include "hsep_sensor.h"
 #include "hsep_settings.h"
+#include "hsep_trusted.h"
 
 #include <stdint.h>
 
 typedef struct {
     hsep_predictor_settings settings;
-    double v_friction;      /* m/s, scale of friction's change of sign; 0: no features of the reference */
-    uint64_t preview;       /* samples from r(k) to the drive, >= Np; Np alone */
-    double n_init;          /* samples of warm-up from the beginning; whole, >= 0 */
-    int planned;            /* whether a compensator decides the commands of a window when it begins */
-    int unlearns;           /* whether a window with a missing sample is unlearned */
-    uint64_t n_modes;       /* >= 1 */
-    const hsep_mode *modes; /* (n_modes,) */
+    hsep_trust_settings trust; /* alone */
+    double v_friction;         /* m/s, scale of friction's change of sign; 0: no features of the reference */
+    uint64_t preview;          /* samples from r(k) to the drive, >= Np; Np alone */
+    double n_init;             /* samples of warm-up from the beginning; whole, >= 0 */
+    int planned;               /* whether a compensator decides the commands of a window when it begins */
+    int unlearns;              /* whether a window with a missing sample is unlearned */
+    uint64_t n_modes;          /* >= 1 */
+    const hsep_mode *modes;    /* (n_modes,) */
 } hsep_predictor_parameters;
 
 typedef struct {
@@ -64,6 +67,7 @@ typedef struct {
     uint64_t x_pb;     /* (Np,) m, the window: physics-based predictions, */
     uint64_t x_h;      /* (Np,) m, hybrid predictions */
     uint64_t ahead_pb; /* (Np,) m, response of the physics model to ahead, relative to start; alone */
+    uint64_t command;  /* (Np,) m, commands of the window relative to start, newest first; with trust */
     uint64_t past_x;   /* (Np + q,) m, x_pb of this window and of the q samples before it, newest first */
     uint64_t past_e;   /* (Np + p,) m, e_pb likewise, as measured */
     uint64_t e_h;      /* (Np + p,) m, e_pb as predicted, behind it the measured ones; alone it is past_e */
@@ -71,10 +75,11 @@ typedef struct {
     uint64_t signs;    /* (preview + 2 HSEP_REFERENCE_REACH,) psi of the reference, if it has features */
     uint64_t drive;    /* (preview,) m, their part of the residuals, newest first */
     uint64_t physics, regression;
-    uint64_t saved; /* the regression as it was before this window; 0: no window is unlearned */
+    uint64_t trusted; /* the residual model that can be trusted, with a regression of its own; 0: the paper's */
+    uint64_t saved;   /* the regression as it was before this window; 0: no window is unlearned */
 } hsep_predictor;
 
-HSEP_ASSERT_WORDS(hsep_predictor, 41);
+HSEP_ASSERT_WORDS(hsep_predictor, 43);
 
 typedef struct {
     double x_d, x_pb, x_h;       /* m, now */
@@ -95,6 +100,9 @@ HSEP_API int hsep_predictor_valid(const void *block, const hsep_predictor_parame
 
 /* The regression, for a warm start by hsep_regression_load before the first sample. */
 HSEP_API hsep_regression *hsep_predictor_regression(hsep_predictor *self);
+
+/* The residual model that can be trusted; NULL for the paper's. */
+HSEP_API hsep_trusted *hsep_predictor_trusted(hsep_predictor *self);
 
 HSEP_API hsep_physics *hsep_predictor_physics(hsep_predictor *self);
 

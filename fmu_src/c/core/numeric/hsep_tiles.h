@@ -1,0 +1,38 @@
+/* Places in the factor of a regression.
+ *
+ * The unit triangle U = D^(-1/2) R with z beside it is kept in tiles of 4 x 4, by rows, row of tiles after row of
+ * tiles, from the diagonal tile to the right: a sweep over 4 rows runs through memory once, and a compiler makes
+ * vectors of a tile's rows without knowing how long they are. Columns behind the target are 0 for ever.
+ * Each tile is followed by its carry: what rounding took from the entries, to be given back with the next row. Without
+ * it an entry walks away at random, by half a unit in its last place a row. */
+#ifndef HSEP_TILES_H
+#define HSEP_TILES_H
+
+#include "hsep_layout.h"
+#include "hsep_regression.h"
+
+#include <stdint.h>
+
+#define HSEP_TILE 4
+#define HSEP_TILE_ENTRIES 16 /* of a tile */
+#define HSEP_TILE_STRIDE 32  /* doubles from tile to tile: the entries, then their carries */
+
+/* Place of entry (i, j), i <= j, of [U z] in the tiles. */
+static inline uint64_t hsep_tile_place(const hsep_regression *self, uint64_t i, uint64_t j)
+{
+    const uint64_t I = i / HSEP_TILE, J = j / HSEP_TILE;
+    const uint64_t tile = I * self->n_tiles - I * (I + 1) / 2 + J; /* (n_tiles - I') tiles in each row above */
+    return HSEP_TILE_STRIDE * tile + 4 * (i % HSEP_TILE) + j % HSEP_TILE;
+}
+
+static inline const double *hsep_tile_entry_const(const hsep_regression *self, uint64_t i, uint64_t j)
+{
+    return hsep_at_const(self, self->tiles) + hsep_tile_place(self, i, j);
+}
+
+static inline double *hsep_tile_entry(hsep_regression *self, uint64_t i, uint64_t j)
+{
+    return hsep_at(self, self->tiles) + hsep_tile_place(self, i, j);
+}
+
+#endif

@@ -1,0 +1,175 @@
+#include "hsep_candidate.h"
+
+#include "hsep_penalised.h"
+#include "hsep_vector.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Prior variance of the weight of the last lag relative to that of the first. */
+static const double candidate_last_lag = 0.005;
+
+/* Factor on the predicted variance when a prediction is shrunk by it: its distribution has long tails. */
+static const double candidate_caution = 2.0;
+
+/* Largest lag within a window and largest prediction, relative to the largest residual. */
+static const double candidate_lag_max = 10.0, candidate_prediction_max = 1.2;
+
+/* Bound on the impulse response, and on the variance relative to the square of the largest residual. */
+static const double candidate_diverged = 1e6;
+
+static const double candidate_first_correlation = 10.0, candidate_correlation_max = 1e4;
+static const double candidate_correlation_rate = 0.1;
+
+/* Correlation beyond which the penalty does not grow: with more, a wrong model would learn nothing at all. */
+static const double candidate_penalty_correlation_max = 100.0;
+
+/* Set what follows from the parameters; return the bytes of the block. */
+static double candidate_lay_out(hsep_candidate *self, uint64_t Np, uint64_t n_static, uint64_t p)
+{
+    const double window = (double)Np, n = (double)(n_static + p), lags = (double)p;
+    double end = HSEP_WORDS(hsep_candidate);
+    self->Np = Np;
+    self->n_static = n_static;
+    self->p = p;
+    self->priors = hsep_take(&end, n);
+    self->weights = hsep_take(&end, n);
+    self->run = hsep_take(&end, window + lags);
+    self->unshrunk = hsep_take(&end, window + lags);
+    self->e_h = hsep_take(&end, window);
+    self->response = hsep_take(&end, window + lags);
+    self->squares = hsep_take(&end, window);
+    self->spread = hsep_take(&end, window);
+    self->solved = hsep_take_block(&end, hsep_regression_size(n_static + p));
+    return end * sizeof(double);
+}
+
+static hsep_regression *candidate_solved(hsep_candidate *self)
+{
+    return (hsep_regression *)hsep_at(self, self->solved);
+}
+
+HSEP_API double hsep_candidate_size(uint64_t Np, uint64_t n_static, uint64_t p)
+{
+    return candidate_lay_out(&(hsep_candidate){0}, Np, n_static, p);
+}
+
+HSEP_API void hsep_candidate_init(hsep_candidate *self, uint64_t Np, uint64_t n_static, uint64_t p)
+{
+    memset(self, 0, (size_t)hsep_candidate_size(Np, n_static, p));
+    (void)candidate_lay_out(self, Np, n_static, p);
+    self->correlation = candidate_first_correlation;
+    hsep_regression_init(candidate_solved(self), n_static + p, 1.0);
+}
+
+HSEP_API int hsep_candidate_valid(const void *block, uint64_t Np, uint64_t n_static, uint64_t p)
+{
+    hsep_candidate got;
+    memcpy(&got, block, sizeof got);
+    (void)candidate_lay_out(&got, Np, n_static, p); /* changes nothing where it is sound */
+    return memcmp(&got, block, sizeof got) == 0 &&
+           hsep_regression_valid(hsep_at_bytes(block, got.solved), n_static + p);
+}
+
+HSEP_API const double *hsep_candidate_prediction(const hsep_candidate *self) { return hsep_at_const(self, self->e_h); }
+
+HSEP_API void hsep_candidate_solve(
+    hsep_candidate *self, const hsep_regression *regression, const double static_scales[], double least_variance)
+{
+    double *penalties = hsep_at(self, self->priors);
+    self->variance =
+        fmax(self->noise_variance, least_variance) * fmin(self->correlation, candidate_penalty_correlation_max);
+    memcpy(penalties, static_scales, (size_t)self->n_static * sizeof(double));
+    for (uint64_t i = 0; i < self->p; i++) {
+        penalties[self->n_static + i] = sqrt(pow(candidate_last_lag, (double)i / (double)self->p));
+    }
+    for (uint64_t i = 0; i < self->n_static + self->p; i++) {
+        penalties[i] = self->variance / (penalties[i] * penalties[i]);
+    }
+    self->residual_sum =
+        hsep_penalised_solve(regression, penalties, candidate_solved(self), hsep_at(self, self->weights));
+}
+
+static double candidate_bounded(double value, double bound) { return fmax(-bound, fmin(value, bound)); }
+
+/* e(k) := e(k) + sum_i w_i e(k - i) over a window; eq. (4). */
+static void candidate_run(const hsep_candidate *self, double e[])
+{
+    const double *lag_weights = hsep_at_const(self, self->weights) + self->n_static;
+    for (uint64_t j = self->Np; self->p > 0 && j-- > 0;) {
+        e[j] += hsep_dot(lag_weights, e + j + 1, self->p);
+    }
+}
+
+/* Free run from the last residuals, and the same within bounds. */
+static void candidate_free_run(hsep_candidate *self, const double rows[], const double past[], double bound)
+{
+    const uint64_t Np = self->Np, n_static = self->n_static;
+    const double *weights = hsep_at(self, self->weights);
+    double *run = hsep_at(self, self->run), *unshrunk = hsep_at(self, self->unshrunk);
+    for (uint64_t j = Np; j-- > 0; rows += n_static) {
+        run[j] = hsep_dot(weights, rows, n_static);
+    }
+    memcpy(run + Np, past, (size_t)self->p * sizeof(double));
+    memcpy(unshrunk + Np, past, (size_t)self->p * sizeof(double));
+    candidate_run(self, run);
+    for (uint64_t j = 0; j < Np; j++) {
+        unshrunk[j] = isfinite(run[j]) ? candidate_bounded(run[j], bound) : 0.0;
+    }
+}
+
+/* Variance of the prediction: that of the rows, carried through the impulse response; at most most. */
+static void candidate_spread(hsep_candidate *self, const double rows[], double most)
+{
+    const uint64_t Np = self->Np, n_static = self->n_static, p = self->p;
+    const double *run = hsep_at(self, self->run), *unshrunk = hsep_at(self, self->unshrunk);
+    double *spread = hsep_at(self, self->spread), *response = hsep_at(self, self->response);
+    double *squares = hsep_at(self, self->squares), *row = hsep_regression_row(candidate_solved(self));
+    for (uint64_t j = Np; j-- > 0; rows += n_static) {
+        memcpy(row, rows, (size_t)n_static * sizeof(double));
+        memcpy(row + n_static, unshrunk + j + 1, (size_t)p * sizeof(double));
+        spread[j] = self->variance * hsep_penalised_leverage(candidate_solved(self));
+    }
+    if (p > 0) {
+        memset(response, 0, (size_t)(Np + p) * sizeof(double));
+        response[Np - 1] = 1.0;
+        candidate_run(self, response);
+        for (uint64_t i = 0; i < Np; i++) {
+            const double at = response[Np - 1 - i];
+            const double within = isnan(at) ? candidate_diverged : candidate_bounded(at, candidate_diverged);
+            squares[i] = within * within;
+        }
+        for (uint64_t j = 0; j < Np; j++) { /* from the newest on: what a sum needs is not overwritten yet */
+            spread[j] = fmin(hsep_dot(squares, spread + j, Np - j), most);
+        }
+    }
+    for (uint64_t j = 0; j < Np; j++) {
+        spread[j] = isfinite(run[j]) ? spread[j] : most;
+    }
+}
+
+HSEP_API void hsep_candidate_predict(
+    hsep_candidate *self, const double rows[], const double past[], const hsep_residual_scale *scale)
+{
+    const double largest = scale->largest;
+    const double *unshrunk = hsep_at(self, self->unshrunk), *spread = hsep_at(self, self->spread);
+    double *e_h = hsep_at(self, self->e_h);
+    candidate_free_run(self, rows, past, candidate_lag_max * largest);
+    candidate_spread(self, rows, candidate_diverged * largest * largest);
+    for (uint64_t j = 0; j < self->Np; j++) {
+        const double shrunk = unshrunk[j] * (scale->recent / (scale->recent + candidate_caution * spread[j]));
+        e_h[j] = candidate_bounded(shrunk, candidate_prediction_max * largest);
+    }
+}
+
+HSEP_API void hsep_candidate_judge(hsep_candidate *self, const double measured[])
+{
+    const double *unshrunk = hsep_at(self, self->unshrunk), n = (double)self->Np;
+    double sum = 0.0;
+    for (uint64_t j = 0; j < self->Np; j++) {
+        sum += measured[j] - unshrunk[j];
+    }
+    const double seen = self->noise_variance > 0.0 ? sum * sum / n / self->noise_variance : candidate_correlation_max;
+    self->correlation += candidate_correlation_rate * (fmin(seen, candidate_correlation_max) - self->correlation);
+    self->correlation = fmax(self->correlation, 1.0);
+}

@@ -1,0 +1,72 @@
+/* Candidate model of the residual: the features without lags with some lags, trusted as far as its own variance allows.
+ *
+ * Weights have normal priors, so the variance of w' phi is known; it is carried through the recursion's impulse
+ * response. A prediction e of variance tau^2 is shrunk to e v / (v + 2 tau^2), v being the recent mean square of the
+ * residual: at a first motion, a first reversal or in a region not seen yet the physics model remains.
+ *
+ * Signals are kept newest first: sample k is at place Np - 1 - k. Memory is one block, without pointers. Reentrant;
+ * allocates nothing.
+ */
+#ifndef HSEP_CANDIDATE_H
+#define HSEP_CANDIDATE_H
+
+#include "hsep_api.h"
+#include "hsep_layout.h"
+#include "hsep_regression.h"
+
+#include <stdint.h>
+
+/* Size of the residuals so far. */
+typedef struct {
+    double recent;         /* m2, recent mean square */
+    double largest_square; /* m2, largest mean square of a window */
+    double largest;        /* m, largest magnitude */
+} hsep_residual_scale;
+
+typedef struct {
+    uint64_t Np, n_static, p;
+    double noise_variance; /* m2, of a row about the model; 0 until a window is measured */
+    double correlation;    /* rows that count as one: errors of neighbouring rows are alike */
+    double variance;       /* m2, of the noise as the weights were solved */
+    double residual_sum;   /* m2, of the rows so far about these weights */
+    /* Offsets in doubles from the beginning of the struct */
+    uint64_t priors;   /* (n_static + p,) prior standard deviations, then penalties of the weights */
+    uint64_t weights;  /* (n_static + p,) */
+    uint64_t run;      /* (Np + p,) m, the recursion, behind it measured residuals */
+    uint64_t unshrunk; /* (Np + p,) m, the same within bounds */
+    uint64_t e_h;      /* (Np,) m, shrunk */
+    uint64_t response; /* (Np + p,) the recursion's impulse response, behind it 0 */
+    uint64_t squares;  /* (Np,) its squares, oldest first */
+    uint64_t spread;   /* (Np,) m2, variance of the prediction */
+    uint64_t solved;   /* the regression with penalties */
+} hsep_candidate;
+
+HSEP_ASSERT_WORDS(hsep_residual_scale, 3);
+HSEP_ASSERT_WORDS(hsep_candidate, 16);
+
+/* Bytes of the block, counted in double so that no size can overflow. */
+HSEP_API double hsep_candidate_size(uint64_t Np, uint64_t n_static, uint64_t p);
+
+/* Fill the block for windows of Np samples, n_static features without lags and p lags. */
+HSEP_API void hsep_candidate_init(hsep_candidate *self, uint64_t Np, uint64_t n_static, uint64_t p);
+
+/* Whether a block, in any alignment, is one that hsep_candidate_init with these parameters began. */
+HSEP_API int hsep_candidate_valid(const void *block, uint64_t Np, uint64_t n_static, uint64_t p);
+
+/* Solve for the weights from all rows. static_scales: (n_static,) prior standard deviations of the weights of the
+ * features without lags; least_variance: of the noise, m2. Cost: that of hsep_penalised_solve. */
+HSEP_API void hsep_candidate_solve(
+    hsep_candidate *self, const hsep_regression *regression, const double static_scales[], double least_variance);
+
+/* Predict a window in free run. rows: (Np, n_static), sample after sample; past: (p,) m, the last residuals.
+ * Cost: Np times that of hsep_penalised_leverage, and Np^2 / 2 multiply-adds. */
+HSEP_API void hsep_candidate_predict(
+    hsep_candidate *self, const double rows[], const double past[], const hsep_residual_scale *scale);
+
+/* Estimate the correlation from the errors of a window, (Np,), m, that has been measured. */
+HSEP_API void hsep_candidate_judge(hsep_candidate *self, const double measured[]);
+
+/* Prediction of a window, (Np,), m. */
+HSEP_API const double *hsep_candidate_prediction(const hsep_candidate *self);
+
+#endif

@@ -1,0 +1,119 @@
+/* Memory of a predictor: its layout, beginning and check. */
+#include "hsep_predictor.h"
+
+#include "hsep_range.h"
+#include "hsep_reference_features.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+HSEP_API hsep_physics *hsep_predictor_physics(hsep_predictor *self)
+{
+    return (hsep_physics *)hsep_at(self, self->physics);
+}
+
+HSEP_API hsep_trusted *hsep_predictor_trusted(hsep_predictor *self)
+{
+    return self->trusted ? (hsep_trusted *)hsep_at(self, self->trusted) : NULL;
+}
+
+HSEP_API hsep_regression *hsep_predictor_regression(hsep_predictor *self)
+{
+    return self->trusted ? hsep_trusted_regression(hsep_predictor_trusted(self))
+                         : (hsep_regression *)hsep_at(self, self->regression);
+}
+
+static hsep_trusted_parameters predictor_trusted_parameters(const hsep_predictor_parameters *parameters)
+{
+    return (hsep_trusted_parameters){
+        .settings = &parameters->settings,
+        .trust = &parameters->trust,
+        .modes = parameters->modes,
+        .n_modes = parameters->n_modes};
+}
+
+/* Set what follows from the parameters; return the bytes of the block. */
+static double predictor_lay_out(hsep_predictor *self, const hsep_predictor_parameters *parameters)
+{
+    const double Np = (double)parameters->settings.Np, preview = (double)parameters->preview;
+    const double p = (double)parameters->settings.p, q = (double)parameters->settings.q;
+    const int has_reference = parameters->v_friction > 0.0;
+    double end = HSEP_WORDS(hsep_predictor);
+    hsep_features_lay_out(
+        &self->features, parameters->settings.p, parameters->settings.q, has_reference ? HSEP_N_REFERENCE : 0);
+    const hsep_trusted_parameters trusted = predictor_trusted_parameters(parameters);
+    const double regression = parameters->trust.trust ? 0.0 : hsep_regression_size(self->features.n);
+    self->Np = parameters->settings.Np;
+    self->preview = parameters->preview;
+    self->n_init = parameters->n_init;
+    self->sign_step = parameters->v_friction * parameters->settings.T_s;
+    self->ahead = hsep_take(&end, preview);
+    self->x_d = hsep_take(&end, preview);
+    self->x_pb = hsep_take(&end, Np);
+    self->x_h = hsep_take(&end, Np);
+    self->ahead_pb = hsep_take(&end, parameters->planned ? 0.0 : Np);
+    self->command = hsep_take(&end, parameters->trust.trust ? Np : 0.0);
+    self->past_x = hsep_take(&end, Np + q);
+    self->past_e = hsep_take(&end, Np + p);
+    self->e_h = parameters->planned ? hsep_take(&end, Np + p) : self->past_e;
+    self->weights = hsep_take(&end, (double)self->features.n);
+    self->signs = hsep_take(&end, has_reference ? preview + 2.0 * HSEP_REFERENCE_REACH : 0.0);
+    self->drive = hsep_take(&end, has_reference ? preview : 0.0);
+    self->physics = hsep_take_block(&end, hsep_physics_size(parameters->n_modes, parameters->settings.dead_time));
+    self->regression = hsep_take_block(&end, regression);
+    self->trusted = parameters->trust.trust ? hsep_take_block(&end, hsep_trusted_size(&trusted)) : 0;
+    self->saved = parameters->unlearns ? hsep_take_block(&end, regression) : 0;
+    return end * sizeof(double);
+}
+
+HSEP_API double hsep_predictor_size(const hsep_predictor_parameters *parameters)
+{
+    return predictor_lay_out(&(hsep_predictor){0}, parameters);
+}
+
+HSEP_API void hsep_predictor_init(hsep_predictor *self, const hsep_predictor_parameters *parameters, double start)
+{
+    memset(self, 0, (size_t)hsep_predictor_size(parameters));
+    (void)predictor_lay_out(self, parameters);
+    self->start = self->x_d_last = start;
+    self->n_published = self->n_physics = self->Np; /* the first fill is not predicted */
+    hsep_sensor_init(&self->sensor);
+    for (uint64_t i = 0; i < self->preview; i++) {
+        hsep_at(self, self->ahead)[i] = hsep_at(self, self->x_d)[i] = start;
+    }
+    for (uint64_t i = 0; i < self->Np; i++) {
+        hsep_at(self, self->x_pb)[i] = hsep_at(self, self->x_h)[i] = start;
+    }
+    hsep_physics_init(
+        hsep_predictor_physics(self), parameters->modes, parameters->n_modes, parameters->settings.dead_time,
+        parameters->settings.T_s, (hsep_hold)parameters->settings.input_hold);
+    if (self->trusted) {
+        const hsep_trusted_parameters trusted = predictor_trusted_parameters(parameters);
+        hsep_trusted_init(hsep_predictor_trusted(self), &trusted);
+    } else {
+        hsep_regression_init(hsep_predictor_regression(self), self->features.n, parameters->settings.lambda);
+    }
+}
+
+HSEP_API int hsep_predictor_valid(const void *block, const hsep_predictor_parameters *parameters, uint64_t k)
+{
+    hsep_predictor got;
+    memcpy(&got, block, sizeof got);
+    (void)predictor_lay_out(&got, parameters); /* changes nothing where it is sound */
+    const hsep_trusted_parameters trusted = predictor_trusted_parameters(parameters);
+    const double sums[3] = {got.sum_e, got.sum_pb, got.sum_h};
+    int sound =
+        memcmp(&got, block, sizeof got) == 0 && got.k == k && got.n_published <= got.Np &&
+        k % got.Np < got.n_published && got.n_physics <= got.Np && got.learning <= 1 && got.missing <= 1 &&
+        (!got.missing || got.saved) && got.divergence <= HSEP_DIVERGES_X_DM &&
+        (got.divergence || hsep_within(hsep_at_bytes(block, got.ahead), got.past_x - got.ahead, HSEP_PREDICTION_MAX)) &&
+        hsep_physics_valid(hsep_at_bytes(block, got.physics), parameters->n_modes, parameters->settings.dead_time) &&
+        (got.trusted ? hsep_trusted_valid(hsep_at_bytes(block, got.trusted), &trusted)
+                     : hsep_regression_valid(hsep_at_bytes(block, got.regression), got.features.n)) &&
+        (!got.saved || hsep_regression_valid(hsep_at_bytes(block, got.saved), got.features.n));
+    for (int i = 0; i < 3; i++) {
+        sound = sound && sums[i] >= 0.0 && isfinite(sums[i]);
+    }
+    return sound;
+}

@@ -1,0 +1,190 @@
+#include "hsep_trusted.h"
+
+#include "hsep_vector.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+/* Factor by which the mean square of the residual fades from window to window. */
+static const double trusted_recent = 0.9;
+
+/* Growth of the commanded velocity from which on what was learned at lower ones counts for nothing. */
+static const double trusted_growth = 30.0;
+
+/* Bound on the variance of the noise relative to the largest mean square of the residual: a larger one would prevent
+ * any learning. */
+static const double trusted_least_noise = 1e-4;
+
+/* Velocity, m/s, below which a command is at rest: ratios of smaller ones may underflow. */
+static const double trusted_least_velocity = 1e-200;
+
+static const double trusted_least_magnitude = 1e-150; /* of a feature */
+
+/* Begin the window: its features, at the position x_pb, and their largest magnitudes. Return whether the commanded
+ * velocity has outgrown what was learned. */
+static int trusted_begin(hsep_trusted *self, const double x_d[], const double x_pb[])
+{
+    hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
+    const double peak = hsep_disturbances_peak_velocity(disturbances, x_d);
+    const int outgrown = peak > fmax(trusted_growth * self->velocity_scale, trusted_least_velocity);
+    double *rows = hsep_at(self, self->rows), *largest = hsep_at(self, self->forecast_largest);
+    self->forecast_scale = outgrown ? peak : self->velocity_scale;
+    hsep_disturbances_begin(disturbances, x_d, x_pb, self->forecast_scale, rows);
+    hsep_disturbances_stiffness(disturbances, x_pb, rows);
+    for (uint64_t i = 0; i < self->n_static; i++) {
+        largest[i] = outgrown ? 0.0 : hsep_at(self, self->largest)[i];
+    }
+    for (uint64_t k = 0; k < self->Np; k++, rows += self->n_static) {
+        for (uint64_t i = 0; i < self->n_static; i++) {
+            largest[i] = fmax(largest[i], fabs(rows[i]));
+        }
+    }
+    return outgrown;
+}
+
+/* Predict the window by the candidates. past: (p,), m. */
+static void trusted_predict(hsep_trusted *self, const double x_pb[], const double past[])
+{
+    const double effect = self->effect > 0.0 ? self->effect : sqrt(self->scale.largest_square);
+    const double least = fmin(self->least_variance, trusted_least_noise * self->scale.largest_square);
+    const double *largest = hsep_at(self, self->forecast_largest);
+    double *scales = hsep_at(self, self->scales), *x = hsep_at(self, self->x), *rows = hsep_at(self, self->rows);
+    for (uint64_t i = 0; i < self->n_static; i++) {
+        const double share = hsep_disturbances_share(hsep_trusted_disturbances(self), i);
+        scales[i] = effect * share / fmax(largest[i], trusted_least_magnitude);
+    }
+    for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
+        hsep_candidate_solve(hsep_trusted_candidate(self, i), hsep_trusted_regression(self), scales, least);
+    }
+    /* The stiffness acts at the position, which the physics model alone does not give well enough. */
+    hsep_candidate_predict(hsep_trusted_candidate(self, 0), rows, past, &self->scale);
+    for (uint64_t j = 0; j < self->Np; j++) {
+        x[j] = x_pb[j] + hsep_candidate_prediction(hsep_trusted_candidate(self, 0))[j];
+    }
+    hsep_disturbances_stiffness(hsep_trusted_disturbances(self), x, rows);
+    for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
+        hsep_candidate_predict(hsep_trusted_candidate(self, i), rows, past, &self->scale);
+    }
+}
+
+HSEP_API void hsep_trusted_forecast(hsep_trusted *self, const double x_d[], const double x_pb[], double e[])
+{
+    const double *past = e + self->Np, *weights = self->blend.weights;
+    const int outgrown = trusted_begin(self, x_d, x_pb);
+    self->hold = past[0];
+    self->predicted = self->n_rows > 0.0 && !outgrown && self->scale.largest_square > 0.0;
+    if (self->predicted) {
+        trusted_predict(self, x_pb, past);
+    }
+    for (uint64_t j = 0; j < self->Np; j++) {
+        e[j] = weights[0] * self->hold;
+        for (uint64_t i = 0; self->predicted && i < HSEP_N_CANDIDATES; i++) {
+            e[j] += weights[1 + i] * hsep_candidate_prediction(hsep_trusted_candidate(self, i))[j];
+        }
+    }
+}
+
+/* Update the regression with the window's rows [features without lags | lags | e_pb]. */
+static void trusted_fold(hsep_trusted *self, const double e[])
+{
+    hsep_regression *regression = hsep_trusted_regression(self);
+    const uint64_t n_static = self->n_static;
+    const double *rows = hsep_at(self, self->rows);
+    if (self->kept < 1.0) {
+        hsep_regression_discount(regression, self->kept);
+        self->n_rows *= self->kept;
+    }
+    for (uint64_t j = self->Np; j-- > 0; rows += n_static) {
+        double *row = hsep_regression_row(regression);
+        memcpy(row, rows, (size_t)n_static * sizeof(double));
+        memcpy(row + n_static, e + j + 1, (size_t)self->p * sizeof(double));
+        row[n_static + self->p] = e[j];
+        hsep_regression_fold(regression);
+    }
+    self->n_rows += (double)self->Np;
+}
+
+/* Variance of the noise from the first window: third differences leave white noise, 20 times its variance, and little
+ * else. */
+static double trusted_first_variance(const hsep_trusted *self, const double e[])
+{
+    double sum = 0.0;
+    if (self->Np <= 10) {
+        return hsep_dot(e, e, self->Np) / (double)self->Np;
+    }
+    for (uint64_t j = 0; j + 3 < self->Np; j++) {
+        const double middle = e[j + 1] - e[j + 2];
+        const double third = ((e[j] - e[j + 1]) - middle) - (middle - (e[j + 2] - e[j + 3]));
+        sum += third * third;
+    }
+    return sum / (double)(self->Np - 3) / 20.0;
+}
+
+/* Estimate the errors of the candidates from the measurement of their window. */
+static void trusted_judge(hsep_trusted *self, double n_rows, const double e[])
+{
+    for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
+        hsep_candidate *candidate = hsep_trusted_candidate(self, i);
+        double variance = 0.0;
+        if (self->predicted) {
+            hsep_candidate_judge(candidate, e);
+            variance = candidate->residual_sum / n_rows;
+        } else {
+            variance = trusted_first_variance(self, e);
+        }
+        candidate->noise_variance = self->given_variance > 0.0 ? self->given_variance : variance;
+    }
+}
+
+/* Update the size of the residuals, and the blend of the candidates. */
+static void trusted_assess(hsep_trusted *self, const double e[])
+{
+    hsep_residual_scale *scale = &self->scale;
+    const double *signals[HSEP_N_BLENDED + 1] = {NULL, NULL, NULL, e};
+    double products[HSEP_N_BLENDED + 1][HSEP_N_BLENDED + 1] = {{0.0}}, sum = 0.0;
+    const double mean_square = hsep_dot(e, e, self->Np) / (double)self->Np;
+    for (uint64_t j = 0; j < self->Np; j++) {
+        scale->largest = fmax(scale->largest, fabs(e[j]));
+    }
+    scale->recent =
+        scale->recent > 0.0 ? trusted_recent * scale->recent + (1.0 - trusted_recent) * mean_square : mean_square;
+    scale->largest_square = fmax(scale->largest_square, mean_square);
+    for (uint64_t i = 0; self->predicted && i < HSEP_N_CANDIDATES; i++) {
+        signals[1 + i] = hsep_candidate_prediction(hsep_trusted_candidate(self, i));
+    }
+    for (uint64_t i = 1; i <= HSEP_N_BLENDED; i++) {
+        sum = 0.0;
+        for (uint64_t j = 0; signals[i] != NULL && j < self->Np; j++) {
+            sum += signals[i][j];
+        }
+        products[0][i] = products[i][0] = self->hold * sum;
+        for (uint64_t j = 1; signals[i] != NULL && j <= HSEP_N_BLENDED; j++) {
+            products[i][j] = signals[j] != NULL ? hsep_dot(signals[i], signals[j], self->Np) : 0.0;
+        }
+    }
+    products[0][0] = self->hold * self->hold * (double)self->Np;
+    hsep_blend_update(&self->blend, products, scale->largest_square, self->Np);
+}
+
+HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_pb[], const double e[])
+{
+    hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
+    double *x = hsep_at(self, self->x);
+    const double n_rows = self->n_rows;                 /* of the prediction */
+    if (self->forecast_scale != self->velocity_scale) { /* outgrown */
+        hsep_regression_init(hsep_trusted_regression(self), self->n_static + self->p, HSEP_NO_PENALTY);
+        self->n_rows = 0.0;
+    }
+    self->velocity_scale = self->forecast_scale;
+    memcpy(
+        hsep_at(self, self->largest), hsep_at(self, self->forecast_largest), (size_t)self->n_static * sizeof(double));
+    for (uint64_t j = 0; j < self->Np; j++) {
+        x[j] = x_pb[j] + e[j];
+    }
+    hsep_disturbances_stiffness(disturbances, x, hsep_at(self, self->rows));
+    hsep_disturbances_end(disturbances);
+    trusted_fold(self, e);
+    trusted_judge(self, n_rows, e);
+    trusted_assess(self, e);
+}

@@ -1,0 +1,98 @@
+/* Residual model that can be trusted: features with priors, candidates shrunk by their variance, and their blend.
+ *
+ * Where the paper's regression has one bare penalty lambda on every weight, here each weight has a prior from the
+ * effect that its feature may have, and lambda is the variance of the noise, estimated from the residuals.
+ *
+ * A window is predicted by hsep_trusted_forecast, and learned by hsep_trusted_learn once it is measured. Signals are
+ * kept newest first: sample k is at place Np - 1 - k, and what was before the window is behind it. Positions are
+ * relative to the start. Memory is one block, without pointers; a window predicted and not measured yet is part of it.
+ * Reentrant; allocates nothing.
+ */
+#ifndef HSEP_TRUSTED_H
+#define HSEP_TRUSTED_H
+
+#include "hsep_api.h"
+#include "hsep_blend.h"
+#include "hsep_candidate.h"
+#include "hsep_disturbances.h"
+#include "hsep_layout.h"
+#include "hsep_physics.h"
+#include "hsep_regression.h"
+#include "hsep_settings.h"
+
+#include <stdint.h>
+
+#define HSEP_N_CANDIDATES 2   /* without lags, with lags */
+#define HSEP_NO_PENALTY 1e-40 /* lambda of the factor itself, m2: penalties come with each solution */
+
+typedef struct {
+    const hsep_predictor_settings *settings;
+    const hsep_trust_settings *trust;
+    const hsep_mode *modes; /* (n_modes,) */
+    uint64_t n_modes;
+} hsep_trusted_parameters;
+
+typedef struct {
+    uint64_t Np, p, n_static;
+    double least_variance; /* m2, of the noise */
+    double effect;         /* m, prior standard deviation of a feature's effect; 0: from the residuals */
+    double given_variance; /* m2, of the noise; 0: estimated */
+    double kept;           /* weight of earlier rows, from window to window */
+    /* Learned */
+    double n_rows;         /* weighted */
+    double velocity_scale; /* m/s */
+    hsep_residual_scale scale;
+    hsep_blend blend;
+    /* Of the window that is predicted */
+    double hold;           /* m, last residual */
+    double forecast_scale; /* m/s, its velocity scale */
+    uint64_t predicted;    /* whether the candidates predicted it */
+    /* Offsets in doubles from the beginning of the struct */
+    uint64_t largest;          /* (n_static,) largest magnitudes of the features without lags */
+    uint64_t forecast_largest; /* (n_static,) those with the window that is predicted */
+    uint64_t scales;           /* (n_static,) prior standard deviations of their weights */
+    uint64_t x;                /* (Np,) m, position */
+    uint64_t rows;             /* (Np, n_static) features without lags, sample after sample */
+    uint64_t disturbances, regression;
+    uint64_t candidates[HSEP_N_CANDIDATES];
+} hsep_trusted;
+
+HSEP_ASSERT_WORDS(hsep_trusted, 39);
+
+/* Features, those without lags first. */
+HSEP_API uint64_t hsep_trusted_n(const hsep_predictor_settings *settings);
+
+/* Bytes of the block, counted in double so that no size can overflow. */
+HSEP_API double hsep_trusted_size(const hsep_trusted_parameters *parameters);
+
+/* Fill the block, at rest, with nothing learned. */
+HSEP_API void hsep_trusted_init(hsep_trusted *self, const hsep_trusted_parameters *parameters);
+
+/* Whether a block, in any alignment, is one that hsep_trusted_init with these parameters began. */
+HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters *parameters);
+
+/* The regression of all rows. */
+HSEP_API hsep_regression *hsep_trusted_regression(hsep_trusted *self);
+
+HSEP_API hsep_disturbances *hsep_trusted_disturbances(hsep_trusted *self);
+HSEP_API hsep_candidate *hsep_trusted_candidate(hsep_trusted *self, uint64_t i);
+
+/* The numbers learned besides it, for a warm start before the first window: their count, and the place of one of them.
+ * These are, each >= 0: n_rows, velocity_scale, the scale of the residuals as in its struct, the noise variances of the
+ * candidates, their correlations, the blend's weights and largest; then the blend's gram and cross. */
+HSEP_API uint64_t hsep_trusted_n_learned(const hsep_trusted *self);
+HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i);
+
+/* Whether these numbers are finite and in range. */
+HSEP_API int hsep_trusted_sound(hsep_trusted *self);
+
+/* Predict the residual e, (Np + p,), m, over the next window; behind it the last ones, as measured. x_d: commands,
+ * x_pb: physics-based prediction, (Np,), m. Cost: m^3 / 6 multiply-adds for each candidate's m features, three times
+ * Np m^2 / 2, Np^2 / 2, and 6 Np tanh. */
+HSEP_API void hsep_trusted_forecast(hsep_trusted *self, const double x_d[], const double x_pb[], double e[]);
+
+/* Learn the measured residuals e, (Np + p,), m, of the window that was predicted; behind it those before it. Cost: Np
+ * times that of hsep_regression_fold. */
+HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_pb[], const double e[]);
+
+#endif

@@ -1,0 +1,135 @@
+/* Memory of a residual model that can be trusted: its layout, beginning and check, and what it has learned. */
+#include "hsep_trusted.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+HSEP_API hsep_disturbances *hsep_trusted_disturbances(hsep_trusted *self)
+{
+    return (hsep_disturbances *)hsep_at(self, self->disturbances);
+}
+
+HSEP_API hsep_regression *hsep_trusted_regression(hsep_trusted *self)
+{
+    return (hsep_regression *)hsep_at(self, self->regression);
+}
+
+HSEP_API hsep_candidate *hsep_trusted_candidate(hsep_trusted *self, uint64_t i)
+{
+    return (hsep_candidate *)hsep_at(self, self->candidates[i]);
+}
+
+HSEP_API uint64_t hsep_trusted_n(const hsep_predictor_settings *settings)
+{
+    return hsep_disturbances_n(settings->q) + settings->p;
+}
+
+/* Lags of a candidate. */
+static uint64_t trusted_lags(const hsep_trusted *self, uint64_t candidate) { return candidate > 0 ? self->p : 0; }
+
+/* Set what follows from the parameters; return the bytes of the block. */
+static double trusted_lay_out(hsep_trusted *self, const hsep_trusted_parameters *parameters)
+{
+    const hsep_predictor_settings *settings = parameters->settings;
+    const hsep_trust_settings *trust = parameters->trust;
+    const double Np = (double)settings->Np, n_static = (double)hsep_disturbances_n(settings->q);
+    double end = HSEP_WORDS(hsep_trusted);
+    self->Np = settings->Np;
+    self->p = settings->p;
+    self->n_static = hsep_disturbances_n(settings->q);
+    self->least_variance = settings->lambda;
+    self->effect = trust->effect;
+    self->given_variance = trust->noise_std * trust->noise_std;
+    self->kept = trust->forgetting > 0.0 ? exp(-Np * settings->T_s / trust->forgetting) : 1.0;
+    self->largest = hsep_take(&end, n_static);
+    self->forecast_largest = hsep_take(&end, n_static);
+    self->scales = hsep_take(&end, n_static);
+    self->x = hsep_take(&end, Np);
+    self->rows = hsep_take(&end, Np * n_static);
+    self->disturbances = hsep_take_block(&end, hsep_disturbances_size(settings, parameters->n_modes));
+    self->regression = hsep_take_block(&end, hsep_regression_size(hsep_trusted_n(settings)));
+    for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
+        self->candidates[i] =
+            hsep_take_block(&end, hsep_candidate_size(self->Np, self->n_static, trusted_lags(self, i)));
+    }
+    return end * sizeof(double);
+}
+
+HSEP_API double hsep_trusted_size(const hsep_trusted_parameters *parameters)
+{
+    return trusted_lay_out(&(hsep_trusted){0}, parameters);
+}
+
+HSEP_API void hsep_trusted_init(hsep_trusted *self, const hsep_trusted_parameters *parameters)
+{
+    memset(self, 0, (size_t)hsep_trusted_size(parameters));
+    (void)trusted_lay_out(self, parameters);
+    hsep_blend_init(&self->blend);
+    hsep_disturbances_init(
+        hsep_trusted_disturbances(self), parameters->settings, parameters->modes, parameters->n_modes);
+    hsep_regression_init(hsep_trusted_regression(self), self->n_static + self->p, HSEP_NO_PENALTY);
+    for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
+        hsep_candidate_init(hsep_trusted_candidate(self, i), self->Np, self->n_static, trusted_lags(self, i));
+    }
+}
+
+HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters *parameters)
+{
+    hsep_trusted got;
+    memcpy(&got, block, sizeof got);
+    (void)trusted_lay_out(&got, parameters); /* changes nothing where it is sound */
+    int sound =
+        memcmp(&got, block, sizeof got) == 0 && got.predicted <= 1 &&
+        hsep_disturbances_valid(hsep_at_bytes(block, got.disturbances), parameters->settings, parameters->n_modes) &&
+        hsep_regression_valid(hsep_at_bytes(block, got.regression), got.n_static + got.p);
+    for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
+        const void *candidate = hsep_at_bytes(block, got.candidates[i]);
+        sound = sound && hsep_candidate_valid(candidate, got.Np, got.n_static, trusted_lags(&got, i));
+    }
+    return sound;
+}
+
+HSEP_API uint64_t hsep_trusted_n_learned(const hsep_trusted *self)
+{
+    return 2 + 3 + 2 * HSEP_N_CANDIDATES + self->n_static + HSEP_N_BLENDED * (HSEP_N_BLENDED + 2);
+}
+
+HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i)
+{
+    struct {
+        double *first;
+        uint64_t n;
+    } const parts[] = {
+        {&self->n_rows, 1},
+        {&self->velocity_scale, 1},
+        {&self->scale.recent, 1},
+        {&self->scale.largest_square, 1},
+        {&self->scale.largest, 1},
+        {&hsep_trusted_candidate(self, 0)->noise_variance, 1},
+        {&hsep_trusted_candidate(self, 1)->noise_variance, 1},
+        {&hsep_trusted_candidate(self, 0)->correlation, 1},
+        {&hsep_trusted_candidate(self, 1)->correlation, 1},
+        {self->blend.weights, HSEP_N_BLENDED},
+        {hsep_at(self, self->largest), self->n_static},
+        {self->blend.gram, HSEP_N_BLENDED * HSEP_N_BLENDED},
+        {self->blend.cross, HSEP_N_BLENDED},
+    };
+    size_t part = 0;
+    for (; i >= parts[part].n; part++) {
+        i -= parts[part].n;
+    }
+    return parts[part].first + i;
+}
+
+HSEP_API int hsep_trusted_sound(hsep_trusted *self)
+{
+    const uint64_t n = hsep_trusted_n_learned(self), n_signed = HSEP_N_BLENDED * (HSEP_N_BLENDED + 1);
+    int sound =
+        hsep_trusted_candidate(self, 0)->correlation >= 1.0 && hsep_trusted_candidate(self, 1)->correlation >= 1.0;
+    for (uint64_t i = 0; i < n; i++) {
+        const double learned = *hsep_trusted_learned(self, i);
+        sound = sound && isfinite(learned) && (i + n_signed >= n || learned >= 0.0);
+    }
+    return sound;
+}
