@@ -123,12 +123,14 @@ def test_the_header_says_what_the_model_description_says(fmus: BuiltFmus) -> Non
     description = fmpy.read_model_description(str(fmus("HybridPredictor")))
     assert f'#define HSEP_GUID "{description.guid}"' in header
     rows = re.findall(r'^    \{"([^"]+)", "([^"]*)", HSEP_(\w+), HSEP_(\w+), \d, ([^,]+),', header, re.MULTILINE)
+    assert re.search(r'\{"t_init", "s", HSEP_REAL, HSEP_PARAMETER, 0, 0.3, 0.0, 1000000.0, 0.0, -1.0, 0\}', header)
+    assert re.search(r'\{"effect", "m", HSEP_REAL, HSEP_PARAMETER, 0, 0.0, 0.0, 10.0, 1e-15, HUGE_VAL, 0\}', header)
     assert len(rows) == len(description.modelVariables)
     for (name, unit, kind, causality, start), variable in zip(rows, description.modelVariables, strict=True):
         c_kind = "Integer" if variable.type == "Enumeration" else variable.type
         assert (name, unit, kind) == (variable.name, variable.unit or "", c_kind.upper())
         assert causality == variable.causality.upper()
-        assert float(start) == float(variable.start or 0)
+        assert float(start) == float({"false": 0, "true": 1}.get(variable.start, variable.start or 0))
     references = dict(re.findall(r"^    HSEP_VR_(\w+) = (\d+)", header, re.MULTILINE))
     for name in ("x_h", "lambda", "x_h_window[1]", "mode[1].f_n"):
         place = next(v.valueReference for v in description.modelVariables if v.name == name)

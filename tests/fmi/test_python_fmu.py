@@ -87,6 +87,10 @@ def test_interface_of_the_predictor(predictor: FmuInstance) -> None:
         "t_init": ("parameter", "Real", "s"),
         "input_hold": ("parameter", "Enumeration", None),
         "dead_time": ("parameter", "Integer", None),
+        "trust": ("parameter", "Boolean", None),
+        "effect": ("parameter", "Real", "m"),
+        "noise_std": ("parameter", "Real", "m"),
+        "forgetting": ("parameter", "Real", "s"),
         "mode[1].f_n": ("parameter", "Real", "Hz"),
         "mode[1].zeta": ("parameter", "Real", None),
         "mode[1].alpha": ("parameter", "Real", "1/s2"),
@@ -94,7 +98,8 @@ def test_interface_of_the_predictor(predictor: FmuInstance) -> None:
     }
     found = {name: (v.causality, v.type, v.unit) for name, v in variables.items()}
     assert {name: found[name] for name in expected} == expected
-    assert len(found) == 22 + 300
+    assert len(found) == 26 + 300
+    assert variables["t_init"].min == "-1.0"  # automatic
     starts = {name: variables[name].start for name in ("Np", "p", "q", "lambda", "T_s", "t_init", "input_hold")}
     assert starts == {
         "Np": "100",
