@@ -121,6 +121,11 @@ class LookAhead:
         self.delay = self.Np if self.planner is None else self.planner.preview
 
     @property
+    def may_miss(self) -> bool:
+        """Whether measurements may be NaN, which is missing."""
+        return self.predictor.settings.trust
+
+    @property
     def batch(self) -> int:
         """``⌊k/Np⌋``."""
         return self.k // self.Np
@@ -193,7 +198,7 @@ class LookAhead:
         """
         self.check(x_d_ahead, x_meas)
         self._ahead[self.k % self.delay], self._measured[self.k % self.Np] = x_d_ahead, x_meas
-        if self.k >= self._first_scored:
+        if self.k >= self._first_scored and not math.isnan(x_meas):
             self._n_scored += 1
             self._sums += np.square([x_meas - self.x_d, x_meas - self.x_pb, x_meas - self.x_h])
         self.k += 1
@@ -207,7 +212,8 @@ class LookAhead:
             raise SignalError(self.diverged)
         sample = self.k if k is None else k
         for name, value in (("x_d_ahead", x_d_ahead), ("x_meas", x_meas)):
-            check_position(name, value, f" at sample {sample}")
+            if not (name == "x_meas" and math.isnan(x_meas) and self.may_miss):
+                check_position(name, value, f" at sample {sample}")
 
     def to_bytes(self) -> bytes:
         """Return the complete state, predictor and planner included, as a versioned blob."""

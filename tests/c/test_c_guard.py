@@ -33,16 +33,16 @@ class Guard(ctypes.Structure):
 
     def accepts(self, x: Array, x_pb: Array, largest: float) -> NDArray[np.bool_]:
         work, accepted = np.empty(len(x)), np.empty(len(x))
-        pointers = [np.ascontiguousarray(array).ctypes.data_as(ctypes.c_void_p) for array in (x, x_pb)]
+        newest_first = [np.ascontiguousarray(array[::-1]) for array in (x, x_pb)]
         c_core.library("predictor").hsep_guard_accept(
             ctypes.byref(self),
-            *pointers,
+            *(array.ctypes.data_as(ctypes.c_void_p) for array in newest_first),
             ctypes.c_uint64(len(x)),
             ctypes.c_double(largest),
             work.ctypes.data_as(ctypes.c_void_p),
             accepted.ctypes.data_as(ctypes.c_void_p),
         )
-        return accepted > 0.0
+        return accepted[::-1] > 0.0
 
 
 @pytest.mark.parametrize("seed", range(20))

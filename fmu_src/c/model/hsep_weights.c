@@ -156,6 +156,9 @@ static int weights_take(
         }
     }
     regression->n_samples = head.n_samples;
+    if (trusted != NULL) {
+        hsep_trusted_restart(trusted);
+    }
     return 1;
 }
 

@@ -162,14 +162,28 @@ HSEP_API void hsep_candidate_predict(
     }
 }
 
-HSEP_API void hsep_candidate_judge(hsep_candidate *self, const double measured[])
+HSEP_API void hsep_candidate_judge(hsep_candidate *self, const double measured[], const double accepted[])
 {
-    const double *unshrunk = hsep_at(self, self->unshrunk), n = (double)self->Np;
-    double sum = 0.0;
+    const double *unshrunk = hsep_at(self, self->unshrunk);
+    double sum = 0.0, n = 0.0;
     for (uint64_t j = 0; j < self->Np; j++) {
-        sum += measured[j] - unshrunk[j];
+        sum += accepted[j] * (measured[j] - unshrunk[j]);
+        n += accepted[j];
     }
     const double seen = self->noise_variance > 0.0 ? sum * sum / n / self->noise_variance : candidate_correlation_max;
     self->correlation += candidate_correlation_rate * (fmin(seen, candidate_correlation_max) - self->correlation);
     self->correlation = fmax(self->correlation, 1.0);
+}
+
+HSEP_API double hsep_candidate_surprise(const hsep_candidate *self, const double measured[], const double accepted[])
+{
+    const double *unshrunk = hsep_at_const(self, self->unshrunk), *spread = hsep_at_const(self, self->spread);
+    double squares = 0.0, expected = 0.0, n = 0.0;
+    for (uint64_t j = 0; j < self->Np; j++) {
+        const double error = measured[j] - unshrunk[j];
+        squares += accepted[j] * error * error;
+        expected += spread[j];
+        n += accepted[j];
+    }
+    return squares / n / (self->variance + expected / (double)self->Np);
 }

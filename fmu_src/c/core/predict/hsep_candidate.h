@@ -63,8 +63,12 @@ HSEP_API void hsep_candidate_solve(
 HSEP_API void hsep_candidate_predict(
     hsep_candidate *self, const double rows[], const double past[], const hsep_residual_scale *scale);
 
-/* Estimate the correlation from the errors of a window, (Np,), m, that has been measured. */
-HSEP_API void hsep_candidate_judge(hsep_candidate *self, const double measured[]);
+/* Estimate the correlation from the errors of a window, (Np,), m, that has been measured; accepted: (Np,), 1 where it
+ * counts. */
+HSEP_API void hsep_candidate_judge(hsep_candidate *self, const double measured[], const double accepted[]);
+
+/* Mean square error of the window relative to the one that was expected. */
+HSEP_API double hsep_candidate_surprise(const hsep_candidate *self, const double measured[], const double accepted[]);
 
 /* Prediction of a window, (Np,), m. */
 HSEP_API const double *hsep_candidate_prediction(const hsep_candidate *self);

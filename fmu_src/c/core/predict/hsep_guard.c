@@ -23,13 +23,13 @@ static double guard_residual(const hsep_guard *self, const double x[], const dou
     if (i < 0) {
         return self->before[HSEP_GUARD_NEIGHBOURS + i];
     }
-    return (uint64_t)i < n ? x[i] - x_pb[i] : NAN;
+    return (uint64_t)i < n ? x[n - 1 - (uint64_t)i] - x_pb[n - 1 - (uint64_t)i] : NAN;
 }
 
 /* Deviation of residual i from the median of its neighbours and itself, as far as they are known. */
 static double guard_deviation(const hsep_guard *self, const double x[], const double x_pb[], uint64_t n, uint64_t i)
 {
-    const double residual = x[i] - x_pb[i];
+    const double residual = guard_residual(self, x, x_pb, n, (int64_t)i);
     double ordered[GUARD_WINDOW];
     int count = 0;
     if (!isfinite(residual)) {
@@ -86,11 +86,11 @@ HSEP_API void hsep_guard_accept(
     hsep_guard *self, const double x[], const double x_pb[], uint64_t n, double largest, double deviation[],
     double accepted[])
 {
-    double pace = 0.0, last = isnan(self->x_pb) ? x_pb[0] : self->x_pb;
+    double pace = 0.0, last = isnan(self->x_pb) ? x_pb[n - 1] : self->x_pb;
     for (uint64_t k = 0; k < n; k++) {
-        pace = fmax(pace, fabs(x_pb[k] - last));
-        last = x_pb[k];
-        deviation[k] = guard_deviation(self, x, x_pb, n, k);
+        pace = fmax(pace, fabs(x_pb[n - 1 - k] - last));
+        last = x_pb[n - 1 - k];
+        deviation[n - 1 - k] = guard_deviation(self, x, x_pb, n, k);
     }
     const double step = self->step < HUGE_VAL ? self->step : 0.0;
     const double motion = fmax(pace, self->pace);
@@ -98,26 +98,27 @@ HSEP_API void hsep_guard_accept(
         guard_spreads * self->spread + guard_resolution * step + guard_small * largest + guard_ripple * motion;
     const int known = self->spread >= 0.0;
     for (uint64_t k = 0; k < n; k++) {
-        const double residual = x[k] - x_pb[k];
+        const uint64_t place = n - 1 - k;
+        const double residual = x[place] - x_pb[place];
         self->gap++;
-        accepted[k] = 0.0;
-        if (!isfinite(x[k])) {
+        accepted[place] = 0.0;
+        if (!isfinite(x[place])) {
             continue;
         }
-        if (guard_held(self, x[k], x_pb[k], plausible)) {
+        if (guard_held(self, x[place], x_pb[place], plausible)) {
             for (uint64_t j = k + 1 > self->repeats ? k + 1 - self->repeats : 0; j < k; j++) {
-                accepted[j] = 0.0;
+                accepted[n - 1 - j] = 0.0;
             }
             continue;
         }
         if (known) {
             const int jumping = fabs(residual - self->last) > plausible + (double)self->gap * guard_pace * motion;
             self->jumps = jumping ? self->jumps + 1 : 0;
-            if ((jumping && self->jumps <= self->patience) || deviation[k] > plausible) {
+            if ((jumping && self->jumps <= self->patience) || deviation[place] > plausible) {
                 continue;
             }
         }
-        accepted[k] = 1.0;
+        accepted[place] = 1.0;
         self->last = residual;
         self->gap = self->jumps = 0;
     }

@@ -55,10 +55,13 @@ HSEP_API int hsep_predictor_take_in(hsep_predictor *self, double x_d_ahead, doub
     const double x_h = hsep_at(self, self->x_h)[i];
     hsep_at(self, self->ahead)[self->k % self->preview] = x_d_ahead;
     hsep_at(self, self->past_e)[j] = x_meas - self->start - hsep_at(self, self->past_x)[j]; /* e_pb = x - x_pb */
+    if (self->trusted) {
+        hsep_trusted_measure(hsep_predictor_trusted(self), i, x_meas - self->start);
+    }
     if (predictor_guard(self, x_meas, x_pb)) {
         predictor_learn(self, i);
     }
-    if (self->k >= self->preview && (double)self->k >= self->n_init) {
+    if (self->k >= self->preview && (double)self->k >= self->n_init && !isnan(x_meas)) {
         self->n_measured++;
         self->sum_e += (x_meas - x_d) * (x_meas - x_d);
         self->sum_pb += (x_meas - x_pb) * (x_meas - x_pb);

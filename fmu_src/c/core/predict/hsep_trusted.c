@@ -19,6 +19,19 @@ static const double trusted_least_noise = 1e-4;
 /* Velocity, m/s, below which a command is at rest: ratios of smaller ones may underflow. */
 static const double trusted_least_velocity = 1e-200;
 
+/* Bound on the last residual held, relative to the largest one. */
+static const double trusted_hold_max = 1.2;
+
+/* Lags of a row that may stand for samples without a measurement. */
+static const double trusted_bridged_max = 3.0;
+
+/* Largest weight of earlier runs when another begins, in windows. */
+static const double trusted_carried = 10.0;
+
+/* Mean square error of a window, relative to the expected one, above which the machine has changed; and what then
+ * remains at least of the weight of all samples before, in windows. */
+static const double trusted_surprise = 10.0, trusted_surprised = 0.1;
+
 static const double trusted_least_magnitude = 1e-150; /* of a feature */
 
 /* Begin the window: its features, at the position x_pb, and their largest magnitudes. Return whether the commanded
@@ -70,9 +83,9 @@ static void trusted_predict(hsep_trusted *self, const double x_pb[], const doubl
 
 HSEP_API void hsep_trusted_forecast(hsep_trusted *self, const double x_d[], const double x_pb[], double e[])
 {
-    const double *past = e + self->Np, *weights = self->blend.weights;
+    const double *past = e + self->Np, *weights = self->blend.weights, bound = trusted_hold_max * self->scale.largest;
     const int outgrown = trusted_begin(self, x_d, x_pb);
-    self->hold = past[0];
+    self->hold = fmin(fmax(past[0], -bound), bound);
     self->predicted = self->n_rows > 0.0 && !outgrown && self->scale.largest_square > 0.0;
     if (self->predicted) {
         trusted_predict(self, x_pb, past);
@@ -85,24 +98,73 @@ HSEP_API void hsep_trusted_forecast(hsep_trusted *self, const double x_d[], cons
     }
 }
 
+/* Weigh all samples so far by kept. */
+static void trusted_discount(hsep_trusted *self, double kept)
+{
+    if (kept < 1.0) {
+        hsep_regression_discount(hsep_trusted_regression(self), kept);
+        self->n_rows *= kept;
+    }
+}
+
+HSEP_API void hsep_trusted_restart(hsep_trusted *self)
+{
+    const double most = trusted_carried * (double)self->Np;
+    trusted_discount(self, most / fmax(self->n_rows, most));
+}
+
+HSEP_API void hsep_trusted_measure(hsep_trusted *self, uint64_t k, double x)
+{
+    hsep_at(self, self->measured)[self->Np - 1 - k] = x;
+}
+
+/* The window's residuals, linear in time between accepted ones; return how many are accepted. */
+static double trusted_bridge(hsep_trusted *self, const double x_pb[], double e[])
+{
+    const double *measured = hsep_at(self, self->measured), *accepted = hsep_at(self, self->accepted);
+    double *bridged = hsep_at(self, self->bridged), count = 0.0;
+    uint64_t known = self->Np; /* place of the last accepted residual, at first the one before the window */
+    for (uint64_t j = self->Np; j-- > 0;) {
+        bridged[j] = 1.0 - accepted[j];
+        if (accepted[j] > 0.0) {
+            e[j] = measured[j] - x_pb[j];
+            const double slope = (e[j] - e[known]) / (double)(known - j);
+            for (uint64_t i = known - 1; i > j; i--) {
+                e[i] = slope * (double)(known - i) + e[known];
+            }
+            known = j;
+            count += 1.0;
+        }
+    }
+    for (uint64_t i = 0; i < known; i++) {
+        e[i] = e[known];
+    }
+    return count;
+}
+
 /* Update the regression with the window's rows [features without lags | lags | e_pb]. */
 static void trusted_fold(hsep_trusted *self, const double e[])
 {
     hsep_regression *regression = hsep_trusted_regression(self);
     const uint64_t n_static = self->n_static;
-    const double *rows = hsep_at(self, self->rows);
-    if (self->kept < 1.0) {
-        hsep_regression_discount(regression, self->kept);
-        self->n_rows *= self->kept;
+    const double *rows = hsep_at(self, self->rows), *accepted = hsep_at(self, self->accepted);
+    const double *bridged = hsep_at(self, self->bridged);
+    double n_bridged = 0.0; /* among the lags of the row */
+    for (uint64_t i = 0; i < self->p; i++) {
+        n_bridged += bridged[self->Np + i];
     }
+    trusted_discount(self, self->kept);
     for (uint64_t j = self->Np; j-- > 0; rows += n_static) {
-        double *row = hsep_regression_row(regression);
-        memcpy(row, rows, (size_t)n_static * sizeof(double));
-        memcpy(row + n_static, e + j + 1, (size_t)self->p * sizeof(double));
-        row[n_static + self->p] = e[j];
-        hsep_regression_fold(regression);
+        if (accepted[j] > 0.0 && n_bridged <= trusted_bridged_max) {
+            double *row = hsep_regression_row(regression);
+            memcpy(row, rows, (size_t)n_static * sizeof(double));
+            memcpy(row + n_static, e + j + 1, (size_t)self->p * sizeof(double));
+            row[n_static + self->p] = e[j];
+            hsep_regression_fold(regression);
+            self->n_rows += 1.0;
+        }
+        n_bridged += bridged[j] - bridged[j + self->p];
     }
-    self->n_rows += (double)self->Np;
 }
 
 /* Variance of the noise from the first window: third differences leave white noise, 20 times its variance, and little
@@ -124,11 +186,20 @@ static double trusted_first_variance(const hsep_trusted *self, const double e[])
 /* Estimate the errors of the candidates from the measurement of their window. */
 static void trusted_judge(hsep_trusted *self, double n_rows, const double e[])
 {
+    const double *accepted = hsep_at(self, self->accepted);
+    if (self->predicted) {
+        const hsep_candidate *best = hsep_trusted_candidate(self, HSEP_N_CANDIDATES - 1);
+        const double surprise = hsep_candidate_surprise(best, e, accepted);
+        if (surprise > trusted_surprise) {
+            const double kept = trusted_surprise / surprise * (trusted_surprise / surprise);
+            trusted_discount(self, fmax(kept, trusted_surprised * (double)self->Np / self->n_rows));
+        }
+    }
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
         hsep_candidate *candidate = hsep_trusted_candidate(self, i);
         double variance = 0.0;
         if (self->predicted) {
-            hsep_candidate_judge(candidate, e);
+            hsep_candidate_judge(candidate, e, accepted);
             variance = candidate->residual_sum / n_rows;
         } else {
             variance = trusted_first_variance(self, e);
@@ -137,15 +208,27 @@ static void trusted_judge(hsep_trusted *self, double n_rows, const double e[])
     }
 }
 
-/* Update the size of the residuals, and the blend of the candidates. */
-static void trusted_assess(hsep_trusted *self, const double e[])
+/* Scalar product of two signals over the accepted samples; a missing signal is 0. */
+static double trusted_product(const hsep_trusted *self, const double a[], const double b[])
+{
+    const double *accepted = hsep_at_const(self, self->accepted);
+    double sum = 0.0;
+    for (uint64_t j = 0; a != NULL && b != NULL && j < self->Np; j++) {
+        sum += accepted[j] * a[j] * b[j];
+    }
+    return sum;
+}
+
+/* Update the size of the residuals, and the blend of the candidates, with the accepted samples, count of them. */
+static void trusted_assess(hsep_trusted *self, const double e[], double count)
 {
     hsep_residual_scale *scale = &self->scale;
+    const double *accepted = hsep_at(self, self->accepted);
     const double *signals[HSEP_N_BLENDED + 1] = {NULL, NULL, NULL, e};
-    double products[HSEP_N_BLENDED + 1][HSEP_N_BLENDED + 1] = {{0.0}}, sum = 0.0;
-    const double mean_square = hsep_dot(e, e, self->Np) / (double)self->Np;
+    double products[HSEP_N_BLENDED + 1][HSEP_N_BLENDED + 1] = {{0.0}};
+    const double mean_square = trusted_product(self, e, e) / count;
     for (uint64_t j = 0; j < self->Np; j++) {
-        scale->largest = fmax(scale->largest, fabs(e[j]));
+        scale->largest = fmax(scale->largest, accepted[j] * fabs(e[j]));
     }
     scale->recent =
         scale->recent > 0.0 ? trusted_recent * scale->recent + (1.0 - trusted_recent) * mean_square : mean_square;
@@ -154,23 +237,23 @@ static void trusted_assess(hsep_trusted *self, const double e[])
         signals[1 + i] = hsep_candidate_prediction(hsep_trusted_candidate(self, i));
     }
     for (uint64_t i = 1; i <= HSEP_N_BLENDED; i++) {
-        sum = 0.0;
+        double sum = 0.0;
         for (uint64_t j = 0; signals[i] != NULL && j < self->Np; j++) {
-            sum += signals[i][j];
+            sum += accepted[j] * signals[i][j];
         }
         products[0][i] = products[i][0] = self->hold * sum;
-        for (uint64_t j = 1; signals[i] != NULL && j <= HSEP_N_BLENDED; j++) {
-            products[i][j] = signals[j] != NULL ? hsep_dot(signals[i], signals[j], self->Np) : 0.0;
+        for (uint64_t j = 1; j <= HSEP_N_BLENDED; j++) {
+            products[i][j] = trusted_product(self, signals[i], signals[j]);
         }
     }
-    products[0][0] = self->hold * self->hold * (double)self->Np;
+    products[0][0] = self->hold * self->hold * count;
     hsep_blend_update(&self->blend, products, scale->largest_square, self->Np);
 }
 
-HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_pb[], const double e[])
+HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_pb[], double e[])
 {
     hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
-    double *x = hsep_at(self, self->x);
+    double *x = hsep_at(self, self->x), *bridged = hsep_at(self, self->bridged);
     const double n_rows = self->n_rows;                 /* of the prediction */
     if (self->forecast_scale != self->velocity_scale) { /* outgrown */
         hsep_regression_init(hsep_trusted_regression(self), self->n_static + self->p, HSEP_NO_PENALTY);
@@ -179,12 +262,20 @@ HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_pb[], const 
     self->velocity_scale = self->forecast_scale;
     memcpy(
         hsep_at(self, self->largest), hsep_at(self, self->forecast_largest), (size_t)self->n_static * sizeof(double));
+    hsep_guard_accept(
+        &self->guard, hsep_at(self, self->measured), x_pb, self->Np, self->scale.largest, x,
+        hsep_at(self, self->accepted));
+    const double count = trusted_bridge(self, x_pb, e);
+    self->n_rejected += self->Np - (uint64_t)count;
     for (uint64_t j = 0; j < self->Np; j++) {
         x[j] = x_pb[j] + e[j];
     }
     hsep_disturbances_stiffness(disturbances, x, hsep_at(self, self->rows));
     hsep_disturbances_end(disturbances);
-    trusted_fold(self, e);
-    trusted_judge(self, n_rows, e);
-    trusted_assess(self, e);
+    if (count > 0.0) {
+        trusted_fold(self, e);
+        trusted_judge(self, n_rows, e);
+        trusted_assess(self, e, count);
+    }
+    memmove(bridged + self->Np, bridged, (size_t)self->p * sizeof(double)); /* p <= Np: they do not overlap */
 }

@@ -15,6 +15,7 @@
 #include "hsep_blend.h"
 #include "hsep_candidate.h"
 #include "hsep_disturbances.h"
+#include "hsep_guard.h"
 #include "hsep_layout.h"
 #include "hsep_physics.h"
 #include "hsep_regression.h"
@@ -47,17 +48,22 @@ typedef struct {
     double hold;           /* m, last residual */
     double forecast_scale; /* m/s, its velocity scale */
     uint64_t predicted;    /* whether the candidates predicted it */
+    hsep_guard guard;
+    uint64_t n_rejected; /* samples of this run that were not accepted */
     /* Offsets in doubles from the beginning of the struct */
     uint64_t largest;          /* (n_static,) largest magnitudes of the features without lags */
     uint64_t forecast_largest; /* (n_static,) those with the window that is predicted */
     uint64_t scales;           /* (n_static,) prior standard deviations of their weights */
     uint64_t x;                /* (Np,) m, position */
+    uint64_t measured;         /* (Np,) m, measured position, NaN where missing */
+    uint64_t accepted;         /* (Np,) whether it is plausible */
+    uint64_t bridged;          /* (Np + p,) whether a residual stands for one that is not */
     uint64_t rows;             /* (Np, n_static) features without lags, sample after sample */
     uint64_t disturbances, regression;
     uint64_t candidates[HSEP_N_CANDIDATES];
 } hsep_trusted;
 
-HSEP_ASSERT_WORDS(hsep_trusted, 39);
+HSEP_ASSERT_WORDS(hsep_trusted, 43 + sizeof(hsep_guard) / 8);
 
 /* Features, those without lags first. */
 HSEP_API uint64_t hsep_trusted_n(const hsep_predictor_settings *settings);
@@ -91,8 +97,14 @@ HSEP_API int hsep_trusted_sound(hsep_trusted *self);
  * Np m^2 / 2, Np^2 / 2, and 6 Np tanh. */
 HSEP_API void hsep_trusted_forecast(hsep_trusted *self, const double x_d[], const double x_pb[], double e[]);
 
-/* Learn the measured residuals e, (Np + p,), m, of the window that was predicted; behind it those before it. Cost: Np
- * times that of hsep_regression_fold. */
-HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_pb[], const double e[]);
+/* Take the measured position of sample k of the window that was predicted, m, relative to the start; NaN: missing. */
+HSEP_API void hsep_trusted_measure(hsep_trusted *self, uint64_t k, double x);
+
+/* Learn that window. e: (Np + p,), m, becomes its residuals, where the measurement is not plausible between those beside
+ * it; behind it those before it. Cost: Np times that of hsep_regression_fold. */
+HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_pb[], double e[]);
+
+/* Discount what earlier runs have learned: a machine may have changed meanwhile. */
+HSEP_API void hsep_trusted_restart(hsep_trusted *self);
 
 #endif

@@ -46,6 +46,9 @@ static double trusted_lay_out(hsep_trusted *self, const hsep_trusted_parameters 
     self->forecast_largest = hsep_take(&end, n_static);
     self->scales = hsep_take(&end, n_static);
     self->x = hsep_take(&end, Np);
+    self->measured = hsep_take(&end, Np);
+    self->accepted = hsep_take(&end, Np);
+    self->bridged = hsep_take(&end, Np + (double)settings->p);
     self->rows = hsep_take(&end, Np * n_static);
     self->disturbances = hsep_take_block(&end, hsep_disturbances_size(settings, parameters->n_modes));
     self->regression = hsep_take_block(&end, hsep_regression_size(hsep_trusted_n(settings)));
@@ -66,6 +69,7 @@ HSEP_API void hsep_trusted_init(hsep_trusted *self, const hsep_trusted_parameter
     memset(self, 0, (size_t)hsep_trusted_size(parameters));
     (void)trusted_lay_out(self, parameters);
     hsep_blend_init(&self->blend);
+    hsep_guard_init(&self->guard, 2 * self->Np);
     hsep_disturbances_init(
         hsep_trusted_disturbances(self), parameters->settings, parameters->modes, parameters->n_modes);
     hsep_regression_init(hsep_trusted_regression(self), self->n_static + self->p, HSEP_NO_PENALTY);
@@ -80,7 +84,7 @@ HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters
     memcpy(&got, block, sizeof got);
     (void)trusted_lay_out(&got, parameters); /* changes nothing where it is sound */
     int sound =
-        memcmp(&got, block, sizeof got) == 0 && got.predicted <= 1 &&
+        memcmp(&got, block, sizeof got) == 0 && got.predicted <= 1 && got.guard.patience == 2 * got.Np &&
         hsep_disturbances_valid(hsep_at_bytes(block, got.disturbances), parameters->settings, parameters->n_modes) &&
         hsep_regression_valid(hsep_at_bytes(block, got.regression), got.n_static + got.p);
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
