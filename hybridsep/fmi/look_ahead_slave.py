@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Mapping
 from pathlib import Path
@@ -64,12 +65,15 @@ class LookAheadSlave(TableSlave):
 
     def core_state(self) -> tuple[dict[str, Any], bytes]:
         """Return the clock with the inputs of the sample in progress, and the look-ahead."""
-        return {"inputs": self.inputs.state()}, self.look_ahead.to_bytes()
+        *others, x_meas = self.inputs.state()
+        missing = math.isnan(x_meas)
+        return {"inputs": [*others, 0.0 if missing else x_meas], "missing": missing}, self.look_ahead.to_bytes()
 
     def restore_core(self, meta: Mapping[str, Any], blob: bytes) -> None:
         """Take over a clock and a look-ahead."""
         state = Saved("look-ahead", meta, {}, {})
-        inputs = LookAheadInputs.from_state(state.numbers("inputs", LookAheadInputs.STATE_SIZE))
+        *others, x_meas = state.numbers("inputs", LookAheadInputs.STATE_SIZE)
+        inputs = LookAheadInputs.from_state([*others, math.nan if state.flag("missing") else x_meas])
         look_ahead = LookAhead.from_bytes(blob, self.model_type)
         if inputs.clock.T_s != self.values["T_s"] or (inputs.clock.k != look_ahead.k and not look_ahead.diverged):
             raise state.error("its clock must count the samples of this look-ahead")

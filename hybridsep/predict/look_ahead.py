@@ -20,7 +20,7 @@ import numpy as np
 from ..base.errors import SignalError
 from ..base.saved import Saved
 from ..base.settings import samples_before
-from ..base.signals import Array, check_position
+from ..base.signals import Array, as_measured, check_position
 from ..base.state import pack, unpack
 from .predictor import HybridPredictor
 from .window import PublishedWindow
@@ -256,7 +256,10 @@ class LookAhead:
         look_ahead._first_scored, look_ahead._n_scored = saved.whole("first_scored"), saved.whole("n_scored")
         look_ahead.diverged = saved.text("diverged")
         look_ahead._sums = np.abs(saved.array("sums", 3))
-        look_ahead._ahead, look_ahead._measured = saved.array("ahead", look_ahead.delay), saved.array("measured", Np)
+        look_ahead._ahead = saved.array("ahead", look_ahead.delay)
+        look_ahead._measured = saved.array("measured", Np, finite=not look_ahead.may_miss)
+        with saved.consistent():
+            as_measured(look_ahead._measured, "measured")
         look_ahead.window = PublishedWindow(
             **{name: saved.array(name, Np) for name in PublishedWindow.SIGNALS},
             state=saved.whole("state"),

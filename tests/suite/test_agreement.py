@@ -7,6 +7,7 @@ agrees to the last bit.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -106,6 +107,30 @@ def test_every_parameter_predicts_with_trust_as_in_the_library(
 ) -> None:
     n = 250 if values.get("Np") == 1 else 850
     assert_agreement(new_stream, n, {"trust": True, **values}, 1e-12, path=path)
+
+
+def faulty(k: int, x_meas: float, last: float) -> float:
+    """Miss some samples, jump, stay, read 0 for a while, and shift in the end."""
+    if k % 37 == 5 or 1450 <= k < 1460:
+        return math.nan
+    if k in (777, 1130, 1131):
+        return x_meas + 1e-3 * (k - 1100)
+    if 1030 <= k < 1080:
+        return 0.0123
+    if 2040 <= k < 2090:
+        return 0.0
+    return x_meas + (2e-4 if k > 2300 else 0.0)
+
+
+@on_all((PREDICTOR,), needs="agreement")
+@pytest.mark.parametrize("values", [{}, {"Np": 30, "p": 7, "q": 1}], ids=named)
+def test_faulty_measurements_are_judged_as_by_the_library(new_stream: StreamMaker, values: dict[str, Value]) -> None:
+    given = {"trust": True, "t_init": -1.0, **values}
+    loop = assert_agreement(new_stream, 2850, given, 1e-12, sensor=faulty)
+    sound = closed_loop(new_stream.model, 2850, given)
+    change = np.abs(loop.column(PREDICTOR, "x_h") - loop.column(PREDICTOR, "x_pb"))
+    assert change.max() < 2 * np.abs(sound.x - sound.column(PREDICTOR, "x_pb")[:-1]).max()
+    assert np.isfinite(loop.outputs).all()
 
 
 @on_all((COMPENSATOR,), needs="agreement")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import subprocess
 import sys
 from pathlib import Path
@@ -10,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from built_once import BuiltFmus
-from driving import SHORT, T_S, TIGHT, initialise, set_inputs, steps
+from driving import SHORT, T_S, TIGHT, initialise, position, set_inputs, steps
 from places import SUPPORT
 from stream import CANNOT, COMPENSATOR, LOOK_AHEADS, PLANTS, PREDICTOR, TRAJECTORY, RefusedStreamError, Stream, Value
 from streams import StreamMaker, on_all
@@ -102,6 +103,23 @@ def test_a_state_with_trust_goes_on_in_a_second_instance(new_stream: StreamMaker
     second.restore(blob)  # without trust of its own
     assert second.save() == blob
     assert steps(second, 150, 300) == steps(first, 150, 300)
+
+
+@on_all((PREDICTOR,))
+def test_what_is_missing_is_part_of_a_state(new_stream: StreamMaker) -> None:
+    stream = new_stream()
+    initialise(stream, trust=True)
+    steps(stream, 0, 107)
+    for k in range(107, 110):
+        stream.set("x_d_ahead", position(k * T_S))
+        stream.set("x_meas", math.nan)
+        stream.step(k * T_S, T_S)
+    blob = stream.save()
+    expected = steps(stream, 110, 200)
+    assert np.isfinite(expected).all()
+    stream.restore(blob)
+    assert stream.save() == blob
+    assert steps(stream, 110, 200) == expected
 
 
 @on_all((PREDICTOR,))
