@@ -17,7 +17,7 @@ class HybridPredictorPy(look_ahead_slave.LookAheadSlave):
 
     def initial_value(self, name: str) -> float | int | bool:
         """Return the value at ``t_0``: the drive rests at the start value of ``x_d_ahead``."""
-        if name == "batch":
+        if name in ("batch", "n_rejected"):
             return 0
         if name == "hybrid_active":
             return False

@@ -183,6 +183,10 @@ def predictor_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping
         _position("rms_pb", "output", "running RMS of x_meas - x_pb since t_init", display_unit="um"),
         _position("rms_h", "output", "running RMS of x_meas - x_h since t_init", display_unit="um"),
         Variable("batch", "Integer", "output", "discrete", "number of the window, floor(k / Np); 0 is the first fill"),
+        Variable(
+            *("n_rejected", "Integer", "output", "discrete"),
+            "measurements that were missing or not plausible, with trust; counted window by window",
+        ),
     ]
     table += _parameters({**PREDICTOR_SETTINGS, **TRUST_SETTINGS}, parameters)
     table += _modes(modes)

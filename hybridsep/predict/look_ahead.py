@@ -161,6 +161,11 @@ class LookAhead:
         return self.k % self.Np >= self.window.n_warm_up
 
     @property
+    def n_rejected(self) -> int:
+        """Measurements of this run that were missing or not plausible, with trust; counted window by window."""
+        return 0 if self.predictor.trusted is None else self.predictor.trusted.n_rejected
+
+    @property
     def sep_state(self) -> int:
         """Model that planned the window (``SepState``); 0 without a planner."""
         return self.window.state

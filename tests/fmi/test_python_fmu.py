@@ -76,6 +76,7 @@ def test_interface_of_the_predictor(predictor: FmuInstance) -> None:
         "rms_pb": ("output", "Real", "m"),
         "rms_h": ("output", "Real", "m"),
         "batch": ("output", "Integer", None),
+        "n_rejected": ("output", "Integer", None),
         "x_d_window[1]": ("local", "Real", "m"),
         "x_pb_window[100]": ("local", "Real", "m"),
         "x_h_window[100]": ("local", "Real", "m"),
@@ -98,7 +99,7 @@ def test_interface_of_the_predictor(predictor: FmuInstance) -> None:
     }
     found = {name: (v.causality, v.type, v.unit) for name, v in variables.items()}
     assert {name: found[name] for name in expected} == expected
-    assert len(found) == 26 + 300
+    assert len(found) == 27 + 300
     starts = {name: variables[name].start for name in ("Np", "p", "q", "lambda", "T_s", "t_init", "input_hold")}
     assert starts == {
         "Np": "100",

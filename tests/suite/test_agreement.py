@@ -42,7 +42,7 @@ def assert_agreement(new_stream: StreamMaker, n: int, values: dict[str, Value], 
     if new_stream.implementation == PYTHON:
         tolerance = 0.0
     for name, output, expected in zip(OUTPUTS[kind_of(new_stream.model)], shown.T, loop.outputs.T, strict=True):
-        whole = name in ("batch", "hybrid_active", "sep_state")
+        whole = name in ("batch", "n_rejected", "hybrid_active", "sep_state")
         np.testing.assert_allclose(output, expected, rtol=0, atol=0 if whole else tolerance, err_msg=name)
     return loop
 
@@ -131,6 +131,9 @@ def test_faulty_measurements_are_judged_as_by_the_library(new_stream: StreamMake
     change = np.abs(loop.column(PREDICTOR, "x_h") - loop.column(PREDICTOR, "x_pb"))
     assert change.max() < 2 * np.abs(sound.x - sound.column(PREDICTOR, "x_pb")[:-1]).max()
     assert np.isfinite(loop.outputs).all()
+    n_rejected = loop.column(PREDICTOR, "n_rejected")
+    assert 150 < n_rejected[-1] < 500
+    assert not closed_loop(new_stream.model, 2850, {}).column(PREDICTOR, "n_rejected").any()  # without trust
 
 
 @on_all((COMPENSATOR,), needs="agreement")

@@ -43,7 +43,7 @@ CANNOT = {
 """(implementation, model or ability): why it is not there."""
 
 OUTPUTS = {
-    PREDICTOR: ("x_d", "x_pb", "x_h", "e_servo", "hybrid_active", "rms_pb", "rms_h", "batch"),
+    PREDICTOR: ("x_d", "x_pb", "x_h", "e_servo", "hybrid_active", "rms_pb", "rms_h", "batch", "n_rejected"),
     COMPENSATOR: ("x_dm", "x_d", "x_pb", "x_h", "e_servo", "sep_state", "rms_e", "rms_pb", "rms_h", "batch"),
     TRAJECTORY: ("r",),
     DRIVE: ("x", "v", "x_meas"),

@@ -40,6 +40,7 @@ HSEP_API void hsep_online_write(const hsep_online *self, int window, double valu
     values[HSEP_VR_rms_pb] = outputs.rms_pb;
     values[HSEP_VR_rms_h] = outputs.rms_h;
     values[HSEP_VR_batch] = (double)outputs.batch;
+    values[HSEP_VR_n_rejected] = (double)outputs.n_rejected;
     /* Entries past a smaller Np are 0, of a larger Np the first ones are shown. */
     for (uint64_t i = 0; window && i < HSEP_WINDOW; i++) {
         const int shown = i < self->Np;
@@ -55,7 +56,7 @@ HSEP_API void hsep_model_start_values(const hsep_context *context, double values
     const double start = values[HSEP_VR_x_d_ahead]; /* the drive rests there */
     values[HSEP_VR_x_d] = values[HSEP_VR_x_pb] = values[HSEP_VR_x_h] = start;
     values[HSEP_VR_e_servo] = values[HSEP_VR_rms_pb] = values[HSEP_VR_rms_h] = 0.0;
-    values[HSEP_VR_hybrid_active] = values[HSEP_VR_batch] = 0.0;
+    values[HSEP_VR_hybrid_active] = values[HSEP_VR_batch] = values[HSEP_VR_n_rejected] = 0.0;
     for (size_t i = 0; i < HSEP_WINDOW; i++) {
         const double position = (double)i < values[HSEP_VR_Np] ? start : 0.0;
         values[HSEP_VR_x_d_window + i] = position;

@@ -240,5 +240,6 @@ HSEP_API void hsep_predictor_read(const hsep_predictor *self, hsep_predictor_out
     outputs->rms_pb = predictor_rms(self, self->sum_pb);
     outputs->rms_h = predictor_rms(self, self->sum_h);
     outputs->batch = self->k / self->Np;
+    outputs->n_rejected = self->trusted ? ((const hsep_trusted *)hsep_at_const(self, self->trusted))->n_rejected : 0;
     outputs->hybrid_active = i >= self->n_physics;
 }

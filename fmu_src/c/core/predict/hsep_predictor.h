@@ -85,6 +85,7 @@ typedef struct {
     double x_d, x_pb, x_h;       /* m, now */
     double rms_e, rms_pb, rms_h; /* m, since t_init */
     uint64_t batch;              /* floor(k / Np) */
+    uint64_t n_rejected;         /* measurements that were missing or not plausible, with trust */
     int hybrid_active;           /* whether x_h is the hybrid prediction now */
 } hsep_predictor_outputs;
 
