@@ -1,0 +1,233 @@
+"""Paper's model and predictor with trust beside the physics model and the hold, cold and warm.
+
+    python benchmarks/trust.py [--emps DATA_EMPS.mat] [--recordings FOLDER]      (half a minute)
+
+RMS of the prediction error against the measured position, µm, over the whole run from its first sample. A warm run goes
+on with what the cold one has learned, under other noise; over a recording it is a second pass. Recordings come with no
+model: a first-order lag with a whole number of samples of dead time is fitted to each by least squares. ``diverged``
+stands where a replay was refused.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # benchmarks are no part of the package
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+from scipy.signal import lfilter
+
+from hybridsep.base.errors import SignalError
+from hybridsep.base.metrics import rms
+from hybridsep.base.settings import PredictorSettings
+from hybridsep.base.signals import Array
+from hybridsep.evaluate.backtest import backtest
+from hybridsep.logs.log import read_log
+from hybridsep.machine import Machine, load_machine
+from hybridsep.model.physics import ModalModel, Mode
+from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.plant import simulate
+from hybridsep.plants.trajectory import PAPER_LIMITS, along_path, rest_to_rest, spiral, staircase
+from hybridsep.predict.predictor import HybridPredictor
+
+SEEDS = (0, 1000)
+"""Seeds of the encoder noise, cold and warm."""
+
+DEAD_TIME_MAX = 20
+"""Largest dead time, samples, that is tried for a recording."""
+
+TIME_CONSTANTS = (0.05, 1e4)
+"""Least and largest time constant that are tried for a recording, in samples."""
+
+WINDOWS = (100, 20)
+"""Samples in a window, ``Np``, over a recording; ``p`` is 50 where it fits."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """Axis and a run to predict.
+
+    Attributes
+    ----------
+    name : str
+    model : ModalModel
+    settings : PredictorSettings
+        Of the paper's model.
+    x_d : (n,) array, m
+        Commanded positions.
+    x_meas : tuple of two (n,) arrays, m
+        Measured positions of the cold and the warm run.
+    """
+
+    name: str
+    model: ModalModel
+    settings: PredictorSettings
+    x_d: Array
+    x_meas: tuple[Array, Array]
+
+
+@dataclass(frozen=True)
+class Row:
+    """RMS errors of a case, m; infinite where the replay was refused, because the prediction diverged.
+
+    Attributes
+    ----------
+    name : str
+    physics, hold : float
+        Of the cold run.
+    paper, trust : tuple of two floats
+        Cold and warm.
+    """
+
+    name: str
+    physics: float
+    hold: float
+    paper: tuple[float, float]
+    trust: tuple[float, float]
+
+    def __str__(self) -> str:
+        cells = [self.physics, self.hold, *self.paper, *self.trust]
+        ratios = [self.trust[0] / self.physics, self.trust[0] / self.hold]
+        return (
+            f"{self.name:34}"
+            + "".join(f"{_micrometres(cell):>10}" for cell in cells)
+            + "".join(f"{ratio:10.3f}" for ratio in ratios)
+        )
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--emps", type=Path, help="DATA_EMPS.mat: the recorded axis, too")
+    parser.add_argument("--recordings", type=Path, help="folder of recordings, *.csv with the columns t, x_d, x")
+    options = parser.parse_args(arguments)
+    columns = ("physics", "hold", "paper", "warm", "trust", "warm", "× physics", "× hold")
+    print(f"{'µm; ratios: trust, cold':34}" + "".join(f"{column:>10}" for column in columns))
+    for case in cases(options.emps, options.recordings):
+        print(replayed(case), flush=True)
+
+
+def cases(emps: Path | None = None, recordings: Path | None = None) -> Iterator[Case]:
+    """Yield the simulated drives, the EMPS axis and the recordings."""
+    drive, stage = load_machine("spring_mass_damper"), [load_machine(f"als25010_{axis}") for axis in "xy"]
+    yield simulated("staircase", drive, staircase())
+    yield simulated("staircase of 7 mm", drive, short_staircase())
+    for name, path in (("spiral", spiral()), ("circle", circle())):
+        for axis, machine, x_d in zip("XY", stage, path, strict=True):
+            yield simulated(f"{name}, stage {axis}", machine, x_d)
+    for axis, machine in zip("XY", stage, strict=True):
+        yield simulated(f"staircase of 7 mm, stage {axis}", machine, short_staircase())
+    if emps is not None:
+        machine = load_machine("emps")
+        log = read_log(emps, columns=machine.log.given())
+        yield Case("EMPS", machine.model, machine.predictor_settings, log.x_d, (log.x_meas, log.x_meas))
+    files = [] if recordings is None else sorted(recordings.glob("*.csv"))
+    for Np in WINDOWS:
+        yield from (recorded(file, Np) for file in files)
+
+
+def simulated(name: str, machine: Machine, x_d: Array) -> Case:
+    """Return a run of a machine's plant over ``x_d``, (n,), m, measured under two noises."""
+    assert machine.plant is not None
+    x, std = simulate(machine.new_plant(), x_d, machine.T_s), machine.plant.noise_std
+    cold, warm = (Encoder(std, seed).measure_all(x) for seed in SEEDS)
+    return Case(name, machine.model, machine.predictor_settings, x_d, (cold, warm))
+
+
+def short_staircase() -> Array:
+    """Return the paper's staircase with moves of 7 instead of 10 mm, (n,), m."""
+    steps = np.array([0.0, 1, 2, 3, 2, 1, 0]) * 0.007
+    return rest_to_rest(steps, PAPER_LIMITS, start_times=range(6), duration=6.0)
+
+
+def circle(radius: float = 0.02, turns: float = 3.0) -> tuple[Array, Array]:
+    """Return the commands of X and Y for a circle from rest to rest, (n,), m."""
+
+    def position(theta: Array) -> Array:
+        return radius * np.stack((np.cos(theta) - 1.0, np.sin(theta)), axis=-1)
+
+    def derivative(theta: Array) -> Array:
+        return radius * np.stack((-np.sin(theta), np.cos(theta)), axis=-1)
+
+    points = along_path(position, derivative, 2 * np.pi * turns, PAPER_LIMITS)
+    return np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1])
+
+
+def recorded(path: Path, Np: int) -> Case:
+    """Return the case of a recording, resampled where its intervals vary, with a model fitted to it."""
+    t, x_d, x = np.genfromtxt(path, delimiter=",", names=("t", "x_d", "x"), skip_header=1, unpack=True)
+    T_s = round(float(np.median(np.diff(t))), 6)
+    if np.ptp(np.diff(t)) > 0.1 * T_s:
+        even = np.arange(t[0], t[-1], T_s)
+        x_d, x = np.interp(even, t, x_d), np.interp(even, t, x)
+    settings = PredictorSettings(trust=False, Np=Np, p=min(50, Np), T_s=T_s)
+    return Case(f"{path.stem}, Np = {Np}", fitted_lag(x_d, x, T_s), settings, x_d, (x, x))
+
+
+def fitted_lag(x_d: Array, x: Array, T_s: float) -> ModalModel:
+    """Return the first-order lag with whole samples of dead time that fits a recording best by least squares.
+
+    Parameters
+    ----------
+    x_d, x : (n,) array, m
+        Commanded and measured positions.
+    T_s : float
+        Sampling interval, s.
+    """
+    command, measured = x_d - x_d[0], x - x_d[0]
+
+    def misfit(log_tau: float, dead_time: int) -> float:
+        pole = math.exp(-T_s / math.exp(log_tau))
+        delayed = np.concatenate((np.zeros(dead_time), command[: len(command) - dead_time]))
+        return float(np.sum((measured - lfilter([0.0, 1.0 - pole], [1.0, -pole], delayed)) ** 2))
+
+    bounds = [math.log(samples * T_s) for samples in TIME_CONSTANTS]
+    fits = [
+        (minimize_scalar(misfit, bounds=bounds, args=(dead_time,), method="bounded"), dead_time)
+        for dead_time in range(DEAD_TIME_MAX + 1)
+    ]
+    best, dead_time = min(fits, key=lambda fit: float(fit[0].fun))
+    omega = 1.0 / math.exp(best.x)
+    # 1/(τs + 1) = (ω² + ω s)/(s + ω)²
+    return ModalModel([Mode(omega / (2 * math.pi), 1.0, omega**2, omega)], dead_time)
+
+
+def replayed(case: Case) -> Row:
+    """Return the errors of all predictors on a case."""
+    trusting = replace(case.settings, trust=True, t_init=-1.0)
+    peers = backtest(HybridPredictor(case.model, trusting), case.x_d, case.x_meas[0]).overall
+    return Row(
+        case.name,
+        peers.rms_pb,
+        peers.rms_hold,
+        _cold_and_warm(HybridPredictor(case.model, case.settings), case),
+        _cold_and_warm(HybridPredictor(case.model, trusting), case),
+    )
+
+
+def _cold_and_warm(predictor: HybridPredictor, case: Case) -> tuple[float, float]:
+    """Return the RMS errors of ``x_h``, m, of a first and a second run."""
+    errors = []
+    for x in case.x_meas:
+        try:
+            errors.append(rms(x - backtest(predictor, case.x_d, x).x_h))
+        except SignalError:
+            errors.append(math.inf)
+        predictor.restart()
+    return errors[0], errors[1]
+
+
+def _micrometres(error: float) -> str:
+    return f"{1e6 * error:.4g}" if math.isfinite(error) else "diverged"
+
+
+if __name__ == "__main__":
+    main()
