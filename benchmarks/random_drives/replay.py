@@ -15,7 +15,6 @@ from hybridsep.base.errors import SignalError
 from hybridsep.base.metrics import rms
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
-from hybridsep.evaluate.backtest import backtest
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.predictor import HybridPredictor
 
@@ -31,13 +30,17 @@ It returns x_h, (n,), m, each window predicted before its measurement is known; 
 PREDICTORS: dict[str, Callable[[ModalModel], HybridPredictor]] = {
     "default": HybridPredictor,
     "paper": lambda model: HybridPredictor(model, PredictorSettings(trust=False)),
-    "trust": lambda model: HybridPredictor(model, PredictorSettings(trust=True)),
 }
 
 
 def library_replay(predictor: str, model: ModalModel, x_d: Array, x_meas: Array) -> Array:
-    """Return ``x_h`` of the library's predictor, ``(n,)``, m."""
-    return backtest(PREDICTORS[predictor](model), x_d, x_meas).x_h
+    """Return ``x_h`` of the library's predictor, ``(n,)``, m; with trust ``x_meas`` is NaN where missing."""
+    online, x_h = PREDICTORS[predictor](model), np.empty(len(x_d))
+    for first in range(0, len(x_d), online.Np):
+        window = slice(first, first + online.Np)
+        x_h[window] = online.predict(x_d[window]).x_h
+        online.update(x_meas[window])
+    return x_h
 
 
 @dataclass(frozen=True)

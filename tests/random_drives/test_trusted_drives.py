@@ -11,7 +11,7 @@ N = 40
 
 
 def test_no_drive_is_worse_than_by_physics() -> None:
-    results = [replay(drive, "trust") for drive in random_drives(range(N), SEED)]
+    results = [replay(drive, "default") for drive in random_drives(range(N), SEED)]
     ratios = np.array([result.ratio for result in results])
     assert not any(result.diverged for result in results)
     assert ratios.max() <= 1.02, results[int(ratios.argmax())]
