@@ -77,9 +77,10 @@ int main(int n_arguments, char *arguments[])
     for (size_t i = 0; i < HSEP_N_VARIABLES; i++) {
         if (hsep_variables[i].causality == HSEP_INPUT) {
             const double before = values[i];
-            values[i] = NAN;
+            values[i] = strcmp(hsep_variables[i].name, "x_meas") == 0 ? HUGE_VAL : NAN; /* NaN may be missing */
             expect(
-                hsep_model_step(&context, state, values, STEPS * STEP_SIZE, STEP_SIZE, message) == HSEP_REFUSED, "NaN");
+                hsep_model_step(&context, state, values, STEPS * STEP_SIZE, STEP_SIZE, message) == HSEP_REFUSED,
+                "not finite");
             values[i] = before;
         }
     }

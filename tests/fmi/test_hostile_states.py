@@ -40,7 +40,9 @@ def sampled(look_ahead: LookAhead | LookAhead, count: int) -> None:
 
 
 def small_predictor(**more: Any) -> HybridPredictor:
-    return HybridPredictor(MODEL, PredictorSettings(trust=False, Np=8, p=3, q=2, lam=1e-8, t_init=0.0, **more))
+    return HybridPredictor(
+        MODEL, PredictorSettings(**{"trust": False, "Np": 8, "p": 3, "q": 2, "lam": 1e-8, "t_init": 0.0} | more)
+    )
 
 
 def small_compensator() -> SepCompensator:

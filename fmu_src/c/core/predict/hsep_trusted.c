@@ -277,5 +277,5 @@ HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_pb[], double
         trusted_judge(self, n_rows, e);
         trusted_assess(self, e, count);
     }
-    memmove(bridged + self->Np, bridged, (size_t)self->p * sizeof(double)); /* p <= Np: they do not overlap */
+    memcpy(bridged + self->Np, bridged, (size_t)self->p * sizeof(double)); /* p <= Np: they do not overlap */
 }

@@ -100,8 +100,8 @@ HSEP_API void hsep_trusted_forecast(hsep_trusted *self, const double x_d[], cons
 /* Take the measured position of sample k of the window that was predicted, m, relative to the start; NaN: missing. */
 HSEP_API void hsep_trusted_measure(hsep_trusted *self, uint64_t k, double x);
 
-/* Learn that window. e: (Np + p,), m, becomes its residuals, where the measurement is not plausible between those beside
- * it; behind it those before it. Cost: Np times that of hsep_regression_fold. */
+/* Learn that window. e: (Np + p,), m, becomes its residuals; where the measurement is not plausible, between those
+ * beside it; behind it those before it. Cost: Np times that of hsep_regression_fold. */
 HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_pb[], double e[]);
 
 /* Discount what earlier runs have learned: a machine may have changed meanwhile. */
