@@ -104,7 +104,7 @@ class Machine(Section):
     def compensator_predictor(self) -> PredictorSettings:
         """Settings of the compensator's own predictor: those of the predictor where the section has no others."""
         own = self._compensator_entries(PredictorSettings)
-        given = {name: value for name, value in self.predictor.given().items() if name not in PredictorSettings.ALONE}
+        given = _without(PredictorSettings.ALONE, self.predictor.given())
         return PredictorSettings(**{**given, **own}, **self._sampling, trust=False)
 
     @property
@@ -164,7 +164,7 @@ class Machine(Section):
     def fmi_parameters(self) -> dict[str, float | int | bool]:
         """Return the start values of the predictor FMU's scalar parameters, under their FMI names."""
         values = {**self.predictor_settings.to_fmi(), "dead_time": self.physics.dead_time}
-        return {name: value for name, value in values.items() if name not in PredictorSettings.NEEDS_PREVIEW}
+        return _without(PredictorSettings.NEEDS_PREVIEW, values)
 
     def fmi_compensator_parameters(self) -> dict[str, float | int | bool]:
         """Return the start values of the compensator FMU's scalar parameters, under their FMI names.
@@ -176,8 +176,7 @@ class Machine(Section):
         """
         if self.drive_limits is None:
             raise MachineError(f"machine {self.name} has no [drive_limits] section, which a compensator FMU needs")
-        predictor = self.compensator_predictor.to_fmi()
-        predictor = {name: value for name, value in predictor.items() if name not in PredictorSettings.ALONE}
+        predictor = _without(PredictorSettings.ALONE, self.compensator_predictor.to_fmi())
         return {**predictor, **self.compensator_settings.to_fmi(), "dead_time": self.physics.dead_time}
 
     @property
@@ -261,6 +260,10 @@ def load_machine(machine: str | Path) -> Machine:
         return _validated(content)
     except ParameterError as error:
         raise MachineError(f"{path.name}: {error}") from error
+
+
+def _without(names: tuple[str, ...], values: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in values.items() if name not in names}
 
 
 def _validated(content: Mapping[str, Any]) -> Machine:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import struct
 import zlib
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -28,8 +29,6 @@ _MAGIC = b"HSEPWGT4"
 _HEAD = struct.Struct("<8s4Q")
 _SETTING = struct.Struct("<24sd")
 _CHECKSUM = struct.Struct("<Q")
-_N_BLENDED = 3
-_CORRELATIONS = slice(7, 9)
 _MODE = ("f_n", "zeta", "alpha", "beta")
 _DAMAGED = f"{WEIGHTS_FILE} must be a factor of learned rows; it is damaged or truncated"
 
@@ -48,7 +47,8 @@ def learned_settings(predictor: HybridPredictor) -> dict[str, float]:
 def weights_file(predictor: HybridPredictor) -> bytes:
     """Return the file's content for a trained predictor."""
     settings = learned_settings(predictor)
-    factor, trusted = predictor.regression.factor, _trusted_numbers(predictor.trusted)
+    factor = predictor.regression.factor
+    trusted = np.concatenate([np.zeros(0), *(part.ravel() for part in _learned(predictor.trusted).values())])
     content = _HEAD.pack(
         _MAGIC, len(settings), len(predictor.model.modes), predictor.regression.n_samples, len(trusted)
     )
@@ -88,62 +88,62 @@ def restore_weights(predictor: HybridPredictor, content: bytes) -> None:
             problems += _differences(name, then, settings.get(name, 0.0))
     if problems:
         raise StateError("; ".join(problems))
-    size, trusted = predictor.regression.n_features + 1, _trusted_numbers(predictor.trusted)
+    size, parts = predictor.regression.n_features + 1, _learned(predictor.trusted)
     upper = np.triu_indices(size)
-    n_numbers = len(trusted) + len(upper[0])
-    if learned.keys() != settings.keys() or n_trusted != len(trusted) or len(body) - start != 8 * n_numbers:
+    ends = np.cumsum([0, *(part.size for part in parts.values())])
+    n_numbers = int(ends[-1]) + len(upper[0])
+    if learned.keys() != settings.keys() or n_trusted != ends[-1] or len(body) - start != 8 * n_numbers:
         raise StateError(_DAMAGED)
     numbers = np.frombuffer(body, "<f8", offset=start)
     factor = np.zeros((size, size))
     factor[upper] = numbers[n_trusted:]
-    if not _are_sound(numbers[:n_trusted]):
+    found = {
+        name: numbers[first:end].reshape(parts[name].shape).copy()
+        for name, first, end in zip(parts, ends, ends[1:], strict=False)
+    }
+    if not _are_sound(found):
         raise StateError(_DAMAGED)
     try:
         predictor.regression.restore(factor, n_samples)
     except SignalError:
         raise StateError(_DAMAGED) from None
     if predictor.trusted is not None:
-        _restore_trusted(predictor.trusted, numbers[:n_trusted])
+        _restore_learned(predictor.trusted, found)
 
 
-def _trusted_numbers(trusted: TrustedModel | None) -> Array:
-    """Return what the model has learned besides the factor: first what is never negative, then gram and cross."""
+def _learned(trusted: TrustedModel | None) -> dict[str, Array]:
+    """Return what the model has learned besides the factor, in the order of the file."""
     if trusted is None:
-        return np.zeros(0)
+        return {}
     blend, candidates = trusted.blend, trusted.candidates
-    return np.concatenate(
-        (
-            [trusted.n_rows, trusted.velocity_scale, *trusted.scale],
-            [candidate.noise_variance for candidate in candidates],
-            [candidate.correlation for candidate in candidates],
-            blend.weights,
-            trusted.largest,
-            blend.gram.ravel(),
-            blend.cross,
-        )
-    )
+    return {
+        "n_rows": np.array([trusted.n_rows]),
+        "velocity_scale": np.array([trusted.velocity_scale]),
+        "scale": np.array(trusted.scale),
+        "noise_variances": np.array([candidate.noise_variance for candidate in candidates]),
+        "correlations": np.array([candidate.correlation for candidate in candidates]),
+        "weights": blend.weights,
+        "largest": trusted.largest,
+        "gram": blend.gram,
+        "cross": blend.cross,
+    }
 
 
-def _are_sound(numbers: Array) -> bool:
-    """Return whether :func:`_trusted_numbers` are finite and in range; none are."""
-    n_signed = _N_BLENDED * (_N_BLENDED + 1)
-    return bool(
-        np.isfinite(numbers).all() and (numbers[:-n_signed] >= 0.0).all() and (numbers[_CORRELATIONS] >= 1.0).all()
-    )
+def _are_sound(learned: Mapping[str, Array]) -> bool:
+    """Return whether the numbers of :func:`_learned` are finite and in range."""
+    least = {"gram": -np.inf, "cross": -np.inf, "correlations": 1.0}
+    return all(np.isfinite(part).all() and (part >= least.get(name, 0.0)).all() for name, part in learned.items())
 
 
-def _restore_trusted(trusted: TrustedModel, numbers: Array) -> None:
-    """Take over :func:`_trusted_numbers`, which are sound."""
-    n, blend = _N_BLENDED, trusted.blend
-    trusted.n_rows, trusted.velocity_scale = numbers[:2].tolist()
-    trusted.scale = ResidualScale(*numbers[2:5].tolist())
-    for candidate, noise_variance, correlation in zip(
-        trusted.candidates, numbers[5:7].tolist(), numbers[_CORRELATIONS].tolist(), strict=True
-    ):
-        candidate.noise_variance, candidate.correlation = noise_variance, correlation
-    blend.weights = numbers[9 : 9 + n].copy()
-    trusted.largest = numbers[9 + n : -n * (n + 1)].copy()
-    blend.gram, blend.cross = numbers[-n * (n + 1) : -n].reshape(n, n).copy(), numbers[-n:].copy()
+def _restore_learned(trusted: TrustedModel, learned: Mapping[str, Array]) -> None:
+    """Restore the numbers of :func:`_learned`, which are sound."""
+    (trusted.n_rows,), (trusted.velocity_scale,) = learned["n_rows"].tolist(), learned["velocity_scale"].tolist()
+    trusted.scale = ResidualScale(*learned["scale"].tolist())
+    variances, correlations = learned["noise_variances"].tolist(), learned["correlations"].tolist()
+    for candidate, variance, correlation in zip(trusted.candidates, variances, correlations, strict=True):
+        candidate.noise_variance, candidate.correlation = variance, correlation
+    trusted.largest, blend = learned["largest"], trusted.blend
+    blend.weights, blend.gram, blend.cross = learned["weights"], learned["gram"], learned["cross"]
 
 
 def _differences(name: str, then: float, now: float) -> list[str]:

@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 from ..base.signals import Array
 from .regression import RidgeRegression
 
-__all__ = ["CORRELATION_MAX", "Candidate", "CandidatePrediction", "ResidualScale"]
+__all__ = ["CORRELATION_MAX", "Candidate", "CandidatePrediction", "ResidualScale", "lags"]
 
 _CAUTION = 2.0
 """Factor on the predicted variance when a prediction is shrunk by it: its distribution has long tails."""
@@ -128,7 +128,7 @@ class Candidate:
             drive, response = _recursion(solution.weights[self.n_static :], drive, past)
         finite = np.isfinite(drive)
         e = np.clip(np.where(finite, drive, 0.0), -_BOUND * largest, _BOUND * largest)
-        phi = np.hstack((rows, _lags(past, e))) if p else rows
+        phi = np.hstack((rows, lags(past, e))) if p else rows
         spread = variance * solution.leverage(phi)
         most = _DIVERGED * largest**2
         if p:
@@ -157,7 +157,7 @@ def _recursion(w_e: Array, drive: Array, past: Array) -> tuple[Array, Array]:
     return e, np.clip(np.nan_to_num(response, nan=_DIVERGED), -_DIVERGED, _DIVERGED)
 
 
-def _lags(past: Array, e: Array) -> Array:
-    """Return the lags ``e(k−1) … e(k−p)`` over a window, ``(n, p)``."""
+def lags(past: Array, e: Array) -> Array:
+    """Return the lags ``e(k−1) … e(k−p)`` over a window ``e``, ``(n, p)``; ``past``, ``(p,)``, is newest first."""
     series = np.concatenate((past[::-1], e[:-1]))
     return np.lib.stride_tricks.sliding_window_view(series, len(past))[:, ::-1]

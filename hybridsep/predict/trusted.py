@@ -17,7 +17,7 @@ from ..base.settings import PredictorSettings
 from ..base.signals import Array
 from ..model.discrete import DiscreteModel
 from .blend import Blend
-from .candidates import Candidate, CandidatePrediction, ResidualScale
+from .candidates import Candidate, CandidatePrediction, ResidualScale, lags
 from .disturbances import LEAST_VELOCITY, StaticFeatures, StaticState
 from .guard import SensorGuard
 from .regression import RidgeRegression
@@ -139,7 +139,7 @@ class TrustedModel:
             x = x_pb + self._predict(self.candidates[0], rows, largest).e_h
             rows, _ = self.static.rows(self.state, x_d, x_pb, x, velocity_scale)
             predictions = tuple(self._predict(candidate, rows, largest) for candidate in self.candidates)
-        e_h = self.blend.weights @ self._candidates(hold, predictions, len(x_d))
+        e_h = self.blend.weights @ self._blended(hold, predictions, len(x_d))
         return Forecast(x_d, x_pb, e_h, hold, predictions, largest, velocity_scale)
 
     def learn(self, forecast: Forecast, x: Array, *, fold: bool = True) -> None:
@@ -182,7 +182,7 @@ class TrustedModel:
         self.scale = ResidualScale(
             recent, max(self.scale.largest_square, mean_square), max(self.scale.largest, largest)
         )
-        candidates = self._candidates(forecast.hold, forecast.predictions, m)
+        candidates = self._blended(forecast.hold, forecast.predictions, m)
         self.blend.update(candidates[:, accepted], sound, self.scale.largest_square)
 
     @property
@@ -202,7 +202,7 @@ class TrustedModel:
         )
 
     @staticmethod
-    def _candidates(hold: float, predictions: tuple[CandidatePrediction, ...], m: int) -> Array:
+    def _blended(hold: float, predictions: tuple[CandidatePrediction, ...], m: int) -> Array:
         """Return the predictions that are blended, ``(3, m)``, m: hold, and the learned candidates, 0 at first."""
         learned = [prediction.e_h[:m] for prediction in predictions] or [np.zeros(m)] * 2
         return np.stack((np.full(m, hold), *learned))
@@ -210,17 +210,17 @@ class TrustedModel:
     def _judge(self, forecast: Forecast, measured: Array, accepted: NDArray[np.bool_]) -> None:
         """Estimate the errors of the candidates from the measurement of their window."""
         m, given = len(measured), self.settings.noise_std**2
-        if forecast.predictions:
-            best = forecast.predictions[-1]
-            surprise = float(np.mean((measured - best.unshrunk[:m])[accepted] ** 2)) / best.expected
-            if surprise > _SURPRISE:
-                self._discount(min(max((_SURPRISE / surprise) ** 2, _SURPRISED * self.settings.Np / self.n_rows), 1.0))
         if not forecast.predictions:
             # Third differences leave white noise, 20 times its variance, and little else.
             first = float(np.mean(np.diff(measured, 3) ** 2)) / 20.0 if m > 10 else float(np.mean(measured**2))
             for candidate in self.candidates:
                 candidate.noise_variance = given or first
-        for candidate, prediction in zip(self.candidates, forecast.predictions, strict=False):
+            return
+        best = forecast.predictions[-1]
+        surprise = float(np.mean((measured - best.unshrunk[:m])[accepted] ** 2)) / best.expected
+        if surprise > _SURPRISE:
+            self._discount(min(max((_SURPRISE / surprise) ** 2, _SURPRISED * self.settings.Np / self.n_rows), 1.0))
+        for candidate, prediction in zip(self.candidates, forecast.predictions, strict=True):
             candidate.judge(prediction.unshrunk[:m][accepted], measured[accepted])
             candidate.noise_variance = given or prediction.noise_variance
 
@@ -231,11 +231,10 @@ class TrustedModel:
 
     def _fold(self, static: Array, measured: Array, learned: NDArray[np.bool_]) -> None:
         """Update the regression with a window's rows ``[static features | lags | e_pb]``."""
-        m, p = static.shape[0], self.settings.p
-        series = np.concatenate((self.past[::-1], measured))
+        m = len(measured)
         rows = np.empty((m, self.regression.n_features + 1), order="F")
         rows[:, : self.static.n] = static
-        rows[:, self.static.n : -1] = np.lib.stride_tricks.sliding_window_view(series, p)[:m, ::-1]
+        rows[:, self.static.n : -1] = lags(self.past, measured)
         rows[:, -1] = measured
         if self.settings.forgetting > 0.0:
             self._discount(math.exp(-m * self.settings.T_s / self.settings.forgetting))
