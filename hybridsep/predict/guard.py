@@ -14,14 +14,9 @@ from numpy.typing import NDArray
 from ..base.errors import SignalError
 from ..base.saved import COUNT_MAX
 from ..base.signals import Array
+from .held import HeldValue
 
 __all__ = ["N_STATE", "SensorGuard"]
-
-_REPEATS = 3
-"""Equal consecutive values from which a measurement may be held: two may occur by chance at slow motion."""
-
-_STEPS = 5.0
-"""Predicted motion, in resolution steps of the sensor, within which equal values are plausible."""
 
 _SPREADS, _RESOLUTION, _SMALL, _RIPPLE = 12.0, 3.0, 0.01, 0.1
 """Plausible deviation: in mean deviations, in resolution steps, and relative to the largest residual and to the
@@ -33,10 +28,10 @@ _PACE = 2.0
 _NEIGHBOURS = 2
 """Samples to either side that an isolated value is compared with."""
 
-_COUNTS = ("gap", "repeats", "jumps")
-_NUMBERS = ("last", "value", "low", "high", "step", "spread", "pace", "last_x_pb")
+_COUNTS = ("gap", "jumps")
+_NUMBERS = ("last", "spread", "pace", "last_x_pb")
 
-N_STATE = len(_COUNTS) + len(_NUMBERS) + _NEIGHBOURS
+N_STATE = len(_COUNTS) + len(_NUMBERS) + HeldValue.N_STATE + _NEIGHBOURS
 """Numbers of a state."""
 
 _RISE, _FALL = 0.5, 0.02
@@ -57,10 +52,7 @@ class SensorGuard:
         Last accepted residual.
     gap : int
         Samples since then.
-    value, repeats, low, high : float, int, float, float
-        Last value, how often it came, and the range of predicted positions meanwhile, m.
-    step : float, m
-        Resolution of the sensor: its least change so far; infinite before there is one.
+    held : HeldValue
     spread : float, m
         Mean deviation of a residual from the median of its neighbours; −1 before the first window.
     pace : float, m
@@ -75,13 +67,13 @@ class SensorGuard:
 
     def __init__(self, patience: int) -> None:
         self.patience = patience
-        self.step, self.spread = math.inf, -1.0
+        self.held, self.spread = HeldValue(), -1.0
         self.restart()
 
     def restart(self) -> None:
         """Begin another run; what is known of the sensor is kept."""
         self.last, self.gap, self.jumps = 0.0, 0, 0
-        self.value, self.repeats, self.low, self.high = math.nan, 0, 0.0, 0.0
+        self.held.restart()
         self.pace = 0.0
         self.before = np.zeros(_NEIGHBOURS)
         self.last_x_pb = math.nan
@@ -102,7 +94,7 @@ class SensorGuard:
         deviation = self._deviations(residuals)
         first = x_pb[0] if math.isnan(self.last_x_pb) else self.last_x_pb
         pace = float(np.abs(np.diff(x_pb, prepend=first)).max())
-        step = 0.0 if math.isinf(self.step) else self.step
+        step = 0.0 if math.isinf(self.held.step) else self.held.step
         motion = max(pace, self.pace)
         plausible = _SPREADS * self.spread + _RESOLUTION * step + _SMALL * largest + _RIPPLE * motion
         accepted = np.isfinite(x)
@@ -110,8 +102,8 @@ class SensorGuard:
             self.gap += 1
             if not accepted[k]:
                 continue
-            if self._held(value, position, plausible):
-                accepted[max(k - self.repeats + 1, 0) : k + 1] = False
+            if self.held.holds(value, position, still=plausible):
+                accepted[max(k - self.held.repeats + 1, 0) : k + 1] = False
                 continue
             if self.spread >= 0.0:
                 jumping = abs(e - self.last) > plausible + self.gap * _PACE * motion
@@ -127,22 +119,21 @@ class SensorGuard:
 
     def state(self) -> list[float]:
         """Return the state as plain numbers."""
-        counts, own = (getattr(self, name) for name in _COUNTS), (getattr(self, name) for name in _NUMBERS)
-        return [*map(float, counts), *own, *self.before.tolist()]
+        own = [float(getattr(self, name)) for name in (*_COUNTS, *_NUMBERS)]
+        return [*own, *self.held.state(), *self.before.tolist()]
 
     def restore(self, state: Array) -> None:
         """Restore a :meth:`state`; SignalError if it is none."""
-        counts, own, before = np.split(state, (len(_COUNTS), len(_COUNTS) + len(_NUMBERS)))
-        sound = (
-            all(0 <= count <= COUNT_MAX and count == int(count) for count in counts)
-            and not np.isinf(np.delete(own, _NUMBERS.index("step"))).any()
-            and not np.isinf(before).any()
-        )
+        ends = np.cumsum((len(_COUNTS), len(_NUMBERS), HeldValue.N_STATE))
+        counts, own, held, before = np.split(state, ends)
         values = dict(zip(_NUMBERS, own.tolist(), strict=True))
-        if not (sound and values["low"] <= values["high"] and values["step"] > 0.0 and values["pace"] >= 0.0):
-            raise SignalError("the guard's state must be counts, residuals, a range of positions, a step and a pace")
-        if not (values["spread"] >= 0.0 or values["spread"] == -1.0) or np.isnan(values["last"]):
-            raise SignalError("the guard's last residual must be finite, its spread ≥ 0 or −1")
+        if not all(0 <= count <= COUNT_MAX and count == int(count) for count in counts):
+            raise SignalError("the guard's gap and jumps must be counts")
+        if np.isinf(own).any() or np.isinf(before).any() or np.isnan(values["last"]) or not values["pace"] >= 0.0:
+            raise SignalError("the guard's residuals and positions must be finite, its pace ≥ 0")
+        if not (values["spread"] >= 0.0 or values["spread"] == -1.0):
+            raise SignalError("the guard's spread must be ≥ 0 or −1")
+        self.held.restore(held)
         for name, value in values.items():
             setattr(self, name, value)
         for name, count in zip(_COUNTS, counts.tolist(), strict=True):
@@ -161,16 +152,6 @@ class SensorGuard:
             ordered[rows, np.maximum(count - 1, 0) // 2] + ordered[rows, np.minimum(count // 2, 2 * _NEIGHBOURS)]
         )
         return np.where(np.isfinite(residuals), np.abs(residuals - median), 0.0)
-
-    def _held(self, value: float, position: float, plausible: float) -> bool:
-        """Return whether the value is held while the drive should move."""
-        if value != self.value:
-            if not math.isnan(self.value):
-                self.step = min(self.step, abs(value - self.value))
-            self.value, self.repeats, self.low, self.high = value, 0, position, position
-        self.repeats += 1
-        self.low, self.high = min(self.low, position), max(self.high, position)
-        return self.repeats >= _REPEATS and self.high - self.low > max(_STEPS * self.step, plausible)
 
     def _follow(self, deviations: Array, plausible: float) -> None:
         """Follow the mean deviation of the measured samples; one beyond what is plausible counts as that."""

@@ -20,8 +20,11 @@ class Guard(ctypes.Structure):
     """hsep_guard."""
 
     _fields_ = (
-        *((name, ctypes.c_uint64) for name in ("patience", "gap", "repeats", "jumps")),
-        *((name, ctypes.c_double) for name in ("last", "value", "low", "high", "step", "spread", "pace", "x_pb")),
+        *((name, ctypes.c_uint64) for name in ("patience", "gap", "jumps")),
+        *(
+            (name, ctypes.c_double)
+            for name in ("last", "value", "repeats", "low", "high", "step", "spread", "pace", "x_pb")
+        ),
         ("before", ctypes.c_double * NEIGHBOURS),
     )
 
@@ -64,6 +67,6 @@ def test_core_and_library_accept_the_same_samples(seed: int) -> None:
         assert core.accepts(x[i : i + n], x_pb[i : i + n], 1e-4).tolist() == expected.tolist()
         rejected += n - int(expected.sum())
     assert 0 < rejected < 20 * n
-    assert (core.gap, core.jumps, core.repeats) == (guard.gap, guard.jumps, guard.repeats)
-    assert (core.step, core.pace) == (guard.step, guard.pace)
+    assert (core.gap, core.jumps, core.repeats) == (guard.gap, guard.jumps, guard.held.repeats)
+    assert (core.step, core.pace) == (guard.held.step, guard.pace)
     assert core.spread == pytest.approx(guard.spread, rel=1e-12)

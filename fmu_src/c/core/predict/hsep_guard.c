@@ -4,8 +4,6 @@
 
 #define GUARD_WINDOW (2 * HSEP_GUARD_NEIGHBOURS + 1)
 
-static const uint64_t guard_repeats = 3; /* equal consecutive values from which one may be held */
-static const double guard_steps = 5.0;   /* predicted motion, in resolution steps, within which they are plausible */
 /* Plausible deviation: in mean deviations, in resolution steps, and relative to the largest residual and to the
  * predicted motion of a sample. */
 static const double guard_spreads = 12.0, guard_resolution = 3.0, guard_small = 0.01, guard_ripple = 0.1;
@@ -14,7 +12,8 @@ static const double guard_rise = 0.5, guard_fall = 0.02; /* rates at which the m
 
 HSEP_API void hsep_guard_init(hsep_guard *self, uint64_t patience)
 {
-    *self = (hsep_guard){.patience = patience, .value = NAN, .step = HUGE_VAL, .spread = -1.0, .x_pb = NAN};
+    *self = (hsep_guard){.patience = patience, .spread = -1.0, .x_pb = NAN};
+    hsep_sensor_init(&self->held);
 }
 
 /* Residual i of the window, or one before it; NaN behind it. */
@@ -48,23 +47,6 @@ static double guard_deviation(const hsep_guard *self, const double x[], const do
     return fabs(residual - 0.5 * (ordered[(count - 1) / 2] + ordered[count / 2]));
 }
 
-/* Return whether a value is held while the drive should move. */
-static int guard_held(hsep_guard *self, double x, double x_pb, double plausible)
-{
-    if (!(x == self->value)) {
-        if (!isnan(self->value)) {
-            self->step = fmin(self->step, fabs(x - self->value));
-        }
-        self->value = x;
-        self->repeats = 0;
-        self->low = self->high = x_pb;
-    }
-    self->repeats++;
-    self->low = fmin(self->low, x_pb);
-    self->high = fmax(self->high, x_pb);
-    return self->repeats >= guard_repeats && self->high - self->low > fmax(guard_steps * self->step, plausible);
-}
-
 /* Let the mean deviation follow that of the measured samples; one beyond what is plausible counts as that. */
 static void guard_follow(
     hsep_guard *self, const double x[], const double deviation[], uint64_t n, int known, double plausible)
@@ -92,7 +74,7 @@ HSEP_API void hsep_guard_accept(
         last = x_pb[n - 1 - k];
         deviation[n - 1 - k] = guard_deviation(self, x, x_pb, n, k);
     }
-    const double step = self->step < HUGE_VAL ? self->step : 0.0;
+    const double step = self->held.step < HUGE_VAL ? self->held.step : 0.0;
     const double motion = fmax(pace, self->pace);
     const double plausible =
         guard_spreads * self->spread + guard_resolution * step + guard_small * largest + guard_ripple * motion;
@@ -105,8 +87,9 @@ HSEP_API void hsep_guard_accept(
         if (!isfinite(x[place])) {
             continue;
         }
-        if (guard_held(self, x[place], x_pb[place], plausible)) {
-            for (uint64_t j = k + 1 > self->repeats ? k + 1 - self->repeats : 0; j < k; j++) {
+        if (hsep_sensor_misses(&self->held, x[place], x_pb[place], plausible, HUGE_VAL)) {
+            const uint64_t repeats = (uint64_t)fmin(self->held.repeats, (double)(k + 1));
+            for (uint64_t j = k + 1 - repeats; j < k; j++) {
                 accepted[n - 1 - j] = 0.0;
             }
             continue;

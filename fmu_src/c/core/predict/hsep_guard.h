@@ -8,6 +8,7 @@
 
 #include "hsep_api.h"
 #include "hsep_layout.h"
+#include "hsep_sensor.h"
 
 #include <stdint.h>
 
@@ -16,15 +17,12 @@
 typedef struct {
     uint64_t patience; /* jumping samples in a row after which the new level is believed */
     uint64_t gap;      /* samples since the last accepted one */
-    uint64_t repeats;  /* length of the run of equal values */
     uint64_t jumps;    /* jumping samples in a row */
     double last;       /* m, the last accepted residual */
-    double value;      /* m, the last measurement; NaN before the first */
-    double low, high;  /* m, range of predicted positions over the run of equal values */
-    double step;       /* m, the smallest change so far; infinite before the first */
-    double spread;     /* m, mean deviation from the neighbours' median; -1 before the first window */
-    double pace;       /* m, largest predicted motion of a sample in the last window */
-    double x_pb;       /* m, the last prediction; NaN before the first */
+    hsep_sensor held;
+    double spread; /* m, mean deviation from the neighbours' median; -1 before the first window */
+    double pace;   /* m, largest predicted motion of a sample in the last window */
+    double x_pb;   /* m, the last prediction; NaN before the first */
     double before[HSEP_GUARD_NEIGHBOURS]; /* m, the last residuals, oldest first */
 } hsep_guard;
 

@@ -21,11 +21,14 @@ HSEP_API const double *hsep_predictor_drive(const hsep_predictor *self, uint64_t
     return has_reference ? hsep_at_const(self, self->drive) + (self->preview - n) : NULL;
 }
 
+static const double predictor_first_step = 1e-5; /* m, resolution of the sensor assumed before its first change */
+static const double predictor_still = 1e-8;      /* m, motion below which the drive counts as at rest */
+
 /* Guard before a row is learned: return whether it is. A measurement held while the drive moves is missing; with trust
  * a window is learned when it has ended. */
 static int predictor_guard(hsep_predictor *self, double x_meas, double x_pb)
 {
-    if (self->saved && hsep_sensor_misses(&self->sensor, x_meas, x_pb)) {
+    if (self->saved && hsep_sensor_misses(&self->sensor, x_meas, x_pb, predictor_still, predictor_first_step)) {
         self->missing = 1;
     }
     return self->learning && !self->missing && !self->trusted;

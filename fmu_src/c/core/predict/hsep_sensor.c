@@ -4,8 +4,6 @@
 
 static const double sensor_repeats = 3.0; /* equal consecutive values from which one may be held */
 static const double sensor_steps = 5.0;   /* predicted motion, in resolution steps, within which they are plausible */
-static const double sensor_first_step = 1e-5; /* m, resolution step assumed before the first change */
-static const double sensor_still = 1e-8;      /* m, motion below which the drive counts as at rest */
 
 HSEP_API void hsep_sensor_init(hsep_sensor *self)
 {
@@ -14,7 +12,7 @@ HSEP_API void hsep_sensor_init(hsep_sensor *self)
     self->step = HUGE_VAL;
 }
 
-HSEP_API int hsep_sensor_misses(hsep_sensor *self, double x_meas, double x_pb)
+HSEP_API int hsep_sensor_misses(hsep_sensor *self, double x_meas, double x_pb, double still, double first_step)
 {
     if (!(x_meas == self->value)) {
         if (!isnan(self->value)) {
@@ -27,6 +25,6 @@ HSEP_API int hsep_sensor_misses(hsep_sensor *self, double x_meas, double x_pb)
     self->repeats += 1.0;
     self->low = fmin(self->low, x_pb);
     self->high = fmax(self->high, x_pb);
-    const double step = self->step < HUGE_VAL ? self->step : sensor_first_step;
-    return self->repeats >= sensor_repeats && self->high - self->low > fmax(sensor_steps * step, sensor_still);
+    const double step = self->step < HUGE_VAL ? self->step : first_step;
+    return self->repeats >= sensor_repeats && self->high - self->low > fmax(sensor_steps * step, still);
 }

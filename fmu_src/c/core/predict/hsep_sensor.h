@@ -21,7 +21,8 @@ HSEP_ASSERT_WORDS(hsep_sensor, 5);
 
 HSEP_API void hsep_sensor_init(hsep_sensor *self);
 
-/* Process a measurement and its prediction, m; return whether it is held. */
-HSEP_API int hsep_sensor_misses(hsep_sensor *self, double x_meas, double x_pb);
+/* Process a measurement and its prediction, m; return whether it is held. still: m, predicted motion within which equal
+ * values are plausible whatever the resolution; first_step: m, resolution assumed before the first change. */
+HSEP_API int hsep_sensor_misses(hsep_sensor *self, double x_meas, double x_pb, double still, double first_step);
 
 #endif
