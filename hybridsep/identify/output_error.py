@@ -13,14 +13,18 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from ..base.signals import Array
-from .responses import free_responses, responses
+from .responses import free_responses, responses, sections_of
 from .segments import Segment, delayed
 from .structure import Structure
 
 __all__ = ["Delay", "Fit", "affine", "fit_structure", "simulated", "without"]
 
-EVALUATIONS_MAX = 40
+EVALUATIONS_MAX = 20
 """Largest number of iterations of one start; a good one converges within 15."""
+
+ROWS_MAX = 4000
+"""Residuals that take part in a search, evenly spaced: the filters run over every sample, but neighbouring residuals
+tell the same."""
 
 EDGE = 0.01
 """Distance from a bound, in the logarithm of a parameter, within which it counts as at the bound."""
@@ -84,10 +88,13 @@ class Fit:
 class _Problem:
     """Separable least-squares problem of a structure with one dead time."""
 
-    def __init__(self, segments: Sequence[Segment], T_s: float, structure: Structure, delay: Delay) -> None:
+    def __init__(
+        self, segments: Sequence[Segment], T_s: float, structure: Structure, delay: Delay, rows_max: int
+    ) -> None:
         self._structure, self._T_s, self._delay = structure, T_s, delay
         used = [segment for segment in segments if segment.stop > 1]
         self._data = [(delayed(s.u[: s.stop], delay.samples), s.y[: s.stop]) for s in used]
+        self._rows = slice(None, None, max(1, sum(s.stop for s in used) // rows_max))
 
     def solve(self, theta: Array) -> tuple[Array, Array, float]:
         """Return residual, linear parameters and mean offset for one set of poles."""
@@ -99,10 +106,10 @@ class _Problem:
 
     def _projected(self, theta: Array, u: Array, y: Array) -> tuple[Array, Array, Array, Array]:
         """Return columns and target less what offset and initial state explain, then the means of both."""
-        columns = responses(self._structure, theta, u, self._T_s, self._delay.input_hold)
-        columns, target = affine(self._structure, columns, y)
-        free = free_responses(self._structure, theta, len(u), self._T_s)
-        nuisance = np.column_stack((np.ones(len(u)), free))
+        sections = sections_of(self._structure, theta, self._T_s, self._delay.input_hold)
+        columns, target = affine(self._structure, responses(self._structure, sections, u)[self._rows], y[self._rows])
+        free = free_responses(sections, len(u))[self._rows]
+        nuisance = np.column_stack((np.ones(len(free)), free))
         both = without(nuisance, np.column_stack((columns, target)))
         return both[:, :-1], both[:, -1], target.mean(keepdims=True), columns.mean(axis=0)
 
@@ -129,6 +136,7 @@ def fit_structure(
     delay: Delay,
     starts: Sequence[Array],
     slowest: float,
+    rows_max: int = ROWS_MAX,
 ) -> Fit:
     """Return the best fit from several starts.
 
@@ -142,8 +150,10 @@ def fit_structure(
         Nonlinear parameters to start from.
     slowest : float
         Lower bound of the natural frequencies, rad/s.
+    rows_max : int
+        Residuals that take part, about.
     """
-    problem = _Problem(segments, T_s, structure, delay)
+    problem = _Problem(segments, T_s, structure, delay, rows_max)
     low, high = structure.bounds(T_s, slowest)
     best: Fit | None = None
     for start in starts if structure.order else [np.empty(0)]:
@@ -171,7 +181,8 @@ def fit_structure(
 def simulated(fit: Fit, segment: Segment, T_s: float) -> Array:
     """Return the position of the fitted model, which starts at rest as the predictor does, ``(n,)``, m."""
     u = delayed(segment.u, fit.delay.samples)
-    columns = responses(fit.structure, fit.theta, u, T_s, fit.delay.input_hold)
+    sections = sections_of(fit.structure, fit.theta, T_s, fit.delay.input_hold)
+    columns = responses(fit.structure, sections, u)
     gains, betas = fit.structure.gains(fit.linear)
     return columns @ np.concatenate((gains, betas if fit.structure.zero else []))
 

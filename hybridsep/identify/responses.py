@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
 from scipy.signal import lfilter
 
@@ -9,75 +12,83 @@ from ..base.signals import Array
 from ..model.discrete import discretised_block
 from .structure import Structure
 
-__all__ = ["free_responses", "responses"]
+__all__ = ["Section", "free_responses", "responses", "sections_of"]
 
 
-def responses(structure: Structure, theta: Array, u: Array, T_s: float, input_hold: str) -> Array:
-    """Return the responses whose weighted sum is the position, ``(n, n_columns)``.
+class Section(NamedTuple):
+    """Discrete mode or lag: ``s(k+1) = A s(k) + b u(k)``, its states being ``s + d u``.
 
-    The static gain of the modes' and the lag's columns is 1, in this order; columns of the zeros, ``ω s/(s² + 2 ζ ω s +
-    ω²)``, follow.
+    The first state is the response with a static gain of 1, the second one of a mode ``ω s/(s² + 2 ζ ω s + ω²)``.
+    """
+
+    A: Array
+    b: Array
+    d: Array
+
+    @property
+    def denominator(self) -> Array:
+        """Coefficients in z⁻¹."""
+        if len(self.b) == 1:
+            return np.array([1.0, -self.A[0, 0]])
+        A = self.A
+        return np.array([1.0, -A[0, 0] - A[1, 1], A[0, 0] * A[1, 1] - A[0, 1] * A[1, 0]])
+
+    def numerators(self) -> list[Array]:
+        """Return each state's coefficients in z⁻¹, of ``(z I − A)⁻¹ b + d``."""
+        A, b = self.A, self.b
+        if len(b) == 1:
+            adjugate = [np.array([0.0, b[0]])]
+        else:
+            adjugate = [
+                np.array([0.0, b[0], A[0, 1] * b[1] - A[1, 1] * b[0]]),
+                np.array([0.0, b[1], A[1, 0] * b[0] - A[0, 0] * b[1]]),
+            ]
+        return [part + d * self.denominator for part, d in zip(adjugate, self.d, strict=True)]
+
+
+def sections_of(structure: Structure, theta: Array, T_s: float, input_hold: str) -> list[Section]:
+    """Return the modes and the lag of a structure with nonlinear parameters ``theta``, ``(order,)``."""
+    sections = []
+    for i in range(structure.n_modes):
+        omega, zeta = np.exp(theta[2 * i]), np.exp(theta[2 * i + 1])
+        A, b = np.array([[0.0, omega], [-omega, -2 * zeta * omega]]), np.array([0.0, omega])
+        sections.append(Section(*discretised_block(A, b, T_s, input_hold)))
+    if structure.lag:
+        rate = np.exp(theta[-1])
+        sections.append(Section(*discretised_block(np.array([[-rate]]), np.array([rate]), T_s, input_hold)))
+    return sections
+
+
+def responses(structure: Structure, sections: Sequence[Section], u: Array) -> Array:
+    """Return the responses whose weighted sum is the position, ``(n, n_columns)``, m.
+
+    Those of modes and lag with a static gain of 1 come first, then those of the modes' zeros.
 
     Parameters
     ----------
     structure : Structure
-    theta : (order,) array
-        Nonlinear parameters.
+    sections : sequence of Section
+        From :func:`sections_of`.
     u : (n,) array, m
         Command after the dead time, 0 before.
-    T_s : float, s
-    input_hold : {"zoh", "foh"}
     """
-    if structure.order == 0:
+    if not sections:
         return u[:, None]
     positions, velocities = [], []
-    for A, b in _sections(structure, theta):
-        A_d, b_d, direct = discretised_block(A, b, T_s, input_hold)
-        denominator, numerators = _filters(A_d, b_d, direct)
+    for section in sections:
+        numerators, denominator = section.numerators(), section.denominator
         positions.append(lfilter(numerators[0], denominator, u))
-        if structure.zero and len(b) == 2:
+        if structure.zero and len(numerators) == 2:
             velocities.append(lfilter(numerators[1], denominator, u))
     return np.column_stack(positions + velocities)
 
 
-def free_responses(structure: Structure, theta: Array, n: int, T_s: float) -> Array:
+def free_responses(sections: Sequence[Section], n: int) -> Array:
     """Return the responses to initial states without a command, ``(n, order)``."""
     impulse = np.eye(1, n)[0]
-    columns = []
-    for A, b in _sections(structure, theta):
-        A_d = discretised_block(A, b, T_s, "zoh")[0]
-        denominator = _denominator(A_d)
-        columns.append(lfilter([1.0], denominator, impulse))
-        if len(b) == 2:
-            columns.append(lfilter([0.0, 1.0], denominator, impulse))
+    columns = [
+        lfilter(np.eye(1, len(section.b), i)[0], section.denominator, impulse)
+        for section in sections
+        for i in range(len(section.b))
+    ]
     return np.column_stack(columns) if columns else np.empty((n, 0))
-
-
-def _sections(structure: Structure, theta: Array) -> list[tuple[Array, Array]]:
-    """Return ``(A, b)`` of each mode, with the states ``(ω² z, ω ż)``, and of the lag."""
-    sections = []
-    for i in range(structure.n_modes):
-        omega, zeta = np.exp(theta[2 * i]), np.exp(theta[2 * i + 1])
-        sections.append((np.array([[0.0, omega], [-omega, -2 * zeta * omega]]), np.array([0.0, omega])))
-    if structure.lag:
-        rate = np.exp(theta[-1])
-        sections.append((np.array([[-rate]]), np.array([rate])))
-    return sections
-
-
-def _denominator(A_d: Array) -> Array:
-    if len(A_d) == 1:
-        return np.array([1.0, -A_d[0, 0]])
-    return np.array([1.0, -A_d[0, 0] - A_d[1, 1], A_d[0, 0] * A_d[1, 1] - A_d[0, 1] * A_d[1, 0]])
-
-
-def _filters(A_d: Array, b: Array, d: Array) -> tuple[Array, list[Array]]:
-    """Return the denominator in z⁻¹ and each state's numerator, of ``(z I − A_d)⁻¹ b + d``."""
-    denominator = _denominator(A_d)
-    if len(b) == 1:
-        return denominator, [np.array([0.0, b[0]]) + d[0] * denominator]
-    adjugate = (
-        np.array([0.0, b[0], A_d[0, 1] * b[1] - A_d[1, 1] * b[0]]),
-        np.array([0.0, b[1], A_d[1, 0] * b[0] - A_d[0, 0] * b[1]]),
-    )
-    return denominator, [numerator + direct * denominator for numerator, direct in zip(adjugate, d, strict=True)]

@@ -52,7 +52,9 @@ def fit_near(segments: Sequence[Segment], T_s: float, fit: Fit, steps: int = 2) 
         fit_structure(segments, T_s, fit.structure, Delay(halves), [fit.theta], fit.slowest)
         for halves in range(max(0, fit.delay.halves - steps), fit.delay.halves + steps + 1)
     ]
-    return min(fits, key=lambda fit: fit.rms)
+    best = min(fits, key=lambda fit: fit.rms)
+    n = sum(segment.stop for segment in segments)
+    return fit_structure(segments, T_s, fit.structure, best.delay, [best.theta], fit.slowest, rows_max=n)
 
 
 def _minimum(at: Callable[[int], Fit], first: int, limit: int) -> Fit:

@@ -42,6 +42,9 @@ GAIN_SIGNIFICANT = 3.0
 GROWTH = 2
 """Orders above the best one that are tried before the search ends."""
 
+LAGS = 20
+"""Lags at which the residual's correlation is looked at: nothing is left to model where it is white."""
+
 
 @dataclass(frozen=True)
 class Candidate:
@@ -79,7 +82,7 @@ def compare_structures(
 ) -> list[Candidate]:
     """Return the candidates, simplest first, fitted to the first part of the motion and judged on the later one.
 
-    Higher orders are left out once two of them have brought no smaller error.
+    Higher orders are left out once two of them have brought no smaller error, or the residual is white.
 
     Parameters
     ----------
@@ -93,12 +96,13 @@ def compare_structures(
     n_fitted = sum(segment.stop for segment in split)
     known: dict[Structure, Fit] = {}
     found: list[tuple[Fit, Array, str]] = []
-    best, best_order = np.inf, 0
+    best, best_order, white = np.inf, 0, False
     orders = sorted({structure.order for structure in structures})
     for i, structure in enumerate(structures):
         if known and structure.n_parameters > n_fitted / 10:
             break
-        if orders.index(structure.order) > orders.index(best_order) + GROWTH and structure.order > GROWTH:
+        growth = orders.index(structure.order) - orders.index(best_order)
+        if structure.order > GROWTH and (growth > GROWTH or (growth > 0 and white)):
             break
         progress(structure.name, i / len(structures))
         fit = known[structure] = fit_delay(split, T_s, structure, known)
@@ -106,7 +110,7 @@ def compare_structures(
         found.append((fit, residual, _objection(fit, split, T_s)))
         rms = float(np.std(residual))
         if not found[-1][2] and rms < best * (1 - TOLERANCE):
-            best, best_order = rms, structure.order
+            best, best_order, white = rms, structure.order, _is_white(residual)
     offsets = [fit.offset for fit, _, _ in found if fit.structure.order] or [found[0][0].offset]
     common = float(np.median(offsets))
     return [Candidate(fit, residual - common, objection) for fit, residual, objection in found]
@@ -143,6 +147,15 @@ def _as_good(candidate: Candidate, best: Candidate) -> bool:
     excess = candidate.held_out**2 - best.held_out**2
     means = np.array([block.mean() for block in np.array_split(excess, min(BLOCKS, len(excess)))])
     return len(means) > 1 and bool(means.mean() <= means.std(ddof=1) / np.sqrt(len(means)))
+
+
+def _is_white(residual: Array) -> bool:
+    """Return whether no correlation at the first lags is significant."""
+    centred = residual - residual.mean()
+    power = float(centred @ centred)
+    return len(centred) > 10 * LAGS and all(
+        abs(float(centred[lag:] @ centred[:-lag])) < 4 * power / np.sqrt(len(centred)) for lag in range(1, LAGS + 1)
+    )
 
 
 def _objection(fit: Fit, segments: Sequence[Segment], T_s: float) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..base.signals import Array
 from .output_error import Fit, affine, without
-from .responses import free_responses, responses
+from .responses import free_responses, responses, sections_of
 from .segments import Segment, delayed
 
 __all__ = ["Estimate", "estimates"]
@@ -87,8 +87,8 @@ def _jacobian(fit: Fit, segments: Sequence[Segment], T_s: float) -> tuple[Array,
         u, y = delayed(segment.u, fit.delay.samples), segment.y
 
         def position(theta: Array, u: Array = u, y: Array = y) -> tuple[Array, Array]:
-            columns = responses(fit.structure, theta, u, T_s, fit.delay.input_hold)
-            columns, target = affine(fit.structure, columns, y)
+            sections = sections_of(fit.structure, theta, T_s, fit.delay.input_hold)
+            columns, target = affine(fit.structure, responses(fit.structure, sections, u), y)
             return columns @ fit.linear + (y - target), columns
 
         x, columns = position(fit.theta)
@@ -98,7 +98,7 @@ def _jacobian(fit: Fit, segments: Sequence[Segment], T_s: float) -> tuple[Array,
         ]
         by_delay = -np.gradient(x)
         block = np.column_stack((*slopes, columns, by_delay, np.ones(len(x))))
-        free = free_responses(fit.structure, fit.theta, len(x), T_s)
+        free = free_responses(sections_of(fit.structure, fit.theta, T_s, "zoh"), len(x))
         both = np.column_stack((block, y - x))
         if free.size:
             both = without(free, both)
