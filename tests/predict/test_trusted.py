@@ -165,7 +165,7 @@ def test_the_noise_that_is_given_is_that_of_the_candidates() -> None:
     predictor = trusted(noise_std=3e-6)
     run(predictor, x_d, x)
     assert predictor.trusted is not None
-    assert [one.noise_variance for one in predictor.trusted.candidates] == [pytest.approx(9e-12)] * 2
+    assert [one.noise_variance for one in predictor.trusted.candidates] == [pytest.approx(9e-12)] * 3
     estimated = trusted()
     run(estimated, x_d, x)
     assert estimated.trusted is not None
