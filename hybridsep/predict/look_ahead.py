@@ -169,7 +169,7 @@ class LookAhead:
     @property
     def n_rejected(self) -> int:
         """Measurements of this run that were missing or not plausible, with trust; counted window by window."""
-        return 0 if self.predictor.trusted is None else self.predictor.trusted.n_rejected
+        return self.predictor.n_rejected
 
     @property
     def sep_state(self) -> int:
@@ -193,7 +193,7 @@ class LookAhead:
 
     @property
     def rms_hold(self) -> float:
-        """Running RMS of the hold baseline, ``x_pb`` plus the residual before a window, since ``t_init``, m; 0 before."""
+        """Running RMS of hold, ``x_pb`` plus the residual before a window, since ``t_init``, m; 0 before."""
         return self._rms(3)
 
     def sample(self, x_d_ahead: float, x_meas: float) -> None:

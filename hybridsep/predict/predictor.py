@@ -242,6 +242,11 @@ class HybridPredictor:
         """Samples of the predicted window pending measurement; 0 if there is none."""
         return 0 if self.pending is None else len(self.pending.x_d)
 
+    @property
+    def n_rejected(self) -> int:
+        """Measurements of this run that were missing or not plausible; 0 without trust."""
+        return 0 if self.trusted is None else self.trusted.n_rejected
+
     def last_residual(self) -> float:
         """Return the last measured residual ``e_pb``, m, which the hold baseline holds over a window."""
         return float(self.past.e_pb[-1] if self.trusted is None else self.trusted.past[0])

@@ -58,6 +58,10 @@ step of expectation maximisation, which alone would be slow where components are
 _Z, _BEYOND = 1.96, 0.05
 """Standard deviations that a normal error exceeds with this probability."""
 
+_FAR, _FAR_SHARE = 4.0, 0.5
+"""Standard deviations, and the share of a window's errors beyond them from which on all variances are too small by
+their square: the machine or the sensor has changed."""
+
 _FACTOR_RATE, _FACTOR_MAX = 0.2, 4.0
 """Change of ``ln c`` from one window to the next per share of errors, and bound on ``c`` and ``1/c``."""
 
@@ -154,15 +158,18 @@ class Uncertainty:
         m = len(residuals)
         error = measured - predicted.e_h[:m][accepted]
         components = predicted.components[:m][accepted]
-        mean_square = float(np.mean(measured**2))
+        mean_square = _mean_square(measured)
         if self.recent > 0.0:
-            beyond = float(np.mean(np.abs(error) > _Z * predicted.std[:m][accepted]))
-            factor = self.factor * math.exp(_FACTOR_RATE * (beyond - _BEYOND))
-            self.factor = min(max(factor, 1.0 / _FACTOR_MAX), _FACTOR_MAX)
+            relative = np.abs(error) / predicted.std[:m][accepted]
+            if float(np.mean(relative > _FAR)) > _FAR_SHARE:
+                self.theta *= _FAR**2
+            else:
+                factor = self.factor * math.exp(_FACTOR_RATE * (float(np.mean(relative > _Z)) - _BEYOND))
+                self.factor = min(max(factor, 1.0 / _FACTOR_MAX), _FACTOR_MAX)
             self.recent = _RECENT * self.recent + (1.0 - _RECENT) * mean_square
         else:
             self.recent = mean_square
-            self.theta[:2] = float(np.mean(error**2)) * np.array([1.0, _GROWTH])
+            self.theta[:2] = _mean_square(error) * np.array([1.0, _GROWTH])
         variance = self._variance(components)
         share = components * self.theta / variance[:, None]  # of the variance, that is due to each component
         total = share.sum(axis=0)
@@ -171,9 +178,8 @@ class Uncertainty:
         change = np.maximum(np.divide(seen, total, out=np.ones(N_COMPONENTS), where=total > 0.0), _VANISHING)
         step = np.minimum(_STEP * total / Np / (self.evidence + _FIRST_EVIDENCE), 1.0)
         theta = self.theta * change**step
-        self.theta[:2] = np.maximum(theta[:2], _FLOOR * self.recent)
-        shares = np.array(_SHARES)
-        self.theta[2:] = np.clip(theta[2:], _SHARE_LEAST * shares, _SHARE_MOST * shares)
+        self.theta[:2] = np.clip(theta[:2], _FLOOR * self.recent, PREDICTION_MAX)
+        self.theta[2:] = np.clip(theta[2:], *_share_bounds())
 
     def learned(self) -> Array:
         """Return what has been learned, ``(N_LEARNED,)``: all numbers are ≥ 0."""
@@ -187,8 +193,11 @@ class Uncertainty:
     @staticmethod
     def is_sound(learned: Array) -> bool:
         """Return whether the numbers of :meth:`learned` are in range."""
+        least, most = _share_bounds()
+        shares, others = learned[2:N_COMPONENTS], np.delete(learned, range(2, N_COMPONENTS))
         return bool(
-            ((learned >= 0.0) & (learned <= PREDICTION_MAX**2)).all()
+            ((shares >= least) & (shares <= most)).all()
+            and ((others >= 0.0) & (others <= PREDICTION_MAX)).all()
             and 1.0 / _FACTOR_MAX <= learned[-2] <= _FACTOR_MAX
         )
 
@@ -202,3 +211,13 @@ def _differences(signal: Array) -> Array:
         return np.zeros(len(signal))
     change = np.diff(signal)
     return np.concatenate((change[:1], change))
+
+
+def _mean_square(signal: Array) -> float:
+    return min(float(np.mean(signal**2)), PREDICTION_MAX)
+
+
+def _share_bounds() -> tuple[Array, Array]:
+    """Return the bounds on the variances that are relative to their causes."""
+    shares = np.array(_SHARES)
+    return _SHARE_LEAST * shares, _SHARE_MOST * shares

@@ -55,7 +55,7 @@ HSEP_API int hsep_predictor_take_in(hsep_predictor *self, double x_d_ahead, doub
 {
     const uint64_t i = self->k % self->Np, j = self->Np - 1 - i;
     const double x_d = hsep_at(self, self->x_d)[i], x_pb = hsep_at(self, self->x_pb)[i];
-    const double x_h = hsep_at(self, self->x_h)[i];
+    const double x_h = hsep_at(self, self->x_h)[i], x_hold = x_pb + hsep_at(self, self->past_e)[self->Np];
     hsep_at(self, self->ahead)[self->k % self->preview] = x_d_ahead;
     hsep_at(self, self->past_e)[j] = x_meas - self->start - hsep_at(self, self->past_x)[j]; /* e_pb = x - x_pb */
     if (self->trusted) {
@@ -69,7 +69,7 @@ HSEP_API int hsep_predictor_take_in(hsep_predictor *self, double x_d_ahead, doub
         self->sum_e += (x_meas - x_d) * (x_meas - x_d);
         self->sum_pb += (x_meas - x_pb) * (x_meas - x_pb);
         self->sum_h += (x_meas - x_h) * (x_meas - x_h);
-        self->sum_hold += (x_meas - (x_pb + self->hold)) * (x_meas - (x_pb + self->hold));
+        self->sum_hold += (x_meas - x_hold) * (x_meas - x_hold);
     }
     self->k++;
     return i + 1 == self->Np;
@@ -141,7 +141,6 @@ HSEP_API void hsep_predictor_begin(hsep_predictor *self)
     double *x_d = hsep_at(self, self->x_d), *e_h = hsep_at(self, self->e_h);
     memcpy(x_d, ahead + oldest, (size_t)newest * sizeof(double));
     memcpy(x_d + newest, ahead, (size_t)oldest * sizeof(double));
-    self->hold = past_e[Np];
     if (e_h != past_e) {
         memcpy(e_h + Np, past_e + Np, (size_t)self->features.p * sizeof(double));
     }

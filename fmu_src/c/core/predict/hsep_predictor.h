@@ -61,7 +61,6 @@ typedef struct {
     uint64_t n_measured;         /* samples since t_init */
     double sum_e, sum_pb, sum_h; /* m2, sums of squared servo and prediction errors over them */
     double sum_hold;             /* m2, the same if the last residual before each window were held */
-    double hold;                 /* m, that residual */
     uint64_t divergence;         /* hsep_divergence of the first window that diverged; latched */
     hsep_sensor sensor;
     /* Offsets in doubles from the beginning of the struct */
@@ -82,7 +81,7 @@ typedef struct {
     uint64_t saved;   /* the regression as it was before this window; 0: no window is unlearned */
 } hsep_predictor;
 
-HSEP_ASSERT_WORDS(hsep_predictor, 46);
+HSEP_ASSERT_WORDS(hsep_predictor, 45);
 
 typedef struct {
     double x_d, x_pb, x_h;                 /* m, now */

@@ -117,7 +117,7 @@ HSEP_API int hsep_predictor_valid(const void *block, const hsep_predictor_parame
         k % got.Np < got.n_published && got.n_physics <= got.Np && got.learning <= 1 && got.missing <= 1 &&
         (!got.missing || got.saved) && got.divergence <= HSEP_DIVERGES_X_DM &&
         (got.divergence || hsep_within(hsep_at_bytes(block, got.ahead), got.past_x - got.ahead, HSEP_PREDICTION_MAX)) &&
-        isfinite(got.hold) && hsep_uncertainty_valid(hsep_at_bytes(block, got.uncertainty), got.Np) &&
+        hsep_uncertainty_valid(hsep_at_bytes(block, got.uncertainty), got.Np) &&
         hsep_physics_valid(hsep_at_bytes(block, got.physics), parameters->n_modes, parameters->settings.dead_time) &&
         (got.trusted ? hsep_trusted_valid(hsep_at_bytes(block, got.trusted), &trusted)
                      : hsep_regression_valid(hsep_at_bytes(block, got.regression), got.features.n)) &&

@@ -29,6 +29,10 @@ static const double uncertainty_memory = 0.95, uncertainty_first_evidence = 0.2,
 /* Standard deviations that a normal error exceeds with this probability. */
 static const double uncertainty_z = 1.96, uncertainty_beyond = 0.05;
 
+/* Standard deviations, and the share of a window's errors beyond them from which on all variances are too small by their
+ * square: the machine or the sensor has changed. */
+static const double uncertainty_far = 4.0, uncertainty_far_share = 0.5;
+
 /* Change of ln c from one window to the next per share of errors; bound on c and 1/c. */
 static const double uncertainty_factor_rate = 0.2, uncertainty_factor_max = 4.0;
 
@@ -70,7 +74,10 @@ HSEP_API int hsep_uncertainty_sound(const hsep_uncertainty *self)
     memcpy(learned, (const char *)self + sizeof self->Np, sizeof learned);
     int sound = self->factor >= 1.0 / uncertainty_factor_max && self->factor <= uncertainty_factor_max;
     for (int i = 0; i < HSEP_N_UNCERTAINTY; i++) {
-        sound = sound && learned[i] >= 0.0 && learned[i] <= HSEP_PREDICTION_MAX * HSEP_PREDICTION_MAX;
+        const double share = i < HSEP_N_COMPONENTS ? uncertainty_shares[i] : 0.0;
+        const double least = uncertainty_share_least * share;
+        const double most = share > 0.0 ? uncertainty_share_most * share : HSEP_PREDICTION_MAX;
+        sound = sound && learned[i] >= least && learned[i] <= most;
     }
     return sound;
 }
@@ -115,16 +122,24 @@ HSEP_API void hsep_uncertainty_predict(
 
 /* Follow the size of the residuals and the share of errors beyond the interval; after the first window, begin with its
  * mean square error. The sums are those of count samples. */
-static void uncertainty_follow(hsep_uncertainty *self, double count, double squares, double errors, double beyond)
+static void uncertainty_follow(
+    hsep_uncertainty *self, double count, double squares, double errors, double beyond, double far)
 {
+    const double mean_square = fmin(squares / count, HSEP_PREDICTION_MAX);
     if (self->recent > 0.0) {
-        const double factor = self->factor * exp(uncertainty_factor_rate * (beyond / count - uncertainty_beyond));
-        self->factor = fmin(fmax(factor, 1.0 / uncertainty_factor_max), uncertainty_factor_max);
-        self->recent = uncertainty_recent * self->recent + (1.0 - uncertainty_recent) * (squares / count);
+        if (far / count > uncertainty_far_share) {
+            for (int i = 0; i < HSEP_N_COMPONENTS; i++) {
+                self->theta[i] *= uncertainty_far * uncertainty_far;
+            }
+        } else {
+            const double factor = self->factor * exp(uncertainty_factor_rate * (beyond / count - uncertainty_beyond));
+            self->factor = fmin(fmax(factor, 1.0 / uncertainty_factor_max), uncertainty_factor_max);
+        }
+        self->recent = uncertainty_recent * self->recent + (1.0 - uncertainty_recent) * mean_square;
     } else {
-        self->recent = squares / count;
-        self->theta[0] = errors / count;
-        self->theta[1] = errors / count * uncertainty_growth;
+        self->recent = mean_square;
+        self->theta[0] = fmin(errors / count, HSEP_PREDICTION_MAX);
+        self->theta[1] = self->theta[0] * uncertainty_growth;
     }
 }
 
@@ -140,7 +155,7 @@ static void uncertainty_step_by(
         const double step = fmin(uncertainty_step * windows / (self->evidence[i] + uncertainty_first_evidence), 1.0);
         const double theta = self->theta[i] * pow(change, step);
         self->theta[i] = share == 0.0
-                             ? fmax(theta, uncertainty_floor * self->recent)
+                             ? fmin(fmax(theta, uncertainty_floor * self->recent), HSEP_PREDICTION_MAX)
                              : fmin(fmax(theta, uncertainty_share_least * share), uncertainty_share_most * share);
     }
 }
@@ -149,7 +164,7 @@ HSEP_API void hsep_uncertainty_learn(hsep_uncertainty *self, const double e[], c
 {
     const double *e_h = hsep_at(self, self->e_h), *std = hsep_at(self, self->std);
     const double *f = hsep_at(self, self->components);
-    double count = 0.0, squares = 0.0, errors = 0.0, beyond = 0.0, seen[HSEP_N_COMPONENTS] = {0.0},
+    double count = 0.0, squares = 0.0, errors = 0.0, beyond = 0.0, far = 0.0, seen[HSEP_N_COMPONENTS] = {0.0},
            total[HSEP_N_COMPONENTS] = {0.0};
     for (uint64_t j = 0; j < self->Np; j++) {
         if (accepted == NULL || accepted[j] > 0.0) {
@@ -157,13 +172,14 @@ HSEP_API void hsep_uncertainty_learn(hsep_uncertainty *self, const double e[], c
             count += 1.0;
             squares += e[j] * e[j];
             errors += error * error;
-            beyond += fabs(error) > uncertainty_z * std[j] ? 1.0 : 0.0;
+            beyond += fabs(error) / std[j] > uncertainty_z ? 1.0 : 0.0;
+            far += fabs(error) / std[j] > uncertainty_far ? 1.0 : 0.0;
         }
     }
     if (!(squares > 0.0)) { /* nothing to learn a scale from */
         return;
     }
-    uncertainty_follow(self, count, squares, errors, beyond);
+    uncertainty_follow(self, count, squares, errors, beyond, far);
     for (uint64_t j = 0; j < self->Np; j++, f += HSEP_N_COMPONENTS) {
         if (accepted == NULL || accepted[j] > 0.0) {
             const double variance = uncertainty_variance(self, f);
