@@ -124,7 +124,7 @@ def recorded_case(log: Log, out: Path) -> dict[str, Any]:
         Np=predictor.Np,
     )
     prediction_figure(run, "EMPS, a recorded axis: causal replay", out / "emps.png")
-    return {**found.summary(), **_worse(run)}
+    return {**found.summary(), **_worse(run), "verdict": str(found.verdict)}
 
 
 def _worse(run: Run) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ..cosim.run import PREDICTOR, Run
-from ..evaluate.verdict import verdict_of
+from ..evaluate.verdict import Verdict, verdict_of
 from .printed import PRINTED
 
 __all__ = ["console", "print_compensation", "print_json", "print_predictions", "print_run", "print_scores"]
@@ -91,30 +91,30 @@ def _figure(value: float | None, unit: str = "") -> str:
     return f"{value:.1f}{unit}" if unit else f"{value:.2f}"
 
 
-def print_scores(summary: Mapping[str, float | int | str], as_json: bool, title: str) -> None:
-    """Print prediction errors, of a run or of a backtest."""
+def print_scores(summary: Mapping[str, float | int], verdict: Verdict, as_json: bool, title: str) -> None:
+    """Print prediction errors, of a run or of a backtest, and what they mean."""
     if as_json:
-        print_json(summary)
+        print_json({**summary, "verdict": str(verdict)})
         return
     table = Table(title=f"{title}: prediction error in µm against the measured position")
     for column in ("", "physics", "hold", "hybrid", "reduction", "× hold"):
         table.add_column(column, justify="right")
     for suffix, label in (("", ""), ("_after_warm_up", " after warm-up")):
         for quantity in ("rms", "max"):
-            figures: list[Any] = [summary.get(f"{quantity}_{name}_um{suffix}") for name in ("pb", "hold", "h")]
+            figures = [summary.get(f"{quantity}_{name}_um{suffix}") for name in ("pb", "hold", "h")]
             if all(figure is not None for figure in figures):
-                compared: list[Any] = [summary[f"{name}{suffix}"] for name in ("reduction_percent", "ratio_to_hold")]
+                compared = [summary[f"{name}{suffix}"] for name in ("reduction_percent", "ratio_to_hold")]
                 shown = [_figure(compared[0], " %"), _figure(compared[1])] if quantity == "rms" else ["", ""]
                 label_text = f"{quantity.upper() if quantity == 'rms' else quantity}{label}"
                 table.add_row(label_text, *map(_figure, figures), *shown)
     console.print(table)
-    console.print(summary["verdict"], highlight=False)
+    console.print(str(verdict), highlight=False)
 
 
 def print_run(run: Run, as_json: bool, title: str) -> None:
     """Print the figures of a run: its prediction errors, or its tracking errors."""
     if run.kind == PREDICTOR:
-        print_scores({**run.summary(), "verdict": str(verdict_of(run))}, as_json, title)
+        print_scores(run.summary(), verdict_of(run), as_json, title)
     else:
         _print_tracking(run.summary(), as_json, title)
 

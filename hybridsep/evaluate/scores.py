@@ -67,13 +67,13 @@ class Scores:
     n_batches: int
     verdict: Verdict
 
-    def summary(self) -> dict[str, float | int | str]:
+    def summary(self) -> dict[str, float | int]:
         """Return all scores by name: ``rms_pb_um``, ``max_h_um``, ``reduction_percent``, ``ratio_to_hold``, ….
 
         Errors are in micrometres against the measured position; the names with ``_after_warm_up`` leave the warm-up
-        out and are NaN if nothing is left. ``verdict`` says it in words.
+        out and are NaN if nothing is left.
         """
-        result: dict[str, float | int | str] = {"n_batches": self.n_batches}
+        result: dict[str, float | int] = {"n_batches": self.n_batches}
         for score, suffix in ((self.overall, ""), (self.after_warm_up, "_after_warm_up")):
             for quantity in ("rms", "max"):
                 for name in ("pb", "hold", "h"):
@@ -81,4 +81,4 @@ class Scores:
             result[f"reduction_percent{suffix}"] = score.reduction_percent
             result[f"ratio_to_hold{suffix}"] = score.ratio_to_hold
             result[f"n_samples{suffix}"] = score.n_samples
-        return {**result, "verdict": str(self.verdict)}
+        return result

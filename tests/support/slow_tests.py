@@ -35,6 +35,7 @@ SLOW = (
     r"cosim/test_predictor_fmus\.py::test_(spiral|staircase)_error_reduction",
     r"cosim/test_compensator_fmus\.py::test_(the_direction_and|recommended_settings|staircase_tracking|\w+\[python)",
     r"plants/test_plant\.py::test_fast_modes_are_resolved\[5000",
+    r"identify/test_operation\.py::test_(the_recorded_axis|recordings_get|a_half_at_rest|two_modes)",
     r"predict/test_predictor_with_reference_features\.py::test_friction_is_predicted_better",
     r"predict/test_trusted_figures\.py::test_(spiral|recorded)",
     r"random_drives/test_trusted_drives\.py",
@@ -67,7 +68,7 @@ SLOW = (
     r"cosim/test_instances\.py",
     # Other programs and processes: importers, demonstrations, documents, the child that reads .mat files
     r"suite/test_rollback\.py::test_states_go_on_in_another_process",
-    r"logs/test_log_errors\.py::test_(missing_columns|millimetres|too_short|truncated)\w*\[.*\.mat\]",
+    r"logs/test_log_errors\.py::test_(missing_columns|millimetres|too_short|truncated)\w*\[.*\.mat",
     r"logs/test_logs\.py::test_(chunks|which_column)\w*\[.*\.mat\]",
     r"logs/test_logs\.py::test_types_and_orientations\[shape1-.*\.mat\]",
     r"base/test_output\.py::test_a_full_tmpfs_costs_the_new_file_only",
