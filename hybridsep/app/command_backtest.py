@@ -66,4 +66,4 @@ def backtest(
     if out is not None:
         with written_text(out) as file:
             csv.writer(file).writerows([BATCH_COLUMNS, *rows])
-    print_scores(scores.summary(), as_json, f"{axis.title}, {log.name}")
+    print_scores(scores.summary(), scores.verdict, as_json, f"{axis.title}, {log.name}")

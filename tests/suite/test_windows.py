@@ -13,6 +13,8 @@ from staircase_data import TS, C, K, M
 from stream import COMPENSATOR, LIBRARY, LOOK_AHEADS, OUTPUTS, PREDICTOR, PYTHON, Value
 from streams import StreamMaker, on_all
 
+from hybridsep.base.metrics import hold
+
 
 def shown_by(new_stream: StreamMaker, n: int, values: dict[str, Value], start: float = 0.0) -> dict[str, np.ndarray]:
     """Return the inputs of a closed loop of the library and what a stream shows of it."""
@@ -139,6 +141,8 @@ def test_running_rms_counts_from_the_warm_up(new_stream: StreamMaker, t_init: fl
     sums = {"rms_pb": shown["x_pb"], "rms_h": shown["x_h"]}
     if new_stream.model == COMPENSATOR:
         sums["rms_e"] = shown["x_d"]
+    else:
+        sums["rms_hold"] = hold(shown["x_pb"], shown["x_meas"], np.arange(len(shown["x_pb"])) >= fill, Np)
     for name, against in sums.items():
         assert not shown[name][: first + 1].any()
         for k in (first, first + 1, first + 400, 1499):

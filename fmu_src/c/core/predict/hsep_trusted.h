@@ -58,12 +58,13 @@ typedef struct {
     uint64_t measured;         /* (Np,) m, measured position, NaN where missing */
     uint64_t accepted;         /* (Np,) whether it is plausible */
     uint64_t bridged;          /* (Np + p,) whether a residual stands for one that is not */
+    uint64_t disagreement;     /* (Np,) m2, variance of the candidates about their blend */
     uint64_t rows;             /* (Np, n_static) features without lags, sample after sample */
     uint64_t disturbances, regression;
     uint64_t candidates[HSEP_N_CANDIDATES];
 } hsep_trusted;
 
-HSEP_ASSERT_WORDS(hsep_trusted, 53 + sizeof(hsep_guard) / 8);
+HSEP_ASSERT_WORDS(hsep_trusted, 54 + sizeof(hsep_guard) / 8);
 
 /* Features, those without lags first. */
 HSEP_API uint64_t hsep_trusted_n(const hsep_predictor_settings *settings);

@@ -56,6 +56,7 @@ static double trusted_lay_out(hsep_trusted *self, const hsep_trusted_parameters 
     self->measured = hsep_take(&end, Np);
     self->accepted = hsep_take(&end, Np);
     self->bridged = hsep_take(&end, Np + (double)settings->p);
+    self->disagreement = hsep_take(&end, Np);
     self->rows = hsep_take(&end, Np * n_static);
     self->disturbances = hsep_take_block(&end, hsep_disturbances_size(settings, parameters->n_modes));
     self->regression = hsep_take_block(&end, hsep_regression_size(hsep_trusted_n(settings)));
