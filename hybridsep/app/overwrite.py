@@ -11,7 +11,18 @@ from pathlib import Path
 from ..base.errors import ParameterError
 from ..cosim.run import COMPENSATOR, PREDICTOR
 
-__all__ = ["BATCHES", "BATCH_COLUMNS", "BY_ENDING", "FIGURE", "FMU", "RUN", "Kind", "Output", "check_outputs"]
+__all__ = [
+    "BATCHES",
+    "BATCH_COLUMNS",
+    "BY_ENDING",
+    "FIGURE",
+    "FIT_FILES",
+    "FMU",
+    "RUN",
+    "Kind",
+    "Output",
+    "check_outputs",
+]
 
 BATCH_COLUMNS = ("t", "rms_pb", "rms_hold", "rms_h")
 """Columns of the CSV of ``hybridsep backtest``."""
@@ -89,10 +100,16 @@ RUN = Kind("result of hybridsep cosim", _has_columns(PREDICTOR.columns, COMPENSA
 FIGURE = Kind("PNG", _begins_with(b"\x89PNG\r\n\x1a\n"))
 FMU = Kind("FMU of hybridsep", _is_our_fmu)
 STATE = Kind("saved predictor", _begins_with(b"HSEP"))
+MACHINE = Kind("machine file of hybridsep fit", _begins_with(b"# Identified by hybridsep fit"))
+STAGES = Kind("result of hybridsep fit", _begins_with(b'{\n  "hybridsep": "'))
+REPORT = Kind("report of hybridsep", _begins_with(b"<!DOCTYPE html>\n<!-- report of hybridsep -->"))
 SUMMARY = Kind("summary of hybridsep demo", _begins_with(b'{\n  "staircase": {'))
 
 BY_ENDING = {".csv": RUN, ".npz": RUN, ".png": FIGURE, ".fmu": FMU, ".state": STATE, ".json": SUMMARY}
 """Kinds of the files that the library names itself."""
+
+FIT_FILES = {".toml": MACHINE, ".json": STAGES, ".html": REPORT, ".fmu": FMU, ".state": STATE}
+"""Kinds of the files of ``hybridsep fit``."""
 
 
 def check_outputs(outputs: Iterable[Output], inputs: Mapping[str, str | Path | None], *, force: bool = False) -> None:

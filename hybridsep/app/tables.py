@@ -14,9 +14,11 @@ from rich.table import Table
 
 from ..cosim.run import PREDICTOR, Run
 from ..evaluate.verdict import Verdict, verdict_of
+from ..intake.finding import Finding
+from .fit import Fit, shown_unit
 from .printed import PRINTED
 
-__all__ = ["console", "print_compensation", "print_json", "print_predictions", "print_run", "print_scores"]
+__all__ = ["console", "print_compensation", "print_fit", "print_json", "print_predictions", "print_run", "print_scores"]
 
 console = Console()
 
@@ -109,6 +111,27 @@ def print_scores(summary: Mapping[str, float | int], verdict: Verdict, as_json: 
                 table.add_row(label_text, *map(_figure, figures), *shown)
     console.print(table)
     console.print(str(verdict), highlight=False)
+
+
+def print_fit(fit: Fit, findings: Mapping[str, Iterable[Finding]], unit: str) -> None:
+    """Print what the intake of logs found, what was identified and how it was judged; ``unit`` is m or rad."""
+    for name, found in findings.items():
+        for finding in found:
+            console.print(f"{name}: {finding}", highlight=False, markup=False)
+    scale, shown = shown_unit(fit.judged.rms()[0], unit)
+    model, settings = fit.identification, fit.machine.predictor_settings
+    table = Table(
+        "prediction by", title=f"Error on samples that taught nothing [{shown}]", box=box.SIMPLE, pad_edge=False
+    )
+    table.add_column("RMS", justify="right")
+    for label, value in zip(("physics model", "hold", "hybrid"), fit.judged.rms(), strict=True):
+        table.add_row(label, _figure(scale * value))
+    console.print(f"{model['structure']}, dead time {model['dead_time']} samples", highlight=False)
+    for line in model["findings"]:
+        console.print(f"  {line}", highlight=False, markup=False)
+    console.print(f"Np = {settings.Np}, p = {settings.p}, q = {settings.q}", highlight=False)
+    console.print(table)
+    console.print(str(fit.judged.verdict()), highlight=False)
 
 
 def print_run(run: Run, as_json: bool, title: str) -> None:
