@@ -211,8 +211,8 @@ def _settings(report: Report, fit: Fit, scale: float, unit: str) -> None:
     ]
     report.table(["p", "q", f"RMS [{unit}]", ""], rows)
     report.paragraph(
-        "Errors of causal replays over the later half of what teaches. The first row is the default, which stays unless "
-        "another is better by 5 %.",
+        "Errors of causal replays over the later half of what teaches. The first row is the default, which stays "
+        "unless another is better by 5 %.",
         "dim",
     )
 
