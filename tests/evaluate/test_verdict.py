@@ -19,6 +19,7 @@ NP = 30
 UM = 1e-6
 NOISE = np.random.default_rng(0).normal(size=NP)
 HALF = np.arange(NP) < NP // 2
+MOVING = np.linspace(0.0, 1e-3 * (NP - 1), NP)
 
 
 def errors(*sizes: Array | float) -> Array:
@@ -86,7 +87,7 @@ def test_causes(sizes: tuple[float, float, float], motion: Array | float, cause:
 
 
 def test_a_bad_beginning_is_told_from_a_bad_model() -> None:
-    tally, x_d = Tally(NP), np.arange(NP) * 1e-3
+    tally, x_d = Tally(NP), MOVING
     for k in range(60):
         tally.add(x_d + k * NP * 1e-3, np.zeros(NP), errors(10, 10, 28 if k < 10 else 2))
     found = tally.verdict()
@@ -102,8 +103,8 @@ def test_rejected_measurements_are_told() -> None:
 def test_missing_measurements_are_not_judged() -> None:
     tally, x = Tally(NP), np.zeros(NP)
     x[:3] = np.nan
-    tally.add(np.arange(NP) * 1e-3, x, errors(10, 8, 4))
-    tally.add(np.arange(NP) * 1e-3, np.full(NP, np.nan), np.ones((3, NP)))
+    tally.add(MOVING, x, errors(10, 8, 4))
+    tally.add(MOVING, np.full(NP, np.nan), np.ones((3, NP)))
     found = tally.verdict(n_rejected=NP + 3)
     assert found.ratio_pb == pytest.approx(0.4)
     assert found.n_samples == 2 * NP
