@@ -87,7 +87,7 @@ def verdict_of(run: Run) -> Verdict:
     for first in range(0, len(run.t), run.Np):
         window = slice(first, first + run.Np)
         tally.add(run.x_d[window], run.x_meas[window], predictions[:, window])
-    return tally.verdict()
+    return tally.verdict(n_rejected=run.n_rejected)
 
 
 class Tally:

@@ -134,3 +134,14 @@ def test_of_a_run() -> None:
     assert found.ratio_pb == pytest.approx(run.summary()["rms_h_um"] / run.summary()["rms_pb_um"])
     assert found.ratio_hold == pytest.approx(run.summary()["ratio_to_hold"])
     assert str(found).startswith("Better than the physics model")
+    assert "not learned" not in str(found)
+
+
+def test_outliers_of_a_run_are_told() -> None:
+    machine = load_machine("spring_mass_damper")
+    predictor = HybridPredictor(machine.model)
+    run = cosimulate(
+        predictor, machine.new_plant(), staircase()[:1000], sensor=lambda k, x: x + 1e-3 if k in (555, 666) else x
+    )
+    assert run.n_rejected == 2
+    assert str(verdict_of(run)).endswith("2 of 1000 measurements were missing or not plausible, and not learned.")
