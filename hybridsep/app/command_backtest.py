@@ -49,7 +49,7 @@ def backtest(
     if T_s is not None and t is None:
         names.pop("t", None)  # there may be none
     predictor = axis.changed("predictor", parameters).new_predictor()
-    reader = open_log(log, columns=names, unit=unit, T_s=T_s)
+    reader = open_log(log, columns=names, unit=unit, T_s=T_s, may_miss=predictor.settings.trust)
     check_interval(log.name, reader.T_s, axis)
     outputs = [] if out is None else [Output("--out", out, BATCHES)]
     check_outputs(outputs, {"log": log, "machine file": machine_path(machine)}, force=force)

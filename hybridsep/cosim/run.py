@@ -93,6 +93,8 @@ class Run:
         Sampling interval, s.
     Np : int
         Samples in a window.
+    n_rejected : int
+        Measurements that were missing or not plausible, as far as the controller tells.
     """
 
     kind: Kind
@@ -106,6 +108,7 @@ class Run:
     state: NDArray[np.int64]
     T_s: float
     Np: int
+    n_rejected: int = 0
 
     @property
     def active(self) -> NDArray[np.bool_]:

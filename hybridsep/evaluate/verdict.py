@@ -51,6 +51,8 @@ class Verdict:
         RMS error of the hybrid relative to that of the physics model, and to that of the hold baseline.
     worse : tuple of tuples of two str
         Places where it is worse than the physics model, and where it is worse than hold.
+    judged : tuple of str
+        Places with enough samples.
     causes : tuple of str
         What explains it where it is worse, as far as the run shows.
     n_rejected, n_samples : int
@@ -60,6 +62,7 @@ class Verdict:
     ratio_pb: float
     ratio_hold: float
     worse: tuple[tuple[str, ...], tuple[str, ...]]
+    judged: tuple[str, ...]
     causes: tuple[str, ...]
     n_rejected: int
     n_samples: int
@@ -67,7 +70,7 @@ class Verdict:
     def __str__(self) -> str:
         ratios = (self.ratio_pb, self.ratio_hold)
         lines = [
-            f"{_comparison(value)} {peer}: {value:.3g} × its RMS error{_places(value, places)}"
+            f"{_comparison(value)} {peer}: {value:.3g} × its RMS error{_where(value, places, self.judged)}"
             for peer, value, places in zip(_PEERS, ratios, self.worse, strict=True)
         ]
         lines += [f"Why: {cause}" for cause in self.causes]
@@ -84,7 +87,7 @@ def verdict_of(run: Run) -> Verdict:
     for first in range(0, len(run.t), run.Np):
         window = slice(first, first + run.Np)
         tally.add(run.x_d[window], run.x_meas[window], predictions[:, window])
-    return tally.verdict()
+    return tally.verdict(n_rejected=run.n_rejected)
 
 
 class Tally:
@@ -146,20 +149,29 @@ class Tally:
         ratios = [_ratio(h.sum(), peer.sum()) for peer in (pb, hold)]
         worse = tuple(self._worse(h, peer) for peer in (pb, hold))
         n_samples = int(self._counts.sum()) + self._n_missing
-        return Verdict(ratios[0], ratios[1], (worse[0], worse[1]), tuple(self._causes(ratios)), n_rejected, n_samples)
+        return Verdict(
+            ratios[0],
+            ratios[1],
+            (worse[0], worse[1]),
+            tuple(self._places()),
+            tuple(self._causes(ratios)),
+            n_rejected,
+            n_samples,
+        )
+
+    def _places(self) -> dict[str, tuple[int, int]]:
+        """Return the places with enough samples: name → axis of the sums, and place there."""
+        places = {name: (0, i) for i, name in enumerate(_MOTIONS)} | {name: (1, i) for i, name in enumerate(_THIRDS)}
+        least = max(_LEAST_SHARE * self._counts.sum(), 1.0)
+        return {name: (axis, i) for name, (axis, i) in places.items() if self._counts.take(i, axis=axis).sum() >= least}
 
     def _worse(self, h: Array, peer: Array) -> tuple[str, ...]:
-        """Return the places with enough samples where the hybrid is worse."""
-        n = self._counts.sum()
-        found = []
-        for names, axis in ((_MOTIONS, 1), (_THIRDS, 0)):
-            count, own, other = (sums.sum(axis=axis) for sums in (self._counts, h, peer))
-            found += [
-                name
-                for i, name in enumerate(names)
-                if count[i] >= max(_LEAST_SHARE * n, 1.0) and _ratio(own[i], other[i]) > 1.0 + _ALIKE
-            ]
-        return tuple(found)
+        """Return the places where the hybrid is worse."""
+        return tuple(
+            name
+            for name, (axis, i) in self._places().items()
+            if _ratio(h.take(i, axis=axis).sum(), peer.take(i, axis=axis).sum()) > 1.0 + _ALIKE
+        )
 
     def _causes(self, ratios: list[float]) -> list[str]:
         """Return what explains a hybrid that is worse."""
@@ -204,16 +216,19 @@ def _comparison(value: float) -> str:
     return "Better than" if value < 1.0 else "Worse than"
 
 
-def _places(value: float, worse: tuple[str, ...]) -> str:
-    """Return where the hybrid is worse; nowhere if it is better everywhere."""
+def _where(value: float, worse: tuple[str, ...], judged: tuple[str, ...]) -> str:
+    """Return where the hybrid is worse; everywhere or nowhere, where that says it."""
     if not worse:
-        return ", at standstill and in motion, over the whole window" if value < 1.0 - _ALIKE else ""
-    if set(worse) >= {*_MOTIONS, *_THIRDS}:
-        return ", everywhere"
-    shown = [{"standstill": "at standstill", "motion": "in motion"}[place] for place in worse if place in _MOTIONS]
-    thirds = [place.partition(" ")[0] for place in worse if place in _THIRDS]
+        return f", {_listed(judged)}" if value < 1.0 - _ALIKE else ""
+    return ", everywhere" if worse == judged else f"; worse {_listed(worse)}"
+
+
+def _listed(places: tuple[str, ...]) -> str:
+    """Return places as text: "at standstill and in the first third of the window"."""
+    shown = [text for place, text in zip(_MOTIONS, ("at standstill", "in motion"), strict=True) if place in places]
+    thirds = [place.partition(" ")[0] for place in places if place in _THIRDS]
     if len(thirds) == _N_THIRDS:
-        shown.append("over the whole window")
-    elif thirds:
+        return f"{' and '.join(shown)}{', ' if shown else ''}over the whole window"
+    if thirds:
         shown.append(f"in the {' and '.join(thirds)} third of the window")
-    return f"; worse {', '.join(shown[:-1])}{' and ' if len(shown) > 1 else ''}{shown[-1]}"
+    return " and ".join(shown)

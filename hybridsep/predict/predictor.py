@@ -60,7 +60,7 @@ class HybridPredictor:
         self.past = PastSamples(self.layout, self.Np)
         self.trusted = TrustedModel(settings, self.discrete) if settings.trust else None
         self._regression = None if settings.trust else RidgeRegression(self.layout.n, settings.lam)
-        self.uncertainty = Uncertainty(max(settings.lam, settings.noise_std**2))
+        self.uncertainty = Uncertainty(max(settings.lam, settings.noise_std**2), settings.Np)
         self.restart(start, t_init=settings.warm_up)
 
     @property
@@ -157,7 +157,6 @@ class HybridPredictor:
             np.where(active, e_h, 0.0),
             last=self.last_residual(),
             disagreement=0.0 if forecast is None else np.where(active, forecast.disagreement, 0.0),
-            Np=self.Np,
         )
         return e_h, PredictedWindow(x_d, x_pb, start, reference, signs, error, forecast)
 
@@ -193,7 +192,7 @@ class HybridPredictor:
                 stop = min(i + self.Np, m)
                 self._take_in(pending.x_pb[i:stop], e_pb[i:stop], from_reference[i:stop], learn)
         if learn:
-            self.uncertainty.learn(pending.error, e_pb, accepted, Np=self.Np)
+            self.uncertainty.learn(pending.error, e_pb, accepted)
         self.reference_features.advance(pending.signs, pending.reference, m)
         _, self.state = self.discrete.forced_response(self.state, pending.x_d[:m])
         self.start = pending.start

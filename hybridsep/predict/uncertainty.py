@@ -91,6 +91,8 @@ class Uncertainty:
     ----------
     variance : float, m²
         That of the measurement noise, assumed before the first window is measured.
+    Np : int
+        Samples of a usual window.
 
     Attributes
     ----------
@@ -104,13 +106,14 @@ class Uncertainty:
         Recent mean square of the residual; 0 before the first window.
     """
 
-    def __init__(self, variance: float) -> None:
+    def __init__(self, variance: float, Np: int) -> None:
+        self.Np = Np
         self.theta = np.array([variance, 0.0, *_SHARES])
         self.evidence = np.zeros(N_COMPONENTS)
         self.factor, self.recent = 1.0, 0.0
 
     def predict(
-        self, x_d: Array, x_pb: Array, e_h: Array, *, last: float, disagreement: Array | float, Np: int
+        self, x_d: Array, x_pb: Array, e_h: Array, *, last: float, disagreement: Array | float
     ) -> PredictedError:
         """Return what is known of the error of the next window; nothing is changed.
 
@@ -122,14 +125,12 @@ class Uncertainty:
             Last measured residual.
         disagreement : (n,) array or float, m²
             Variance of the candidates about their blend.
-        Np : int
-            Samples of a usual window.
         """
         n = len(x_d)
         bounded = np.clip(np.nan_to_num(e_h), -PREDICTION_MAX, PREDICTION_MAX)
         components = np.empty((n, N_COMPONENTS))
         components[:, 0] = 1.0
-        components[:, 1] = np.arange(1, n + 1) / Np
+        components[:, 1] = np.arange(1, n + 1) / self.Np
         components[:, 2] = _differences(x_pb)
         components[:, 3] = _differences(bounded)
         components[:, 4] = x_d - x_pb
@@ -139,7 +140,7 @@ class Uncertainty:
         std = np.minimum(self.factor * np.sqrt(self._variance(components)), PREDICTION_MAX)
         return PredictedError(bounded, components, std)
 
-    def learn(self, predicted: PredictedError, residuals: Array, accepted: NDArray[np.bool_], *, Np: int) -> None:
+    def learn(self, predicted: PredictedError, residuals: Array, accepted: NDArray[np.bool_]) -> None:
         """Learn from the measurement of a window.
 
         Parameters
@@ -149,8 +150,6 @@ class Uncertainty:
             Measured residuals ``e_pb`` of its first ``m`` samples.
         accepted : (m,) array of bool
             Whether they count.
-        Np : int
-            Samples of a usual window.
         """
         measured = residuals[accepted]
         if not len(measured) or not measured.any():  # nothing to learn a scale from
@@ -173,10 +172,10 @@ class Uncertainty:
         variance = self._variance(components)
         share = components * self.theta / variance[:, None]  # of the variance, that is due to each component
         total = share.sum(axis=0)
-        self.evidence = _MEMORY * self.evidence + total / Np
+        self.evidence = _MEMORY * self.evidence + total / self.Np
         seen = share.T @ np.minimum(error**2 / variance, _OUTLYING)
         change = np.maximum(np.divide(seen, total, out=np.ones(N_COMPONENTS), where=total > 0.0), _VANISHING)
-        step = np.minimum(_STEP * total / Np / (self.evidence + _FIRST_EVIDENCE), 1.0)
+        step = np.minimum(_STEP * total / self.Np / (self.evidence + _FIRST_EVIDENCE), 1.0)
         theta = self.theta * change**step
         self.theta[:2] = np.clip(theta[:2], _FLOOR * self.recent, PREDICTION_MAX)
         self.theta[2:] = np.clip(theta[2:], *_share_bounds())

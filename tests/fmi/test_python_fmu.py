@@ -102,7 +102,7 @@ def test_interface_of_the_predictor(predictor: FmuInstance) -> None:
     }
     found = {name: (v.causality, v.type, v.unit) for name, v in variables.items()}
     assert {name: found[name] for name in expected} == expected
-    assert len(found) == 27 + 300
+    assert len(found) == 29 + 400
     starts = {name: variables[name].start for name in ("Np", "p", "q", "lambda", "T_s", "t_init", "input_hold")}
     assert starts == {
         "Np": "100",

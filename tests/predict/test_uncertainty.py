@@ -27,14 +27,14 @@ ALL = np.ones(N, dtype=np.bool_)
 def window(uncertainty: Uncertainty, motion: Array | float = 0.0, e_h: Array | float = 0.0) -> PredictedError:
     """Return the predicted error of a window with a servo error ``motion`` and a residual ``e_h``."""
     x_pb = np.zeros(N)
-    return uncertainty.predict(x_pb + motion, x_pb, x_pb + e_h, last=0.0, disagreement=0.0, Np=N)
+    return uncertainty.predict(x_pb + motion, x_pb, x_pb + e_h, last=0.0, disagreement=0.0)
 
 
 def after_noise(std: float, n: int = 60, seed: int = 0, uncertainty: Uncertainty | None = None) -> Uncertainty:
     """Return an uncertainty after ``n`` windows of white errors."""
-    learning = uncertainty or Uncertainty(1e-12)
+    learning = uncertainty or Uncertainty(1e-12, N)
     for errors in np.random.default_rng(seed).normal(0.0, std, (n, N)):
-        learning.learn(window(learning), errors, ALL, Np=N)
+        learning.learn(window(learning), errors, ALL)
     return learning
 
 
@@ -46,17 +46,17 @@ def test_white_noise_of_any_size_is_known_after_a_second(std: float) -> None:
 
 
 def test_before_the_first_window_it_is_the_assumed_noise_and_a_share_of_the_servo_error() -> None:
-    uncertainty = Uncertainty(4e-12)
+    uncertainty = Uncertainty(4e-12, N)
     np.testing.assert_allclose(window(uncertainty).std, 2e-6, rtol=1e-6)
     np.testing.assert_allclose(window(uncertainty, motion=1e-3).std, 1e-4, rtol=1e-2)
 
 
 def test_errors_in_motion_do_not_widen_the_interval_at_standstill() -> None:
-    rng, uncertainty = np.random.default_rng(1), Uncertainty(1e-12)
+    rng, uncertainty = np.random.default_rng(1), Uncertainty(1e-12, N)
     motion = np.where(np.arange(N) < 50, 0.0, 1e-3)
     for _ in range(80):
         predicted = window(uncertainty, motion)
-        uncertainty.learn(predicted, rng.normal(0.0, np.where(motion > 0.0, 2e-5, 1e-6)), ALL, Np=N)
+        uncertainty.learn(predicted, rng.normal(0.0, np.where(motion > 0.0, 2e-5, 1e-6)), ALL)
     std = window(uncertainty, motion).std
     assert np.all((std[:50] > 0.7e-6) & (std[:50] < 2e-6))
     np.testing.assert_allclose(std[50:], 2e-5, rtol=0.2)
@@ -69,24 +69,24 @@ def test_larger_noise_is_followed() -> None:
 
 
 def test_heavy_tails_are_covered_at_95_percent() -> None:
-    rng, uncertainty, inside = np.random.default_rng(3), Uncertainty(1e-12), []
+    rng, uncertainty, inside = np.random.default_rng(3), Uncertainty(1e-12, N), []
     for k in range(300):
         predicted = window(uncertainty)
         errors = 1e-6 * rng.standard_t(2.5, N)
         if k >= 50:
             inside.append(coverage(errors, predicted.std, 0.95))
-        uncertainty.learn(predicted, errors, ALL, Np=N)
+        uncertainty.learn(predicted, errors, ALL)
     assert np.mean(inside) == pytest.approx(0.95, abs=0.015)
 
 
 def test_it_is_invariant_to_the_unit() -> None:
     found = []
     for unit in (1.0, 1e3, 1e-3):
-        uncertainty = Uncertainty(1e-12 * unit**2)
+        uncertainty = Uncertainty(1e-12 * unit**2, N)
         drawn = np.random.default_rng(5)
         for _ in range(20):
             motion, errors = 1e-3 * drawn.normal(size=N), 1e-5 * drawn.normal(size=N)
-            uncertainty.learn(window(uncertainty, unit * motion), unit * errors, ALL, Np=N)
+            uncertainty.learn(window(uncertainty, unit * motion), unit * errors, ALL)
         found.append(window(uncertainty, unit * 1e-3).std / unit)
     np.testing.assert_allclose(found[1:], [found[0]] * 2, rtol=1e-6)
 
@@ -94,10 +94,10 @@ def test_it_is_invariant_to_the_unit() -> None:
 def test_what_is_not_measured_is_not_learned() -> None:
     uncertainty = after_noise(1e-6, 5)
     before = uncertainty.learned()
-    uncertainty.learn(window(uncertainty), np.ones(N), ~ALL, Np=N)
-    uncertainty.learn(window(uncertainty), np.zeros(N), ALL, Np=N)  # exactly the physics model
+    uncertainty.learn(window(uncertainty), np.ones(N), ~ALL)
+    uncertainty.learn(window(uncertainty), np.zeros(N), ALL)  # exactly the physics model
     np.testing.assert_array_equal(uncertainty.learned(), before)
-    uncertainty.learn(window(uncertainty), np.where(np.arange(N) == 7, 1.0, 1e-6), np.arange(N) != 7, Np=N)
+    uncertainty.learn(window(uncertainty), np.where(np.arange(N) == 7, 1.0, 1e-6), np.arange(N) != 7)
     assert window(uncertainty).std.max() < 3e-6
 
 
@@ -106,14 +106,14 @@ def test_a_diverging_prediction_has_a_finite_deviation() -> None:
     for e_h in (np.inf, np.nan, 1e300, -np.inf):
         predicted = window(uncertainty, e_h=e_h)
         assert np.isfinite(predicted.std).all()
-        uncertainty.learn(predicted, np.ones(N), ALL, Np=N)
+        uncertainty.learn(predicted, np.ones(N), ALL)
         assert Uncertainty.is_sound(uncertainty.learned())
     assert window(uncertainty, motion=PREDICTION_MAX).std.max() <= PREDICTION_MAX
 
 
 def test_saved_numbers_are_checked() -> None:
     learned = after_noise(1e-6, 5).learned()
-    other = Uncertainty(1.0)
+    other = Uncertainty(1.0, N)
     other.restore(learned)
     np.testing.assert_array_equal(window(other).std, window(after_noise(1e-6, 5)).std)
     assert Uncertainty.is_sound(learned)
