@@ -48,7 +48,7 @@ class Machine(Section):
 
     name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")
     title: Line
-    sources: tuple[Line, ...] = Field(min_length=1)
+    sources: tuple[Line, ...] = Field(default=(), min_length=1)
     T_s: Number = PARAMETERS["T_s"].default
     physics: Physics
     predictor: PredictorSection = PredictorSection()

@@ -35,6 +35,7 @@ SLOW = (
     r"cosim/test_predictor_fmus\.py::test_(spiral|staircase)_error_reduction",
     r"cosim/test_compensator_fmus\.py::test_(the_direction_and|recommended_settings|staircase_tracking|\w+\[python)",
     r"plants/test_plant\.py::test_fast_modes_are_resolved\[5000",
+    r"identify/test_operation\.py::test_(the_recorded_axis|recordings_get|a_half_at_rest|two_modes)",
     r"predict/test_predictor_with_reference_features\.py::test_friction_is_predicted_better",
     r"predict/test_trusted_figures\.py::test_(spiral|recorded)",
     r"random_drives/test_trusted_drives\.py",
