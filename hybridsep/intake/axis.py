@@ -33,7 +33,7 @@ _VELOCITY_SHARE, _VELOCITY_LEFT = 0.5, 0.3
 _GAINS = (0.2, 5.0)
 """Gains outside which no position loop is: a small servo under load was recorded at 0.3."""
 
-_GAIN_CLOSE, _LEFT_CLOSE = 0.1, 1e-3
+_GAIN_CLOSE, _LEFT_CLOSE = 0.15, 3e-3
 """Distance from 1 of the gain of an axis that follows its command within this share of the variance."""
 
 _KNOWN_GAINS = {
@@ -59,14 +59,23 @@ _KNOWN_WITHIN = 0.03
 _OFFSET_TRAVEL, _OFFSET_SPREAD = 0.02, 6.0
 """Offset, in travels and in spreads of the error around it, from which it is no servo error."""
 
-_DELAY_MIN, _DELAY_GAIN = 3.0, 1.5
-"""Dead time, in samples, and what it must divide the squared residual of a mode by, from which a column is late."""
+_DELAY_MIN = 3.0
+"""Dead time, in samples, below which a drive may have it."""
 
-_LEAD_MIN, _LEAD_GAIN, _LEAD_LAG = 3.5, 4.0, 2.0
-"""The same of a response before its cause, which modes in antiphase show a little of; lag at most, in samples."""
+_DELAYS = ((4.5, 0.4, 1.0), (2.0, 1.1, 0.2), (1.1, 2.5, 1.0))
+"""What a dead time must do to be a fault of the log, one of: divide the squared residual of one mode by the first
+number, be the second one times the mode's lag, and leave the third one of what a mere lag leaves. Further modes look
+like a dead time, too."""
 
-_MODEL_DELAY, _MODEL_GAIN = 0.4, 4.0
-"""Delay, in samples, against a known model, and what its correction must divide the squared error by."""
+_LEAD_MIN = 3.5
+"""Lead, in samples, below which modes in antiphase may show it."""
+
+_LEADS = ((50.0, -1.0), (8.0, -2.5))
+"""The same of a response before its cause: the gain, and the lag, in samples, that the whole response must be below."""
+
+_MODEL_DELAY, _MODEL_SHARE, _MODEL_GAIN = 0.4, 0.4, 10.0
+"""Delay against a known model, in samples and in the model's own lag, and what its correction must divide the squared
+error by."""
 
 
 def stretch(log: Log) -> slice:
@@ -102,17 +111,20 @@ def check_swapped(log: Log) -> Iterator[Finding]:
 def check_velocity(log: Log) -> Iterator[Finding]:
     """Find a column that holds a velocity where a position was meant."""
     part = stretch(log)
-    x_d, x = log.x_d[part], log.x_meas[part]
+    x_d, x = log.x_d[part], _smooth(log.x_meas[part])
     position = line_at_best_lag(x_d, x).unexplained
     for column, cause, effect, sense in (
         ("x_meas", np.gradient(x_d) / log.T_s, x, "measured"),
-        ("x_d", np.gradient(_smooth(x)) / log.T_s, x_d, "commanded"),
+        ("x_d", np.gradient(x) / log.T_s, x_d, "commanded"),
     ):
         fit = line_at_best_lag(cause, effect)
         explained = 1.0 - fit.unexplained
         if explained < _VELOCITY_SHARE or fit.unexplained > _VELOCITY_LEFT * position:
             continue
-        factor = 1.0 / fit.gain
+        # The derivative of noise biases its gain, the integral does not.
+        travelled = log.T_s * np.cumsum(effect if column == "x_meas" else x_d)
+        whole = line_at_best_lag(travelled, x_d if column == "x_meas" else x)
+        factor = whole.gain if whole.gain != 0.0 else 1.0 / fit.gain
         near = min((1.0, 1e-3, 1e3, 60.0, 0.06, 1 / 60), key=lambda known: abs(math.log(abs(factor) / known)))
         factor = math.copysign(near, factor) if abs(math.log(abs(factor) / near)) < 0.1 else factor
         words = (
@@ -147,8 +159,12 @@ def check_scale(log: Log) -> Iterator[Finding]:
     part = stretch(log)
     fit = line_at_best_lag(log.x_d[part], log.x_meas[part])
     gain = abs(fit.gain)
-    follows = fit.unexplained < 0.5
-    off = not _GAINS[0] <= gain <= _GAINS[1] or (abs(gain - 1) > _GAIN_CLOSE and fit.unexplained < _LEFT_CLOSE)
+    follows = fit.unexplained < 0.7
+    off = (
+        not follows
+        or not _GAINS[0] <= gain <= _GAINS[1]
+        or (abs(gain - 1) > _GAIN_CLOSE and fit.unexplained < _LEFT_CLOSE)
+    )
     if not off:
         return
     if not follows or gain == 0.0:
@@ -215,9 +231,12 @@ def _delay_of_mode(x_d: Array, x: Array) -> tuple[float, dict[str, float], str] 
         return None
     free, none = fit_dead_time(x_d, x, total.lag), fit_dead_time(x_d, x, None)
     gain = none.unexplained / max(free.unexplained, 1e-300)
-    delay, lag = free.dead_time, free.lag
-    late = delay >= _DELAY_MIN and (gain >= _DELAY_GAIN or delay >= max(lag, _DELAY_MIN))
-    early = delay <= -_LEAD_MIN and gain >= _LEAD_GAIN and total.lag < _LEAD_LAG
+    delay = free.dead_time
+    left = free.unexplained / max(total.unexplained, 1e-300)
+    late = delay >= _DELAY_MIN and any(
+        gain >= least and delay >= times * free.lag and left <= most for least, times, most in _DELAYS
+    )
+    early = delay <= -_LEAD_MIN and any(gain >= least and total.lag <= most for least, most in _LEADS)
     if not (late or early):
         return None
     evidence = {"delay": delay, "lag": total.lag, "gain": gain}
@@ -233,14 +252,15 @@ def _delay_of_model(log: Log, part: slice, machine: Machine | None) -> tuple[flo
     x = log.x_meas[part]
     fit, now = line_at_best_lag(x_pb, x), line(x_pb, x)
     gain = now.unexplained / max(fit.unexplained, 1e-300)
-    if abs(fit.lag) < _MODEL_DELAY or gain < _MODEL_GAIN or fit.unexplained > 0.5:
+    own = line_at_best_lag(log.x_d[part], x_pb).lag
+    if abs(fit.lag) < max(_MODEL_DELAY, _MODEL_SHARE * abs(own)) or gain < _MODEL_GAIN or fit.unexplained > 0.5:
         return None
     return fit.lag, {"delay": fit.lag, "gain": gain}, f"the model of {machine.name}"
 
 
 def _smooth(x: Array) -> Array:
-    """Return the mean of five neighbours."""
-    return np.asarray(np.convolve(np.pad(x, 2, mode="edge"), np.full(5, 0.2), "valid"))
+    """Return the mean of fifteen neighbours."""
+    return np.asarray(np.convolve(np.pad(x, 7, mode="edge"), np.full(15, 1 / 15), "valid"))
 
 
 def _numbers(fit: Line) -> dict[str, float]:

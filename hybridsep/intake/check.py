@@ -21,7 +21,7 @@ __all__ = ["Intake", "apply", "check"]
 _Check = Callable[[Log], Iterator[Finding]]
 
 _SAMPLES: tuple[_Check, ...] = (check_order, check_gaps, check_jitter, check_outliers, check_stuck, check_repeated)
-_AXIS: tuple[_Check, ...] = (check_unit, check_swapped, check_velocity, check_sign, check_scale, check_offset)
+_AXIS: tuple[_Check, ...] = (check_swapped, check_velocity, check_sign, check_scale, check_offset, check_unit)
 
 
 @dataclass(frozen=True)
@@ -81,8 +81,8 @@ def check(log: Log, machine: Machine | None = None) -> Intake:
     findings.extend(hopeless)
     if not hopeless:
         look(_AXIS)
-        look((lambda log: check_delay(log, machine),))
         look((check_start,))
+        look((lambda log: check_delay(log, machine),))
     if machine is not None:
         findings.extend(check_rate(log, machine))
     return Intake(given, tuple(sorted(findings, key=lambda finding: NAMES.index(finding.name))))

@@ -23,14 +23,14 @@ NAMES = (
     "stuck samples",
     "repeated samples",
     "too little motion",
-    "unit",
     "columns swapped",
     "velocity for position",
     "sign",
     "scale",
     "offset",
-    "delay",
+    "unit",
     "start in motion",
+    "delay",
     "sampling rate",
 )
 """Names of findings in the order in which they are looked for, and fixed."""

@@ -28,14 +28,14 @@ _SAMPLES_MIN = 200
 _MOVING_MIN = 30
 """Samples in motion below which dynamics cannot be seen."""
 
-_NOISE_TIMES = 10.0
-"""Travel, in standard deviations of the noise, below which noise is all there is."""
+_NOISE_TIMES = 3.0
+"""Travel of the mean of 25 samples, in standard deviations of the noise, below which noise is all there is."""
 
 _START = 0.25
-"""Velocity of the first samples, in the largest one, from which a start is in motion; EMPS, 0.12, is not."""
+"""Velocity between the first samples, in the largest one, from which a start is in motion; EMPS, 0.12, is not."""
 
-_TRAVEL_MAX, _VELOCITY_MAX = 20.0, 20.0
-"""Travel, m, and velocity, m/s, beyond which a feed axis is read in too large a unit."""
+_LARGEST = {"travel": (20.0, "m"), "velocity": (20.0, "m/s"), "acceleration": (500.0, "m/s²")}
+"""What a feed axis travels and does at most; more of it is read in too large a unit."""
 
 _PER_PERIOD = 4.0
 """Samples a period of the fastest mode below which its motion is not resolved."""
@@ -54,8 +54,8 @@ def check_motion(log: Log) -> Iterator[Finding]:
     reasons = []
     if travel == 0.0:
         reasons.append("the command never moves")
-    elif travel < _NOISE_TIMES * noise:
-        reasons.append(f"the command travels {travel:.3g} {log.unit}, and the noise has a deviation of {noise:.3g}")
+    elif np.ptp(_mean(log.x_meas)) < _NOISE_TIMES * noise:
+        reasons.append(f"the measured position is noise, of a deviation of {noise:.3g} {log.unit}")
     elif moving < _MOVING_MIN:
         reasons.append(f"the command moves in {moving} samples only")
     if travel > 0.0 and np.ptp(log.x_meas) == 0.0:
@@ -69,35 +69,27 @@ def check_motion(log: Log) -> Iterator[Finding]:
     yield Finding("too little motion", ERROR, words, evidence, _positions(log, "Command and measurement"))
 
 
+def _mean(x: Array) -> Array:
+    """Return the mean of 25 neighbours."""
+    return np.asarray(np.convolve(x, np.full(25, 0.04), "valid") if len(x) > 25 else x)
+
+
 def check_start(log: Log) -> Iterator[Finding]:
-    """Find segments that begin in motion: the model takes them to begin at rest."""
+    """Find a log that begins in motion: the model takes it to begin at rest."""
     largest = float(np.abs(np.diff(log.x_d)).max(initial=0.0))
-    if largest == 0.0:
+    first = float(np.abs(np.diff(log.x_d[:2])).max(initial=0.0))
+    if first <= _START * largest:
         return
-    ends = (*log.starts[1:], len(log.t))
-    late = [
-        (start, end) for start, end in zip(log.starts, ends, strict=True) if _begins_in_motion(log, start, end, largest)
-    ]
-    if not late:
-        return
-    start, end = late[0]
-    speed = float(np.abs(np.diff(log.x_d[start : start + 4])).max()) / log.T_s
-    rest = _first_rest(log.x_d[start:end], largest)
-    which = "the log begins" if len(log.starts) == 1 else f"{len(late)} of {len(log.starts)} segments begin"
     words = (
-        f"{which} in motion, at {speed:.3g} {log.unit}/s of {largest / log.T_s:.3g} at most; the model begins at rest, "
-        "and its first second or so is wrong"
+        f"the log begins in motion, at {first / log.T_s:.3g} {log.unit}/s of {largest / log.T_s:.3g} at most; the "
+        "model begins at rest, and its first second or so is wrong"
     )
+    rest = _first_rest(log.x_d, largest)
     fix = None
-    if len(log.starts) == 1 and rest is not None:
+    if rest is not None:
         fix = Fix(f"leave out the first {rest} samples, up to the first rest", partial(fixes.begin_at, first=rest))
-    evidence = {"velocity": speed, "largest": largest / log.T_s, "n": float(len(late))}
+    evidence = {"velocity": first / log.T_s, "largest": largest / log.T_s}
     yield Finding("start in motion", WARNING, words, evidence, _positions(log, "Start", min(len(log.t), 500)), fix)
-
-
-def _begins_in_motion(log: Log, start: int, end: int, largest: float) -> bool:
-    command = log.x_d[start : min(end, start + 4)]
-    return len(command) > 1 and float(np.abs(np.diff(command)).max()) > _START * largest
 
 
 def _first_rest(x_d: Array, largest: float) -> int | None:
@@ -113,17 +105,29 @@ def check_unit(log: Log) -> Iterator[Finding]:
     """Find positions that no axis has in metres, where nothing states their unit."""
     if log.unit != "m" or log.unit_stated:
         return
-    travel = float(np.ptp(log.x_d))
-    speed = float(np.quantile(np.abs(np.diff(log.x_d)), 0.999)) / log.T_s if len(log.t) > 1 else 0.0
-    if travel <= _TRAVEL_MAX and speed <= _VELOCITY_MAX:
+    evidence = {"travel": float(np.ptp(log.x_d)), **_fastest(log)}
+    beyond = [name for name, (largest, _) in _LARGEST.items() if evidence[name] > largest]
+    if not beyond:
         return
+    shown = " and ".join(f"{_LARGEST[name][1]} of {name}".join((f"{evidence[name]:.4g} ", "")) for name in beyond)
     words = (
-        f"positions read in m travel {travel:.4g} m at up to {speed:.4g} m/s, more than a feed axis does: they are "
-        "rather mm (--unit mm), µm (--unit um), or deg of a rotary axis (--unit deg)"
+        f"read in m there are {shown}, more than a feed axis has: the positions are rather in mm (--unit mm), µm "
+        "(--unit um), or deg of a rotary axis (--unit deg)"
     )
-    evidence = {"travel": travel, "velocity": speed, "factor": 1e-3}
     fix = Fix("read both positions as mm", partial(fixes.scaled, factor=1e-3))
-    yield Finding("unit", ERROR, words, evidence, _positions(log, "Positions as read"), fix)
+    yield Finding("unit", ERROR, words, {**evidence, "factor": 1e-3}, _positions(log, "Positions as read"), fix)
+
+
+def _fastest(log: Log) -> dict[str, float]:
+    """Return velocity and acceleration that the command exceeds in 1 % of its motion, over ten samples each."""
+    velocity, acceleration = [0.0], [0.0]
+    for segment in log.segments():
+        speed = (segment.x_d[10:] - segment.x_d[:-10]) / (10 * log.T_s)
+        speed = speed[speed != 0.0]
+        if len(speed) > 10:
+            velocity.append(float(np.quantile(np.abs(speed), 0.99)))
+            acceleration.append(float(np.quantile(np.abs(speed[10:] - speed[:-10]), 0.99)) / (10 * log.T_s))
+    return {"velocity": max(velocity), "acceleration": max(acceleration)}
 
 
 def check_rate(log: Log, machine: Machine) -> Iterator[Finding]:

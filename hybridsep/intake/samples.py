@@ -18,7 +18,10 @@ __all__ = ["check_outliers", "check_repeated", "check_stuck", "resolution"]
 _COLUMNS = {"x_d": "commanded position", "x_meas": "measured position"}
 
 _OUTLIER = 5.0
-"""Distance from the median of five, in its 98 % quantile, that no noise reaches."""
+"""Distance from the median of five, in its 95 % quantile, that no noise reaches."""
+
+_TURN = 5.0
+"""The same in the acceleration of the rest, per sample squared: 4 is what a triangle's corner has."""
 
 _STUCK = 5
 """Equal values in a row that a moving axis does not show unless its sensor holds them."""
@@ -59,21 +62,24 @@ def check_outliers(log: Log) -> Iterator[Finding]:
 def outliers(x: Array) -> tuple[Indices, Array]:
     """Return indices of outliers, and their distances from the median of five samples.
 
-    An outlier is further from that median than noise and turning points are, which shows in the second differences of
-    the rest, and further from the cubic through its neighbours than what is around it.
+    An outlier is further from that median than noise and turning points of the motion are, and further from the cubic
+    through its neighbours than what is around it.
     """
     distance = np.abs(x - median_filter(x, 5, mode="nearest"))
     padded = np.pad(x, 2, mode="edge")
     cubic = (-padded[:-4] + 4 * padded[1:-3] + 4 * padded[3:-1] - padded[4:]) / 6
     beside = np.abs(x - cubic)
-    far = distance > max(_OUTLIER * float(np.quantile(distance, 0.98)), 4 * resolution(x))
+    far = distance > max(_OUTLIER * float(np.quantile(distance, 0.95)), 4 * resolution(x))
     if not far.any():
         return np.empty(0, dtype=np.intp), np.empty(0)
-    near = maximum_filter1d(far.astype(np.uint8), 7) > 0
-    turns = np.abs(np.diff(np.pad(x, 1, mode="edge"), 2))
-    usual = float(turns[~near].max(initial=0.0))
-    around = maximum_filter1d(np.where(near, 0.0, beside), 61)
-    wrong = np.flatnonzero(far & (distance > 2 * usual) & (beside > _OUTLIER / 2 * around) & (beside > 0.3 * distance))
+    near = maximum_filter1d(far.astype(np.uint8), 3) > 0
+    # Acceleration over nine samples, none of them near a candidate
+    turns = np.abs(x[8:] - 2 * x[4:-4] + x[:-8]) / 16
+    usual = float(turns[~(near[8:] | near[4:-4] | near[:-8])].max(initial=0.0))
+    around = maximum_filter1d(np.where(maximum_filter1d(near, 5), 0.0, beside), 61)
+    wrong = np.flatnonzero(
+        far & (distance > _TURN * usual) & (beside > _OUTLIER / 2 * around) & (beside > 0.3 * distance)
+    )
     return wrong, distance[wrong]
 
 
@@ -136,21 +142,20 @@ def check_repeated(log: Log) -> Iterator[Finding]:
     share = float(held.sum() / moving.sum())
     if share < _HELD_SHARE:
         return
-    period = round(1.0 / (1.0 - share)) if share < 0.95 else 0
-    renewed = np.flatnonzero((np.diff(x) != 0.0) & moving) + 1
-    regular = (
-        period > 1 and len(renewed) > 5 and float(np.mean(np.diff(renewed)[np.diff(renewed) < 50] == period)) > 0.8
-    )
+    renewed = np.flatnonzero(np.diff(x) != 0.0) + 1
+    between = np.diff(renewed[maximum_filter1d(moving, 9)[renewed - 1]])
+    period = int(np.median(between)) if len(between) else 0
+    regular = period > 1 and float(np.mean(between[between < 3 * period] == period)) > 0.8
     words = (
         f"{100 * share:.0f} % of the measured positions repeat the one before while the axis moves: they are "
-        f"renewed about every {1 / max(1 - share, 1e-3):.2g} samples only"
+        f"renewed about every {period if regular else 1 / max(1 - share, 1e-3):.2g} samples only"
     )
     evidence = {"share": share, "period": float(period)}
     if regular:
-        last = int(renewed[0]) % period
-        fix = Fix(f"keep every {period}th sample, where it is new", partial(fixes.thinned, step=period, first=last))
+        first = int(renewed[0]) % period
+        fix = Fix(f"keep every {period}th sample, where it is new", partial(fixes.thinned, step=period, first=first))
     else:
-        wrong = np.flatnonzero(np.concatenate(([False], held)))
+        wrong = np.flatnonzero((np.diff(x) == 0.0) & maximum_filter1d(moving, 9)) + 1
         fix = Fix("interpolate over the repeated ones", partial(fixes.bridge, column="x_meas", wrong=wrong))
     marks = np.flatnonzero(held) + 1
     yield Finding("repeated samples", WARNING, words, evidence, _signals(log, _COLUMNS["x_meas"], marks), fix)

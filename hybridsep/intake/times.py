@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from ..base.signals import Indices
+from ..base.signals import Array, Indices
 from ..logs.log import Log
 from ..logs.time_axis import TOLERANCE
 from . import fixes
@@ -17,6 +17,9 @@ __all__ = ["check_gaps", "check_jitter", "check_order"]
 
 _GAP = 1.5
 """Intervals, in sampling intervals, from which at least one sample is missing."""
+
+_LATE = 0.6
+"""The same of the times around it, on the whole: jitter alone does not last."""
 
 
 def check_order(log: Log) -> Iterator[Finding]:
@@ -39,7 +42,8 @@ def check_gaps(log: Log) -> Iterator[Finding]:
     """Find stretches of time without samples."""
     steps = np.diff(log.t) / log.T_s
     inner = np.isin(np.arange(1, len(log.t)), log.starts)
-    gaps = np.flatnonzero((steps > _GAP) & ~inner) + 1
+    phase = log.t / log.T_s - np.arange(len(log.t))
+    gaps = np.array([k for k in np.flatnonzero((steps > _GAP) & ~inner) + 1 if _is_late(phase, int(k))], dtype=np.intp)
     if not len(gaps):
         return
     lost = np.round(steps[gaps - 1]) - 1
@@ -52,11 +56,16 @@ def check_gaps(log: Log) -> Iterator[Finding]:
     yield Finding("gaps", ERROR, words, evidence, _intervals(log, gaps), fix)
 
 
+def _is_late(phase: Array, k: int) -> bool:
+    """Return whether times lag behind their count from sample ``k`` on, as jitter does not make them."""
+    return float(np.median(phase[k : k + 9]) - np.median(phase[max(0, k - 9) : k])) > _LATE
+
+
 def check_jitter(log: Log) -> Iterator[Finding]:
     """Find uneven sampling: intervals that differ by more than a reader accepts."""
     steps = np.diff(log.t) / log.T_s
     inner = np.isin(np.arange(1, len(log.t)), log.starts)
-    deviations = np.where(inner | (steps > _GAP), 0.0, np.abs(steps - 1.0))
+    deviations = np.where(inner, 0.0, np.abs(steps - 1.0))
     uneven = np.flatnonzero(deviations > TOLERANCE) + 1
     if not len(uneven):
         return
