@@ -67,8 +67,8 @@ class Lines:
         continuous, weight = self.response / part, np.abs(part) / self.sigma
         thin = slice(None, None, max(1, len(self.omega) // THINNED))
         poles = vector_fit(self.omega[thin], continuous[thin], weight[thin], start)
-        poles = quadratics_of(poles)
-        return polish(self.omega, continuous, weight, poles, unit_gain=self.unit_gain, iterations=ROUGH)
+        quadratics = quadratics_of(poles)
+        return polish(self.omega, continuous, weight, quadratics, unit_gain=self.unit_gain, iterations=ROUGH)
 
     def refine(self, fit: ModalFit) -> tuple[ModalFit, Complex]:
         """Return the fit with its own weights and the hold's exact part, and that part."""
