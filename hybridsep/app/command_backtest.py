@@ -22,7 +22,7 @@ def backtest(
         Path, typer.Argument(help="CSV with the columns t, x_d, x_meas or x, or .npz or .mat with named columns.")
     ],
     machine: MachineOption,
-    unit: UnitOption = "m",
+    unit: UnitOption = None,
     T_s: TsOption = None,
     t: Annotated[str | None, typer.Option("--t", help="Name of the time column.")] = None,
     x_d: Annotated[str | None, typer.Option("--x-d", help="Name of the commanded position's column.")] = None,

@@ -39,7 +39,13 @@ FlavourOption = Annotated[str, typer.Option(help=f"Flavour of the FMUs: {', '.jo
 TsOption = Annotated[
     float | None, typer.Option("--T_s", "--Ts", help="Sampling interval [s], for a file without a time column.")
 ]
-UnitOption = Annotated[str, typer.Option(help="Unit of the positions in the file: m, mm or um.")]
+UnitOption = Annotated[
+    str | None,
+    typer.Option(
+        help="Unit of the positions in the file: m, mm, um, nm, in, or of a rotary axis rad, mrad, urad, deg, rev; "
+        "that of the columns' names (x [mm]) or m if left out."
+    ),
+]
 WeightsOption = Annotated[
     Path | None,
     typer.Option(

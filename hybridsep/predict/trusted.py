@@ -27,6 +27,13 @@ __all__ = ["Forecast", "TrustedModel"]
 _LAST_LAG = 0.005
 """Prior variance of the weight of a lag relative to that of the lag ``p`` before it."""
 
+_CAUTIOUS = 100.0
+"""Correlation beyond which the penalty of a cautious candidate does not grow: it would learn nothing at all."""
+
+_FIRST_WEIGHTS = (0.0, 0.5, 0.5, 0.0)
+"""Of the blend: hold, without lags, with lags, with lags and rows taken as independent. The last one learns fastest
+where G_pb is wrong, and is trusted once it has shown that."""
+
 _BOUND = 1.2
 """Largest prediction relative to the largest residual so far."""
 
@@ -99,8 +106,12 @@ class TrustedModel:
         p = settings.p
         self.regression = RidgeRegression(self.static.n + p, _NO_PENALTY)
         lag_scales = np.sqrt(_LAST_LAG ** (np.arange(p) / p))
-        self.candidates = (Candidate(self.static.n, lag_scales[:0]), Candidate(self.static.n, lag_scales))
-        self.blend = Blend((0.0, 0.5, 0.5), settings.Np)  # hold, without lags, with lags
+        self.candidates = (
+            Candidate(self.static.n, lag_scales[:0], _CAUTIOUS),
+            Candidate(self.static.n, lag_scales, _CAUTIOUS),
+            Candidate(self.static.n, lag_scales, 1.0),
+        )
+        self.blend = Blend(_FIRST_WEIGHTS, settings.Np)
         self.n_rows = 0.0
         self.largest = np.zeros(self.static.n)
         self.velocity_scale = 0.0
@@ -203,8 +214,8 @@ class TrustedModel:
 
     @staticmethod
     def _blended(hold: float, predictions: tuple[CandidatePrediction, ...], m: int) -> Array:
-        """Return the predictions that are blended, ``(3, m)``, m: hold, and the learned candidates, 0 at first."""
-        learned = [prediction.e_h[:m] for prediction in predictions] or [np.zeros(m)] * 2
+        """Return the predictions that are blended, ``(4, m)``, m: hold, and the learned candidates, 0 at first."""
+        learned = [prediction.e_h[:m] for prediction in predictions] or [np.zeros(m)] * (len(_FIRST_WEIGHTS) - 1)
         return np.stack((np.full(m, hold), *learned))
 
     def _judge(self, forecast: Forecast, measured: Array, accepted: NDArray[np.bool_]) -> None:
@@ -216,8 +227,8 @@ class TrustedModel:
             for candidate in self.candidates:
                 candidate.noise_variance = given or first
             return
-        best = forecast.predictions[-1]
-        surprise = float(np.mean((measured - best.unshrunk[:m])[accepted] ** 2)) / best.expected
+        cautious = forecast.predictions[1]
+        surprise = float(np.mean((measured - cautious.unshrunk[:m])[accepted] ** 2)) / cautious.expected
         if surprise > _SURPRISE:
             self._discount(min(max((_SURPRISE / surprise) ** 2, _SURPRISED * self.settings.Np / self.n_rows), 1.0))
         for candidate, prediction in zip(self.candidates, forecast.predictions, strict=True):

@@ -181,8 +181,8 @@ def test_help_shows_units_and_ranges(hybridsep: Run) -> None:
         (["backtest", "{log}", "-m", "spring_mass_damper", "--lam", "0"], "lambda must be 1e-40 … 1e+12 m2, got 0"),
         (["backtest", "{log}", "-m", "spring_mass_damper", "--x", "pos"], "column 'pos'"),
         (
-            ["backtest", "{log}", "-m", "spring_mass_damper", "--unit", "inch"],
-            "unit must be one of m, mm, um, got 'inch'",
+            ["backtest", "{log}", "-m", "spring_mass_damper", "--unit", "furlong"],
+            "unit must be one of m, mm, um, nm, in, rad, mrad, urad, deg, rev, got 'furlong'",
         ),
         (["backtest", "nothing.csv", "-m", "spring_mass_damper"], "nothing.csv"),
         (["build", "Robot", "--flavour", "python"], "no FMU Robot; there are HybridPredictorPy_als25010_x"),
@@ -221,10 +221,11 @@ def test_errors_are_one_line_and_status_2(hybridsep: Run, tmp_path: Path, argume
 
 def test_a_log_in_milliseconds_gets_a_hint(hybridsep: Run, tmp_path: Path) -> None:
     log = tmp_path / "ms.csv"
-    log.write_text("t,x_d,x\n" + "".join(f"{k},0,0\n" for k in range(10)))
-    status, _, err = hybridsep("backtest", log, "-m", "spring_mass_damper")
-    assert status == 2
-    assert "is its time in ms? It must be in seconds" in " ".join(err.split())
+    for start, message in ((5, "is its time in ms? It must be in seconds"), (0, "an index, or a time in ms; give T_s")):
+        log.write_text("t,x_d,x\n" + "".join(f"{start + k},0,0\n" for k in range(10)))
+        status, _, err = hybridsep("backtest", log, "-m", "spring_mass_damper")
+        assert status == 2
+        assert message in " ".join(err.split())
 
 
 def test_a_log_without_times(hybridsep: Run, tmp_path: Path) -> None:

@@ -47,6 +47,13 @@ STAGE = ("f", "kappa", "T_s", "noise_std")
 bounded = settings(max_examples=150, deadline=timedelta(seconds=20), suppress_health_check=list(HealthCheck))
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _compiled() -> None:
+    """Compile the models first: that is no part of an example's time."""
+    for name in ("predictor_2", "compensator", "feed_drive", "stage_drive"):
+        c_core.library(name)
+
+
 @st.composite
 def extreme(draw: st.DrawFn, name: str) -> float:
     """A parameter's value: now and then anything there is, else log-uniform over its range, with its bounds."""

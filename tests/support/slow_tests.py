@@ -68,7 +68,7 @@ SLOW = (
     r"cosim/test_instances\.py",
     # Other programs and processes: importers, demonstrations, documents, the child that reads .mat files
     r"suite/test_rollback\.py::test_states_go_on_in_another_process",
-    r"logs/test_log_errors\.py::test_(missing_columns|millimetres|too_short|truncated)\w*\[.*\.mat\]",
+    r"logs/test_log_errors\.py::test_(missing_columns|millimetres|too_short|truncated)\w*\[.*\.mat",
     r"logs/test_logs\.py::test_(chunks|which_column)\w*\[.*\.mat\]",
     r"logs/test_logs\.py::test_types_and_orientations\[shape1-.*\.mat\]",
     r"base/test_output\.py::test_a_full_tmpfs_costs_the_new_file_only",

@@ -23,7 +23,7 @@
 
 #include <stdint.h>
 
-#define HSEP_N_CANDIDATES 2   /* without lags, with lags */
+#define HSEP_N_CANDIDATES 3   /* without lags, with lags, with lags and rows taken as independent */
 #define HSEP_NO_PENALTY 1e-40 /* lambda of the factor itself, m2: penalties come with each solution */
 
 typedef struct {
@@ -63,7 +63,7 @@ typedef struct {
     uint64_t candidates[HSEP_N_CANDIDATES];
 } hsep_trusted;
 
-HSEP_ASSERT_WORDS(hsep_trusted, 43 + sizeof(hsep_guard) / 8);
+HSEP_ASSERT_WORDS(hsep_trusted, 53 + sizeof(hsep_guard) / 8);
 
 /* Features, those without lags first. */
 HSEP_API uint64_t hsep_trusted_n(const hsep_predictor_settings *settings);
@@ -93,7 +93,7 @@ HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i);
 HSEP_API int hsep_trusted_sound(hsep_trusted *self);
 
 /* Predict the residual e, (Np + p,), m, over the next window; behind it the last ones, as measured. x_d: commands,
- * x_pb: physics-based prediction, (Np,), m. Cost: m^3 / 6 multiply-adds for each candidate's m features, three times
+ * x_pb: physics-based prediction, (Np,), m. Cost: m^3 / 6 multiply-adds for each candidate's m features, four times
  * Np m^2 / 2, Np^2 / 2, and 6 Np tanh. */
 HSEP_API void hsep_trusted_forecast(hsep_trusted *self, const double x_d[], const double x_pb[], double e[]);
 
