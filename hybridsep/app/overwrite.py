@@ -11,7 +11,18 @@ from pathlib import Path
 from ..base.errors import ParameterError
 from ..cosim.run import COMPENSATOR, PREDICTOR
 
-__all__ = ["BATCHES", "BATCH_COLUMNS", "BY_ENDING", "FIGURE", "FMU", "RUN", "Kind", "Output", "check_outputs"]
+__all__ = [
+    "BATCHES",
+    "BATCH_COLUMNS",
+    "BY_ENDING",
+    "FIGURE",
+    "FMU",
+    "MACHINE",
+    "RUN",
+    "Kind",
+    "Output",
+    "check_outputs",
+]
 
 BATCH_COLUMNS = ("t", "rms_pb", "rms_hold", "rms_h")
 """Columns of the CSV of ``hybridsep backtest``."""
@@ -72,6 +83,17 @@ def _has_columns(*tables: tuple[str, ...]) -> Callable[[Path], bool]:
     return recognises
 
 
+def _contains(*parts: bytes) -> Callable[[Path], bool]:
+    """Return a test for a small file with one of the parts in it."""
+
+    def recognises(path: Path) -> bool:
+        with path.open("rb") as file:
+            content = file.read(100_000)
+        return any(part in content for part in parts)
+
+    return recognises
+
+
 def _is_our_fmu(path: Path) -> bool:
     if not zipfile.is_zipfile(path) or "modelDescription.xml" not in _members(path):
         return False
@@ -86,6 +108,7 @@ def _members(path: Path) -> list[str]:
 
 BATCHES = Kind("CSV of hybridsep backtest", _has_columns(BATCH_COLUMNS))
 RUN = Kind("result of hybridsep cosim", _has_columns(PREDICTOR.columns, COMPENSATOR.columns))
+MACHINE = Kind("machine file", _contains(b"\n[physics", b"\n[[physics"))
 FIGURE = Kind("PNG", _begins_with(b"\x89PNG\r\n\x1a\n"))
 FMU = Kind("FMU of hybridsep", _is_our_fmu)
 STATE = Kind("saved predictor", _begins_with(b"HSEP"))
