@@ -105,7 +105,7 @@ def observe_position(acceleration: ArrayLike, reference: ArrayLike, T_s: float, 
     if a.shape != r.shape or not np.isfinite(a).all():
         raise ParameterError(f"acceleration must be {len(r)} finite numbers, got shape {a.shape}")
     if len(r) < 2:
-        return r.copy()
+        return np.array(r)
     velocity = float(r[1] - r[0]) / T_s
     bias = float(a.mean()) - (float(r[-1] - r[-2]) / T_s - velocity) / (len(r) * T_s)
     observer = PositionObserver(T_s, crossover, position=float(r[0]), velocity=velocity, bias=bias)
