@@ -1,4 +1,4 @@
-"""Command line ``hybridsep fit | demo | build | cosim | backtest``."""
+"""Command line ``hybridsep fit | identify | demo | build | cosim | backtest``."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from .command_build import build
 from .command_cosim import cosim
 from .command_demo import demo
 from .command_fit import fit
+from .command_identify import identify
 from .failures import DEBUG_VARIABLE, run
 
 __all__ = ["app", "main"]
@@ -27,7 +28,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     add_completion=False,
 )
-for _command in (fit, demo, build, cosim, backtest):
+for _command in (fit, identify, demo, build, cosim, backtest):
     app.command()(_command)
 
 

@@ -11,7 +11,7 @@ from ..machine_sections import ModeSection, Physics
 from ..model.physics import ModalModel
 from .uncertainty import Estimate
 
-__all__ = ["Alternative", "IdentifiedModel"]
+__all__ = ["Alternative", "IdentifiedModel", "machine_of"]
 
 
 @dataclass(frozen=True)
@@ -98,9 +98,7 @@ class IdentifiedModel:
         ValueError
             If an entry is invalid.
         """
-        modes = tuple(ModeSection(**vars(mode)) for mode in self.model.modes)
-        physics = Physics(mode=modes, dead_time=self.model.dead_time, input_hold=self.input_hold)  # type: ignore[arg-type]
-        return Machine(name=name, title=title, T_s=self.T_s, physics=physics, **entries)
+        return machine_of(self.model, self.input_hold, self.T_s, name, title, **entries)
 
     def summary(self) -> Mapping[str, Any]:
         """Return plain values for JSON and tables."""
@@ -127,3 +125,10 @@ class IdentifiedModel:
             ],
             "findings": list(self.findings),
         }
+
+
+def machine_of(model: ModalModel, input_hold: str, T_s: float, name: str, title: str, **entries: Any) -> Machine:
+    """Return the machine with an identified model; parameters as for :meth:`IdentifiedModel.machine`."""
+    modes = tuple(ModeSection(**vars(mode)) for mode in model.modes)
+    physics = Physics(mode=modes, dead_time=model.dead_time, input_hold=input_hold)  # type: ignore[arg-type]
+    return Machine(name=name, title=title, T_s=T_s, physics=physics, **entries)
