@@ -132,6 +132,7 @@ def _learned_with_trust(trusted: TrustedModel) -> dict[str, Array]:
         "largest": trusted.largest,
         "gram": blend.gram,
         "cross": blend.cross,
+        "sensor": np.array([trusted.guard.spread, trusted.guard.held.step]),
     }
 
 
@@ -140,7 +141,15 @@ def _are_sound(learned: Mapping[str, Array]) -> bool:
     if not Uncertainty.is_sound(learned["errors"]):
         return False
     least = {"gram": -np.inf, "cross": -np.inf, "correlations": 1.0}
-    return all(np.isfinite(part).all() and (part >= least.get(name, 0.0)).all() for name, part in learned.items())
+    if "sensor" in learned:
+        spread, step = learned["sensor"].tolist()  # -1 and infinite where they are not known
+        if not (step > 0.0 and (spread == -1.0 or 0.0 <= spread < np.inf)):
+            return False
+    return all(
+        np.isfinite(part).all() and (part >= least.get(name, 0.0)).all()
+        for name, part in learned.items()
+        if name != "sensor"
+    )
 
 
 def _restore_learned(trusted: TrustedModel, learned: Mapping[str, Array]) -> None:
@@ -152,6 +161,7 @@ def _restore_learned(trusted: TrustedModel, learned: Mapping[str, Array]) -> Non
         candidate.noise_variance, candidate.correlation = variance, correlation
     trusted.largest, blend = learned["largest"], trusted.blend
     blend.weights, blend.gram, blend.cross = learned["weights"], learned["gram"], learned["cross"]
+    trusted.guard.spread, trusted.guard.held.step = learned["sensor"].tolist()
 
 
 def _differences(name: str, then: float, now: float) -> list[str]:
