@@ -119,16 +119,20 @@ class Tally:
         predictions : (3, n) array, m
             ``x_pb``, ``x_hold`` and ``x_h``.
         """
-        speed = np.abs(np.diff(x_d, prepend=x_d[0] if math.isnan(self._last_x_d) else self._last_x_d))
+        speed = np.empty(len(x_d))
+        speed[0] = 0.0 if math.isnan(self._last_x_d) else abs(x_d[0] - self._last_x_d)
+        np.abs(x_d[1:] - x_d[:-1], out=speed[1:])
         self._last_x_d = float(x_d[-1])
         self._fastest = max(self._fastest, float(speed.max()))
         moving = (speed > _STANDSTILL * self._fastest).astype(np.int64)
         third = np.minimum(np.arange(len(x)) * _N_THIRDS // self.Np, _N_THIRDS - 1)
         known = ~np.isnan(x)
-        squares = np.where(known, x - predictions, 0.0) ** 2
-        for i in range(3):
-            np.add.at(self._squares[i], (moving, third), squares[i])
-        np.add.at(self._counts, (moving[known], third[known]), 1)
+        squares = (x - predictions) ** 2
+        if not known.all():
+            squares = np.where(known, squares, 0.0)
+        place = _N_THIRDS * moving + third
+        for total, weights in zip((*self._squares, self._counts), (*squares, known), strict=True):
+            total += np.bincount(place, weights, total.size).reshape(total.shape)
         self._n_missing += int((~known).sum())
         self._largest_change = max(self._largest_change, float(np.abs(predictions[2] - predictions[0]).max()))
         if known.any():

@@ -36,8 +36,8 @@ N_LEARNED = 2 * N_COMPONENTS + 2
 _GROWTH = 0.3
 """First variance of the error's growth over a window, relative to the mean square error of the first window."""
 
-_SHARE_LEAST, _SHARE_MOST = 1e-9, 1e4
-"""Bounds on the variance of a cause relative to its first value."""
+_SHARE_LEAST, _SHARE_MOST = 1e-9 * np.array(_SHARES), 1e4 * np.array(_SHARES)
+"""Bounds on the variance relative to its cause."""
 
 _FLOOR = 1e-6
 """Least variance relative to the recent mean square of the residual."""
@@ -127,12 +127,14 @@ class Uncertainty:
             Variance of the candidates about their blend.
         """
         n = len(x_d)
-        bounded = np.clip(np.nan_to_num(e_h), -PREDICTION_MAX, PREDICTION_MAX)
+        bounded = e_h
+        if not np.abs(e_h).max() <= PREDICTION_MAX:  # a prediction that diverges is refused when it is published
+            bounded = np.clip(np.nan_to_num(e_h), -PREDICTION_MAX, PREDICTION_MAX)
         components = np.empty((n, N_COMPONENTS))
         components[:, 0] = 1.0
         components[:, 1] = np.arange(1, n + 1) / self.Np
-        components[:, 2] = _differences(x_pb)
-        components[:, 3] = _differences(bounded)
+        _set_differences(components[:, 2], x_pb)
+        _set_differences(components[:, 3], bounded)
         components[:, 4] = x_d - x_pb
         components[:, 5] = bounded - last
         components[:, 2:6] = np.minimum(np.abs(components[:, 2:6]), PREDICTION_MAX) ** 2
@@ -151,19 +153,20 @@ class Uncertainty:
         accepted : (m,) array of bool
             Whether they count.
         """
-        measured = residuals[accepted]
-        if not len(measured) or not measured.any():  # nothing to learn a scale from
-            return
         m = len(residuals)
-        error = measured - predicted.e_h[:m][accepted]
-        components = predicted.components[:m][accepted]
+        measured, e_h, components, std = residuals, predicted.e_h[:m], predicted.components[:m], predicted.std[:m]
+        if not accepted.all():
+            measured, e_h, components, std = (signal[accepted] for signal in (measured, e_h, components, std))
+        if not measured.any():  # nothing to learn a scale from
+            return
+        error = measured - e_h
         mean_square = _mean_square(measured)
         if self.recent > 0.0:
-            relative = np.abs(error) / predicted.std[:m][accepted]
-            if float(np.mean(relative > _FAR)) > _FAR_SHARE:
+            relative = np.abs(error) / std
+            if np.count_nonzero(relative > _FAR) > _FAR_SHARE * len(error):
                 self.theta *= _FAR**2
             else:
-                factor = self.factor * math.exp(_FACTOR_RATE * (float(np.mean(relative > _Z)) - _BEYOND))
+                factor = self.factor * math.exp(_FACTOR_RATE * (np.count_nonzero(relative > _Z) / len(error) - _BEYOND))
                 self.factor = min(max(factor, 1.0 / _FACTOR_MAX), _FACTOR_MAX)
             self.recent = _RECENT * self.recent + (1.0 - _RECENT) * mean_square
         else:
@@ -177,8 +180,8 @@ class Uncertainty:
         change = np.maximum(np.divide(seen, total, out=np.ones(N_COMPONENTS), where=total > 0.0), _VANISHING)
         step = np.minimum(_STEP * total / self.Np / (self.evidence + _FIRST_EVIDENCE), 1.0)
         theta = self.theta * change**step
-        self.theta[:2] = np.clip(theta[:2], _FLOOR * self.recent, PREDICTION_MAX)
-        self.theta[2:] = np.clip(theta[2:], *_share_bounds())
+        self.theta[:2] = np.minimum(np.maximum(theta[:2], _FLOOR * self.recent), PREDICTION_MAX)
+        self.theta[2:] = np.minimum(np.maximum(theta[2:], _SHARE_LEAST), _SHARE_MOST)
 
     def learned(self) -> Array:
         """Return what has been learned, ``(N_LEARNED,)``: all numbers are ≥ 0."""
@@ -192,10 +195,9 @@ class Uncertainty:
     @staticmethod
     def is_sound(learned: Array) -> bool:
         """Return whether the numbers of :meth:`learned` are in range."""
-        least, most = _share_bounds()
         shares, others = learned[2:N_COMPONENTS], np.delete(learned, range(2, N_COMPONENTS))
         return bool(
-            ((shares >= least) & (shares <= most)).all()
+            ((shares >= _SHARE_LEAST) & (shares <= _SHARE_MOST)).all()
             and ((others >= 0.0) & (others <= PREDICTION_MAX)).all()
             and 1.0 / _FACTOR_MAX <= learned[-2] <= _FACTOR_MAX
         )
@@ -204,19 +206,11 @@ class Uncertainty:
         return np.asarray(components @ self.theta + (_FLOOR * self.recent + _LEAST_VARIANCE))
 
 
-def _differences(signal: Array) -> Array:
-    """Return the change of a signal from sample to sample, ``(n,)``, the first one as the second."""
-    if len(signal) < 2:
-        return np.zeros(len(signal))
-    change = np.diff(signal)
-    return np.concatenate((change[:1], change))
+def _set_differences(changes: Array, signal: Array) -> None:
+    """Set the changes of a signal from sample to sample, ``(n,)``, the first one as the second."""
+    np.subtract(signal[1:], signal[:-1], out=changes[1:])
+    changes[0] = changes[1] if len(signal) > 1 else 0.0
 
 
 def _mean_square(signal: Array) -> float:
-    return min(float(np.mean(signal**2)), PREDICTION_MAX)
-
-
-def _share_bounds() -> tuple[Array, Array]:
-    """Return the bounds on the variances that are relative to their causes."""
-    shares = np.array(_SHARES)
-    return _SHARE_LEAST * shares, _SHARE_MOST * shares
+    return min(float(signal.dot(signal)) / len(signal), PREDICTION_MAX)
