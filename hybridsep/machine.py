@@ -44,12 +44,16 @@ __all__ = ["Machine", "load_machine", "machine_names", "machine_path"]
 
 
 class Machine(Section):
-    """One axis: identification, physics model, settings and, where there is one, simulated plant."""
+    """One axis: identification, physics model, settings and, where there is one, simulated plant.
+
+    ``unit`` is that of its positions; where it is rad, for a rotary axis, every m of other units stands for rad.
+    """
 
     name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")
     title: Line
     sources: tuple[Line, ...] = Field(default=(), min_length=1)
     T_s: Number = PARAMETERS["T_s"].default
+    unit: Literal["m", "rad"] = "m"
     physics: Physics
     predictor: PredictorSection = PredictorSection()
     compensator: CompensatorSection = CompensatorSection()

@@ -79,6 +79,13 @@ def _is_our_fmu(path: Path) -> bool:
         return b'generationTool="hybridsep ' in archive.read("modelDescription.xml")
 
 
+def _is_our_drawing(path: Path) -> bool:
+    """Return whether a PDF or SVG names its creator; a PDF may be the user's own paper."""
+    content = path.read_bytes()
+    named = (b"/Creator (hybridsep)", b"<dc:title>hybridsep</dc:title>")
+    return content.startswith((b"%PDF", b"<?xml")) and any(name in content for name in named)
+
+
 def _members(path: Path) -> list[str]:
     with zipfile.ZipFile(path) as archive:
         return archive.namelist()
@@ -87,11 +94,21 @@ def _members(path: Path) -> list[str]:
 BATCHES = Kind("CSV of hybridsep backtest", _has_columns(BATCH_COLUMNS))
 RUN = Kind("result of hybridsep cosim", _has_columns(PREDICTOR.columns, COMPENSATOR.columns))
 FIGURE = Kind("PNG", _begins_with(b"\x89PNG\r\n\x1a\n"))
+VECTOR_FIGURE = Kind("figure of hybridsep", _is_our_drawing)
 FMU = Kind("FMU of hybridsep", _is_our_fmu)
 STATE = Kind("saved predictor", _begins_with(b"HSEP"))
 SUMMARY = Kind("summary of hybridsep demo", _begins_with(b'{\n  "staircase": {'))
 
-BY_ENDING = {".csv": RUN, ".npz": RUN, ".png": FIGURE, ".fmu": FMU, ".state": STATE, ".json": SUMMARY}
+BY_ENDING = {
+    ".csv": RUN,
+    ".npz": RUN,
+    ".png": FIGURE,
+    ".pdf": VECTOR_FIGURE,
+    ".svg": VECTOR_FIGURE,
+    ".fmu": FMU,
+    ".state": STATE,
+    ".json": SUMMARY,
+}
 """Kinds of the files that the library names itself."""
 
 

@@ -88,12 +88,31 @@ def _figure(value: float | None, unit: str = "") -> str:
     return f"{value:.1f}{unit}" if unit else f"{value:.2f}"
 
 
-def print_scores(summary: Mapping[str, float | int], as_json: bool, title: str) -> None:
-    """Print prediction errors, of a run or of a backtest."""
+def print_scores(
+    summary: Mapping[str, float | int],
+    as_json: bool,
+    title: str,
+    *,
+    unit: str = "m",
+    more: Mapping[str, Any] | None = None,
+) -> None:
+    """Print prediction errors, of a run or of a backtest.
+
+    Parameters
+    ----------
+    summary : mapping
+        Scores, in millionths of the axis's unit.
+    as_json : bool
+        Print them as JSON, with ``more``; the names of a rotary axis's end in ``_urad``.
+    title : str
+    unit : {"m", "rad"}
+        Unit of the axis's positions.
+    more : mapping, optional
+    """
     if as_json:
-        print_json(summary)
+        print_json({**{name.replace("_um", f"_u{unit}"): value for name, value in summary.items()}, **(more or {})})
         return
-    table = Table(title=f"{title}: prediction error in µm against the measured position")
+    table = Table(title=f"{title}: prediction error in µ{unit} against the measured position")
     for column in ("", "physics", "hold", "hybrid", "reduction"):
         table.add_column(column, justify="right")
     for suffix, label in (("", ""), ("_after_warm_up", " after warm-up")):
