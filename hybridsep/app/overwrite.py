@@ -10,8 +10,20 @@ from pathlib import Path
 
 from ..base.errors import ParameterError
 from ..cosim.run import COMPENSATOR, PREDICTOR
+from ..logs.example import EXAMPLE, HEAD
 
-__all__ = ["BATCHES", "BATCH_COLUMNS", "BY_ENDING", "FIGURE", "FMU", "RUN", "Kind", "Output", "check_outputs"]
+__all__ = [
+    "BATCHES",
+    "BATCH_COLUMNS",
+    "BY_ENDING",
+    "EXAMPLE_LOG",
+    "FIGURE",
+    "FMU",
+    "RUN",
+    "Kind",
+    "Output",
+    "check_outputs",
+]
 
 BATCH_COLUMNS = ("t", "rms_pb", "rms_hold", "rms_h")
 """Columns of the CSV of ``hybridsep backtest``."""
@@ -79,6 +91,12 @@ def _is_our_fmu(path: Path) -> bool:
         return b'generationTool="hybridsep ' in archive.read("modelDescription.xml")
 
 
+def _is_example(path: Path) -> bool:
+    content = path.read_bytes()
+    first = HEAD.splitlines()[0].encode()
+    return content.startswith(first) or content == EXAMPLE.read_bytes()
+
+
 def _is_our_drawing(path: Path) -> bool:
     """Return whether a PDF or SVG names its creator; a PDF may be the user's own paper."""
     content = path.read_bytes()
@@ -96,6 +114,7 @@ RUN = Kind("result of hybridsep cosim", _has_columns(PREDICTOR.columns, COMPENSA
 FIGURE = Kind("PNG", _begins_with(b"\x89PNG\r\n\x1a\n"))
 VECTOR_FIGURE = Kind("figure of hybridsep", _is_our_drawing)
 FMU = Kind("FMU of hybridsep", _is_our_fmu)
+EXAMPLE_LOG = Kind("example log of hybridsep", _is_example)
 STATE = Kind("saved predictor", _begins_with(b"HSEP"))
 SUMMARY = Kind("summary of hybridsep demo", _begins_with(b'{\n  "staircase": {'))
 
