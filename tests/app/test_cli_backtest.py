@@ -121,19 +121,23 @@ def test_saved_state_and_predictions(hybridsep: Run, tmp_path: Path) -> None:
 
 
 def test_a_rotary_axis(hybridsep: Run, tmp_path: Path) -> None:
-    text = (data_folder("models") / "spring_mass_damper.toml").read_text(encoding="utf-8")
-    machine = tmp_path / "table.toml"
-    machine.write_text(text.replace("T_s =", 'unit = "rad"\nT_s =', 1) + '\n[log]\nx = "angle"\n', encoding="utf-8")
+    text = (data_folder("models") / "emps.toml").read_text(encoding="utf-8").partition("[log]")[0]
+    linear, rotary = tmp_path / "axis.toml", tmp_path / "table.toml"
+    linear.write_text(text, encoding="utf-8")
+    rotary.write_text(text.replace("T_s =", 'unit = "rad"\nT_s =', 1) + '[log]\nx = "angle"\n', encoding="utf-8")
     t = np.arange(2500) * 1e-3
     columns = np.column_stack((t, np.degrees(commanded()[:2500]), np.degrees(measured(0)[:2500])))
     log = tmp_path / "log.csv"
     np.savetxt(log, columns, delimiter=",", header="t,x_d [deg],angle [deg]", comments="", fmt="%.17g")
     assert read_log(log, columns={"x": "angle"}).unit == "rad"
-    linear = json.loads(hybridsep("backtest", write_log(tmp_path / "m.csv"), *MACHINE, "--json")[1])
-    status, out, _ = hybridsep("backtest", log, "-m", machine, "--json")
+    expected = json.loads(hybridsep("backtest", write_log(tmp_path / "m.csv"), "-m", linear, "--json")[1])
+    status, out, _ = hybridsep("backtest", log, "-m", rotary, "--json")
     assert status == 0
-    assert json.loads(out)["rms_h_urad"] == pytest.approx(linear["rms_h_um"], rel=1e-6)
-    assert "prediction error in µrad" in hybridsep("backtest", log, "-m", machine)[1]
-    status, _, err = hybridsep("backtest", log, *MACHINE, "--x", "angle")
+    assert json.loads(out)["rms_h_urad"] == pytest.approx(expected["rms_h_um"], rel=1e-6)
+    assert "prediction error in µrad" in hybridsep("backtest", log, "-m", rotary)[1]
+    # Where nothing is stated, the positions are in the machine's unit.
+    status, out, _ = hybridsep("backtest", tmp_path / "m.csv", "-m", rotary, "--x", "x", "--json")
+    assert json.loads(out)["rms_h_urad"] == pytest.approx(expected["rms_h_um"], rel=1e-9)
+    status, _, err = hybridsep("backtest", log, "-m", linear, "--x", "angle")
     assert status == 2
-    assert "log.csv is in rad, but machine spring_mass_damper has unit = 'm'" in err
+    assert "log.csv is in rad, but machine emps has unit = 'm'; correct the machine file, or say" in err
