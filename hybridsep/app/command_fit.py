@@ -44,9 +44,10 @@ def fit(
         from .fit import fit as fit_logs
         from .fit_intake import take_in
         from .fit_report import recommendation, write_report
+        from .fit_table import print_fit
         from .overwrite import FIT_FILES, Output, check_outputs
         from .progress import progress_bar
-        from .tables import console, print_fit, print_json
+        from .tables import console, print_json
 
     columns = {role: column for role, column in (("t", t), ("x_d", x_d), ("x", x)) if column}
     name = checked_name(name) if name else machine_name(logs[0])

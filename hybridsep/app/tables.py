@@ -14,11 +14,17 @@ from rich.table import Table
 
 from ..cosim.run import PREDICTOR, Run
 from ..evaluate.verdict import Verdict, verdict_of
-from ..intake.finding import Finding
-from .fit import Fit, shown_unit
 from .printed import PRINTED
 
-__all__ = ["console", "print_compensation", "print_fit", "print_json", "print_predictions", "print_run", "print_scores"]
+__all__ = [
+    "console",
+    "shown_figure",
+    "print_compensation",
+    "print_json",
+    "print_predictions",
+    "print_run",
+    "print_scores",
+]
 
 console = Console()
 
@@ -61,7 +67,7 @@ def print_compensation(summary: Mapping[str, Mapping[str, Any]]) -> None:
     rows["spiral, contour"] = ("spiral_x", "contour_rms_um")
     for label, (name, figure) in rows.items():
         compensation = summary[name]["compensation"]
-        table.add_row(label, *(_figure(compensation[kind][figure]) for kind in kinds))
+        table.add_row(label, *(shown_figure(compensation[kind][figure]) for kind in kinds))
     console.print(table)
 
 
@@ -76,8 +82,8 @@ def _table_of_cases(title: str, caption: str, columns: Iterable[str]) -> Table:
 
 def _figures(case: Mapping[str, Any]) -> list[str]:
     """Return physics, hold, hybrid, reduction and ratio to hold of a case as text, a dash where there is no figure."""
-    figures = [_figure(case.get(name)) for name in ("rms_pb_um", "rms_hold_um", "rms_h_um")]
-    return [*figures, _figure(case.get("reduction_percent"), " %"), _figure(case.get("ratio_to_hold"))]
+    figures = [shown_figure(case.get(name)) for name in ("rms_pb_um", "rms_hold_um", "rms_h_um")]
+    return [*figures, shown_figure(case.get("reduction_percent"), " %"), shown_figure(case.get("ratio_to_hold"))]
 
 
 def _printed(case: Mapping[str, float]) -> str:
@@ -87,18 +93,45 @@ def _printed(case: Mapping[str, float]) -> str:
     return f"{case['rms_pb_um']:g}→{case['rms_h_um']:g}, {case['reduction_percent']:g} %"
 
 
-def _figure(value: float | None, unit: str = "") -> str:
+def shown_figure(value: float | None, unit: str = "") -> str:
     if value is None or not np.isfinite(value):
         return "–"
     return f"{value:.1f}{unit}" if unit else f"{value:.2f}"
 
 
-def print_scores(summary: Mapping[str, float | int], verdict: Verdict, as_json: bool, title: str) -> None:
-    """Print prediction errors, of a run or of a backtest, and what they mean."""
+def print_scores(
+    summary: Mapping[str, float | int],
+    verdict: Verdict,
+    as_json: bool,
+    title: str,
+    *,
+    unit: str = "m",
+    more: Mapping[str, Any] | None = None,
+) -> None:
+    """Print prediction errors, of a run or of a backtest, and what they mean.
+
+    Parameters
+    ----------
+    summary : mapping
+        Scores, in millionths of the axis's unit.
+    verdict : Verdict
+    as_json : bool
+        Print them as JSON, with ``more``; the names of a rotary axis's end in ``_urad``.
+    title : str
+    unit : {"m", "rad"}
+        Unit of the axis's positions.
+    more : mapping, optional
+    """
     if as_json:
-        print_json({**summary, "verdict": str(verdict)})
+        print_json(
+            {
+                **{name.replace("_um", f"_u{unit}"): value for name, value in summary.items()},
+                "verdict": str(verdict),
+                **(more or {}),
+            }
+        )
         return
-    table = Table(title=f"{title}: prediction error in µm against the measured position")
+    table = Table(title=f"{title}: prediction error in µ{unit} against the measured position")
     for column in ("", "physics", "hold", "hybrid", "reduction", "× hold"):
         table.add_column(column, justify="right")
     for suffix, label in (("", ""), ("_after_warm_up", " after warm-up")):
@@ -106,32 +139,11 @@ def print_scores(summary: Mapping[str, float | int], verdict: Verdict, as_json: 
             figures = [summary.get(f"{quantity}_{name}_um{suffix}") for name in ("pb", "hold", "h")]
             if all(figure is not None for figure in figures):
                 compared = [summary[f"{name}{suffix}"] for name in ("reduction_percent", "ratio_to_hold")]
-                shown = [_figure(compared[0], " %"), _figure(compared[1])] if quantity == "rms" else ["", ""]
+                shown = [shown_figure(compared[0], " %"), shown_figure(compared[1])] if quantity == "rms" else ["", ""]
                 label_text = f"{quantity.upper() if quantity == 'rms' else quantity}{label}"
-                table.add_row(label_text, *map(_figure, figures), *shown)
+                table.add_row(label_text, *map(shown_figure, figures), *shown)
     console.print(table)
     console.print(str(verdict), highlight=False)
-
-
-def print_fit(fit: Fit, findings: Mapping[str, Iterable[Finding]], unit: str) -> None:
-    """Print what the intake of logs found, what was identified and how it was judged; ``unit`` is m or rad."""
-    for name, found in findings.items():
-        for finding in found:
-            console.print(f"{name}: {finding}", highlight=False, markup=False)
-    scale, shown = shown_unit(fit.judged.rms()[0], unit)
-    model, settings = fit.identification, fit.machine.predictor_settings
-    table = Table(
-        "prediction by", title=f"Error on samples that taught nothing [{shown}]", box=box.SIMPLE, pad_edge=False
-    )
-    table.add_column("RMS", justify="right")
-    for label, value in zip(("physics model", "hold", "hybrid"), fit.judged.rms(), strict=True):
-        table.add_row(label, _figure(scale * value))
-    console.print(f"{model['structure']}, dead time {model['dead_time']} samples", highlight=False)
-    for line in model["findings"]:
-        console.print(f"  {line}", highlight=False, markup=False)
-    console.print(f"Np = {settings.Np}, p = {settings.p}, q = {settings.q}", highlight=False)
-    console.print(table)
-    console.print(str(fit.judged.verdict()), highlight=False)
 
 
 def print_run(run: Run, as_json: bool, title: str) -> None:
@@ -155,7 +167,7 @@ def _print_tracking(summary: Mapping[str, float | int], as_json: bool, title: st
         ("tracking_measured", "tracking error, measured position"),
         ("change", "change of the command"),
     ):
-        table.add_row(label, *(_figure(summary[f"{name}_{quantity}_um"]) for quantity in ("rms", "max")))
+        table.add_row(label, *(shown_figure(summary[f"{name}_{quantity}_um"]) for quantity in ("rms", "max")))
     console.print(table)
     peaks = [summary[f"peak_{name}"] for name in ("velocity_m_s", "acceleration_m_s2", "jerk_m_s3")]
     console.print(

@@ -7,11 +7,12 @@ it. This module is packed into the FMUs: it needs nothing but the standard libra
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ..base.parameters import Parameter
 from ..base.settings import PARAMETERS, CompensatorSettings, PredictorSettings, check
+from .angular_units import angular_unit
 
 __all__ = [
     "COMPENSATOR_SETTINGS",
@@ -311,5 +312,12 @@ INTERPOLATED: dict[str, tuple[str, ...]] = {
 
 
 def variables_of(description: Mapping[str, object]) -> list[Variable]:
-    """Return the table that an FMU's ``machine.json`` describes: its model, parameters and modes."""
-    return MODELS[str(description["model"])](description["parameters"], description["modes"])  # type: ignore[arg-type]
+    """Return the table that an FMU's ``machine.json`` describes: its model, parameters, modes and unit."""
+    table = MODELS[str(description["model"])](description["parameters"], description["modes"])  # type: ignore[arg-type]
+    return table if description.get("unit", "m") == "m" else [_angular(variable) for variable in table]
+
+
+def _angular(variable: Variable) -> Variable:
+    """Return a variable of a rotary axis for that of a linear one."""
+    unit, display = angular_unit(variable.unit), angular_unit(variable.display_unit)
+    return replace(variable, unit=unit, display_unit=display)

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 from ..logs.log import Log
 from .axis import check_delay, check_offset, check_scale, check_sign, check_swapped, check_velocity
-from .finding import ERROR, NAMES, Finding
+from .finding import ERROR, HOPELESS, NAMES, Finding
 from .motion import check_motion, check_rate, check_start, check_unit
-from .samples import check_outliers, check_repeated, check_stuck
+from .samples import check_missing, check_outliers, check_repeated, check_stuck
 from .times import check_gaps, check_jitter, check_order
 
 if TYPE_CHECKING:
@@ -20,7 +20,15 @@ __all__ = ["Intake", "apply", "check"]
 
 _Check = Callable[[Log], Iterator[Finding]]
 
-_SAMPLES: tuple[_Check, ...] = (check_order, check_gaps, check_jitter, check_outliers, check_stuck, check_repeated)
+_SAMPLES: tuple[_Check, ...] = (
+    check_order,
+    check_gaps,
+    check_jitter,
+    check_missing,
+    check_outliers,
+    check_stuck,
+    check_repeated,
+)
 _AXIS: tuple[_Check, ...] = (check_swapped, check_velocity, check_sign, check_scale, check_offset, check_unit)
 
 
@@ -41,8 +49,14 @@ class Intake:
 
     @property
     def usable(self) -> bool:
-        """Whether a model can be learned once the fixes are applied: no error is left without one."""
-        return all(finding.fix is not None for finding in self.findings if finding.severity == ERROR)
+        """Whether a model can be learned once the fixes are applied."""
+        beyond = [finding for finding in self.findings if finding.severity == ERROR and finding.fix is None]
+        return not beyond and all(finding.name != HOPELESS for finding in self.findings)
+
+    @property
+    def errors(self) -> tuple[Finding, ...]:
+        """Findings with which figures from the log flatter or mean nothing."""
+        return tuple(finding for finding in self.findings if finding.severity == ERROR)
 
     def fixed(self) -> Log:
         """Return the log with every fix applied."""

@@ -10,19 +10,23 @@ import numpy as np
 from ..base.signals import Array
 from ..logs.log import Log
 
-__all__ = ["ERROR", "NAMES", "NOTE", "WARNING", "Finding", "Fix", "Picture"]
+__all__ = ["ERROR", "HOPELESS", "NAMES", "NOTE", "WARNING", "Finding", "Fix", "Picture"]
 
 ERROR, WARNING, NOTE = "error", "warning", "note"
-"""Severities: figures from the log mean nothing; they are worse than they need be; worth knowing."""
+"""Severities: figures from the log flatter or mean nothing; they are worse than they need be; worth knowing."""
+
+HOPELESS = "too little motion"
+"""Finding that no fix helps: the log cannot teach a model."""
 
 NAMES = (
     "time order",
     "gaps",
     "jitter",
+    "missing samples",
     "outliers",
     "stuck samples",
     "repeated samples",
-    "too little motion",
+    HOPELESS,
     "columns swapped",
     "velocity for position",
     "sign",

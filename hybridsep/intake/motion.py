@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..base.signals import Array
 from ..logs.log import Log
 from . import fixes
-from .finding import ERROR, NOTE, WARNING, Finding, Fix, Picture
+from .finding import ERROR, HOPELESS, NOTE, WARNING, Finding, Fix, Picture
 from .relation import noise_std
 
 if TYPE_CHECKING:
@@ -58,7 +58,9 @@ def check_motion(log: Log) -> Iterator[Finding]:
         reasons.append(f"the measured position is noise, of a deviation of {noise:.3g} {log.unit}")
     elif moving < _MOVING_MIN:
         reasons.append(f"the command moves in {moving} samples only")
-    if travel > 0.0 and np.ptp(log.x_meas) == 0.0:
+    if np.isnan(log.x_meas).all():
+        reasons.append("every measured position is missing")
+    elif travel > 0.0 and np.ptp(log.x_meas) == 0.0:
         reasons.append("the measured position never changes")
     if n < _SAMPLES_MIN:
         reasons.append(f"there are {n} samples, fewer than {_SAMPLES_MIN}")
@@ -66,7 +68,7 @@ def check_motion(log: Log) -> Iterator[Finding]:
         return
     words = f"{' and '.join(reasons)}: this log cannot teach a model; record moves over the travel that is used"
     evidence = {"travel": travel, "noise": noise, "n_moving": float(moving), "n": float(n)}
-    yield Finding("too little motion", ERROR, words, evidence, _positions(log, "Command and measurement"))
+    yield Finding(HOPELESS, WARNING, words, evidence, _positions(log, "Command and measurement"))
 
 
 def _mean(x: Array) -> Array:

@@ -11,9 +11,9 @@ from scipy.ndimage import maximum_filter1d, median_filter
 from ..base.signals import Array, Indices
 from ..logs.log import Log
 from . import fixes
-from .finding import ERROR, WARNING, Finding, Fix, Picture
+from .finding import NOTE, WARNING, Finding, Fix, Picture
 
-__all__ = ["check_outliers", "check_repeated", "check_stuck", "resolution"]
+__all__ = ["check_missing", "check_outliers", "check_repeated", "check_stuck", "resolution"]
 
 _COLUMNS = {"x_d": "commanded position", "x_meas": "measured position"}
 
@@ -42,6 +42,20 @@ def resolution(x: Array) -> float:
     return float(steps[steps > 0].min(initial=np.inf)) if steps.any() else 0.0
 
 
+def check_missing(log: Log) -> Iterator[Finding]:
+    """Find measured positions that are missing, NaN."""
+    wrong = np.flatnonzero(np.isnan(log.x_meas))
+    if not len(wrong) or len(wrong) == len(log.t):
+        return
+    words = (
+        f"{len(wrong)} of {len(log.t)} measured positions are missing; the first is sample {wrong[0] + 1}, t = "
+        f"{log.t[wrong[0]]:.6g} s; with trust they are replayed as such"
+    )
+    evidence = {"n": float(len(wrong)), "first": float(wrong[0])}
+    fix = Fix("interpolate the measured position over them", partial(fixes.bridge, column="x_meas", wrong=wrong))
+    yield Finding("missing samples", NOTE, words, evidence, _signals(log, _COLUMNS["x_meas"], wrong), fix)
+
+
 def check_outliers(log: Log) -> Iterator[Finding]:
     """Find values that leave the signal for one or two samples."""
     for column, title in _COLUMNS.items():
@@ -56,7 +70,7 @@ def check_outliers(log: Log) -> Iterator[Finding]:
         )
         evidence = {"n": float(len(wrong)), "first": float(wrong[0]), "largest": float(heights.max())}
         fix = Fix(f"interpolate the {title} over them", partial(fixes.bridge, column=column, wrong=wrong))
-        yield Finding("outliers", ERROR, words, evidence, _signals(log, title, wrong), fix)
+        yield Finding("outliers", WARNING, words, evidence, _signals(log, title, wrong), fix)
 
 
 def outliers(x: Array) -> tuple[Indices, Array]:
@@ -114,7 +128,7 @@ def check_stuck(log: Log) -> Iterator[Finding]:
     evidence = {"n": float(len(held)), "n_samples": float(lengths.sum()), "longest": float(lengths.max())}
     fix = Fix("cut them out and keep what is left apart", partial(fixes.cut_out, begins=first[:, 0], ends=first[:, 1]))
     marks = np.concatenate([np.arange(begin, end) for begin, end in held])
-    yield Finding("stuck samples", ERROR, words, evidence, _signals(log, _COLUMNS["x_meas"], marks), fix)
+    yield Finding("stuck samples", WARNING, words, evidence, _signals(log, _COLUMNS["x_meas"], marks), fix)
 
 
 def _runs(x: Array) -> tuple[Indices, Indices]:

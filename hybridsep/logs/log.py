@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -131,12 +132,15 @@ class LogReader:
             raise LogError(f"{self.path}: a chunk must have n ≥ 1 samples, got {n}")
         return ((x_d, x_meas) for x_d, x_meas in self._signals(n, ("x_d", "x")))
 
-    def read(self) -> Log:
-        """Return the whole log."""
+    def read(self, most: int | None = None) -> Log:
+        """Return the whole log, or at least its first ``most`` samples."""
         roles = ("x_d", "x", "t") if "t" in self._columns else ("x_d", "x")
-        columns = [np.concatenate(parts) for parts in zip(*self._signals(_BLOCK, roles), strict=True)]
+        blocks = self._signals(_BLOCK, roles)
+        if most is not None and most < self.n_samples:
+            blocks = islice(blocks, -(-most // _BLOCK))
+        columns = [np.concatenate(parts) for parts in zip(*blocks, strict=True)]
         if len(columns) == 2:
-            columns.append(np.arange(self.n_samples, dtype=np.float64) * self.T_s)
+            columns.append(np.arange(len(columns[0]), dtype=np.float64) * self.T_s)
         x_d, x_meas, t = columns
         stated = self._columns["x_d"].stated and self._columns["x"].stated
         return Log(t, x_d, x_meas, self.T_s, self.path, self.unit, stated, remarks=self.remarks)
@@ -253,7 +257,7 @@ def open_log(
         Axis of a file that holds several, such as ``"X1"``.
     uniform : bool
         Whether an uneven time axis is refused; otherwise ``T_s`` is its median interval, for
-        :func:`hybridsep.logs.intake.check`.
+        :func:`hybridsep.intake.check.check`.
     may_miss : bool
         Whether measured positions may be missing: NaN, in text ``nan`` or nothing. With trust a predictor replays them.
 

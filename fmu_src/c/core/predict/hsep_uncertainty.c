@@ -29,8 +29,8 @@ static const double uncertainty_memory = 0.95, uncertainty_first_evidence = 0.2,
 /* Standard deviations that a normal error exceeds with this probability. */
 static const double uncertainty_z = 1.96, uncertainty_beyond = 0.05;
 
-/* Standard deviations, and the share of a window's errors beyond them from which on all variances are too small by their
- * square: the machine or the sensor has changed. */
+/* Standard deviations, and the share of a window's errors beyond them from which on all variances are too small by
+ * their square: the machine or the sensor has changed. */
 static const double uncertainty_far = 4.0, uncertainty_far_share = 0.5;
 
 /* Change of ln c from one window to the next per share of errors; bound on c and 1/c. */
