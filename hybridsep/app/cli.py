@@ -1,4 +1,4 @@
-"""Command line ``hybridsep demo | build | cosim | backtest | identify``."""
+"""Command line ``hybridsep demo | build | cosim | backtest | identify | init``."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from .command_build import build
 from .command_cosim import cosim
 from .command_demo import demo
 from .command_identify import identify
+from .command_init import init
 from .failures import DEBUG_VARIABLE, run
 
 __all__ = ["app", "main"]
@@ -27,7 +28,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     add_completion=False,
 )
-for _command in (demo, build, cosim, backtest, identify):
+for _command in (demo, build, cosim, backtest, identify, init):
     app.command()(_command)
 
 
