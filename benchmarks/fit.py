@@ -4,8 +4,8 @@
 
 RMS of the second half, which taught nothing, in 1e-6 of the log's unit: a first-order lag with dead time, fitted to the
 first half by least squares; hold of its last residual over the window; the identified physics model; the hybrid that
-the first half taught. The ratio is to the better of lag and hold. ``time`` is in multiples of one replay with the settings
-that were chosen.
+the first half taught. The ratio is to the better of lag and hold. ``time`` is in multiples of one replay with the
+settings that were chosen.
 """
 
 from __future__ import annotations

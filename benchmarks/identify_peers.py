@@ -42,13 +42,13 @@ def ours(x_d: Array, x: Array, T_s: float) -> tuple[float, float, float, float]:
 
 
 def peer(x_d: Array, x: Array, T_s: float) -> tuple[float, float, float, float]:
-    """Return the same of SIPPY's second-order model with one sample of delay."""
+    """Return the same of SIPPY's second-order model , whose B begins with one sample of delay."""
     from sippy_unipi import system_identification
 
     scale = 1.0 / np.std(x_d)
     start = time.perf_counter()
     found: Any = system_identification(
-        (x - x_d[0]) * scale, (x_d - x_d[0]) * scale, "OE", OE_orders=[2, 2, 1], tsample=T_s, max_iterations=300
+        (x - x_d[0]) * scale, (x_d - x_d[0]) * scale, "OE", OE_orders=[2, 2, 0], tsample=T_s, max_iterations=300
     )
     elapsed = time.perf_counter() - start
     poles = np.asarray(found.G.poles(), dtype=complex)

@@ -18,12 +18,12 @@ from .printed import PRINTED
 
 __all__ = [
     "console",
-    "shown_figure",
     "print_compensation",
     "print_json",
     "print_predictions",
     "print_run",
     "print_scores",
+    "shown_figure",
 ]
 
 console = Console()
@@ -94,6 +94,7 @@ def _printed(case: Mapping[str, float]) -> str:
 
 
 def shown_figure(value: float | None, unit: str = "") -> str:
+    """Return a figure as text, a dash where there is none."""
     if value is None or not np.isfinite(value):
         return "–"
     return f"{value:.1f}{unit}" if unit else f"{value:.2f}"

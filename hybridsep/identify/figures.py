@@ -42,13 +42,13 @@ def operation_figure(
     for x_d, x in recordings:
         x_pb = discrete.forced_response(discrete.rest(), x_d - x_d[0])[0] + x_d[0]
         t = start + np.arange(len(x)) * found.T_s
-        servo.plot(t, 1e6 * (x_d - x), color=HOLD, linewidth=1.2)
+        servo.plot(t, 1e6 * (x_d - x), color=HOLD, linewidth=2.5, alpha=0.6)
         servo.plot(t, 1e6 * (x_d - x_pb), color=PHYSICS, linewidth=0.8)
         residual.plot(t, 1e6 * (x - x_pb), color=PHYSICS, linewidth=0.8)
         start = float(t[-1]) + found.T_s
     micro = f"µ{unit}"
     servo.set_ylabel(f"servo error [{micro}]")
-    servo.legend(["measured", found.structure], frameon=False, loc="upper right", ncols=2)
+    servo.legend(["measured", found.structure], frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
     residual.set_ylabel(f"measured −\nmodelled [{micro}]")
     residual.set_xlabel("time [s]")
     servo.sharex(residual)
@@ -89,9 +89,10 @@ def response_figure(found: IdentifiedResponse, title: str, path: str | Path) -> 
     magnitude, phase, error = figure.subplots(3, 1, sharex=True, height_ratios=[1.6, 1.2, 1.0])
     figure.suptitle(title)
     f = found.frequency
-    for values, style in ((found.response, {"color": HOLD, "linewidth": 2.0}), (found.fitted, {"color": PHYSICS})):
-        magnitude.plot(f, 20 * np.log10(np.abs(values)), **style)
-        phase.plot(f, np.rad2deg(np.unwrap(np.angle(values))), **style)
+    for values, color, width in ((found.response, HOLD, 4.0), (found.fitted, PHYSICS, 1.2)):
+        alpha = 0.6 if width > 2 else 1.0
+        magnitude.plot(f, 20 * np.log10(np.abs(values)), color=color, linewidth=width, alpha=alpha)
+        phase.plot(f, np.rad2deg(np.unwrap(np.angle(values))), color=color, linewidth=width, alpha=alpha)
     magnitude.set_ylabel("magnitude [dB]")
     n = len(found.model.modes)
     magnitude.legend(["measured", f"{n} mode{'s' if n > 1 else ''}"], frameon=False, loc="lower left")

@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..machine import Machine
-from ..machine_sections import ModeSection, Physics
+from ..machine import Machine, machine_from_table
 from ..model.physics import ModalModel
 from .uncertainty import Estimate
 
@@ -95,7 +94,7 @@ class IdentifiedModel:
 
         Raises
         ------
-        ValueError
+        ParameterError
             If an entry is invalid.
         """
         return machine_of(self.model, self.input_hold, self.T_s, name, title, **entries)
@@ -129,6 +128,9 @@ class IdentifiedModel:
 
 def machine_of(model: ModalModel, input_hold: str, T_s: float, name: str, title: str, **entries: Any) -> Machine:
     """Return the machine with an identified model; parameters as for :meth:`IdentifiedModel.machine`."""
-    modes = tuple(ModeSection(**vars(mode)) for mode in model.modes)
-    physics = Physics(mode=modes, dead_time=model.dead_time, input_hold=input_hold)  # type: ignore[arg-type]
-    return Machine(name=name, title=title, T_s=T_s, physics=physics, **entries)
+    physics = {
+        "mode": [vars(mode) for mode in model.modes],
+        "dead_time": model.dead_time,
+        "input_hold": input_hold,
+    }
+    return machine_from_table({"name": name, "title": title, "T_s": T_s, "physics": physics, **entries})
