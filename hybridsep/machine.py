@@ -44,12 +44,13 @@ __all__ = ["Machine", "load_machine", "machine_from_table", "machine_names", "ma
 
 
 class Machine(Section):
-    """One axis: identification, physics model, settings and, where there is one, simulated plant."""
+    """One axis: identification, physics model, settings, plant if it has one; ``unit`` rad: every m stands for rad."""
 
     name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")
     title: Line
     sources: tuple[Line, ...] = Field(default=(), min_length=1)
     T_s: Number = PARAMETERS["T_s"].default
+    unit: Literal["m", "rad"] = "m"
     physics: Physics
     predictor: PredictorSection = PredictorSection()
     compensator: CompensatorSection = CompensatorSection()
@@ -64,6 +65,8 @@ class Machine(Section):
             raise ValueError("a plant of kind feed_drive needs [physics.spring_mass_damper]")
         if isinstance(self.plant, StageSection) and not self.physics.mode:
             raise ValueError("a plant of kind stage needs [[physics.mode]] entries")
+        if self.plant is not None and self.unit != "m":
+            raise ValueError("a machine with a plant must have unit = 'm': the plants are linear axes")
         if self.plant is not None and self.physics.dead_time:
             raise ValueError("a machine with a plant must have physics.dead_time = 0: the plants have none")
         if self.plant is not None:

@@ -14,6 +14,7 @@ from ..fmi.flavours import FLAVOURS
 
 __all__ = [
     "TRAJECTORIES",
+    "AxisOption",
     "FlavourOption",
     "ForceOption",
     "JsonOption",
@@ -46,6 +47,7 @@ UnitOption = Annotated[
         "that of the columns' names (x [mm]) or m if left out."
     ),
 ]
+AxisOption = Annotated[str | None, typer.Option(help="Axis of a file that holds several, such as X1.")]
 WeightsOption = Annotated[
     Path | None,
     typer.Option(

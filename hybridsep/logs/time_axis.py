@@ -102,6 +102,7 @@ class TimeAxis:
         )
         return next(candidate for candidate in candidates if abs(candidate - mean) <= tolerance * mean)
 
+    @np.errstate(over="ignore", invalid="ignore")
     def _median_interval(self) -> float:
         steps = np.concatenate(self._intervals)
         steps = steps[steps > 0.0]
@@ -131,6 +132,6 @@ class TimeAxis:
             raise LogError(
                 f"{self._path}, {block.where(i + shift)}: time {self._name!r} must be uniform: an interval of "
                 f"{self._median:.6g} s ± {100 * TOLERANCE:g} % was expected, got {steps[i]:.6g} s{samples}; "
-                f"resample the log, or remove the time column and give T_s"
+                f"resample the log, or remove the time column and give T_s (--fix, --T_s)"
             )
         self._jitter = max(self._jitter, worst)

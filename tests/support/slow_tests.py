@@ -70,6 +70,9 @@ SLOW = (
     r"fmi/test_hostile_states\.py",
     r"cosim/test_instances\.py",
     # Other programs and processes: importers, demonstrations, documents, the child that reads .mat files
+    r"intake/test_intake\.py::test_a_good_log_is_not_accused\[(random|stage)",
+    r"intake/test_intake\.py::test_a_delay_is_measured_against_the_model\[.*stage",
+    r"app/test_example_log\.py::test_it_is_what",
     r"suite/test_rollback\.py::test_states_go_on_in_another_process",
     r"logs/test_log_errors\.py::test_(missing_columns|millimetres|too_short|truncated)\w*\[.*\.mat",
     r"logs/test_logs\.py::test_(chunks|which_column)\w*\[.*\.mat\]",
