@@ -40,7 +40,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-__all__ = ["Machine", "load_machine", "machine_names", "machine_path"]
+__all__ = ["Machine", "load_machine", "machine_from_table", "machine_names", "machine_path"]
 
 
 class Machine(Section):
@@ -125,7 +125,7 @@ class Machine(Section):
         """
         table = self.model_dump(by_alias=True, exclude_unset=True)
         table[section] = {**table.get(section, {}), **values}
-        return _validated(table)
+        return machine_from_table(table)
 
     def new_predictor(self, settings: PredictorSettings | None = None) -> HybridPredictor:
         """Return a predictor for this machine, with its :attr:`predictor_settings` unless others are given."""
@@ -260,7 +260,7 @@ def load_machine(machine: str | Path) -> Machine:
     except (ValueError, RecursionError) as error:  # an integer of 5000 digits is a ValueError, too
         raise MachineError(f"{path.name} is not valid TOML: {error}") from error
     try:
-        return _validated(content)
+        return machine_from_table(content)
     except ParameterError as error:
         raise MachineError(f"{path.name}: {error}") from error
 
@@ -269,8 +269,8 @@ def _without(names: tuple[str, ...], values: Mapping[str, Any]) -> dict[str, Any
     return {name: value for name, value in values.items() if name not in names}
 
 
-def _validated(content: Mapping[str, Any]) -> Machine:
-    """Return the machine of a file's content; ParameterError if it is invalid."""
+def machine_from_table(content: Mapping[str, Any]) -> Machine:
+    """Return the machine of a file's content, its tables as mappings; ParameterError if it is invalid."""
     try:
         return Machine(**content)
     except ValidationError as error:

@@ -14,7 +14,7 @@ _COLUMN = 32
 """Column of the comments, for alignment."""
 
 
-def machine_text(machine: Machine, comments: Iterable[str] = ()) -> str:
+def machine_text(machine: Machine, comments: Iterable[str] = (), *, annotated: bool = False) -> str:
     """Return a machine file; :func:`~hybridsep.machine.load_machine` reads the same machine.
 
     Parameters
@@ -22,33 +22,35 @@ def machine_text(machine: Machine, comments: Iterable[str] = ()) -> str:
     machine : Machine
     comments : iterable of str
         Lines at the head of the file.
+    annotated : bool
+        Whether each entry says what it is, besides its unit.
     """
     table = machine.model_dump(by_alias=True, exclude_unset=True, exclude_none=True)
     table.setdefault("T_s", machine.T_s)
     head = [f"# {line}".rstrip() for comment in comments for line in comment.splitlines()]
-    lines = [*head, *_entries(table)]
+    lines = [*head, *_entries(table, annotated)]
     for name, value in table.items():
         if isinstance(value, Mapping):
-            lines += _section(name, value)
+            lines += _section(name, value, annotated)
     return "\n".join(lines).strip("\n") + "\n"
 
 
-def _section(name: str, table: Mapping[str, Any]) -> list[str]:
+def _section(name: str, table: Mapping[str, Any], annotated: bool) -> list[str]:
     """Return the lines of a table with its tables, a blank one first; an empty table has none."""
-    own = _entries(table)
+    own = _entries(table, annotated)
     lines = ["", f"[{name}]", *own] if own else []
     for key, value in table.items():
         if isinstance(value, Mapping):
-            lines += _section(f"{name}.{key}", value)
+            lines += _section(f"{name}.{key}", value, annotated)
         elif _is_tables(value):
             for item in value:
-                lines += ["", f"[[{name}.{key}]]", *_entries(item)]
+                lines += ["", f"[[{name}.{key}]]", *_entries(item, annotated)]
     return lines
 
 
-def _entries(table: Mapping[str, Any]) -> list[str]:
+def _entries(table: Mapping[str, Any], annotated: bool) -> list[str]:
     return [
-        _with_unit(f"{name} = {_value(value)}", name)
+        _with_comment(f"{name} = {_value(value)}", name, annotated)
         for name, value in table.items()
         if not isinstance(value, Mapping) and not _is_tables(value)
     ]
@@ -58,11 +60,14 @@ def _is_tables(value: Any) -> bool:
     return isinstance(value, list | tuple) and bool(value) and isinstance(value[0], Mapping)
 
 
-def _with_unit(line: str, name: str) -> str:
-    unit = PARAMETERS[name].unit if name in PARAMETERS else "1"
-    if unit == "1" or len(line.splitlines()) > 1 or PARAMETERS[name].kind is not float:
+def _with_comment(line: str, name: str, annotated: bool) -> str:
+    """Return an entry with its unit and, if it is annotated, its description."""
+    parameter = PARAMETERS.get(name)
+    if parameter is None or "\n" in line:
         return line
-    return f"{line:<{_COLUMN}}# {unit}"
+    parts = [parameter.unit] if parameter.kind is float and parameter.unit != "1" else []
+    parts += [parameter.description] if annotated else []
+    return f"{line:<{_COLUMN}}# {', '.join(parts)}" if parts else line
 
 
 def _value(value: Any) -> str:

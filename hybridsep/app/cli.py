@@ -1,4 +1,4 @@
-"""Command line ``hybridsep demo | build | cosim | backtest | example-log``."""
+"""Command line ``hybridsep fit | identify | init | demo | build | cosim | backtest | example-log``."""
 
 from __future__ import annotations
 
@@ -14,6 +14,9 @@ from .command_build import build
 from .command_cosim import cosim
 from .command_demo import demo
 from .command_example_log import example_log
+from .command_fit import fit
+from .command_identify import identify
+from .command_init import init
 from .failures import DEBUG_VARIABLE, run
 
 __all__ = ["app", "main"]
@@ -27,7 +30,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     add_completion=False,
 )
-for _command in (demo, build, cosim, backtest, example_log):
+for _command in (fit, identify, init, demo, build, cosim, backtest, example_log):
     app.command()(_command)
 
 

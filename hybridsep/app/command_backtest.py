@@ -60,6 +60,7 @@ def backtest(
         from ..evaluate.backtest import Batch, backtest_stream
         from ..evaluate.backtest import backtest as backtest_whole
         from ..evaluate.replayed import replayed_run
+        from ..evaluate.scores import Scores
         from ..fmi.warm_start import load_trained
         from ..logs.log import Log
         from ..machine import load_machine, machine_path
@@ -84,9 +85,15 @@ def backtest(
     if T_s is not None and t is None:
         names.pop("t", None)  # there may be none
     own = axis_machine.log
-    reading = {"columns": names, "unit": unit or own.unit, "T_s": T_s, "axis": axis or own.axis}
     changed = axis_machine.changed("predictor", parameters)
     predictor = changed.new_predictor()
+    reading = {
+        "columns": names,
+        "unit": unit or own.unit,
+        "T_s": T_s,
+        "axis": axis or own.axis,
+        "may_miss": predictor.settings.trust,
+    }
     if weights is not None:
         predictor = load_trained(weights, changed, "HybridPredictor")
         predictor.restart()
@@ -111,14 +118,14 @@ def backtest(
         if isinstance(opened, Log) or figure is not None or predictions:
             whole = opened if isinstance(opened, Log) else opened.read()
             found = backtest_whole(predictor, whole.x_d, whole.x_meas, on_batch=on_batch)
+            scores: Scores = found
             run = replayed_run(found, whole.x_d, whole.x_meas, whole.T_s, predictor.Np)
-            summary = found.summary()
             for path in predictions:
                 run.save(path)
             if figure is not None:
                 prediction_figure(run, title, figure, unit=axis_machine.unit)
         else:
-            summary = backtest_stream(predictor, opened.chunks(), on_batch=on_batch).summary()
+            scores = backtest_stream(predictor, opened.chunks(), on_batch=on_batch)
     for path in saved:
         if path.suffix.lower() == ".state":
             predictor.save(path)
@@ -126,4 +133,4 @@ def backtest(
         with written_text(out) as file:
             csv.writer(file).writerows([BATCH_COLUMNS, *rows])
     findings = findings_table(intake.findings)
-    print_scores(summary, as_json, title, unit=axis_machine.unit, more={"findings": findings})
+    print_scores(scores.summary(), scores.verdict, as_json, title, unit=axis_machine.unit, more={"findings": findings})

@@ -15,6 +15,7 @@ from ..evaluate.backtest import backtest
 from ..evaluate.path_plots import contour_figure, spiral_figure
 from ..evaluate.replayed import replayed_run
 from ..evaluate.time_plots import prediction_figure, tracking_figure
+from ..evaluate.verdict import verdict_of
 from ..logs.log import Log, read_log
 from ..machine import load_machine
 from ..plants.trajectory import spiral, staircase
@@ -52,6 +53,7 @@ def staircase_case(out: Path, seeds: int, flavour: str, advance: Callable[[str],
         "n_seeds": seeds,
         "batches_of_seed": 0,
         **_worse(runs[0]),
+        "verdict": str(verdict_of(runs[0])),
         "compensation": compensation,
     }
 
@@ -67,6 +69,7 @@ def spiral_case(out: Path, flavour: str, advance: Callable[[str], None]) -> Summ
         advance(label)
         axes[axis] = run = cosimulate(*fmus, command)
         case = summary[f"spiral_{axis}"] = {**run.summary(), "physics_tuned_to_printed": True, **_worse(run)}
+        case["verdict"] = str(verdict_of(run))
         for name, off in (("friction_alone", "kappa"), ("stiffness_alone", "f")):
             advance(f"{label}, {name.replace('_', ' ')}")
             case[name] = cosimulate(*fmus, command, plant_values={off: 0.0}).summary()
@@ -109,7 +112,7 @@ def recorded_case(log: Log, out: Path) -> dict[str, Any]:
     found = backtest(predictor, log.x_d, log.x_meas)
     run = replayed_run(found, log.x_d, log.x_meas, log.T_s, predictor.Np)
     prediction_figure(run, "EMPS, a recorded axis: causal replay", out / "emps.png")
-    return {**found.summary(), **_worse(run)}
+    return {**found.summary(), **_worse(run), "verdict": str(found.verdict)}
 
 
 def _worse(run: Run) -> dict[str, Any]:

@@ -18,7 +18,9 @@ __all__ = [
     "BY_ENDING",
     "EXAMPLE_LOG",
     "FIGURE",
+    "FIT_FILES",
     "FMU",
+    "MACHINE",
     "RUN",
     "Kind",
     "Output",
@@ -84,6 +86,17 @@ def _has_columns(*tables: tuple[str, ...]) -> Callable[[Path], bool]:
     return recognises
 
 
+def _contains(*parts: bytes) -> Callable[[Path], bool]:
+    """Return a test for a small file with one of the parts in it."""
+
+    def recognises(path: Path) -> bool:
+        with path.open("rb") as file:
+            content = file.read(100_000)
+        return any(part in content for part in parts)
+
+    return recognises
+
+
 def _is_our_fmu(path: Path) -> bool:
     if not zipfile.is_zipfile(path) or "modelDescription.xml" not in _members(path):
         return False
@@ -111,11 +124,15 @@ def _members(path: Path) -> list[str]:
 
 BATCHES = Kind("CSV of hybridsep backtest", _has_columns(BATCH_COLUMNS))
 RUN = Kind("result of hybridsep cosim", _has_columns(PREDICTOR.columns, COMPENSATOR.columns))
+MACHINE = Kind("machine file", _contains(b"\n[physics", b"\n[[physics"))
 FIGURE = Kind("PNG", _begins_with(b"\x89PNG\r\n\x1a\n"))
 VECTOR_FIGURE = Kind("figure of hybridsep", _is_our_drawing)
 FMU = Kind("FMU of hybridsep", _is_our_fmu)
 EXAMPLE_LOG = Kind("example log of hybridsep", _is_example)
 STATE = Kind("saved predictor", _begins_with(b"HSEP"))
+FITTED = Kind("machine file of hybridsep fit", _begins_with(b"# Identified by hybridsep fit"))
+STAGES = Kind("result of hybridsep fit", _begins_with(b'{\n  "hybridsep": "'))
+REPORT = Kind("report of hybridsep", _begins_with(b"<!DOCTYPE html>\n<!-- report of hybridsep -->"))
 SUMMARY = Kind("summary of hybridsep demo", _begins_with(b'{\n  "staircase": {'))
 
 BY_ENDING = {
@@ -129,6 +146,9 @@ BY_ENDING = {
     ".json": SUMMARY,
 }
 """Kinds of the files that the library names itself."""
+
+FIT_FILES = {".toml": FITTED, ".json": STAGES, ".html": REPORT, ".fmu": FMU, ".state": STATE}
+"""Kinds of the files of ``hybridsep fit``."""
 
 
 def check_outputs(outputs: Iterable[Output], inputs: Mapping[str, str | Path | None], *, force: bool = False) -> None:

@@ -139,7 +139,8 @@ class SepCompensator:
             x_h, n_warm_up = as_published(prediction.x_pb + prediction.e_h, "x_h"), 0
         else:
             x_h, n_warm_up = prediction.x_pb.copy(), Np
-        return PublishedWindow(command[:Np].copy(), x_dm, prediction.x_pb, x_h, state, n_warm_up)
+        x_h_std = prediction.x_h_std if state is SepState.HYBRID else np.zeros(Np)
+        return PublishedWindow(command[:Np].copy(), x_dm, prediction.x_pb, x_h, x_h_std, state, n_warm_up)
 
     def update(self, x: ArrayLike) -> None:
         """Learn from the measurement of the planned window.
@@ -242,7 +243,7 @@ class SepCompensator:
         }
         if pending is not None:
             arrays |= {"coefficients": pending.coefficients, "delta": pending.delta, "x_d": pending.x_d}
-            arrays |= {"x_pb": pending.prediction.x_pb, "e_h": pending.prediction.e_h}
+            arrays |= {name: getattr(pending.prediction, name) for name in ("x_pb", "e_h", "x_h_std")}
         return pack(_KIND, meta, arrays, {"predictor": self.predictor.to_bytes()})
 
     @classmethod
@@ -272,7 +273,12 @@ class SepCompensator:
             if state not in tuple(SepState) or n_warm_up not in range(Np + 1) or restored.n_pending != Np:
                 raise saved.error("the pending window must be planned and predicted")
             # A hybrid prediction that is not used may diverge.
-            prediction = Prediction(saved.array("x_pb", Np), saved.array("e_h", Np, finite=False), int(n_warm_up))
+            prediction = Prediction(
+                saved.array("x_pb", Np),
+                saved.array("e_h", Np, finite=False),
+                saved.array("x_h_std", Np),
+                int(n_warm_up),
+            )
             compensator._pending = PendingPlan(
                 saved.array("coefficients", n),
                 saved.array("delta", Np),

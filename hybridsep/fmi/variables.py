@@ -179,10 +179,14 @@ def predictor_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping
             "x_pb", "output", "physics-based prediction for now, made when the window began", initially_from=ahead
         ),
         _position("x_h", "output", "hybrid prediction for now, made when the window began", initially_from=ahead),
+        _position("x_h_std", "output", "standard deviation of x_meas - x_h, now; 0: not known", display_unit="um"),
         _position("e_servo", "output", "predicted servo error x_d - x_h", display_unit="um"),
         Variable("hybrid_active", "Boolean", "output", "discrete", "whether x_h is the hybrid prediction now"),
         _position("rms_pb", "output", "running RMS of x_meas - x_pb since t_init", display_unit="um"),
         _position("rms_h", "output", "running RMS of x_meas - x_h since t_init", display_unit="um"),
+        _position(
+            "rms_hold", "output", "the same for x_pb plus the residual before the window, held", display_unit="um"
+        ),
         Variable("batch", "Integer", "output", "discrete", "number of the window, floor(k / Np); 0 is the first fill"),
         Variable(
             *("n_rejected", "Integer", "output", "discrete"),
@@ -197,6 +201,8 @@ def predictor_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping
         ("x_h", "hybrid predictions"),
     ):
         table += [_position(f"{name}_window[{i}]", "local", f"{meaning} of the current window") for i in window]
+    spread = "standard deviations of x_meas - x_h in the current window"
+    table += [_position(f"x_h_std_window[{i}]", "local", spread, display_unit="um") for i in window]
     return table
 
 

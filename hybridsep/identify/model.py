@@ -6,12 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..machine import Machine
-from ..machine_sections import ModeSection, Physics
+from ..machine import Machine, machine_from_table
 from ..model.physics import ModalModel
 from .uncertainty import Estimate
 
-__all__ = ["Alternative", "IdentifiedModel"]
+__all__ = ["Alternative", "IdentifiedModel", "machine_of"]
 
 
 @dataclass(frozen=True)
@@ -95,12 +94,10 @@ class IdentifiedModel:
 
         Raises
         ------
-        ValueError
+        ParameterError
             If an entry is invalid.
         """
-        modes = tuple(ModeSection(**vars(mode)) for mode in self.model.modes)
-        physics = Physics(mode=modes, dead_time=self.model.dead_time, input_hold=self.input_hold)  # type: ignore[arg-type]
-        return Machine(name=name, title=title, T_s=self.T_s, physics=physics, **entries)
+        return machine_of(self.model, self.input_hold, self.T_s, name, title, **entries)
 
     def summary(self) -> Mapping[str, Any]:
         """Return plain values for JSON and tables."""
@@ -127,3 +124,13 @@ class IdentifiedModel:
             ],
             "findings": list(self.findings),
         }
+
+
+def machine_of(model: ModalModel, input_hold: str, T_s: float, name: str, title: str, **entries: Any) -> Machine:
+    """Return the machine with an identified model; parameters as for :meth:`IdentifiedModel.machine`."""
+    physics = {
+        "mode": [vars(mode) for mode in model.modes],
+        "dead_time": model.dead_time,
+        "input_hold": input_hold,
+    }
+    return machine_from_table({"name": name, "title": title, "T_s": T_s, "physics": physics, **entries})

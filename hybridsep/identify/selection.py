@@ -36,8 +36,9 @@ it is 6.6."""
 SPREAD_MAX = 0.5
 """Largest relative standard deviation of a natural frequency where a structure has several poles to place."""
 
-GAIN_SIGNIFICANT = 3.0
-"""Standard deviations from 1 at which a static gain is taken for estimated."""
+FITTED_BETTER = 0.7
+"""Ratio of the fitted errors at which a larger structure is taken though the held-out ones are alike: what no structure
+explains, such as a first reversal, may be most of these."""
 
 GROWTH = 2
 """Orders above the best one that are tried before the search ends."""
@@ -119,13 +120,18 @@ def compare_structures(
 def choose(candidates: Sequence[Candidate]) -> Candidate:
     """Return the simplest candidate whose held-out error is that of the best one within its standard error.
 
-    Of two that differ in whether the static gain is 1, the one with the estimated gain is taken if that differs from 1
-    and the held-out error is no larger.
+    A larger one of these is taken where it fits the first part much better. Of two that differ in whether the static
+    gain is 1, the one with the estimated gain is taken if its error is smaller on the first part and no larger on the
+    later one.
     """
     usable = [candidate for candidate in candidates if not candidate.objection] or list(candidates[:1])
     best = min(usable, key=lambda candidate: candidate.rms_held_out)
     by_size = sorted(usable, key=lambda candidate: candidate.structure.n_parameters)
-    chosen = next(candidate for candidate in by_size if _as_good(candidate, best))
+    alike = [candidate for candidate in by_size if _as_good(candidate, best)]
+    chosen = alike[0]
+    for candidate in alike[1:]:
+        if candidate.fit.rms < FITTED_BETTER * chosen.fit.rms:
+            chosen = candidate
     for other in usable:
         s, c = other.structure, chosen.structure
         if (s.n_modes, s.lag, s.zero) == (c.n_modes, c.lag, c.zero) and c.unit_gain and not s.unit_gain and c.order:

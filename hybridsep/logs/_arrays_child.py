@@ -3,7 +3,8 @@
 Run as ``python -I _arrays_child.py KIND PATHS FILE FOLDER``: KIND is ``mat`` (SciPy) or ``hdf5`` (h5py), PATHS the
 parent's ``sys.path`` as JSON. Arrays of numbers go to ``FOLDER/<i>.npy``, and a JSON object to standard output:
 ``missing``, true where h5py is not installed; or ``damage``, the library's message; or ``variables``, name → type and,
-where it is an array, dtype, shape and, where it is saved, the number ``i``. Fields of structs are ``struct.field``.
+where it is an array, dtype, shape and, where it is saved, the number ``i``. Fields of structs are ``struct.field``, the
+parts of a complex array ``array.real`` and ``array.imag``.
 """
 
 from __future__ import annotations
@@ -32,6 +33,9 @@ def fields(name: str, value: Any) -> Iterator[tuple[str, Any]]:
             yield from fields(f"{name}.{field}", value[field].reshape(-1)[0])
     else:
         yield name, value
+        if getattr(getattr(value, "dtype", None), "kind", "") == "c":
+            yield f"{name}.real", value.real
+            yield f"{name}.imag", value.imag
 
 
 def hdf5(file: str) -> Iterator[tuple[str, Any]]:

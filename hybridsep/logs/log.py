@@ -14,7 +14,7 @@ from ..base.settings import check
 from ..base.signals import POSITION_MAX, Array
 from .columns import Column, choose_columns
 from .formats import open_source
-from .source import Block
+from .source import NEEDS_TRUST, Block
 from .time_axis import TimeAxis
 from .units import POSITION_UNITS, position_unit
 
@@ -106,6 +106,7 @@ class LogReader:
         T_s: float | None = None,
         axis: str | None = None,
         uniform: bool = True,
+        may_miss: bool = False,
     ) -> None:
         self.path = Path(path)
         given = check_reading(unit, T_s)
@@ -115,7 +116,8 @@ class LogReader:
         self._columns = choose_columns(self._source, columns, unit, time_needed=given is None)
         self.unit = self._columns["x_d"].unit.si
         self.remarks = tuple(self._source.remarks)
-        self._uniform = uniform
+        self._uniform, self._may_miss = uniform, may_miss
+        self._source.measured, self._source.may_miss = self._columns["x"].name, may_miss
         self.n_samples, self.T_s = self._scan(given)
 
     def chunks(self, n: int = _BLOCK) -> Iterator[tuple[Array, Array]]:
@@ -149,7 +151,7 @@ class LogReader:
         lowest, highest, count = np.inf, -np.inf, 0
         for block in self._source.blocks([column.name for column in columns], n):
             for column, values in zip(columns, block.columns, strict=True):
-                self._check_finite(block, column.name, values)
+                self._check_finite(block, column.name, values, measured=column is self._columns["x"])
             signals = [values * column.unit.factor for column, values in zip(columns, block.columns, strict=True)]
             x_d = signals[0]
             lowest, highest = min(lowest, float(x_d.min())), max(highest, float(x_d.max()))
@@ -203,11 +205,15 @@ class LogReader:
             )
         return count, found if given is None else given
 
-    def _check_finite(self, block: Block, name: str, column: Array) -> None:
+    def _check_finite(self, block: Block, name: str, column: Array, *, measured: bool = False) -> None:
+        """Raise LogError if a value is infinite, or NaN and not a measurement that may miss."""
         finite = np.isfinite(column)
         if not finite.all():
-            i = int(np.argmin(finite))
-            raise LogError(f"{self.path}, {block.where(i)}: column {name!r} must be finite, got {column[i]}")
+            if measured and self._may_miss and not np.isinf(column).any():
+                return
+            i = int(np.argmax(np.isinf(column) if measured and self._may_miss else ~finite))
+            hint = NEEDS_TRUST if measured and np.isnan(column[i]) else ""
+            raise LogError(f"{self.path}, {block.where(i)}: column {name!r} must be finite, got {column[i]}{hint}")
 
 
 def check_reading(unit: str | None, T_s: float | None) -> float | None:
@@ -225,6 +231,7 @@ def open_log(
     T_s: float | None = None,
     axis: str | None = None,
     uniform: bool = True,
+    may_miss: bool = False,
 ) -> LogReader:
     """Open a log for reading in bounded memory.
 
@@ -251,6 +258,8 @@ def open_log(
     uniform : bool
         Whether an uneven time axis is refused; otherwise ``T_s`` is its median interval, for
         :func:`hybridsep.intake.check.check`.
+    may_miss : bool
+        Whether measured positions may be missing: NaN, in text ``nan`` or nothing. With trust a predictor replays them.
 
     Returns
     -------
@@ -261,7 +270,7 @@ def open_log(
     LogError
         If the file, its columns or its time axis cannot be used.
     """
-    return LogReader(path, columns=columns, unit=unit, T_s=T_s, axis=axis, uniform=uniform)
+    return LogReader(path, columns=columns, unit=unit, T_s=T_s, axis=axis, uniform=uniform, may_miss=may_miss)
 
 
 def read_log(
@@ -272,6 +281,7 @@ def read_log(
     T_s: float | None = None,
     axis: str | None = None,
     uniform: bool = True,
+    may_miss: bool = False,
 ) -> Log:
     """Return a whole log; parameters and errors as for :func:`open_log`."""
-    return LogReader(path, columns=columns, unit=unit, T_s=T_s, axis=axis, uniform=uniform).read()
+    return LogReader(path, columns=columns, unit=unit, T_s=T_s, axis=axis, uniform=uniform, may_miss=may_miss).read()

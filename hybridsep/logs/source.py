@@ -13,7 +13,11 @@ import numpy as np
 from ..base.errors import LogError
 from ..base.signals import Array
 
-__all__ = ["Block", "Source", "check_column", "check_lengths", "sample_number"]
+__all__ = ["NEEDS_TRUST", "Block", "Source", "check_column", "check_lengths", "sample_number"]
+
+
+NEEDS_TRUST = "; missing measurements are replayed with trust alone (--trust true)"
+"""End of the message about a measured position that is missing."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +59,10 @@ class Source(ABC):
         What was chosen for the reader that the user may want to change.
     advice : str
         Addition to the message about a missing column.
+    measured : str
+        Column of the measured position.
+    may_miss : bool
+        Whether nothing between two delimiters stands for NaN there.
     """
 
     format: ClassVar[str]
@@ -68,6 +76,7 @@ class Source(ABC):
         self.roles: Mapping[str, str] = {}
         self.remarks: list[str] = []
         self.advice = ""
+        self.measured, self.may_miss = "", False
 
     @staticmethod
     @abstractmethod

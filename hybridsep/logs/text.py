@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import gzip
+import math
 import zlib
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -15,7 +16,7 @@ import numpy as np
 
 from ..base.errors import LogError
 from ..base.signals import Array
-from .source import Block, Source
+from .source import NEEDS_TRUST, Block, Source
 from .text_layout import COMMENTS, Layout, decimal_points, find_layout, is_number, split
 
 __all__ = ["TextSource"]
@@ -146,12 +147,16 @@ class TextSource(Source):
         for i in use:
             if i >= len(fields):
                 continue
+            missing = not fields[i] and self.names[i] == self.measured
+            if missing and self.may_miss:
+                row.append(math.nan)
+                continue
             number_there = decimal_points(fields[i])
             if not is_number(number_there):
                 came = repr(fields[i]) if fields[i] else "nothing"
                 raise LogError(
                     f"{self.path}, line {number}: column {self.names[i]!r} must be a number, got {came}"
-                    f"{_hint(fields[i])}"
+                    f"{NEEDS_TRUST if missing else _hint(fields[i])}"
                 )
             row.append(float(number_there))
         return row

@@ -70,6 +70,8 @@ class Forecast:
         Commands and physics-based prediction, relative to the start.
     e_h : (n,) array, m
         Predicted residual.
+    disagreement : (n,) array, m²
+        Variance of the candidates about their blend.
     hold : float, m
         Last residual, bounded: the prediction of the hold candidate.
     predictions : tuple of CandidatePrediction
@@ -83,6 +85,7 @@ class Forecast:
     x_d: Array
     x_pb: Array
     e_h: Array
+    disagreement: Array
     hold: float
     predictions: tuple[CandidatePrediction, ...]
     largest: Array
@@ -150,11 +153,13 @@ class TrustedModel:
             x = x_pb + self._predict(self.candidates[0], rows, largest).e_h
             rows, _ = self.static.rows(self.state, x_d, x_pb, x, velocity_scale)
             predictions = tuple(self._predict(candidate, rows, largest) for candidate in self.candidates)
-        e_h = self.blend.weights @ self._blended(hold, predictions, len(x_d))
-        return Forecast(x_d, x_pb, e_h, hold, predictions, largest, velocity_scale)
+        candidates = self._blended(hold, predictions, len(x_d))
+        e_h = self.blend.weights @ candidates
+        disagreement = np.maximum(self.blend.weights @ candidates**2 - e_h**2, 0.0)
+        return Forecast(x_d, x_pb, e_h, disagreement, hold, predictions, largest, velocity_scale)
 
-    def learn(self, forecast: Forecast, x: Array, *, fold: bool = True) -> None:
-        """Learn from the measurement of a window.
+    def learn(self, forecast: Forecast, x: Array, *, fold: bool = True) -> NDArray[np.bool_]:
+        """Learn from the measurement of a window; return which samples are accepted, ``(m,)`` bool.
 
         Parameters
         ----------
@@ -182,6 +187,7 @@ class TrustedModel:
         self.n_rejected += m - int(accepted.sum())
         self.past = np.concatenate((e[::-1], self.past))[:p]
         self.past_bridged = bridged[-p:]
+        return accepted
 
     def _assess(self, forecast: Forecast, measured: Array, accepted: NDArray[np.bool_]) -> None:
         """Judge the candidates and their blend by the measurement of their window."""

@@ -32,7 +32,24 @@ def test_backtest_of_a_csv(hybridsep: Run, tmp_path: Path) -> None:
     status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper")
     assert status == 0
     assert f"{summary['rms_h_um']:.2f}" in out
+    assert f"{summary['ratio_to_hold']:.2f}" in out
     assert "after warm-up" in out
+    assert " ".join(summary["verdict"].split()) in " ".join(out.split())
+    assert summary["verdict"].startswith("Better than the physics model: 0.4")
+
+
+def test_backtest_of_a_log_with_missing_measurements(hybridsep: Run, tmp_path: Path) -> None:
+    rows = write_log(tmp_path / "whole.csv", n=2000).read_text().splitlines()
+    rows[1500] = rows[1500].rpartition(",")[0] + ","
+    log = tmp_path / "log.csv"
+    log.write_text("\n".join(rows))
+    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--trust", "true", "--json")
+    assert status == 0
+    assert json.loads(out)["n_samples"] == 1999
+    assert "measurements were missing or not plausible" in json.loads(out)["verdict"]
+    status, _, said = hybridsep("backtest", log, "-m", "spring_mass_damper")
+    assert status == 2
+    assert "line 1501: column 'x' must be a number, got nothing; missing measurements are replayed with trust" in said
 
 
 def test_backtest_takes_units_columns_and_parameters(hybridsep: Run, tmp_path: Path) -> None:
@@ -169,7 +186,7 @@ def test_help_shows_units_and_ranges(hybridsep: Run) -> None:
         assert PARAMETERS[name].range_text in text
     assert "[m2]" in text
     status, out, _ = hybridsep("--help")
-    assert all(command in out for command in ("demo", "build", "cosim", "backtest"))
+    assert all(command in out for command in ("demo", "build", "cosim", "backtest", "identify", "init"))
     assert hybridsep("--version")[1].strip() == __version__
 
 

@@ -136,3 +136,31 @@ def test_a_line_without_end_does_not_fill_the_memory(tmp_path: Path) -> None:
     path.write_bytes(gzip.compress(b"t,x_d,x\n0,1," + b"2" * 3_000_000))
     with pytest.raises(LogError, match=r"line 2: has 1000000 characters or more; is the file a log\?"):
         read_log(path)
+
+
+@pytest.mark.parametrize("nothing", ["", "nan", "NaN"])
+def test_missing_measurements(tmp_path: Path, nothing: str) -> None:
+    path = write_csv(tmp_path / "log.csv", f"t,x_d,x\n0,1,2\n1,3,{nothing}\n2,5,6\n")
+    with pytest.raises(
+        LogError, match=r"line 3: column 'x' must be .*got n.*missing measurements .* \(--trust true\)$"
+    ):
+        read_log(path)
+    log = read_log(path, may_miss=True)
+    np.testing.assert_array_equal(log.x_meas, [2.0, np.nan, 6.0])
+    np.testing.assert_array_equal(log.x_d, [1.0, 3.0, 5.0])
+
+
+@pytest.mark.parametrize(
+    ("row", "problem"),
+    [
+        ("1,,4", "column 'x_d' must be a number, got nothing$"),
+        ("1,nan,4", "column 'x_d' must be finite, got nan$"),
+        (",3,4", "column 't' must be a number, got nothing$"),
+        ("1,3,inf", "column 'x' must be finite, got inf$"),
+        ("1,3,-", "column 'x' must be a number, got '-'$"),
+    ],
+)
+def test_nothing_else_may_be_missing(tmp_path: Path, row: str, problem: str) -> None:
+    path = write_csv(tmp_path / "log.csv", f"t,x_d,x\n0,1,2\n{row}\n2,5,\n")
+    with pytest.raises(LogError, match=f"line 3: {problem}"):
+        read_log(path, may_miss=True)

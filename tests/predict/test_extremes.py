@@ -139,7 +139,11 @@ def test_the_predictor(learning: dict[str, float], modes: dict[str, float], samp
     def run() -> None:
         parameters = {**learning, **{name: SMALL[name] for name in ("Np", "p", "q")}, "input_hold": hold}
         predictor = HybridPredictor(model_from(modes), PredictorSettings.from_fmi({"trust": False, **parameters}))
-        check_look_ahead(LookAhead(predictor, 0.0), ("x_d", "x_pb", "x_h", "e_servo", "rms_pb", "rms_h"), samples)
+        check_look_ahead(
+            LookAhead(predictor, 0.0),
+            ("x_d", "x_pb", "x_h", "x_h_std", "e_servo", "rms_pb", "rms_h", "rms_hold"),
+            samples,
+        )
 
     refused(values, run)
 

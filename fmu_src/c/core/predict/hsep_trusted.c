@@ -85,16 +85,21 @@ HSEP_API void hsep_trusted_forecast(hsep_trusted *self, const double x_d[], cons
 {
     const double *past = e + self->Np, *weights = self->blend.weights, bound = trusted_hold_max * self->scale.largest;
     const int outgrown = trusted_begin(self, x_d, x_pb);
+    double *disagreement = hsep_at(self, self->disagreement);
     self->hold = fmin(fmax(past[0], -bound), bound);
     self->predicted = self->n_rows > 0.0 && !outgrown && self->scale.largest_square > 0.0;
     if (self->predicted) {
         trusted_predict(self, x_pb, past);
     }
     for (uint64_t j = 0; j < self->Np; j++) {
+        double square = weights[0] * self->hold * self->hold;
         e[j] = weights[0] * self->hold;
         for (uint64_t i = 0; self->predicted && i < HSEP_N_CANDIDATES; i++) {
-            e[j] += weights[1 + i] * hsep_candidate_prediction(hsep_trusted_candidate(self, i))[j];
+            const double candidate = hsep_candidate_prediction(hsep_trusted_candidate(self, i))[j];
+            e[j] += weights[1 + i] * candidate;
+            square += weights[1 + i] * candidate * candidate;
         }
+        disagreement[j] = fmax(square - e[j] * e[j], 0.0);
     }
 }
 

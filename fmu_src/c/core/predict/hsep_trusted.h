@@ -58,12 +58,13 @@ typedef struct {
     uint64_t measured;         /* (Np,) m, measured position, NaN where missing */
     uint64_t accepted;         /* (Np,) whether it is plausible */
     uint64_t bridged;          /* (Np + p,) whether a residual stands for one that is not */
+    uint64_t disagreement;     /* (Np,) m2, variance of the candidates about their blend */
     uint64_t rows;             /* (Np, n_static) features without lags, sample after sample */
     uint64_t disturbances, regression;
     uint64_t candidates[HSEP_N_CANDIDATES];
 } hsep_trusted;
 
-HSEP_ASSERT_WORDS(hsep_trusted, 53 + sizeof(hsep_guard) / 8);
+HSEP_ASSERT_WORDS(hsep_trusted, 54 + sizeof(hsep_guard) / 8);
 
 /* Features, those without lags first. */
 HSEP_API uint64_t hsep_trusted_n(const hsep_predictor_settings *settings);
@@ -85,7 +86,8 @@ HSEP_API hsep_candidate *hsep_trusted_candidate(hsep_trusted *self, uint64_t i);
 
 /* The numbers learned besides it, for a warm start before the first window: their count, and the place of one of them.
  * These are, each >= 0: n_rows, velocity_scale, the scale of the residuals as in its struct, the noise variances of the
- * candidates, their correlations, the blend's weights and largest; then the blend's gram and cross. */
+ * candidates, their correlations, the blend's weights and largest; then the blend's gram and cross, and what is known
+ * of the sensor: its spread, -1 where it is not known, and its step, then infinite. */
 HSEP_API uint64_t hsep_trusted_n_learned(const hsep_trusted *self);
 HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i);
 

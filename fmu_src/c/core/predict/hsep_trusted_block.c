@@ -56,6 +56,7 @@ static double trusted_lay_out(hsep_trusted *self, const hsep_trusted_parameters 
     self->measured = hsep_take(&end, Np);
     self->accepted = hsep_take(&end, Np);
     self->bridged = hsep_take(&end, Np + (double)settings->p);
+    self->disagreement = hsep_take(&end, Np);
     self->rows = hsep_take(&end, Np * n_static);
     self->disturbances = hsep_take_block(&end, hsep_disturbances_size(settings, parameters->n_modes));
     self->regression = hsep_take_block(&end, hsep_regression_size(hsep_trusted_n(settings)));
@@ -105,7 +106,7 @@ HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters
 
 HSEP_API uint64_t hsep_trusted_n_learned(const hsep_trusted *self)
 {
-    return 2 + 3 + 2 * HSEP_N_CANDIDATES + self->n_static + HSEP_N_BLENDED * (HSEP_N_BLENDED + 2);
+    return 2 + 3 + 2 * HSEP_N_CANDIDATES + self->n_static + HSEP_N_BLENDED * (HSEP_N_BLENDED + 2) + 2;
 }
 
 HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i)
@@ -129,6 +130,8 @@ HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i)
         {hsep_at(self, self->largest), self->n_static},
         {self->blend.gram, HSEP_N_BLENDED * HSEP_N_BLENDED},
         {self->blend.cross, HSEP_N_BLENDED},
+        {&self->guard.spread, 1},
+        {&self->guard.held.step, 1},
     };
     size_t part = 0;
     for (; i >= parts[part].n; part++) {
@@ -139,8 +142,9 @@ HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i)
 
 HSEP_API int hsep_trusted_sound(hsep_trusted *self)
 {
-    const uint64_t n = hsep_trusted_n_learned(self), n_signed = HSEP_N_BLENDED * (HSEP_N_BLENDED + 1);
-    int sound = 1;
+    const uint64_t n = hsep_trusted_n_learned(self) - 2, n_signed = HSEP_N_BLENDED * (HSEP_N_BLENDED + 1);
+    const double spread = self->guard.spread;
+    int sound = self->guard.held.step > 0.0 && (spread == -1.0 || (spread >= 0.0 && isfinite(spread)));
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
         sound = sound && hsep_trusted_candidate(self, i)->correlation >= 1.0;
     }
