@@ -73,7 +73,7 @@ def test_the_machine_file_in_the_readme_is_valid(tmp_path: Path) -> None:
     "example", sorted(path.name for path in (ROOT / "examples").glob("*.py") if "__main__" in path.read_text("utf-8"))
 )
 def test_examples_run(example: str, tmp_path: Path) -> None:
-    command = [sys.executable, "-W", "error", ROOT / "examples" / example]
+    command = [sys.executable, "-W", "error", str(ROOT / "examples" / example)]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert done.stdout
