@@ -353,6 +353,7 @@ _OTHERS = (
     # The stage's disturbance and the encoder.
     real(0.0, 0.0, 1.0, "m", "friction of the carriage, as an offset of the command", name="f", display_unit="um"),
     real(0.0, 0.0, 1e6, "1/m", "cable stiffness, an offset kappa·x·|x| of the command", name="kappa"),
+    choice("command", ("command", "motion"), "velocity of the friction: commanded or actual", name="friction_on"),
     real(0.0, 0.0, 1.0, "m", "standard deviation of the encoder noise", name="noise_std", display_unit="um"),
     whole(0, 0, 2**31 - 1, "seed of the encoder noise", name="seed"),
     # The source of commands.
