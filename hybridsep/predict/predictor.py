@@ -25,7 +25,7 @@ from .reference_features import ReferenceFeatures
 from .regression import RidgeRegression
 from .saved_predictor import predictor_blob, predictor_from
 from .trusted import TrustedModel
-from .window import PredictedWindow, Prediction, WindowOperator
+from .window import PredictedWindow, Prediction, WindowOperator, path_beyond
 
 __all__ = ["HybridPredictor"]
 
@@ -137,7 +137,9 @@ class HybridPredictor:
         if len(path) < n:
             raise SignalError(f"reference must have at least the {n} samples of x_d, got {len(path)}")
         signs = self.reference_features.signs(path, start)
-        forecast = None if self.trusted is None else self.trusted.forecast(command, x_pb)
+        forecast = None
+        if self.trusted is not None:
+            forecast = self.trusted.forecast(command, x_pb, path_beyond(path, start, n))
         self.pending = PredictedWindow(command, x_pb, start, path, signs, forecast)
         features = self.reference_features.features(signs, n)
         e_h = self._free_run(x_pb, features) if forecast is None else forecast.e_h
@@ -215,6 +217,13 @@ class HybridPredictor:
             g_pb=g_pb,
             free_pb=free_pb + start * (1.0 - np.cumsum(g_pb)),
         )
+
+    def physics_operator(self, n: int) -> tuple[Array, Array]:
+        """Return the first column of ``G_pb``, m/m, and its free response, m, ``(n,)`` each; the start is known."""
+        assert self.start is not None
+        g_pb = self.discrete.impulse_response(n)
+        free, _ = self.discrete.forced_response(self.state, np.zeros(n))
+        return g_pb, free + self.start * (1.0 - np.cumsum(g_pb))
 
     @property
     def n_pending(self) -> int:

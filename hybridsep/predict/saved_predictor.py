@@ -13,7 +13,7 @@ from ..model.physics import ModalModel, Mode
 from .features import FeatureLayout
 from .reference_features import N_REFERENCE
 from .saved_trusted import restore_trusted, restored_forecast, trusted_blob, trusted_fields
-from .window import PredictedWindow
+from .window import PredictedWindow, path_beyond
 
 if TYPE_CHECKING:
     from .predictor import HybridPredictor
@@ -94,5 +94,6 @@ def _pending(predictor: HybridPredictor, saved: Saved) -> PredictedWindow:
     x_pb = saved.array("pending_x_pb", len(x_d))
     signs = saved.array("pending_signs", len(predictor.reference_features.signs(reference, start)))
     model = predictor.trusted
-    forecast = None if model is None else restored_forecast(model, saved, x_d, x_pb)
+    path = path_beyond(reference, start, len(x_d))
+    forecast = None if model is None else restored_forecast(model, saved, x_d, x_pb, path)
     return PredictedWindow(x_d, x_pb, start, reference, signs, forecast)

@@ -93,10 +93,10 @@ def restore_trusted(model: TrustedModel, saved: Saved) -> None:
         model.guard.restore(saved.array("guard", N_STATE, finite=False))
 
 
-def restored_forecast(model: TrustedModel, saved: Saved, x_d: Array, x_pb: Array) -> Forecast:
+def restored_forecast(model: TrustedModel, saved: Saved, x_d: Array, x_pb: Array, path: Array | None) -> Forecast:
     """Return the forecast of the pending window, which follows from the state; StateError if it overflows."""
     with np.errstate(all="ignore"):
-        forecast = model.forecast(x_d, x_pb)
+        forecast = model.forecast(x_d, x_pb, path)
     if not np.isfinite(forecast.e_h).all():
         raise saved.error("the prediction of the pending window must be finite")
     return forecast

@@ -17,7 +17,7 @@ from ..base.settings import PredictorSettings
 from ..base.signals import Array
 from ..model.discrete import DiscreteModel
 from .blend import Blend
-from .candidates import Candidate, CandidatePrediction, ResidualScale, lags
+from .candidates import Candidate, CandidatePrediction, ResidualScale, SolvedCandidate, lags
 from .disturbances import LEAST_VELOCITY, StaticFeatures, StaticState
 from .guard import SensorGuard
 from .regression import RidgeRegression
@@ -117,30 +117,57 @@ class TrustedModel:
         self.n_rejected = 0
         self._discount(_CARRIED * self.settings.Np / max(self.n_rows, _CARRIED * self.settings.Np))
 
-    def forecast(self, x_d: Array, x_pb: Array) -> Forecast:
+    def forecast(self, x_d: Array, x_pb: Array, path: Array | None = None) -> Forecast:
         """Predict the residual over the next window; nothing is changed.
 
         Parameters
         ----------
         x_d, x_pb : (n,) array, m
             Commands and physics-based prediction, relative to the start.
+        path : (m,) array, m, optional
+            Commanded positions as far as they are known, in a compensator.
+        """
+        velocity_scale, largest = self.scales(x_d, x_pb, path)
+        predictions: tuple[CandidatePrediction, ...] = ()
+        if self.has_learned(velocity_scale):
+            rows, _ = self.static.rows(self.state, x_d, x_pb, x_pb, velocity_scale)
+            solved = [self.solve(candidate, largest) for candidate in self.candidates]
+            # The stiffness acts at the position, which the physics model alone does not give well enough.
+            x = x_pb + self.predict(solved[0], rows).e_h
+            rows, _ = self.static.rows(self.state, x_d, x_pb, x, velocity_scale)
+            predictions = tuple(self.predict(candidate, rows) for candidate in solved)
+        hold = self.hold
+        e_h = self.blend.weights @ self._blended(hold, predictions, len(x_d))
+        return Forecast(x_d, x_pb, e_h, hold, predictions, largest, velocity_scale)
+
+    def scales(self, x_d: Array, x_pb: Array, path: Array | None = None) -> tuple[float, Array]:
+        """Return the velocity scale of the friction, m/s, and the largest magnitudes of the features, window included.
+
+        Parameters
+        ----------
+        x_d, x_pb : (n,) array, m
+            Commands and physics-based prediction of the next window, relative to the start.
+        path : (m,) array, m, optional
+            Commanded positions as far as they are known: a compensator begins to move before them, with a creep.
         """
         peak = self.static.peak_velocity(self.state, x_d)
         outgrown = peak > max(_GROWTH * self.velocity_scale, LEAST_VELOCITY)
+        if path is not None and self.n_rows == 0.0:
+            peak = max(float(np.abs(np.diff(path)).max(initial=0.0)) / self.settings.T_s, self.velocity_scale)
+            outgrown = peak > max(self.velocity_scale, LEAST_VELOCITY)
         velocity_scale = peak if outgrown else self.velocity_scale
         rows, _ = self.static.rows(self.state, x_d, x_pb, x_pb, velocity_scale)
         before = np.zeros(self.static.n) if outgrown else self.largest
-        largest = np.maximum(before, np.abs(rows).max(axis=0))
-        bound = self._bound  # residuals that were not learned may be larger
-        hold = min(max(float(self.past[0]), -bound), bound)
-        predictions: tuple[CandidatePrediction, ...] = ()
-        if self.n_rows > 0.0 and not outgrown and self.scale.largest_square > 0.0:
-            # The stiffness acts at the position, which the physics model alone does not give well enough.
-            x = x_pb + self._predict(self.candidates[0], rows, largest).e_h
-            rows, _ = self.static.rows(self.state, x_d, x_pb, x, velocity_scale)
-            predictions = tuple(self._predict(candidate, rows, largest) for candidate in self.candidates)
-        e_h = self.blend.weights @ self._blended(hold, predictions, len(x_d))
-        return Forecast(x_d, x_pb, e_h, hold, predictions, largest, velocity_scale)
+        return velocity_scale, np.maximum(before, np.abs(rows).max(axis=0))
+
+    def has_learned(self, velocity_scale: float) -> bool:
+        """Return whether there is something to predict with at a velocity scale of :meth:`scales`, m/s."""
+        return self.n_rows > 0.0 and velocity_scale == self.velocity_scale and self.scale.largest_square > 0.0
+
+    @property
+    def hold(self) -> float:
+        """Last residual, m, bounded: one that was not learned may be larger."""
+        return min(max(float(self.past[0]), -self.bound), self.bound)
 
     def learn(self, forecast: Forecast, x: Array, *, fold: bool = True) -> None:
         """Learn from the measurement of a window.
@@ -186,19 +213,29 @@ class TrustedModel:
         self.blend.update(candidates[:, accepted], sound, self.scale.largest_square)
 
     @property
-    def _bound(self) -> float:
+    def bound(self) -> float:
         """Bound on what is predicted, m."""
         return _BOUND * self.scale.largest
 
-    def _predict(self, candidate: Candidate, rows: Array, largest: Array) -> CandidatePrediction:
-        """Return the prediction of a candidate, bounded by the residuals so far."""
+    def solve(self, candidate: Candidate, largest: Array) -> SolvedCandidate:
+        """Return a candidate with the weights that follow from all rows so far.
+
+        Parameters
+        ----------
+        candidate : Candidate
+        largest : (n_static,) array
+            Largest magnitudes of the static features, those of the window to predict included.
+        """
         scale = self.scale
         effect = self.settings.effect or math.sqrt(scale.largest_square)
         least = min(self.settings.lam, _LEAST_NOISE * scale.largest_square)
-        static_scales = effect * self.static.shares / np.maximum(largest, 1e-150)
-        found = candidate.predict(self.regression, static_scales, rows, self.past, scale, least)
+        return candidate.solve(self.regression, effect * self.static.shares / np.maximum(largest, 1e-150), least)
+
+    def predict(self, solved: SolvedCandidate, rows: Array) -> CandidatePrediction:
+        """Return the prediction of a candidate over a window, bounded by the residuals so far."""
+        found = solved.predict(rows, self.past[: len(solved.lag_weights)], self.scale)
         return found._replace(
-            e_h=np.clip(found.e_h, -self._bound, self._bound), noise_variance=found.noise_variance / self.n_rows
+            e_h=np.clip(found.e_h, -self.bound, self.bound), noise_variance=found.noise_variance / self.n_rows
         )
 
     @staticmethod
