@@ -73,6 +73,8 @@ class SepCompensator:
             self._basis, predictor.T_s, settings.limits, settings.change_max, no_reversal=settings.no_reversal
         )
         self._monitor = PlanMonitor()
+        if predictor.trusted is not None:
+            predictor.trusted.plan_ahead(self.preview)
         self.restart(predictor.start, t_init=predictor.settings.warm_up)
 
     def restart(self, start: float | None = None, *, t_init: float = 0.0, lead_in: int = 0) -> None:

@@ -40,7 +40,7 @@ _LEAST_NOISE = 1e-4
 """Bound on λ relative to the largest mean square of the residual: a larger λ would prevent any learning."""
 
 _CARRIED = 10.0
-"""Largest weight of earlier runs when another begins, in windows: a machine may have changed meanwhile."""
+"""Largest weight of earlier runs when another begins, in look-aheads: a machine may have changed meanwhile."""
 
 _SURPRISE, _SURPRISED = 10.0, 0.1
 """Mean square error of a window, relative to the expected one, above which the machine has changed; and what then
@@ -94,7 +94,7 @@ class TrustedModel:
     """
 
     def __init__(self, settings: PredictorSettings, discrete: DiscreteModel) -> None:
-        self.settings = settings
+        self.settings, self.look_ahead = settings, settings.Np
         self.static = StaticFeatures(discrete, settings.q)
         p = settings.p
         self.regression = RidgeRegression(self.static.n + p, _NO_PENALTY)
@@ -115,7 +115,13 @@ class TrustedModel:
         self.past_bridged: NDArray[np.bool_] = np.zeros(self.settings.p, dtype=np.bool_)
         self.guard.restart()
         self.n_rejected = 0
-        self._discount(_CARRIED * self.settings.Np / max(self.n_rows, _CARRIED * self.settings.Np))
+        carried = _CARRIED * self.look_ahead
+        self._discount(carried / max(self.n_rows, carried))
+
+    def plan_ahead(self, preview: int) -> None:
+        """Adapt to a compensator, which plans over a preview, in samples, and moves the drive as it commands."""
+        self.look_ahead = preview
+        self.static.damping_of_motion = preview > self.settings.Np
 
     def forecast(self, x_d: Array, x_pb: Array, path: Array | None = None) -> Forecast:
         """Predict the residual over the next window; nothing is changed.
