@@ -127,7 +127,7 @@ def cases(emps: Path | None = None, recordings: Path | None = None) -> Iterator[
         yield simulated(f"staircase of 7 mm, stage {axis}", machine, short_staircase())
     if emps is not None:
         machine = load_machine("emps")
-        log = read_log(emps, columns=machine.log.given())
+        log = read_log(emps, columns=machine.log.columns)
         yield Case("EMPS", machine.model, machine.predictor_settings, log.x_d, (log.x_meas, log.x_meas))
     files = [] if recordings is None else sorted(recordings.glob("*.csv"))
     for Np in WINDOWS:

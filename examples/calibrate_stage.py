@@ -68,7 +68,8 @@ def compare_assumptions() -> None:
             found = backtest(predictor, command, measured(machine, command, f, ratio)).overall
             print(
                 f"{axis.upper()}  {name:<26}f = {f:.4e} m: {1e6 * found.rms_pb:6.1f} → {1e6 * found.rms_h:5.1f} µm, "
-                f"−{found.reduction_percent:.0f} % (printed: −{PRINTED[f'spiral_{axis}']['reduction_percent']:g} %)",
+                f"−{found.reduction_percent:.0f} % (printed: −{PRINTED[f'spiral_{axis}']['reduction_percent']:g} %), "
+                f"{found.ratio_to_hold:.2f} × hold",
                 flush=True,
             )
 

@@ -40,16 +40,17 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-__all__ = ["Machine", "load_machine", "machine_names", "machine_path"]
+__all__ = ["Machine", "load_machine", "machine_from_table", "machine_names", "machine_path"]
 
 
 class Machine(Section):
-    """One axis: identification, physics model, settings and, where there is one, simulated plant."""
+    """One axis: identification, physics model, settings, plant if it has one; ``unit`` rad: every m stands for rad."""
 
     name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")
     title: Line
-    sources: tuple[Line, ...] = Field(min_length=1)
+    sources: tuple[Line, ...] = Field(default=(), min_length=1)
     T_s: Number = PARAMETERS["T_s"].default
+    unit: Literal["m", "rad"] = "m"
     physics: Physics
     predictor: PredictorSection = PredictorSection()
     compensator: CompensatorSection = CompensatorSection()
@@ -64,6 +65,8 @@ class Machine(Section):
             raise ValueError("a plant of kind feed_drive needs [physics.spring_mass_damper]")
         if isinstance(self.plant, StageSection) and not self.physics.mode:
             raise ValueError("a plant of kind stage needs [[physics.mode]] entries")
+        if self.plant is not None and self.unit != "m":
+            raise ValueError("a machine with a plant must have unit = 'm': the plants are linear axes")
         if self.plant is not None and self.physics.dead_time:
             raise ValueError("a machine with a plant must have physics.dead_time = 0: the plants have none")
         if self.plant is not None:
@@ -122,7 +125,7 @@ class Machine(Section):
         """
         table = self.model_dump(by_alias=True, exclude_unset=True)
         table[section] = {**table.get(section, {}), **values}
-        return _validated(table)
+        return machine_from_table(table)
 
     def new_predictor(self, settings: PredictorSettings | None = None) -> HybridPredictor:
         """Return a predictor for this machine, with its :attr:`predictor_settings` unless others are given."""
@@ -257,7 +260,7 @@ def load_machine(machine: str | Path) -> Machine:
     except (ValueError, RecursionError) as error:  # an integer of 5000 digits is a ValueError, too
         raise MachineError(f"{path.name} is not valid TOML: {error}") from error
     try:
-        return _validated(content)
+        return machine_from_table(content)
     except ParameterError as error:
         raise MachineError(f"{path.name}: {error}") from error
 
@@ -266,8 +269,8 @@ def _without(names: tuple[str, ...], values: Mapping[str, Any]) -> dict[str, Any
     return {name: value for name, value in values.items() if name not in names}
 
 
-def _validated(content: Mapping[str, Any]) -> Machine:
-    """Return the machine of a file's content; ParameterError if it is invalid."""
+def machine_from_table(content: Mapping[str, Any]) -> Machine:
+    """Return the machine of a file's content, its tables as mappings; ParameterError if it is invalid."""
     try:
         return Machine(**content)
     except ValidationError as error:

@@ -191,8 +191,15 @@ class DriveLimitsSection(LimitsSection):
 
 
 class LogSection(Entries):
-    """Names of a recorded log's columns; those of :func:`hybridsep.logs.log.open_log` where they are left out."""
+    """How a recorded log is read; as by :func:`hybridsep.logs.log.open_log` where an entry is left out."""
 
     t: str | None = None
     x_d: str | None = None
     x: str | None = None
+    unit: str | None = None
+    axis: str | None = None
+
+    @property
+    def columns(self) -> dict[str, str]:
+        """Names of the columns by role."""
+        return {name: value for name, value in self.given().items() if name in ("t", "x_d", "x")}

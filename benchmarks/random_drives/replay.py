@@ -15,6 +15,7 @@ from hybridsep.base.errors import SignalError
 from hybridsep.base.metrics import rms
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
+from hybridsep.evaluate.backtest import backtest
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.predictor import HybridPredictor
 
@@ -35,12 +36,7 @@ PREDICTORS: dict[str, Callable[[ModalModel], HybridPredictor]] = {
 
 def library_replay(predictor: str, model: ModalModel, x_d: Array, x_meas: Array) -> Array:
     """Return ``x_h`` of the library's predictor, ``(n,)``, m; with trust ``x_meas`` is NaN where missing."""
-    online, x_h = PREDICTORS[predictor](model), np.empty(len(x_d))
-    for first in range(0, len(x_d), online.Np):
-        window = slice(first, first + online.Np)
-        x_h[window] = online.predict(x_d[window]).x_h
-        online.update(x_meas[window])
-    return x_h
+    return backtest(PREDICTORS[predictor](model), x_d, x_meas).x_h
 
 
 @dataclass(frozen=True)

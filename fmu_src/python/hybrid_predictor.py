@@ -21,9 +21,11 @@ class HybridPredictorPy(look_ahead_slave.LookAheadSlave):
             return 0
         if name == "hybrid_active":
             return False
-        if name in ("e_servo", "rms_pb", "rms_h"):
+        if name in ("x_h_std", "e_servo", "rms_pb", "rms_h", "rms_hold"):
             return 0.0
-        _, i = _window_index(name)
+        window, i = _window_index(name)
+        if window == "x_h_std_window":
+            return 0.0
         return float(self.values["x_d_ahead"]) if i < self.values["Np"] else 0.0
 
     def current_value(self, name: str) -> float | int | bool:

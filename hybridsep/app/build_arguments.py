@@ -38,7 +38,7 @@ def jobs_of(fmus: Sequence[str], machines: Sequence[str], flavour: str, targets:
 
 
 def extras_of(
-    jobs: Sequence[Job], weights: Path | None, trajectory: Path | None, unit: str, T_s: float | None
+    jobs: Sequence[Job], weights: Path | None, trajectory: Path | None, unit: str | None, T_s: float | None
 ) -> dict[str, dict[str, Any]]:
     """Return weights or samples of a trajectory for one of the FMUs: model → keywords of ``build_fmu``."""
     extras: dict[str, dict[str, Any]] = {}

@@ -1,4 +1,4 @@
-"""Command line ``hybridsep demo | build | cosim | backtest``."""
+"""Command line ``hybridsep fit | identify | init | demo | build | cosim | backtest | example-log``."""
 
 from __future__ import annotations
 
@@ -13,6 +13,10 @@ from .command_backtest import backtest
 from .command_build import build
 from .command_cosim import cosim
 from .command_demo import demo
+from .command_example_log import example_log
+from .command_fit import fit
+from .command_identify import identify
+from .command_init import init
 from .failures import DEBUG_VARIABLE, run
 
 __all__ = ["app", "main"]
@@ -26,7 +30,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     add_completion=False,
 )
-for _command in (demo, build, cosim, backtest):
+for _command in (fit, identify, init, demo, build, cosim, backtest, example_log):
     app.command()(_command)
 
 

@@ -10,7 +10,7 @@ import typer
 
 from ..base.output import written_text
 from .failures import loading
-from .options import ForceOption, JsonOption, MachineOption, TsOption, UnitOption
+from .options import AxisOption, ForceOption, JsonOption, MachineOption, TsOption, UnitOption
 from .parameter_options import PREDICTOR_ENTRIES, takes_parameters
 
 __all__ = ["backtest"]
@@ -19,51 +19,118 @@ __all__ = ["backtest"]
 @takes_parameters(PREDICTOR_ENTRIES)
 def backtest(
     log: Annotated[
-        Path, typer.Argument(help="CSV with the columns t, x_d, x_meas or x, or .npz or .mat with named columns.")
+        Path,
+        typer.Argument(
+            help="Recorded log with the columns t, x_d, x_meas or x: CSV, .npz, .mat, HDF5 or Siemens Capture JSON."
+        ),
     ],
     machine: MachineOption,
-    unit: UnitOption = "m",
+    unit: UnitOption = None,
     T_s: TsOption = None,
+    axis: AxisOption = None,
     t: Annotated[str | None, typer.Option("--t", help="Name of the time column.")] = None,
-    x_d: Annotated[str | None, typer.Option("--x-d", help="Name of the commanded position's column.")] = None,
+    x_d: Annotated[str | None, typer.Option("--x_d", "--x-d", help="Name of the commanded position's column.")] = None,
     x: Annotated[str | None, typer.Option("--x", help="Name of the measured position's column.")] = None,
+    fix: Annotated[bool, typer.Option("--fix", help="Apply the fixes of what the checks of the log find.")] = False,
+    as_is: Annotated[
+        bool, typer.Option("--as-is", help="Replay the log with the faults that the checks find in it.")
+    ] = False,
+    weights: Annotated[
+        Path | None, typer.Option(help="A predictor saved with --save, to begin with what it learned.")
+    ] = None,
     *,
     parameters: dict[str, Any],
     out: Annotated[Path | None, typer.Option(help="CSV for the RMS errors batch by batch.")] = None,
+    figure: Annotated[
+        Path | None, typer.Option(help="PNG, PDF or SVG with the errors of the predictions over time.")
+    ] = None,
+    save: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="File for what was learned (.state, for --weights here, of build and of cosim), or for the "
+            "predictions sample by sample (.csv, .npz); may be given for each."
+        ),
+    ] = None,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Replay a recorded log causally: physics model, hold baseline and hybrid."""
+    """Check a recorded log and replay it causally: physics model, hold baseline and hybrid."""
     with loading():
+        from ..base.errors import ParameterError
         from ..evaluate.backtest import Batch, backtest_stream
-        from ..logs.log import open_log
+        from ..evaluate.backtest import backtest as backtest_whole
+        from ..evaluate.replayed import replayed_run
+        from ..evaluate.scores import Scores
+        from ..fmi.warm_start import load_trained
+        from ..logs.log import Log
         from ..machine import load_machine, machine_path
-        from .arguments import check_interval
-        from .overwrite import BATCH_COLUMNS, BATCHES, Output, check_outputs
+        from .arguments import check_ending
+        from .log_intake import findings_table, open_checked
+        from .overwrite import BATCH_COLUMNS, BATCHES, BY_ENDING, Output, check_outputs
         from .progress import progress_bar
         from .tables import print_scores
 
-    axis = load_machine(machine)
+        if figure is not None:
+            from ..evaluate.time_plots import prediction_figure
+
+    axis_machine = load_machine(machine)
+    if fix and as_is:
+        raise ParameterError("--fix and --as-is exclude each other")
+    saved = list(save or [])
+    check_ending(figure, "--figure", (".png", ".pdf", ".svg"))
+    for path in saved:
+        check_ending(path, "--save", (".state", ".csv", ".npz"))
     given = {role: column for role, column in (("t", t), ("x_d", x_d), ("x", x)) if column}
-    names = {**axis.log.given(), **given}
+    names = {**axis_machine.log.columns, **given}
     if T_s is not None and t is None:
         names.pop("t", None)  # there may be none
-    predictor = axis.changed("predictor", parameters).new_predictor()
-    reader = open_log(log, columns=names, unit=unit, T_s=T_s)
-    check_interval(log.name, reader.T_s, axis)
+    own = axis_machine.log
+    changed = axis_machine.changed("predictor", parameters)
+    predictor = changed.new_predictor()
+    reading = {
+        "columns": names,
+        "unit": unit or own.unit,
+        "T_s": T_s,
+        "axis": axis or own.axis,
+        "may_miss": predictor.settings.trust,
+    }
+    if weights is not None:
+        predictor = load_trained(weights, changed, "HybridPredictor")
+        predictor.restart()
     outputs = [] if out is None else [Output("--out", out, BATCHES)]
-    check_outputs(outputs, {"log": log, "machine file": machine_path(machine)}, force=force)
+    outputs += [Output("--figure", figure, BY_ENDING[figure.suffix.lower()])] if figure is not None else []
+    outputs += [Output("--save", path, BY_ENDING[path.suffix.lower()]) for path in saved]
+    inputs = {"log": log, "machine file": machine_path(machine), "saved predictor": weights}
+    opened, intake = open_checked(log, reading, axis_machine, fix=fix, as_is=as_is)
+    check_outputs(outputs, inputs, force=force)
+    n_samples = len(opened.t) if isinstance(opened, Log) else opened.n_samples
     rows: list[tuple[float, ...]] = []
+    title = f"{axis_machine.title}, {log.name}"
     with progress_bar(as_json) as advance:
 
         def on_batch(batch: Batch) -> None:
             if out is not None:
-                rows.append((round(batch.k * reader.T_s, 9), batch.rms_pb, batch.rms_hold, batch.rms_h))
+                rows.append((round(batch.k * opened.T_s, 9), batch.rms_pb, batch.rms_hold, batch.rms_h))
             if batch.j % 100 == 0:
-                advance("replay", batch.k / reader.n_samples)
+                advance("replay", batch.k / n_samples)
 
-        scores = backtest_stream(predictor, reader.chunks(), on_batch=on_batch)
+        predictions = [path for path in saved if path.suffix.lower() != ".state"]
+        if isinstance(opened, Log) or figure is not None or predictions:
+            whole = opened if isinstance(opened, Log) else opened.read()
+            found = backtest_whole(predictor, whole.x_d, whole.x_meas, on_batch=on_batch)
+            scores: Scores = found
+            run = replayed_run(found, whole.x_d, whole.x_meas, whole.T_s, predictor.Np)
+            for path in predictions:
+                run.save(path)
+            if figure is not None:
+                prediction_figure(run, title, figure, unit=axis_machine.unit)
+        else:
+            scores = backtest_stream(predictor, opened.chunks(), on_batch=on_batch)
+    for path in saved:
+        if path.suffix.lower() == ".state":
+            predictor.save(path)
     if out is not None:
         with written_text(out) as file:
             csv.writer(file).writerows([BATCH_COLUMNS, *rows])
-    print_scores(scores.summary(), as_json, f"{axis.title}, {log.name}")
+    findings = findings_table(intake.findings)
+    print_scores(scores.summary(), scores.verdict, as_json, title, unit=axis_machine.unit, more={"findings": findings})

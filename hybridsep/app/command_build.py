@@ -36,7 +36,7 @@ def build(
         Path | None,
         typer.Option(help="CSV, .npz or .mat file with the columns t and x_d, for ReferenceTrajectory to play."),
     ] = None,
-    unit: UnitOption = "m",
+    unit: UnitOption = None,
     T_s: TsOption = None,
     out: Annotated[Path, typer.Option(help="Folder for the archives.")] = Path("dist"),
     force: ForceOption = False,

@@ -33,7 +33,7 @@ def cosim(
     trajectory: Annotated[
         str, typer.Option(help=f"{', '.join(TRAJECTORIES)}, or a CSV, .npz or .mat file with the columns t and x_d.")
     ] = "staircase",
-    unit: UnitOption = "m",
+    unit: UnitOption = None,
     T_s: TsOption = None,
     compensate: Annotated[
         str | None,

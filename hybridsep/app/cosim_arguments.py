@@ -23,7 +23,7 @@ from .parameter_options import COMPENSATOR_ENTRIES
 __all__ = ["check_pair", "checked_group", "fitting", "read_command"]
 
 
-def read_command(trajectory: str, axis: Machine, unit: str, T_s: float | None) -> Array:
+def read_command(trajectory: str, axis: Machine, unit: str | None, T_s: float | None) -> Array:
     """Return the samples of a named trajectory or of a file, at the machine's sampling interval."""
     check_reading(unit, T_s)
     limits = PAPER_LIMITS if axis.limits is None else axis.trajectory_limits()

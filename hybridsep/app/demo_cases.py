@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from ..base.metrics import largest, rms
-from ..compensate.plan import SepState
 from ..cosim.loop import cosimulate
-from ..cosim.run import PREDICTOR, Run
+from ..cosim.run import Run
 from ..evaluate.backtest import backtest
 from ..evaluate.path_plots import contour_figure, spiral_figure
+from ..evaluate.replayed import replayed_run
 from ..evaluate.time_plots import prediction_figure, tracking_figure
+from ..evaluate.verdict import verdict_of
 from ..logs.log import Log, read_log
 from ..machine import load_machine
 from ..plants.trajectory import spiral, staircase
@@ -52,6 +53,7 @@ def staircase_case(out: Path, seeds: int, flavour: str, advance: Callable[[str],
         "n_seeds": seeds,
         "batches_of_seed": 0,
         **_worse(runs[0]),
+        "verdict": str(verdict_of(runs[0])),
         "compensation": compensation,
     }
 
@@ -67,6 +69,7 @@ def spiral_case(out: Path, flavour: str, advance: Callable[[str], None]) -> Summ
         advance(label)
         axes[axis] = run = cosimulate(*fmus, command)
         case = summary[f"spiral_{axis}"] = {**run.summary(), "physics_tuned_to_printed": True, **_worse(run)}
+        case["verdict"] = str(verdict_of(run))
         for name, off in (("friction_alone", "kappa"), ("stiffness_alone", "f")):
             advance(f"{label}, {name.replace('_', ' ')}")
             case[name] = cosimulate(*fmus, command, plant_values={off: 0.0}).summary()
@@ -100,28 +103,16 @@ def read_recorded(path: str | Path) -> Log:
     LogError
         If the file cannot be read as a ``DATA_EMPS.mat``.
     """
-    return read_log(path, columns=load_machine("emps").log.given())
+    return read_log(path, columns=load_machine("emps").log.columns)
 
 
 def recorded_case(log: Log, out: Path) -> dict[str, Any]:
     """Replay the EMPS recording with its published constants."""
     predictor = load_machine("emps").new_predictor()
     found = backtest(predictor, log.x_d, log.x_meas)
-    run = Run(
-        kind=PREDICTOR,
-        t=np.asarray(np.arange(len(log.x_meas)) * log.T_s, dtype=np.float64),
-        x_d=log.x_d,
-        x_dm=log.x_d,
-        x=np.full(len(log.x_meas), np.nan),
-        x_meas=log.x_meas,
-        x_pb=found.x_pb,
-        x_h=found.x_h,
-        state=np.where(found.active, SepState.HYBRID, SepState.PHYSICS),
-        T_s=log.T_s,
-        Np=predictor.Np,
-    )
+    run = replayed_run(found, log.x_d, log.x_meas, log.T_s, predictor.Np)
     prediction_figure(run, "EMPS, a recorded axis: causal replay", out / "emps.png")
-    return {**found.summary(), **_worse(run)}
+    return {**found.summary(), **_worse(run), "verdict": str(found.verdict)}
 
 
 def _worse(run: Run) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from ..fmi.flavours import FLAVOURS
 
 __all__ = [
     "TRAJECTORIES",
+    "AxisOption",
     "FlavourOption",
     "ForceOption",
     "JsonOption",
@@ -39,7 +40,14 @@ FlavourOption = Annotated[str, typer.Option(help=f"Flavour of the FMUs: {', '.jo
 TsOption = Annotated[
     float | None, typer.Option("--T_s", "--Ts", help="Sampling interval [s], for a file without a time column.")
 ]
-UnitOption = Annotated[str, typer.Option(help="Unit of the positions in the file: m, mm or um.")]
+UnitOption = Annotated[
+    str | None,
+    typer.Option(
+        help="Unit of the positions in the file: m, mm, um, nm, in, or of a rotary axis rad, mrad, urad, deg, rev; "
+        "that of the columns' names (x [mm]) or m if left out."
+    ),
+]
+AxisOption = Annotated[str | None, typer.Option(help="Axis of a file that holds several, such as X1.")]
 WeightsOption = Annotated[
     Path | None,
     typer.Option(

@@ -10,8 +10,22 @@ from pathlib import Path
 
 from ..base.errors import ParameterError
 from ..cosim.run import COMPENSATOR, PREDICTOR
+from ..logs.example import EXAMPLE, HEAD
 
-__all__ = ["BATCHES", "BATCH_COLUMNS", "BY_ENDING", "FIGURE", "FMU", "RUN", "Kind", "Output", "check_outputs"]
+__all__ = [
+    "BATCHES",
+    "BATCH_COLUMNS",
+    "BY_ENDING",
+    "EXAMPLE_LOG",
+    "FIGURE",
+    "FIT_FILES",
+    "FMU",
+    "MACHINE",
+    "RUN",
+    "Kind",
+    "Output",
+    "check_outputs",
+]
 
 BATCH_COLUMNS = ("t", "rms_pb", "rms_hold", "rms_h")
 """Columns of the CSV of ``hybridsep backtest``."""
@@ -72,11 +86,35 @@ def _has_columns(*tables: tuple[str, ...]) -> Callable[[Path], bool]:
     return recognises
 
 
+def _contains(*parts: bytes) -> Callable[[Path], bool]:
+    """Return a test for a small file with one of the parts in it."""
+
+    def recognises(path: Path) -> bool:
+        with path.open("rb") as file:
+            content = file.read(100_000)
+        return any(part in content for part in parts)
+
+    return recognises
+
+
 def _is_our_fmu(path: Path) -> bool:
     if not zipfile.is_zipfile(path) or "modelDescription.xml" not in _members(path):
         return False
     with zipfile.ZipFile(path) as archive:
         return b'generationTool="hybridsep ' in archive.read("modelDescription.xml")
+
+
+def _is_example(path: Path) -> bool:
+    content = path.read_bytes()
+    first = HEAD.splitlines()[0].encode()
+    return content.startswith(first) or content == EXAMPLE.read_bytes()
+
+
+def _is_our_drawing(path: Path) -> bool:
+    """Return whether a PDF or SVG names its creator; a PDF may be the user's own paper."""
+    content = path.read_bytes()
+    named = (b"/Creator (hybridsep)", b"<dc:title>hybridsep</dc:title>")
+    return content.startswith((b"%PDF", b"<?xml")) and any(name in content for name in named)
 
 
 def _members(path: Path) -> list[str]:
@@ -86,13 +124,31 @@ def _members(path: Path) -> list[str]:
 
 BATCHES = Kind("CSV of hybridsep backtest", _has_columns(BATCH_COLUMNS))
 RUN = Kind("result of hybridsep cosim", _has_columns(PREDICTOR.columns, COMPENSATOR.columns))
+MACHINE = Kind("machine file", _contains(b"\n[physics", b"\n[[physics"))
 FIGURE = Kind("PNG", _begins_with(b"\x89PNG\r\n\x1a\n"))
+VECTOR_FIGURE = Kind("figure of hybridsep", _is_our_drawing)
 FMU = Kind("FMU of hybridsep", _is_our_fmu)
+EXAMPLE_LOG = Kind("example log of hybridsep", _is_example)
 STATE = Kind("saved predictor", _begins_with(b"HSEP"))
+FITTED = Kind("machine file of hybridsep fit", _begins_with(b"# Identified by hybridsep fit"))
+STAGES = Kind("result of hybridsep fit", _begins_with(b'{\n  "hybridsep": "'))
+REPORT = Kind("report of hybridsep", _begins_with(b"<!DOCTYPE html>\n<!-- report of hybridsep -->"))
 SUMMARY = Kind("summary of hybridsep demo", _begins_with(b'{\n  "staircase": {'))
 
-BY_ENDING = {".csv": RUN, ".npz": RUN, ".png": FIGURE, ".fmu": FMU, ".state": STATE, ".json": SUMMARY}
+BY_ENDING = {
+    ".csv": RUN,
+    ".npz": RUN,
+    ".png": FIGURE,
+    ".pdf": VECTOR_FIGURE,
+    ".svg": VECTOR_FIGURE,
+    ".fmu": FMU,
+    ".state": STATE,
+    ".json": SUMMARY,
+}
 """Kinds of the files that the library names itself."""
+
+FIT_FILES = {".toml": FITTED, ".json": STAGES, ".html": REPORT, ".fmu": FMU, ".state": STATE}
+"""Kinds of the files of ``hybridsep fit``."""
 
 
 def check_outputs(outputs: Iterable[Output], inputs: Mapping[str, str | Path | None], *, force: bool = False) -> None:

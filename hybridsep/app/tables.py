@@ -13,19 +13,28 @@ from rich.console import Console
 from rich.table import Table
 
 from ..cosim.run import PREDICTOR, Run
+from ..evaluate.verdict import Verdict, verdict_of
 from .printed import PRINTED
 
-__all__ = ["console", "print_compensation", "print_json", "print_predictions", "print_run", "print_scores"]
+__all__ = [
+    "console",
+    "print_compensation",
+    "print_json",
+    "print_predictions",
+    "print_run",
+    "print_scores",
+    "shown_figure",
+]
 
 console = Console()
 
-PAPER_COLUMN = "paper: physics → hybrid, reduction, as printed there"
+PAPER_COLUMN = "× hold: RMS relative to holding the last residual; paper: physics → hybrid, reduction, as printed there"
 
 
 def print_predictions(summary: Mapping[str, Mapping[str, Any]]) -> None:
     """Print the prediction errors of the demo."""
     title = "Prediction error, RMS in µm against the measured position"
-    table = _table_of_cases(title, PAPER_COLUMN, ("physics", "hold", "hybrid", "reduction", "paper"))
+    table = _table_of_cases(title, PAPER_COLUMN, ("physics", "hold", "hybrid", "reduction", "× hold", "paper"))
     for name, case in summary.items():
         table.add_row(name, *_figures(case), _printed(PRINTED[name]))
         for part in ("friction_alone", "stiffness_alone"):
@@ -44,6 +53,8 @@ def print_predictions(summary: Mapping[str, Mapping[str, Any]]) -> None:
             f"{text}{f' (from {times} s on)' if worse else ''}, worse than hold in {case['n_batches_worse_than_hold']}",
             highlight=False,
         )
+    for name, case in summary.items():
+        console.print(f"\n{name}\n{case['verdict']}", highlight=False)
 
 
 def print_compensation(summary: Mapping[str, Mapping[str, Any]]) -> None:
@@ -56,7 +67,7 @@ def print_compensation(summary: Mapping[str, Mapping[str, Any]]) -> None:
     rows["spiral, contour"] = ("spiral_x", "contour_rms_um")
     for label, (name, figure) in rows.items():
         compensation = summary[name]["compensation"]
-        table.add_row(label, *(_figure(compensation[kind][figure]) for kind in kinds))
+        table.add_row(label, *(shown_figure(compensation[kind][figure]) for kind in kinds))
     console.print(table)
 
 
@@ -70,9 +81,9 @@ def _table_of_cases(title: str, caption: str, columns: Iterable[str]) -> Table:
 
 
 def _figures(case: Mapping[str, Any]) -> list[str]:
-    """Return physics, hold, hybrid and reduction of a case as text, a dash where there is no figure."""
-    figures = [_figure(case.get(name)) for name in ("rms_pb_um", "rms_hold_um", "rms_h_um")]
-    return [*figures, _figure(case.get("reduction_percent"), " %")]
+    """Return physics, hold, hybrid, reduction and ratio to hold of a case as text, a dash where there is no figure."""
+    figures = [shown_figure(case.get(name)) for name in ("rms_pb_um", "rms_hold_um", "rms_h_um")]
+    return [*figures, shown_figure(case.get("reduction_percent"), " %"), shown_figure(case.get("ratio_to_hold"))]
 
 
 def _printed(case: Mapping[str, float]) -> str:
@@ -82,34 +93,66 @@ def _printed(case: Mapping[str, float]) -> str:
     return f"{case['rms_pb_um']:g}→{case['rms_h_um']:g}, {case['reduction_percent']:g} %"
 
 
-def _figure(value: float | None, unit: str = "") -> str:
+def shown_figure(value: float | None, unit: str = "") -> str:
+    """Return a figure as text, a dash where there is none."""
     if value is None or not np.isfinite(value):
         return "–"
     return f"{value:.1f}{unit}" if unit else f"{value:.2f}"
 
 
-def print_scores(summary: Mapping[str, float | int], as_json: bool, title: str) -> None:
-    """Print prediction errors, of a run or of a backtest."""
+def print_scores(
+    summary: Mapping[str, float | int],
+    verdict: Verdict,
+    as_json: bool,
+    title: str,
+    *,
+    unit: str = "m",
+    more: Mapping[str, Any] | None = None,
+) -> None:
+    """Print prediction errors, of a run or of a backtest, and what they mean.
+
+    Parameters
+    ----------
+    summary : mapping
+        Scores, in millionths of the axis's unit.
+    verdict : Verdict
+    as_json : bool
+        Print them as JSON, with ``more``; the names of a rotary axis's end in ``_urad``.
+    title : str
+    unit : {"m", "rad"}
+        Unit of the axis's positions.
+    more : mapping, optional
+    """
     if as_json:
-        print_json(summary)
+        print_json(
+            {
+                **{name.replace("_um", f"_u{unit}"): value for name, value in summary.items()},
+                "verdict": str(verdict),
+                **(more or {}),
+            }
+        )
         return
-    table = Table(title=f"{title}: prediction error in µm against the measured position")
-    for column in ("", "physics", "hold", "hybrid", "reduction"):
+    table = Table(title=f"{title}: prediction error in µ{unit} against the measured position")
+    for column in ("", "physics", "hold", "hybrid", "reduction", "× hold"):
         table.add_column(column, justify="right")
     for suffix, label in (("", ""), ("_after_warm_up", " after warm-up")):
         for quantity in ("rms", "max"):
             figures = [summary.get(f"{quantity}_{name}_um{suffix}") for name in ("pb", "hold", "h")]
             if all(figure is not None for figure in figures):
-                shown = _figure(summary[f"reduction_percent{suffix}"], " %") if quantity == "rms" else ""
+                compared = [summary[f"{name}{suffix}"] for name in ("reduction_percent", "ratio_to_hold")]
+                shown = [shown_figure(compared[0], " %"), shown_figure(compared[1])] if quantity == "rms" else ["", ""]
                 label_text = f"{quantity.upper() if quantity == 'rms' else quantity}{label}"
-                table.add_row(label_text, *map(_figure, figures), shown)
+                table.add_row(label_text, *map(shown_figure, figures), *shown)
     console.print(table)
+    console.print(str(verdict), highlight=False)
 
 
 def print_run(run: Run, as_json: bool, title: str) -> None:
     """Print the figures of a run: its prediction errors, or its tracking errors."""
-    show = print_scores if run.kind == PREDICTOR else _print_tracking
-    show(run.summary(), as_json, title)
+    if run.kind == PREDICTOR:
+        print_scores(run.summary(), verdict_of(run), as_json, title)
+    else:
+        _print_tracking(run.summary(), as_json, title)
 
 
 def _print_tracking(summary: Mapping[str, float | int], as_json: bool, title: str) -> None:
@@ -125,7 +168,7 @@ def _print_tracking(summary: Mapping[str, float | int], as_json: bool, title: st
         ("tracking_measured", "tracking error, measured position"),
         ("change", "change of the command"),
     ):
-        table.add_row(label, *(_figure(summary[f"{name}_{quantity}_um"]) for quantity in ("rms", "max")))
+        table.add_row(label, *(shown_figure(summary[f"{name}_{quantity}_um"]) for quantity in ("rms", "max")))
     console.print(table)
     peaks = [summary[f"peak_{name}"] for name in ("velocity_m_s", "acceleration_m_s2", "jerk_m_s3")]
     console.print(

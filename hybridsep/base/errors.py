@@ -8,6 +8,7 @@
     ├── LogError         a recorded log that cannot be read: columns, time axis, format
     ├── MachineError     a machine file that cannot be read or is inconsistent
     ├── ModelError       a linear model that is unstable, improper or of an unsupported kind
+    ├── IdentificationError  a recording or a frequency response that cannot teach a model
     ├── StateError       a saved state that is foreign, truncated or of another version
     └── FmuError         an FMU that cannot be built, or a call that FMI does not allow now
 
@@ -19,6 +20,7 @@ from __future__ import annotations
 __all__ = [
     "FmuError",
     "HybridSepError",
+    "IdentificationError",
     "LogError",
     "MachineError",
     "ModelError",
@@ -60,6 +62,10 @@ class MachineError(HybridSepError, ValueError):
 
 class ModelError(HybridSepError, ValueError):
     """A linear model is unstable, improper or cannot be written as a sum of modes."""
+
+
+class IdentificationError(HybridSepError, ValueError):
+    """A recording or a frequency response cannot teach a model."""
 
 
 class StateError(HybridSepError, ValueError):

@@ -1,10 +1,11 @@
-"""Figures of merit of sampled signals: RMS and largest magnitude, hold baseline, derivatives, shares, contour error."""
+"""Figures of merit of sampled signals: RMS, largest magnitude, coverage, hold, derivatives, shares, contour error."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
 from enum import IntEnum
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,11 +16,13 @@ __all__ = [
     "RunningErrors",
     "batch_rms",
     "contour_error",
+    "coverage",
     "hold",
     "largest",
     "peak_derivatives",
     "reduction_percent",
     "rms",
+    "rms_ratio",
     "shares",
 ]
 
@@ -37,11 +40,32 @@ def largest(error: ArrayLike) -> float:
     return float(np.max(np.abs(error), initial=0.0))
 
 
+def coverage(error: Array, std: Array, level: float) -> float:
+    """Return the share of errors, 0 … 1, within the interval of a level around 0 of a normal distribution.
+
+    Parameters
+    ----------
+    error, std : (n,) array, m
+        Errors, NaN where there is none, and their standard deviations.
+    level : float
+        Between 0 and 1.
+    """
+    known = ~np.isnan(error)
+    return float(np.mean(np.abs(error[known]) <= NormalDist().inv_cdf(0.5 + 0.5 * level) * std[known]))
+
+
 def reduction_percent(rms_h: float, rms_pb: float) -> float:
     """Return the reduction of the RMS error from the physics model to the hybrid, %."""
     if rms_pb == 0.0:
         return 0.0 if rms_h == 0.0 else -math.inf
     return 100.0 * (1.0 - rms_h / rms_pb)
+
+
+def rms_ratio(rms_h: float, rms_peer: float) -> float:
+    """Return the RMS error of the hybrid relative to a peer's; 1 if both are 0."""
+    if rms_peer == 0.0:
+        return 1.0 if rms_h == 0.0 else math.inf
+    return rms_h / rms_peer
 
 
 class RunningErrors:

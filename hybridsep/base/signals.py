@@ -14,6 +14,7 @@ __all__ = [
     "POSITION_MAX",
     "PREDICTION_MAX",
     "Array",
+    "Indices",
     "as_measured",
     "as_published",
     "as_samples",
@@ -21,6 +22,7 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
 POSITION_MAX = 1e3
 """Largest magnitude of a position, m: beyond any axis; a larger value is an error or in another unit."""

@@ -136,7 +136,8 @@ class SepCompensator:
             x_h, n_warm_up = as_published(prediction.x_pb + prediction.e_h, "x_h"), 0
         else:
             x_h, n_warm_up = prediction.x_pb.copy(), Np
-        return PublishedWindow(command[:Np].copy(), x_dm, prediction.x_pb, x_h, state, n_warm_up)
+        x_h_std = prediction.x_h_std if state is SepState.HYBRID else np.zeros(Np)
+        return PublishedWindow(command[:Np].copy(), x_dm, prediction.x_pb, x_h, x_h_std, state, n_warm_up)
 
     def update(self, x: ArrayLike) -> None:
         """Learn from the measurement of the planned window.

@@ -39,7 +39,7 @@ def compensator_blob(compensator: SepCompensator) -> bytes:
     }
     if pending is not None:
         arrays |= {"coefficients": pending.coefficients, "delta": pending.delta, "x_d": pending.x_d}
-        arrays |= {"x_pb": pending.prediction.x_pb, "e_h": pending.prediction.e_h}
+        arrays |= {name: getattr(pending.prediction, name) for name in ("x_pb", "e_h", "x_h_std")}
     return pack(_KIND, meta, arrays, {"predictor": compensator.predictor.to_bytes()})
 
 
@@ -69,7 +69,9 @@ def compensator_from(kind: type[SepCompensator], blob: bytes) -> SepCompensator:
         if state not in tuple(SepState) or n_warm_up not in range(Np + 1) or restored.n_pending != Np:
             raise saved.error("the pending window must be planned and predicted")
         # A hybrid prediction that is not used may diverge.
-        prediction = Prediction(saved.array("x_pb", Np), saved.array("e_h", Np, finite=False), int(n_warm_up))
+        prediction = Prediction(
+            saved.array("x_pb", Np), saved.array("e_h", Np, finite=False), saved.array("x_h_std", Np), int(n_warm_up)
+        )
         compensator._pending = PendingPlan(
             saved.array("coefficients", n),
             saved.array("delta", Np),

@@ -73,6 +73,10 @@ class FmuController(_OpenedFmu):
         """Return the positions of the kind's outputs, m, and the state, now."""
         return tuple(self._get()), self.kind.lowest + int(self.fmu.get(self.kind.state))
 
+    def n_rejected(self) -> int:
+        """Return how many measurements were missing or not plausible; 0 of an FMU that does not tell."""
+        return int(self.fmu.get("n_rejected")) if "n_rejected" in self.fmu.variables else 0
+
     def step(self, k: int, x_d_ahead: float, x_meas: float) -> None:
         """Take in sample ``k``, m, and move on to the next."""
         self._set([x_d_ahead, x_meas])

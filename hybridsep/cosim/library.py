@@ -57,6 +57,10 @@ class LibraryController:
         ahead, kind = self._look_ahead, self.kind
         return tuple(getattr(ahead, name) for name in kind.outputs), kind.lowest + int(getattr(ahead, kind.state))
 
+    def n_rejected(self) -> int:
+        """Return how many measurements were missing or not plausible."""
+        return self._look_ahead.n_rejected
+
     def step(self, k: int, x_d_ahead: float, x_meas: float) -> None:
         """Take in sample ``k``, m, and move on to the next."""
         self._look_ahead.sample(x_d_ahead, x_meas)

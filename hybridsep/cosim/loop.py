@@ -123,10 +123,11 @@ def cosimulate(
             ahead.step(k, float(command[min(k, len(command) - 1)]), x_meas)
             if progress is not None and (k % every == 0 or k == n - 1):
                 progress(k + 1, n)
+        n_rejected = ahead.n_rejected()
     found = dict(zip((*kind.outputs, "x", "x_meas"), signals[delay:].T.copy(), strict=True))
     found.setdefault("x_dm", found["x_d"])
     t = np.asarray(start_time + np.arange(delay, n) * T_s, dtype=np.float64)
-    return Run(kind=kind, t=t, **found, state=state[delay:], T_s=T_s, Np=ahead.Np)
+    return Run(kind=kind, t=t, **found, state=state[delay:], T_s=T_s, Np=ahead.Np, n_rejected=n_rejected)
 
 
 def _controller(

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.metrics import batch_rms, hold, largest, peak_derivatives, reduction_percent, rms, shares
+from ..base.metrics import batch_rms, hold, largest, peak_derivatives, reduction_percent, rms, rms_ratio, shares
 from ..base.output import written_text, written_whole
 from ..base.signals import Array
 from ..compensate.plan import SepState
@@ -93,6 +93,8 @@ class Run:
         Sampling interval, s.
     Np : int
         Samples in a window.
+    n_rejected : int
+        Measurements that were missing or not plausible, as far as the controller tells.
     """
 
     kind: Kind
@@ -106,6 +108,7 @@ class Run:
     state: NDArray[np.int64]
     T_s: float
     Np: int
+    n_rejected: int = 0
 
     @property
     def active(self) -> NDArray[np.bool_]:
@@ -138,12 +141,13 @@ class Run:
 
     def prediction_figures(self) -> dict[str, float | int]:
         """Return RMS errors in µm over the whole trajectory, against the measured position unless named true."""
-        rms_pb, rms_h = rms(self.x_meas - self.x_pb), rms(self.x_meas - self.x_h)
+        rms_pb, rms_hold, rms_h = (rms(self.x_meas - x) for x in (self.x_pb, self.x_hold, self.x_h))
         return {
             "rms_pb_um": 1e6 * rms_pb,
-            "rms_hold_um": 1e6 * rms(self.x_meas - self.x_hold),
+            "rms_hold_um": 1e6 * rms_hold,
             "rms_h_um": 1e6 * rms_h,
             "reduction_percent": reduction_percent(rms_h, rms_pb),
+            "ratio_to_hold": rms_ratio(rms_h, rms_hold),
             "rms_pb_true_um": 1e6 * rms(self.x - self.x_pb),
             "rms_h_true_um": 1e6 * rms(self.x - self.x_h),
             "servo_error_rms_um": 1e6 * rms(self.error),

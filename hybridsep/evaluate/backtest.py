@@ -17,10 +17,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base.errors import SignalError
 from ..base.metrics import RunningErrors
-from ..base.signals import PREDICTION_MAX, Array, as_samples
+from ..base.signals import PREDICTION_MAX, Array, as_measured, as_samples
 from ..base.threads import one_blas_thread
 from ..predict.predictor import HybridPredictor
 from .scores import Score, Scores
+from .verdict import Tally
 
 __all__ = ["Backtest", "Batch", "backtest", "backtest_stream"]
 
@@ -37,11 +38,13 @@ class Batch(NamedTuple):
     n_warm_up : int
         Its leading samples that belong to the warm-up.
     x_d, x : (n,) array, m
-        Commanded and measured positions.
+        Commanded and measured positions, NaN where missing.
     x_pb, x_hold, x_h : (n,) array, m
         Predictions made before any of ``x`` was known.
+    x_h_std : (n,) array, m
+        Standard deviation of ``x − x_h``, as predicted.
     rms_pb, rms_hold, rms_h : float
-        RMS of ``x`` minus each prediction over the window, m.
+        RMS of ``x`` minus each prediction over the window, m; NaN if all of ``x`` is missing.
     """
 
     j: int
@@ -52,6 +55,7 @@ class Batch(NamedTuple):
     x_pb: Array
     x_hold: Array
     x_h: Array
+    x_h_std: Array
     rms_pb: float
     rms_hold: float
     rms_h: float
@@ -65,6 +69,8 @@ class Backtest(Scores):
     ----------
     x_pb, x_hold, x_h : (n,) array, m
         Predictions, each made before its window was revealed.
+    x_h_std : (n,) array, m
+        Standard deviation of the error of ``x_h``, as predicted.
     active : (n,) array of bool
         Whether the hybrid is published, that is, after the warm-up.
     batch_rms_pb, batch_rms_hold, batch_rms_h : (n_batches,) array, m
@@ -74,6 +80,7 @@ class Backtest(Scores):
     x_pb: Array
     x_hold: Array
     x_h: Array
+    x_h_std: Array
     active: NDArray[np.bool_]
     batch_rms_pb: Array
     batch_rms_hold: Array
@@ -93,7 +100,7 @@ def backtest(predictor: HybridPredictor, x_d: ArrayLike, x: ArrayLike, *, on_bat
     predictor : HybridPredictor
         It learns the log on the way.
     x_d, x : (n,) array_like, m
-        Commanded and measured positions, ``n ≥ 1``.
+        Commanded and measured positions, ``n ≥ 1``; with trust ``x`` is NaN where it is missing.
     on_batch : callable, optional
         Called with each :class:`Batch` when it is finished.
 
@@ -107,7 +114,7 @@ def backtest(predictor: HybridPredictor, x_d: ArrayLike, x: ArrayLike, *, on_bat
         If the samples are empty, of different lengths or not finite; the predictor is unchanged then.
     """
     command = as_samples(x_d, "x_d")
-    measured = as_samples(x, "x", len(command))
+    measured = _measured(predictor, x, "x", len(command))
     batches: list[Batch] = []
 
     def keep(batch: Batch) -> None:
@@ -123,8 +130,9 @@ def backtest(predictor: HybridPredictor, x_d: ArrayLike, x: ArrayLike, *, on_bat
         scores.overall,
         scores.after_warm_up,
         scores.n_batches,
+        scores.verdict,
         active=np.concatenate([np.arange(len(batch.x)) >= batch.n_warm_up for batch in batches]),
-        **{name: joined(name) for name in ("x_pb", "x_hold", "x_h")},
+        **{name: joined(name) for name in ("x_pb", "x_hold", "x_h", "x_h_std")},
         **{f"batch_{name}": joined(name) for name in ("rms_pb", "rms_hold", "rms_h")},
     )
 
@@ -140,7 +148,8 @@ def backtest_stream(
     predictor : HybridPredictor
         It learns the log on the way.
     chunks : iterable of pairs ``(x_d, x)`` of (m,) array_like, m
-        Commanded and measured positions in chunks of any sizes; they are predicted ``Np`` samples at a time.
+        Commanded and measured positions in chunks of any sizes; they are predicted ``Np`` samples at a time. With trust
+        ``x`` is NaN where it is missing; missing samples are not scored.
     on_batch : callable, optional
         Called with each :class:`Batch` when it is finished.
 
@@ -154,9 +163,9 @@ def backtest_stream(
         If a chunk's samples cannot be used, there are none at all, or a prediction diverges. The windows before are
         learned.
     """
-    overall, after = RunningErrors(3), RunningErrors(3)
-    j = 0
-    for x_d, x in _windows(chunks, predictor.Np):
+    overall, after, tally = RunningErrors(3), RunningErrors(3), Tally(predictor.Np)
+    j = k = n_rejected = 0
+    for x_d, x in _windows(predictor, chunks):
         residual = predictor.last_residual()
         prediction = predictor.predict(x_d)
         n, warm = len(x), prediction.n_warm_up
@@ -167,36 +176,44 @@ def backtest_stream(
         if warm:
             predicted[1:, :warm] = prediction.x_pb[:warm]
         error = x - predicted
-        squares, peaks = _measure(error, overall.n)
+        n_known, squares, peaks = _measure(error, k)
         if warm == 0:
-            after.add(n, squares, peaks)
+            after.add(n_known, squares, peaks)
         elif warm < n:
-            after.add(n - warm, *_measure(error[:, warm:], overall.n))
-        rms = [math.sqrt(square / n) for square in squares]
-        batch = Batch(j, overall.n, warm, x_d, x, *predicted, *rms)
-        overall.add(n, squares, peaks)
+            after.add(*_measure(error[:, warm:], k))
+        rms = [math.sqrt(square / n_known) if n_known else math.nan for square in squares]
+        batch = Batch(j, k, warm, x_d, x, predicted[0], predicted[1], predicted[2], prediction.x_h_std, *rms)
+        overall.add(n_known, squares, peaks)
+        tally.add(x_d, x, predicted)
+        n_before = predictor.n_rejected
         predictor.update(x)
-        j += 1
+        n_rejected += predictor.n_rejected - n_before
+        j, k = j + 1, k + n
         if on_batch is not None:
             on_batch(batch)
     if j == 0:
         raise SignalError("a log must have at least one sample, got none")
-    return Scores(Score.of(overall), Score.of(after), j)
+    return Scores(Score.of(overall), Score.of(after), j, tally.verdict(n_rejected=n_rejected))
 
 
-def _measure(error: Array, k: int) -> tuple[list[float], list[float]]:
-    """Return sums of squares and largest magnitudes of the three errors of the window from sample ``k`` on."""
-    peaks: list[float] = np.abs(error).max(axis=1).tolist()
+def _measure(error: Array, k: int) -> tuple[int, list[float], list[float]]:
+    """Return number, sums of squares and largest magnitudes of the three errors of the window from sample ``k`` on."""
+    missing = np.isnan(error[0])
+    if missing.any():
+        error = error[:, ~missing]
+    peaks: list[float] = np.abs(error).max(axis=1, initial=0.0).tolist()
     if not all(peak <= PREDICTION_MAX for peak in peaks):
         raise SignalError(f"x_h diverges in the window from sample {k} on; raise lambda or lower p")
-    return [float(row.dot(row)) for row in error], peaks
+    return error.shape[1], [float(row.dot(row)) for row in error], peaks
 
 
-def _windows(chunks: Iterable[tuple[ArrayLike, ArrayLike]], Np: int) -> Iterator[tuple[Array, Array]]:
+def _windows(
+    predictor: HybridPredictor, chunks: Iterable[tuple[ArrayLike, ArrayLike]]
+) -> Iterator[tuple[Array, Array]]:
     """Cut chunks of any sizes into windows of ``Np`` samples; the last one may be shorter."""
-    waiting, k = np.empty((2, 0)), 0
+    waiting, k, Np = np.empty((2, 0)), 0, predictor.Np
     for chunk in chunks:
-        samples = np.asarray(_checked(chunk, k))
+        samples = np.asarray(_checked(predictor, chunk, k))
         k += samples.shape[1]
         if waiting.size:
             samples = np.concatenate((waiting, samples), axis=1)
@@ -208,7 +225,7 @@ def _windows(chunks: Iterable[tuple[ArrayLike, ArrayLike]], Np: int) -> Iterator
         yield waiting[0], waiting[1]
 
 
-def _checked(chunk: tuple[ArrayLike, ArrayLike], k: int) -> tuple[Array, Array]:
+def _checked(predictor: HybridPredictor, chunk: tuple[ArrayLike, ArrayLike], k: int) -> tuple[Array, Array]:
     """Return a chunk's samples; SignalError names the chunk by its first sample ``k``."""
     place = f" of the chunk from sample {k} on" if k else ""
     try:
@@ -216,4 +233,13 @@ def _checked(chunk: tuple[ArrayLike, ArrayLike], k: int) -> tuple[Array, Array]:
     except (TypeError, ValueError):
         raise SignalError(f"each chunk must be a pair (x_d, x), got {type(chunk).__name__}{place}") from None
     x_d = as_samples(first, f"x_d{place}")
-    return x_d, as_samples(second, f"x{place}", len(x_d))
+    return x_d, _measured(predictor, second, f"x{place}", len(x_d))
+
+
+def _measured(predictor: HybridPredictor, x: ArrayLike, name: str, length: int) -> Array:
+    """Return measured positions, NaN where missing; SignalError if one is missing without trust."""
+    measured = as_measured(x, name, length)
+    if not predictor.settings.trust and np.isnan(measured).any():
+        i = int(np.argmax(np.isnan(measured)))
+        raise SignalError(f"{name} must be finite, got nan at sample {i}: missing measurements need trust = true")
+    return measured

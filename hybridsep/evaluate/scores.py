@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..base.metrics import RunningErrors, reduction_percent
+from ..base.metrics import RunningErrors, reduction_percent, rms_ratio
+from .verdict import Verdict
 
 __all__ = ["Score", "Scores"]
 
@@ -32,6 +33,11 @@ class Score:
     max_h: float
 
     @property
+    def ratio_to_hold(self) -> float:
+        """RMS of the hybrid relative to that of the hold baseline."""
+        return rms_ratio(self.rms_h, self.rms_hold)
+
+    @property
     def reduction_percent(self) -> float:
         """By how much the hybrid's RMS is below the physics model's, percent of the latter."""
         return reduction_percent(self.rms_h, self.rms_pb)
@@ -52,14 +58,17 @@ class Scores:
         Over all samples, and over those after the warm-up.
     n_batches : int
         Windows replayed, the last one may be incomplete.
+    verdict : Verdict
+        Judgement of the hybrid over all samples, in words.
     """
 
     overall: Score
     after_warm_up: Score
     n_batches: int
+    verdict: Verdict
 
     def summary(self) -> dict[str, float | int]:
-        """Return all scores by name: ``rms_pb_um``, ``max_h_um``, ``reduction_percent``, ….
+        """Return all scores by name: ``rms_pb_um``, ``max_h_um``, ``reduction_percent``, ``ratio_to_hold``, ….
 
         Errors are in micrometres against the measured position; the names with ``_after_warm_up`` leave the warm-up
         out and are NaN if nothing is left.
@@ -70,5 +79,6 @@ class Scores:
                 for name in ("pb", "hold", "h"):
                     result[f"{quantity}_{name}_um{suffix}"] = 1e6 * float(getattr(score, f"{quantity}_{name}"))
             result[f"reduction_percent{suffix}"] = score.reduction_percent
+            result[f"ratio_to_hold{suffix}"] = score.ratio_to_hold
             result[f"n_samples{suffix}"] = score.n_samples
         return result

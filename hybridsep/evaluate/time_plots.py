@@ -22,8 +22,8 @@ _SPANS = {SepState.OFF: ("not compensated", HOLD), SepState.PHYSICS: ("planned b
 """Shading of spans that a lesser model planned than others of the run."""
 
 
-def prediction_figure(run: Run, title: str, path: str | Path) -> None:
-    """Draw the command, the two models' prediction errors and the RMS of each window to a PNG.
+def prediction_figure(run: Run, title: str, path: str | Path, unit: str = "m") -> None:
+    """Draw the command, the two models' prediction errors and the RMS of each window to a PNG, PDF or SVG.
 
     Parameters
     ----------
@@ -32,14 +32,16 @@ def prediction_figure(run: Run, title: str, path: str | Path) -> None:
     title : str
         Heading.
     path : str or Path
-        The PNG.
+        The file.
+    unit : {"m", "rad"}
+        Unit of the positions.
     """
     figure = Figure(figsize=(9.0, 8.0), layout="constrained")
     command, error, windows = figure.subplots(3, 1, sharex=True, height_ratios=[1.0, 2.0, 1.4])
     figure.suptitle(title)
     t = run.t - run.t[0]
     command.plot(t, 1e3 * run.x_d, color="black", linewidth=1.2)
-    command.set_ylabel("commanded\nposition [mm]")
+    command.set_ylabel(f"commanded\nposition [m{unit}]")
     error.plot(t, 1e6 * (run.x_meas - run.x_pb), color=PHYSICS, linewidth=0.8, label="physics-based model")
     hybrid = np.where(run.active, 1e6 * (run.x_meas - run.x_h), np.nan)
     error.plot(t, hybrid, color=HYBRID, linewidth=0.8, label="linear hybrid model, after the warm-up")
@@ -50,16 +52,16 @@ def prediction_figure(run: Run, title: str, path: str | Path) -> None:
         error.annotate(
             "t_init", (t_init, 0.02), xycoords=("data", "axes fraction"), xytext=(4, 0), textcoords="offset points"
         )
-    error.set_ylabel("prediction error\nx − x̂ [µm]")
+    error.set_ylabel(f"prediction error\nx − x̂ [µ{unit}]")
     error.margins(y=0.15)
     error.legend(loc="upper right", ncols=2, frameon=False)
-    _draw_windows(windows, run)
+    _draw_windows(windows, run, unit)
     windows.set_xlabel("time [s]")
     finish_panels((command, error, windows))
     save_figure(figure, path)
 
 
-def _draw_windows(axes: Axes, run: Run) -> None:
+def _draw_windows(axes: Axes, run: Run, unit: str) -> None:
     """Draw the RMS error of each window and mark the windows where the hybrid is worse than the physics model."""
     errors = {name: 1e6 * values for name, values in run.batch_rms().items()}
     edges = np.append(np.arange(len(errors["x_pb"])) * run.Np, len(run.t)) * run.T_s
@@ -73,7 +75,7 @@ def _draw_windows(axes: Axes, run: Run) -> None:
     for begin, end in zip(edges[:-1][worse], edges[1:][worse], strict=True):
         axes.axvspan(begin, end, color=PHYSICS, alpha=0.15, linewidth=0)
     axes.set_ylim(0.0, 1.35 * max(float(values.max()) for values in errors.values()))
-    axes.set_ylabel("RMS of each\nwindow [µm]")
+    axes.set_ylabel(f"RMS of each\nwindow [µ{unit}]")
     axes.legend(loc="upper right", ncols=3, frameon=False, title="shaded: hybrid worse than physics", title_fontsize=8)
 
 

@@ -129,7 +129,12 @@ def build_fmu(
 
 
 def fmu_description(machine: Machine, model: str, name: str) -> dict[str, Any]:
-    """Return the description from which an FMU is made: model, name, start values and modes."""
+    """Return the description from which an FMU is made: model, name, start values, modes, and unit unless it is m."""
+    description = _description(machine, model, name)
+    return description if machine.unit == "m" else {**description, "unit": machine.unit}
+
+
+def _description(machine: Machine, model: str, name: str) -> dict[str, Any]:
     if model in ("HybridPredictor", "SepCompensator"):
         physics = [{"f_n": m.f_n, "zeta": m.zeta, "alpha": m.alpha, "beta": m.beta} for m in machine.model.modes]
         values = machine.fmi_parameters() if model == "HybridPredictor" else machine.fmi_compensator_parameters()

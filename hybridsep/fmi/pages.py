@@ -69,6 +69,7 @@ def index_page(
     has_inputs = model != "ReferenceTrajectory"
     inputs = f', fed with <a href="reference/{name}_in.csv">reference/{name}_in.csv</a>' if has_inputs else ""
     digits = _AGREEMENT_DIGITS.get(model, 11)
+    sources = _SOURCES.get(model, machine.sources) or ("none is named in the machine file",)
     partner, command = _PARTNERS.get(model, ("HybridPredictor", "x_d"))
     page = filled(
         "index",
@@ -81,6 +82,6 @@ def index_page(
         rows=rows,
         reference=filled("reference", name=name, inputs=inputs, digits=digits) if reference else "",
         limits=limits,
-        sources="\n".join(f"<li>{html.escape(source)}</li>" for source in _SOURCES.get(model, machine.sources)),
+        sources="\n".join(f"<li>{html.escape(source)}</li>" for source in sources),
     )
     return f"{page}\n".encode()

@@ -7,11 +7,12 @@ it. This module is packed into the FMUs: it needs nothing but the standard libra
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ..base.parameters import Parameter
 from ..base.settings import PARAMETERS, CompensatorSettings, PredictorSettings, check
+from .angular_units import angular_unit
 
 __all__ = [
     "COMPENSATOR_SETTINGS",
@@ -178,10 +179,14 @@ def predictor_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping
             "x_pb", "output", "physics-based prediction for now, made when the window began", initially_from=ahead
         ),
         _position("x_h", "output", "hybrid prediction for now, made when the window began", initially_from=ahead),
+        _position("x_h_std", "output", "standard deviation of x_meas - x_h, now; 0: not known", display_unit="um"),
         _position("e_servo", "output", "predicted servo error x_d - x_h", display_unit="um"),
         Variable("hybrid_active", "Boolean", "output", "discrete", "whether x_h is the hybrid prediction now"),
         _position("rms_pb", "output", "running RMS of x_meas - x_pb since t_init", display_unit="um"),
         _position("rms_h", "output", "running RMS of x_meas - x_h since t_init", display_unit="um"),
+        _position(
+            "rms_hold", "output", "the same for x_pb plus the residual before the window, held", display_unit="um"
+        ),
         Variable("batch", "Integer", "output", "discrete", "number of the window, floor(k / Np); 0 is the first fill"),
         Variable(
             *("n_rejected", "Integer", "output", "discrete"),
@@ -196,6 +201,8 @@ def predictor_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping
         ("x_h", "hybrid predictions"),
     ):
         table += [_position(f"{name}_window[{i}]", "local", f"{meaning} of the current window") for i in window]
+    spread = "standard deviations of x_meas - x_h in the current window"
+    table += [_position(f"x_h_std_window[{i}]", "local", spread, display_unit="um") for i in window]
     return table
 
 
@@ -303,5 +310,12 @@ INTERPOLATED: dict[str, tuple[str, ...]] = {
 
 
 def variables_of(description: Mapping[str, object]) -> list[Variable]:
-    """Return the table that an FMU's ``machine.json`` describes: its model, parameters and modes."""
-    return MODELS[str(description["model"])](description["parameters"], description["modes"])  # type: ignore[arg-type]
+    """Return the table that an FMU's ``machine.json`` describes: its model, parameters, modes and unit."""
+    table = MODELS[str(description["model"])](description["parameters"], description["modes"])  # type: ignore[arg-type]
+    return table if description.get("unit", "m") == "m" else [_angular(variable) for variable in table]
+
+
+def _angular(variable: Variable) -> Variable:
+    """Return a variable of a rotary axis for that of a linear one."""
+    unit, display = angular_unit(variable.unit), angular_unit(variable.display_unit)
+    return replace(variable, unit=unit, display_unit=display)

@@ -1,10 +1,10 @@
 """Weights file ``resources/weights.bin`` of an FMU that starts warm: the factor of a trained predictor.
 
-Layout, little-endian: ``HSEPWGT4``; the numbers of settings, of modes, of learned samples and of what a residual model
-that can be trusted has learned besides the factor, as u64; each setting that shapes the features and the factor (with
-others the weights mean something else), its name in 24 bytes and its value as float64; that model's numbers as float64;
-the upper triangle of the factor ``[R z; 0 ρ]`` by rows; the CRC-32 of all before as u64. This module is packed into the
-pythonfmu FMUs; the C model reads the same file.
+Layout, little-endian: ``HSEPWGT6``; the numbers of settings, of modes, of learned samples and of what has been learned
+besides the factor, as u64; each setting that shapes the features and the factor (with others the weights mean something
+else), its name in 24 bytes and its value as float64; as float64 the numbers of a residual model that can be trusted and
+those of the errors' variance; the upper triangle of the factor ``[R z; 0 ρ]`` by rows; the CRC-32 of all before as u64.
+This module is packed into the pythonfmu FMUs; the C model reads the same file.
 """
 
 from __future__ import annotations
@@ -21,11 +21,12 @@ from ..base.signals import Array
 from ..predict.candidates import ResidualScale
 from ..predict.predictor import HybridPredictor
 from ..predict.trusted import TrustedModel
+from ..predict.uncertainty import Uncertainty
 
 __all__ = ["WEIGHTS_FILE", "learned_settings", "restore_weights", "weights_file"]
 
 WEIGHTS_FILE = "weights.bin"
-_MAGIC = b"HSEPWGT4"
+_MAGIC = b"HSEPWGT6"
 _HEAD = struct.Struct("<8s4Q")
 _SETTING = struct.Struct("<24sd")
 _CHECKSUM = struct.Struct("<Q")
@@ -48,12 +49,12 @@ def weights_file(predictor: HybridPredictor) -> bytes:
     """Return the file's content for a trained predictor."""
     settings = learned_settings(predictor)
     factor = predictor.regression.factor
-    trusted = np.concatenate([np.zeros(0), *(part.ravel() for part in _learned(predictor.trusted).values())])
+    learned = np.concatenate([part.ravel() for part in _learned(predictor).values()])
     content = _HEAD.pack(
-        _MAGIC, len(settings), len(predictor.model.modes), predictor.regression.n_samples, len(trusted)
+        _MAGIC, len(settings), len(predictor.model.modes), predictor.regression.n_samples, len(learned)
     )
     content += b"".join(_SETTING.pack(name.encode(), value) for name, value in settings.items())
-    content += np.concatenate((trusted, factor[np.triu_indices(len(factor))])).astype("<f8").tobytes()
+    content += np.concatenate((learned, factor[np.triu_indices(len(factor))])).astype("<f8").tobytes()
     return content + _CHECKSUM.pack(zlib.crc32(content))
 
 
@@ -73,7 +74,7 @@ def restore_weights(predictor: HybridPredictor, content: bytes) -> None:
         or _CHECKSUM.pack(zlib.crc32(body)) != content[-_CHECKSUM.size :]
     ):
         raise StateError(_DAMAGED)
-    _, n_settings, n_modes, n_samples, n_trusted = _HEAD.unpack_from(body)
+    _, n_settings, n_modes, n_samples, n_learned = _HEAD.unpack_from(body)
     start = _HEAD.size + n_settings * _SETTING.size
     if start > len(body):
         raise StateError(_DAMAGED)
@@ -88,15 +89,15 @@ def restore_weights(predictor: HybridPredictor, content: bytes) -> None:
             problems += _differences(name, then, settings.get(name, 0.0))
     if problems:
         raise StateError("; ".join(problems))
-    size, parts = predictor.regression.n_features + 1, _learned(predictor.trusted)
+    size, parts = predictor.regression.n_features + 1, _learned(predictor)
     upper = np.triu_indices(size)
     ends = np.cumsum([0, *(part.size for part in parts.values())])
     n_numbers = int(ends[-1]) + len(upper[0])
-    if learned.keys() != settings.keys() or n_trusted != ends[-1] or len(body) - start != 8 * n_numbers:
+    if learned.keys() != settings.keys() or n_learned != ends[-1] or len(body) - start != 8 * n_numbers:
         raise StateError(_DAMAGED)
     numbers = np.frombuffer(body, "<f8", offset=start)
     factor = np.zeros((size, size))
-    factor[upper] = numbers[n_trusted:]
+    factor[upper] = numbers[n_learned:]
     found = {
         name: numbers[first:end].reshape(parts[name].shape).copy()
         for name, first, end in zip(parts, ends, ends[1:], strict=False)
@@ -107,14 +108,19 @@ def restore_weights(predictor: HybridPredictor, content: bytes) -> None:
         predictor.regression.restore(factor, n_samples)
     except SignalError:
         raise StateError(_DAMAGED) from None
+    predictor.uncertainty.restore(found["errors"])
     if predictor.trusted is not None:
         _restore_learned(predictor.trusted, found)
 
 
-def _learned(trusted: TrustedModel | None) -> dict[str, Array]:
-    """Return what the model has learned besides the factor, in the order of the file."""
-    if trusted is None:
-        return {}
+def _learned(predictor: HybridPredictor) -> dict[str, Array]:
+    """Return what has been learned besides the factor, in the order of the file."""
+    errors = {"errors": predictor.uncertainty.learned()}
+    return errors if predictor.trusted is None else _learned_with_trust(predictor.trusted) | errors
+
+
+def _learned_with_trust(trusted: TrustedModel) -> dict[str, Array]:
+    """Return what the residual model has learned."""
     blend, candidates = trusted.blend, trusted.candidates
     return {
         "n_rows": np.array([trusted.n_rows]),
@@ -126,13 +132,24 @@ def _learned(trusted: TrustedModel | None) -> dict[str, Array]:
         "largest": trusted.largest,
         "gram": blend.gram,
         "cross": blend.cross,
+        "sensor": np.array([trusted.guard.spread, trusted.guard.held.step]),
     }
 
 
 def _are_sound(learned: Mapping[str, Array]) -> bool:
     """Return whether the numbers of :func:`_learned` are finite and in range."""
+    if not Uncertainty.is_sound(learned["errors"]):
+        return False
     least = {"gram": -np.inf, "cross": -np.inf, "correlations": 1.0}
-    return all(np.isfinite(part).all() and (part >= least.get(name, 0.0)).all() for name, part in learned.items())
+    if "sensor" in learned:
+        spread, step = learned["sensor"].tolist()  # -1 and infinite where they are not known
+        if not (step > 0.0 and (spread == -1.0 or 0.0 <= spread < np.inf)):
+            return False
+    return all(
+        np.isfinite(part).all() and (part >= least.get(name, 0.0)).all()
+        for name, part in learned.items()
+        if name != "sensor"
+    )
 
 
 def _restore_learned(trusted: TrustedModel, learned: Mapping[str, Array]) -> None:
@@ -144,6 +161,7 @@ def _restore_learned(trusted: TrustedModel, learned: Mapping[str, Array]) -> Non
         candidate.noise_variance, candidate.correlation = variance, correlation
     trusted.largest, blend = learned["largest"], trusted.blend
     blend.weights, blend.gram, blend.cross = learned["weights"], learned["gram"], learned["cross"]
+    trusted.guard.spread, trusted.guard.held.step = learned["sensor"].tolist()
 
 
 def _differences(name: str, then: float, now: float) -> list[str]:

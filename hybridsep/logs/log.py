@@ -3,41 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
 from ..base.errors import LogError
 from ..base.settings import check
-from ..base.signals import Array
-from .mat import MatSource
-from .npz import NpzSource
-from .source import Block, Source
-from .text import TextSource
+from ..base.signals import POSITION_MAX, Array
+from .columns import Column, choose_columns
+from .formats import open_source
+from .source import NEEDS_TRUST, Block
 from .time_axis import TimeAxis
+from .units import POSITION_UNITS, position_unit
 
-__all__ = ["UNITS", "Log", "LogReader", "check_reading", "open_log", "read_log"]
+__all__ = ["Log", "LogReader", "check_reading", "open_log", "read_log"]
 
-UNITS: Mapping[str, float] = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
-"""Units of a log's positions, in metres."""
-
-SPAN_MAX = 100.0
-"""Largest plausible travel of an axis, m; a larger one indicates a log in a smaller unit."""
+SPAN_MAX: Mapping[str, float] = {"m": 100.0, "rad": POSITION_MAX}
+"""Largest plausible travel of an axis, m or rad; a larger one indicates a log in a smaller unit."""
 
 TS_TOLERANCE = 0.01
 """Largest relative difference between a given ``T_s`` and the time column's: more than any clock's drift."""
 
-_SOURCES: Mapping[str, type[Source]] = {
-    ".csv": TextSource,
-    ".tsv": TextSource,
-    ".txt": TextSource,
-    ".npz": NpzSource,
-    ".mat": MatSource,
-}
-_ROLES = ("t", "x_d", "x")
-_MEASURED = "x_meas"
-"""Measured position in a file that calls the true one x; read before x unless a name is given."""
+_SMALLER = {"m": "mm", "mm": "um", "um": "nm", "in": "mm", "rad": "deg"}
+"""Unit that a log may be in if its travel is implausible in the key's."""
 
 _BLOCK = 10_000
 
@@ -46,16 +36,27 @@ _BLOCK = 10_000
 class Log:
     """A recorded log.
 
+    Positions are in metres, those of a rotary axis in radians; ``unit`` says which. The library's metres stand for
+    radians there: λ is in rad², a limit in rad/s.
+
     Attributes
     ----------
     t : (n,) array, s
         Times as recorded, or ``k·T_s`` if the file has no time column.
-    x_d, x_meas : (n,) array, m
+    x_d, x_meas : (n,) array, m or rad
         Commanded and measured positions.
     T_s : float
         Sampling interval, s.
     path : Path
         The file.
+    unit : {"m", "rad"}
+        Unit of the positions.
+    unit_stated : bool
+        Whether the file or the caller stated the positions' unit.
+    starts : tuple of int
+        First samples of the segments, which gaps separate; the first is 0.
+    remarks : tuple of str
+        What the reader chose that the user may want to change.
     """
 
     t: Array
@@ -63,6 +64,16 @@ class Log:
     x_meas: Array
     T_s: float
     path: Path
+    unit: str = "m"
+    unit_stated: bool = False
+    starts: tuple[int, ...] = (0,)
+    remarks: tuple[str, ...] = ()
+
+    def segments(self) -> list[Log]:
+        """Return each stretch without a gap as a log of its own."""
+        ends = (*self.starts[1:], len(self.t))
+        pieces = [slice(start, end) for start, end in zip(self.starts, ends, strict=True)]
+        return [replace(self, t=self.t[s], x_d=self.x_d[s], x_meas=self.x_meas[s], starts=(0,)) for s in pieces]
 
 
 class LogReader:
@@ -76,9 +87,14 @@ class LogReader:
     path : Path
         The file.
     T_s : float
-        Sampling interval, s: the given one, or the mean of the time column's, rounded to its significant digits.
+        Sampling interval, s: the given one, or the mean of the time column's, rounded to its significant digits; the
+        median one where ``uniform`` is false.
     n_samples : int
         Samples in the log.
+    unit : {"m", "rad"}
+        Unit of the positions that are returned.
+    remarks : tuple of str
+        What was chosen that the user may want to change.
     """
 
     def __init__(
@@ -86,24 +102,26 @@ class LogReader:
         path: str | Path,
         *,
         columns: Mapping[str, str] | None = None,
-        unit: str = "m",
+        unit: str | None = None,
         T_s: float | None = None,
+        axis: str | None = None,
+        uniform: bool = True,
+        may_miss: bool = False,
     ) -> None:
         self.path = Path(path)
         given = check_reading(unit, T_s)
-        self._unit = unit
-        self._source = _open_source(self.path)
-        self._names = _column_names(self._source, columns, time_needed=given is None)
-        self.n_samples, found = self._scan()
-        if given is not None and found is not None and abs(found - given) > TS_TOLERANCE * given:
-            raise LogError(
-                f"{self.path}: T_s = {given:g} s was given, but column {self._names['t']!r} has an interval of "
-                f"{found:g} s; leave T_s out, or correct it or the column"
-            )
-        self.T_s = float(given or found or 0.0)  # one of them is there, both are > 0
+        self._source = open_source(self.path)
+        if axis is not None:
+            self._source.choose_axis(axis)
+        self._columns = choose_columns(self._source, columns, unit, time_needed=given is None)
+        self.unit = self._columns["x_d"].unit.si
+        self.remarks = tuple(self._source.remarks)
+        self._uniform, self._may_miss = uniform, may_miss
+        self._source.measured, self._source.may_miss = self._columns["x"].name, may_miss
+        self.n_samples, self.T_s = self._scan(given)
 
     def chunks(self, n: int = _BLOCK) -> Iterator[tuple[Array, Array]]:
-        """Iterate over the log as pairs ``(x_d, x_meas)``, m, of at most ``n`` samples each.
+        """Iterate over the log as pairs ``(x_d, x_meas)``, in :attr:`unit`, of at most ``n`` samples each.
 
         Raises
         ------
@@ -112,83 +130,136 @@ class LogReader:
         """
         if n < 1:
             raise LogError(f"{self.path}: a chunk must have n ≥ 1 samples, got {n}")
-        return ((x_d, x_meas) for x_d, x_meas in self._positions(n, ("x_d", "x")))
+        return ((x_d, x_meas) for x_d, x_meas in self._signals(n, ("x_d", "x")))
 
-    def read(self) -> Log:
-        """Return the whole log."""
-        roles = ("x_d", "x", "t") if "t" in self._names else ("x_d", "x")
-        columns = [np.concatenate(parts) for parts in zip(*self._positions(_BLOCK, roles), strict=True)]
+    def read(self, most: int | None = None) -> Log:
+        """Return the whole log, or at least its first ``most`` samples."""
+        roles = ("x_d", "x", "t") if "t" in self._columns else ("x_d", "x")
+        blocks = self._signals(_BLOCK, roles)
+        if most is not None and most < self.n_samples:
+            blocks = islice(blocks, -(-most // _BLOCK))
+        columns = [np.concatenate(parts) for parts in zip(*blocks, strict=True)]
         if len(columns) == 2:
-            columns.append(np.arange(self.n_samples, dtype=np.float64) * self.T_s)
+            columns.append(np.arange(len(columns[0]), dtype=np.float64) * self.T_s)
         x_d, x_meas, t = columns
-        return Log(t, x_d, x_meas, self.T_s, self.path)
+        stated = self._columns["x_d"].stated and self._columns["x"].stated
+        return Log(t, x_d, x_meas, self.T_s, self.path, self.unit, stated, remarks=self.remarks)
 
-    def _positions(self, n: int, roles: tuple[str, ...]) -> Iterator[tuple[Array, ...]]:
-        """Iterate over the columns ``roles``, the first two being positions, checked and in SI units."""
-        names, metres = [self._names[role] for role in roles], UNITS[self._unit]
+    def _signals(self, n: int, roles: tuple[str, ...]) -> Iterator[tuple[Array, ...]]:
+        """Iterate over the columns ``roles``, the first being the commanded position, checked and in SI units."""
+        columns = [self._columns[role] for role in roles]
         lowest, highest, count = np.inf, -np.inf, 0
-        for block in self._source.blocks(names, n):
-            for name, column in zip(names, block.columns, strict=True):
-                self._check_finite(block, name, column)
-            x_d, x_meas = block.columns[0] * metres, block.columns[1] * metres
+        for block in self._source.blocks([column.name for column in columns], n):
+            for column, values in zip(columns, block.columns, strict=True):
+                self._check_finite(block, column.name, values, measured=column is self._columns["x"])
+            signals = [values * column.unit.factor for column, values in zip(columns, block.columns, strict=True)]
+            x_d = signals[0]
             lowest, highest = min(lowest, float(x_d.min())), max(highest, float(x_d.max()))
-            if highest - lowest > SPAN_MAX:
-                smaller = "um" if self._unit != "m" else "mm"
-                raise LogError(
-                    f"{self.path}: column {names[0]!r} read in {self._unit} spans {highest - lowest:.4g} m, more than "
-                    f"{SPAN_MAX:g} m; if the log is in {smaller}, say unit='{smaller}' (--unit {smaller})"
-                )
+            self._check_span(columns[0], highest - lowest)
             count += len(x_d)
-            yield (x_d, x_meas, *block.columns[2:])
+            yield tuple(signals)
         if count != self.n_samples:
             raise LogError(f"{self.path}: the file had {self.n_samples} samples when opened, now it has {count}")
 
-    def _scan(self) -> tuple[int, float | None]:
-        """Scan one column; return the number of samples and, if it is the time, the sampling interval."""
-        role = "t" if "t" in self._names else "x_d"
-        axis, count = TimeAxis(self.path, self._names[role]), 0
-        for block in self._source.blocks([self._names[role]], _BLOCK):
-            self._check_finite(block, self._names[role], block.columns[0])
+    def _check_span(self, column: Column, span: float) -> None:
+        """Raise LogError if the commanded position spans more than any axis does."""
+        si, largest = column.unit.si, SPAN_MAX[column.unit.si]
+        if span > largest:
+            smaller = _SMALLER.get(column.unit.name)
+            hint = f"; if the log is in {smaller}, say unit='{smaller}' (--unit {smaller})" if smaller else ""
+            raise LogError(
+                f"{self.path}: column {column.name!r} read in {column.unit.name} spans {span:.4g} {si}, more than "
+                f"{largest:g} {si}{hint}"
+            )
+
+    def _scan(self, given: float | None) -> tuple[int, float]:
+        """Scan one column; return the number of samples and the sampling interval.
+
+        A column of time that counts samples is an index: its place is taken by the given interval.
+        """
+        role = "t" if "t" in self._columns else "x_d"
+        column = self._columns[role]
+        axis, count = TimeAxis(self.path, column.name, uniform=self._uniform), 0
+        for block in self._source.blocks([column.name], _BLOCK):
+            self._check_finite(block, column.name, block.columns[0])
             if role == "t":
-                axis.extend(block)
+                axis.extend(Block([block.columns[0] * column.unit.factor], block.where))
             count += len(block.columns[0])
         if count < 2:
             raise LogError(f"{self.path}: a log needs at least 2 samples, got {count or 'none'}")
-        return count, axis.interval() if role == "t" else None
+        if role != "t":
+            return count, float(given or 0.0)  # given, as there is no time
+        if axis.counts_samples and not column.stated:
+            if given is None:
+                raise LogError(
+                    f"{self.path}: column {column.name!r} counts samples: it is an index, or a time in ms; give T_s "
+                    f"(--T_s), or name its unit in the file, '{column.name} [ms]'"
+                )
+            del self._columns["t"]
+            return count, given
+        found = axis.interval()
+        if given is not None and abs(found - given) > TS_TOLERANCE * given:
+            raise LogError(
+                f"{self.path}: T_s = {given:g} s was given, but column {column.name!r} has an interval of "
+                f"{found:g} s; leave T_s out, or correct it or the column"
+            )
+        return count, found if given is None else given
 
-    def _check_finite(self, block: Block, name: str, column: Array) -> None:
+    def _check_finite(self, block: Block, name: str, column: Array, *, measured: bool = False) -> None:
+        """Raise LogError if a value is infinite, or NaN and not a measurement that may miss."""
         finite = np.isfinite(column)
         if not finite.all():
-            i = int(np.argmin(finite))
-            raise LogError(f"{self.path}, {block.where(i)}: column {name!r} must be finite, got {column[i]}")
+            if measured and self._may_miss and not np.isinf(column).any():
+                return
+            i = int(np.argmax(np.isinf(column) if measured and self._may_miss else ~finite))
+            hint = NEEDS_TRUST if measured and np.isnan(column[i]) else ""
+            raise LogError(f"{self.path}, {block.where(i)}: column {name!r} must be finite, got {column[i]}{hint}")
 
 
-def check_reading(unit: str, T_s: float | None) -> float | None:
+def check_reading(unit: str | None, T_s: float | None) -> float | None:
     """Return the given sampling interval, validated; LogError for an unknown unit."""
-    if unit not in UNITS:
-        raise LogError(f"unit must be one of {', '.join(UNITS)}, got {unit!r}")
+    if unit is not None and position_unit(unit) is None:
+        raise LogError(f"unit must be one of {', '.join(POSITION_UNITS)}, got {unit!r}")
     return None if T_s is None else float(check("T_s", T_s, label="T_s"))
 
 
 def open_log(
-    path: str | Path, *, columns: Mapping[str, str] | None = None, unit: str = "m", T_s: float | None = None
+    path: str | Path,
+    *,
+    columns: Mapping[str, str] | None = None,
+    unit: str | None = None,
+    T_s: float | None = None,
+    axis: str | None = None,
+    uniform: bool = True,
+    may_miss: bool = False,
 ) -> LogReader:
     """Open a log for reading in bounded memory.
 
-    CSV files are streamed by lines and ``.npz`` files by members; a ``.mat`` file is loaded whole by SciPy, so that its
-    size is limited by the memory.
+    Text is streamed by lines and ``.npz`` files by members; ``.mat``, HDF5 and JSON files are loaded whole, so that
+    their size is limited by the memory. What a file is, its content tells.
 
     Parameters
     ----------
     path : str or Path
-        ``.csv`` (also ``.tsv``, ``.txt``; comma, semicolon, tab or blanks between columns), ``.npz`` or ``.mat``.
+        Text (CSV, TSV; comma, semicolon, tab or blanks between columns; plain or in gzip), ``.npz``, ``.mat`` (version
+        7.3 with the extra ``hdf5``) or Siemens Capture JSON.
     columns : mapping, optional
         The file's names of ``"t"``, ``"x_d"`` and ``"x"``, the measured position, where they are others, such as
-        ``{"x_d": "qg", "x": "qm"}``. Without a name for ``"x"``, ``x_meas`` is read where the file has it.
-    unit : {"m", "mm", "um"}
-        Unit of the file's positions.
+        ``{"x_d": "qg", "x": "qm"}``; units in them may be left out. Without a name for ``"x"``, ``x_meas`` is read
+        where the file has it.
+    unit : str, optional
+        Unit of the positions: m, mm, um, nm, in, or rad, mrad, urad, deg, rev for a rotary axis. If left out, that of
+        the columns' names (``x [mm]``), otherwise m.
     T_s : float, optional
-        Sampling interval, s; needed only if the file has no time column, checked against that if it has.
+        Sampling interval, s; needed only if the file has no time column or an index in its place, checked against that
+        if it has.
+    axis : str, optional
+        Axis of a file that holds several, such as ``"X1"``.
+    uniform : bool
+        Whether an uneven time axis is refused; otherwise ``T_s`` is its median interval, for
+        :func:`hybridsep.intake.check.check`.
+    may_miss : bool
+        Whether measured positions may be missing: NaN, in text ``nan`` or nothing. With trust a predictor replays them.
 
     Returns
     -------
@@ -199,46 +270,18 @@ def open_log(
     LogError
         If the file, its columns or its time axis cannot be used.
     """
-    return LogReader(path, columns=columns, unit=unit, T_s=T_s)
+    return LogReader(path, columns=columns, unit=unit, T_s=T_s, axis=axis, uniform=uniform, may_miss=may_miss)
 
 
 def read_log(
-    path: str | Path, *, columns: Mapping[str, str] | None = None, unit: str = "m", T_s: float | None = None
+    path: str | Path,
+    *,
+    columns: Mapping[str, str] | None = None,
+    unit: str | None = None,
+    T_s: float | None = None,
+    axis: str | None = None,
+    uniform: bool = True,
+    may_miss: bool = False,
 ) -> Log:
     """Return a whole log; parameters and errors as for :func:`open_log`."""
-    return LogReader(path, columns=columns, unit=unit, T_s=T_s).read()
-
-
-def _open_source(path: Path) -> Source:
-    if path.suffix.lower() not in _SOURCES:
-        raise LogError(f"{path}: a log must be one of {', '.join(_SOURCES)}, got {path.suffix or 'no extension'!r}")
-    try:
-        if not path.is_file():
-            raise LogError(f"{path}: there is no such file" if not path.exists() else f"{path}: is not a file")
-        if path.stat().st_size == 0:
-            raise LogError(f"{path}: the file is empty")
-        return _SOURCES[path.suffix.lower()](path)
-    except OSError as error:
-        raise LogError(f"{path}: cannot be read: {error.strerror or error}") from error
-
-
-def _column_names(source: Source, columns: Mapping[str, str] | None, *, time_needed: bool) -> dict[str, str]:
-    """Return the file's names of the columns to read, by role."""
-    for role in columns or ():
-        if role not in _ROLES:
-            raise LogError(f"{source.path}: columns may name {', '.join(_ROLES)}, got {role!r}")
-    names = {role: role for role in _ROLES}
-    if _MEASURED in source.names:
-        names["x"] = _MEASURED
-    names |= dict(columns or {})
-    if names["t"] not in source.names and "t" not in (columns or {}) and not time_needed:
-        del names["t"]
-    for role, name in names.items():
-        if name not in source.names:
-            there = ", ".join(repr(other) for other in source.names) or "none"
-            hint = "; give its name in columns, or T_s" if role == "t" else "; give its name in columns"
-            what = repr(name) if name == role else f"{name!r} ({role})"
-            raise LogError(f"{source.path}: column {what} is missing, the file has {there}{hint}{source.advice}")
-        if source.names.count(name) > 1:
-            raise LogError(f"{source.path}: column {name!r} must occur once, got it {source.names.count(name)} times")
-    return names
+    return LogReader(path, columns=columns, unit=unit, T_s=T_s, axis=axis, uniform=uniform, may_miss=may_miss).read()

@@ -1,74 +1,33 @@
-"""Reader of MATLAB ``.mat`` files up to version 7, loaded whole by SciPy in a child process.
-
-A damaged file can crash SciPy's reader (99 of 6300 random mutations did); in a child process
-that is an error message.
-"""
+"""MATLAB ``.mat`` files up to version 7, read by SciPy."""
 
 from __future__ import annotations
 
-import json
-import signal
-import subprocess
-import sys
-from collections.abc import Iterator, Sequence
-from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import Any
+import struct
 
-import numpy as np
-
-from ..base.errors import LogError
-from .source import Block, check_column, check_lengths, sample_number
+from .arrays import ArraysSource
 
 __all__ = ["MatSource"]
 
-_CHILD = Path(__file__).with_name("_mat_child.py")
+_TYPE_MAX = 4052
+"""Largest type of a matrix in a version 4 file, ``1000·machine + 10·precision + kind``."""
 
 
-class MatSource:
-    """The vectors of a ``.mat`` file; SciPy reads it whole, so its size is limited by the memory."""
+class MatSource(ArraysSource):
+    """The vectors of a ``.mat`` file of version 4, 5, 6 or 7; those in structs are ``struct.field``."""
 
-    advice = ""
+    format = "MATLAB"
+    endings = (".mat",)
+    kind = "mat"
+    library = "SciPy"
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        with TemporaryDirectory() as folder:
-            self._variables = self._read(folder)
-        self.names = list(self._variables)
-
-    def _read(self, folder: str) -> dict[str, Any]:
-        """Return the child's description of each variable, with the array as ``value`` where it is numeric."""
-        command = [sys.executable, "-I", str(_CHILD), json.dumps(sys.path), str(self.path.absolute()), folder]
-        done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
-        if done.returncode < 0:
-            end = signal.Signals(-done.returncode).name
-            raise LogError(f"{self.path}: is truncated, damaged or not a MATLAB file: SciPy crashed on it with {end}")
-        if done.returncode:
-            reason = "".join(done.stderr.strip().splitlines()[-1:])
-            raise LogError(f"{self.path}: the process that reads it ended with status {done.returncode}: {reason}")
-        answer = json.loads(done.stdout)
-        if "hdf5" in answer:
-            raise LogError(
-                f"{self.path}: is a MATLAB v7.3 (HDF5) file; versions up to 7 are read: save it with '-v7' in MATLAB, "
-                f"load('{self.path.name}'); save('{self.path.stem}_v7.mat', '-v7')"
-            )
-        if "damage" in answer:
-            raise LogError(f"{self.path}: is truncated, damaged or not a MATLAB file: {answer['damage']}")
-        variables: dict[str, Any] = answer["variables"]
-        for variable in variables.values():
-            if "i" in variable:
-                variable["value"] = np.load(Path(folder) / f"{variable['i']}.npy", allow_pickle=False)
-        return variables
-
-    def blocks(self, names: Sequence[str], n: int) -> Iterator[Block]:
-        """Iterate over the columns ``names`` in blocks of at most ``n`` samples."""
-        lengths, columns = {}, []
-        for name in names:
-            variable = self._variables[name]
-            if "shape" not in variable:
-                raise LogError(f"{self.path}: column {name!r} must be a full matrix, got {variable['type']}")
-            lengths[name] = check_column(self.path, name, tuple(variable["shape"]), np.dtype(variable["dtype"]))
-            columns.append(variable["value"].astype(np.float64).ravel())
-        check_lengths(self.path, lengths)
-        for i in range(0, lengths[names[0]], n):
-            yield Block([column[i : i + n] for column in columns], sample_number(i))
+    @staticmethod
+    def recognises(head: bytes) -> bool:
+        """Return whether it has the text of version 5, or the five small integers that begin one of version 4."""
+        if head.startswith(b"MATLAB 5.0 MAT-file"):
+            return True
+        for order in "<>" if len(head) >= 20 else "":
+            kind, rows, columns, imaginary, length = struct.unpack(f"{order}5I", head[:20])
+            plausible = kind <= _TYPE_MAX and rows and columns and imaginary in (0, 1) and 1 < length <= 64
+            if plausible and head[19 + length : 20 + length] == b"\0":
+                return True
+        return False

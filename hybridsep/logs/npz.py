@@ -14,7 +14,7 @@ from numpy.lib import format as npy
 
 from ..base.errors import LogError
 from ..base.signals import Array
-from .source import Block, check_column, check_lengths, sample_number
+from .source import Block, Source, check_column, check_lengths, sample_number
 
 __all__ = ["NpzSource"]
 
@@ -22,19 +22,26 @@ _DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError, Valu
 """Exceptions raised by damaged archives."""
 
 
-class NpzSource:
+class NpzSource(Source):
     """The arrays of an ``.npz`` file, compressed or not."""
 
-    advice = ""
+    format = "NumPy .npz"
+    endings = (".npz",)
 
     def __init__(self, path: Path) -> None:
-        self.path = path
+        super().__init__(path)
         try:
             with zipfile.ZipFile(path) as archive:
                 members = archive.namelist()
         except _DAMAGE as error:
             raise LogError(f"{path}: is truncated, damaged or not an .npz file: {error}") from error
         self.names = [member.removesuffix(".npy") for member in members if member.endswith(".npy")]
+
+    @staticmethod
+    def recognises(head: bytes) -> bool:
+        """Return whether it is a zip archive whose first member is an array, as far as that can be seen."""
+        name = head[30 : 30 + int.from_bytes(head[26:28], "little")]
+        return head.startswith(b"PK\x03\x04") and name.endswith(b".npy")
 
     def blocks(self, names: Sequence[str], n: int) -> Iterator[Block]:
         """Iterate over the columns ``names`` in blocks of at most ``n`` samples."""

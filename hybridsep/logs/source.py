@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 
 from ..base.errors import LogError
 from ..base.signals import Array
 
-__all__ = ["Block", "Source", "check_column", "check_lengths", "sample_number"]
+__all__ = ["NEEDS_TRUST", "Block", "Source", "check_column", "check_lengths", "sample_number"]
+
+
+NEEDS_TRUST = "; missing measurements are replayed with trust alone (--trust true)"
+"""End of the message about a measured position that is missing."""
 
 
 @dataclass(frozen=True)
@@ -31,28 +36,60 @@ class Block:
     where: Callable[[int], str]
 
 
-class Source(Protocol):
-    """Open log file.
+class Source(ABC):
+    """Open log file; one subclass a format, listed in :mod:`hybridsep.logs.formats`.
 
     Attributes
     ----------
+    format : str
+        The format's name in messages.
+    endings : tuple of str
+        Usual endings of its files' names; what a file is, its content tells.
     path : Path
         The file.
     names : list of str
         Available columns.
+    units : mapping
+        Name of a column → unit that the file states beside it, where it does so outside the name.
+    assumed_units : mapping
+        Name of a column → unit by the format's convention, which a given one overrides.
+    roles : mapping
+        ``"t"``, ``"x_d"``, ``"x"`` → the column that the format itself has for it.
+    remarks : list of str
+        What was chosen for the reader that the user may want to change.
     advice : str
         Addition to the message about a missing column.
+    measured : str
+        Column of the measured position.
+    may_miss : bool
+        Whether nothing between two delimiters stands for NaN there.
     """
 
-    path: Path
-    names: list[str]
-    advice: str
+    format: ClassVar[str]
+    endings: ClassVar[tuple[str, ...]]
 
-    def __init__(self, path: Path) -> None: ...
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.names: list[str] = []
+        self.units: Mapping[str, str] = {}
+        self.assumed_units: Mapping[str, str] = {}
+        self.roles: Mapping[str, str] = {}
+        self.remarks: list[str] = []
+        self.advice = ""
+        self.measured, self.may_miss = "", False
 
+    @staticmethod
+    @abstractmethod
+    def recognises(head: bytes) -> bool:
+        """Return whether a file that begins with these bytes, 4 kB if it has as many, is of this format."""
+
+    @abstractmethod
     def blocks(self, names: Sequence[str], n: int) -> Iterator[Block]:
         """Iterate over the columns ``names`` in blocks of at most ``n`` samples."""
-        ...
+
+    def choose_axis(self, axis: str) -> None:
+        """Choose one of several axes by its name; LogError if the format holds a single one."""
+        raise LogError(f"{self.path}: axis {axis!r} was named, but a {self.format} file holds columns: name those")
 
 
 def sample_number(offset: int) -> Callable[[int], str]:

@@ -1,8 +1,13 @@
-"""Streaming reader of delimited text: one line of column names, then numbers."""
+"""Streaming reader of delimited text, plain or gzip-compressed."""
 
 from __future__ import annotations
 
+import codecs
+import gzip
+import math
+import zlib
 from collections.abc import Iterator, Sequence
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import IO
@@ -11,63 +16,117 @@ import numpy as np
 
 from ..base.errors import LogError
 from ..base.signals import Array
-from .source import Block
+from .source import NEEDS_TRUST, Block, Source
+from .text_layout import COMMENTS, Layout, decimal_points, find_layout, is_number, split
 
 __all__ = ["TextSource"]
 
-_DELIMITERS = (";", "\t", ",")
-"""Delimiters by precedence in the line of names; blanks if none occurs."""
+_HEAD_LINES = 400
+"""Lines, blank ones aside, in which names and numbers must begin."""
+
+_LINE_MAX = 1_000_000
+"""Largest length of a line, in characters: a thousand columns; a file without line ends must not fill the memory."""
+
+_GZIP = b"\x1f\x8b"
+_UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+_DAMAGE = (gzip.BadGzipFile, EOFError, zlib.error)
 
 
-class TextSource:
-    """Text file with a line of column names, delimited by comma, semicolon, tab or blanks."""
+def _as_latin_1(error: UnicodeError) -> tuple[str, int]:
+    """Read bytes that are no UTF-8 as Latin-1, in which every byte is a character."""
+    if not isinstance(error, UnicodeDecodeError):
+        raise error
+    return error.object[error.start : error.end].decode("latin-1"), error.end
+
+
+_FALLBACK = "hybridsep-latin-1"
+codecs.register_error(_FALLBACK, _as_latin_1)
+
+
+class TextSource(Source):
+    """Text with a line of column names, then numbers, delimited by comma, semicolon, tab or blanks.
+
+    Preamble, comments and a row of units are skipped, decimal commas are read. UTF-8, UTF-16 with a byte-order mark or
+    Latin-1, plain or in gzip.
+    """
+
+    format = "text"
+    endings = (".csv", ".tsv", ".txt", ".csv.gz", ".tsv.gz")
 
     def __init__(self, path: Path) -> None:
-        self.path = path
+        super().__init__(path)
+        with path.open("rb") as file:
+            start = file.read(4)
+        self._compressed = start.startswith(_GZIP)
+        self._encoding = "utf-8-sig"
         try:
+            if self._compressed:
+                with gzip.open(path) as packed:
+                    start = packed.read(4)
+            self._encoding = "utf-16" if start.startswith(_UTF_16) else "utf-8-sig"
             with self._open() as file:
-                header, self._header_line = _first_line(file)
-        except UnicodeDecodeError as error:
-            raise LogError(f"{path}: must be text in UTF-8, got byte {error.object[error.start]:#04x}") from None
-        if not header:
+                numbered = ((i, line) for i, line in enumerate(self._lines(file), 1) if not line.isspace())
+                layout = find_layout(list(islice(numbered, _HEAD_LINES)))
+        except _DAMAGE as error:
+            raise LogError(f"{path}: is truncated or damaged: {error}") from error
+        if layout is None:
             raise LogError(f"{path}: the file is empty, a line of column names was expected")
-        self._delimiter = next((mark for mark in _DELIMITERS if mark in header), None)
-        # A leading # is how numpy.savetxt writes its header.
-        self.names = self._split(header.removeprefix("#").strip(" \r\n"))
-        no_names = all(_is_number(name) for name in self.names)
-        self.advice = f"; line {self._header_line} must hold the column names, it holds numbers" if no_names else ""
+        self._layout: Layout = layout
+        self.names = layout.names
+        self.units = layout.units
+        if all(is_number(name) for name in self.names):
+            self.advice = f"; line {layout.header} must hold the column names, it holds numbers"
+
+    @staticmethod
+    def recognises(head: bytes) -> bool:
+        """Return whether there is no byte 0, or a mark of gzip or UTF-16."""
+        return head.startswith((_GZIP, *_UTF_16)) or b"\0" not in head
 
     def blocks(self, names: Sequence[str], n: int) -> Iterator[Block]:
         """Iterate over the columns ``names`` in blocks of at most ``n`` samples."""
         use = [self.names.index(name) for name in names]
+        line = self._layout.first - 1
         try:
             with self._open() as file:
-                _, line = _first_line(file)
-                while lines := list(islice(file, n)):
-                    numbers = [line + 1 + i for i, text in enumerate(lines) if not text.isspace()]
+                rest = islice(self._lines(file), line, None)
+                while lines := list(islice(rest, n)):
+                    numbers = [line + 1 + i for i, text in enumerate(lines) if not _is_skipped(text)]
                     line += len(lines)
                     if len(numbers) < len(lines):
-                        lines = [text for text in lines if not text.isspace()]
+                        lines = [text for text in lines if not _is_skipped(text)]
                     if lines:
                         yield self._block(lines, numbers, use)
-        except UnicodeDecodeError as error:
-            byte = error.object[error.start]
-            raise LogError(f"{self.path}: must be text in UTF-8, got byte {byte:#04x} after line {line}") from None
+        except _DAMAGE as error:
+            raise LogError(f"{self.path}: is truncated or damaged after line {line}: {error}") from error
 
     def _open(self) -> IO[str]:
-        return self.path.open(encoding="utf-8-sig")
+        if self._compressed:
+            return gzip.open(self.path, "rt", encoding=self._encoding, errors=self._errors)
+        return self.path.open(encoding=self._encoding, errors=self._errors)
 
-    def _split(self, line: str) -> list[str]:
-        return [field.strip().strip("\"'") for field in line.split(self._delimiter)]
+    @property
+    def _errors(self) -> str:
+        return _FALLBACK if self._encoding == "utf-8-sig" else "replace"
+
+    def _lines(self, file: IO[str]) -> Iterator[str]:
+        """Iterate over the lines; LogError for one that is too long."""
+        for i, line in enumerate(iter(partial(file.readline, _LINE_MAX), ""), 1):
+            if len(line) == _LINE_MAX:
+                raise LogError(f"{self.path}, line {i}: has {_LINE_MAX} characters or more; is the file a log?")
+            yield line
 
     def _block(self, lines: list[str], numbers: list[int], use: list[int]) -> Block:
-        mark, expected = self._delimiter, len(self.names)
+        mark, expected = self._layout.delimiter, len(self.names)
+        if self._layout.decimal_comma:
+            lines = [decimal_points(text) for text in lines]
         widths = [text.count(mark) + 1 for text in lines] if mark else [len(text.split()) for text in lines]
+        if min(widths) != expected or max(widths) != expected:
+            widths = [len(split(text, mark)) for text in lines]  # without delimiters between quotation marks
         if min(widths) != expected or max(widths) != expected:
             i = next(i for i, width in enumerate(widths) if width != expected)
             self._convert(lines[i], numbers[i], use)  # a decimal comma is the likelier fault
             raise LogError(
-                f"{self.path}, line {numbers[i]}: {expected} columns were expected as in line {self._header_line}, "
+                f"{self.path}, line {numbers[i]}: {expected} columns were expected as in line {self._layout.header}, "
                 f"got {widths[i]}"
             )
         try:
@@ -81,31 +140,32 @@ class TextSource:
 
     def _convert(self, text: str, number: int, use: list[int]) -> list[float]:
         """Return the numbers of one line in those of the columns ``use`` that it has."""
-        fields, row = self._split(text), []
+        fields, row = split(text.strip(" \r\n"), self._layout.delimiter), []
         for i in use:
-            if i < len(fields) and not _is_number(fields[i]):
-                field = fields[i]
-                hint = "; write decimal points" if _is_number(field.replace(",", ".", 1)) else ""
-                came = repr(field) if field else "nothing"
+            if i >= len(fields):
+                continue
+            missing = not fields[i] and self.names[i] == self.measured
+            if missing and self.may_miss:
+                row.append(math.nan)
+                continue
+            number_there = decimal_points(fields[i])
+            if not is_number(number_there):
+                came = repr(fields[i]) if fields[i] else "nothing"
                 raise LogError(
-                    f"{self.path}, line {number}: column {self.names[i]!r} must be a number, got {came}{hint}"
+                    f"{self.path}, line {number}: column {self.names[i]!r} must be a number, got {came}"
+                    f"{NEEDS_TRUST if missing else _hint(fields[i])}"
                 )
-            row += [float(fields[i])] if i < len(fields) else []
+            row.append(float(number_there))
         return row
 
 
-def _first_line(file: IO[str]) -> tuple[str, int]:
-    """Return the first non-blank line, without its line end, and its number; empty if there is none."""
-    number = 0
-    for number, line in enumerate(file, 1):
-        if line.strip():
-            return line.rstrip("\r\n"), number
-    return "", number
+def _hint(field: str) -> str:
+    if is_number(field.replace(".", "").replace(",", ".")) or is_number(field.replace(",", "")):
+        return "; write numbers without separators of thousands"
+    if ":" in field and is_number(decimal_points(field.rsplit(":", 1)[1])):
+        return "; write times of day as seconds"
+    return ""
 
 
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return "_" not in text
+def _is_skipped(text: str) -> bool:
+    return text.isspace() or text.lstrip().startswith(COMMENTS)

@@ -11,7 +11,7 @@ from ..base.errors import LogError
 from ..base.signals import Array
 from .source import Block
 
-__all__ = ["TOLERANCE", "TimeAxis"]
+__all__ = ["COUNTED", "TOLERANCE", "TimeAxis"]
 
 TOLERANCE = 0.05
 """Largest relative deviation of an interval from the median one.
@@ -19,6 +19,9 @@ TOLERANCE = 0.05
 A recorder's clock jitters by a few per cent at most; a lost sample doubles an interval. At a feed rate of 80 mm/s
 and 1 kHz, 5 % of an interval are 4 µm of travel, comparable to encoder noise.
 """
+
+COUNTED = 10
+"""Fewest times that count samples before they are taken for an index: a log with an interval of 1 s is none yet."""
 
 _ROUNDING = 1e-8
 """Relative tolerance when the interval is rounded: 0.001000000003 s becomes 0.001 s."""
@@ -35,11 +38,15 @@ class TimeAxis:
         The file, for messages.
     name : str
         The column, for messages.
+    uniform : bool
+        Whether an interval that is not the median one is refused; otherwise all of them are kept, for their median.
     """
 
-    def __init__(self, path: Path, name: str) -> None:
-        self._path, self._name = path, name
+    def __init__(self, path: Path, name: str, *, uniform: bool = True) -> None:
+        self._path, self._name, self._uniform = path, name, uniform
         self._n = 0
+        self._counts = True
+        self._intervals: list[Array] = []
         self._first = self._last = self._median = self._jitter = 0.0
 
     @np.errstate(over="ignore", invalid="ignore")  # an interval that overflows is reported at the end
@@ -59,13 +66,21 @@ class TimeAxis:
             steps = np.diff(t, prepend=self._last)
         # steps[i] ends at sample i + shift of this block.
         shift = len(t) - len(steps)
-        if len(steps):
+        self._counts = self._counts and self._first in (0.0, 1.0) and bool((steps == 1.0).all())
+        if not self._uniform:
+            self._intervals.append(steps)
+        elif len(steps):
             self._check_increasing(steps, shift, block)
             if self._median == 0.0:
                 self._median = float(np.median(steps))
             self._check_uniform(steps, shift, block)
         self._n += len(t)
         self._last = float(t[-1])
+
+    @property
+    def counts_samples(self) -> bool:
+        """Whether the times are 0, 1, 2, … or 1, 2, 3, …, at least :data:`COUNTED` of them."""
+        return self._counts and self._n >= COUNTED
 
     def interval(self) -> float:
         """Return the mean interval, s, rounded to its significant digits under the jitter; needs two samples.
@@ -75,7 +90,7 @@ class TimeAxis:
         LogError
             If the interval or its reciprocal underflows.
         """
-        mean = (self._last - self._first) / (self._n - 1)
+        mean = (self._last - self._first) / (self._n - 1) if self._uniform else self._median_interval()
         if not sys.float_info.min <= mean <= 1 / sys.float_info.min:
             raise LogError(f"{self._path}: time {self._name!r} must be in seconds, got an interval of {mean:g} s")
         tolerance = _ROUNDING + min(1e-4, self._jitter / (self._n - 1))
@@ -86,6 +101,16 @@ class TimeAxis:
             for candidate in (float(f"{mean:.{digits}e}"), 1 / float(f"{1 / mean:.{digits}e}"))
         )
         return next(candidate for candidate in candidates if abs(candidate - mean) <= tolerance * mean)
+
+    @np.errstate(over="ignore", invalid="ignore")
+    def _median_interval(self) -> float:
+        steps = np.concatenate(self._intervals)
+        steps = steps[steps > 0.0]
+        if not len(steps):
+            raise LogError(f"{self._path}: time {self._name!r} must increase, it never does")
+        median = float(np.median(steps))
+        # The clock's mean, gaps and repeated times aside
+        return float(np.mean(steps[np.abs(steps - median) <= 0.5 * median]))
 
     def _check_increasing(self, steps: Array, shift: int, block: Block) -> None:
         if steps.min() <= 0.0:
@@ -107,6 +132,6 @@ class TimeAxis:
             raise LogError(
                 f"{self._path}, {block.where(i + shift)}: time {self._name!r} must be uniform: an interval of "
                 f"{self._median:.6g} s ± {100 * TOLERANCE:g} % was expected, got {steps[i]:.6g} s{samples}; "
-                f"resample the log, or remove the time column and give T_s"
+                f"resample the log, or remove the time column and give T_s (--fix, --T_s)"
             )
         self._jitter = max(self._jitter, worst)

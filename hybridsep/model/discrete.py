@@ -8,7 +8,7 @@ from scipy.linalg import expm, toeplitz
 from ..base.settings import check
 from ..base.signals import Array
 
-__all__ = ["BLOCK_MAX", "DiscreteModel"]
+__all__ = ["BLOCK_MAX", "DiscreteModel", "discretised_block"]
 
 BLOCK_MAX = 256
 """Largest size of the lifted matrices, for memory's sake; longer windows are split into blocks."""
@@ -121,17 +121,29 @@ def _discretised(state_space: StateSpace, T_s: float, input_hold: str) -> tuple[
     A_d, b_d, d = np.zeros_like(A), np.zeros_like(b), 0.0
     for i in range(0, len(b), 2):
         block = slice(i, i + 2)
-        augmented = np.zeros((4, 4))
-        augmented[:2, :2] = A[block, block] * T_s
-        augmented[:2, 2] = b[block] * T_s
-        augmented[2, 3] = 1.0  # the ramp from u(k) to u(k+1)
-        exponential = expm(augmented)
-        phi, gamma_1, gamma_2 = exponential[:2, :2], exponential[:2, 2], exponential[:2, 3]
-        A_d[block, block] = phi
-        if input_hold == "zoh":
-            b_d[block] = gamma_1
-        else:
-            # ξ(k+1) = Φ ξ + Γ₁ u(k) + Γ₂ (u(k+1) − u(k)); with s = ξ − Γ₂ u it needs no future command.
-            b_d[block] = phi @ gamma_2 + gamma_1 - gamma_2
-            d += float(c[block] @ gamma_2)
+        A_d[block, block], b_d[block], direct = discretised_block(A[block, block], b[block], T_s, input_hold)
+        d += float(c[block] @ direct)
     return A_d, b_d, c, d
+
+
+def discretised_block(A: Array, b: Array, T_s: float, input_hold: str) -> tuple[Array, Array, Array]:
+    """Return ``(A_d, b_d, d)`` with ``s(k+1) = A_d s(k) + b_d u(k)`` and the continuous state ``s(k) + d u(k)``.
+
+    Parameters
+    ----------
+    A : (m, m) array, 1/s
+    b : (m,) array, 1/s
+    T_s : float, s
+    input_hold : {"zoh", "foh"}
+    """
+    m = len(b)
+    augmented = np.zeros((m + 2, m + 2))
+    augmented[:m, :m] = A * T_s
+    augmented[:m, m] = b * T_s
+    augmented[m, m + 1] = 1.0  # the ramp from u(k) to u(k+1)
+    exponential = expm(augmented)
+    phi, gamma_1, gamma_2 = exponential[:m, :m], exponential[:m, m], exponential[:m, m + 1]
+    if input_hold == "zoh":
+        return phi, gamma_1, np.zeros(m)
+    # ξ(k+1) = Φ ξ + Γ₁ u(k) + Γ₂ (u(k+1) − u(k)); with s = ξ − Γ₂ u it needs no future command.
+    return phi, phi @ gamma_2 + gamma_1 - gamma_2, gamma_2

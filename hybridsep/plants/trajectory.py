@@ -154,24 +154,24 @@ def spiral(
 
 
 def read_trajectory(
-    path: str | Path, *, column: str = "x_d", unit: str = "m", T_s: float | None = None
+    path: str | Path, *, column: str = "x_d", unit: str | None = None, T_s: float | None = None
 ) -> tuple[Array, float]:
-    """Read a commanded position from a CSV, ``.npz`` or ``.mat`` file.
+    """Read a commanded position from a file.
 
     Parameters
     ----------
     path : str or Path
-        A file with a time column ``t`` and the command; see :func:`hybridsep.logs.read_log`.
+        A file with a time column ``t`` and the command, in any format of :func:`hybridsep.logs.log.open_log`.
     column : str
         The command's name in the file.
-    unit : {"m", "mm", "um"}
-        Unit of the command.
+    unit : str, optional
+        Unit of the command; that of the column's name, or m, if left out.
     T_s : float, optional
         Sampling interval, s, for a file without a time column.
 
     Returns
     -------
-    x_d : (n,) array, m
+    x_d : (n,) array, m, or rad where the unit is an angle
     T_s : float, s
 
     Raises

@@ -26,9 +26,6 @@ CORRELATION_MAX = 1e4
 
 _FIRST_CORRELATION, _CORRELATION_RATE = 10.0, 0.1
 
-_PENALTY_CORRELATION_MAX = 100.0
-"""Correlation beyond which the penalty does not grow: with more, a wrong model would learn nothing at all."""
-
 
 class ResidualScale(NamedTuple):
     """Size of the residuals so far.
@@ -131,6 +128,8 @@ class Candidate:
         Static features, the first ones of a row.
     lag_scales : (p,) array
         Prior standard deviations of the weights of ``e_pb(k−1) … e_pb(k−p)``; empty for a model without lags.
+    correlation_max : float
+        Correlation beyond which the penalty does not grow; 1 takes the rows as independent, and learns fastest.
 
     Attributes
     ----------
@@ -140,8 +139,8 @@ class Candidate:
         Rows that count as one: where a disturbance has no feature, the errors of neighbouring rows are alike.
     """
 
-    def __init__(self, n_static: int, lag_scales: Array) -> None:
-        self.n_static, self.lag_scales = n_static, lag_scales
+    def __init__(self, n_static: int, lag_scales: Array, correlation_max: float) -> None:
+        self.n_static, self.lag_scales, self.correlation_max = n_static, lag_scales, correlation_max
         self.noise_variance, self.correlation = 0.0, _FIRST_CORRELATION
 
     def solve(self, regression: RidgeRegression, static_scales: Array, least_variance: float) -> SolvedCandidate:
@@ -156,7 +155,7 @@ class Candidate:
         least_variance : float
             Least variance of the noise, m².
         """
-        variance = max(self.noise_variance, least_variance) * min(self.correlation, _PENALTY_CORRELATION_MAX)
+        variance = max(self.noise_variance, least_variance) * min(self.correlation, self.correlation_max)
         priors = np.concatenate((static_scales, self.lag_scales))
         return SolvedCandidate(self.n_static, regression.penalised(variance / priors**2), variance)
 

@@ -103,7 +103,8 @@ class LookAhead:
         self.start = start
         self.k = 0
         self._first_scored = self.delay + samples_before(warm_up, self.predictor.T_s)
-        self._n_scored, self._sums = 0, np.zeros(3)
+        self._n_scored, self._sums = 0, np.zeros(4)
+        self._hold_residual = 0.0  # m, before the window
         # The last commands, r(k − delay) … r(k − 1), which is x_d(k) … x_d(k + delay − 1)
         self._ahead, self._measured = np.full(self.delay, self.start), np.full(self.Np, self.start)
         if self.planner is None:
@@ -151,6 +152,11 @@ class LookAhead:
         return self._now(self.window.x_h)
 
     @property
+    def x_h_std(self) -> float:
+        """Standard deviation of ``x_meas − x_h`` now, m; 0 where it is not known."""
+        return self._now(self.window.x_h_std)
+
+    @property
     def e_servo(self) -> float:
         """Predicted servo error ``x_d − x_h``, m."""
         return self.x_d - self.x_h
@@ -163,7 +169,7 @@ class LookAhead:
     @property
     def n_rejected(self) -> int:
         """Measurements of this run that were missing or not plausible, with trust; counted window by window."""
-        return 0 if self.predictor.trusted is None else self.predictor.trusted.n_rejected
+        return self.predictor.n_rejected
 
     @property
     def sep_state(self) -> int:
@@ -185,6 +191,11 @@ class LookAhead:
         """Running RMS of ``x_meas − x_h`` since ``t_init``, m; 0 before."""
         return self._rms(2)
 
+    @property
+    def rms_hold(self) -> float:
+        """Running RMS of hold, ``x_pb`` plus the residual before a window, since ``t_init``, m; 0 before."""
+        return self._rms(3)
+
     def sample(self, x_d_ahead: float, x_meas: float) -> None:
         """Process sample ``k`` and advance to ``k + 1``.
 
@@ -205,7 +216,9 @@ class LookAhead:
         self._ahead[self.k % self.delay], self._measured[self.k % self.Np] = x_d_ahead, x_meas
         if self.k >= self._first_scored and not math.isnan(x_meas):
             self._n_scored += 1
-            self._sums += np.square([x_meas - self.x_d, x_meas - self.x_pb, x_meas - self.x_h])
+            self._sums += np.square(
+                [x_meas - position for position in (self.x_d, self.x_pb, self.x_h, self.x_pb + self._hold_residual)]
+            )
         self.k += 1
         if self.k % self.Np == 0:
             self._learn()
@@ -230,6 +243,7 @@ class LookAhead:
             "n_warm_up": self.window.n_warm_up,
             "state": int(self.window.state),
             "diverged": self.diverged,
+            "hold_residual": self._hold_residual,
         }
         arrays = {"sums": self._sums, "ahead": self._ahead, "measured": self._measured}
         arrays |= {name: getattr(self.window, name) for name in PublishedWindow.SIGNALS}
@@ -260,7 +274,8 @@ class LookAhead:
         look_ahead.k = saved.whole("k")
         look_ahead._first_scored, look_ahead._n_scored = saved.whole("first_scored"), saved.whole("n_scored")
         look_ahead.diverged = saved.text("diverged")
-        look_ahead._sums = np.abs(saved.array("sums", 3))
+        look_ahead._sums = np.abs(saved.array("sums", 4))
+        look_ahead._hold_residual = saved.real("hold_residual")
         look_ahead._ahead = saved.array("ahead", look_ahead.delay)
         look_ahead._measured = saved.array("measured", Np, finite=not look_ahead.may_miss)
         with saved.consistent():
@@ -290,6 +305,7 @@ class LookAhead:
     def _begin_window(self) -> None:
         """Predict or plan the next window; if it diverges, outputs keep the last one and later samples are refused."""
         x_d = np.roll(self._ahead, -(self.k % self.delay))
+        self._hold_residual = self.predictor.last_residual()
         try:
             if self.planner is None:
                 self.window = PublishedWindow.of_prediction(x_d, self.predictor.predict(x_d))

@@ -25,6 +25,7 @@ from .reference_features import ReferenceFeatures
 from .regression import RidgeRegression
 from .saved_predictor import predictor_blob, predictor_from
 from .trusted import TrustedModel
+from .uncertainty import Uncertainty
 from .window import PredictedWindow, Prediction, WindowOperator, path_beyond
 
 __all__ = ["HybridPredictor"]
@@ -59,6 +60,7 @@ class HybridPredictor:
         self.past = PastSamples(self.layout, self.Np)
         self.trusted = TrustedModel(settings, self.discrete) if settings.trust else None
         self._regression = None if settings.trust else RidgeRegression(self.layout.n, settings.lam)
+        self.uncertainty = Uncertainty(max(settings.lam, settings.noise_std**2), settings.Np)
         self.restart(start, t_init=settings.warm_up)
 
     @property
@@ -137,13 +139,27 @@ class HybridPredictor:
         if len(path) < n:
             raise SignalError(f"reference must have at least the {n} samples of x_d, got {len(path)}")
         signs = self.reference_features.signs(path, start)
-        forecast = None
+        e_h, self.pending = self.predicted(command, x_pb, start, path, signs)
+        return Prediction(x_pb + start, e_h, self.pending.error.std, self._warm_up(n))
+
+    def predicted(
+        self, x_d: Array, x_pb: Array, start: float, reference: Array, signs: Array
+    ) -> tuple[Array, PredictedWindow]:
+        """Return the residual predicted over a window, ``(n,)``, m, and the window, pending measurement."""
+        n, forecast = len(x_d), None
         if self.trusted is not None:
-            forecast = self.trusted.forecast(command, x_pb, path_beyond(path, start, n))
-        self.pending = PredictedWindow(command, x_pb, start, path, signs, forecast)
+            forecast = self.trusted.forecast(x_d, x_pb, path_beyond(reference, start, n))
         features = self.reference_features.features(signs, n)
         e_h = self._free_run(x_pb, features) if forecast is None else forecast.e_h
-        return Prediction(x_pb + start, e_h, min(max(self.n_init - self.k, 0), n))
+        active = np.arange(n) >= self._warm_up(n)
+        error = self.uncertainty.predict(
+            x_d,
+            x_pb,
+            np.where(active, e_h, 0.0),
+            last=self.last_residual(),
+            disagreement=0.0 if forecast is None else np.where(active, forecast.disagreement, 0.0),
+        )
+        return e_h, PredictedWindow(x_d, x_pb, start, reference, signs, error, forecast)
 
     def update(self, x: ArrayLike, *, learn: bool = True) -> None:
         """Learn from the measurement of the predicted window, or of its first samples; eq. (6).
@@ -167,14 +183,17 @@ class HybridPredictor:
         if not 1 <= len(measured) <= len(pending.x_d):
             raise SignalError(f"x must have 1 … {len(pending.x_d)} samples, as predicted, got {len(measured)}")
         m = len(measured)
+        accepted = np.ones(m, dtype=np.bool_)
+        e_pb = measured - pending.start - pending.x_pb[:m]
         if self.trusted is not None and pending.forecast is not None:
-            self.trusted.learn(pending.forecast, measured - pending.start, fold=learn)
+            accepted = self.trusted.learn(pending.forecast, measured - pending.start, fold=learn)
         else:
-            e_pb = measured - pending.start - pending.x_pb[:m]
             from_reference = self.reference_features.features(pending.signs, m)
             for i in range(0, m, self.Np):
                 stop = min(i + self.Np, m)
                 self._take_in(pending.x_pb[i:stop], e_pb[i:stop], from_reference[i:stop], learn)
+        if learn:
+            self.uncertainty.learn(pending.error, e_pb, accepted)
         self.reference_features.advance(pending.signs, pending.reference, m)
         _, self.state = self.discrete.forced_response(self.state, pending.x_d[:m])
         self.start = pending.start
@@ -230,6 +249,11 @@ class HybridPredictor:
         """Samples of the predicted window pending measurement; 0 if there is none."""
         return 0 if self.pending is None else len(self.pending.x_d)
 
+    @property
+    def n_rejected(self) -> int:
+        """Measurements of this run that were missing or not plausible; 0 without trust."""
+        return 0 if self.trusted is None else self.trusted.n_rejected
+
     def last_residual(self) -> float:
         """Return the last measured residual ``e_pb``, m, which the hold baseline holds over a window."""
         return float(self.past.e_pb[-1] if self.trusted is None else self.trusted.past[0])
@@ -269,6 +293,10 @@ class HybridPredictor:
             If the file is not a saved predictor.
         """
         return cls.from_bytes(Path(path).read_bytes())
+
+    def _warm_up(self, n: int) -> int:
+        """Return how many of the next ``n`` samples are within the warm-up."""
+        return min(max(self.n_init - self.k, 0), n)
 
     def _free_run(self, x_pb: Array, reference: Array) -> Array:
         """Return ``wᵀφ`` over a window in free run, ``(n,)``; eq. (4)."""

@@ -12,8 +12,9 @@ from ..base.state import pack, unpack
 from ..model.physics import ModalModel, Mode
 from .features import FeatureLayout
 from .reference_features import N_REFERENCE
-from .saved_trusted import restore_trusted, restored_forecast, trusted_blob, trusted_fields
-from .window import PredictedWindow, path_beyond
+from .saved_trusted import restore_trusted, trusted_blob, trusted_fields
+from .uncertainty import N_LEARNED
+from .window import PredictedWindow
 
 if TYPE_CHECKING:
     from .predictor import HybridPredictor
@@ -45,6 +46,7 @@ def predictor_blob(predictor: HybridPredictor) -> bytes:
         **learned,
         "signs": reference.before,
         "reference": np.array([reference.last]),
+        "uncertainty": predictor.uncertainty.learned(),
     }
     if pending is not None:
         arrays |= {f"pending_{name}": getattr(pending, name) for name in ("x_d", "x_pb", "reference", "signs")}
@@ -80,6 +82,10 @@ def predictor_from(kind: type[HybridPredictor], blob: bytes) -> HybridPredictor:
     features.last = float(saved.array("reference", 1, finite=False)[0])
     if predictor.trusted is not None and trusted is not None:
         restore_trusted(predictor.trusted, trusted)
+    learned = saved.array("uncertainty", N_LEARNED, finite=False)
+    if not predictor.uncertainty.is_sound(learned):
+        raise saved.error("the variances of the errors must be finite and ≥ 0")
+    predictor.uncertainty.restore(learned)
     if saved.field("pending_start") is not None:
         predictor.pending = _pending(predictor, saved)
     return predictor
@@ -93,7 +99,8 @@ def _pending(predictor: HybridPredictor, saved: Saved) -> PredictedWindow:
         raise saved.error("the pending window must have samples, and a reference at least as long")
     x_pb = saved.array("pending_x_pb", len(x_d))
     signs = saved.array("pending_signs", len(predictor.reference_features.signs(reference, start)))
-    model = predictor.trusted
-    path = path_beyond(reference, start, len(x_d))
-    forecast = None if model is None else restored_forecast(model, saved, x_d, x_pb, path)
-    return PredictedWindow(x_d, x_pb, start, reference, signs, forecast)
+    with np.errstate(all="ignore"):
+        e_h, pending = predictor.predicted(x_d, x_pb, start, reference, signs)  # which follow from the state
+    if predictor.trusted is not None and not np.isfinite(e_h).all():
+        raise saved.error("the prediction of the pending window must be finite")
+    return pending

@@ -13,9 +13,9 @@ from .blend import Blend
 from .candidates import CORRELATION_MAX, ResidualScale
 from .disturbances import LEAST_VELOCITY, N_DISTURBANCES, StaticState
 from .guard import N_STATE
-from .trusted import Forecast, TrustedModel
+from .trusted import TrustedModel
 
-__all__ = ["restore_trusted", "restored_forecast", "trusted_blob", "trusted_fields"]
+__all__ = ["restore_trusted", "trusted_blob", "trusted_fields"]
 
 _KIND = "trusted model"
 
@@ -92,15 +92,6 @@ def restore_trusted(model: TrustedModel, saved: Saved) -> None:
     model.n_rejected = saved.whole("n_rejected")
     with saved.consistent():
         model.guard.restore(saved.array("guard", N_STATE, finite=False))
-
-
-def restored_forecast(model: TrustedModel, saved: Saved, x_d: Array, x_pb: Array, path: Array | None) -> Forecast:
-    """Return the forecast of the pending window, which follows from the state; StateError if it overflows."""
-    with np.errstate(all="ignore"):
-        forecast = model.forecast(x_d, x_pb, path)
-    if not np.isfinite(forecast.e_h).all():
-        raise saved.error("the prediction of the pending window must be finite")
-    return forecast
 
 
 def _scale(saved: Saved) -> ResidualScale:

@@ -27,6 +27,13 @@ __all__ = ["Forecast", "TrustedModel"]
 _LAST_LAG = 0.005
 """Prior variance of the weight of a lag relative to that of the lag ``p`` before it."""
 
+_CAUTIOUS = 100.0
+"""Correlation beyond which the penalty of a cautious candidate does not grow: it would learn nothing at all."""
+
+_FIRST_WEIGHTS = (0.0, 0.5, 0.5, 0.0)
+"""Of the blend: hold, without lags, with lags, with lags and rows taken as independent. The last one learns fastest
+where G_pb is wrong, and is trusted once it has shown that."""
+
 _BOUND = 1.2
 """Largest prediction relative to the largest residual so far."""
 
@@ -63,6 +70,8 @@ class Forecast:
         Commands and physics-based prediction, relative to the start.
     e_h : (n,) array, m
         Predicted residual.
+    disagreement : (n,) array, m²
+        Variance of the candidates about their blend.
     hold : float, m
         Last residual, bounded: the prediction of the hold candidate.
     predictions : tuple of CandidatePrediction
@@ -76,6 +85,7 @@ class Forecast:
     x_d: Array
     x_pb: Array
     e_h: Array
+    disagreement: Array
     hold: float
     predictions: tuple[CandidatePrediction, ...]
     largest: Array
@@ -99,8 +109,12 @@ class TrustedModel:
         p = settings.p
         self.regression = RidgeRegression(self.static.n + p, _NO_PENALTY)
         lag_scales = np.sqrt(_LAST_LAG ** (np.arange(p) / p))
-        self.candidates = (Candidate(self.static.n, lag_scales[:0]), Candidate(self.static.n, lag_scales))
-        self.blend = Blend((0.0, 0.5, 0.5), settings.Np)  # hold, without lags, with lags
+        self.candidates = (
+            Candidate(self.static.n, lag_scales[:0], _CAUTIOUS),
+            Candidate(self.static.n, lag_scales, _CAUTIOUS),
+            Candidate(self.static.n, lag_scales, 1.0),
+        )
+        self.blend = Blend(_FIRST_WEIGHTS, settings.Np)
         self.n_rows = 0.0
         self.largest = np.zeros(self.static.n)
         self.velocity_scale = 0.0
@@ -143,8 +157,10 @@ class TrustedModel:
             rows, _ = self.static.rows(self.state, x_d, x_pb, x, velocity_scale)
             predictions = tuple(self.predict(candidate, rows) for candidate in solved)
         hold = self.hold
-        e_h = self.blend.weights @ self._blended(hold, predictions, len(x_d))
-        return Forecast(x_d, x_pb, e_h, hold, predictions, largest, velocity_scale)
+        candidates = self._blended(hold, predictions, len(x_d))
+        e_h = self.blend.weights @ candidates
+        disagreement = np.maximum(self.blend.weights @ candidates**2 - e_h**2, 0.0)
+        return Forecast(x_d, x_pb, e_h, disagreement, hold, predictions, largest, velocity_scale)
 
     def scales(self, x_d: Array, x_pb: Array, path: Array | None = None) -> tuple[float, Array]:
         """Return the velocity scale of the friction, m/s, and the largest magnitudes of the features, window included.
@@ -175,8 +191,8 @@ class TrustedModel:
         """Last residual, m, bounded: one that was not learned may be larger."""
         return min(max(float(self.past[0]), -self.bound), self.bound)
 
-    def learn(self, forecast: Forecast, x: Array, *, fold: bool = True) -> None:
-        """Learn from the measurement of a window.
+    def learn(self, forecast: Forecast, x: Array, *, fold: bool = True) -> NDArray[np.bool_]:
+        """Learn from the measurement of a window; return which samples are accepted, ``(m,)`` bool.
 
         Parameters
         ----------
@@ -204,6 +220,7 @@ class TrustedModel:
         self.n_rejected += m - int(accepted.sum())
         self.past = np.concatenate((e[::-1], self.past))[:p]
         self.past_bridged = bridged[-p:]
+        return accepted
 
     def _assess(self, forecast: Forecast, measured: Array, accepted: NDArray[np.bool_]) -> None:
         """Judge the candidates and their blend by the measurement of their window."""
@@ -246,8 +263,8 @@ class TrustedModel:
 
     @staticmethod
     def _blended(hold: float, predictions: tuple[CandidatePrediction, ...], m: int) -> Array:
-        """Return the predictions that are blended, ``(3, m)``, m: hold, and the learned candidates, 0 at first."""
-        learned = [prediction.e_h[:m] for prediction in predictions] or [np.zeros(m)] * 2
+        """Return the predictions that are blended, ``(4, m)``, m: hold, and the learned candidates, 0 at first."""
+        learned = [prediction.e_h[:m] for prediction in predictions] or [np.zeros(m)] * (len(_FIRST_WEIGHTS) - 1)
         return np.stack((np.full(m, hold), *learned))
 
     def _judge(self, forecast: Forecast, measured: Array, accepted: NDArray[np.bool_]) -> None:
@@ -259,8 +276,8 @@ class TrustedModel:
             for candidate in self.candidates:
                 candidate.noise_variance = given or first
             return
-        best = forecast.predictions[-1]
-        surprise = float(np.mean((measured - best.unshrunk[:m])[accepted] ** 2)) / best.expected
+        cautious = forecast.predictions[1]
+        surprise = float(np.mean((measured - cautious.unshrunk[:m])[accepted] ** 2)) / cautious.expected
         if surprise > _SURPRISE:
             self._discount(min(max((_SURPRISE / surprise) ** 2, _SURPRISED * self.settings.Np / self.n_rows), 1.0))
         for candidate, prediction in zip(self.candidates, forecast.predictions, strict=True):

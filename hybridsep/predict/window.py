@@ -12,6 +12,7 @@ from scipy.signal import lfilter
 
 from ..base.signals import Array, as_published, as_samples
 from .trusted import Forecast
+from .uncertainty import PredictedError
 
 __all__ = ["PredictedWindow", "Prediction", "PublishedWindow", "WindowOperator", "path_beyond"]
 
@@ -26,12 +27,15 @@ class Prediction:
         Physics-based prediction, eq. (2).
     e_h : (n,) array, m
         Predicted residual ``wᵀφ``, during the warm-up too.
+    x_h_std : (n,) array, m
+        Standard deviation of the error ``x − x_h`` against the measured position.
     n_warm_up : int
         Leading samples within the warm-up, where ``x_h = x_pb``.
     """
 
     x_pb: Array
     e_h: Array
+    x_h_std: Array
     n_warm_up: int
 
     @property
@@ -62,6 +66,8 @@ class PredictedWindow:
         Unmodified commanded positions.
     signs : array
         ψ of the reference.
+    error : PredictedError
+        Published residual, and what is known of its error.
     forecast : Forecast, optional
         Prediction of the residual, with trust.
     """
@@ -71,6 +77,7 @@ class PredictedWindow:
     start: float
     reference: Array
     signs: Array
+    error: PredictedError
     forecast: Forecast | None = None
 
 
@@ -84,18 +91,21 @@ class PublishedWindow:
         Commanded position, and the modified command sent to the drive; the same without a planner.
     x_pb, x_h : (Np,) arrays, m
         Physics-based prediction under ``x_dm``, and that of the best available model.
+    x_h_std : (Np,) array, m
+        Standard deviation of the error of ``x_h``; 0 where it is not known.
     state : int
         Model that planned it (:class:`~hybridsep.compensate.plan.SepState`); 0 without a planner.
     n_warm_up : int
         Leading samples where ``x_h = x_pb``.
     """
 
-    SIGNALS: ClassVar[tuple[str, ...]] = ("x_d", "x_dm", "x_pb", "x_h")
+    SIGNALS: ClassVar[tuple[str, ...]] = ("x_d", "x_dm", "x_pb", "x_h", "x_h_std")
 
     x_d: Array
     x_dm: Array
     x_pb: Array
     x_h: Array
+    x_h_std: Array
     state: int
     n_warm_up: int
 
@@ -103,12 +113,12 @@ class PublishedWindow:
     def at_rest(cls, start: float, Np: int) -> PublishedWindow:
         """Return the window of a drive at rest at ``start``, m, without a prediction."""
         rest = np.full(Np, start)
-        return cls(rest, rest, rest, rest, 0, Np)
+        return cls(rest, rest, rest, rest, np.zeros(Np), 0, Np)
 
     @classmethod
     def of_prediction(cls, x_d: Array, prediction: Prediction) -> PublishedWindow:
         """Return the window of unmodified commands; SignalError if its prediction diverges."""
-        return cls(x_d, x_d, prediction.x_pb, prediction.x_h, 0, prediction.n_warm_up)
+        return cls(x_d, x_d, prediction.x_pb, prediction.x_h, prediction.x_h_std, 0, prediction.n_warm_up)
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,24 @@ def test_backtest_of_a_csv(hybridsep: Run, tmp_path: Path) -> None:
     status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper")
     assert status == 0
     assert f"{summary['rms_h_um']:.2f}" in out
+    assert f"{summary['ratio_to_hold']:.2f}" in out
     assert "after warm-up" in out
+    assert " ".join(summary["verdict"].split()) in " ".join(out.split())
+    assert summary["verdict"].startswith("Better than the physics model: 0.4")
+
+
+def test_backtest_of_a_log_with_missing_measurements(hybridsep: Run, tmp_path: Path) -> None:
+    rows = write_log(tmp_path / "whole.csv", n=2000).read_text().splitlines()
+    rows[1500] = rows[1500].rpartition(",")[0] + ","
+    log = tmp_path / "log.csv"
+    log.write_text("\n".join(rows))
+    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--trust", "true", "--json")
+    assert status == 0
+    assert json.loads(out)["n_samples"] == 1999
+    assert "measurements were missing or not plausible" in json.loads(out)["verdict"]
+    status, _, said = hybridsep("backtest", log, "-m", "spring_mass_damper")
+    assert status == 2
+    assert "line 1501: column 'x' must be a number, got nothing; missing measurements are replayed with trust" in said
 
 
 def test_backtest_takes_units_columns_and_parameters(hybridsep: Run, tmp_path: Path) -> None:
@@ -169,7 +186,7 @@ def test_help_shows_units_and_ranges(hybridsep: Run) -> None:
         assert PARAMETERS[name].range_text in text
     assert "[m2]" in text
     status, out, _ = hybridsep("--help")
-    assert all(command in out for command in ("demo", "build", "cosim", "backtest"))
+    assert all(command in out for command in ("demo", "build", "cosim", "backtest", "identify", "init"))
     assert hybridsep("--version")[1].strip() == __version__
 
 
@@ -181,8 +198,8 @@ def test_help_shows_units_and_ranges(hybridsep: Run) -> None:
         (["backtest", "{log}", "-m", "spring_mass_damper", "--lam", "0"], "lambda must be 1e-40 … 1e+12 m2, got 0"),
         (["backtest", "{log}", "-m", "spring_mass_damper", "--x", "pos"], "column 'pos'"),
         (
-            ["backtest", "{log}", "-m", "spring_mass_damper", "--unit", "inch"],
-            "unit must be one of m, mm, um, got 'inch'",
+            ["backtest", "{log}", "-m", "spring_mass_damper", "--unit", "furlong"],
+            "unit must be one of m, mm, um, nm, in, rad, mrad, urad, deg, rev, got 'furlong'",
         ),
         (["backtest", "nothing.csv", "-m", "spring_mass_damper"], "nothing.csv"),
         (["build", "Robot", "--flavour", "python"], "no FMU Robot; there are HybridPredictorPy_als25010_x"),
@@ -221,10 +238,11 @@ def test_errors_are_one_line_and_status_2(hybridsep: Run, tmp_path: Path, argume
 
 def test_a_log_in_milliseconds_gets_a_hint(hybridsep: Run, tmp_path: Path) -> None:
     log = tmp_path / "ms.csv"
-    log.write_text("t,x_d,x\n" + "".join(f"{k},0,0\n" for k in range(10)))
-    status, _, err = hybridsep("backtest", log, "-m", "spring_mass_damper")
-    assert status == 2
-    assert "is its time in ms? It must be in seconds" in " ".join(err.split())
+    for start, message in ((5, "is its time in ms? It must be in seconds"), (0, "an index, or a time in ms; give T_s")):
+        log.write_text("t,x_d,x\n" + "".join(f"{start + k},0,0\n" for k in range(10)))
+        status, _, err = hybridsep("backtest", log, "-m", "spring_mass_damper")
+        assert status == 2
+        assert message in " ".join(err.split())
 
 
 def test_a_log_without_times(hybridsep: Run, tmp_path: Path) -> None:

@@ -12,11 +12,13 @@ from hybridsep.base.metrics import (
     RunningErrors,
     batch_rms,
     contour_error,
+    coverage,
     hold,
     largest,
     peak_derivatives,
     reduction_percent,
     rms,
+    rms_ratio,
     shares,
 )
 from hybridsep.base.signals import Array
@@ -36,6 +38,14 @@ def test_reduction() -> None:
     assert reduction_percent(5.0, 4.0) == -25.0
     assert reduction_percent(0.0, 0.0) == 0.0
     assert reduction_percent(1.0, 0.0) == -math.inf
+    assert (rms_ratio(1.0, 4.0), rms_ratio(0.0, 0.0), rms_ratio(1.0, 0.0)) == (0.25, 1.0, math.inf)
+
+
+def test_coverage() -> None:
+    error, std = np.random.default_rng(0).normal(0.0, 3e-6, 100_000), np.full(100_000, 3e-6)
+    for level in (0.5, 0.9, 0.95):
+        assert coverage(error, std, level) == pytest.approx(level, abs=5e-3)
+    assert coverage(np.array([0.0, np.nan, 3.0]), np.ones(3), 0.95) == 0.5
 
 
 def test_blocks_of_errors_are_one_error() -> None:

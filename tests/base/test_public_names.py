@@ -66,7 +66,13 @@ def loaded(code: str) -> set[str]:
 
 
 @pytest.mark.parametrize(
-    "arguments", [[], ["--help"], ["--version"], *([name, "--help"] for name in ("demo", "build", "cosim", "backtest"))]
+    "arguments",
+    [
+        [],
+        ["--help"],
+        ["--version"],
+        *([name, "--help"] for name in ("demo", "build", "cosim", "backtest", "identify", "init")),
+    ],
 )
 def test_help_and_import_load_nothing_slow(arguments: list[str]) -> None:
     command = f"sys.argv[1:] = {arguments!r}; from hybridsep_main import main; main()"

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from places import ROOT
 
-PAGES = ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "docs/importers.md", "docs/paper.md")
+PAGES = ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "docs/identify.md", "docs/importers.md", "docs/paper.md")
 FOLDERS = (".", "hybridsep", "fmu_src/c", "fmu_src/c/core", "benchmarks", "benchmarks/step_time")
 """Folders below which a page names files."""
 FILE = re.compile(r"(?<![\w*{./-])((?:[\w.-]+/)*[\w.-]+\.(?:py|c|h|toml|md))(?![\w*}])")

@@ -45,8 +45,10 @@ def test_processes_of_tests_tell_where_they_crash() -> None:
 
 
 def test_python_blocks_run(tmp_path: Path) -> None:
-    block, closed_loop = blocks("python")
+    intake, block, closed_loop = blocks("python")
     assert len(block.strip().splitlines()) <= 12
+    done = subprocess.run([sys.executable, "-W", "error", "-c", intake], cwd=tmp_path, capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("1 True\n", "")
     done = subprocess.run([sys.executable, "-W", "error", "-c", block], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     rms_pb, rms_h = map(float, done.stdout.splitlines()[0].split())

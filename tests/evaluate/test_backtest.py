@@ -233,3 +233,26 @@ def test_bad_chunks() -> None:
         backtest_stream(predictor(), [good])  # type: ignore[list-item]
     with pytest.raises(SignalError, match="at least one sample, got none"):
         backtest_stream(predictor(), [])
+
+
+def test_missing_measurements_are_bridged_with_trust_and_refused_without() -> None:
+    x_d, x = log()
+    holes = x.copy()
+    holes[300:320:2] = np.nan
+    holes[500:520] = np.nan  # a whole window
+    with pytest.raises(SignalError, match="x must be finite, got nan at sample 300: missing measurements need trust"):
+        backtest(predictor(), x_d, holes)
+    with pytest.raises(
+        SignalError, match="x of the chunk from sample 500 on must be finite, got nan at sample 0: miss"
+    ):
+        backtest_stream(predictor(), [(x_d[:500], x[:500]), (x_d[500:], holes[500:])])
+    settings = PredictorSettings(Np=20, p=5, q=2, t_init=-1.0)
+    batches: list[Batch] = []
+    result = backtest(HybridPredictor(predictor().model, settings), x_d, holes, on_batch=batches.append)
+    assert result.overall.n_samples == 1010 - 30
+    assert result.overall.rms_h == pytest.approx(rms((holes - result.x_h)[~np.isnan(holes)]), rel=1e-12)
+    assert np.isfinite(result.x_h).all()
+    assert np.isfinite(result.x_h_std).all()
+    assert math.isnan(result.batch_rms_h[25])
+    assert [batch.k for batch in batches] == list(range(0, 1010, 20))
+    assert result.verdict.n_rejected >= 30

@@ -61,7 +61,8 @@ def use_predictor(predictor: HybridPredictor) -> None:
 def use_look_ahead(look_ahead: LookAhead | LookAhead) -> None:
     for _ in range(2):
         sampled(look_ahead, 12)
-        outputs = [look_ahead.x_d, look_ahead.x_pb, look_ahead.x_h, look_ahead.rms_pb, look_ahead.rms_h]
+        names = ("x_d", "x_pb", "x_h", "x_h_std", "rms_pb", "rms_h", "rms_hold")
+        outputs = [getattr(look_ahead, name) for name in names]
         assert np.isfinite(outputs).all()
     look_ahead.to_bytes()
 

@@ -215,7 +215,12 @@ def drive(
         for part in range(parts):
             instance.step(start + (k + part / parts) * 1e-3, 1e-3 / parts)
             instance.set("x_d_ahead", 99.0)  # inputs count at the beginning of a sample only
-        outputs.append(tuple(instance.get(name) for name in ("x_d", "x_pb", "x_h", "e_servo", "rms_pb", "rms_h")))
+        outputs.append(
+            tuple(
+                instance.get(name)
+                for name in ("x_d", "x_pb", "x_h", "x_h_std", "e_servo", "rms_pb", "rms_h", "rms_hold")
+            )
+        )
     return outputs
 
 

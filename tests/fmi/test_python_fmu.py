@@ -71,15 +71,18 @@ def test_interface_of_the_predictor(predictor: FmuInstance) -> None:
         "x_d": ("output", "Real", "m"),
         "x_pb": ("output", "Real", "m"),
         "x_h": ("output", "Real", "m"),
+        "x_h_std": ("output", "Real", "m"),
         "e_servo": ("output", "Real", "m"),
         "hybrid_active": ("output", "Boolean", None),
         "rms_pb": ("output", "Real", "m"),
         "rms_h": ("output", "Real", "m"),
+        "rms_hold": ("output", "Real", "m"),
         "batch": ("output", "Integer", None),
         "n_rejected": ("output", "Integer", None),
         "x_d_window[1]": ("local", "Real", "m"),
         "x_pb_window[100]": ("local", "Real", "m"),
         "x_h_window[100]": ("local", "Real", "m"),
+        "x_h_std_window[100]": ("local", "Real", "m"),
         "Np": ("parameter", "Integer", None),
         "p": ("parameter", "Integer", None),
         "q": ("parameter", "Integer", None),
@@ -99,7 +102,7 @@ def test_interface_of_the_predictor(predictor: FmuInstance) -> None:
     }
     found = {name: (v.causality, v.type, v.unit) for name, v in variables.items()}
     assert {name: found[name] for name in expected} == expected
-    assert len(found) == 27 + 300
+    assert len(found) == 29 + 400
     starts = {name: variables[name].start for name in ("Np", "p", "q", "lambda", "T_s", "t_init", "input_hold")}
     assert starts == {
         "Np": "100",

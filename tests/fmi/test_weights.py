@@ -30,6 +30,7 @@ from hybridsep.fmi.weights import WEIGHTS_FILE, learned_settings, restore_weight
 from hybridsep.machine import load_machine
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
+from hybridsep.predict.uncertainty import N_LEARNED
 
 MACHINE = load_machine("spring_mass_damper")
 
@@ -108,7 +109,7 @@ def test_weights_and_samples_have_one_model_each(tmp_path: Path, trained: Path) 
 def test_damaged_files_leave_the_predictor_as_it_was(trained: Path) -> None:
     content = weights_file(HybridPredictor.load(trained))
     predictor = MACHINE.new_predictor()
-    first = 40 + 32 * len(learned_settings(predictor))  # of the triangle, behind the head and the settings
+    first = 40 + 32 * len(learned_settings(predictor)) + 8 * N_LEARNED  # of the triangle
     zero = sealed(content[:first] + bytes(8) + content[first + 8 : -8])
     infinite = sealed(content[:first] + struct.pack("<d", np.inf) + content[first + 8 : -8])
     longer = sealed(content[:-8] + bytes(8))
@@ -199,11 +200,18 @@ def test_no_mutation_of_a_file_with_trust_is_accepted(tmp_path: Path) -> None:
     body = content[:-8]
     trusted = predictor.trusted
     assert trusted is not None
-    n_numbers = 9 + 3 + trusted.static.n + 9 + 3
+    n_blended, n_candidates = len(trusted.blend.first), len(trusted.candidates)
+    n_numbers = 5 + 2 * n_candidates + trusted.static.n + n_blended * (n_blended + 2) + 2 + N_LEARNED
+    errors, correlations = first + 8 * (n_numbers - N_LEARNED), first + 8 * (5 + n_candidates)
     assert struct.unpack_from("<Q", body, 32) == (n_numbers,)
+    spread, step = errors - 16, errors - 8
     nonsense = [
+        *(body[:i] + struct.pack("<d", wrong) + body[i + 8 :] for i in (spread, step) for wrong in (-2.0, np.nan)),
+        body[:spread] + struct.pack("<d", np.inf) + body[spread + 8 :],
+        body[:step] + struct.pack("<d", 0.0) + body[step + 8 :],
         *(body[:i] + struct.pack("<d", wrong) + body[i + 8 :] for i in (first, first + 80) for wrong in (-1.0, np.nan)),
-        *(body[:i] + struct.pack("<d", 0.5) + body[i + 8 :] for i in (first + 56, first + 64)),  # correlations
+        *(body[:i] + struct.pack("<d", 0.5) + body[i + 8 :] for i in (correlations, correlations + 8)),
+        *(body[:i] + struct.pack("<d", -1.0) + body[i + 8 :] for i in (errors, errors + 8 * (N_LEARNED - 2))),
         *(body[:32] + struct.pack("<Q", n) + body[40:] for n in (0, n_numbers - 1, n_numbers + 1, 2**63)),
         body[:first] + body[first + 8 :],
         body[:first] + bytes(8) + body[first:],

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from log_files import FORMATS, columns, write, write_csv
+from log_files import EVERY_FORMAT, FORMATS, columns, write, write_csv
 from places import EMPS
 
 from hybridsep.logs.log import LogReader, open_log, read_log
 
 
-@FORMATS
+@EVERY_FORMAT
 def test_every_format_gives_the_same_log(tmp_path: Path, suffix: str) -> None:
     data = columns()
     log = read_log(write(tmp_path / f"log{suffix}", data))

@@ -31,7 +31,7 @@ def test_a_direct_prediction_that_diverges_is_refused() -> None:
         _ = runaway_predictor().predict(np.full(100, 1e-3)).x_h
     assert str(caught.value) == SAID
     with pytest.raises(SignalError, match="x_pb must stay within"):
-        _ = Prediction(np.array([np.nan]), np.zeros(1), 1).x_h
+        _ = Prediction(np.array([np.nan]), np.zeros(1), np.zeros(1), 1).x_h
 
 
 def test_a_replay_that_diverges_is_refused() -> None:
@@ -60,7 +60,7 @@ def test_a_restored_state_shows_no_output_that_is_not_finite(offset: int) -> Non
 def test_a_plan_that_diverges_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     values = {**c_core.COMPENSATOR, **numbered([c_core.SPRING_MASS_DAMPER]), "t_init": 0.0}
     look_ahead = LookAhead(library_compensator(values), 0.0)
-    diverging = Prediction(np.full(100, np.inf), np.zeros(100), 0)
+    diverging = Prediction(np.full(100, np.inf), np.zeros(100), np.zeros(100), 0)
     monkeypatch.setattr(look_ahead.predictor, "predict", lambda *_, **__: diverging)
     for _ in range(99):
         look_ahead.sample(0.0, 0.0)

@@ -111,16 +111,16 @@ def test_memory_does_not_grow() -> None:
         ("scale", np.array([1.0, 5.0, 2.0])),
         ("scale", np.array([0.0, 0.0, -2.0])),
         ("scale", np.array([0.0, 0.0, np.inf])),
-        ("candidates", np.array([[1e-12, 0.5], [1e-12, 10.0]])),
-        ("candidates", np.array([[1e-12, 10.0], [1e-12, 1e5]])),
-        ("candidates", np.array([[-1e-12, 10.0], [1e-12, 10.0]])),
-        ("candidates", np.ones((3, 2))),
-        ("gram", -np.eye(3)),
-        ("gram", np.triu(np.ones((3, 3)))),
-        ("gram", np.full((3, 3), np.nan)),
-        ("cross", np.ones(2)),
-        ("weights", np.array([0.5, 0.5, 0.5])),
-        ("weights", np.array([-0.5, 0.5, 0.5])),
+        ("candidates", np.array([[1e-12, 0.5], [1e-12, 10.0], [1e-12, 10.0]])),
+        ("candidates", np.array([[1e-12, 10.0], [1e-12, 10.0], [1e-12, 1e5]])),
+        ("candidates", np.array([[-1e-12, 10.0], [1e-12, 10.0], [1e-12, 10.0]])),
+        ("candidates", np.ones((2, 2))),
+        ("gram", -np.eye(4)),
+        ("gram", np.triu(np.ones((4, 4)))),
+        ("gram", np.full((4, 4), np.nan)),
+        ("cross", np.ones(3)),
+        ("weights", np.array([0.5, 0.5, 0.5, 0.0])),
+        ("weights", np.array([-0.5, 0.5, 0.5, 0.5])),
         ("filters", np.zeros((3, 8))),
         ("filtered", np.full(8, np.inf)),
         ("x_d", np.array([np.nan])),
@@ -149,7 +149,7 @@ def test_a_prediction_that_overflows_is_refused() -> None:
     own, inside, _ = unpack("trusted model", parts["trusted"])
     # The leverage of the lags overflows: they are huge, and nothing is known of their weights.
     inside["past"], inside["scale"] = np.full(6, 1e100), np.array([1e-200, 1e-200, 1e-100])
-    inside["factor"], inside["candidates"] = 1e-100 * np.eye(27), np.array([[0.0, 1.0], [0.0, 1.0]])
+    inside["factor"], inside["candidates"] = 1e-100 * np.eye(27), np.tile([0.0, 1.0], (3, 1))
     forged = pack("predictor", meta, arrays, {"trusted": pack("trusted model", own, inside)})
     with pytest.raises(StateError, match="the prediction of the pending window must be finite"):
         HybridPredictor.from_bytes(forged)

@@ -153,11 +153,12 @@ def test_a_changed_drive_is_relearned_where_samples_lose_their_weight() -> None:
     x_pb, changed = physics(x_d), 6 * PERIOD
     e = friction(x_d)
     e[changed:] *= -3.0
-    x = x_pb + e + 1e-6 * np.random.default_rng(2).normal(size=len(x_d))
+    true = x_pb + e
+    x = true + 1e-6 * np.random.default_rng(2).normal(size=len(x_d))
     kept, faded = run(trusted(), x_d, x), run(trusted(forgetting=0.3), x_d, x)
     late = slice(changed + 4 * PERIOD, None)
-    assert rms((x - faded)[late]) < 0.85 * rms((x - kept)[late])
-    assert rms((x - faded)[late]) < 2e-6
+    assert rms((true - faded)[late]) < 0.7 * rms((true - kept)[late])
+    assert rms((true - faded)[late]) < 1e-6
 
 
 def test_the_noise_that_is_given_is_that_of_the_candidates() -> None:
@@ -165,7 +166,7 @@ def test_the_noise_that_is_given_is_that_of_the_candidates() -> None:
     predictor = trusted(noise_std=3e-6)
     run(predictor, x_d, x)
     assert predictor.trusted is not None
-    assert [one.noise_variance for one in predictor.trusted.candidates] == [pytest.approx(9e-12)] * 2
+    assert [one.noise_variance for one in predictor.trusted.candidates] == [pytest.approx(9e-12)] * 3
     estimated = trusted()
     run(estimated, x_d, x)
     assert estimated.trusted is not None

@@ -13,6 +13,8 @@ from staircase_data import TS, C, K, M
 from stream import COMPENSATOR, LIBRARY, LOOK_AHEADS, OUTPUTS, PREDICTOR, PYTHON, Value
 from streams import StreamMaker, on_all
 
+from hybridsep.base.metrics import hold
+
 
 def shown_by(new_stream: StreamMaker, n: int, values: dict[str, Value], start: float = 0.0) -> dict[str, np.ndarray]:
     """Return the inputs of a closed loop of the library and what a stream shows of it."""
@@ -69,7 +71,7 @@ def test_the_first_fill_keeps_the_drive_at_its_start_and_is_not_learned(new_stre
         for k in range(20):
             stream.set("x_d_ahead", 0.3)
             stream.set("x_meas", x_meas)
-            assert stream.outputs() == [0.25, 0.25, 0.25, *[0.0] * 6], k
+            assert stream.outputs() == [0.25, 0.25, 0.25, *[0.0] * 8], k
             stream.step(k * TS, TS)
         assert stream.outputs()[0] == 0.3
         for k in range(20, 100):
@@ -139,6 +141,9 @@ def test_running_rms_counts_from_the_warm_up(new_stream: StreamMaker, t_init: fl
     sums = {"rms_pb": shown["x_pb"], "rms_h": shown["x_h"]}
     if new_stream.model == COMPENSATOR:
         sums["rms_e"] = shown["x_d"]
+    else:
+        x_pb, after_fill = shown["x_pb"][:-1], np.arange(1500) >= fill
+        sums["rms_hold"] = hold(x_pb, np.where(after_fill, shown["x_meas"], x_pb), after_fill, Np)
     for name, against in sums.items():
         assert not shown[name][: first + 1].any()
         for k in (first, first + 1, first + 400, 1499):

@@ -22,6 +22,7 @@ from hybridsep.base.settings import PARAMETERS
 from hybridsep.fmi.c_header import c_header
 from hybridsep.fmi.variables import COMPENSATOR_SETTINGS, INTERPOLATED, PREDICTOR_SETTINGS, TRUST_SETTINGS, variables_of
 from hybridsep.machine import load_machine
+from hybridsep.predict.uncertainty import N_LEARNED, Uncertainty
 
 Array = NDArray[np.float64]
 
@@ -217,8 +218,9 @@ def write_weights(folder: Path, name: str, factor: Array, n_samples: int, **sett
     names = (*PREDICTOR_SETTINGS, "trust", "v_friction")
     learned = {key: values[key] for key in names if PARAMETERS[key].learned}
     learned |= {f"mode[{i}].{key}": value for i, mode in enumerate(modes, start=1) for key, value in mode.items()}
-    content = b"HSEPWGT4" + struct.pack("<4Q", len(learned), len(modes), n_samples, 0)
+    content = b"HSEPWGT6" + struct.pack("<4Q", len(learned), len(modes), n_samples, N_LEARNED)
     content += b"".join(struct.pack("<24sd", key.encode(), value) for key, value in learned.items())
+    content += Uncertainty(values["lambda"], int(values["Np"])).learned().astype("<f8").tobytes()
     content += np.concatenate([factor[i, i:] for i in range(len(factor))]).astype("<f8").tobytes()
     (folder / "weights.bin").write_bytes(content + struct.pack("<Q", zlib.crc32(content)))
 

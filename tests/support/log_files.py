@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import gzip
+import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 from scipy import io
 
-__all__ = ["FORMATS", "Columns", "columns", "write", "write_csv"]
+__all__ = ["EVERY_FORMAT", "FORMATS", "Columns", "capture", "columns", "write", "write_csv"]
 
 Columns = dict[str, Any]
 
@@ -19,9 +23,21 @@ def columns(n: int = 50, T_s: float = 1e-3) -> Columns:
     return {"t": t, "x_d": np.sin(t), "x": 0.9 * np.sin(t)}
 
 
-def write_csv(path: Path, text: str) -> Path:
-    path.write_text(text, encoding="utf-8")
+def write_csv(path: Path, text: str, encoding: str = "utf-8") -> Path:
+    path.write_text(text, encoding=encoding, newline="")
     return path
+
+
+def capture(data: Columns, axes: Sequence[str] = ()) -> dict[str, Any]:
+    """Return what a Siemens recording of these signals holds, its rows in two entries with an event between them."""
+    names = list(axes) or ["Cycle"] * len(data)
+    signals = [
+        {"Name": name, "Type": "DOUBLE", "Axis": axis, "Address": name} for name, axis in zip(data, names, strict=True)
+    ]
+    rows = [list(map(float, row)) for row in zip(*(np.ravel(column) for column in data.values()), strict=True)]
+    event = {"HFBlockEvent": {"HFProbeCounter": 5, "GCode": "G1"}}
+    payload = [{"HFData": rows[:20]}, event, {"LFData": []}, {"HFData": rows[20:]}]
+    return {"Header": {"CycleTimeMs": 2, "SignalListHFData": signals}, "Payload": payload, "Footer": {}}
 
 
 def write(path: Path, data: Columns) -> Path:
@@ -30,11 +46,18 @@ def write(path: Path, data: Columns) -> Path:
         np.savez(path, **data)
     elif path.suffix == ".mat":
         io.savemat(path, data)
+    elif path.suffix == ".h5":
+        with h5py.File(path, "w") as file:
+            for name, values in data.items():
+                file[name] = values
+    elif path.suffix == ".json":
+        path.write_text(json.dumps(capture(data)))
     else:
         rows = zip(*data.values(), strict=True)
-        text = "\n".join([",".join(data), *(",".join(map(repr, map(float, row))) for row in rows)])
-        write_csv(path, text + "\n")
+        text = "\n".join([",".join(data), *(",".join(map(repr, map(float, row))) for row in rows)]) + "\n"
+        path.write_bytes(gzip.compress(text.encode()) if path.suffix == ".gz" else text.encode())
     return path
 
 
 FORMATS = pytest.mark.parametrize("suffix", [".csv", ".npz", ".mat"])
+EVERY_FORMAT = pytest.mark.parametrize("suffix", [".csv", ".csv.gz", ".npz", ".mat", ".h5", ".json"])

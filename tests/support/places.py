@@ -7,3 +7,4 @@ from pathlib import Path
 SUPPORT = Path(__file__).resolve().parent
 ROOT = SUPPORT.parents[1]
 EMPS = ROOT.parent / "shared" / "data" / "emps" / "DATA_EMPS.mat"
+RECORDINGS = ROOT.parent / "shared" / "data" / "recordings"

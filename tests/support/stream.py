@@ -43,13 +43,16 @@ CANNOT = {
 """(implementation, model or ability): why it is not there."""
 
 OUTPUTS = {
-    PREDICTOR: ("x_d", "x_pb", "x_h", "e_servo", "hybrid_active", "rms_pb", "rms_h", "batch", "n_rejected"),
+    PREDICTOR: (
+        *("x_d", "x_pb", "x_h", "x_h_std", "e_servo", "hybrid_active"),
+        *("rms_pb", "rms_h", "rms_hold", "batch", "n_rejected"),
+    ),
     COMPENSATOR: ("x_dm", "x_d", "x_pb", "x_h", "e_servo", "sep_state", "rms_e", "rms_pb", "rms_h", "batch"),
     TRAJECTORY: ("r",),
     DRIVE: ("x", "v", "x_meas"),
 }
 
-WINDOWS = ("x_d_window", "x_pb_window", "x_h_window")
+WINDOWS = ("x_d_window", "x_pb_window", "x_h_window", "x_h_std_window")
 """Arrays that a predictor shows."""
 
 

@@ -7,12 +7,12 @@
 #include <string.h>
 
 #define WEIGHTS_FILE "weights.bin"
-#define WEIGHTS_MAGIC "HSEPWGT4"
+#define WEIGHTS_MAGIC "HSEPWGT6"
 #define WEIGHTS_CHUNK 512 /* bytes that are summed up at once, a multiple of 8 */
 
 typedef struct {
     char magic[8];
-    uint64_t n_settings, n_modes, n_samples, n_trusted;
+    uint64_t n_settings, n_modes, n_samples, n_learned;
 } weights_head;
 
 HSEP_ASSERT_WORDS(weights_head, 5);
@@ -113,15 +113,18 @@ static int weights_compare_settings(
     return n_missing == 0 || message[0] != '\0';
 }
 
-/* Read what the residual model that can be trusted has learned besides the factor: 0 if it is damaged. */
-static int weights_take_trusted(FILE *file, hsep_trusted *trusted)
+/* Read what has been learned besides the factor: by the residual model that can be trusted, if there is one, and of
+ * the errors. 0 if it is damaged. */
+static int weights_take_learned(FILE *file, hsep_trusted *trusted, hsep_uncertainty *uncertainty)
 {
     for (uint64_t i = 0; trusted != NULL && i < hsep_trusted_n_learned(trusted); i++) {
         if (fread(hsep_trusted_learned(trusted, i), sizeof(double), 1, file) != 1) {
             return 0;
         }
     }
-    return trusted == NULL || hsep_trusted_sound(trusted);
+    double *errors = hsep_uncertainty_learned(uncertainty);
+    return fread(errors, sizeof(double), HSEP_N_UNCERTAINTY, file) == HSEP_N_UNCERTAINTY &&
+           hsep_uncertainty_sound(uncertainty) && (trusted == NULL || hsep_trusted_sound(trusted));
 }
 
 /* Read the file: 0 if it is damaged; with a message, if it was learned with other settings. */
@@ -141,11 +144,11 @@ static int weights_take(
     if (!weights_compare_settings(file, context, values, head.n_settings, message) || message[0] != '\0') {
         return 0;
     }
-    const uint64_t n_trusted = trusted != NULL ? hsep_trusted_n_learned(trusted) : 0;
+    const uint64_t n_learned = HSEP_N_UNCERTAINTY + (trusted != NULL ? hsep_trusted_n_learned(trusted) : 0);
     const double n = (double)regression->n, settings = 4.0 * (double)head.n_settings;
-    const double words = settings + (double)n_trusted + 0.5 * (n + 1.0) * (n + 2.0) + 1.0;
-    if (head.n_trusted != n_trusted || size != (double)sizeof head + words * (double)sizeof(double) ||
-        !weights_take_trusted(file, trusted)) {
+    const double words = settings + (double)n_learned + 0.5 * (n + 1.0) * (n + 2.0) + 1.0;
+    if (head.n_learned != n_learned || size != (double)sizeof head + words * (double)sizeof(double) ||
+        !weights_take_learned(file, trusted, hsep_predictor_uncertainty(predictor))) {
         return 0;
     }
     for (uint64_t i = 0; i <= regression->n; i++) { /* row after row through the regression's own row */

@@ -35,10 +35,12 @@ HSEP_API void hsep_online_write(const hsep_online *self, int window, double valu
     values[HSEP_VR_x_d] = outputs.x_d;
     values[HSEP_VR_x_pb] = outputs.x_pb;
     values[HSEP_VR_x_h] = outputs.x_h;
+    values[HSEP_VR_x_h_std] = outputs.x_h_std;
     values[HSEP_VR_e_servo] = outputs.x_d - outputs.x_h; /* the predicted servo error */
     values[HSEP_VR_hybrid_active] = outputs.hybrid_active;
     values[HSEP_VR_rms_pb] = outputs.rms_pb;
     values[HSEP_VR_rms_h] = outputs.rms_h;
+    values[HSEP_VR_rms_hold] = outputs.rms_hold;
     values[HSEP_VR_batch] = (double)outputs.batch;
     values[HSEP_VR_n_rejected] = (double)outputs.n_rejected;
     /* Entries past a smaller Np are 0, of a larger Np the first ones are shown. */
@@ -47,6 +49,7 @@ HSEP_API void hsep_online_write(const hsep_online *self, int window, double valu
         values[HSEP_VR_x_d_window + i] = shown ? hsep_at_const(self, self->x_d)[i] : 0.0;
         values[HSEP_VR_x_pb_window + i] = shown ? hsep_at_const(self, self->x_pb)[i] : 0.0;
         values[HSEP_VR_x_h_window + i] = shown ? hsep_at_const(self, self->x_h)[i] : 0.0;
+        values[HSEP_VR_x_h_std_window + i] = shown ? hsep_predictor_std(self, i) : 0.0;
     }
 }
 
@@ -55,13 +58,15 @@ HSEP_API void hsep_model_start_values(const hsep_context *context, double values
     (void)context;
     const double start = values[HSEP_VR_x_d_ahead]; /* the drive rests there */
     values[HSEP_VR_x_d] = values[HSEP_VR_x_pb] = values[HSEP_VR_x_h] = start;
-    values[HSEP_VR_e_servo] = values[HSEP_VR_rms_pb] = values[HSEP_VR_rms_h] = 0.0;
+    values[HSEP_VR_x_h_std] = values[HSEP_VR_e_servo] = 0.0;
+    values[HSEP_VR_rms_pb] = values[HSEP_VR_rms_h] = values[HSEP_VR_rms_hold] = 0.0;
     values[HSEP_VR_hybrid_active] = values[HSEP_VR_batch] = values[HSEP_VR_n_rejected] = 0.0;
     for (size_t i = 0; i < HSEP_WINDOW; i++) {
         const double position = (double)i < values[HSEP_VR_Np] ? start : 0.0;
         values[HSEP_VR_x_d_window + i] = position;
         values[HSEP_VR_x_pb_window + i] = position;
         values[HSEP_VR_x_h_window + i] = position;
+        values[HSEP_VR_x_h_std_window + i] = 0.0;
     }
 }
 

@@ -9,7 +9,9 @@ static const double blend_memory = 0.97;
 /* Evidence that the first weights count for, in windows of the largest mean square error. */
 static const double blend_confidence = 0.3;
 
-static const double blend_first[HSEP_N_BLENDED] = {0.0, 0.5, 0.5};
+/* Hold, without lags, with lags, with lags and rows taken as independent: that is trusted once it has shown to be
+ * better. */
+static const double blend_first[HSEP_N_BLENDED] = {0.0, 0.5, 0.5, 0.0};
 
 HSEP_API void hsep_blend_init(hsep_blend *self)
 {
@@ -83,12 +85,16 @@ static double blend_try(
 static void blend_minimise(
     double H[HSEP_N_BLENDED][HSEP_N_BLENDED], const double l[HSEP_N_BLENDED], double weights[HSEP_N_BLENDED])
 {
-    static const int supports[7][HSEP_N_BLENDED] = {{0}, {1}, {2}, {0, 1}, {0, 2}, {1, 2}, {0, 1, 2}};
-    static const int sizes[7] = {1, 1, 1, 2, 2, 2, 3};
     double least = 0.0, tried[HSEP_N_BLENDED];
     memset(weights, 0, HSEP_N_BLENDED * sizeof *weights);
-    for (int s = 0; s < 7; s++) {
-        const double cost = blend_try(H, l, supports[s], sizes[s], tried);
+    for (unsigned set = 1; set < 1U << HSEP_N_BLENDED; set++) {
+        int support[HSEP_N_BLENDED], n = 0;
+        for (int i = 0; i < HSEP_N_BLENDED; i++) {
+            if ((set >> i & 1U) != 0U) {
+                support[n++] = i;
+            }
+        }
+        const double cost = blend_try(H, l, support, n, tried);
         if (cost < least) {
             least = cost;
             memcpy(weights, tried, sizeof tried);

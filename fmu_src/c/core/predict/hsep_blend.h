@@ -12,7 +12,7 @@
 
 #include <stdint.h>
 
-#define HSEP_N_BLENDED 3 /* the last residual held, the model without lags, that with lags */
+#define HSEP_N_BLENDED 4 /* the last residual held, and the learned candidates */
 
 typedef struct {
     double gram[HSEP_N_BLENDED * HSEP_N_BLENDED]; /* m2 */
@@ -20,7 +20,7 @@ typedef struct {
     double weights[HSEP_N_BLENDED];
 } hsep_blend;
 
-HSEP_ASSERT_WORDS(hsep_blend, 15);
+HSEP_ASSERT_WORDS(hsep_blend, 24);
 
 HSEP_API void hsep_blend_init(hsep_blend *self);
 

@@ -21,17 +21,15 @@ static const double candidate_diverged = 1e6;
 static const double candidate_first_correlation = 10.0, candidate_correlation_max = 1e4;
 static const double candidate_correlation_rate = 0.1;
 
-/* Correlation beyond which the penalty does not grow: with more, a wrong model would learn nothing at all. */
-static const double candidate_penalty_correlation_max = 100.0;
-
 /* Set what follows from the parameters; return the bytes of the block. */
-static double candidate_lay_out(hsep_candidate *self, uint64_t Np, uint64_t n_static, uint64_t p)
+static double candidate_lay_out(hsep_candidate *self, const hsep_candidate_shape *shape)
 {
-    const double window = (double)Np, n = (double)(n_static + p), lags = (double)p;
+    const double window = (double)shape->Np, lags = (double)shape->p, n = (double)shape->n_static + lags;
     double end = HSEP_WORDS(hsep_candidate);
-    self->Np = Np;
-    self->n_static = n_static;
-    self->p = p;
+    self->Np = shape->Np;
+    self->n_static = shape->n_static;
+    self->p = shape->p;
+    self->correlation_max = shape->correlation_max;
     self->priors = hsep_take(&end, n);
     self->weights = hsep_take(&end, n);
     self->run = hsep_take(&end, window + lags);
@@ -40,7 +38,7 @@ static double candidate_lay_out(hsep_candidate *self, uint64_t Np, uint64_t n_st
     self->response = hsep_take(&end, window + lags);
     self->squares = hsep_take(&end, window);
     self->spread = hsep_take(&end, window);
-    self->solved = hsep_take_block(&end, hsep_regression_size(n_static + p));
+    self->solved = hsep_take_block(&end, hsep_regression_size(shape->n_static + shape->p));
     return end * sizeof(double);
 }
 
@@ -49,26 +47,26 @@ static hsep_regression *candidate_solved(hsep_candidate *self)
     return (hsep_regression *)hsep_at(self, self->solved);
 }
 
-HSEP_API double hsep_candidate_size(uint64_t Np, uint64_t n_static, uint64_t p)
+HSEP_API double hsep_candidate_size(const hsep_candidate_shape *shape)
 {
-    return candidate_lay_out(&(hsep_candidate){0}, Np, n_static, p);
+    return candidate_lay_out(&(hsep_candidate){0}, shape);
 }
 
-HSEP_API void hsep_candidate_init(hsep_candidate *self, uint64_t Np, uint64_t n_static, uint64_t p)
+HSEP_API void hsep_candidate_init(hsep_candidate *self, const hsep_candidate_shape *shape)
 {
-    memset(self, 0, (size_t)hsep_candidate_size(Np, n_static, p));
-    (void)candidate_lay_out(self, Np, n_static, p);
+    memset(self, 0, (size_t)hsep_candidate_size(shape));
+    (void)candidate_lay_out(self, shape);
     self->correlation = candidate_first_correlation;
-    hsep_regression_init(candidate_solved(self), n_static + p, 1.0);
+    hsep_regression_init(candidate_solved(self), shape->n_static + shape->p, 1.0);
 }
 
-HSEP_API int hsep_candidate_valid(const void *block, uint64_t Np, uint64_t n_static, uint64_t p)
+HSEP_API int hsep_candidate_valid(const void *block, const hsep_candidate_shape *shape)
 {
     hsep_candidate got;
     memcpy(&got, block, sizeof got);
-    (void)candidate_lay_out(&got, Np, n_static, p); /* changes nothing where it is sound */
+    (void)candidate_lay_out(&got, shape); /* changes nothing where it is sound */
     return memcmp(&got, block, sizeof got) == 0 &&
-           hsep_regression_valid(hsep_at_bytes(block, got.solved), n_static + p);
+           hsep_regression_valid(hsep_at_bytes(block, got.solved), shape->n_static + shape->p);
 }
 
 HSEP_API const double *hsep_candidate_prediction(const hsep_candidate *self) { return hsep_at_const(self, self->e_h); }
@@ -77,8 +75,7 @@ HSEP_API void hsep_candidate_solve(
     hsep_candidate *self, const hsep_regression *regression, const double static_scales[], double least_variance)
 {
     double *penalties = hsep_at(self, self->priors);
-    self->variance =
-        fmax(self->noise_variance, least_variance) * fmin(self->correlation, candidate_penalty_correlation_max);
+    self->variance = fmax(self->noise_variance, least_variance) * fmin(self->correlation, self->correlation_max);
     memcpy(penalties, static_scales, (size_t)self->n_static * sizeof(double));
     for (uint64_t i = 0; i < self->p; i++) {
         penalties[self->n_static + i] = sqrt(pow(candidate_last_lag, (double)i / (double)self->p));

@@ -24,7 +24,13 @@ typedef struct {
 } hsep_residual_scale;
 
 typedef struct {
+    uint64_t Np, n_static, p; /* samples of a window, features without lags, lags */
+    double correlation_max;   /* beyond which the penalty does not grow; 1: rows are taken as independent */
+} hsep_candidate_shape;
+
+typedef struct {
     uint64_t Np, n_static, p;
+    double correlation_max;
     double noise_variance; /* m2, of a row about the model; 0 until a window is measured */
     double correlation;    /* rows that count as one: errors of neighbouring rows are alike */
     double variance;       /* m2, of the noise as the weights were solved */
@@ -42,16 +48,17 @@ typedef struct {
 } hsep_candidate;
 
 HSEP_ASSERT_WORDS(hsep_residual_scale, 3);
-HSEP_ASSERT_WORDS(hsep_candidate, 16);
+HSEP_ASSERT_WORDS(hsep_candidate_shape, 4);
+HSEP_ASSERT_WORDS(hsep_candidate, 17);
 
 /* Bytes of the block, counted in double so that no size can overflow. */
-HSEP_API double hsep_candidate_size(uint64_t Np, uint64_t n_static, uint64_t p);
+HSEP_API double hsep_candidate_size(const hsep_candidate_shape *shape);
 
-/* Fill the block for windows of Np samples, n_static features without lags and p lags. */
-HSEP_API void hsep_candidate_init(hsep_candidate *self, uint64_t Np, uint64_t n_static, uint64_t p);
+/* Fill the block, with nothing learned. */
+HSEP_API void hsep_candidate_init(hsep_candidate *self, const hsep_candidate_shape *shape);
 
-/* Whether a block, in any alignment, is one that hsep_candidate_init with these parameters began. */
-HSEP_API int hsep_candidate_valid(const void *block, uint64_t Np, uint64_t n_static, uint64_t p);
+/* Whether a block, in any alignment, is one that hsep_candidate_init with this shape began. */
+HSEP_API int hsep_candidate_valid(const void *block, const hsep_candidate_shape *shape);
 
 /* Solve for the weights from all rows. static_scales: (n_static,) prior standard deviations of the weights of the
  * features without lags; least_variance: of the noise, m2. Cost: that of hsep_penalised_solve. */

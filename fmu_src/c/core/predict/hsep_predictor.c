@@ -55,7 +55,7 @@ HSEP_API int hsep_predictor_take_in(hsep_predictor *self, double x_d_ahead, doub
 {
     const uint64_t i = self->k % self->Np, j = self->Np - 1 - i;
     const double x_d = hsep_at(self, self->x_d)[i], x_pb = hsep_at(self, self->x_pb)[i];
-    const double x_h = hsep_at(self, self->x_h)[i];
+    const double x_h = hsep_at(self, self->x_h)[i], x_hold = x_pb + hsep_at(self, self->past_e)[self->Np];
     hsep_at(self, self->ahead)[self->k % self->preview] = x_d_ahead;
     hsep_at(self, self->past_e)[j] = x_meas - self->start - hsep_at(self, self->past_x)[j]; /* e_pb = x - x_pb */
     if (self->trusted) {
@@ -69,6 +69,7 @@ HSEP_API int hsep_predictor_take_in(hsep_predictor *self, double x_d_ahead, doub
         self->sum_e += (x_meas - x_d) * (x_meas - x_d);
         self->sum_pb += (x_meas - x_pb) * (x_meas - x_pb);
         self->sum_h += (x_meas - x_h) * (x_meas - x_h);
+        self->sum_hold += (x_meas - x_hold) * (x_meas - x_hold);
     }
     self->k++;
     return i + 1 == self->Np;
@@ -182,11 +183,29 @@ HSEP_API void hsep_predictor_publish(hsep_predictor *self, uint64_t last)
     self->n_published = last;
 }
 
-/* Learn the measured window by the residual model that can be trusted. */
-static void predictor_learn_trusted(hsep_predictor *self)
+/* Learn the measured window: by the residual model that can be trusted, and its errors. */
+static void predictor_learn_window(hsep_predictor *self)
 {
-    if (self->trusted && self->learning) {
-        hsep_trusted_learn(hsep_predictor_trusted(self), hsep_at(self, self->past_x), hsep_at(self, self->past_e));
+    hsep_trusted *trusted = hsep_predictor_trusted(self);
+    double *past_e = hsep_at(self, self->past_e);
+    if (self->learning) {
+        if (trusted != NULL) {
+            hsep_trusted_learn(trusted, hsep_at(self, self->past_x), past_e);
+        }
+        hsep_uncertainty_learn(
+            hsep_predictor_uncertainty(self), past_e, trusted != NULL ? hsep_at(trusted, trusted->accepted) : NULL);
+    }
+}
+
+/* Predict the errors of the window that was published. */
+static void predictor_doubt(hsep_predictor *self)
+{
+    hsep_trusted *trusted = hsep_predictor_trusted(self);
+    if (self->divergence == HSEP_CONVERGES) {
+        hsep_uncertainty_predict(
+            hsep_predictor_uncertainty(self), hsep_at(self, self->command), hsep_at(self, self->past_x),
+            hsep_at(self, self->e_h), self->n_physics,
+            trusted != NULL ? hsep_at(trusted, trusted->disagreement) : NULL);
     }
 }
 
@@ -194,7 +213,7 @@ static void predictor_learn_trusted(hsep_predictor *self)
 static void predictor_forecast(hsep_predictor *self)
 {
     double *command = hsep_at(self, self->command);
-    for (uint64_t i = 0; self->trusted && i < self->Np; i++) {
+    for (uint64_t i = 0; i < self->Np; i++) {
         command[self->Np - 1 - i] = hsep_at(self, self->x_d)[i] - self->start;
     }
     if (self->trusted) {
@@ -212,7 +231,7 @@ HSEP_API int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, doubl
     if (!hsep_predictor_take_in(self, x_d_ahead, x_meas)) {
         return 0;
     }
-    predictor_learn_trusted(self);
+    predictor_learn_window(self);
     (void)hsep_predictor_finish(self);
     if (self->k == self->preview) { /* the first fill was not predicted */
         memset(hsep_at(self, self->past_e), 0, (size_t)(Np + self->features.p) * sizeof(double));
@@ -225,7 +244,14 @@ HSEP_API int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, doubl
     const double warm_up = self->n_init - (double)self->k;
     self->n_physics = warm_up >= (double)Np ? Np : warm_up > 0.0 ? (uint64_t)warm_up : 0;
     hsep_predictor_publish(self, Np);
+    predictor_doubt(self);
     return 1;
+}
+
+HSEP_API double hsep_predictor_std(const hsep_predictor *self, uint64_t i)
+{
+    const hsep_uncertainty *uncertainty = (const hsep_uncertainty *)hsep_at_const(self, self->uncertainty);
+    return hsep_at_const(uncertainty, uncertainty->std)[self->Np - 1 - i];
 }
 
 static double predictor_rms(const hsep_predictor *self, double sum)
@@ -239,9 +265,11 @@ HSEP_API void hsep_predictor_read(const hsep_predictor *self, hsep_predictor_out
     outputs->x_d = hsep_at_const(self, self->x_d)[i];
     outputs->x_pb = hsep_at_const(self, self->x_pb)[i];
     outputs->x_h = hsep_at_const(self, self->x_h)[i];
+    outputs->x_h_std = hsep_predictor_std(self, i);
     outputs->rms_e = predictor_rms(self, self->sum_e);
     outputs->rms_pb = predictor_rms(self, self->sum_pb);
     outputs->rms_h = predictor_rms(self, self->sum_h);
+    outputs->rms_hold = predictor_rms(self, self->sum_hold);
     outputs->batch = self->k / self->Np;
     outputs->n_rejected = self->trusted ? ((const hsep_trusted *)hsep_at_const(self, self->trusted))->n_rejected : 0;
     outputs->hybrid_active = i >= self->n_physics;

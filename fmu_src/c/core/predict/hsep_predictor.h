@@ -30,6 +30,7 @@
 #include "hsep_sensor.h"
 #include "hsep_settings.h"
 #include "hsep_trusted.h"
+#include "hsep_uncertainty.h"
 
 #include <stdint.h>
 
@@ -59,6 +60,7 @@ typedef struct {
     uint64_t missing;            /* whether a sample of it is missing */
     uint64_t n_measured;         /* samples since t_init */
     double sum_e, sum_pb, sum_h; /* m2, sums of squared servo and prediction errors over them */
+    double sum_hold;             /* m2, the same if the last residual before each window were held */
     uint64_t divergence;         /* hsep_divergence of the first window that diverged; latched */
     hsep_sensor sensor;
     /* Offsets in doubles from the beginning of the struct */
@@ -67,26 +69,27 @@ typedef struct {
     uint64_t x_pb;     /* (Np,) m, the window: physics-based predictions, */
     uint64_t x_h;      /* (Np,) m, hybrid predictions */
     uint64_t ahead_pb; /* (Np,) m, response of the physics model to ahead, relative to start; alone */
-    uint64_t command;  /* (Np,) m, commands of the window relative to start, newest first; with trust */
+    uint64_t command;  /* (Np,) m, commands of the window relative to start, newest first; alone */
     uint64_t past_x;   /* (Np + q,) m, x_pb of this window and of the q samples before it, newest first */
     uint64_t past_e;   /* (Np + p,) m, e_pb likewise, as measured */
     uint64_t e_h;      /* (Np + p,) m, e_pb as predicted, behind it the measured ones; alone it is past_e */
     uint64_t weights;  /* (n,) w */
     uint64_t signs;    /* (preview + 2 HSEP_REFERENCE_REACH,) psi of the reference, if it has features */
     uint64_t drive;    /* (preview,) m, their part of the residuals, newest first */
-    uint64_t physics, regression;
+    uint64_t physics, uncertainty, regression;
     uint64_t trusted; /* the residual model that can be trusted, with a regression of its own; 0: the paper's */
     uint64_t saved;   /* the regression as it was before this window; 0: no window is unlearned */
 } hsep_predictor;
 
-HSEP_ASSERT_WORDS(hsep_predictor, 43);
+HSEP_ASSERT_WORDS(hsep_predictor, 45);
 
 typedef struct {
-    double x_d, x_pb, x_h;       /* m, now */
-    double rms_e, rms_pb, rms_h; /* m, since t_init */
-    uint64_t batch;              /* floor(k / Np) */
-    uint64_t n_rejected;         /* measurements that were missing or not plausible, with trust */
-    int hybrid_active;           /* whether x_h is the hybrid prediction now */
+    double x_d, x_pb, x_h;                 /* m, now */
+    double x_h_std;                        /* m, standard deviation of the error of x_h; 0 where it is not known */
+    double rms_e, rms_pb, rms_h, rms_hold; /* m, since t_init */
+    uint64_t batch;                        /* floor(k / Np) */
+    uint64_t n_rejected;                   /* measurements that were missing or not plausible, with trust */
+    int hybrid_active;                     /* whether x_h is the hybrid prediction now */
 } hsep_predictor_outputs;
 
 /* Bytes of the block, counted in double so that no size can overflow. */
@@ -107,11 +110,17 @@ HSEP_API hsep_trusted *hsep_predictor_trusted(hsep_predictor *self);
 
 HSEP_API hsep_physics *hsep_predictor_physics(hsep_predictor *self);
 
+/* What is known of the errors of x_h; predicted and learned by a predictor alone. */
+HSEP_API hsep_uncertainty *hsep_predictor_uncertainty(hsep_predictor *self);
+
 /* Process sample k, both inputs finite, m, and advance to k + 1; return whether a new window has begun. */
 HSEP_API int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, double x_meas);
 
 /* Read the outputs of the next sample. Constant cost. */
 HSEP_API void hsep_predictor_read(const hsep_predictor *self, hsep_predictor_outputs *outputs);
+
+/* Standard deviation of the error of x_h at sample i of the window, m; 0 where it is not known. */
+HSEP_API double hsep_predictor_std(const hsep_predictor *self, uint64_t i);
 
 /* Process sample k: learn it, update the error sums, advance to k + 1; return whether the window has ended. */
 HSEP_API int hsep_predictor_take_in(hsep_predictor *self, double x_d_ahead, double x_meas);

@@ -13,6 +13,11 @@ HSEP_API hsep_physics *hsep_predictor_physics(hsep_predictor *self)
     return (hsep_physics *)hsep_at(self, self->physics);
 }
 
+HSEP_API hsep_uncertainty *hsep_predictor_uncertainty(hsep_predictor *self)
+{
+    return (hsep_uncertainty *)hsep_at(self, self->uncertainty);
+}
+
 HSEP_API hsep_trusted *hsep_predictor_trusted(hsep_predictor *self)
 {
     return self->trusted ? (hsep_trusted *)hsep_at(self, self->trusted) : NULL;
@@ -53,7 +58,7 @@ static double predictor_lay_out(hsep_predictor *self, const hsep_predictor_param
     self->x_pb = hsep_take(&end, Np);
     self->x_h = hsep_take(&end, Np);
     self->ahead_pb = hsep_take(&end, parameters->planned ? 0.0 : Np);
-    self->command = hsep_take(&end, parameters->trust.trust ? Np : 0.0);
+    self->command = hsep_take(&end, parameters->planned ? 0.0 : Np);
     self->past_x = hsep_take(&end, Np + q);
     self->past_e = hsep_take(&end, Np + p);
     self->e_h = parameters->planned ? hsep_take(&end, Np + p) : self->past_e;
@@ -61,6 +66,7 @@ static double predictor_lay_out(hsep_predictor *self, const hsep_predictor_param
     self->signs = hsep_take(&end, has_reference ? preview + 2.0 * HSEP_REFERENCE_REACH : 0.0);
     self->drive = hsep_take(&end, has_reference ? preview : 0.0);
     self->physics = hsep_take_block(&end, hsep_physics_size(parameters->n_modes, parameters->settings.dead_time));
+    self->uncertainty = hsep_take_block(&end, hsep_uncertainty_size(self->Np));
     self->regression = hsep_take_block(&end, regression);
     self->trusted = parameters->trust.trust ? hsep_take_block(&end, hsep_trusted_size(&trusted)) : 0;
     self->saved = parameters->unlearns ? hsep_take_block(&end, regression) : 0;
@@ -88,6 +94,9 @@ HSEP_API void hsep_predictor_init(hsep_predictor *self, const hsep_predictor_par
     hsep_physics_init(
         hsep_predictor_physics(self), parameters->modes, parameters->n_modes, parameters->settings.dead_time,
         parameters->settings.T_s, (hsep_hold)parameters->settings.input_hold);
+    const double noise_std = parameters->trust.noise_std;
+    hsep_uncertainty_init(
+        hsep_predictor_uncertainty(self), self->Np, fmax(parameters->settings.lambda, noise_std * noise_std));
     if (self->trusted) {
         const hsep_trusted_parameters trusted = predictor_trusted_parameters(parameters);
         hsep_trusted_init(hsep_predictor_trusted(self), &trusted);
@@ -102,17 +111,18 @@ HSEP_API int hsep_predictor_valid(const void *block, const hsep_predictor_parame
     memcpy(&got, block, sizeof got);
     (void)predictor_lay_out(&got, parameters); /* changes nothing where it is sound */
     const hsep_trusted_parameters trusted = predictor_trusted_parameters(parameters);
-    const double sums[3] = {got.sum_e, got.sum_pb, got.sum_h};
+    const double sums[4] = {got.sum_e, got.sum_pb, got.sum_h, got.sum_hold};
     int sound =
         memcmp(&got, block, sizeof got) == 0 && got.k == k && got.n_published <= got.Np &&
         k % got.Np < got.n_published && got.n_physics <= got.Np && got.learning <= 1 && got.missing <= 1 &&
         (!got.missing || got.saved) && got.divergence <= HSEP_DIVERGES_X_DM &&
         (got.divergence || hsep_within(hsep_at_bytes(block, got.ahead), got.past_x - got.ahead, HSEP_PREDICTION_MAX)) &&
+        hsep_uncertainty_valid(hsep_at_bytes(block, got.uncertainty), got.Np) &&
         hsep_physics_valid(hsep_at_bytes(block, got.physics), parameters->n_modes, parameters->settings.dead_time) &&
         (got.trusted ? hsep_trusted_valid(hsep_at_bytes(block, got.trusted), &trusted)
                      : hsep_regression_valid(hsep_at_bytes(block, got.regression), got.features.n)) &&
         (!got.saved || hsep_regression_valid(hsep_at_bytes(block, got.saved), got.features.n));
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < 4; i++) {
         sound = sound && sums[i] >= 0.0 && isfinite(sums[i]);
     }
     return sound;

@@ -85,16 +85,21 @@ HSEP_API void hsep_trusted_forecast(hsep_trusted *self, const double x_d[], cons
 {
     const double *past = e + self->Np, *weights = self->blend.weights, bound = trusted_hold_max * self->scale.largest;
     const int outgrown = trusted_begin(self, x_d, x_pb);
+    double *disagreement = hsep_at(self, self->disagreement);
     self->hold = fmin(fmax(past[0], -bound), bound);
     self->predicted = self->n_rows > 0.0 && !outgrown && self->scale.largest_square > 0.0;
     if (self->predicted) {
         trusted_predict(self, x_pb, past);
     }
     for (uint64_t j = 0; j < self->Np; j++) {
+        double square = weights[0] * self->hold * self->hold;
         e[j] = weights[0] * self->hold;
         for (uint64_t i = 0; self->predicted && i < HSEP_N_CANDIDATES; i++) {
-            e[j] += weights[1 + i] * hsep_candidate_prediction(hsep_trusted_candidate(self, i))[j];
+            const double candidate = hsep_candidate_prediction(hsep_trusted_candidate(self, i))[j];
+            e[j] += weights[1 + i] * candidate;
+            square += weights[1 + i] * candidate * candidate;
         }
+        disagreement[j] = fmax(square - e[j] * e[j], 0.0);
     }
 }
 
@@ -188,8 +193,8 @@ static void trusted_judge(hsep_trusted *self, double n_rows, const double e[])
 {
     const double *accepted = hsep_at(self, self->accepted);
     if (self->predicted) {
-        const hsep_candidate *best = hsep_trusted_candidate(self, HSEP_N_CANDIDATES - 1);
-        const double surprise = hsep_candidate_surprise(best, e, accepted);
+        const hsep_candidate *cautious = hsep_trusted_candidate(self, 1);
+        const double surprise = hsep_candidate_surprise(cautious, e, accepted);
         if (surprise > trusted_surprise) {
             const double kept = trusted_surprise / surprise * (trusted_surprise / surprise);
             trusted_discount(self, fmax(kept, trusted_surprised * (double)self->Np / self->n_rows));
@@ -224,7 +229,7 @@ static void trusted_assess(hsep_trusted *self, const double e[], double count)
 {
     hsep_residual_scale *scale = &self->scale;
     const double *accepted = hsep_at(self, self->accepted);
-    const double *signals[HSEP_N_BLENDED + 1] = {NULL, NULL, NULL, e};
+    const double *signals[HSEP_N_BLENDED + 1] = {NULL};
     double products[HSEP_N_BLENDED + 1][HSEP_N_BLENDED + 1] = {{0.0}};
     const double mean_square = trusted_product(self, e, e) / count;
     for (uint64_t j = 0; j < self->Np; j++) {
@@ -233,6 +238,7 @@ static void trusted_assess(hsep_trusted *self, const double e[], double count)
     scale->recent =
         scale->recent > 0.0 ? trusted_recent * scale->recent + (1.0 - trusted_recent) * mean_square : mean_square;
     scale->largest_square = fmax(scale->largest_square, mean_square);
+    signals[HSEP_N_BLENDED] = e;
     for (uint64_t i = 0; self->predicted && i < HSEP_N_CANDIDATES; i++) {
         signals[1 + i] = hsep_candidate_prediction(hsep_trusted_candidate(self, i));
     }

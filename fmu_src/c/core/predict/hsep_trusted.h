@@ -23,7 +23,7 @@
 
 #include <stdint.h>
 
-#define HSEP_N_CANDIDATES 2   /* without lags, with lags */
+#define HSEP_N_CANDIDATES 3   /* without lags, with lags, with lags and rows taken as independent */
 #define HSEP_NO_PENALTY 1e-40 /* lambda of the factor itself, m2: penalties come with each solution */
 
 typedef struct {
@@ -58,12 +58,13 @@ typedef struct {
     uint64_t measured;         /* (Np,) m, measured position, NaN where missing */
     uint64_t accepted;         /* (Np,) whether it is plausible */
     uint64_t bridged;          /* (Np + p,) whether a residual stands for one that is not */
+    uint64_t disagreement;     /* (Np,) m2, variance of the candidates about their blend */
     uint64_t rows;             /* (Np, n_static) features without lags, sample after sample */
     uint64_t disturbances, regression;
     uint64_t candidates[HSEP_N_CANDIDATES];
 } hsep_trusted;
 
-HSEP_ASSERT_WORDS(hsep_trusted, 43 + sizeof(hsep_guard) / 8);
+HSEP_ASSERT_WORDS(hsep_trusted, 54 + sizeof(hsep_guard) / 8);
 
 /* Features, those without lags first. */
 HSEP_API uint64_t hsep_trusted_n(const hsep_predictor_settings *settings);
@@ -85,7 +86,8 @@ HSEP_API hsep_candidate *hsep_trusted_candidate(hsep_trusted *self, uint64_t i);
 
 /* The numbers learned besides it, for a warm start before the first window: their count, and the place of one of them.
  * These are, each >= 0: n_rows, velocity_scale, the scale of the residuals as in its struct, the noise variances of the
- * candidates, their correlations, the blend's weights and largest; then the blend's gram and cross. */
+ * candidates, their correlations, the blend's weights and largest; then the blend's gram and cross, and what is known
+ * of the sensor: its spread, -1 where it is not known, and its step, then infinite. */
 HSEP_API uint64_t hsep_trusted_n_learned(const hsep_trusted *self);
 HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i);
 
@@ -93,7 +95,7 @@ HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i);
 HSEP_API int hsep_trusted_sound(hsep_trusted *self);
 
 /* Predict the residual e, (Np + p,), m, over the next window; behind it the last ones, as measured. x_d: commands,
- * x_pb: physics-based prediction, (Np,), m. Cost: m^3 / 6 multiply-adds for each candidate's m features, three times
+ * x_pb: physics-based prediction, (Np,), m. Cost: m^3 / 6 multiply-adds for each candidate's m features, four times
  * Np m^2 / 2, Np^2 / 2, and 6 Np tanh. */
 HSEP_API void hsep_trusted_forecast(hsep_trusted *self, const double x_d[], const double x_pb[], double e[]);
 

@@ -25,8 +25,15 @@ HSEP_API uint64_t hsep_trusted_n(const hsep_predictor_settings *settings)
     return hsep_disturbances_n(settings->q) + settings->p;
 }
 
-/* Lags of a candidate. */
-static uint64_t trusted_lags(const hsep_trusted *self, uint64_t candidate) { return candidate > 0 ? self->p : 0; }
+/* Correlation beyond which the penalty of a cautious candidate does not grow: it would learn nothing at all. */
+static const double trusted_cautious = 100.0;
+
+/* The last candidate takes the rows as independent: it learns fastest where G_pb is wrong. */
+static hsep_candidate_shape trusted_shape(const hsep_trusted *self, uint64_t candidate)
+{
+    return (hsep_candidate_shape){
+        self->Np, self->n_static, candidate > 0 ? self->p : 0, candidate > 1 ? 1.0 : trusted_cautious};
+}
 
 /* Set what follows from the parameters; return the bytes of the block. */
 static double trusted_lay_out(hsep_trusted *self, const hsep_trusted_parameters *parameters)
@@ -49,12 +56,13 @@ static double trusted_lay_out(hsep_trusted *self, const hsep_trusted_parameters 
     self->measured = hsep_take(&end, Np);
     self->accepted = hsep_take(&end, Np);
     self->bridged = hsep_take(&end, Np + (double)settings->p);
+    self->disagreement = hsep_take(&end, Np);
     self->rows = hsep_take(&end, Np * n_static);
     self->disturbances = hsep_take_block(&end, hsep_disturbances_size(settings, parameters->n_modes));
     self->regression = hsep_take_block(&end, hsep_regression_size(hsep_trusted_n(settings)));
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
-        self->candidates[i] =
-            hsep_take_block(&end, hsep_candidate_size(self->Np, self->n_static, trusted_lags(self, i)));
+        const hsep_candidate_shape shape = trusted_shape(self, i);
+        self->candidates[i] = hsep_take_block(&end, hsep_candidate_size(&shape));
     }
     return end * sizeof(double);
 }
@@ -74,7 +82,8 @@ HSEP_API void hsep_trusted_init(hsep_trusted *self, const hsep_trusted_parameter
         hsep_trusted_disturbances(self), parameters->settings, parameters->modes, parameters->n_modes);
     hsep_regression_init(hsep_trusted_regression(self), self->n_static + self->p, HSEP_NO_PENALTY);
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
-        hsep_candidate_init(hsep_trusted_candidate(self, i), self->Np, self->n_static, trusted_lags(self, i));
+        const hsep_candidate_shape shape = trusted_shape(self, i);
+        hsep_candidate_init(hsep_trusted_candidate(self, i), &shape);
     }
 }
 
@@ -89,14 +98,15 @@ HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters
         hsep_regression_valid(hsep_at_bytes(block, got.regression), got.n_static + got.p);
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
         const void *candidate = hsep_at_bytes(block, got.candidates[i]);
-        sound = sound && hsep_candidate_valid(candidate, got.Np, got.n_static, trusted_lags(&got, i));
+        const hsep_candidate_shape shape = trusted_shape(&got, i);
+        sound = sound && hsep_candidate_valid(candidate, &shape);
     }
     return sound;
 }
 
 HSEP_API uint64_t hsep_trusted_n_learned(const hsep_trusted *self)
 {
-    return 2 + 3 + 2 * HSEP_N_CANDIDATES + self->n_static + HSEP_N_BLENDED * (HSEP_N_BLENDED + 2);
+    return 2 + 3 + 2 * HSEP_N_CANDIDATES + self->n_static + HSEP_N_BLENDED * (HSEP_N_BLENDED + 2) + 2;
 }
 
 HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i)
@@ -112,12 +122,16 @@ HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i)
         {&self->scale.largest, 1},
         {&hsep_trusted_candidate(self, 0)->noise_variance, 1},
         {&hsep_trusted_candidate(self, 1)->noise_variance, 1},
+        {&hsep_trusted_candidate(self, 2)->noise_variance, 1},
         {&hsep_trusted_candidate(self, 0)->correlation, 1},
         {&hsep_trusted_candidate(self, 1)->correlation, 1},
+        {&hsep_trusted_candidate(self, 2)->correlation, 1},
         {self->blend.weights, HSEP_N_BLENDED},
         {hsep_at(self, self->largest), self->n_static},
         {self->blend.gram, HSEP_N_BLENDED * HSEP_N_BLENDED},
         {self->blend.cross, HSEP_N_BLENDED},
+        {&self->guard.spread, 1},
+        {&self->guard.held.step, 1},
     };
     size_t part = 0;
     for (; i >= parts[part].n; part++) {
@@ -128,9 +142,12 @@ HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i)
 
 HSEP_API int hsep_trusted_sound(hsep_trusted *self)
 {
-    const uint64_t n = hsep_trusted_n_learned(self), n_signed = HSEP_N_BLENDED * (HSEP_N_BLENDED + 1);
-    int sound =
-        hsep_trusted_candidate(self, 0)->correlation >= 1.0 && hsep_trusted_candidate(self, 1)->correlation >= 1.0;
+    const uint64_t n = hsep_trusted_n_learned(self) - 2, n_signed = HSEP_N_BLENDED * (HSEP_N_BLENDED + 1);
+    const double spread = self->guard.spread;
+    int sound = self->guard.held.step > 0.0 && (spread == -1.0 || (spread >= 0.0 && isfinite(spread)));
+    for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
+        sound = sound && hsep_trusted_candidate(self, i)->correlation >= 1.0;
+    }
     for (uint64_t i = 0; i < n; i++) {
         const double learned = *hsep_trusted_learned(self, i);
         sound = sound && isfinite(learned) && (i + n_signed >= n || learned >= 0.0);

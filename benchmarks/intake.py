@@ -1,0 +1,67 @@
+"""Faults in many logs, and what the intake says of them and of good logs.
+
+``python -m benchmarks.intake --drives 150`` takes some minutes. The faults are those of tests/support/spoiled_logs.py.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
+
+from spoiled_logs import FAULTS, GOOD, good, log_of
+
+from benchmarks.random_drives.commands import T_S
+from benchmarks.random_drives.generator import random_drives
+from hybridsep.intake.check import check
+from hybridsep.logs.log import Log
+
+SPOILED = ("staircase", "stage x", "EMPS", "cnc_a_axis1.csv", "cnc_a_axis2.csv", "random drive 3", "random drive 26")
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print what is missed, and what is accused."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--drives", type=int, default=150, help="random drives that must not be accused")
+    options = parser.parse_args(arguments)
+    missed = others = n = 0
+    for name in SPOILED:
+        for fault, (expected, spoil) in FAULTS.items():
+            found = [finding.name for finding in check(spoil(good(name))).findings]
+            n += 1
+            missed += expected not in found
+            others += any(other != expected for other in found)
+            if found != [expected]:
+                print(f"{name:20} {fault:22} is {expected}, found: {', '.join(found) or 'nothing'}", flush=True)
+    print(f"{n} spoiled logs: {missed} faults not found, {others} logs with another finding besides")
+    report("good logs", ((name, good(name), None) for name in GOOD))
+    report("random drives", random_logs(options.drives))
+    report("random drives, with a model that is 20 % wrong", random_logs(options.drives, with_model=True))
+
+
+def report(title: str, logs: Iterator[tuple[str, Log, Any]]) -> None:
+    """Print how many of some good logs are accused, and of what."""
+    accused = n = 0
+    for name, log, machine in logs:
+        found = [finding.name for finding in check(log, machine).findings]
+        n, accused = n + 1, accused + bool(found)
+        if found:
+            print(f"{name:20} accused: {', '.join(found)}", flush=True)
+    print(f"{title}: {accused} of {n} accused")
+
+
+def random_logs(n: int, *, with_model: bool = False) -> Iterator[tuple[str, Log, Any]]:
+    """Yield random drives, with a machine of their models or none."""
+    for drive in random_drives(range(n)):
+        physics = SimpleNamespace(input_hold="zoh")
+        machine = SimpleNamespace(model=drive.model, physics=physics, name="nominal", T_s=T_S) if with_model else None
+        yield f"random drive {drive.index}", log_of(drive.x_d, drive.x_meas, T_S), machine
+
+
+if __name__ == "__main__":
+    main()

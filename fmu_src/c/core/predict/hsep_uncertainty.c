@@ -1,0 +1,195 @@
+#include "hsep_uncertainty.h"
+
+#include "hsep_range.h"
+#include "hsep_vector.h"
+
+#include <math.h>
+#include <string.h>
+
+/* First variance of the error relative to that of its causes: differences of x_pb and of e_h, servo error, change since
+ * the last residual, disagreement; bounds relative to it. */
+static const double uncertainty_shares[HSEP_N_COMPONENTS] = {0.0, 0.0, 4.0, 9.0, 0.01, 0.3, 2.0};
+static const double uncertainty_share_least = 1e-9, uncertainty_share_most = 1e4;
+
+/* First variance of the growth, relative to the mean square error of the first window. */
+static const double uncertainty_growth = 0.3;
+
+/* Least variance relative to the recent mean square of the residual; and in m2, so that no divisor is 0. */
+static const double uncertainty_floor = 1e-6, uncertainty_least = 1e-100;
+
+/* Largest square of an error, relative to its variance, that counts; least change of a component in one window. */
+static const double uncertainty_outlying = 16.0, uncertainty_vanishing = 0.01;
+
+/* Factor by which the mean square of the residual fades from window to window. */
+static const double uncertainty_recent = 0.9;
+
+/* The same of evidence; evidence that the first values count for, in windows; step of expectation maximisation. */
+static const double uncertainty_memory = 0.95, uncertainty_first_evidence = 0.2, uncertainty_step = 6.0;
+
+/* Standard deviations that a normal error exceeds with this probability. */
+static const double uncertainty_z = 1.96, uncertainty_beyond = 0.05;
+
+/* Standard deviations, and the share of a window's errors beyond them from which on all variances are too small by
+ * their square: the machine or the sensor has changed. */
+static const double uncertainty_far = 4.0, uncertainty_far_share = 0.5;
+
+/* Change of ln c from one window to the next per share of errors; bound on c and 1/c. */
+static const double uncertainty_factor_rate = 0.2, uncertainty_factor_max = 4.0;
+
+/* Set what follows from the parameter; return the bytes of the block. */
+static double uncertainty_lay_out(hsep_uncertainty *self, uint64_t Np)
+{
+    double end = HSEP_WORDS(hsep_uncertainty);
+    self->Np = Np;
+    self->e_h = hsep_take(&end, (double)Np);
+    self->components = hsep_take(&end, (double)Np * HSEP_N_COMPONENTS);
+    self->std = hsep_take(&end, (double)Np);
+    return end * sizeof(double);
+}
+
+HSEP_API double hsep_uncertainty_size(uint64_t Np) { return uncertainty_lay_out(&(hsep_uncertainty){0}, Np); }
+
+HSEP_API void hsep_uncertainty_init(hsep_uncertainty *self, uint64_t Np, double variance)
+{
+    memset(self, 0, (size_t)hsep_uncertainty_size(Np));
+    (void)uncertainty_lay_out(self, Np);
+    memcpy(self->theta, uncertainty_shares, sizeof self->theta);
+    self->theta[0] = variance;
+    self->factor = 1.0;
+}
+
+HSEP_API int hsep_uncertainty_valid(const void *block, uint64_t Np)
+{
+    hsep_uncertainty got;
+    memcpy(&got, block, sizeof got);
+    (void)uncertainty_lay_out(&got, Np); /* changes nothing where it is sound */
+    return memcmp(&got, block, sizeof got) == 0 && hsep_uncertainty_sound(&got);
+}
+
+HSEP_API double *hsep_uncertainty_learned(hsep_uncertainty *self) { return self->theta; }
+
+HSEP_API int hsep_uncertainty_sound(const hsep_uncertainty *self)
+{
+    double learned[HSEP_N_UNCERTAINTY];
+    memcpy(learned, (const char *)self + sizeof self->Np, sizeof learned);
+    int sound = self->factor >= 1.0 / uncertainty_factor_max && self->factor <= uncertainty_factor_max;
+    for (int i = 0; i < HSEP_N_UNCERTAINTY; i++) {
+        const double share = i < HSEP_N_COMPONENTS ? uncertainty_shares[i] : 0.0;
+        const double least = uncertainty_share_least * share;
+        const double most = share > 0.0 ? uncertainty_share_most * share : HSEP_PREDICTION_MAX;
+        sound = sound && learned[i] >= least && learned[i] <= most;
+    }
+    return sound;
+}
+
+/* Variance of the error with these components. */
+static double uncertainty_variance(const hsep_uncertainty *self, const double components[])
+{
+    return hsep_dot(self->theta, components, HSEP_N_COMPONENTS) +
+           (uncertainty_floor * self->recent + uncertainty_least);
+}
+
+static double uncertainty_square(double value)
+{
+    const double magnitude = fmin(fabs(value), HSEP_PREDICTION_MAX);
+    return magnitude * magnitude;
+}
+
+HSEP_API void hsep_uncertainty_predict(
+    hsep_uncertainty *self, const double x_d[], const double x_pb[], const double e_h[], uint64_t n_physics,
+    const double disagreement[])
+{
+    const uint64_t Np = self->Np;
+    const double last = e_h[Np];
+    double *published = hsep_at(self, self->e_h), *std = hsep_at(self, self->std);
+    double *f = hsep_at(self, self->components);
+    for (uint64_t j = 0; j < Np; j++) {
+        published[j] = Np - 1 - j < n_physics ? 0.0 : e_h[j];
+    }
+    for (uint64_t j = 0; j < Np; j++, f += HSEP_N_COMPONENTS) {
+        /* The difference of the first sample is that of the second. */
+        const uint64_t newer = j + 1 == Np && j > 0 ? j - 1 : j, older = newer + 1 < Np ? newer + 1 : newer;
+        f[0] = 1.0;
+        f[1] = (double)(Np - j) / (double)Np;
+        f[2] = uncertainty_square(x_pb[newer] - x_pb[older]);
+        f[3] = uncertainty_square(published[newer] - published[older]);
+        f[4] = uncertainty_square(x_d[j] - x_pb[j]);
+        f[5] = uncertainty_square(published[j] - last);
+        f[6] = disagreement == NULL || Np - 1 - j < n_physics ? 0.0 : disagreement[j];
+        std[j] = fmin(self->factor * sqrt(uncertainty_variance(self, f)), HSEP_PREDICTION_MAX);
+    }
+}
+
+/* Follow the size of the residuals and the share of errors beyond the interval; after the first window, begin with its
+ * mean square error. The sums are those of count samples. */
+static void uncertainty_follow(
+    hsep_uncertainty *self, double count, double squares, double errors, double beyond, double far)
+{
+    const double mean_square = fmin(squares / count, HSEP_PREDICTION_MAX);
+    if (self->recent > 0.0) {
+        if (far / count > uncertainty_far_share) {
+            for (int i = 0; i < HSEP_N_COMPONENTS; i++) {
+                self->theta[i] *= uncertainty_far * uncertainty_far;
+            }
+        } else {
+            const double factor = self->factor * exp(uncertainty_factor_rate * (beyond / count - uncertainty_beyond));
+            self->factor = fmin(fmax(factor, 1.0 / uncertainty_factor_max), uncertainty_factor_max);
+        }
+        self->recent = uncertainty_recent * self->recent + (1.0 - uncertainty_recent) * mean_square;
+    } else {
+        self->recent = mean_square;
+        self->theta[0] = fmin(errors / count, HSEP_PREDICTION_MAX);
+        self->theta[1] = self->theta[0] * uncertainty_growth;
+    }
+}
+
+/* A step of expectation maximisation. seen, total: over the samples, the share of each component in the variance, with
+ * and without the squared error. */
+static void uncertainty_step_by(
+    hsep_uncertainty *self, const double seen[HSEP_N_COMPONENTS], const double total[HSEP_N_COMPONENTS])
+{
+    for (int i = 0; i < HSEP_N_COMPONENTS; i++) {
+        const double windows = total[i] / (double)self->Np, share = uncertainty_shares[i];
+        self->evidence[i] = uncertainty_memory * self->evidence[i] + windows;
+        const double change = fmax(total[i] > 0.0 ? seen[i] / total[i] : 1.0, uncertainty_vanishing);
+        const double step = fmin(uncertainty_step * windows / (self->evidence[i] + uncertainty_first_evidence), 1.0);
+        const double theta = self->theta[i] * pow(change, step);
+        self->theta[i] = share == 0.0
+                             ? fmin(fmax(theta, uncertainty_floor * self->recent), HSEP_PREDICTION_MAX)
+                             : fmin(fmax(theta, uncertainty_share_least * share), uncertainty_share_most * share);
+    }
+}
+
+HSEP_API void hsep_uncertainty_learn(hsep_uncertainty *self, const double e[], const double accepted[])
+{
+    const double *e_h = hsep_at(self, self->e_h), *std = hsep_at(self, self->std);
+    const double *f = hsep_at(self, self->components);
+    double count = 0.0, squares = 0.0, errors = 0.0, beyond = 0.0, far = 0.0, seen[HSEP_N_COMPONENTS] = {0.0},
+           total[HSEP_N_COMPONENTS] = {0.0};
+    for (uint64_t j = 0; j < self->Np; j++) {
+        if (accepted == NULL || accepted[j] > 0.0) {
+            const double error = e[j] - e_h[j];
+            count += 1.0;
+            squares += e[j] * e[j];
+            errors += error * error;
+            beyond += fabs(error) / std[j] > uncertainty_z ? 1.0 : 0.0;
+            far += fabs(error) / std[j] > uncertainty_far ? 1.0 : 0.0;
+        }
+    }
+    if (!(squares > 0.0)) { /* nothing to learn a scale from */
+        return;
+    }
+    uncertainty_follow(self, count, squares, errors, beyond, far);
+    for (uint64_t j = 0; j < self->Np; j++, f += HSEP_N_COMPONENTS) {
+        if (accepted == NULL || accepted[j] > 0.0) {
+            const double variance = uncertainty_variance(self, f);
+            const double error = e[j] - e_h[j], relative = fmin(error * error / variance, uncertainty_outlying);
+            for (int i = 0; i < HSEP_N_COMPONENTS; i++) {
+                const double share = f[i] * self->theta[i] / variance;
+                total[i] += share;
+                seen[i] += share * relative;
+            }
+        }
+    }
+    uncertainty_step_by(self, seen, total);
+}

@@ -1,0 +1,29 @@
+"""``hybridsep example-log``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .failures import loading
+from .options import ForceOption
+
+__all__ = ["example_log"]
+
+
+def example_log(
+    out: Annotated[Path, typer.Option(help="File for the log, .csv or .csv.gz.")] = Path("example_axis.csv"),
+    force: ForceOption = False,
+) -> None:
+    """Write the example log that comes with the library: 20 s of a simulated axis at 1 kHz, in mm."""
+    with loading():
+        from ..logs.example import write_example
+        from .arguments import check_ending
+        from .overwrite import EXAMPLE_LOG, Output, check_outputs
+
+    check_ending(out, "--out", (".csv", ".gz"))
+    check_outputs([Output("--out", out, EXAMPLE_LOG)], {}, force=force)
+    write_example(out)
+    typer.echo(out)

@@ -1,0 +1,148 @@
+"""``hybridsep identify``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..base.errors import ParameterError
+from ..base.output import written_text
+from .failures import loading
+from .options import ForceOption, JsonOption, TsOption, UnitOption
+
+if TYPE_CHECKING:
+    from ..identify.frequency_response import IdentifiedResponse
+    from ..identify.model import IdentifiedModel
+
+__all__ = ["identify"]
+
+KINDS = ("auto", "operation", "response", "sweep", "klipper")
+"""What ``--kind`` takes."""
+
+
+def identify(
+    recording: Annotated[
+        Path,
+        typer.Argument(
+            help="Log of commanded and measured positions, frequency response (CSV, MAT), or Klipper's accelerometers."
+        ),
+    ],
+    kind: Annotated[
+        str,
+        typer.Option(
+            help=f"What the file is: {', '.join(KINDS)}. auto: by its columns, a log being one of operation; sweep: a "
+            "log of a swept sine, at rest at both ends."
+        ),
+    ] = "auto",
+    out: Annotated[Path | None, typer.Option(help="Machine file to write.")] = None,
+    figure: Annotated[Path | None, typer.Option(help="PNG to draw.")] = None,
+    name: Annotated[str, typer.Option(help="Name of the machine in its file.")] = "axis",
+    unit_gain: Annotated[
+        bool | None, typer.Option("--unit-gain/--free-gain", help="Static gain of 1, or estimated; chosen if left out.")
+    ] = None,
+    modes: Annotated[int | None, typer.Option(help="Number of modes of a response; chosen if left out.")] = None,
+    hold: Annotated[str, typer.Option(help="Hold of the command with a response: zoh or foh.")] = "zoh",
+    dead_time: Annotated[int, typer.Option(help="Whole samples of dead time in a response.")] = 0,
+    unit: UnitOption = None,
+    T_s: TsOption = None,
+    t: Annotated[str | None, typer.Option("--t", help="Name of the time column.")] = None,
+    x_d: Annotated[str | None, typer.Option("--x-d", help="Name of the commanded position's column.")] = None,
+    x: Annotated[str | None, typer.Option("--x", help="Name of the measured position's column.")] = None,
+    axis: Annotated[str | None, typer.Option(help="Axis of a file that holds several: x, y or z of Klipper's.")] = None,
+    *,
+    force: ForceOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Identify the physics model: from a log, a frequency response or a swept sine."""
+    with loading():
+        from ..identify.figures import operation_figure, response_figure
+        from ..identify.frequency_response import IdentifiedResponse, identify_frequency_response
+        from ..identify.klipper import identify_resonance, is_klipper, read_klipper
+        from ..identify.operation import identify_operation
+        from ..identify.response_files import has_response, read_response
+        from ..identify.swept_sine import h1
+        from ..logs.log import read_log
+        from .arguments import check_ending
+        from .identify_tables import print_identified
+        from .overwrite import FIGURE, MACHINE, Output, check_outputs
+        from .progress import progress_bar
+
+    if kind not in KINDS:
+        raise ParameterError(f"--kind must be one of {', '.join(KINDS)}, got {kind!r}")
+    check_ending(out, "--out", (".toml",))
+    check_ending(figure, "--figure", (".png",))
+    given = [("--out", out, MACHINE), ("--figure", figure, FIGURE)]
+    outputs = [Output(option, path, what) for option, path, what in given if path is not None]
+    check_outputs(outputs, {"recording": recording}, force=force)
+    columns = {role: column for role, column in (("t", t), ("x_d", x_d), ("x", x)) if column}
+    if kind == "auto":
+        kind = "operation"
+        if is_klipper(recording):
+            kind = "klipper"
+        elif not columns and has_response(recording):
+            kind = "response"
+    interval = 1e-3 if T_s is None else T_s
+    found: IdentifiedModel | IdentifiedResponse
+    with progress_bar(as_json) as advance:
+        if kind == "klipper":
+            found = identify_resonance(read_klipper(recording), _klipper_axis(axis), T_s=interval)
+        elif kind == "response":
+            f, G, std = read_response(recording)
+            found = identify_frequency_response(
+                *(f, G),
+                std=std,
+                n_modes=modes,
+                unit_gain=bool(unit_gain),
+                T_s=interval,
+                input_hold=hold,
+                dead_time=dead_time,
+                progress=advance,
+            )
+        else:
+            log = read_log(recording, columns=columns, unit=unit, T_s=T_s, axis=axis)
+            pieces = [(piece.x_d, piece.x_meas) for piece in log.segments()]
+            if kind == "sweep":
+                if len(pieces) > 1:
+                    raise ParameterError(f"{recording}: a swept sine must have no gap, got {len(pieces)} pieces")
+                lines = h1(*pieces[0], log.T_s)
+                found = identify_frequency_response(
+                    *(lines.frequency, lines.response),
+                    std=lines.std,
+                    n_modes=modes,
+                    unit_gain=bool(unit_gain),
+                    T_s=log.T_s,
+                    input_hold=hold,
+                    dead_time=dead_time,
+                    sampled=True,
+                    progress=advance,
+                )
+            else:
+                found = identify_operation(pieces, log.T_s, unit_gain=unit_gain, progress=advance)
+                if figure is not None:
+                    operation_figure(found, pieces, recording.name, figure, log.unit)
+    if figure is not None and isinstance(found, IdentifiedResponse):
+        response_figure(found, recording.name, figure)
+    if out is not None:
+        _write_machine(found, name, recording.name, out)
+    print_identified(found, as_json, recording.name)
+
+
+def _klipper_axis(axis: str | None) -> str:
+    if axis is None or axis not in ("x", "y", "z"):
+        raise ParameterError(f"Klipper's file holds three axes: say which was shaken, --axis x, y or z, got {axis!r}")
+    return axis
+
+
+def _write_machine(found: IdentifiedModel | IdentifiedResponse, name: str, recording: str, out: Path) -> None:
+    """Write the machine file, with the deviations and findings as comments."""
+    from ..machine_text import machine_text
+
+    deviations = [
+        f"{e.name} = {e.value:.6g} ± {e.std:.2g}{'' if e.unit == '1' else ' ' + e.unit}" for e in found.parameters
+    ]
+    comments = [f"Identified by hybridsep from {recording}.", *deviations, *found.findings]
+    machine = found.machine(name, f"Axis identified from {recording}")
+    with written_text(out) as file:
+        file.write(machine_text(machine, comments))

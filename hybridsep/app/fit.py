@@ -1,0 +1,257 @@
+"""From recorded logs to FMUs: identification, choice of settings, judgement on samples that taught nothing."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from ..base.errors import IdentificationError, ParameterError
+from ..base.output import written_text
+from ..base.settings import PredictorSettings
+from ..fmi.archive import build_fmu
+from ..fmi.compiler import can_compile
+from ..fmi.flavours import FLAVOURS
+from ..identify.operation import identify_operation, unit_gain_model
+from ..logs.log import Log
+from ..machine import Machine
+from ..machine_sections import ModeSection, Physics
+from ..machine_text import machine_text
+from ..model.physics import ModalModel, Mode
+from ..predict.predictor import HybridPredictor
+from ..tune.choice import choose_settings, settings_for, window_scores
+from ..tune.halves import Recording, Replay, halves, replay
+from .fit_stages import Stages, key_of
+from .step_times import step_times
+
+__all__ = ["MACHINE_MARK", "Fit", "FitOptions", "checked_name", "fit", "fit_files", "machine_name", "shown_unit"]
+
+MACHINE_MARK = "# Identified by hybridsep fit"
+"""How a machine file that was written here begins."""
+
+_LOOK_AHEAD = 0.1
+"""Look-ahead, s, of a controller of which nothing is known."""
+
+_UNITS = {"m": ((1e6, "µm"), (1e3, "mm")), "rad": ((1e6, "µrad"), (1e3, "mrad"))}
+
+Progress = Callable[[str, float], object]
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """Options of :func:`fit`.
+
+    Attributes
+    ----------
+    Np : int, optional
+        Samples of the controller's look-ahead; those of 0.1 s if left out.
+    name : str
+        The machine's.
+    share : float
+        Share of each log's samples that teaches; the rest judges.
+    """
+
+    Np: int | None
+    name: str
+    share: float = 0.5
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What was found.
+
+    Attributes
+    ----------
+    machine : Machine
+    identification, choice, windows, steps : plain values
+        As in ``fit.json``.
+    judged : Replay
+        Replay of the logs; what judges taught neither the physics model nor the choice.
+    files : tuple of Path
+        Files that were written.
+    """
+
+    machine: Machine
+    identification: dict[str, Any]
+    choice: list[dict[str, Any]]
+    windows: list[dict[str, Any]]
+    steps: dict[str, float]
+    judged: Replay
+    files: tuple[Path, ...]
+
+    def summary(self) -> dict[str, Any]:
+        """Return plain values: errors in m over the samples that judge, settings, identification, step times in s."""
+        rms_pb, rms_hold, rms_h = self.judged.rms()
+        judged = {"rms_pb": rms_pb, "rms_hold": rms_hold, "rms_h": rms_h, "verdict": str(self.judged.verdict())}
+        settings = {name: getattr(self.machine.predictor_settings, name) for name in ("Np", "p", "q")}
+        parts = {"identification": self.identification, "tried": self.choice, "over_Np": self.windows}
+        return {"judged": judged, "settings": settings, **parts, "step_times": self.steps}
+
+
+def machine_name(path: Path) -> str:
+    """Return a machine's name from that of a log."""
+    name = re.sub(r"[^A-Za-z0-9]+", "_", path.name.partition(".")[0]).strip("_")
+    return name if re.match(r"[A-Za-z]", name) else f"axis_{name}".rstrip("_")
+
+
+def checked_name(name: str) -> str:
+    """Return a machine's name; ParameterError if it cannot be one."""
+    if re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
+        return name
+    raise ParameterError(f"--name must be a letter, then letters, digits and _, got {name!r}")
+
+
+def fit_files(out: Path, name: str) -> dict[str, Path]:
+    """Return the files that :func:`fit` writes and its report, by what they are."""
+    return {
+        "machine file": out / "machine.toml",
+        "trained predictor": out / "trained.state",
+        "results": out / "fit.json",
+        "report": out / "report.html",
+        **{f"{flavour} FMU": out / f"{_fmu_name(name, flavour)}.fmu" for flavour in _flavours()},
+    }
+
+
+def fit(logs: Sequence[Log], out: Path, options: FitOptions, progress: Progress = lambda _message, _done: None) -> Fit:
+    """Identify an axis from its logs, choose settings, judge them, and build its FMUs.
+
+    The first half of each log teaches: the physics model is identified from it, and settings are chosen by causal
+    replays of it. Then the whole is replayed, causally; its second half judges. What the predictor has learned at the
+    end is the state with which the FMUs start.
+
+    Parameters
+    ----------
+    logs : sequence of Log
+        Of one axis, all sampled alike.
+    out : Path
+        Folder of :func:`fit_files`; it exists.
+    options : FitOptions
+    progress : callable, optional
+        Called with a message and the fraction done.
+
+    Raises
+    ------
+    ParameterError
+        If the logs are sampled differently or in different units, or ``Np`` does not fit.
+    SignalError
+        If a log is too short to be split.
+    """
+    T_s = _common(logs)
+    recordings = [piece for log in logs for piece in halves([(s.x_d, s.x_meas) for s in log.segments()], options.share)]
+    default = settings_for(_window(options.Np, T_s), T_s, "zoh")
+    files = fit_files(out, options.name)
+    stages = Stages(files["results"], key_of([log.path for log in logs], (options, [log.t.shape for log in logs])))
+
+    def within(begin: float, end: float, message: str) -> Callable[[float], object]:
+        return lambda done: progress(message, begin + (end - begin) * done)
+
+    found = stages.result("identification", lambda: _identified(recordings, T_s, within(0.0, 0.35, "identify")))
+    model = ModalModel([Mode(**mode) for mode in found["modes"]], found["dead_time"])
+    default = replace(default, input_hold=found["input_hold"])
+    choice = stages.result("choice", lambda: _choice(model, recordings, default, within(0.35, 0.6, "choose p and q")))
+    p, q = _chosen(choice)
+    settings = replace(default, p=p, q=q)
+    windows = stages.result(
+        "windows",
+        lambda: [asdict(one) for one in window_scores(model, recordings, settings, within(0.6, 0.8, "error over Np"))],
+    )
+    predictor = HybridPredictor(model, settings)
+    judged = replay(predictor, recordings, progress=within(0.8, 0.85, "judge on the second half"))
+    machine = _machine(options.name, logs, model, settings)
+    with written_text(files["machine file"]) as file:
+        file.write(machine_text(machine, comments=[f"{MACHINE_MARK[2:]}; {found['structure']}"]))
+    predictor.save(files["trained predictor"])
+    for i, flavour in enumerate(_flavours()):
+        progress(f"build the {flavour} FMU", 0.85 + 0.05 * i)
+        targets = ("host",) if flavour == "native" else None
+        name = _fmu_name(options.name, flavour)
+        build_fmu(machine, name, out, flavour, targets=targets, weights=files["trained predictor"])
+    progress("time the FMU's steps", 0.95)
+    fmu = files[f"{_flavours()[0]} FMU"]
+    steps = step_times(fmu, recordings[0].x_d, recordings[0].x)
+    result = Fit(machine, found, choice, windows, steps, judged, tuple(files.values()))
+    stages.keep("judged", result.summary()["judged"])
+    progress("done", 1.0)
+    return result
+
+
+def shown_unit(rms: float, si: str) -> tuple[float, str]:
+    """Return factor and name of the unit in which errors of about ``rms``, m or rad, are shown."""
+    small, large = _UNITS[si]
+    return small if small[0] * rms < 1e4 else large
+
+
+def _common(logs: Sequence[Log]) -> float:
+    """Return the sampling interval of all logs, s; ParameterError if they differ in it or in the unit."""
+    T_s = logs[0].T_s
+    for log in logs[1:]:
+        if abs(log.T_s - T_s) > 0.01 * T_s:
+            raise ParameterError(f"{log.path.name} is sampled every {log.T_s:g} s, {logs[0].path.name} every {T_s:g} s")
+        if log.unit != logs[0].unit:
+            raise ParameterError(f"{log.path.name} is in {log.unit}, {logs[0].path.name} in {logs[0].unit}")
+    return T_s
+
+
+def _window(Np: int | None, T_s: float) -> int:
+    """Return the window, samples."""
+    return max(1, round(_LOOK_AHEAD / T_s)) if Np is None else Np
+
+
+def _identified(recordings: Sequence[Recording], T_s: float, progress: Callable[[float], object]) -> dict[str, Any]:
+    """Return the identification from the samples that teach, as plain values."""
+    taught = [recording.taught for recording in recordings if recording.n_taught > 1]
+    try:
+        found = identify_operation(taught, T_s, progress=lambda _message, done: progress(done))
+    except IdentificationError as error:
+        found = unit_gain_model(T_s, f"{error}; a gain of 1 without lag is taken")
+    summary = dict(found.summary())
+    return {name: None if isinstance(value, float) and math.isnan(value) else value for name, value in summary.items()}
+
+
+def _choice(
+    model: ModalModel,
+    recordings: Sequence[Recording],
+    default: PredictorSettings,
+    progress: Callable[[float], object],
+) -> list[dict[str, Any]]:
+    """Return all settings that were tried, as plain values."""
+    choice = choose_settings(model, recordings, default, progress)
+    return [
+        {
+            "p": one.settings.p,
+            "q": one.settings.q,
+            "rms_h": one.rms_h if math.isfinite(one.rms_h) else None,
+            "chosen": one.settings == choice.settings,
+        }
+        for one in choice.tried
+    ]
+
+
+def _chosen(choice: Sequence[dict[str, Any]]) -> tuple[int, int]:
+    """Return ``p`` and ``q``."""
+    chosen = next(one for one in choice if one["chosen"])
+    return int(chosen["p"]), int(chosen["q"])
+
+
+def _machine(name: str, logs: Sequence[Log], model: ModalModel, settings: PredictorSettings) -> Machine:
+    modes = tuple(ModeSection(**vars(mode)) for mode in model.modes)
+    return Machine(
+        name=name,
+        title=f"Axis {name}, identified",
+        sources=tuple(f"identified from {log.path.name}, {len(log.t)} samples" for log in logs),
+        T_s=settings.T_s,
+        physics=Physics(mode=modes, dead_time=model.dead_time, input_hold=settings.input_hold),  # type: ignore[arg-type]
+        predictor={"Np": settings.Np, "p": settings.p, "q": settings.q},  # type: ignore[arg-type]
+    )
+
+
+def _flavours() -> tuple[str, ...]:
+    """Return the flavours that can be built here."""
+    return FLAVOURS if can_compile() else ("python",)
+
+
+def _fmu_name(name: str, flavour: str) -> str:
+    return f"HybridPredictor{'' if flavour == 'native' else 'Py'}_{name}"

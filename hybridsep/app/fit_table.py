@@ -1,0 +1,35 @@
+"""What ``hybridsep fit`` prints."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from rich import box
+from rich.table import Table
+
+from ..intake.finding import Finding
+from .fit import Fit, shown_unit
+from .tables import console, shown_figure
+
+__all__ = ["print_fit"]
+
+
+def print_fit(fit: Fit, findings: Mapping[str, Iterable[Finding]], unit: str) -> None:
+    """Print what the intake of logs found, what was identified and how it was judged; ``unit`` is m or rad."""
+    for name, found in findings.items():
+        for finding in found:
+            console.print(f"{name}: {finding}", highlight=False, markup=False)
+    scale, shown = shown_unit(fit.judged.rms()[0], unit)
+    model, settings = fit.identification, fit.machine.predictor_settings
+    table = Table(
+        "prediction by", title=f"Error on samples that taught nothing [{shown}]", box=box.SIMPLE, pad_edge=False
+    )
+    table.add_column("RMS", justify="right")
+    for label, value in zip(("physics model", "hold", "hybrid"), fit.judged.rms(), strict=True):
+        table.add_row(label, shown_figure(scale * value))
+    console.print(f"{model['structure']}, dead time {model['dead_time']} samples", highlight=False)
+    for line in model["findings"]:
+        console.print(f"  {line}", highlight=False, markup=False)
+    console.print(f"Np = {settings.Np}, p = {settings.p}, q = {settings.q}", highlight=False)
+    console.print(table)
+    console.print(str(fit.judged.verdict()), highlight=False)

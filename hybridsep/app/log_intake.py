@@ -1,0 +1,102 @@
+"""Intake of a log on the command line: findings are shown, and put right or refused."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from ..base.errors import LogError
+from ..intake.check import Intake, check
+from ..intake.finding import Finding
+from ..logs.log import Log, LogReader, open_log
+from ..machine import Machine
+from .arguments import check_interval, check_unit
+from .failures import errors_console
+
+__all__ = ["Reading", "findings_table", "open_checked"]
+
+CHECKED_MAX = 2_000_000
+"""Samples that are checked at most; a longer log is replayed in bounded memory all the same."""
+
+Reading = Mapping[str, Any]
+"""Arguments of :func:`~hybridsep.logs.log.open_log`."""
+
+
+def open_checked(
+    path: Path, reading: Reading, machine: Machine, *, fix: bool, as_is: bool
+) -> tuple[LogReader | Log, Intake]:
+    """Open a log and check it.
+
+    Parameters
+    ----------
+    path : Path
+    reading : mapping
+        How it is read.
+    machine : Machine
+        Whose log it is.
+    fix : bool
+        Whether the fixes of all findings are applied.
+    as_is : bool
+        Whether it is taken with the faults that it has.
+
+    Returns
+    -------
+    log : LogReader or Log
+        The log; with ``fix`` the fixed one, of several segments the longest.
+    intake : Intake
+
+    Raises
+    ------
+    LogError
+        If the log cannot be read, or has a fault that makes figures flatter and is neither fixed nor taken as it is.
+    """
+    reader = open_log(path, **reading, uniform=False)
+    checked = reader.read(CHECKED_MAX)
+    check_unit(path.name, checked, machine)
+    intake = check(replace(checked, unit=machine.unit), machine)
+    if not fix:
+        check_interval(path.name, reader.T_s, machine)
+    if intake.errors and not (fix or as_is):
+        raise LogError(
+            f"{path}: figures from this log would mean nothing: {'; '.join(f.words for f in intake.errors)}. Apply the "
+            "fixes with --fix, correct the log or the options it is read with, or go on with --as-is"
+        )
+    _show(reader.remarks, intake.findings)
+    if fix:
+        if reader.n_samples > CHECKED_MAX:
+            raise LogError(f"{path}: --fix takes at most {CHECKED_MAX} samples, the log has {reader.n_samples}; cut it")
+        return _longest_segment(intake.fixed(), path), intake
+    return (reader if as_is else open_log(path, **reading)), intake
+
+
+def findings_table(findings: Iterable[Finding]) -> list[dict[str, Any]]:
+    """Return findings as plain data, for JSON."""
+    return [
+        {
+            "name": finding.name,
+            "severity": finding.severity,
+            "words": finding.words,
+            "evidence": dict(finding.evidence),
+            "fix": finding.fix.words if finding.fix else None,
+        }
+        for finding in findings
+    ]
+
+
+def _show(remarks: Iterable[str], findings: Iterable[Finding]) -> None:
+    """Print remarks and findings on standard error."""
+    for line in [f"note: {remark}" for remark in remarks] + [str(finding) for finding in findings]:
+        errors_console.print(line, markup=False, highlight=False, soft_wrap=True)
+
+
+def _longest_segment(log: Log, path: Path) -> Log:
+    segments = log.segments()
+    if len(segments) == 1:
+        return log
+    longest = max(segments, key=lambda segment: len(segment.t))
+    _show(
+        [f"{path.name}: of {len(segments)} segments the longest, {len(longest.t)} of {len(log.t)} samples, is read"], []
+    )
+    return longest

@@ -1,0 +1,238 @@
+"""Verdict on a hybrid model in words: better or worse than the physics model and than hold, where, and why.
+
+The errors of a run are summed up by place: a third of the look-ahead window, and whether the axis is commanded to move.
+What is kept does not grow with the run.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.metrics import rms_ratio
+from ..base.signals import Array
+from ..cosim.run import Run
+
+__all__ = ["Tally", "Verdict", "verdict_of"]
+
+_ALIKE = 0.02
+"""Relative difference of two RMS errors below which they count as equal."""
+
+_LEAST_SHARE = 0.01
+"""Share of the samples from which on a place is judged."""
+
+_STANDSTILL = 1e-3
+"""Commanded motion of a sample, relative to the largest so far, below which the axis is at rest."""
+
+_UNSTABLE = 3.0
+"""Largest change of the prediction, relative to the largest residual, from which on the model counts as unstable."""
+
+_LITTLE_MOTION = 0.1
+"""Share of samples in motion below which there is too little of it to learn from."""
+
+_N_EARLY = 10
+"""Windows that count as the beginning of a run."""
+
+_N_THIRDS = 3
+_THIRDS = ("first third", "second third", "last third")
+_MOTIONS = ("standstill", "motion")
+_PEERS = ("the physics model", "hold")
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Judgement of the hybrid model against its two peers.
+
+    Attributes
+    ----------
+    ratio_pb, ratio_hold : float
+        RMS error of the hybrid relative to that of the physics model, and to that of the hold baseline.
+    worse : tuple of tuples of two str
+        Places where it is worse than the physics model, and where it is worse than hold.
+    judged : tuple of str
+        Places with enough samples.
+    causes : tuple of str
+        What explains it where it is worse, as far as the run shows.
+    n_rejected, n_samples : int
+        Measurements that were not learned, as they were missing or not plausible, and all of them.
+    """
+
+    ratio_pb: float
+    ratio_hold: float
+    worse: tuple[tuple[str, ...], tuple[str, ...]]
+    judged: tuple[str, ...]
+    causes: tuple[str, ...]
+    n_rejected: int
+    n_samples: int
+
+    def __str__(self) -> str:
+        ratios = (self.ratio_pb, self.ratio_hold)
+        lines = [
+            f"{_comparison(value)} {peer}: {value:.3g} × its RMS error{_where(value, places, self.judged)}"
+            for peer, value, places in zip(_PEERS, ratios, self.worse, strict=True)
+        ]
+        lines += [f"Why: {cause}" for cause in self.causes]
+        if self.n_rejected:
+            lines.append(
+                f"{self.n_rejected} of {self.n_samples} measurements were missing or not plausible, and not learned"
+            )
+        return "\n".join(f"{line}." for line in lines)
+
+
+def verdict_of(run: Run) -> Verdict:
+    """Return the verdict on the prediction of a run."""
+    tally, predictions = Tally(run.Np), np.stack((run.x_pb, run.x_hold, run.x_h))
+    for first in range(0, len(run.t), run.Np):
+        window = slice(first, first + run.Np)
+        tally.add(run.x_d[window], run.x_meas[window], predictions[:, window])
+    return tally.verdict(n_rejected=run.n_rejected)
+
+
+class Tally:
+    """Running sums of the errors of physics model, hold and hybrid, by their place.
+
+    Parameters
+    ----------
+    Np : int
+        Samples in a window.
+    """
+
+    def __init__(self, Np: int) -> None:
+        self.Np = Np
+        self._squares = np.zeros((3, len(_MOTIONS), _N_THIRDS))
+        self._counts = np.zeros((len(_MOTIONS), _N_THIRDS))
+        self._early, self._n_windows = np.zeros(3), 0
+        self._last_x_d = math.nan
+        self._fastest = 0.0
+        self._largest_residual = self._largest_change = 0.0
+        self._n_missing = 0
+
+    def add(self, x_d: Array, x: Array, predictions: Array) -> None:
+        """Add a window.
+
+        Parameters
+        ----------
+        x_d, x : (n,) array, m
+            Commanded and measured positions, NaN where missing.
+        predictions : (3, n) array, m
+            ``x_pb``, ``x_hold`` and ``x_h``.
+        """
+        speed = np.empty(len(x_d))
+        speed[0] = 0.0 if math.isnan(self._last_x_d) else abs(x_d[0] - self._last_x_d)
+        np.abs(x_d[1:] - x_d[:-1], out=speed[1:])
+        self._last_x_d = float(x_d[-1])
+        self._fastest = max(self._fastest, float(speed.max()))
+        moving = (speed > _STANDSTILL * self._fastest).astype(np.int64)
+        third = np.minimum(np.arange(len(x)) * _N_THIRDS // self.Np, _N_THIRDS - 1)
+        known = ~np.isnan(x)
+        squares = (x - predictions) ** 2
+        if not known.all():
+            squares = np.where(known, squares, 0.0)
+        place = _N_THIRDS * moving + third
+        for total, weights in zip((*self._squares, self._counts), (*squares, known), strict=True):
+            total += np.bincount(place, weights, total.size).reshape(total.shape)
+        self._n_missing += int((~known).sum())
+        self._largest_change = max(self._largest_change, float(np.abs(predictions[2] - predictions[0]).max()))
+        if known.any():
+            self._largest_residual = max(self._largest_residual, float(np.sqrt(squares[0].max())))
+        if self._n_windows < _N_EARLY:
+            self._early += squares.sum(axis=1)
+        self._n_windows += 1
+
+    def verdict(self, *, n_rejected: int = 0) -> Verdict:
+        """Return the verdict on the windows so far.
+
+        Parameters
+        ----------
+        n_rejected : int
+            Measurements that were not learned, missing ones included.
+        """
+        pb, hold, h = self._squares
+        ratios = [_ratio(h.sum(), peer.sum()) for peer in (pb, hold)]
+        worse = tuple(self._worse(h, peer) for peer in (pb, hold))
+        n_samples = int(self._counts.sum()) + self._n_missing
+        return Verdict(
+            ratios[0],
+            ratios[1],
+            (worse[0], worse[1]),
+            tuple(self._places()),
+            tuple(self._causes(ratios)),
+            n_rejected,
+            n_samples,
+        )
+
+    def _places(self) -> dict[str, tuple[int, int]]:
+        """Return the places with enough samples: name → axis of the sums, and place there."""
+        places = {name: (0, i) for i, name in enumerate(_MOTIONS)} | {name: (1, i) for i, name in enumerate(_THIRDS)}
+        least = max(_LEAST_SHARE * self._counts.sum(), 1.0)
+        return {name: (axis, i) for name, (axis, i) in places.items() if self._counts.take(i, axis=axis).sum() >= least}
+
+    def _worse(self, h: Array, peer: Array) -> tuple[str, ...]:
+        """Return the places where the hybrid is worse."""
+        return tuple(
+            name
+            for name, (axis, i) in self._places().items()
+            if _ratio(h.take(i, axis=axis).sum(), peer.take(i, axis=axis).sum()) > 1.0 + _ALIKE
+        )
+
+    def _causes(self, ratios: list[float]) -> list[str]:
+        """Return what explains a hybrid that is worse."""
+        causes = []
+        if self._largest_change > _UNSTABLE * self._largest_residual > 0.0:
+            times = self._largest_change / self._largest_residual
+            causes.append(
+                f"the prediction is unstable: it leaves the physics model by {times:.2g} × the largest residual"
+            )
+        elif max(ratios) > 1.0 + _ALIKE:
+            causes += self._causes_of_worse(ratios)
+        return causes
+
+    def _causes_of_worse(self, ratios: list[float]) -> list[str]:
+        moving = float(self._counts[1].sum() / max(self._counts.sum(), 1.0))
+        causes = []
+        if moving < _LITTLE_MOTION:
+            causes.append(f"too little motion to learn from, {100 * moving:.2g} % of the samples")
+        peers = [peer for peer, value in enumerate(ratios) if value > 1.0 + _ALIKE]
+        if all(self._worse_early(peer) for peer in peers):
+            causes.append(f"only the first {_N_EARLY} windows are worse, where next to nothing is learned yet")
+        elif ratios[0] <= 1.0 + _ALIKE and not causes:
+            causes.append("the residual changes so slowly that its last value says more than the motion does")
+        elif not causes:
+            causes.append("the residual does not repeat with the motion")
+        return causes
+
+    def _worse_early(self, peer: int) -> bool:
+        """Return whether the hybrid is worse than a peer in the beginning of the run and not in the rest."""
+        rest = np.maximum(self._squares.sum(axis=(1, 2)) - self._early, 0.0)
+        return self._n_windows > 2 * _N_EARLY and _ratio(rest[2], rest[peer]) <= 1.0 + _ALIKE
+
+
+def _ratio(own: float, other: float) -> float:
+    """Return the ratio of two RMS errors from their sums of squares."""
+    return rms_ratio(math.sqrt(own), math.sqrt(other))
+
+
+def _comparison(value: float) -> str:
+    if abs(value - 1.0) <= _ALIKE:
+        return "As good as"
+    return "Better than" if value < 1.0 else "Worse than"
+
+
+def _where(value: float, worse: tuple[str, ...], judged: tuple[str, ...]) -> str:
+    """Return where the hybrid is worse; everywhere or nowhere, where that says it."""
+    if not worse:
+        return f", {_listed(judged)}" if value < 1.0 - _ALIKE else ""
+    return ", everywhere" if worse == judged else f"; worse {_listed(worse)}"
+
+
+def _listed(places: tuple[str, ...]) -> str:
+    """Return places as text: "at standstill and in the first third of the window"."""
+    shown = [text for place, text in zip(_MOTIONS, ("at standstill", "in motion"), strict=True) if place in places]
+    thirds = [place.partition(" ")[0] for place in places if place in _THIRDS]
+    if len(thirds) == _N_THIRDS:
+        return f"{' and '.join(shown)}{', ' if shown else ''}over the whole window"
+    if thirds:
+        shown.append(f"in the {' and '.join(thirds)} third of the window")
+    return " and ".join(shown)

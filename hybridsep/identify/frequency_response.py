@@ -1,0 +1,220 @@
+"""Identification of ``G_pb`` from a frequency response: vector fitting for the poles, then weighted least squares.
+
+The response is position over position. Acceleration over acceleration is the same ratio, as is velocity over velocity:
+numerator and denominator are differentiated alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..base.errors import IdentificationError, ParameterError
+from ..base.settings import check
+from ..base.signals import Array
+from ..base.threads import one_blas_thread
+from ..machine import Machine
+from ..model.physics import ModalModel
+from .modal_fit import ModalFit
+from .model import machine_of
+from .response_fit import MODES_MAX, Lines, fits_by_size
+from .uncertainty import Estimate
+
+__all__ = ["IdentifiedResponse", "identify_frequency_response"]
+
+Complex = NDArray[np.complex128]
+
+LINES_MIN = 8
+"""Lines below which nothing is fitted."""
+
+
+@dataclass(frozen=True)
+class IdentifiedResponse:
+    """Model identified from a frequency response.
+
+    Attributes
+    ----------
+    model : ModalModel
+        ``G_pb`` of eq. (15), with the dead time that was given.
+    input_hold : {"zoh", "foh"}
+        Hold for the machine file.
+    T_s : float
+        Sampling interval for the machine file, s.
+    parameters : tuple of Estimate
+        ``f_n``, ``zeta``, ``alpha``, ``beta`` of each mode and the static gain, with Cramér–Rao standard deviations.
+    frequency : (n,) array, Hz
+        Lines that were used.
+    response, fitted : (n,) array of complex
+        Measured response, and that of the model.
+    noise : float
+        Standard deviation of a line's error in multiples of its given one, or of its magnitude if none was given.
+    criteria : tuple of (int, float, float)
+        Number of modes, RMS of the relative error, Bayesian information criterion.
+    findings : tuple of str
+        What a user should know, in words.
+    """
+
+    model: ModalModel
+    input_hold: str
+    T_s: float
+    parameters: tuple[Estimate, ...]
+    frequency: Array
+    response: Complex
+    fitted: Complex
+    noise: float
+    criteria: tuple[tuple[int, float, float], ...]
+    findings: tuple[str, ...]
+
+    def machine(self, name: str, title: str, **entries: Any) -> Machine:
+        """Return the machine with this model, as :meth:`IdentifiedModel.machine` does."""
+        return machine_of(self.model, self.input_hold, self.T_s, name, title, **entries)
+
+    def summary(self) -> dict[str, Any]:
+        """Return plain values for JSON and tables."""
+        return {
+            "T_s": self.T_s,
+            "input_hold": self.input_hold,
+            "dead_time": self.model.dead_time,
+            "modes": [vars(mode) for mode in self.model.modes],
+            "parameters": [vars(estimate) for estimate in self.parameters],
+            "n_lines": len(self.frequency),
+            "noise": self.noise,
+            "criteria": [dict(zip(("n_modes", "rms_relative", "bic"), row, strict=True)) for row in self.criteria],
+            "findings": list(self.findings),
+        }
+
+
+@one_blas_thread
+def identify_frequency_response(
+    frequency: ArrayLike,
+    response: ArrayLike,
+    *,
+    std: ArrayLike | None = None,
+    n_modes: int | None = None,
+    unit_gain: bool = False,
+    T_s: float = 1e-3,
+    input_hold: str = "zoh",
+    dead_time: int = 0,
+    sampled: bool = False,
+    progress: Callable[[str, float], object] = lambda _message, _done: None,
+) -> IdentifiedResponse:
+    """Identify the physics model from a frequency response.
+
+    Parameters
+    ----------
+    frequency : (n,) array_like, Hz
+        Lines in any order; those at 0 and where the response is 0 or not finite are left out.
+    response : (n,) array_like of complex, m/m
+    std : (n,) array_like, optional
+        Standard deviation of each line's complex error; a constant part of its magnitude if left out.
+    n_modes : int, optional
+        Number of modes; by the Bayesian information criterion if left out.
+    unit_gain : bool
+        Whether the static gain is 1.
+    T_s : float
+        Sampling interval of the machine, s.
+    input_hold : {"zoh", "foh"}
+    dead_time : int
+        Whole samples of dead time in the response.
+    sampled : bool
+        Whether the response is that of sampled signals, which the hold has a part in.
+    progress : callable, optional
+        Called with a message and the fraction done.
+
+    Raises
+    ------
+    IdentificationError
+        If there are too few lines.
+    ParameterError
+        If a parameter is out of its range.
+    """
+    T_s, input_hold = check("T_s", T_s), check("input_hold", input_hold)
+    dead_time = check("dead_time", dead_time)
+    f, G, sigma = _usable(frequency, response, std)
+    if n_modes is not None and not 1 <= n_modes <= len(f) // 4:
+        raise ParameterError(f"n_modes must be 1 … {len(f) // 4} for {len(f)} lines, got {n_modes}")
+    omega = 2 * np.pi * f
+    counts = range(1, min(MODES_MAX, len(f) // 4) + 1) if n_modes is None else [n_modes]
+    delay = np.exp(1j * omega * dead_time * T_s)
+    lines = Lines(omega, G * delay, sigma, std is None, unit_gain, (T_s, input_hold) if sampled else None)
+    fits = fits_by_size(lines, counts, progress)
+    best, part = min(fits, key=lambda found: lines.criterion(found[0]))
+    model = ModalModel(best.modes(), dead_time)
+    noise = float(np.sqrt(best.cost / max(1, 2 * len(f) - best.n_free))) * np.sqrt(2.0)
+    return IdentifiedResponse(
+        model=model,
+        input_hold=input_hold,
+        T_s=T_s,
+        parameters=_estimates(best, noise if std is None else max(noise, 1.0)),
+        frequency=f,
+        response=G,
+        fitted=np.asarray(best.fitted * part / delay),
+        noise=noise,
+        criteria=tuple(
+            (len(fit.parameters), lines.relative_error(fit, part), lines.criterion(fit)) for fit, part in fits
+        ),
+        findings=tuple(_findings(best, f, noise, std is not None)),
+    )
+
+
+def _usable(frequency: ArrayLike, response: ArrayLike, std: ArrayLike | None) -> tuple[Array, Complex, Array]:
+    """Return the usable lines by ascending frequency, with each one's standard deviation up to a factor."""
+    f = np.asarray(frequency, dtype=np.float64).ravel()
+    G = np.asarray(response, dtype=np.complex128).ravel()
+    sigma = np.abs(G) if std is None else np.asarray(std, dtype=np.float64).ravel()
+    if not len(f) == len(G) == len(sigma):
+        raise IdentificationError(
+            f"a frequency response needs as many frequencies as values and deviations, got {len(f)}, {len(G)} and "
+            f"{len(sigma)}"
+        )
+    usable = np.isfinite(f) & np.isfinite(G) & np.isfinite(sigma) & (f > 0) & (np.abs(G) > 0) & (sigma > 0)
+    order = np.argsort(f[usable], kind="stable")
+    f, G, sigma = f[usable][order], G[usable][order], sigma[usable][order]
+    if len(f) < LINES_MIN or f[0] == f[-1]:
+        raise IdentificationError(
+            f"this frequency response cannot teach a model, because it has {len(f)} usable lines; at least "
+            f"{LINES_MIN} at frequencies above 0 are needed"
+        )
+    return f, G, sigma
+
+
+def _estimates(fit: ModalFit, noise: float) -> tuple[Estimate, ...]:
+    """Return the parameters with Cramér–Rao deviations for a complex error of that standard deviation a line."""
+    covariance = fit.covariance * noise**2 / 2  # real and imaginary part have half of the variance each
+    found = []
+    for i, (log_omega, log_zeta, g, h) in enumerate(fit.parameters):
+        own = covariance[4 * i : 4 * i + 4, 4 * i : 4 * i + 4]
+        omega, zeta = np.exp(log_omega), np.exp(log_zeta)
+        alpha, beta = g * omega**2, h * omega
+        slopes = {
+            "f_n": (omega / (2 * np.pi), [omega / (2 * np.pi), 0, 0, 0], "Hz"),
+            "zeta": (zeta, [0, zeta, 0, 0], "1"),
+            "alpha": (alpha, [2 * alpha, 0, omega**2, 0], "1/s2"),
+            "beta": (beta, [beta, 0, 0, omega], "1/s"),
+        }
+        for name, (value, slope, unit) in slopes.items():
+            variance = float(np.asarray(slope) @ own @ np.asarray(slope))
+            found.append(Estimate(f"mode[{i + 1}].{name}", float(value), float(np.sqrt(max(variance, 0.0))), unit))
+    gains = np.arange(2, fit.parameters.size, 4)
+    variance = float(covariance[np.ix_(gains, gains)].sum())
+    found.append(Estimate("gain", float(fit.parameters[:, 2].sum()), float(np.sqrt(max(variance, 0.0))), "1"))
+    return tuple(found)
+
+
+def _findings(fit: ModalFit, f: Array, noise: float, std_given: bool) -> list[str]:
+    findings = []
+    frequencies = np.exp(fit.parameters[:, 0]) / (2 * np.pi)
+    outside = [value for value in frequencies if not f[0] <= value <= f[-1]]
+    if outside:
+        values = ", ".join(f"{value:.4g} Hz" for value in outside)
+        findings.append(f"modes outside of the lines ({f[0]:g} … {f[-1]:g} Hz) stand for what is beyond them: {values}")
+    gain = float(fit.parameters[:, 2].sum())
+    if abs(gain - 1) > 0.02:
+        findings.append(f"the static gain is {gain:.4g}; position over position should have 1")
+    if std_given and noise > 2:
+        findings.append(f"the errors are {noise:.1f} times as large as the given deviations: the axis is no linear one")
+    return findings

@@ -1,0 +1,221 @@
+"""Identification of ``G_pb`` from operation in closed loop: commanded and measured positions of a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..base.errors import IdentificationError
+from ..base.settings import check
+from ..base.signals import Array
+from ..base.threads import one_blas_thread
+from ..model.physics import ModalModel
+from .model import Alternative, IdentifiedModel
+from .output_error import Delay, Fit, fit_structure, simulated
+from .search import fit_near
+from .segments import Segment, as_segments
+from .selection import Candidate, choose, compare_structures
+from .structure import STRUCTURES, Structure
+from .uncertainty import estimates
+
+__all__ = ["SAMPLES_MIN", "identify_operation", "unit_gain_model"]
+
+SAMPLES_MIN = 100
+"""Samples below which nothing is identified."""
+
+WEAK = 3.0
+"""Commanded motion in multiples of the unexplained one (standard deviations) below which only a gain of 1 is taken."""
+
+OPPOSED = -0.7
+"""Correlation of commanded and measured motion below which one of them has the wrong sign."""
+
+GAIN_RANGE = (0.1, 10.0)
+"""Static gains outside of which a unit is probably wrong."""
+
+Progress = Callable[[str, float], object]
+
+
+@one_blas_thread
+def identify_operation(
+    recordings: Iterable[tuple[ArrayLike, ArrayLike]],
+    T_s: float,
+    *,
+    unit_gain: bool | None = None,
+    order_max: int = 6,
+    progress: Progress = lambda _message, _done: None,
+) -> IdentifiedModel:
+    """Identify the physics model from recordings of one axis in operation.
+
+    The error of the simulated position is least over poles, zeros, gain, whole samples of dead time and the hold, for
+    structures from a gain alone to three modes; offset and state at the start of each recording are estimated beside
+    them. The last 35 % of the commanded motion choose among the structures, fitted to what comes before; the chosen
+    one is then fitted to everything.
+
+    Parameters
+    ----------
+    recordings : iterable of pairs ``(x_d, x)`` of (n,) array_like, m
+        Commanded and measured positions, one pair for each piece without a gap, sampled alike.
+    T_s : float
+        Sampling interval, s.
+    unit_gain : bool, optional
+        Whether the static gain is 1; chosen by the recordings if left out.
+    order_max : int
+        Largest number of poles, at least 1.
+    progress : callable, optional
+        Called with a message and the fraction done.
+
+    Raises
+    ------
+    IdentificationError
+        If the recordings cannot teach a model, with the reason.
+    SignalError
+        If samples are not finite or of different lengths.
+    ParameterError
+        If ``T_s`` is out of its range.
+    """
+    T_s = check("T_s", T_s)
+    given = [(x_d, x) for x_d, x in recordings]
+    segments = as_segments(given)
+    _require_motion(segments)
+    structures = [
+        structure
+        for structure in STRUCTURES
+        if structure.order <= max(order_max, 1) and unit_gain in (None, structure.unit_gain)
+    ]
+    candidates = compare_structures(segments, T_s, structures, progress)
+    chosen = choose(candidates)
+    progress(f"{chosen.structure.name}: all samples", 0.95)
+    fit = fit_near(segments, T_s, chosen.fit)
+    findings = []
+    if _is_weak(fit, segments, T_s):
+        fit = _at_rest(segments, T_s)
+        findings.append(
+            f"the commanded position moves by no more than {_um(_spread(segments))} and {_um(fit.rms)} of the measured "
+            "one (RMS) are not explained by it: too little motion to learn the dynamics from, a gain of 1 without lag "
+            "is taken"
+        )
+    parameters, n_effective = estimates(fit, segments, T_s)
+    findings += _findings(fit, chosen, segments, parameters[0].std, n_effective)
+    progress("identified", 1.0)
+    return IdentifiedModel(
+        model=_modal(fit, T_s),
+        input_hold=fit.delay.input_hold,
+        T_s=T_s,
+        structure=fit.structure.name,
+        parameters=parameters,
+        offset=fit.offset,
+        rms=fit.rms,
+        rms_held_out=chosen.rms_held_out,
+        n_samples=sum(len(segment.u) for segment in segments),
+        n_effective=n_effective,
+        alternatives=tuple(_alternative(candidate, T_s) for candidate in candidates),
+        findings=tuple(findings),
+    )
+
+
+def unit_gain_model(T_s: float, reason: str) -> IdentifiedModel:
+    """Return a model that follows its command, for recordings that cannot teach one; ``reason`` is its finding."""
+    model = ModalModel(Structure(0).modes(np.empty(0), np.empty(0), T_s))
+    return IdentifiedModel(
+        *(model, "foh", T_s, Structure(0).name, (), 0.0, np.nan, np.nan, 0, 0.0, (), (reason,)),
+    )
+
+
+def _require_motion(segments: Sequence[Segment]) -> None:
+    """Raise IdentificationError if there is nothing to learn from."""
+    n = sum(len(segment.u) for segment in segments)
+    if n < SAMPLES_MIN:
+        raise _refusal(f"it has {n} samples, at least {SAMPLES_MIN} are needed")
+    if all(np.ptp(segment.u) == 0 for segment in segments):
+        raise _refusal("the commanded position does not move; record the axis while it works")
+    if all(np.ptp(segment.y) == 0 for segment in segments):
+        raise _refusal("the measured position does not move")
+    u = np.concatenate([segment.u - segment.u.mean() for segment in segments])
+    y = np.concatenate([segment.y - segment.y.mean() for segment in segments])
+    correlation = float(u @ y / np.sqrt((u @ u) * (y @ y)))
+    if correlation < OPPOSED:
+        raise _refusal(
+            f"the measured position moves against the commanded one (correlation {correlation:.2f}); turn the sign of "
+            "one of them"
+        )
+
+
+def _refusal(reason: str) -> IdentificationError:
+    return IdentificationError(f"this log cannot teach a model, because {reason}")
+
+
+def _is_weak(fit: Fit, segments: Sequence[Segment], T_s: float) -> bool:
+    """Return whether the commanded motion is hardly larger than what no model explains."""
+    residual = np.concatenate([s.y - simulated(fit, s, T_s) for s in segments])
+    return _spread(segments) < WEAK * float(np.std(residual))
+
+
+def _spread(segments: Sequence[Segment]) -> float:
+    """Return the standard deviation of the commanded position, m."""
+    return float(np.sqrt(np.mean(np.concatenate([(s.u - s.u.mean()) ** 2 for s in segments]))))
+
+
+def _at_rest(segments: Sequence[Segment], T_s: float) -> Fit:
+    """Return the gain of 1 without dead time."""
+    return fit_structure(segments, T_s, Structure(0), Delay(0), [], slowest=1.0)
+
+
+def _modal(fit: Fit, T_s: float) -> ModalModel:
+    return ModalModel(fit.structure.modes(fit.theta, fit.linear, T_s), fit.delay.samples)
+
+
+def _alternative(candidate: Candidate, T_s: float) -> Alternative:
+    fit = candidate.fit
+    possible = not candidate.objection
+    return Alternative(
+        name=fit.structure.name,
+        n_parameters=fit.structure.n_parameters,
+        model=_modal(fit, T_s) if possible else None,
+        input_hold=fit.delay.input_hold,
+        rms_fitted=fit.rms,
+        rms_held_out=candidate.rms_held_out,
+        objection=candidate.objection,
+    )
+
+
+def _findings(
+    fit: Fit, chosen: Candidate, segments: Sequence[Segment], gain_std: float, n_effective: float
+) -> list[str]:
+    """Return what a user should know of the identification, in words."""
+    findings = []
+    n = sum(len(segment.u) for segment in segments)
+    moving = sum(int(np.count_nonzero(np.diff(segment.u))) for segment in segments) / n
+    if moving < 0.25:
+        findings.append(f"the command moves in {100 * moving:.0f} % of the samples")
+    started = [segment for segment in segments if _starts_in_motion(segment.u)]
+    if started:
+        findings.append("the recording starts in motion: the state at its start was estimated")
+    if n_effective < 0.2 * n:
+        findings.append(
+            f"the residual is not white (friction and the like): {n} samples tell as much as {n_effective:.0f} "
+            "independent ones, which the standard deviations take into account"
+        )
+    gain = float(fit.structure.gains(fit.linear)[0].sum())
+    if not GAIN_RANGE[0] <= gain <= GAIN_RANGE[1]:
+        findings.append(f"the static gain is {gain:.4g}: are both positions in the same unit?")
+    elif not fit.structure.unit_gain:
+        findings.append(f"the static gain is {gain:.7g} ± {gain_std:.2g}")
+    if fit.structure.order and chosen.rms_held_out > 2 * chosen.fit.rms:
+        findings.append(
+            f"the error on the part that was held out, {_um(chosen.rms_held_out)}, is "
+            f"{chosen.rms_held_out / chosen.fit.rms:.1f} times that of the fit before: the later motion is of another "
+            "kind, or the axis is not linear"
+        )
+    return findings
+
+
+def _starts_in_motion(u: Array) -> bool:
+    """Return whether the command moves in the first interval with a tenth of its largest velocity."""
+    velocity = np.abs(np.diff(u))
+    return bool(velocity[0] > 0.1 * velocity.max()) if velocity.max() > 0 else False
+
+
+def _um(value: float) -> str:
+    return f"{value * 1e6:.3g} µm"

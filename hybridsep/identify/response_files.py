@@ -1,0 +1,141 @@
+"""Files of frequency responses: CSV, MAT or NPZ with frequency and complex value, or magnitude and phase."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.errors import LogError
+from ..base.signals import Array
+from ..logs.formats import open_source
+from ..logs.source import Source
+
+__all__ = ["ResponseFile", "has_response", "read_response"]
+
+ROLES: Mapping[str, tuple[str, ...]] = {
+    "frequency": ("frequency", "freq", "f", "hz", "omega", "w"),
+    "real": ("real", "re"),
+    "imag": ("imag", "im", "imaginary"),
+    "magnitude": ("magnitude", "mag", "abs", "amplitude", "gain"),
+    "phase": ("phase", "arg", "angle"),
+    "std": ("std", "sigma"),
+}
+"""Names of the columns, without unit and brackets; ``h_re``, ``Re(H)`` and ``H.real`` are found by their parts."""
+
+_WORD = re.compile(r"[a-z]+")
+_ALL = 10_000_000
+
+
+class ResponseFile(NamedTuple):
+    """Frequency response of a file.
+
+    Attributes
+    ----------
+    frequency : (n,) array, Hz
+    response : (n,) array of complex
+    std : (n,) array or None
+        Standard deviation of each line's complex error.
+    """
+
+    frequency: Array
+    response: NDArray[np.complex128]
+    std: Array | None
+
+
+def has_response(path: str | Path, columns: Mapping[str, str] | None = None) -> bool:
+    """Return whether a file has columns of a frequency response and none of a log."""
+    names = open_source(Path(path)).names
+    found = _found(names, columns or {})
+    return "frequency" in found and "x_d" not in names and ("real" in found or "magnitude" in found)
+
+
+def read_response(path: str | Path, columns: Mapping[str, str] | None = None) -> ResponseFile:
+    """Return the frequency response of a file.
+
+    Frequencies are in Hz, or in rad/s where the column is called omega or has that unit; magnitudes are linear unless
+    their column's name has dB; phases are in degrees or radians as theirs says, in degrees where one is beyond 2π.
+
+    Parameters
+    ----------
+    path : str or Path
+        CSV, MAT or NPZ; a complex vector ``H`` of a MAT file counts as ``H.real`` and ``H.imag``.
+    columns : mapping, optional
+        The file's names of ``"frequency"``, ``"real"``, ``"imag"``, ``"magnitude"``, ``"phase"``, ``"std"``.
+
+    Raises
+    ------
+    LogError
+        If the file or its columns cannot be used.
+    """
+    file = Path(path)
+    source = open_source(file)
+    found = _found(source.names, columns or {})
+    pair = ("real", "imag") if "real" in found else ("magnitude", "phase")
+    missing = [role for role in ("frequency", *pair) if role not in found]
+    if missing:
+        there = ", ".join(repr(name) for name in source.names) or "none"
+        raise LogError(
+            f"{path}: a frequency response needs the columns frequency and real, imag or magnitude, phase; "
+            f"{', '.join(missing)} was not found, the file has {there}; give its name in columns"
+        )
+    roles = ["frequency", *pair, *(["std"] if "std" in found else [])]
+    values = _columns(source, [found[role] for role in roles])
+    frequency = values[0] / (2 * np.pi) if _is_angular(found["frequency"]) else values[0]
+    if pair == ("real", "imag"):
+        response = values[1] + 1j * values[2]
+    else:
+        phase = _phase(file, found["phase"], values[2])
+        response = _magnitude(found["magnitude"], values[1]) * np.exp(1j * phase)
+    return ResponseFile(frequency, np.asarray(response, np.complex128), values[3] if "std" in found else None)
+
+
+def _found(names: list[str], columns: Mapping[str, str]) -> dict[str, str]:
+    """Return the file's column of each role: as given, else by its whole name, else by a word of it."""
+    found = {}
+    for role, words in ROLES.items():
+        if role in columns:
+            found[role] = columns[role]
+            continue
+        whole = [name for name in names if _plain(name) in words]
+        part = [name for name in names if set(_WORD.findall(name.lower())) & set(words[:2])]
+        if role == "magnitude":
+            part += [name for name in names if "db" in _WORD.findall(name.lower())]
+        if whole or part:
+            found[role] = (whole or part)[0]
+    return found
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"[\[(].*", "", name.lower()).strip(" _")
+
+
+def _columns(source: Source, names: list[str]) -> list[Array]:
+    for name in names:
+        if name not in source.names:
+            raise LogError(f"{source.path}: column {name!r} is missing, the file has {', '.join(source.names)}")
+    blocks = [block.columns for block in source.blocks(names, _ALL)]
+    if not blocks:
+        raise LogError(f"{source.path}: a frequency response needs lines, got none")
+    return [np.concatenate(parts) for parts in zip(*blocks, strict=True)]
+
+
+def _is_angular(name: str) -> bool:
+    return _plain(name) in ("omega", "w") or "rad" in name.lower()
+
+
+def _magnitude(name: str, values: Array) -> Array:
+    return np.asarray(10 ** (values / 20)) if "db" in _WORD.findall(name.lower()) else values
+
+
+def _phase(path: Path, name: str, values: Array) -> Array:
+    words = _WORD.findall(name.lower())
+    if "rad" in words:
+        return values
+    if "deg" not in words and "°" not in name and np.nanmax(np.abs(values)) <= 2 * np.pi:
+        raise LogError(f"{path}: column {name!r} may be in degrees or radians; call it 'phase [deg]' or 'phase [rad]'")
+    return np.deg2rad(values)

@@ -1,0 +1,118 @@
+"""Search for poles and dead time of one structure: starts from simpler fits, dead time in doubling, halving steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from ..base.signals import Array
+from .output_error import Delay, Fit, fit_structure
+from .segments import Segment
+from .structure import DECAY_MIN, SLOWEST, Structure
+
+__all__ = ["fit_delay", "fit_near"]
+
+DEAD_TIME_MAX = 0.25
+"""Longest dead time that is tried, s, and at most a quarter of the recording."""
+
+
+def fit_delay(segments: Sequence[Segment], T_s: float, structure: Structure, known: Mapping[Structure, Fit]) -> Fit:
+    """Return the fit of a structure over poles and dead time.
+
+    Parameters
+    ----------
+    segments : sequence of Segment
+    T_s : float, s
+    structure : Structure
+    known : mapping
+        Fits of simpler structures, which give the starts.
+    """
+    longest = min(DEAD_TIME_MAX / T_s, max(segment.stop for segment in segments) / 4)
+    limit = int(2 * longest)
+    cache: dict[int, Fit] = {}
+    rate = _bandwidth(segments, T_s, known)
+    starts = _starts(structure, known, T_s, rate)
+    slowest = _slowest(structure, rate, T_s, segments)
+
+    def at(halves: int) -> Fit:
+        if halves not in cache:
+            nearest = min(cache.values(), key=lambda fit: abs(fit.delay.halves - halves), default=None)
+            tried = starts if nearest is None else [nearest.theta]
+            cache[halves] = fit_structure(segments, T_s, structure, Delay(halves), tried, slowest)
+        return cache[halves]
+
+    first = min(limit, _first_delay(structure, known))
+    return _minimum(at, first, limit)
+
+
+def fit_near(segments: Sequence[Segment], T_s: float, fit: Fit, steps: int = 2) -> Fit:
+    """Return the fit of the same structure to other samples, with a dead time near the known one."""
+    fits = [
+        fit_structure(segments, T_s, fit.structure, Delay(halves), [fit.theta], fit.slowest)
+        for halves in range(max(0, fit.delay.halves - steps), fit.delay.halves + steps + 1)
+    ]
+    best = min(fits, key=lambda fit: fit.rms)
+    n = sum(segment.stop for segment in segments)
+    return fit_structure(segments, T_s, fit.structure, best.delay, [best.theta], fit.slowest, rows_max=n)
+
+
+def _minimum(at: Callable[[int], Fit], first: int, limit: int) -> Fit:
+    """Descend from a first number of half samples with steps that double while they help, then halve."""
+    best = at(first)
+    step = 1
+    while True:
+        neighbours = {max(0, min(limit, best.delay.halves + sign * step)) for sign in (-1, 1)}
+        better = min((at(halves) for halves in neighbours), key=lambda fit: fit.rms)
+        if better.rms < best.rms * (1 - 1e-9):
+            best, step = better, step * 2
+        elif step > 1:
+            step //= 2
+        else:
+            return best
+
+
+def _first_delay(structure: Structure, known: Mapping[Structure, Fit]) -> int:
+    """Return where the search begins: the dead time of the best simpler fit of at least the same kind."""
+    simpler = [fit for other, fit in known.items() if 0 < other.order <= structure.order]
+    return min(simpler, key=lambda fit: fit.rms).delay.halves if simpler else 0
+
+
+def _slowest(structure: Structure, rate: float, T_s: float, segments: Sequence[Segment]) -> float:
+    """Return the lower bound of the natural frequencies, rad/s, for that bandwidth."""
+    recorded = DECAY_MIN / (T_s * max(segment.stop for segment in segments))
+    return recorded if structure.order <= 1 else max(recorded, SLOWEST * rate)
+
+
+def _starts(structure: Structure, known: Mapping[Structure, Fit], T_s: float, rate: float) -> list[Array]:
+    """Return starts: the other gain's fit, else what a simpler one found with a mode or a lag added."""
+    for other, fit in known.items():
+        if (other.n_modes, other.lag) == (structure.n_modes, structure.lag) and other.order:
+            return [fit.theta]
+    if structure.n_modes == 0:
+        return [np.log([rate])] if structure.lag else [np.empty(0)]
+    if structure.n_modes == 1 and not structure.lag:
+        return [np.log([factor * rate, zeta]) for factor, zeta in ((1.0, 0.5), (2.0, 0.9), (4.0, 0.3))]
+    bases = [fit for other, fit in known.items() if other.n_modes == structure.n_modes - (not structure.lag)]
+    bases = [fit for fit in bases if not fit.structure.lag]
+    if not bases:
+        return []
+    base = min(bases, key=lambda fit: fit.rms).theta
+    if structure.lag:
+        return [np.append(base, np.log(factor * rate)) for factor in (0.5, 3.0)]
+    fastest = 0.5 * np.pi / T_s
+    added = np.exp(np.linspace(np.log(rate), np.log(fastest), 6)[1:]) if fastest > rate else [fastest]
+    return [np.concatenate((base, np.log([omega, 0.1]))) for omega in added]
+
+
+def _bandwidth(segments: Sequence[Segment], T_s: float, known: Mapping[Structure, Fit]) -> float:
+    """Return the bandwidth, rad/s: 1 over lag and dead time of the fitted lag, else over the servo error's delay."""
+    lags = [fit for structure, fit in known.items() if structure.lag and not structure.n_modes]
+    if lags:
+        lag = min(lags, key=lambda fit: fit.rms)
+        return float(1.0 / (np.exp(-lag.theta[0]) + T_s * lag.delay.halves / 2))
+    velocity = np.concatenate([np.gradient(s.u[: s.stop], T_s) for s in segments if s.stop > 1])
+    error = np.concatenate([(s.u - s.y)[: s.stop] for s in segments if s.stop > 1])
+    power = float(velocity @ velocity)
+    tau = float(velocity @ (error - error.mean())) / power if power > 0 else 0.0
+    return 1.0 / min(max(tau, 2 * T_s), 1.0)

@@ -1,0 +1,187 @@
+"""Choice of the structure by the error on a later part of the recording that was not fitted to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.signals import Array
+from .output_error import Fit, simulated
+from .search import fit_delay
+from .segments import Segment, motion_split
+from .structure import DECAY_MIN, STRUCTURES, Structure
+from .uncertainty import estimates
+
+__all__ = ["HELD_OUT", "Candidate", "choose", "compare_structures"]
+
+HELD_OUT = 0.35
+"""Part of the commanded motion that is held out."""
+
+BLOCKS = 12
+"""Blocks of the held-out part whose errors are compared pair by pair."""
+
+TOLERANCE = 0.02
+"""Relative increase of the held-out error that a simpler structure may always have."""
+
+EXCESS_MAX = 0.1
+"""Relative increase of the held-out error that a simpler structure may have within the standard error: few blocks
+whose errors are alike tell little."""
+
+GAINS_MAX = 20.0
+"""Largest sum of the modes' gains in multiples of the static gain: above it, large modes cancel each other. In Table 1
+it is 6.6."""
+
+SPREAD_MAX = 0.5
+"""Largest relative standard deviation of a natural frequency where a structure has several poles to place."""
+
+FITTED_BETTER = 0.7
+"""Ratio of the fitted errors at which a larger structure is taken though the held-out ones are alike: what no structure
+explains, such as a first reversal, may be most of these."""
+
+GROWTH = 2
+"""Orders above the best one that are tried before the search ends."""
+
+LAGS = 20
+"""Lags at which the residual's correlation is looked at: nothing is left to model where it is white."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Structure with its fit to the first part and its error on the later one.
+
+    Attributes
+    ----------
+    fit : Fit
+    held_out : (n,) array, m
+        Measured minus simulated position on the later part, the common offset removed.
+    objection : str
+        Why it cannot be chosen, in words; empty if it can.
+    """
+
+    fit: Fit
+    held_out: Array
+    objection: str
+
+    @property
+    def structure(self) -> Structure:
+        """Its structure."""
+        return self.fit.structure
+
+    @property
+    def rms_held_out(self) -> float:
+        """Root mean square of the held-out error, m."""
+        return float(np.sqrt(np.mean(self.held_out**2)))
+
+
+def compare_structures(
+    segments: Sequence[Segment],
+    T_s: float,
+    structures: Sequence[Structure] = STRUCTURES,
+    progress: Callable[[str, float], object] = lambda _message, _done: None,
+) -> list[Candidate]:
+    """Return the candidates, simplest first, fitted to the first part of the motion and judged on the later one.
+
+    Higher orders are left out once two of them have brought no smaller error, or the residual is white.
+
+    Parameters
+    ----------
+    segments : sequence of Segment
+    T_s : float, s
+    structures : sequence of Structure
+    progress : callable, optional
+        Called with a message and the fraction done.
+    """
+    split = motion_split(segments, 1.0 - HELD_OUT)
+    n_fitted = sum(segment.stop for segment in split)
+    known: dict[Structure, Fit] = {}
+    found: list[tuple[Fit, Array, str]] = []
+    best, best_order, white = np.inf, 0, False
+    orders = sorted({structure.order for structure in structures})
+    for i, structure in enumerate(structures):
+        if known and structure.n_parameters > n_fitted / 10:
+            break
+        growth = orders.index(structure.order) - orders.index(best_order)
+        if structure.order > GROWTH and (growth > GROWTH or (growth > 0 and white)):
+            break
+        progress(structure.name, i / len(structures))
+        fit = known[structure] = fit_delay(split, T_s, structure, known)
+        residual = np.concatenate([(s.y - simulated(fit, s, T_s))[s.stop :] for s in split])
+        found.append((fit, residual, _objection(fit, split, T_s)))
+        rms = float(np.std(residual))
+        if not found[-1][2] and rms < best * (1 - TOLERANCE):
+            best, best_order, white = rms, structure.order, _is_white(residual)
+    offsets = [fit.offset for fit, _, _ in found if fit.structure.order] or [found[0][0].offset]
+    common = float(np.median(offsets))
+    return [Candidate(fit, residual - common, objection) for fit, residual, objection in found]
+
+
+def choose(candidates: Sequence[Candidate]) -> Candidate:
+    """Return the simplest candidate whose held-out error is that of the best one within its standard error.
+
+    A larger one of these is taken where it fits the first part much better. Of two that differ in whether the static
+    gain is 1, the one with the estimated gain is taken if its error is smaller on the first part and no larger on the
+    later one.
+    """
+    usable = [candidate for candidate in candidates if not candidate.objection] or list(candidates[:1])
+    best = min(usable, key=lambda candidate: candidate.rms_held_out)
+    by_size = sorted(usable, key=lambda candidate: candidate.structure.n_parameters)
+    alike = [candidate for candidate in by_size if _as_good(candidate, best)]
+    chosen = alike[0]
+    for candidate in alike[1:]:
+        if candidate.fit.rms < FITTED_BETTER * chosen.fit.rms:
+            chosen = candidate
+    for other in usable:
+        s, c = other.structure, chosen.structure
+        if (s.n_modes, s.lag, s.zero) == (c.n_modes, c.lag, c.zero) and c.unit_gain and not s.unit_gain and c.order:
+            gains = s.gains(other.fit.linear)[0]
+            if (
+                other.rms_held_out <= (1 + TOLERANCE) * chosen.rms_held_out
+                and other.fit.rms < (1 - TOLERANCE) * chosen.fit.rms
+                and gains.sum() > 0
+            ):
+                return other
+    return chosen
+
+
+def _as_good(candidate: Candidate, best: Candidate) -> bool:
+    if candidate.rms_held_out <= (1 + TOLERANCE) * best.rms_held_out:
+        return True
+    if candidate.rms_held_out > (1 + EXCESS_MAX) * best.rms_held_out:
+        return False
+    excess = candidate.held_out**2 - best.held_out**2
+    means = np.array([block.mean() for block in np.array_split(excess, min(BLOCKS, len(excess)))])
+    return len(means) > 1 and bool(means.mean() <= means.std(ddof=1) / np.sqrt(len(means)))
+
+
+def _is_white(residual: Array) -> bool:
+    """Return whether no correlation at the first lags is significant."""
+    centred = residual - residual.mean()
+    power = float(centred @ centred)
+    return len(centred) > 10 * LAGS and all(
+        abs(float(centred[lag:] @ centred[:-lag])) < 4 * power / np.sqrt(len(centred)) for lag in range(1, LAGS + 1)
+    )
+
+
+def _objection(fit: Fit, segments: Sequence[Segment], T_s: float) -> str:
+    """Return why a fit is no plausible drive, or cannot be told from others; empty if neither."""
+    structure = fit.structure
+    gains, _ = structure.gains(fit.linear)
+    gain = float(gains.sum())
+    if gain <= 0:
+        return f"static gain of {gain:.3g}"
+    if float(np.abs(gains).sum()) > GAINS_MAX * gain:
+        return "large modes that cancel each other"
+    if structure.order <= 1:
+        return ""
+    if fit.at_bound:
+        return "a parameter at the end of its range"
+    if structure.decay(fit.theta) < DECAY_MIN / (T_s * max(segment.stop for segment in segments)):
+        return "a pole slower than the recording shows"
+    if structure.order > 2:
+        fitted = [Segment(s.u[: s.stop], s.y[: s.stop], s.stop) for s in segments if s.stop > 1]
+        spreads = [e.std / e.value for e in estimates(fit, fitted, T_s)[0] if e.name.endswith(("f_n", "tau"))]
+        if max(spreads) > SPREAD_MAX:
+            return "poles that the recording does not determine"
+    return ""

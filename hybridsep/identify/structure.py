@@ -1,0 +1,145 @@
+"""Structures of ``G_pb`` that are tried on a log, and their parameters as modes of eq. (15)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.signals import Array
+from ..model.physics import Mode
+
+__all__ = ["DECAY_MIN", "SLOWEST", "STRUCTURES", "Structure", "lag_mode"]
+
+ZETA_RANGE = (0.003, 5.0)
+"""Damping ratios that are tried; Table 1 has 0.007, and at 5 the two poles are a factor of 98 apart."""
+
+SLOWEST = 0.1
+"""Slowest pole in multiples of the bandwidth: friction and the like, which are not linear, look like slower ones."""
+
+DECAY_MIN = 5.0
+"""Time constants of a pole within the recording, at least; a slower one cannot be told from drift."""
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Form of a transfer function with unknown parameters.
+
+    Its nonlinear parameters are ``log ω_i, log ζ_i`` of each mode, then ``log 1/τ`` of the lag; its linear ones the
+    static gain of each mode and of the lag, and ``β_i/ω_i`` of each mode with a zero.
+
+    Attributes
+    ----------
+    n_modes : int
+        Second-order modes.
+    lag : bool
+        Whether there is a first-order lag as well.
+    zero : bool
+        Whether the modes have a ``β``.
+    unit_gain : bool
+        Whether the static gain is 1, not estimated.
+    """
+
+    n_modes: int
+    lag: bool = False
+    zero: bool = False
+    unit_gain: bool = True
+
+    @property
+    def order(self) -> int:
+        """Number of poles."""
+        return 2 * self.n_modes + self.lag
+
+    @property
+    def n_linear(self) -> int:
+        """Number of linear parameters."""
+        return self.n_modes * (1 + self.zero) + self.lag - self.unit_gain if self.order else 1 - self.unit_gain
+
+    @property
+    def n_parameters(self) -> int:
+        """Number of parameters, with the dead time."""
+        return self.order + self.n_linear + 1
+
+    @property
+    def name(self) -> str:
+        """Name in tables."""
+        if self.order == 0:
+            form = "gain alone"
+        elif self.n_modes == 0:
+            form = "first-order lag"
+        else:
+            form = "second order" if self.n_modes == 1 else f"{self.n_modes} modes"
+            form += " with zero" if self.zero and self.n_modes == 1 else ""
+            form += " and lag" if self.lag else ""
+        return f"{form}, gain {'1' if self.unit_gain else 'free'}"
+
+    def bounds(self, T_s: float, slowest: float) -> tuple[Array, Array]:
+        """Return the range of the nonlinear parameters with poles no slower than ``slowest``, rad/s."""
+        slowest = min(slowest, 1.0 / T_s)
+        mode_low, mode_high = [slowest, ZETA_RANGE[0]], [np.pi / T_s, ZETA_RANGE[1]]
+        low = mode_low * self.n_modes + [slowest] * self.lag
+        high = mode_high * self.n_modes + [10.0 / T_s] * self.lag
+        return np.log(low), np.log(high)
+
+    def decay(self, theta: Array) -> float:
+        """Return the slowest decay rate of its poles, 1/s; infinite without poles."""
+        omegas, zetas = np.exp(theta[: 2 * self.n_modes : 2]), np.exp(theta[1 : 2 * self.n_modes : 2])
+        rates = omegas * np.where(zetas > 1, zetas - np.sqrt(np.maximum(zetas**2 - 1, 0.0)), zetas)
+        return float(min([*rates, *np.exp(theta[2 * self.n_modes :])], default=np.inf))
+
+    def modes(self, theta: Array, linear: Array, T_s: float) -> list[Mode]:
+        """Return the modes of eq. (15).
+
+        Parameters
+        ----------
+        theta : (order,) array
+            Nonlinear parameters.
+        linear : (n_linear,) array
+            Static gains, the first one left out if they sum to 1, then ``β_i/ω_i``.
+        T_s : float
+            Sampling interval, s.
+        """
+        gains, betas = self.gains(linear)
+        if self.order == 0:
+            return [lag_mode(max(T_s / 20, 2e-6), gains[0])]
+        omegas, zetas = np.exp(theta[: 2 * self.n_modes : 2]), np.exp(theta[1 : 2 * self.n_modes : 2])
+        modes = [
+            Mode(omega / (2 * np.pi), zeta, gain * omega**2, beta * omega)
+            for omega, zeta, gain, beta in zip(omegas, zetas, gains, betas, strict=False)
+        ]
+        return [*modes, lag_mode(float(np.exp(-theta[-1])), gains[-1])] if self.lag else modes
+
+    def gains(self, linear: Sequence[float] | Array) -> tuple[Array, Array]:
+        """Return the static gains of modes and lag, and ``β_i/ω_i`` of the modes."""
+        values = np.asarray(linear, dtype=np.float64)
+        n = max(self.n_modes + self.lag, 1) - self.unit_gain
+        gains, betas = values[:n], values[n:]
+        if self.unit_gain:
+            gains = np.concatenate(([1.0 - gains.sum()], gains))
+        return gains, betas if self.zero else np.zeros(self.n_modes)
+
+
+def lag_mode(tau: float, gain: float = 1.0) -> Mode:
+    """Return ``gain/(τ s + 1)`` as a mode: ``(1/τ² + s/τ)/(s + 1/τ)²``, whose zero cancels one of its two poles.
+
+    Parameters
+    ----------
+    tau : float
+        Time constant, s.
+    gain : float
+        Static gain.
+    """
+    return Mode(f_n=1 / (2 * np.pi * tau), zeta=1.0, alpha=gain / tau**2, beta=gain / tau)
+
+
+STRUCTURES = (
+    *(Structure(0, unit_gain=unit) for unit in (True, False)),
+    *(Structure(0, lag=True, unit_gain=unit) for unit in (True, False)),
+    *(Structure(1, unit_gain=unit) for unit in (True, False)),
+    *(Structure(1, zero=True, unit_gain=unit) for unit in (True, False)),
+    *(Structure(1, lag=True, zero=True, unit_gain=unit) for unit in (True, False)),
+    *(Structure(2, zero=True, unit_gain=unit) for unit in (True, False)),
+    *(Structure(3, zero=True, unit_gain=unit) for unit in (True, False)),
+)
+"""Structures by number of parameters, the simplest first."""

@@ -1,0 +1,158 @@
+"""Standard deviations of an output-error fit whose residual is not white: sandwich with batch sums of the scores.
+
+``cov = (JᵀJ)⁻¹ (Σ_b s_b s_bᵀ) (JᵀJ)⁻¹`` with ``s_b = Σ_{k in b} J_k r_k`` over consecutive batches ``b``, which holds
+whatever the correlation of the residual within a batch is; friction and the like leave it far from white. The dead
+time is a whole number of samples: the others' deviations are those with it as chosen, its own is that with all free.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.signals import Array
+from .output_error import Fit, affine, without
+from .responses import free_responses, responses, sections_of
+from .segments import Segment, delayed
+
+__all__ = ["Estimate", "estimates"]
+
+BATCHES = 30
+"""Batches of the residual: enough for a variance, and each long beside a servo's memory."""
+
+_STEP = 1e-5
+"""Step of the differences in the logarithms of the poles, and of the relative ones in the delta method."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Estimated parameter.
+
+    Attributes
+    ----------
+    name : str
+    value : float
+    std : float
+        Standard deviation; 0 for a parameter that was not estimated.
+    unit : str
+    """
+
+    name: str
+    value: float
+    std: float
+    unit: str
+
+
+def estimates(fit: Fit, segments: Sequence[Segment], T_s: float) -> tuple[tuple[Estimate, ...], float]:
+    """Return the parameters with their standard deviations, and the number of samples that tell as much as white ones.
+
+    Parameters
+    ----------
+    fit : Fit
+        Fitted to the segments.
+    segments : sequence of Segment
+    T_s : float, s
+    """
+    jacobian, residual = _jacobian(fit, segments, T_s)
+    scale = np.linalg.norm(jacobian, axis=0)
+    scale[scale == 0] = 1.0
+    jacobian = jacobian / scale
+    edges = np.linspace(0, len(residual), min(BATCHES, len(residual)) + 1).astype(int)[:-1]
+    scores = np.add.reduceat(jacobian * residual[:, None], edges)
+    given_delay = [i for i in range(jacobian.shape[1]) if i != jacobian.shape[1] - 2]
+    covariance = np.zeros((len(scale), len(scale)))
+    covariance[-2, -2] = _sandwich(jacobian, scores)[-2, -2]
+    covariance[np.ix_(given_delay, given_delay)] = _sandwich(jacobian[:, given_delay], scores[:, given_delay])
+    sums = np.add.reduceat(residual, edges)
+    white = float(residual @ residual)
+    n_effective = len(residual) * min(1.0, white / max(float(sums @ sums), 1e-300))
+    return _named(fit, covariance / np.outer(scale, scale), T_s), n_effective
+
+
+def _sandwich(jacobian: Array, scores: Array) -> Array:
+    bread = np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-12, hermitian=True)
+    covariance: Array = bread @ (scores.T @ scores) @ bread * (len(scores) / max(1, len(scores) - 1))
+    return covariance
+
+
+def _jacobian(fit: Fit, segments: Sequence[Segment], T_s: float) -> tuple[Array, Array]:
+    """Return derivatives of the position with respect to θ, linear parameters, dead time and offset, and residual.
+
+    What initial states explain is projected out.
+    """
+    blocks, residuals = [], []
+    for segment in segments:
+        u, y = delayed(segment.u, fit.delay.samples), segment.y
+
+        def position(theta: Array, u: Array = u, y: Array = y) -> tuple[Array, Array]:
+            sections = sections_of(fit.structure, theta, T_s, fit.delay.input_hold)
+            columns, target = affine(fit.structure, responses(fit.structure, sections, u), y)
+            return columns @ fit.linear + (y - target), columns
+
+        x, columns = position(fit.theta)
+        slopes = [
+            (position(fit.theta + step)[0] - position(fit.theta - step)[0]) / (2 * _STEP)
+            for step in _STEP * np.eye(len(fit.theta))
+        ]
+        by_delay = -np.gradient(x)
+        block = np.column_stack((*slopes, columns, by_delay, np.ones(len(x))))
+        free = free_responses(sections_of(fit.structure, fit.theta, T_s, "zoh"), len(x))
+        both = np.column_stack((block, y - x))
+        if free.size:
+            both = without(free, both)
+        blocks.append(both[:, :-1])
+        residuals.append(without(both[:, -2:-1], both[:, -1:])[:, 0])
+    return np.concatenate(blocks), np.concatenate(residuals)
+
+
+def _named(fit: Fit, covariance: Array, T_s: float) -> tuple[Estimate, ...]:
+    """Return the estimates in physical units, their deviations by the delta method."""
+    n_theta, n_linear = len(fit.theta), len(fit.linear)
+    point = np.concatenate((fit.theta, fit.linear))
+
+    def values(parameters: Array) -> Array:
+        return _physical(fit, parameters[:n_theta], parameters[n_theta:], T_s)
+
+    slopes = _differences(values, point) if point.size else np.zeros((len(values(point)), 0))
+    inner = covariance[: n_theta + n_linear, : n_theta + n_linear]
+    deviations = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slopes, inner, slopes), 0.0))
+    found = [
+        Estimate(name, float(value), float(deviation), unit)
+        for (name, unit), value, deviation in zip(_names(fit), values(point), deviations, strict=True)
+    ]
+    delay, offset = np.sqrt(np.maximum(np.diag(covariance)[-2:], 0.0))
+    found.append(Estimate("dead_time", float(fit.delay.samples), float(delay), "samples"))
+    found.append(Estimate("offset", fit.offset, float(offset), "m"))
+    return tuple(found)
+
+
+def _names(fit: Fit) -> list[tuple[str, str]]:
+    names = [("gain", "1")]
+    for i in range(fit.structure.n_modes):
+        names += [(f"mode[{i + 1}].{name}", unit) for name, unit in _MODE]
+    return names + [("lag.tau", "s"), ("lag.gain", "1")] * fit.structure.lag
+
+
+_MODE = (("f_n", "Hz"), ("zeta", "1"), ("alpha", "1/s2"), ("beta", "1/s"))
+
+
+def _physical(fit: Fit, theta: Array, linear: Array, T_s: float) -> Array:
+    gains = fit.structure.gains(linear)[0]
+    values = [gains.sum()]
+    if fit.structure.order:
+        modes = fit.structure.modes(theta, linear, T_s)
+        for mode in modes[: fit.structure.n_modes]:
+            values += [mode.f_n, mode.zeta, mode.alpha, mode.beta]
+    if fit.structure.lag:
+        values += [np.exp(-theta[-1]), gains[-1]]
+    return np.array(values)
+
+
+def _differences(function: Callable[[Array], Array], point: Array) -> Array:
+    """Return the Jacobian by central differences, ``(n_values, n_parameters)``."""
+    steps = _STEP * np.maximum(np.abs(point), 1.0)
+    return np.column_stack(
+        [(function(point + step) - function(point - step)) / (2 * step.sum()) for step in np.diag(steps)]
+    )

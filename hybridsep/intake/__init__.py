@@ -1,0 +1,1 @@
+"""Intake of recorded logs: what may be wrong with one, in words and numbers, and how it is put right."""

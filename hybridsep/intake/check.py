@@ -1,0 +1,118 @@
+"""Intake of a log: every check, each on what the fixes of the findings before it leave."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ..logs.log import Log
+from .axis import check_delay, check_offset, check_scale, check_sign, check_swapped, check_velocity
+from .finding import ERROR, HOPELESS, NAMES, Finding
+from .motion import check_motion, check_rate, check_start, check_unit
+from .samples import check_missing, check_outliers, check_repeated, check_stuck
+from .times import check_gaps, check_jitter, check_order
+
+if TYPE_CHECKING:
+    from ..machine import Machine
+
+__all__ = ["Intake", "apply", "check"]
+
+_Check = Callable[[Log], Iterator[Finding]]
+
+_SAMPLES: tuple[_Check, ...] = (
+    check_order,
+    check_gaps,
+    check_jitter,
+    check_missing,
+    check_outliers,
+    check_stuck,
+    check_repeated,
+)
+_AXIS: tuple[_Check, ...] = (check_swapped, check_velocity, check_sign, check_scale, check_offset, check_unit)
+
+
+@dataclass(frozen=True)
+class Intake:
+    """Result of the checks of a log.
+
+    Attributes
+    ----------
+    log : Log
+        As it was checked.
+    findings : tuple of Finding
+        In the order of :data:`~hybridsep.intake.finding.NAMES`.
+    """
+
+    log: Log
+    findings: tuple[Finding, ...]
+
+    @property
+    def usable(self) -> bool:
+        """Whether a model can be learned once the fixes are applied."""
+        beyond = [finding for finding in self.findings if finding.severity == ERROR and finding.fix is None]
+        return not beyond and all(finding.name != HOPELESS for finding in self.findings)
+
+    @property
+    def errors(self) -> tuple[Finding, ...]:
+        """Findings with which figures from the log flatter or mean nothing."""
+        return tuple(finding for finding in self.findings if finding.severity == ERROR)
+
+    def fixed(self) -> Log:
+        """Return the log with every fix applied."""
+        return apply(self.log, self.findings)
+
+
+def check(log: Log, machine: Machine | None = None) -> Intake:
+    """Check a log.
+
+    Times first, then single samples, then the motion, then the columns against each other, each on the log that the
+    fixes before leave, so that one fault is not found under several names.
+
+    Parameters
+    ----------
+    log : Log
+        Read with ``uniform=False``, so that gaps and jitter reach the checks.
+    machine : Machine, optional
+        Its model makes the check of the delay exact, and says which sampling rate is needed.
+
+    Returns
+    -------
+    Intake
+    """
+    findings: list[Finding] = []
+
+    def look(checks: Iterable[_Check]) -> None:
+        nonlocal log
+        for one in checks:
+            found = list(one(log))
+            findings.extend(found)
+            log = apply(log, found)
+
+    given = log
+    look(_SAMPLES)
+    hopeless = list(check_motion(log))
+    findings.extend(hopeless)
+    if not hopeless:
+        look(_AXIS)
+        look((check_start,))
+        look((lambda log: check_delay(log, machine),))
+    if machine is not None:
+        findings.extend(check_rate(log, machine))
+    return Intake(given, tuple(sorted(findings, key=lambda finding: NAMES.index(finding.name))))
+
+
+def apply(log: Log, findings: Iterable[Finding]) -> Log:
+    """Return the log with the fixes of the findings applied, in their order; those without one change nothing.
+
+    Parameters
+    ----------
+    log : Log
+        The log that was checked.
+    findings : iterable of Finding
+        All of an :class:`Intake`, or some.
+    """
+    for finding in findings:
+        if finding.fix is not None:
+            log = finding.fix.change(log)
+    return log

@@ -1,0 +1,108 @@
+"""Findings of an intake: what is wrong with a log, the evidence, data for a picture, and a fix."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..base.signals import Array
+from ..logs.log import Log
+
+__all__ = ["ERROR", "HOPELESS", "NAMES", "NOTE", "WARNING", "Finding", "Fix", "Picture"]
+
+ERROR, WARNING, NOTE = "error", "warning", "note"
+"""Severities: figures from the log flatter or mean nothing; they are worse than they need be; worth knowing."""
+
+HOPELESS = "too little motion"
+"""Finding that no fix helps: the log cannot teach a model."""
+
+NAMES = (
+    "time order",
+    "gaps",
+    "jitter",
+    "missing samples",
+    "outliers",
+    "stuck samples",
+    "repeated samples",
+    HOPELESS,
+    "columns swapped",
+    "velocity for position",
+    "sign",
+    "scale",
+    "offset",
+    "unit",
+    "start in motion",
+    "delay",
+    "sampling rate",
+)
+"""Names of findings in the order in which they are looked for, and fixed."""
+
+
+@dataclass(frozen=True)
+class Fix:
+    """Change that puts a log right.
+
+    Attributes
+    ----------
+    words : str
+        What it does, as an imperative.
+    change : callable
+        Log → log.
+    """
+
+    words: str
+    change: Callable[[Log], Log] = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """Data of a picture that shows a finding.
+
+    Attributes
+    ----------
+    title : str
+    x_label, y_label : str
+        With units.
+    lines : mapping
+        Name → two (n,) arrays, abscissa and ordinate.
+    marks : (m,) array
+        Abscissae that the finding is about.
+    """
+
+    title: str
+    x_label: str
+    y_label: str
+    lines: Mapping[str, tuple[Array, Array]]
+    marks: Array = field(default_factory=lambda: np.empty(0))
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What is wrong with a log.
+
+    Attributes
+    ----------
+    name : str
+        One of :data:`NAMES`.
+    severity : {"error", "warning", "note"}
+    words : str
+        What is wrong, by how much, and what it does to the figures.
+    evidence : mapping
+        Numbers behind the words, by name; SI units.
+    picture : Picture
+    fix : Fix, optional
+        None where only another recording helps.
+    """
+
+    name: str
+    severity: str
+    words: str
+    evidence: Mapping[str, float]
+    picture: Picture = field(repr=False)
+    fix: Fix | None = None
+
+    def __str__(self) -> str:
+        fix = f" Fix: {self.fix.words}." if self.fix else ""
+        return f"{self.severity}: {self.name}: {self.words}.{fix}"

@@ -1,0 +1,135 @@
+"""Changes that put a log right; each returns another log and leaves the given one as it is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from ..base.signals import Indices
+from ..logs.log import Log
+
+__all__ = [
+    "begin_at",
+    "bridge",
+    "cut_out",
+    "in_order",
+    "integrated",
+    "offset_removed",
+    "resampled",
+    "scaled",
+    "shifted_back",
+    "split",
+    "swapped",
+    "thinned",
+]
+
+
+def in_order(log: Log) -> Log:
+    """Sort by time and drop samples whose time repeats."""
+    _, keep = np.unique(log.t, return_index=True)
+    return replace(log, t=log.t[keep], x_d=log.x_d[keep], x_meas=log.x_meas[keep], starts=(0,))
+
+
+def split(log: Log, starts: Indices) -> Log:
+    """Begin a segment at each of these samples."""
+    return replace(log, starts=tuple(sorted({*log.starts, *(int(k) for k in starts)})))
+
+
+def resampled(log: Log) -> Log:
+    """Interpolate linearly at multiples of ``T_s``, each segment from its own first time on."""
+    parts = []
+    for segment in log.segments():
+        n = int((segment.t[-1] - segment.t[0]) / log.T_s + 1e-6) + 1
+        t = segment.t[0] + log.T_s * np.arange(n)
+        x_d, x_meas = (np.interp(t, segment.t, signal) for signal in (segment.x_d, segment.x_meas))
+        parts.append(replace(segment, t=t, x_d=x_d, x_meas=x_meas))
+    return _joined(log, parts)
+
+
+def thinned(log: Log, step: int, first: int) -> Log:
+    """Keep every ``step``-th sample from ``first`` on, at an interval as much longer."""
+    parts = []
+    for segment in log.segments():
+        keep = slice(first % step, None, step)
+        parts.append(replace(segment, t=segment.t[keep], x_d=segment.x_d[keep], x_meas=segment.x_meas[keep]))
+    return replace(_joined(log, parts), T_s=log.T_s * step)
+
+
+def bridge(log: Log, column: str, wrong: Indices) -> Log:
+    """Interpolate linearly over the samples ``wrong``, indices, of ``x_d`` or ``x_meas``."""
+    signal, known = getattr(log, column), np.ones(len(log.t), dtype=np.bool_)
+    known[wrong] = False
+    k = np.arange(len(signal))
+    return replace(log, **{column: np.interp(k, k[known], signal[known])})
+
+
+def cut_out(log: Log, begins: Indices, ends: Indices) -> Log:
+    """Remove the samples ``begins[i]`` to ``ends[i] − 1``, and begin a segment behind each stretch."""
+    keep = np.ones(len(log.t), dtype=np.bool_)
+    for begin, end in zip(begins, ends, strict=True):
+        keep[begin:end] = False
+    place: Indices = np.cumsum(keep) - keep
+    starts = {int(place[start]) for start in log.starts} | {int(place[end]) for end in ends if end < len(keep)}
+    n = int(keep.sum())
+    starts = {0, *(start for start in starts if start < n)}
+    return replace(log, t=log.t[keep], x_d=log.x_d[keep], x_meas=log.x_meas[keep], starts=tuple(sorted(starts)))
+
+
+def begin_at(log: Log, first: int) -> Log:
+    """Leave out the samples before ``first``."""
+    starts = sorted({0, *(start - first for start in log.starts if start > first)})
+    return replace(log, t=log.t[first:], x_d=log.x_d[first:], x_meas=log.x_meas[first:], starts=tuple(starts))
+
+
+def swapped(log: Log) -> Log:
+    """Exchange commanded and measured positions."""
+    return replace(log, x_d=log.x_meas, x_meas=log.x_d)
+
+
+def integrated(log: Log, column: str, factor: float) -> Log:
+    """Integrate a velocity, times ``factor``, from the other column's first position on."""
+    other = "x_d" if column == "x_meas" else "x_meas"
+    parts = []
+    for segment in log.segments():
+        velocity = factor * getattr(segment, column)
+        position = np.concatenate(([0.0], np.cumsum((velocity[1:] + velocity[:-1]) / 2))) * log.T_s
+        parts.append(replace(segment, **{column: getattr(segment, other)[0] + position}))
+    return _joined(log, parts)
+
+
+def scaled(log: Log, factor: float, *, column: str | None = None, unit: str | None = None) -> Log:
+    """Multiply a column, or both, by a factor; ``unit`` is the SI unit of both then."""
+    columns = ("x_d", "x_meas") if column is None else (column,)
+    changed = {name: factor * getattr(log, name) for name in columns}
+    return replace(log, **changed, unit=unit or log.unit)
+
+
+def offset_removed(log: Log, offset: float) -> Log:
+    """Subtract an offset from the measured position."""
+    return replace(log, x_meas=log.x_meas - offset)
+
+
+def shifted_back(log: Log, delay: float) -> Log:
+    """Advance the measured position by ``delay`` samples, and leave out the ends where it is not known then.
+
+    Fractions of a sample are interpolated by a cubic spline.
+    """
+    parts = []
+    for segment in log.segments():
+        n, k = len(segment.t), np.arange(len(segment.t), dtype=np.float64)
+        inside = (k + delay >= 0) & (k + delay <= n - 1)
+        if inside.sum() < 4:
+            continue
+        at = (k + delay)[inside]
+        whole = delay == round(delay)
+        x = segment.x_meas[at.astype(np.intp)] if whole else CubicSpline(k, segment.x_meas)(at)
+        parts.append(replace(segment, t=segment.t[inside], x_d=segment.x_d[inside], x_meas=x))
+    return _joined(log, parts)
+
+
+def _joined(log: Log, parts: list[Log]) -> Log:
+    lengths = np.cumsum([0, *(len(part.t) for part in parts[:-1])])
+    t, x_d, x_meas = (np.concatenate([getattr(part, name) for part in parts]) for name in ("t", "x_d", "x_meas"))
+    return replace(log, t=t, x_d=x_d, x_meas=x_meas, starts=tuple(int(length) for length in lengths))

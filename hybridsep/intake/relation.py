@@ -1,0 +1,144 @@
+"""Relations between commanded and measured position: regression at a lag, and a mode with dead time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares, minimize_scalar
+from scipy.signal import lfilter
+
+from ..base.signals import Array
+
+__all__ = ["DeadTime", "Line", "fit_dead_time", "line", "line_at_best_lag", "noise_std", "shifted"]
+
+LAG_MAX = 300
+"""Largest lag that is looked for, in samples: 0.3 s at 1 kHz is beyond any drive and any bus."""
+
+
+_EVALUATIONS = 25
+"""Steps of a search, which need not end at the minimum: a dead time within a tenth of a sample is enough."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """Regression ``x ≈ gain · u(k − lag) + offset``.
+
+    Attributes
+    ----------
+    lag : float
+        Samples.
+    gain, offset : float
+    unexplained : float
+        Share of the variance of x that is left, 0 … 1.
+    """
+
+    lag: float
+    gain: float
+    offset: float
+    unexplained: float
+
+
+@dataclass(frozen=True)
+class DeadTime:
+    """Mode with dead time, fitted by output error.
+
+    Attributes
+    ----------
+    dead_time : float
+        Samples; negative where the response comes before its cause.
+    lag : float
+        Steady lag of the mode behind a constant velocity, ``2ζ/ω``, samples.
+    unexplained : float
+        Share of the variance of x that is left.
+    """
+
+    dead_time: float
+    lag: float
+    unexplained: float
+
+
+def shifted(u: Array, lag: float) -> Array:
+    """Return ``u(k − lag)``, linear between samples and held beyond the ends."""
+    k = np.arange(len(u), dtype=np.float64)
+    return np.asarray(np.interp(k - lag, k, u))
+
+
+def line(u: Array, x: Array, lag: float = 0.0) -> Line:
+    """Return the regression of ``x``, (n,), on ``u``, (n,), at a lag."""
+    moved = shifted(u, lag)
+    du, dx = moved - moved.mean(), x - x.mean()
+    squares, total, product = float(du @ du), float(dx @ dx), float(du @ dx)
+    if squares == 0.0 or total == 0.0:
+        return Line(lag, 0.0, float(x.mean()), 1.0)
+    gain = product / squares
+    return Line(lag, gain, float(x.mean() - gain * moved.mean()), max(0.0, 1.0 - product * product / squares / total))
+
+
+def line_at_best_lag(u: Array, x: Array) -> Line:
+    """Return the regression at the lag, positive or negative, that leaves least."""
+    largest = min(LAG_MAX, len(u) // 4)
+    steps = np.unique(np.round(np.geomspace(1, max(largest, 1), 40)))
+    lags = np.concatenate((-steps[::-1], [0.0], steps))
+    left = [line(u, x, lag).unexplained for lag in lags]
+    i = int(np.argmin(left))
+    between = (float(lags[max(i - 1, 0)]), float(lags[min(i + 1, len(lags) - 1)]))
+    found = minimize_scalar(lambda lag: line(u, x, lag).unexplained, bounds=between, method="bounded")
+    return min(line(u, x, float(found.x)), line(u, x, float(lags[i])), key=lambda fit: fit.unexplained)
+
+
+def noise_std(x: Array) -> float:
+    """Return the standard deviation of white noise on a smooth signal, from the median of its fifth differences."""
+    if len(x) < 12:
+        return 0.0
+    return float(np.median(np.abs(np.diff(x, 5)))) / (0.6745 * math.sqrt(252.0))
+
+
+def fit_dead_time(u: Array, x: Array, first: float | None) -> DeadTime:
+    """Return the output-error fit of one mode of free gain and offset, after a dead time.
+
+    Parameters
+    ----------
+    u, x : (n,) array
+        Commanded and measured positions.
+    first : float, optional
+        Dead time, samples, that the search also begins with; None if it is to be 0.
+    """
+    scale = float(np.ptp(u))
+    command, response = (u - u[0]) / scale, (x - x.mean()) / float(np.ptp(x))
+    total = float(response @ response)
+
+    def residual(parameters: Array) -> Array:
+        y = _mode(parameters, command)
+        fit = line(y, response)
+        left = response - fit.gain * y - fit.offset
+        return np.asarray(np.nan_to_num(left, nan=1e3, posinf=1e3, neginf=-1e3))
+
+    best = None
+    for omega, dead_time in ((0.15, 0.0), (0.5, first or 0.0)):
+        start = [math.log(omega), math.log(0.5), dead_time][: 2 if first is None else 3]
+        bounds = [(-7, 1), (-4.5, 2), (-LAG_MAX, LAG_MAX)][: len(start)]
+        found = least_squares(
+            residual, start, bounds=np.transpose(bounds), x_scale=[1, 1, 5][: len(start)], max_nfev=_EVALUATIONS
+        )
+        if best is None or found.cost < best.cost:
+            best = found
+    assert best is not None
+    lag = 2 * math.exp(best.x[1] - best.x[0])
+    return DeadTime(0.0 if first is None else float(best.x[2]), lag, 2 * best.cost / total)
+
+
+def _mode(parameters: Array, u: Array) -> Array:
+    """Return the response of a mode of unit gain, matched poles; ``log ω``, ``log ζ`` and perhaps the dead time."""
+    omega, zeta = math.exp(parameters[0]), math.exp(parameters[1])
+    if zeta < 1.0:
+        radius, angle = math.exp(-zeta * omega), omega * math.sqrt(1 - zeta * zeta)
+        poles = [1.0, -2 * radius * math.cos(angle), radius * radius]
+    else:
+        root = math.sqrt(zeta * zeta - 1.0)
+        slow, fast = math.exp(-omega * (zeta - root)), math.exp(-omega * (zeta + root))
+        poles = [1.0, -slow - fast, slow * fast]
+    late = shifted(u, float(parameters[2])) if len(parameters) > 2 else u
+    # Held over a sample, the command acts from the next one on.
+    return np.asarray(lfilter([0.0, sum(poles)], poles, late))

@@ -1,0 +1,164 @@
+"""Choice of a log's columns: which are time, commanded and measured position, and in which units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from ..base.errors import LogError
+from .source import Source
+from .units import POSITION_UNITS, TIME_UNITS, Unit, position_unit, stated_unit, time_unit
+
+__all__ = ["ROLES", "Column", "choose_columns"]
+
+ROLES = ("t", "x_d", "x")
+"""Time, commanded and measured position."""
+
+_NAMES: Mapping[str, tuple[str, ...]] = {
+    "t": ("t", "time", "timestamp", "time_stamp", "zeit"),
+    "x_d": (
+        "x_d", "xd", "x_ref", "xref", "x_cmd", "x_set", "x_des", "reference", "setpoint", "command", "commanded",
+        "position_commanded", "commanded_position", "pos_cmd", "cmd_pos", "pos_ref", "pos_set", "des_pos", "q_d",
+    ),
+    "x": (
+        "x_meas", "x", "x_m", "x_act", "measured", "measurement", "actual", "position_measured", "measured_position",
+        "actual_position", "position_actual", "pos_meas", "pos_act", "act_pos", "enc_pos", "feedback", "q_meas",
+    ),
+}  # fmt: skip
+"""Names of each role's column, by precedence, in small letters; where the true position is x, x_meas is meant."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """Column that is read.
+
+    Attributes
+    ----------
+    name : str
+        Its name in the file.
+    unit : Unit
+        Unit of its numbers.
+    stated : bool
+        Whether the file or the caller stated the unit; otherwise it is SI.
+    """
+
+    name: str
+    unit: Unit
+    stated: bool
+
+
+def choose_columns(
+    source: Source, columns: Mapping[str, str] | None, unit: str | None, *, time_needed: bool
+) -> dict[str, Column]:
+    """Return the columns to read, by role.
+
+    Parameters
+    ----------
+    source : Source
+    columns : mapping, optional
+        Names by role; a name may leave out the unit that the file's has.
+    unit : str, optional
+        Unit of the positions.
+    time_needed : bool
+        Whether a time column must be there.
+
+    Raises
+    ------
+    LogError
+        If a column is missing, occurs twice, or its unit is unknown or contradicts the given one.
+    """
+    for role in columns or ():
+        if role not in ROLES:
+            raise LogError(f"{source.path}: columns may name {', '.join(ROLES)}, got {role!r}")
+    names = {role: _name(source, role, (columns or {}).get(role)) for role in ROLES}
+    if names["t"] is None and "t" not in (columns or {}) and not time_needed:
+        del names["t"]
+    found: dict[str, Column] = {}
+    for role, name in names.items():
+        if name is None:
+            raise _missing(source, role, (columns or {}).get(role, role))
+        if source.names.count(name) > 1:
+            raise LogError(f"{source.path}: column {name!r} must occur once, got it {source.names.count(name)} times")
+        found[role] = _time(source, name) if role == "t" else _position(source, name, unit)
+    x_d, x = found["x_d"], found["x"]
+    if x_d.unit.si != x.unit.si:
+        raise LogError(
+            f"{source.path}: column {x_d.name!r} is in {x_d.unit.name} and column {x.name!r} in {x.unit.name}; both "
+            "must be lengths or both angles"
+        )
+    return found
+
+
+def _name(source: Source, role: str, given: str | None) -> str | None:
+    """Return the file's name of a role's column, None if there is none.
+
+    A given name is the file's own, or that without its unit; otherwise the format's own choice counts, then the known
+    names as they are, then those without units and in any spelling.
+    """
+    plain = {name: stated_unit(name)[0] for name in source.names}
+    if given is not None:
+        known = [name for name in source.names if name == given] or [name for name in plain if plain[name] == given]
+        return known[0] if known else None
+    if role in source.roles:
+        return source.roles[role]
+    for spelled in ({name: name for name in source.names}, {name: _spelling(plain[name]) for name in source.names}):
+        for key in _NAMES[role]:
+            known = [name for name in source.names if spelled[name] == key]
+            if len(set(known)) > 1:
+                there = ", ".join(map(repr, known))
+                raise LogError(
+                    f"{source.path}: column {role} may be {there}; give its name in columns (--{_option(role)})"
+                )
+            if known:
+                return known[0]
+    return None
+
+
+def _spelling(name: str) -> str:
+    return name.strip().lower().replace(" ", "_").replace("-", "_").replace(".", "_")
+
+
+def _option(role: str) -> str:
+    return role.replace("_", "-")
+
+
+def _missing(source: Source, role: str, name: str) -> LogError:
+    there = ", ".join(repr(other) for other in source.names) or "none"
+    ways = f"; give its name in columns{', or T_s' if role == 't' else ''}"
+    options = f" (--{_option(role)}{', --T_s' if role == 't' else ''})"
+    what = repr(name) if name == role else f"{name!r} ({role})"
+    return LogError(f"{source.path}: column {what} is missing, the file has {there}{ways}{options}{source.advice}")
+
+
+def _stated(source: Source, name: str) -> str:
+    """Return the unit that the file states of a column, empty if it states none."""
+    return source.units.get(name, "") or stated_unit(name)[1]
+
+
+def _time(source: Source, name: str) -> Column:
+    text = _stated(source, name)
+    unit = time_unit(text) if text else TIME_UNITS["s"]
+    if unit is None:
+        raise LogError(
+            f"{source.path}: time {name!r} must be in one of {', '.join(TIME_UNITS)}, its unit is {text!r}; correct "
+            "it, or remove the column and give T_s (--T_s)"
+        )
+    return Column(name, unit, bool(text))
+
+
+def _position(source: Source, name: str, given: str | None) -> Column:
+    text = _stated(source, name)
+    unit = position_unit(text) if text else None
+    if text and unit is None:
+        raise LogError(
+            f"{source.path}: column {name!r} must be a position in one of {', '.join(POSITION_UNITS)}, its unit is "
+            f"{text!r}; is it another quantity? Name another column in columns (--x-d, --x), or correct the unit"
+        )
+    chosen = position_unit(given) if given is not None else None
+    if unit is not None and chosen not in (None, unit):
+        raise LogError(
+            f"{source.path}: unit={given!r} (--unit {given}) was given, but column {name!r} states {text!r}; leave the "
+            "unit out, or correct the file"
+        )
+    chosen = chosen or unit or position_unit(source.assumed_units.get(name, ""))
+    return Column(name, chosen or POSITION_UNITS["m"], chosen is not None)

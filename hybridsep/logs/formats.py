@@ -1,0 +1,85 @@
+"""Registry of log formats: which reader a file's content asks for, and how to convert what has none.
+
+A new format is a file with a subclass of :class:`~hybridsep.logs.source.Source` and its entry in :data:`READERS`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..base.errors import LogError
+from .capture import CaptureSource
+from .hdf5 import Hdf5Source
+from .mat import MatSource
+from .npz import NpzSource
+from .source import Source
+from .text import TextSource
+
+__all__ = ["READERS", "open_source"]
+
+READERS: tuple[type[Source], ...] = (NpzSource, Hdf5Source, MatSource, CaptureSource, TextSource)
+"""Readers by precedence; text, which has no mark of its own, is last."""
+
+_HEAD = 4096
+
+_SAVE = "save its columns t, x_d and x as CSV"
+_PANDAS = "pandas.read_{}('{{path}}').to_csv('log.csv', index=False)"
+
+_OTHERS: tuple[tuple[str, tuple[bytes, ...], str], ...] = (
+    ("a NumPy .npy array", (b"\x93NUMPY",), "numpy.savez('log.npz', t=a[:, 0], x_d=a[:, 1], x=a[:, 2])"),
+    ("Parquet", (b"PAR1",), _PANDAS.format("parquet")),
+    ("Arrow or Feather", (b"ARROW1", b"FEA1"), _PANDAS.format("feather")),
+    ("ASAM MDF", (b"MDF     ", b"UnFinMF "), "asammdf.MDF('{path}').export('csv')"),
+    ("NI TDMS", (b"TDSm",), "nptdms.TdmsFile.read('{path}').as_dataframe().to_csv('log.csv', index=False)"),
+    ("a ROS bag", (b"#ROSBAG", b"\x89MCAP0"), "export the joint's topic as CSV, for example by PlotJuggler"),
+    ("an old Excel workbook", (b"\xd0\xcf\x11\xe0",), f"{_SAVE} there"),
+    ("XML", (b"<?xml", b"\xef\xbb\xbf<?xml"), f"{_SAVE}; a TwinCAT or TIA scope exports it itself"),
+    (
+        "JSON of another kind than Siemens Capture",
+        (b'{"', b"{ ", b"{\n", b"{\r", b"[{", b"[[", b"[\n"),
+        _PANDAS.format("json"),
+    ),
+    ("a Python pickle", (b"\x80\x03", b"\x80\x04", b"\x80\x05"), f"{_SAVE} where it was made: a pickle runs code"),
+    ("SQLite", (b"SQLite format 3",), _SAVE),
+    ("a sound file", (b"RIFF", b"fLaC"), _SAVE),
+    ("PDF", (b"%PDF",), _SAVE),
+    ("compressed", (b"BZh", b"\xfd7zXZ", b"\x28\xb5\x2f\xfd", b"7z\xbc\xaf"), "unpack it, or compress it by gzip"),
+    ("an Excel workbook, or another zip archive", (b"PK\x03\x04",), "pandas.read_excel('{path}').to_csv('log.csv')"),
+)
+"""Formats without a reader: what they are, how they begin, how to convert them."""
+
+
+def open_source(path: Path) -> Source:
+    """Open a file with the reader that its content asks for.
+
+    Raises
+    ------
+    LogError
+        If there is no such file, or none of :data:`READERS` for it; the message says how to convert it.
+    """
+    try:
+        if not path.is_file():
+            raise LogError(f"{path}: there is no such file" if not path.exists() else f"{path}: is not a file")
+        with path.open("rb") as file:
+            head = file.read(_HEAD)
+        if not head:
+            raise LogError(f"{path}: the file is empty")
+        return _reader(path, head)(path)
+    except OSError as error:
+        raise LogError(f"{path}: cannot be read: {error.strerror or error}") from error
+
+
+def _reader(path: Path, head: bytes) -> type[Source]:
+    for reader in READERS[:-1]:
+        if reader.recognises(head):
+            return reader
+    for name, marks, how in _OTHERS:
+        if head.lstrip(b" \r\n\t").startswith(marks):
+            raise LogError(f"{path}: is {name}, which is not read; {how.format(path=path.name)}")
+    if READERS[-1].recognises(head):
+        return READERS[-1]
+    named = [reader for reader in READERS[:-1] if path.name.lower().endswith(reader.endings)]
+    if named:
+        return named[-1]  # its message says what is damaged
+    known = ", ".join(reader.format for reader in READERS)
+    raise LogError(f"{path}: is in no format that is read ({known}); {_SAVE}")

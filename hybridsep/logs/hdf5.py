@@ -1,0 +1,31 @@
+"""HDF5 files, MATLAB's version 7.3 among them, read by h5py."""
+
+from __future__ import annotations
+
+from .arrays import ArraysSource
+
+__all__ = ["Hdf5Source"]
+
+_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+
+
+class Hdf5Source(ArraysSource):
+    """The vectors of an HDF5 file; those in groups or structs are ``group.name``."""
+
+    format = "MATLAB v7.3 (HDF5)"
+    endings = (".mat", ".h5", ".hdf5")
+    kind = "hdf5"
+    library = "h5py"
+
+    @staticmethod
+    def recognises(head: bytes) -> bool:
+        """Return whether it begins with HDF5's signature, or with that of MATLAB 7.3 before it."""
+        return head.startswith((_SIGNATURE, b"MATLAB 7.3 MAT-file"))
+
+    def without_library(self) -> str:
+        """Return what to do where h5py is not installed."""
+        stem = self.path.stem
+        return (
+            f"is a {self.format} file, which needs the extra hdf5: pip install 'hybridsep[hdf5]'; or save it with "
+            f"'-v7' in MATLAB: load('{self.path.name}'); save('{stem}_v7.mat', '-v7')"
+        )

@@ -1,0 +1,120 @@
+"""Units of a log's columns: names, factors to SI, and where a column's name states one (``x [mm]``, ``x_mm``)."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+__all__ = ["POSITION_UNITS", "TIME_UNITS", "Unit", "plain_name", "position_unit", "stated_unit", "time_unit"]
+
+
+@dataclass(frozen=True)
+class Unit:
+    """Unit of a column.
+
+    Attributes
+    ----------
+    name : str
+        Its spelling in options.
+    si : {"m", "rad", "s"}
+        SI unit that the library computes with: metres for linear axes, radians for rotary ones, seconds.
+    factor : float
+        One unit in SI.
+    """
+
+    name: str
+    si: str
+    factor: float
+
+
+def _units(si: str, factors: Mapping[str, float]) -> dict[str, Unit]:
+    return {name: Unit(name, si, factor) for name, factor in factors.items()}
+
+
+POSITION_UNITS: Mapping[str, Unit] = {
+    **_units("m", {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254}),
+    **_units("rad", {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180, "rev": 2 * math.pi}),
+}
+"""Units of positions by name; a log's positions are read in metres, or in radians where their unit is an angle."""
+
+TIME_UNITS: Mapping[str, Unit] = _units("s", {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0})
+"""Units of times by name."""
+
+_SPELLINGS = {
+    "meter": "m",
+    "metre": "m",
+    "meters": "m",
+    "metres": "m",
+    "millimeter": "mm",
+    "millimetre": "mm",
+    "micron": "um",
+    "microns": "um",
+    "inch": "in",
+    '"': "in",
+    "°": "deg",
+    "degree": "deg",
+    "degrees": "deg",
+    "radian": "rad",
+    "radians": "rad",
+    "turn": "rev",
+    "turns": "rev",
+    "revolution": "rev",
+    "sec": "s",
+    "second": "s",
+    "seconds": "s",
+    "msec": "ms",
+    "usec": "us",
+}
+"""Other spellings, in small letters, of the units' names; µ is u."""
+
+_SUFFIXES = ("mm", "um", "nm", "rad", "mrad", "urad", "deg", "s", "ms", "us", "ns")
+"""Units that end a name after an underscore or a blank; m is none, as ``x_m`` is rather the measured position."""
+
+_BRACKETS = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))\s*$")
+_SLASH = re.compile(r"^(?P<name>.*?\S)\s*(?:/|\bin\b)\s*(?P<unit>\S+)\s*$")
+_SUFFIX = re.compile(r"^(?P<name>.*?[^_\s])[_\s](?P<unit>[^_\s]+)$")
+
+
+def plain_name(text: str) -> str:
+    """Return a unit's name in the spelling of the tables, in small letters."""
+    text = text.strip().lower().replace("µ", "u").replace("μ", "u")
+    return _SPELLINGS.get(text, text)
+
+
+def position_unit(text: str) -> Unit | None:
+    """Return the unit of a position of that spelling, None if there is none."""
+    return POSITION_UNITS.get(plain_name(text))
+
+
+def time_unit(text: str) -> Unit | None:
+    """Return the unit of a time of that spelling, None if there is none."""
+    return TIME_UNITS.get(plain_name(text))
+
+
+def stated_unit(name: str) -> tuple[str, str]:
+    """Return a column's name without its unit, and the unit as it is written, empty if it states none.
+
+    ``x [mm]``, ``x (mm)``, ``x / mm``, ``x in mm``, ``x_mm`` and ``x mm`` are ``("x", "mm")``. In square brackets any
+    text is a unit, and anywhere a known one divided by another, as in ``v (mm/s)``; otherwise only a known one.
+    """
+    brackets = _BRACKETS.match(name)
+    if brackets:
+        square, text = brackets["square"], brackets["square"] or brackets["round"] or ""
+        if text.strip() in ("", "-", "1"):
+            return brackets["name"], ""
+        if square is not None or _is_unit(text.split("/")[0]):
+            return brackets["name"], text.strip()
+        return name, ""
+    slash = _SLASH.match(name)
+    if slash and _is_unit(slash["unit"]):
+        return slash["name"], slash["unit"]
+    suffix = _SUFFIX.match(name)
+    if suffix and plain_name(suffix["unit"]) in _SUFFIXES:
+        return suffix["name"], suffix["unit"]
+    return name, ""
+
+
+def _is_unit(text: str) -> bool:
+    return position_unit(text) is not None or time_unit(text) is not None

@@ -1,0 +1,216 @@
+"""Uncertainty of a prediction: the variance of its error against the measured position, learned from earlier windows.
+
+The variance at sample ``k`` of a window is a sum of components, ``v(k) = Σ_i θ_i f_i(k)``, each the square of something
+that errors come with: measurement noise and its growth over the window, wrong timing (the squared differences of
+``x_pb`` and ``e_h``), a wrong share of the servo error, a change since the last measured residual, candidates that
+disagree. What errors come with is known before the window is measured, so that the variance is small at standstill and
+large at a reversal. The published standard deviation is ``c·√v``.
+
+After each window every ``θ_i`` takes a step of expectation maximisation for normal errors of that variance (variance
+components: Dempster, Laird, Rubin, J. R. Stat. Soc. B 39 (1977)), and ``c`` moves until 5 % of all errors are beyond
+1.96 standard deviations (adaptive conformal inference: Gibbs, Candès, NeurIPS 2021): errors are not normal, and
+neighbouring ones are alike.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.signals import PREDICTION_MAX, Array
+
+__all__ = ["N_COMPONENTS", "N_LEARNED", "PredictedError", "Uncertainty"]
+
+_SHARES = (4.0, 9.0, 0.01, 0.3, 2.0)
+"""First variance of the error relative to that of its causes: differences of ``x_pb`` and of ``e_h`` from sample to
+sample, servo error, change since the last residual, disagreement."""
+
+N_COMPONENTS = 2 + len(_SHARES)
+
+N_LEARNED = 2 * N_COMPONENTS + 2
+"""Numbers that :meth:`Uncertainty.learned` returns."""
+
+_GROWTH = 0.3
+"""First variance of the error's growth over a window, relative to the mean square error of the first window."""
+
+_SHARE_LEAST, _SHARE_MOST = 1e-9 * np.array(_SHARES), 1e4 * np.array(_SHARES)
+"""Bounds on the variance relative to its cause."""
+
+_FLOOR = 1e-6
+"""Least variance relative to the recent mean square of the residual."""
+
+_LEAST_VARIANCE = 1e-100
+"""Variance, m², that no divisor is below."""
+
+_OUTLYING, _VANISHING = 16.0, 0.01
+"""Largest square of an error, relative to its variance, that counts; least change of a component in one window."""
+
+_RECENT = 0.9
+"""Factor by which the mean square of the residual fades from window to window."""
+
+_MEMORY, _FIRST_EVIDENCE, _STEP = 0.95, 0.2, 6.0
+"""Factor by which evidence fades from window to window; evidence that the first values count for, in windows; and the
+step of expectation maximisation, which alone would be slow where components are alike."""
+
+_Z, _BEYOND = 1.96, 0.05
+"""Standard deviations that a normal error exceeds with this probability."""
+
+_FAR, _FAR_SHARE = 4.0, 0.5
+"""Standard deviations, and the share of a window's errors beyond them from which on all variances are too small by
+their square: the machine or the sensor has changed."""
+
+_FACTOR_RATE, _FACTOR_MAX = 0.2, 4.0
+"""Change of ``ln c`` from one window to the next per share of errors, and bound on ``c`` and ``1/c``."""
+
+
+class PredictedError(NamedTuple):
+    """What is known of the error of a window before it is measured.
+
+    Attributes
+    ----------
+    e_h : (n,) array, m
+        Published residual.
+    components : (n, N_COMPONENTS) array
+        ``f_i(k)``; m² but for the first two, which are relative.
+    std : (n,) array, m
+        Standard deviation of the error.
+    """
+
+    e_h: Array
+    components: Array
+    std: Array
+
+
+class Uncertainty:
+    """Standard deviation of prediction errors, calibrated online.
+
+    Parameters
+    ----------
+    variance : float, m²
+        That of the measurement noise, assumed before the first window is measured.
+    Np : int
+        Samples of a usual window.
+
+    Attributes
+    ----------
+    theta : (N_COMPONENTS,) array
+        ``θ``: variances, m², of noise and growth, and those relative to their causes.
+    evidence : (N_COMPONENTS,) array
+        Windows that each stands on, faded.
+    factor : float
+        ``c``.
+    recent : float, m²
+        Recent mean square of the residual; 0 before the first window.
+    """
+
+    def __init__(self, variance: float, Np: int) -> None:
+        self.Np = Np
+        self.theta = np.array([variance, 0.0, *_SHARES])
+        self.evidence = np.zeros(N_COMPONENTS)
+        self.factor, self.recent = 1.0, 0.0
+
+    def predict(
+        self, x_d: Array, x_pb: Array, e_h: Array, *, last: float, disagreement: Array | float
+    ) -> PredictedError:
+        """Return what is known of the error of the next window; nothing is changed.
+
+        Parameters
+        ----------
+        x_d, x_pb, e_h : (n,) array, m
+            Commands, physics-based prediction and published residual, relative to the start.
+        last : float, m
+            Last measured residual.
+        disagreement : (n,) array or float, m²
+            Variance of the candidates about their blend.
+        """
+        n = len(x_d)
+        bounded = e_h
+        if not np.abs(e_h).max() <= PREDICTION_MAX:  # a prediction that diverges is refused when it is published
+            bounded = np.clip(np.nan_to_num(e_h), -PREDICTION_MAX, PREDICTION_MAX)
+        components = np.empty((n, N_COMPONENTS))
+        components[:, 0] = 1.0
+        components[:, 1] = np.arange(1, n + 1) / self.Np
+        _set_differences(components[:, 2], x_pb)
+        _set_differences(components[:, 3], bounded)
+        components[:, 4] = x_d - x_pb
+        components[:, 5] = bounded - last
+        components[:, 2:6] = np.minimum(np.abs(components[:, 2:6]), PREDICTION_MAX) ** 2
+        components[:, 6] = disagreement
+        std = np.minimum(self.factor * np.sqrt(self._variance(components)), PREDICTION_MAX)
+        return PredictedError(bounded, components, std)
+
+    def learn(self, predicted: PredictedError, residuals: Array, accepted: NDArray[np.bool_]) -> None:
+        """Learn from the measurement of a window.
+
+        Parameters
+        ----------
+        predicted : PredictedError
+        residuals : (m,) array, m
+            Measured residuals ``e_pb`` of its first ``m`` samples.
+        accepted : (m,) array of bool
+            Whether they count.
+        """
+        m = len(residuals)
+        measured, e_h, components, std = residuals, predicted.e_h[:m], predicted.components[:m], predicted.std[:m]
+        if not accepted.all():
+            measured, e_h, components, std = (signal[accepted] for signal in (measured, e_h, components, std))
+        if not measured.any():  # nothing to learn a scale from
+            return
+        error = measured - e_h
+        mean_square = _mean_square(measured)
+        if self.recent > 0.0:
+            relative = np.abs(error) / std
+            if np.count_nonzero(relative > _FAR) > _FAR_SHARE * len(error):
+                self.theta *= _FAR**2
+            else:
+                factor = self.factor * math.exp(_FACTOR_RATE * (np.count_nonzero(relative > _Z) / len(error) - _BEYOND))
+                self.factor = min(max(factor, 1.0 / _FACTOR_MAX), _FACTOR_MAX)
+            self.recent = _RECENT * self.recent + (1.0 - _RECENT) * mean_square
+        else:
+            self.recent = mean_square
+            self.theta[:2] = _mean_square(error) * np.array([1.0, _GROWTH])
+        variance = self._variance(components)
+        share = components * self.theta / variance[:, None]  # of the variance, that is due to each component
+        total = share.sum(axis=0)
+        self.evidence = _MEMORY * self.evidence + total / self.Np
+        seen = share.T @ np.minimum(error**2 / variance, _OUTLYING)
+        change = np.maximum(np.divide(seen, total, out=np.ones(N_COMPONENTS), where=total > 0.0), _VANISHING)
+        step = np.minimum(_STEP * total / self.Np / (self.evidence + _FIRST_EVIDENCE), 1.0)
+        theta = self.theta * change**step
+        self.theta[:2] = np.minimum(np.maximum(theta[:2], _FLOOR * self.recent), PREDICTION_MAX)
+        self.theta[2:] = np.minimum(np.maximum(theta[2:], _SHARE_LEAST), _SHARE_MOST)
+
+    def learned(self) -> Array:
+        """Return what has been learned, ``(N_LEARNED,)``: all numbers are ≥ 0."""
+        return np.concatenate((self.theta, self.evidence, [self.factor, self.recent]))
+
+    def restore(self, learned: Array) -> None:
+        """Restore what :meth:`learned` returned and :meth:`is_sound` accepts."""
+        self.theta, self.evidence = learned[:N_COMPONENTS].copy(), learned[N_COMPONENTS:-2].copy()
+        self.factor, self.recent = learned[-2:].tolist()
+
+    @staticmethod
+    def is_sound(learned: Array) -> bool:
+        """Return whether the numbers of :meth:`learned` are in range."""
+        shares, others = learned[2:N_COMPONENTS], np.delete(learned, range(2, N_COMPONENTS))
+        return bool(
+            ((shares >= _SHARE_LEAST) & (shares <= _SHARE_MOST)).all()
+            and ((others >= 0.0) & (others <= PREDICTION_MAX)).all()
+            and 1.0 / _FACTOR_MAX <= learned[-2] <= _FACTOR_MAX
+        )
+
+    def _variance(self, components: Array) -> Array:
+        return np.asarray(components @ self.theta + (_FLOOR * self.recent + _LEAST_VARIANCE))
+
+
+def _set_differences(changes: Array, signal: Array) -> None:
+    """Set the changes of a signal from sample to sample, ``(n,)``, the first one as the second."""
+    np.subtract(signal[1:], signal[:-1], out=changes[1:])
+    changes[0] = changes[1] if len(signal) > 1 else 0.0
+
+
+def _mean_square(signal: Array) -> float:
+    return min(float(signal.dot(signal)) / len(signal), PREDICTION_MAX)

@@ -1,0 +1,1 @@
+"""Choice of a predictor's settings by causal replays of recordings."""

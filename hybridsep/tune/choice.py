@@ -1,0 +1,158 @@
+"""Choice of what trust leaves to choose: the numbers of lags.
+
+Windows of all that is tried are equally long: a shorter one is always predicted better, by holding the last residual
+best of all, so ``Np`` is the controller's look-ahead and is never chosen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..base.errors import SignalError
+from ..base.metrics import rms
+from ..base.settings import PredictorSettings
+from ..model.physics import ModalModel
+from ..predict.predictor import HybridPredictor
+from .halves import Recording, replay
+
+__all__ = ["Choice", "Tried", "WindowScore", "choose_settings", "settings_for", "settings_to_try", "window_scores"]
+
+_WORTH = 0.05
+"""Relative gain below which the default settings stay: less may be chance."""
+
+_SHARES = (0.1, 0.25, 1.0)
+"""Numbers of lags ``p`` that are tried besides the default, in windows."""
+
+_Q = (1,)
+"""Numbers of lags ``q`` of the physics-based position that are tried besides the default."""
+
+_WINDOWS = (0.2, 0.5, 1.0, 2.0)
+"""Windows over which the error is shown, in those of the controller."""
+
+
+@dataclass(frozen=True)
+class Tried:
+    """Settings that were tried.
+
+    Attributes
+    ----------
+    settings : PredictorSettings
+    rms_h : float
+        RMS of the hybrid's error over the later half of the samples that teach, m; infinite if it diverged. The
+        earlier half says who learns fastest, but machines run warm.
+    """
+
+    settings: PredictorSettings
+    rms_h: float
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Chosen settings.
+
+    Attributes
+    ----------
+    settings : PredictorSettings
+    tried : tuple of Tried
+        All that was tried, the default first.
+    """
+
+    settings: PredictorSettings
+    tried: tuple[Tried, ...]
+
+
+@dataclass(frozen=True)
+class WindowScore:
+    """Errors with another look-ahead window.
+
+    Attributes
+    ----------
+    Np : int
+    rms_pb, rms_hold, rms_h : float
+        RMS over the samples that judge, m.
+    """
+
+    Np: int
+    rms_pb: float
+    rms_hold: float
+    rms_h: float
+
+
+def settings_for(Np: int, T_s: float, input_hold: str) -> PredictorSettings:
+    """Return the default settings for a window, with as many lags as fit into it."""
+    default = PredictorSettings()
+    p, q = min(default.p, Np), min(default.q, Np - 1)
+    return replace(default, Np=Np, p=p, q=q, T_s=T_s, input_hold=input_hold)
+
+
+def settings_to_try(settings: PredictorSettings) -> list[PredictorSettings]:
+    """Return the settings themselves and others with the same window."""
+    Np = settings.Np
+    lags = dict.fromkeys([settings.p, *(max(1, round(share * Np)) for share in _SHARES)])
+    found = [replace(settings, p=p) for p in lags]
+    found += [replace(settings, q=q) for q in _Q if q < Np and q != settings.q]
+    return found
+
+
+def choose_settings(
+    model: ModalModel,
+    recordings: Sequence[Recording],
+    settings: PredictorSettings,
+    progress: Callable[[float], object] = lambda _done: None,
+) -> Choice:
+    """Return the settings with the least error of causal replays over the samples that teach.
+
+    Parameters
+    ----------
+    model : ModalModel
+        ``G_pb``.
+    recordings : sequence of Recording
+    settings : PredictorSettings
+        The default, which stays unless others are better by 5 %.
+    progress : callable, optional
+        Called with the fraction done.
+    """
+    tried: list[Tried] = []
+    candidates = settings_to_try(settings)
+    for i, candidate in enumerate(candidates):
+        tried.append(Tried(candidate, _taught_rms(model, candidate, recordings)))
+        progress((i + 1) / len(candidates))
+    best = min(tried, key=lambda one: one.rms_h)
+    chosen = best if best.rms_h < (1.0 - _WORTH) * tried[0].rms_h else tried[0]
+    return Choice(chosen.settings, tuple(tried))
+
+
+def _taught_rms(model: ModalModel, settings: PredictorSettings, recordings: Sequence[Recording]) -> float:
+    try:
+        errors = replay(HybridPredictor(model, settings), recordings, taught=True).errors(taught=True)[2]
+    except SignalError:  # it diverges
+        return float("inf")
+    later = errors[len(errors) // 2 :]
+    return rms(later[~np.isnan(later)])
+
+
+def window_scores(
+    model: ModalModel,
+    recordings: Sequence[Recording],
+    settings: PredictorSettings,
+    progress: Callable[[float], object] = lambda _done: None,
+) -> tuple[WindowScore, ...]:
+    """Return the errors with shorter and longer windows than the controller's, for as much as the log has.
+
+    Parameters
+    ----------
+    model, recordings, settings, progress
+        As for :func:`choose_settings`.
+    """
+    shortest = min(len(recording.x) for recording in recordings)
+    sizes = dict.fromkeys(max(1, round(share * settings.Np)) for share in _WINDOWS)
+    sizes = {Np: None for Np in sizes if Np <= max(shortest, settings.Np)}
+    scores = []
+    for i, Np in enumerate(sizes):
+        fitted = replace(settings, Np=Np, p=min(settings.p, Np), q=min(settings.q, Np - 1))
+        scores.append(WindowScore(Np, *replay(HybridPredictor(model, fitted), recordings).rms()))
+        progress((i + 1) / len(sizes))
+    return tuple(scores)

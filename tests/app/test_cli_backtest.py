@@ -1,0 +1,143 @@
+"""``hybridsep backtest``: checks of the log, fixes, figure, saved state and predictions, warm start, rotary axes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import Run, write_log
+from staircase_data import commanded, measured
+
+from hybridsep import HybridPredictor, load_machine, read_log
+from hybridsep.base.data_files import data_folder
+from hybridsep.evaluate.backtest import backtest
+
+MACHINE = ("-m", "spring_mass_damper")
+
+
+def spoiled(path: Path, *, n: int = 2500, gain: float = 1.0, offset: float = 0.0, names: str = "t,x_d,x") -> Path:
+    t = np.arange(n) * 1e-3
+    columns = np.column_stack((t, commanded()[:n], gain * measured(0)[:n] + offset))
+    np.savetxt(path, columns, delimiter=",", header=names, comments="", fmt="%.17g")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("gain", "offset", "words"),
+    [
+        (-1.0, 0.0, "the measured position runs against the command (gain -0.99"),
+        (1.0, 0.25, "the measured position is +0.249"),
+        (4e-5, 0.0, "times the commanded one: a wrong unit, gear ratio or encoder resolution"),
+        (1e3, 0.0, "times the commanded one: measured in mm, commanded in m"),
+    ],
+)
+def test_a_log_that_would_flatter_is_refused_fixed_or_taken_as_it_is(
+    hybridsep: Run, tmp_path: Path, gain: float, offset: float, words: str
+) -> None:
+    log = spoiled(tmp_path / "log.csv", gain=gain, offset=offset)
+    status, out, err = hybridsep("backtest", log, *MACHINE)
+    assert (status, out) == (2, "")
+    assert len(err.strip().splitlines()) == 1
+    assert "figures from this log would mean nothing: " in err
+    assert words in err
+    assert "Apply the fixes with --fix, correct the log or the options it is read with, or go on with --as-is" in err
+    good = json.loads(hybridsep("backtest", write_log(tmp_path / "good.csv"), *MACHINE, "--json")[1])
+    status, out, err = hybridsep("backtest", log, *MACHINE, "--fix", "--json")
+    assert status == 0
+    assert words in err
+    assert json.loads(out)["rms_pb_um"] == pytest.approx(good["rms_pb_um"], rel=0.5)
+    (finding,) = json.loads(out)["findings"]
+    assert finding["severity"] == "error"
+    assert words in finding["words"]
+    assert finding["fix"]
+    status, out, _ = hybridsep("backtest", log, *MACHINE, "--as-is", "--json")
+    assert status == 0
+    assert json.loads(out)["rms_pb_um"] > 50 * good["rms_pb_um"]
+    assert good["findings"] == []
+    assert "--fix and --as-is exclude each other" in hybridsep("backtest", log, *MACHINE, "--as-is", "--fix")[2]
+
+
+def test_gaps_and_jitter(hybridsep: Run, tmp_path: Path) -> None:
+    t = np.arange(3000) * 1e-3
+    t += np.random.default_rng(1).uniform(-2e-4, 2e-4, len(t))
+    rows = np.column_stack((t, commanded()[:3000], measured(0)[:3000]))
+    keep = np.r_[0:900, 960:3000]
+    np.savetxt(tmp_path / "log.csv", rows[keep], delimiter=",", header="t,x_d,x", comments="", fmt="%.17g")
+    status, _, err = hybridsep("backtest", tmp_path / "log.csv", *MACHINE)
+    assert status == 2
+    assert "60 samples are missing in 1 gap" in err
+    np.savetxt(tmp_path / "jitter.csv", rows, delimiter=",", header="t,x_d,x", comments="", fmt="%.17g")
+    status, _, err = hybridsep("backtest", tmp_path / "jitter.csv", *MACHINE)
+    assert status == 2
+    assert "time 't' must be uniform" in err
+    assert "(--fix, --T_s)" in err
+    status, out, err = hybridsep("backtest", tmp_path / "log.csv", *MACHINE, "--fix", "--json")
+    assert status == 0
+    assert json.loads(out)["n_samples"] == pytest.approx(2040, abs=1)
+    assert "log.csv: of 2 segments the longest, 20" in err
+    assert [finding["name"] for finding in json.loads(out)["findings"]] == ["gaps", "jitter"]
+
+
+@pytest.mark.parametrize("suffix", [".png", ".pdf", ".svg"])
+def test_figures(hybridsep: Run, tmp_path: Path, suffix: str) -> None:
+    log, figure = write_log(tmp_path / "log.csv", n=1000), tmp_path / f"figure{suffix}"
+    assert hybridsep("backtest", log, *MACHINE, "--figure", figure)[0] == 0
+    first = figure.read_bytes()
+    assert first[:5] in (b"\x89PNG\r", b"%PDF-", b"<?xml")
+    assert hybridsep("backtest", log, *MACHINE, "--figure", figure)[0] == 0  # it is ours
+    assert figure.read_bytes() == first
+    if suffix != ".png":
+        figure.write_bytes(first.replace(b"hybridsep", b"somebody "))
+        status, _, err = hybridsep("backtest", log, *MACHINE, "--figure", figure)
+        assert status == 2
+        assert "exists and is no figure of hybridsep" in err
+    assert "--figure must end in .png or .pdf or .svg" in hybridsep("backtest", log, *MACHINE, "--figure", "a.jpg")[2]
+
+
+def test_saved_state_and_predictions(hybridsep: Run, tmp_path: Path) -> None:
+    log, state, table = write_log(tmp_path / "log.csv"), tmp_path / "my.state", tmp_path / "my.csv"
+    cold = json.loads(hybridsep("backtest", log, *MACHINE, "--save", state, "--save", table, "--json")[1])
+    assert HybridPredictor.load(state).k == 2500
+    predictions = np.genfromtxt(table, delimiter=",", names=True)
+    machine = load_machine("spring_mass_damper")
+    found = backtest(machine.new_predictor(), commanded()[:2500], measured(0)[:2500])
+    np.testing.assert_allclose(predictions["x_h"], found.x_h, atol=1e-12)
+    warm = json.loads(hybridsep("backtest", log, *MACHINE, "--weights", state, "--json")[1])
+    assert warm["rms_h_um"] < 0.8 * cold["rms_h_um"]
+    assert warm["rms_pb_um"] == pytest.approx(cold["rms_pb_um"], rel=1e-12)
+    status, _, err = hybridsep("backtest", log, *MACHINE, "--weights", state, "--p", 20)
+    assert status == 2
+    assert "my.state was not trained for machine spring_mass_damper: it has p = 50 instead of 20" in err
+    for option in ("--save", "--figure"):
+        other = tmp_path / ("user.csv" if option == "--save" else "user.pdf")
+        other.write_text("t,x_d,x\n0,0,0\n")
+        status, _, err = hybridsep("backtest", log, *MACHINE, option, other)
+        assert status == 2
+        assert f"{option} {other} exists and is no" in err
+    assert "is the same file as the log" in hybridsep("backtest", log, *MACHINE, "--save", log)[2]
+    assert "--save must end in .state or .csv or .npz" in hybridsep("backtest", log, *MACHINE, "--save", "a.bin")[2]
+
+
+def test_a_rotary_axis(hybridsep: Run, tmp_path: Path) -> None:
+    text = (data_folder("models") / "emps.toml").read_text(encoding="utf-8").partition("[log]")[0]
+    linear, rotary = tmp_path / "axis.toml", tmp_path / "table.toml"
+    linear.write_text(text, encoding="utf-8")
+    rotary.write_text(text.replace("T_s =", 'unit = "rad"\nT_s =', 1) + '[log]\nx = "angle"\n', encoding="utf-8")
+    t = np.arange(2500) * 1e-3
+    columns = np.column_stack((t, np.degrees(commanded()[:2500]), np.degrees(measured(0)[:2500])))
+    log = tmp_path / "log.csv"
+    np.savetxt(log, columns, delimiter=",", header="t,x_d [deg],angle [deg]", comments="", fmt="%.17g")
+    assert read_log(log, columns={"x": "angle"}).unit == "rad"
+    expected = json.loads(hybridsep("backtest", write_log(tmp_path / "m.csv"), "-m", linear, "--json")[1])
+    status, out, _ = hybridsep("backtest", log, "-m", rotary, "--json")
+    assert status == 0
+    assert json.loads(out)["rms_h_urad"] == pytest.approx(expected["rms_h_um"], rel=1e-6)
+    assert "prediction error in µrad" in hybridsep("backtest", log, "-m", rotary)[1]
+    # Where nothing is stated, the positions are in the machine's unit.
+    status, out, _ = hybridsep("backtest", tmp_path / "m.csv", "-m", rotary, "--x", "x", "--json")
+    assert json.loads(out)["rms_h_urad"] == pytest.approx(expected["rms_h_um"], rel=1e-9)
+    status, _, err = hybridsep("backtest", log, "-m", linear, "--x", "angle")
+    assert status == 2
+    assert "log.csv is in rad, but machine emps has unit = 'm'; correct the machine file, or say" in err

@@ -1,0 +1,44 @@
+"""``hybridsep example-log`` and the log that it writes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import example_log
+import numpy as np
+import pytest
+from command_line import Run
+
+from hybridsep import read_log
+from hybridsep.intake.check import check
+from hybridsep.logs.example import EXAMPLE
+
+
+def test_it_is_written_and_read(hybridsep: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert hybridsep("example-log") == (0, "example_axis.csv\n", "")
+    assert hybridsep("example-log", "--out", "logs/other.csv.gz")[0] == 0
+    log = read_log("example_axis.csv")
+    assert (len(log.t), log.T_s, log.unit, log.unit_stated) == (20_000, 1e-3, "m", True)
+    np.testing.assert_array_equal(read_log("logs/other.csv.gz").x_meas, log.x_meas)
+    assert EXAMPLE.stat().st_size < 300_000
+    # It is ours and may be written again; another file may not.
+    assert hybridsep("example-log")[0] == 0
+    Path("example_axis.csv").write_text("t,x_d,x\n0,0,0\n")
+    status, _, err = hybridsep("example-log")
+    assert status == 2
+    assert "--out example_axis.csv exists and is no example log of hybridsep; choose another name" in err
+    assert "--out must end in .csv or .gz, got 'log.mat'" in hybridsep("example-log", "--out", "log.mat")[2]
+
+
+def test_the_intake_has_nothing_to_say_of_it() -> None:
+    assert check(read_log(EXAMPLE)).findings == ()
+
+
+def test_it_is_what_its_script_makes() -> None:
+    log = read_log(EXAMPLE)
+    t, x_d, x_meas = example_log.table().T
+    np.testing.assert_allclose(log.t, t, atol=1e-12)
+    np.testing.assert_allclose(1e3 * log.x_d, x_d, atol=1e-9)
+    # A rounding to the encoder's resolution, 0.2 µm, may fall otherwise on another platform.
+    np.testing.assert_allclose(1e3 * log.x_meas, x_meas, atol=2.1e-4)

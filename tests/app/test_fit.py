@@ -1,0 +1,182 @@
+"""``hybridsep fit``: from a log to files that work, on samples that taught nothing; what is refused, and going on."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import Run
+from staircase_data import commanded, measured
+
+from hybridsep import HybridPredictor, load_machine, read_log
+from hybridsep.app import fit as fitting
+from hybridsep.app.fit import Fit, FitOptions, fit, fit_files, machine_name
+from hybridsep.app.fit_intake import take_in
+from hybridsep.app.fit_report import recommendation, write_report
+from hybridsep.base.errors import LogError, ParameterError
+from hybridsep.cosim.fmus import FmuController
+from hybridsep.tune.halves import halves, replay
+
+N = 3000
+NP = 50
+
+
+def write_rows(path: Path, x_d: np.ndarray, x: np.ndarray) -> Path:
+    columns = np.column_stack((np.arange(len(x)) * 1e-3, x_d, x))
+    np.savetxt(path, columns, delimiter=",", header="t,x_d,x_meas", comments="", fmt="%.17g")
+    return path
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_rows(tmp_path_factory.mktemp("log") / "axis.csv", commanded()[:N], measured(0)[:N])
+
+
+@pytest.fixture(scope="module")
+def fitted(log: Path) -> Fit:
+    out = log.parent / "out"
+    out.mkdir()
+    return fit([read_log(log)], out, FitOptions(NP, "axis"))
+
+
+def test_the_figures_are_of_a_causal_replay_with_the_machine_file(fitted: Fit, log: Path) -> None:
+    machine = load_machine(log.parent / "out" / "machine.toml")
+    assert machine == fitted.machine
+    found = read_log(log)
+    by_hand = replay(machine.new_predictor(), halves([(found.x_d, found.x_meas)], 0.5))
+    assert fitted.judged.rms() == by_hand.rms()
+    rms_pb, rms_hold, rms_h = by_hand.rms()
+    assert rms_h < 0.6 * min(rms_pb, rms_hold)
+    assert rms_h < 12e-6  # noise is 5 µm
+
+
+def test_the_fmus_begin_with_what_the_log_taught(fitted: Fit, log: Path) -> None:
+    found, trained = read_log(log), HybridPredictor.load(log.parent / "out" / "trained.state")
+    trained.restart()
+    x_d, x = found.x_d[: 6 * NP], found.x_meas[: 6 * NP]
+    expected = []
+    for i in range(0, len(x_d), NP):
+        expected.append(trained.predict(x_d[i : i + NP]).x_h)
+        trained.update(x[i : i + NP])
+    fmus = [path for path in fitted.files if path.suffix == ".fmu"]
+    assert len(fmus) == 2
+    for path in fmus:
+        controller = FmuController(path, {}, 0.0)
+        x_h = []
+        with controller:
+            controller.initialise(float(x_d[0]))
+            outputs = list(controller.kind.outputs)
+            for k in range(len(x_d) + NP):
+                x_h.append(controller.outputs()[0][outputs.index("x_h")])
+                ahead = float(x_d[min(k, len(x_d) - 1)])
+                controller.step(k, ahead, float(x[k - NP]) if k >= NP else float(x_d[0]))
+        np.testing.assert_allclose(x_h[NP:], np.concatenate(expected), rtol=0, atol=1e-9)
+
+
+def test_step_times_are_of_the_steps(fitted: Fit) -> None:
+    assert 0.0 < fitted.steps["median"] <= fitted.steps["p99_9"] <= fitted.steps["largest"]
+
+
+def test_a_second_run_goes_on_from_the_first(fitted: Fit, log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def never(*_arguments: object, **_options: object) -> None:
+        raise AssertionError("identified again")
+
+    monkeypatch.setattr(fitting, "identify_operation", never)
+    monkeypatch.setattr(fitting, "choose_settings", never)
+    out = log.parent / "out"
+    assert fit([read_log(log)], out, FitOptions(NP, "axis")).judged.rms() == fitted.judged.rms()
+    with pytest.raises(AssertionError, match="identified again"):
+        fit([read_log(log)], out, FitOptions(NP + 1, "axis"))
+
+
+def test_the_report_says_what_to_do_and_shows_the_figures(fitted: Fit, log: Path, tmp_path: Path) -> None:
+    used, findings = take_in([read_log(log, uniform=False)], fix=False)
+    write_report(tmp_path / "report.html", fitted, used, findings)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert recommendation(fitted).startswith("Use the hybrid: its error is 0.")
+    assert recommendation(fitted) in page
+    assert all(f"{1e6 * value:.4g}" in page for value in fitted.judged.rms())
+    assert "HybridPredictor_axis.fmu" in page
+    assert page.count('<div id="chart') == 4
+
+
+def test_the_command_line(hybridsep: Run, tmp_path: Path) -> None:
+    log = write_rows(tmp_path / "my axis.csv", commanded()[:800], measured(0)[:800])
+    status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", 40, "--json")
+    assert status == 0, err
+    result = json.loads(out)
+    assert result["settings"]["Np"] == 40
+    assert [one["Np"] for one in result["over_Np"]] == [8, 20, 40, 80]
+    assert set(result["files"].values()) == {str(path) for path in (tmp_path / "fit").iterdir()}
+    assert load_machine(tmp_path / "fit" / "machine.toml").name == "my_axis"
+    status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", 40)
+    assert status == 0, err
+    assert "Np = 40" in out
+    assert "report: " in out
+
+
+def test_a_flipped_sign_is_refused_until_it_is_fixed(hybridsep: Run, tmp_path: Path) -> None:
+    log = write_rows(tmp_path / "axis.csv", commanded()[:800], -measured(0)[:800])
+    status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit")
+    assert (status, out) == (2, "")
+    assert "sign" in err
+    assert "--fix" in err
+    used, findings = take_in([read_log(log, uniform=False)], fix=True)
+    assert [finding.name for finding in findings["axis.csv"]] == ["sign"]
+    np.testing.assert_allclose(used[0].x_meas, measured(0)[:800], atol=1e-15)
+
+
+def test_a_log_that_cannot_teach_a_model_is_predicted_by_its_command(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    log = write_rows(tmp_path / "still.csv", np.full(600, 0.1), 0.1 + 1e-6 * rng.normal(size=600))
+    used, findings = take_in([read_log(log, uniform=False)], fix=False)
+    assert [finding.name for finding in findings["still.csv"]] == ["too little motion"]
+    found = fit(used, tmp_path, FitOptions(20, "still"))
+    [reason] = found.identification["findings"]
+    assert reason.startswith("this log cannot teach a model, because")
+    rms_pb, _, rms_h = found.judged.rms()
+    assert rms_pb == pytest.approx(1e-6, rel=0.1)
+    assert rms_h <= 1.02 * rms_pb
+    write_report(tmp_path / "report.html", found, used, findings)
+
+
+def test_logs_of_different_sampling_are_refused(log: Path, tmp_path: Path) -> None:
+    found = read_log(log)
+    with pytest.raises(ParameterError, match=r"axis\.csv is sampled every 0\.002 s, axis\.csv every 0\.001 s"):
+        fit([found, replace(found, T_s=2e-3)], tmp_path, FitOptions(NP, "axis"))
+    with pytest.raises(ParameterError, match=r"axis\.csv is in rad, axis\.csv in m"):
+        fit([found, replace(found, unit="rad")], tmp_path, FitOptions(NP, "axis"))
+
+
+@pytest.mark.parametrize(
+    ("file", "name"),
+    [("axis.csv", "axis"), ("X axis-2.tar.gz", "X_axis_2"), ("2026 run.csv", "axis_2026_run"), ("µ.csv", "axis")],
+)
+def test_the_machine_is_named_after_the_log(file: str, name: str) -> None:
+    assert machine_name(Path(file)) == name
+
+
+def test_a_foreign_file_is_not_overwritten(hybridsep: Run, log: Path, tmp_path: Path) -> None:
+    (tmp_path / "machine.toml").write_text("# mine\n")
+    status, _, err = hybridsep("fit", log, "--out", tmp_path)
+    assert status == 2
+    assert "machine.toml exists and is no machine file of hybridsep fit" in " ".join(err.split())
+    status, _, err = hybridsep("fit", log, "--out", tmp_path, "--name", "no name")
+    assert status == 2
+    assert "--name must be" in err
+
+
+def test_all_files_are_declared(fitted: Fit, log: Path) -> None:
+    declared = fit_files(log.parent / "out", "axis")
+    assert set(fitted.files) == set(declared.values())
+    written = {path for path in declared.values() if path.exists()}
+    assert set(declared.values()) - written <= {declared["report"]}
+
+
+def test_unfixable_logs_are_refused(tmp_path: Path) -> None:
+    log = write_rows(tmp_path / "axis.csv", commanded()[:800], 4e-5 * measured(0)[:800])
+    with pytest.raises(LogError, match="scale"):
+        take_in([read_log(log, uniform=False)], fix=False)

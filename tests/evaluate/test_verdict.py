@@ -1,0 +1,147 @@
+"""Verdicts in words, on made-up errors and on replays."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from trusted_cases import FRICTION, cycles, friction, physics, trusted
+
+from hybridsep.base.settings import PredictorSettings
+from hybridsep.base.signals import Array
+from hybridsep.cosim.loop import cosimulate
+from hybridsep.evaluate.backtest import backtest
+from hybridsep.evaluate.verdict import Tally, Verdict, verdict_of
+from hybridsep.machine import load_machine
+from hybridsep.plants.trajectory import staircase
+from hybridsep.predict.predictor import HybridPredictor
+
+NP = 30
+UM = 1e-6
+NOISE = np.random.default_rng(0).normal(size=NP)
+HALF = np.arange(NP) < NP // 2
+MOVING = np.linspace(0.0, 1e-3 * (NP - 1), NP)
+
+
+def errors(*sizes: Array | float) -> Array:
+    """Return errors of physics model, hold and hybrid of these sizes, ``(3, NP)``, m."""
+    return np.array([UM * NOISE * np.broadcast_to(size, NP) for size in sizes], dtype=np.float64)
+
+
+def verdict(
+    pb: Array | float, hold: Array | float, h: Array | float, *, n: int = 40, motion: Array | float = 1e-3, **how: int
+) -> Verdict:
+    """Return the verdict on ``n`` windows with these errors, µm; the axis moves by ``motion``, m a sample."""
+    tally, x_d = Tally(NP), 0.0
+    for _ in range(n):
+        command = x_d + np.cumsum(np.full(NP, motion))
+        x_d = float(command[-1])
+        tally.add(command, np.zeros(NP), errors(pb, hold, h))
+    return tally.verdict(**how)
+
+
+def test_better_everywhere() -> None:
+    found = verdict(10, 8, 4)
+    assert (found.ratio_pb, found.ratio_hold) == pytest.approx((0.4, 0.5))
+    assert str(found) == (
+        "Better than the physics model: 0.4 × its RMS error, in motion, over the whole window.\n"
+        "Better than hold: 0.5 × its RMS error, in motion, over the whole window."
+    )
+
+
+def test_places_where_it_is_worse() -> None:
+    motion = np.where(HALF, 0.0, 1e-3)
+    said = str(verdict(10, 10, np.where(HALF, 11, 1), motion=motion))
+    assert said.splitlines()[0].endswith("; worse at standstill and in the first third of the window.")
+    said = str(verdict(10, np.where(HALF, 1, 20), 5, motion=motion))
+    assert "Better than the physics model: 0.5 × its RMS error, at standstill and in motion, over the whole" in said
+    assert "Better than hold" in said
+    assert said.endswith("; worse at standstill and in the first third of the window.")
+    assert str(verdict(10, 10, 20, motion=motion)).startswith("Worse than the physics model: 2 × its RMS error, every")
+
+
+def test_alike_is_neither_better_nor_worse() -> None:
+    assert str(verdict(100, 101, 101)).splitlines() == [
+        "As good as the physics model: 1.01 × its RMS error.",
+        "As good as hold: 1 × its RMS error.",
+    ]
+    assert str(verdict(0, 0, 0)).startswith("As good as the physics model: 1 × its RMS error.")
+    assert str(verdict(0, 0, 1)).startswith("Worse than the physics model: inf × its RMS error, everywhere.")
+
+
+@pytest.mark.parametrize(
+    ("sizes", "motion", "cause"),
+    [
+        (
+            (10, 10, 60),
+            1e-3,
+            "Why: the prediction is unstable: it leaves the physics model by 5 × the largest residual.",
+        ),
+        ((10, 10, 12), np.where(np.arange(NP) < 1, 1e-3, 0.0), "Why: too little motion to learn from, 3.2 % of the"),
+        ((10, 3, 5), 1e-3, "Why: the residual changes so slowly that its last value says more than the motion does."),
+        ((10, 10, 15), 1e-3, "Why: the residual does not repeat with the motion."),
+    ],
+)
+def test_causes(sizes: tuple[float, float, float], motion: Array | float, cause: str) -> None:
+    assert cause in str(verdict(*sizes, motion=motion))
+    assert "Why" not in str(verdict(10, 10, 5, motion=motion))
+
+
+def test_a_bad_beginning_is_told_from_a_bad_model() -> None:
+    tally, x_d = Tally(NP), MOVING
+    for k in range(60):
+        tally.add(x_d + k * NP * 1e-3, np.zeros(NP), errors(10, 10, 28 if k < 10 else 2))
+    found = tally.verdict()
+    assert found.ratio_pb > 1.1
+    assert found.causes == ("only the first 10 windows are worse, where next to nothing is learned yet",)
+
+
+def test_rejected_measurements_are_told() -> None:
+    said = str(verdict(10, 10, 5, n_rejected=7))
+    assert said.endswith("\n7 of 1200 measurements were missing or not plausible, and not learned.")
+
+
+def test_missing_measurements_are_not_judged() -> None:
+    tally, x = Tally(NP), np.zeros(NP)
+    x[:3] = np.nan
+    tally.add(MOVING, x, errors(10, 8, 4))
+    tally.add(MOVING, np.full(NP, np.nan), np.ones((3, NP)))
+    found = tally.verdict(n_rejected=NP + 3)
+    assert found.ratio_pb == pytest.approx(0.4)
+    assert found.n_samples == 2 * NP
+
+
+def test_of_replays() -> None:
+    x_d = cycles(6000)
+    x = physics(x_d) + friction(x_d, FRICTION) + np.random.default_rng(1).normal(0.0, 1e-6, len(x_d))
+    good = backtest(trusted(), x_d, x).verdict
+    assert good.worse == ((), ())
+    assert max(good.ratio_pb, good.ratio_hold) < 0.6
+    x[3000:3010] = np.nan
+    told = backtest(trusted(), x_d, x).verdict
+    assert told.n_rejected >= 10
+    # At rest there is nothing but noise; with a small penalty the first weights of the paper's model are nonsense.
+    noise = np.random.default_rng(2).normal(0.0, 1e-6, 3000)
+    paper = HybridPredictor(trusted().model, PredictorSettings(trust=False, t_init=0.0, Np=20, p=19, lam=1e-30))
+    bad = backtest(paper, np.zeros(3000), noise).verdict
+    assert bad.ratio_pb > 1.02
+    assert bad.causes[0].startswith(("too little motion", "the prediction is unstable", "only the first"))
+
+
+def test_of_a_run() -> None:
+    machine = load_machine("spring_mass_damper")
+    run = cosimulate(machine.new_predictor(), machine.new_plant(), staircase()[:2500])
+    found = verdict_of(run)
+    assert found.ratio_pb == pytest.approx(run.summary()["rms_h_um"] / run.summary()["rms_pb_um"])
+    assert found.ratio_hold == pytest.approx(run.summary()["ratio_to_hold"])
+    assert str(found).startswith("Better than the physics model")
+    assert "not learned" not in str(found)
+
+
+def test_outliers_of_a_run_are_told() -> None:
+    machine = load_machine("spring_mass_damper")
+    predictor = HybridPredictor(machine.model)
+    run = cosimulate(
+        predictor, machine.new_plant(), staircase()[:1000], sensor=lambda k, x: x + 1e-3 if k in (555, 666) else x
+    )
+    assert run.n_rejected == 2
+    assert str(verdict_of(run)).endswith("2 of 1000 measurements were missing or not plausible, and not learned.")

@@ -1,0 +1,49 @@
+"""FMU of a rotary axis: radians for metres, shown in degrees."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import fmpy
+import pytest
+
+from hybridsep import build_fmu, load_machine
+from hybridsep.base.data_files import data_folder
+from hybridsep.base.errors import MachineError
+from hybridsep.fmi.archive import fmu_description
+from hybridsep.fmi.variables import variables_of
+
+
+def rotary(folder: Path, machine: str = "emps") -> Path:
+    text = (data_folder("models") / f"{machine}.toml").read_text(encoding="utf-8")
+    path = folder / "table.toml"
+    path.write_text(text.replace("T_s =", 'unit = "rad"\nT_s =', 1), encoding="utf-8")
+    return path
+
+
+def test_units(tmp_path: Path) -> None:
+    machine = load_machine(rotary(tmp_path))
+    table = {v.name: v for v in variables_of(fmu_description(machine, "HybridPredictor", "HybridPredictor"))}
+    assert (table["x_h"].unit, table["x_h"].display_unit) == ("rad", "deg")
+    assert (table["e_servo"].unit, table["e_servo"].display_unit) == ("rad", "urad")
+    assert (table["lambda"].unit, table["T_s"].unit, table["mode[1].f_n"].unit) == ("rad2", "s", "Hz")
+    assert not {variable.unit for variable in table.values()} & {"m", "m2", "m/s"}
+
+
+def test_the_fmu_is_valid(tmp_path: Path) -> None:
+    path = build_fmu(load_machine(rotary(tmp_path)), "HybridPredictorPy_emps", tmp_path, flavour="python")
+    description = fmpy.read_model_description(path, validate=True)
+    units = {unit.name: unit for unit in description.unitDefinitions}
+    assert units["rad"].baseUnit.rad == 1
+    assert "m" not in units
+    positions = {v.name: (v.unit, v.displayUnit) for v in description.modelVariables}
+    assert positions["x_d_ahead"] == ("rad", "deg")
+
+
+def test_a_plant_is_a_linear_axis(tmp_path: Path) -> None:
+    with pytest.raises(MachineError, match=r"a machine with a plant must have unit = 'm': the plants are linear axes"):
+        load_machine(rotary(tmp_path, "spring_mass_damper"))
+    path = rotary(tmp_path)
+    path.write_text(path.read_text(encoding="utf-8").replace('"rad"', '"deg"'), encoding="utf-8")
+    with pytest.raises(MachineError, match=r"unit: Input should be 'm' or 'rad', got 'deg'"):
+        load_machine(path)

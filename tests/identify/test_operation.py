@@ -1,0 +1,231 @@
+"""Identification from operation: simulated axes are found again, recordings that teach nothing are refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from identification_cases import T_S, correlated, measured, moves
+from places import EMPS, ROOT
+from scipy import io
+
+from hybridsep import ModalModel, Mode
+from hybridsep.base.errors import IdentificationError
+from hybridsep.base.signals import Array
+from hybridsep.identify.model import IdentifiedModel
+from hybridsep.identify.operation import identify_operation, unit_gain_model
+from hybridsep.identify.output_error import Delay, fit_structure
+from hybridsep.identify.segments import as_segments
+from hybridsep.identify.structure import Structure, lag_mode
+from hybridsep.identify.uncertainty import estimates
+
+LAG = ModalModel([lag_mode(8e-3)], dead_time=3)
+SECOND = ModalModel([Mode(20.0, 0.4, (40 * np.pi) ** 2, 0.0)])
+RECORDINGS = ROOT.parent / "shared" / "data" / "recordings"
+
+
+def value(found: IdentifiedModel, name: str) -> tuple[float, float]:
+    estimate = next(estimate for estimate in found.parameters if estimate.name == name)
+    return estimate.value, estimate.std
+
+
+def difference(found: IdentifiedModel, truth: ModalModel, input_hold: str, x_d: Array) -> float:
+    """Return the largest difference of the responses to a command, m."""
+    ours = measured(found.model, x_d, found.input_hold)
+    return float(np.abs(ours - measured(truth, x_d, input_hold)).max())
+
+
+def test_a_lag_as_a_mode_is_exact() -> None:
+    omega = np.geomspace(0.1, 1e4, 50)
+    G = ModalModel([lag_mode(5e-3, 0.9)]).frequency_response(omega)
+    np.testing.assert_allclose(G, 0.9 / (1 + 5e-3j * omega), rtol=1e-12)
+
+
+def test_a_lag_with_dead_time_is_found() -> None:
+    x_d = moves(2000)
+    found = identify_operation([(x_d, measured(LAG, x_d, "zoh", 1e-6))], T_S)
+    assert found.structure == "first-order lag, gain 1"
+    assert (found.model.dead_time, found.input_hold) == (3, "zoh")
+    tau, std = value(found, "lag.tau")
+    assert 0 < std < 5e-6
+    assert abs(tau - 8e-3) < 4 * std
+    assert found.rms == pytest.approx(1e-6, rel=0.05)
+
+
+def test_a_second_order_axis_is_found() -> None:
+    x_d = moves(2000)
+    found = identify_operation([(x_d, measured(SECOND, x_d, "foh", 1e-6))], T_S)
+    assert found.structure == "second order, gain 1"
+    for name, truth in (("mode[1].f_n", 20.0), ("mode[1].zeta", 0.4)):
+        estimate, std = value(found, name)
+        assert 0 < std < 0.002 * truth
+        assert abs(estimate - truth) < 4 * std
+    assert difference(found, SECOND, "foh", x_d) < 1e-6
+
+
+def test_two_modes_are_found_with_a_gain() -> None:
+    omegas = 2 * np.pi * np.array([25.0, 60.0])
+    truth = ModalModel([Mode(25.0, 0.3, 0.72 * omegas[0] ** 2, 20.0), Mode(60.0, 0.1, 0.26 * omegas[1] ** 2, -10.0)])
+    x_d = moves(1500)
+    found = identify_operation([(x_d, measured(truth, x_d, "foh", 1e-7))], T_S)
+    assert found.structure == "2 modes, gain free"
+    assert sorted(value(found, f"mode[{i}].f_n")[0] for i in (1, 2)) == pytest.approx([25.0, 60.0], rel=0.01)
+    assert value(found, "gain")[0] == pytest.approx(0.98, abs=1e-4)
+    assert difference(found, truth, "foh", x_d) < 2e-6
+
+
+def test_a_recording_that_starts_in_motion_is_used() -> None:
+    x_d = moves(2000)
+    x = measured(SECOND, x_d, "foh", 1e-6)
+    start = int(np.argmax(np.abs(np.diff(x_d)))) - 5
+    found = identify_operation([(x_d[start:], x[start:])], T_S)
+    assert "starts in motion" in " ".join(found.findings)
+    assert value(found, "mode[1].f_n")[0] == pytest.approx(20.0, rel=0.002)
+
+
+def test_a_recording_that_rests_most_of_the_time_is_used() -> None:
+    x_d = np.concatenate((np.zeros(3000), moves(600), np.full(3000, moves(600)[-1])))
+    x = measured(LAG, x_d, "zoh", 1e-6)
+    found = identify_operation([(x_d, x)], T_S)
+    assert "moves in" in " ".join(found.findings)
+    assert value(found, "lag.tau")[0] == pytest.approx(8e-3, rel=0.01)
+
+
+def test_pieces_between_gaps_count_together() -> None:
+    x_d = moves(2000)
+    x = measured(SECOND, x_d, "foh", 1e-6)
+    found = identify_operation([(x_d[:900], x[:900]), (x_d[1000:], x[1000:])], T_S)
+    assert value(found, "mode[1].f_n")[0] == pytest.approx(20.0, rel=0.002)
+    assert found.n_samples == 1900
+
+
+def test_the_parts_with_most_motion_are_taken_of_a_long_recording() -> None:
+    x_d = np.concatenate((moves(12_000), np.full(90_000, moves(12_000)[-1])))
+    segments = as_segments([(x_d, x_d)])
+    assert sum(len(segment.u) for segment in segments) <= 60_000
+    assert sum(float(segment.motion[-1]) for segment in segments) > 0.99 * float(np.abs(np.diff(x_d)).sum())
+
+
+def test_an_offset_is_no_part_of_the_model() -> None:
+    x_d = moves(2000)
+    found = identify_operation([(x_d, measured(SECOND, x_d, "foh", 1e-6) + 5e-3)], T_S)
+    offset, std = value(found, "offset")
+    assert abs(offset - 5e-3) < 4 * std < 1e-6
+    assert value(found, "mode[1].f_n")[0] == pytest.approx(20.0, rel=0.002)
+
+
+def test_the_static_gain_may_be_given() -> None:
+    x_d = moves(1500)
+    x = 0.9 * measured(SECOND, x_d, "foh", 1e-6)
+    free = identify_operation([(x_d, x)], T_S, order_max=2)
+    assert free.model.dc_gain == pytest.approx(0.9, abs=1e-4)
+    unit = identify_operation([(x_d, x)], T_S, unit_gain=True, order_max=2)
+    assert unit.model.dc_gain == pytest.approx(1.0, abs=1e-12)
+    assert unit.rms > 10 * free.rms
+
+
+def test_deviations_hold_for_a_residual_that_is_not_white() -> None:
+    x_d = moves(3000)
+    x = measured(LAG, x_d)
+    structure, delay = Structure(0, lag=True), Delay(7)
+    found, stated, effective = [], [], []
+    for seed in range(60):
+        segments = as_segments([(x_d, x + correlated(len(x), 5e-6, seed))])
+        fit = fit_structure(segments, T_S, structure, delay, [np.log([100.0])], 1.0)
+        parameters, n_effective = estimates(fit, segments, T_S)
+        found.append(parameters[1].value)
+        stated.append(parameters[1].std)
+        effective.append(n_effective)
+    assert 0.6 < np.median(stated) / np.std(found) < 1.5
+    assert np.median(effective) < 0.1 * len(x)
+
+
+X_D = moves(1500)
+
+
+@pytest.mark.parametrize(
+    ("x_d", "x", "reason"),
+    [
+        (np.full(500, 0.1), X_D[:500], "commanded position does not move"),
+        (X_D, np.zeros(len(X_D)), "measured position does not move"),
+        (X_D, -X_D, "turn the sign"),
+        (X_D[:60], X_D[:60], "it has 60 samples"),
+    ],
+    ids=["rest", "stuck", "sign", "short"],
+)
+def test_what_teaches_nothing_is_refused(x_d: Array, x: Array, reason: str) -> None:
+    with pytest.raises(IdentificationError, match=f"cannot teach a model, because .*{reason}"):
+        identify_operation([(x_d, x)], T_S)
+
+
+def test_too_little_motion_gives_a_gain_of_one() -> None:
+    x_d = moves(1500) * 2e-4
+    found = identify_operation([(x_d, measured(SECOND, x_d, "foh", 5e-7))], T_S)
+    assert found.structure == "gain alone, gain 1"
+    assert "too little motion" in found.findings[0]
+    np.testing.assert_allclose(measured(found.model, x_d, found.input_hold), x_d, atol=1e-8)
+
+
+def test_the_last_resort_follows_its_command() -> None:
+    found = unit_gain_model(T_S, "nothing moved")
+    assert found.findings == ("nothing moved",)
+    np.testing.assert_allclose(measured(found.model, X_D, found.input_hold), X_D, atol=1e-5)
+
+
+def test_the_summary_is_json() -> None:
+    found = identify_operation([(X_D, measured(SECOND, X_D, "foh", 1e-6))], T_S, order_max=2)
+    summary = json.loads(json.dumps(found.summary()))
+    assert summary["structure"] == found.structure
+    assert len(summary["alternatives"]) == len(found.alternatives) == 8
+
+
+def half(name: str) -> tuple[Array, Array, float]:
+    _, x_d, x = np.loadtxt(RECORDINGS / f"{name}.csv", delimiter=",", skiprows=1).T
+    return x_d, x, 0.002 if name.startswith("cnc") else 0.0053
+
+
+def physics_error(found: IdentifiedModel, x_d: Array, x: Array) -> float:
+    """Return the RMS error of the physics model on the second half, m."""
+    discrete = found.model.discretise(found.T_s, found.input_hold)
+    x_pb = discrete.forced_response(discrete.rest(), x_d - x_d[0])[0] + x_d[0]
+    return float(np.sqrt(np.mean((x - x_pb)[len(x) // 2 :] ** 2)))
+
+
+@pytest.mark.skipif(not EMPS.is_file(), reason=f"the recorded axis is not at {EMPS}")
+def test_the_recorded_axis_is_predicted() -> None:
+    """At most 7.2 µm on the second half, where the published constants leave 15.4."""
+    data = io.loadmat(EMPS)
+    x_d, x = data["qg"].ravel(), data["qm"].ravel()
+    n = len(x) // 2
+    found = identify_operation([(x_d[:n], x[:n])], 1e-3)
+    assert physics_error(found, x_d, x) < 6.65e-6
+
+
+@pytest.mark.skipif(not RECORDINGS.is_dir(), reason=f"the recordings are not at {RECORDINGS}")
+@pytest.mark.parametrize(
+    ("name", "limit"), [("cnc_a_axis1", 48e-6), ("cnc_a_axis2", 1.6e-6), ("xl330_kp200", 0.19), ("xl330_kp800", 0.25)]
+)
+def test_recordings_get_a_model(name: str, limit: float) -> None:
+    x_d, x, T_s = half(name)
+    n = len(x) // 2
+    found = identify_operation([(x_d[:n], x[:n])], T_s)
+    assert physics_error(found, x_d, x) < limit
+
+
+@pytest.mark.skipif(not RECORDINGS.is_dir(), reason=f"the recordings are not at {RECORDINGS}")
+def test_a_half_at_rest_is_refused() -> None:
+    x_d, x, T_s = half("cnc_a_axis6")
+    n = len(x) // 2
+    with pytest.raises(IdentificationError, match="does not move"):
+        identify_operation([(x_d[:n], x[:n])], T_s)
+    assert identify_operation([(x_d, x)], T_s).model.dc_gain == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_machine_of_the_model(tmp_path: Path) -> None:
+    found = unit_gain_model(T_S, "nothing moved")
+    machine = found.machine("axis", "An axis", predictor={"Np": 20, "p": 20})
+    assert machine.model == found.model
+    assert machine.predictor_settings.Np == 20
+    assert machine.predictor_settings.input_hold == found.input_hold

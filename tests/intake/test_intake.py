@@ -1,0 +1,171 @@
+"""Intake: faults are found and named, good logs are not accused, fixes put logs right."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from places import EMPS, RECORDINGS
+from spoiled_logs import FAULTS, GOOD, good, log_of
+
+from hybridsep import load_machine
+from hybridsep.intake.check import apply, check
+from hybridsep.intake.finding import HOPELESS, NAMES, Finding
+from hybridsep.intake.relation import shifted
+from hybridsep.logs.log import Log, read_log
+
+SPOILED = ("staircase", "cnc_a_axis2.csv")
+"""Logs that every fault is made in; ``benchmarks/intake.py`` does so in more."""
+
+MACHINES = {"staircase": "spring_mass_damper", "stage x": "als25010_x", "EMPS": "emps"}
+
+
+def needed(name: str) -> Log:
+    if (name == "EMPS" and not EMPS.is_file()) or (name.endswith((".csv", ".json")) and not RECORDINGS.is_dir()):
+        pytest.skip("needs ../shared/data beside the repository")
+    return good(name)
+
+
+def names(findings: tuple[Finding, ...]) -> list[str]:
+    return [finding.name for finding in findings]
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_a_good_log_is_not_accused(name: str) -> None:
+    log = needed(name)
+    machine = load_machine(MACHINES[name]) if name in MACHINES else None
+    assert check(log, machine).findings == ()
+    if machine is not None:
+        assert check(log).findings == ()
+
+
+@pytest.mark.parametrize("name", SPOILED)
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_is_found_and_named(name: str, fault: str) -> None:
+    expected, spoil = FAULTS[fault]
+    found = check(spoil(needed(name))).findings
+    assert expected in names(found)
+    for finding in found:
+        assert finding.name in NAMES
+        assert finding.severity in ("error", "warning", "note")
+        assert all(np.isfinite(value) for value in finding.evidence.values())
+        assert all(len(x) == len(y) > 0 for x, y in finding.picture.lines.values())
+        assert (finding.fix is None) == (finding.name == HOPELESS)
+        assert str(finding).startswith(f"{finding.severity}: {finding.name}: {finding.words}.")
+        pickle.loads(pickle.dumps(finding))
+    # A time that is taken out leaves a gap.
+    assert set(names(found)) <= {expected, "gaps"} if expected == "time order" else names(found) == [expected]
+
+
+@pytest.mark.parametrize("fault", [fault for fault, (name, _) in FAULTS.items() if name != HOPELESS])
+def test_a_fix_leaves_nothing_to_find(fault: str) -> None:
+    expected, spoil = FAULTS[fault]
+    log = needed("staircase")
+    intake = check(spoil(log))
+    assert intake.usable
+    fixed = intake.fixed()
+    assert expected not in names(check(fixed).findings)
+    if expected in ("sign", "scale", "offset", "unit", "columns swapped"):
+        np.testing.assert_allclose(fixed.x_meas, log.x_meas, atol=2e-3 * np.ptp(log.x_d))
+        np.testing.assert_allclose(fixed.x_d, log.x_d, rtol=1e-12)
+    if expected == "outliers":
+        assert np.abs(fixed.x_meas - log.x_meas).max() < 3e-4
+    if expected == "delay":
+        assert np.abs(fixed.x_meas - np.interp(fixed.t, log.t, log.x_meas)).max() < 2e-4
+
+
+@pytest.mark.parametrize("name", MACHINES)
+@pytest.mark.parametrize("delay", [10.0, 6.5, -8.0])
+def test_a_delay_is_measured_against_the_model(name: str, delay: float) -> None:
+    log = needed(name)
+    (finding,) = check(replace(log, x_meas=shifted(log.x_meas, delay)), load_machine(MACHINES[name])).findings
+    assert finding.name == "delay"
+    assert finding.evidence["delay"] == pytest.approx(delay, abs=0.6)
+
+
+@pytest.mark.parametrize("fault", ["flipped", "offset of a third", "slow sensor", "five spikes", "10 samples late"])
+@pytest.mark.parametrize("scale", [1e-4, 30.0])
+def test_findings_do_not_depend_on_the_scale(fault: str, scale: float) -> None:
+    """Only the unit is a matter of scale, and it is not if it is stated."""
+    spoiled = FAULTS[fault][1](needed("staircase"))
+    other = replace(spoiled, x_d=scale * spoiled.x_d, x_meas=scale * spoiled.x_meas, unit_stated=True)
+    for one, same in zip(check(spoiled).findings, check(other).findings, strict=True):
+        assert one.name == same.name
+
+
+def test_several_faults_at_once() -> None:
+    log = needed("staircase")
+    spoiled = log
+    for fault in ("five spikes", "flipped", "mm for m", "rows lost"):
+        spoiled = FAULTS[fault][1](spoiled)
+    intake = check(spoiled)
+    assert names(intake.findings) == ["gaps", "outliers", "sign", "scale"]
+    assert len(intake.fixed().segments()) == 3
+    some = apply(spoiled, intake.findings[:1])
+    assert names(check(some).findings) == ["outliers", "sign", "scale"]
+
+
+def test_what_no_fix_helps() -> None:
+    still = check(FAULTS["no motion"][1](needed("staircase")))
+    assert not still.usable
+    assert still.errors == ()
+    assert "the command never moves: this log cannot teach a model" in still.findings[0].words
+    log = needed("staircase")
+    another = check(replace(log, x_meas=np.cumsum(np.random.default_rng(1).normal(0.0, 1e-4, len(log.t)))))
+    assert "hardly follows the command" in another.findings[0].words
+    assert not another.usable
+
+
+def test_missing_measurements() -> None:
+    log = needed("staircase")
+    x = log.x_meas.copy()
+    x[500:520] = np.nan
+    (finding,) = check(replace(log, x_meas=x)).findings
+    assert (finding.name, finding.severity) == ("missing samples", "note")
+    assert "20 of 6001 measured positions are missing; the first is sample 501" in finding.words
+    assert np.isfinite(apply(replace(log, x_meas=x), [finding]).x_meas).all()
+    nothing = check(replace(log, x_meas=np.full_like(x, np.nan)))
+    assert "every measured position is missing" in nothing.findings[0].words
+
+
+def test_words() -> None:
+    log = needed("staircase")
+
+    def words(fault: str) -> str:
+        return str(check(FAULTS[fault][1](log)).findings[0])
+
+    assert "the measured position runs against the command (gain -0.999" in words("flipped")
+    assert "999.143 times the commanded one: measured in mm, commanded in m. Fix: multiply" in words("mm for m")
+    assert "is +0.249989 m away from the commanded one throughout, 8.3 of the travel" in words("offset of 0.25 m")
+    assert "47 samples are missing in 2 gaps, the longest of 0.041 s; the first is before sample 201" in words(
+        "rows lost"
+    )
+    assert "9.9 samples (9.91 ms) too late against the motion that a drive" in words("10 samples late")
+    assert "shift the measured position by -10 samples" in words("10 samples late")
+
+
+def test_sampling_rate_against_the_machine() -> None:
+    machine = load_machine("spring_mass_damper")
+    log = needed("staircase")
+    slow = log_of(log.x_d[::20], log.x_meas[::20], 0.02)
+    (finding,) = [finding for finding in check(slow, machine).findings if finding.name == "sampling rate"]
+    assert (finding.severity, finding.fix) == ("error", None)
+    assert "has 2 samples a period of the machine's mode at 25 Hz" in finding.words
+    half = log_of(log.x_d[::2], log.x_meas[::2], 0.002)
+    (finding,) = [finding for finding in check(half, machine).findings if finding.name == "sampling rate"]
+    assert "sampled every 0.002 s, the machine file says T_s = 0.001 s" in finding.words
+    assert finding.fix is not None
+    assert finding.fix.change(half).T_s == 0.001
+    assert len(finding.fix.change(half).t) == len(log.t)
+
+
+@pytest.mark.skipif(not RECORDINGS.is_dir(), reason="needs ../shared/data/recordings beside the repository")
+def test_a_recording_with_an_uneven_clock() -> None:
+    log = read_log(RECORDINGS / "xl330_kp100_raw_jitter.csv", uniform=False)
+    intake = check(log)
+    assert names(intake.findings) == ["jitter", "start in motion"]
+    fixed = intake.fixed()
+    np.testing.assert_allclose(np.diff(fixed.t), log.T_s)
+    assert "jitter" not in names(check(fixed).findings)

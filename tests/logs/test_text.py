@@ -1,0 +1,166 @@
+"""Text logs: preamble, comments, units, encodings, decimal commas, compression; and what is wrong in one."""
+
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+
+import numpy as np
+import pytest
+from log_files import columns, write, write_csv
+
+from hybridsep.base.errors import LogError
+from hybridsep.logs.log import open_log, read_log
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        # Preambles, comments and rows of units
+        "Machine;A 12\nDate;2023-12-21\n\nt;x_d;x\n0;1;2\n1;3;4\n",
+        "Recorded by nobody, on 3 days\nFile 7\nt,x_d,x\n0,1,2\n1,3,4\n",
+        "# machine A\n% two marks\n// three\nt,x_d,x\n0,1,2\n# paused, here\n1,3,4\n",
+        "# t,x_d,x\n# recorded yesterday\n0,1,2\n1,3,4\n",
+        "t;x_d;x\ns;m;m\n0;1;2\n1;3;4\n",
+        "t;x_d;x\n[s];[m];[-]\n0;1;2\n1;3;4\n",
+        "3 4 5\nt x_d x\n0 1 2\n1 3 4\n",
+        "".join(f"key {i}: value\n" for i in range(300)) + "t,x_d,x\n0,1,2\n1,3,4\n",
+        # Decimal commas, with every delimiter that leaves them readable
+        "t;x_d;x\n0;1,0;2\n1;3;4,0\n",
+        "t\tx_d\tx\n0,0\t1,0\t2,0\n1,0\t3,0\t4,0\n",
+        "t x_d x\n0,0 1,0 2,0\n1,0 3,0 4,0\n",
+        't,x_d,x\n0,"1,0","2,0"\n1,"3,0","4,0"\n',
+        # Names beside which the units stand
+        "t [s],x_d [m],x [m]\n0,1,2\n1,3,4\n",
+        "t (ms);x_d (mm);x (µm)\n0;1000;2e6\n1000;3000;4e6\n",
+        "time_ms,x_d_mm,x_meas_mm\n0,1000,2000\n1000,3000,4000\n",
+        "t / us\tx_d in mm\tx / m\n0\t1000\t2\n1e6\t3000\t4\n",
+        "t;x_d;x\nms;mm;um\n0;1000;2e6\n1000;3000;4e6\n",
+        # Names that a controller has
+        "Time [s],Position Commanded [mm],Position Actual [mm]\n0,1000,2000\n1,3000,4000\n",
+        "Timestamp,POS_CMD,POS_ACT\n0,1,2\n1,3,4\n",
+        "t,x_d,x,x_m\n0,1,2,9\n1,3,4,9\n",
+    ],
+)
+@pytest.mark.parametrize("encoding", ["utf-8", "latin-1", "utf-16"])
+def test_layouts(tmp_path: Path, text: str, encoding: str) -> None:
+    log = read_log(write_csv(tmp_path / "log", text, encoding))
+    np.testing.assert_allclose([log.t, log.x_d, log.x_meas], [[0, 1], [1, 3], [2, 4]], rtol=1e-15)
+    assert (log.T_s, log.unit) == (1.0, "m")
+
+
+def test_latin_1_far_down(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_bytes(
+        b"t,x_d,x,note\n" + b"".join(b"%g,0,0,\n" % (0.1 * i) for i in range(20_000)) + b"2000,0,0,\xe9t\xe9"
+    )
+    assert len(read_log(path).t) == 20_001
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor", "si"),
+    [("mm", 1e-3, "m"), ("nm", 1e-9, "m"), ("in", 0.0254, "m"), ("°", np.pi / 180, "rad"), ("rev", 2 * np.pi, "rad")],
+)
+def test_units(tmp_path: Path, unit: str, factor: float, si: str) -> None:
+    log = read_log(write_csv(tmp_path / "log.csv", f"t,x_d [{unit}],x [{unit}]\n0,1,2\n1,3,4\n"))
+    np.testing.assert_allclose(log.x_meas, [2 * factor, 4 * factor], rtol=1e-15)
+    assert (log.unit, log.unit_stated) == (si, True)
+
+
+def test_an_index_is_told_from_time(tmp_path: Path) -> None:
+    rows = "".join(f"{i},{i},{i}\n" for i in range(20))
+    path = write_csv(tmp_path / "log.csv", "t,x_d,x\n" + rows)
+    message = r"column 't' counts samples: it is an index, or a time in ms; give T_s \(--T_s\), or .*'t \[ms\]'"
+    with pytest.raises(LogError, match=message):
+        open_log(path)
+    log = read_log(path, T_s=2e-3)
+    np.testing.assert_allclose(log.t, 2e-3 * np.arange(20))
+    assert read_log(write_csv(path, "t [ms],x_d,x\n" + rows)).T_s == 1e-3
+    assert read_log(write_csv(path, "t [s],x_d,x\n" + rows)).T_s == 1.0
+    assert read_log(write_csv(path, "index,x_d,x\n" + rows), T_s=2e-3).T_s == 2e-3
+    with pytest.raises(LogError, match=r"column 't' is missing, the file has 'index', 'x_d', 'x'; .* or T_s"):
+        open_log(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            "t,x_d [mm/s],x\n0,1,2\n",
+            r"column 'x_d \[mm/s\]' must be a position in one of m, .* its unit is 'mm/s'; is it",
+        ),
+        ("t,x_d,x (m/s)\n0,1,2\n", r"column 'x \(m/s\)' must be a position"),
+        ("t,x_d [m],x [deg]\n0,1,2\n", r"'x_d \[m\]' is in m and column 'x \[deg\]' in deg; both must be lengths or"),
+        (
+            "t [h],x_d,x\n0,1,2\n",
+            r"time 't \[h\]' must be in one of s, ms, us, ns, min, its unit is 'h'; correct it, or",
+        ),
+        ("t,x [mm],x_d,x_mm\n0,1,2,3\n", r"column x may be 'x \[mm\]', 'x_mm'; give its name in columns \(--x\)"),
+        (
+            "t;x_d;x\n0;1;2\n1;1.000,5;2\n",
+            r"line 3: column 'x_d' must be a number, got '1\.000,5'; write numbers without",
+        ),
+        ("t,x_d,x\n0,1,2\n12:00:01.5,1,2\n", r"line 3: column 't' must be a number, got '12:00:01\.5'; write times of"),
+        ("a\nb;c\n# d\n1;2\n", r"column 't' is missing, the file has 'b', 'c'"),
+        ("# nothing\n# else\n", r"column 't' is missing, the file has 'nothing'"),
+    ],
+)
+def test_refused_texts(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(LogError, match=message):
+        read_log(write_csv(tmp_path / "log.csv", text))
+
+
+def test_a_given_unit_must_not_contradict_the_names(tmp_path: Path) -> None:
+    path = write_csv(tmp_path / "log.csv", "t,x_d [mm],x [mm]\n0,1,2\n1,3,4\n")
+    with pytest.raises(
+        LogError, match=r"unit='um' \(--unit um\) was given, but column 'x_d \[mm\]' states 'mm'; leave"
+    ):
+        read_log(path, unit="um")
+    assert read_log(path, unit="mm").x_d[1] == read_log(path, unit="millimetre").x_d[1] == 3e-3
+    assert read_log(path, columns={"x": "x"}).x_meas[1] == 4e-3
+    with pytest.raises(LogError, match=r"axis 'X1' was named, but a text file holds columns: name those"):
+        read_log(path, axis="X1")
+
+
+@pytest.mark.parametrize("kept", [0.3, 0.99])
+def test_truncated_gzip(tmp_path: Path, kept: float) -> None:
+    path = write(tmp_path / "log.csv.gz", columns(3000))
+    packed = path.read_bytes()
+    path.write_bytes(packed[: int(kept * len(packed))])
+    with pytest.raises(LogError, match=r"log\.csv\.gz: is truncated or damaged( after line \d+)?: "):
+        read_log(path)
+
+
+def test_a_line_without_end_does_not_fill_the_memory(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv.gz"
+    path.write_bytes(gzip.compress(b"t,x_d,x\n0,1," + b"2" * 3_000_000))
+    with pytest.raises(LogError, match=r"line 2: has 1000000 characters or more; is the file a log\?"):
+        read_log(path)
+
+
+@pytest.mark.parametrize("nothing", ["", "nan", "NaN"])
+def test_missing_measurements(tmp_path: Path, nothing: str) -> None:
+    path = write_csv(tmp_path / "log.csv", f"t,x_d,x\n0,1,2\n1,3,{nothing}\n2,5,6\n")
+    with pytest.raises(
+        LogError, match=r"line 3: column 'x' must be .*got n.*missing measurements .* \(--trust true\)$"
+    ):
+        read_log(path)
+    log = read_log(path, may_miss=True)
+    np.testing.assert_array_equal(log.x_meas, [2.0, np.nan, 6.0])
+    np.testing.assert_array_equal(log.x_d, [1.0, 3.0, 5.0])
+
+
+@pytest.mark.parametrize(
+    ("row", "problem"),
+    [
+        ("1,,4", "column 'x_d' must be a number, got nothing$"),
+        ("1,nan,4", "column 'x_d' must be finite, got nan$"),
+        (",3,4", "column 't' must be a number, got nothing$"),
+        ("1,3,inf", "column 'x' must be finite, got inf$"),
+        ("1,3,-", "column 'x' must be a number, got '-'$"),
+    ],
+)
+def test_nothing_else_may_be_missing(tmp_path: Path, row: str, problem: str) -> None:
+    path = write_csv(tmp_path / "log.csv", f"t,x_d,x\n0,1,2\n{row}\n2,5,\n")
+    with pytest.raises(LogError, match=f"line 3: {problem}"):
+        read_log(path, may_miss=True)

@@ -1,0 +1,164 @@
+"""Standard deviation of the prediction error: calibrated online, wherever the error comes from."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from trusted_cases import FRICTION, cycles, friction, physics, trusted
+
+from hybridsep.base.metrics import coverage
+from hybridsep.base.settings import PredictorSettings
+from hybridsep.base.signals import PREDICTION_MAX, Array
+from hybridsep.evaluate.backtest import backtest
+from hybridsep.machine import load_machine
+from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.plant import simulate
+from hybridsep.plants.trajectory import staircase
+from hybridsep.predict.predictor import HybridPredictor
+from hybridsep.predict.uncertainty import N_COMPONENTS, PredictedError, Uncertainty
+
+N = 100
+LEVELS = (0.5, 0.9, 0.95)
+ALL = np.ones(N, dtype=np.bool_)
+
+
+def window(uncertainty: Uncertainty, motion: Array | float = 0.0, e_h: Array | float = 0.0) -> PredictedError:
+    """Return the predicted error of a window with a servo error ``motion`` and a residual ``e_h``."""
+    x_pb = np.zeros(N)
+    return uncertainty.predict(x_pb + motion, x_pb, x_pb + e_h, last=0.0, disagreement=0.0)
+
+
+def after_noise(std: float, n: int = 60, seed: int = 0, uncertainty: Uncertainty | None = None) -> Uncertainty:
+    """Return an uncertainty after ``n`` windows of white errors."""
+    learning = uncertainty or Uncertainty(1e-12, N)
+    for errors in np.random.default_rng(seed).normal(0.0, std, (n, N)):
+        learning.learn(window(learning), errors, ALL)
+    return learning
+
+
+@pytest.mark.parametrize("std", [1e-9, 5e-6, 1e-3])
+def test_white_noise_of_any_size_is_known_after_a_second(std: float) -> None:
+    predicted = window(after_noise(std, 10)).std
+    np.testing.assert_allclose(predicted, std, rtol=0.25)
+    assert float(np.sqrt(np.mean(predicted**2))) == pytest.approx(std, rel=0.15)
+
+
+def test_before_the_first_window_it_is_the_assumed_noise_and_a_share_of_the_servo_error() -> None:
+    uncertainty = Uncertainty(4e-12, N)
+    np.testing.assert_allclose(window(uncertainty).std, 2e-6, rtol=1e-6)
+    np.testing.assert_allclose(window(uncertainty, motion=1e-3).std, 1e-4, rtol=1e-2)
+
+
+def test_errors_in_motion_do_not_widen_the_interval_at_standstill() -> None:
+    rng, uncertainty = np.random.default_rng(1), Uncertainty(1e-12, N)
+    motion = np.where(np.arange(N) < 50, 0.0, 1e-3)
+    for _ in range(80):
+        predicted = window(uncertainty, motion)
+        uncertainty.learn(predicted, rng.normal(0.0, np.where(motion > 0.0, 2e-5, 1e-6)), ALL)
+    std = window(uncertainty, motion).std
+    assert np.all((std[:50] > 0.7e-6) & (std[:50] < 2e-6))
+    np.testing.assert_allclose(std[50:], 2e-5, rtol=0.2)
+
+
+def test_larger_noise_is_followed() -> None:
+    uncertainty = after_noise(1e-6)
+    changed = after_noise(3e-5, 25, 2, uncertainty)
+    np.testing.assert_allclose(window(changed).std, 3e-5, rtol=0.3)
+
+
+def test_heavy_tails_are_covered_at_95_percent() -> None:
+    rng, uncertainty, inside = np.random.default_rng(3), Uncertainty(1e-12, N), []
+    for k in range(300):
+        predicted = window(uncertainty)
+        errors = 1e-6 * rng.standard_t(2.5, N)
+        if k >= 50:
+            inside.append(coverage(errors, predicted.std, 0.95))
+        uncertainty.learn(predicted, errors, ALL)
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.015)
+
+
+def test_it_is_invariant_to_the_unit() -> None:
+    found = []
+    for unit in (1.0, 1e3, 1e-3):
+        uncertainty = Uncertainty(1e-12 * unit**2, N)
+        drawn = np.random.default_rng(5)
+        for _ in range(20):
+            motion, errors = 1e-3 * drawn.normal(size=N), 1e-5 * drawn.normal(size=N)
+            uncertainty.learn(window(uncertainty, unit * motion), unit * errors, ALL)
+        found.append(window(uncertainty, unit * 1e-3).std / unit)
+    np.testing.assert_allclose(found[1:], [found[0]] * 2, rtol=1e-6)
+
+
+def test_what_is_not_measured_is_not_learned() -> None:
+    uncertainty = after_noise(1e-6, 5)
+    before = uncertainty.learned()
+    uncertainty.learn(window(uncertainty), np.ones(N), ~ALL)
+    uncertainty.learn(window(uncertainty), np.zeros(N), ALL)  # exactly the physics model
+    np.testing.assert_array_equal(uncertainty.learned(), before)
+    uncertainty.learn(window(uncertainty), np.where(np.arange(N) == 7, 1.0, 1e-6), np.arange(N) != 7)
+    assert window(uncertainty).std.max() < 3e-6
+
+
+def test_a_diverging_prediction_has_a_finite_deviation() -> None:
+    uncertainty = after_noise(1e-6, 5)
+    for e_h in (np.inf, np.nan, 1e300, -np.inf):
+        predicted = window(uncertainty, e_h=e_h)
+        assert np.isfinite(predicted.std).all()
+        uncertainty.learn(predicted, np.ones(N), ALL)
+        assert Uncertainty.is_sound(uncertainty.learned())
+    assert window(uncertainty, motion=PREDICTION_MAX).std.max() <= PREDICTION_MAX
+
+
+def test_saved_numbers_are_checked() -> None:
+    learned = after_noise(1e-6, 5).learned()
+    other = Uncertainty(1.0, N)
+    other.restore(learned)
+    np.testing.assert_array_equal(window(other).std, window(after_noise(1e-6, 5)).std)
+    assert Uncertainty.is_sound(learned)
+    for place, value in ((0, -1.0), (1, np.inf), (N_COMPONENTS - 1, 0.0), (-2, 100.0), (-1, np.nan), (8, -1e-3)):
+        damaged = learned.copy()
+        damaged[place] = value
+        assert not Uncertainty.is_sound(damaged)
+
+
+def covered(predictor: HybridPredictor, x_d: Array, x: Array) -> list[float]:
+    """Return the share of measurements within the intervals of :data:`LEVELS`."""
+    result = backtest(predictor, x_d, x)
+    return [coverage(x - result.x_h, result.x_h_std, level) for level in LEVELS]
+
+
+def test_a_warm_run_over_the_staircase_covers_at_each_third_of_the_window() -> None:
+    machine = load_machine("spring_mass_damper")
+    x_d = staircase()
+    x = simulate(machine.new_plant(), x_d, machine.T_s)
+    predictor = machine.new_predictor(PredictorSettings(t_init=-1.0))
+    backtest(predictor, x_d, Encoder(5e-6, 0).measure_all(x))
+    predictor.restart()
+    measured = Encoder(5e-6, 1000).measure_all(x)
+    result = backtest(predictor, x_d, measured)
+    third = np.arange(len(x_d)) % 100 * 3 // 100
+    for part in (third >= 0, *(third == i for i in range(3))):
+        shares = [coverage((measured - result.x_h)[part], result.x_h_std[part], level) for level in LEVELS]
+        np.testing.assert_allclose(shares, LEVELS, atol=0.05)
+
+
+@pytest.mark.parametrize("trust", [True, False])
+def test_intervals_cover_friction_and_noise(trust: bool) -> None:
+    x_d = cycles(8000)
+    x = physics(x_d) + friction(x_d, FRICTION) + np.random.default_rng(6).normal(0.0, 2e-6, len(x_d))
+    predictor = trusted() if trust else HybridPredictor(trusted().model, PredictorSettings(trust=False))
+    shares = covered(predictor, x_d, x)
+    np.testing.assert_allclose(shares[1:], LEVELS[1:], atol=0.04)
+    assert shares[0] == pytest.approx(0.5, abs=0.1)
+
+
+def test_the_warm_up_has_the_deviation_of_the_physics_model() -> None:
+    x_d = cycles(3000)
+    x = physics(x_d) + friction(x_d, FRICTION) + np.random.default_rng(7).normal(0.0, 1e-6, len(x_d))
+    results: dict[float, Any] = {t_init: backtest(trusted(t_init=t_init), x_d, x) for t_init in (-1.0, 2.0)}
+    assert not results[2.0].active[:2000].any()
+    residual = float(np.sqrt(np.mean((x - results[2.0].x_pb)[1000:2000] ** 2)))
+    assert 0.5 * residual < np.median(results[2.0].x_h_std[1000:2000]) < 2.0 * residual
+    assert np.median(results[-1.0].x_h_std[1000:2000]) < 0.5 * residual

@@ -1,0 +1,37 @@
+"""Writer of machine files: what is written is read as the same machine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from hybridsep import load_machine, machine_names
+from hybridsep.base.settings import PARAMETERS
+from hybridsep.machine import Machine
+from hybridsep.machine_sections import Physics, SpringMassDamper
+from hybridsep.machine_text import machine_text
+
+
+@pytest.mark.parametrize("name", machine_names())
+def test_a_written_machine_is_read_again(name: str, tmp_path: Path) -> None:
+    machine = load_machine(name)
+    path = tmp_path / "axis.toml"
+    path.write_text(machine_text(machine, ["identified", "two lines\nof text"]), encoding="utf-8")
+    assert load_machine(path) == machine
+    assert path.read_text(encoding="utf-8").startswith("# identified\n# two lines\n# of text\nname = ")
+
+
+def test_text_with_quotes_and_no_sources(tmp_path: Path) -> None:
+    physics = Physics(spring_mass_damper=SpringMassDamper(m=2.0, c=30.0, k=2e4))
+    machine = Machine(name="a", title='the "old" axis \\ Y', physics=physics)
+    path = tmp_path / "axis.toml"
+    path.write_text(machine_text(machine), encoding="utf-8")
+    assert load_machine(path) == machine
+    assert load_machine(path).sources == ()
+
+
+def test_units_stand_beside_the_entries() -> None:
+    text = machine_text(load_machine("als25010_x"))
+    assert f"f_n = 20.52{'':<19}# {PARAMETERS['f_n'].unit}".replace(" ", "") in text.replace(" ", "")
+    assert "Np = 100\n" in text

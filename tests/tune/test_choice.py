@@ -1,0 +1,69 @@
+"""Choice of settings: what is tried, what is chosen, and the error over other windows."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hybridsep.base.settings import PredictorSettings
+from hybridsep.model.physics import ModalModel
+from hybridsep.predict.predictor import HybridPredictor
+from hybridsep.tune.choice import choose_settings, settings_for, settings_to_try, window_scores
+from hybridsep.tune.halves import Recording, halves, replay
+
+MODEL = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
+
+
+def ringing(n: int = 1600) -> list[Recording]:
+    """A log whose residual rings with a period of 30 samples, so that many lags are needed to see it."""
+    rng = np.random.default_rng(1)
+    k = np.arange(n)
+    x_d = 1e-3 * np.cumsum(rng.normal(size=n) * (k % 97 == 0))
+    ring, state = np.zeros(n), np.zeros(2)
+    for i in range(2, n):
+        state = np.array([2 * 0.995 * np.cos(2 * np.pi / 30) * state[0] - 0.995**2 * state[1], state[0]])
+        state[0] += 1e-6 * rng.normal()
+        ring[i] = state[0]
+    return halves([(x_d, x_d + ring)], 0.5)
+
+
+def test_what_fits_into_a_short_window_is_the_default() -> None:
+    default = PredictorSettings()
+    assert settings_for(default.Np, 1e-3, "foh") == replace(default, input_hold="foh")
+    short = settings_for(1, 2e-3, "zoh")
+    assert (short.Np, short.p, short.q, short.T_s) == (1, 1, 0, 2e-3)
+
+
+@pytest.mark.parametrize("Np", [1, 2, 19, 100])
+def test_all_that_is_tried_has_the_controllers_window(Np: int) -> None:
+    settings = settings_for(Np, 1e-3, "zoh")
+    tried = settings_to_try(settings)
+    assert tried[0] == settings
+    assert all(one.Np == Np and one.p <= Np and one.q < Np for one in tried)
+    assert len(set(tried)) == len(tried)
+
+
+def test_the_best_of_what_was_tried_is_chosen_by_what_teaches() -> None:
+    recordings = ringing()
+    settings = settings_for(40, 1e-3, "zoh")
+    choice = choose_settings(MODEL, recordings, settings)
+    assert [one.settings for one in choice.tried] == settings_to_try(settings)
+    for one in choice.tried:
+        errors = replay(HybridPredictor(MODEL, one.settings), recordings, taught=True).errors(taught=True)[2]
+        assert one.rms_h == pytest.approx(np.sqrt(np.mean(errors[400:] ** 2)))
+    best = min(choice.tried, key=lambda one: one.rms_h)
+    gain = best.rms_h / choice.tried[0].rms_h
+    assert choice.settings == (best.settings if gain < 0.95 else settings)
+    spoiled = [replace(recordings[0], x=np.concatenate((recordings[0].x[:800], np.zeros(800))))]
+    assert choose_settings(MODEL, spoiled, settings).settings == choice.settings
+
+
+def test_errors_over_the_window() -> None:
+    recordings, settings = ringing(), settings_for(40, 1e-3, "zoh")
+    scores = window_scores(MODEL, recordings, settings)
+    assert [score.Np for score in scores] == [8, 20, 40, 80]
+    own = replay(HybridPredictor(MODEL, settings), recordings).rms()
+    assert [scores[2].rms_pb, scores[2].rms_hold, scores[2].rms_h] == own
+    assert scores[0].rms_hold < scores[2].rms_hold

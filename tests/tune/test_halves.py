@@ -1,0 +1,91 @@
+"""Recordings in two parts: what teaches, what judges, and the figures of their replay."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hybridsep.base.errors import SignalError
+from hybridsep.base.settings import PredictorSettings
+from hybridsep.evaluate.backtest import backtest
+from hybridsep.model.physics import ModalModel
+from hybridsep.predict.predictor import HybridPredictor
+from hybridsep.tune.halves import Recording, halves, replay
+
+N = 400
+
+
+def predictor() -> HybridPredictor:
+    return HybridPredictor(ModalModel.spring_mass_damper(1.0, 15.7, 24674.0), PredictorSettings(Np=20, p=5, q=2))
+
+
+def pieces(*lengths: int) -> list[tuple[np.ndarray, np.ndarray]]:
+    rng = np.random.default_rng(0)
+    found = []
+    for n in lengths:
+        x_d = 1e-3 * np.sin(0.05 * np.arange(n))
+        found.append((x_d, x_d + 1e-5 * rng.normal(size=n)))
+    return found
+
+
+def test_a_log_is_split_by_its_samples_across_its_gaps() -> None:
+    parts = halves(pieces(100, 300, 200), 0.5)
+    assert [part.n_taught for part in parts] == [100, 200, 0]
+    x_d, x = parts[1].taught
+    assert len(x_d) == len(x) == 200
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0, 1e-9])
+def test_a_part_without_samples_is_refused(share: float) -> None:
+    with pytest.raises(SignalError, match="none to teach or none to judge"):
+        halves(pieces(N), share)
+
+
+def test_a_replay_is_the_backtest_of_the_whole_judged_on_its_second_half() -> None:
+    (x_d, x), half = pieces(N)[0], N // 2
+    whole = backtest(predictor(), x_d, x)
+    found = replay(predictor(), halves([(x_d, x)], 0.5))
+    for i, name in enumerate(("x_pb", "x_hold", "x_h")):
+        np.testing.assert_array_equal(found.joined(name), getattr(whole, name)[half:])
+        np.testing.assert_array_equal(found.errors()[i], (x - getattr(whole, name))[half:])
+        assert found.rms()[i] == pytest.approx(np.sqrt(np.mean((x - getattr(whole, name))[half:] ** 2)))
+        assert found.rms(taught=True)[i] == pytest.approx(np.sqrt(np.mean((x - getattr(whole, name))[:half] ** 2)))
+
+
+def test_only_what_teaches_is_seen_where_asked() -> None:
+    x_d, x = pieces(N)[0]
+    spoiled = x.copy()
+    spoiled[N // 2 :] = np.nan
+    given, other = (replay(predictor(), halves([(x_d, one)], 0.5), taught=True) for one in (x, spoiled))
+    np.testing.assert_array_equal(given.errors(taught=True), other.errors(taught=True))
+
+
+def test_the_error_over_the_horizon() -> None:
+    found = replay(predictor(), halves(pieces(N), 0.5))
+    horizon, errors = found.horizon(), found.errors()
+    assert horizon.shape == (3, 20)
+    np.testing.assert_allclose(horizon[:, 3], np.sqrt(np.mean(errors[:, 3::20] ** 2, axis=1)))
+
+
+def test_missing_measurements_are_not_scored() -> None:
+    x_d, x = pieces(N)[0]
+    x[N // 2 + 5 : N // 2 + 25] = np.nan
+    found = replay(predictor(), halves([(x_d, x)], 0.5))
+    assert np.isfinite(found.rms()).all()
+    assert np.isfinite(found.horizon()).all()
+
+
+def test_later_recordings_begin_with_what_the_earlier_ones_taught() -> None:
+    first, second = pieces(N, N)
+    found = replay(predictor(), [Recording(*first, N), Recording(*second, 0)])
+    by_hand = predictor()
+    backtest(by_hand, *first)
+    by_hand.restart()
+    np.testing.assert_array_equal(found.joined("x_h"), backtest(by_hand, *second).x_h)
+
+
+def test_the_verdict_is_on_what_judges() -> None:
+    x_d, x = pieces(N)[0]
+    x[: N // 2] += 1e-2  # would make the hybrid look good
+    verdict = replay(predictor(), halves([(x_d, x)], 0.5)).verdict()
+    assert verdict.n_samples == N // 2
