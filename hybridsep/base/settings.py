@@ -167,7 +167,7 @@ class PredictorSettings(Settings):
     """Fields of a predictor that a compensator holds: alone it has no reference beyond its window."""
 
     ALONE: ClassVar[tuple[str, ...]] = ("trust", "effect", "noise_std", "forgetting")
-    """Fields of a predictor that no compensator holds: a plan needs a model that is affine in the commands."""
+    """Fields of a predictor that the compensator of a machine file or an FMU has not: it plans with the paper's model."""
 
     ELSEWHERE: ClassVar[tuple[str, ...]] = ("T_s", "input_hold", *NEEDS_PREVIEW)
 
@@ -271,7 +271,8 @@ class CompensatorSettings(Settings):
         Bound on the magnitude of the change, m; none if None.
     no_reversal : bool
         Whether the velocity of ``x_dm`` keeps the sign of that of ``x_d``: otherwise friction changes its sign too. It
-        has no effect without ``limits``, and a predictor with ``v_friction > 0`` may then be worse than without.
+        has no effect without ``limits``, and a predictor with ``v_friction > 0`` may then be worse than without. Plans
+        of a model with ``trust`` follow the friction and may turn.
     compensate : {"off", "physics", "hybrid"}
         Best model allowed; ``"off"`` leaves the command unmodified.
     """
