@@ -167,7 +167,7 @@ class PredictorSettings(Settings):
     """Fields of a predictor that a compensator holds: alone it has no reference beyond its window."""
 
     ALONE: ClassVar[tuple[str, ...]] = ("trust", "effect", "noise_std", "forgetting")
-    """Fields of a predictor that the compensator of a machine file or an FMU has not: it plans with the paper's model."""
+    """Fields of a predictor that no machine file's or FMU's compensator has: it plans with the paper's model."""
 
     ELSEWHERE: ClassVar[tuple[str, ...]] = ("T_s", "input_hold", *NEEDS_PREVIEW)
 
