@@ -46,6 +46,7 @@ def main(folder: Path) -> None:
 
 def _write(path: Path, header: str, *columns: NDArray[np.floating[Any]]) -> None:
     np.savetxt(path, np.column_stack(columns), delimiter=",", header=header, comments="", fmt="%.9g")
+    print(f"{path}: {len(columns[0])} rows")
 
 
 if __name__ == "__main__":

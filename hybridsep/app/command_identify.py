@@ -119,9 +119,9 @@ def identify(
                     progress=advance,
                 )
             else:
-                found = identify_operation(pieces, log.T_s, unit_gain=unit_gain, progress=advance)
+                found = identify_operation(pieces, log.T_s, unit_gain=unit_gain, unit=log.unit, progress=advance)
                 if figure is not None:
-                    operation_figure(found, pieces, recording.name, figure, log.unit)
+                    operation_figure(found, pieces, recording.name, figure)
     if figure is not None and isinstance(found, IdentifiedResponse):
         response_figure(found, recording.name, figure)
     if out is not None:

@@ -148,7 +148,9 @@ def fit(logs: Sequence[Log], out: Path, options: FitOptions, progress: Progress 
     def within(begin: float, end: float, message: str) -> Callable[[float], object]:
         return lambda done: progress(message, begin + (end - begin) * done)
 
-    found = stages.result("identification", lambda: _identified(recordings, T_s, within(0.0, 0.35, "identify")))
+    found = stages.result(
+        "identification", lambda: _identified(recordings, T_s, logs[0].unit, within(0.0, 0.35, "identify"))
+    )
     model = ModalModel([Mode(**mode) for mode in found["modes"]], found["dead_time"])
     default = replace(default, input_hold=found["input_hold"])
     choice = stages.result("choice", lambda: _choice(model, recordings, default, within(0.35, 0.6, "choose p and q")))
@@ -200,11 +202,13 @@ def _window(Np: int | None, T_s: float) -> int:
     return max(1, round(_LOOK_AHEAD / T_s)) if Np is None else Np
 
 
-def _identified(recordings: Sequence[Recording], T_s: float, progress: Callable[[float], object]) -> dict[str, Any]:
+def _identified(
+    recordings: Sequence[Recording], T_s: float, unit: str, progress: Callable[[float], object]
+) -> dict[str, Any]:
     """Return the identification from the samples that teach, as plain values."""
     taught = [recording.taught for recording in recordings if recording.n_taught > 1]
     try:
-        found = identify_operation(taught, T_s, progress=lambda _message, done: progress(done))
+        found = identify_operation(taught, T_s, unit=unit, progress=lambda _message, done: progress(done))
     except IdentificationError as error:
         found = unit_gain_model(T_s, f"{error}; a gain of 1 without lag is taken")
     summary = dict(found.summary())

@@ -38,7 +38,7 @@ def _parameters(found: IdentifiedModel | IdentifiedResponse, title: str) -> Tabl
 def _structures(found: IdentifiedModel) -> Table:
     table = Table(
         *("structure", "parameters", "fitted", "held out", ""),
-        title="RMS error of the simulated position, in µm",
+        title=f"RMS error of the simulated position, in µ{found.unit}",
         box=box.SIMPLE,
     )
     for other in found.alternatives:

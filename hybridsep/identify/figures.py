@@ -18,7 +18,7 @@ __all__ = ["operation_figure", "response_figure"]
 
 
 def operation_figure(
-    found: IdentifiedModel, recordings: Sequence[tuple[Array, Array]], title: str, path: str | Path, unit: str = "m"
+    found: IdentifiedModel, recordings: Sequence[tuple[Array, Array]], title: str, path: str | Path
 ) -> None:
     """Draw servo error, residual and the structures' errors to a PNG.
 
@@ -31,8 +31,6 @@ def operation_figure(
         Heading.
     path : str or Path
         The PNG.
-    unit : {"m", "rad"}
-        Unit of the positions.
     """
     figure = Figure(figsize=(9.0, 8.5), layout="constrained")
     servo, residual, structures = figure.subplots(3, 1, height_ratios=[1.2, 1.2, 1.4])
@@ -46,7 +44,7 @@ def operation_figure(
         servo.plot(t, 1e6 * (x_d - x_pb), color=PHYSICS, linewidth=0.8)
         residual.plot(t, 1e6 * (x - x_pb), color=PHYSICS, linewidth=0.8)
         start = float(t[-1]) + found.T_s
-    micro = f"µ{unit}"
+    micro = f"µ{found.unit}"
     servo.set_ylabel(f"servo error [{micro}]")
     servo.legend(["measured", found.structure], frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
     residual.set_ylabel(f"measured −\nmodelled [{micro}]")

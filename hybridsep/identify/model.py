@@ -51,6 +51,8 @@ class IdentifiedModel:
         Hold of the command between samples.
     T_s : float
         Sampling interval, s.
+    unit : {"m", "rad"}
+        Unit of the positions, and of what is in metres below.
     structure : str
         Name of the chosen structure.
     parameters : tuple of Estimate
@@ -72,6 +74,7 @@ class IdentifiedModel:
     model: ModalModel
     input_hold: str
     T_s: float
+    unit: str
     structure: str
     parameters: tuple[Estimate, ...]
     offset: float
@@ -104,6 +107,7 @@ class IdentifiedModel:
         return {
             "structure": self.structure,
             "T_s": self.T_s,
+            "unit": self.unit,
             "input_hold": self.input_hold,
             "dead_time": self.model.dead_time,
             "modes": [vars(mode) for mode in self.model.modes],

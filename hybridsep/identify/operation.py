@@ -44,6 +44,7 @@ def identify_operation(
     *,
     unit_gain: bool | None = None,
     order_max: int = 6,
+    unit: str = "m",
     progress: Progress = lambda _message, _done: None,
 ) -> IdentifiedModel:
     """Identify the physics model from recordings of one axis in operation.
@@ -63,6 +64,8 @@ def identify_operation(
         Whether the static gain is 1; chosen by the recordings if left out.
     order_max : int
         Largest number of poles, at least 1.
+    unit : {"m", "rad"}
+        Unit of the positions, for findings and estimates.
     progress : callable, optional
         Called with a message and the fraction done.
 
@@ -91,18 +94,19 @@ def identify_operation(
     findings = []
     if _is_weak(fit, segments, T_s):
         fit = _at_rest(segments, T_s)
+        spread, rest = _micro(_spread(segments), unit), _micro(fit.rms, unit)
         findings.append(
-            f"the commanded position moves by no more than {_um(_spread(segments))} and {_um(fit.rms)} of the measured "
-            "one (RMS) are not explained by it: too little motion to learn the dynamics from, a gain of 1 without lag "
-            "is taken"
+            f"too little motion to learn the dynamics from: the commanded position moves by {spread} (standard "
+            f"deviation), and {rest} of the measured one are not explained by it; a gain of 1 without lag is taken"
         )
-    parameters, n_effective = estimates(fit, segments, T_s)
-    findings += _findings(fit, chosen, segments, parameters[0].std, n_effective)
+    parameters, n_effective = estimates(fit, segments, T_s, unit)
+    findings += _findings(fit, chosen, segments, parameters[0].std, n_effective, unit)
     progress("identified", 1.0)
     return IdentifiedModel(
         model=_modal(fit, T_s),
         input_hold=fit.delay.input_hold,
         T_s=T_s,
+        unit=unit,
         structure=fit.structure.name,
         parameters=parameters,
         offset=fit.offset,
@@ -119,7 +123,7 @@ def unit_gain_model(T_s: float, reason: str) -> IdentifiedModel:
     """Return a model that follows its command, for recordings that cannot teach one; ``reason`` is its finding."""
     model = ModalModel(Structure(0).modes(np.empty(0), np.empty(0), T_s))
     return IdentifiedModel(
-        *(model, "foh", T_s, Structure(0).name, (), 0.0, np.nan, np.nan, 0, 0.0, (), (reason,)),
+        *(model, "foh", T_s, "m", Structure(0).name, (), 0.0, np.nan, np.nan, 0, 0.0, (), (reason,)),
     )
 
 
@@ -181,7 +185,7 @@ def _alternative(candidate: Candidate, T_s: float) -> Alternative:
 
 
 def _findings(
-    fit: Fit, chosen: Candidate, segments: Sequence[Segment], gain_std: float, n_effective: float
+    fit: Fit, chosen: Candidate, segments: Sequence[Segment], gain_std: float, n_effective: float, unit: str
 ) -> list[str]:
     """Return what a user should know of the identification, in words."""
     findings = []
@@ -204,7 +208,7 @@ def _findings(
         findings.append(f"the static gain is {gain:.7g} ± {gain_std:.2g}")
     if fit.structure.order and chosen.rms_held_out > 2 * chosen.fit.rms:
         findings.append(
-            f"the error on the part that was held out, {_um(chosen.rms_held_out)}, is "
+            f"the error on the part that was held out, {_micro(chosen.rms_held_out, unit)}, is "
             f"{chosen.rms_held_out / chosen.fit.rms:.1f} times that of the fit before: the later motion is of another "
             "kind, or the axis is not linear"
         )
@@ -217,5 +221,5 @@ def _starts_in_motion(u: Array) -> bool:
     return bool(velocity[0] > 0.1 * velocity.max()) if velocity.max() > 0 else False
 
 
-def _um(value: float) -> str:
-    return f"{value * 1e6:.3g} µm"
+def _micro(value: float, unit: str) -> str:
+    return f"{value * 1e6:.3g} µ{unit}"

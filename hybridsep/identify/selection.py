@@ -19,6 +19,9 @@ __all__ = ["HELD_OUT", "Candidate", "choose", "compare_structures"]
 HELD_OUT = 0.35
 """Part of the commanded motion that is held out."""
 
+SETTLING = 10
+"""Part of a segment, one in so many, that is not judged: it may start in motion, where the model starts at rest."""
+
 BLOCKS = 12
 """Blocks of the held-out part whose errors are compared pair by pair."""
 
@@ -107,7 +110,7 @@ def compare_structures(
             break
         progress(structure.name, i / len(structures))
         fit = known[structure] = fit_delay(split, T_s, structure, known)
-        residual = np.concatenate([(s.y - simulated(fit, s, T_s))[s.stop :] for s in split])
+        residual = np.concatenate([(s.y - simulated(fit, s, T_s))[max(s.stop, len(s.u) // SETTLING) :] for s in split])
         found.append((fit, residual, _objection(fit, split, T_s)))
         rms = float(np.std(residual))
         if not found[-1][2] and rms < best * (1 - TOLERANCE):

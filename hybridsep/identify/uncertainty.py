@@ -45,7 +45,7 @@ class Estimate:
     unit: str
 
 
-def estimates(fit: Fit, segments: Sequence[Segment], T_s: float) -> tuple[tuple[Estimate, ...], float]:
+def estimates(fit: Fit, segments: Sequence[Segment], T_s: float, unit: str = "m") -> tuple[tuple[Estimate, ...], float]:
     """Return the parameters with their standard deviations, and the number of samples that tell as much as white ones.
 
     Parameters
@@ -54,6 +54,8 @@ def estimates(fit: Fit, segments: Sequence[Segment], T_s: float) -> tuple[tuple[
         Fitted to the segments.
     segments : sequence of Segment
     T_s : float, s
+    unit : {"m", "rad"}
+        Unit of the positions.
     """
     jacobian, residual = _jacobian(fit, segments, T_s)
     scale = np.linalg.norm(jacobian, axis=0)
@@ -68,7 +70,7 @@ def estimates(fit: Fit, segments: Sequence[Segment], T_s: float) -> tuple[tuple[
     sums = np.add.reduceat(residual, edges)
     white = float(residual @ residual)
     n_effective = len(residual) * min(1.0, white / max(float(sums @ sums), 1e-300))
-    return _named(fit, covariance / np.outer(scale, scale), T_s), n_effective
+    return _named(fit, covariance / np.outer(scale, scale), T_s, unit), n_effective
 
 
 def _sandwich(jacobian: Array, scores: Array) -> Array:
@@ -107,7 +109,7 @@ def _jacobian(fit: Fit, segments: Sequence[Segment], T_s: float) -> tuple[Array,
     return np.concatenate(blocks), np.concatenate(residuals)
 
 
-def _named(fit: Fit, covariance: Array, T_s: float) -> tuple[Estimate, ...]:
+def _named(fit: Fit, covariance: Array, T_s: float, unit: str) -> tuple[Estimate, ...]:
     """Return the estimates in physical units, their deviations by the delta method."""
     n_theta, n_linear = len(fit.theta), len(fit.linear)
     point = np.concatenate((fit.theta, fit.linear))
@@ -119,12 +121,12 @@ def _named(fit: Fit, covariance: Array, T_s: float) -> tuple[Estimate, ...]:
     inner = covariance[: n_theta + n_linear, : n_theta + n_linear]
     deviations = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slopes, inner, slopes), 0.0))
     found = [
-        Estimate(name, float(value), float(deviation), unit)
-        for (name, unit), value, deviation in zip(_names(fit), values(point), deviations, strict=True)
+        Estimate(name, float(value), float(deviation), unit_of)
+        for (name, unit_of), value, deviation in zip(_names(fit), values(point), deviations, strict=True)
     ]
     delay, offset = np.sqrt(np.maximum(np.diag(covariance)[-2:], 0.0))
     found.append(Estimate("dead_time", float(fit.delay.samples), float(delay), "samples"))
-    found.append(Estimate("offset", fit.offset, float(offset), "m"))
+    found.append(Estimate("offset", fit.offset, float(offset), unit))
     return tuple(found)
 
 

@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..logs.log import Log
 from .axis import check_delay, check_offset, check_scale, check_sign, check_swapped, check_velocity
 from .finding import ERROR, HOPELESS, NAMES, Finding
@@ -20,16 +22,13 @@ __all__ = ["Intake", "apply", "check"]
 
 _Check = Callable[[Log], Iterator[Finding]]
 
-_SAMPLES: tuple[_Check, ...] = (
-    check_order,
-    check_gaps,
-    check_jitter,
-    check_missing,
-    check_outliers,
-    check_stuck,
-    check_repeated,
-)
+_TIMES: tuple[_Check, ...] = (check_order, check_gaps, check_jitter)
+_SAMPLES: tuple[_Check, ...] = (check_missing, check_outliers, check_stuck, check_repeated)
 _AXIS: tuple[_Check, ...] = (check_swapped, check_velocity, check_sign, check_scale, check_offset, check_unit)
+
+
+_FEW = 50
+"""Samples below which single ones are not judged."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +62,7 @@ class Intake:
         return apply(self.log, self.findings)
 
 
+@np.errstate(all="ignore")  # a log may hold any finite number
 def check(log: Log, machine: Machine | None = None) -> Intake:
     """Check a log.
 
@@ -90,7 +90,9 @@ def check(log: Log, machine: Machine | None = None) -> Intake:
             log = apply(log, found)
 
     given = log
-    look(_SAMPLES)
+    look(_TIMES)
+    if len(log.t) >= _FEW and np.isfinite(log.x_meas).any():
+        look(_SAMPLES)
     hopeless = list(check_motion(log))
     findings.extend(hopeless)
     if not hopeless:

@@ -27,6 +27,9 @@ _HEAD_LINES = 400
 _LINE_MAX = 1_000_000
 """Largest length of a line, in characters: a thousand columns; a file without line ends must not fill the memory."""
 
+_NUMBER_BEGINS = frozenset("0123456789+-.")
+"""First characters that most lines have, and no comment."""
+
 _GZIP = b"\x1f\x8b"
 _UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _DAMAGE = (gzip.BadGzipFile, EOFError, zlib.error)
@@ -168,4 +171,4 @@ def _hint(field: str) -> str:
 
 
 def _is_skipped(text: str) -> bool:
-    return text.isspace() or text.lstrip().startswith(COMMENTS)
+    return text[0] not in _NUMBER_BEGINS and (text.isspace() or text.lstrip().startswith(COMMENTS))

@@ -72,7 +72,8 @@ def test_the_machine_file_in_the_readme_is_valid(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "example", sorted(path.name for path in (ROOT / "examples").glob("*.py") if "__main__" in path.read_text("utf-8"))
 )
-def test_examples_run(example: str) -> None:
-    done = subprocess.run([sys.executable, "-W", "error", ROOT / "examples" / example], capture_output=True, text=True)
+def test_examples_run(example: str, tmp_path: Path) -> None:
+    command = [sys.executable, "-W", "error", ROOT / "examples" / example]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert done.stdout

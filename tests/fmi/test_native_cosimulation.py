@@ -69,7 +69,7 @@ def test_every_pairing_agrees_with_the_library_on_the_spiral(
         next(n for n, m in fmu_names(machine, b).items() if m == model)
         for b, model in ((predictor, "HybridPredictor"), (plant, "FeedDrive"))
     ]
-    command = spiral()[axis]
+    command = spiral()[axis][: None if predictor == plant == "native" else 2000]
     assert_equal(cosimulate(fmus(names[0]), fmus(names[1]), command), reference(machine, command))
 
 

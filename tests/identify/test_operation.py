@@ -165,6 +165,10 @@ def test_too_little_motion_gives_a_gain_of_one() -> None:
     found = identify_operation([(x_d, measured(SECOND, x_d, "foh", 5e-7))], T_S)
     assert found.structure == "gain alone, gain 1"
     assert "too little motion" in found.findings[0]
+    assert " µm of the measured one" in found.findings[0]
+    turned = identify_operation([(x_d, measured(SECOND, x_d, "foh", 5e-7))], T_S, unit="rad")
+    assert " µrad of the measured one" in turned.findings[0]
+    assert turned.parameters[-1].unit == turned.unit == "rad"
     np.testing.assert_allclose(measured(found.model, x_d, found.input_hold), x_d, atol=1e-8)
 
 

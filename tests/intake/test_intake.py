@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import pickle
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 from places import EMPS, RECORDINGS
 from spoiled_logs import FAULTS, GOOD, good, log_of
 
@@ -169,3 +171,31 @@ def test_a_recording_with_an_uneven_clock() -> None:
     fixed = intake.fixed()
     np.testing.assert_allclose(np.diff(fixed.t), log.T_s)
     assert "jitter" not in names(check(fixed).findings)
+
+
+ODD: tuple[Callable[[int, np.random.Generator], ArrayLike], ...] = (
+    lambda n, _: np.zeros(n),
+    lambda n, numbers: numbers.normal(size=n),
+    lambda n, numbers: np.round(np.cumsum(numbers.normal(size=n))),
+    lambda n, _: np.sin(np.arange(n) / 7),
+    lambda n, _: (np.arange(n) % 50 > 25) * 1.0,
+    lambda n, numbers: 1e3 * np.sign(numbers.normal(size=n)),
+    lambda n, numbers: 5e-324 * numbers.integers(0, 9, n),
+    lambda n, _: np.r_[np.zeros(n - 1), 1.0],
+)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_odd_logs_are_checked_and_fixed_without_an_error(seed: int) -> None:
+    numbers = np.random.default_rng(seed)
+    n = int(numbers.choice([2, 3, 9, 60, 300]))
+    x_d, x = (np.asarray(ODD[i](n, numbers), dtype=np.float64) for i in numbers.integers(0, len(ODD), 2))
+    log = log_of(x_d, np.where(numbers.random(n) < 0.05 * (seed % 2), np.nan, x))
+    if seed % 3 == 0:
+        log = replace(log, t=log.t + numbers.normal(size=n) * 1e-3)
+    intake = check(log, load_machine("emps"))
+    fixed = intake.fixed()
+    assert len(fixed.t) == len(fixed.x_d) == len(fixed.x_meas) > 0
+    assert sum(len(segment.t) for segment in fixed.segments()) == len(fixed.t)
+    if n < 200:
+        assert "too little motion" in names(intake.findings)
