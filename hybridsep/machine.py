@@ -146,7 +146,7 @@ class Machine(Section):
         own = self.new_predictor(self.compensator_predictor if predictor is None else predictor)
         return SepCompensator(own, self._compensation() if settings is None else settings)
 
-    def new_plant(self, **changes: float) -> Plant:
+    def new_plant(self, **changes: float | str) -> Plant:
         """Return the nonlinear plant; ``changes`` are values of its own section, such as ``c_nl`` or ``kappa``.
 
         Raises

@@ -171,6 +171,7 @@ class StageSection(Section):
     kind: Literal["stage"]
     f: Number = PARAMETERS["f"].default
     kappa: Number = PARAMETERS["kappa"].default
+    friction_on: Literal["command", "motion"] = "command"
     noise_std: Number = PARAMETERS["noise_std"].default
     seed: Whole = PARAMETERS["seed"].default
 

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from hybridsep.base.settings import PARAMETERS, Limits
+from hybridsep.base.settings import PARAMETERS, Limits, PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepCompensator
 from hybridsep.cosim.loop import cosimulate
@@ -26,13 +26,32 @@ __all__ = ["Case", "FmuLoops", "LibraryLoops", "Loops", "noise_seed"]
 
 @dataclass(frozen=True)
 class Case:
-    """Disturbance of the loop: another plant from sample ``at`` on, a held sensor, other limits or noise."""
+    """Disturbance of the loop: another plant from sample ``at`` on, other measurements, limits or noise."""
 
     change: Callable[[FeedDrive], None] | None = None
     at: int = 3050
     held: tuple[int, int] | None = None
+    outlier: tuple[int, float] | None = None
     limits: Limits | None = None
     noise: float = 1.0
+
+    @property
+    def sensor(self) -> Callable[[int, float], float] | None:
+        """What becomes of the measurement; None: nothing."""
+        if self.held is not None:
+            return HeldSensor(*self.held)
+        return None if self.outlier is None else Outlier(*self.outlier)
+
+
+class Outlier:
+    """Adds ``size``, m, to sample ``k``."""
+
+    def __init__(self, k: int, size: float) -> None:
+        self.k, self.size = k, size
+
+    def __call__(self, k: int, x_meas: float) -> float:
+        """Return what arrives of the measurement at sample ``k``."""
+        return x_meas + (self.size if k == self.k else 0.0)
 
 
 class HeldSensor:
@@ -80,7 +99,16 @@ def noise_seed(seed: int, run: int) -> int:
 
 
 class LibraryLoops:
-    """The library's compensator and plant, with the FMU's timing."""
+    """The library's compensator and plant, with the FMU's timing.
+
+    Parameters
+    ----------
+    predictor : PredictorSettings, optional
+        Of the compensator's predictor, but for the sampling; the machine's if left out.
+    """
+
+    def __init__(self, predictor: PredictorSettings | None = None) -> None:
+        self._predictor = predictor
 
     def run(
         self, machine: Machine, r: Array, compensate: str, seed: int, n: int = 1, case: Case | None = None
@@ -92,7 +120,12 @@ class LibraryLoops:
     def compensator(self, machine: Machine, compensate: str, case: Case) -> SepCompensator:
         """Return a compensator that has learned nothing."""
         settings = replace(machine.compensator_settings, compensate=compensate)
-        return machine.new_compensator(settings if case.limits is None else replace(settings, limits=case.limits))
+        if case.limits is not None:
+            settings = replace(settings, limits=case.limits)
+        predictor = self._predictor
+        if predictor is not None:
+            predictor = replace(predictor, T_s=machine.T_s, input_hold=machine.physics.input_hold)
+        return machine.new_compensator(settings, predictor=predictor)
 
     def once(self, compensator: SepCompensator, machine: Machine, r: Array, seed: int, run: int, case: Case) -> Run:
         """Return run number ``run`` of a compensator, warm if it is not the first."""
@@ -109,7 +142,7 @@ class LibraryLoops:
             encoder=Encoder(machine.plant.noise_std * case.noise, noise_seed(seed, run)),
             t_init=None if run == 0 else 0.0,
             disturb=disturb,
-            sensor=None if case.held is None else HeldSensor(*case.held),
+            sensor=case.sensor,
         )
 
 
@@ -178,7 +211,7 @@ class FmuLoops:
             r,
             controller_values=values,
             plant_values=plant,
-            sensor=None if case.held is None else HeldSensor(*case.held),
+            sensor=case.sensor,
         )
 
     def _fmu(self, machine: Machine, model: str, weights: Path | None = None) -> Path:

@@ -8,6 +8,7 @@ from typing import Any
 
 from hybridsep.base.errors import FmuError
 from hybridsep.base.saved import Saved
+from hybridsep.base.settings import PARAMETERS
 from hybridsep.base.signals import check_position
 from hybridsep.fmi import slave
 from hybridsep.fmi.variables import modes_from
@@ -65,5 +66,7 @@ class FeedDrivePy(slave.TableSlave):
         values = self.values
         modes = modes_from(values)
         if modes:
-            return StageDrive(ModalModel([Mode(**mode) for mode in modes]), values["f"], values["kappa"], values["T_s"])
+            friction_on = PARAMETERS["friction_on"].from_fmi(values["friction_on"])
+            model = ModalModel([Mode(**mode) for mode in modes])
+            return StageDrive(model, values["f"], values["kappa"], values["T_s"], friction_on)
         return FeedDrive(*(values[name] for name in ("m", "c", "k", "c_nl", "k_nl")))

@@ -167,7 +167,7 @@ class PredictorSettings(Settings):
     """Fields of a predictor that a compensator holds: alone it has no reference beyond its window."""
 
     ALONE: ClassVar[tuple[str, ...]] = ("trust", "effect", "noise_std", "forgetting")
-    """Fields of a predictor that no compensator holds: a plan needs a model that is affine in the commands."""
+    """Fields of a predictor that no machine file's or FMU's compensator has: it plans with the paper's model."""
 
     ELSEWHERE: ClassVar[tuple[str, ...]] = ("T_s", "input_hold", *NEEDS_PREVIEW)
 
@@ -271,7 +271,8 @@ class CompensatorSettings(Settings):
         Bound on the magnitude of the change, m; none if None.
     no_reversal : bool
         Whether the velocity of ``x_dm`` keeps the sign of that of ``x_d``: otherwise friction changes its sign too. It
-        has no effect without ``limits``, and a predictor with ``v_friction > 0`` may then be worse than without.
+        has no effect without ``limits``, and a predictor with ``v_friction > 0`` may then be worse than without. Plans
+        of a model with ``trust`` follow the friction and may turn.
     compensate : {"off", "physics", "hybrid"}
         Best model allowed; ``"off"`` leaves the command unmodified.
     """
@@ -353,6 +354,7 @@ _OTHERS = (
     # The stage's disturbance and the encoder.
     real(0.0, 0.0, 1.0, "m", "friction of the carriage, as an offset of the command", name="f", display_unit="um"),
     real(0.0, 0.0, 1e6, "1/m", "cable stiffness, an offset kappa·x·|x| of the command", name="kappa"),
+    choice("command", ("command", "motion"), "velocity of the friction: commanded or actual", name="friction_on"),
     real(0.0, 0.0, 1.0, "m", "standard deviation of the encoder noise", name="noise_std", display_unit="um"),
     whole(0, 0, 2**31 - 1, "seed of the encoder noise", name="seed"),
     # The source of commands.

@@ -16,22 +16,21 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.errors import ParameterError, SignalError
-from ..base.saved import Saved
+from ..base.errors import SignalError
 from ..base.settings import CompensatorSettings, PredictorSettings
 from ..base.signals import Array, as_published, as_samples
-from ..base.state import pack, unpack
+from ..predict.linearised import PlanModel
 from ..predict.predictor import HybridPredictor
-from ..predict.window import Prediction, PublishedWindow
-from .constraints import DriveBounds, solve
+from ..predict.window import PublishedWindow
+from .constraints import Bounds, DriveBounds, solve
 from .plan import PendingPlan, SepState
+from .plan_monitor import PlanMonitor, has_stable_poles
+from .saved_compensator import compensator_blob, compensator_from
 from .sensor import SensorWatch
 from .splines import N_DECIDED, SplineBasis, direct_samples
-from .trust import Trust, has_stable_poles
+from .trusted_plan import TrustedPlanner
 
 __all__ = ["RECOMMENDED", "SepCompensator", "SepState", "direct_samples"]
-
-_KIND = "compensator"
 
 _PINNED = 8
 """Leading samples of a window in which a bounded plan follows the last one: real-time solvers take 3 steps in each."""
@@ -49,22 +48,18 @@ class SepCompensator:
     Parameters
     ----------
     predictor : HybridPredictor
-        At the beginning of a run; it learns from the modified commands.
+        At the beginning of a run; it learns from the modified commands. With ``trust`` plans follow the slope of its
+        model (:mod:`~hybridsep.compensate.trusted_plan`); else they use the paper's, where :class:`PlanMonitor` allows.
     settings : CompensatorSettings, optional
         The defaults if left out.
 
     Raises
     ------
     ParameterError
-        If ``preview`` or ``spacing`` does not fit the predictor's ``Np``, or the predictor is one with ``trust``.
+        If ``preview`` or ``spacing`` does not fit the predictor's ``Np``.
     """
 
     def __init__(self, predictor: HybridPredictor, settings: CompensatorSettings | None = None) -> None:
-        if predictor.settings.trust:
-            raise ParameterError(
-                "trust must be false in a compensator's predictor: "
-                "it plans with a model that is affine in the commands, which that with trust is not"
-            )
         Np = predictor.Np
         self.predictor = predictor
         self.settings = settings = (settings or CompensatorSettings()).for_window(Np)
@@ -77,7 +72,9 @@ class SepCompensator:
         self._bounds = DriveBounds(
             self._basis, predictor.T_s, settings.limits, settings.change_max, no_reversal=settings.no_reversal
         )
-        self._trust = Trust()
+        self._monitor = PlanMonitor()
+        if predictor.trusted is not None:
+            predictor.trusted.plan_ahead(self.preview)
         self.restart(predictor.start, t_init=predictor.settings.warm_up)
 
     def restart(self, start: float | None = None, *, t_init: float = 0.0, lead_in: int = 0) -> None:
@@ -95,7 +92,7 @@ class SepCompensator:
         predictor = self.predictor
         predictor.restart(start, t_init=t_init + lead_in * predictor.T_s if t_init > 0 else 0.0)
         self.lead_in = int(lead_in)
-        self._trust.restart()
+        self._monitor.restart()
         self._sensor = SensorWatch()
         self._measured_before = True
         # Coefficients of the remainder of the last plan; last three values of δ and of x_d
@@ -146,7 +143,8 @@ class SepCompensator:
         """Learn from the measurement of the planned window.
 
         A window with missing samples (NaN, or a value held while the drive moves) is not learned: its residuals are
-        replaced by their predictions, and learning resumes after a completely measured window.
+        replaced by their predictions, and learning resumes after a completely measured window. With ``trust`` the
+        predictor itself leaves out what is missing or not plausible.
 
         Parameters
         ----------
@@ -164,6 +162,21 @@ class SepCompensator:
         predictor, Np = self.predictor, self.predictor.Np
         measured = np.asarray(x, dtype=np.float64)
         as_samples(np.nan_to_num(measured, nan=0.0, posinf=np.inf, neginf=-np.inf), "x", Np)
+        if predictor.trusted is None:
+            self._update_paper(measured, pending)
+        else:
+            predictor.update(measured, learn=predictor.k >= self.lead_in)
+        kept = Np // self.spacing
+        self._rest = np.concatenate((pending.coefficients[kept:], np.zeros(kept)))
+        self._delta_before, self._x_d_before = (
+            _last_three(self._delta_before, pending.delta),
+            _last_three(self._x_d_before, pending.x_d),
+        )
+        self._pending = None
+
+    def _update_paper(self, measured: Array, pending: PendingPlan) -> None:
+        """Learn from the measurement of the planned window with the paper's model."""
+        predictor = self.predictor
         x_pb, e_h = pending.prediction.x_pb, pending.prediction.e_h
         missing = self._sensor.misses(measured, x_pb)
         if missing:
@@ -177,15 +190,8 @@ class SepCompensator:
             predictor.update(measured, learn=learn)
             if judge:
                 regression = predictor.regression
-                self._trust.observe(measured - x_pb, e_h, regression.residual_sum / regression.n_samples)
+                self._monitor.observe(measured - x_pb, e_h, regression.residual_sum / regression.n_samples)
         self._measured_before = not missing
-        kept = Np // self.spacing
-        self._rest = np.concatenate((pending.coefficients[kept:], np.zeros(kept)))
-        self._delta_before, self._x_d_before = (
-            _last_three(self._delta_before, pending.delta),
-            _last_three(self._x_d_before, pending.x_d),
-        )
-        self._pending = None
 
     @property
     def is_planned(self) -> bool:
@@ -194,6 +200,8 @@ class SepCompensator:
 
     def _best_plan(self, command: Array) -> tuple[SepState, Array]:
         """Return the model and the coefficients of the best available plan, the decided ones first."""
+        if self.predictor.trusted is not None:
+            return self._trusted_plan(command)
         rest = self._rest
         candidates = self._candidates()
         if not candidates:
@@ -204,13 +212,44 @@ class SepCompensator:
         for state in candidates:
             hybrid = state is SepState.HYBRID
             g, free = (operator.g_h, operator.free) if hybrid else (operator.g_pb, operator.free_pb)
-            if not (np.isfinite(g).all() and np.isfinite(free).all()):
-                continue
-            cost = self._basis.cost(g, free, command, rest[:N_DECIDED], self._delta_before, self.settings.jerk_weight)
-            found = solve(cost, bounds, rest[N_DECIDED:], self._n_pinned)
+            found = self._affine_plan(g, free, command, bounds)
             if found is not None:
-                return state, np.concatenate((rest[:N_DECIDED], found))
+                return state, found
         return SepState.OFF, rest
+
+    def _affine_plan(self, g: Array, free: Array, command: Array, bounds: Bounds) -> Array | None:
+        """Return the coefficients of the best plan on a model ``g``, ``free`` of eq. (3); None if there is none."""
+        rest = self._rest
+        if not (np.isfinite(g).all() and np.isfinite(free).all()):
+            return None
+        cost = self._basis.cost(g, free, command, rest[:N_DECIDED], self._delta_before, self.settings.jerk_weight)
+        found = solve(cost, bounds, rest[N_DECIDED:], self._n_pinned)
+        return None if found is None else np.concatenate((rest[:N_DECIDED], found))
+
+    def _trusted_plan(self, command: Array) -> tuple[SepState, Array]:
+        """Return the model and the coefficients of the best plan, with trust: the physics model's, or a better one."""
+        predictor, rest, start = self.predictor, self._rest, self.predictor.start
+        assert predictor.trusted is not None
+        assert start is not None
+        if self.compensate is SepState.OFF:
+            return SepState.OFF, rest
+        before = command, self._x_d_before, self._delta_before, rest
+        g, free = predictor.physics_operator(self.preview)
+        physics = self._affine_plan(g, free, command, self._bounds.bounds(*before))
+        if physics is None:
+            return SepState.OFF, rest
+        if not (self.compensate is SepState.HYBRID and predictor.k >= predictor.n_init):
+            return SepState.PHYSICS, physics
+        path = command - start
+        with np.errstate(all="ignore"):  # a prediction that is no candidate may overflow
+            model = PlanModel(predictor.trusted, predictor.state, path + self._basis.values @ rest, path)
+            if not model.has_learned:
+                return SepState.PHYSICS, physics
+            planner = TrustedPlanner(self._basis, self.settings.jerk_weight, model, path, self._delta_before)
+            bounds = self._bounds.bounds(*before, may_turn=True)
+            hybrid, cost = planner.plan(rest, bounds, self._n_pinned, self._basis.filtered(g))
+            better = cost < planner.cost(physics)  # false for NaN
+        return (SepState.HYBRID, hybrid) if better else (SepState.PHYSICS, physics)
 
     def _candidates(self) -> list[SepState]:
         """Return the candidate models, best first."""
@@ -219,7 +258,7 @@ class SepCompensator:
             self.compensate is SepState.HYBRID
             and predictor.k >= predictor.n_init
             and predictor.regression.n_samples > 0
-            and self._trust.hybrid
+            and self._monitor.hybrid
             and has_stable_poles(predictor.residual_weights)
         )
         candidates = [SepState.HYBRID] if hybrid else []
@@ -227,24 +266,7 @@ class SepCompensator:
 
     def to_bytes(self) -> bytes:
         """Return parameters and state, predictor and pending window included, as a versioned blob."""
-        pending = self._pending
-        meta = {
-            "settings": self.settings.as_table(),
-            "lead_in": self.lead_in,
-            "excess": self._trust.excess,
-            "measured_before": self._measured_before,
-            "pending": None if pending is None else [int(pending.state), pending.prediction.n_warm_up],
-        }
-        arrays = {
-            "rest": self._rest,
-            "delta_before": self._delta_before,
-            "x_d_before": self._x_d_before,
-            "sensor": np.array(self._sensor.state()),
-        }
-        if pending is not None:
-            arrays |= {"coefficients": pending.coefficients, "delta": pending.delta, "x_d": pending.x_d}
-            arrays |= {name: getattr(pending.prediction, name) for name in ("x_pb", "e_h", "x_h_std")}
-        return pack(_KIND, meta, arrays, {"predictor": self.predictor.to_bytes()})
+        return compensator_blob(self)
 
     @classmethod
     def from_bytes(cls, blob: bytes) -> SepCompensator:
@@ -255,38 +277,7 @@ class SepCompensator:
         StateError
             If the blob is foreign, truncated or of another version.
         """
-        saved = Saved(_KIND, *unpack(_KIND, blob))
-        predictor = HybridPredictor.from_bytes(saved.part("predictor"))
-        restored = HybridPredictor.from_bytes(saved.part("predictor"))
-        with saved.consistent():
-            compensator = cls(predictor, CompensatorSettings.from_table(saved.table("settings")))
-        compensator.predictor = restored  # the constructor has restarted the other one
-        compensator.lead_in = saved.whole("lead_in")
-        compensator._trust.excess, compensator._measured_before = saved.real("excess"), saved.flag("measured_before")
-        n, Np = len(compensator._rest), predictor.Np
-        compensator._rest, compensator._delta_before = saved.array("rest", n), saved.array("delta_before", 3)
-        compensator._x_d_before = saved.array("x_d_before", 3, finite=False)
-        with saved.consistent():
-            compensator._sensor.restore(saved.array("sensor", 5, finite=False))
-        if saved.field("pending") is not None:
-            state, n_warm_up = saved.numbers("pending", 2)
-            if state not in tuple(SepState) or n_warm_up not in range(Np + 1) or restored.n_pending != Np:
-                raise saved.error("the pending window must be planned and predicted")
-            # A hybrid prediction that is not used may diverge.
-            prediction = Prediction(
-                saved.array("x_pb", Np),
-                saved.array("e_h", Np, finite=False),
-                saved.array("x_h_std", Np),
-                int(n_warm_up),
-            )
-            compensator._pending = PendingPlan(
-                saved.array("coefficients", n),
-                saved.array("delta", Np),
-                saved.array("x_d", Np),
-                prediction,
-                SepState(int(state)),
-            )
-        return compensator
+        return compensator_from(cls, blob)
 
 
 def _last_three(before: Array, window: Array) -> Array:

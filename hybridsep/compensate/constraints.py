@@ -94,7 +94,9 @@ class DriveBounds:
         self._all = np.concatenate(parts) if parts else np.zeros((0, basis.values.shape[1]))
         self._free = np.ascontiguousarray(self._all[:, N_DECIDED:])
 
-    def bounds(self, x_d: Array, x_d_before: Array, delta_before: Array, rest: Array) -> Bounds:
+    def bounds(
+        self, x_d: Array, x_d_before: Array, delta_before: Array, rest: Array, *, may_turn: bool = False
+    ) -> Bounds:
         """Return the bounds on the free coefficients of a plan.
 
         Parameters
@@ -105,6 +107,8 @@ class DriveBounds:
             Their last three values, and those of the change.
         rest : (3 + n_free,) array, m
             Coefficients of the rest of the last plan, the decided ones first.
+        may_turn : bool
+            Whether the command may turn where ``no_reversal`` forbids it: the plan's model follows the friction.
         """
         past = np.concatenate((delta_before, np.zeros(len(x_d))))
         command = np.concatenate((x_d_before, x_d)) + past
@@ -116,7 +120,7 @@ class DriveBounds:
         at_rest = self._free @ rest[N_DECIDED:]
         most = np.full(len(offset), 1.0 - _ROUNDING)
         least = -most
-        if self._no_reversal:
+        if self._no_reversal and not may_turn:
             steps, n = np.diff(x_d, prepend=x_d_before[-1]), len(x_d)
             for i, (order, _) in enumerate(self._scales):
                 if order == 1:

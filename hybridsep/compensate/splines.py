@@ -41,6 +41,20 @@ class PlanCost:
     P: Array
     v: Array
 
+    @classmethod
+    def regular(cls, P: Array, v: Array, ridge: float = 1e-12) -> PlanCost:
+        """Return the cost with ``P``, which is changed, made positive definite by ``ridge``.
+
+        Parameters
+        ----------
+        P : (n, n) array
+        v : (n,) array, m
+        ridge : float
+            Added to the diagonal, relative to its largest entry.
+        """
+        P[np.diag_indices_from(P)] += ridge * np.max(np.diag(P))
+        return cls(P, v)
+
 
 class SplineBasis:
     """B-spline basis of one plan.
@@ -71,9 +85,7 @@ class SplineBasis:
         # Time-invariance: one spline is filtered, the others are its shifts
         return _shifts(np.asarray(lfilter(g, [1.0], self._spline)), self.n_free, self.spacing)
 
-    def cost(
-        self, g: Array, free: Array, x_d: Array, decided: Array, before: Array, jerk_weight: float, ridge: float = 1e-12
-    ) -> PlanCost:
+    def cost(self, g: Array, free: Array, x_d: Array, decided: Array, before: Array, jerk_weight: float) -> PlanCost:
         """Return ``‖x_d − G (x_d + δ) − free‖² + jerk_weight·‖D³ δ‖²`` as a function of the free coefficients.
 
         Parameters
@@ -88,8 +100,6 @@ class SplineBasis:
             Last three values of δ.
         jerk_weight : float
             Weight of the third differences.
-        ridge : float
-            Regularisation of the diagonal, relative to its largest entry.
         """
         delta = self.values[:, :N_DECIDED] @ decided
         # Eq. (3) with the decided part of δ: x_d − G (x_d + δ_decided) − free
@@ -97,8 +107,7 @@ class SplineBasis:
         third_decided = np.diff(np.concatenate((before, delta)), 3)
         W, D = self.filtered(g), self.third[:, N_DECIDED:]
         P = W.T @ W + jerk_weight * (D.T @ D)
-        P[np.diag_indices_from(P)] += ridge * np.max(np.diag(P))
-        return PlanCost(P, W.T @ target - jerk_weight * (D.T @ third_decided))
+        return PlanCost.regular(P, W.T @ target - jerk_weight * (D.T @ third_decided))
 
 
 def direct_samples(g: ArrayLike, free: ArrayLike, x_d: ArrayLike, before: ArrayLike, jerk_weight: float) -> Array:

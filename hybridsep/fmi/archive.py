@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from ..base.data_files import DEFAULT_MACHINE
 from ..base.errors import FmuError
 from ..base.output import written_whole
+from ..base.settings import PARAMETERS
 from ..machine import Machine
 from ..machine_sections import FeedDriveSection
 from . import native_flavour, python_flavour
@@ -148,6 +149,7 @@ def _description(machine: Machine, model: str, name: str) -> dict[str, Any]:
         parameters |= machine.physics.spring_mass_damper.model_dump()
     else:
         parameters["T_s"] = machine.T_s
+        parameters["friction_on"] = PARAMETERS["friction_on"].to_fmi(machine.plant.friction_on)
     return {"model": model, "name": name, "parameters": parameters, "modes": modes}
 
 

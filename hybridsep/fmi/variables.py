@@ -253,17 +253,15 @@ def plant_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping[str
     Parameters
     ----------
     parameters : mapping
-        Start values of ``m``, ``c``, ``k``, ``c_nl``, ``k_nl`` or of ``f``, ``kappa``, ``T_s``; and of
-        ``noise_std`` and ``seed``.
+        Start values of ``m``, ``c``, ``k``, ``c_nl``, ``k_nl`` or of ``f``, ``kappa``, ``friction_on``, ``T_s``;
+        and of ``noise_std`` and ``seed``.
     modes : sequence of mappings
         ``f_n``, ``zeta``, ``alpha``, ``beta`` of each mode.
     """
     velocity = Variable(
         "v", "Real", "output", "continuous", "true velocity", unit="m/s", display_unit="mm/s", nominal=1e-2
     )
-    names = (
-        ("f", "kappa", "T_s", "noise_std", "seed") if modes else ("m", "c", "k", "c_nl", "k_nl", "noise_std", "seed")
-    )
+    own = ("f", "kappa", "friction_on", "T_s") if modes else ("m", "c", "k", "c_nl", "k_nl")
     return [
         _position("x_d", "input", "commanded position, constant over a step", start=0.0),
         _position("x", "output", "true position", variability="continuous", initially_from=("x_d",)),
@@ -272,7 +270,7 @@ def plant_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping[str
             "x_meas", "output", "measured position, with encoder noise", initially_from=("x_d", "noise_std", "seed")
         ),
         *_modes(modes),
-        *(_parameter(PARAMETERS[name], parameters[name]) for name in names),
+        *(_parameter(PARAMETERS[name], parameters[name]) for name in (*own, "noise_std", "seed")),
     ]
 
 

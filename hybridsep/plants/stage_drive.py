@@ -8,6 +8,7 @@ from ..base.clock import SampleClock
 from ..base.errors import ParameterError, SignalError
 from ..base.settings import check
 from ..model.physics import ModalModel, Mode
+from .motion_friction import velocity_under_friction
 from .plant import RATE_MAX, STATE_MAX, check_command, check_step, internal_steps
 
 __all__ = ["FRICTION_VELOCITY", "StageDrive"]
@@ -19,8 +20,8 @@ FRICTION_VELOCITY = 2e-3
 class StageDrive:
     """Linear-motor stage: modal model with friction and cable stiffness as input disturbances.
 
-    ``x = G_pb (x_d − d)`` with ``d = f·tanh(v_d / 2 mm/s) + κ·x·|x|``: the carriage's friction follows the commanded
-    velocity ``v_d``, the backward difference of ``x_d`` over ``T_s``.
+    ``x = G_pb (x_d − d)`` with ``d = f·tanh(v_f / 2 mm/s) + κ·x·|x|``. ``v_f`` is the commanded velocity, the backward
+    difference of ``x_d`` over ``T_s``, or the velocity of ``x`` itself.
 
     Parameters
     ----------
@@ -31,16 +32,22 @@ class StageDrive:
     kappa : float
         Cable stiffness as an offset of the command, 1/m, ≥ 0.
     T_s : float
-        Sampling interval of the command, s, for the difference ``v_d``.
+        Sampling interval of the command, s, for the commanded velocity.
+    friction_on : {"command", "motion"}
+        Velocity of the friction, the commanded or the actual one.
     """
 
-    def __init__(self, model: ModalModel, f: float = 0.0, kappa: float = 0.0, T_s: float = 1e-3) -> None:
+    def __init__(
+        self, model: ModalModel, f: float = 0.0, kappa: float = 0.0, T_s: float = 1e-3, friction_on: str = "command"
+    ) -> None:
         if model.dead_time:
             raise ParameterError(f"the stage's model must have no dead time, got {model.dead_time} samples")
         self.model = model
         self.f: float = check("f", f)
         self.kappa: float = check("kappa", kappa)
         self.T_s: float = check("T_s", T_s)
+        self.friction_on: str = check("friction_on", friction_on)
+        self._friction_gain = self.f * sum(mode.beta for mode in model.modes)
         self._modes = [(mode.omega**2, 2 * mode.zeta * mode.omega, mode.alpha, mode.beta) for mode in model.modes]
         self._rate = max(map(_mode_rate, model.modes))
         for i, mode in enumerate(model.modes, start=1):
@@ -73,19 +80,19 @@ class StageDrive:
         check_command(x_d)
         check_step(h, self._rate)
         step = self._clock.stepped(self._clock.end, h)
-        r, z = x_d - self._start, self._z
+        r, z, v = x_d - self._start, self._z, self._v
         last_x_d, v_d, done = self._last_x_d, self._v_d, 0.0
         # v_d is updated at the sampling instants, whatever the step size.
         for i in range(step.n_latched + 1):
             end = max(done, step.first + i * self.T_s) if i < step.n_latched else h
             if end > done:
-                z = self._integrated(z, self._disturbed(r, v_d), end - done)
+                z, v = self._integrated(z, self._disturbed(r, v_d), end - done, v)
                 done = end
             if i < step.n_latched:
                 last_x_d, v_d = r, (r - last_x_d) / self.T_s
         if not all(abs(s) < STATE_MAX for s in z):
             raise SignalError(f"the stage's state overflowed (command {x_d} m)")
-        self._z, self._v = z, self._position(self._derivative(z, self._disturbed(r, v_d)))
+        self._z, self._v = z, self._position(self._derivative(z, self._disturbed(r, v_d), v))
         self._last_x_d, self._v_d, self._clock = last_x_d, v_d, step.after
 
     def state(self) -> list[float]:
@@ -99,31 +106,37 @@ class StageDrive:
         self._z = list(state[11:])
 
     def _disturbed(self, r: float, v_d: float) -> float:
-        """Return the command disturbed by friction, a function of the commanded velocity."""
-        return r - self.f * math.tanh(v_d / FRICTION_VELOCITY)
+        """Return the command disturbed by friction, if it is one of the commanded velocity."""
+        return r - self.f * math.tanh(v_d / FRICTION_VELOCITY) if self.friction_on == "command" else r
 
-    def _integrated(self, z: list[float], disturbed: float, time: float) -> list[float]:
-        """Return ``z`` after ``time``, s, with the command held."""
+    def _integrated(self, z: list[float], disturbed: float, time: float, v: float) -> tuple[list[float], float]:
+        """Return ``z`` after ``time``, s, with the command held, and a velocity of the last internal step."""
         n = internal_steps(time, self._rate)
         dt, f = time / n, self._derivative
         for _ in range(n):
-            k1 = f(z, disturbed)
-            k2 = f([s + dt / 2 * k for s, k in zip(z, k1, strict=True)], disturbed)
-            k3 = f([s + dt / 2 * k for s, k in zip(z, k2, strict=True)], disturbed)
-            k4 = f([s + dt * k for s, k in zip(z, k3, strict=True)], disturbed)
+            k1 = f(z, disturbed, v)
+            v = self._position(k1)
+            k2 = f([s + dt / 2 * k for s, k in zip(z, k1, strict=True)], disturbed, v)
+            k3 = f([s + dt / 2 * k for s, k in zip(z, k2, strict=True)], disturbed, v)
+            k4 = f([s + dt * k for s, k in zip(z, k3, strict=True)], disturbed, v)
             z = [s + dt / 6 * (a + 2 * b + 2 * c + d) for s, a, b, c, d in zip(z, k1, k2, k3, k4, strict=True)]
-        return z
+        return z, v
 
     def _position(self, z: list[float]) -> float:
         return sum(alpha * z[2 * i] + beta * z[2 * i + 1] for i, (_, _, alpha, beta) in enumerate(self._modes))
 
-    def _derivative(self, z: list[float], disturbed: float) -> list[float]:
+    def _derivative(self, z: list[float], disturbed: float, v: float) -> list[float]:
+        """Return the slope of ``z``; ``v``, m/s, is a velocity shortly before."""
         x = self._position(z)
         u = disturbed - self.kappa * x * abs(x)
         slope = []
         for i, (w2, two_zw, _, _) in enumerate(self._modes):
             # z̈ + 2ζω ż + ω² z = u, eq. (15)
             slope += [z[2 * i + 1], u - two_zw * z[2 * i + 1] - w2 * z[2 * i]]
+        if self.friction_on == "motion":
+            v = velocity_under_friction(self._position(slope), self._friction_gain, FRICTION_VELOCITY, v)
+            friction = self.f * math.tanh(v / FRICTION_VELOCITY)
+            slope[1::2] = [s - friction for s in slope[1::2]]
         return slope
 
 

@@ -8,9 +8,9 @@ import numpy as np
 from scipy.signal import lfilter
 
 from ..base.signals import Array
-from .regression import RidgeRegression
+from .regression import PenalisedSolution, RidgeRegression
 
-__all__ = ["CORRELATION_MAX", "Candidate", "CandidatePrediction", "ResidualScale", "lags"]
+__all__ = ["CORRELATION_MAX", "Candidate", "CandidatePrediction", "ResidualScale", "SolvedCandidate", "lags"]
 
 _CAUTION = 2.0
 """Factor on the predicted variance when a prediction is shrunk by it: its distribution has long tails."""
@@ -63,6 +63,62 @@ class CandidatePrediction(NamedTuple):
     expected: float
 
 
+class SolvedCandidate(NamedTuple):
+    """Candidate with weights.
+
+    Attributes
+    ----------
+    n_static : int
+        Static features, the first ones of a row.
+    solution : PenalisedSolution
+        Weights of these and of the lags.
+    variance : float, m²
+        Of the noise that the penalties come from.
+    """
+
+    n_static: int
+    solution: PenalisedSolution
+    variance: float
+
+    @property
+    def lag_weights(self) -> Array:
+        """Weights of ``e_pb(k−1) … e_pb(k−p)``, ``(p,)``."""
+        return self.solution.weights[self.n_static :]
+
+    def predict(self, rows: Array, past: Array, scale: ResidualScale) -> CandidatePrediction:
+        """Predict the residual over a window in free run.
+
+        Weights have normal priors, so the variance of ``wᵀφ`` is known; it is carried through the recursion's impulse
+        response. A prediction ``e`` of variance ``τ²`` is shrunk to ``e·v/(v + 2τ²)``, ``v`` being the recent mean
+        square of the residual: at a first motion, a first reversal or in a region not seen yet the physics model
+        remains.
+
+        Parameters
+        ----------
+        rows : (n, n_static) array
+            Static features of the window.
+        past : (p,) array, m
+            Last residuals, newest first.
+        scale : ResidualScale
+        """
+        w_e, largest = self.lag_weights, scale.largest
+        p = len(w_e)
+        drive = rows @ self.solution.weights[: self.n_static]
+        response = np.zeros(0)
+        if p:
+            drive, response = _recursion(w_e, drive, past)
+        finite = np.isfinite(drive)
+        e = np.clip(np.where(finite, drive, 0.0), -_BOUND * largest, _BOUND * largest)
+        phi = np.hstack((rows, lags(past, e))) if p else rows
+        spread = self.variance * self.solution.leverage(phi)
+        most = _DIVERGED * largest**2
+        if p:
+            spread = np.minimum(lfilter(response**2, [1.0], spread), most)
+        spread = np.where(finite, spread, most)
+        shrink = scale.recent / (scale.recent + _CAUTION * spread)
+        return CandidatePrediction(e * shrink, e, self.solution.residual_sum, self.variance + float(spread.mean()))
+
+
 class Candidate:
     """Model of the residual, and what is known of its errors.
 
@@ -87,21 +143,8 @@ class Candidate:
         self.n_static, self.lag_scales, self.correlation_max = n_static, lag_scales, correlation_max
         self.noise_variance, self.correlation = 0.0, _FIRST_CORRELATION
 
-    def predict(
-        self,
-        regression: RidgeRegression,
-        static_scales: Array,
-        rows: Array,
-        past: Array,
-        scale: ResidualScale,
-        least_variance: float,
-    ) -> CandidatePrediction:
-        """Predict the residual over a window in free run.
-
-        Weights have normal priors, so the variance of ``wᵀφ`` is known; it is carried through the recursion's impulse
-        response. A prediction ``e`` of variance ``τ²`` is shrunk to ``e·v/(v + 2τ²)``, ``v`` being the recent mean
-        square of the residual: at a first motion, a first reversal or in a region not seen yet the physics model
-        remains.
+    def solve(self, regression: RidgeRegression, static_scales: Array, least_variance: float) -> SolvedCandidate:
+        """Return the model with the weights that follow from all rows so far.
 
         Parameters
         ----------
@@ -109,32 +152,12 @@ class Candidate:
             Factor of all rows.
         static_scales : (n_static,) array
             Prior standard deviations of the weights of the static features.
-        rows : (n, n_static) array
-            Static features of the window.
-        past : (p,) array, m
-            Last residuals, newest first.
-        scale : ResidualScale
         least_variance : float
             Least variance of the noise, m².
         """
-        p, largest = len(self.lag_scales), scale.largest
         variance = max(self.noise_variance, least_variance) * min(self.correlation, self.correlation_max)
         priors = np.concatenate((static_scales, self.lag_scales))
-        solution = regression.penalised(variance / priors**2)
-        drive = rows @ solution.weights[: self.n_static]
-        response = np.zeros(0)
-        if p:
-            drive, response = _recursion(solution.weights[self.n_static :], drive, past)
-        finite = np.isfinite(drive)
-        e = np.clip(np.where(finite, drive, 0.0), -_BOUND * largest, _BOUND * largest)
-        phi = np.hstack((rows, lags(past, e))) if p else rows
-        spread = variance * solution.leverage(phi)
-        most = _DIVERGED * largest**2
-        if p:
-            spread = np.minimum(lfilter(response**2, [1.0], spread), most)
-        spread = np.where(finite, spread, most)
-        shrunk = e * (scale.recent / (scale.recent + _CAUTION * spread))
-        return CandidatePrediction(shrunk, e, solution.residual_sum, variance + float(spread.mean()))
+        return SolvedCandidate(self.n_static, regression.penalised(variance / priors**2), variance)
 
     def judge(self, unshrunk: Array, measured: Array) -> None:
         """Estimate the correlation from the errors of a window, ``(n,)``, m, that has been measured."""

@@ -26,7 +26,7 @@ from .regression import RidgeRegression
 from .saved_predictor import predictor_blob, predictor_from
 from .trusted import TrustedModel
 from .uncertainty import Uncertainty
-from .window import PredictedWindow, Prediction, WindowOperator
+from .window import PredictedWindow, Prediction, WindowOperator, path_beyond
 
 __all__ = ["HybridPredictor"]
 
@@ -146,8 +146,9 @@ class HybridPredictor:
         self, x_d: Array, x_pb: Array, start: float, reference: Array, signs: Array
     ) -> tuple[Array, PredictedWindow]:
         """Return the residual predicted over a window, ``(n,)``, m, and the window, pending measurement."""
-        n = len(x_d)
-        forecast = None if self.trusted is None else self.trusted.forecast(x_d, x_pb)
+        n, forecast = len(x_d), None
+        if self.trusted is not None:
+            forecast = self.trusted.forecast(x_d, x_pb, path_beyond(reference, start, n))
         features = self.reference_features.features(signs, n)
         e_h = self._free_run(x_pb, features) if forecast is None else forecast.e_h
         active = np.arange(n) >= self._warm_up(n)
@@ -235,6 +236,13 @@ class HybridPredictor:
             g_pb=g_pb,
             free_pb=free_pb + start * (1.0 - np.cumsum(g_pb)),
         )
+
+    def physics_operator(self, n: int) -> tuple[Array, Array]:
+        """Return the first column of ``G_pb``, m/m, and its free response, m, ``(n,)`` each; the start is known."""
+        assert self.start is not None
+        g_pb = self.discrete.impulse_response(n)
+        free, _ = self.discrete.forced_response(self.state, np.zeros(n))
+        return g_pb, free + self.start * (1.0 - np.cumsum(g_pb))
 
     @property
     def n_pending(self) -> int:

@@ -17,7 +17,7 @@ from ..base.settings import PredictorSettings
 from ..base.signals import Array
 from ..model.discrete import DiscreteModel
 from .blend import Blend
-from .candidates import Candidate, CandidatePrediction, ResidualScale, lags
+from .candidates import Candidate, CandidatePrediction, ResidualScale, SolvedCandidate, lags
 from .disturbances import LEAST_VELOCITY, StaticFeatures, StaticState
 from .guard import SensorGuard
 from .regression import RidgeRegression
@@ -47,7 +47,7 @@ _LEAST_NOISE = 1e-4
 """Bound on λ relative to the largest mean square of the residual: a larger λ would prevent any learning."""
 
 _CARRIED = 10.0
-"""Largest weight of earlier runs when another begins, in windows: a machine may have changed meanwhile."""
+"""Largest weight of earlier runs when another begins, in look-aheads: a machine may have changed meanwhile."""
 
 _SURPRISE, _SURPRISED = 10.0, 0.1
 """Mean square error of a window, relative to the expected one, above which the machine has changed; and what then
@@ -104,7 +104,7 @@ class TrustedModel:
     """
 
     def __init__(self, settings: PredictorSettings, discrete: DiscreteModel) -> None:
-        self.settings = settings
+        self.settings, self.look_ahead = settings, settings.Np
         self.static = StaticFeatures(discrete, settings.q)
         p = settings.p
         self.regression = RidgeRegression(self.static.n + p, _NO_PENALTY)
@@ -129,34 +129,67 @@ class TrustedModel:
         self.past_bridged: NDArray[np.bool_] = np.zeros(self.settings.p, dtype=np.bool_)
         self.guard.restart()
         self.n_rejected = 0
-        self._discount(_CARRIED * self.settings.Np / max(self.n_rows, _CARRIED * self.settings.Np))
+        carried = _CARRIED * self.look_ahead
+        self._discount(carried / max(self.n_rows, carried))
 
-    def forecast(self, x_d: Array, x_pb: Array) -> Forecast:
+    def plan_ahead(self, preview: int) -> None:
+        """Adapt to a compensator, which plans over a preview, in samples, and moves the drive as it commands."""
+        self.look_ahead = preview
+        self.static.damping_of_motion = preview > self.settings.Np
+
+    def forecast(self, x_d: Array, x_pb: Array, path: Array | None = None) -> Forecast:
         """Predict the residual over the next window; nothing is changed.
 
         Parameters
         ----------
         x_d, x_pb : (n,) array, m
             Commands and physics-based prediction, relative to the start.
+        path : (m,) array, m, optional
+            Commanded positions as far as they are known, in a compensator.
         """
-        peak = self.static.peak_velocity(self.state, x_d)
-        outgrown = peak > max(_GROWTH * self.velocity_scale, LEAST_VELOCITY)
-        velocity_scale = peak if outgrown else self.velocity_scale
-        rows, _ = self.static.rows(self.state, x_d, x_pb, x_pb, velocity_scale)
-        before = np.zeros(self.static.n) if outgrown else self.largest
-        largest = np.maximum(before, np.abs(rows).max(axis=0))
-        bound = self._bound  # residuals that were not learned may be larger
-        hold = min(max(float(self.past[0]), -bound), bound)
+        velocity_scale, largest = self.scales(x_d, x_pb, path)
         predictions: tuple[CandidatePrediction, ...] = ()
-        if self.n_rows > 0.0 and not outgrown and self.scale.largest_square > 0.0:
+        if self.has_learned(velocity_scale):
+            rows, _ = self.static.rows(self.state, x_d, x_pb, x_pb, velocity_scale)
+            solved = [self.solve(candidate, largest) for candidate in self.candidates]
             # The stiffness acts at the position, which the physics model alone does not give well enough.
-            x = x_pb + self._predict(self.candidates[0], rows, largest).e_h
+            x = x_pb + self.predict(solved[0], rows).e_h
             rows, _ = self.static.rows(self.state, x_d, x_pb, x, velocity_scale)
-            predictions = tuple(self._predict(candidate, rows, largest) for candidate in self.candidates)
+            predictions = tuple(self.predict(candidate, rows) for candidate in solved)
+        hold = self.hold
         candidates = self._blended(hold, predictions, len(x_d))
         e_h = self.blend.weights @ candidates
         disagreement = np.maximum(self.blend.weights @ candidates**2 - e_h**2, 0.0)
         return Forecast(x_d, x_pb, e_h, disagreement, hold, predictions, largest, velocity_scale)
+
+    def scales(self, x_d: Array, x_pb: Array, path: Array | None = None) -> tuple[float, Array]:
+        """Return the velocity scale of the friction, m/s, and the largest magnitudes of the features, window included.
+
+        Parameters
+        ----------
+        x_d, x_pb : (n,) array, m
+            Commands and physics-based prediction of the next window, relative to the start.
+        path : (m,) array, m, optional
+            Commanded positions as far as they are known: a compensator begins to move before them, with a creep.
+        """
+        peak = self.static.peak_velocity(self.state, x_d)
+        outgrown = peak > max(_GROWTH * self.velocity_scale, LEAST_VELOCITY)
+        if path is not None and self.n_rows == 0.0:
+            peak = max(float(np.abs(np.diff(path)).max(initial=0.0)) / self.settings.T_s, self.velocity_scale)
+            outgrown = peak > max(self.velocity_scale, LEAST_VELOCITY)
+        velocity_scale = peak if outgrown else self.velocity_scale
+        rows, _ = self.static.rows(self.state, x_d, x_pb, x_pb, velocity_scale)
+        before = np.zeros(self.static.n) if outgrown else self.largest
+        return velocity_scale, np.maximum(before, np.abs(rows).max(axis=0))
+
+    def has_learned(self, velocity_scale: float) -> bool:
+        """Return whether there is something to predict with at a velocity scale of :meth:`scales`, m/s."""
+        return self.n_rows > 0.0 and velocity_scale == self.velocity_scale and self.scale.largest_square > 0.0
+
+    @property
+    def hold(self) -> float:
+        """Last residual, m, bounded: one that was not learned may be larger."""
+        return min(max(float(self.past[0]), -self.bound), self.bound)
 
     def learn(self, forecast: Forecast, x: Array, *, fold: bool = True) -> NDArray[np.bool_]:
         """Learn from the measurement of a window; return which samples are accepted, ``(m,)`` bool.
@@ -203,19 +236,29 @@ class TrustedModel:
         self.blend.update(candidates[:, accepted], sound, self.scale.largest_square)
 
     @property
-    def _bound(self) -> float:
+    def bound(self) -> float:
         """Bound on what is predicted, m."""
         return _BOUND * self.scale.largest
 
-    def _predict(self, candidate: Candidate, rows: Array, largest: Array) -> CandidatePrediction:
-        """Return the prediction of a candidate, bounded by the residuals so far."""
+    def solve(self, candidate: Candidate, largest: Array) -> SolvedCandidate:
+        """Return a candidate with the weights that follow from all rows so far.
+
+        Parameters
+        ----------
+        candidate : Candidate
+        largest : (n_static,) array
+            Largest magnitudes of the static features, those of the window to predict included.
+        """
         scale = self.scale
         effect = self.settings.effect or math.sqrt(scale.largest_square)
         least = min(self.settings.lam, _LEAST_NOISE * scale.largest_square)
-        static_scales = effect * self.static.shares / np.maximum(largest, 1e-150)
-        found = candidate.predict(self.regression, static_scales, rows, self.past, scale, least)
+        return candidate.solve(self.regression, effect * self.static.shares / np.maximum(largest, 1e-150), least)
+
+    def predict(self, solved: SolvedCandidate, rows: Array) -> CandidatePrediction:
+        """Return the prediction of a candidate over a window, bounded by the residuals so far."""
+        found = solved.predict(rows, self.past[: len(solved.lag_weights)], self.scale)
         return found._replace(
-            e_h=np.clip(found.e_h, -self._bound, self._bound), noise_variance=found.noise_variance / self.n_rows
+            e_h=np.clip(found.e_h, -self.bound, self.bound), noise_variance=found.noise_variance / self.n_rows
         )
 
     @staticmethod

@@ -14,7 +14,7 @@ from ..base.signals import Array, as_published, as_samples
 from .trusted import Forecast
 from .uncertainty import PredictedError
 
-__all__ = ["PredictedWindow", "Prediction", "PublishedWindow", "WindowOperator"]
+__all__ = ["PredictedWindow", "Prediction", "PublishedWindow", "WindowOperator", "path_beyond"]
 
 
 @dataclass(frozen=True)
@@ -154,3 +154,8 @@ class WindowOperator:
         """Return ``G_h x_d + free`` for commands ``x_d``, ``(n,)``, m."""
         command = as_samples(x_d, "x_d", len(self.g_h))
         return np.asarray(lfilter(self.g_h, [1.0], command)) + self.free
+
+
+def path_beyond(reference: Array, start: float, n: int) -> Array | None:
+    """Return the unmodified commands relative to the start, m, if they are known beyond a window of ``n`` samples."""
+    return reference - start if len(reference) > n else None

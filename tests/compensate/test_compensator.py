@@ -13,7 +13,6 @@ from staircase_data import commanded
 from hybridsep.base.errors import ParameterError, SignalError, StateError
 from hybridsep.base.settings import CompensatorSettings, PredictorSettings
 from hybridsep.base.signals import Array
-from hybridsep.base.state import pack, unpack
 from hybridsep.compensate.compensator import RECOMMENDED, SepCompensator, SepState
 from hybridsep.plants.feed_drive import FeedDrive
 from hybridsep.plants.plant import Plant
@@ -119,19 +118,6 @@ def test_a_saved_state_goes_on_bit_for_bit(planned: bool, v_friction: float) -> 
 def test_parameters_out_of_range_are_named(values: dict[str, Any], message: str) -> None:
     with pytest.raises(ParameterError, match=message):
         SepCompensator(HybridPredictor(MODEL, PredictorSettings(trust=False)), CompensatorSettings(**values))
-
-
-def test_a_predictor_with_trust_is_refused() -> None:
-    trusted = HybridPredictor(MODEL, PredictorSettings(trust=True))
-    with pytest.raises(
-        ParameterError, match=r"^trust must be false in a compensator's predictor: .* affine in the comm"
-    ):
-        SepCompensator(trusted)
-    meta, arrays, parts = unpack(
-        "compensator", SepCompensator(HybridPredictor(MODEL, PredictorSettings(trust=False))).to_bytes()
-    )
-    with pytest.raises(StateError, match="trust must be false"):
-        SepCompensator.from_bytes(pack("compensator", meta, arrays, parts | {"predictor": trusted.to_bytes()}))
 
 
 def test_bad_samples_change_nothing() -> None:

@@ -68,7 +68,7 @@ CLANG = pytest.param([sys.executable, "-m", "ziglang", "cc"], id="clang")
 @pytest.mark.parametrize("compiler", [GCC, CLANG])
 @pytest.mark.parametrize("model", ["HybridPredictor", "SepCompensator", "FeedDrive"])
 def test_each_source_compiles_alone_without_warnings(tmp_path: Path, compiler: list[str], model: str) -> None:
-    parameters: dict[str, object] = dict.fromkeys(("f", "kappa", "noise_std", "seed"), 0) | {"T_s": 1e-3}
+    parameters: dict[str, object] = dict.fromkeys(("f", "kappa", "friction_on", "noise_std", "seed"), 0) | {"T_s": 1e-3}
     mode = {"f_n": 25.0, "zeta": 0.05, "alpha": 1.0, "beta": 0.0}
     description = {"model": "FeedDrive", "name": "Stage", "parameters": parameters, "modes": [mode]}
     if model != "FeedDrive":

@@ -50,7 +50,7 @@ def test_prediction_is_the_formulas(p: int, k: int, correlation_max: float) -> N
     candidate = Candidate(N_STATIC, LAG_PRIORS[:p], correlation_max)
     candidate.noise_variance, candidate.correlation = 0.05**2, 5.0
     scale = ResidualScale(recent=0.2, largest_square=0.3, largest=100.0)
-    found = candidate.predict(learned(static, lags, target), EFFECTS, rows, past, scale, 1e-9)
+    found = candidate.solve(learned(static, lags, target), EFFECTS, 1e-9).predict(rows, past[:p], scale)
     free, shrunk = written_out(static, lags, target, rows, past, correlation_max * 0.05**2, p, scale.recent)
     np.testing.assert_allclose(found.unshrunk, free, rtol=0, atol=1e-12)
     np.testing.assert_allclose(found.e_h, shrunk, rtol=0, atol=1e-12)
@@ -63,9 +63,8 @@ def test_what_was_never_told_apart_is_shrunk_by_its_prior() -> None:
     candidate = Candidate(N_STATIC, LAG_PRIORS[:0], 1e4)
     candidate.noise_variance, candidate.correlation = 1e-8, 1.0
     regression, scale = learned(same, np.zeros((500, 2)), np.ones(500)), ResidualScale(1.0, 1.0, 1.0)
-    seen, unseen = candidate.predict(
-        regression, EFFECTS, np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0]]), np.zeros(2), scale, 0.0
-    ).e_h
+    solved = candidate.solve(regression, EFFECTS, 0.0)
+    seen, unseen = solved.predict(np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0]]), np.zeros(0), scale).e_h
     assert seen == pytest.approx(1.0, abs=1e-6)
     # Weights 0.8 and 0.2; the variance of their difference is 4 · 1² · 0.5² / (1² + 0.5²) = 0.8.
     assert unseen == pytest.approx(0.6 / (1.0 + 2.0 * 0.8), rel=1e-6)
@@ -78,7 +77,7 @@ def test_a_recursion_that_diverges_predicts_nothing() -> None:
     candidate.noise_variance = 1e-6
     rows, past = np.ones((200, N_STATIC)), np.array([1.0, 1.0])
     scale = ResidualScale(1.0, 1.0, 1.0)
-    found = candidate.predict(regression, EFFECTS, rows, past, scale, 0.0)
+    found = candidate.solve(regression, EFFECTS, 0.0).predict(rows, past, scale)
     assert np.isfinite(found.e_h).all()
     assert np.abs(found.unshrunk).max() <= 10.0 * scale.largest
     assert np.abs(found.e_h[20:]).max() < 1e-4

@@ -204,11 +204,12 @@ def test_the_feed_drive(values: dict[str, float], samples: Any, h: float) -> Non
     refused(values, run)
 
 
+@pytest.mark.parametrize("friction_on", ["command", "motion"])
 @bounded
 @given(values_of(*STAGE), modes_of(2), positions, st.floats(-9, -3).map(lambda e: 10.0**e))
-def test_the_stage(values: dict[str, float], modes: dict[str, float], samples: Any, h: float) -> None:
+def test_the_stage(values: dict[str, float], modes: dict[str, float], samples: Any, h: float, friction_on: str) -> None:
     def run() -> None:
-        plant = StageDrive(model_from(modes), values["f"], values["kappa"], values["T_s"])
+        plant = StageDrive(model_from(modes), values["f"], values["kappa"], values["T_s"], friction_on)
         check_plant(plant, values["noise_std"], samples[:4], h)
 
     refused({**values, **modes}, run)
@@ -221,10 +222,13 @@ def test_the_feed_drive_in_c(values: dict[str, float], samples: Any, h: float) -
     refused(values, lambda: check_c_model(model, samples[:10], h))
 
 
+@pytest.mark.parametrize("friction_on", [0, 1])
 @bounded
 @given(values_of(*STAGE), modes_of(2), positions, st.floats(-12, 3).map(lambda e: 10.0**e))
-def test_the_stage_in_c(values: dict[str, float], modes: dict[str, float], samples: Any, h: float) -> None:
-    model = CModel("stage_drive", {**values, **modes})
+def test_the_stage_in_c(
+    values: dict[str, float], modes: dict[str, float], samples: Any, h: float, friction_on: int
+) -> None:
+    model = CModel("stage_drive", {**values, **modes, "friction_on": friction_on})
     refused({**values, **modes}, lambda: check_c_model(model, samples[:10], h))
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hybridsep.base.settings import CompensatorSettings, PredictorSettings
+from hybridsep.base.settings import PARAMETERS, CompensatorSettings, PredictorSettings
 from hybridsep.compensate.compensator import SepCompensator
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.evaluate.backtest import backtest
@@ -49,7 +49,8 @@ def library_plant(values: Mapping[str, Any]) -> Plant:
     """Return the stage where there are modes among the values, the nonlinear drive otherwise."""
     if modes := modes_from(values):
         model = ModalModel([Mode(**mode) for mode in modes])
-        return StageDrive(model, values["f"], values["kappa"], values["T_s"])
+        friction_on = PARAMETERS["friction_on"].from_fmi(values["friction_on"])
+        return StageDrive(model, values["f"], values["kappa"], values["T_s"], friction_on)
     return FeedDrive(*(values[name] for name in ("m", "c", "k", "c_nl", "k_nl")))
 
 

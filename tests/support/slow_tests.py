@@ -30,6 +30,8 @@ SLOW = (
     r"compensate/test_interior\.py",
     r"compensate/test_compensator\.py::test_trouble",
     r"compensate/test_path_direction\.py",
+    r"compensate/test_trusted_plan\.py::(?!test_(without|a_plan))",
+    r"plants/test_motion_friction\.py::test_the_error_on_the_x_axis",
     r"compensate/test_plans\.py::test_limits_hold",
     r"fmi/test_native_fmu\.py::test_checkers_have_no_finding\[\w+_(als|emps)",
     r"cosim/test_predictor_fmus\.py::test_(spiral|staircase)_error_reduction",

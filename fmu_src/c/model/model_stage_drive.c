@@ -29,7 +29,8 @@ HSEP_API void hsep_drive_begin(hsep_drive *self, const double values[])
     hsep_mode modes[HSEP_N_MODES];
     hsep_modes_read(&values[HSEP_VR_mode], HSEP_N_MODES, modes);
     hsep_stage_init(
-        self, modes, HSEP_N_MODES, values[HSEP_VR_f], values[HSEP_VR_kappa], values[HSEP_VR_T_s], values[HSEP_VR_x_d]);
+        self, modes, HSEP_N_MODES, values[HSEP_VR_f], values[HSEP_VR_kappa],
+        (hsep_friction_on)values[HSEP_VR_friction_on], values[HSEP_VR_T_s], values[HSEP_VR_x_d]);
 }
 
 HSEP_API hsep_status hsep_drive_step(hsep_drive *self, double x_d, double h, char message[])
@@ -47,11 +48,13 @@ HSEP_API int hsep_drive_valid(const void *block, size_t bytes, const double valu
 {
     hsep_stage stage;
     memcpy(&stage, block, sizeof stage);
-    const double numbers[] = {stage.f, stage.kappa, stage.start, stage.last_x_d, stage.v_d, stage.v};
+    const double numbers[] = {stage.f, stage.kappa, stage.friction_gain, stage.start,
+                              stage.last_x_d, stage.v_d, stage.v};
     return hsep_within(numbers, sizeof numbers / sizeof *numbers, HSEP_PREDICTION_MAX) &&
            hsep_within(
                (const char *)block + sizeof stage, (bytes - sizeof stage) / sizeof(double), HSEP_PREDICTION_MAX) &&
-           hsep_stage_valid(block, HSEP_N_MODES) && stage.clock.T_s == values[HSEP_VR_T_s];
+           hsep_stage_valid(block, HSEP_N_MODES) && stage.friction_on == (uint64_t)values[HSEP_VR_friction_on] &&
+           stage.clock.T_s == values[HSEP_VR_T_s];
 }
 
 #else

@@ -130,7 +130,7 @@ static int compensator_trusts(hsep_compensator *self)
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     const hsep_recursion recursion = hsep_predictor_recursion(predictor, 0);
     return self->compensate == HSEP_SEP_HYBRID && (double)predictor->k >= predictor->n_init &&
-           hsep_predictor_regression(predictor)->n_samples > 0 && self->trust.excess <= 0.0 &&
+           hsep_predictor_regression(predictor)->n_samples > 0 && self->monitor.excess <= 0.0 &&
            hsep_recursion_stable(&recursion, hsep_at(self, self->trial_e));
 }
 
@@ -210,8 +210,8 @@ static void compensator_next_window(hsep_compensator *self)
     /* Predictions from few rows, before the warm-up is over, are not used: they are not judged. */
     if (hsep_predictor_finish(predictor) && (double)(predictor->k - Np) >= predictor->n_init) {
         const hsep_regression *regression = hsep_predictor_regression(predictor);
-        hsep_trust_observe(
-            &self->trust, hsep_at(predictor, predictor->past_e), hsep_at(predictor, predictor->e_h), Np,
+        hsep_plan_monitor_observe(
+            &self->monitor, hsep_at(predictor, predictor->past_e), hsep_at(predictor, predictor->e_h), Np,
             regression->residual_sum / (double)regression->n_samples);
     }
     hsep_planner_next(compensator_planner(self), hsep_at(predictor, predictor->x_d));

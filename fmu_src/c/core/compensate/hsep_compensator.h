@@ -24,7 +24,7 @@
 #include "hsep_layout.h"
 #include "hsep_planner.h"
 #include "hsep_predictor.h"
-#include "hsep_trust.h"
+#include "hsep_plan_monitor.h"
 
 #include <stdint.h>
 
@@ -41,7 +41,7 @@ typedef struct {
     uint64_t compensate; /* hsep_sep_state, the best model allowed */
     uint64_t state;      /* hsep_sep_state of the window */
     uint64_t solving;    /* whether its plan is being solved */
-    hsep_trust trust;
+    hsep_plan_monitor monitor;
     /* Offsets in doubles from the beginning of the struct */
     uint64_t x_dm;      /* (Np,) m, the window: modified commands */
     uint64_t trial_x;   /* (preview + q,) m, x_pb of a trial, newest first */

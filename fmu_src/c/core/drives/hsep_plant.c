@@ -1,5 +1,7 @@
 #include "hsep_plant.h"
 
+#include "hsep_friction.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -102,10 +104,13 @@ HSEP_API int hsep_stage_valid(const void *block, uint64_t n_modes)
 }
 
 HSEP_API void hsep_stage_init(
-    hsep_stage *self, const hsep_mode modes[], uint64_t n_modes, double f, double kappa, double T_s, double start)
+    hsep_stage *self, const hsep_mode modes[], uint64_t n_modes, double f, double kappa, hsep_friction_on friction_on,
+    double T_s, double start)
 {
     self->f = f;
     self->kappa = kappa;
+    self->friction_on = (uint64_t)friction_on;
+    self->friction_gain = 0.0;
     self->start = start;
     self->last_x_d = self->v_d = self->v = 0.0;
     (void)hsep_clock_init(&self->clock, 0.0, T_s);
@@ -117,7 +122,9 @@ HSEP_API void hsep_stage_init(
         stage[i].two_zeta_omega = 2.0 * modes[i].zeta * omega;
         stage[i].alpha = modes[i].alpha;
         stage[i].beta = modes[i].beta;
+        self->friction_gain += modes[i].beta;
     }
+    self->friction_gain *= f;
     memset(hsep_at(self, self->z), 0, (size_t)(2 * n_modes) * sizeof(double));
 }
 
@@ -132,8 +139,9 @@ static double plant_position(const hsep_stage *s, const double z[])
     return x;
 }
 
-/* The slope of z, (2 n_modes,), under a command disturbed by friction. */
-static void plant_stage_slope(const hsep_stage *s, const double z[], double disturbed, double slope[])
+/* The slope of z, (2 n_modes,), under a command disturbed by friction of the commanded velocity; v, m/s, is a velocity
+ * shortly before. */
+static void plant_stage_slope(const hsep_stage *s, const double z[], double disturbed, double v, double slope[])
 {
     const hsep_stage_mode *mode = stage_modes(s);
     const double x = plant_position(s, z);
@@ -143,16 +151,24 @@ static void plant_stage_slope(const hsep_stage *s, const double z[], double dist
         slope[2 * i] = z[2 * i + 1];
         slope[2 * i + 1] = u - mode[i].two_zeta_omega * z[2 * i + 1] - mode[i].omega2 * z[2 * i];
     }
+    if (s->friction_on == HSEP_FRICTION_MOTION) {
+        v = hsep_friction_velocity(plant_position(s, slope), s->friction_gain, plant_friction_velocity, v);
+        const double friction = s->f * tanh(v / plant_friction_velocity);
+        for (uint64_t i = 0; i < s->n_modes; i++) {
+            slope[2 * i + 1] -= friction;
+        }
+    }
 }
 
-/* The command after the carriage's friction, which follows the commanded velocity: d = f tanh(v_d / 2 mm/s). */
+/* The command after the carriage's friction, d = f tanh(v_d / 2 mm/s), if it is that of the commanded velocity. */
 static double plant_disturbed(const hsep_stage *s, double r, double v_d)
 {
-    return r - s->f * tanh(v_d / plant_friction_velocity);
+    return s->friction_on == HSEP_FRICTION_COMMAND ? r - s->f * tanh(v_d / plant_friction_velocity) : r;
 }
 
-/* One Runge-Kutta step of z, (size,), with three more vectors of work space behind it. */
-static void plant_stage_internal_step(const hsep_stage *s, double z[], double disturbed, double dt)
+/* One Runge-Kutta step of z, (size,), with three more vectors of work space behind it. *v, m/s: a velocity shortly
+ * before; that at its beginning. */
+static void plant_stage_internal_step(const hsep_stage *s, double z[], double disturbed, double dt, double *v)
 {
     static const double weight[4] = {1.0, 2.0, 2.0, 1.0};
     const double reach[4] = {dt / 2.0, dt / 2.0, dt, 0.0}; /* from z to where the next slope is taken */
@@ -163,7 +179,10 @@ static void plant_stage_internal_step(const hsep_stage *s, double z[], double di
         sum[i] = 0.0;
     }
     for (int stage = 0; stage < 4; stage++) {
-        plant_stage_slope(s, at, disturbed, slope);
+        plant_stage_slope(s, at, disturbed, *v, slope);
+        if (stage == 0) {
+            *v = plant_position(s, slope);
+        }
         for (uint64_t i = 0; i < size; i++) {
             sum[i] += weight[stage] * slope[i];
             at[i] = z[i] + reach[stage] * slope[i];
@@ -184,19 +203,20 @@ HSEP_API double hsep_stage_rate(const hsep_stage *self)
     return rate;
 }
 
-/* Integrate z over time, s, with the command r, m from the start, and the commanded velocity v_d held. */
-static void plant_stage_integrate(const hsep_stage *s, double z[], double r, double v_d, double time)
+/* Integrate z over time, s, with the command r, m from the start, and the commanded velocity v_d held; *v, m/s, is a
+ * velocity of the last internal step. */
+static void plant_stage_integrate(const hsep_stage *s, double z[], double r, double v_d, double time, double *v)
 {
     const double n = plant_internal_steps(time, hsep_stage_rate(s)), disturbed = plant_disturbed(s, r, v_d);
     for (double i = 0.0; i < n; i += 1.0) {
-        plant_stage_internal_step(s, z, disturbed, time / n);
+        plant_stage_internal_step(s, z, disturbed, time / n, v);
     }
 }
 
 HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work[])
 {
     const double r = x_d - self->start;
-    double last_x_d = self->last_x_d, v_d = self->v_d, done = 0.0;
+    double last_x_d = self->last_x_d, v_d = self->v_d, v = self->v, done = 0.0;
     const size_t z_size = (size_t)(2 * self->n_modes) * sizeof(double);
     double *z = work, *slope = work + 2 * self->n_modes;
     hsep_clock_step step;
@@ -206,7 +226,7 @@ HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work
     for (int64_t i = 0; i <= step.n_latched; i++) {
         const double next = i < step.n_latched ? fmax(done, step.first + (double)i * self->clock.T_s) : h;
         if (next > done) {
-            plant_stage_integrate(self, z, r, v_d, next - done);
+            plant_stage_integrate(self, z, r, v_d, next - done, &v);
             done = next;
         }
         if (i < step.n_latched) {
@@ -219,7 +239,7 @@ HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work
             return 0;
         }
     }
-    plant_stage_slope(self, z, plant_disturbed(self, r, v_d), slope);
+    plant_stage_slope(self, z, plant_disturbed(self, r, v_d), v, slope);
     self->v = plant_position(self, slope);
     memcpy(hsep_at(self, self->z), z, z_size);
     self->last_x_d = last_x_d;

@@ -49,9 +49,14 @@ typedef struct {
     double alpha, beta;            /* 1/s^2, 1/s */
 } hsep_stage_mode;
 
-/* x = G_pb (x_d - d) with d = f tanh(v_d / 2 mm/s) + kappa x|x|; v_d is the backward difference of x_d over T_s. */
+/* Velocity of the stage's friction: the commanded one, the backward difference of x_d over T_s, or the actual one. */
+typedef enum { HSEP_FRICTION_COMMAND = 0, HSEP_FRICTION_MOTION = 1 } hsep_friction_on;
+
+/* x = G_pb (x_d - d) with d = f tanh(v_f / 2 mm/s) + kappa x|x|; v_f is the velocity of the friction. */
 typedef struct {
     double f, kappa;      /* m, 1/m */
+    uint64_t friction_on; /* hsep_friction_on */
+    double friction_gain; /* m/s, velocity that the whole friction takes away at once, f sum beta */
     double start;         /* position of rest, m */
     hsep_clock clock;     /* of the instants at which the command is sampled, from the reset */
     double last_x_d, v_d; /* m from start, at the last instant; m/s */
@@ -64,7 +69,7 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_feed_drive, 9);
 HSEP_ASSERT_WORDS(hsep_stage_mode, 4);
-HSEP_ASSERT_WORDS(hsep_stage, 16);
+HSEP_ASSERT_WORDS(hsep_stage, 18);
 
 #define HSEP_STAGE_WORK 8 /* doubles of work space for each mode */
 
@@ -75,7 +80,8 @@ HSEP_API int hsep_stage_valid(const void *block, uint64_t n_modes);
 
 /* Reset the stage to rest at start, m. modes: (n_modes,). */
 HSEP_API void hsep_stage_init(
-    hsep_stage *self, const hsep_mode modes[], uint64_t n_modes, double f, double kappa, double T_s, double start);
+    hsep_stage *self, const hsep_mode modes[], uint64_t n_modes, double f, double kappa, hsep_friction_on friction_on,
+    double T_s, double start);
 
 /* Advance by h, s, at most hsep_plant_step_max, with the command x_d, m, held. work: (HSEP_STAGE_WORK n_modes,).
  * Fails, and returns 0 with the state unchanged, if the state overflows. */

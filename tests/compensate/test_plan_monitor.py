@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hybridsep.compensate.compensator import SepState
+from hybridsep.compensate.plan_monitor import PlanMonitor, has_stable_poles
 from hybridsep.compensate.sensor import SensorWatch
-from hybridsep.compensate.trust import Trust, has_stable_poles
 
 
 @settings(max_examples=200)
@@ -40,19 +40,19 @@ def test_an_unstable_recursion_never_plans() -> None:
 
 def test_trust_needs_more_than_noise_to_be_lost() -> None:
     rng = np.random.default_rng(2)
-    trust = Trust()
+    monitor = PlanMonitor()
     for _ in range(50):
         noise = rng.normal(0, 5e-6, 100)
-        trust.observe(noise, rng.normal(0, 1e-6, 100), 25e-12)
-    assert trust.hybrid
+        monitor.observe(noise, rng.normal(0, 1e-6, 100), 25e-12)
+    assert monitor.hybrid
     for _ in range(3):
-        trust.observe(noise, rng.normal(0, 20e-6, 100), 25e-12)
-    assert not trust.hybrid
-    trust.restart()
-    assert trust.hybrid
-    trust.observe(noise, np.full(100, np.inf), 25e-12)
-    assert not trust.hybrid
-    assert math.isfinite(trust.excess)
+        monitor.observe(noise, rng.normal(0, 20e-6, 100), 25e-12)
+    assert not monitor.hybrid
+    monitor.restart()
+    assert monitor.hybrid
+    monitor.observe(noise, np.full(100, np.inf), 25e-12)
+    assert not monitor.hybrid
+    assert math.isfinite(monitor.excess)
 
 
 def test_trust_is_not_judged_before_the_warm_up_is_over() -> None:
@@ -62,7 +62,7 @@ def test_trust_is_not_judged_before_the_warm_up_is_over() -> None:
     for _ in range(8):
         plan = sep.plan(np.zeros(200))
         sep.update(plan.x_pb + 1e-4 * rng.normal(size=50))
-        excess.append(sep._trust.excess)
+        excess.append(sep._monitor.excess)
     assert excess[:4] == [0.0] * 4
     assert all(excess[4:])
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..base.signals import Array
 
-__all__ = ["Trust", "has_stable_poles"]
+__all__ = ["PlanMonitor", "has_stable_poles"]
 
 _FORGET = 0.9
 """Forgetting factor per window: a memory of about ten windows."""
@@ -43,7 +43,7 @@ def has_stable_poles(w_e: Array) -> bool:
     return True
 
 
-class Trust:
+class PlanMonitor:
     """Excess prediction error of the hybrid model over the physics model, with exponential forgetting.
 
     The hybrid model is trusted while its mean square prediction error exceeds the physics model's by at most half the

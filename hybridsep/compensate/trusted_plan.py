@@ -1,0 +1,119 @@
+"""Plan on the trusted model, by Newton steps that follow the slope of its disturbances.
+
+``min ‖x_d − x_h(x_d + δ)‖² + jerk_weight·‖D³ δ‖²`` within the drive's limits, where ``x_h`` is not affine in ``δ``:
+friction that follows the command changes its sign with the command's velocity. Each step solves the quadratic programme
+of the linearised model (Gauss-Newton); a step that does not lower the cost is repeated with a penalty on the change of
+velocity (Levenberg-Marquardt). The number of steps is bounded. Predictions are shrunk by their variance, so where the
+model knows nothing the plan is that of the physics model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.signals import Array
+from ..predict.linearised import PlanModel, PlanPrediction
+from .constraints import Bounds, solve
+from .splines import N_DECIDED, PlanCost, SplineBasis
+
+__all__ = ["TrustedPlanner"]
+
+_REACHES = (0.1, 0.03, 0.01, 0.0)
+"""Reach of friction's slope in each Newton step, relative to the model's velocity scale: a tangent is blind to a sign
+that changes nearby."""
+
+_TRIES = 6
+"""Largest number of penalties tried in a step."""
+
+_FIRST_PENALTY, _RAISE, _LOWER = 1.0, 8.0, 0.25
+"""Penalty on the change of velocity, in the unit of the jerk's weight: its first value, and how it follows success."""
+
+_GAIN = 1e-3
+"""Relative gain of a step below which it is the last one."""
+
+
+@dataclass(frozen=True)
+class _Point:
+    """Coefficients ``(3 + n_free,)``, the prediction and the cost under them, and their third differences, ``(n,)``."""
+
+    coefficients: Array
+    prediction: PlanPrediction
+    third: Array
+    cost: float
+
+
+class TrustedPlanner:
+    """Cost of the plans of one window on the trusted model.
+
+    Parameters
+    ----------
+    basis : SplineBasis
+    jerk_weight : float
+    model : PlanModel
+        At the beginning of the window.
+    x_d : (preview,) array, m
+        Commanded positions, relative to the start.
+    delta_before : (3,) array, m
+        Last three values of δ.
+    """
+
+    def __init__(
+        self, basis: SplineBasis, jerk_weight: float, model: PlanModel, x_d: Array, delta_before: Array
+    ) -> None:
+        self._basis, self._jerk_weight, self._model, self._x_d = basis, jerk_weight, model, x_d
+        self._third_before = np.diff(np.concatenate((delta_before, np.zeros(len(x_d)))), 3)
+
+    def cost(self, coefficients: Array) -> float:
+        """Return the cost of a plan, m²; not finite if its prediction overflows."""
+        return self._at(coefficients).cost
+
+    def plan(self, rest: Array, bounds: Bounds, n_pinned: int, passed: Array) -> tuple[Array, float]:
+        """Return the coefficients of the best plan found from the rest of the last one, and its cost, m².
+
+        Parameters
+        ----------
+        rest : (3 + n_free,) array, m
+            Coefficients of the rest of the last plan, the decided ones first; they are feasible.
+        bounds : Bounds
+        n_pinned : int
+            Coefficients that a bounded plan does not change.
+        passed : (preview, n_free) array
+            Free splines filtered by ``G_pb``.
+        """
+        decided, free = rest[:N_DECIDED], rest[N_DECIDED:]
+        splines, third = self._basis.values[:, N_DECIDED:], self._basis.third[:, N_DECIDED:]
+        velocity = np.diff(splines, axis=0, prepend=0.0)
+        damping = velocity.T @ velocity
+        here, penalty = self._at(rest), 0.0
+        for reach in _REACHES:
+            W = self._model.slope(here.prediction, splines, passed, reach)
+            at = here.coefficients[N_DECIDED:]
+            P = W.T @ W + self._jerk_weight * (third.T @ third)
+            target = self._x_d - here.prediction.x_h + W @ at
+            v = W.T @ target - self._jerk_weight * (third.T @ (here.third - third @ at))
+            best = None
+            for _ in range(_TRIES):
+                cost = PlanCost.regular(P + penalty * damping, v + penalty * (damping @ at))
+                found = solve(cost, bounds, free, n_pinned)
+                if found is None:
+                    break
+                there = self._at(np.concatenate((decided, found)))
+                if there.cost < here.cost:
+                    best = there
+                    break
+                penalty = max(_RAISE * penalty, _FIRST_PENALTY)
+            if best is None:
+                break
+            gain, here, penalty = here.cost - best.cost, best, _LOWER * penalty
+            if gain < _GAIN * (gain + here.cost):
+                break
+        return here.coefficients, here.cost
+
+    def _at(self, coefficients: Array) -> _Point:
+        prediction = self._model.predict(self._x_d + self._basis.values @ coefficients)
+        third = self._basis.third @ coefficients + self._third_before
+        error = self._x_d - prediction.x_h
+        cost = float(error @ error) + self._jerk_weight * float(third @ third)
+        return _Point(coefficients, prediction, third, cost)

@@ -1,0 +1,152 @@
+"""Compensation with the trusted model: its slope, what a plan gains, and what it must survive."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+from compensator_cases import DRIVE_LIMITS, TS, beyond
+
+from hybridsep import load_machine
+from hybridsep.base.settings import CompensatorSettings, Limits, PredictorSettings
+from hybridsep.base.signals import Array
+from hybridsep.compensate.compensator import SepCompensator, SepState
+from hybridsep.compensate.splines import SplineBasis
+from hybridsep.cosim.loop import cosimulate
+from hybridsep.cosim.run import Run
+from hybridsep.machine import Machine
+from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest
+from hybridsep.predict.linearised import PlanModel
+from hybridsep.predict.predictor import HybridPredictor
+
+TRUSTED = PredictorSettings(Np=50, p=20)
+STAGE = load_machine("als25010_x")
+
+
+def compensator(machine: Machine = STAGE, compensate: str = "hybrid", **changes: object) -> SepCompensator:
+    settings = CompensatorSettings(limits=DRIVE_LIMITS, compensate=compensate, **changes)  # type: ignore[arg-type]
+    return machine.new_compensator(settings, predictor=TRUSTED)
+
+
+def moves() -> Array:
+    """Return one second of 7 mm moves, there and back."""
+    return rest_to_rest([0.0, 0.007, 0.0, 0.007], PAPER_LIMITS, TS, start_times=[0.05, 0.35, 0.65], duration=1.0)
+
+
+def run(sep: SepCompensator, machine: Machine = STAGE, **more: object) -> Run:
+    assert machine.plant is not None
+    return cosimulate(sep, machine.new_plant(), moves(), encoder=Encoder(machine.plant.noise_std, 0), **more)  # type: ignore[arg-type]
+
+
+@cache
+def learned() -> bytes:
+    """Return a compensator that has learned the moves."""
+    sep = compensator()
+    run(sep)
+    sep.restart(0.0)
+    return sep.to_bytes()
+
+
+def plan_model(sep: SepCompensator, x_d: Array) -> PlanModel:
+    assert sep.predictor.trusted is not None
+    return PlanModel(sep.predictor.trusted, sep.predictor.state, x_d, x_d)
+
+
+def test_the_slope_is_that_of_the_prediction() -> None:
+    sep = SepCompensator.from_bytes(learned())
+    x_d = moves()[:200]
+    model, basis = plan_model(sep, x_d), SplineBasis(200, 2)
+    changes = basis.values[:, 10:60:7]
+    passed = basis.filtered(sep.predictor.physics_operator(200)[0])[:, 7:57:7]
+    found = model.slope(model.predict(x_d), changes, passed, 0.0)
+    size = 1e-9
+    for column, slope in zip(changes.T, found.T, strict=True):
+        ahead, behind = (model.predict(x_d + sign * size * column).x_h for sign in (1.0, -1.0))
+        # Shrinking and the second pass of the stiffness are held in the slope.
+        expected = (ahead - behind) / (2.0 * size)
+        assert np.max(np.abs(slope - expected)) < 0.05 * np.max(np.abs(expected))
+
+
+def test_without_anything_learned_the_physics_model_plans() -> None:
+    x_d, none = np.concatenate((np.zeros(20), moves()[50:230])), compensator()
+    plans = [sep.plan(x_d) for sep in (none, compensator(compensate="physics"))]
+    assert plans[0].state is SepState.PHYSICS
+    np.testing.assert_array_equal(plans[0].x_dm, plans[1].x_dm)
+    assert compensator(compensate="off").plan(x_d).state is SepState.OFF
+
+
+def test_plans_follow_friction_that_follows_the_command() -> None:
+    physics = run(compensator(compensate="physics"))
+    sep = compensator()
+    cold, warm = run(sep), run(sep, t_init=0.0)
+    assert warm.state.max() == SepState.HYBRID
+    assert cold.tracking_rms < 0.6 * physics.tracking_rms
+    assert warm.tracking_rms < 0.2 * physics.tracking_rms
+    for found in (cold, warm):
+        assert beyond(found.x_dm, DRIVE_LIMITS) <= 1.0 + 1e-6
+
+
+def test_a_plan_that_is_predicted_to_be_worse_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
+    x_d = moves()[:200]
+    expected = SepCompensator.from_bytes(learned())
+    expected.compensate = SepState.PHYSICS
+    sep = SepCompensator.from_bytes(learned())
+    assert sep.plan(x_d).state is SepState.HYBRID
+    worse = np.full(3 + sep._basis.n_free, 1e-3)
+    for cost in (math.inf, math.nan):
+        monkeypatch.setattr(
+            "hybridsep.compensate.trusted_plan.TrustedPlanner.plan", lambda *_, cost=cost: (worse, cost)
+        )
+        plan = sep.plan(x_d)
+        assert plan.state is SepState.PHYSICS
+        np.testing.assert_array_equal(plan.x_dm, expected.plan(x_d).x_dm)
+
+
+def test_an_outlier_of_a_millimetre_hardly_moves_the_command() -> None:
+    def wrong(k: int, x_meas: float) -> float:
+        return x_meas + (1e-3 if k == 430 else 0.0)
+
+    sound, other = run(compensator()), run(compensator(), sensor=wrong)
+    assert np.max(np.abs(other.x_dm - sound.x_dm)) < 5e-6
+
+
+def test_missing_measurements_are_bridged() -> None:
+    def missing(k: int, x_meas: float) -> float:
+        return math.nan if 400 <= k < 460 or k % 97 == 0 else x_meas
+
+    physics, found = run(compensator(compensate="physics")), run(compensator(), sensor=missing)
+    assert np.isfinite(found.x_dm).all()
+    assert found.tracking_rms < 0.8 * physics.tracking_rms
+
+
+def test_a_restored_compensator_goes_on() -> None:
+    sep, x_d = SepCompensator.from_bytes(learned()), moves()
+    plan = sep.plan(x_d[:200])
+    restored = SepCompensator.from_bytes(sep.to_bytes())
+    for one in (sep, restored):
+        one.update(plan.x_pb)
+    again = [one.plan(x_d[50:250]) for one in (sep, restored)]
+    assert again[0].state is SepState.HYBRID
+    assert np.abs(again[0].x_dm - again[0].x_d).max() > 1e-6
+    np.testing.assert_array_equal(again[0].x_dm, again[1].x_dm)
+
+
+def test_positions_in_another_unit_are_commanded_the_same() -> None:
+    def commands(unit: float) -> Array:
+        limits = Limits(*(unit * limit for limit in (0.1, 16.0, 5000.0)))
+        settings = CompensatorSettings(limits=limits, change_max=1e-3 * unit)
+        sep = SepCompensator(
+            HybridPredictor(STAGE.model, PredictorSettings(Np=50, p=20, lam=1e-12 * unit**2)), settings
+        )
+        x_d, found = np.concatenate((moves(), np.full(200, moves()[-1]))), []
+        for k in range(0, 1000, 50):
+            plan = sep.plan(unit * x_d[k : k + 200])
+            friction = 1e-5 * np.tanh(np.gradient(x_d[k : k + 50]) / 2e-6)
+            sep.update(plan.x_pb - unit * friction)
+            found.append(plan.x_dm / unit)
+        return np.concatenate(found)
+
+    np.testing.assert_allclose(commands(1e3), commands(1.0), rtol=0, atol=1e-8)
