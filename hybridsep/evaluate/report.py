@@ -127,7 +127,7 @@ class Report:
             include_plotlyjs=False,
             full_html=False,
             div_id=f"chart{self._n_charts}",
-            config={"responsive": True, "displaylogo": False},
+            config={"responsive": True, "displayModeBar": False},
         )
         caption = f"<figcaption>{html.escape(chart.caption)}</figcaption>" if chart.caption else ""
         self._parts.append(f'<figure><div class="chart">{drawn}</div>{caption}</figure>')
@@ -166,10 +166,11 @@ def _figure(chart: Chart) -> Any:
         for trace in _traces(line):
             figure.add_trace(trace, row=line.panel + 1, col=1)
     figure.update_xaxes(title_text=chart.x_label, row=n, col=1)
-    figure.update_xaxes(type="log" if chart.x_log else "linear", gridcolor="#e8ecf0", zeroline=False, automargin=True)
+    for update, log in ((figure.update_xaxes, chart.x_log), (figure.update_yaxes, chart.y_log)):
+        scale = {"type": "log", "dtick": 1} if log else {"type": "linear"}
+        update(**scale, gridcolor="#e8ecf0", zeroline=False, automargin=True)
     for i, label in enumerate(chart.y_labels):
         figure.update_yaxes(title_text=label, row=i + 1, col=1)
-    figure.update_yaxes(type="log" if chart.y_log else "linear", gridcolor="#e8ecf0", zeroline=False, automargin=True)
     figure.update_layout(
         height=_HEIGHT * n if n == 1 else int(0.75 * _HEIGHT * n),
         margin={"l": 10, "r": 10, "t": 30, "b": 10},
