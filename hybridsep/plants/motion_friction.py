@@ -34,7 +34,8 @@ def velocity_under_friction(w: float, gain: float, scale: float, last: float) ->
     sign = math.copysign(1.0, w)
     if gain < -scale:
         # v + gain·tanh(v/scale) falls between ± turn: a solution of the other sign than w may be there
-        turn = scale * math.acosh(math.sqrt(-gain / scale))
+        ratio = -gain / scale
+        turn = scale * math.log(math.sqrt(ratio) + math.sqrt(ratio - 1.0))  # acosh √ratio
         if last * w < 0.0 and abs(w) <= -turn - gain * math.tanh(turn / scale):
             sign = -sign
     w *= sign

@@ -48,8 +48,8 @@ HSEP_API int hsep_drive_valid(const void *block, size_t bytes, const double valu
 {
     hsep_stage stage;
     memcpy(&stage, block, sizeof stage);
-    const double numbers[] = {stage.f, stage.kappa, stage.friction_gain, stage.start,
-                              stage.last_x_d, stage.v_d, stage.v};
+    const double numbers[] = {stage.f,   stage.kappa, stage.friction_gain, stage.start, stage.last_x_d,
+                              stage.v_d, stage.v};
     return hsep_within(numbers, sizeof numbers / sizeof *numbers, HSEP_PREDICTION_MAX) &&
            hsep_within(
                (const char *)block + sizeof stage, (bytes - sizeof stage) / sizeof(double), HSEP_PREDICTION_MAX) &&

@@ -14,7 +14,7 @@ HSEP_API double hsep_friction_velocity(double w, double gain, double scale, doub
     double sign = copysign(1.0, w);
     if (gain < -scale) {
         /* v + gain tanh(v / scale) falls between +-turn: a solution of the other sign than w may be there */
-        const double turn = scale * acosh(sqrt(-gain / scale));
+        const double ratio = -gain / scale, turn = scale * log(sqrt(ratio) + sqrt(ratio - 1.0));
         if (last * w < 0.0 && fabs(w) <= -turn - gain * tanh(turn / scale)) {
             sign = -sign;
         }
