@@ -8,7 +8,6 @@ results for positions in another unit are the same in that unit.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +18,11 @@ from ..model.discrete import DiscreteModel
 from .blend import Blend
 from .candidates import Candidate, CandidatePrediction, ResidualScale, SolvedCandidate, lags
 from .disturbances import LEAST_VELOCITY, StaticFeatures, StaticState
+from .forecast import Forecast
 from .guard import SensorGuard
 from .regression import RidgeRegression
 
-__all__ = ["Forecast", "TrustedModel"]
+__all__ = ["TrustedModel"]
 
 _LAST_LAG = 0.005
 """Prior variance of the weight of a lag relative to that of the lag ``p`` before it."""
@@ -58,38 +58,6 @@ _BRIDGED = 3
 
 _NO_PENALTY = 1e-40
 """λ of the factor itself, m²: penalties come with each solution."""
-
-
-@dataclass(frozen=True)
-class Forecast:
-    """Window predicted before it is measured.
-
-    Attributes
-    ----------
-    x_d, x_pb : (n,) array, m
-        Commands and physics-based prediction, relative to the start.
-    e_h : (n,) array, m
-        Predicted residual.
-    disagreement : (n,) array, m²
-        Variance of the candidates about their blend.
-    hold : float, m
-        Last residual, bounded: the prediction of the hold candidate.
-    predictions : tuple of CandidatePrediction
-        Of the learned candidates; empty before anything is learned.
-    largest : (n_static,) array
-        Largest magnitudes of the static features, this window included.
-    velocity_scale : float, m/s
-        Velocity scale of the friction features.
-    """
-
-    x_d: Array
-    x_pb: Array
-    e_h: Array
-    disagreement: Array
-    hold: float
-    predictions: tuple[CandidatePrediction, ...]
-    largest: Array
-    velocity_scale: float
 
 
 class TrustedModel:

@@ -11,7 +11,7 @@ from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
 from ..base.signals import Array, as_published, as_samples
-from .trusted import Forecast
+from .forecast import Forecast
 from .uncertainty import PredictedError
 
 __all__ = ["PredictedWindow", "Prediction", "PublishedWindow", "WindowOperator", "path_beyond"]
