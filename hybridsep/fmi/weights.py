@@ -132,7 +132,7 @@ def _learned_with_trust(trusted: TrustedModel) -> dict[str, Array]:
         "largest": trusted.largest,
         "gram": blend.gram,
         "cross": blend.cross,
-        "sensor": np.array([trusted.guard.spread, trusted.guard.held.step]),
+        "sensor": np.array([trusted.guard.spread, trusted.guard.held.step, trusted.guard.stuck]),
     }
 
 
@@ -142,8 +142,8 @@ def _are_sound(learned: Mapping[str, Array]) -> bool:
         return False
     least = {"gram": -np.inf, "cross": -np.inf, "correlations": 1.0}
     if "sensor" in learned:
-        spread, step = learned["sensor"].tolist()  # -1 and infinite where they are not known
-        if not (step > 0.0 and (spread == -1.0 or 0.0 <= spread < np.inf)):
+        spread, step, stuck = learned["sensor"].tolist()  # -1 and infinite where they are not known
+        if not (step > 0.0 and (spread == -1.0 or 0.0 <= spread < np.inf) and 0.0 <= stuck < np.inf):
             return False
     return all(
         np.isfinite(part).all() and (part >= least.get(name, 0.0)).all()
@@ -161,7 +161,7 @@ def _restore_learned(trusted: TrustedModel, learned: Mapping[str, Array]) -> Non
         candidate.noise_variance, candidate.correlation = variance, correlation
     trusted.largest, blend = learned["largest"], trusted.blend
     blend.weights, blend.gram, blend.cross = learned["weights"], learned["gram"], learned["cross"]
-    trusted.guard.spread, trusted.guard.held.step = learned["sensor"].tolist()
+    trusted.guard.spread, trusted.guard.held.step, trusted.guard.stuck = learned["sensor"].tolist()
 
 
 def _differences(name: str, then: float, now: float) -> list[str]:

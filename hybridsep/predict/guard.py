@@ -25,11 +25,16 @@ predicted motion of a sample: a drive at rest does not show the ripple that it h
 _PACE = 2.0
 """Plausible change of the residual from sample to sample, relative to the predicted motion."""
 
+_STOOD, _STUCK = 0.5, 2.0
+"""Change at the end of a run of equal values, relative to the motion predicted since its beginning, below which the
+axis itself stood still: a sensor that was held shows the whole motion then. And what is believed from then on,
+relative to that motion."""
+
 _NEIGHBOURS = 2
 """Samples to either side that an isolated value is compared with."""
 
-_COUNTS = ("gap", "jumps")
-_NUMBERS = ("last", "spread", "pace", "last_x_pb")
+_COUNTS = ("gap", "jumps", "holding")
+_NUMBERS = ("last", "spread", "pace", "last_x_pb", "first", "stuck")
 
 N_STATE = len(_COUNTS) + len(_NUMBERS) + HeldValue.N_STATE + _NEIGHBOURS
 """Numbers of a state."""
@@ -53,6 +58,12 @@ class SensorGuard:
     gap : int
         Samples since then.
     held : HeldValue
+    holding : int
+        Whether the last value was held, 0 or 1.
+    first : float, m
+        Prediction at the beginning of the run of equal values.
+    stuck : float, m
+        Largest motion that was predicted while the axis itself stood still; 0 if it never did.
     spread : float, m
         Mean deviation of a residual from the median of its neighbours; −1 before the first window.
     pace : float, m
@@ -67,13 +78,14 @@ class SensorGuard:
 
     def __init__(self, patience: int) -> None:
         self.patience = patience
-        self.held, self.spread = HeldValue(), -1.0
+        self.held, self.spread, self.stuck = HeldValue(), -1.0, 0.0
         self.restart()
 
     def restart(self) -> None:
         """Begin another run; what is known of the sensor is kept."""
         self.last, self.gap, self.jumps = 0.0, 0, 0
         self.held.restart()
+        self.holding, self.first = 0, 0.0
         self.pace = 0.0
         self.before = np.zeros(_NEIGHBOURS)
         self.last_x_pb = math.nan
@@ -97,12 +109,15 @@ class SensorGuard:
         step = 0.0 if math.isinf(self.held.step) else self.held.step
         motion = max(pace, self.pace)
         plausible = _SPREADS * self.spread + _RESOLUTION * step + _SMALL * largest + _RIPPLE * motion
+        still = max(plausible, _STUCK * self.stuck)
         accepted = np.isfinite(x)
         for k, (value, position, e) in enumerate(zip(x.tolist(), x_pb.tolist(), residuals.tolist(), strict=True)):
             self.gap += 1
             if not accepted[k]:
                 continue
-            if self.held.holds(value, position, still=plausible):
+            self._end_run(value, position)
+            self.holding = int(self.held.holds(value, position, still=still))
+            if self.holding:
                 accepted[max(k - self.held.repeats + 1, 0) : k + 1] = False
                 continue
             if self.spread >= 0.0:
@@ -117,6 +132,15 @@ class SensorGuard:
         self.before = np.concatenate((self.before, residuals))[-_NEIGHBOURS:]
         return accepted
 
+    def _end_run(self, value: float, position: float) -> None:
+        """Judge who stood still where a run of equal values ends, and begin another."""
+        if value == self.held.value:
+            return
+        moved = abs(position - self.first)
+        if self.holding and abs(value - self.held.value) < _STOOD * moved:
+            self.stuck = max(self.stuck, moved)
+        self.first = position
+
     def state(self) -> list[float]:
         """Return the state as plain numbers."""
         own = [float(getattr(self, name)) for name in (*_COUNTS, *_NUMBERS)]
@@ -127,10 +151,12 @@ class SensorGuard:
         ends = np.cumsum((len(_COUNTS), len(_NUMBERS), HeldValue.N_STATE))
         counts, own, held, before = np.split(state, ends)
         values = dict(zip(_NUMBERS, own.tolist(), strict=True))
-        if not all(0 <= count <= COUNT_MAX and count == int(count) for count in counts):
-            raise SignalError("the guard's gap and jumps must be counts")
-        if np.isinf(own).any() or np.isinf(before).any() or np.isnan(values["last"]) or not values["pace"] >= 0.0:
-            raise SignalError("the guard's residuals and positions must be finite, its pace ≥ 0")
+        if not all(0 <= count <= COUNT_MAX and count == int(count) for count in counts) or counts[2] > 1:
+            raise SignalError("the guard's gap and jumps must be counts, and holding 0 or 1")
+        if np.isinf(own).any() or np.isinf(before).any() or np.isnan([values["last"], values["first"]]).any():
+            raise SignalError("the guard's residuals and positions must be finite")
+        if not (values["pace"] >= 0.0 and values["stuck"] >= 0.0):
+            raise SignalError("the guard's motions must be ≥ 0")
         if not (values["spread"] >= 0.0 or values["spread"] == -1.0):
             raise SignalError("the guard's spread must be ≥ 0 or −1")
         self.held.restore(held)

@@ -69,6 +69,26 @@ def test_a_held_value_is_rejected_until_it_moves_again() -> None:
     assert len(rejected) <= 70
 
 
+def with_play(x_pb: Array, width: float) -> Array:
+    """Return the position of an axis that stands still after each reversal until the play is taken up."""
+    x = x_pb.copy()
+    for k in range(1, len(x)):
+        x[k] = min(max(x[k - 1], x_pb[k] - width), x_pb[k] + width)
+    return x
+
+
+def test_an_axis_that_stands_still_by_itself_is_believed_after_the_first_time() -> None:
+    x_pb, _ = motion(4000)
+    x = with_play(x_pb, 2e-4)
+    rejected = np.flatnonzero(~accepted(x, x_pb))
+    assert 0 < len(rejected) < 200
+    assert rejected.max() < 1000  # the first reversal is at 500
+    x[2250:2300] = x[2250]  # at full speed: the sensor this time, which only its end tells
+    x[3250:3300] = x[3250]
+    rejected = np.flatnonzero(~accepted(x, x_pb))
+    assert set(range(3260, 3300)) <= set(rejected.tolist())
+
+
 def test_zeros_for_a_while_are_rejected() -> None:
     x_pb, x = motion()
     x[1330:1380] = 0.0

@@ -7,7 +7,11 @@
 /* Plausible deviation: in mean deviations, in resolution steps, and relative to the largest residual and to the
  * predicted motion of a sample. */
 static const double guard_spreads = 12.0, guard_resolution = 3.0, guard_small = 0.01, guard_ripple = 0.1;
-static const double guard_pace = 2.0;                    /* plausible change, relative to the predicted motion */
+static const double guard_pace = 2.0; /* plausible change, relative to the predicted motion */
+/* Change at the end of a run of equal values, relative to the motion predicted since its beginning, below which the axis
+ * itself stood still: a sensor that was held shows the whole motion then. And what is believed from then on, relative to
+ * that motion. */
+static const double guard_stood = 0.5, guard_stuck = 2.0;
 static const double guard_rise = 0.5, guard_fall = 0.02; /* rates at which the mean deviation follows a window's */
 
 HSEP_API void hsep_guard_init(hsep_guard *self, uint64_t patience)
@@ -64,6 +68,19 @@ static void guard_follow(
     }
 }
 
+/* Judge who stood still where a run of equal values ends, and begin another. */
+static void guard_end_run(hsep_guard *self, double x, double x_pb)
+{
+    const double moved = fabs(x_pb - self->first);
+    if (x == self->held.value) {
+        return;
+    }
+    if (self->holding && fabs(x - self->held.value) < guard_stood * moved) {
+        self->stuck = fmax(self->stuck, moved);
+    }
+    self->first = x_pb;
+}
+
 HSEP_API void hsep_guard_accept(
     hsep_guard *self, const double x[], const double x_pb[], uint64_t n, double largest, double deviation[],
     double accepted[])
@@ -78,6 +95,7 @@ HSEP_API void hsep_guard_accept(
     const double motion = fmax(pace, self->pace);
     const double plausible =
         guard_spreads * self->spread + guard_resolution * step + guard_small * largest + guard_ripple * motion;
+    const double still = fmax(plausible, guard_stuck * self->stuck);
     const int known = self->spread >= 0.0;
     for (uint64_t k = 0; k < n; k++) {
         const uint64_t place = n - 1 - k;
@@ -87,7 +105,9 @@ HSEP_API void hsep_guard_accept(
         if (!isfinite(x[place])) {
             continue;
         }
-        if (hsep_sensor_misses(&self->held, x[place], x_pb[place], plausible, HUGE_VAL)) {
+        guard_end_run(self, x[place], x_pb[place]);
+        self->holding = (uint64_t)hsep_sensor_misses(&self->held, x[place], x_pb[place], still, HUGE_VAL);
+        if (self->holding) {
             const uint64_t repeats = (uint64_t)fmin(self->held.repeats, (double)(k + 1));
             for (uint64_t j = k + 1 - repeats; j < k; j++) {
                 accepted[n - 1 - j] = 0.0;

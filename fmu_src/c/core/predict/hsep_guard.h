@@ -18,6 +18,9 @@ typedef struct {
     uint64_t patience; /* jumping samples in a row after which the new level is believed */
     uint64_t gap;      /* samples since the last accepted one */
     uint64_t jumps;    /* jumping samples in a row */
+    uint64_t holding;  /* whether the last value was held */
+    double stuck;      /* m, largest motion that was predicted while the axis itself stood still; 0 if it never did */
+    double first;      /* m, prediction at the beginning of the run of equal values */
     double last;       /* m, the last accepted residual */
     hsep_sensor held;
     double spread; /* m, mean deviation from the neighbours' median; -1 before the first window */
@@ -26,7 +29,7 @@ typedef struct {
     double before[HSEP_GUARD_NEIGHBOURS]; /* m, the last residuals, oldest first */
 } hsep_guard;
 
-HSEP_ASSERT_WORDS(hsep_guard, 12 + HSEP_GUARD_NEIGHBOURS);
+HSEP_ASSERT_WORDS(hsep_guard, 15 + HSEP_GUARD_NEIGHBOURS);
 
 HSEP_API void hsep_guard_init(hsep_guard *self, uint64_t patience);
 

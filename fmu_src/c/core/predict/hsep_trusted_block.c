@@ -106,7 +106,7 @@ HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters
 
 HSEP_API uint64_t hsep_trusted_n_learned(const hsep_trusted *self)
 {
-    return 2 + 3 + 2 * HSEP_N_CANDIDATES + self->n_static + HSEP_N_BLENDED * (HSEP_N_BLENDED + 2) + 2;
+    return 2 + 3 + 2 * HSEP_N_CANDIDATES + self->n_static + HSEP_N_BLENDED * (HSEP_N_BLENDED + 2) + 3;
 }
 
 HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i)
@@ -132,6 +132,7 @@ HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i)
         {self->blend.cross, HSEP_N_BLENDED},
         {&self->guard.spread, 1},
         {&self->guard.held.step, 1},
+        {&self->guard.stuck, 1},
     };
     size_t part = 0;
     for (; i >= parts[part].n; part++) {
@@ -142,9 +143,10 @@ HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i)
 
 HSEP_API int hsep_trusted_sound(hsep_trusted *self)
 {
-    const uint64_t n = hsep_trusted_n_learned(self) - 2, n_signed = HSEP_N_BLENDED * (HSEP_N_BLENDED + 1);
-    const double spread = self->guard.spread;
-    int sound = self->guard.held.step > 0.0 && (spread == -1.0 || (spread >= 0.0 && isfinite(spread)));
+    const uint64_t n = hsep_trusted_n_learned(self) - 3, n_signed = HSEP_N_BLENDED * (HSEP_N_BLENDED + 1);
+    const double spread = self->guard.spread, stuck = self->guard.stuck;
+    int sound = self->guard.held.step > 0.0 && (spread == -1.0 || (spread >= 0.0 && isfinite(spread))) &&
+                stuck >= 0.0 && isfinite(stuck);
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
         sound = sound && hsep_trusted_candidate(self, i)->correlation >= 1.0;
     }
