@@ -71,7 +71,7 @@ def test_a_held_value_is_rejected_until_it_moves_again() -> None:
 
 def with_play(x_pb: Array, width: float) -> Array:
     """Return the position of an axis that stands still after each reversal until the play is taken up."""
-    x = x_pb.copy()
+    x: Array = x_pb.copy()
     for k in range(1, len(x)):
         x[k] = min(max(x[k - 1], x_pb[k] - width), x_pb[k] + width)
     return x
