@@ -48,15 +48,15 @@ def array_bytes() -> int:
 
     ``n = 2 + p + q`` features; the upper triangle of the factor of ``[phi | target]``, each entry with what rounding
     took from it; five windows; the past of ``x_pb`` and ``e_pb`` behind a window; the weights, those of ``e_pb`` also
-    in the order of their use; per mode a matrix, two vectors, the feed-through and the state; and one number for each
-    FMI variable.
+    in the order of their use; for the uncertainty two windows and one of each of its seven components; per mode a
+    matrix, two vectors, the feed-through and the state; and one number for each FMI variable.
     """
     machine = load_machine("spring_mass_damper")
     values = machine.fmi_parameters()
     Np, p, q = (int(values[name]) for name in ("Np", "p", "q"))
     n = 2 + p + q
     factor = (n + 1) * (n + 2) + 2 * (n + 1)  # twice the triangle; the scales and the incoming row
-    windows = 5 * Np + (Np + q) + (Np + p) + n + p
+    windows = (5 + 2 + 7) * Np + (Np + q) + (Np + p) + n + p
     modes = [{"f_n": m.f_n, "zeta": m.zeta, "alpha": m.alpha, "beta": m.beta} for m in machine.model.modes]
     table = variables_of({"model": "HybridPredictor", "parameters": values, "modes": modes})
     return 8 * (factor + windows + 11 * len(modes) + len(table))

@@ -12,7 +12,7 @@ PAGES = ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "docs/identify.md", 
 FOLDERS = (".", "hybridsep", "fmu_src/c", "fmu_src/c/core", "benchmarks", "benchmarks/step_time")
 """Folders below which a page names files."""
 FILE = re.compile(r"(?<![\w*{./-])((?:[\w.-]+/)*[\w.-]+\.(?:py|c|h|toml|md))(?![\w*}])")
-ELSEWHERE = {"my_axis.toml", "all.c", "sources/all.c", "FMI.c"}
+ELSEWHERE = {"my_axis.toml", "machine.toml", "all.c", "sources/all.c", "FMI.c"}
 """Files of the user, of an archive, of another project."""
 
 

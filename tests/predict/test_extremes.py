@@ -207,7 +207,7 @@ def test_the_feed_drive(values: dict[str, float], samples: Any, h: float) -> Non
 @pytest.mark.parametrize("friction_on", ["command", "motion"])
 @bounded
 @given(values_of(*STAGE), modes_of(2), positions, st.floats(-9, -3).map(lambda e: 10.0**e))
-def test_the_stage(values: dict[str, float], modes: dict[str, float], samples: Any, h: float, friction_on: str) -> None:
+def test_the_stage(friction_on: str, values: dict[str, float], modes: dict[str, float], samples: Any, h: float) -> None:
     def run() -> None:
         plant = StageDrive(model_from(modes), values["f"], values["kappa"], values["T_s"], friction_on)
         check_plant(plant, values["noise_std"], samples[:4], h)
@@ -226,7 +226,7 @@ def test_the_feed_drive_in_c(values: dict[str, float], samples: Any, h: float) -
 @bounded
 @given(values_of(*STAGE), modes_of(2), positions, st.floats(-12, 3).map(lambda e: 10.0**e))
 def test_the_stage_in_c(
-    values: dict[str, float], modes: dict[str, float], samples: Any, h: float, friction_on: int
+    friction_on: int, values: dict[str, float], modes: dict[str, float], samples: Any, h: float
 ) -> None:
     model = CModel("stage_drive", {**values, **modes, "friction_on": friction_on})
     refused({**values, **modes}, lambda: check_c_model(model, samples[:10], h))

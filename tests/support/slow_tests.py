@@ -39,7 +39,7 @@ SLOW = (
     r"plants/test_plant\.py::test_fast_modes_are_resolved\[5000",
     r"app/test_identify_command\.py::test_a_log",
     r"identify/test_frequency_response\.py::test_table_1_is_found_within",
-    r"identify/test_peers\.py::test_poles_are_among",
+    r"identify/test_identification_peers\.py::test_poles_are_among",
     r"identify/test_operation\.py::test_(the_recorded_axis|recordings_get|a_half_at_rest|two_modes)",
     r"predict/test_predictor_with_reference_features\.py::test_friction_is_predicted_better",
     r"predict/test_trusted_figures\.py::test_(spiral|recorded)",

@@ -8,9 +8,9 @@
  * predicted motion of a sample. */
 static const double guard_spreads = 12.0, guard_resolution = 3.0, guard_small = 0.01, guard_ripple = 0.1;
 static const double guard_pace = 2.0; /* plausible change, relative to the predicted motion */
-/* Change at the end of a run of equal values, relative to the motion predicted since its beginning, below which the axis
- * itself stood still: a sensor that was held shows the whole motion then. And what is believed from then on, relative to
- * that motion. */
+/* Change at the end of a run of equal values, relative to the motion predicted since its beginning, below which the
+ * axis itself stood still: a sensor that was held shows the whole motion then. And what is believed from then on,
+ * relative to that motion. */
 static const double guard_stood = 0.5, guard_stuck = 2.0;
 static const double guard_rise = 0.5, guard_fall = 0.02; /* rates at which the mean deviation follows a window's */
 
