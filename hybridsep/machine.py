@@ -40,13 +40,16 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-__all__ = ["Machine", "load_machine", "machine_from_table", "machine_names", "machine_path"]
+__all__ = ["NAME_PATTERN", "Machine", "load_machine", "machine_from_table", "machine_names", "machine_path"]
+
+NAME_PATTERN = r"^[A-Za-z][A-Za-z0-9_]*$"
+"""Names of machines; they become parts of FMUs' names."""
 
 
 class Machine(Section):
     """One axis: identification, physics model, settings, plant if it has one; ``unit`` rad: every m stands for rad."""
 
-    name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")
+    name: str = Field(pattern=NAME_PATTERN)
     title: Line
     sources: tuple[Line, ...] = Field(default=(), min_length=1)
     T_s: Number = PARAMETERS["T_s"].default

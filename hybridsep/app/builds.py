@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..fmi.archive import build_fmu, fmu_names
+from ..fmi.archive import build_fmu, fmu_name
 from ..fmi.compiler import can_compile
 from ..machine import Machine
 
@@ -18,8 +18,8 @@ def default_flavour() -> str:
 
 def build_for_host(machine: Machine, model: str, out: Path, flavour: str, *, weights: Path | None = None) -> Path:
     """Build one of a machine's FMUs for this platform."""
-    names = {built: name for name, built in fmu_names(machine, flavour).items()}
-    return build_fmu(machine, names[model], out, flavour, targets=("host",), weights=weights)
+    name = fmu_name(model, machine.name, flavour)
+    return build_fmu(machine, name, out, flavour, targets=("host",), weights=weights)
 
 
 def build_pair(machine: Machine, out: Path, flavour: str) -> tuple[Path, Path]:

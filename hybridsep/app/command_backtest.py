@@ -10,7 +10,17 @@ import typer
 
 from ..base.output import written_text
 from .failures import loading
-from .options import AxisOption, ForceOption, JsonOption, MachineOption, TsOption, UnitOption
+from .options import (
+    AxisOption,
+    CommandColumnOption,
+    ForceOption,
+    JsonOption,
+    MachineOption,
+    MeasuredColumnOption,
+    TimeColumnOption,
+    TsOption,
+    UnitOption,
+)
 from .parameter_options import PREDICTOR_ENTRIES, takes_parameters
 
 __all__ = ["backtest"]
@@ -28,9 +38,9 @@ def backtest(
     unit: UnitOption = None,
     T_s: TsOption = None,
     axis: AxisOption = None,
-    t: Annotated[str | None, typer.Option("--t", help="Name of the time column.")] = None,
-    x_d: Annotated[str | None, typer.Option("--x_d", "--x-d", help="Name of the commanded position's column.")] = None,
-    x: Annotated[str | None, typer.Option("--x", help="Name of the measured position's column.")] = None,
+    t: TimeColumnOption = None,
+    x_d: CommandColumnOption = None,
+    x: MeasuredColumnOption = None,
     fix: Annotated[bool, typer.Option("--fix", help="Apply the fixes of what the checks of the log find.")] = False,
     as_is: Annotated[
         bool, typer.Option("--as-is", help="Replay the log with the faults that the checks find in it.")

@@ -8,7 +8,16 @@ from typing import Annotated
 import typer
 
 from .failures import loading
-from .options import ForceOption, JsonOption, TsOption, UnitOption
+from .options import (
+    AxisOption,
+    CommandColumnOption,
+    ForceOption,
+    JsonOption,
+    MeasuredColumnOption,
+    TimeColumnOption,
+    TsOption,
+    UnitOption,
+)
 
 __all__ = ["fit"]
 
@@ -27,10 +36,10 @@ def fit(
     name: Annotated[str | None, typer.Option(help="Name of the axis; that of the log if left out.")] = None,
     unit: UnitOption = None,
     T_s: TsOption = None,
-    t: Annotated[str | None, typer.Option("--t", help="Name of the time column.")] = None,
-    x_d: Annotated[str | None, typer.Option("--x-d", help="Name of the commanded position's column.")] = None,
-    x: Annotated[str | None, typer.Option("--x", help="Name of the measured position's column.")] = None,
-    axis: Annotated[str | None, typer.Option(help="Axis of a file that holds several.")] = None,
+    t: TimeColumnOption = None,
+    x_d: CommandColumnOption = None,
+    x: MeasuredColumnOption = None,
+    axis: AxisOption = None,
     fix: Annotated[
         bool, typer.Option("--fix", help="Apply what puts a finding of the checks right, and go on.")
     ] = False,

@@ -10,7 +10,15 @@ import typer
 from ..base.errors import ParameterError
 from ..base.output import written_text
 from .failures import loading
-from .options import ForceOption, JsonOption, TsOption, UnitOption
+from .options import (
+    CommandColumnOption,
+    ForceOption,
+    JsonOption,
+    MeasuredColumnOption,
+    TimeColumnOption,
+    TsOption,
+    UnitOption,
+)
 
 if TYPE_CHECKING:
     from ..identify.frequency_response import IdentifiedResponse
@@ -47,9 +55,9 @@ def identify(
     dead_time: Annotated[int, typer.Option(help="Whole samples of dead time in a response.")] = 0,
     unit: UnitOption = None,
     T_s: TsOption = None,
-    t: Annotated[str | None, typer.Option("--t", help="Name of the time column.")] = None,
-    x_d: Annotated[str | None, typer.Option("--x-d", help="Name of the commanded position's column.")] = None,
-    x: Annotated[str | None, typer.Option("--x", help="Name of the measured position's column.")] = None,
+    t: TimeColumnOption = None,
+    x_d: CommandColumnOption = None,
+    x: MeasuredColumnOption = None,
     axis: Annotated[str | None, typer.Option(help="Axis of a file that holds several: x, y or z of Klipper's.")] = None,
     *,
     force: ForceOption = False,

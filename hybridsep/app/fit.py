@@ -12,25 +12,26 @@ from typing import Any
 from ..base.errors import IdentificationError, ParameterError
 from ..base.output import written_text
 from ..base.settings import PredictorSettings
-from ..fmi.archive import build_fmu
+from ..fmi.archive import fmu_name
 from ..fmi.compiler import can_compile
 from ..fmi.flavours import FLAVOURS
+from ..identify.model import machine_of
 from ..identify.operation import identify_operation, unit_gain_model
 from ..logs.log import Log
-from ..machine import Machine
-from ..machine_sections import ModeSection, Physics
+from ..machine import NAME_PATTERN, Machine
 from ..machine_text import machine_text
 from ..model.physics import ModalModel, Mode
 from ..predict.predictor import HybridPredictor
 from ..tune.choice import choose_settings, settings_for, window_scores
 from ..tune.halves import Recording, Replay, halves, replay
+from .builds import build_for_host
 from .fit_stages import Stages, key_of
+from .overwrite import FIT_MARK
 from .step_times import step_times
 
-__all__ = ["MACHINE_MARK", "Fit", "FitOptions", "checked_name", "fit", "fit_files", "machine_name", "shown_unit"]
+__all__ = ["Fit", "FitOptions", "checked_name", "fit", "fit_files", "machine_name", "shown_unit"]
 
-MACHINE_MARK = "# Identified by hybridsep fit"
-"""How a machine file that was written here begins."""
+_MODEL = "HybridPredictor"
 
 _LOOK_AHEAD = 0.1
 """Look-ahead, s, of a controller of which nothing is known."""
@@ -99,7 +100,7 @@ def machine_name(path: Path) -> str:
 
 def checked_name(name: str) -> str:
     """Return a machine's name; ParameterError if it cannot be one."""
-    if re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
+    if re.fullmatch(NAME_PATTERN, name):
         return name
     raise ParameterError(f"--name must be a letter, then letters, digits and _, got {name!r}")
 
@@ -111,7 +112,7 @@ def fit_files(out: Path, name: str) -> dict[str, Path]:
         "trained predictor": out / "trained.state",
         "results": out / "fit.json",
         "report": out / "report.html",
-        **{f"{flavour} FMU": out / f"{_fmu_name(name, flavour)}.fmu" for flavour in _flavours()},
+        **{f"{flavour} FMU": out / f"{fmu_name(_MODEL, name, flavour)}.fmu" for flavour in _flavours()},
     }
 
 
@@ -143,7 +144,7 @@ def fit(logs: Sequence[Log], out: Path, options: FitOptions, progress: Progress 
     recordings = [piece for log in logs for piece in halves([(s.x_d, s.x_meas) for s in log.segments()], options.share)]
     default = settings_for(_window(options.Np, T_s), T_s, "zoh")
     files = fit_files(out, options.name)
-    stages = Stages(files["results"], key_of([log.path for log in logs], (options, [log.t.shape for log in logs])))
+    stages = Stages(files["results"], key_of(recordings, (options, T_s, logs[0].unit)))
 
     def within(begin: float, end: float, message: str) -> Callable[[float], object]:
         return lambda done: progress(message, begin + (end - begin) * done)
@@ -164,13 +165,11 @@ def fit(logs: Sequence[Log], out: Path, options: FitOptions, progress: Progress 
     judged = replay(predictor, recordings, progress=within(0.8, 0.85, "judge on the second half"))
     machine = _machine(options.name, logs, model, settings)
     with written_text(files["machine file"]) as file:
-        file.write(machine_text(machine, comments=[f"{MACHINE_MARK[2:]}; {found['structure']}"]))
+        file.write(machine_text(machine, comments=[f"{FIT_MARK}; {found['structure']}"]))
     predictor.save(files["trained predictor"])
     for i, flavour in enumerate(_flavours()):
         progress(f"build the {flavour} FMU", 0.85 + 0.05 * i)
-        targets = ("host",) if flavour == "native" else None
-        name = _fmu_name(options.name, flavour)
-        build_fmu(machine, name, out, flavour, targets=targets, weights=files["trained predictor"])
+        build_for_host(machine, _MODEL, out, flavour, weights=files["trained predictor"])
     progress("time the FMU's steps", 0.95)
     fmu = files[f"{_flavours()[0]} FMU"]
     steps = step_times(fmu, recordings[0].x_d, recordings[0].x)
@@ -241,21 +240,14 @@ def _chosen(choice: Sequence[dict[str, Any]]) -> tuple[int, int]:
 
 
 def _machine(name: str, logs: Sequence[Log], model: ModalModel, settings: PredictorSettings) -> Machine:
-    modes = tuple(ModeSection(**vars(mode)) for mode in model.modes)
-    return Machine(
-        name=name,
-        title=f"Axis {name}, identified",
-        sources=tuple(f"identified from {log.path.name}, {len(log.t)} samples" for log in logs),
-        T_s=settings.T_s,
-        physics=Physics(mode=modes, dead_time=model.dead_time, input_hold=settings.input_hold),  # type: ignore[arg-type]
-        predictor={"Np": settings.Np, "p": settings.p, "q": settings.q},  # type: ignore[arg-type]
+    return machine_of(
+        *(model, settings.input_hold, settings.T_s, name, f"Axis {name}, identified"),
+        unit=logs[0].unit,
+        sources=[f"identified from {log.path.name}, {len(log.t)} samples" for log in logs],
+        predictor={"Np": settings.Np, "p": settings.p, "q": settings.q},
     )
 
 
 def _flavours() -> tuple[str, ...]:
     """Return the flavours that can be built here."""
     return FLAVOURS if can_compile() else ("python",)
-
-
-def _fmu_name(name: str, flavour: str) -> str:
-    return f"HybridPredictor{'' if flavour == 'native' else 'Py'}_{name}"

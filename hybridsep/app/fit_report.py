@@ -14,6 +14,7 @@ from ..evaluate.canvas import HOLD, HYBRID, PHYSICS
 from ..evaluate.report import Chart, Line, Report
 from ..intake.finding import Finding
 from ..logs.log import Log
+from ..tune.choice import WORTH
 from .fit import Fit, shown_unit
 
 __all__ = ["recommendation", "write_report"]
@@ -212,7 +213,7 @@ def _settings(report: Report, fit: Fit, scale: float, unit: str) -> None:
     report.table(["p", "q", f"RMS [{unit}]", ""], rows)
     report.paragraph(
         "Errors of causal replays over the later half of what teaches. The first row is the default, which stays "
-        "unless another is better by 5 %.",
+        f"unless another is better by {100 * WORTH:g} %.",
         "dim",
     )
 

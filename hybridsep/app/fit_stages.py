@@ -10,15 +10,17 @@ from typing import Any
 
 from ..base.output import written_text
 from ..base.version import __version__
+from ..tune.halves import Recording
 
 __all__ = ["Stages", "key_of"]
 
 
-def key_of(files: Iterable[Path], options: object) -> str:
-    """Return what a result depends on as a hash: the files' content, the options, the version."""
+def key_of(recordings: Iterable[Recording], options: object) -> str:
+    """Return what a result depends on as a hash: the samples as they are used, the options, the version."""
     found = hashlib.sha256(f"{__version__} {options!r}".encode())
-    for path in files:
-        found.update(hashlib.sha256(path.read_bytes()).digest())
+    for recording in recordings:
+        found.update(f"{len(recording.x)} {recording.n_taught}".encode())
+        found.update(recording.x_d.tobytes() + recording.x.tobytes())
     return found.hexdigest()
 
 

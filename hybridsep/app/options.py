@@ -15,10 +15,13 @@ from ..fmi.flavours import FLAVOURS
 __all__ = [
     "TRAJECTORIES",
     "AxisOption",
+    "CommandColumnOption",
     "FlavourOption",
     "ForceOption",
     "JsonOption",
     "MachineOption",
+    "MeasuredColumnOption",
+    "TimeColumnOption",
     "TsOption",
     "UnitOption",
     "WeightsOption",
@@ -47,6 +50,11 @@ UnitOption = Annotated[
         "that of the columns' names (x [mm]) or m if left out."
     ),
 ]
+TimeColumnOption = Annotated[str | None, typer.Option("--t", help="Name of the time column.")]
+CommandColumnOption = Annotated[
+    str | None, typer.Option("--x_d", "--x-d", help="Name of the commanded position's column.")
+]
+MeasuredColumnOption = Annotated[str | None, typer.Option("--x", help="Name of the measured position's column.")]
 AxisOption = Annotated[str | None, typer.Option(help="Axis of a file that holds several, such as X1.")]
 WeightsOption = Annotated[
     Path | None,

@@ -19,6 +19,7 @@ __all__ = [
     "EXAMPLE_LOG",
     "FIGURE",
     "FIT_FILES",
+    "FIT_MARK",
     "FMU",
     "MACHINE",
     "RUN",
@@ -130,7 +131,10 @@ VECTOR_FIGURE = Kind("figure of hybridsep", _is_our_drawing)
 FMU = Kind("FMU of hybridsep", _is_our_fmu)
 EXAMPLE_LOG = Kind("example log of hybridsep", _is_example)
 STATE = Kind("saved predictor", _begins_with(b"HSEP"))
-FITTED = Kind("machine file of hybridsep fit", _begins_with(b"# Identified by hybridsep fit"))
+FIT_MARK = "Identified by hybridsep fit"
+"""How the comment begins that a machine file of ``hybridsep fit`` begins with."""
+
+FITTED = Kind("machine file of hybridsep fit", _begins_with(f"# {FIT_MARK}".encode()))
 STAGES = Kind("result of hybridsep fit", _begins_with(b'{\n  "hybridsep": "'))
 REPORT = Kind("report of hybridsep", _begins_with(b"<!DOCTYPE html>\n<!-- report of hybridsep -->"))
 SUMMARY = Kind("summary of hybridsep demo", _begins_with(b'{\n  "staircase": {'))

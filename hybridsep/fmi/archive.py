@@ -23,7 +23,7 @@ from . import native_flavour, python_flavour
 from .flavours import FLAVOURS
 from .warm_start import load_trained
 
-__all__ = ["build_fmu", "fmu_description", "fmu_names"]
+__all__ = ["build_fmu", "fmu_description", "fmu_name", "fmu_names"]
 
 _SUFFIX = {"native": "", "python": "Py"}
 _SAMPLES_TRAJECTORY = 3
@@ -43,9 +43,6 @@ def fmu_names(machine: Machine, flavour: str = FLAVOURS[0]) -> dict[str, str]:
     FmuError
         If the flavour is unknown.
     """
-    if flavour not in FLAVOURS:
-        raise FmuError(f"flavour must be one of {', '.join(FLAVOURS)}, got {flavour!r}")
-    suffix = "" if machine.name == DEFAULT_MACHINE else f"_{machine.name}"
     models = ["HybridPredictor"]
     if machine.drive_limits is not None:
         models.append("SepCompensator")
@@ -53,7 +50,14 @@ def fmu_names(machine: Machine, flavour: str = FLAVOURS[0]) -> dict[str, str]:
         models.append("FeedDrive")
     if machine.name == DEFAULT_MACHINE and flavour == "native":
         models.append("ReferenceTrajectory")
-    return {f"{model}{_SUFFIX[flavour]}{suffix}": model for model in models}
+    return {fmu_name(model, machine.name, flavour): model for model in models}
+
+
+def fmu_name(model: str, machine: str, flavour: str) -> str:
+    """Return the archive stem of a model of the machine with a name; FmuError if the flavour is unknown."""
+    if flavour not in FLAVOURS:
+        raise FmuError(f"flavour must be one of {', '.join(FLAVOURS)}, got {flavour!r}")
+    return f"{model}{_SUFFIX[flavour]}{'' if machine == DEFAULT_MACHINE else f'_{machine}'}"
 
 
 def build_fmu(

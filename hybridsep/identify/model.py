@@ -100,7 +100,7 @@ class IdentifiedModel:
         ParameterError
             If an entry is invalid.
         """
-        return machine_of(self.model, self.input_hold, self.T_s, name, title, **entries)
+        return machine_of(self.model, self.input_hold, self.T_s, name, title, unit=self.unit, **entries)
 
     def summary(self) -> Mapping[str, Any]:
         """Return plain values for JSON and tables."""

@@ -18,9 +18,18 @@ from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
 from .halves import Recording, replay
 
-__all__ = ["Choice", "Tried", "WindowScore", "choose_settings", "settings_for", "settings_to_try", "window_scores"]
+__all__ = [
+    "WORTH",
+    "Choice",
+    "Tried",
+    "WindowScore",
+    "choose_settings",
+    "settings_for",
+    "settings_to_try",
+    "window_scores",
+]
 
-_WORTH = 0.05
+WORTH = 0.05
 """Relative gain below which the default settings stay: less may be chance."""
 
 _SHARES = (0.1, 0.25, 1.0)
@@ -121,7 +130,7 @@ def choose_settings(
         tried.append(Tried(candidate, _taught_rms(model, candidate, recordings)))
         progress((i + 1) / len(candidates))
     best = min(tried, key=lambda one: one.rms_h)
-    chosen = best if best.rms_h < (1.0 - _WORTH) * tried[0].rms_h else tried[0]
+    chosen = best if best.rms_h < (1.0 - WORTH) * tried[0].rms_h else tried[0]
     return Choice(chosen.settings, tuple(tried))
 
 

@@ -16,6 +16,7 @@ from hybridsep.app import fit as fitting
 from hybridsep.app.fit import Fit, FitOptions, fit, fit_files, machine_name
 from hybridsep.app.fit_intake import take_in
 from hybridsep.app.fit_report import recommendation, write_report
+from hybridsep.app.fit_stages import key_of
 from hybridsep.base.errors import LogError, ParameterError
 from hybridsep.cosim.fmus import FmuController
 from hybridsep.tune.halves import halves, replay
@@ -141,6 +142,27 @@ def test_a_log_that_cannot_teach_a_model_is_predicted_by_its_command(tmp_path: P
     assert rms_pb == pytest.approx(1e-6, rel=0.1)
     assert rms_h <= 1.02 * rms_pb
     write_report(tmp_path / "report.html", found, used, findings)
+
+
+def test_what_is_kept_is_of_the_samples_as_they_are_read(log: Path) -> None:
+    found = read_log(log)
+    [recording] = halves([(found.x_d, found.x_meas)], 0.5)
+    keys = {
+        key_of([recording], "m"),
+        key_of([recording], "rad"),
+        key_of([replace(recording, x=-recording.x)], "m"),
+        key_of([replace(recording, n_taught=recording.n_taught + 1)], "m"),
+    }
+    assert len(keys) == 4
+    assert key_of([replace(recording, x=recording.x.copy())], "m") in keys
+
+
+def test_a_rotary_axis_stays_one_under_the_default_machines_name(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    log = write_rows(tmp_path / "still.csv", np.full(600, 0.1), 0.1 + 1e-6 * rng.normal(size=600))
+    found = fit([replace(read_log(log), unit="rad")], tmp_path, FitOptions(20, "spring_mass_damper"))
+    assert load_machine(tmp_path / "machine.toml").unit == "rad"
+    assert all(path.exists() for path in found.files if path.suffix == ".fmu")
 
 
 def test_logs_of_different_sampling_are_refused(log: Path, tmp_path: Path) -> None:
