@@ -12,6 +12,7 @@ from ..base.metrics import coverage
 from ..base.signals import Array
 from ..evaluate.canvas import HOLD, HYBRID, PHYSICS
 from ..evaluate.report import Chart, Line, Report
+from ..evaluate.verdict import ALIKE
 from ..intake.finding import Finding
 from ..logs.log import Log
 from ..tune.choice import WORTH
@@ -22,8 +23,6 @@ __all__ = ["recommendation", "write_report"]
 _NAMES = ("physics model", "hold the last residual", "hybrid")
 _COLOURS = (PHYSICS, HOLD, HYBRID)
 _BAND = "rgba(27, 108, 168, 0.18)"
-_GAIN = 0.02
-"""Relative gain below which the hybrid is called no better."""
 
 
 def recommendation(fit: Fit) -> str:
@@ -33,9 +32,9 @@ def recommendation(fit: Fit) -> str:
     if value == 0.0:
         return "The log's second half has no error to predict: record the axis while it works."
     ratio = h / value
-    if ratio < 1.0 - _GAIN:
+    if ratio < 1.0 - ALIKE:
         return f"Use the hybrid: its error is {ratio:.2f} × that of {peer}, the best without learning."
-    if ratio <= 1.0 + _GAIN:
+    if ratio <= 1.0 + ALIKE:
         return f"The hybrid does no harm and no good here: {ratio:.2f} × the error of {peer}."
     return f"Do not use the hybrid on what this log shows: {ratio:.2f} × the error of {peer}; record more motion."
 

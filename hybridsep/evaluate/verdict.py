@@ -15,9 +15,9 @@ from ..base.metrics import rms_ratio
 from ..base.signals import Array
 from ..cosim.run import Run
 
-__all__ = ["Tally", "Verdict", "verdict_of"]
+__all__ = ["ALIKE", "Tally", "Verdict", "verdict_of"]
 
-_ALIKE = 0.02
+ALIKE = 0.02
 """Relative difference of two RMS errors below which they count as equal."""
 
 _LEAST_SHARE = 0.01
@@ -174,7 +174,7 @@ class Tally:
         return tuple(
             name
             for name, (axis, i) in self._places().items()
-            if _ratio(h.take(i, axis=axis).sum(), peer.take(i, axis=axis).sum()) > 1.0 + _ALIKE
+            if _ratio(h.take(i, axis=axis).sum(), peer.take(i, axis=axis).sum()) > 1.0 + ALIKE
         )
 
     def _causes(self, ratios: list[float]) -> list[str]:
@@ -185,7 +185,7 @@ class Tally:
             causes.append(
                 f"the prediction is unstable: it leaves the physics model by {times:.2g} × the largest residual"
             )
-        elif max(ratios) > 1.0 + _ALIKE:
+        elif max(ratios) > 1.0 + ALIKE:
             causes += self._causes_of_worse(ratios)
         return causes
 
@@ -194,10 +194,10 @@ class Tally:
         causes = []
         if moving < _LITTLE_MOTION:
             causes.append(f"too little motion to learn from, {100 * moving:.2g} % of the samples")
-        peers = [peer for peer, value in enumerate(ratios) if value > 1.0 + _ALIKE]
+        peers = [peer for peer, value in enumerate(ratios) if value > 1.0 + ALIKE]
         if all(self._worse_early(peer) for peer in peers):
             causes.append(f"only the first {_N_EARLY} windows are worse, where next to nothing is learned yet")
-        elif ratios[0] <= 1.0 + _ALIKE and not causes:
+        elif ratios[0] <= 1.0 + ALIKE and not causes:
             causes.append("the residual changes so slowly that its last value says more than the motion does")
         elif not causes:
             causes.append("the residual does not repeat with the motion")
@@ -206,7 +206,7 @@ class Tally:
     def _worse_early(self, peer: int) -> bool:
         """Return whether the hybrid is worse than a peer in the beginning of the run and not in the rest."""
         rest = np.maximum(self._squares.sum(axis=(1, 2)) - self._early, 0.0)
-        return self._n_windows > 2 * _N_EARLY and _ratio(rest[2], rest[peer]) <= 1.0 + _ALIKE
+        return self._n_windows > 2 * _N_EARLY and _ratio(rest[2], rest[peer]) <= 1.0 + ALIKE
 
 
 def _ratio(own: float, other: float) -> float:
@@ -215,7 +215,7 @@ def _ratio(own: float, other: float) -> float:
 
 
 def _comparison(value: float) -> str:
-    if abs(value - 1.0) <= _ALIKE:
+    if abs(value - 1.0) <= ALIKE:
         return "As good as"
     return "Better than" if value < 1.0 else "Worse than"
 
@@ -223,7 +223,7 @@ def _comparison(value: float) -> str:
 def _where(value: float, worse: tuple[str, ...], judged: tuple[str, ...]) -> str:
     """Return where the hybrid is worse; everywhere or nowhere, where that says it."""
     if not worse:
-        return f", {_listed(judged)}" if value < 1.0 - _ALIKE else ""
+        return f", {_listed(judged)}" if value < 1.0 - ALIKE else ""
     return ", everywhere" if worse == judged else f"; worse {_listed(worse)}"
 
 
