@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..base.errors import LogError
+from ..base.errors import LogError, ParameterError
 from ..intake.check import Intake, check
 from ..intake.finding import Finding
 from ..logs.log import Log, LogReader, open_log
@@ -15,13 +15,47 @@ from ..machine import Machine
 from .arguments import check_interval, check_unit
 from .failures import errors_console
 
-__all__ = ["Reading", "findings_table", "open_checked"]
+__all__ = ["Reading", "findings_table", "open_checked", "reading_of"]
 
 CHECKED_MAX = 2_000_000
 """Samples that are checked at most; a longer log is replayed in bounded memory all the same."""
 
 Reading = Mapping[str, Any]
 """Arguments of :func:`~hybridsep.logs.log.open_log`."""
+
+
+def reading_of(
+    machine: Machine,
+    columns: Mapping[str, str | None],
+    *,
+    unit: str | None,
+    T_s: float | None,
+    axis: str | None,
+    may_miss: bool,
+) -> Reading:
+    """Return how a log of a machine is read: as its machine file says, where an option does not say otherwise.
+
+    Parameters
+    ----------
+    machine : Machine
+    columns : mapping
+        Column of ``t``, ``x_d`` and ``x``; None where it is not given.
+    unit, T_s, axis
+        As given.
+    may_miss : bool
+        Whether positions may be missing.
+    """
+    own = machine.log
+    names = {**own.columns, **{role: column for role, column in columns.items() if column}}
+    if T_s is not None and columns["t"] is None:
+        names.pop("t", None)  # there may be none
+    return {
+        "columns": names,
+        "unit": unit or own.unit,
+        "T_s": T_s,
+        "axis": axis or own.axis,
+        "may_miss": may_miss,
+    }
 
 
 def open_checked(
@@ -51,7 +85,11 @@ def open_checked(
     ------
     LogError
         If the log cannot be read, or has a fault that makes figures flatter and is neither fixed nor taken as it is.
+    ParameterError
+        If it is both.
     """
+    if fix and as_is:
+        raise ParameterError("--fix and --as-is exclude each other")
     reader = open_log(path, **reading, uniform=False)
     checked = reader.read(CHECKED_MAX)
     check_unit(path.name, checked, machine)
