@@ -158,6 +158,8 @@ class PredictorSettings(Settings):
         the residuals.
     forgetting : float
         With trust: time constant with which samples lose their weight, s; 0: never.
+    measurement_delay : int
+        Samples by which the measurement is late: the position that arrives at ``k`` is ``x(k − measurement_delay)``.
     v_friction : float
         Velocity scale of the friction's change of sign, m/s, for additional features of the reference
         (:mod:`~hybridsep.predict.reference_features`); 0, as in the paper: none.
@@ -166,8 +168,9 @@ class PredictorSettings(Settings):
     NEEDS_PREVIEW: ClassVar[tuple[str, ...]] = ("v_friction",)
     """Fields of a predictor that a compensator holds: alone it has no reference beyond its window."""
 
-    ALONE: ClassVar[tuple[str, ...]] = ("trust", "effect", "noise_std", "forgetting")
-    """Fields of a predictor that no machine file's or FMU's compensator has: it plans with the paper's model."""
+    ALONE: ClassVar[tuple[str, ...]] = ("trust", "effect", "noise_std", "forgetting", "measurement_delay")
+    """Fields of a predictor that no machine file's or FMU's compensator has: it plans with the paper's model, from the
+    state of ``G_pb`` now."""
 
     ELSEWHERE: ClassVar[tuple[str, ...]] = ("T_s", "input_hold", *NEEDS_PREVIEW)
 
@@ -201,6 +204,7 @@ class PredictorSettings(Settings):
         *(0.0, 0.0, 1e9, "s", "time after which samples have lost 63 % of their weight, with trust; 0: never"),
         nonzero=1e-3,
     )
+    measurement_delay: int = whole(0, 0, 10_000, "whole samples by which the measured position is late")
     v_friction: float = real(
         *(2e-3, 0.0, 1e4, "m/s"),
         "velocity over which friction changes its sign, for features of the reference; 0: none of them",

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.errors import SignalError
+from ..base.errors import ParameterError, SignalError
 from ..base.settings import CompensatorSettings, PredictorSettings
 from ..base.signals import Array, as_published, as_samples
 from ..predict.linearised import PlanModel
@@ -56,11 +56,16 @@ class SepCompensator:
     Raises
     ------
     ParameterError
-        If ``preview`` or ``spacing`` does not fit the predictor's ``Np``.
+        If ``preview`` or ``spacing`` does not fit the predictor's ``Np``, or the predictor has a ``measurement_delay``.
     """
 
     def __init__(self, predictor: HybridPredictor, settings: CompensatorSettings | None = None) -> None:
         Np = predictor.Np
+        if predictor.settings.measurement_delay:
+            raise ParameterError(
+                "measurement_delay must be 0 for a compensator, which plans from the state of the physics model now, "
+                f"got {predictor.settings.measurement_delay} samples"
+            )
         self.predictor = predictor
         self.settings = settings = (settings or CompensatorSettings()).for_window(Np)
         assert settings.preview is not None

@@ -40,7 +40,8 @@ class Batch(NamedTuple):
     x_d, x : (n,) array, m
         Commanded and measured positions, NaN where missing.
     x_pb, x_hold, x_h : (n,) array, m
-        Predictions made before any of ``x`` was known.
+        Predictions made before any of ``x`` was known. With a ``measurement_delay`` they, their deviation and ``x_d``
+        are those of the instants that ``x`` was measured at; before the first one the drive is at rest.
     x_h_std : (n,) array, m
         Standard deviation of ``x − x_h``, as predicted.
     rms_pb, rms_hold, rms_h : float
@@ -165,16 +166,16 @@ def backtest_stream(
     """
     overall, after, tally = RunningErrors(3), RunningErrors(3), Tally(predictor.Np)
     j = k = n_rejected = 0
-    for x_d, x in _windows(predictor, chunks):
-        residual = predictor.last_residual()
-        prediction = predictor.predict(x_d)
-        n, warm = len(x), prediction.n_warm_up
-        predicted = np.empty((3, n))
-        predicted[0] = prediction.x_pb
-        np.add(prediction.x_pb, residual, out=predicted[1])
-        np.add(prediction.x_pb, prediction.e_h, out=predicted[2])  # Eq. (4)
-        if warm:
-            predicted[1:, :warm] = prediction.x_pb[:warm]
+    late: Array | None = None
+    for commands, x in _windows(predictor, chunks):
+        window = _predicted(predictor, commands)
+        if late is None:
+            late = _at_rest(commands[0] if predictor.start is None else predictor.start, predictor.late)
+        n = len(x)
+        signals = np.concatenate((late, window), axis=1)
+        late = signals[:, n:]
+        x_d, x_h_std, predicted = signals[_X_D, :n], signals[_STD, :n], signals[_PREDICTED, :n]
+        warm = n - int(signals[_ACTIVE, :n].sum())
         error = x - predicted
         n_known, squares, peaks = _measure(error, k)
         if warm == 0:
@@ -182,7 +183,7 @@ def backtest_stream(
         elif warm < n:
             after.add(*_measure(error[:, warm:], k))
         rms = [math.sqrt(square / n_known) if n_known else math.nan for square in squares]
-        batch = Batch(j, k, warm, x_d, x, predicted[0], predicted[1], predicted[2], prediction.x_h_std, *rms)
+        batch = Batch(j, k, warm, x_d, x, predicted[0], predicted[1], predicted[2], x_h_std, *rms)
         overall.add(n_known, squares, peaks)
         tally.add(x_d, x, predicted)
         n_before = predictor.n_rejected
@@ -194,6 +195,26 @@ def backtest_stream(
     if j == 0:
         raise SignalError("a log must have at least one sample, got none")
     return Scores(Score.of(overall), Score.of(after), j, tally.verdict(n_rejected=n_rejected))
+
+
+_X_D, _STD, _ACTIVE, _PREDICTED = 0, 1, 2, slice(3, 6)
+"""Rows of the signals of a window: command, standard deviation, whether the hybrid is published, the predictions."""
+
+
+def _predicted(predictor: HybridPredictor, x_d: Array) -> Array:
+    """Predict a window, and return its signals, ``(6, n)``."""
+    residual = predictor.last_residual()
+    prediction = predictor.predict(x_d)
+    active, x_pb = prediction.active, prediction.x_pb
+    hold, x_h = x_pb + residual, x_pb + prediction.e_h  # Eq. (4)
+    return np.stack((x_d, prediction.x_h_std, active, x_pb, np.where(active, hold, x_pb), np.where(active, x_h, x_pb)))
+
+
+def _at_rest(start: float, late: Array) -> Array:
+    """Return the signals of a drive that follows its last commands, ``late`` relative to ``start``, m, ``(6, delay)``."""
+    rest = np.tile(start + late, (6, 1))
+    rest[_STD] = rest[_ACTIVE] = 0.0
+    return rest
 
 
 def _measure(error: Array, k: int) -> tuple[int, list[float], list[float]]:

@@ -102,9 +102,11 @@ class LookAhead:
         check_position("the start value of x_d_ahead", start)
         self.start = start
         self.k = 0
-        self._first_scored = self.delay + samples_before(warm_up, self.predictor.T_s)
+        late = self.predictor.settings.measurement_delay
+        self._first_scored = self.delay + late + samples_before(warm_up, self.predictor.T_s)
         self._n_scored, self._sums = 0, np.zeros(4)
-        self._hold_residual = 0.0  # m, before the window
+        # Commanded position, x_pb, x_h and hold, as predicted for the samples whose measurement is still to come
+        self._compared = np.full((4, late + self.Np), self.start)
         # The last commands, r(k − delay) … r(k − 1), which is x_d(k) … x_d(k + delay − 1)
         self._ahead, self._measured = np.full(self.delay, self.start), np.full(self.Np, self.start)
         if self.planner is None:
@@ -113,6 +115,7 @@ class LookAhead:
         else:
             self.planner.restart(self.start, t_init=warm_up, lead_in=self.delay)
             self.window = self.planner.plan(self._ahead.copy())
+            self._compare()
 
     def _hold(self, model: HybridPredictor | Planner) -> None:
         self.model = model
@@ -216,9 +219,7 @@ class LookAhead:
         self._ahead[self.k % self.delay], self._measured[self.k % self.Np] = x_d_ahead, x_meas
         if self.k >= self._first_scored and not math.isnan(x_meas):
             self._n_scored += 1
-            self._sums += np.square(
-                [x_meas - position for position in (self.x_d, self.x_pb, self.x_h, self.x_pb + self._hold_residual)]
-            )
+            self._sums += np.square(x_meas - self._compared[:, self.k % self.Np])
         self.k += 1
         if self.k % self.Np == 0:
             self._learn()
@@ -243,9 +244,8 @@ class LookAhead:
             "n_warm_up": self.window.n_warm_up,
             "state": int(self.window.state),
             "diverged": self.diverged,
-            "hold_residual": self._hold_residual,
         }
-        arrays = {"sums": self._sums, "ahead": self._ahead, "measured": self._measured}
+        arrays = {"sums": self._sums, "ahead": self._ahead, "measured": self._measured, "compared": self._compared}
         arrays |= {name: getattr(self.window, name) for name in PublishedWindow.SIGNALS}
         return pack(_KIND, meta, arrays, {"model": self.model.to_bytes()})
 
@@ -275,7 +275,8 @@ class LookAhead:
         look_ahead._first_scored, look_ahead._n_scored = saved.whole("first_scored"), saved.whole("n_scored")
         look_ahead.diverged = saved.text("diverged")
         look_ahead._sums = np.abs(saved.array("sums", 4))
-        look_ahead._hold_residual = saved.real("hold_residual")
+        late = look_ahead.predictor.settings.measurement_delay
+        look_ahead._compared = saved.array("compared", 4, late + Np)
         look_ahead._ahead = saved.array("ahead", look_ahead.delay)
         look_ahead._measured = saved.array("measured", Np, finite=not look_ahead.may_miss)
         with saved.consistent():
@@ -305,16 +306,22 @@ class LookAhead:
     def _begin_window(self) -> None:
         """Predict or plan the next window; if it diverges, outputs keep the last one and later samples are refused."""
         x_d = np.roll(self._ahead, -(self.k % self.delay))
-        self._hold_residual = self.predictor.last_residual()
         try:
             if self.planner is None:
                 self.window = PublishedWindow.of_prediction(x_d, self.predictor.predict(x_d))
             else:
                 self.window = self.planner.plan(x_d)
+            self._compare()
         except SignalError as error:
             self.diverged = str(error)
             self.k -= 1  # the sample is refused, and outputs stay those of the last one
             raise
+
+    def _compare(self) -> None:
+        """Append the window to what measurements are compared with."""
+        window, Np = self.window, self.Np
+        hold = window.x_pb + self.predictor.last_residual()
+        self._compared = np.hstack((self._compared[:, Np:], np.stack((window.x_d, window.x_pb, window.x_h, hold))))
 
     def _now(self, signal: Array) -> float:
         return float(signal[self.k % self.Np])

@@ -24,6 +24,7 @@ from .features import FeatureLayout, PastSamples
 from .reference_features import ReferenceFeatures
 from .regression import RidgeRegression
 from .saved_predictor import predictor_blob, predictor_from
+from .start_in_motion import initial_state
 from .trusted import TrustedModel
 from .uncertainty import Uncertainty
 from .window import PredictedWindow, Prediction, WindowOperator, path_beyond
@@ -35,7 +36,8 @@ class HybridPredictor:
     """Predictor of a drive's position by windows, learning from their measurement; eqs. (2) to (6).
 
     For each window, call :meth:`predict` with its commands, then :meth:`update` with the measured positions.
-    :meth:`predict` does not change the weights. Memory and cost per window are constant.
+    :meth:`predict` does not change the weights. Memory and cost per window are constant. With a ``measurement_delay``
+    what arrives over a window was measured so many samples earlier; what is not measured yet is predicted anew.
 
     Parameters
     ----------
@@ -101,6 +103,7 @@ class HybridPredictor:
         self.start = rest
         self.k = 0
         self.state = self.discrete.rest()
+        self.late = np.zeros(self.settings.measurement_delay)
         self.past.restart()
         if self.trusted is not None:
             self.trusted.restart()
@@ -133,25 +136,30 @@ class HybridPredictor:
         if n == 0:
             raise SignalError("x_d must have at least one sample, got none")
         start = float(command[0]) if self.start is None else self.start
-        command = command - start
-        x_pb, _ = self.discrete.forced_response(self.state, command)  # Eq. (2)
-        path = command + start if reference is None else as_samples(reference, "reference")
+        path = command if reference is None else as_samples(reference, "reference")
         if len(path) < n:
             raise SignalError(f"reference must have at least the {n} samples of x_d, got {len(path)}")
+        delay = len(self.late)
+        command, path = np.concatenate((self.late, command - start)), np.concatenate((self.late + start, path))
+        x_pb, _ = self.discrete.forced_response(self.state, command)  # Eq. (2)
         signs = self.reference_features.signs(path, start)
         e_h, self.pending = self.predicted(command, x_pb, start, path, signs)
-        return Prediction(x_pb + start, e_h, self.pending.error.std, self._warm_up(n))
+        std = self.pending.error.std
+        return Prediction(x_pb[delay:] + start, e_h[delay:], std[delay:], self._warm_up(n))
 
     def predicted(
         self, x_d: Array, x_pb: Array, start: float, reference: Array, signs: Array
     ) -> tuple[Array, PredictedWindow]:
-        """Return the residual predicted over a window, ``(n,)``, m, and the window, pending measurement."""
+        """Return the residual predicted over a window, ``(n,)``, m, and the window, pending measurement.
+
+        With a ``measurement_delay`` the window begins so many samples earlier, with those not measured yet.
+        """
         n, forecast = len(x_d), None
         if self.trusted is not None:
             forecast = self.trusted.forecast(x_d, x_pb, path_beyond(reference, start, n))
         features = self.reference_features.features(signs, n)
         e_h = self._free_run(x_pb, features) if forecast is None else forecast.e_h
-        active = np.arange(n) >= self._warm_up(n)
+        active = np.arange(n) >= self._warm_up(n, late=len(self.late))
         error = self.uncertainty.predict(
             x_d,
             x_pb,
@@ -167,7 +175,7 @@ class HybridPredictor:
         Parameters
         ----------
         x : (m,) array_like, m
-            Measured positions, ``1 ≤ m ≤ n`` of the last :meth:`predict`.
+            Measured positions that arrived, ``1 ≤ m ≤ n`` of the last :meth:`predict`.
         learn : bool
             Whether the samples enter the regression; the next window starts from their residuals in any case.
 
@@ -180,12 +188,15 @@ class HybridPredictor:
         if pending is None:
             raise SignalError("update must follow predict: there is no predicted window to measure")
         measured = as_samples(x, "x") if self.trusted is None else as_measured(x, "x")
-        if not 1 <= len(measured) <= len(pending.x_d):
-            raise SignalError(f"x must have 1 … {len(pending.x_d)} samples, as predicted, got {len(measured)}")
+        if not 1 <= len(measured) <= self.n_pending:
+            raise SignalError(f"x must have 1 … {self.n_pending} samples, as predicted, got {len(measured)}")
         m = len(measured)
         accepted = np.ones(m, dtype=np.bool_)
         e_pb = measured - pending.start - pending.x_pb[:m]
         if self.trusted is not None and pending.forecast is not None:
+            if self.k == 0 and not self.trusted.plans:
+                pending, e_pb = self._as_it_began(pending, e_pb)
+            assert pending.forecast is not None
             accepted = self.trusted.learn(pending.forecast, measured - pending.start, fold=learn)
         else:
             from_reference = self.reference_features.features(pending.signs, m)
@@ -196,9 +207,21 @@ class HybridPredictor:
             self.uncertainty.learn(pending.error, e_pb, accepted)
         self.reference_features.advance(pending.signs, pending.reference, m)
         _, self.state = self.discrete.forced_response(self.state, pending.x_d[:m])
-        self.start = pending.start
+        self.start, self.late = pending.start, pending.x_d[m : m + len(self.late)].copy()
         self.k += m
         self.pending = None
+
+    def _as_it_began(self, pending: PredictedWindow, e_pb: Array) -> tuple[PredictedWindow, Array]:
+        """Correct the state at the beginning of a run, if its first residuals tell that it was in motion."""
+        m = len(e_pb)
+        state = initial_state(self.model, self.discrete, pending.x_d, e_pb - pending.error.e_h[:m])
+        if state is None or self.trusted is None or pending.forecast is None:
+            return pending, e_pb
+        self.state = self.state + state
+        free, _ = self.discrete.forced_response(state, np.zeros(len(pending.x_pb)))
+        x_pb = pending.x_pb + free
+        self.trusted.begin_in_motion(x_pb)
+        return replace(pending, x_pb=x_pb, forecast=replace(pending.forecast, x_pb=x_pb)), e_pb - free[:m]
 
     def operator(self, n: int | None = None, *, reference: ArrayLike | None = None) -> WindowOperator:
         """Return the lifted prediction of the next ``n`` (default ``Np``) samples, affine in their commands; eq. (3).
@@ -226,10 +249,12 @@ class HybridPredictor:
         # x_h = x_pb + wᵀφ as filters: G_h = (1 + W_x(z) / (1 − W_e(z))) G_pb
         denominator = np.concatenate(([1.0], -w_e))
         g_h = g_pb + lfilter(w_x, denominator, g_pb)
-        free_pb, _ = self.discrete.forced_response(self.state, np.zeros(length))
+        delay = len(self.late)
+        free_pb, _ = self.discrete.forced_response(self.state, np.concatenate((self.late, np.zeros(length))))
         path = np.full(length, start) if reference is None else as_samples(reference, "reference", length)
-        from_reference = self.reference_features.features(self.reference_features.signs(path, start), length)
-        free = free_pb + self._free_run(free_pb, from_reference)
+        signs = self.reference_features.signs(np.concatenate((self.late + start, path)), start)
+        free = (free_pb + self._free_run(free_pb, self.reference_features.features(signs, delay + length)))[delay:]
+        free_pb = free_pb[delay:]
         return WindowOperator(
             g_h=g_h,
             free=free + start * (1.0 - np.cumsum(g_h)),
@@ -247,7 +272,7 @@ class HybridPredictor:
     @property
     def n_pending(self) -> int:
         """Samples of the predicted window pending measurement; 0 if there is none."""
-        return 0 if self.pending is None else len(self.pending.x_d)
+        return 0 if self.pending is None else len(self.pending.x_d) - len(self.late)
 
     @property
     def n_rejected(self) -> int:
@@ -294,9 +319,9 @@ class HybridPredictor:
         """
         return cls.from_bytes(Path(path).read_bytes())
 
-    def _warm_up(self, n: int) -> int:
-        """Return how many of the next ``n`` samples are within the warm-up."""
-        return min(max(self.n_init - self.k, 0), n)
+    def _warm_up(self, n: int, *, late: int = 0) -> int:
+        """Return how many of ``n`` samples, the next ones or from ``late`` samples before, are within the warm-up."""
+        return min(max(self.n_init - self.k + late, 0), n)
 
     def _free_run(self, x_pb: Array, reference: Array) -> Array:
         """Return ``wᵀφ`` over a window in free run, ``(n,)``; eq. (4)."""

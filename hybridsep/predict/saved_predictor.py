@@ -41,6 +41,7 @@ def predictor_blob(predictor: HybridPredictor) -> bytes:
     arrays = {
         "modes": modes,
         "state": predictor.state,
+        "late": predictor.late,
         "x_pb": past.x_pb,
         "e_pb": past.e_pb,
         **learned,
@@ -76,6 +77,7 @@ def predictor_from(kind: type[HybridPredictor], blob: bytes) -> HybridPredictor:
             predictor.regression.restore(factor, saved.whole("n_samples"))
     predictor.k, predictor.n_init = saved.whole("k"), saved.whole("n_init")
     predictor.state[:] = saved.array("state", predictor.discrete.n_state)
+    predictor.late = saved.array("late", settings.measurement_delay)
     predictor.past.x_pb[:], predictor.past.e_pb[:] = x_pb, e_pb
     features = predictor.reference_features
     features.before = saved.array("signs", len(features.before))
@@ -95,7 +97,7 @@ def _pending(predictor: HybridPredictor, saved: Saved) -> PredictedWindow:
     """Return the predicted window; StateError if it is inconsistent."""
     start = saved.real("pending_start")
     x_d, reference = saved.array("pending_x_d", None), saved.array("pending_reference", None)
-    if not 0 < len(x_d) <= len(reference):
+    if not len(predictor.late) < len(x_d) <= len(reference):
         raise saved.error("the pending window must have samples, and a reference at least as long")
     x_pb = saved.array("pending_x_pb", len(x_d))
     signs = saved.array("pending_signs", len(predictor.reference_features.signs(reference, start)))

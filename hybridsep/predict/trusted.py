@@ -100,6 +100,16 @@ class TrustedModel:
         carried = _CARRIED * self.look_ahead
         self._discount(carried / max(self.n_rows, carried))
 
+    def begin_in_motion(self, x_pb: Array) -> None:
+        """Correct what was before a run in motion: the physics-based prediction, (n,), m, ran on as it begins."""
+        before = np.arange(-len(self.state.x_pb), 0)
+        self.state = self.state._replace(x_pb=x_pb[0] + (x_pb[1] - x_pb[0]) * before)
+
+    @property
+    def plans(self) -> bool:
+        """Whether a compensator plans with it."""
+        return self.look_ahead > self.settings.Np
+
     def plan_ahead(self, preview: int) -> None:
         """Adapt to a compensator, which plans over a preview, in samples, and moves the drive as it commands."""
         self.look_ahead = preview

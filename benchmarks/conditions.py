@@ -1,0 +1,214 @@
+"""Predictor with trust in conditions that differ from a run at rest at 1 kHz with a sensor that does not lag.
+
+    python -m benchmarks.conditions [--emps DATA_EMPS.mat] [--recordings FOLDER] [--n 40]      (some minutes)
+
+1. Start in motion: runs cut in mid-motion, RMS relative to the physics model's, which starts at rest, too.
+2. Delay of the measurement: RMS relative to that of a run without delay at the same horizon, the samples from the last
+   measurement that has arrived to the end of the window.
+3. Plant changed before a warm run: RMS from 2 s on, relative to that of a cold run.
+4. Sampling rates: RMS of one plant at 250 Hz, 1 kHz and 8 kHz, windows of 0.1 s each, relative to 1 kHz.
+
+RMS is against the measured position.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from copy import copy
+from dataclasses import replace
+from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # benchmarks are no part of the package
+
+import numpy as np
+
+from benchmarks.random_drives.generator import random_drives
+from benchmarks.random_drives.simulation import simulate as simulate_many
+from benchmarks.trust import SEEDS, Case, cases, simulated
+from hybridsep.base.metrics import rms
+from hybridsep.base.settings import PredictorSettings
+from hybridsep.base.signals import Array
+from hybridsep.evaluate.backtest import backtest
+from hybridsep.machine import Machine, load_machine
+from hybridsep.model.physics import ModalModel
+from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.plant import Plant, simulate
+from hybridsep.plants.trajectory import spiral, staircase
+from hybridsep.predict.predictor import HybridPredictor
+
+DELAY = 5
+"""Samples by which the measurement is late."""
+
+SETTLED = 2.0
+"""Time after which a warm run is to be no worse than a cold one, s."""
+
+RATES = (250.0, 1000.0, 8000.0)
+"""Sampling rates, Hz."""
+
+HORIZON = 0.1
+"""Length of a window at each of them, s."""
+
+CUTS = (0.21, 0.37, 0.58)
+"""Parts of a run of a random drive that are cut off, or up to a tenth more: until it moves fast."""
+
+CHANGES = {
+    "damping × 1.2, stiffness × 0.9": {"c": 1.2, "k": 0.9},
+    "stiffness × 1.2": {"k": 1.2},
+    "nonlinearities × 3": {"c_nl": 3.0, "k_nl": 3.0},
+    "no nonlinearities": {"c_nl": 0.0, "k_nl": 0.0},
+}
+"""Factors on the parameters of the paper's drive after it was learned."""
+
+STAGE_CHANGES = {
+    "stage X, friction × 2": {"f": 2.0},
+    "stage X, friction × 0.3": {"f": 0.3},
+    "stage X, stiffness × 3": {"kappa": 3.0},
+}
+"""The same of the stage's X axis."""
+
+DETUNED = 0.9
+"""Factor on the natural frequencies of a random drive after it was learned."""
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--emps", type=Path, help="DATA_EMPS.mat: the recorded axis, too")
+    parser.add_argument("--recordings", type=Path, help="folder of recordings, *.csv with the columns t, x_d, x")
+    parser.add_argument("--n", type=int, default=40, help="number of random drives")
+    options = parser.parse_args(arguments)
+    print_ratios("start in motion, × physics", starts_in_motion(options.emps, options.recordings, options.n))
+    print_ratios(f"delay of {DELAY} samples, × no delay", delays(options.emps, options.n))
+    print_ratios(f"changed plant, warm × cold from {SETTLED:g} s on", changes(options.n))
+    print_ratios(f"windows of {HORIZON:g} s, × {RATES[1]:g} Hz", rates())
+
+
+def print_ratios(title: str, ratios: Iterator[tuple[str, float, float]]) -> None:
+    """Print a table of names, RMS errors, m, and their ratios to those of a peer."""
+    print(f"\n{title:44}{'µm':>10}{'peer':>10}{'ratio':>9}")
+    found = []
+    for name, error, peer in ratios:
+        found.append(error / peer)
+        print(f"{name:44}{1e6 * error:10.4g}{1e6 * peer:10.4g}{error / peer:9.3f}", flush=True)
+    print(f"{f'largest of {len(found)}':64}{max(found):9.3f}")
+
+
+def starts_in_motion(emps: Path | None, recordings: Path | None, n: int) -> Iterator[tuple[str, float, float]]:
+    """Yield names, RMS errors with trust and of the physics model on runs cut in mid-motion."""
+    for case, cut in motions(emps, recordings, n):
+        settings = replace(case.settings, trust=True, t_init=-1.0)
+        found = backtest(HybridPredictor(case.model, settings), case.x_d[cut:], case.x_meas[0][cut:]).overall
+        yield f"{case.name}, from sample {cut} on", found.rms_h, found.rms_pb
+
+
+def motions(emps: Path | None, recordings: Path | None, n: int) -> Iterator[tuple[Case, int]]:
+    """Yield cases and the samples at which they are cut."""
+    for case in (*cases(emps, recordings), *random_cases(n)):
+        for part in CUTS:
+            first = round(part * len(case.x_d))
+            speed = np.abs(np.diff(case.x_d[first : first + len(case.x_d) // 10]))
+            if speed.any():
+                yield case, first + int(np.argmax(speed))
+
+
+def random_cases(n: int) -> Iterator[Case]:
+    """Yield the first random drives."""
+    for drive in random_drives(range(n)):
+        measured = (drive.x_meas, drive.x_meas)
+        yield Case(f"drive {drive.index}", drive.model, PredictorSettings(), drive.x_d, measured)
+
+
+def delays(emps: Path | None, n: int) -> Iterator[tuple[str, float, float]]:
+    """Yield names and RMS errors with a late measurement, and without delay at the same horizon."""
+    for case in (*cases(emps), *random_cases(n)):
+        settings = replace(case.settings, trust=True, t_init=-1.0)
+        shorter = replace(settings, Np=settings.Np - DELAY, measurement_delay=DELAY)
+        errors = [
+            [backtest(run, case.x_d, x).overall.rms_h for x in measured]
+            for run, measured in (
+                (HybridPredictor(case.model, shorter), [np.concatenate((np.full(DELAY, x[0]), x[:-DELAY])) for x in case.x_meas]),
+                (HybridPredictor(case.model, settings), case.x_meas),
+            )
+        ]
+        yield f"{case.name}", errors[0][0], errors[1][0]
+
+
+def changes(n: int) -> Iterator[tuple[str, float, float]]:
+    """Yield names and RMS errors after a while, warm and cold, of plants that have changed before the warm run."""
+    drive, stage = load_machine("spring_mass_damper"), load_machine("als25010_x")
+    for name, factors in CHANGES.items():
+        yield name, *_relearned(drive, _scaled(drive.new_plant(), factors), staircase())
+    for name, factors in STAGE_CHANGES.items():
+        yield name, *_relearned(stage, _scaled(stage.new_plant(), factors), spiral()[0])
+    for drawn in random_drives(range(n)):
+        modes = [replace(mode, f_n=DETUNED * mode.f_n, alpha=DETUNED**2 * mode.alpha) for mode in drawn.true_model.modes]
+        x = simulate_many([ModalModel(modes)], [drawn.disturbances], [drawn.x_d])[0]
+        x_meas = x + drawn.noise_std * np.random.default_rng(drawn.index).standard_normal(len(x))
+        case = Case("", drawn.model, PredictorSettings(), drawn.x_d, (drawn.x_meas, x_meas))
+        yield f"drive {drawn.index}, frequencies × {DETUNED:g}", *_warm_and_cold(case)
+
+
+def _scaled(plant: Plant, factors: dict[str, float]) -> Plant:
+    """Return a copy of a plant with some of its parameters changed."""
+    changed = copy(plant)
+    for name, factor in factors.items():
+        setattr(changed, name, factor * getattr(plant, name))
+    return changed
+
+
+def _relearned(machine: Machine, changed: Plant, x_d: Array) -> tuple[float, float]:
+    """Return RMS errors, warm and cold, on a changed plant of a machine."""
+    assert machine.plant is not None
+    before = simulated("", machine, x_d)
+    after = Encoder(machine.plant.noise_std, 1000).measure_all(simulate(changed, x_d, machine.T_s))
+    return _warm_and_cold(replace(before, x_meas=(before.x_meas[0], after)))
+
+
+def _warm_and_cold(case: Case) -> tuple[float, float]:
+    """Return RMS errors from 2 s on over the second run of a case, after the first one and without it."""
+    settings = replace(case.settings, trust=True, t_init=-1.0)
+    settled, predictor = round(SETTLED / settings.T_s), HybridPredictor(case.model, settings)
+    backtest(predictor, case.x_d, case.x_meas[0])
+    predictor.restart()
+    runs = (predictor, HybridPredictor(case.model, settings))
+    warm, cold = (rms((case.x_meas[1] - backtest(run, case.x_d, case.x_meas[1]).x_h)[settled:]) for run in runs)
+    return warm, cold
+
+
+def rates() -> Iterator[tuple[str, float, float]]:
+    """Yield names and RMS errors of one plant at each sampling rate, and at 1 kHz."""
+    drive, stage = load_machine("spring_mass_damper"), load_machine("als25010_x")
+    for name, machine, path in (
+        ("staircase", drive, lambda T_s: staircase(T_s)),
+        ("spiral, stage X", stage, lambda T_s: spiral(T_s)[0]),
+    ):
+        peer = _at_rate(machine, path, RATES[1])
+        for rate in RATES:
+            for run, error, of_peer in zip(("cold", "warm"), _at_rate(machine, path, rate), peer, strict=True):
+                yield f"{name}, {rate:g} Hz, {run}", error, of_peer
+
+
+def _at_rate(machine: Machine, path: Callable[[float], Array], rate: float) -> tuple[float, float]:
+    """Return RMS errors, cold and warm, with windows and lags of the same time at a sampling rate, Hz."""
+    T_s, Np = 1.0 / rate, round(HORIZON * rate)
+    usual = PredictorSettings()
+    settings = replace(usual, T_s=T_s, Np=Np, p=max(round(usual.p * usual.T_s * rate), 1))
+    x_d = path(T_s)
+    assert machine.plant is not None
+    plant = machine.model_copy(update={"T_s": T_s}).new_plant()
+    x = simulate(plant, x_d, T_s)
+    predictor = HybridPredictor(machine.model, settings)
+    errors = []
+    for seed in SEEDS:
+        x_meas = Encoder(machine.plant.noise_std, seed).measure_all(x)
+        errors.append(rms(x_meas - backtest(predictor, x_d, x_meas).x_h))
+        predictor.restart()
+    return errors[0], errors[1]
+
+
+if __name__ == "__main__":
+    main()
