@@ -123,18 +123,23 @@ def random_cases(n: int) -> Iterator[Case]:
 
 
 def delays(emps: Path | None, n: int) -> Iterator[tuple[str, float, float]]:
-    """Yield names and RMS errors with a late measurement, and without delay at the same horizon."""
+    """Yield names and RMS errors with a late measurement, and without delay with the same windows."""
     for case in (*cases(emps), *random_cases(n)):
-        settings = replace(case.settings, trust=True, t_init=-1.0)
-        shorter = replace(settings, Np=settings.Np - DELAY, measurement_delay=DELAY)
-        errors = [
-            [backtest(run, case.x_d, x).overall.rms_h for x in measured]
-            for run, measured in (
-                (HybridPredictor(case.model, shorter), [np.concatenate((np.full(DELAY, x[0]), x[:-DELAY])) for x in case.x_meas]),
-                (HybridPredictor(case.model, settings), case.x_meas),
-            )
-        ]
-        yield f"{case.name}", errors[0][0], errors[1][0]
+        usual = replace(case.settings, trust=True, t_init=-1.0)
+        late = replace(usual, measurement_delay=DELAY)
+        delayed = [np.concatenate((np.full(DELAY, x[0]), x[:-DELAY])) for x in case.x_meas]
+        runs = [_in_turn(case.model, usual, case.x_d, case.x_meas), _in_turn(case.model, late, case.x_d, delayed)]
+        for name, peer, error in zip(("cold", "warm"), *runs, strict=True):
+            yield f"{case.name}, {name}", error, peer
+
+
+def _in_turn(model: ModalModel, settings: PredictorSettings, x_d: Array, runs: Sequence[Array]) -> list[float]:
+    """Return RMS errors, m, of runs of a predictor, each going on with what the ones before have taught."""
+    predictor, errors = HybridPredictor(model, settings), []
+    for x_meas in runs:
+        errors.append(backtest(predictor, x_d, x_meas).overall.rms_h)
+        predictor.restart()
+    return errors
 
 
 def changes(n: int) -> Iterator[tuple[str, float, float]]:

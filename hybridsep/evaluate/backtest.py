@@ -41,7 +41,7 @@ class Batch(NamedTuple):
         Commanded and measured positions, NaN where missing.
     x_pb, x_hold, x_h : (n,) array, m
         Predictions made before any of ``x`` was known. With a ``measurement_delay`` they, their deviation and ``x_d``
-        are those of the instants that ``x`` was measured at; before the first one the drive is at rest.
+        are those of the instants that ``x`` was measured at; what was measured before the first one is taken as missing.
     x_h_std : (n,) array, m
         Standard deviation of ``x − x_h``, as predicted.
     rms_pb, rms_hold, rms_h : float
@@ -176,16 +176,17 @@ def backtest_stream(
         late = signals[:, n:]
         x_d, x_h_std, predicted = signals[_X_D, :n], signals[_STD, :n], signals[_PREDICTED, :n]
         warm = n - int(signals[_ACTIVE, :n].sum())
-        error = x - predicted
+        compared = np.where(np.arange(k, k + n) < late.shape[1], np.nan, x)
+        error = compared - predicted
         n_known, squares, peaks = _measure(error, k)
         if warm == 0:
             after.add(n_known, squares, peaks)
         elif warm < n:
             after.add(*_measure(error[:, warm:], k))
         rms = [math.sqrt(square / n_known) if n_known else math.nan for square in squares]
-        batch = Batch(j, k, warm, x_d, x, predicted[0], predicted[1], predicted[2], x_h_std, *rms)
+        batch = Batch(j, k, warm, x_d, compared, predicted[0], predicted[1], predicted[2], x_h_std, *rms)
         overall.add(n_known, squares, peaks)
-        tally.add(x_d, x, predicted)
+        tally.add(x_d, compared, predicted)
         n_before = predictor.n_rejected
         predictor.update(x)
         n_rejected += predictor.n_rejected - n_before

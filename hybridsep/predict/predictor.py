@@ -24,7 +24,7 @@ from .features import FeatureLayout, PastSamples
 from .reference_features import ReferenceFeatures
 from .regression import RidgeRegression
 from .saved_predictor import predictor_blob, predictor_from
-from .start_in_motion import initial_state
+from .start_in_motion import motion_before
 from .trusted import TrustedModel
 from .uncertainty import Uncertainty
 from .window import PredictedWindow, Prediction, WindowOperator, path_beyond
@@ -213,15 +213,15 @@ class HybridPredictor:
 
     def _as_it_began(self, pending: PredictedWindow, e_pb: Array) -> tuple[PredictedWindow, Array]:
         """Correct the state at the beginning of a run, if its first residuals tell that it was in motion."""
-        m = len(e_pb)
-        state = initial_state(self.model, self.discrete, pending.x_d, e_pb - pending.error.e_h[:m])
-        if state is None or self.trusted is None or pending.forecast is None:
+        m, late = len(e_pb), len(self.late)
+        before = motion_before(self.model, self.discrete, pending.x_d, e_pb - pending.error.e_h[:m], late)
+        if before is None or self.trusted is None or pending.forecast is None:
             return pending, e_pb
-        self.state = self.state + state
-        free, _ = self.discrete.forced_response(state, np.zeros(len(pending.x_pb)))
-        x_pb = pending.x_pb + free
-        self.trusted.begin_in_motion(x_pb)
-        return replace(pending, x_pb=x_pb, forecast=replace(pending.forecast, x_pb=x_pb)), e_pb - free[:m]
+        self.state = self.state + before.state
+        x_d, x_pb = pending.x_d + before.x_d, pending.x_pb + before.x_pb
+        self.trusted.begin_in_motion(x_d, x_pb)
+        forecast = replace(pending.forecast, x_d=x_d, x_pb=x_pb)
+        return replace(pending, x_d=x_d, x_pb=x_pb, forecast=forecast), e_pb - before.x_pb[:m]
 
     def operator(self, n: int | None = None, *, reference: ArrayLike | None = None) -> WindowOperator:
         """Return the lifted prediction of the next ``n`` (default ``Np``) samples, affine in their commands; eq. (3).

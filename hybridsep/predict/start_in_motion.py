@@ -7,6 +7,8 @@ disturbances did before. Its state follows from the first window by least square
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ..base.signals import Array
@@ -14,7 +16,7 @@ from ..model.discrete import DiscreteModel
 from ..model.physics import ModalModel
 from .regression import RidgeRegression
 
-__all__ = ["initial_state"]
+__all__ = ["MotionBefore", "motion_before"]
 
 _MOVING = 0.05
 """Commanded velocity of the first sample relative to the largest of the window, from which on an axis may have been in
@@ -28,8 +30,28 @@ _DAMPING = 1e-3
 determined."""
 
 
-def initial_state(model: ModalModel, discrete: DiscreteModel, x_d: Array, residuals: Array) -> Array | None:
-    """Return the state of ``G_pb`` that a run began with, ``(n_state,)``; None if it is more likely to be rest.
+class MotionBefore(NamedTuple):
+    """Motion before a run, relative to rest.
+
+    Attributes
+    ----------
+    state : (n_state,) array, m
+        Of ``G_pb`` at the beginning of the first window.
+    x_d : (n,) array, m
+        Commands of the window; 0 but for those before the run, whose measurement was late.
+    x_pb : (n,) array, m
+        Response to both.
+    """
+
+    state: Array
+    x_d: Array
+    x_pb: Array
+
+
+def motion_before(
+    model: ModalModel, discrete: DiscreteModel, x_d: Array, residuals: Array, late: int
+) -> MotionBefore | None:
+    """Return the motion that a run began in; None if it is more likely to have begun at rest.
 
     The residuals decide, between rest and a motion at the first commanded velocity; the state is then the one that they
     are explained by best, near that of this motion.
@@ -39,30 +61,35 @@ def initial_state(model: ModalModel, discrete: DiscreteModel, x_d: Array, residu
     model, discrete : ModalModel, DiscreteModel
         ``G_pb``.
     x_d : (n,) array, m
-        Commands of the first window.
+        Commands of the first window, the first ``late`` of them from before the run.
     residuals : (m,) array, m
         Of its first ``m`` samples, relative to the prediction from rest; NaN where missing.
+    late : int
+        Samples by which the measurement is late.
     """
-    speed, known = np.abs(np.diff(x_d)), np.isfinite(residuals)
+    speed, known = np.abs(np.diff(x_d[late:])), np.isfinite(residuals)
     n = discrete.n_state - discrete.dead_time
-    if known.sum() < _SAMPLES * n or not speed[0] > _MOVING * speed.max():
+    if known[late:].sum() < _SAMPLES * n or not speed[0] > _MOVING * speed.max():
         return None
-    moving = _state_in_motion(model, discrete, x_d[1] - x_d[0])
-    states = np.column_stack((moving, np.eye(discrete.n_state, n)))
-    responses, _ = discrete.forced_response(states, np.zeros((len(residuals), 1 + n)))
-    seen, left = residuals[known], (residuals - responses[:, 0])[known]
+    step = float(x_d[late + 1] - x_d[late])
+    commands = np.zeros(len(x_d))
+    commands[:late] = step * np.arange(-late, 0)
+    moving = _state_in_motion(model, discrete, step, late)
+    of_motion, _ = discrete.forced_response(moving, commands)
+    modes = np.eye(discrete.n_state, n)
+    of_modes, _ = discrete.forced_response(modes, np.zeros((len(x_d), n)))
+    seen, left = residuals[known], (residuals - of_motion[: len(residuals)])[known]
     if not left @ left < seen @ seen:
         return None
     regression = RidgeRegression(n, _DAMPING)
-    regression.update(responses[known, 1:], left)
-    return np.asarray(states @ np.concatenate(([1.0], regression.weights)))
+    regression.update(of_modes[: len(residuals)][known], left)
+    return MotionBefore(moving + modes @ regression.weights, commands, of_motion + of_modes @ regression.weights)
 
 
-def _state_in_motion(model: ModalModel, discrete: DiscreteModel, step: float) -> Array:
-    """Return the state at command 0 of a motion that has lasted, ``step`` from sample to sample, m, ``(n_state,)``."""
-    register = step * np.arange(-discrete.dead_time, 0)
+def _state_in_motion(model: ModalModel, discrete: DiscreteModel, step: float, late: int) -> Array:
+    """Return the state, ``late`` samples before command 0, of a motion that has lasted, ``step`` m a sample."""
+    register = step * np.arange(-discrete.dead_time - late, -late)
     # z̈ + 2ζω ż + ω² z = v t has the solution ω² z = v t − 2ζ v/ω, in the state (ω² z, ω ż).
-    late = -discrete.dead_time * step
-    v = step / discrete.T_s
-    states = [(late - 2.0 * mode.zeta * v / mode.omega, v / mode.omega) for mode in model.modes]
+    here, v = -(discrete.dead_time + late) * step, step / discrete.T_s
+    states = [(here - 2.0 * mode.zeta * v / mode.omega, v / mode.omega) for mode in model.modes]
     return np.concatenate((np.ravel(states), register))

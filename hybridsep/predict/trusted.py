@@ -100,10 +100,12 @@ class TrustedModel:
         carried = _CARRIED * self.look_ahead
         self._discount(carried / max(self.n_rows, carried))
 
-    def begin_in_motion(self, x_pb: Array) -> None:
-        """Correct what was before a run in motion: the physics-based prediction, (n,), m, ran on as it begins."""
+    def begin_in_motion(self, x_d: Array, x_pb: Array) -> None:
+        """Correct what was before a run in motion: commands and physics-based prediction went on as they begin."""
         before = np.arange(-len(self.state.x_pb), 0)
-        self.state = self.state._replace(x_pb=x_pb[0] + (x_pb[1] - x_pb[0]) * before)
+        self.state = self.state._replace(
+            x_d=float(2.0 * x_d[0] - x_d[1]), x_pb=x_pb[0] + (x_pb[1] - x_pb[0]) * before
+        )
 
     @property
     def plans(self) -> bool:
