@@ -126,6 +126,31 @@ HSEP_API void hsep_physics_init(
     memset(hsep_at(self, self->ring), 0, (size_t)dead_time * sizeof(double));
 }
 
+HSEP_API void hsep_physics_begin(hsep_physics *self, const double state[])
+{
+    double *ring = hsep_at(self, self->ring);
+    self->oldest = 0;
+    for (uint64_t i = 0; i < 2 * self->n_modes; i++) {
+        physics_modes(self)[i / 2].s[i % 2] = state != NULL ? state[i] : 0.0;
+    }
+    for (uint64_t i = 0; i < self->dead_time; i++) {
+        ring[i] = state != NULL ? state[2 * self->n_modes + i] : 0.0;
+    }
+}
+
+HSEP_API void hsep_physics_add(hsep_physics *self, const hsep_physics *other)
+{
+    const hsep_discrete_mode *modes = (const hsep_discrete_mode *)hsep_at_const(other, other->modes);
+    const double *ring = hsep_at_const(other, other->ring);
+    for (uint64_t i = 0; i < self->n_modes; i++) {
+        physics_modes(self)[i].s[0] += modes[i].s[0];
+        physics_modes(self)[i].s[1] += modes[i].s[1];
+    }
+    for (uint64_t i = 0; i < self->dead_time; i++) {
+        hsep_at(self, self->ring)[(self->oldest + i) % self->dead_time] += ring[(other->oldest + i) % self->dead_time];
+    }
+}
+
 HSEP_API void hsep_physics_forced_response(hsep_physics *self, const double x_d[], double x_pb[], size_t n)
 {
     hsep_discrete_mode *modes = physics_modes(self);

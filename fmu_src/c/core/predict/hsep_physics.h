@@ -58,6 +58,13 @@ HSEP_API void hsep_physics_init(
 /* Whether a block, in any alignment, is one that hsep_physics_init with these parameters began. */
 HSEP_API int hsep_physics_valid(const void *block, uint64_t n_modes, uint64_t dead_time);
 
+/* Begin with a state: (2 n_modes + dead_time,), m, of the modes, then the commands within the dead time, oldest first;
+ * NULL: at rest. */
+HSEP_API void hsep_physics_begin(hsep_physics *self, const double state[]);
+
+/* Add the state of another one with the same parameters: the responses are those to the sum of the commands. */
+HSEP_API void hsep_physics_add(hsep_physics *self, const hsep_physics *other);
+
 /* Response x_pb, (n,), m, to n commands x_d, (n,), m, relative to the initial position; eq. (2).
  * The state is carried from call to call. Cost: 9 multiply-adds a mode and sample. */
 HSEP_API void hsep_physics_forced_response(hsep_physics *self, const double x_d[], double x_pb[], size_t n);

@@ -34,11 +34,11 @@ static int predictor_guard(hsep_predictor *self, double x_meas, double x_pb)
     return self->learning && !self->missing && !self->trusted;
 }
 
-/* Fold the row of a sample, at place i of its window, into the regression; eqs. (5) and (6). */
+/* Fold the row of sample i of its window into the regression; eqs. (5) and (6). */
 static void predictor_learn(hsep_predictor *self, uint64_t i)
 {
     const hsep_features *f = &self->features;
-    const uint64_t j = self->Np - 1 - i;
+    const uint64_t j = self->n - 1 - i;
     const double *x = hsep_at(self, self->past_x) + j, *e = hsep_at(self, self->past_e) + j;
     double *row = hsep_regression_row(hsep_predictor_regression(self)); /* phi(k), its target e_pb(k) behind it */
     row[HSEP_BIAS] = 1.0;
@@ -53,9 +53,10 @@ static void predictor_learn(hsep_predictor *self, uint64_t i)
 
 HSEP_API int hsep_predictor_take_in(hsep_predictor *self, double x_d_ahead, double x_meas)
 {
-    const uint64_t i = self->k % self->Np, j = self->Np - 1 - i;
-    const double x_d = hsep_at(self, self->x_d)[i], x_pb = hsep_at(self, self->x_pb)[i];
-    const double x_h = hsep_at(self, self->x_h)[i], x_hold = x_pb + hsep_at(self, self->past_e)[self->Np];
+    const uint64_t i = self->k % self->Np, j = self->n - 1 - i, late = self->late;
+    /* What was measured is that of late samples ago. */
+    const double x_d = hsep_at(self, self->x_d - late)[i], x_pb = hsep_at(self, self->x_pb - late)[i];
+    const double x_h = hsep_at(self, self->x_h - late)[i], x_hold = hsep_at(self, self->x_hold - late)[i];
     hsep_at(self, self->ahead)[self->k % self->preview] = x_d_ahead;
     hsep_at(self, self->past_e)[j] = x_meas - self->start - hsep_at(self, self->past_x)[j]; /* e_pb = x - x_pb */
     if (self->trusted) {
@@ -64,7 +65,7 @@ HSEP_API int hsep_predictor_take_in(hsep_predictor *self, double x_d_ahead, doub
     if (predictor_guard(self, x_meas, x_pb)) {
         predictor_learn(self, i);
     }
-    if (self->k >= self->preview && (double)self->k >= self->n_init && !isnan(x_meas)) {
+    if (self->k >= self->preview + late && (double)self->k >= self->n_init + (double)late && !isnan(x_meas)) {
         self->n_measured++;
         self->sum_e += (x_meas - x_d) * (x_meas - x_d);
         self->sum_pb += (x_meas - x_pb) * (x_meas - x_pb);
@@ -91,17 +92,17 @@ static void predictor_unlearn(hsep_predictor *self)
 HSEP_API int hsep_predictor_finish(hsep_predictor *self)
 {
     const hsep_features *f = &self->features;
-    const uint64_t Np = self->Np;
+    const uint64_t n = self->n, late = self->late;
     double *past_x = hsep_at(self, self->past_x), *past_e = hsep_at(self, self->past_e);
     if (self->missing) {
         predictor_unlearn(self);
     }
     if (f->n > f->reference) {
-        hsep_reference_features_advance(hsep_at(self, self->signs), Np);
+        hsep_reference_features_advance(hsep_at(self, self->signs), self->Np);
     }
-    self->x_d_last = hsep_at(self, self->x_d)[Np - 1];
-    memcpy(past_x + Np, past_x, (size_t)f->q * sizeof(double)); /* q < Np, p <= Np: they do not overlap */
-    memcpy(past_e + Np, past_e, (size_t)f->p * sizeof(double));
+    self->x_d_last = hsep_at(self, self->x_d)[self->Np - 1];
+    memcpy(past_x + n, past_x + late, (size_t)f->q * sizeof(double)); /* q < Np, p <= Np: they do not overlap */
+    memcpy(past_e + n, past_e + late, (size_t)f->p * sizeof(double));
     return self->learning && !self->missing;
 }
 
@@ -134,15 +135,26 @@ static void predictor_solve(hsep_predictor *self)
     }
 }
 
+/* Keep the samples of the window that are not measured yet, before the next one. */
+static void predictor_keep(hsep_predictor *self)
+{
+    const uint64_t late = self->late, signals[4] = {self->x_d, self->x_pb, self->x_h, self->x_hold};
+    for (int i = 0; i < 4; i++) {
+        double *kept = hsep_at(self, signals[i] - late);
+        memmove(kept, kept + self->Np, (size_t)late * sizeof(double));
+    }
+}
+
 HSEP_API void hsep_predictor_begin(hsep_predictor *self)
 {
-    const uint64_t Np = self->Np, oldest = self->k % self->preview, newest = self->preview - oldest;
+    const uint64_t n = self->n, oldest = self->k % self->preview, newest = self->preview - oldest;
     const double *ahead = hsep_at(self, self->ahead), *past_e = hsep_at(self, self->past_e);
     double *x_d = hsep_at(self, self->x_d), *e_h = hsep_at(self, self->e_h);
+    predictor_keep(self);
     memcpy(x_d, ahead + oldest, (size_t)newest * sizeof(double));
     memcpy(x_d + newest, ahead, (size_t)oldest * sizeof(double));
     if (e_h != past_e) {
-        memcpy(e_h + Np, past_e + Np, (size_t)self->features.p * sizeof(double));
+        memcpy(e_h + n, past_e + n, (size_t)self->features.p * sizeof(double));
     }
     predictor_solve(self);
     self->n_published = 0;
@@ -168,19 +180,48 @@ static void predictor_bound(hsep_predictor *self, uint64_t first, uint64_t last)
 
 HSEP_API void hsep_predictor_publish(hsep_predictor *self, uint64_t last)
 {
-    const uint64_t Np = self->Np, first = self->n_published;
+    const uint64_t Np = self->Np, late = self->late, first = self->n_published;
     const hsep_recursion recursion = hsep_predictor_recursion(self, 1);
     const double *past_x = hsep_at(self, self->past_x);
     double *x_pb = hsep_at(self, self->x_pb), *x_h = hsep_at(self, self->x_h), *e_h = hsep_at(self, self->e_h);
+    double *x_hold = hsep_at(self, self->x_hold);
     if (!self->trusted) { /* Eq. (4) */
-        hsep_recursion_run(&recursion, past_x, hsep_predictor_drive(self, Np), e_h, Np, first, last);
+        hsep_recursion_run(
+            &recursion, past_x, hsep_predictor_drive(self, Np), e_h, self->n, first > 0 ? late + first : 0,
+            late + last);
     }
     for (uint64_t i = first; i < last; i++) {
         x_pb[i] = past_x[Np - 1 - i] + self->start;
         x_h[i] = i < self->n_physics ? x_pb[i] : x_pb[i] + e_h[Np - 1 - i]; /* Eq. (4) */
+        x_hold[i] = x_pb[i] + hsep_at(self, self->past_e)[self->n];
     }
     predictor_bound(self, first, last);
     self->n_published = last;
+}
+
+/* Correct the state at the beginning of the run, if its first residuals tell that it was in motion. */
+static void predictor_start(hsep_predictor *self)
+{
+    const uint64_t Np = self->Np, late = self->late;
+    hsep_start *motion = (hsep_start *)hsep_at(self, self->motion);
+    hsep_uncertainty *uncertainty = hsep_predictor_uncertainty(self);
+    hsep_trusted *trusted = hsep_predictor_trusted(self);
+    double *command = hsep_at(self, self->command), *past_x = hsep_at(self, self->past_x);
+    double *e = hsep_at(self, self->past_e) + late, *work = hsep_at(trusted, trusted->x);
+    const double *e_h = hsep_at(uncertainty, uncertainty->e_h) + late;
+    for (uint64_t j = 0; j < Np; j++) {
+        work[j] = e[j] - e_h[j];
+    }
+    if (hsep_start_estimate(motion, command, work)) {
+        for (uint64_t j = 0; j < Np; j++) {
+            e[j] += past_x[late + j];
+        }
+        hsep_start_apply(motion, command, past_x, hsep_at(self, self->ahead_pb), hsep_predictor_physics(self));
+        for (uint64_t j = 0; j < Np; j++) {
+            e[j] -= past_x[late + j];
+        }
+        hsep_trusted_begin_in_motion(trusted, command, past_x);
+    }
 }
 
 /* Learn the measured window: by the residual model that can be trusted, and its errors. */
@@ -188,13 +229,25 @@ static void predictor_learn_window(hsep_predictor *self)
 {
     hsep_trusted *trusted = hsep_predictor_trusted(self);
     double *past_e = hsep_at(self, self->past_e);
+    if (self->motion && self->k == self->preview + self->Np) {
+        predictor_start(self);
+    }
     if (self->learning) {
         if (trusted != NULL) {
             hsep_trusted_learn(trusted, hsep_at(self, self->past_x), past_e);
         }
         hsep_uncertainty_learn(
-            hsep_predictor_uncertainty(self), past_e, trusted != NULL ? hsep_at(trusted, trusted->accepted) : NULL);
+            hsep_predictor_uncertainty(self), past_e + self->late,
+            trusted != NULL ? hsep_at(trusted, trusted->accepted) : NULL);
     }
+}
+
+/* Samples within the warm-up, of the window and the late ones before it. */
+static uint64_t predictor_warm_up(const hsep_predictor *self, uint64_t late)
+{
+    const double warm_up = self->n_init - (double)self->k + (double)late;
+    const uint64_t n = self->Np + late;
+    return warm_up >= (double)n ? n : warm_up > 0.0 ? (uint64_t)warm_up : 0;
 }
 
 /* Predict the errors of the window that was published. */
@@ -204,17 +257,22 @@ static void predictor_doubt(hsep_predictor *self)
     if (self->divergence == HSEP_CONVERGES) {
         hsep_uncertainty_predict(
             hsep_predictor_uncertainty(self), hsep_at(self, self->command), hsep_at(self, self->past_x),
-            hsep_at(self, self->e_h), self->n_physics,
+            hsep_at(self, self->e_h), predictor_warm_up(self, self->late),
             trusted != NULL ? hsep_at(trusted, trusted->disagreement) : NULL);
     }
 }
 
-/* Predict the residuals of the window that begins by the residual model that can be trusted. */
+/* Predict the residuals of the window that begins, with commands and x_pb as they came, eq. (2), behind those that are
+ * not measured yet; with trust by the residual model that can be trusted. */
 static void predictor_forecast(hsep_predictor *self)
 {
-    double *command = hsep_at(self, self->command);
-    for (uint64_t i = 0; i < self->Np; i++) {
-        command[self->Np - 1 - i] = hsep_at(self, self->x_d)[i] - self->start;
+    const uint64_t Np = self->Np, late = self->late;
+    double *command = hsep_at(self, self->command), *past_x = hsep_at(self, self->past_x);
+    memmove(command + Np, command, (size_t)late * sizeof(double));
+    memmove(past_x + Np, past_x, (size_t)late * sizeof(double));
+    for (uint64_t i = 0; i < Np; i++) {
+        command[Np - 1 - i] = hsep_at(self, self->x_d)[i] - self->start;
+        past_x[Np - 1 - i] = hsep_at(self, self->ahead_pb)[i];
     }
     if (self->trusted) {
         hsep_trusted_forecast(
@@ -226,7 +284,7 @@ HSEP_API int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, doubl
 {
     const uint64_t Np = self->Np;
     const double relative = x_d_ahead - self->start;
-    double *past_x = hsep_at(self, self->past_x), *ahead_pb = hsep_at(self, self->ahead_pb);
+    double *ahead_pb = hsep_at(self, self->ahead_pb);
     hsep_physics_forced_response(hsep_predictor_physics(self), &relative, ahead_pb + self->k % Np, 1);
     if (!hsep_predictor_take_in(self, x_d_ahead, x_meas)) {
         return 0;
@@ -234,15 +292,11 @@ HSEP_API int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, doubl
     predictor_learn_window(self);
     (void)hsep_predictor_finish(self);
     if (self->k == self->preview) { /* the first fill was not predicted */
-        memset(hsep_at(self, self->past_e), 0, (size_t)(Np + self->features.p) * sizeof(double));
+        memset(hsep_at(self, self->past_e), 0, (size_t)(self->n + self->features.p) * sizeof(double));
     }
     hsep_predictor_begin(self);
-    for (uint64_t i = 0; i < Np; i++) {
-        past_x[Np - 1 - i] = ahead_pb[i]; /* Eq. (2), computed as the commands came */
-    }
     predictor_forecast(self);
-    const double warm_up = self->n_init - (double)self->k;
-    self->n_physics = warm_up >= (double)Np ? Np : warm_up > 0.0 ? (uint64_t)warm_up : 0;
+    self->n_physics = predictor_warm_up(self, 0);
     hsep_predictor_publish(self, Np);
     predictor_doubt(self);
     return 1;

@@ -5,6 +5,9 @@
  * window and every measurement before it have arrived: the weights are solved and the window is predicted in that
  * sample. Over the first fill (k < preview) the commanded position is the start; what is measured then is not learned.
  *
+ * Where the measurement is late by some samples, x_meas = x(k - late): a window is predicted with the samples before it
+ * that are not measured yet, n = Np + late of them, and what is learned over it are the first Np.
+ *
  * Alone (hsep_predictor_sample, preview = Np) it predicts under the commands as they came. A compensator, which decides
  * the commands of a window, calls the parts in this order: hsep_predictor_take_in at each sample; at the end of a
  * window hsep_predictor_finish and _begin; once commands are decided, hsep_predictor_publish.
@@ -29,6 +32,7 @@
 #include "hsep_regression.h"
 #include "hsep_sensor.h"
 #include "hsep_settings.h"
+#include "hsep_start.h"
 #include "hsep_trusted.h"
 #include "hsep_uncertainty.h"
 
@@ -47,7 +51,7 @@ typedef struct {
 } hsep_predictor_parameters;
 
 typedef struct {
-    uint64_t Np, preview;
+    uint64_t Np, late, n, preview; /* n = Np + late */
     hsep_features features;
     double n_init;
     double sign_step;            /* v_friction T_s, m */
@@ -67,21 +71,23 @@ typedef struct {
     uint64_t ahead;    /* (preview,) m, ring of the commands that came last */
     uint64_t x_d;      /* (preview,) m, commands of the window and what follows it */
     uint64_t x_pb;     /* (Np,) m, the window: physics-based predictions, */
-    uint64_t x_h;      /* (Np,) m, hybrid predictions */
+    uint64_t x_h;      /* (Np,) m, hybrid predictions, */
+    uint64_t x_hold;   /* (Np,) m, and the last residual held; before all four the last samples not measured yet */
     uint64_t ahead_pb; /* (Np,) m, response of the physics model to ahead, relative to start; alone */
-    uint64_t command;  /* (Np,) m, commands of the window relative to start, newest first; alone */
-    uint64_t past_x;   /* (Np + q,) m, x_pb of this window and of the q samples before it, newest first */
-    uint64_t past_e;   /* (Np + p,) m, e_pb likewise, as measured */
-    uint64_t e_h;      /* (Np + p,) m, e_pb as predicted, behind it the measured ones; alone it is past_e */
+    uint64_t command;  /* (n,) m, commands of the window relative to start, newest first; alone */
+    uint64_t past_x;   /* (n + q,) m, x_pb of this window and of the q samples before it, newest first */
+    uint64_t past_e;   /* (n + p,) m, e_pb likewise, as measured */
+    uint64_t e_h;      /* (n + p,) m, e_pb as predicted, behind it the measured ones; alone it is past_e */
     uint64_t weights;  /* (n,) w */
     uint64_t signs;    /* (preview + 2 HSEP_REFERENCE_REACH,) psi of the reference, if it has features */
     uint64_t drive;    /* (preview,) m, their part of the residuals, newest first */
     uint64_t physics, uncertainty, regression;
     uint64_t trusted; /* the residual model that can be trusted, with a regression of its own; 0: the paper's */
+    uint64_t motion;  /* the motion before the run; with trust, alone */
     uint64_t saved;   /* the regression as it was before this window; 0: no window is unlearned */
 } hsep_predictor;
 
-HSEP_ASSERT_WORDS(hsep_predictor, 45);
+HSEP_ASSERT_WORDS(hsep_predictor, 49);
 
 typedef struct {
     double x_d, x_pb, x_h;                 /* m, now */

@@ -38,37 +38,62 @@ static hsep_trusted_parameters predictor_trusted_parameters(const hsep_predictor
         .n_modes = parameters->n_modes};
 }
 
+static hsep_start_parameters predictor_start_parameters(const hsep_predictor_parameters *parameters)
+{
+    const hsep_predictor_settings *settings = &parameters->settings;
+    return (hsep_start_parameters){
+        .Np = settings->Np,
+        .late = parameters->trust.measurement_delay,
+        .n_modes = parameters->n_modes,
+        .dead_time = settings->dead_time,
+        .modes = parameters->modes,
+        .T_s = settings->T_s,
+        .input_hold = (hsep_hold)settings->input_hold};
+}
+
+/* Take a signal of the window, this long, and what is before it; return the offset of the window. */
+static uint64_t predictor_take(double *end, double late, double count)
+{
+    return hsep_take(end, late + count) + (uint64_t)late;
+}
+
 /* Set what follows from the parameters; return the bytes of the block. */
 static double predictor_lay_out(hsep_predictor *self, const hsep_predictor_parameters *parameters)
 {
     const double Np = (double)parameters->settings.Np, preview = (double)parameters->preview;
+    const double late = (double)parameters->trust.measurement_delay, n = Np + late;
     const double p = (double)parameters->settings.p, q = (double)parameters->settings.q;
     const int has_reference = parameters->v_friction > 0.0;
     double end = HSEP_WORDS(hsep_predictor);
     hsep_features_lay_out(
         &self->features, parameters->settings.p, parameters->settings.q, has_reference ? HSEP_N_REFERENCE : 0);
     const hsep_trusted_parameters trusted = predictor_trusted_parameters(parameters);
+    const hsep_start_parameters start = predictor_start_parameters(parameters);
     const double regression = parameters->trust.trust ? 0.0 : hsep_regression_size(self->features.n);
     self->Np = parameters->settings.Np;
+    self->late = parameters->trust.measurement_delay;
+    self->n = parameters->settings.Np + parameters->trust.measurement_delay;
     self->preview = parameters->preview;
     self->n_init = parameters->n_init;
     self->sign_step = parameters->v_friction * parameters->settings.T_s;
     self->ahead = hsep_take(&end, preview);
-    self->x_d = hsep_take(&end, preview);
-    self->x_pb = hsep_take(&end, Np);
-    self->x_h = hsep_take(&end, Np);
+    self->x_d = predictor_take(&end, late, preview);
+    self->x_pb = predictor_take(&end, late, Np);
+    self->x_h = predictor_take(&end, late, Np);
+    self->x_hold = predictor_take(&end, late, Np);
     self->ahead_pb = hsep_take(&end, parameters->planned ? 0.0 : Np);
-    self->command = hsep_take(&end, parameters->planned ? 0.0 : Np);
-    self->past_x = hsep_take(&end, Np + q);
-    self->past_e = hsep_take(&end, Np + p);
-    self->e_h = parameters->planned ? hsep_take(&end, Np + p) : self->past_e;
+    self->command = hsep_take(&end, parameters->planned ? 0.0 : n);
+    self->past_x = hsep_take(&end, n + q);
+    self->past_e = hsep_take(&end, n + p);
+    self->e_h = parameters->planned ? hsep_take(&end, n + p) : self->past_e;
     self->weights = hsep_take(&end, (double)self->features.n);
     self->signs = hsep_take(&end, has_reference ? preview + 2.0 * HSEP_REFERENCE_REACH : 0.0);
     self->drive = hsep_take(&end, has_reference ? preview : 0.0);
     self->physics = hsep_take_block(&end, hsep_physics_size(parameters->n_modes, parameters->settings.dead_time));
-    self->uncertainty = hsep_take_block(&end, hsep_uncertainty_size(self->Np));
+    self->uncertainty = hsep_take_block(&end, hsep_uncertainty_size(self->Np, self->n));
     self->regression = hsep_take_block(&end, regression);
     self->trusted = parameters->trust.trust ? hsep_take_block(&end, hsep_trusted_size(&trusted)) : 0;
+    self->motion = self->trusted && !parameters->planned ? hsep_take_block(&end, hsep_start_size(&start)) : 0;
     self->saved = parameters->unlearns ? hsep_take_block(&end, regression) : 0;
     return end * sizeof(double);
 }
@@ -85,21 +110,22 @@ HSEP_API void hsep_predictor_init(hsep_predictor *self, const hsep_predictor_par
     self->start = self->x_d_last = start;
     self->n_published = self->n_physics = self->Np; /* the first fill is not predicted */
     hsep_sensor_init(&self->sensor);
-    for (uint64_t i = 0; i < self->preview; i++) {
-        hsep_at(self, self->ahead)[i] = hsep_at(self, self->x_d)[i] = start;
-    }
-    for (uint64_t i = 0; i < self->Np; i++) {
-        hsep_at(self, self->x_pb)[i] = hsep_at(self, self->x_h)[i] = start;
+    for (uint64_t i = self->ahead; i < self->ahead_pb; i++) { /* commands, and the four signals of the window */
+        hsep_at(self, 0)[i] = start;
     }
     hsep_physics_init(
         hsep_predictor_physics(self), parameters->modes, parameters->n_modes, parameters->settings.dead_time,
         parameters->settings.T_s, (hsep_hold)parameters->settings.input_hold);
     const double noise_std = parameters->trust.noise_std;
     hsep_uncertainty_init(
-        hsep_predictor_uncertainty(self), self->Np, fmax(parameters->settings.lambda, noise_std * noise_std));
+        hsep_predictor_uncertainty(self), self->Np, self->n, fmax(parameters->settings.lambda, noise_std * noise_std));
     if (self->trusted) {
         const hsep_trusted_parameters trusted = predictor_trusted_parameters(parameters);
         hsep_trusted_init(hsep_predictor_trusted(self), &trusted);
+        if (self->motion) {
+            const hsep_start_parameters motion = predictor_start_parameters(parameters);
+            hsep_start_init((hsep_start *)hsep_at(self, self->motion), &motion);
+        }
     } else {
         hsep_regression_init(hsep_predictor_regression(self), self->features.n, parameters->settings.lambda);
     }
@@ -111,13 +137,15 @@ HSEP_API int hsep_predictor_valid(const void *block, const hsep_predictor_parame
     memcpy(&got, block, sizeof got);
     (void)predictor_lay_out(&got, parameters); /* changes nothing where it is sound */
     const hsep_trusted_parameters trusted = predictor_trusted_parameters(parameters);
+    const hsep_start_parameters motion = predictor_start_parameters(parameters);
     const double sums[4] = {got.sum_e, got.sum_pb, got.sum_h, got.sum_hold};
     int sound =
         memcmp(&got, block, sizeof got) == 0 && got.k == k && got.n_published <= got.Np &&
         k % got.Np < got.n_published && got.n_physics <= got.Np && got.learning <= 1 && got.missing <= 1 &&
         (!got.missing || got.saved) && got.divergence <= HSEP_DIVERGES_X_DM &&
         (got.divergence || hsep_within(hsep_at_bytes(block, got.ahead), got.past_x - got.ahead, HSEP_PREDICTION_MAX)) &&
-        hsep_uncertainty_valid(hsep_at_bytes(block, got.uncertainty), got.Np) &&
+        hsep_uncertainty_valid(hsep_at_bytes(block, got.uncertainty), got.Np, got.n) &&
+        (!got.motion || hsep_start_valid(hsep_at_bytes(block, got.motion), &motion)) &&
         hsep_physics_valid(hsep_at_bytes(block, got.physics), parameters->n_modes, parameters->settings.dead_time) &&
         (got.trusted ? hsep_trusted_valid(hsep_at_bytes(block, got.trusted), &trusted)
                      : hsep_regression_valid(hsep_at_bytes(block, got.regression), got.features.n)) &&

@@ -44,11 +44,11 @@ static int trusted_begin(hsep_trusted *self, const double x_d[], const double x_
     double *rows = hsep_at(self, self->rows), *largest = hsep_at(self, self->forecast_largest);
     self->forecast_scale = outgrown ? peak : self->velocity_scale;
     hsep_disturbances_begin(disturbances, x_d, x_pb, self->forecast_scale, rows);
-    hsep_disturbances_stiffness(disturbances, x_pb, rows);
+    hsep_disturbances_stiffness(disturbances, x_pb, rows, self->n);
     for (uint64_t i = 0; i < self->n_static; i++) {
         largest[i] = outgrown ? 0.0 : hsep_at(self, self->largest)[i];
     }
-    for (uint64_t k = 0; k < self->Np; k++, rows += self->n_static) {
+    for (uint64_t k = 0; k < self->n; k++, rows += self->n_static) {
         for (uint64_t i = 0; i < self->n_static; i++) {
             largest[i] = fmax(largest[i], fabs(rows[i]));
         }
@@ -72,10 +72,10 @@ static void trusted_predict(hsep_trusted *self, const double x_pb[], const doubl
     }
     /* The stiffness acts at the position, which the physics model alone does not give well enough. */
     hsep_candidate_predict(hsep_trusted_candidate(self, 0), rows, past, &self->scale);
-    for (uint64_t j = 0; j < self->Np; j++) {
+    for (uint64_t j = 0; j < self->n; j++) {
         x[j] = x_pb[j] + hsep_candidate_prediction(hsep_trusted_candidate(self, 0))[j];
     }
-    hsep_disturbances_stiffness(hsep_trusted_disturbances(self), x, rows);
+    hsep_disturbances_stiffness(hsep_trusted_disturbances(self), x, rows, self->n);
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
         hsep_candidate_predict(hsep_trusted_candidate(self, i), rows, past, &self->scale);
     }
@@ -83,7 +83,7 @@ static void trusted_predict(hsep_trusted *self, const double x_pb[], const doubl
 
 HSEP_API void hsep_trusted_forecast(hsep_trusted *self, const double x_d[], const double x_pb[], double e[])
 {
-    const double *past = e + self->Np, *weights = self->blend.weights, bound = trusted_hold_max * self->scale.largest;
+    const double *past = e + self->n, *weights = self->blend.weights, bound = trusted_hold_max * self->scale.largest;
     const int outgrown = trusted_begin(self, x_d, x_pb);
     double *disagreement = hsep_at(self, self->disagreement);
     self->hold = fmin(fmax(past[0], -bound), bound);
@@ -91,7 +91,7 @@ HSEP_API void hsep_trusted_forecast(hsep_trusted *self, const double x_d[], cons
     if (self->predicted) {
         trusted_predict(self, x_pb, past);
     }
-    for (uint64_t j = 0; j < self->Np; j++) {
+    for (uint64_t j = 0; j < self->n; j++) {
         double square = weights[0] * self->hold * self->hold;
         e[j] = weights[0] * self->hold;
         for (uint64_t i = 0; self->predicted && i < HSEP_N_CANDIDATES; i++) {
@@ -240,7 +240,7 @@ static void trusted_assess(hsep_trusted *self, const double e[], double count)
     scale->largest_square = fmax(scale->largest_square, mean_square);
     signals[HSEP_N_BLENDED] = e;
     for (uint64_t i = 0; self->predicted && i < HSEP_N_CANDIDATES; i++) {
-        signals[1 + i] = hsep_candidate_prediction(hsep_trusted_candidate(self, i));
+        signals[1 + i] = hsep_candidate_prediction(hsep_trusted_candidate(self, i)) + (self->n - self->Np);
     }
     for (uint64_t i = 1; i <= HSEP_N_BLENDED; i++) {
         double sum = 0.0;
@@ -256,10 +256,18 @@ static void trusted_assess(hsep_trusted *self, const double e[], double count)
     hsep_blend_update(&self->blend, products, scale->largest_square, self->Np);
 }
 
-HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_pb[], double e[])
+HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const double x_d[], const double x_pb[])
 {
     hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
-    double *x = hsep_at(self, self->x), *bridged = hsep_at(self, self->bridged);
+    hsep_disturbances_restart(disturbances, x_d, x_pb);
+    hsep_disturbances_begin(disturbances, x_d, x_pb, self->forecast_scale, hsep_at(self, self->rows));
+}
+
+HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double predicted[], double residuals[])
+{
+    hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
+    const double *x_pb = predicted + (self->n - self->Np); /* of the samples that are measured */
+    double *e = residuals + (self->n - self->Np), *x = hsep_at(self, self->x), *bridged = hsep_at(self, self->bridged);
     const double n_rows = self->n_rows;                 /* of the prediction */
     if (self->forecast_scale != self->velocity_scale) { /* outgrown */
         hsep_regression_init(hsep_trusted_regression(self), self->n_static + self->p, HSEP_NO_PENALTY);
@@ -276,7 +284,7 @@ HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_pb[], double
     for (uint64_t j = 0; j < self->Np; j++) {
         x[j] = x_pb[j] + e[j];
     }
-    hsep_disturbances_stiffness(disturbances, x, hsep_at(self, self->rows));
+    hsep_disturbances_stiffness(disturbances, x, hsep_at(self, self->rows), self->Np);
     hsep_disturbances_end(disturbances);
     if (count > 0.0) {
         trusted_fold(self, e);

@@ -36,33 +36,37 @@ static const double uncertainty_far = 4.0, uncertainty_far_share = 0.5;
 /* Change of ln c from one window to the next per share of errors; bound on c and 1/c. */
 static const double uncertainty_factor_rate = 0.2, uncertainty_factor_max = 4.0;
 
-/* Set what follows from the parameter; return the bytes of the block. */
-static double uncertainty_lay_out(hsep_uncertainty *self, uint64_t Np)
+/* Set what follows from the parameters; return the bytes of the block. */
+static double uncertainty_lay_out(hsep_uncertainty *self, uint64_t Np, uint64_t n)
 {
     double end = HSEP_WORDS(hsep_uncertainty);
     self->Np = Np;
-    self->e_h = hsep_take(&end, (double)Np);
-    self->components = hsep_take(&end, (double)Np * HSEP_N_COMPONENTS);
-    self->std = hsep_take(&end, (double)Np);
+    self->n = n;
+    self->e_h = hsep_take(&end, (double)n);
+    self->components = hsep_take(&end, (double)n * HSEP_N_COMPONENTS);
+    self->std = hsep_take(&end, (double)n);
     return end * sizeof(double);
 }
 
-HSEP_API double hsep_uncertainty_size(uint64_t Np) { return uncertainty_lay_out(&(hsep_uncertainty){0}, Np); }
-
-HSEP_API void hsep_uncertainty_init(hsep_uncertainty *self, uint64_t Np, double variance)
+HSEP_API double hsep_uncertainty_size(uint64_t Np, uint64_t n)
 {
-    memset(self, 0, (size_t)hsep_uncertainty_size(Np));
-    (void)uncertainty_lay_out(self, Np);
+    return uncertainty_lay_out(&(hsep_uncertainty){0}, Np, n);
+}
+
+HSEP_API void hsep_uncertainty_init(hsep_uncertainty *self, uint64_t Np, uint64_t n, double variance)
+{
+    memset(self, 0, (size_t)hsep_uncertainty_size(Np, n));
+    (void)uncertainty_lay_out(self, Np, n);
     memcpy(self->theta, uncertainty_shares, sizeof self->theta);
     self->theta[0] = variance;
     self->factor = 1.0;
 }
 
-HSEP_API int hsep_uncertainty_valid(const void *block, uint64_t Np)
+HSEP_API int hsep_uncertainty_valid(const void *block, uint64_t Np, uint64_t n)
 {
     hsep_uncertainty got;
     memcpy(&got, block, sizeof got);
-    (void)uncertainty_lay_out(&got, Np); /* changes nothing where it is sound */
+    (void)uncertainty_lay_out(&got, Np, n); /* changes nothing where it is sound */
     return memcmp(&got, block, sizeof got) == 0 && hsep_uncertainty_sound(&got);
 }
 
@@ -99,23 +103,23 @@ HSEP_API void hsep_uncertainty_predict(
     hsep_uncertainty *self, const double x_d[], const double x_pb[], const double e_h[], uint64_t n_physics,
     const double disagreement[])
 {
-    const uint64_t Np = self->Np;
-    const double last = e_h[Np];
+    const uint64_t n = self->n;
+    const double last = e_h[n];
     double *published = hsep_at(self, self->e_h), *std = hsep_at(self, self->std);
     double *f = hsep_at(self, self->components);
-    for (uint64_t j = 0; j < Np; j++) {
-        published[j] = Np - 1 - j < n_physics ? 0.0 : e_h[j];
+    for (uint64_t j = 0; j < n; j++) {
+        published[j] = n - 1 - j < n_physics ? 0.0 : e_h[j];
     }
-    for (uint64_t j = 0; j < Np; j++, f += HSEP_N_COMPONENTS) {
+    for (uint64_t j = 0; j < n; j++, f += HSEP_N_COMPONENTS) {
         /* The difference of the first sample is that of the second. */
-        const uint64_t newer = j + 1 == Np && j > 0 ? j - 1 : j, older = newer + 1 < Np ? newer + 1 : newer;
+        const uint64_t newer = j + 1 == n && j > 0 ? j - 1 : j, older = newer + 1 < n ? newer + 1 : newer;
         f[0] = 1.0;
-        f[1] = (double)(Np - j) / (double)Np;
+        f[1] = (double)(n - j) / (double)self->Np;
         f[2] = uncertainty_square(x_pb[newer] - x_pb[older]);
         f[3] = uncertainty_square(published[newer] - published[older]);
         f[4] = uncertainty_square(x_d[j] - x_pb[j]);
         f[5] = uncertainty_square(published[j] - last);
-        f[6] = disagreement == NULL || Np - 1 - j < n_physics ? 0.0 : disagreement[j];
+        f[6] = disagreement == NULL || n - 1 - j < n_physics ? 0.0 : disagreement[j];
         std[j] = fmin(self->factor * sqrt(uncertainty_variance(self, f)), HSEP_PREDICTION_MAX);
     }
 }
@@ -162,8 +166,9 @@ static void uncertainty_step_by(
 
 HSEP_API void hsep_uncertainty_learn(hsep_uncertainty *self, const double e[], const double accepted[])
 {
-    const double *e_h = hsep_at(self, self->e_h), *std = hsep_at(self, self->std);
-    const double *f = hsep_at(self, self->components);
+    const uint64_t newest = self->n - self->Np; /* place of the last one that is measured */
+    const double *e_h = hsep_at(self, self->e_h) + newest, *std = hsep_at(self, self->std) + newest;
+    const double *f = hsep_at(self, self->components) + newest * HSEP_N_COMPONENTS;
     double count = 0.0, squares = 0.0, errors = 0.0, beyond = 0.0, far = 0.0, seen[HSEP_N_COMPONENTS] = {0.0},
            total[HSEP_N_COMPONENTS] = {0.0};
     for (uint64_t j = 0; j < self->Np; j++) {

@@ -6,8 +6,8 @@
  * deviation is c sqrt(v). After each window theta takes a step of expectation maximisation for normal errors of that
  * variance, and c moves until 5 % of all errors are beyond 1.96 standard deviations.
  *
- * Signals are kept newest first: sample k is at place Np - 1 - k. Memory is one block, without pointers. Reentrant;
- * allocates nothing. Cost of a window: 50 Np operations each.
+ * Signals are kept newest first: sample k of the n that are predicted is at place n - 1 - k. The first Np of them are
+ * learned. Memory is one block, without pointers. Reentrant; allocates nothing. Cost of a window: 50 n operations each.
  */
 #ifndef HSEP_UNCERTAINTY_H
 #define HSEP_UNCERTAINTY_H
@@ -26,35 +26,36 @@ typedef struct {
     double evidence[HSEP_N_COMPONENTS]; /* windows that each stands on, faded */
     double factor;                      /* c */
     double recent;                      /* m2, recent mean square of the residual; 0 before the first window */
+    uint64_t n;                         /* samples that are predicted */
     /* Offsets in doubles from the beginning of the struct */
-    uint64_t e_h;        /* (Np,) m, residual of the window as published */
-    uint64_t components; /* (Np, HSEP_N_COMPONENTS) m2 but for the first two */
-    uint64_t std;        /* (Np,) m, standard deviation of the error */
+    uint64_t e_h;        /* (n,) m, residual of the window as published */
+    uint64_t components; /* (n, HSEP_N_COMPONENTS) m2 but for the first two */
+    uint64_t std;        /* (n,) m, standard deviation of the error */
 } hsep_uncertainty;
 
-HSEP_ASSERT_WORDS(hsep_uncertainty, 4 + HSEP_N_UNCERTAINTY);
+HSEP_ASSERT_WORDS(hsep_uncertainty, 5 + HSEP_N_UNCERTAINTY);
 
 /* Bytes of the block, counted in double so that no size can overflow. */
-HSEP_API double hsep_uncertainty_size(uint64_t Np);
+HSEP_API double hsep_uncertainty_size(uint64_t Np, uint64_t n);
 
 /* Fill the block. variance: of the measurement noise, m2, assumed before the first window is measured. */
-HSEP_API void hsep_uncertainty_init(hsep_uncertainty *self, uint64_t Np, double variance);
+HSEP_API void hsep_uncertainty_init(hsep_uncertainty *self, uint64_t Np, uint64_t n, double variance);
 
-/* Whether a block, in any alignment, is one that hsep_uncertainty_init with this parameter began. */
-HSEP_API int hsep_uncertainty_valid(const void *block, uint64_t Np);
+/* Whether a block, in any alignment, is one that hsep_uncertainty_init with these parameters began. */
+HSEP_API int hsep_uncertainty_valid(const void *block, uint64_t Np, uint64_t n);
 
 /* The numbers learned, (HSEP_N_UNCERTAINTY,), and whether they are in range. */
 HSEP_API double *hsep_uncertainty_learned(hsep_uncertainty *self);
 HSEP_API int hsep_uncertainty_sound(const hsep_uncertainty *self);
 
-/* Predict the error of a window. x_d: commands, x_pb: physics-based prediction, (Np,), m; e_h: (Np + 1,), m, predicted
+/* Predict the error of a window. x_d: commands, x_pb: physics-based prediction, (n,), m; e_h: (n + 1,), m, predicted
  * residual, behind it the last measured one; n_physics: leading samples where it is not published; disagreement:
- * variance of the candidates about their blend, (Np,), m2, or NULL. */
+ * variance of the candidates about their blend, (n,), m2, or NULL. */
 HSEP_API void hsep_uncertainty_predict(
     hsep_uncertainty *self, const double x_d[], const double x_pb[], const double e_h[], uint64_t n_physics,
     const double disagreement[]);
 
-/* Learn from the measured residuals e, (Np,), m, of that window; accepted: (Np,), 1 where they count, or NULL for all
+/* Learn from the measured residuals e, (Np,), m, of its first samples; accepted: (Np,), 1 where they count, or NULL for all
  * of them. */
 HSEP_API void hsep_uncertainty_learn(hsep_uncertainty *self, const double e[], const double accepted[]);
 

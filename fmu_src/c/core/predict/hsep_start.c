@@ -1,0 +1,181 @@
+#include "hsep_start.h"
+
+#include "hsep_regression.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+/* Commanded velocity of the first sample relative to the largest of the window, from which on an axis may have been in
+ * motion: from rest a jerk-limited command needs time. */
+static const double start_moving = 0.05;
+
+/* Samples for each number of the state that are needed to estimate it. */
+static const uint64_t start_samples = 4;
+
+/* Ridge penalty on the change of the state, relative to a response of unit gain: modes that decay at once are not
+ * determined. */
+static const double start_damping = 1e-3;
+
+static const double start_two_pi = 6.283185307179586;
+
+/* Set what follows from the parameters; return the bytes of the block. */
+static double start_lay_out(hsep_start *self, const hsep_start_parameters *parameters)
+{
+    const double Np = (double)parameters->Np, n = Np + (double)parameters->late;
+    const double n_states = 2.0 * (double)parameters->n_modes, all = n_states + (double)parameters->dead_time;
+    double end = HSEP_WORDS(hsep_start);
+    self->Np = parameters->Np;
+    self->n = parameters->Np + parameters->late;
+    self->n_states = 2 * parameters->n_modes;
+    self->dead_time = parameters->dead_time;
+    self->states = hsep_take(&end, all);
+    self->state = hsep_take(&end, all);
+    self->response = hsep_take(&end, n + Np);
+    self->responses = hsep_take(&end, n_states * n);
+    self->weights = hsep_take(&end, n_states);
+    self->trial = hsep_take_block(&end, hsep_physics_size(parameters->n_modes, parameters->dead_time));
+    self->regression = hsep_take_block(&end, hsep_regression_size(self->n_states));
+    return end * sizeof(double);
+}
+
+HSEP_API double hsep_start_size(const hsep_start_parameters *parameters)
+{
+    return start_lay_out(&(hsep_start){0}, parameters);
+}
+
+HSEP_API void hsep_start_init(hsep_start *self, const hsep_start_parameters *parameters)
+{
+    memset(self, 0, (size_t)hsep_start_size(parameters));
+    (void)start_lay_out(self, parameters);
+    double *states = hsep_at(self, self->states), *within = states + self->n_states;
+    const double late = (double)(parameters->dead_time + parameters->late); /* samples */
+    for (uint64_t i = 0; i < parameters->n_modes; i++) {
+        /* z'' + 2 zeta omega z' + omega^2 z = v t has the solution omega^2 z = v t - 2 zeta v / omega, in the state
+         * (omega^2 z, omega z'). */
+        const double omega = start_two_pi * parameters->modes[i].f_n, v = 1.0 / parameters->T_s;
+        states[2 * i] = -late - 2.0 * parameters->modes[i].zeta * v / omega;
+        states[2 * i + 1] = v / omega;
+    }
+    for (uint64_t i = 0; i < self->dead_time; i++) {
+        within[i] = (double)i - late;
+    }
+    hsep_physics_init(
+        (hsep_physics *)hsep_at(self, self->trial), parameters->modes, parameters->n_modes, parameters->dead_time,
+        parameters->T_s, parameters->input_hold);
+    hsep_regression_init((hsep_regression *)hsep_at(self, self->regression), self->n_states, start_damping);
+}
+
+HSEP_API int hsep_start_valid(const void *block, const hsep_start_parameters *parameters)
+{
+    hsep_start got;
+    memcpy(&got, block, sizeof got);
+    (void)start_lay_out(&got, parameters); /* changes nothing where it is sound */
+    return memcmp(&got, block, sizeof got) == 0 &&
+           hsep_physics_valid(hsep_at_bytes(block, got.trial), parameters->n_modes, parameters->dead_time) &&
+           hsep_regression_valid(hsep_at_bytes(block, got.regression), got.n_states);
+}
+
+/* Response x_pb, (count,), m, to the state that is tried, and to a command that comes to 0 by step m a sample while the
+ * measurement is late. */
+static void start_respond(hsep_start *self, double step, double x_pb[], uint64_t count)
+{
+    hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
+    const uint64_t late = self->n - self->Np;
+    hsep_physics_begin(trial, hsep_at(self, self->state));
+    for (uint64_t k = 0; k < count; k++) {
+        const double x_d = k < late ? -step * (double)(late - k) : 0.0;
+        hsep_physics_forced_response(trial, &x_d, x_pb + k, 1);
+    }
+}
+
+/* First step of the commands, m; 0 if the axis begins at rest, as far as they and the measured residuals tell. */
+static double start_step(const hsep_start *self, const double x_d[], const double e[])
+{
+    const uint64_t late = self->n - self->Np, first = self->n - 1 - late;
+    double peak = 0.0;
+    uint64_t known = 0;
+    for (uint64_t j = first; j-- > 0;) {
+        peak = fmax(peak, fabs(x_d[j] - x_d[j + 1]));
+    }
+    for (uint64_t k = late; k < self->Np; k++) {
+        known += isfinite(e[self->Np - 1 - k]) ? 1 : 0;
+    }
+    if (known < start_samples * self->n_states || first == 0) {
+        return 0.0;
+    }
+    const double step = x_d[first - 1] - x_d[first];
+    return fabs(step) > start_moving * peak ? step : 0.0;
+}
+
+/* Fold the residuals that the motion leaves, and the responses to the states, into the regression. */
+static void start_fold(hsep_start *self, const double e[])
+{
+    hsep_regression *regression = (hsep_regression *)hsep_at(self, self->regression);
+    const double *response = hsep_at(self, self->response), *responses = hsep_at(self, self->responses);
+    hsep_regression_init(regression, self->n_states, start_damping);
+    for (uint64_t k = 0; k < self->Np; k++) {
+        double *row = hsep_regression_row(regression);
+        const double measured = e[self->Np - 1 - k];
+        if (isfinite(measured)) {
+            for (uint64_t i = 0; i < self->n_states; i++) {
+                row[i] = responses[i * self->n + k];
+            }
+            row[self->n_states] = measured - response[k];
+            hsep_regression_fold(regression);
+        }
+    }
+    hsep_regression_solve(regression, hsep_at(self, self->weights));
+}
+
+HSEP_API int hsep_start_estimate(hsep_start *self, const double x_d[], const double e[])
+{
+    const uint64_t all = self->n_states + self->dead_time;
+    const double step = start_step(self, x_d, e), *weights = hsep_at(self, self->weights);
+    double *state = hsep_at(self, self->state), *response = hsep_at(self, self->response);
+    double seen = 0.0, left = 0.0;
+    if (!(fabs(step) > 0.0)) {
+        return 0;
+    }
+    for (uint64_t i = 0; i < self->n_states; i++) {
+        memset(state, 0, (size_t)all * sizeof(double));
+        state[i] = 1.0;
+        start_respond(self, 0.0, hsep_at(self, self->responses) + i * self->n, self->n);
+    }
+    for (uint64_t i = 0; i < all; i++) {
+        state[i] = step * hsep_at(self, self->states)[i];
+    }
+    start_respond(self, step, response, self->n);
+    for (uint64_t k = 0; k < self->Np; k++) {
+        const double measured = e[self->Np - 1 - k], rest = measured - response[k];
+        seen += isfinite(measured) ? measured * measured : 0.0;
+        left += isfinite(measured) ? rest * rest : 0.0;
+    }
+    if (!(left < seen)) {
+        return 0;
+    }
+    start_fold(self, e);
+    for (uint64_t i = 0; i < self->n_states; i++) {
+        state[i] += weights[i];
+    }
+    start_respond(self, step, response, self->n + self->Np);
+    return 1;
+}
+
+HSEP_API void hsep_start_apply(
+    const hsep_start *self, double x_d[], double x_pb[], double ahead[], hsep_physics *physics)
+{
+    const uint64_t late = self->n - self->Np;
+    const double *response = hsep_at_const(self, self->response);
+    const double step = late + 1 < self->n ? x_d[self->n - 2 - late] - x_d[self->n - 1 - late] : 0.0;
+    for (uint64_t k = 0; k < late; k++) {
+        x_d[self->n - 1 - k] -= step * (double)(late - k);
+    }
+    for (uint64_t k = 0; k < self->n; k++) {
+        x_pb[self->n - 1 - k] += response[k];
+    }
+    for (uint64_t i = 0; i < self->Np; i++) {
+        ahead[i] += response[self->n + i];
+    }
+    hsep_physics_add(physics, (const hsep_physics *)hsep_at_const(self, self->trial));
+}
