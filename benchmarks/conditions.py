@@ -150,7 +150,9 @@ def changes(n: int) -> Iterator[tuple[str, float, float]]:
     for name, factors in STAGE_CHANGES.items():
         yield name, *_relearned(stage, _scaled(stage.new_plant(), factors), spiral()[0])
     for drawn in random_drives(range(n)):
-        modes = [replace(mode, f_n=DETUNED * mode.f_n, alpha=DETUNED**2 * mode.alpha) for mode in drawn.true_model.modes]
+        modes = [
+            replace(mode, f_n=DETUNED * mode.f_n, alpha=DETUNED**2 * mode.alpha) for mode in drawn.true_model.modes
+        ]
         x = simulate_many([ModalModel(modes)], [drawn.disturbances], [drawn.x_d])[0]
         x_meas = x + drawn.noise_std * np.random.default_rng(drawn.index).standard_normal(len(x))
         case = Case("", drawn.model, PredictorSettings(), drawn.x_d, (drawn.x_meas, x_meas))

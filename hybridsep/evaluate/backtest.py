@@ -41,7 +41,7 @@ class Batch(NamedTuple):
         Commanded and measured positions, NaN where missing.
     x_pb, x_hold, x_h : (n,) array, m
         Predictions made before any of ``x`` was known. With a ``measurement_delay`` they, their deviation and ``x_d``
-        are those of the instants that ``x`` was measured at; what was measured before the first one is taken as missing.
+        are those of the instants that ``x`` was measured at; it counts as missing before the first of them.
     x_h_std : (n,) array, m
         Standard deviation of ``x − x_h``, as predicted.
     rms_pb, rms_hold, rms_h : float
@@ -212,7 +212,7 @@ def _predicted(predictor: HybridPredictor, x_d: Array) -> Array:
 
 
 def _at_rest(start: float, late: Array) -> Array:
-    """Return the signals of a drive that follows its last commands, ``late`` relative to ``start``, m, ``(6, delay)``."""
+    """Return the signals of a drive that follows its commands, ``late`` relative to ``start``, m, ``(6, delay)``."""
     rest = np.tile(start + late, (6, 1))
     rest[_STD] = rest[_ACTIVE] = 0.0
     return rest

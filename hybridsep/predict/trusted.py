@@ -103,9 +103,7 @@ class TrustedModel:
     def begin_in_motion(self, x_d: Array, x_pb: Array) -> None:
         """Correct what was before a run in motion: commands and physics-based prediction went on as they begin."""
         before = np.arange(-len(self.state.x_pb), 0)
-        self.state = self.state._replace(
-            x_d=float(2.0 * x_d[0] - x_d[1]), x_pb=x_pb[0] + (x_pb[1] - x_pb[0]) * before
-        )
+        self.state = self.state._replace(x_d=float(2.0 * x_d[0] - x_d[1]), x_pb=x_pb[0] + (x_pb[1] - x_pb[0]) * before)
 
     @property
     def plans(self) -> bool:

@@ -1,0 +1,135 @@
+"""Late measurements and starts in motion, in every implementation.
+
+Every implementation shows what the library shows: within 1e-12 m with trust, 1e-11 m with the paper's model, to the
+last bit in a pythonfmu FMU. That what it shows is good is tested beside it.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from driving import T_S
+from library_stream import LookAheadStream
+from staircase_data import commanded
+from stream import OUTPUTS, PREDICTOR, PYTHON, STAGE_PREDICTOR, Array, Stream, Value, machine_of
+from streams import StreamMaker, on_all
+
+from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.plant import simulate
+
+TRUST: dict[str, Value] = {"trust": True, "t_init": 0.0}
+DELAY = 5
+
+CUT = 1060
+"""Sample of the staircase in the middle of a move, at 80 mm/s."""
+
+
+@cache
+def moved(model: str) -> tuple[Array, Array]:
+    """Return commanded and measured positions of the model's plant over the staircase, (n,), m."""
+    machine, x_d = machine_of(model), commanded()[:3300]
+    assert machine.plant is not None
+    x = simulate(machine.new_plant(), x_d, T_S)
+    return x_d, Encoder(machine.plant.noise_std, 3).measure_all(x)
+
+
+def late(model: str, Np: int, delay: int, n: int = 1500) -> tuple[Array, Array]:
+    """Return the inputs of a look-ahead whose sensor is late, from rest, (n,), m."""
+    x_d, x = moved(model)
+    at_rest = np.full(Np + delay, x_d[0])
+    return x_d[:n], np.concatenate((at_rest, x))[:n]
+
+
+def cut(model: str, Np: int, delay: int, n: int = 1500) -> tuple[Array, Array]:
+    """Return the inputs of a look-ahead beside an axis that is in motion already, (n,), m."""
+    x_d, x = moved(model)
+    return x_d[CUT : CUT + n], x[CUT - Np - delay :][:n]
+
+
+def run(stream: Stream, inputs: tuple[Array, Array], values: dict[str, Value], *, saved_at: int = -1) -> Array:
+    """Return the outputs before each sample and after the last; saved and restored once."""
+    r, x = inputs
+    stream.initialise({**values, "x_d_ahead": float(r[0]), "x_meas": float(x[0])})
+    outputs = [stream.outputs()]
+    for k, (ahead, measured) in enumerate(zip(r.tolist(), x.tolist(), strict=True)):
+        if k == saved_at:
+            stream.restore(stream.save())
+        stream.set("x_d_ahead", ahead)
+        stream.set("x_meas", measured)
+        stream.step(k * T_S, T_S)
+        outputs.append(stream.outputs())
+    return np.array(outputs)
+
+
+def assert_agreement(new_stream: StreamMaker, inputs: tuple[Array, Array], values: dict[str, Value]) -> None:
+    expected = run(LookAheadStream(new_stream.model), inputs, values)
+    shown = run(new_stream(), inputs, values, saved_at=733)
+    tolerance = 0.0 if new_stream.implementation == PYTHON else 1e-12 if values.get("trust") else 1e-11
+    for name, output, of_library in zip(OUTPUTS[PREDICTOR], shown.T, expected.T, strict=True):
+        whole = name in ("batch", "n_rejected", "hybrid_active")
+        np.testing.assert_allclose(output, of_library, rtol=0, atol=0 if whole else tolerance, err_msg=name)
+
+
+def last(outputs: Array, name: str) -> float:
+    return float(outputs[-1, OUTPUTS[PREDICTOR].index(name)])
+
+
+def named(values: dict[str, Any]) -> str:
+    return ",".join(f"{key}={value:g}" for key, value in values.items())
+
+
+@on_all((PREDICTOR,), needs="agreement")
+@pytest.mark.parametrize("inputs", [late, cut])
+@pytest.mark.parametrize(
+    "values",
+    [
+        TRUST | {"measurement_delay": 1},
+        TRUST | {"measurement_delay": DELAY, "dead_time": 3, "input_hold": 1},
+        TRUST | {"Np": 20, "p": 6, "q": 2, "measurement_delay": 50},  # later than a window
+        TRUST | {"Np": 7, "p": 7, "q": 0, "measurement_delay": 7, "t_init": 0.25},
+        {"p": 20, "measurement_delay": DELAY},
+        {"Np": 20, "p": 6, "q": 2, "measurement_delay": 50, "t_init": 0.0},
+    ],
+    ids=named,
+)
+def test_a_late_measurement_is_predicted_as_by_the_library(
+    new_stream: StreamMaker, values: dict[str, Value], inputs: Any
+) -> None:
+    n = 1200 if values.get("Np") == 7 else 1500
+    delay = int(values["measurement_delay"])
+    assert_agreement(new_stream, inputs(new_stream.model, int(values.get("Np", 100)), delay, n), values)
+
+
+@on_all((PREDICTOR, STAGE_PREDICTOR), needs="agreement")
+@pytest.mark.parametrize(
+    "values", [{}, {"Np": 30, "p": 5}, {"p": 20, "dead_time": 4, "input_hold": 1}, {"trust": False}], ids=named
+)
+def test_a_start_in_motion_is_predicted_as_by_the_library(new_stream: StreamMaker, values: dict[str, Value]) -> None:
+    inputs = cut(new_stream.model, int(values.get("Np", 100)), 0)
+    assert_agreement(new_stream, inputs, TRUST | values)
+
+
+@on_all((PREDICTOR,))
+@pytest.mark.parametrize("trust", [True, False])
+def test_a_known_delay_costs_little(new_stream: StreamMaker, trust: bool) -> None:
+    """At most 5 % more than without delay at the same horizon, but many times as much where the delay is not known."""
+    values: dict[str, Value] = {**TRUST, "trust": trust}
+    horizon = 100 + DELAY
+    sound = run(new_stream(), late(PREDICTOR, horizon, 0, 2700), values | {"Np": horizon})
+    known = run(new_stream(), late(PREDICTOR, 100, DELAY, 2700), values | {"measurement_delay": DELAY})
+    unknown = run(new_stream(), late(PREDICTOR, 100, DELAY, 2700), values)
+    assert last(known, "rms_pb") == pytest.approx(last(sound, "rms_pb"), rel=0.02)
+    assert last(known, "rms_h") < 1.05 * last(sound, "rms_h")
+    assert last(known, "rms_hold") < 1.1 * last(sound, "rms_hold")
+    assert last(unknown, "rms_pb") > 3 * last(sound, "rms_pb")
+
+
+@on_all((PREDICTOR, STAGE_PREDICTOR))
+def test_a_run_in_motion_is_no_worse_than_physics(new_stream: StreamMaker) -> None:
+    inputs = cut(new_stream.model, 100, 0, 2000)
+    trusted, paper = (run(new_stream(), inputs, {**TRUST, "trust": trust}) for trust in (True, False))
+    assert last(trusted, "rms_h") < 1.02 * last(trusted, "rms_pb")
+    assert last(trusted, "rms_pb") < 0.97 * last(paper, "rms_pb")  # the state is found after the first window
