@@ -24,7 +24,8 @@ _DIVERGED = 1e6
 CORRELATION_MAX = 1e4
 """Bound on the correlation of the rows: as much as there is in a long window of errors that are all alike."""
 
-_FIRST_CORRELATION, _CORRELATION_RATE = 10.0, 0.1
+_FIRST_CORRELATION, _CORRELATION_RATE = 0.1, 0.1
+"""Correlation before a window is measured, in windows: at any sampling rate the same time; and how fast it follows."""
 
 
 class ResidualScale(NamedTuple):
@@ -130,6 +131,8 @@ class Candidate:
         Prior standard deviations of the weights of ``e_pb(k−1) … e_pb(k−p)``; empty for a model without lags.
     correlation_max : float
         Correlation beyond which the penalty does not grow; 1 takes the rows as independent, and learns fastest.
+    Np : int
+        Samples of a usual window.
 
     Attributes
     ----------
@@ -139,9 +142,9 @@ class Candidate:
         Rows that count as one: where a disturbance has no feature, the errors of neighbouring rows are alike.
     """
 
-    def __init__(self, n_static: int, lag_scales: Array, correlation_max: float) -> None:
+    def __init__(self, n_static: int, lag_scales: Array, correlation_max: float, Np: int) -> None:
         self.n_static, self.lag_scales, self.correlation_max = n_static, lag_scales, correlation_max
-        self.noise_variance, self.correlation = 0.0, _FIRST_CORRELATION
+        self.noise_variance, self.correlation = 0.0, max(_FIRST_CORRELATION * Np, 1.0)
 
     def solve(self, regression: RidgeRegression, static_scales: Array, least_variance: float) -> SolvedCandidate:
         """Return the model with the weights that follow from all rows so far.

@@ -78,9 +78,9 @@ class TrustedModel:
         self.regression = RidgeRegression(self.static.n + p, _NO_PENALTY)
         lag_scales = np.sqrt(_LAST_LAG ** (np.arange(p) / p))
         self.candidates = (
-            Candidate(self.static.n, lag_scales[:0], _CAUTIOUS),
-            Candidate(self.static.n, lag_scales, _CAUTIOUS),
-            Candidate(self.static.n, lag_scales, 1.0),
+            Candidate(self.static.n, lag_scales[:0], _CAUTIOUS, settings.Np),
+            Candidate(self.static.n, lag_scales, _CAUTIOUS, settings.Np),
+            Candidate(self.static.n, lag_scales, 1.0, settings.Np),
         )
         self.blend = Blend(_FIRST_WEIGHTS, settings.Np)
         self.n_rows = 0.0

@@ -47,7 +47,7 @@ def test_prediction_is_the_formulas(p: int, k: int, correlation_max: float) -> N
     static, lags = rng.normal(size=(k, N_STATIC)), 0.3 * rng.normal(size=(k, 2))
     target = static @ [0.5, -0.3, 0.1] + lags @ [0.7, 0.1] + 0.05 * rng.normal(size=k)
     rows, past = rng.normal(size=(N, N_STATIC)), np.array([0.2, -0.1])
-    candidate = Candidate(N_STATIC, LAG_PRIORS[:p], correlation_max)
+    candidate = Candidate(N_STATIC, LAG_PRIORS[:p], correlation_max, 100)
     candidate.noise_variance, candidate.correlation = 0.05**2, 5.0
     scale = ResidualScale(recent=0.2, largest_square=0.3, largest=100.0)
     found = candidate.solve(learned(static, lags, target), EFFECTS, 1e-9).predict(rows, past[:p], scale)
@@ -60,7 +60,7 @@ def test_prediction_is_the_formulas(p: int, k: int, correlation_max: float) -> N
 def test_what_was_never_told_apart_is_shrunk_by_its_prior() -> None:
     """Two features that were always equal turn against each other, as friction and an offset at a first reversal."""
     same = np.hstack((np.ones((500, 2)), np.zeros((500, 1))))
-    candidate = Candidate(N_STATIC, LAG_PRIORS[:0], 1e4)
+    candidate = Candidate(N_STATIC, LAG_PRIORS[:0], 1e4, 100)
     candidate.noise_variance, candidate.correlation = 1e-8, 1.0
     regression, scale = learned(same, np.zeros((500, 2)), np.ones(500)), ResidualScale(1.0, 1.0, 1.0)
     solved = candidate.solve(regression, EFFECTS, 0.0)
@@ -73,7 +73,7 @@ def test_what_was_never_told_apart_is_shrunk_by_its_prior() -> None:
 def test_a_recursion_that_diverges_predicts_nothing() -> None:
     lags = np.column_stack((np.logspace(-6, -2, 100), np.zeros(100)))
     regression = learned(np.zeros((100, N_STATIC)), lags, 1e4 * lags[:, 0])  # a pole at 1e4
-    candidate = Candidate(N_STATIC, np.full(2, 1e6), 1e4)
+    candidate = Candidate(N_STATIC, np.full(2, 1e6), 1e4, 100)
     candidate.noise_variance = 1e-6
     rows, past = np.ones((200, N_STATIC)), np.array([1.0, 1.0])
     scale = ResidualScale(1.0, 1.0, 1.0)
@@ -85,7 +85,7 @@ def test_a_recursion_that_diverges_predicts_nothing() -> None:
 
 def test_correlation_follows_errors_that_are_alike() -> None:
     rng = np.random.default_rng(0)
-    white, alike = (Candidate(N_STATIC, LAG_PRIORS, 1e4) for _ in range(2))
+    white, alike = (Candidate(N_STATIC, LAG_PRIORS, 1e4, 100) for _ in range(2))
     for candidate, common in ((white, 0.0), (alike, 1.0)):
         candidate.noise_variance = 1.0
         for _ in range(300):

@@ -18,7 +18,8 @@ static const double candidate_lag_max = 10.0, candidate_prediction_max = 1.2;
 /* Bound on the impulse response, and on the variance relative to the square of the largest residual. */
 static const double candidate_diverged = 1e6;
 
-static const double candidate_first_correlation = 10.0, candidate_correlation_max = 1e4;
+/* Correlation before a window is measured, in windows: at any sampling rate the same time; and its bound, in rows. */
+static const double candidate_first_correlation = 0.1, candidate_correlation_max = 1e4;
 static const double candidate_correlation_rate = 0.1;
 
 /* Set what follows from the parameters; return the bytes of the block. */
@@ -57,7 +58,7 @@ HSEP_API void hsep_candidate_init(hsep_candidate *self, const hsep_candidate_sha
 {
     memset(self, 0, (size_t)hsep_candidate_size(shape));
     (void)candidate_lay_out(self, shape);
-    self->correlation = candidate_first_correlation;
+    self->correlation = fmax(candidate_first_correlation * (double)self->Np, 1.0);
     hsep_regression_init(candidate_solved(self), shape->n_static + shape->p, 1.0);
 }
 
