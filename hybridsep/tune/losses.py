@@ -8,16 +8,16 @@ velocity and the scales found on the way, so no factor is common to two candidat
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..base.errors import ParameterError, SignalError
 from ..base.settings import PredictorSettings, samples_before
-from ..base.signals import PREDICTION_MAX, Array, as_samples
+from ..base.signals import PREDICTION_MAX, Array, as_measured, as_samples
 from ..base.threads import one_blas_thread
-from ..evaluate.backtest import backtest_stream
+from ..evaluate.backtest import Batch, backtest_stream
 from ..model.physics import ModalModel
 from ..predict.features import PastSamples
 from ..predict.predictor import HybridPredictor
@@ -30,6 +30,9 @@ Piece = tuple[Array, Array]
 """Commanded and measured positions of a part of a log without a gap, ``(n,)`` each, m."""
 
 Progress = Callable[[float], object]
+
+_AT_ONCE = 100_000
+"""Samples that are checked and replayed at once."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +86,7 @@ def nested_losses(
     """
     if not share_a_pass(candidates):
         raise ParameterError("candidates of one pass must have trust = false and differ in p, q and lambda only")
+    _check(pieces, as_samples)
     common = candidates[0]
     order = sorted(range(len(candidates)), key=lambda i: candidates[i].p)
     ridge = NestedRidge([candidates[i] for i in order])
@@ -91,8 +95,7 @@ def nested_losses(
     past = PastSamples(ridge.layout, common.Np)
     squares = _Squares(len(candidates))
     n_samples = sum(len(x) for _, x in pieces)
-    for i, piece in enumerate(pieces):
-        x_d, x = as_samples(piece[0], "x_d"), as_samples(piece[1], "x", len(piece[0]))
+    for i, (x_d, x) in enumerate(pieces):
         n_init = 0 if i else samples_before(common.warm_up, common.T_s)
         state, start, n_before = discrete.rest(), x_d[:1], squares.n
         past.restart()
@@ -153,7 +156,7 @@ def replayed_losses(
     candidate: PredictorSettings,
     progress: Progress = lambda _done: None,
 ) -> Losses:
-    """Return the losses of one candidate, any, by a backtest of its own.
+    """Return the losses of one candidate, any, by a backtest of its own; NaN for the baselines where it diverges.
 
     Parameters
     ----------
@@ -167,16 +170,40 @@ def replayed_losses(
         If samples cannot be used.
     """
     predictor = HybridPredictor(model, candidate)
-    n_samples, done = sum(len(x) for _, x in pieces), 0
-    n, squares = 0, np.zeros(3)
-    for i, (x_d, x) in enumerate(pieces):
+    _check(pieces, as_measured if candidate.trust else as_samples)
+    n_samples, n_before, scores = sum(len(x) for _, x in pieces), 0, []
+    for i, piece in enumerate(pieces):
         if i:
             predictor.restart()
-        before = done
-        score = backtest_stream(predictor, [(x_d, x)], on_batch=lambda batch, before=before: progress((before + batch.k) / n_samples)).overall
-        if score.n_samples:
-            squares += score.n_samples * np.square([score.rms_pb, score.rms_hold, score.rms_h])
-            n += score.n_samples
-        done += len(x)
-    rms_pb, rms_hold, rms_h = np.sqrt(squares / n)
-    return Losses(float(rms_pb), float(rms_hold), np.array([rms_h]))
+
+        def on_batch(batch: Batch, n_before: int = n_before) -> None:
+            progress((n_before + batch.k) / n_samples)
+
+        try:
+            scores.append(backtest_stream(predictor, _chunks(piece), on_batch=on_batch).overall)
+        except SignalError:  # the samples are sound: it diverges
+            return Losses(math.nan, math.nan, np.array([math.inf]))
+        n_before += len(piece[1])
+    known = [score for score in scores if score.n_samples]
+    squares = [score.n_samples * np.square([score.rms_pb, score.rms_hold, score.rms_h]) for score in known]
+    rms = np.sqrt(sum(squares, np.zeros(3)) / max(sum(score.n_samples for score in known), 1))
+    return Losses(float(rms[0]), float(rms[1]), rms[2:])
+
+
+def _check(pieces: Sequence[Piece], measured: Callable[[Array, str, int], Array]) -> None:
+    """Raise SignalError if samples cannot be used; ``measured`` says whether measured ones may be missing."""
+    for piece in pieces:
+        if len(piece[0]) != len(piece[1]) or not len(piece[0]):
+            raise SignalError(
+                f"x_d and x must have as many samples, at least one, got {len(piece[0])}, {len(piece[1])}"
+            )
+        for i, (x_d, x) in enumerate(_chunks(piece)):
+            place = f" of the chunk from sample {i * _AT_ONCE} on" if i else ""
+            measured(x, f"x{place}", len(as_samples(x_d, f"x_d{place}")))
+
+
+def _chunks(piece: Piece) -> Iterator[Piece]:
+    """Yield a piece in parts, so that what is computed of one does not grow with the log."""
+    x_d, x = piece
+    for i in range(0, len(x), _AT_ONCE):
+        yield x_d[i : i + _AT_ONCE], x[i : i + _AT_ONCE]

@@ -1,10 +1,10 @@
 """Weights of many candidates (p, q, λ) from one triangular factor; eq. (6).
 
-The factor of the rows with the most lags and the least penalty holds the solutions of all candidates. Rows ``√(λ − λ₀)·I``
-folded into a copy raise its penalty. In the order ``[1, x_pb(k) … x_pb(k−q) | e_pb(k−1) … e_pb(k−p)]`` its leading
-columns are the factor of a smaller p, and a smaller q is reached by folding the rows of the lags that are left out into
-the triangle below (Golub and Van Loan, *Matrix Computations*, 4th ed., section 6.5). All of it is orthogonal, so the
-weights are as accurate as those of a regression for each candidate.
+The factor of the rows with the most lags and the least penalty λ₀ holds the solutions of all candidates. Rows
+``√(λ − λ₀)·I`` folded into a copy raise its penalty. In the order ``[1, x_pb(k) … x_pb(k−q) | e_pb(k−1) … e_pb(k−p)]``
+its leading columns are the factor of a smaller p, and a smaller q is reached by folding the rows of the lags that are
+left out into the triangle below (Golub and Van Loan, *Matrix Computations*, 4th ed., section 6.5). All of it is
+orthogonal, so the weights are as accurate as those of a regression for each candidate.
 """
 
 from __future__ import annotations
