@@ -66,7 +66,6 @@ def backtest(
 ) -> None:
     """Check a recorded log and replay it causally: physics model, hold baseline and hybrid."""
     with loading():
-        from ..base.errors import ParameterError
         from ..evaluate.backtest import Batch, backtest_stream
         from ..evaluate.backtest import backtest as backtest_whole
         from ..evaluate.replayed import replayed_run
@@ -75,7 +74,7 @@ def backtest(
         from ..logs.log import Log
         from ..machine import load_machine, machine_path
         from .arguments import check_ending
-        from .log_intake import findings_table, open_checked
+        from .log_intake import findings_table, open_checked, reading_of
         from .overwrite import BATCH_COLUMNS, BATCHES, BY_ENDING, Output, check_outputs
         from .progress import progress_bar
         from .tables import print_scores
@@ -84,26 +83,19 @@ def backtest(
             from ..evaluate.time_plots import prediction_figure
 
     axis_machine = load_machine(machine)
-    if fix and as_is:
-        raise ParameterError("--fix and --as-is exclude each other")
     saved = list(save or [])
     check_ending(figure, "--figure", (".png", ".pdf", ".svg"))
     for path in saved:
         check_ending(path, "--save", (".state", ".csv", ".npz"))
-    given = {role: column for role, column in (("t", t), ("x_d", x_d), ("x", x)) if column}
-    names = {**axis_machine.log.columns, **given}
-    if T_s is not None and t is None:
-        names.pop("t", None)  # there may be none
-    own = axis_machine.log
     changed = axis_machine.changed("predictor", parameters)
     predictor = changed.new_predictor()
-    reading = {
-        "columns": names,
-        "unit": unit or own.unit,
-        "T_s": T_s,
-        "axis": axis or own.axis,
-        "may_miss": predictor.settings.trust,
-    }
+    reading = reading_of(
+        *(axis_machine, {"t": t, "x_d": x_d, "x": x}),
+        unit=unit,
+        T_s=T_s,
+        axis=axis,
+        may_miss=predictor.settings.trust,
+    )
     if weights is not None:
         predictor = load_trained(weights, changed, "HybridPredictor")
         predictor.restart()

@@ -26,7 +26,7 @@ __all__ = [
     "shown_figure",
 ]
 
-console = Console()
+console = Console(emoji=False)
 
 PAPER_COLUMN = "× hold: RMS relative to holding the last residual; paper: physics → hybrid, reduction, as printed there"
 

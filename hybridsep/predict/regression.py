@@ -176,7 +176,7 @@ class RidgeRegression:
             At least :attr:`lam`, of a regression that was not discounted.
         """
         n = self.n_features
-        factor = self._factor.copy(order="F")
+        factor = np.array(self._factor, order="F")
         if lam > self.lam:
             rows = np.zeros((n, n + 1), order="F")
             np.fill_diagonal(rows, math.sqrt(lam - self.lam))

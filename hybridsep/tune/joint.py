@@ -18,7 +18,7 @@ from .choice import WORTH, window_sizes
 from .grid import own_settings
 from .losses import Losses, Piece, nested_losses, replayed_losses, share_a_pass
 
-__all__ = ["Tuning", "over_windows", "tune"]
+__all__ = ["Tuning", "joint_ratio", "n_processors", "over_windows", "tune"]
 
 Logs = Mapping[str, Sequence[Piece]]
 """Logs by name, each in pieces without a gap."""
@@ -85,6 +85,13 @@ class Tuning:
     def n_diverged(self) -> int:
         """Number of candidates whose prediction diverges on some log."""
         return int(np.isinf(self.rms_h).any(axis=1).sum())
+
+
+def n_processors() -> int:
+    """Return the number of processors that this process may use."""
+    from joblib import cpu_count
+
+    return int(cpu_count())
 
 
 def joint_ratio(rms: Array, rms_hold: Array) -> float:
