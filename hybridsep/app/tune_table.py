@@ -74,10 +74,17 @@ def tuning_summary(tuning: Tuning, windows: Mapping[int, Tuning], values: Values
 def print_tuning(tuning: Tuning, windows: Mapping[int, Tuning], values: Values, title: str, unit: str) -> None:
     """Print a tuning; ``unit`` of the positions is m or rad."""
     chosen = tuning.candidates[tuning.chosen]
-    console.print(_ranked(tuning, values, f"{title}: RMS in µ{unit} against the measured position, Np = {chosen.Np}"))
+    heading = f"{title}: RMS in µ{unit} against the measured position, Np = {chosen.Np}"
+    console.print(heading, highlight=False, markup=False)
+    console.print(_ranked(tuning, values))
     for line in _words(tuning, values):
         console.print(line, highlight=False, markup=False)
-    console.print(_over_windows(windows, unit))
+    console.print(
+        f"\nThe same settings over other look-aheads, RMS in µ{unit}; no choice: the look-ahead is the controller's, and "
+        "a shorter one is always predicted better",
+        highlight=False,
+    )
+    console.print(_over_windows(windows))
     console.print("For the machine file:\n", highlight=False)
     lines = {"Np": chosen.Np, **entries(chosen, values), "trust": str(chosen.trust).lower()}
     console.print("[predictor]", markup=False, highlight=False)
@@ -85,9 +92,9 @@ def print_tuning(tuning: Tuning, windows: Mapping[int, Tuning], values: Values, 
         console.print(f"{name} = {value}", highlight=False)
 
 
-def _ranked(tuning: Tuning, values: Values, title: str) -> Table:
+def _ranked(tuning: Tuning, values: Values) -> Table:
     """Return the table of the best candidates and of the machine's own, below the baselines."""
-    table = Table("", title=title, box=box.SIMPLE, pad_edge=False)
+    table = Table("", box=box.SIMPLE, pad_edge=False)
     for field in values:
         table.add_column("λ" if field == "lam" else field, justify="right")
     names = tuning.logs if len(tuning.logs) <= _LOGS else ()
@@ -141,12 +148,10 @@ def _words(tuning: Tuning, values: Values) -> list[str]:
     return lines
 
 
-def _over_windows(windows: Mapping[int, Tuning], unit: str) -> Table:
+def _over_windows(windows: Mapping[int, Tuning]) -> Table:
     """Return the table of errors with shorter and longer windows."""
     table = Table(
         *("Np", "log", "physics", "hold", "hybrid", "× hold"),
-        title=f"The same settings over other look-aheads, RMS in µ{unit}",
-        caption="no choice: the look-ahead is the controller's, and a shorter one is always predicted better",
         box=box.SIMPLE,
         pad_edge=False,
     )
