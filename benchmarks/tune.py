@@ -2,11 +2,12 @@
 
     python benchmarks/tune.py [--emps DATA_EMPS.mat] [--samples 10000000]      (five minutes)
 
-The log is EMPS, 24 841 samples, or as many of the staircase drive; ``p`` 5 to 100, ``q`` 0 to 8, ``λ`` 1e-14 to 1e-5, with
-``Np = 100``. Times are process times, as other work on the machine then counts less, each the median of runs by turns. One
-by one is the mean time of randomly drawn candidates times their number; their losses are compared with those of the pass,
-beside what a change in the last digits of the measured positions does to the same backtest. Then a log of ``--samples`` samples
-in memory: what the process uses beyond it, at a tenth and at the end. Exit status 1 if a figure is missed.
+The log is EMPS, 24 841 samples, or as many of the staircase drive; ``p`` 5 to 100, ``q`` 0 to 8, ``λ`` 1e-14 to 1e-5,
+with ``Np = 100``. Times are process times, in which other work on the machine counts less, each the median of runs by
+turns. One by one is the mean time of randomly drawn candidates times the number of all; their losses are compared with
+those of the pass, and with those of the same backtest when each measured position is changed by a unit in its last place.
+Then a log of ``--samples`` samples in memory: what the process uses beyond it, at a tenth and at the end. Exit status 1
+if a figure is missed.
 """
 
 from __future__ import annotations
@@ -89,7 +90,7 @@ def compare(machine: Machine, x_d: Array, x: Array) -> bool:
         alone += [timed(lambda j=j: (rms_h(tried[j]), j)) for j in drawn[i::RUNS]]  # type: ignore[misc]
     one, whole = statistics.median(once), statistics.median(passes)
     each = statistics.mean(seconds for seconds, _ in alone)
-    error = max(abs(found[j] / loss - 1.0) for _, (loss, j) in alone)
+    error = max(abs(float(found[j]) / loss - 1.0) for _, (loss, j) in alone)
     # One unit in the last place of a double, up or down or not at all, in each measured position
     rounded = x + rng.choice([-1.0, 0.0, 1.0], len(x)) * np.spacing(x)
     sensitivity = max(abs(rms_h(tried[j], rounded) / loss - 1.0) for _, (loss, j) in alone)
@@ -124,8 +125,8 @@ def stays_flat(n: int) -> bool:
     seconds = perf_counter() - begin
     early, late = memory.values()
     print(
-        f"{n:,} samples, {len(tried)} candidates: {1e6 * seconds / n:.2f} µs a sample, losses to {losses.rms_h.min():.4g} m; "
-        f"beyond the log {early / 1e6:.2f} MB after a tenth, {late / 1e6:.2f} MB at the end, "
+        f"{n:,} samples, {len(tried)} candidates: {1e6 * seconds / n:.2f} µs a sample, least loss "
+        f"{losses.rms_h.min():.4g} m; beyond the log {early / 1e6:.2f} MB after a tenth, {late / 1e6:.2f} MB at the end, "
         f"growth at most {GROWTH_MAX / 1e6:g} MB (the log itself: {2 * x.nbytes / 1e6:.0f} MB)"
     )
     return late - early <= GROWTH_MAX

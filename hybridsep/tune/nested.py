@@ -25,16 +25,17 @@ __all__ = ["NestedRidge"]
 
 @dataclass(frozen=True)
 class _SameLags:
-    """Candidates that share q and λ; ``rows`` are theirs among those of that λ."""
+    """Candidates that share q and λ: their rows among those of that λ, and which equations each of them has."""
 
     q: int
     rows: Indices
-    p: Indices
+    equations: Array
+    """``(p_max + 1, n)`` array, column-major: 1 for the first p rows of the triangle of the lags, 0 below."""
 
 
 @dataclass(frozen=True)
 class _SamePenalty:
-    """Candidates that share λ; ``members`` are their indices among all, ``by_q`` with q descending."""
+    """Candidates that share λ: their indices among all, and by q, descending."""
 
     lam: float
     members: Indices
@@ -59,7 +60,7 @@ class NestedRidge:
         self.layout = FeatureLayout(max(one.p for one in candidates), max(one.q for one in candidates))
         self.n_candidates = len(candidates)
         self.regression = RidgeRegression(self.layout.n, min(one.lam for one in candidates))
-        self._groups = tuple(_by_penalty(candidates))
+        self._groups = tuple(_by_penalty(candidates, self.layout.p))
 
     def update_stacked(self, rows: Array) -> None:
         """Update with rows ``[φ(k) | e_pb(k)]`` of :attr:`layout`; they are overwritten."""
@@ -85,9 +86,8 @@ class NestedRidge:
                 fold(lags, np.array(factor[left_out, first:], order="F"))
                 q_now = same.q
             lags[-1, -1] = 1.0  # ρ belongs to no weight, and may be 0
-            # R_e w_e = z_e in the leading p rows and columns; a row beyond them has the solution 0.
-            right = np.where(np.arange(layout.p + 1)[:, None] < same.p, lags[:, -1:], 0.0)
-            w_e, _ = lapack.dtrtrs(lags, np.asfortranarray(right))
+            # R_e w_e = z_e in the leading p rows and columns; with 0 on the right of the others, their solution is 0.
+            w_e, _ = lapack.dtrtrs(lags, same.equations * lags[:, -1:], overwrite_b=1)
             w[same.rows, first:] = w_e[:-1].T
         # R_x w_x = z_x − R_xe w_e
         right = factor[:first, n:] - factor[:first, first:n] @ w[:, first:].T
@@ -98,11 +98,13 @@ class NestedRidge:
         return w
 
 
-def _by_penalty(candidates: Sequence[PredictorSettings]) -> Iterable[_SamePenalty]:
+def _by_penalty(candidates: Sequence[PredictorSettings], p_max: int) -> Iterable[_SamePenalty]:
     for lam in sorted({one.lam for one in candidates}):
         members = [i for i, one in enumerate(candidates) if one.lam == lam]
         by_q = []
         for q in sorted({candidates[i].q for i in members}, reverse=True):
             rows = [row for row, i in enumerate(members) if candidates[i].q == q]
-            by_q.append(_SameLags(q, np.array(rows), np.array([candidates[members[row]].p for row in rows])))
+            p = np.array([candidates[members[row]].p for row in rows])
+            equations = np.asfortranarray(np.arange(p_max + 1)[:, None] < p, dtype=np.float64)
+            by_q.append(_SameLags(q, np.array(rows), equations))
         yield _SamePenalty(lam, np.array(members), tuple(by_q))
