@@ -5,7 +5,7 @@
 The log is EMPS, 24 841 samples, or as many of the staircase drive; ``p`` 5 to 100, ``q`` 0 to 8, ``λ`` 1e-14 to 1e-5,
 with ``Np = 100``. Times are process times, in which other work on the machine counts less, each the median of runs by
 turns. One by one is the mean time of randomly drawn candidates times the number of all; their losses are compared with
-those of the pass, and with those of the same backtest when each measured position is changed by a unit in its last place.
+those of the pass, and with those of the same backtest when measured positions change by a unit in their last place.
 Then a log of ``--samples`` samples in memory: what the process uses beyond it, at a tenth and at the end. Exit status 1
 if a figure is missed.
 """
@@ -126,8 +126,8 @@ def stays_flat(n: int) -> bool:
     early, late = memory.values()
     print(
         f"{n:,} samples, {len(tried)} candidates: {1e6 * seconds / n:.2f} µs a sample, least loss "
-        f"{losses.rms_h.min():.4g} m; beyond the log {early / 1e6:.2f} MB after a tenth, {late / 1e6:.2f} MB at the end, "
-        f"growth at most {GROWTH_MAX / 1e6:g} MB (the log itself: {2 * x.nbytes / 1e6:.0f} MB)"
+        f"{losses.rms_h.min():.4g} m; beyond the log {early / 1e6:.2f} MB after a tenth, {late / 1e6:.2f} MB at the "
+        f"end, growth at most {GROWTH_MAX / 1e6:g} MB (the log itself: {2 * x.nbytes / 1e6:.0f} MB)"
     )
     return late - early <= GROWTH_MAX
 

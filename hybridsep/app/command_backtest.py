@@ -11,12 +11,16 @@ import typer
 from ..base.output import written_text
 from .failures import loading
 from .options import (
+    AsIsOption,
     AxisOption,
     CommandColumnOption,
+    FixOption,
     ForceOption,
     JsonOption,
+    LogArgument,
     MachineOption,
     MeasuredColumnOption,
+    SavedOption,
     TimeColumnOption,
     TsOption,
     UnitOption,
@@ -28,12 +32,7 @@ __all__ = ["backtest"]
 
 @takes_parameters(PREDICTOR_ENTRIES)
 def backtest(
-    log: Annotated[
-        Path,
-        typer.Argument(
-            help="Recorded log with the columns t, x_d, x_meas or x: CSV, .npz, .mat, HDF5 or Siemens Capture JSON."
-        ),
-    ],
+    log: LogArgument,
     machine: MachineOption,
     unit: UnitOption = None,
     T_s: TsOption = None,
@@ -41,13 +40,9 @@ def backtest(
     t: TimeColumnOption = None,
     x_d: CommandColumnOption = None,
     x: MeasuredColumnOption = None,
-    fix: Annotated[bool, typer.Option("--fix", help="Apply the fixes of what the checks of the log find.")] = False,
-    as_is: Annotated[
-        bool, typer.Option("--as-is", help="Replay the log with the faults that the checks find in it.")
-    ] = False,
-    weights: Annotated[
-        Path | None, typer.Option(help="A predictor saved with --save, to begin with what it learned.")
-    ] = None,
+    fix: FixOption = False,
+    as_is: AsIsOption = False,
+    weights: SavedOption = None,
     *,
     parameters: dict[str, Any],
     out: Annotated[Path | None, typer.Option(help="CSV for the RMS errors batch by batch.")] = None,
@@ -89,13 +84,8 @@ def backtest(
         check_ending(path, "--save", (".state", ".csv", ".npz"))
     changed = axis_machine.changed("predictor", parameters)
     predictor = changed.new_predictor()
-    reading = reading_of(
-        *(axis_machine, {"t": t, "x_d": x_d, "x": x}),
-        unit=unit,
-        T_s=T_s,
-        axis=axis,
-        may_miss=predictor.settings.trust,
-    )
+    may_miss = predictor.settings.trust
+    reading = reading_of(axis_machine, {"t": t, "x_d": x_d, "x": x}, unit=unit, T_s=T_s, axis=axis, may_miss=may_miss)
     if weights is not None:
         predictor = load_trained(weights, changed, "HybridPredictor")
         predictor.restart()

@@ -13,8 +13,10 @@ from ..base.ranges import parse_range
 from ..base.settings import PredictorSettings
 from .failures import loading
 from .options import (
+    AsIsOption,
     AxisOption,
     CommandColumnOption,
+    FixOption,
     ForceOption,
     JsonOption,
     MachineOption,
@@ -38,10 +40,8 @@ def tune(
     t: TimeColumnOption = None,
     x_d: CommandColumnOption = None,
     x: MeasuredColumnOption = None,
-    fix: Annotated[bool, typer.Option("--fix", help="Apply the fixes of what the checks of the logs find.")] = False,
-    as_is: Annotated[
-        bool, typer.Option("--as-is", help="Replay the logs with the faults that the checks find in them.")
-    ] = False,
+    fix: FixOption = False,
+    as_is: AsIsOption = False,
     *,
     parameters: dict[str, Any],
     jobs: Annotated[

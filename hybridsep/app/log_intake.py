@@ -33,23 +33,29 @@ def reading_of(
     axis: str | None,
     may_miss: bool,
 ) -> Reading:
-    """Return how a machine's logs are read, by options where they are given and else by its file.
+    """Return how a log of a machine is read: as its machine file says, where an option does not say otherwise.
 
     Parameters
     ----------
     machine : Machine
     columns : mapping
-        Names of the columns ``t``, ``x_d`` and ``x``.
+        Column of ``t``, ``x_d`` and ``x``; None where it is not given.
     unit, T_s, axis
-        As for :func:`~hybridsep.logs.log.open_log`.
+        As given.
     may_miss : bool
-        Whether measurements may be missing.
+        Whether positions may be missing.
     """
-    names = {**machine.log.columns, **{role: column for role, column in columns.items() if column}}
-    if T_s is not None and columns.get("t") is None:
-        names.pop("t", None)  # there may be none
     own = machine.log
-    return {"columns": names, "unit": unit or own.unit, "T_s": T_s, "axis": axis or own.axis, "may_miss": may_miss}
+    names = {**own.columns, **{role: column for role, column in columns.items() if column}}
+    if T_s is not None and columns["t"] is None:
+        names.pop("t", None)  # there may be none
+    return {
+        "columns": names,
+        "unit": unit or own.unit,
+        "T_s": T_s,
+        "axis": axis or own.axis,
+        "may_miss": may_miss,
+    }
 
 
 def open_checked(
@@ -81,6 +87,8 @@ def open_checked(
     ------
     LogError
         If the log cannot be read, or has a fault that makes figures flatter and is neither fixed nor taken as it is.
+    ParameterError
+        If it is both.
     """
     if fix and as_is:
         raise ParameterError("--fix and --as-is exclude each other")

@@ -80,8 +80,8 @@ def print_tuning(tuning: Tuning, windows: Mapping[int, Tuning], values: Values, 
     for line in _words(tuning, values):
         console.print(line, highlight=False, markup=False)
     console.print(
-        f"\nThe same settings over other look-aheads, RMS in µ{unit}; no choice: the look-ahead is the controller's, and "
-        "a shorter one is always predicted better",
+        f"\nThe same settings over other look-aheads, RMS in µ{unit}; no choice: the look-ahead is the controller's, "
+        "and a shorter one is always predicted better",
         highlight=False,
     )
     console.print(_over_windows(windows))
