@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -191,9 +192,11 @@ def _losses(model: ModalModel, tasks: Sequence[_Task], jobs: int, progress: Prog
     from joblib import Parallel, delayed
 
     found = []
-    for losses in Parallel(n_jobs, return_as="generator")(delayed(_task_losses)(model, task) for task in tasks):
-        found.append(losses)
-        progress(len(found) / n)
+    running = Parallel(n_jobs, return_as="generator")(delayed(_task_losses)(model, task) for task in tasks)
+    with closing(running):  # ends the processes where this one is interrupted
+        for losses in running:
+            found.append(losses)
+            progress(len(found) / n)
     return found
 
 
