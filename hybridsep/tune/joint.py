@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from ..base.errors import SignalError
+from ..base.interrupt import starting_processes
 from ..base.metrics import rms_ratio
 from ..base.settings import PredictorSettings
 from ..base.signals import Array
@@ -25,6 +26,9 @@ Logs = Mapping[str, Sequence[Piece]]
 """Logs by name, each in pieces without a gap."""
 
 Progress = Callable[[float], object]
+
+_IDLE = 10
+"""Seconds after which a process without work ends; half a minute later where this one was killed."""
 
 _Task = tuple[str, Sequence[Piece], tuple[PredictorSettings, ...]]
 """Name and pieces of a log, and candidates that are replayed together."""
@@ -192,7 +196,9 @@ def _losses(model: ModalModel, tasks: Sequence[_Task], jobs: int, progress: Prog
     from joblib import Parallel, delayed
 
     found = []
-    running = Parallel(n_jobs, return_as="generator")(delayed(_task_losses)(model, task) for task in tasks)
+    with starting_processes():
+        parallel = Parallel(n_jobs, return_as="generator", idle_worker_timeout=_IDLE)
+        running = parallel(delayed(_task_losses)(model, task) for task in tasks)
     with closing(running):  # ends the processes where this one is interrupted
         for losses in running:
             found.append(losses)
