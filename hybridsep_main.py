@@ -32,7 +32,7 @@ def main() -> None:
     except KeyboardInterrupt:
         _leave()
     except SystemExit as stop:
-        # All is said and cleaned up, and taking the library down would take Python long; only joblib has locks to remove.
+        # All is said and cleaned up, and taking the library down would take Python long; joblib has locks to remove.
         if stop.code == INTERRUPTED and "joblib" not in sys.modules:
             sys.stderr.flush()
             os._exit(INTERRUPTED)

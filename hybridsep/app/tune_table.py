@@ -25,6 +25,8 @@ _ROWS = 10
 _LOGS = 4
 """Logs whose RMS errors have a column each."""
 
+_MARGIN = f"{100 * WORTH:.0f} %"
+
 Values = Mapping[str, Sequence[Any]]
 
 
@@ -123,25 +125,26 @@ def _ranked(tuning: Tuning, values: Values) -> Table:
 def _words(tuning: Tuning, values: Values) -> list[str]:
     """Return how the candidates were ranked, how many are alike, and what was chosen."""
     n, best = len(tuning.candidates), tuning.candidates[tuning.ranking[0]]
+    if tuning.n_diverged == n:
+        return [f"all {n} candidates diverge; try larger --lambda or smaller --p"]
     lines = []
     if len(tuning.logs) > 1:
         lines.append("ranked by the geometric mean over the logs of RMS relative to hold; reduction is from physics")
     spans = []
     for field in values:
         alike = [getattr(tuning.candidates[i], field) for i in tuning.alike]
-        if alike:
-            span = f"{min(alike):g}" if min(alike) == max(alike) else f"{min(alike):g} … {max(alike):g}"
-            spans.append(f"{TUNED[field].name} {span}")
-    lines.append(f"{len(tuning.alike)} of {n} candidates are within {WORTH:.0%} of the best: {', '.join(spans)}")
+        span = f"{min(alike):g}" if min(alike) == max(alike) else f"{min(alike):g} … {max(alike):g}"
+        spans.append(f"{TUNED[field].name} {span}")
+    lines.append(f"{len(tuning.alike)} of {n} candidates are within {_MARGIN} of the best: {', '.join(spans)}")
     if tuning.n_diverged:
         lines.append(f"{tuning.n_diverged} of {n} diverge")
     described = ", ".join(f"{name} = {value:g}" for name, value in entries(best, values).items())
-    gain = 1.0 - tuning.ratio[tuning.ranking[0]] / tuning.ratio[0] if tuning.ratio[0] else 0.0
+    gain = reduction_percent(float(tuning.ratio[tuning.ranking[0]]), float(tuning.ratio[0]))
     if tuning.chosen:
-        lines.append(f"chosen: {described}, {gain:.1%} better than the machine's own settings")
+        lines.append(f"chosen: {described}, {gain:.1f} % better than the machine's own settings")
     else:
         lines.append(
-            f"chosen: the machine's own settings; the best is {gain:.1%} better, less than {WORTH:.0%} may be chance"
+            f"chosen: the machine's own settings; the best is {gain:.1f} % better, less than {_MARGIN} may be chance"
         )
     if min(tuning.ratio) >= 1.0:
         lines.append("no candidate is better than holding the last residual")

@@ -87,7 +87,7 @@ def _draw_parameter(axes: Axes, tuning: Tuning, field: str, highest: float) -> N
     for level, color in ((1.0, HOLD), (tuning.ratio_pb, PHYSICS)):
         if level < highest:
             axes.axhline(level, color=color, linewidth=1.2, linestyle="--")
-    margin = 0.05 * (highest - min(best))
+    margin = 0.05 * max(highest - min(best), 0.1 * highest)
     axes.set_ylim(max(min(best) - margin, 0.0), highest + 0.2 * margin)
     every = -(-len(values) // 10)
     axes.set_xticks(range(0, len(values), every), [f"{value:g}" for value in values[::every]], fontsize="small")

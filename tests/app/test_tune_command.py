@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,10 @@ import pytest
 from command_line import Run, write_log
 
 from hybridsep import load_machine
+from hybridsep.app.tune_table import print_tuning
+from hybridsep.base.settings import PredictorSettings
+from hybridsep.tune.figures import tuning_figure
+from hybridsep.tune.joint import Tuning
 
 PAPER = ("-m", "spring_mass_damper", "--jobs", "1")  # its machine file says trust = false
 FEW = ("--Np", "50", "--p", "5,40", "--q", "0:1", "--lambda", "1e-12:1e-8:x100", "--t_init", "0.1")
@@ -20,13 +25,14 @@ def test_candidates_are_ranked_with_the_baselines_beside_and_the_best_written(hy
     before = log.read_bytes()
     status, text, err = hybridsep("tune", log, *PAPER, *FEW, "--out", out, "--figure", figure)
     assert status == 0, err
+    text = " ".join(text.split())
     assert "RMS in µm against the measured position, Np = 50" in text
     for words in (
         "physics",
         "hold",
         "as it is",
         "× hold",
-        "of 13 candidates are within 5% of the best: p ",
+        "of 13 candidates are within 5 % of the best: p ",
         "chosen: ",
     ):
         assert words in text
@@ -64,7 +70,7 @@ def test_several_logs_and_trust(hybridsep: Run, tmp_path: Path) -> None:
     for one in found["candidates"]:
         rms = [one["rms_h"][name] / figures["rms_hold"] for name, figures in found["logs"].items()]
         assert one["ratio_to_hold"] == pytest.approx(np.prod(rms) ** (1 / 3))
-    text = hybridsep("tune", *logs, *PAPER, *few)[1]
+    text = " ".join(hybridsep("tune", *logs, *PAPER, *few)[1].split())
     assert "ranked by the geometric mean over the logs of RMS relative to hold" in text
 
 
@@ -125,3 +131,22 @@ def test_a_compensator_that_the_lags_do_not_fit_is_told_before_the_replays(hybri
     status, _, err = hybridsep("tune", tmp_path / "log.csv", *lagged)
     assert status == 2
     assert "compensator: q must be 0 … Np − 1 = 19, got 30" in err
+
+
+def test_what_diverges_is_said(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    own = PredictorSettings(trust=False)
+    settings = (own, replace(own, p=20), replace(own, p=30))
+    hold = np.array([1e-6])
+    for losses, words in (
+        ((np.inf, 5e-7, np.inf), ("2 of 3 diverge", "chosen: p = 20", "diverges")),
+        ((5e-7, np.inf, 4.9e-7), ("1 of 3 diverge", "the best is 2.0 % better, less than 5 % may be chance")),
+        ((2e-6, 3e-6, 2e-6), ("no candidate is better than holding the last residual",)),
+        ((np.inf, np.inf, np.inf), ("all 3 candidates diverge; try larger --lambda or smaller --p",)),
+    ):
+        found = Tuning(("a.csv",), settings, 2 * hold, hold, np.array(losses)[:, None])
+        windows = {100: Tuning(("a.csv",), settings[:1], 2 * hold, hold, found.rms_h[:1])}
+        print_tuning(found, windows, {"p": (20, 30, 50)}, "Axis", "rad")
+        text = " ".join(capsys.readouterr().out.split())
+        assert "RMS in µrad" in text
+        assert all(part in text for part in words)
+        tuning_figure(found, windows, {"p": (20, 30, 50)}, "Axis", tmp_path / "figure.svg")
