@@ -44,6 +44,8 @@ SLOW = (
     r"predict/test_predictor_with_reference_features\.py::test_friction_is_predicted_better",
     r"predict/test_trusted_figures\.py::test_(spiral|recorded)",
     r"random_drives/test_trusted_drives\.py",
+    r"random_drives/test_replay\.py::test_command_line",
+    r"app/test_fit\.py::test_a_(rotary|second)",
     r"test_machine\.py::test_the_stages_friction_is_calibrated",
     r"predict/test_regression\.py::test_weights_after_the_staircase_against_extended_precision\[100",
     r"suite/test_rollback\.py::test_a_state_goes_on_in_a_second_instance\[(19|21|57|203)-",
