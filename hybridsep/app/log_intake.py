@@ -59,7 +59,7 @@ def reading_of(
 
 
 def open_checked(
-    path: Path, reading: Reading, machine: Machine, *, fix: bool, as_is: bool
+    path: Path, reading: Reading, machine: Machine, *, fix: bool, as_is: bool, segments: bool = False
 ) -> tuple[LogReader | Log, Intake]:
     """Open a log and check it.
 
@@ -74,11 +74,13 @@ def open_checked(
         Whether the fixes of all findings are applied.
     as_is : bool
         Whether it is taken with the faults that it has.
+    segments : bool
+        Whether a fixed log may have several segments; else the longest is taken.
 
     Returns
     -------
     log : LogReader or Log
-        The log; with ``fix`` the fixed one, of several segments the longest.
+        The log; with ``fix`` the fixed one.
     intake : Intake
 
     Raises
@@ -105,7 +107,8 @@ def open_checked(
     if fix:
         if reader.n_samples > CHECKED_MAX:
             raise LogError(f"{path}: --fix takes at most {CHECKED_MAX} samples, the log has {reader.n_samples}; cut it")
-        return _longest_segment(intake.fixed(), path), intake
+        fixed = intake.fixed()
+        return (fixed if segments else _longest_segment(fixed, path)), intake
     return (reader if as_is else open_log(path, **reading)), intake
 
 

@@ -27,7 +27,7 @@ __all__ = [
     "shown_unit",
 ]
 
-console = Console()
+console = Console(emoji=False)
 
 _UNITS = {"m": ((1e6, "µm"), (1e3, "mm")), "rad": ((1e6, "µrad"), (1e3, "mrad"))}
 

@@ -172,6 +172,9 @@ class PredictorSettings(Settings):
     """Fields of a predictor that no machine file's or FMU's compensator has: it plans with the paper's model, from the
     state of ``G_pb`` now."""
 
+    TUNED: ClassVar[tuple[str, ...]] = ("p", "q", "lam", "effect", "noise_std", "forgetting")
+    """Fields that can be tuned on a log: ``Np`` is the controller's, and a warm-up hides errors."""
+
     ELSEWHERE: ClassVar[tuple[str, ...]] = ("T_s", "input_hold", *NEEDS_PREVIEW)
 
     Np: int = whole(100, 1, 100_000, "samples in a look-ahead window")
