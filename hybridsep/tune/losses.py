@@ -53,9 +53,10 @@ class Losses:
 
 
 def share_a_pass(candidates: Sequence[PredictorSettings]) -> bool:
-    """Return whether candidates are of the paper's model and differ in p, q and λ only."""
+    """Return whether candidates are of the paper's model, without a delay, and differ in p, q and λ only."""
     common = {replace(one, p=1, q=0, lam=1.0) for one in candidates}
-    return len(common) == 1 and not candidates[0].trust and candidates[0].v_friction == 0.0
+    one = candidates[0]
+    return len(common) == 1 and not one.trust and one.v_friction == 0.0 and one.measurement_delay == 0
 
 
 @one_blas_thread
@@ -85,7 +86,9 @@ def nested_losses(
         If samples cannot be used.
     """
     if not share_a_pass(candidates):
-        raise ParameterError("candidates of one pass must have trust = false and differ in p, q and lambda only")
+        raise ParameterError(
+            "candidates of one pass must have trust = false and no delay, and differ in p, q and lambda only"
+        )
     _check(pieces, as_samples)
     common = candidates[0]
     order = sorted(range(len(candidates)), key=lambda i: candidates[i].p)

@@ -123,8 +123,11 @@ def test_what_cannot_share_a_pass_is_replayed_with_the_same_losses() -> None:
         [PAPER, replace(PAPER, t_init=0.1)],
         [replace(PAPER, trust=True)],
         [replace(PAPER, v_friction=1e-3)],
+        [replace(PAPER, measurement_delay=2)],
     ):
-        with pytest.raises(ParameterError, match="must have trust = false and differ in p, q and lambda only"):
+        with pytest.raises(
+            ParameterError, match="must have trust = false and no delay, and differ in p, q and lambda only"
+        ):
             nested_losses(MODEL, pieces, others)
 
 
