@@ -118,6 +118,7 @@ def test_a_file_with_defaults(tmp_path: Path) -> None:
         "effect": 0.0,
         "noise_std": 0.0,
         "forgetting": 0.0,
+        "measurement_delay": 0,
         "dead_time": 0,
     }
     predictor = machine.new_predictor(replace(machine.predictor_settings, p=10))

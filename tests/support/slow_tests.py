@@ -52,6 +52,7 @@ SLOW = (
     r"suite/test_agreement\.py::test_plants_move_as_the_librarys_do\[0\.00(25|025)-",
     r"suite/test_agreement\.py::test_every_parameter",
     r"suite/test_agreement\.py::test_the_stage",
+    r"suite/test_conditions\.py::test_a_late",
     r"suite/test_agreement\.py::test_a_held_sensor",
     r"suite/test_agreement\.py::test_the_staircase_is_\w+_as_by_the_library\[(100|0\.1)",
     r"suite/test_timing\.py::test_outputs_are_those_of_the_last_instant\[(?!mixture-0)",
