@@ -83,6 +83,7 @@ def test_interface_of_the_predictor(predictor: FmuInstance) -> None:
         "x_pb_window[100]": ("local", "Real", "m"),
         "x_h_window[100]": ("local", "Real", "m"),
         "x_h_std_window[100]": ("local", "Real", "m"),
+        "measurement_delay": ("parameter", "Integer", None),
         "Np": ("parameter", "Integer", None),
         "p": ("parameter", "Integer", None),
         "q": ("parameter", "Integer", None),
@@ -102,7 +103,7 @@ def test_interface_of_the_predictor(predictor: FmuInstance) -> None:
     }
     found = {name: (v.causality, v.type, v.unit) for name, v in variables.items()}
     assert {name: found[name] for name in expected} == expected
-    assert len(found) == 29 + 400
+    assert len(found) == 30 + 400
     starts = {name: variables[name].start for name in ("Np", "p", "q", "lambda", "T_s", "t_init", "input_hold")}
     assert starts == {
         "Np": "100",
