@@ -18,7 +18,7 @@ from ..model.discrete import DiscreteModel
 from .blend import Blend
 from .candidates import Candidate, CandidatePrediction, ResidualScale, SolvedCandidate, lags
 from .disturbances import LEAST_VELOCITY, StaticFeatures, StaticState
-from .forecast import Forecast
+from .forecast import FeatureScales, Forecast
 from .guard import SensorGuard
 from .regression import RidgeRegression
 
@@ -105,33 +105,39 @@ class TrustedModel:
         self.look_ahead = preview
         self.static.damping_of_motion = preview > self.settings.Np
 
-    def forecast(self, x_d: Array, x_pb: Array, path: Array | None = None) -> Forecast:
+    def forecast(self, x_d: Array, x_pb: Array, scales: FeatureScales | None = None) -> Forecast:
         """Predict the residual over the next window; nothing is changed.
 
         Parameters
         ----------
         x_d, x_pb : (n,) array, m
             Commands and physics-based prediction, relative to the start.
-        path : (m,) array, m, optional
-            Commanded positions as far as they are known, in a compensator.
+        scales : FeatureScales, optional
+            Those of :meth:`scales` for these commands if left out; a compensator's follow from its preview.
         """
-        velocity_scale, largest = self.scales(x_d, x_pb, path)
+        scales = self.scales(x_d, x_pb) if scales is None else scales
+        return self.forecast_by(self.solved(scales), x_d, x_pb, scales)
+
+    def forecast_by(
+        self, solved: tuple[SolvedCandidate, ...], x_d: Array, x_pb: Array, scales: FeatureScales
+    ) -> Forecast:
+        """Predict as :meth:`forecast` by the candidates of :meth:`solved`."""
         predictions: tuple[CandidatePrediction, ...] = ()
-        if self.has_learned(velocity_scale):
-            rows, _ = self.static.rows(self.state, x_d, x_pb, x_pb, velocity_scale)
-            solved = [self.solve(candidate, largest) for candidate in self.candidates]
+        x = x_pb
+        if solved:
+            rows, _ = self.static.rows(self.state, x_d, x_pb, x_pb, scales.velocity)
             # The stiffness acts at the position, which the physics model alone does not give well enough.
             x = x_pb + self.predict(solved[0], rows).e_h
-            rows, _ = self.static.rows(self.state, x_d, x_pb, x, velocity_scale)
+            rows, _ = self.static.rows(self.state, x_d, x_pb, x, scales.velocity)
             predictions = tuple(self.predict(candidate, rows) for candidate in solved)
         hold = self.hold
         candidates = self._blended(hold, predictions, len(x_d))
         e_h = self.blend.weights @ candidates
         disagreement = np.maximum(self.blend.weights @ candidates**2 - e_h**2, 0.0)
-        return Forecast(x_d, x_pb, e_h, disagreement, hold, predictions, largest, velocity_scale)
+        return Forecast(x_d, x_pb, e_h, disagreement, x, hold, predictions, scales)
 
-    def scales(self, x_d: Array, x_pb: Array, path: Array | None = None) -> tuple[float, Array]:
-        """Return the velocity scale of the friction, m/s, and the largest magnitudes of the features, window included.
+    def scales(self, x_d: Array, x_pb: Array, path: Array | None = None) -> FeatureScales:
+        """Return the scales of the features, those of the next window included.
 
         Parameters
         ----------
@@ -148,11 +154,17 @@ class TrustedModel:
         velocity_scale = peak if outgrown else self.velocity_scale
         rows, _ = self.static.rows(self.state, x_d, x_pb, x_pb, velocity_scale)
         before = np.zeros(self.static.n) if outgrown else self.largest
-        return velocity_scale, np.maximum(before, np.abs(rows).max(axis=0))
+        return FeatureScales(velocity_scale, np.maximum(before, np.abs(rows).max(axis=0)))
 
     def has_learned(self, velocity_scale: float) -> bool:
         """Return whether there is something to predict with at a velocity scale of :meth:`scales`, m/s."""
         return self.n_rows > 0.0 and velocity_scale == self.velocity_scale and self.scale.largest_square > 0.0
+
+    def solved(self, scales: FeatureScales) -> tuple[SolvedCandidate, ...]:
+        """Return the candidates with their weights; none if there is nothing to predict with."""
+        if not self.has_learned(scales.velocity):
+            return ()
+        return tuple(self.solve(candidate, scales.largest) for candidate in self.candidates)
 
     @property
     def hold(self) -> float:
@@ -172,10 +184,10 @@ class TrustedModel:
             Whether they are learned; the next window starts from them in any case.
         """
         m, p = len(x), self.settings.p
-        if forecast.velocity_scale != self.velocity_scale:  # outgrown
+        if forecast.scales.velocity != self.velocity_scale:  # outgrown
             self.regression = RidgeRegression(self.regression.n_features, _NO_PENALTY)
             self.n_rows = 0.0
-        self.largest, self.velocity_scale = forecast.largest, forecast.velocity_scale
+        self.velocity_scale, self.largest = forecast.scales
         x_d, x_pb = forecast.x_d[:m], forecast.x_pb[:m]
         accepted = self.guard.accepts(x, x_pb, self.scale.largest)
         e = _bridged(float(self.past[0]), x - x_pb, accepted)
