@@ -24,9 +24,10 @@ static const double candidate_correlation_rate = 0.1;
 /* Set what follows from the parameters; return the bytes of the block. */
 static double candidate_lay_out(hsep_candidate *self, const hsep_candidate_shape *shape)
 {
-    const double window = (double)shape->Np, lags = (double)shape->p, n = (double)shape->n_static + lags;
+    const double window = (double)shape->n, lags = (double)shape->p, n = (double)shape->n_static + lags;
     double end = HSEP_WORDS(hsep_candidate);
     self->Np = shape->Np;
+    self->n = shape->n;
     self->n_static = shape->n_static;
     self->p = shape->p;
     self->correlation_max = shape->correlation_max;
@@ -69,7 +70,22 @@ HSEP_API int hsep_candidate_valid(const void *block, const hsep_candidate_shape 
            hsep_regression_valid(hsep_at_bytes(block, got.solved), shape->n_static + shape->p);
 }
 
-HSEP_API const double *hsep_candidate_prediction(const hsep_candidate *self) { return hsep_at_const(self, self->e_h); }
+/* The window's part of a signal of all predicted samples. */
+static const double *candidate_window(const hsep_candidate *self, uint64_t signal)
+{
+    return hsep_at_const(self, signal) + (self->n - self->Np);
+}
+
+HSEP_API const double *hsep_candidate_prediction(const hsep_candidate *self)
+{
+    return candidate_window(self, self->e_h);
+}
+
+HSEP_API double hsep_candidate_shrink(const hsep_candidate *self, uint64_t j)
+{
+    const double unshrunk = hsep_at_const(self, self->unshrunk)[j];
+    return unshrunk == 0.0 ? 0.0 : hsep_at_const(self, self->e_h)[j] / unshrunk;
+}
 
 HSEP_API void hsep_candidate_solve(
     hsep_candidate *self, const hsep_regression *regression, const double static_scales[], double least_variance)
@@ -93,7 +109,7 @@ static double candidate_bounded(double value, double bound) { return fmax(-bound
 static void candidate_run(const hsep_candidate *self, double e[])
 {
     const double *lag_weights = hsep_at_const(self, self->weights) + self->n_static;
-    for (uint64_t j = self->Np; self->p > 0 && j-- > 0;) {
+    for (uint64_t j = self->n; self->p > 0 && j-- > 0;) {
         e[j] += hsep_dot(lag_weights, e + j + 1, self->p);
     }
 }
@@ -101,16 +117,16 @@ static void candidate_run(const hsep_candidate *self, double e[])
 /* Free run from the last residuals, and the same within bounds. */
 static void candidate_free_run(hsep_candidate *self, const double rows[], const double past[], double bound)
 {
-    const uint64_t Np = self->Np, n_static = self->n_static;
+    const uint64_t n = self->n, n_static = self->n_static;
     const double *weights = hsep_at(self, self->weights);
     double *run = hsep_at(self, self->run), *unshrunk = hsep_at(self, self->unshrunk);
-    for (uint64_t j = Np; j-- > 0; rows += n_static) {
+    for (uint64_t j = n; j-- > 0; rows += n_static) {
         run[j] = hsep_dot(weights, rows, n_static);
     }
-    memcpy(run + Np, past, (size_t)self->p * sizeof(double));
-    memcpy(unshrunk + Np, past, (size_t)self->p * sizeof(double));
+    memcpy(run + n, past, (size_t)self->p * sizeof(double));
+    memcpy(unshrunk + n, past, (size_t)self->p * sizeof(double));
     candidate_run(self, run);
-    for (uint64_t j = 0; j < Np; j++) {
+    for (uint64_t j = 0; j < n; j++) {
         unshrunk[j] = isfinite(run[j]) ? candidate_bounded(run[j], bound) : 0.0;
     }
 }
@@ -118,29 +134,29 @@ static void candidate_free_run(hsep_candidate *self, const double rows[], const 
 /* Variance of the prediction: that of the rows, carried through the impulse response; at most most. */
 static void candidate_spread(hsep_candidate *self, const double rows[], double most)
 {
-    const uint64_t Np = self->Np, n_static = self->n_static, p = self->p;
+    const uint64_t n = self->n, n_static = self->n_static, p = self->p;
     const double *run = hsep_at(self, self->run), *unshrunk = hsep_at(self, self->unshrunk);
     double *spread = hsep_at(self, self->spread), *response = hsep_at(self, self->response);
     double *squares = hsep_at(self, self->squares), *row = hsep_regression_row(candidate_solved(self));
-    for (uint64_t j = Np; j-- > 0; rows += n_static) {
+    for (uint64_t j = n; j-- > 0; rows += n_static) {
         memcpy(row, rows, (size_t)n_static * sizeof(double));
         memcpy(row + n_static, unshrunk + j + 1, (size_t)p * sizeof(double));
         spread[j] = self->variance * hsep_penalised_leverage(candidate_solved(self));
     }
     if (p > 0) {
-        memset(response, 0, (size_t)(Np + p) * sizeof(double));
-        response[Np - 1] = 1.0;
+        memset(response, 0, (size_t)(n + p) * sizeof(double));
+        response[n - 1] = 1.0;
         candidate_run(self, response);
-        for (uint64_t i = 0; i < Np; i++) {
-            const double at = response[Np - 1 - i];
+        for (uint64_t i = 0; i < n; i++) {
+            const double at = response[n - 1 - i];
             const double within = isnan(at) ? candidate_diverged : candidate_bounded(at, candidate_diverged);
             squares[i] = within * within;
         }
-        for (uint64_t j = 0; j < Np; j++) { /* from the newest on: what a sum needs is not overwritten yet */
-            spread[j] = fmin(hsep_dot(squares, spread + j, Np - j), most);
+        for (uint64_t j = 0; j < n; j++) { /* from the newest on: what a sum needs is not overwritten yet */
+            spread[j] = fmin(hsep_dot(squares, spread + j, n - j), most);
         }
     }
-    for (uint64_t j = 0; j < Np; j++) {
+    for (uint64_t j = 0; j < n; j++) {
         spread[j] = isfinite(run[j]) ? spread[j] : most;
     }
 }
@@ -153,7 +169,7 @@ HSEP_API void hsep_candidate_predict(
     double *e_h = hsep_at(self, self->e_h);
     candidate_free_run(self, rows, past, candidate_lag_max * largest);
     candidate_spread(self, rows, candidate_diverged * largest * largest);
-    for (uint64_t j = 0; j < self->Np; j++) {
+    for (uint64_t j = 0; j < self->n; j++) {
         const double shrunk = unshrunk[j] * (scale->recent / (scale->recent + candidate_caution * spread[j]));
         e_h[j] = candidate_bounded(shrunk, candidate_prediction_max * largest);
     }
@@ -161,7 +177,7 @@ HSEP_API void hsep_candidate_predict(
 
 HSEP_API void hsep_candidate_judge(hsep_candidate *self, const double measured[], const double accepted[])
 {
-    const double *unshrunk = hsep_at(self, self->unshrunk);
+    const double *unshrunk = candidate_window(self, self->unshrunk);
     double sum = 0.0, n = 0.0;
     for (uint64_t j = 0; j < self->Np; j++) {
         sum += accepted[j] * (measured[j] - unshrunk[j]);
@@ -174,7 +190,7 @@ HSEP_API void hsep_candidate_judge(hsep_candidate *self, const double measured[]
 
 HSEP_API double hsep_candidate_surprise(const hsep_candidate *self, const double measured[], const double accepted[])
 {
-    const double *unshrunk = hsep_at_const(self, self->unshrunk), *spread = hsep_at_const(self, self->spread);
+    const double *unshrunk = candidate_window(self, self->unshrunk), *spread = candidate_window(self, self->spread);
     double squares = 0.0, expected = 0.0, n = 0.0;
     for (uint64_t j = 0; j < self->Np; j++) {
         const double error = measured[j] - unshrunk[j];

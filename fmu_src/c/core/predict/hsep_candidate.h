@@ -4,8 +4,8 @@
  * response. A prediction e of variance tau^2 is shrunk to e v / (v + 2 tau^2), v being the recent mean square of the
  * residual: at a first motion, a first reversal or in a region not seen yet the physics model remains.
  *
- * Signals are kept newest first: sample k is at place Np - 1 - k. Memory is one block, without pointers. Reentrant;
- * allocates nothing.
+ * Signals are kept newest first: of the n samples that are predicted, sample k is at place n - 1 - k. The first Np of
+ * them are the window, which is measured then. Memory is one block, without pointers. Reentrant; allocates nothing.
  */
 #ifndef HSEP_CANDIDATE_H
 #define HSEP_CANDIDATE_H
@@ -24,12 +24,13 @@ typedef struct {
 } hsep_residual_scale;
 
 typedef struct {
-    uint64_t Np, n_static, p; /* samples of a window, features without lags, lags */
+    uint64_t Np, n;           /* samples of a window, and of a prediction, n >= Np */
+    uint64_t n_static, p;     /* features without lags, lags */
     double correlation_max;   /* beyond which the penalty does not grow; 1: rows are taken as independent */
 } hsep_candidate_shape;
 
 typedef struct {
-    uint64_t Np, n_static, p;
+    uint64_t Np, n, n_static, p;
     double correlation_max;
     double noise_variance; /* m2, of a row about the model; 0 until a window is measured */
     double correlation;    /* rows that count as one: errors of neighbouring rows are alike */
@@ -38,18 +39,18 @@ typedef struct {
     /* Offsets in doubles from the beginning of the struct */
     uint64_t priors;   /* (n_static + p,) prior standard deviations, then penalties of the weights */
     uint64_t weights;  /* (n_static + p,) */
-    uint64_t run;      /* (Np + p,) m, the recursion, behind it measured residuals */
-    uint64_t unshrunk; /* (Np + p,) m, the same within bounds */
-    uint64_t e_h;      /* (Np,) m, shrunk */
-    uint64_t response; /* (Np + p,) the recursion's impulse response, behind it 0 */
-    uint64_t squares;  /* (Np,) its squares, oldest first */
-    uint64_t spread;   /* (Np,) m2, variance of the prediction */
+    uint64_t run;      /* (n + p,) m, the recursion, behind it measured residuals */
+    uint64_t unshrunk; /* (n + p,) m, the same within bounds */
+    uint64_t e_h;      /* (n,) m, shrunk */
+    uint64_t response; /* (n + p,) the recursion's impulse response, behind it 0 */
+    uint64_t squares;  /* (n,) its squares, oldest first */
+    uint64_t spread;   /* (n,) m2, variance of the prediction */
     uint64_t solved;   /* the regression with penalties */
 } hsep_candidate;
 
 HSEP_ASSERT_WORDS(hsep_residual_scale, 3);
-HSEP_ASSERT_WORDS(hsep_candidate_shape, 4);
-HSEP_ASSERT_WORDS(hsep_candidate, 17);
+HSEP_ASSERT_WORDS(hsep_candidate_shape, 5);
+HSEP_ASSERT_WORDS(hsep_candidate, 18);
 
 /* Bytes of the block, counted in double so that no size can overflow. */
 HSEP_API double hsep_candidate_size(const hsep_candidate_shape *shape);
@@ -65,8 +66,8 @@ HSEP_API int hsep_candidate_valid(const void *block, const hsep_candidate_shape 
 HSEP_API void hsep_candidate_solve(
     hsep_candidate *self, const hsep_regression *regression, const double static_scales[], double least_variance);
 
-/* Predict a window in free run. rows: (Np, n_static), sample after sample; past: (p,) m, the last residuals.
- * Cost: Np times that of hsep_penalised_leverage, and Np^2 / 2 multiply-adds. */
+/* Predict n samples in free run. rows: (n, n_static), sample after sample; past: (p,) m, the last residuals.
+ * Cost: n times that of hsep_penalised_leverage, and n^2 / 2 multiply-adds. */
 HSEP_API void hsep_candidate_predict(
     hsep_candidate *self, const double rows[], const double past[], const hsep_residual_scale *scale);
 
@@ -77,7 +78,10 @@ HSEP_API void hsep_candidate_judge(hsep_candidate *self, const double measured[]
 /* Mean square error of the window relative to the one that was expected. */
 HSEP_API double hsep_candidate_surprise(const hsep_candidate *self, const double measured[], const double accepted[]);
 
-/* Prediction of a window, (Np,), m. */
+/* Prediction of the window, (Np,), m. */
 HSEP_API const double *hsep_candidate_prediction(const hsep_candidate *self);
+
+/* Part of the recursion that the prediction of n samples has, at place j: what shrinking and bounds leave of it. */
+HSEP_API double hsep_candidate_shrink(const hsep_candidate *self, uint64_t j);
 
 #endif

@@ -190,7 +190,7 @@ static void predictor_learn_window(hsep_predictor *self)
     double *past_e = hsep_at(self, self->past_e);
     if (self->learning) {
         if (trusted != NULL) {
-            hsep_trusted_learn(trusted, hsep_at(self, self->past_x), past_e);
+            hsep_trusted_learn(trusted, hsep_at(self, self->command), hsep_at(self, self->past_x), past_e, 1);
         }
         hsep_uncertainty_learn(
             hsep_predictor_uncertainty(self), past_e, trusted != NULL ? hsep_at(trusted, trusted->accepted) : NULL);

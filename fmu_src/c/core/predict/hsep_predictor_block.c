@@ -35,7 +35,8 @@ static hsep_trusted_parameters predictor_trusted_parameters(const hsep_predictor
         .settings = &parameters->settings,
         .trust = &parameters->trust,
         .modes = parameters->modes,
-        .n_modes = parameters->n_modes};
+        .n_modes = parameters->n_modes,
+        .preview = parameters->preview};
 }
 
 /* Set what follows from the parameters; return the bytes of the block. */
@@ -58,7 +59,7 @@ static double predictor_lay_out(hsep_predictor *self, const hsep_predictor_param
     self->x_pb = hsep_take(&end, Np);
     self->x_h = hsep_take(&end, Np);
     self->ahead_pb = hsep_take(&end, parameters->planned ? 0.0 : Np);
-    self->command = hsep_take(&end, parameters->planned ? 0.0 : Np);
+    self->command = hsep_take(&end, Np);
     self->past_x = hsep_take(&end, Np + q);
     self->past_e = hsep_take(&end, Np + p);
     self->e_h = parameters->planned ? hsep_take(&end, Np + p) : self->past_e;

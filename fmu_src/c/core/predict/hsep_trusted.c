@@ -25,7 +25,7 @@ static const double trusted_hold_max = 1.2;
 /* Lags of a row that may stand for samples without a measurement. */
 static const double trusted_bridged_max = 3.0;
 
-/* Largest weight of earlier runs when another begins, in windows. */
+/* Largest weight of earlier runs when another begins, in predictions. */
 static const double trusted_carried = 10.0;
 
 /* Mean square error of a window, relative to the expected one, above which the machine has changed; and what then
@@ -34,35 +34,33 @@ static const double trusted_surprise = 10.0, trusted_surprised = 0.1;
 
 static const double trusted_least_magnitude = 1e-150; /* of a feature */
 
-/* Begin the window: its features, at the position x_pb, and their largest magnitudes. Return whether the commanded
- * velocity has outgrown what was learned. */
-static int trusted_begin(hsep_trusted *self, const double x_d[], const double x_pb[])
+/* Whether the commanded velocity outgrows what was learned; the velocity scale with it. A compensator begins to move
+ * before the path, with a creep: its first scale is the path's. */
+static int trusted_outgrown(hsep_trusted *self, const double x_d[], const double path[])
 {
-    hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
-    const double peak = hsep_disturbances_peak_velocity(disturbances, x_d);
-    const int outgrown = peak > fmax(trusted_growth * self->velocity_scale, trusted_least_velocity);
-    double *rows = hsep_at(self, self->rows), *largest = hsep_at(self, self->forecast_largest);
-    self->forecast_scale = outgrown ? peak : self->velocity_scale;
-    hsep_disturbances_begin(disturbances, x_d, x_pb, self->forecast_scale, rows);
-    hsep_disturbances_stiffness(disturbances, x_pb, rows);
-    for (uint64_t i = 0; i < self->n_static; i++) {
-        largest[i] = outgrown ? 0.0 : hsep_at(self, self->largest)[i];
-    }
-    for (uint64_t k = 0; k < self->Np; k++, rows += self->n_static) {
-        for (uint64_t i = 0; i < self->n_static; i++) {
-            largest[i] = fmax(largest[i], fabs(rows[i]));
+    const hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
+    double peak = hsep_disturbances_peak_velocity(disturbances, x_d, self->n);
+    double most = trusted_growth * self->velocity_scale;
+    if (path != NULL && self->n_rows == 0.0) {
+        peak = 0.0;
+        for (uint64_t j = 0; j + 1 < self->n; j++) {
+            peak = fmax(peak, fabs(path[j] - path[j + 1]));
         }
+        peak = fmax(peak / disturbances->T_s, self->velocity_scale);
+        most = self->velocity_scale;
     }
+    const int outgrown = peak > fmax(most, trusted_least_velocity);
+    self->forecast_scale = outgrown ? peak : self->velocity_scale;
     return outgrown;
 }
 
-/* Predict the window by the candidates. past: (p,), m. */
-static void trusted_predict(hsep_trusted *self, const double x_pb[], const double past[])
+/* Solve for the weights of the candidates. */
+static void trusted_solve(hsep_trusted *self)
 {
     const double effect = self->effect > 0.0 ? self->effect : sqrt(self->scale.largest_square);
     const double least = fmin(self->least_variance, trusted_least_noise * self->scale.largest_square);
     const double *largest = hsep_at(self, self->forecast_largest);
-    double *scales = hsep_at(self, self->scales), *x = hsep_at(self, self->x), *rows = hsep_at(self, self->rows);
+    double *scales = hsep_at(self, self->scales);
     for (uint64_t i = 0; i < self->n_static; i++) {
         const double share = hsep_disturbances_share(hsep_trusted_disturbances(self), i);
         scales[i] = effect * share / fmax(largest[i], trusted_least_magnitude);
@@ -70,37 +68,82 @@ static void trusted_predict(hsep_trusted *self, const double x_pb[], const doubl
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
         hsep_candidate_solve(hsep_trusted_candidate(self, i), hsep_trusted_regression(self), scales, least);
     }
-    /* The stiffness acts at the position, which the physics model alone does not give well enough. */
-    hsep_candidate_predict(hsep_trusted_candidate(self, 0), rows, past, &self->scale);
-    for (uint64_t j = 0; j < self->Np; j++) {
-        x[j] = x_pb[j] + hsep_candidate_prediction(hsep_trusted_candidate(self, 0))[j];
+}
+
+HSEP_API void hsep_trusted_scale(
+    hsep_trusted *self, const double x_d[], const double x_pb[], const double path[], double last_residual)
+{
+    hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
+    const double bound = trusted_hold_max * self->scale.largest;
+    const int outgrown = trusted_outgrown(self, x_d, path);
+    double *rows = hsep_at(self, self->rows), *largest = hsep_at(self, self->forecast_largest);
+    hsep_disturbances_command(disturbances, x_d, x_pb, self->n, self->forecast_scale, rows);
+    hsep_disturbances_motion(disturbances, x_pb, x_pb, self->n, rows);
+    for (uint64_t i = 0; i < self->n_static; i++) {
+        largest[i] = outgrown ? 0.0 : hsep_at(self, self->largest)[i];
     }
-    hsep_disturbances_stiffness(hsep_trusted_disturbances(self), x, rows);
+    for (uint64_t k = 0; k < self->n; k++, rows += self->n_static) {
+        for (uint64_t i = 0; i < self->n_static; i++) {
+            largest[i] = fmax(largest[i], fabs(rows[i]));
+        }
+    }
+    self->hold = fmin(fmax(last_residual, -bound), bound);
+    self->predicted = self->n_rows > 0.0 && !outgrown && self->scale.largest_square > 0.0;
+    if (self->predicted) {
+        trusted_solve(self);
+    }
+}
+
+/* Predict by the candidates, whose rows hold the commands and stiffness and damping at x_pb. past: (p,), m. */
+static void trusted_candidates(hsep_trusted *self, const double x_pb[], const double past[])
+{
+    double *x = hsep_at(self, self->x), *rows = hsep_at(self, self->rows);
+    hsep_candidate *first = hsep_trusted_candidate(self, 0);
+    /* The stiffness acts at the position, which the physics model alone does not give well enough. */
+    hsep_candidate_predict(first, rows, past, &self->scale);
+    for (uint64_t j = 0; j < self->n; j++) {
+        x[j] = x_pb[j] + hsep_at(first, first->e_h)[j];
+    }
+    hsep_disturbances_motion(hsep_trusted_disturbances(self), x_pb, x, self->n, rows);
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
         hsep_candidate_predict(hsep_trusted_candidate(self, i), rows, past, &self->scale);
     }
 }
 
-HSEP_API void hsep_trusted_forecast(hsep_trusted *self, const double x_d[], const double x_pb[], double e[])
+/* e: the blend of the candidates, which have predicted. */
+static void trusted_blend(hsep_trusted *self, const double x_pb[], double e[])
 {
-    const double *past = e + self->Np, *weights = self->blend.weights, bound = trusted_hold_max * self->scale.largest;
-    const int outgrown = trusted_begin(self, x_d, x_pb);
+    const double *weights = self->blend.weights;
     double *disagreement = hsep_at(self, self->disagreement);
-    self->hold = fmin(fmax(past[0], -bound), bound);
-    self->predicted = self->n_rows > 0.0 && !outgrown && self->scale.largest_square > 0.0;
     if (self->predicted) {
-        trusted_predict(self, x_pb, past);
+        trusted_candidates(self, x_pb, e + self->n);
     }
-    for (uint64_t j = 0; j < self->Np; j++) {
+    for (uint64_t j = 0; j < self->n; j++) {
         double square = weights[0] * self->hold * self->hold;
         e[j] = weights[0] * self->hold;
         for (uint64_t i = 0; self->predicted && i < HSEP_N_CANDIDATES; i++) {
-            const double candidate = hsep_candidate_prediction(hsep_trusted_candidate(self, i))[j];
+            hsep_candidate *one = hsep_trusted_candidate(self, i);
+            const double candidate = hsep_at(one, one->e_h)[j];
             e[j] += weights[1 + i] * candidate;
             square += weights[1 + i] * candidate * candidate;
         }
         disagreement[j] = fmax(square - e[j] * e[j], 0.0);
     }
+}
+
+HSEP_API void hsep_trusted_predict(hsep_trusted *self, const double x_d[], const double x_pb[], double e[])
+{
+    hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
+    double *rows = hsep_at(self, self->rows);
+    hsep_disturbances_command(disturbances, x_d, x_pb, self->n, self->forecast_scale, rows);
+    hsep_disturbances_motion(disturbances, x_pb, x_pb, self->n, rows);
+    trusted_blend(self, x_pb, e);
+}
+
+HSEP_API void hsep_trusted_forecast(hsep_trusted *self, const double x_d[], const double x_pb[], double e[])
+{
+    hsep_trusted_scale(self, x_d, x_pb, NULL, e[self->n]);
+    trusted_blend(self, x_pb, e); /* the rows are those of the scales */
 }
 
 /* Weigh all samples so far by kept. */
@@ -114,7 +157,7 @@ static void trusted_discount(hsep_trusted *self, double kept)
 
 HSEP_API void hsep_trusted_restart(hsep_trusted *self)
 {
-    const double most = trusted_carried * (double)self->Np;
+    const double most = trusted_carried * (double)self->n;
     trusted_discount(self, most / fmax(self->n_rows, most));
 }
 
@@ -256,7 +299,7 @@ static void trusted_assess(hsep_trusted *self, const double e[], double count)
     hsep_blend_update(&self->blend, products, scale->largest_square, self->Np);
 }
 
-HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_pb[], double e[])
+HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_d[], const double x_pb[], double e[], int fold)
 {
     hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
     double *x = hsep_at(self, self->x), *bridged = hsep_at(self, self->bridged);
@@ -276,9 +319,12 @@ HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_pb[], double
     for (uint64_t j = 0; j < self->Np; j++) {
         x[j] = x_pb[j] + e[j];
     }
-    hsep_disturbances_stiffness(disturbances, x, hsep_at(self, self->rows));
+    if (self->n > self->Np) { /* what was tried last went beyond the window */
+        hsep_disturbances_command(disturbances, x_d, x_pb, self->Np, self->velocity_scale, hsep_at(self, self->rows));
+    }
+    hsep_disturbances_motion(disturbances, x_pb, x, self->Np, hsep_at(self, self->rows));
     hsep_disturbances_end(disturbances);
-    if (count > 0.0) {
+    if (fold && count > 0.0) {
         trusted_fold(self, e);
         trusted_judge(self, n_rows, e);
         trusted_assess(self, e, count);

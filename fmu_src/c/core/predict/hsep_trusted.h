@@ -3,10 +3,11 @@
  * Where the paper's regression has one bare penalty lambda on every weight, here each weight has a prior from the
  * effect that its feature may have, and lambda is the variance of the noise, estimated from the residuals.
  *
- * A window is predicted by hsep_trusted_forecast, and learned by hsep_trusted_learn once it is measured. Signals are
- * kept newest first: sample k is at place Np - 1 - k, and what was before the window is behind it. Positions are
- * relative to the start. Memory is one block, without pointers; a window predicted and not measured yet is part of it.
- * Reentrant; allocates nothing.
+ * A window is predicted by hsep_trusted_forecast, and learned by hsep_trusted_learn once it is measured. A compensator,
+ * which decides the commands of a window, calls hsep_trusted_scale and, for commands that it tries over its preview,
+ * hsep_trusted_predict; the last ones count. Signals are kept newest first: of n samples, sample k is at place
+ * n - 1 - k, and what was before them is behind them. Positions are relative to the start. Memory is one block, without
+ * pointers; a window predicted and not measured yet is part of it. Reentrant; allocates nothing.
  */
 #ifndef HSEP_TRUSTED_H
 #define HSEP_TRUSTED_H
@@ -31,10 +32,11 @@ typedef struct {
     const hsep_trust_settings *trust;
     const hsep_mode *modes; /* (n_modes,) */
     uint64_t n_modes;
+    uint64_t preview; /* samples of a prediction, >= Np; more in a compensator */
 } hsep_trusted_parameters;
 
 typedef struct {
-    uint64_t Np, p, n_static;
+    uint64_t Np, n, p, n_static; /* samples of a window and of a prediction, lags, features without lags */
     double least_variance; /* m2, of the noise */
     double effect;         /* m, prior standard deviation of a feature's effect; 0: from the residuals */
     double given_variance; /* m2, of the noise; 0: estimated */
@@ -54,17 +56,17 @@ typedef struct {
     uint64_t largest;          /* (n_static,) largest magnitudes of the features without lags */
     uint64_t forecast_largest; /* (n_static,) those with the window that is predicted */
     uint64_t scales;           /* (n_static,) prior standard deviations of their weights */
-    uint64_t x;                /* (Np,) m, position */
+    uint64_t x;                /* (n,) m, position */
     uint64_t measured;         /* (Np,) m, measured position, NaN where missing */
     uint64_t accepted;         /* (Np,) whether it is plausible */
     uint64_t bridged;          /* (Np + p,) whether a residual stands for one that is not */
-    uint64_t disagreement;     /* (Np,) m2, variance of the candidates about their blend */
-    uint64_t rows;             /* (Np, n_static) features without lags, sample after sample */
+    uint64_t disagreement;     /* (n,) m2, variance of the candidates about their blend */
+    uint64_t rows;             /* (n, n_static) features without lags, sample after sample */
     uint64_t disturbances, regression;
     uint64_t candidates[HSEP_N_CANDIDATES];
 } hsep_trusted;
 
-HSEP_ASSERT_WORDS(hsep_trusted, 54 + sizeof(hsep_guard) / 8);
+HSEP_ASSERT_WORDS(hsep_trusted, 55 + sizeof(hsep_guard) / 8);
 
 /* Features, those without lags first. */
 HSEP_API uint64_t hsep_trusted_n(const hsep_predictor_settings *settings);
@@ -99,12 +101,21 @@ HSEP_API int hsep_trusted_sound(hsep_trusted *self);
  * Np m^2 / 2, Np^2 / 2, and 6 Np tanh. */
 HSEP_API void hsep_trusted_forecast(hsep_trusted *self, const double x_d[], const double x_pb[], double e[]);
 
+/* Its two parts over n samples. Take the scales of the features from the samples that come next, and solve for the
+ * weights; path: unmodified commands, (n,), m, which a compensator knows, or NULL. */
+HSEP_API void hsep_trusted_scale(
+    hsep_trusted *self, const double x_d[], const double x_pb[], const double path[], double last_residual);
+
+/* Predict with them. e: (n + p,), m. */
+HSEP_API void hsep_trusted_predict(hsep_trusted *self, const double x_d[], const double x_pb[], double e[]);
+
 /* Take the measured position of sample k of the window that was predicted, m, relative to the start; NaN: missing. */
 HSEP_API void hsep_trusted_measure(hsep_trusted *self, uint64_t k, double x);
 
-/* Learn that window. e: (Np + p,), m, becomes its residuals; where the measurement is not plausible, between those
- * beside it; behind it those before it. Cost: Np times that of hsep_regression_fold. */
-HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_pb[], double e[]);
+/* Learn that window. x_d: its commands, (Np,), m; e: (Np + p,), m, becomes its residuals; where the measurement is not
+ * plausible, between those beside it; behind it those before it; fold: whether it is learned, the next window starts
+ * from it in any case. Cost: Np times that of hsep_regression_fold. */
+HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_d[], const double x_pb[], double e[], int fold);
 
 /* Discount what earlier runs have learned: a machine may have changed meanwhile. */
 HSEP_API void hsep_trusted_restart(hsep_trusted *self);

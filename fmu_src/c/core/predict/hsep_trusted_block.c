@@ -32,7 +32,7 @@ static const double trusted_cautious = 100.0;
 static hsep_candidate_shape trusted_shape(const hsep_trusted *self, uint64_t candidate)
 {
     return (hsep_candidate_shape){
-        self->Np, self->n_static, candidate > 0 ? self->p : 0, candidate > 1 ? 1.0 : trusted_cautious};
+        self->Np, self->n, self->n_static, candidate > 0 ? self->p : 0, candidate > 1 ? 1.0 : trusted_cautious};
 }
 
 /* Set what follows from the parameters; return the bytes of the block. */
@@ -40,9 +40,11 @@ static double trusted_lay_out(hsep_trusted *self, const hsep_trusted_parameters 
 {
     const hsep_predictor_settings *settings = parameters->settings;
     const hsep_trust_settings *trust = parameters->trust;
-    const double Np = (double)settings->Np, n_static = (double)hsep_disturbances_n(settings->q);
+    const double Np = (double)settings->Np, n = (double)parameters->preview;
+    const double n_static = (double)hsep_disturbances_n(settings->q);
     double end = HSEP_WORDS(hsep_trusted);
     self->Np = settings->Np;
+    self->n = parameters->preview;
     self->p = settings->p;
     self->n_static = hsep_disturbances_n(settings->q);
     self->least_variance = settings->lambda;
@@ -52,12 +54,12 @@ static double trusted_lay_out(hsep_trusted *self, const hsep_trusted_parameters 
     self->largest = hsep_take(&end, n_static);
     self->forecast_largest = hsep_take(&end, n_static);
     self->scales = hsep_take(&end, n_static);
-    self->x = hsep_take(&end, Np);
+    self->x = hsep_take(&end, n);
     self->measured = hsep_take(&end, Np);
     self->accepted = hsep_take(&end, Np);
     self->bridged = hsep_take(&end, Np + (double)settings->p);
-    self->disagreement = hsep_take(&end, Np);
-    self->rows = hsep_take(&end, Np * n_static);
+    self->disagreement = hsep_take(&end, n);
+    self->rows = hsep_take(&end, n * n_static);
     self->disturbances = hsep_take_block(&end, hsep_disturbances_size(settings, parameters->n_modes));
     self->regression = hsep_take_block(&end, hsep_regression_size(hsep_trusted_n(settings)));
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
@@ -79,7 +81,8 @@ HSEP_API void hsep_trusted_init(hsep_trusted *self, const hsep_trusted_parameter
     hsep_blend_init(&self->blend);
     hsep_guard_init(&self->guard, 2 * self->Np);
     hsep_disturbances_init(
-        hsep_trusted_disturbances(self), parameters->settings, parameters->modes, parameters->n_modes);
+        hsep_trusted_disturbances(self), parameters->settings, parameters->modes, parameters->n_modes,
+        self->n > self->Np);
     hsep_regression_init(hsep_trusted_regression(self), self->n_static + self->p, HSEP_NO_PENALTY);
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
         const hsep_candidate_shape shape = trusted_shape(self, i);
@@ -94,7 +97,8 @@ HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters
     (void)trusted_lay_out(&got, parameters); /* changes nothing where it is sound */
     int sound =
         memcmp(&got, block, sizeof got) == 0 && got.predicted <= 1 && got.guard.patience == 2 * got.Np &&
-        hsep_disturbances_valid(hsep_at_bytes(block, got.disturbances), parameters->settings, parameters->n_modes) &&
+        hsep_disturbances_valid(
+            hsep_at_bytes(block, got.disturbances), parameters->settings, parameters->n_modes, got.n > got.Np) &&
         hsep_regression_valid(hsep_at_bytes(block, got.regression), got.n_static + got.p);
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
         const void *candidate = hsep_at_bytes(block, got.candidates[i]);
