@@ -166,8 +166,8 @@ class PredictorSettings(Settings):
     NEEDS_PREVIEW: ClassVar[tuple[str, ...]] = ("v_friction",)
     """Fields of a predictor that a compensator holds: alone it has no reference beyond its window."""
 
-    ALONE: ClassVar[tuple[str, ...]] = ("trust", "effect", "noise_std", "forgetting")
-    """Fields of a predictor that no machine file's or FMU's compensator has: it plans with the paper's model."""
+    TRUST: ClassVar[tuple[str, ...]] = ("trust", "effect", "noise_std", "forgetting")
+    """Fields of the residual model with trust."""
 
     ELSEWHERE: ClassVar[tuple[str, ...]] = ("T_s", "input_hold", *NEEDS_PREVIEW)
 

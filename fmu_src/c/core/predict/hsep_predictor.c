@@ -88,11 +88,28 @@ static void predictor_unlearn(hsep_predictor *self)
     }
 }
 
+/* Learn the measured window: by the residual model that can be trusted, and its errors. A first fill that was predicted
+ * is not learned, but is what comes before. */
+static void predictor_learn_window(hsep_predictor *self)
+{
+    hsep_trusted *trusted = hsep_predictor_trusted(self);
+    double *past_e = hsep_at(self, self->past_e);
+    if (trusted != NULL && (self->learning || self->preview > self->Np)) {
+        hsep_trusted_learn(
+            trusted, hsep_at(self, self->command), hsep_at(self, self->past_x), past_e, self->learning != 0);
+    }
+    if (self->learning && !self->missing) {
+        hsep_uncertainty_learn(
+            hsep_predictor_uncertainty(self), past_e, trusted != NULL ? hsep_at(trusted, trusted->accepted) : NULL);
+    }
+}
+
 HSEP_API int hsep_predictor_finish(hsep_predictor *self)
 {
     const hsep_features *f = &self->features;
     const uint64_t Np = self->Np;
     double *past_x = hsep_at(self, self->past_x), *past_e = hsep_at(self, self->past_e);
+    predictor_learn_window(self);
     if (self->missing) {
         predictor_unlearn(self);
     }
@@ -183,30 +200,21 @@ HSEP_API void hsep_predictor_publish(hsep_predictor *self, uint64_t last)
     self->n_published = last;
 }
 
-/* Learn the measured window: by the residual model that can be trusted, and its errors. */
-static void predictor_learn_window(hsep_predictor *self)
-{
-    hsep_trusted *trusted = hsep_predictor_trusted(self);
-    double *past_e = hsep_at(self, self->past_e);
-    if (self->learning) {
-        if (trusted != NULL) {
-            hsep_trusted_learn(trusted, hsep_at(self, self->command), hsep_at(self, self->past_x), past_e, 1);
-        }
-        hsep_uncertainty_learn(
-            hsep_predictor_uncertainty(self), past_e, trusted != NULL ? hsep_at(trusted, trusted->accepted) : NULL);
-    }
-}
-
-/* Predict the errors of the window that was published. */
-static void predictor_doubt(hsep_predictor *self)
+HSEP_API void hsep_predictor_doubt(hsep_predictor *self, uint64_t n_warm_up)
 {
     hsep_trusted *trusted = hsep_predictor_trusted(self);
     if (self->divergence == HSEP_CONVERGES) {
         hsep_uncertainty_predict(
             hsep_predictor_uncertainty(self), hsep_at(self, self->command), hsep_at(self, self->past_x),
-            hsep_at(self, self->e_h), self->n_physics,
-            trusted != NULL ? hsep_at(trusted, trusted->disagreement) : NULL);
+            hsep_at(self, self->e_h), n_warm_up,
+            trusted != NULL ? hsep_at(trusted, trusted->disagreement) + (trusted->n - self->Np) : NULL);
     }
+}
+
+HSEP_API uint64_t hsep_predictor_warm_up(const hsep_predictor *self)
+{
+    const double left = self->n_init - (double)self->k;
+    return left >= (double)self->Np ? self->Np : left > 0.0 ? (uint64_t)left : 0;
 }
 
 /* Predict the residuals of the window that begins by the residual model that can be trusted. */
@@ -231,7 +239,6 @@ HSEP_API int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, doubl
     if (!hsep_predictor_take_in(self, x_d_ahead, x_meas)) {
         return 0;
     }
-    predictor_learn_window(self);
     (void)hsep_predictor_finish(self);
     if (self->k == self->preview) { /* the first fill was not predicted */
         memset(hsep_at(self, self->past_e), 0, (size_t)(Np + self->features.p) * sizeof(double));
@@ -241,10 +248,9 @@ HSEP_API int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, doubl
         past_x[Np - 1 - i] = ahead_pb[i]; /* Eq. (2), computed as the commands came */
     }
     predictor_forecast(self);
-    const double warm_up = self->n_init - (double)self->k;
-    self->n_physics = warm_up >= (double)Np ? Np : warm_up > 0.0 ? (uint64_t)warm_up : 0;
+    self->n_physics = hsep_predictor_warm_up(self);
     hsep_predictor_publish(self, Np);
-    predictor_doubt(self);
+    hsep_predictor_doubt(self, self->n_physics);
     return 1;
 }
 

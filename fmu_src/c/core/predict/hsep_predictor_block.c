@@ -29,7 +29,7 @@ HSEP_API hsep_regression *hsep_predictor_regression(hsep_predictor *self)
                          : (hsep_regression *)hsep_at(self, self->regression);
 }
 
-static hsep_trusted_parameters predictor_trusted_parameters(const hsep_predictor_parameters *parameters)
+HSEP_API hsep_trusted_parameters hsep_predictor_trusted_parameters(const hsep_predictor_parameters *parameters)
 {
     return (hsep_trusted_parameters){
         .settings = &parameters->settings,
@@ -48,7 +48,7 @@ static double predictor_lay_out(hsep_predictor *self, const hsep_predictor_param
     double end = HSEP_WORDS(hsep_predictor);
     hsep_features_lay_out(
         &self->features, parameters->settings.p, parameters->settings.q, has_reference ? HSEP_N_REFERENCE : 0);
-    const hsep_trusted_parameters trusted = predictor_trusted_parameters(parameters);
+    const hsep_trusted_parameters trusted = hsep_predictor_trusted_parameters(parameters);
     const double regression = parameters->trust.trust ? 0.0 : hsep_regression_size(self->features.n);
     self->Np = parameters->settings.Np;
     self->preview = parameters->preview;
@@ -99,7 +99,7 @@ HSEP_API void hsep_predictor_init(hsep_predictor *self, const hsep_predictor_par
     hsep_uncertainty_init(
         hsep_predictor_uncertainty(self), self->Np, fmax(parameters->settings.lambda, noise_std * noise_std));
     if (self->trusted) {
-        const hsep_trusted_parameters trusted = predictor_trusted_parameters(parameters);
+        const hsep_trusted_parameters trusted = hsep_predictor_trusted_parameters(parameters);
         hsep_trusted_init(hsep_predictor_trusted(self), &trusted);
     } else {
         hsep_regression_init(hsep_predictor_regression(self), self->features.n, parameters->settings.lambda);
@@ -111,7 +111,7 @@ HSEP_API int hsep_predictor_valid(const void *block, const hsep_predictor_parame
     hsep_predictor got;
     memcpy(&got, block, sizeof got);
     (void)predictor_lay_out(&got, parameters); /* changes nothing where it is sound */
-    const hsep_trusted_parameters trusted = predictor_trusted_parameters(parameters);
+    const hsep_trusted_parameters trusted = hsep_predictor_trusted_parameters(parameters);
     const double sums[4] = {got.sum_e, got.sum_pb, got.sum_h, got.sum_hold};
     int sound =
         memcmp(&got, block, sizeof got) == 0 && got.k == k && got.n_published <= got.Np &&

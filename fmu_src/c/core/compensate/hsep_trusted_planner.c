@@ -1,0 +1,334 @@
+#include "hsep_trusted_planner.h"
+
+#include "hsep_cholesky.h"
+#include "hsep_vector.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+#define TRUSTED_PLANNER_STEPS 4      /* Newton steps at most, */
+#define TRUSTED_PLANNER_TRIES 6      /* tries of each, */
+#define TRUSTED_PLANNER_TOGETHER 10  /* tries of all, */
+#define TRUSTED_PLANNER_SOLVER 96    /* and solver steps after which no bounded try is begun */
+
+/* Reach of friction's slope in each Newton step, relative to the model's velocity scale: a tangent is blind to a sign
+ * that changes nearby. */
+static const double trusted_planner_reaches[TRUSTED_PLANNER_STEPS] = {0.1, 0.03, 0.01, 0.0};
+
+/* Penalty on the change of velocity: its first value, and how it follows success. */
+static const double trusted_planner_first = 1.0, trusted_planner_raise = 8.0, trusted_planner_lower = 0.25;
+
+/* Relative gain of a step below which it is the last one. */
+static const double trusted_planner_gain = 1e-3;
+
+/* Set what follows from the parameters; return the bytes of the block. */
+static double trusted_planner_lay_out(
+    hsep_trusted_planner *self, const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner)
+{
+    const uint64_t n = hsep_splines_count(planner->preview, planner->spacing);
+    const double preview = (double)planner->preview, filter = hsep_physics_size(parameters->n_modes, parameters->settings->dead_time);
+    const double columns = (double)n, coefficients = HSEP_DECIDED + columns;
+    double end = HSEP_WORDS(hsep_trusted_planner);
+    self->preview = planner->preview;
+    self->p = parameters->settings->p;
+    self->Np = planner->Np;
+    self->n = n;
+    self->rest = hsep_take(&end, coefficients);
+    self->best = hsep_take(&end, coefficients);
+    self->of_physics = hsep_take(&end, coefficients);
+    self->command = hsep_take(&end, preview);
+    self->x_pb = hsep_take(&end, preview);
+    self->e_h = hsep_take(&end, preview + (double)self->p);
+    self->target = hsep_take(&end, preview);
+    self->W = hsep_take(&end, columns * preview - (double)planner->spacing * 0.5 * columns * (columns - 1.0));
+    self->P = hsep_take(&end, hsep_triangle(n));
+    self->v = hsep_take(&end, columns);
+    self->linearised = hsep_take_block(&end, hsep_linearised_size(parameters));
+    self->physics = hsep_take_block(&end, filter);
+    self->trial = hsep_take_block(&end, filter);
+    return end * sizeof(double);
+}
+
+HSEP_API double
+hsep_trusted_planner_size(const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner)
+{
+    return trusted_planner_lay_out(&(hsep_trusted_planner){0}, parameters, planner);
+}
+
+HSEP_API void hsep_trusted_planner_init(
+    hsep_trusted_planner *self, const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner,
+    double start)
+{
+    const hsep_predictor_settings *settings = parameters->settings;
+    memset(self, 0, (size_t)hsep_trusted_planner_size(parameters, planner));
+    (void)trusted_planner_lay_out(self, parameters, planner);
+    self->start = start;
+    hsep_linearised_init((hsep_linearised *)hsep_at(self, self->linearised), parameters);
+    for (int i = 0; i < 2; i++) {
+        hsep_physics_init(
+            (hsep_physics *)hsep_at(self, i == 0 ? self->physics : self->trial), parameters->modes,
+            parameters->n_modes, settings->dead_time, settings->T_s, (hsep_hold)settings->input_hold);
+    }
+}
+
+HSEP_API int hsep_trusted_planner_valid(
+    const void *block, const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner)
+{
+    const uint64_t n_modes = parameters->n_modes, dead_time = parameters->settings->dead_time;
+    hsep_trusted_planner got;
+    memcpy(&got, block, sizeof got);
+    (void)trusted_planner_lay_out(&got, parameters, planner); /* changes nothing where it is sound */
+    return memcmp(&got, block, sizeof got) == 0 && got.stage <= HSEP_TRUSTED_PREDICT && got.follows <= 1 &&
+           got.steps <= TRUSTED_PLANNER_STEPS && got.tries <= TRUSTED_PLANNER_TRIES &&
+           got.tries_in_all <= TRUSTED_PLANNER_TOGETHER &&
+           got.solver_steps < TRUSTED_PLANNER_SOLVER + HSEP_INTERIOR_STEPS && got.planned <= 2 &&
+           hsep_linearised_valid(hsep_at_bytes(block, got.linearised), parameters) &&
+           hsep_physics_valid(hsep_at_bytes(block, got.physics), n_modes, dead_time) &&
+           hsep_physics_valid(hsep_at_bytes(block, got.trial), n_modes, dead_time);
+}
+
+static void trusted_planner_copy(hsep_trusted_planner *self, double to[], const double from[])
+{
+    memcpy(to, from, (size_t)(HSEP_DECIDED + self->n) * sizeof(double));
+}
+
+/* Response of the physics model, newest first, to commands relative to the start, newest first. */
+static void trusted_planner_respond(hsep_trusted_planner *self)
+{
+    const double *command = hsep_at(self, self->command);
+    double *x_pb = hsep_at(self, self->x_pb);
+    hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
+    memcpy(trial, hsep_at(self, self->physics), (size_t)(self->trial - self->physics) * sizeof(double));
+    for (uint64_t j = self->preview; j-- > 0;) {
+        hsep_physics_forced_response(trial, &command[j], &x_pb[j], 1);
+    }
+}
+
+/* Commands under the first count coefficients of a plan, and the response of the physics model to them. */
+static void trusted_planner_command(
+    hsep_trusted_planner *self, const hsep_trusted_task *task, const double c[], uint64_t count)
+{
+    const hsep_splines *splines = hsep_planner_splines(task->planner);
+    double *command = hsep_at(self, self->command);
+    for (uint64_t k = 0; k < self->preview; k++) {
+        command[self->preview - 1 - k] = task->x_d[k] - self->start + hsep_splines_sum(splines, c, count, k);
+    }
+    trusted_planner_respond(self);
+}
+
+/* Predict these commands; return the cost of the plan, m2; not finite if the prediction overflows. */
+static double trusted_planner_predict(hsep_trusted_planner *self, const hsep_trusted_task *task, const double c[])
+{
+    const hsep_splines *splines = hsep_planner_splines(task->planner);
+    const uint64_t count = HSEP_DECIDED + self->n;
+    const double *x_pb = hsep_at(self, self->x_pb), *before = task->planner->delta_before;
+    double *e_h = hsep_at(self, self->e_h), d[4] = {before[0], before[1], before[2], 0.0}, error = 0.0, jerk = 0.0;
+    hsep_trusted_predict(task->model, hsep_at(self, self->command), x_pb, e_h);
+    for (uint64_t k = 0; k < self->preview; k++) {
+        const uint64_t j = self->preview - 1 - k;
+        const double e = task->x_d[k] - self->start - (x_pb[j] + e_h[j]);
+        d[3] = hsep_splines_sum(splines, c, count, k);
+        const double third = ((d[3] - d[2]) - (d[2] - d[1])) - ((d[2] - d[1]) - (d[1] - d[0]));
+        error += e * e;
+        jerk += third * third;
+        d[0] = d[1], d[1] = d[2], d[2] = d[3];
+    }
+    return error + task->planner->jerk_weight * jerk;
+}
+
+static double trusted_planner_at(hsep_trusted_planner *self, const hsep_trusted_task *task, const double c[])
+{
+    trusted_planner_command(self, task, c, HSEP_DECIDED + self->n);
+    return trusted_planner_predict(self, task, c);
+}
+
+/* The physics model's plan is made: try a better one, if there may be one. */
+static void trusted_planner_continue(hsep_trusted_planner *self, const hsep_trusted_task *task)
+{
+    double *c = hsep_planner_coefficients(task->planner), *rest = hsep_at(self, self->rest);
+    self->planned = 1;
+    self->stage = self->follows ? HSEP_TRUSTED_STEP : HSEP_TRUSTED_PREDICT;
+    if (self->follows) {
+        trusted_planner_copy(self, hsep_at(self, self->of_physics), c);
+        trusted_planner_copy(self, hsep_at(self, self->best), rest);
+        trusted_planner_copy(self, c, rest);
+        hsep_planner_let_turn(task->planner);
+    }
+}
+
+/* Programme of the physics model; return its status. target: x_d minus its response to x_d with what is decided. */
+static hsep_plan_status trusted_planner_physics(hsep_trusted_planner *self, const hsep_trusted_task *task)
+{
+    const double *x_pb = hsep_at(self, self->x_pb);
+    double *target = hsep_at(self, self->target);
+    trusted_planner_command(self, task, hsep_at(self, self->rest), HSEP_DECIDED);
+    for (uint64_t k = 0; k < self->preview; k++) {
+        target[k] = task->x_d[k] - self->start - x_pb[self->preview - 1 - k];
+    }
+    hsep_planner_open(task->planner, task->x_d);
+    hsep_planner_aim(task->planner, task->spline, target);
+    return hsep_planner_solve(task->planner, 1);
+}
+
+HSEP_API void hsep_trusted_planner_begin(
+    hsep_trusted_planner *self, const hsep_trusted_task *task, const hsep_physics *physics, const double past[],
+    uint64_t best)
+{
+    double *path = hsep_at(self, self->target), *rest = hsep_at(self, self->rest);
+    hsep_plan_status status = HSEP_PLAN_FAILED;
+    self->steps = self->tries = self->tries_in_all = self->solver_steps = 0;
+    self->penalty = 0.0;
+    trusted_planner_copy(self, rest, hsep_planner_coefficients(task->planner));
+    memcpy(hsep_at(self, self->physics), physics, (size_t)(self->trial - self->physics) * sizeof(double));
+    memcpy(hsep_at(self, self->e_h) + self->preview, past, (size_t)self->p * sizeof(double));
+    if (best > 0) { /* before the prediction, so that what was predicted last is what the rest gives */
+        status = trusted_planner_physics(self, task);
+    }
+    for (uint64_t k = 0; k < self->preview; k++) {
+        path[self->preview - 1 - k] = task->x_d[k] - self->start;
+    }
+    trusted_planner_command(self, task, rest, HSEP_DECIDED + self->n);
+    hsep_trusted_scale(task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb), path, past[0]);
+    self->cost = trusted_planner_predict(self, task, rest);
+    self->follows = best > 1 && task->model->predicted;
+    self->planned = status != HSEP_PLAN_FAILED;
+    self->stage = status == HSEP_PLAN_BOUNDED ? HSEP_TRUSTED_PHYSICS : HSEP_TRUSTED_DONE;
+    if (status == HSEP_PLAN_DONE) {
+        trusted_planner_continue(self, task);
+    }
+}
+
+/* Linearise at the best plan, which was predicted last, and set the programme of a Newton step. */
+static void trusted_planner_step(hsep_trusted_planner *self, const hsep_trusted_task *task)
+{
+    const hsep_splines *splines = hsep_planner_splines(task->planner);
+    const uint64_t n = self->n, preview = self->preview, spacing = splines->spacing;
+    const double *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
+    const double *at = hsep_at(self, self->best) + HSEP_DECIDED;
+    hsep_linearised *linearised = (hsep_linearised *)hsep_at(self, self->linearised);
+    double *W = hsep_at(self, self->W), *P = hsep_at(self, self->P), *v = hsep_at(self, self->v);
+    double *target = hsep_at(self, self->target);
+    hsep_linearised_at(
+        linearised, task->model, hsep_at(self, self->command), x_pb, task->spline,
+        trusted_planner_reaches[self->steps]);
+    for (uint64_t k = 0; k < preview; k++) { /* x_d - x_h + W c */
+        const uint64_t j = preview - 1 - k;
+        target[k] = task->x_d[k] - self->start - (x_pb[j] + e_h[j]);
+    }
+    double *column = W;
+    for (uint64_t j = 0; j < n; j++) {
+        const uint64_t first = j * spacing;
+        hsep_linearised_column(
+            linearised, task->model, hsep_splines_shape(splines), 4 * spacing, task->spline, first, column);
+        hsep_axpy(target + first, at[j], column, preview - first);
+        column += preview - first;
+    }
+    const double *left = W;
+    for (uint64_t i = 0; i < n; i++) {
+        const double *right = left;
+        for (uint64_t j = i; j < n; j++) { /* column j begins (j - i) spacing later */
+            *P++ = hsep_dot(left + (j - i) * spacing, right, preview - j * spacing);
+            right += preview - j * spacing;
+        }
+        v[i] = hsep_dot(left, target + i * spacing, preview - i * spacing);
+        left += preview - i * spacing;
+    }
+    hsep_splines_difference_gram(splines, 3, task->planner->jerk_weight, hsep_at(self, self->P));
+    hsep_splines_project_jerk(splines, task->planner->jerk_weight, hsep_planner_third(task->planner), v);
+    self->steps++;
+    self->tries = 0;
+    self->stage = HSEP_TRUSTED_TRY;
+}
+
+/* Solve the programme with a penalty on the change of velocity. */
+static void trusted_planner_try(hsep_trusted_planner *self, const hsep_trusted_task *task)
+{
+    const hsep_splines *splines = hsep_planner_splines(task->planner);
+    const double *at = hsep_at(self, self->best) + HSEP_DECIDED;
+    double *P = hsep_planner_quadratic(task->planner), *v = hsep_planner_linear(task->planner);
+    memcpy(P, hsep_at(self, self->P), (size_t)hsep_triangle(self->n) * sizeof(double));
+    memcpy(v, hsep_at(self, self->v), (size_t)self->n * sizeof(double));
+    hsep_splines_difference_gram(splines, 1, self->penalty, P);
+    hsep_splines_difference_product(splines, 1, self->penalty, at, v);
+    hsep_planner_regularise(task->planner);
+    self->tries++;
+    self->tries_in_all++;
+    const hsep_plan_status status = hsep_planner_solve(task->planner, 1);
+    self->stage = status == HSEP_PLAN_DONE ? HSEP_TRUSTED_JUDGE : HSEP_TRUSTED_COMPARE;
+    if (status == HSEP_PLAN_BOUNDED && self->solver_steps < TRUSTED_PLANNER_SOLVER) {
+        self->stage = HSEP_TRUSTED_BOUNDED;
+    }
+}
+
+/* Predict a try, and take it if it is better. */
+static void trusted_planner_judge(hsep_trusted_planner *self, const hsep_trusted_task *task)
+{
+    double *c = hsep_planner_coefficients(task->planner);
+    const double cost = trusted_planner_at(self, task, c), gain = self->cost - cost;
+    if (cost < self->cost) {
+        trusted_planner_copy(self, hsep_at(self, self->best), c);
+        self->cost = cost;
+        self->penalty *= trusted_planner_lower;
+        self->stage = gain < trusted_planner_gain * (gain + cost) || self->steps == TRUSTED_PLANNER_STEPS
+                          ? HSEP_TRUSTED_COMPARE
+                          : HSEP_TRUSTED_STEP;
+    } else {
+        self->penalty = fmax(trusted_planner_raise * self->penalty, trusted_planner_first);
+        self->stage = self->tries < TRUSTED_PLANNER_TRIES && self->tries_in_all < TRUSTED_PLANNER_TOGETHER
+                          ? HSEP_TRUSTED_TRY
+                          : HSEP_TRUSTED_COMPARE;
+    }
+    trusted_planner_copy(self, c, hsep_at(self, self->rest));
+}
+
+/* Take the plan whose cost is predicted to be lower. */
+static void trusted_planner_compare(hsep_trusted_planner *self, const hsep_trusted_task *task)
+{
+    const double cost = trusted_planner_at(self, task, hsep_at(self, self->of_physics));
+    const int is_better = self->cost < cost; /* not if it is NaN */
+    self->planned = is_better ? 2 : 1;
+    self->stage = is_better ? HSEP_TRUSTED_PREDICT : HSEP_TRUSTED_DONE;
+    trusted_planner_copy(
+        self, hsep_planner_coefficients(task->planner), hsep_at(self, is_better ? self->best : self->of_physics));
+}
+
+HSEP_API uint64_t hsep_trusted_planner_advance(hsep_trusted_planner *self, const hsep_trusted_task *task)
+{
+    switch ((hsep_trusted_stage)self->stage) {
+    case HSEP_TRUSTED_PHYSICS:
+        if (hsep_planner_step(task->planner)) {
+            trusted_planner_continue(self, task);
+        }
+        return 1;
+    case HSEP_TRUSTED_STEP:
+        if (self->tries_in_all == TRUSTED_PLANNER_TOGETHER) {
+            self->stage = HSEP_TRUSTED_COMPARE;
+            return 1;
+        }
+        trusted_planner_step(self, task);
+        return HSEP_TRUSTED_SLOPE;
+    case HSEP_TRUSTED_TRY:
+        trusted_planner_try(self, task);
+        return 1;
+    case HSEP_TRUSTED_BOUNDED:
+        if (hsep_planner_step(task->planner)) {
+            self->solver_steps += hsep_planner_steps(task->planner);
+            self->stage = HSEP_TRUSTED_JUDGE;
+        }
+        return 1;
+    case HSEP_TRUSTED_JUDGE:
+        trusted_planner_judge(self, task);
+        return HSEP_TRUSTED_PREDICTION;
+    case HSEP_TRUSTED_COMPARE:
+        trusted_planner_compare(self, task);
+        return HSEP_TRUSTED_PREDICTION;
+    case HSEP_TRUSTED_PREDICT:
+        (void)trusted_planner_at(self, task, hsep_planner_coefficients(task->planner));
+        self->stage = HSEP_TRUSTED_DONE;
+        return HSEP_TRUSTED_PREDICTION;
+    case HSEP_TRUSTED_DONE:
+        break;
+    }
+    return 0;
+}
