@@ -26,10 +26,10 @@ _REACHES = (0.1, 0.03, 0.01, 0.0)
 """Reach of friction's slope in each Newton step, relative to the model's velocity scale: a tangent is blind to a sign
 that changes nearby."""
 
-_TRIES, _TRIES_TOGETHER = 6, 10
+_TRIES, _TRIES_TOGETHER = 6, 8
 """Largest number of penalties tried in a step, and in all steps."""
 
-_SOLVER_STEPS = 96
+_SOLVER_STEPS = 60
 """Interior-point steps after which no further programme that the drive's limits bound is begun: the plan is what was
 found before."""
 

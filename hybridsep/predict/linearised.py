@@ -27,7 +27,8 @@ class PlanModel:
     state : (n_state,) array
         State of ``G_pb`` there.
     x_d, path : (n,) array, m
-        Commands that the scales of the features follow from, and unmodified ones, relative to the start.
+        Commands that the scales of the features and the variances of predictions follow from, and unmodified ones,
+        relative to the start.
 
     Attributes
     ----------
@@ -39,6 +40,7 @@ class PlanModel:
         x_pb, _ = self._discrete.forced_response(state, x_d)
         self.scales = model.scales(x_d, x_pb, path)
         self._solved = model.solved(self.scales)
+        self._held = model.forecast_by(self._solved, x_d, x_pb, self.scales).predictions
 
     @property
     def has_learned(self) -> bool:
@@ -48,7 +50,7 @@ class PlanModel:
     def predict(self, x_d: Array) -> Forecast:
         """Predict the preview under commands ``x_d``, ``(n,)``, m, relative to the start."""
         x_pb, _ = self._discrete.forced_response(self._state, x_d)
-        return self._model.forecast_by(self._solved, x_d, x_pb, self.scales)
+        return self._model.forecast_by(self._solved, x_d, x_pb, self.scales, self._held)
 
     def slope(self, at: Forecast, changes: Array, passed: Array, reach: float) -> Array:
         """Return the change of ``x_h`` with changes of the commands, ``(n, m)``, once something is learned.
@@ -71,6 +73,8 @@ class PlanModel:
         velocity = np.diff(changes, axis=0, prepend=0.0) / discrete.T_s
         moved = np.diff(passed, axis=0, prepend=0.0) / discrete.T_s
         for solved, found, part in zip(self._solved, at.predictions, parts, strict=True):
+            if part == 0.0:
+                continue
             e = found.unshrunk
             shrink = part * np.divide(found.e_h, e, out=np.zeros_like(e), where=e != 0.0)
             linear, own, differences = static.split(solved.solution.weights[: solved.n_static])

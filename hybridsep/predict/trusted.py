@@ -8,6 +8,7 @@ results for positions in another unit are the same in that unit.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,17 +120,25 @@ class TrustedModel:
         return self.forecast_by(self.solved(scales), x_d, x_pb, scales)
 
     def forecast_by(
-        self, solved: tuple[SolvedCandidate, ...], x_d: Array, x_pb: Array, scales: FeatureScales
+        self,
+        solved: tuple[SolvedCandidate, ...],
+        x_d: Array,
+        x_pb: Array,
+        scales: FeatureScales,
+        held: tuple[CandidatePrediction, ...] = (),
     ) -> Forecast:
-        """Predict as :meth:`forecast` by the candidates of :meth:`solved`."""
+        """Predict as :meth:`forecast` by the candidates of :meth:`solved`, with the variances ``held`` if there are."""
         predictions: tuple[CandidatePrediction, ...] = ()
+        spreads: Sequence[Array | None] = [one.spread for one in held] or [None] * len(solved)
         x = x_pb
         if solved:
             rows, _ = self.static.rows(self.state, x_d, x_pb, x_pb, scales.velocity)
             # The stiffness acts at the position, which the physics model alone does not give well enough.
-            x = x_pb + self.predict(solved[0], rows).e_h
+            x = x_pb + self.predict(solved[0], rows, spreads[0]).e_h
             rows, _ = self.static.rows(self.state, x_d, x_pb, x, scales.velocity)
-            predictions = tuple(self.predict(candidate, rows) for candidate in solved)
+            predictions = tuple(
+                self.predict(candidate, rows, spread) for candidate, spread in zip(solved, spreads, strict=True)
+            )
         hold = self.hold
         candidates = self._blended(hold, predictions, len(x_d))
         e_h = self.blend.weights @ candidates
@@ -234,9 +243,9 @@ class TrustedModel:
         least = min(self.settings.lam, _LEAST_NOISE * scale.largest_square)
         return candidate.solve(self.regression, effect * self.static.shares / np.maximum(largest, 1e-150), least)
 
-    def predict(self, solved: SolvedCandidate, rows: Array) -> CandidatePrediction:
-        """Return the prediction of a candidate over a window, bounded by the residuals so far."""
-        found = solved.predict(rows, self.past[: len(solved.lag_weights)], self.scale)
+    def predict(self, solved: SolvedCandidate, rows: Array, spread: Array | None = None) -> CandidatePrediction:
+        """Return the prediction of a candidate over a window, bounded by the residuals so far; ``spread`` if held."""
+        found = solved.predict(rows, self.past[: len(solved.lag_weights)], self.scale, spread)
         return found._replace(
             e_h=np.clip(found.e_h, -self.bound, self.bound), noise_variance=found.noise_variance / self.n_rows
         )

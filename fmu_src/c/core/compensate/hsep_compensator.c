@@ -195,24 +195,38 @@ static void compensator_publish(hsep_compensator *self, uint64_t last)
     hsep_predictor_doubt(predictor, hsep_predictor_warm_up(predictor));
 }
 
-/* Work on a plan that is due before the next sample: solver steps of a bounded one, with trust as much of any work. */
+/* Do parts of a plan with trust, as much work as is due; return whether it is made. */
+static int compensator_advance(hsep_compensator *self, uint64_t due)
+{
+    hsep_trusted_planner *trusted = compensator_trusted(self);
+    const hsep_trusted_task task = compensator_task(self);
+    uint64_t next = hsep_trusted_planner_next(trusted), done = 0;
+    while (next > 0 && next <= due - done) {
+        hsep_trusted_planner_advance(trusted, &task);
+        done += next;
+        next = hsep_trusted_planner_next(trusted);
+    }
+    return next == 0;
+}
+
+/* Solver steps of a bounded plan; return whether it is solved. */
+static int compensator_step(hsep_compensator *self, uint64_t due)
+{
+    int done = 0;
+    for (uint64_t step = 0; !done && step < due; step++) {
+        done = hsep_planner_step(compensator_planner(self));
+    }
+    return done;
+}
+
+/* Work on a plan that is due before the next sample. */
 static void compensator_solve(hsep_compensator *self)
 {
     const hsep_predictor *predictor = hsep_compensator_predictor(self);
     const uint64_t pinned = compensator_pinned(self), i = predictor->k % predictor->Np;
     const uint64_t work = self->trusted ? HSEP_TRUSTED_WORK : HSEP_INTERIOR_STEPS;
-    const uint64_t due = pinned > 0 && i < pinned ? (work + pinned - 1) / pinned : UINT64_MAX;
-    const hsep_trusted_task task = compensator_task(self);
-    int done = 0;
-    for (uint64_t did = 0, part = 1; !done && did < due; did += part) {
-        if (self->trusted) {
-            part = hsep_trusted_planner_advance(compensator_trusted(self), &task);
-            done = part == 0;
-        } else {
-            done = hsep_planner_step(compensator_planner(self));
-        }
-    }
-    if (done) {
+    const uint64_t due = i < pinned ? (work + pinned - 1) / pinned : UINT64_MAX;
+    if (self->trusted ? compensator_advance(self, due) : compensator_step(self, due)) {
         self->solving = 0;
         self->state = self->trusted ? compensator_trusted(self)->planned : self->state;
         compensator_publish(self, predictor->Np);

@@ -9,8 +9,8 @@
 
 #define TRUSTED_PLANNER_STEPS 4      /* Newton steps at most, */
 #define TRUSTED_PLANNER_TRIES 6      /* tries of each, */
-#define TRUSTED_PLANNER_TOGETHER 10  /* tries of all, */
-#define TRUSTED_PLANNER_SOLVER 96    /* and solver steps after which no bounded try is begun */
+#define TRUSTED_PLANNER_TOGETHER 8   /* tries of all, */
+#define TRUSTED_PLANNER_SOLVER 60    /* and solver steps after which no bounded try is begun */
 
 /* Reach of friction's slope in each Newton step, relative to the model's velocity scale: a tangent is blind to a sign
  * that changes nearby. */
@@ -80,7 +80,7 @@ HSEP_API int hsep_trusted_planner_valid(
     memcpy(&got, block, sizeof got);
     (void)trusted_planner_lay_out(&got, parameters, planner); /* changes nothing where it is sound */
     return memcmp(&got, block, sizeof got) == 0 && got.stage <= HSEP_TRUSTED_PREDICT && got.follows <= 1 &&
-           got.steps <= TRUSTED_PLANNER_STEPS && got.tries <= TRUSTED_PLANNER_TRIES &&
+           got.steps <= TRUSTED_PLANNER_STEPS && got.columns <= got.n && got.tries <= TRUSTED_PLANNER_TRIES &&
            got.tries_in_all <= TRUSTED_PLANNER_TOGETHER &&
            got.solver_steps < TRUSTED_PLANNER_SOLVER + HSEP_INTERIOR_STEPS && got.planned <= 2 &&
            hsep_linearised_valid(hsep_at_bytes(block, got.linearised), parameters) &&
@@ -118,13 +118,14 @@ static void trusted_planner_command(
 }
 
 /* Predict these commands; return the cost of the plan, m2; not finite if the prediction overflows. */
-static double trusted_planner_predict(hsep_trusted_planner *self, const hsep_trusted_task *task, const double c[])
+static double
+trusted_planner_predict(hsep_trusted_planner *self, const hsep_trusted_task *task, const double c[], int held)
 {
     const hsep_splines *splines = hsep_planner_splines(task->planner);
     const uint64_t count = HSEP_DECIDED + self->n;
     const double *x_pb = hsep_at(self, self->x_pb), *before = task->planner->delta_before;
     double *e_h = hsep_at(self, self->e_h), d[4] = {before[0], before[1], before[2], 0.0}, error = 0.0, jerk = 0.0;
-    hsep_trusted_predict(task->model, hsep_at(self, self->command), x_pb, e_h);
+    hsep_trusted_predict(task->model, hsep_at(self, self->command), x_pb, e_h, held);
     for (uint64_t k = 0; k < self->preview; k++) {
         const uint64_t j = self->preview - 1 - k;
         const double e = task->x_d[k] - self->start - (x_pb[j] + e_h[j]);
@@ -137,10 +138,11 @@ static double trusted_planner_predict(hsep_trusted_planner *self, const hsep_tru
     return error + task->planner->jerk_weight * jerk;
 }
 
+/* Cost of a plan, with the variances of the prediction under the rest of the last plan. */
 static double trusted_planner_at(hsep_trusted_planner *self, const hsep_trusted_task *task, const double c[])
 {
     trusted_planner_command(self, task, c, HSEP_DECIDED + self->n);
-    return trusted_planner_predict(self, task, c);
+    return trusted_planner_predict(self, task, c, 1);
 }
 
 /* The physics model's plan is made: try a better one, if there may be one. */
@@ -148,7 +150,7 @@ static void trusted_planner_continue(hsep_trusted_planner *self, const hsep_trus
 {
     double *c = hsep_planner_coefficients(task->planner), *rest = hsep_at(self, self->rest);
     self->planned = 1;
-    self->stage = self->follows ? HSEP_TRUSTED_STEP : HSEP_TRUSTED_PREDICT;
+    self->stage = self->follows ? HSEP_TRUSTED_REST : HSEP_TRUSTED_PREDICT;
     if (self->follows) {
         trusted_planner_copy(self, hsep_at(self, self->of_physics), c);
         trusted_planner_copy(self, hsep_at(self, self->best), rest);
@@ -157,18 +159,23 @@ static void trusted_planner_continue(hsep_trusted_planner *self, const hsep_trus
     }
 }
 
-/* Programme of the physics model; return its status. target: x_d minus its response to x_d with what is decided. */
-static hsep_plan_status trusted_planner_physics(hsep_trusted_planner *self, const hsep_trusted_task *task)
+/* Begin the physics model's plan; without one the rest of the last plan goes on, which is predicted. */
+static void trusted_planner_physics(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
     const double *x_pb = hsep_at(self, self->x_pb);
-    double *target = hsep_at(self, self->target);
+    double *target = hsep_at(self, self->target); /* x_d minus its response to x_d with what is decided of delta */
     trusted_planner_command(self, task, hsep_at(self, self->rest), HSEP_DECIDED);
     for (uint64_t k = 0; k < self->preview; k++) {
         target[k] = task->x_d[k] - self->start - x_pb[self->preview - 1 - k];
     }
     hsep_planner_open(task->planner, task->x_d);
     hsep_planner_aim(task->planner, task->spline, target);
-    return hsep_planner_solve(task->planner, 1);
+    const hsep_plan_status status = hsep_planner_solve(task->planner, 1);
+    if (status == HSEP_PLAN_DONE) {
+        trusted_planner_continue(self, task);
+    } else {
+        self->stage = status == HSEP_PLAN_BOUNDED ? HSEP_TRUSTED_PHYSICS : HSEP_TRUSTED_DONE;
+    }
 }
 
 HSEP_API void hsep_trusted_planner_begin(
@@ -176,68 +183,81 @@ HSEP_API void hsep_trusted_planner_begin(
     uint64_t best)
 {
     double *path = hsep_at(self, self->target), *rest = hsep_at(self, self->rest);
-    hsep_plan_status status = HSEP_PLAN_FAILED;
-    self->steps = self->tries = self->tries_in_all = self->solver_steps = 0;
+    self->steps = self->tries = self->tries_in_all = self->solver_steps = self->planned = 0;
     self->penalty = 0.0;
     trusted_planner_copy(self, rest, hsep_planner_coefficients(task->planner));
     memcpy(hsep_at(self, self->physics), physics, (size_t)(self->trial - self->physics) * sizeof(double));
     memcpy(hsep_at(self, self->e_h) + self->preview, past, (size_t)self->p * sizeof(double));
-    if (best > 0) { /* before the prediction, so that what was predicted last is what the rest gives */
-        status = trusted_planner_physics(self, task);
-    }
     for (uint64_t k = 0; k < self->preview; k++) {
         path[self->preview - 1 - k] = task->x_d[k] - self->start;
     }
     trusted_planner_command(self, task, rest, HSEP_DECIDED + self->n);
     hsep_trusted_scale(task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb), path, past[0]);
-    self->cost = trusted_planner_predict(self, task, rest);
+    (void)trusted_planner_predict(self, task, rest, 0);
     self->follows = best > 1 && task->model->predicted;
-    self->planned = status != HSEP_PLAN_FAILED;
-    self->stage = status == HSEP_PLAN_BOUNDED ? HSEP_TRUSTED_PHYSICS : HSEP_TRUSTED_DONE;
-    if (status == HSEP_PLAN_DONE) {
-        trusted_planner_continue(self, task);
-    }
+    self->stage = best > 0 ? HSEP_TRUSTED_BEGIN : HSEP_TRUSTED_DONE;
 }
 
-/* Linearise at the best plan, which was predicted last, and set the programme of a Newton step. */
+/* Begin a Newton step: linearise at the best plan, which was predicted last. */
 static void trusted_planner_step(hsep_trusted_planner *self, const hsep_trusted_task *task)
+{
+    const double *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
+    double *target = hsep_at(self, self->target);
+    hsep_linearised_at(
+        (hsep_linearised *)hsep_at(self, self->linearised), task->model, hsep_at(self, self->command), x_pb,
+        task->spline, trusted_planner_reaches[self->steps]);
+    for (uint64_t k = 0; k < self->preview; k++) { /* x_d - x_h, to which W c is added */
+        const uint64_t j = self->preview - 1 - k;
+        target[k] = task->x_d[k] - self->start - (x_pb[j] + e_h[j]);
+    }
+    self->steps++;
+    self->columns = 0;
+    self->tries = 0;
+    self->stage = HSEP_TRUSTED_COLUMN;
+}
+
+/* Change of x_h by a spline; W is kept without the zeros before the splines begin. */
+static double *trusted_planner_column_of(hsep_trusted_planner *self, uint64_t j, uint64_t spacing)
+{
+    return hsep_at(self, self->W) + (j * self->preview - spacing * (j * (j - 1) / 2));
+}
+
+/* Changes of x_h by some of the splines, as much work as in each of the parts. */
+static void trusted_planner_columns(hsep_trusted_planner *self, const hsep_trusted_task *task)
+{
+    const hsep_splines *splines = hsep_planner_splines(task->planner);
+    const double *at = hsep_at(self, self->best) + HSEP_DECIDED;
+    const uint64_t n = self->n, spacing = splines->spacing;
+    const uint64_t all = n * self->preview - spacing * (n * (n - 1) / 2);
+    double *target = hsep_at(self, self->target);
+    for (uint64_t done = 0; self->columns < n && done * HSEP_TRUSTED_COLUMNS < all;) {
+        const uint64_t j = self->columns++, first = j * spacing, length = self->preview - first;
+        double *column = trusted_planner_column_of(self, j, spacing);
+        hsep_linearised_column(
+            (hsep_linearised *)hsep_at(self, self->linearised), task->model, hsep_splines_shape(splines), 4 * spacing,
+            task->spline, first, column);
+        hsep_axpy(target + first, at[j], column, length);
+        done += length;
+    }
+    self->stage = self->columns < n ? HSEP_TRUSTED_COLUMN : HSEP_TRUSTED_PRODUCT;
+}
+
+/* Programme of a Newton step: P = W' W + jerk_weight D' D, and its linear term. */
+static void trusted_planner_products(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
     const hsep_splines *splines = hsep_planner_splines(task->planner);
     const uint64_t n = self->n, preview = self->preview, spacing = splines->spacing;
-    const double *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
-    const double *at = hsep_at(self, self->best) + HSEP_DECIDED;
-    hsep_linearised *linearised = (hsep_linearised *)hsep_at(self, self->linearised);
-    double *W = hsep_at(self, self->W), *P = hsep_at(self, self->P), *v = hsep_at(self, self->v);
-    double *target = hsep_at(self, self->target);
-    hsep_linearised_at(
-        linearised, task->model, hsep_at(self, self->command), x_pb, task->spline,
-        trusted_planner_reaches[self->steps]);
-    for (uint64_t k = 0; k < preview; k++) { /* x_d - x_h + W c */
-        const uint64_t j = preview - 1 - k;
-        target[k] = task->x_d[k] - self->start - (x_pb[j] + e_h[j]);
-    }
-    double *column = W;
-    for (uint64_t j = 0; j < n; j++) {
-        const uint64_t first = j * spacing;
-        hsep_linearised_column(
-            linearised, task->model, hsep_splines_shape(splines), 4 * spacing, task->spline, first, column);
-        hsep_axpy(target + first, at[j], column, preview - first);
-        column += preview - first;
-    }
-    const double *left = W;
+    double *P = hsep_at(self, self->P), *v = hsep_at(self, self->v), *target = hsep_at(self, self->target);
     for (uint64_t i = 0; i < n; i++) {
-        const double *right = left;
+        const double *left = trusted_planner_column_of(self, i, spacing);
         for (uint64_t j = i; j < n; j++) { /* column j begins (j - i) spacing later */
+            const double *right = trusted_planner_column_of(self, j, spacing);
             *P++ = hsep_dot(left + (j - i) * spacing, right, preview - j * spacing);
-            right += preview - j * spacing;
         }
         v[i] = hsep_dot(left, target + i * spacing, preview - i * spacing);
-        left += preview - i * spacing;
     }
     hsep_splines_difference_gram(splines, 3, task->planner->jerk_weight, hsep_at(self, self->P));
     hsep_splines_project_jerk(splines, task->planner->jerk_weight, hsep_planner_third(task->planner), v);
-    self->steps++;
-    self->tries = 0;
     self->stage = HSEP_TRUSTED_TRY;
 }
 
@@ -261,74 +281,98 @@ static void trusted_planner_try(hsep_trusted_planner *self, const hsep_trusted_t
     }
 }
 
-/* Predict a try, and take it if it is better. */
+/* Judge a try, and take it if it is better. */
 static void trusted_planner_judge(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
     double *c = hsep_planner_coefficients(task->planner);
     const double cost = trusted_planner_at(self, task, c), gain = self->cost - cost;
+    const int may_try = self->tries_in_all < TRUSTED_PLANNER_TOGETHER;
+    self->stage = HSEP_TRUSTED_COMPARE;
     if (cost < self->cost) {
+        const int is_last = gain < trusted_planner_gain * (gain + cost) || self->steps == TRUSTED_PLANNER_STEPS;
         trusted_planner_copy(self, hsep_at(self, self->best), c);
         self->cost = cost;
         self->penalty *= trusted_planner_lower;
-        self->stage = gain < trusted_planner_gain * (gain + cost) || self->steps == TRUSTED_PLANNER_STEPS
-                          ? HSEP_TRUSTED_COMPARE
-                          : HSEP_TRUSTED_STEP;
+        self->stage = is_last || !may_try ? HSEP_TRUSTED_COMPARE : HSEP_TRUSTED_STEP;
     } else {
         self->penalty = fmax(trusted_planner_raise * self->penalty, trusted_planner_first);
-        self->stage = self->tries < TRUSTED_PLANNER_TRIES && self->tries_in_all < TRUSTED_PLANNER_TOGETHER
-                          ? HSEP_TRUSTED_TRY
-                          : HSEP_TRUSTED_COMPARE;
+        self->stage = self->tries < TRUSTED_PLANNER_TRIES && may_try ? HSEP_TRUSTED_TRY : HSEP_TRUSTED_COMPARE;
     }
     trusted_planner_copy(self, c, hsep_at(self, self->rest));
 }
 
-/* Take the plan whose cost is predicted to be lower. */
+/* Take the plan whose cost is lower. */
 static void trusted_planner_compare(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
     const double cost = trusted_planner_at(self, task, hsep_at(self, self->of_physics));
     const int is_better = self->cost < cost; /* not if it is NaN */
     self->planned = is_better ? 2 : 1;
-    self->stage = is_better ? HSEP_TRUSTED_PREDICT : HSEP_TRUSTED_DONE;
+    self->stage = HSEP_TRUSTED_PREDICT;
     trusted_planner_copy(
         self, hsep_planner_coefficients(task->planner), hsep_at(self, is_better ? self->best : self->of_physics));
 }
 
-HSEP_API uint64_t hsep_trusted_planner_advance(hsep_trusted_planner *self, const hsep_trusted_task *task)
+HSEP_API uint64_t hsep_trusted_planner_next(const hsep_trusted_planner *self)
 {
     switch ((hsep_trusted_stage)self->stage) {
+    case HSEP_TRUSTED_DONE:
+        return 0;
+    case HSEP_TRUSTED_BEGIN:
+    case HSEP_TRUSTED_PRODUCT:
+        return 2;
+    case HSEP_TRUSTED_PREDICT: /* with its variance */
+        return 4;
+    default:
+        return 1;
+    }
+}
+
+HSEP_API void hsep_trusted_planner_advance(hsep_trusted_planner *self, const hsep_trusted_task *task)
+{
+    double *c = hsep_planner_coefficients(task->planner);
+    switch ((hsep_trusted_stage)self->stage) {
+    case HSEP_TRUSTED_DONE:
+        break;
+    case HSEP_TRUSTED_BEGIN:
+        trusted_planner_physics(self, task);
+        break;
     case HSEP_TRUSTED_PHYSICS:
         if (hsep_planner_step(task->planner)) {
             trusted_planner_continue(self, task);
         }
-        return 1;
+        break;
+    case HSEP_TRUSTED_REST:
+        self->cost = trusted_planner_at(self, task, hsep_at(self, self->rest));
+        self->stage = HSEP_TRUSTED_STEP;
+        break;
     case HSEP_TRUSTED_STEP:
-        if (self->tries_in_all == TRUSTED_PLANNER_TOGETHER) {
-            self->stage = HSEP_TRUSTED_COMPARE;
-            return 1;
-        }
         trusted_planner_step(self, task);
-        return HSEP_TRUSTED_SLOPE;
+        break;
+    case HSEP_TRUSTED_COLUMN:
+        trusted_planner_columns(self, task);
+        break;
+    case HSEP_TRUSTED_PRODUCT:
+        trusted_planner_products(self, task);
+        break;
     case HSEP_TRUSTED_TRY:
         trusted_planner_try(self, task);
-        return 1;
+        break;
     case HSEP_TRUSTED_BOUNDED:
         if (hsep_planner_step(task->planner)) {
             self->solver_steps += hsep_planner_steps(task->planner);
             self->stage = HSEP_TRUSTED_JUDGE;
         }
-        return 1;
+        break;
     case HSEP_TRUSTED_JUDGE:
         trusted_planner_judge(self, task);
-        return HSEP_TRUSTED_PREDICTION;
+        break;
     case HSEP_TRUSTED_COMPARE:
         trusted_planner_compare(self, task);
-        return HSEP_TRUSTED_PREDICTION;
+        break;
     case HSEP_TRUSTED_PREDICT:
-        (void)trusted_planner_at(self, task, hsep_planner_coefficients(task->planner));
+        trusted_planner_command(self, task, c, HSEP_DECIDED + self->n);
+        (void)trusted_planner_predict(self, task, c, 0);
         self->stage = HSEP_TRUSTED_DONE;
-        return HSEP_TRUSTED_PREDICTION;
-    case HSEP_TRUSTED_DONE:
         break;
     }
-    return 0;
 }

@@ -5,8 +5,8 @@
  * repeated with a penalty on the change of velocity (Levenberg-Marquardt). The plan is compared with that of the physics
  * model, and the better one is taken.
  *
- * Nothing of it is long: hsep_trusted_planner_advance does a part of it, and tells how much work that was. All of it is
- * at most HSEP_TRUSTED_WORK. Memory is one block, without pointers. Reentrant; allocates nothing.
+ * Nothing of it is long: hsep_trusted_planner_advance does a part of it, hsep_trusted_planner_next tells how much work
+ * that is. All of it is at most HSEP_TRUSTED_WORK. Memory is one block, without pointers. Reentrant; allocates nothing.
  */
 #ifndef HSEP_TRUSTED_PLANNER_H
 #define HSEP_TRUSTED_PLANNER_H
@@ -20,22 +20,26 @@
 
 #include <stdint.h>
 
-/* Work of a part, in steps of the interior-point solver, and of a whole plan at most: the programme of the physics model;
- * 4 slopes; 10 tries; at most 96 steps and those of a programme begun before; three predictions more. */
-#define HSEP_TRUSTED_SLOPE 5
-#define HSEP_TRUSTED_PREDICTION 3
+/* Work of a whole plan at most, in steps of the interior-point solver: the programmes of the physics model and of 8 tries;
+ * 4 Newton steps; 59 solver steps and those of a programme begun then; predictions; and what is lost because a part is
+ * not divided between samples. */
+#define HSEP_TRUSTED_COLUMNS 8 /* parts in which the changes of x_h by the splines are computed */
 #define HSEP_TRUSTED_WORK                                                                                              \
-    (1 + HSEP_INTERIOR_STEPS + 4 * HSEP_TRUSTED_SLOPE + 10 * (1 + HSEP_TRUSTED_PREDICTION) +                           \
-     96 + HSEP_INTERIOR_STEPS + 3 * HSEP_TRUSTED_PREDICTION)
+    ((2 + HSEP_INTERIOR_STEPS) + 4 * (1 + HSEP_TRUSTED_COLUMNS + 2) + 8 * (1 + 1) + (59 + HSEP_INTERIOR_STEPS) +       \
+     (1 + 1 + 4) + 8)
 
 typedef enum {
     HSEP_TRUSTED_DONE = 0,
-    HSEP_TRUSTED_PHYSICS, /* the physics model's plan is bounded and being solved */
-    HSEP_TRUSTED_STEP,    /* a Newton step begins */
+    HSEP_TRUSTED_BEGIN,   /* the physics model's plan begins, */
+    HSEP_TRUSTED_PHYSICS, /* it is bounded and being solved */
+    HSEP_TRUSTED_REST,    /* the rest of the last plan is to be judged */
+    HSEP_TRUSTED_STEP,    /* a Newton step begins, */
+    HSEP_TRUSTED_COLUMN,  /* changes of x_h by the splines are to be computed, */
+    HSEP_TRUSTED_PRODUCT, /* and their products */
     HSEP_TRUSTED_TRY,     /* a try of it begins */
     HSEP_TRUSTED_BOUNDED, /* a try is bounded and being solved */
-    HSEP_TRUSTED_JUDGE,   /* a try is to be predicted */
-    HSEP_TRUSTED_COMPARE, /* the physics model's plan is to be predicted */
+    HSEP_TRUSTED_JUDGE,   /* a try is to be judged */
+    HSEP_TRUSTED_COMPARE, /* the physics model's plan is to be judged */
     HSEP_TRUSTED_PREDICT  /* the plan is to be predicted */
 } hsep_trusted_stage;
 
@@ -45,6 +49,7 @@ typedef struct {
     uint64_t stage;        /* hsep_trusted_stage */
     uint64_t follows;      /* whether the trusted model may plan */
     uint64_t steps;        /* Newton steps begun */
+    uint64_t columns;      /* splines whose change of x_h is computed */
     uint64_t tries;        /* of this step, and */
     uint64_t tries_in_all; /* of all */
     uint64_t solver_steps; /* of all bounded tries */
@@ -68,7 +73,7 @@ typedef struct {
     uint64_t trial;   /* and for a trial */
 } hsep_trusted_planner;
 
-HSEP_ASSERT_WORDS(hsep_trusted_planner, 27);
+HSEP_ASSERT_WORDS(hsep_trusted_planner, 28);
 
 /* What it plans with: other blocks, and the window's data. */
 typedef struct {
@@ -92,14 +97,15 @@ HSEP_API int hsep_trusted_planner_valid(
     const void *block, const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner);
 
 /* Begin a window: predict it under the rest of the last plan. physics: G_pb there; past: (p,) m, the last residuals;
- * best: best model allowed, 0 none, 1 physics, 2 the trusted one. Cost: that of hsep_trusted_scale, two predictions and
- * the programme of the physics model. */
+ * best: best model allowed, 0 none, 1 physics, 2 the trusted one. Cost: that of hsep_trusted_scale and a prediction. */
 HSEP_API void hsep_trusted_planner_begin(
     hsep_trusted_planner *self, const hsep_trusted_task *task, const hsep_physics *physics, const double past[],
     uint64_t best);
 
-/* Do a part of the plan that is left; return the work it was, in steps of the interior-point solver; 0: the plan is made
- * and predicted. */
-HSEP_API uint64_t hsep_trusted_planner_advance(hsep_trusted_planner *self, const hsep_trusted_task *task);
+/* Work of the part that is next, in steps of the interior-point solver; 0: the plan is made and predicted. */
+HSEP_API uint64_t hsep_trusted_planner_next(const hsep_trusted_planner *self);
+
+/* Do that part. */
+HSEP_API void hsep_trusted_planner_advance(hsep_trusted_planner *self, const hsep_trusted_task *task);
 
 #endif

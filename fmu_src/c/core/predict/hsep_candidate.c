@@ -162,13 +162,15 @@ static void candidate_spread(hsep_candidate *self, const double rows[], double m
 }
 
 HSEP_API void hsep_candidate_predict(
-    hsep_candidate *self, const double rows[], const double past[], const hsep_residual_scale *scale)
+    hsep_candidate *self, const double rows[], const double past[], const hsep_residual_scale *scale, int held)
 {
     const double largest = scale->largest;
     const double *unshrunk = hsep_at(self, self->unshrunk), *spread = hsep_at(self, self->spread);
     double *e_h = hsep_at(self, self->e_h);
     candidate_free_run(self, rows, past, candidate_lag_max * largest);
-    candidate_spread(self, rows, candidate_diverged * largest * largest);
+    if (!held) {
+        candidate_spread(self, rows, candidate_diverged * largest * largest);
+    }
     for (uint64_t j = 0; j < self->n; j++) {
         const double shrunk = unshrunk[j] * (scale->recent / (scale->recent + candidate_caution * spread[j]));
         e_h[j] = candidate_bounded(shrunk, candidate_prediction_max * largest);

@@ -66,10 +66,11 @@ HSEP_API int hsep_candidate_valid(const void *block, const hsep_candidate_shape 
 HSEP_API void hsep_candidate_solve(
     hsep_candidate *self, const hsep_regression *regression, const double static_scales[], double least_variance);
 
-/* Predict n samples in free run. rows: (n, n_static), sample after sample; past: (p,) m, the last residuals.
- * Cost: n times that of hsep_penalised_leverage, and n^2 / 2 multiply-adds. */
+/* Predict n samples in free run. rows: (n, n_static), sample after sample; past: (p,) m, the last residuals; held:
+ * whether the variance stays that of the last prediction. Cost: n times that of hsep_penalised_leverage, and n^2 / 2
+ * multiply-adds; with a variance held n (n_static + p). */
 HSEP_API void hsep_candidate_predict(
-    hsep_candidate *self, const double rows[], const double past[], const hsep_residual_scale *scale);
+    hsep_candidate *self, const double rows[], const double past[], const hsep_residual_scale *scale, int held);
 
 /* Estimate the correlation from the errors of a window, (Np,), m, that has been measured; accepted: (Np,), 1 where it
  * counts. */

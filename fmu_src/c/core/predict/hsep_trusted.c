@@ -95,28 +95,28 @@ HSEP_API void hsep_trusted_scale(
 }
 
 /* Predict by the candidates, whose rows hold the commands and stiffness and damping at x_pb. past: (p,), m. */
-static void trusted_candidates(hsep_trusted *self, const double x_pb[], const double past[])
+static void trusted_candidates(hsep_trusted *self, const double x_pb[], const double past[], int held)
 {
     double *x = hsep_at(self, self->x), *rows = hsep_at(self, self->rows);
     hsep_candidate *first = hsep_trusted_candidate(self, 0);
     /* The stiffness acts at the position, which the physics model alone does not give well enough. */
-    hsep_candidate_predict(first, rows, past, &self->scale);
+    hsep_candidate_predict(first, rows, past, &self->scale, held);
     for (uint64_t j = 0; j < self->n; j++) {
         x[j] = x_pb[j] + hsep_at(first, first->e_h)[j];
     }
     hsep_disturbances_motion(hsep_trusted_disturbances(self), x_pb, x, self->n, rows);
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
-        hsep_candidate_predict(hsep_trusted_candidate(self, i), rows, past, &self->scale);
+        hsep_candidate_predict(hsep_trusted_candidate(self, i), rows, past, &self->scale, held);
     }
 }
 
 /* e: the blend of the candidates, which have predicted. */
-static void trusted_blend(hsep_trusted *self, const double x_pb[], double e[])
+static void trusted_blend(hsep_trusted *self, const double x_pb[], double e[], int held)
 {
     const double *weights = self->blend.weights;
     double *disagreement = hsep_at(self, self->disagreement);
     if (self->predicted) {
-        trusted_candidates(self, x_pb, e + self->n);
+        trusted_candidates(self, x_pb, e + self->n, held);
     }
     for (uint64_t j = 0; j < self->n; j++) {
         double square = weights[0] * self->hold * self->hold;
@@ -131,19 +131,19 @@ static void trusted_blend(hsep_trusted *self, const double x_pb[], double e[])
     }
 }
 
-HSEP_API void hsep_trusted_predict(hsep_trusted *self, const double x_d[], const double x_pb[], double e[])
+HSEP_API void hsep_trusted_predict(hsep_trusted *self, const double x_d[], const double x_pb[], double e[], int held)
 {
     hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
     double *rows = hsep_at(self, self->rows);
     hsep_disturbances_command(disturbances, x_d, x_pb, self->n, self->forecast_scale, rows);
     hsep_disturbances_motion(disturbances, x_pb, x_pb, self->n, rows);
-    trusted_blend(self, x_pb, e);
+    trusted_blend(self, x_pb, e, held);
 }
 
 HSEP_API void hsep_trusted_forecast(hsep_trusted *self, const double x_d[], const double x_pb[], double e[])
 {
     hsep_trusted_scale(self, x_d, x_pb, NULL, e[self->n]);
-    trusted_blend(self, x_pb, e); /* the rows are those of the scales */
+    trusted_blend(self, x_pb, e, 0); /* the rows are those of the scales */
 }
 
 /* Weigh all samples so far by kept. */
