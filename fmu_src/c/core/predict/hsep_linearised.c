@@ -18,7 +18,8 @@ static double linearised_lay_out(hsep_linearised *self, const hsep_trusted_param
     self->gains = hsep_take(&end, n * HSEP_N_CANDIDATES * LINEARISED_GAINS);
     self->shrink = hsep_take(&end, n * HSEP_N_CANDIDATES);
     self->passed = hsep_take(&end, n * HSEP_N_CANDIDATES);
-    self->run = hsep_take(&end, n + (double)parameters->settings->p);
+    self->run = hsep_take(&end, n);
+    self->drive = hsep_take(&end, n);
     self->physics = hsep_take_block(&end, filter);
     self->filter = hsep_take_block(&end, filter);
     return end * sizeof(double);
@@ -110,26 +111,36 @@ HSEP_API void hsep_linearised_at(
     }
 }
 
-/* The disturbance that a change makes, filtered by G_pb, and what the features of x_pb give of it: (n - first,), newest
- * first. */
-static void linearised_drive(
-    hsep_linearised *self, const double gains[], const double own[], const double change[], uint64_t n_change,
-    const double passed[], uint64_t first, double T_s, double drive[])
+/* The disturbance that a change makes, in the last count samples, oldest first. */
+static void linearised_disturbance(
+    const hsep_linearised *self, const double gains[], const double change[], uint64_t n_change, const double passed[],
+    uint64_t count, double T_s, double disturbance[])
 {
-    const uint64_t n = self->n, count = n - first;
-    hsep_physics *filter = (hsep_physics *)hsep_at(self, self->filter);
+    const uint64_t n = self->n;
+    const double *gain = gains + (n - count);
     double last_change = 0.0, last_passed = 0.0, last_difference = 0.0;
-    memcpy(filter, hsep_at(self, self->physics), (size_t)(self->filter - self->physics) * sizeof(double));
-    for (uint64_t u = 0; u < count; u++) {
-        const double *gain = gains + first + u, now = u < n_change ? change[u] : 0.0;
+    for (uint64_t u = 0; u < count; u++, gain++) {
+        const double now = u < n_change ? change[u] : 0.0;
         const double v_d = (now - last_change) / T_s, v = (passed[u] - last_passed) / T_s;
         const double difference = gain[3 * n] * v_d + gain[4 * n] * passed[u] + gain[5 * n] * v;
-        const double disturbance =
-            (gain[0] * v_d + gain[n] * passed[u] + gain[2 * n] * v) + (difference - last_difference);
-        double filtered;
-        hsep_physics_forced_response(filter, &disturbance, &filtered, 1);
-        drive[count - 1 - u] = filtered + own[u];
+        disturbance[u] = (gain[0] * v_d + gain[n] * passed[u] + gain[2 * n] * v) + (difference - last_difference);
         last_change = now, last_passed = passed[u], last_difference = difference;
+    }
+}
+
+/* Run of the recursion of candidate i from rest, driven by the filtered disturbance and what the features of x_pb give,
+ * and its part of the change of x_h. */
+static void linearised_run(
+    hsep_linearised *self, const hsep_candidate *candidate, uint64_t i, uint64_t count, double column[])
+{
+    const double *lag_weights = hsep_at_const(candidate, candidate->weights) + candidate->n_static;
+    const double *own = hsep_at(self, self->passed) + i * self->n, *drive = hsep_at(self, self->drive);
+    const double *shrink = hsep_at(self, self->shrink) + i * self->n + (self->n - count);
+    double *run = hsep_at(self, self->run);
+    for (uint64_t u = 0; u < count; u++) {
+        double *e = run + (count - 1 - u);
+        *e = drive[u] + own[u] + hsep_dot(lag_weights, e + 1, u < candidate->p ? u : candidate->p);
+        column[u] += shrink[u] * *e;
     }
 }
 
@@ -139,22 +150,16 @@ HSEP_API void hsep_linearised_column(
 {
     const uint64_t n = self->n, count = n - first;
     const double T_s = hsep_trusted_disturbances(model)->T_s;
-    double *run = hsep_at(self, self->run);
+    hsep_physics *filter = (hsep_physics *)hsep_at(self, self->filter);
+    double *drive = hsep_at(self, self->drive);
     memcpy(column, passed, (size_t)count * sizeof(double));
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
-        hsep_candidate *candidate = hsep_trusted_candidate(model, i);
-        const double *lag_weights = hsep_at(candidate, candidate->weights) + candidate->n_static;
-        const double *shrink = hsep_at(self, self->shrink) + i * n + first;
-        if (model->blend.weights[1 + i] == 0.0) {
-            continue;
-        }
-        linearised_drive(
-            self, hsep_at(self, self->gains) + i * n * LINEARISED_GAINS, hsep_at(self, self->passed) + i * n, change,
-            n_change, passed, first, T_s, run);
-        for (uint64_t j = count; j-- > 0;) { /* at rest before */
-            const uint64_t past = count - 1 - j;
-            run[j] += hsep_dot(lag_weights, run + j + 1, past < candidate->p ? past : candidate->p);
-            column[past] += shrink[past] * run[j];
+        if (model->blend.weights[1 + i] > 0.0) {
+            const double *gains = hsep_at(self, self->gains) + i * n * LINEARISED_GAINS;
+            linearised_disturbance(self, gains, change, n_change, passed, count, T_s, drive);
+            memcpy(filter, hsep_at(self, self->physics), (size_t)(self->filter - self->physics) * sizeof(double));
+            hsep_physics_forced_response(filter, drive, drive, (size_t)count);
+            linearised_run(self, hsep_trusted_candidate(model, i), i, count, column);
         }
     }
 }

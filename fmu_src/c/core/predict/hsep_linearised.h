@@ -21,12 +21,13 @@ typedef struct {
                        * the disturbances themselves and then their differences */
     uint64_t shrink;  /* (HSEP_N_CANDIDATES, n) part of each candidate in the blend */
     uint64_t passed;  /* (HSEP_N_CANDIDATES, n) what the features of x_pb give of a change */
-    uint64_t run;     /* (n + p,) work of a recursion, newest first */
+    uint64_t run;     /* (n,) work of a recursion, newest first, */
+    uint64_t drive;   /* (n,) and that which drives it, oldest first */
     uint64_t physics; /* G_pb at rest, */
     uint64_t filter;  /* and for one change */
 } hsep_linearised;
 
-HSEP_ASSERT_WORDS(hsep_linearised, 8);
+HSEP_ASSERT_WORDS(hsep_linearised, 9);
 
 /* Bytes of the block, counted in double so that no size can overflow. */
 HSEP_API double hsep_linearised_size(const hsep_trusted_parameters *parameters);
