@@ -33,7 +33,7 @@ from .trusted_plan import TrustedPlanner
 
 __all__ = ["RECOMMENDED", "SepCompensator", "SepState", "direct_samples"]
 
-_PINNED, _PINNED_WITH_TRUST = 8, 16
+_PINNED, _PINNED_WITH_TRUST = 8, 20
 """Leading samples of a window in which a bounded plan follows the last one: real-time solvers take 3 steps in each. With
 trust every plan does, as it takes more work."""
 

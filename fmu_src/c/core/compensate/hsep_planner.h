@@ -21,7 +21,7 @@
 /* Samples at the beginning of a window in which a bounded plan follows the last one; with trust every plan does, as it
  * takes more work. */
 #define HSEP_PINNED 8
-#define HSEP_PINNED_WITH_TRUST 16
+#define HSEP_PINNED_WITH_TRUST 20
 
 typedef struct {
     uint64_t Np;               /* samples of a window */

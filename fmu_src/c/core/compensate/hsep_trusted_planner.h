@@ -23,7 +23,7 @@
 /* Work of a whole plan at most, in steps of the interior-point solver: the programmes of the physics model and of 8 tries;
  * 4 Newton steps; 59 solver steps and those of a programme begun then; predictions; and what is lost because a part is
  * not divided between samples. */
-#define HSEP_TRUSTED_COLUMNS 8 /* parts in which the changes of x_h by the splines are computed */
+#define HSEP_TRUSTED_COLUMNS 10 /* parts in which the changes of x_h by the splines are computed */
 #define HSEP_TRUSTED_WORK                                                                                              \
     ((2 + HSEP_INTERIOR_STEPS) + 4 * (1 + HSEP_TRUSTED_COLUMNS + 2) + 8 * (1 + 1) + (59 + HSEP_INTERIOR_STEPS) +       \
      (1 + 1 + 4) + 8)
