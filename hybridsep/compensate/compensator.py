@@ -38,7 +38,8 @@ _PINNED, _PINNED_WITH_TRUST = 8, 20
 trust every plan does, as it takes more work."""
 
 RECOMMENDED = PredictorSettings(trust=False, Np=50, p=50, q=40, lam=1e-8, t_init=0.1, v_friction=2e-3)
-"""Predictor settings with the smallest tracking error on the staircase drive, with the compensator's defaults."""
+"""Predictor settings of the paper's model with the smallest tracking error on the staircase drive, with the compensator's
+defaults."""
 
 
 class SepCompensator:
