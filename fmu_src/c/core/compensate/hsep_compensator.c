@@ -6,107 +6,21 @@
 #include <stddef.h>
 #include <string.h>
 
-static hsep_planner *compensator_planner(hsep_compensator *self)
-{
-    return (hsep_planner *)hsep_at(self, self->planner);
-}
-
-HSEP_API hsep_predictor *hsep_compensator_predictor(hsep_compensator *self)
-{
-    return (hsep_predictor *)hsep_at(self, self->predictor);
-}
-
-static hsep_trusted_planner *compensator_trusted(hsep_compensator *self)
-{
-    return (hsep_trusted_planner *)hsep_at(self, self->trusted);
-}
-
 static hsep_trusted_task compensator_task(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     return (hsep_trusted_task){
         .model = hsep_predictor_trusted(predictor),
-        .planner = compensator_planner(self),
+        .planner = hsep_compensator_planner(self),
         .spline = hsep_at(self, self->spline_pb),
         .x_d = hsep_at(predictor, predictor->x_d)};
-}
-
-/* Set what follows from the parameters; return the bytes of the block. */
-static double compensator_lay_out(hsep_compensator *self, const hsep_compensator_parameters *parameters)
-{
-    const hsep_predictor_parameters *predictor = &parameters->predictor;
-    const double preview = (double)predictor->preview;
-    const hsep_trusted_parameters trusted = hsep_predictor_trusted_parameters(predictor);
-    double end = HSEP_WORDS(hsep_compensator);
-    self->compensate = (uint64_t)parameters->compensate;
-    self->x_dm = hsep_take(&end, (double)predictor->settings.Np);
-    self->trial_x = hsep_take(&end, preview + (double)predictor->settings.q);
-    self->trial_e = hsep_take(&end, preview + (double)predictor->settings.p);
-    self->target = hsep_take(&end, preview);
-    self->spline_pb = hsep_take(&end, preview);
-    self->spline_h = hsep_take(&end, preview);
-    self->trial = hsep_take_block(&end, hsep_physics_size(predictor->n_modes, predictor->settings.dead_time));
-    self->planner = hsep_take_block(&end, hsep_planner_size(&parameters->planner));
-    self->predictor = hsep_take_block(&end, hsep_predictor_size(predictor));
-    self->trusted =
-        predictor->trust.trust ? hsep_take_block(&end, hsep_trusted_planner_size(&trusted, &parameters->planner)) : 0;
-    return end * sizeof(double);
-}
-
-HSEP_API double hsep_compensator_size(const hsep_compensator_parameters *parameters)
-{
-    return compensator_lay_out(&(hsep_compensator){0}, parameters);
-}
-
-HSEP_API void hsep_compensator_init(hsep_compensator *self, const hsep_compensator_parameters *parameters, double start)
-{
-    const hsep_predictor_parameters *predictor = &parameters->predictor;
-    memset(self, 0, (size_t)hsep_compensator_size(parameters));
-    (void)compensator_lay_out(self, parameters);
-    hsep_predictor_init(hsep_compensator_predictor(self), predictor, start);
-    hsep_planner_init(compensator_planner(self), &parameters->planner, start);
-    if (self->trusted) {
-        const hsep_trusted_parameters trusted = hsep_predictor_trusted_parameters(predictor);
-        hsep_trusted_planner_init(compensator_trusted(self), &trusted, &parameters->planner, start);
-    }
-    self->state = self->before = self->compensate > HSEP_SEP_PHYSICS ? HSEP_SEP_PHYSICS : self->compensate;
-    /* The spline filtered by the physics model from rest, which is constant. */
-    hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
-    double *spline = hsep_at(self, self->spline_pb);
-    hsep_physics_init(
-        trial, predictor->modes, predictor->n_modes, predictor->settings.dead_time, predictor->settings.T_s,
-        (hsep_hold)predictor->settings.input_hold);
-    memcpy(
-        spline, hsep_splines_shape(hsep_planner_splines(compensator_planner(self))),
-        (size_t)(4 * parameters->planner.spacing) * sizeof(double));
-    hsep_physics_forced_response(trial, spline, spline, (size_t)predictor->preview);
-}
-
-HSEP_API int hsep_compensator_valid(const void *block, const hsep_compensator_parameters *parameters, uint64_t k)
-{
-    const hsep_predictor_parameters *predictor = &parameters->predictor;
-    const hsep_trusted_parameters trusted = hsep_predictor_trusted_parameters(predictor);
-    hsep_compensator got;
-    hsep_predictor online;
-    memcpy(&got, block, sizeof got);
-    (void)compensator_lay_out(&got, parameters); /* changes nothing where it is sound */
-    memcpy(&online, hsep_at_bytes(block, got.predictor), sizeof online);
-    return memcmp(&got, block, sizeof got) == 0 && got.state <= HSEP_SEP_HYBRID && got.before <= HSEP_SEP_HYBRID &&
-           got.solving <= 1 &&
-           (got.solving || online.n_published == predictor->settings.Np) &&
-           (online.divergence ||
-            hsep_within(hsep_at_bytes(block, got.x_dm), predictor->settings.Np, HSEP_PREDICTION_MAX)) &&
-           hsep_physics_valid(hsep_at_bytes(block, got.trial), predictor->n_modes, predictor->settings.dead_time) &&
-           hsep_planner_valid(hsep_at_bytes(block, got.planner), &parameters->planner) &&
-           (!got.trusted || hsep_trusted_planner_valid(hsep_at_bytes(block, got.trusted), &trusted, &parameters->planner)) &&
-           hsep_predictor_valid(hsep_at_bytes(block, got.predictor), predictor, k);
 }
 
 /* target := x_d - the model's response to x_d with the decided part of delta; eq. (3) without a matrix. */
 static void compensator_target(hsep_compensator *self, hsep_sep_state state)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
-    const hsep_planner *planner = compensator_planner(self);
+    const hsep_planner *planner = hsep_compensator_planner(self);
     const hsep_features *f = &predictor->features;
     const uint64_t preview = predictor->preview, Np = predictor->Np;
     const double *x_d = hsep_at(predictor, predictor->x_d);
@@ -164,7 +78,7 @@ static int compensator_trusts(hsep_compensator *self)
  * differences. */
 static uint64_t compensator_pinned(hsep_compensator *self)
 {
-    const uint64_t pinned = hsep_planner_pinned(compensator_planner(self));
+    const uint64_t pinned = hsep_planner_pinned(hsep_compensator_planner(self));
     return pinned > 1 ? pinned : 0;
 }
 
@@ -177,16 +91,15 @@ static void compensator_publish(hsep_compensator *self, uint64_t last)
     double *x_dm = hsep_at(self, self->x_dm), *past_x = hsep_at(predictor, predictor->past_x);
     double *command = hsep_at(predictor, predictor->command);
     for (uint64_t k = first; k < last; k++) {
-        x_dm[k] = x_d[k] + hsep_planner_delta(compensator_planner(self), k);
+        x_dm[k] = x_d[k] + hsep_planner_delta(hsep_compensator_planner(self), k);
         command[Np - 1 - k] = x_dm[k] - predictor->start;
-        hsep_physics_forced_response(
-            hsep_predictor_physics(predictor), &command[Np - 1 - k], &past_x[Np - 1 - k], 1);
+        hsep_physics_forced_response(hsep_predictor_physics(predictor), &command[Np - 1 - k], &past_x[Np - 1 - k], 1);
     }
     if (!hsep_within(x_dm + first, last - first, HSEP_PREDICTION_MAX)) {
         predictor->divergence = HSEP_DIVERGES_X_DM;
     }
     if (self->trusted) { /* the window's part of the preview */
-        const hsep_trusted_planner *trusted = compensator_trusted(self);
+        const hsep_trusted_planner *trusted = hsep_compensator_trusted(self);
         memcpy(
             hsep_at(predictor, predictor->e_h), hsep_at_const(trusted, trusted->e_h) + (trusted->preview - Np),
             (size_t)Np * sizeof(double));
@@ -198,7 +111,7 @@ static void compensator_publish(hsep_compensator *self, uint64_t last)
 /* Do parts of a plan with trust, as much work as is due; return whether it is made. */
 static int compensator_advance(hsep_compensator *self, uint64_t due)
 {
-    hsep_trusted_planner *trusted = compensator_trusted(self);
+    hsep_trusted_planner *trusted = hsep_compensator_trusted(self);
     const hsep_trusted_task task = compensator_task(self);
     uint64_t next = hsep_trusted_planner_next(trusted), done = 0;
     while (next > 0 && next <= due - done) {
@@ -214,7 +127,7 @@ static int compensator_step(hsep_compensator *self, uint64_t due)
 {
     int done = 0;
     for (uint64_t step = 0; !done && step < due; step++) {
-        done = hsep_planner_step(compensator_planner(self));
+        done = hsep_planner_step(hsep_compensator_planner(self));
     }
     return done;
 }
@@ -228,7 +141,7 @@ static void compensator_solve(hsep_compensator *self)
     const uint64_t due = i < pinned ? (work + pinned - 1) / pinned : UINT64_MAX;
     if (self->trusted ? compensator_advance(self, due) : compensator_step(self, due)) {
         self->solving = 0;
-        self->state = self->trusted ? compensator_trusted(self)->planned : self->state;
+        self->state = self->trusted ? hsep_compensator_trusted(self)->planned : self->state;
         compensator_publish(self, predictor->Np);
     }
 }
@@ -239,9 +152,9 @@ static hsep_plan_status compensator_try(hsep_compensator *self, hsep_sep_state s
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     const uint64_t spline = state == HSEP_SEP_HYBRID ? self->spline_h : self->spline_pb;
     compensator_target(self, state);
-    hsep_planner_open(compensator_planner(self), hsep_at(predictor, predictor->x_d));
-    hsep_planner_aim(compensator_planner(self), hsep_at(self, spline), hsep_at(self, self->target));
-    const hsep_plan_status status = hsep_planner_solve(compensator_planner(self), 0);
+    hsep_planner_open(hsep_compensator_planner(self), hsep_at(predictor, predictor->x_d));
+    hsep_planner_aim(hsep_compensator_planner(self), hsep_at(self, spline), hsep_at(self, self->target));
+    const hsep_plan_status status = hsep_planner_solve(hsep_compensator_planner(self), 0);
     self->state = (uint64_t)(status == HSEP_PLAN_FAILED ? HSEP_SEP_OFF : state);
     return status;
 }
@@ -273,7 +186,7 @@ static void compensator_plan_trusted(hsep_compensator *self)
     self->before = self->state;
     predictor->n_physics = self->compensate == HSEP_SEP_HYBRID ? hsep_predictor_warm_up(predictor) : predictor->Np;
     hsep_trusted_planner_begin(
-        compensator_trusted(self), &task, hsep_predictor_physics(predictor),
+        hsep_compensator_trusted(self), &task, hsep_predictor_physics(predictor),
         hsep_at(predictor, predictor->past_e) + predictor->Np, best);
     self->solving = 1;
 }
@@ -305,7 +218,7 @@ static void compensator_next_window(hsep_compensator *self)
             &self->monitor, hsep_at(predictor, predictor->past_e), hsep_at(predictor, predictor->e_h), Np,
             regression->residual_sum / (double)regression->n_samples);
     }
-    hsep_planner_next(compensator_planner(self), hsep_at(predictor, predictor->x_d));
+    hsep_planner_next(hsep_compensator_planner(self), hsep_at(predictor, predictor->x_d));
     hsep_compensator_begin(self);
 }
 

@@ -75,6 +75,11 @@ HSEP_API void hsep_compensator_init(
 /* The predictor, for a warm start between hsep_compensator_init and _begin. */
 HSEP_API hsep_predictor *hsep_compensator_predictor(hsep_compensator *self);
 
+HSEP_API hsep_planner *hsep_compensator_planner(hsep_compensator *self);
+
+/* The planner with trust, if there is one. */
+HSEP_API hsep_trusted_planner *hsep_compensator_trusted(hsep_compensator *self);
+
 /* Plan the first window. */
 HSEP_API void hsep_compensator_begin(hsep_compensator *self);
 

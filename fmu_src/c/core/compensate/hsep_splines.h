@@ -66,8 +66,7 @@ HSEP_API double hsep_splines_energy(const hsep_splines *self);
 HSEP_API void hsep_splines_filtered_gram(const hsep_splines *self, const double filtered[], double triangle[]);
 
 /* The triangle of n rows += weight D' D with the differences D of an order of the splines, m. */
-HSEP_API void
-hsep_splines_difference_gram(const hsep_splines *self, unsigned order, double weight, double triangle[]);
+HSEP_API void hsep_splines_difference_gram(const hsep_splines *self, unsigned order, double weight, double triangle[]);
 
 /* What weight D' D, of hsep_splines_difference_gram, makes of coefficients: y, (n,), += weight D' D c. */
 HSEP_API void hsep_splines_difference_product(

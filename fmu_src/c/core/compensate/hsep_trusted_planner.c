@@ -7,14 +7,9 @@
 #include <stddef.h>
 #include <string.h>
 
-#define TRUSTED_PLANNER_STEPS 4      /* Newton steps at most, */
-#define TRUSTED_PLANNER_TRIES 6      /* tries of each, */
-#define TRUSTED_PLANNER_TOGETHER 8   /* tries of all, */
-#define TRUSTED_PLANNER_SOLVER 60    /* and solver steps after which no bounded try is begun */
-
 /* Reach of friction's slope in each Newton step, relative to the model's velocity scale: a tangent is blind to a sign
  * that changes nearby. */
-static const double trusted_planner_reaches[TRUSTED_PLANNER_STEPS] = {0.1, 0.03, 0.01, 0.0};
+static const double trusted_planner_reaches[HSEP_TRUSTED_STEPS] = {0.1, 0.03, 0.01, 0.0};
 
 /* Penalty on the change of velocity: its first value, and how it follows success. */
 static const double trusted_planner_first = 1.0, trusted_planner_raise = 8.0, trusted_planner_lower = 0.25;
@@ -22,87 +17,9 @@ static const double trusted_planner_first = 1.0, trusted_planner_raise = 8.0, tr
 /* Relative gain of a step below which it is the last one. */
 static const double trusted_planner_gain = 1e-3;
 
-/* Set what follows from the parameters; return the bytes of the block. */
-static double trusted_planner_lay_out(
-    hsep_trusted_planner *self, const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner)
-{
-    const uint64_t n = hsep_splines_count(planner->preview, planner->spacing);
-    const double preview = (double)planner->preview, filter = hsep_physics_size(parameters->n_modes, parameters->settings->dead_time);
-    const double columns = (double)n, coefficients = HSEP_DECIDED + columns;
-    double end = HSEP_WORDS(hsep_trusted_planner);
-    self->preview = planner->preview;
-    self->p = parameters->settings->p;
-    self->Np = planner->Np;
-    self->n = n;
-    self->rest = hsep_take(&end, coefficients);
-    self->best = hsep_take(&end, coefficients);
-    self->of_physics = hsep_take(&end, coefficients);
-    self->command = hsep_take(&end, preview);
-    self->x_pb = hsep_take(&end, preview);
-    self->e_h = hsep_take(&end, preview + (double)self->p);
-    self->target = hsep_take(&end, preview);
-    self->W = hsep_take(&end, columns * preview - (double)planner->spacing * 0.5 * columns * (columns - 1.0));
-    self->P = hsep_take(&end, hsep_triangle(n));
-    self->v = hsep_take(&end, columns);
-    self->linearised = hsep_take_block(&end, hsep_linearised_size(parameters));
-    self->physics = hsep_take_block(&end, filter);
-    self->trial = hsep_take_block(&end, filter);
-    return end * sizeof(double);
-}
-
-HSEP_API double
-hsep_trusted_planner_size(const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner)
-{
-    return trusted_planner_lay_out(&(hsep_trusted_planner){0}, parameters, planner);
-}
-
-HSEP_API void hsep_trusted_planner_init(
-    hsep_trusted_planner *self, const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner,
-    double start)
-{
-    const hsep_predictor_settings *settings = parameters->settings;
-    memset(self, 0, (size_t)hsep_trusted_planner_size(parameters, planner));
-    (void)trusted_planner_lay_out(self, parameters, planner);
-    self->start = start;
-    hsep_linearised_init((hsep_linearised *)hsep_at(self, self->linearised), parameters);
-    for (int i = 0; i < 2; i++) {
-        hsep_physics_init(
-            (hsep_physics *)hsep_at(self, i == 0 ? self->physics : self->trial), parameters->modes,
-            parameters->n_modes, settings->dead_time, settings->T_s, (hsep_hold)settings->input_hold);
-    }
-}
-
-HSEP_API int hsep_trusted_planner_valid(
-    const void *block, const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner)
-{
-    const uint64_t n_modes = parameters->n_modes, dead_time = parameters->settings->dead_time;
-    hsep_trusted_planner got;
-    memcpy(&got, block, sizeof got);
-    (void)trusted_planner_lay_out(&got, parameters, planner); /* changes nothing where it is sound */
-    return memcmp(&got, block, sizeof got) == 0 && got.stage <= HSEP_TRUSTED_PREDICT && got.follows <= 1 &&
-           got.steps <= TRUSTED_PLANNER_STEPS && got.columns <= got.n && got.tries <= TRUSTED_PLANNER_TRIES &&
-           got.tries_in_all <= TRUSTED_PLANNER_TOGETHER &&
-           got.solver_steps < TRUSTED_PLANNER_SOLVER + HSEP_INTERIOR_STEPS && got.planned <= 2 &&
-           hsep_linearised_valid(hsep_at_bytes(block, got.linearised), parameters) &&
-           hsep_physics_valid(hsep_at_bytes(block, got.physics), n_modes, dead_time) &&
-           hsep_physics_valid(hsep_at_bytes(block, got.trial), n_modes, dead_time);
-}
-
 static void trusted_planner_copy(hsep_trusted_planner *self, double to[], const double from[])
 {
     memcpy(to, from, (size_t)(HSEP_DECIDED + self->n) * sizeof(double));
-}
-
-/* Response of the physics model, newest first, to commands relative to the start, newest first. */
-static void trusted_planner_respond(hsep_trusted_planner *self)
-{
-    const double *command = hsep_at(self, self->command);
-    double *x_pb = hsep_at(self, self->x_pb);
-    hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
-    memcpy(trial, hsep_at(self, self->physics), (size_t)(self->trial - self->physics) * sizeof(double));
-    for (uint64_t j = self->preview; j-- > 0;) {
-        hsep_physics_forced_response(trial, &command[j], &x_pb[j], 1);
-    }
 }
 
 /* Commands under the first count coefficients of a plan, and the response of the physics model to them. */
@@ -110,16 +27,20 @@ static void trusted_planner_command(
     hsep_trusted_planner *self, const hsep_trusted_task *task, const double c[], uint64_t count)
 {
     const hsep_splines *splines = hsep_planner_splines(task->planner);
-    double *command = hsep_at(self, self->command);
+    double *command = hsep_at(self, self->command), *x_pb = hsep_at(self, self->x_pb);
+    hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
+    memcpy(trial, hsep_at(self, self->physics), (size_t)(self->trial - self->physics) * sizeof(double));
     for (uint64_t k = 0; k < self->preview; k++) {
-        command[self->preview - 1 - k] = task->x_d[k] - self->start + hsep_splines_sum(splines, c, count, k);
+        const uint64_t j = self->preview - 1 - k;
+        command[j] = task->x_d[k] - self->start + hsep_splines_sum(splines, c, count, k);
+        hsep_physics_forced_response(trial, &command[j], &x_pb[j], 1);
     }
-    trusted_planner_respond(self);
 }
 
-/* Predict these commands; return the cost of the plan, m2; not finite if the prediction overflows. */
-static double
-trusted_planner_predict(hsep_trusted_planner *self, const hsep_trusted_task *task, const double c[], int held)
+/* Predict these commands; return the cost of the plan, m2; not finite if the prediction overflows. held: whether the
+ * variances are those under the rest of the last plan. */
+static double trusted_planner_predict(
+    hsep_trusted_planner *self, const hsep_trusted_task *task, const double c[], int held)
 {
     const hsep_splines *splines = hsep_planner_splines(task->planner);
     const uint64_t count = HSEP_DECIDED + self->n;
@@ -138,11 +59,11 @@ trusted_planner_predict(hsep_trusted_planner *self, const hsep_trusted_task *tas
     return error + task->planner->jerk_weight * jerk;
 }
 
-/* Cost of a plan, with the variances of the prediction under the rest of the last plan. */
-static double trusted_planner_at(hsep_trusted_planner *self, const hsep_trusted_task *task, const double c[])
+/* The same of the commands of a plan. */
+static double trusted_planner_at(hsep_trusted_planner *self, const hsep_trusted_task *task, const double c[], int held)
 {
     trusted_planner_command(self, task, c, HSEP_DECIDED + self->n);
-    return trusted_planner_predict(self, task, c, 1);
+    return trusted_planner_predict(self, task, c, held);
 }
 
 /* The physics model's plan is made: try a better one, if there may be one. */
@@ -276,7 +197,7 @@ static void trusted_planner_try(hsep_trusted_planner *self, const hsep_trusted_t
     self->tries_in_all++;
     const hsep_plan_status status = hsep_planner_solve(task->planner, 1);
     self->stage = status == HSEP_PLAN_DONE ? HSEP_TRUSTED_JUDGE : HSEP_TRUSTED_COMPARE;
-    if (status == HSEP_PLAN_BOUNDED && self->solver_steps < TRUSTED_PLANNER_SOLVER) {
+    if (status == HSEP_PLAN_BOUNDED && self->solver_steps < HSEP_TRUSTED_SOLVER) {
         self->stage = HSEP_TRUSTED_BOUNDED;
     }
 }
@@ -285,18 +206,18 @@ static void trusted_planner_try(hsep_trusted_planner *self, const hsep_trusted_t
 static void trusted_planner_judge(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
     double *c = hsep_planner_coefficients(task->planner);
-    const double cost = trusted_planner_at(self, task, c), gain = self->cost - cost;
-    const int may_try = self->tries_in_all < TRUSTED_PLANNER_TOGETHER;
+    const double cost = trusted_planner_at(self, task, c, 1), gain = self->cost - cost;
+    const int may_try = self->tries_in_all < HSEP_TRUSTED_TOGETHER;
     self->stage = HSEP_TRUSTED_COMPARE;
     if (cost < self->cost) {
-        const int is_last = gain < trusted_planner_gain * (gain + cost) || self->steps == TRUSTED_PLANNER_STEPS;
+        const int is_last = gain < trusted_planner_gain * (gain + cost) || self->steps == HSEP_TRUSTED_STEPS;
         trusted_planner_copy(self, hsep_at(self, self->best), c);
         self->cost = cost;
         self->penalty *= trusted_planner_lower;
         self->stage = is_last || !may_try ? HSEP_TRUSTED_COMPARE : HSEP_TRUSTED_STEP;
     } else {
         self->penalty = fmax(trusted_planner_raise * self->penalty, trusted_planner_first);
-        self->stage = self->tries < TRUSTED_PLANNER_TRIES && may_try ? HSEP_TRUSTED_TRY : HSEP_TRUSTED_COMPARE;
+        self->stage = self->tries < HSEP_TRUSTED_TRIES && may_try ? HSEP_TRUSTED_TRY : HSEP_TRUSTED_COMPARE;
     }
     trusted_planner_copy(self, c, hsep_at(self, self->rest));
 }
@@ -304,7 +225,7 @@ static void trusted_planner_judge(hsep_trusted_planner *self, const hsep_trusted
 /* Take the plan whose cost is lower. */
 static void trusted_planner_compare(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
-    const double cost = trusted_planner_at(self, task, hsep_at(self, self->of_physics));
+    const double cost = trusted_planner_at(self, task, hsep_at(self, self->of_physics), 1);
     const int is_better = self->cost < cost; /* not if it is NaN */
     self->planned = is_better ? 2 : 1;
     self->stage = HSEP_TRUSTED_PREDICT;
@@ -342,7 +263,7 @@ HSEP_API void hsep_trusted_planner_advance(hsep_trusted_planner *self, const hse
         }
         break;
     case HSEP_TRUSTED_REST:
-        self->cost = trusted_planner_at(self, task, hsep_at(self, self->rest));
+        self->cost = trusted_planner_at(self, task, hsep_at(self, self->rest), 1);
         self->stage = HSEP_TRUSTED_STEP;
         break;
     case HSEP_TRUSTED_STEP:
@@ -370,8 +291,7 @@ HSEP_API void hsep_trusted_planner_advance(hsep_trusted_planner *self, const hse
         trusted_planner_compare(self, task);
         break;
     case HSEP_TRUSTED_PREDICT:
-        trusted_planner_command(self, task, c, HSEP_DECIDED + self->n);
-        (void)trusted_planner_predict(self, task, c, 0);
+        (void)trusted_planner_at(self, task, c, 0);
         self->stage = HSEP_TRUSTED_DONE;
         break;
     }

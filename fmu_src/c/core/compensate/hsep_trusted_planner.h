@@ -20,13 +20,17 @@
 
 #include <stdint.h>
 
-/* Work of a whole plan at most, in steps of the interior-point solver: the programmes of the physics model and of 8 tries;
- * 4 Newton steps; 59 solver steps and those of a programme begun then; predictions; and what is lost because a part is
- * not divided between samples. */
+#define HSEP_TRUSTED_STEPS 4    /* Newton steps of a plan at most, */
+#define HSEP_TRUSTED_TRIES 6    /* tries of each, */
+#define HSEP_TRUSTED_TOGETHER 8 /* tries of all, */
+#define HSEP_TRUSTED_SOLVER 60  /* and solver steps after which no bounded try is begun */
 #define HSEP_TRUSTED_COLUMNS 10 /* parts in which the changes of x_h by the splines are computed */
-#define HSEP_TRUSTED_WORK                                                                                              \
-    ((2 + HSEP_INTERIOR_STEPS) + 4 * (1 + HSEP_TRUSTED_COLUMNS + 2) + 8 * (1 + 1) + (59 + HSEP_INTERIOR_STEPS) +       \
-     (1 + 1 + 4) + 8)
+
+/* Work of a plan at most, in steps of the interior-point solver: the physics model's programme, Newton steps, tries with
+ * their programmes, predictions; and 8 because a part is not divided between samples. */
+#define HSEP_TRUSTED_WORK \
+    ((2 + HSEP_INTERIOR_STEPS) + HSEP_TRUSTED_STEPS * (1 + HSEP_TRUSTED_COLUMNS + 2) + 2 * HSEP_TRUSTED_TOGETHER + \
+     (HSEP_TRUSTED_SOLVER - 1 + HSEP_INTERIOR_STEPS) + (1 + 1 + 4) + 8)
 
 typedef enum {
     HSEP_TRUSTED_DONE = 0,
@@ -58,16 +62,16 @@ typedef struct {
     double penalty;        /* on the change of velocity, in the unit of the jerk's weight */
     double start;          /* m, position of rest */
     /* Offsets in doubles from the beginning of the struct */
-    uint64_t rest;    /* (3 + n,) m, coefficients of the rest of the last plan */
-    uint64_t best;    /* (3 + n,) m, those of the best plan so far */
+    uint64_t rest;       /* (3 + n,) m, coefficients of the rest of the last plan */
+    uint64_t best;       /* (3 + n,) m, those of the best plan so far */
     uint64_t of_physics; /* (3 + n,) m, those of the physics model's */
-    uint64_t command; /* (preview,) m, commands that were predicted last, relative to the start, newest first */
-    uint64_t x_pb;    /* (preview,) m, their prediction by the physics model, */
-    uint64_t e_h;     /* (preview + p,) m, and what the trusted model adds; behind it the last residuals */
-    uint64_t target;  /* (preview,) m, work */
-    uint64_t W;       /* changes of x_h by the splines: of spline j from sample j spacing on, behind each other */
-    uint64_t P;       /* triangle of n rows: W' W + jerk_weight D' D */
-    uint64_t v;       /* (n,) m, linear term of it */
+    uint64_t command;    /* (preview,) m, commands that were predicted last, relative to the start, newest first */
+    uint64_t x_pb;       /* (preview,) m, their prediction by the physics model, */
+    uint64_t e_h;        /* (preview + p,) m, and what the trusted model adds; behind it the last residuals */
+    uint64_t target;     /* (preview,) m, work */
+    uint64_t W;          /* changes of x_h by the splines: of spline j from sample j spacing on, behind each other */
+    uint64_t P;          /* triangle of n rows: W' W + jerk_weight D' D */
+    uint64_t v;          /* (n,) m, linear term of it */
     uint64_t linearised;
     uint64_t physics; /* G_pb at the beginning of the window, */
     uint64_t trial;   /* and for a trial */
@@ -84,8 +88,8 @@ typedef struct {
 } hsep_trusted_task;
 
 /* Bytes of the block, counted in double so that no size can overflow. */
-HSEP_API double
-hsep_trusted_planner_size(const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner);
+HSEP_API double hsep_trusted_planner_size(
+    const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner);
 
 /* Fill the block for a drive at rest at start, m. */
 HSEP_API void hsep_trusted_planner_init(

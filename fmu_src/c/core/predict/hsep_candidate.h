@@ -24,9 +24,9 @@ typedef struct {
 } hsep_residual_scale;
 
 typedef struct {
-    uint64_t Np, n;           /* samples of a window, and of a prediction, n >= Np */
-    uint64_t n_static, p;     /* features without lags, lags */
-    double correlation_max;   /* beyond which the penalty does not grow; 1: rows are taken as independent */
+    uint64_t Np, n;         /* samples of a window, and of a prediction, n >= Np */
+    uint64_t n_static, p;   /* features without lags, lags */
+    double correlation_max; /* beyond which the penalty does not grow; 1: rows are taken as independent */
 } hsep_candidate_shape;
 
 typedef struct {

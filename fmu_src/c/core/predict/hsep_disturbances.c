@@ -68,8 +68,8 @@ HSEP_API void hsep_disturbances_init(
     }
 }
 
-HSEP_API int
-hsep_disturbances_valid(const void *block, const hsep_predictor_settings *settings, uint64_t n_modes, int of_motion)
+HSEP_API int hsep_disturbances_valid(
+    const void *block, const hsep_predictor_settings *settings, uint64_t n_modes, int of_motion)
 {
     hsep_disturbances got;
     memcpy(&got, block, sizeof got);

@@ -57,8 +57,8 @@ HSEP_API void hsep_disturbances_init(
     int of_motion);
 
 /* Whether a block, in any alignment, is one that hsep_disturbances_init with these parameters began. */
-HSEP_API int
-hsep_disturbances_valid(const void *block, const hsep_predictor_settings *settings, uint64_t n_modes, int of_motion);
+HSEP_API int hsep_disturbances_valid(
+    const void *block, const hsep_predictor_settings *settings, uint64_t n_modes, int of_motion);
 
 /* Largest magnitude of the commanded velocity over the n samples that come next, m/s. x_d: (n,), m, newest first. */
 HSEP_API double hsep_disturbances_peak_velocity(const hsep_disturbances *self, const double x_d[], uint64_t n);

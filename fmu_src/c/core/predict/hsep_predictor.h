@@ -37,13 +37,13 @@
 typedef struct {
     hsep_predictor_settings settings;
     hsep_trust_settings trust;
-    double v_friction;         /* m/s, scale of friction's change of sign; 0: no features of the reference */
-    uint64_t preview;          /* samples from r(k) to the drive, >= Np; Np alone */
-    double n_init;             /* samples of warm-up from the beginning; whole, >= 0 */
-    int planned;               /* whether a compensator decides the commands of a window when it begins */
-    int unlearns;              /* whether a window with a missing sample is unlearned */
-    uint64_t n_modes;          /* >= 1 */
-    const hsep_mode *modes;    /* (n_modes,) */
+    double v_friction;      /* m/s, scale of friction's change of sign; 0: no features of the reference */
+    uint64_t preview;       /* samples from r(k) to the drive, >= Np; Np alone */
+    double n_init;          /* samples of warm-up from the beginning; whole, >= 0 */
+    int planned;            /* whether a compensator decides the commands of a window when it begins */
+    int unlearns;           /* whether a window with a missing sample is unlearned */
+    uint64_t n_modes;       /* >= 1 */
+    const hsep_mode *modes; /* (n_modes,) */
 } hsep_predictor_parameters;
 
 typedef struct {

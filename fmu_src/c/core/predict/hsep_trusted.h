@@ -37,10 +37,10 @@ typedef struct {
 
 typedef struct {
     uint64_t Np, n, p, n_static; /* samples of a window and of a prediction, lags, features without lags */
-    double least_variance; /* m2, of the noise */
-    double effect;         /* m, prior standard deviation of a feature's effect; 0: from the residuals */
-    double given_variance; /* m2, of the noise; 0: estimated */
-    double kept;           /* weight of earlier rows, from window to window */
+    double least_variance;       /* m2, of the noise */
+    double effect;               /* m, prior standard deviation of a feature's effect; 0: from the residuals */
+    double given_variance;       /* m2, of the noise; 0: estimated */
+    double kept;                 /* weight of earlier rows, from window to window */
     /* Learned */
     double n_rows;         /* weighted */
     double velocity_scale; /* m/s */
