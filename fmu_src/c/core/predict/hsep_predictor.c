@@ -213,7 +213,7 @@ HSEP_API void hsep_predictor_doubt(hsep_predictor *self, uint64_t n_warm_up)
 
 HSEP_API uint64_t hsep_predictor_warm_up(const hsep_predictor *self)
 {
-    const double left = self->n_init - (double)self->k;
+    const double left = self->n_init - (double)(self->k - self->k % self->Np);
     return left >= (double)self->Np ? self->Np : left > 0.0 ? (uint64_t)left : 0;
 }
 

@@ -142,7 +142,7 @@ HSEP_API void hsep_predictor_publish(hsep_predictor *self, uint64_t last);
  * the window in the warm-up. */
 HSEP_API void hsep_predictor_doubt(hsep_predictor *self, uint64_t n_warm_up);
 
-/* Leading samples of the window that begins in the warm-up. */
+/* Leading samples of the window in the warm-up. */
 HSEP_API uint64_t hsep_predictor_warm_up(const hsep_predictor *self);
 
 /* The learned recursion, with its bias or without. */
