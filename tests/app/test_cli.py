@@ -134,7 +134,7 @@ def test_cosim_with_compensation(hybridsep: Run, tmp_path: Path) -> None:
         assert summary[f"share_{kind}"] > 0.9
         figures[kind] = summary["tracking_rms_um"]
     assert 87.0 < figures["off"] < 90.0
-    assert figures["hybrid"] < 6.9 < 19.0 < figures["physics"] < 20.5
+    assert figures["hybrid"] < 4.2 < 19.0 < figures["physics"] < 20.5
     assert (tmp_path / "run.csv").read_text().startswith("t,x_d,x_dm,x,")
     assert (tmp_path / "run.png").read_bytes().startswith(b"\x89PNG")
     fmus = ("--predictor", tmp_path / "SepCompensatorPy.fmu", "--plant", tmp_path / "FeedDrivePy.fmu")
