@@ -32,7 +32,8 @@ def main() -> None:
     except KeyboardInterrupt:
         _leave()
     except SystemExit as stop:
-        if stop.code == INTERRUPTED:  # all is said and cleaned up; taking the library down would take Python long
+        # All is said and cleaned up, and taking the library down would take Python long; joblib has locks to remove.
+        if stop.code == INTERRUPTED and "joblib" not in sys.modules:
             sys.stderr.flush()
             os._exit(INTERRUPTED)
         raise

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,6 +24,7 @@ __all__ = [
     "physics_response",
     "relative_error",
     "require_extended_precision",
+    "resident_bytes",
     "staircase_log",
     "staircase_predictor",
 ]
@@ -116,3 +119,8 @@ def require_extended_precision() -> None:
     """Stop where ``numpy.longdouble`` is no more precise than float64, as on ARM and with MSVC."""
     if np.finfo(np.longdouble).eps > 2e-19:
         raise SystemExit("the exact weights need an extended-precision numpy.longdouble; run this on x86-64 Linux")
+
+
+def resident_bytes() -> int:
+    """Return the memory this process has in use now."""
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")

@@ -19,7 +19,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 
-SLOW_MODULES = ("matplotlib", "control", "fmpy", "ruckig", "scipy.spatial")
+SLOW_MODULES = ("matplotlib", "control", "fmpy", "ruckig", "scipy.spatial", "joblib")
 """Modules that must not be loaded before they are used."""
 
 PEER = "import scipy.signal"

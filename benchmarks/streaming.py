@@ -32,6 +32,7 @@ from benchmarks.common import (
     physics_response,
     relative_error,
     require_extended_precision,
+    resident_bytes,
 )
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.evaluate.backtest import Batch, backtest_stream
@@ -85,11 +86,6 @@ def write_repeated(path: Path, repetitions: int, **columns: Array) -> None:
                 npy.write_array_header_1_0(member, header)
                 for _ in range(repetitions):
                     member.write(data)
-
-
-def resident_bytes() -> int:
-    """Return the memory this process has in use now."""
-    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
 def main() -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import zipfile
 
 # Threads make the small factorisations of these tests slower by two orders of magnitude on a busy machine. The
@@ -10,6 +11,10 @@ import zipfile
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # A process that a test starts says where it crashed, as pytest's own does.
 os.environ.setdefault("PYTHONFAULTHANDLER", "1")
+
+# A shell's background jobs ignore Ctrl-C, and so would the processes of the tests about it.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 from collections.abc import Callable, Iterator
 from pathlib import Path

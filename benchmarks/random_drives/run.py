@@ -1,6 +1,6 @@
 """Benchmark of trust: the predictor replayed on random nonlinear drives whose physics model is 20 % wrong.
 
-    python -m benchmarks.random_drives.run [--seed 1] [--n 1000] [--faults] [--predictor default] [--cache FILE]
+    python -m benchmarks.random_drives.run [--n 1000] [--faults] [--predictor default] [--core] [--cache FILE]
 
 RMS against the measured position over the whole run, relative to the physics model alone and to the hold (the physics
 model plus the last measured residual, in every window from the first).
@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # benchmarks are n
 
 from benchmarks.random_drives.cache import read_positions, write_positions
 from benchmarks.random_drives.generator import CHUNK, SEED, drives_at, true_positions
-from benchmarks.random_drives.replay import PREDICTORS, FaultyReplay, Replay, replay, replay_faults
+from benchmarks.random_drives.replay import PREDICTORS, FaultyReplay, Replay, library_replay, replay, replay_faults
 from benchmarks.random_drives.report import print_faults, print_replays
 from hybridsep.base.signals import Array
 
@@ -36,6 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--n", type=int, default=1000, help="number of drives")
     parser.add_argument("--faults", action="store_true", help="with each fault of the sensor too")
     parser.add_argument("--predictor", choices=tuple(PREDICTORS), default="default")
+    parser.add_argument("--core", action="store_true", help="the C core instead of the library")
     parser.add_argument("--cache", type=Path, help="file (.npz) of simulated positions, written if there is none")
     parser.add_argument("--processes", type=int, default=os.cpu_count())
     chosen = parser.parse_args(arguments)
@@ -47,18 +48,21 @@ def main(arguments: Sequence[str] | None = None) -> None:
             x = [one for group in pool.map(partial(true_positions, seed=chosen.seed), groups) for one in group]
             if chosen.cache:
                 write_positions(chosen.cache, chosen.seed, x)
-        task = partial(_results, seed=chosen.seed, predictor=chosen.predictor, faults=chosen.faults)
+        task = partial(_results, seed=chosen.seed, predictor=chosen.predictor, faults=chosen.faults, core=chosen.core)
         results = list(pool.map(task, groups, [x[group.start : group.stop] for group in groups]))
     print_replays([replayed for group, _ in results for replayed in group], chosen.predictor)
     if chosen.faults:
         print_faults([replayed for _, group in results for replayed in group])
 
 
-def _results(indices: range, x: Sequence[Array], *, seed: int, predictor: str, faults: bool) -> Results:
+def _results(indices: range, x: Sequence[Array], *, seed: int, predictor: str, faults: bool, core: bool) -> Results:
     """Return the results of drives whose true positions are known."""
+    run = library_replay
+    if core:
+        from benchmarks.random_drives.core import core_replay as run
     drives = drives_at(indices, x, seed)
-    faulty = [one for drive in drives for one in replay_faults(drive, seed, predictor)] if faults else []
-    return [replay(drive, predictor) for drive in drives], faulty
+    faulty = [one for drive in drives for one in replay_faults(drive, seed, predictor, run)] if faults else []
+    return [replay(drive, predictor, run) for drive in drives], faulty
 
 
 if __name__ == "__main__":

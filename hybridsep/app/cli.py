@@ -1,4 +1,4 @@
-"""Command line ``hybridsep fit | identify | init | demo | build | cosim | backtest | example-log``."""
+"""Command line ``hybridsep fit | identify | tune | init | demo | build | cosim | backtest | report | example-log``."""
 
 from __future__ import annotations
 
@@ -17,6 +17,8 @@ from .command_example_log import example_log
 from .command_fit import fit
 from .command_identify import identify
 from .command_init import init
+from .command_report import report
+from .command_tune import tune
 from .failures import DEBUG_VARIABLE, run
 
 __all__ = ["app", "main"]
@@ -30,7 +32,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     add_completion=False,
 )
-for _command in (fit, identify, init, demo, build, cosim, backtest, example_log):
+for _command in (fit, identify, tune, init, demo, build, cosim, backtest, report, example_log):
     app.command()(_command)
 
 

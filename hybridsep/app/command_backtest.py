@@ -11,12 +11,16 @@ import typer
 from ..base.output import written_text
 from .failures import loading
 from .options import (
+    AsIsOption,
     AxisOption,
     CommandColumnOption,
+    FixOption,
     ForceOption,
     JsonOption,
+    LogArgument,
     MachineOption,
     MeasuredColumnOption,
+    SavedOption,
     TimeColumnOption,
     TsOption,
     UnitOption,
@@ -28,12 +32,7 @@ __all__ = ["backtest"]
 
 @takes_parameters(PREDICTOR_ENTRIES)
 def backtest(
-    log: Annotated[
-        Path,
-        typer.Argument(
-            help="Recorded log with the columns t, x_d, x_meas or x: CSV, .npz, .mat, HDF5 or Siemens Capture JSON."
-        ),
-    ],
+    log: LogArgument,
     machine: MachineOption,
     unit: UnitOption = None,
     T_s: TsOption = None,
@@ -41,13 +40,9 @@ def backtest(
     t: TimeColumnOption = None,
     x_d: CommandColumnOption = None,
     x: MeasuredColumnOption = None,
-    fix: Annotated[bool, typer.Option("--fix", help="Apply the fixes of what the checks of the log find.")] = False,
-    as_is: Annotated[
-        bool, typer.Option("--as-is", help="Replay the log with the faults that the checks find in it.")
-    ] = False,
-    weights: Annotated[
-        Path | None, typer.Option(help="A predictor saved with --save, to begin with what it learned.")
-    ] = None,
+    fix: FixOption = False,
+    as_is: AsIsOption = False,
+    weights: SavedOption = None,
     *,
     parameters: dict[str, Any],
     out: Annotated[Path | None, typer.Option(help="CSV for the RMS errors batch by batch.")] = None,
@@ -66,7 +61,6 @@ def backtest(
 ) -> None:
     """Check a recorded log and replay it causally: physics model, hold baseline and hybrid."""
     with loading():
-        from ..base.errors import ParameterError
         from ..evaluate.backtest import Batch, backtest_stream
         from ..evaluate.backtest import backtest as backtest_whole
         from ..evaluate.replayed import replayed_run
@@ -75,7 +69,7 @@ def backtest(
         from ..logs.log import Log
         from ..machine import load_machine, machine_path
         from .arguments import check_ending
-        from .log_intake import findings_table, open_checked
+        from .log_intake import findings_table, open_checked, reading_of
         from .overwrite import BATCH_COLUMNS, BATCHES, BY_ENDING, Output, check_outputs
         from .progress import progress_bar
         from .tables import print_scores
@@ -84,26 +78,14 @@ def backtest(
             from ..evaluate.time_plots import prediction_figure
 
     axis_machine = load_machine(machine)
-    if fix and as_is:
-        raise ParameterError("--fix and --as-is exclude each other")
     saved = list(save or [])
     check_ending(figure, "--figure", (".png", ".pdf", ".svg"))
     for path in saved:
         check_ending(path, "--save", (".state", ".csv", ".npz"))
-    given = {role: column for role, column in (("t", t), ("x_d", x_d), ("x", x)) if column}
-    names = {**axis_machine.log.columns, **given}
-    if T_s is not None and t is None:
-        names.pop("t", None)  # there may be none
-    own = axis_machine.log
     changed = axis_machine.changed("predictor", parameters)
     predictor = changed.new_predictor()
-    reading = {
-        "columns": names,
-        "unit": unit or own.unit,
-        "T_s": T_s,
-        "axis": axis or own.axis,
-        "may_miss": predictor.settings.trust,
-    }
+    may_miss = predictor.settings.trust
+    reading = reading_of(axis_machine, {"t": t, "x_d": x_d, "x": x}, unit=unit, T_s=T_s, axis=axis, may_miss=may_miss)
     if weights is not None:
         predictor = load_trained(weights, changed, "HybridPredictor")
         predictor.restart()

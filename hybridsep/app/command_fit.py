@@ -11,6 +11,7 @@ from .failures import loading
 from .options import (
     AxisOption,
     CommandColumnOption,
+    FigurePagesOption,
     ForceOption,
     JsonOption,
     MeasuredColumnOption,
@@ -43,19 +44,23 @@ def fit(
     fix: Annotated[
         bool, typer.Option("--fix", help="Apply what puts a finding of the checks right, and go on.")
     ] = False,
+    figure: FigurePagesOption = None,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """From the log of an axis to its model, settings, FMUs and a report."""
     with loading():
         from ..logs.log import read_log
+        from .arguments import check_ending
         from .fit import FitOptions, checked_name, fit_files, machine_name
         from .fit import fit as fit_logs
         from .fit_intake import take_in
-        from .fit_report import recommendation, write_report
+        from .fit_report import fit_report, judged_by
         from .fit_table import print_fit
-        from .overwrite import FIT_FILES, Output, check_outputs
+        from .log_intake import findings_table
+        from .overwrite import BY_ENDING, FIT_FILES, Output, check_outputs
         from .progress import progress_bar
+        from .report_sections import recommendation
         from .tables import console, print_json
 
     columns = {role: column for role, column in (("t", t), ("x_d", x_d), ("x", x)) if column}
@@ -63,15 +68,20 @@ def fit(
     folder = out or Path(name)
     files = fit_files(folder, name)
     inputs: dict[str, str | Path | None] = {f"log {path.name}": path for path in logs}
-    check_outputs([Output("--out", path, FIT_FILES[path.suffix]) for path in files.values()], inputs, force=force)
+    check_ending(figure, "--figure", (".pdf",))
+    outputs = [Output("--out", path, FIT_FILES[path.suffix]) for path in files.values()]
+    outputs += [Output("--figure", figure, BY_ENDING[".pdf"])] if figure is not None else []
+    check_outputs(outputs, inputs, force=force)
     found = [read_log(path, columns=columns, unit=unit, T_s=T_s, axis=axis, uniform=False) for path in logs]
     used, findings = take_in(found, fix=fix)
     with progress_bar(as_json) as advance:
         result = fit_logs(used, folder, FitOptions(Np, name), advance)
-        write_report(files["report"], result, used, findings)
+        fit_report(result, used, findings).write(files["report"], figure)
     if as_json:
-        print_json({**result.summary(), "files": {what: str(path) for what, path in files.items()}})
+        listed = {log_name: findings_table(one) for log_name, one in findings.items()}
+        written = {what: str(path) for what, path in files.items()}
+        print_json({**result.summary(), "findings": listed, "files": written})
         return
     print_fit(result, findings, used[0].unit)
-    console.print(f"\n{recommendation(result)}", highlight=False)
+    console.print(f"\n{recommendation(judged_by(result, used[0].unit))}", highlight=False)
     console.print("\n".join(f"{what}: {path}" for what, path in files.items()), highlight=False, soft_wrap=True)

@@ -23,7 +23,7 @@ __all__ = ["DEBUG_VARIABLE", "errors_console", "loading", "run"]
 DEBUG_VARIABLE = "HYBRIDSEP_DEBUG"
 """Environment variable: if it is set, an unexpected error shows its traceback."""
 
-errors_console = Console(stderr=True)
+errors_console = Console(stderr=True, emoji=False)
 
 _PLAIN = str.maketrans(
     {"µ": "u", "→": "->", "–": "-", "−": "-", "…": "...", "²": "2", "³": "3", "·": "*", "λ": "lambda"}

@@ -29,14 +29,12 @@ from .fit_stages import Stages, key_of
 from .overwrite import FIT_MARK
 from .step_times import step_times
 
-__all__ = ["Fit", "FitOptions", "checked_name", "fit", "fit_files", "machine_name", "shown_unit"]
+__all__ = ["Fit", "FitOptions", "checked_name", "fit", "fit_files", "machine_name"]
 
 _MODEL = "HybridPredictor"
 
 _LOOK_AHEAD = 0.1
 """Look-ahead, s, of a controller of which nothing is known."""
-
-_UNITS = {"m": ((1e6, "µm"), (1e3, "mm")), "rad": ((1e6, "µrad"), (1e3, "mrad"))}
 
 Progress = Callable[[str, float], object]
 
@@ -177,12 +175,6 @@ def fit(logs: Sequence[Log], out: Path, options: FitOptions, progress: Progress 
     stages.keep("judged", result.summary()["judged"])
     progress("done", 1.0)
     return result
-
-
-def shown_unit(rms: float, si: str) -> tuple[float, str]:
-    """Return factor and name of the unit in which errors of about ``rms``, m or rad, are shown."""
-    small, large = _UNITS[si]
-    return small if small[0] * rms < 1e4 else large
 
 
 def _common(logs: Sequence[Log]) -> float:

@@ -8,8 +8,8 @@ from rich import box
 from rich.table import Table
 
 from ..intake.finding import Finding
-from .fit import Fit, shown_unit
-from .tables import console, shown_figure
+from .fit import Fit
+from .tables import console, shown_figure, shown_unit
 
 __all__ = ["print_fit"]
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..base.errors import LogError
+from ..base.errors import LogError, ParameterError
 from ..intake.check import Intake, check
 from ..intake.finding import Finding
 from ..logs.log import Log, LogReader, open_log
@@ -15,7 +15,7 @@ from ..machine import Machine
 from .arguments import check_interval, check_unit
 from .failures import errors_console
 
-__all__ = ["Reading", "findings_table", "open_checked"]
+__all__ = ["Reading", "findings_table", "open_checked", "reading_of"]
 
 CHECKED_MAX = 2_000_000
 """Samples that are checked at most; a longer log is replayed in bounded memory all the same."""
@@ -24,8 +24,42 @@ Reading = Mapping[str, Any]
 """Arguments of :func:`~hybridsep.logs.log.open_log`."""
 
 
+def reading_of(
+    machine: Machine,
+    columns: Mapping[str, str | None],
+    *,
+    unit: str | None,
+    T_s: float | None,
+    axis: str | None,
+    may_miss: bool,
+) -> Reading:
+    """Return how a log of a machine is read: as its machine file says, where an option does not say otherwise.
+
+    Parameters
+    ----------
+    machine : Machine
+    columns : mapping
+        Column of ``t``, ``x_d`` and ``x``; None where it is not given.
+    unit, T_s, axis
+        As given.
+    may_miss : bool
+        Whether positions may be missing.
+    """
+    own = machine.log
+    names = {**own.columns, **{role: column for role, column in columns.items() if column}}
+    if T_s is not None and columns["t"] is None:
+        names.pop("t", None)  # there may be none
+    return {
+        "columns": names,
+        "unit": unit or own.unit,
+        "T_s": T_s,
+        "axis": axis or own.axis,
+        "may_miss": may_miss,
+    }
+
+
 def open_checked(
-    path: Path, reading: Reading, machine: Machine, *, fix: bool, as_is: bool
+    path: Path, reading: Reading, machine: Machine, *, fix: bool, as_is: bool, segments: bool = False
 ) -> tuple[LogReader | Log, Intake]:
     """Open a log and check it.
 
@@ -40,18 +74,24 @@ def open_checked(
         Whether the fixes of all findings are applied.
     as_is : bool
         Whether it is taken with the faults that it has.
+    segments : bool
+        Whether a fixed log may have several segments; else the longest is taken.
 
     Returns
     -------
     log : LogReader or Log
-        The log; with ``fix`` the fixed one, of several segments the longest.
+        The log; with ``fix`` the fixed one.
     intake : Intake
 
     Raises
     ------
     LogError
         If the log cannot be read, or has a fault that makes figures flatter and is neither fixed nor taken as it is.
+    ParameterError
+        If it is both.
     """
+    if fix and as_is:
+        raise ParameterError("--fix and --as-is exclude each other")
     reader = open_log(path, **reading, uniform=False)
     checked = reader.read(CHECKED_MAX)
     check_unit(path.name, checked, machine)
@@ -67,7 +107,8 @@ def open_checked(
     if fix:
         if reader.n_samples > CHECKED_MAX:
             raise LogError(f"{path}: --fix takes at most {CHECKED_MAX} samples, the log has {reader.n_samples}; cut it")
-        return _longest_segment(intake.fixed(), path), intake
+        fixed = intake.fixed()
+        return (fixed if segments else _longest_segment(fixed, path)), intake
     return (reader if as_is else open_log(path, **reading)), intake
 
 

@@ -14,13 +14,18 @@ from ..fmi.flavours import FLAVOURS
 
 __all__ = [
     "TRAJECTORIES",
+    "AsIsOption",
     "AxisOption",
     "CommandColumnOption",
+    "FigurePagesOption",
+    "FixOption",
     "FlavourOption",
     "ForceOption",
     "JsonOption",
+    "LogArgument",
     "MachineOption",
     "MeasuredColumnOption",
+    "SavedOption",
     "TimeColumnOption",
     "TsOption",
     "UnitOption",
@@ -62,4 +67,19 @@ WeightsOption = Annotated[
         help="A predictor saved with HybridPredictor.save: the one HybridPredictor or SepCompensator that is built "
         "here starts warm; name it where there are more."
     ),
+]
+LogArgument = Annotated[
+    Path,
+    typer.Argument(
+        help="Recorded log with the columns t, x_d, x_meas or x: CSV, .npz, .mat, HDF5 or Siemens Capture JSON."
+    ),
+]
+FixOption = Annotated[bool, typer.Option("--fix", help="Apply the fixes of what the checks of the log find.")]
+AsIsOption = Annotated[bool, typer.Option("--as-is", help="Replay the log with the faults that the checks find in it.")]
+SavedOption = Annotated[
+    Path | None,
+    typer.Option(help="A predictor saved with hybridsep backtest --save, to begin with what it learned."),
+]
+FigurePagesOption = Annotated[
+    Path | None, typer.Option(help="PDF with the report's charts for print, a page each, one column wide.")
 ]

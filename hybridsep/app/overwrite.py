@@ -22,6 +22,7 @@ __all__ = [
     "FIT_MARK",
     "FMU",
     "MACHINE",
+    "REPORT",
     "RUN",
     "Kind",
     "Output",

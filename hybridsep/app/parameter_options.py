@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from functools import wraps
 from typing import Annotated, Any
 
 import typer
 
 from ..base.parameters import Parameter
+from ..base.ranges import GRAMMAR
 from ..base.settings import PARAMETERS, CompensatorSettings, PredictorSettings, Settings
 
 __all__ = ["COMPENSATOR_ENTRIES", "PREDICTOR_ENTRIES", "parameter_help", "takes_parameters"]
@@ -34,7 +35,9 @@ def parameter_help(parameter: Parameter) -> str:
     return parameter.help + "; the machine's own if left out"
 
 
-def takes_parameters(*groups: dict[str, Parameter]) -> Callable[[Callable[..., None]], Callable[..., None]]:
+def takes_parameters(
+    *groups: dict[str, Parameter], ranges: Collection[str] = ()
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Return a decorator that gives a command an option for each parameter.
 
     The command's argument ``parameters`` becomes the mapping of those that are given, by their names in FMUs.
@@ -43,6 +46,8 @@ def takes_parameters(*groups: dict[str, Parameter]) -> Callable[[Callable[..., N
     ----------
     *groups : dict
         Of :data:`PREDICTOR_ENTRIES` and :data:`COMPENSATOR_ENTRIES`.
+    ranges : collection of str
+        Fields of those that take several values; theirs are given as text.
     """
     options = {field: parameter for group in groups for field, parameter in group.items()}
 
@@ -53,7 +58,7 @@ def takes_parameters(*groups: dict[str, Parameter]) -> Callable[[Callable[..., N
             command(**arguments, parameters={name: value for name, value in given.items() if value is not None})
 
         signature = inspect.signature(command, eval_str=True)
-        arguments = list(_with_options(signature, options))
+        arguments = list(_with_options(signature, options, ranges))
         run.__signature__ = signature.replace(parameters=arguments)  # type: ignore[attr-defined]
         run.__annotations__ = {argument.name: argument.annotation for argument in arguments}
         return run
@@ -61,21 +66,27 @@ def takes_parameters(*groups: dict[str, Parameter]) -> Callable[[Callable[..., N
     return decorate
 
 
-def _with_options(signature: inspect.Signature, options: dict[str, Parameter]) -> Iterator[inspect.Parameter]:
+def _with_options(
+    signature: inspect.Signature, options: dict[str, Parameter], ranges: Collection[str]
+) -> Iterator[inspect.Parameter]:
     """Yield a command's arguments, the options in the place of ``parameters``."""
     for name, argument in signature.parameters.items():
         if name != "parameters":
             yield argument.replace(kind=inspect.Parameter.KEYWORD_ONLY)
             continue
         for field, parameter in options.items():
-            kind: Any = str if parameter.kind is bool else parameter.kind
-            annotation = Annotated[kind | None, _option(field, parameter)]
+            kind: Any = str if parameter.kind is bool or field in ranges else parameter.kind
+            annotation = Annotated[kind | None, _option(field, parameter, several=field in ranges)]
             yield inspect.Parameter(field, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
 
 
-def _option(field: str, parameter: Parameter) -> Any:
+def _option(field: str, parameter: Parameter, *, several: bool) -> Any:
     """Return the option, under the FMU's name; with hyphens or by the field's name it is accepted, too."""
     names = dict.fromkeys(f"--{name}" for name in (parameter.name, parameter.name.replace("_", "-"), field))
+    if several:
+        return typer.Option(
+            *names, help=f"{parameter.help}; several as {GRAMMAR}; a default range if left out", metavar="RANGE"
+        )
     more: dict[str, Any] = {"parser": _truth_value, "metavar": "true|false"} if parameter.kind is bool else {}
     return typer.Option(*names, help=parameter_help(parameter), **more)
 

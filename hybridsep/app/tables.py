@@ -24,9 +24,12 @@ __all__ = [
     "print_run",
     "print_scores",
     "shown_figure",
+    "shown_unit",
 ]
 
-console = Console()
+console = Console(emoji=False)
+
+_UNITS = {"m": ((1e6, "µm"), (1e3, "mm")), "rad": ((1e6, "µrad"), (1e3, "mrad"))}
 
 PAPER_COLUMN = "× hold: RMS relative to holding the last residual; paper: physics → hybrid, reduction, as printed there"
 
@@ -98,6 +101,12 @@ def shown_figure(value: float | None, unit: str = "") -> str:
     if value is None or not np.isfinite(value):
         return "–"
     return f"{value:.1f}{unit}" if unit else f"{value:.2f}"
+
+
+def shown_unit(rms: float, si: str) -> tuple[float, str]:
+    """Return factor and name of the unit in which errors of about ``rms``, m or rad, are shown."""
+    small, large = _UNITS[si]
+    return small if small[0] * rms < 1e4 else large
 
 
 def print_scores(

@@ -14,7 +14,7 @@ from functools import wraps
 from types import FrameType
 from typing import ParamSpec, TypeVar
 
-__all__ = ["interrupts_between_calls", "uninterrupted"]
+__all__ = ["interrupts_between_calls", "starting_processes", "uninterrupted"]
 
 P = ParamSpec("P")
 Result = TypeVar("Result")
@@ -72,3 +72,19 @@ def interrupts_between_calls(stop: type[BaseException] = KeyboardInterrupt) -> I
         yield
     finally:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@contextmanager
+def starting_processes() -> Iterator[None]:
+    """Let processes that are started ignore a terminal's Ctrl-C, which ends this one and with it them.
+
+    Meanwhile it is ignored here, too. Does nothing outside the main thread.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # inherited, also by a new program
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)

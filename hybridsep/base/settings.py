@@ -169,6 +169,9 @@ class PredictorSettings(Settings):
     TRUST: ClassVar[tuple[str, ...]] = ("trust", "effect", "noise_std", "forgetting")
     """Fields of the residual model with trust."""
 
+    TUNED: ClassVar[tuple[str, ...]] = ("p", "q", "lam", "effect", "noise_std", "forgetting")
+    """Fields that can be tuned on a log: ``Np`` is the controller's, and a warm-up hides errors."""
+
     ELSEWHERE: ClassVar[tuple[str, ...]] = ("T_s", "input_hold", *NEEDS_PREVIEW)
 
     Np: int = whole(100, 1, 100_000, "samples in a look-ahead window")

@@ -5,75 +5,20 @@ from __future__ import annotations
 import html
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 from pathlib import Path
 from string import Template
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..base.output import written_text
-from ..base.signals import Array, Indices
+from .chart import BAND_OPACITY, Chart, Line, drawn_places
+from .chart_pages import write_pages
 
-__all__ = ["Chart", "Line", "Report"]
-
-_POINTS = 6000
-"""Points of a line that are drawn; of a longer one the extremes of each stretch are."""
+__all__ = ["Report"]
 
 _HEIGHT = 340
 """Height of a panel, px."""
-
-
-@dataclass(frozen=True)
-class Line:
-    """Line, band or row of points of a chart.
-
-    Attributes
-    ----------
-    name : str
-        In the legend; empty for none.
-    x, y : (n,) array_like
-        Of a long line the extremes of each stretch are drawn.
-    colour : str
-    upper : (n,) array_like, optional
-        Upper edge of a band, ``y`` being the lower one.
-    points : bool
-        Whether points are drawn instead of a line.
-    panel : int
-        Panel, from 0, top first.
-    """
-
-    name: str
-    x: ArrayLike
-    y: ArrayLike
-    colour: str
-    upper: ArrayLike | None = None
-    points: bool = False
-    panel: int = 0
-
-
-@dataclass(frozen=True)
-class Chart:
-    """Interactive chart.
-
-    Attributes
-    ----------
-    x_label : str
-    y_labels : tuple of str
-        One a panel.
-    lines : sequence of Line
-    caption : str
-    x_log, y_log : bool
-        Whether an axis is logarithmic.
-    """
-
-    x_label: str
-    y_labels: tuple[str, ...]
-    lines: Sequence[Line]
-    caption: str = ""
-    x_log: bool = False
-    y_log: bool = False
 
 
 @dataclass
@@ -83,12 +28,14 @@ class Report:
     Attributes
     ----------
     title, subtitle : str
+    charts : list of Chart
+        Those added so far.
     """
 
     title: str
     subtitle: str
+    charts: list[Chart] = field(default_factory=list)
     _parts: list[str] = field(default_factory=list)
-    _n_charts: int = 0
 
     def heading(self, text: str) -> None:
         """Begin a section."""
@@ -121,19 +68,26 @@ class Report:
         """Add a chart."""
         from plotly.io import to_html
 
-        self._n_charts += 1
+        self.charts.append(chart)
         drawn = to_html(
             _figure(chart),
             include_plotlyjs=False,
             full_html=False,
-            div_id=f"chart{self._n_charts}",
+            div_id=f"chart{len(self.charts)}",
             config={"responsive": True, "displayModeBar": False},
         )
         caption = f"<figcaption>{html.escape(chart.caption)}</figcaption>" if chart.caption else ""
         self._parts.append(f'<figure><div class="chart">{drawn}</div>{caption}</figure>')
 
-    def write(self, path: str | Path) -> None:
-        """Write the HTML file."""
+    def write(self, path: str | Path, figures: str | Path | None = None) -> None:
+        """Write the HTML file, and its charts to a PDF, a page each, for print.
+
+        Parameters
+        ----------
+        path : str or Path
+        figures : str or Path, optional
+            The PDF.
+        """
         from plotly.offline import get_plotlyjs
 
         template = (Path(__file__).parent / "templates" / "report.html").read_text(encoding="utf-8")
@@ -141,18 +95,8 @@ class Report:
         page = Template(template).substitute(values, plotly=get_plotlyjs(), body="\n".join(self._parts))
         with written_text(path) as file:
             file.write(page)
-
-
-def _drawn(y: Array) -> Indices:
-    """Return the indices of a line that are drawn: the extremes of each stretch where there are too many."""
-    if len(y) <= _POINTS:
-        return np.arange(len(y))
-    known = np.where(np.isnan(y), 0.0, y)
-    keep = {0, len(y) - 1}
-    for begin, end in pairwise(np.linspace(0, len(y), _POINTS // 2 + 1).astype(np.intp).tolist()):
-        stretch = known[begin:end]
-        keep |= {begin + int(stretch.argmin()), begin + int(stretch.argmax())}
-    return np.array(sorted(keep))
+        if figures is not None:
+            write_pages(self.charts, figures)
 
 
 def _figure(chart: Chart) -> Any:
@@ -185,7 +129,7 @@ def _figure(chart: Chart) -> Any:
 def _traces(line: Line) -> list[Mapping[str, Any]]:
     """Return plotly's traces of a line: two for a band."""
     lower = np.asarray(line.y, dtype=np.float64)
-    places = _drawn(lower)
+    places = drawn_places(lower)
     x, lower = np.asarray(line.x, dtype=np.float64)[places], lower[places]
     common = {"type": "scatter", "legendgroup": line.name, "name": line.name}
     if line.upper is None:
@@ -193,8 +137,14 @@ def _traces(line: Line) -> list[Mapping[str, Any]]:
         drawn = {} if line.points else {"line": {"color": line.colour, "width": 1.3}}
         return [{**common, **mode, **drawn, "x": x, "y": lower, "showlegend": bool(line.name)}]
     edge = {**common, "x": x, "mode": "lines", "line": {"width": 0}, "hoverinfo": "skip"}
-    filled = {"fill": "tonexty", "fillcolor": line.colour}
+    filled = {"fill": "tonexty", "fillcolor": _transparent(line.colour)}
     return [
         {**edge, "y": lower, "showlegend": False},
         {**edge, **filled, "y": np.asarray(line.upper, dtype=np.float64)[places], "showlegend": bool(line.name)},
     ]
+
+
+def _transparent(colour: str) -> str:
+    """Return the colour of a band's area."""
+    red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
+    return f"rgba({red}, {green}, {blue}, {BAND_OPACITY:g})"

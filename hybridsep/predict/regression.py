@@ -21,7 +21,7 @@ from ..base.errors import ParameterError, SignalError
 from ..base.settings import check
 from ..base.signals import Array, as_samples
 
-__all__ = ["PenalisedSolution", "RidgeRegression"]
+__all__ = ["PenalisedSolution", "RidgeRegression", "fold"]
 
 _COLUMNS_AT_ONCE = 8
 """Block size of dtpqrt, the fastest one measured for 50 to 200 features."""
@@ -29,6 +29,24 @@ _COLUMNS_AT_ONCE = 8
 
 _LEAST_DIAGONAL = 1e-150
 """Bound on the factor's diagonal: its square is a normal number."""
+
+
+def fold(factor: Array, rows: Array, *, n_triangular: int = 0) -> None:
+    """Fold rows into an upper triangle in place: ``Q R = [R; rows]``.
+
+    Parameters
+    ----------
+    factor : (n, n) array, column-major
+        ``R``, below whose diagonal nothing is read or written.
+    rows : (m, n) array, column-major
+        Used as work space.
+    n_triangular : int
+        Number of last rows that are upper trapezoidal themselves, which saves the work on their zeros.
+    """
+    block = min(_COLUMNS_AT_ONCE, factor.shape[1])
+    _, _, _, info = lapack.dtpqrt(n_triangular, block, factor, rows, overwrite_a=1, overwrite_b=1)
+    if info != 0:  # an illegal argument, a fault of this module
+        raise AssertionError(f"dtpqrt returned info = {info}")
 
 
 class PenalisedSolution(NamedTuple):
@@ -133,17 +151,7 @@ class RidgeRegression:
         stacked : (m, n + 1) array, column-major
             Used as work space.
         """
-        # Q R = [R; Φ]: the new rows are folded into the triangle, in place.
-        _, _, _, info = lapack.dtpqrt(
-            0,
-            min(_COLUMNS_AT_ONCE, self.n_features + 1),
-            self._factor,
-            stacked,
-            overwrite_a=1,
-            overwrite_b=1,
-        )
-        if info != 0:  # an illegal argument, a fault of this module
-            raise AssertionError(f"dtpqrt returned info = {info}")
+        fold(self._factor, stacked)
         self.n_samples += len(stacked)
         self._weights = None
 
@@ -156,6 +164,24 @@ class RidgeRegression:
         diagonal = np.einsum("ii->i", self._factor)[:-1]
         diagonal[np.abs(diagonal) < _LEAST_DIAGONAL] = _LEAST_DIAGONAL
         self._weights = None
+
+    def factor_with(self, lam: float) -> Array:
+        """Return the factor ``[R z; 0 ρ]`` that another penalty would have given, ``(n+1, n+1)``, column-major.
+
+        Below its diagonal are arbitrary values.
+
+        Parameters
+        ----------
+        lam : float
+            At least :attr:`lam`, of a regression that was not discounted.
+        """
+        n = self.n_features
+        factor = np.array(self._factor, order="F")
+        if lam > self.lam:
+            rows = np.zeros((n, n + 1), order="F")
+            np.fill_diagonal(rows, math.sqrt(lam - self.lam))
+            fold(factor, rows, n_triangular=n)
+        return factor
 
     def penalised(self, penalties: Array) -> PenalisedSolution:
         """Solve for the weights of the first ``m`` features, each with a penalty of its own.
@@ -173,7 +199,7 @@ class RidgeRegression:
         factor[:m, :m], factor[:m, m] = self._factor[:m, :m], self._factor[:m, n]
         rows = np.zeros((m, m + 1), order="F")
         np.fill_diagonal(rows, np.sqrt(penalties))
-        lapack.dtpqrt(0, min(_COLUMNS_AT_ONCE, m + 1), factor, rows, overwrite_a=1, overwrite_b=1)
+        fold(factor, rows)
         triangle = factor[:m, :m]
         weights, _ = lapack.dtrtrs(triangle, factor[:m, m])
         residuals = self._factor[:, n].copy()

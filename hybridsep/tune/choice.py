@@ -27,6 +27,7 @@ __all__ = [
     "settings_for",
     "settings_to_try",
     "window_scores",
+    "window_sizes",
 ]
 
 WORTH = 0.05
@@ -143,6 +144,12 @@ def _taught_rms(model: ModalModel, settings: PredictorSettings, recordings: Sequ
     return rms(later[~np.isnan(later)])
 
 
+def window_sizes(Np: int, n_samples: int) -> list[int]:
+    """Return the windows over which the error is shown: the controller's, and those that a log is long enough for."""
+    sizes = dict.fromkeys(max(1, round(share * Np)) for share in _WINDOWS)
+    return [size for size in sizes if size <= max(n_samples, Np)]
+
+
 def window_scores(
     model: ModalModel,
     recordings: Sequence[Recording],
@@ -156,9 +163,7 @@ def window_scores(
     model, recordings, settings, progress
         As for :func:`choose_settings`.
     """
-    shortest = min(len(recording.x) for recording in recordings)
-    sizes = dict.fromkeys(max(1, round(share * settings.Np)) for share in _WINDOWS)
-    sizes = {Np: None for Np in sizes if Np <= max(shortest, settings.Np)}
+    sizes = window_sizes(settings.Np, min(len(recording.x) for recording in recordings))
     scores = []
     for i, Np in enumerate(sizes):
         fitted = replace(settings, Np=Np, p=min(settings.p, Np), q=min(settings.q, Np - 1))

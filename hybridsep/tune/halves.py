@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..base.errors import SignalError
 from ..base.metrics import rms
-from ..base.signals import Array
+from ..base.signals import Array, Indices
 from ..evaluate.backtest import Backtest, backtest
 from ..evaluate.verdict import Tally, Verdict
 from ..predict.predictor import HybridPredictor
@@ -40,6 +40,10 @@ class Recording:
     def taught(self) -> tuple[Array, Array]:
         """Commanded and measured positions of the part that teaches."""
         return self.x_d[: self.n_taught], self.x[: self.n_taught]
+
+    def first_judged(self, Np: int) -> int:
+        """Return the first sample of the first window of ``Np`` that judges as a whole."""
+        return -(-self.n_taught // Np) * Np
 
 
 def halves(pieces: Iterable[tuple[Array, Array]], share: float) -> list[Recording]:
@@ -108,16 +112,41 @@ class Replay:
                 found[:, i] = np.sqrt(np.mean(at**2, axis=1))
         return found
 
+    def window_errors(self) -> tuple[Indices, Array]:
+        """Return the first sample of each window that judges as a whole, and the RMS of each prediction over it.
+
+        Returns
+        -------
+        begins : (n,) array of int
+            Counted in the samples that judge.
+        rms : (3, n) array, m
+            NaN where nothing was measured.
+        """
+        begins, found = [], []
+        for recording, window, predictions, begin in self._windows():
+            begins.append(begin)
+            errors = recording.x[window] - predictions
+            known = errors[:, ~np.isnan(errors[0])]
+            found.append(np.sqrt(np.mean(known**2, axis=1)) if known.size else np.full(len(PREDICTIONS), np.nan))
+        return np.array(begins, dtype=np.intp), np.reshape(found, (-1, len(PREDICTIONS))).T
+
     def verdict(self) -> Verdict:
         """Return the verdict on the samples that judge."""
         tally = Tally(self.Np)
+        for recording, window, predictions, _ in self._windows():
+            tally.add(recording.x_d[window], recording.x[window], predictions)
+        return tally.verdict()
+
+    def _windows(self) -> Iterator[tuple[Recording, slice, Array, int]]:
+        """Yield recording, samples, predictions, ``(3, m)``, and place in what judges, of each window that judges."""
+        before = 0
         for recording, result in zip(self.recordings, self.results, strict=True):
             predictions = np.stack([getattr(result, name) for name in PREDICTIONS])
-            first = -(-recording.n_taught // self.Np) * self.Np
-            for i in range(first, len(recording.x), self.Np):
+            before -= recording.n_taught
+            for i in range(recording.first_judged(self.Np), len(recording.x), self.Np):
                 window = slice(i, i + self.Np)
-                tally.add(recording.x_d[window], recording.x[window], predictions[:, window])
-        return tally.verdict()
+                yield recording, window, predictions[:, window], before + i
+            before += len(recording.x)
 
     def _parts(self, signals: Sequence[Array], taught: bool) -> Array:
         parts = [

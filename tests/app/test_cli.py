@@ -186,7 +186,7 @@ def test_help_shows_units_and_ranges(hybridsep: Run) -> None:
         assert PARAMETERS[name].range_text in text
     assert "[m2]" in text
     status, out, _ = hybridsep("--help")
-    assert all(command in out for command in ("demo", "build", "cosim", "backtest", "identify", "init"))
+    assert all(command in out for command in ("demo", "build", "cosim", "backtest", "identify", "init", "tune"))
     assert hybridsep("--version")[1].strip() == __version__
 
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.signal
-from command_line import Run
+from command_line import Run, write_log
 
 from hybridsep import cosimulate
 from hybridsep.base.interrupt import interrupts_between_calls, uninterrupted
@@ -81,6 +81,43 @@ def test_ctrl_c_during_a_build_ends_the_compilers(tmp_path: Path) -> None:
     assert (status, err.strip()) == (130, SAID)
     assert list(out.iterdir()) == []
     assert list(temporary.rglob("all.c")) == []
+
+
+@POSIX
+def test_ctrl_c_in_a_terminal_ends_the_processes_of_tune(tmp_path: Path) -> None:
+    """A terminal sends it to all of them; half a minute of replays, two at a time."""
+    log, out = write_log(tmp_path / "log.csv", n=6000), tmp_path / "tuned.toml"
+    arguments = ("tune", log, "-m", MACHINE, "--trust", "true", "--p", "5:100:5", "--jobs", "2", "--out", out)
+    process = subprocess.Popen(
+        [*MAIN, *map(str, arguments)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+    begun = time.monotonic()
+    while time.monotonic() < begun + 60.0 and not (children.exists() and len(children.read_text().split()) >= 3):
+        time.sleep(0.05)
+        if not children.exists() and time.monotonic() > begun + 5.0:  # no /proc
+            break
+    os.killpg(process.pid, signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert (process.returncode, err.strip()) == (130, SAID)
+    assert not out.exists()
+    while time.monotonic() < begun + 90.0 and group_lives(process.pid):
+        time.sleep(0.05)
+    assert not group_lives(process.pid)
+
+
+def group_lives(pid: int) -> bool:
+    """Whether a process of the group is left."""
+    try:
+        os.killpg(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
 
 
 @POSIX

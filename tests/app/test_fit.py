@@ -8,27 +8,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import Run
+from command_line import Run, write_rows
 from staircase_data import commanded, measured
 
 from hybridsep import HybridPredictor, load_machine, read_log
 from hybridsep.app import fit as fitting
 from hybridsep.app.fit import Fit, FitOptions, fit, fit_files, machine_name
 from hybridsep.app.fit_intake import take_in
-from hybridsep.app.fit_report import recommendation, write_report
+from hybridsep.app.fit_report import fit_report, judged_by
 from hybridsep.app.fit_stages import key_of
+from hybridsep.app.report_sections import recommendation
 from hybridsep.base.errors import LogError, ParameterError
 from hybridsep.cosim.fmus import FmuController
 from hybridsep.tune.halves import halves, replay
 
 N = 3000
 NP = 50
-
-
-def write_rows(path: Path, x_d: np.ndarray, x: np.ndarray) -> Path:
-    columns = np.column_stack((np.arange(len(x)) * 1e-3, x_d, x))
-    np.savetxt(path, columns, delimiter=",", header="t,x_d,x_meas", comments="", fmt="%.17g")
-    return path
 
 
 @pytest.fixture(scope="module")
@@ -95,20 +90,24 @@ def test_a_second_run_goes_on_from_the_first(fitted: Fit, log: Path, monkeypatch
 
 def test_the_report_says_what_to_do_and_shows_the_figures(fitted: Fit, log: Path, tmp_path: Path) -> None:
     used, findings = take_in([read_log(log, uniform=False)], fix=False)
-    write_report(tmp_path / "report.html", fitted, used, findings)
+    fit_report(fitted, used, findings).write(tmp_path / "report.html")
+    advice = recommendation(judged_by(fitted, "m"))
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert recommendation(fitted).startswith("Use the hybrid: its error is 0.")
-    assert recommendation(fitted) in page
+    assert advice.startswith("Use the hybrid: its error is 0.")
+    assert advice in page
     assert all(f"{1e6 * value:.4g}" in page for value in fitted.judged.rms())
     assert "HybridPredictor_axis.fmu" in page
-    assert page.count('<div id="chart') == 4
+    assert page.count('<div id="chart') == 5
 
 
 def test_the_command_line(hybridsep: Run, tmp_path: Path) -> None:
     log = write_rows(tmp_path / "my axis.csv", commanded()[:800], measured(0)[:800])
-    status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", 40, "--json")
+    pages = tmp_path / "charts.pdf"
+    status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", 40, "--json", "--figure", pages)
     assert status == 0, err
+    assert pages.read_bytes().count(b"/Type /Page ") == 5
     result = json.loads(out)
+    assert result["findings"] == {"my axis.csv": []}
     assert result["settings"]["Np"] == 40
     assert [one["Np"] for one in result["over_Np"]] == [8, 20, 40, 80]
     assert set(result["files"].values()) == {str(path) for path in (tmp_path / "fit").iterdir()}
@@ -141,7 +140,7 @@ def test_a_log_that_cannot_teach_a_model_is_predicted_by_its_command(tmp_path: P
     rms_pb, _, rms_h = found.judged.rms()
     assert rms_pb == pytest.approx(1e-6, rel=0.1)
     assert rms_h <= 1.02 * rms_pb
-    write_report(tmp_path / "report.html", found, used, findings)
+    fit_report(found, used, findings).write(tmp_path / "report.html")
 
 
 def test_what_is_kept_is_of_the_samples_as_they_are_read(log: Path) -> None:

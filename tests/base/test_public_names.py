@@ -14,7 +14,7 @@ from places import ROOT
 
 import hybridsep
 
-SLOW_MODULES = {"matplotlib", "control", "fmpy", "ruckig", "scipy.spatial"}
+SLOW_MODULES = {"matplotlib", "control", "fmpy", "ruckig", "scipy.spatial", "joblib"}
 SOURCE = Path(hybridsep.__file__).read_text(encoding="utf-8")
 
 
@@ -71,7 +71,7 @@ def loaded(code: str) -> set[str]:
         [],
         ["--help"],
         ["--version"],
-        *([name, "--help"] for name in ("demo", "build", "cosim", "backtest", "identify", "init")),
+        *([name, "--help"] for name in ("demo", "build", "cosim", "backtest", "identify", "init", "tune")),
     ],
 )
 def test_help_and_import_load_nothing_slow(arguments: list[str]) -> None:

@@ -8,11 +8,22 @@ from pathlib import Path
 import pytest
 from places import ROOT
 
-PAGES = ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "docs/identify.md", "docs/importers.md", "docs/paper.md")
+PAGES = (
+    *("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md"),
+    *("docs/identify.md", "docs/importers.md", "docs/paper.md", "docs/tune.md"),
+)
 FOLDERS = (".", "hybridsep", "fmu_src/c", "fmu_src/c/core", "benchmarks", "benchmarks/step_time")
 """Folders below which a page names files."""
 FILE = re.compile(r"(?<![\w*{./-])((?:[\w.-]+/)*[\w.-]+\.(?:py|c|h|toml|md))(?![\w*}])")
-ELSEWHERE = {"my_axis.toml", "machine.toml", "all.c", "sources/all.c", "FMI.c"}
+ELSEWHERE = {
+    "my_axis.toml",
+    "machine.toml",
+    "tuned.toml",
+    "example_axis/machine.toml",
+    "all.c",
+    "sources/all.c",
+    "FMI.c",
+}
 """Files of the user, of an archive, of another project."""
 
 

@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hybridsep.evaluate.report import Chart, Line, Report
+from hybridsep.evaluate.chart import Chart, Line
+from hybridsep.evaluate.chart_pages import COLUMN_WIDTH, write_pages
+from hybridsep.evaluate.report import Report
 
 
 class Tags(HTMLParser):
@@ -45,10 +47,10 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> str:
     t = np.arange(50_000) * 1e-3
     y = np.sin(t)
     y[31_234], y[100] = 7.0, np.nan
-    band = Line("band", t, -np.ones(len(t)), "rgba(1, 2, 3, 0.2)", upper=np.ones(len(t)), panel=1)
+    band = Line("band", t, -np.ones(len(t)), "#010203", upper=np.ones(len(t)), panel=1)
     report.chart(Chart("t [s]", ("y [µm]", "e [µm]"), [Line("y", t, y, "#123456"), band], "A caption"))
     report.chart(
-        Chart("f [Hz]", ("g",), [Line("", [1.0, 2.0], [3.0, 4.0], "red", points=True)], x_log=True, y_log=True)
+        Chart("f [Hz]", ("g",), [Line("", [1.0, 2.0], [3.0, 4.0], "#ff0000", points=True)], x_log=True, y_log=True)
     )
     path = tmp_path_factory.mktemp("report") / "report.html"
     report.write(path)
@@ -82,6 +84,7 @@ def test_long_lines_keep_their_extremes(page: str) -> None:
     assert [trace["name"] for trace in first] == ["y", "band", "band"]
     assert [trace["showlegend"] for trace in first] == [True, False, True]
     assert second[0]["mode"] == "markers"
+    assert first[2]["fillcolor"] == "rgba(1, 2, 3, 0.18)"
     assert len(page) < 6_500_000  # of which plotly.js has 4.9 million
     y = np.frombuffer(base64.b64decode(first[0]["y"]["bdata"]), dtype=first[0]["y"]["dtype"])
     assert len(y) <= 6002
@@ -91,3 +94,20 @@ def test_long_lines_keep_their_extremes(page: str) -> None:
 def test_a_file_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     with pytest.raises(OSError, match="nowhere"):
         Report("a", "b").write(tmp_path / "nowhere" / "report.html")
+
+
+def test_charts_for_print_are_one_column_wide_a_page_each(tmp_path: Path) -> None:
+    t = np.arange(50_000) * 1e-3
+    band = Line("band", t, -np.ones(len(t)), "#010203", upper=np.ones(len(t)), panel=1)
+    charts = [
+        Chart("t [s]", ("y [µm]", "e [µm]"), [Line("y", t, np.sin(t), "#123456"), band]),
+        Chart("f [Hz]", ("g",), [Line("", [1.0, 2.0], [3.0, 4.0], "#ff0000", points=True)], x_log=True, y_log=True),
+    ]
+    written = []
+    for name in ("a.pdf", "b.pdf"):
+        write_pages(charts, tmp_path / name)
+        written.append((tmp_path / name).read_bytes())
+    assert written[0] == written[1]
+    boxes = [[float(edge) for edge in box.split()] for box in re.findall(rb"/MediaBox \[([^]]*)\]", written[0])]
+    assert [box[2] for box in boxes] == [pytest.approx(72.0 * COLUMN_WIDTH / 25.4, abs=0.01)] * 2
+    assert len(written[0]) < 400_000

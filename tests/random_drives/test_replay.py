@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.random_drives.core import core_replay
 from benchmarks.random_drives.faults import FAULTS, JITTER, OFFSET_STEP
 from benchmarks.random_drives.generator import Drive, Recipe
 from benchmarks.random_drives.replay import _hold, library_replay, replay, replay_faults
@@ -49,6 +50,12 @@ def test_figures_are_those_of_backtest(drive: Drive) -> None:
     hold = _hold(scores.x_pb, drive.x_meas, 100)
     assert np.abs((hold - scores.x_hold)[scores.active]).max() < 1e-12
     assert result.rms_hold == pytest.approx(float(np.sqrt(np.mean((drive.x_meas - hold) ** 2))))
+
+
+@pytest.mark.parametrize("predictor", ["default", "paper"])
+def test_the_c_core_replays_as_the_library(drive: Drive, predictor: str) -> None:
+    given = predictor, drive.model, drive.x_d, drive.x_meas
+    np.testing.assert_allclose(core_replay(*given), library_replay(*given), rtol=0, atol=1e-12)
 
 
 def test_physics_is_the_measure(drive: Drive) -> None:

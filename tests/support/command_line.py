@@ -11,7 +11,7 @@ from staircase_data import commanded, measured
 
 from hybridsep.app import cli
 
-__all__ = ["Run", "write_log"]
+__all__ = ["Run", "write_log", "write_rows"]
 
 
 class Run:
@@ -33,7 +33,10 @@ class Run:
 
 
 def write_log(path: Path, *, n: int = 2500, header: str = "t,x_d,x", scale: float = 1.0) -> Path:
-    t = np.arange(n) * 1e-3
-    columns = np.column_stack((t, commanded()[:n] * scale, measured(0)[:n] * scale))
+    return write_rows(path, commanded()[:n] * scale, measured(0)[:n] * scale, header=header)
+
+
+def write_rows(path: Path, x_d: np.ndarray, x: np.ndarray, *, header: str = "t,x_d,x_meas") -> Path:
+    columns = np.column_stack((np.arange(len(x)) * 1e-3, x_d, x))
     np.savetxt(path, columns, delimiter=",", header=header, comments="", fmt="%.17g")
     return path

@@ -1,0 +1,47 @@
+"""Replay by the C core, as an FMU's binary does it, compiled for this machine."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests" / "support"))
+
+from c_core import DESCRIPTIONS, CModel, RefusedError
+
+from benchmarks.random_drives.commands import T_S
+from hybridsep.base.errors import SignalError
+from hybridsep.base.settings import PredictorSettings
+from hybridsep.base.signals import Array
+from hybridsep.model.physics import ModalModel
+
+__all__ = ["core_replay"]
+
+
+def core_replay(predictor: str, model: ModalModel, x_d: Array, x_meas: Array) -> Array:
+    """Return ``x_h`` of the C core's predictor, ``(n,)``, m; with trust ``x_meas`` is NaN where missing.
+
+    A last window that is cut off is predicted as part of a whole one, beyond whose end the command rests; the library
+    predicts it alone.
+    """
+    Np, n, modes = PredictorSettings().Np, len(x_d), model.modes
+    name = f"predictor of {len(modes)} modes"
+    any_modes = DESCRIPTIONS["predictor"]["modes"] * len(modes)
+    DESCRIPTIONS.setdefault(name, {**DESCRIPTIONS["predictor"], "modes": any_modes})
+    start = {f"mode[{i}].{key}": value for i, mode in enumerate(modes, 1) for key, value in asdict(mode).items()}
+    core = CModel(name, {**start, "trust": predictor == "default", "x_d_ahead": x_d[0], "x_meas": x_d[0]}).initialise()
+    x_h = np.empty(n)
+    x_d_ahead, measured, predicted = (core.place[key] for key in ("x_d_ahead", "x_meas", "x_h"))
+    try:
+        for k in range(n + Np - 1):
+            core.values[x_d_ahead] = x_d[min(k, n - 1)]
+            core.values[measured] = x_meas[k - Np] if k >= Np else x_d[0]
+            core.step(k * T_S, T_S)
+            if k + 1 >= Np:
+                x_h[k + 1 - Np] = core.values[predicted]
+    except RefusedError as error:
+        raise SignalError(str(error)) from error
+    return x_h

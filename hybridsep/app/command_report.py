@@ -1,0 +1,104 @@
+"""Command ``hybridsep report``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from .failures import loading
+from .options import (
+    AsIsOption,
+    AxisOption,
+    CommandColumnOption,
+    FigurePagesOption,
+    FixOption,
+    ForceOption,
+    LogArgument,
+    MachineOption,
+    MeasuredColumnOption,
+    SavedOption,
+    TimeColumnOption,
+    TsOption,
+    UnitOption,
+)
+from .parameter_options import PREDICTOR_ENTRIES, takes_parameters
+
+__all__ = ["report"]
+
+
+@takes_parameters(PREDICTOR_ENTRIES)
+def report(
+    log: LogArgument,
+    machine: MachineOption,
+    out: Annotated[Path | None, typer.Option(help="The HTML file; named after the log if left out.")] = None,
+    figure: FigurePagesOption = None,
+    fmu: Annotated[Path | None, typer.Option(help="A HybridPredictor whose steps are timed with the log.")] = None,
+    unit: UnitOption = None,
+    T_s: TsOption = None,
+    axis: AxisOption = None,
+    t: TimeColumnOption = None,
+    x_d: CommandColumnOption = None,
+    x: MeasuredColumnOption = None,
+    fix: FixOption = False,
+    as_is: AsIsOption = False,
+    weights: SavedOption = None,
+    *,
+    parameters: dict[str, Any],
+    force: ForceOption = False,
+) -> None:
+    """Check and replay a recorded log as backtest does, and write one self-contained HTML file about it."""
+    with loading():
+        from ..evaluate.report import Report
+        from ..fmi.warm_start import load_trained
+        from ..logs.log import Log
+        from ..machine import load_machine, machine_path
+        from ..tune.halves import Recording, replay
+        from .arguments import check_ending
+        from .fit import machine_name
+        from .log_intake import open_checked, reading_of
+        from .overwrite import BY_ENDING, REPORT, Output, check_outputs
+        from .progress import progress_bar
+        from .report_sections import Judged, recommendation, write_errors, write_findings, write_use
+        from .step_times import step_times
+        from .tables import console
+
+    page = out or Path(f"{machine_name(log)}_report.html")
+    check_ending(page, "--out", (".html",))
+    check_ending(figure, "--figure", (".pdf",))
+    outputs = [Output("--out", page, REPORT)]
+    outputs += [Output("--figure", figure, BY_ENDING[".pdf"])] if figure is not None else []
+    inputs = {"log": log, "machine file": machine_path(machine), "saved predictor": weights, "FMU": fmu}
+    axis_machine = load_machine(machine)
+    changed = axis_machine.changed("predictor", parameters)
+    predictor = changed.new_predictor()
+    may_miss = predictor.settings.trust
+    reading = reading_of(axis_machine, {"t": t, "x_d": x_d, "x": x}, unit=unit, T_s=T_s, axis=axis, may_miss=may_miss)
+    if weights is not None:
+        predictor = load_trained(weights, changed, "HybridPredictor")
+        predictor.restart()
+    opened, intake = open_checked(log, reading, axis_machine, fix=fix, as_is=as_is)
+    check_outputs(outputs, inputs, force=force)
+    whole = opened if isinstance(opened, Log) else opened.read()
+    with progress_bar(False) as advance:
+        recording = Recording(whole.x_d, whole.x_meas, 0)
+        replayed = replay(predictor, [recording], progress=lambda done: advance("replay", 0.9 * done))
+        advance("time the FMU's steps", 0.95)
+        steps = step_times(fmu, whole.x_d, whole.x_meas) if fmu is not None else {}
+    judged = Judged(replayed, whole.T_s, axis_machine.unit, "the log")
+    n, settings = len(whole.t), predictor.settings
+    written = Report(
+        f"{axis_machine.title}: {log.name}",
+        f"{n} samples, {n * whole.T_s:.4g} s at {1 / whole.T_s:.4g} Hz · look-ahead {settings.Np} samples, "
+        f"{1e3 * settings.Np * whole.T_s:.4g} ms · p = {settings.p}, q = {settings.q}",
+    )
+    written.paragraph(recommendation(judged), "verdict")
+    learned = "began with what an earlier run had learned" if weights is not None else "began without any knowledge"
+    write_errors(report=written, judged=judged, title="Errors of the replay", how=f"The predictor {learned}.")
+    write_findings(written, {log.name: intake.findings})
+    if fmu is not None:
+        write_use(written, [fmu.name], steps, whole.T_s)
+    written.write(page, figure)
+    console.print(recommendation(judged), highlight=False)
+    console.print(f"report: {page}", highlight=False, soft_wrap=True)

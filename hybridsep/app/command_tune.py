@@ -1,0 +1,130 @@
+"""``hybridsep tune``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ..base.output import written_text
+from ..base.ranges import parse_range
+from ..base.settings import PredictorSettings
+from .failures import loading
+from .options import (
+    AsIsOption,
+    AxisOption,
+    CommandColumnOption,
+    FixOption,
+    ForceOption,
+    JsonOption,
+    MachineOption,
+    MeasuredColumnOption,
+    TimeColumnOption,
+    TsOption,
+    UnitOption,
+)
+from .parameter_options import PREDICTOR_ENTRIES, takes_parameters
+
+__all__ = ["tune"]
+
+
+@takes_parameters(PREDICTOR_ENTRIES, ranges=PredictorSettings.TUNED)
+def tune(
+    logs: Annotated[list[Path], typer.Argument(help="Recorded logs of one axis: commanded and measured positions.")],
+    machine: MachineOption,
+    unit: UnitOption = None,
+    T_s: TsOption = None,
+    axis: AxisOption = None,
+    t: TimeColumnOption = None,
+    x_d: CommandColumnOption = None,
+    x: MeasuredColumnOption = None,
+    fix: FixOption = False,
+    as_is: AsIsOption = False,
+    *,
+    parameters: dict[str, Any],
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Processes; as many as there are processors if left out.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Machine file to write, with what was chosen.")] = None,
+    figure: Annotated[
+        Path | None, typer.Option(help="PNG, PDF or SVG with the error over each parameter and over the look-ahead.")
+    ] = None,
+    force: ForceOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Rank settings of the predictor by causal replays of logs, at the controller's look-ahead."""
+    with loading():
+        from ..logs.log import Log
+        from ..machine import load_machine, machine_path
+        from ..machine_text import machine_text
+        from ..tune.grid import TUNED, candidates, default_values, own_settings
+        from ..tune.joint import n_processors, over_windows
+        from ..tune.joint import tune as tune_on
+        from .arguments import check_ending
+        from .log_intake import findings_table, open_checked, reading_of
+        from .overwrite import BY_ENDING, MACHINE, Output, check_outputs
+        from .progress import progress_bar
+        from .tables import print_json
+        from .tune_table import entries, print_tuning, tuning_summary
+
+        if figure is not None:
+            from ..tune.figures import tuning_figure
+
+    given = load_machine(machine)
+    check_ending(out, "--out", (".toml",))
+    check_ending(figure, "--figure", (".png", ".pdf", ".svg"))
+    ranges = {
+        field: parse_range(parameters[parameter.name], parameter)
+        for field, parameter in TUNED.items()
+        if parameter.name in parameters
+    }
+    fixed = {name: value for name, value in parameters.items() if name in ("Np", "t_init", "trust")}
+    fitting = own_settings(given.predictor_settings, fixed.get("Np", given.predictor_settings.Np))
+    changed = given.changed("predictor", {"p": fitting.p, "q": fitting.q, **fixed})
+    settings = changed.predictor_settings
+    values = {**default_values(settings), **ranges}
+    tried = candidates(settings, values)
+    if out is not None:  # a [compensator] that takes over p and q may not allow the largest
+        changed.changed("predictor", {"p": max(one.p for one in tried), "q": max(one.q for one in tried)})
+    outputs = [Output("--out", out, MACHINE)] if out is not None else []
+    outputs += [Output("--figure", figure, BY_ENDING[figure.suffix.lower()])] if figure is not None else []
+    inputs: dict[str, str | Path | None] = {f"log {path}": path for path in logs}
+    check_outputs(outputs, {**inputs, "machine file": machine_path(machine)}, force=force)
+    columns = {"t": t, "x_d": x_d, "x": x}
+    reading = reading_of(given, columns, unit=unit, T_s=T_s, axis=axis, may_miss=settings.trust)
+    pieces, findings = {}, {}
+    for name, path in _named(logs).items():
+        opened, intake = open_checked(path, reading, given, fix=fix, as_is=as_is, segments=True)
+        log = opened if isinstance(opened, Log) else opened.read()
+        pieces[name] = [(segment.x_d, segment.x_meas) for segment in log.segments()]
+        findings[name] = findings_table(intake.findings)
+    with progress_bar(as_json) as advance:
+        jobs = n_processors() if jobs is None else jobs
+        tuning = tune_on(
+            *(given.model, pieces, tried),
+            jobs=jobs,
+            progress=lambda done: advance(f"replay {len(tried)} candidates", 0.9 * done),
+        )
+        chosen = tuning.candidates[tuning.chosen]
+        windows = over_windows(
+            given.model, pieces, chosen, jobs=jobs, progress=lambda done: advance("error over Np", 0.9 + 0.1 * done)
+        )
+    if figure is not None:
+        tuning_figure(tuning, windows, values, given.title, figure)
+    if as_json:
+        print_json({**tuning_summary(tuning, windows, values), "findings": findings})
+    else:
+        print_tuning(tuning, windows, values, given.title, given.unit)
+    if out is not None:
+        best = changed.changed("predictor", {"Np": chosen.Np, **entries(chosen, values)})
+        comment = f"Settings of [predictor] from hybridsep tune on {', '.join(path.name for path in logs)}."
+        with written_text(out) as file:
+            file.write(machine_text(best, [comment]))
+
+
+def _named(logs: Sequence[Path]) -> dict[str, Path]:
+    """Return the logs by their files' names, or paths where two have the same name."""
+    names = [path.name for path in logs]
+    return {name if names.count(name) == 1 else str(path): path for name, path in zip(names, logs, strict=True)}

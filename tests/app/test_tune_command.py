@@ -1,0 +1,152 @@
+"""``hybridsep tune``: table, JSON, figure, machine file, intake, refusals."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import Run, write_log
+
+from hybridsep import load_machine
+from hybridsep.app.tune_table import print_tuning
+from hybridsep.base.settings import PredictorSettings
+from hybridsep.tune.figures import tuning_figure
+from hybridsep.tune.joint import Tuning
+
+PAPER = ("-m", "spring_mass_damper", "--jobs", "1")  # its machine file says trust = false
+FEW = ("--Np", "50", "--p", "5,40", "--q", "0:1", "--lambda", "1e-12:1e-8:x100", "--t_init", "0.1")
+
+
+def test_candidates_are_ranked_with_the_baselines_beside_and_the_best_written(hybridsep: Run, tmp_path: Path) -> None:
+    log, out, figure = write_log(tmp_path / "log.csv"), tmp_path / "tuned.toml", tmp_path / "tuned.png"
+    before = log.read_bytes()
+    status, text, err = hybridsep("tune", log, *PAPER, *FEW, "--out", out, "--figure", figure)
+    assert status == 0, err
+    text = " ".join(text.split())
+    assert "RMS in µm against the measured position, Np = 50" in text
+    for words in (
+        "physics",
+        "hold",
+        "as it is",
+        "× hold",
+        "of 13 candidates are within 5 % of the best: p ",
+        "chosen: ",
+    ):
+        assert words in text
+    assert "no choice: the look-ahead is the controller's, and a shorter one is always predicted better" in text
+    assert figure.read_bytes().startswith(b"\x89PNG")
+    assert log.read_bytes() == before
+    found = json.loads(hybridsep("tune", log, *PAPER, *FEW, "--json")[1])
+    tuned, own = load_machine(out).predictor_settings, load_machine("spring_mass_damper").predictor_settings
+    assert {"p": tuned.p, "q": tuned.q, "lambda": tuned.lam} == found["chosen"]
+    assert (tuned.Np, tuned.t_init, tuned.trust) == (50, 0.1, False)
+    assert own.Np == 100
+    assert [one["own"] for one in found["candidates"]].count(True) == 1
+    ratios = [one["ratio_to_hold"] for one in found["candidates"]]
+    assert ratios == sorted(ratios)
+    assert len(ratios) == 2 * 2 * 3 + 1
+    assert list(found["logs"]) == ["log.csv"]
+    assert [one["Np"] for one in found["over_Np"]] == [10, 25, 50, 100]
+    assert found["findings"] == {"log.csv": []}
+    backtest = ("backtest", log, "-m", out, "--json")
+    replayed = json.loads(hybridsep(*backtest)[1])
+    assert replayed["ratio_to_hold"] == pytest.approx(found["ratio_to_hold"], rel=1e-9)
+    assert replayed["rms_pb_um"] == pytest.approx(1e6 * found["logs"]["log.csv"]["rms_pb"], rel=1e-9)
+
+
+def test_several_logs_and_trust(hybridsep: Run, tmp_path: Path) -> None:
+    logs = [write_log(tmp_path / name, n=n) for name, n in (("a.csv", 400), ("b.csv", 600))]
+    (tmp_path / "sub").mkdir()
+    logs.append(write_log(tmp_path / "sub" / "a.csv", n=300))
+    few = ("--trust", "true", "--p", "10", "--q", "1", "--effect", "0,1e-5", "--forgetting", "0", "--Np", "50")
+    status, text, err = hybridsep("tune", *logs, *PAPER, *few, "--json")
+    assert status == 0, err
+    found = json.loads(text)
+    assert list(found["logs"]) == [str(logs[0]), "b.csv", str(logs[2])]
+    assert found["trust"] is True
+    for one in found["candidates"]:
+        rms = [one["rms_h"][name] / figures["rms_hold"] for name, figures in found["logs"].items()]
+        assert one["ratio_to_hold"] == pytest.approx(np.prod(rms) ** (1 / 3))
+    text = " ".join(hybridsep("tune", *logs, *PAPER, *few)[1].split())
+    assert "ranked by the geometric mean over the logs of RMS relative to hold" in text
+
+
+def test_a_log_with_a_gap_is_tuned_on_in_pieces(hybridsep: Run, tmp_path: Path) -> None:
+    log = write_log(tmp_path / "log.csv")
+    lines = log.read_text().splitlines(keepends=True)
+    log.write_text("".join([*lines[:900], *lines[1100:]]))
+    status, _, err = hybridsep("tune", log, *PAPER, *FEW)
+    assert status == 2
+    assert "--fix" in err
+    status, text, err = hybridsep("tune", log, *PAPER, *FEW, "--fix", "--json")
+    assert status == 0, err
+    assert "segments the longest" not in err
+    assert "gaps" in [finding["name"] for finding in json.loads(text)["findings"]["log.csv"]]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--p", "5:120:5"), "--p: p must be 1 … Np = 100, got 105; lower p or raise Np"),
+        (
+            ("--lambda", "1e-12:1e-6"),
+            "such as 5,10,50 or 5:100:5 (steps) or 1e-14:1e-6:x10 (factors), got '1e-12:1e-6'",
+        ),
+        (("--effect", "1e-5"), "--effect has an effect with trust only: give --trust true, too"),
+        (("--fix", "--as-is"), "--fix and --as-is exclude each other"),
+        (("--out", "x.csv"), "--out must end in .toml, got 'x.csv'"),
+        (("--figure", "x.jpg"), "--figure must end in .png or .pdf or .svg, got 'x.jpg'"),
+    ],
+)
+def test_what_cannot_be_is_refused_on_one_line(
+    hybridsep: Run, tmp_path: Path, options: tuple[str, ...], words: str
+) -> None:
+    status, out, err = hybridsep("tune", write_log(tmp_path / "log.csv", n=300), *PAPER, *options)
+    assert (status, out) == (2, "")
+    assert len(err.strip().splitlines()) == 1
+    assert words in err
+
+
+def test_inputs_are_never_overwritten_nor_other_files(hybridsep: Run, tmp_path: Path) -> None:
+    log, notes = write_log(tmp_path / "log.csv", n=300), tmp_path / "notes.toml"
+    notes.write_text("title = 'mine'\n")
+    machine = tmp_path / "machine.toml"
+    assert hybridsep("tune", log, *PAPER, *FEW, "--out", machine)[0] == 0
+    again = ("tune", log, "-m", machine, "--jobs", "1", *FEW, "--out")
+    assert "is the same file as the machine file" in hybridsep(*again, machine)[2]
+    assert "exists and is no machine file" in hybridsep(*again, notes)[2]
+    assert hybridsep(*again, notes, "--force")[0] == 0
+
+
+def test_a_compensator_that_the_lags_do_not_fit_is_told_before_the_replays(hybridsep: Run, tmp_path: Path) -> None:
+    machine = tmp_path / "machine.toml"
+    assert hybridsep("tune", write_log(tmp_path / "log.csv", n=300), *PAPER, *FEW, "--out", machine)[0] == 0
+    text = machine.read_text()
+    machine.write_text(text[: text.index("[compensator]")] + "[compensator]\nNp = 20\np = 10\n")
+    lags = ("--p", "40", "--q", "30", "--lambda", "1e-9")
+    lagged = ("-m", machine, "--jobs", "1", *lags, "--out", tmp_path / "new.toml")
+    status, _, err = hybridsep("tune", tmp_path / "log.csv", *lagged)
+    assert status == 2
+    assert "compensator: q must be 0 … Np − 1 = 19, got 30" in err
+
+
+def test_what_diverges_is_said(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    own = PredictorSettings(trust=False)
+    settings = (own, replace(own, p=20), replace(own, p=30))
+    hold = np.array([1e-6])
+    for losses, words in (
+        ((np.inf, 5e-7, np.inf), ("2 of 3 diverge", "chosen: p = 20", "diverges")),
+        ((5e-7, np.inf, 4.9e-7), ("1 of 3 diverge", "the best is 2.0 % better, less than 5 % may be chance")),
+        ((2e-6, 3e-6, 2e-6), ("no candidate is better than holding the last residual",)),
+        ((np.inf, np.inf, np.inf), ("all 3 candidates diverge; try larger --lambda or smaller --p",)),
+    ):
+        found = Tuning(("a.csv",), settings, 2 * hold, hold, np.array(losses)[:, None])
+        windows = {100: Tuning(("a.csv",), settings[:1], 2 * hold, hold, found.rms_h[:1])}
+        print_tuning(found, windows, {"p": (20, 30, 50)}, "Axis", "rad")
+        text = " ".join(capsys.readouterr().out.split())
+        assert "RMS in µrad" in text
+        assert all(part in text for part in words)
+        tuning_figure(found, windows, {"p": (20, 30, 50)}, "Axis", tmp_path / "figure.svg")

@@ -1,0 +1,62 @@
+"""Candidates: defaults, combinations, refusals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from hybridsep.base.errors import ParameterError
+from hybridsep.base.settings import PredictorSettings
+from hybridsep.tune.grid import TUNED, candidates, default_values, own_settings
+from hybridsep.tune.losses import share_a_pass
+
+PAPER = PredictorSettings(Np=100, p=50, q=3, lam=1e-12, trust=False)
+TRUST = replace(PAPER, trust=True)
+
+
+def test_the_defaults_are_hundreds_that_share_a_pass_or_a_few_replays() -> None:
+    tried = candidates(PAPER, default_values(PAPER))
+    assert 500 <= len(tried) <= 1500
+    assert share_a_pass(tried)
+    trusting = candidates(TRUST, default_values(TRUST))
+    assert 10 <= len(trusting) <= 20
+    assert not share_a_pass(trusting)
+    assert not share_a_pass([replace(PAPER, v_friction=1e-3)])
+
+
+@pytest.mark.parametrize("trust", [False, True])
+@pytest.mark.parametrize("Np", [1, 2, 19, 5000])
+def test_all_fit_the_window_and_the_machines_own_come_first(Np: int, trust: bool) -> None:
+    own = replace(own_settings(PAPER, Np), trust=trust, forgetting=7.0)
+    assert (own.p, own.q) == (min(50, Np), min(3, Np - 1))
+    tried = candidates(own, default_values(own))
+    assert tried[0] == own
+    assert len(set(tried)) == len(tried)
+    differing = {field for field in TUNED if len({getattr(one, field) for one in tried}) > 1}
+    assert differing <= ({"p", "q", "forgetting"} if trust else {"p", "q", "lam"})
+    assert {replace(one, **{field: getattr(own, field) for field in TUNED}) for one in tried} == {own}
+
+
+def test_the_least_penalty_that_is_allowed_bounds_the_defaults() -> None:
+    least = replace(PAPER, lam=1e-40)
+    assert min(default_values(least)["lam"]) == 1e-40
+
+
+@pytest.mark.parametrize(
+    ("settings", "values", "words"),
+    [
+        (PAPER, {"p": (5, 101)}, "--p: p must be 1 … Np = 100, got 101; lower p or raise Np"),
+        (PAPER, {"q": (100,)}, "--q: q must be 0 … Np − 1 = 99, got 100; lower q or raise Np"),
+        (PAPER, {"effect": (1e-5,)}, "--effect has an effect with trust only: give --trust true, too"),
+        (
+            replace(PAPER, Np=1000),
+            {"p": range(1, 1001), "lam": [10.0**-i for i in range(30)], "q": range(4)},
+            "--p and --lambda and --q have 120000 combinations, at most 100000 are allowed; take fewer",
+        ),
+    ],
+)
+def test_what_does_not_fit_is_refused(settings: PredictorSettings, values: dict[str, list[float]], words: str) -> None:
+    with pytest.raises(ParameterError) as refused:
+        candidates(settings, values)
+    assert str(refused.value) == words
