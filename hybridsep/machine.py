@@ -181,7 +181,11 @@ class Machine(Section):
         """
         if self.drive_limits is None:
             raise MachineError(f"machine {self.name} has no [drive_limits] section, which a compensator FMU needs")
-        return {**self.compensator_predictor.to_fmi(), **self.compensator_settings.to_fmi(), "dead_time": self.physics.dead_time}
+        return {
+            **self.compensator_predictor.to_fmi(),
+            **self.compensator_settings.to_fmi(),
+            "dead_time": self.physics.dead_time,
+        }
 
     @property
     def _sampling(self) -> dict[str, Any]:

@@ -31,7 +31,6 @@ def paper_machine(name: str) -> Machine:
     return load_machine(name).changed("compensator", _PAPER)
 
 
-
 @dataclass(frozen=True)
 class Case:
     """Disturbance of the loop: another plant from sample ``at`` on, other measurements, limits or noise."""

@@ -34,12 +34,12 @@ from .trusted_plan import TrustedPlanner
 __all__ = ["RECOMMENDED", "SepCompensator", "SepState", "direct_samples"]
 
 _PINNED, _PINNED_WITH_TRUST = 8, 20
-"""Leading samples of a window in which a bounded plan follows the last one: real-time solvers take 3 steps in each. With
-trust every plan does, as it takes more work."""
+"""Leading samples of a window in which a bounded plan follows the last one: real-time solvers take 3 steps in each.
+With trust every plan does, as it takes more work."""
 
 RECOMMENDED = PredictorSettings(trust=False, Np=50, p=50, q=40, lam=1e-8, t_init=0.1, v_friction=2e-3)
-"""Predictor settings of the paper's model with the smallest tracking error on the staircase drive, with the compensator's
-defaults."""
+"""Predictor settings of the paper's model with the smallest tracking error on the staircase drive, with the
+compensator's defaults."""
 
 
 class SepCompensator:
@@ -133,7 +133,9 @@ class SepCompensator:
             self._x_d_before[:] = predictor.start
         trusted = predictor.trusted
         model = None if trusted is None else self._plan_model(trusted, command - predictor.start)
-        state, coefficients = self._best_plan(command) if model is None else self._trusted_plan(command, command - predictor.start, model)
+        state, coefficients = (
+            self._best_plan(command) if model is None else self._trusted_plan(command, command - predictor.start, model)
+        )
         delta = (self._basis.values @ coefficients)[:Np]
         x_dm = command[:Np] + delta
         prediction = predictor.predict(x_dm, reference=command, scales=None if model is None else model.scales)

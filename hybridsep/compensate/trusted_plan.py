@@ -3,9 +3,9 @@
 ``min ‖x_d − x_h(x_d + δ)‖² + jerk_weight·‖D³ δ‖²`` within the drive's limits, where ``x_h`` is not affine in ``δ``:
 friction that follows the command changes its sign with the command's velocity. Each step solves the quadratic programme
 of the linearised model (Gauss-Newton); a step that does not lower the cost is repeated with a penalty on the change of
-velocity (Levenberg-Marquardt). A plan is made while its first samples act, which follow the last one; their number, tries and
-solver steps are limited, so that their work fits into those samples. Predictions are shrunk by their variance, so where the
-model knows nothing the plan is that of the physics model.
+velocity (Levenberg-Marquardt). A plan is made while its first samples act, which follow the last one; steps, tries and
+the solver's steps are limited, so that their work fits into those samples. Predictions are shrunk by their variance, so
+where the model knows nothing the plan is that of the physics model.
 """
 
 from __future__ import annotations

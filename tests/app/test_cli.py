@@ -142,7 +142,7 @@ def test_cosim_with_compensation(hybridsep: Run, tmp_path: Path) -> None:
     status, out, _ = hybridsep("cosim", "--compensate", "hybrid", *fmus)
     assert status == 0
     assert f"{figures['hybrid']:.2f}" in out
-    assert "planned by the hybrid 98.3%" in out
+    assert "planned by the hybrid 98.8%" in out
     # Preview and knots follow a window of another length.
     sizes = ("--Np", 25, "--p", 20, "--q", 3)
     assert hybridsep("cosim", "--compensate", "physics", "--flavour", "python", *sizes)[0] == 0
