@@ -111,7 +111,7 @@ class Machine(Section):
         """Settings of the compensator's own predictor: those of the predictor where the section has no others."""
         own = self._compensator_entries(PredictorSettings)
         given = _without(PredictorSettings.ALONE, self.predictor.given())
-        return PredictorSettings(**{**given, **own}, **self._sampling, trust=False)
+        return PredictorSettings(**{**given, **own}, **self._sampling)
 
     @property
     def compensator_settings(self) -> CompensatorSettings:
@@ -182,8 +182,11 @@ class Machine(Section):
         """
         if self.drive_limits is None:
             raise MachineError(f"machine {self.name} has no [drive_limits] section, which a compensator FMU needs")
-        predictor = _without(PredictorSettings.ALONE, self.compensator_predictor.to_fmi())
-        return {**predictor, **self.compensator_settings.to_fmi(), "dead_time": self.physics.dead_time}
+        return {
+            **_without(PredictorSettings.ALONE, self.compensator_predictor.to_fmi()),
+            **self.compensator_settings.to_fmi(),
+            "dead_time": self.physics.dead_time,
+        }
 
     @property
     def _sampling(self) -> dict[str, Any]:

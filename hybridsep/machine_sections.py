@@ -100,7 +100,7 @@ def _settings_section(
     inherits : bool
         Whether a missing entry is taken from another section.
     without : tuple of str
-        Fields that the section does not have.
+        Fields that the section has not.
     """
     entries: dict[str, Any] = {}
     for field, parameter in ((field, settings.parameters().get(field.name)) for field in fields(settings)):

@@ -164,7 +164,9 @@ def test_the_compensators_settings_are_the_recommended_ones() -> None:
     for name in ("spring_mass_damper", "als25010_x", "als25010_y"):
         machine = load_machine(name)
         compensator = machine.new_compensator()
-        assert compensator.predictor.settings == RECOMMENDED
+        assert compensator.predictor.settings == PredictorSettings(Np=50, v_friction=2e-3)
+        paper = {"trust": False, "p": 50, "q": 40, "lambda": 1e-8, "t_init": 0.1}  # as the comment there says
+        assert machine.changed("compensator", paper).compensator_predictor == RECOMMENDED
         limits = Limits(0.1, 16.0, 5000.0)
         assert compensator.settings == CompensatorSettings(preview=200, spacing=2, limits=limits, change_max=1e-3)
         assert machine.new_predictor().Np == 100
@@ -183,6 +185,10 @@ def test_what_the_compensator_section_leaves_out_is_the_predictors(tmp_path: Pat
         "t_init": -1.0,
         "input_hold": 0,
         "dead_time": 0,
+        "trust": True,
+        "effect": 0.0,
+        "noise_std": 0.0,
+        "forgetting": 0.0,
         "preview": 200,
         "spacing": 2,
         "jerk_weight": 1.0,
@@ -203,11 +209,11 @@ def test_what_the_compensator_section_leaves_out_is_the_predictors(tmp_path: Pat
     assert {name: found[name] for name in given} == given
     changes = replace(machine.compensator_settings, preview=90, change_max=None, compensate="physics")
     compensator = machine.new_compensator(changes, predictor=replace(machine.compensator_predictor, p=10))
-    settings = PredictorSettings(trust=False, Np=30, p=10, q=9, lam=1e-9, T_s=0.002, t_init=0.1, v_friction=1e-3)
+    settings = PredictorSettings(Np=30, p=10, q=9, lam=1e-9, T_s=0.002, t_init=0.1, v_friction=1e-3)
     assert compensator.predictor.settings == settings
     assert compensator.settings == changes
     assert (changes.spacing, changes.no_reversal, changes.jerk_weight) == (3, False, 0.0)
-    without = machine.new_compensator(predictor=replace(machine.compensator_predictor, v_friction=0.0))
+    without = machine.new_compensator(predictor=replace(machine.compensator_predictor, trust=False, v_friction=0.0))
     assert without.predictor.n_features == 2 + 9 + 20
     assert machine.predictor_settings.v_friction == 0.0  # it predicts with the paper's features
     assert machine.fmi_parameters()["Np"] == 50

@@ -10,18 +10,25 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from hybridsep.base.settings import PARAMETERS, Limits, PredictorSettings
+from hybridsep.base.settings import PARAMETERS, Limits
 from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepCompensator
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.cosim.run import Run
 from hybridsep.fmi.archive import build_fmu, fmu_names
-from hybridsep.machine import Machine
+from hybridsep.machine import Machine, load_machine
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.feed_drive import FeedDrive
 from hybridsep.plants.plant import Plant
 
-__all__ = ["Case", "FmuLoops", "LibraryLoops", "Loops", "noise_seed"]
+__all__ = ["Case", "FmuLoops", "LibraryLoops", "Loops", "noise_seed", "paper_machine"]
+
+_PAPER = {"trust": False, "Np": 50, "p": 50, "q": 40, "lambda": 1e-8, "t_init": 0.1}
+
+
+def paper_machine(name: str) -> Machine:
+    """Return a bundled machine whose compensator plans with the paper's model, with the settings best for it."""
+    return load_machine(name).changed("compensator", _PAPER)
 
 
 @dataclass(frozen=True)
@@ -99,16 +106,7 @@ def noise_seed(seed: int, run: int) -> int:
 
 
 class LibraryLoops:
-    """The library's compensator and plant, with the FMU's timing.
-
-    Parameters
-    ----------
-    predictor : PredictorSettings, optional
-        Of the compensator's predictor, but for the sampling; the machine's if left out.
-    """
-
-    def __init__(self, predictor: PredictorSettings | None = None) -> None:
-        self._predictor = predictor
+    """The library's compensator and plant, with the FMU's timing."""
 
     def run(
         self, machine: Machine, r: Array, compensate: str, seed: int, n: int = 1, case: Case | None = None
@@ -122,10 +120,7 @@ class LibraryLoops:
         settings = replace(machine.compensator_settings, compensate=compensate)
         if case.limits is not None:
             settings = replace(settings, limits=case.limits)
-        predictor = self._predictor
-        if predictor is not None:
-            predictor = replace(predictor, T_s=machine.T_s, input_hold=machine.physics.input_hold)
-        return machine.new_compensator(settings, predictor=predictor)
+        return machine.new_compensator(settings)
 
     def once(self, compensator: SepCompensator, machine: Machine, r: Array, seed: int, run: int, case: Case) -> Run:
         """Return run number ``run`` of a compensator, warm if it is not the first."""

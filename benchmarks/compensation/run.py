@@ -1,4 +1,4 @@
-"""Benchmark of compensation: tracking errors in closed loop, with and without it, beside peers.
+"""Benchmark of compensation with the paper's model: tracking errors in closed loop, with and without it, beside peers.
 
     python benchmarks/compensation/run.py [--seeds 5] [--first-seed 0] [--fmu native|python|none]
 
@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # benchmarks are n
 
 import numpy as np
 
-from benchmarks.compensation.loops import Case, FmuLoops, LibraryLoops, Loops
+from benchmarks.compensation.loops import Case, FmuLoops, LibraryLoops, Loops, paper_machine
 from benchmarks.compensation.path_friction import runs_with_path_friction
 from benchmarks.compensation.peers import input_shaper, shape, zero_phase_command
 from benchmarks.compensation.report import Report
@@ -29,7 +29,7 @@ from hybridsep.base.metrics import contour_error, largest, peak_derivatives, rms
 from hybridsep.base.settings import Limits
 from hybridsep.base.signals import Array
 from hybridsep.cosim.run import Run
-from hybridsep.machine import Machine, load_machine
+from hybridsep.machine import Machine
 from hybridsep.machine_sections import CompensatorSection
 from hybridsep.plants.feed_drive import FeedDrive
 from hybridsep.plants.plant import simulate
@@ -112,7 +112,7 @@ def mean_rms(loops: list[Run]) -> float:
 
 def staircase_rows(report: Report, loops: Loops, seeds: range) -> tuple[float, float]:
     """Rows 1 and 2; return the figures of the recommended settings, cold and warm."""
-    recommended, r = load_machine("spring_mass_damper"), staircase()
+    recommended, r = paper_machine("spring_mass_damper"), staircase()
     machine = with_the_papers_settings(recommended)
     report.title("1  staircase, p = 50, q = 3, the paper's features (tracking RMS of the true position, µm)")
     none = mean_rms([loops.run(machine, r, "off", s)[0] for s in seeds])
@@ -135,7 +135,7 @@ def stage_rows(report: Report, loops: Loops, seeds: range) -> None:
     """Row 3: both axes of the spiral, and the contour error of the two together."""
     report.title("3  stage, spiral, recommended settings; physics: filtered basis functions as published")
     position, derivative, end = archimedean_spiral(0.030, 5.0)
-    machines, commands = [load_machine("als25010_x"), load_machine("als25010_y")], spiral()
+    machines, commands = [paper_machine("als25010_x"), paper_machine("als25010_y")], spiral()
     found: dict[str, list[list[Run]]] = {name: [] for name in STAGE_CASES}
     for machine, r in zip(machines, commands, strict=True):
         plain = as_published(machine)
@@ -189,7 +189,7 @@ def after_reversals(r: Array) -> Any:
 def peer_rows(report: Report, cold: float, warm: float) -> None:
     """Row 4: peers; the true position does not depend on the noise, except for the hybrid's."""
     report.title("4  peers on the staircase drive")
-    machine, r = load_machine("spring_mass_damper"), staircase()
+    machine, r = paper_machine("spring_mass_damper"), staircase()
     discrete = machine.new_predictor().discrete
     commands = {"no compensation": r}
     for kind in ("zv", "zvd"):
@@ -211,7 +211,7 @@ def peer_rows(report: Report, cold: float, warm: float) -> None:
 
 def robustness_rows(report: Report, loops: Loops, seeds: range) -> None:
     """Row 5: disturbances in practice."""
-    recommended, r = load_machine("spring_mass_damper"), staircase()
+    recommended, r = paper_machine("spring_mass_damper"), staircase()
     usual_limits, change_max = recommended.command_limits()
     for title, machine in (
         ("p = 50, q = 3", with_the_papers_settings(recommended)),

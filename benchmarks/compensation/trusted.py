@@ -1,4 +1,4 @@
-"""Benchmark of compensation with the trusted model, in the library.
+"""Benchmark of compensation with the trusted model, by the settings of the machine files.
 
     python benchmarks/compensation/trusted.py [--seeds 1] [--first-seed 0] [--only TEXT]      (15 minutes a seed)
 
@@ -26,14 +26,10 @@ from benchmarks.compensation.report import Report
 from benchmarks.compensation.run import CASES, LESS_THAN_5_PERCENT_WORSE, UM, excess
 from benchmarks.trust import circle, short_staircase
 from hybridsep.base.metrics import largest
-from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.machine import Machine, load_machine
 from hybridsep.machine_sections import StageSection
 from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest, spiral, staircase
-
-TRUSTED = PredictorSettings(Np=50)
-"""Predictor with trust; the rest are its defaults."""
 
 NO_WORSE = 1.02
 """Largest RMS relative to that of the physics model's plans, where there is no figure."""
@@ -94,7 +90,7 @@ def measured(row: Row, seed: int) -> tuple[float, float, float, float]:
 
     With an outlier, the largest changes of ``x_dm`` by it instead of the RMS.
     """
-    loops, case = LibraryLoops(TRUSTED), row.case or Case()
+    loops, case = LibraryLoops(), row.case or Case()
     physics = loops.run(row.machine, row.x_d, "physics", seed, 1, case)[0].tracking_rms
     runs = loops.run(row.machine, row.x_d, "hybrid", seed, 2, case)
     figures = [run.tracking_rms for run in runs]

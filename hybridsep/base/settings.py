@@ -168,9 +168,11 @@ class PredictorSettings(Settings):
     NEEDS_PREVIEW: ClassVar[tuple[str, ...]] = ("v_friction",)
     """Fields of a predictor that a compensator holds: alone it has no reference beyond its window."""
 
-    ALONE: ClassVar[tuple[str, ...]] = ("trust", "effect", "noise_std", "forgetting", "measurement_delay")
-    """Fields of a predictor that no machine file's or FMU's compensator has: it plans with the paper's model, from the
-    state of ``G_pb`` now."""
+    TRUST: ClassVar[tuple[str, ...]] = ("trust", "effect", "noise_std", "forgetting")
+    """Fields of the residual model with trust."""
+
+    ALONE: ClassVar[tuple[str, ...]] = ("measurement_delay",)
+    """Fields of a predictor that no machine file's or FMU's compensator has: it plans from the state of ``G_pb``."""
 
     TUNED: ClassVar[tuple[str, ...]] = ("p", "q", "lam", "effect", "noise_std", "forgetting")
     """Fields that can be tuned on a log: ``Np`` is the controller's, and a warm-up hides errors."""

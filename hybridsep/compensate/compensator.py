@@ -21,6 +21,7 @@ from ..base.settings import CompensatorSettings, PredictorSettings
 from ..base.signals import Array, as_published, as_samples
 from ..predict.linearised import PlanModel
 from ..predict.predictor import HybridPredictor
+from ..predict.trusted import TrustedModel
 from ..predict.window import PublishedWindow
 from .constraints import Bounds, DriveBounds, solve
 from .plan import PendingPlan, SepState
@@ -32,11 +33,13 @@ from .trusted_plan import TrustedPlanner
 
 __all__ = ["RECOMMENDED", "SepCompensator", "SepState", "direct_samples"]
 
-_PINNED = 8
-"""Leading samples of a window in which a bounded plan follows the last one: real-time solvers take 3 steps in each."""
+_PINNED, _PINNED_WITH_TRUST = 8, 20
+"""Leading samples of a window in which a bounded plan follows the last one: real-time solvers take 3 steps in each.
+With trust every plan does, as it takes more work."""
 
 RECOMMENDED = PredictorSettings(trust=False, Np=50, p=50, q=40, lam=1e-8, t_init=0.1, v_friction=2e-3)
-"""Predictor settings with the smallest tracking error on the staircase drive, with the compensator's defaults."""
+"""Predictor settings of the paper's model with the smallest tracking error on the staircase drive, with the
+compensator's defaults."""
 
 
 class SepCompensator:
@@ -73,7 +76,8 @@ class SepCompensator:
         self.preview, self.spacing = settings.preview, settings.spacing
         self.compensate = SepState[settings.compensate.upper()]
         self._basis = SplineBasis(self.preview, self.spacing)
-        self._n_pinned = min(_PINNED, Np // 2) // self.spacing
+        n_pinned = _PINNED if predictor.trusted is None else _PINNED_WITH_TRUST
+        self._n_pinned = min(n_pinned, Np // 2) // self.spacing
         self._bounds = DriveBounds(
             self._basis, predictor.T_s, settings.limits, settings.change_max, no_reversal=settings.no_reversal
         )
@@ -100,6 +104,7 @@ class SepCompensator:
         self._monitor.restart()
         self._sensor = SensorWatch()
         self._measured_before = True
+        self._state_before = min(self.compensate, SepState.PHYSICS)
         # Coefficients of the remainder of the last plan; last three values of δ and of x_d
         self._rest = np.zeros(N_DECIDED + self._basis.n_free)
         self._delta_before = np.zeros(3)
@@ -131,18 +136,34 @@ class SepCompensator:
             predictor.start = float(command[0])
         if np.isnan(self._x_d_before[0]):
             self._x_d_before[:] = predictor.start
-        state, coefficients = self._best_plan(command)
+        trusted = predictor.trusted
+        model = None if trusted is None else self._plan_model(trusted, command - predictor.start)
+        state, coefficients = (
+            self._best_plan(command) if model is None else self._trusted_plan(command, command - predictor.start, model)
+        )
         delta = (self._basis.values @ coefficients)[:Np]
         x_dm = command[:Np] + delta
-        prediction = predictor.predict(x_dm, reference=command)
+        prediction = predictor.predict(x_dm, reference=command, scales=None if model is None else model.scales)
         self._pending = PendingPlan(coefficients, delta, command[:Np].copy(), prediction, state)
+        return self._published(x_dm, self._pending)
+
+    def _published(self, x_dm: Array, plan: PendingPlan) -> PublishedWindow:
+        """Return what is published of a plan; SignalError if its prediction diverges.
+
+        The paper's model is published where it planned. With trust it is published wherever it may plan: it vouches for
+        itself, and what planned the window is not known before its first samples have acted.
+        """
+        Np, prediction, trusted = self.predictor.Np, plan.prediction, self.predictor.trusted is not None
         as_published(prediction.x_pb, "x_pb")
-        if state is SepState.HYBRID:
-            x_h, n_warm_up = as_published(prediction.x_pb + prediction.e_h, "x_h"), 0
-        else:
-            x_h, n_warm_up = prediction.x_pb.copy(), Np
-        x_h_std = prediction.x_h_std if state is SepState.HYBRID else np.zeros(Np)
-        return PublishedWindow(command[:Np].copy(), x_dm, prediction.x_pb, x_h, x_h_std, state, n_warm_up)
+        x_h, x_h_std, n_warm_up = prediction.x_pb.copy(), np.zeros(Np), Np
+        if trusted and self.compensate is SepState.HYBRID:
+            x_h, x_h_std, n_warm_up = prediction.x_h, prediction.x_h_std, prediction.n_warm_up
+        elif plan.state is SepState.HYBRID:
+            x_h, x_h_std, n_warm_up = as_published(x_h + prediction.e_h, "x_h"), prediction.x_h_std, 0
+        n_followed = self._n_pinned * self.spacing if trusted else 0
+        return PublishedWindow(
+            plan.x_d, x_dm, prediction.x_pb, x_h, x_h_std, plan.state, n_warm_up, n_followed, self._state_before
+        )
 
     def update(self, x: ArrayLike) -> None:
         """Learn from the measurement of the planned window.
@@ -177,6 +198,7 @@ class SepCompensator:
             _last_three(self._delta_before, pending.delta),
             _last_three(self._x_d_before, pending.x_d),
         )
+        self._state_before = pending.state
         self._pending = None
 
     def _update_paper(self, measured: Array, pending: PendingPlan) -> None:
@@ -205,8 +227,6 @@ class SepCompensator:
 
     def _best_plan(self, command: Array) -> tuple[SepState, Array]:
         """Return the model and the coefficients of the best available plan, the decided ones first."""
-        if self.predictor.trusted is not None:
-            return self._trusted_plan(command)
         rest = self._rest
         candidates = self._candidates()
         if not candidates:
@@ -228,14 +248,18 @@ class SepCompensator:
         if not (np.isfinite(g).all() and np.isfinite(free).all()):
             return None
         cost = self._basis.cost(g, free, command, rest[:N_DECIDED], self._delta_before, self.settings.jerk_weight)
-        found = solve(cost, bounds, rest[N_DECIDED:], self._n_pinned)
+        always = self.predictor.trusted is not None
+        found = solve(cost, bounds, rest[N_DECIDED:], self._n_pinned, always=always)
         return None if found is None else np.concatenate((rest[:N_DECIDED], found))
 
-    def _trusted_plan(self, command: Array) -> tuple[SepState, Array]:
+    def _plan_model(self, trusted: TrustedModel, path: Array) -> PlanModel:
+        """Return the trusted model over the preview, with the scales of the rest of the last plan."""
+        with np.errstate(all="ignore"):  # a prediction that is no candidate may overflow
+            return PlanModel(trusted, self.predictor.state, path + self._basis.values @ self._rest, path)
+
+    def _trusted_plan(self, command: Array, path: Array, model: PlanModel) -> tuple[SepState, Array]:
         """Return the model and the coefficients of the best plan, with trust: the physics model's, or a better one."""
-        predictor, rest, start = self.predictor, self._rest, self.predictor.start
-        assert predictor.trusted is not None
-        assert start is not None
+        predictor, rest = self.predictor, self._rest
         if self.compensate is SepState.OFF:
             return SepState.OFF, rest
         before = command, self._x_d_before, self._delta_before, rest
@@ -243,13 +267,9 @@ class SepCompensator:
         physics = self._affine_plan(g, free, command, self._bounds.bounds(*before))
         if physics is None:
             return SepState.OFF, rest
-        if not (self.compensate is SepState.HYBRID and predictor.k >= predictor.n_init):
+        if not (self.compensate is SepState.HYBRID and predictor.k >= predictor.n_init and model.has_learned):
             return SepState.PHYSICS, physics
-        path = command - start
-        with np.errstate(all="ignore"):  # a prediction that is no candidate may overflow
-            model = PlanModel(predictor.trusted, predictor.state, path + self._basis.values @ rest, path)
-            if not model.has_learned:
-                return SepState.PHYSICS, physics
+        with np.errstate(all="ignore"):
             planner = TrustedPlanner(self._basis, self.settings.jerk_weight, model, path, self._delta_before)
             bounds = self._bounds.bounds(*before, may_turn=True)
             hybrid, cost = planner.plan(rest, bounds, self._n_pinned, self._basis.filtered(g))

@@ -13,10 +13,10 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from ..base.settings import Limits
 from ..base.signals import Array
-from .interior import PRIMAL_RESIDUAL, minimise
+from .interior import PRIMAL_RESIDUAL, Minimum, minimise
 from .splines import N_DECIDED, PlanCost, SplineBasis
 
-__all__ = ["Bounds", "DriveBounds", "solve"]
+__all__ = ["Bounds", "DriveBounds", "bounded", "cost_scale", "solve", "unbounded"]
 
 _ROUNDING = 1e-9
 """Tolerance for rounding, as a share of a limit: bounds are tightened by it; rows that change by less do not bind."""
@@ -130,7 +130,7 @@ class DriveBounds:
         return Bounds(rows=self._free, low=low, high=high)
 
 
-def solve(cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int) -> Array | None:
+def solve(cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int, *, always: bool = False) -> Array | None:
     """Return the minimiser of the cost within the bounds.
 
     The unconstrained minimiser if it is feasible. Otherwise the first ``n_pinned`` coefficients stay as they are in
@@ -144,33 +144,60 @@ def solve(cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int) -> Array |
         Feasible coefficients.
     n_pinned : int
         Coefficients that a bounded plan does not change, < n.
+    always : bool
+        Whether no plan changes them.
 
     Returns
     -------
     c : (n,) array, m, or None
         None if there is no finite minimiser.
     """
+    n_kept = n_pinned if always else 0
+    c = unbounded(cost, rest, n_kept)
+    if c is None or bounds.allow(c):
+        return c
+    return bounded(cost, bounds, rest, n_pinned, cost_scale(cost, c, rest, n_kept)).x
+
+
+def unbounded(cost: PlanCost, rest: Array, n_pinned: int) -> Array | None:
+    """Return the minimiser of the cost, ``(n,)``, m, with the first ``n_pinned`` coefficients those of ``rest``."""
+    left = cost.without(rest[:n_pinned])
     try:
-        c = np.asarray(cho_solve(cho_factor(cost.P), cost.v))
+        c = np.asarray(cho_solve(cho_factor(left.P), left.v))
     except (LinAlgError, ValueError):
         return None
-    if not np.isfinite(c).all():
-        return None
-    if bounds.allow(c):
-        return c
-    pinned, left = rest[:n_pinned], rest[n_pinned:]
+    return np.concatenate((rest[:n_pinned], c)) if np.isfinite(c).all() else None
+
+
+def cost_scale(cost: PlanCost, c: Array, rest: Array, n_pinned: int) -> float:
+    """Return the scale of the cost, m², between ``rest`` and its minimiser of :func:`unbounded`."""
+    left, at_rest = cost.without(rest[:n_pinned]), rest[n_pinned:]
+    return float(left.v @ c[n_pinned:] + at_rest @ left.P @ at_rest)
+
+
+def bounded(cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int, scale: float) -> Minimum:
+    """Return the minimiser of the cost within the bounds, as far as it is feasible from ``rest``, and solver steps.
+
+    Parameters
+    ----------
+    cost, bounds, rest, n_pinned
+        As those of :func:`solve`.
+    scale : float, m²
+        :func:`cost_scale`.
+    """
+    pinned, problem = rest[:n_pinned], cost.without(rest[:n_pinned])
     rows, taken = bounds.rows[:, n_pinned:], bounds.rows[:, :n_pinned] @ pinned
     touched = rows.any(axis=1)
     found = minimise(
-        cost.P[n_pinned:, n_pinned:],
-        cost.v[n_pinned:] - cost.P[n_pinned:, :n_pinned] @ pinned,
+        problem.P,
+        problem.v,
         rows[touched],
         (bounds.low - taken)[touched] + PRIMAL_RESIDUAL,
         (bounds.high - taken)[touched] - PRIMAL_RESIDUAL,
-        left,
-        float(cost.v @ c + rest @ cost.P @ rest),
+        rest[n_pinned:],
+        scale,
     )
-    best = np.concatenate((pinned, found))
+    best = np.concatenate((pinned, found.x))
     if not np.isfinite(best).all():
-        return rest
-    return rest + bounds.step(rest, best) * (best - rest)
+        return Minimum(rest, found.steps)
+    return Minimum(rest + bounds.step(rest, best) * (best - rest), found.steps)

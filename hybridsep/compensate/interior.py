@@ -12,13 +12,14 @@ better conditioned than an intermediate iterate: differences in rounding between
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from ..base.signals import Array
 
-__all__ = ["PRIMAL_RESIDUAL", "STEPS_MAX", "minimise"]
+__all__ = ["PRIMAL_RESIDUAL", "STEPS_MAX", "Minimum", "minimise"]
 
 STEPS_MAX = 24
 """Largest number of steps; 12 on average, and 34 of 1 399 bounded plans with random parameters ended here."""
@@ -45,7 +46,14 @@ _TAU = 0.995
 """Fraction τ of the step to the nearest bound that is taken."""
 
 
-def minimise(P: Array, v: Array, rows: Array, low: Array, high: Array, start: Array, cost: float) -> Array:
+class Minimum(NamedTuple):
+    """Minimiser ``x``, ``(n,)``, not finite if the problem's data are not, and the steps that it took."""
+
+    x: Array
+    steps: int
+
+
+def minimise(P: Array, v: Array, rows: Array, low: Array, high: Array, start: Array, cost: float) -> Minimum:
     """Return the minimiser of ``½ xᵀPx − vᵀx`` subject to ``low ≤ rows @ x ≤ high``.
 
     Parameters
@@ -61,11 +69,6 @@ def minimise(P: Array, v: Array, rows: Array, low: Array, high: Array, start: Ar
         Initial iterate.
     cost : float
         Scale of the cost, > 0, for the stopping criterion.
-
-    Returns
-    -------
-    x : (n,) array
-        Not finite if the problem's data are not.
     """
     # As B x ≥ b, with slacks s = B x − b > 0 and multipliers z > 0, s z → 0
     B, b = np.concatenate((rows, -rows)), np.concatenate((low, -high))
@@ -75,7 +78,8 @@ def minimise(P: Array, v: Array, rows: Array, low: Array, high: Array, start: Ar
     z = _FIRST_MU * share / s
     # Where active bounds hardly differ, rounding in rowsᵀ W rows would outgrow P
     rho = _REGULARISATION * float(np.max(np.sum(rows**2, axis=0)) / np.max(np.diag(P)))
-    for _ in range(STEPS_MAX):
+    steps = 0
+    while steps < STEPS_MAX:
         mu = float(s @ z) / len(s)
         r_p = B @ x - b - s
         gradient, force = P @ x, B.T @ z
@@ -84,6 +88,7 @@ def minimise(P: Array, v: Array, rows: Array, low: Array, high: Array, start: Ar
         feasible = np.max(np.abs(r_p)) < PRIMAL_RESIDUAL and np.max(np.abs(r_d)) < _DUAL_RESIDUAL * largest
         if mu < _MU * share and feasible:
             break
+        steps += 1
         inverse = 1.0 / (s + rho * z)
         weight = z * inverse
         try:
@@ -99,7 +104,7 @@ def minimise(P: Array, v: Array, rows: Array, low: Array, high: Array, start: Ar
         lengths = _step_length(s, ds), _step_length(z, dz)
         alpha_p, alpha_d = (1.0 if alpha >= 1.0 else _TAU * alpha for alpha in lengths)
         x, s, z = x + alpha_p * dx, s + alpha_p * ds, z + alpha_d * dz
-    return np.asarray(x)
+    return Minimum(x, steps)
 
 
 @dataclass(frozen=True)

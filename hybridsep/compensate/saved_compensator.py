@@ -29,6 +29,7 @@ def compensator_blob(compensator: SepCompensator) -> bytes:
         "lead_in": compensator.lead_in,
         "excess": compensator._monitor.excess,
         "measured_before": compensator._measured_before,
+        "state_before": int(compensator._state_before),
         "pending": None if pending is None else [int(pending.state), pending.prediction.n_warm_up],
     }
     arrays = {
@@ -59,6 +60,10 @@ def compensator_from(kind: type[SepCompensator], blob: bytes) -> SepCompensator:
     compensator.predictor = restored  # the constructor has restarted the other one
     compensator.lead_in = saved.whole("lead_in")
     compensator._monitor.excess, compensator._measured_before = saved.real("excess"), saved.flag("measured_before")
+    before = saved.whole("state_before")
+    if before not in tuple(SepState):
+        raise saved.error("state_before must be a state")
+    compensator._state_before = SepState(before)
     n, Np = len(compensator._rest), predictor.Np
     compensator._rest, compensator._delta_before = saved.array("rest", n), saved.array("delta_before", 3)
     compensator._x_d_before = saved.array("x_d_before", 3, finite=False)

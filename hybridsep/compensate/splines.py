@@ -55,6 +55,11 @@ class PlanCost:
         P[np.diag_indices_from(P)] += ridge * np.max(np.diag(P))
         return cls(P, v)
 
+    def without(self, pinned: Array) -> PlanCost:
+        """Return the cost of the other coefficients, where the first ones are ``pinned``, m."""
+        n = len(pinned)
+        return PlanCost(self.P[n:, n:], self.v[n:] - self.P[n:, :n] @ pinned)
+
 
 class SplineBasis:
     """B-spline basis of one plan.

@@ -3,8 +3,9 @@
 ``min ‖x_d − x_h(x_d + δ)‖² + jerk_weight·‖D³ δ‖²`` within the drive's limits, where ``x_h`` is not affine in ``δ``:
 friction that follows the command changes its sign with the command's velocity. Each step solves the quadratic programme
 of the linearised model (Gauss-Newton); a step that does not lower the cost is repeated with a penalty on the change of
-velocity (Levenberg-Marquardt). The number of steps is bounded. Predictions are shrunk by their variance, so where the
-model knows nothing the plan is that of the physics model.
+velocity (Levenberg-Marquardt). A plan is made while its first samples act, which follow the last one; steps, tries and
+the solver's steps are limited, so that their work fits into those samples. Predictions are shrunk by their variance, so
+where the model knows nothing the plan is that of the physics model.
 """
 
 from __future__ import annotations
@@ -14,8 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.signals import Array
-from ..predict.linearised import PlanModel, PlanPrediction
-from .constraints import Bounds, solve
+from ..predict.forecast import Forecast
+from ..predict.linearised import PlanModel
+from .constraints import Bounds, bounded, cost_scale, unbounded
 from .splines import N_DECIDED, PlanCost, SplineBasis
 
 __all__ = ["TrustedPlanner"]
@@ -24,8 +26,12 @@ _REACHES = (0.1, 0.03, 0.01, 0.0)
 """Reach of friction's slope in each Newton step, relative to the model's velocity scale: a tangent is blind to a sign
 that changes nearby."""
 
-_TRIES = 6
-"""Largest number of penalties tried in a step."""
+_TRIES, _TRIES_TOGETHER = 6, 8
+"""Largest number of penalties tried in a step, and in all steps."""
+
+_SOLVER_STEPS = 60
+"""Interior-point steps after which no further programme that the drive's limits bound is begun: the plan is what was
+found before."""
 
 _FIRST_PENALTY, _RAISE, _LOWER = 1.0, 8.0, 0.25
 """Penalty on the change of velocity, in the unit of the jerk's weight: its first value, and how it follows success."""
@@ -36,10 +42,11 @@ _GAIN = 1e-3
 
 @dataclass(frozen=True)
 class _Point:
-    """Coefficients ``(3 + n_free,)``, the prediction and the cost under them, and their third differences, ``(n,)``."""
+    """Coefficients ``(3 + n_free,)``; prediction, position, third differences, ``(n,)``, and cost under them."""
 
     coefficients: Array
-    prediction: PlanPrediction
+    prediction: Forecast
+    x_h: Array
     third: Array
     cost: float
 
@@ -78,28 +85,29 @@ class TrustedPlanner:
             Coefficients of the rest of the last plan, the decided ones first; they are feasible.
         bounds : Bounds
         n_pinned : int
-            Coefficients that a bounded plan does not change.
+            Coefficients that the plan does not change.
         passed : (preview, n_free) array
             Free splines filtered by ``G_pb``.
         """
-        decided, free = rest[:N_DECIDED], rest[N_DECIDED:]
         splines, third = self._basis.values[:, N_DECIDED:], self._basis.third[:, N_DECIDED:]
         velocity = np.diff(splines, axis=0, prepend=0.0)
         damping = velocity.T @ velocity
-        here, penalty = self._at(rest), 0.0
+        here, penalty, tries = self._at(rest), 0.0, 0
+        self._solver_steps = 0
         for reach in _REACHES:
             W = self._model.slope(here.prediction, splines, passed, reach)
             at = here.coefficients[N_DECIDED:]
             P = W.T @ W + self._jerk_weight * (third.T @ third)
-            target = self._x_d - here.prediction.x_h + W @ at
+            target = self._x_d - here.x_h + W @ at
             v = W.T @ target - self._jerk_weight * (third.T @ (here.third - third @ at))
             best = None
-            for _ in range(_TRIES):
+            for _ in range(min(_TRIES, _TRIES_TOGETHER - tries)):
+                tries += 1
                 cost = PlanCost.regular(P + penalty * damping, v + penalty * (damping @ at))
-                found = solve(cost, bounds, free, n_pinned)
+                found = self._solve(cost, rest[N_DECIDED:], bounds, n_pinned)
                 if found is None:
                     break
-                there = self._at(np.concatenate((decided, found)))
+                there = self._at(np.concatenate((rest[:N_DECIDED], found)))
                 if there.cost < here.cost:
                     best = there
                     break
@@ -111,9 +119,21 @@ class TrustedPlanner:
                 break
         return here.coefficients, here.cost
 
+    def _solve(self, cost: PlanCost, free: Array, bounds: Bounds, n_pinned: int) -> Array | None:
+        """Return the minimiser within the bounds; None if there is none, or no bounded programme is left."""
+        found = unbounded(cost, free, n_pinned)
+        if found is None or bounds.allow(found):
+            return found
+        if self._solver_steps >= _SOLVER_STEPS:
+            return None
+        minimum = bounded(cost, bounds, free, n_pinned, cost_scale(cost, found, free, n_pinned))
+        self._solver_steps += minimum.steps
+        return minimum.x
+
     def _at(self, coefficients: Array) -> _Point:
         prediction = self._model.predict(self._x_d + self._basis.values @ coefficients)
         third = self._basis.third @ coefficients + self._third_before
-        error = self._x_d - prediction.x_h
+        x_h = prediction.x_pb + prediction.e_h
+        error = self._x_d - x_h
         cost = float(error @ error) + self._jerk_weight * float(third @ third)
-        return _Point(coefficients, prediction, third, cost)
+        return _Point(coefficients, prediction, x_h, third, cost)

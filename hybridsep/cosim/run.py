@@ -52,21 +52,21 @@ class Kind:
 
 PREDICTOR = Kind(
     "predictor",
-    ("x_d", "x_pb", "x_h"),
+    ("x_d", "x_pb", "x_h", "x_h_std"),
     state="hybrid_active",
     lowest=SepState.PHYSICS,
     delay="Np",
-    columns=("t", "x_d", "x", "x_meas", "x_pb", "x_hold", "x_h", "active"),
+    columns=("t", "x_d", "x", "x_meas", "x_pb", "x_hold", "x_h", "x_h_std", "active"),
 )
 """The loop is open: the drive gets the commanded position."""
 
 COMPENSATOR = Kind(
     "compensator",
-    ("x_dm", "x_d", "x_pb", "x_h"),
+    ("x_dm", "x_d", "x_pb", "x_h", "x_h_std"),
     state="sep_state",
     lowest=SepState.OFF,
     delay="preview",
-    columns=("t", "x_d", "x_dm", "x", "x_meas", "x_pb", "x_h", "state"),
+    columns=("t", "x_d", "x_dm", "x", "x_meas", "x_pb", "x_h", "x_h_std", "state"),
 )
 """The loop is closed: the drive gets the modified command."""
 
@@ -87,6 +87,8 @@ class Run:
         True and measured position; the true one of a recorded axis is NaN.
     x_pb, x_h : (n,) array, m
         Physics-based prediction under ``x_dm``, and the one by the model in ``state``.
+    x_h_std : (n,) array, m
+        Standard deviation of ``x_meas − x_h``; 0 where it is not known.
     state : (n,) array of int
         :class:`~hybridsep.compensate.plan.SepState` of each sample: the model that predicts, or that planned.
     T_s : float
@@ -105,6 +107,7 @@ class Run:
     x_meas: Array
     x_pb: Array
     x_h: Array
+    x_h_std: Array
     state: NDArray[np.int64]
     T_s: float
     Np: int

@@ -34,6 +34,7 @@ def replayed_run(found: Backtest, x_d: Array, x_meas: Array, T_s: float, Np: int
         x_meas=x_meas,
         x_pb=found.x_pb,
         x_h=found.x_h,
+        x_h_std=found.x_h_std,
         state=np.where(found.active, SepState.HYBRID, SepState.PHYSICS),
         T_s=T_s,
         Np=Np,

@@ -42,7 +42,7 @@ class LookAheadSlave(TableSlave):
 
     def new_predictor(self, model: ModalModel) -> HybridPredictor:
         """Return a predictor of the current parameters, warm-started from the resources if they hold weights."""
-        predictor = HybridPredictor(model, PredictorSettings.from_fmi({"trust": False, **self.values}))
+        predictor = HybridPredictor(model, PredictorSettings.from_fmi(self.values))
         trained = Path(self.resources) / WEIGHTS_FILE
         if trained.exists():
             restore_weights(predictor, trained.read_bytes())

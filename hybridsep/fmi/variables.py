@@ -37,14 +37,17 @@ PREDICTOR_SETTINGS: Mapping[str, Parameter] = {
     **{
         name: parameter
         for name, parameter in _PREDICTOR.items()
-        if name not in (*PredictorSettings.NEEDS_PREVIEW, *PredictorSettings.ALONE)
+        if name not in (*PredictorSettings.NEEDS_PREVIEW, *PredictorSettings.TRUST, *PredictorSettings.ALONE)
     },
     "dead_time": PARAMETERS["dead_time"],
 }
-"""Parameters of a HybridPredictor and of the predictor that a SepCompensator holds."""
+"""Further parameters of a HybridPredictor and of the predictor that a SepCompensator holds."""
 
-TRUST_SETTINGS: Mapping[str, Parameter] = {name: _PREDICTOR[name] for name in PredictorSettings.ALONE}
-"""Parameters of a HybridPredictor alone."""
+TRUST_SETTINGS: Mapping[str, Parameter] = {name: _PREDICTOR[name] for name in PredictorSettings.TRUST}
+"""Parameters of the residual model with trust, of both."""
+
+ALONE_SETTINGS: Mapping[str, Parameter] = {name: _PREDICTOR[name] for name in PredictorSettings.ALONE}
+"""Parameters of a HybridPredictor that no SepCompensator has."""
 
 COMPENSATOR_SETTINGS: Mapping[str, Parameter] = {
     **{name: _PREDICTOR[name] for name in PredictorSettings.NEEDS_PREVIEW},
@@ -52,6 +55,8 @@ COMPENSATOR_SETTINGS: Mapping[str, Parameter] = {
 }
 """Parameters of a SepCompensator besides those of its predictor."""
 
+_HOLD = "the same for x_pb plus the residual before the window, held"
+_REJECTED = "measurements that were missing or not plausible, with trust; counted window by window"
 _SEP_MODELS = CompensatorSettings.parameters()["compensate"].choices
 _KINDS = {int: "Integer", float: "Real", bool: "Boolean", str: "Enumeration"}
 
@@ -184,16 +189,11 @@ def predictor_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping
         Variable("hybrid_active", "Boolean", "output", "discrete", "whether x_h is the hybrid prediction now"),
         _position("rms_pb", "output", "running RMS of x_meas - x_pb since t_init", display_unit="um"),
         _position("rms_h", "output", "running RMS of x_meas - x_h since t_init", display_unit="um"),
-        _position(
-            "rms_hold", "output", "the same for x_pb plus the residual before the window, held", display_unit="um"
-        ),
+        _position("rms_hold", "output", _HOLD, display_unit="um"),
         Variable("batch", "Integer", "output", "discrete", "number of the window, floor(k / Np); 0 is the first fill"),
-        Variable(
-            *("n_rejected", "Integer", "output", "discrete"),
-            "measurements that were missing or not plausible, with trust; counted window by window",
-        ),
+        Variable("n_rejected", "Integer", "output", "discrete", _REJECTED),
     ]
-    table += _parameters({**PREDICTOR_SETTINGS, **TRUST_SETTINGS}, parameters)
+    table += _parameters({**PREDICTOR_SETTINGS, **TRUST_SETTINGS, **ALONE_SETTINGS}, parameters)
     table += _modes(modes)
     for name, meaning in (
         ("x_d", "commanded positions"),
@@ -219,8 +219,8 @@ def compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mappi
     """
     ahead = ("x_d_ahead",)
     # With weights from an earlier run and no warm-up, the hybrid model may plan the first window already.
-    model = ("t_init", "compensate")
-    state = "model that planned the current window"
+    model = ("t_init", "compensate", "trust")
+    state = "model that planned what x_dm follows now"
     return [
         _position("x_d_ahead", "input", "commanded position entering the look-ahead, preview samples early", start=0.0),
         _position("x_meas", "input", "measured position now", start=0.0),
@@ -228,7 +228,17 @@ def compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mappi
         _position("x_d", "output", "commanded position now: x_d_ahead, preview samples later", initially_from=ahead),
         _position("x_pb", "output", "physics-based prediction for now under x_dm", initially_from=ahead),
         _position(
-            "x_h", "output", "prediction for now by the model that planned the window", initially_from=(*ahead, *model)
+            "x_h",
+            "output",
+            "prediction for now under x_dm: with trust, by its model; else by the one that planned the window",
+            initially_from=(*ahead, *model),
+        ),
+        _position(
+            "x_h_std",
+            "output",
+            "standard deviation of x_meas - x_h, now; 0: not known",
+            display_unit="um",
+            initially_from=(*ahead, *model, "lambda", "noise_std"),
         ),
         _position(
             "e_servo",
@@ -241,8 +251,10 @@ def compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mappi
         _position("rms_e", "output", "running RMS of x_d - x_meas since t_init", display_unit="um"),
         _position("rms_pb", "output", "running RMS of x_meas - x_pb since t_init", display_unit="um"),
         _position("rms_h", "output", "running RMS of x_meas - x_h since t_init", display_unit="um"),
+        _position("rms_hold", "output", _HOLD, display_unit="um"),
         Variable("batch", "Integer", "output", "discrete", "number of the window, floor(k / Np)"),
-        *_parameters({**PREDICTOR_SETTINGS, **COMPENSATOR_SETTINGS}, parameters),
+        Variable("n_rejected", "Integer", "output", "discrete", _REJECTED),
+        *_parameters({**PREDICTOR_SETTINGS, **TRUST_SETTINGS, **COMPENSATOR_SETTINGS}, parameters),
         *_modes(modes),
     ]
 

@@ -54,14 +54,17 @@ class CandidatePrediction(NamedTuple):
     unshrunk : (n,) array, m
     noise_variance : float, m²
         Mean square of the rows so far about this candidate.
-    expected : float, m²
-        Expected mean square of the error of ``unshrunk``.
+    spread : (n,) array, m²
+        Variance of ``unshrunk``.
+    variance : float, m²
+        Of the noise that the penalties come from.
     """
 
     e_h: Array
     unshrunk: Array
     noise_variance: float
-    expected: float
+    spread: Array
+    variance: float
 
 
 class SolvedCandidate(NamedTuple):
@@ -86,7 +89,9 @@ class SolvedCandidate(NamedTuple):
         """Weights of ``e_pb(k−1) … e_pb(k−p)``, ``(p,)``."""
         return self.solution.weights[self.n_static :]
 
-    def predict(self, rows: Array, past: Array, scale: ResidualScale) -> CandidatePrediction:
+    def predict(
+        self, rows: Array, past: Array, scale: ResidualScale, spread: Array | None = None
+    ) -> CandidatePrediction:
         """Predict the residual over a window in free run.
 
         Weights have normal priors, so the variance of ``wᵀφ`` is known; it is carried through the recursion's impulse
@@ -101,6 +106,8 @@ class SolvedCandidate(NamedTuple):
         past : (p,) array, m
             Last residuals, newest first.
         scale : ResidualScale
+        spread : (n,) array, m², optional
+            Variance of the prediction, if it is held; else it is computed.
         """
         w_e, largest = self.lag_weights, scale.largest
         p = len(w_e)
@@ -110,14 +117,15 @@ class SolvedCandidate(NamedTuple):
             drive, response = _recursion(w_e, drive, past)
         finite = np.isfinite(drive)
         e = np.clip(np.where(finite, drive, 0.0), -_BOUND * largest, _BOUND * largest)
-        phi = np.hstack((rows, lags(past, e))) if p else rows
-        spread = self.variance * self.solution.leverage(phi)
-        most = _DIVERGED * largest**2
-        if p:
-            spread = np.minimum(lfilter(response**2, [1.0], spread), most)
-        spread = np.where(finite, spread, most)
+        if spread is None:
+            phi = np.hstack((rows, lags(past, e))) if p else rows
+            spread = self.variance * self.solution.leverage(phi)
+            most = _DIVERGED * largest**2
+            if p:
+                spread = np.minimum(lfilter(response**2, [1.0], spread), most)
+            spread = np.where(finite, spread, most)
         shrink = scale.recent / (scale.recent + _CAUTION * spread)
-        return CandidatePrediction(e * shrink, e, self.solution.residual_sum, self.variance + float(spread.mean()))
+        return CandidatePrediction(e * shrink, e, self.solution.residual_sum, spread, self.variance)
 
 
 class Candidate:

@@ -3,11 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from ..base.signals import Array
 from .candidates import CandidatePrediction
 
-__all__ = ["Forecast"]
+__all__ = ["FeatureScales", "Forecast"]
+
+
+class FeatureScales(NamedTuple):
+    """Scales that the features and their priors are relative to, from the commands ahead.
+
+    Attributes
+    ----------
+    velocity : float, m/s
+        Velocity scale of the friction features.
+    largest : (n_static,) array
+        Largest magnitudes of the static features, those ahead included.
+    """
+
+    velocity: float
+    largest: Array
 
 
 @dataclass(frozen=True)
@@ -22,21 +38,20 @@ class Forecast:
         Predicted residual.
     disagreement : (n,) array, m²
         Variance of the candidates about their blend.
+    x : (n,) array, m
+        Position that the stiffness acts at.
     hold : float, m
         Last residual, bounded: the prediction of the hold candidate.
     predictions : tuple of CandidatePrediction
         Of the learned candidates; empty before anything is learned.
-    largest : (n_static,) array
-        Largest magnitudes of the static features, this window included.
-    velocity_scale : float, m/s
-        Velocity scale of the friction features.
+    scales : FeatureScales
     """
 
     x_d: Array
     x_pb: Array
     e_h: Array
     disagreement: Array
+    x: Array
     hold: float
     predictions: tuple[CandidatePrediction, ...]
-    largest: Array
-    velocity_scale: float
+    scales: FeatureScales

@@ -7,37 +7,14 @@ blend and the shrinking by the variance are held.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.signal import lfilter
 
 from ..base.signals import Array
-from .candidates import SolvedCandidate
+from .forecast import Forecast
 from .trusted import TrustedModel
 
-__all__ = ["PlanModel", "PlanPrediction"]
-
-
-@dataclass(frozen=True)
-class PlanPrediction:
-    """Prediction over a preview under given commands.
-
-    Attributes
-    ----------
-    x_d, x_pb, x_h : (n,) array, m
-        Commands, and predicted positions by the physics model and by the blend, relative to the start.
-    x : (n,) array, m
-        Position that the stiffness acts at.
-    shrink : tuple of (n,) arrays
-        Weight of each learned candidate's recursion in ``x_h``; empty before anything is learned.
-    """
-
-    x_d: Array
-    x_pb: Array
-    x_h: Array
-    x: Array
-    shrink: tuple[Array, ...]
+__all__ = ["PlanModel"]
 
 
 class PlanModel:
@@ -50,47 +27,37 @@ class PlanModel:
     state : (n_state,) array
         State of ``G_pb`` there.
     x_d, path : (n,) array, m
-        Commands that the scales of the features follow from, and unmodified ones, relative to the start.
+        Commands that the scales of the features and the variances of predictions follow from, and unmodified ones,
+        relative to the start.
+
+    Attributes
+    ----------
+    scales : FeatureScales
     """
 
     def __init__(self, model: TrustedModel, state: Array, x_d: Array, path: Array) -> None:
         self._model, self._discrete, self._state = model, model.static.discrete, state
         x_pb, _ = self._discrete.forced_response(state, x_d)
-        self._velocity_scale, largest = model.scales(x_d, x_pb, path)
-        self._solved: tuple[SolvedCandidate, ...] = ()
-        if model.has_learned(self._velocity_scale):
-            self._solved = tuple(model.solve(candidate, largest) for candidate in model.candidates)
+        self.scales = model.scales(x_d, x_pb, path)
+        self._solved = model.solved(self.scales)
+        self._held = model.forecast_by(self._solved, x_d, x_pb, self.scales).predictions
 
     @property
     def has_learned(self) -> bool:
         """Whether it predicts something else than the physics model."""
         return bool(self._solved)
 
-    def predict(self, x_d: Array) -> PlanPrediction:
+    def predict(self, x_d: Array) -> Forecast:
         """Predict the preview under commands ``x_d``, ``(n,)``, m, relative to the start."""
-        model = self._model
         x_pb, _ = self._discrete.forced_response(self._state, x_d)
-        if not self._solved:
-            return PlanPrediction(x_d, x_pb, x_pb, x_pb, ())
-        rows, _ = model.static.rows(model.state, x_d, x_pb, x_pb, self._velocity_scale)
-        x = x_pb + model.predict(self._solved[0], rows).e_h
-        rows, _ = model.static.rows(model.state, x_d, x_pb, x, self._velocity_scale)
-        found = [model.predict(solved, rows) for solved in self._solved]
-        hold, *weights = model.blend.weights.tolist()
-        x_h: Array = x_pb + hold * model.hold
-        shrink: list[Array] = []
-        for weight, prediction in zip(weights, found, strict=True):
-            x_h = x_h + weight * prediction.e_h
-            e = prediction.unshrunk
-            shrink.append(weight * np.divide(prediction.e_h, e, out=np.zeros_like(e), where=e != 0.0))
-        return PlanPrediction(x_d, x_pb, x_h, x, tuple(shrink))
+        return self._model.forecast_by(self._solved, x_d, x_pb, self.scales, self._held)
 
-    def slope(self, at: PlanPrediction, changes: Array, passed: Array, reach: float) -> Array:
-        """Return the change of ``x_h`` with changes of the commands, ``(n, m)``.
+    def slope(self, at: Forecast, changes: Array, passed: Array, reach: float) -> Array:
+        """Return the change of ``x_h`` with changes of the commands, ``(n, m)``, once something is learned.
 
         Parameters
         ----------
-        at : PlanPrediction
+        at : Forecast
             Where the model is linearised.
         changes : (n, m) array
             Changes of the commands, each a column.
@@ -101,12 +68,15 @@ class PlanModel:
         """
         static, discrete = self._model.static, self._discrete
         total: Array = passed.copy()
-        if not self._solved:
-            return total
-        slopes = static.slopes(self._model.state, at.x_d, at.x_pb, at.x, self._velocity_scale, reach)
+        parts = self._model.blend.weights[1:].tolist()
+        slopes = static.slopes(self._model.state, at.x_d, at.x_pb, at.x, self.scales.velocity, reach)
         velocity = np.diff(changes, axis=0, prepend=0.0) / discrete.T_s
         moved = np.diff(passed, axis=0, prepend=0.0) / discrete.T_s
-        for solved, shrink in zip(self._solved, at.shrink, strict=True):
+        for solved, found, part in zip(self._solved, at.predictions, parts, strict=True):
+            if part == 0.0:
+                continue
+            e = found.unshrunk
+            shrink = part * np.divide(found.e_h, e, out=np.zeros_like(e), where=e != 0.0)
             linear, own, differences = static.split(solved.solution.weights[: solved.n_static])
             disturbance = np.zeros_like(changes)
             for weights, is_difference in ((own, False), (differences, True)):

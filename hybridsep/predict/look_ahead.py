@@ -176,8 +176,8 @@ class LookAhead:
 
     @property
     def sep_state(self) -> int:
-        """Model that planned the window (``SepState``); 0 without a planner."""
-        return self.window.state
+        """Model that planned the commands of now (``SepState``); 0 without a planner."""
+        return self.window.state if self.k % self.Np >= self.window.n_followed else self.window.state_before
 
     @property
     def rms_e(self) -> float:
@@ -243,6 +243,8 @@ class LookAhead:
             "n_scored": self._n_scored,
             "n_warm_up": self.window.n_warm_up,
             "state": int(self.window.state),
+            "n_followed": self.window.n_followed,
+            "state_before": int(self.window.state_before),
             "diverged": self.diverged,
         }
         arrays = {"sums": self._sums, "ahead": self._ahead, "measured": self._measured, "compared": self._compared}
@@ -285,6 +287,8 @@ class LookAhead:
             **{name: saved.array(name, Np) for name in PublishedWindow.SIGNALS},
             state=saved.whole("state"),
             n_warm_up=saved.whole("n_warm_up", Np),
+            n_followed=saved.whole("n_followed", Np),
+            state_before=saved.whole("state_before"),
         )
         if not (look_ahead._is_predicted or look_ahead.diverged):
             raise saved.error("the current window must be predicted, and planned if there is a planner")

@@ -21,13 +21,14 @@ from ..base.settings import PredictorSettings, samples_before
 from ..base.signals import Array, as_measured, as_samples
 from ..model.physics import ModalModel
 from .features import FeatureLayout, PastSamples
+from .forecast import FeatureScales
 from .reference_features import ReferenceFeatures
 from .regression import RidgeRegression
 from .saved_predictor import predictor_blob, predictor_from
 from .start_in_motion import motion_before
 from .trusted import TrustedModel
 from .uncertainty import Uncertainty
-from .window import PredictedWindow, Prediction, WindowOperator, path_beyond
+from .window import PredictedWindow, Prediction, WindowOperator
 
 __all__ = ["HybridPredictor"]
 
@@ -110,7 +111,9 @@ class HybridPredictor:
         self.reference_features.restart()
         self.pending: PredictedWindow | None = None
 
-    def predict(self, x_d: ArrayLike, *, reference: ArrayLike | None = None) -> Prediction:
+    def predict(
+        self, x_d: ArrayLike, *, reference: ArrayLike | None = None, scales: FeatureScales | None = None
+    ) -> Prediction:
         """Predict the next window from its commands and all earlier measurements; eqs. (2), (4).
 
         May be called again, with other commands or another length, before :meth:`update`; the last call counts.
@@ -121,6 +124,8 @@ class HybridPredictor:
             Commanded positions of the next ``n ≥ 1`` samples; usually ``n = Np``.
         reference : (m,) array_like, m, optional
             Unmodified commanded positions, ``m ≥ n``, beyond the window as far as known; ``x_d`` if left out.
+        scales : FeatureScales, optional
+            With trust: scales of the features, in a compensator; those of ``x_d`` if left out.
 
         Returns
         -------
@@ -143,12 +148,18 @@ class HybridPredictor:
         command, path = np.concatenate((self.late, command - start)), np.concatenate((self.late + start, path))
         x_pb, _ = self.discrete.forced_response(self.state, command)  # Eq. (2)
         signs = self.reference_features.signs(path, start)
-        e_h, self.pending = self.predicted(command, x_pb, start, path, signs)
+        e_h, self.pending = self.predicted(command, x_pb, start, path, signs, scales)
         std = self.pending.error.std
         return Prediction(x_pb[delay:] + start, e_h[delay:], std[delay:], self._warm_up(n))
 
     def predicted(
-        self, x_d: Array, x_pb: Array, start: float, reference: Array, signs: Array
+        self,
+        x_d: Array,
+        x_pb: Array,
+        start: float,
+        reference: Array,
+        signs: Array,
+        scales: FeatureScales | None = None,
     ) -> tuple[Array, PredictedWindow]:
         """Return the residual predicted over a window, ``(n,)``, m, and the window, pending measurement.
 
@@ -156,7 +167,7 @@ class HybridPredictor:
         """
         n, forecast = len(x_d), None
         if self.trusted is not None:
-            forecast = self.trusted.forecast(x_d, x_pb, path_beyond(reference, start, n))
+            forecast = self.trusted.forecast(x_d, x_pb, scales)
         features = self.reference_features.features(signs, n)
         e_h = self._free_run(x_pb, features) if forecast is None else forecast.e_h
         active = np.arange(n) >= self._warm_up(n, late=len(self.late))

@@ -11,6 +11,7 @@ from ..base.settings import PredictorSettings
 from ..base.state import pack, unpack
 from ..model.physics import ModalModel, Mode
 from .features import FeatureLayout
+from .forecast import FeatureScales
 from .reference_features import N_REFERENCE
 from .saved_trusted import restore_trusted, trusted_blob, trusted_fields
 from .uncertainty import N_LEARNED
@@ -51,6 +52,8 @@ def predictor_blob(predictor: HybridPredictor) -> bytes:
     }
     if pending is not None:
         arrays |= {f"pending_{name}": getattr(pending, name) for name in ("x_d", "x_pb", "reference", "signs")}
+        if pending.forecast is not None:
+            arrays["pending_scales"] = np.array([pending.forecast.scales.velocity, *pending.forecast.scales.largest])
     parts = {} if predictor.trusted is None else {"trusted": trusted_blob(predictor.trusted)}
     return pack(_KIND, meta, arrays, parts)
 
@@ -101,8 +104,14 @@ def _pending(predictor: HybridPredictor, saved: Saved) -> PredictedWindow:
         raise saved.error("the pending window must have samples, and a reference at least as long")
     x_pb = saved.array("pending_x_pb", len(x_d))
     signs = saved.array("pending_signs", len(predictor.reference_features.signs(reference, start)))
+    scales = None
+    if predictor.trusted is not None:
+        velocity, *largest = saved.array("pending_scales", 1 + predictor.trusted.static.n).tolist()
+        if min(velocity, *largest) < 0.0:
+            raise saved.error("the scales of the pending window must be ≥ 0")
+        scales = FeatureScales(velocity, np.array(largest))
     with np.errstate(all="ignore"):
-        e_h, pending = predictor.predicted(x_d, x_pb, start, reference, signs)  # which follow from the state
+        e_h, pending = predictor.predicted(x_d, x_pb, start, reference, signs, scales)  # follow from the state
     if predictor.trusted is not None and not np.isfinite(e_h).all():
         raise saved.error("the prediction of the pending window must be finite")
     return pending

@@ -8,6 +8,7 @@ results for positions in another unit are the same in that unit.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from ..model.discrete import DiscreteModel
 from .blend import Blend
 from .candidates import Candidate, CandidatePrediction, ResidualScale, SolvedCandidate, lags
 from .disturbances import LEAST_VELOCITY, StaticFeatures, StaticState
-from .forecast import Forecast
+from .forecast import FeatureScales, Forecast
 from .guard import SensorGuard
 from .regression import RidgeRegression
 
@@ -72,7 +73,7 @@ class TrustedModel:
     """
 
     def __init__(self, settings: PredictorSettings, discrete: DiscreteModel) -> None:
-        self.settings, self.look_ahead = settings, settings.Np
+        self.settings, self.look_ahead = settings, settings.Np + settings.measurement_delay
         self.static = StaticFeatures(discrete, settings.q)
         p = settings.p
         self.regression = RidgeRegression(self.static.n + p, _NO_PENALTY)
@@ -108,40 +109,54 @@ class TrustedModel:
     @property
     def plans(self) -> bool:
         """Whether a compensator plans with it."""
-        return self.look_ahead > self.settings.Np
+        return self.look_ahead > self.settings.Np + self.settings.measurement_delay
 
     def plan_ahead(self, preview: int) -> None:
         """Adapt to a compensator, which plans over a preview, in samples, and moves the drive as it commands."""
         self.look_ahead = preview
-        self.static.damping_of_motion = preview > self.settings.Np
+        self.static.damping_of_motion = self.plans
 
-    def forecast(self, x_d: Array, x_pb: Array, path: Array | None = None) -> Forecast:
+    def forecast(self, x_d: Array, x_pb: Array, scales: FeatureScales | None = None) -> Forecast:
         """Predict the residual over the next window; nothing is changed.
 
         Parameters
         ----------
         x_d, x_pb : (n,) array, m
             Commands and physics-based prediction, relative to the start.
-        path : (m,) array, m, optional
-            Commanded positions as far as they are known, in a compensator.
+        scales : FeatureScales, optional
+            Those of :meth:`scales` for these commands if left out; a compensator's follow from its preview.
         """
-        velocity_scale, largest = self.scales(x_d, x_pb, path)
+        scales = self.scales(x_d, x_pb) if scales is None else scales
+        return self.forecast_by(self.solved(scales), x_d, x_pb, scales)
+
+    def forecast_by(
+        self,
+        solved: tuple[SolvedCandidate, ...],
+        x_d: Array,
+        x_pb: Array,
+        scales: FeatureScales,
+        held: tuple[CandidatePrediction, ...] = (),
+    ) -> Forecast:
+        """Predict as :meth:`forecast` by the candidates of :meth:`solved`, with the variances ``held`` if there are."""
         predictions: tuple[CandidatePrediction, ...] = ()
-        if self.has_learned(velocity_scale):
-            rows, _ = self.static.rows(self.state, x_d, x_pb, x_pb, velocity_scale)
-            solved = [self.solve(candidate, largest) for candidate in self.candidates]
+        spreads: Sequence[Array | None] = [one.spread for one in held] or [None] * len(solved)
+        x = x_pb
+        if solved:
+            rows, _ = self.static.rows(self.state, x_d, x_pb, x_pb, scales.velocity)
             # The stiffness acts at the position, which the physics model alone does not give well enough.
-            x = x_pb + self.predict(solved[0], rows).e_h
-            rows, _ = self.static.rows(self.state, x_d, x_pb, x, velocity_scale)
-            predictions = tuple(self.predict(candidate, rows) for candidate in solved)
+            x = x_pb + self.predict(solved[0], rows, spreads[0]).e_h
+            rows, _ = self.static.rows(self.state, x_d, x_pb, x, scales.velocity)
+            predictions = tuple(
+                self.predict(candidate, rows, spread) for candidate, spread in zip(solved, spreads, strict=True)
+            )
         hold = self.hold
         candidates = self._blended(hold, predictions, len(x_d))
         e_h = self.blend.weights @ candidates
         disagreement = np.maximum(self.blend.weights @ candidates**2 - e_h**2, 0.0)
-        return Forecast(x_d, x_pb, e_h, disagreement, hold, predictions, largest, velocity_scale)
+        return Forecast(x_d, x_pb, e_h, disagreement, x, hold, predictions, scales)
 
-    def scales(self, x_d: Array, x_pb: Array, path: Array | None = None) -> tuple[float, Array]:
-        """Return the velocity scale of the friction, m/s, and the largest magnitudes of the features, window included.
+    def scales(self, x_d: Array, x_pb: Array, path: Array | None = None) -> FeatureScales:
+        """Return the scales of the features, those of the next window included.
 
         Parameters
         ----------
@@ -158,11 +173,17 @@ class TrustedModel:
         velocity_scale = peak if outgrown else self.velocity_scale
         rows, _ = self.static.rows(self.state, x_d, x_pb, x_pb, velocity_scale)
         before = np.zeros(self.static.n) if outgrown else self.largest
-        return velocity_scale, np.maximum(before, np.abs(rows).max(axis=0))
+        return FeatureScales(velocity_scale, np.maximum(before, np.abs(rows).max(axis=0)))
 
     def has_learned(self, velocity_scale: float) -> bool:
         """Return whether there is something to predict with at a velocity scale of :meth:`scales`, m/s."""
         return self.n_rows > 0.0 and velocity_scale == self.velocity_scale and self.scale.largest_square > 0.0
+
+    def solved(self, scales: FeatureScales) -> tuple[SolvedCandidate, ...]:
+        """Return the candidates with their weights; none if there is nothing to predict with."""
+        if not self.has_learned(scales.velocity):
+            return ()
+        return tuple(self.solve(candidate, scales.largest) for candidate in self.candidates)
 
     @property
     def hold(self) -> float:
@@ -182,10 +203,10 @@ class TrustedModel:
             Whether they are learned; the next window starts from them in any case.
         """
         m, p = len(x), self.settings.p
-        if forecast.velocity_scale != self.velocity_scale:  # outgrown
+        if forecast.scales.velocity != self.velocity_scale:  # outgrown
             self.regression = RidgeRegression(self.regression.n_features, _NO_PENALTY)
             self.n_rows = 0.0
-        self.largest, self.velocity_scale = forecast.largest, forecast.velocity_scale
+        self.velocity_scale, self.largest = forecast.scales
         x_d, x_pb = forecast.x_d[:m], forecast.x_pb[:m]
         accepted = self.guard.accepts(x, x_pb, self.scale.largest)
         e = _bridged(float(self.past[0]), x - x_pb, accepted)
@@ -232,9 +253,9 @@ class TrustedModel:
         least = min(self.settings.lam, _LEAST_NOISE * scale.largest_square)
         return candidate.solve(self.regression, effect * self.static.shares / np.maximum(largest, 1e-150), least)
 
-    def predict(self, solved: SolvedCandidate, rows: Array) -> CandidatePrediction:
-        """Return the prediction of a candidate over a window, bounded by the residuals so far."""
-        found = solved.predict(rows, self.past[: len(solved.lag_weights)], self.scale)
+    def predict(self, solved: SolvedCandidate, rows: Array, spread: Array | None = None) -> CandidatePrediction:
+        """Return the prediction of a candidate over a window, bounded by the residuals so far; ``spread`` if held."""
+        found = solved.predict(rows, self.past[: len(solved.lag_weights)], self.scale, spread)
         return found._replace(
             e_h=np.clip(found.e_h, -self.bound, self.bound), noise_variance=found.noise_variance / self.n_rows
         )
@@ -255,7 +276,8 @@ class TrustedModel:
                 candidate.noise_variance = given or first
             return
         cautious = forecast.predictions[1]
-        surprise = float(np.mean((measured - cautious.unshrunk[:m])[accepted] ** 2)) / cautious.expected
+        expected = cautious.variance + float(cautious.spread[:m].mean())
+        surprise = float(np.mean((measured - cautious.unshrunk[:m])[accepted] ** 2)) / expected
         if surprise > _SURPRISE:
             self._discount(min(max((_SURPRISE / surprise) ** 2, _SURPRISED * self.settings.Np / self.n_rows), 1.0))
         for candidate, prediction in zip(self.candidates, forecast.predictions, strict=True):

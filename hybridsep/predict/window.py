@@ -14,7 +14,7 @@ from ..base.signals import Array, as_published, as_samples
 from .forecast import Forecast
 from .uncertainty import PredictedError
 
-__all__ = ["PredictedWindow", "Prediction", "PublishedWindow", "WindowOperator", "path_beyond"]
+__all__ = ["PredictedWindow", "Prediction", "PublishedWindow", "WindowOperator"]
 
 
 @dataclass(frozen=True)
@@ -97,6 +97,9 @@ class PublishedWindow:
         Model that planned it (:class:`~hybridsep.compensate.plan.SepState`); 0 without a planner.
     n_warm_up : int
         Leading samples where ``x_h = x_pb``.
+    n_followed, state_before : int
+        Leading samples that follow the plan before, in which a real-time implementation makes this one, and the model
+        that planned them.
     """
 
     SIGNALS: ClassVar[tuple[str, ...]] = ("x_d", "x_dm", "x_pb", "x_h", "x_h_std")
@@ -108,6 +111,8 @@ class PublishedWindow:
     x_h_std: Array
     state: int
     n_warm_up: int
+    n_followed: int = 0
+    state_before: int = 0
 
     @classmethod
     def at_rest(cls, start: float, Np: int) -> PublishedWindow:
@@ -154,8 +159,3 @@ class WindowOperator:
         """Return ``G_h x_d + free`` for commands ``x_d``, ``(n,)``, m."""
         command = as_samples(x_d, "x_d", len(self.g_h))
         return np.asarray(lfilter(self.g_h, [1.0], command)) + self.free
-
-
-def path_beyond(reference: Array, start: float, n: int) -> Array | None:
-    """Return the unmodified commands relative to the start, m, if they are known beyond a window of ``n`` samples."""
-    return reference - start if len(reference) > n else None

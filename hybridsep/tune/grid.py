@@ -81,7 +81,7 @@ def candidates(settings: PredictorSettings, values: Values) -> list[PredictorSet
         If a value does not fit the window or has no effect, or there are too many candidates; options are named.
     """
     for name, given in values.items():
-        if name in PredictorSettings.ALONE and not settings.trust:
+        if name in PredictorSettings.TRUST and not settings.trust:
             raise ParameterError(f"--{TUNED[name].name} has an effect with trust only: give --trust true, too")
         for value in given:
             try:

@@ -16,6 +16,10 @@ LOOPS = [
     # and others, with limits of the drive that are those of the trajectory, or anything between
     *((seed, "spring_mass_damper", {}) for seed in (38, 241, 250, 256)),
     (267, "als25010_x", {}),
+    # with trust
+    *((seed, "als25010_y", {"trust": 1}) for seed in (4, 7)),
+    *((seed, "als25010_x", {"trust": 1}) for seed in (6, 9)),
+    (202, "spring_mass_damper", {"trust": 1, "change_max": 1e-4}),
 ]
 
 

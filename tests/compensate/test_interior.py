@@ -21,7 +21,7 @@ def problems_of(monkeypatch: pytest.MonkeyPatch, seed: int, n: int, **fixed: flo
     found = []
 
     def spy(*problem: object) -> Array:
-        x = minimise(*problem)  # type: ignore[arg-type]
+        x = minimise(*problem).x  # type: ignore[arg-type]
         found.append((problem, x))
         return x
 
@@ -60,7 +60,7 @@ def test_bounds_that_are_equal_or_nearly_so() -> None:
     rows = np.concatenate((some, some, some * (1 + 1e-12), some + 1e-6 * rng.normal(size=some.shape)))
     bound = 0.1 + rng.uniform(size=20)
     low, high = np.tile(-bound, 4), np.tile(bound, 4)
-    x = minimise(P, v, rows, low, high, np.zeros(n), float(v @ np.linalg.solve(P, v)))
+    x = minimise(P, v, rows, low, high, np.zeros(n), float(v @ np.linalg.solve(P, v))).x
     expected = clarabel_minimum(P, v, rows, low, high, 1e-11)
     assert np.max(np.abs(rows @ x) - high) <= 10 * PRIMAL_RESIDUAL
     np.testing.assert_allclose(x, expected, rtol=0, atol=1e-7 * float(np.max(np.abs(expected))))
@@ -68,5 +68,5 @@ def test_bounds_that_are_equal_or_nearly_so() -> None:
 
 def test_a_problem_without_active_bounds() -> None:
     P, v = np.diag([1.0, 4.0]), np.array([1.0, 2.0])
-    x = minimise(P, v, np.eye(2), np.full(2, -9.0), np.full(2, 9.0), np.zeros(2), 2.0)
+    x = minimise(P, v, np.eye(2), np.full(2, -9.0), np.full(2, 9.0), np.zeros(2), 2.0).x
     np.testing.assert_allclose(x, [1.0, 0.5], rtol=1e-9)

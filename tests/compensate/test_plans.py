@@ -95,7 +95,8 @@ def test_a_bounded_plan_costs_what_another_solver_finds(
 ) -> None:
     bounded = []
 
-    def compare(cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int) -> Array | None:
+    def compare(cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int, *, always: bool) -> Array | None:
+        assert not always
         c = solve(cost, bounds, rest, n_pinned)
         assert c is not None
         assert np.max(np.maximum(bounds.rows @ c - bounds.high, bounds.low - bounds.rows @ c)) <= 1e-12

@@ -24,7 +24,7 @@ from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.trajectory import spiral, staircase
 
 MACHINE = load_machine("spring_mass_damper")
-PAPER = {"Np": 100, "p": 50, "q": 3, "lambda": 1e-12, "t_init": 0.3, "v_friction": 0.0}
+PAPER = {"trust": False, "Np": 100, "p": 50, "q": 3, "lambda": 1e-12, "t_init": 0.3, "v_friction": 0.0}
 COMPENSATE = PARAMETERS["compensate"]
 TOLERANCE = 1e-9  # m, between library and FMU
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -51,7 +51,7 @@ def pair(flavour: str, tmp_path_factory: pytest.TempPathFactory) -> Pair:
 
 @pytest.fixture(scope="module")
 def runs(pair: Pair) -> dict[str, Run]:
-    """The staircase with the paper's settings."""
+    """The staircase with the paper's model and settings."""
     return {
         choice: cosimulate(*pair, staircase(), controller_values={**PAPER, "compensate": COMPENSATE.to_fmi(choice)})
         for choice in COMPENSATE.choices
@@ -69,7 +69,7 @@ def short(python_pair: Pair) -> Run:
 
 
 def assert_same(run: Run, loop: Run) -> None:
-    for name in ("x_d", "x_dm", "x", "x_meas", "x_pb", "x_h"):
+    for name in ("x_d", "x_dm", "x", "x_meas", "x_pb", "x_h", "x_h_std"):
         np.testing.assert_allclose(getattr(run, name), getattr(loop, name), rtol=0, atol=TOLERANCE, err_msg=name)
     np.testing.assert_array_equal(run.state, loop.state)
 
@@ -98,7 +98,7 @@ def test_the_drives_limits_are_kept(runs: dict[str, Run], choice: str) -> None:
 def test_fmus_equal_the_library(runs: dict[str, Run], choice: str) -> None:
     values = {**MACHINE.fmi_compensator_parameters(), **PAPER, "compensate": COMPENSATE.to_fmi(choice)}
     settings = CompensatorSettings.from_fmi(values)
-    compensator = MACHINE.new_compensator(settings, predictor=PredictorSettings.from_fmi({"trust": False, **values}))
+    compensator = MACHINE.new_compensator(settings, predictor=PredictorSettings.from_fmi(values))
     loop = cosimulate(compensator, MACHINE.new_plant(), staircase(), encoder=Encoder(5e-6, 0))
     assert_same(runs[choice], loop)
     np.testing.assert_array_equal(runs[choice].x_d, staircase())
@@ -111,12 +111,12 @@ def test_recommended_settings_cold_and_warm(flavour: str, pair: Pair, tmp_path: 
     compensator.predictor.save(tmp_path / "trained.state")
     cold = cosimulate(*pair, staircase(), plant_values={"seed": 1})
     assert_same(cold, first)
-    assert cold.summary()["tracking_rms_um"] < 5.0
+    assert cold.summary()["tracking_rms_um"] < 4.2
     trained = build(MACHINE, flavour, "SepCompensator", tmp_path, tmp_path / "trained.state")
     warm = cosimulate(trained, pair[1], staircase(), plant_values={"seed": 2})
     second = cosimulate(compensator, MACHINE.new_plant(), staircase(), encoder=Encoder(5e-6, 2), t_init=0.0)
     assert_same(warm, second)
-    assert warm.summary()["tracking_rms_um"] < 1.8
+    assert warm.summary()["tracking_rms_um"] < 0.6
     assert warm.summary()["share_hybrid"] == 1.0
 
 
@@ -150,8 +150,8 @@ def test_summary_is_what_the_signals_say(short: Run) -> None:
     assert summary["change_max_um"] == pytest.approx(np.max(np.abs(change)))
     assert summary["peak_jerk_m_s3"] == pytest.approx(np.max(np.abs(np.diff(short.x_dm, 3))) * 1e9)
     assert summary["peak_acceleration_m_s2"] == pytest.approx(np.max(np.abs(np.diff(short.x_dm, 2))) * 1e6)
-    # 0.1 s of warm-up, in windows of 50 samples
-    assert summary["share_physics"] == pytest.approx(100 / 600)
+    # Nothing is learned before the first window, of 50 samples; the second follows its plan for 20 more.
+    assert summary["share_physics"] == pytest.approx(70 / 600)
     assert summary["share_off"] + summary["share_physics"] + summary["share_hybrid"] == pytest.approx(1.0)
     assert summary["n_samples"] == 600
 
@@ -169,7 +169,8 @@ def test_results_as_csv_and_npz(short: Run, tmp_path: Path) -> None:
     with (tmp_path / "run.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     with np.load(tmp_path / "run.npz") as arrays:
-        assert list(arrays) == list(rows[0]) == ["t", "x_d", "x_dm", "x", "x_meas", "x_pb", "x_h", "state"]
+        expected = ["t", "x_d", "x_dm", "x", "x_meas", "x_pb", "x_h", "x_h_std", "state"]
+        assert list(arrays) == list(rows[0]) == expected
         for name in arrays:
             np.testing.assert_array_equal(arrays[name], [float(row[name]) for row in rows])
             np.testing.assert_array_equal(arrays[name], getattr(short, name))
@@ -222,10 +223,11 @@ def test_the_direction_and_the_features_of_the_reference_can_be_turned_off(flavo
     )
     commands = []
     for values in settings:
+        values = {"trust": False, "q": 40, "lambda": 1e-8, "t_init": 0.1, **values}
         run = cosimulate(*pair, r, controller_values=values)
         fmi = {**machine.fmi_compensator_parameters(), **values}
         compensator = machine.new_compensator(
-            CompensatorSettings.from_fmi(fmi), predictor=PredictorSettings.from_fmi({"trust": False, **fmi})
+            CompensatorSettings.from_fmi(fmi), predictor=PredictorSettings.from_fmi(fmi)
         )
         loop = cosimulate(compensator, machine.new_plant(), r, encoder=Encoder(1e-6, 0))
         assert_same(run, loop)

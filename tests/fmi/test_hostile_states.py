@@ -45,10 +45,9 @@ def small_predictor(**more: Any) -> HybridPredictor:
     )
 
 
-def small_compensator() -> SepCompensator:
-    return SepCompensator(
-        small_predictor(v_friction=2e-3), CompensatorSettings(preview=24, limits=Limits(0.1, 16.0, 5000.0))
-    )
+def small_compensator(**more: Any) -> SepCompensator:
+    settings = CompensatorSettings(preview=24, limits=Limits(0.1, 16.0, 5000.0))
+    return SepCompensator(small_predictor(v_friction=2e-3, **more), settings)
 
 
 def use_predictor(predictor: HybridPredictor) -> None:
@@ -108,11 +107,19 @@ def compensator_state() -> bytes:
     return compensator.to_bytes()
 
 
+def trusted_compensator_state() -> bytes:
+    compensator = small_compensator(trust=True)
+    use_compensator(compensator)
+    compensator.plan(np.linspace(0, 1e-3, compensator.preview))
+    return compensator.to_bytes()
+
+
 STATES: dict[str, tuple[Callable[[], bytes], Callable[[bytes], Any], Callable[[Any], None]]] = {
     "predictor": (predictor_state, HybridPredictor.from_bytes, use_predictor),
     "predictor with trust": (trusted_state, HybridPredictor.from_bytes, use_predictor),
     "look-ahead": (look_ahead_state, partial(LookAhead.from_bytes, model_type=HybridPredictor), use_look_ahead),
     "compensator": (compensator_state, SepCompensator.from_bytes, use_compensator),
+    "compensator with trust": (trusted_compensator_state, SepCompensator.from_bytes, use_compensator),
     "look-ahead of a compensator": (
         sep_look_ahead_state,
         partial(LookAhead.from_bytes, model_type=SepCompensator),

@@ -31,7 +31,9 @@ from streams import StreamMaker, on_all
 
 from hybridsep.plants.trajectory import staircase
 
-PAPER: dict[str, Any] = {"Np": 100, "p": 50, "q": 3, "lambda": 1e-12, "t_init": 0.3}
+PAPER: dict[str, Any] = {"trust": False, "Np": 100, "p": 50, "q": 3, "lambda": 1e-12, "t_init": 0.3}
+BEST = PAPER | {"Np": 50, "q": 40, "lambda": 1e-8, "t_init": 0.1}
+"""The paper's model, and the settings of a compensator that are best for it."""
 
 
 def assert_agreement(new_stream: StreamMaker, n: int, values: dict[str, Value], tolerance: float, **how: Any) -> Loop:
@@ -149,9 +151,8 @@ def test_the_staircase_is_compensated_as_by_the_library(new_stream: StreamMaker,
 @pytest.mark.parametrize(
     "values",
     [
-        {},
-        TIGHT,
-        {"Np": 50, "p": 50, "q": 40, "lambda": 1e-8, "t_init": 0.1},
+        BEST,
+        BEST | TIGHT,
         PAPER | TIGHT,  # nearly every plan is bounded
         PAPER | TIGHT | {"Np": 50, "p": 20, "t_init": 0.1},
         PAPER | {"change_max": 2e-4, "t_init": -1.0},
@@ -161,10 +162,10 @@ def test_the_staircase_is_compensated_as_by_the_library(new_stream: StreamMaker,
         PAPER | {"compensate": 1, "spacing": 5},
         PAPER | {"spacing": 1, "preview": 130, "p": 7, "q": 0},
         PAPER | {"spacing": 20, "preview": 207, "p": 7, "q": 99},
-        {"Np": 12, "p": 7, "q": 5, "lambda": 1e-12, "spacing": 3, "preview": 77, "t_init": 0.05, "v_friction": 0.0},
-        {"Np": 20, "p": 10, "q": 5, "lambda": 1e-12, "t_init": 0.3, "preview": 160, "v_friction": 5e-3},
-        {"Np": 8, "p": 5, "q": 2, "preview": 160, "t_init": 0.3},
-        {"Np": 1, "p": 1, "q": 0, "lambda": 1e-12, "spacing": 1, "preview": 60, "t_init": 0.05, "v_friction": 0.0},
+        PAPER | {"Np": 12, "p": 7, "q": 5, "spacing": 3, "preview": 77, "t_init": 0.05, "v_friction": 0.0},
+        PAPER | {"Np": 20, "p": 10, "q": 5, "preview": 160, "v_friction": 5e-3},
+        BEST | {"Np": 8, "p": 5, "q": 2, "preview": 160, "t_init": 0.3},
+        PAPER | {"Np": 1, "p": 1, "q": 0, "spacing": 1, "preview": 60, "t_init": 0.05, "v_friction": 0.0},
         PAPER | {"input_hold": 1, "dead_time": 3, "p": 10},
         PAPER | {"jerk_weight": 0.0, "t_init": 0.0, "p": 10},
         PAPER | {"jerk_weight": 300.0, "lambda": 1e-6},
@@ -176,9 +177,52 @@ def test_every_parameter_compensates_as_in_the_library(new_stream: StreamMaker, 
 
 
 @on_all((STAGE_COMPENSATOR,), needs="agreement")
-@pytest.mark.parametrize("values", [{"q": 20}, TIGHT, {"compensate": 1, "change_max": 3e-4, "spacing": 5}], ids=named)
+@pytest.mark.parametrize(
+    "values",
+    [BEST | {"q": 20}, BEST | TIGHT, BEST | {"compensate": 1, "change_max": 3e-4, "spacing": 5}, TIGHT],
+    ids=named,
+)
 def test_the_stage_is_compensated_as_by_the_library(new_stream: StreamMaker, values: dict[str, Value]) -> None:
     assert_agreement(new_stream, 1600, values, 1e-9)
+
+
+@on_all((COMPENSATOR,), needs="agreement")
+@pytest.mark.parametrize("start", [0.0, 0.1])
+def test_the_staircase_is_compensated_with_trust_as_by_the_library(new_stream: StreamMaker, start: float) -> None:
+    loop = assert_agreement(new_stream, 2450, {}, 1e-11, start=start)
+    assert set(loop.column(COMPENSATOR, "sep_state")) == {1.0, 2.0}
+    assert loop.column(COMPENSATOR, "rms_e")[-1] < 1e-5
+    assert (loop.column(COMPENSATOR, "x_h_std") > 0.0).all()
+
+
+@on_all((COMPENSATOR,), needs="agreement")
+@pytest.mark.parametrize(
+    "values",
+    [
+        TIGHT,
+        {"compensate": 0},
+        {"compensate": 1, "spacing": 5},
+        {"Np": 100, "p": 20, "t_init": 0.25},
+        {"p": 10, "q": 40, "change_max": 2e-4, "jerk_weight": 30.0},
+        {"p": 10, "input_hold": 1, "dead_time": 3},
+        {"p": 10, "effect": 1e-4, "noise_std": 1e-6, "forgetting": 0.2, "lambda": 1e-10},
+        {"Np": 12, "p": 7, "q": 2, "spacing": 3, "preview": 77},
+        {"Np": 16, "p": 5, "spacing": 16, "preview": 90, "no_reversal": 0},  # nothing of a plan is decided before
+        {"Np": 2, "p": 1, "q": 0, "spacing": 1, "preview": 40},
+    ],
+    ids=named,
+)
+def test_every_parameter_compensates_with_trust_as_in_the_library(
+    new_stream: StreamMaker, values: dict[str, Value]
+) -> None:
+    assert_agreement(new_stream, 550 if values.get("Np") == 2 else 1100, values, 1e-9)
+
+
+@on_all((COMPENSATOR,), needs="agreement")
+def test_faulty_measurements_are_compensated_as_by_the_library(new_stream: StreamMaker) -> None:
+    loop = assert_agreement(new_stream, 2450, {"p": 20}, 1e-9, sensor=faulty)
+    assert np.isfinite(loop.outputs).all()
+    assert 100 < loop.column(COMPENSATOR, "n_rejected")[-1] < 500
 
 
 def held_from(first: int) -> Sensor:

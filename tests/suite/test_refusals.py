@@ -92,7 +92,12 @@ OF_ONE_MODEL: dict[str, list[tuple[dict[str, Value], str]]] = {
         ({"forgetting": 5e-4}, "forgetting must be 0 or 0.001 … 1000000000 s, got 0.0005"),
     ],
     STAGE_PREDICTOR: [({"mode[2].zeta": 0.0}, "mode[2].zeta must be 1e-06 … 10000, got 0.0")],
-    COMPENSATOR: PLANNING,
+    COMPENSATOR: [
+        *PLANNING,
+        ({"effect": 11.0}, "effect must be 0 or 1e-15 … 10 m, got 11.0"),
+        ({"noise_std": -1e-6}, "noise_std must be 0 or 1e-15 … 1 m, got -1e-06"),
+        ({"forgetting": math.inf}, "forgetting must be finite, got inf"),
+    ],
     DRIVE: [
         ({"m": 0.0}, "m must be 1e-06 … 1000000 kg, got 0.0"),
         ({"k": -24674.0}, "k must be 1e-06 … 1e+15 N/m, got -24674.0"),
@@ -189,7 +194,7 @@ def test_an_input_that_is_no_position_changes_nothing(
 ) -> None:
     stream, untroubled = new_stream(), new_stream()
     for each in (stream, untroubled):
-        initialise(each)
+        initialise(each, trust=not math.isnan(value))  # with trust a measurement may be missing
         steps(each, 0, 245)
         each.step(0.245, 0.4 * T_S)
         set_inputs(each, 0.246)

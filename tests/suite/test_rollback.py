@@ -105,7 +105,18 @@ def test_a_state_with_trust_goes_on_in_a_second_instance(new_stream: StreamMaker
     assert steps(second, 150, 300) == steps(first, 150, 300)
 
 
-@on_all((PREDICTOR,))
+@on_all((COMPENSATOR,))
+def test_a_state_of_the_papers_model_goes_on_in_a_second_instance(new_stream: StreamMaker) -> None:
+    first, second = new_stream(), new_stream()
+    initialise(first, trust=False)
+    steps(first, 0, 155)
+    blob = first.save()
+    second.restore(blob)  # with trust of its own
+    assert second.save() == blob
+    assert steps(second, 155, 260) == steps(first, 155, 260)
+
+
+@on_all((PREDICTOR, COMPENSATOR))
 def test_what_is_missing_is_part_of_a_state(new_stream: StreamMaker) -> None:
     stream = new_stream()
     initialise(stream, trust=True)

@@ -47,7 +47,10 @@ OUTPUTS = {
         *("x_d", "x_pb", "x_h", "x_h_std", "e_servo", "hybrid_active"),
         *("rms_pb", "rms_h", "rms_hold", "batch", "n_rejected"),
     ),
-    COMPENSATOR: ("x_dm", "x_d", "x_pb", "x_h", "e_servo", "sep_state", "rms_e", "rms_pb", "rms_h", "batch"),
+    COMPENSATOR: (
+        *("x_dm", "x_d", "x_pb", "x_h", "x_h_std", "e_servo", "sep_state"),
+        *("rms_e", "rms_pb", "rms_h", "rms_hold", "batch", "n_rejected"),
+    ),
     TRAJECTORY: ("r",),
     DRIVE: ("x", "v", "x_meas"),
 }

@@ -15,9 +15,7 @@ HSEP_API int hsep_online_check(const double values[], char message[])
 HSEP_API void hsep_online_read(const double values[], hsep_online_parameters *parameters)
 {
     parameters->preview = parameters->settings.Np;
-#define READ(type, name) parameters->trust.name = (type)values[HSEP_VR_##name];
-    HSEP_TRUST_SETTINGS(READ)
-#undef READ
+    parameters->late = (uint64_t)values[HSEP_VR_measurement_delay];
     /* The warm-up counts from the end of the first fill. */
     const hsep_predictor_settings *settings = &parameters->settings;
     const double t_init = hsep_warm_up(settings->t_init, parameters->trust.trust != 0);

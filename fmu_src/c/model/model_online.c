@@ -43,6 +43,9 @@ static hsep_status online_checked(
 #define READ(type, name) predictor->settings.name = (type)values[HSEP_VR_##name];
     HSEP_PREDICTOR_SETTINGS(READ)
 #undef READ
+#define READ(type, name) predictor->trust.name = (type)values[HSEP_VR_##name];
+    HSEP_TRUST_SETTINGS(READ)
+#undef READ
     hsep_online_read(values, parameters);
     return HSEP_OK;
 }

@@ -33,13 +33,15 @@ HSEP_API void hsep_online_read(const double values[], hsep_online_parameters *pa
     HSEP_COMPENSATOR_SETTINGS(READ)
 #undef READ
     hsep_predictor_parameters *predictor = &parameters->predictor;
-    const double T_s = predictor->settings.T_s, t_init = hsep_warm_up(predictor->settings.t_init, 0);
+    const int trust = predictor->trust.trust != 0;
+    const double T_s = predictor->settings.T_s, t_init = hsep_warm_up(predictor->settings.t_init, trust);
     predictor->preview = settings.preview;
-    predictor->v_friction = settings.v_friction;
+    predictor->v_friction = trust ? 0.0 : settings.v_friction;
     /* The warm-up counts from the end of the first fill; without one, the first window is planned with what is
      * known. */
     predictor->n_init = hsep_warm_up_samples(t_init > 0.0 ? t_init + (double)settings.preview * T_s : 0.0, T_s);
-    predictor->planned = predictor->unlearns = 1;
+    predictor->planned = 1;
+    predictor->unlearns = !trust;
     parameters->planner = (hsep_planner_parameters){
         .Np = predictor->settings.Np,
         .preview = settings.preview,
@@ -48,7 +50,8 @@ HSEP_API void hsep_online_read(const double values[], hsep_online_parameters *pa
         .limit =
             {settings.change_max, settings.v_max * T_s, settings.a_max * (T_s * T_s),
              settings.j_max * (T_s * T_s * T_s)},
-        .no_reversal = settings.no_reversal != 0};
+        .no_reversal = settings.no_reversal != 0,
+        .pinned = trust ? HSEP_PINNED_WITH_TRUST : HSEP_PINNED};
     parameters->compensate = (hsep_sep_state)settings.compensate;
 }
 
@@ -66,12 +69,15 @@ HSEP_API void hsep_online_write(const hsep_online *self, int window, double valu
     values[HSEP_VR_x_d] = predicted->x_d;
     values[HSEP_VR_x_pb] = predicted->x_pb;
     values[HSEP_VR_x_h] = predicted->x_h;
+    values[HSEP_VR_x_h_std] = predicted->x_h_std;
     values[HSEP_VR_e_servo] = predicted->x_d - predicted->x_h; /* the predicted servo error that is left */
     values[HSEP_VR_sep_state] = (double)outputs.state;
     values[HSEP_VR_rms_e] = predicted->rms_e;
     values[HSEP_VR_rms_pb] = predicted->rms_pb;
     values[HSEP_VR_rms_h] = predicted->rms_h;
+    values[HSEP_VR_rms_hold] = predicted->rms_hold;
     values[HSEP_VR_batch] = (double)predicted->batch;
+    values[HSEP_VR_n_rejected] = (double)predicted->n_rejected;
 }
 
 HSEP_API void hsep_model_start_values(const hsep_context *context, double values[])
@@ -79,8 +85,9 @@ HSEP_API void hsep_model_start_values(const hsep_context *context, double values
     (void)context;
     const double start = values[HSEP_VR_x_d_ahead]; /* the drive rests there */
     values[HSEP_VR_x_dm] = values[HSEP_VR_x_d] = values[HSEP_VR_x_pb] = values[HSEP_VR_x_h] = start;
-    values[HSEP_VR_e_servo] = values[HSEP_VR_rms_e] = values[HSEP_VR_rms_pb] = values[HSEP_VR_rms_h] = 0.0;
-    values[HSEP_VR_batch] = 0.0;
+    values[HSEP_VR_x_h_std] = values[HSEP_VR_e_servo] = values[HSEP_VR_rms_e] = 0.0;
+    values[HSEP_VR_rms_pb] = values[HSEP_VR_rms_h] = values[HSEP_VR_rms_hold] = 0.0;
+    values[HSEP_VR_batch] = values[HSEP_VR_n_rejected] = 0.0;
     values[HSEP_VR_sep_state] = values[HSEP_VR_compensate] > 0.0 ? 1.0 : 0.0;
 }
 

@@ -6,81 +6,21 @@
 #include <stddef.h>
 #include <string.h>
 
-static hsep_planner *compensator_planner(hsep_compensator *self)
+static hsep_trusted_task compensator_task(hsep_compensator *self)
 {
-    return (hsep_planner *)hsep_at(self, self->planner);
-}
-
-HSEP_API hsep_predictor *hsep_compensator_predictor(hsep_compensator *self)
-{
-    return (hsep_predictor *)hsep_at(self, self->predictor);
-}
-
-/* Set what follows from the parameters; return the bytes of the block. */
-static double compensator_lay_out(hsep_compensator *self, const hsep_compensator_parameters *parameters)
-{
-    const hsep_predictor_parameters *predictor = &parameters->predictor;
-    const double preview = (double)predictor->preview;
-    double end = HSEP_WORDS(hsep_compensator);
-    self->compensate = (uint64_t)parameters->compensate;
-    self->x_dm = hsep_take(&end, (double)predictor->settings.Np);
-    self->trial_x = hsep_take(&end, preview + (double)predictor->settings.q);
-    self->trial_e = hsep_take(&end, preview + (double)predictor->settings.p);
-    self->target = hsep_take(&end, preview);
-    self->spline_pb = hsep_take(&end, preview);
-    self->spline_h = hsep_take(&end, preview);
-    self->trial = hsep_take_block(&end, hsep_physics_size(predictor->n_modes, predictor->settings.dead_time));
-    self->planner = hsep_take_block(&end, hsep_planner_size(&parameters->planner));
-    self->predictor = hsep_take_block(&end, hsep_predictor_size(predictor));
-    return end * sizeof(double);
-}
-
-HSEP_API double hsep_compensator_size(const hsep_compensator_parameters *parameters)
-{
-    return compensator_lay_out(&(hsep_compensator){0}, parameters);
-}
-
-HSEP_API void hsep_compensator_init(hsep_compensator *self, const hsep_compensator_parameters *parameters, double start)
-{
-    const hsep_predictor_parameters *predictor = &parameters->predictor;
-    memset(self, 0, (size_t)hsep_compensator_size(parameters));
-    (void)compensator_lay_out(self, parameters);
-    hsep_predictor_init(hsep_compensator_predictor(self), predictor, start);
-    hsep_planner_init(compensator_planner(self), &parameters->planner, start);
-    /* The spline filtered by the physics model from rest, which is constant. */
-    hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
-    double *spline = hsep_at(self, self->spline_pb);
-    hsep_physics_init(
-        trial, predictor->modes, predictor->n_modes, predictor->settings.dead_time, predictor->settings.T_s,
-        (hsep_hold)predictor->settings.input_hold);
-    memcpy(
-        spline, hsep_splines_shape(hsep_planner_splines(compensator_planner(self))),
-        (size_t)(4 * parameters->planner.spacing) * sizeof(double));
-    hsep_physics_forced_response(trial, spline, spline, (size_t)predictor->preview);
-}
-
-HSEP_API int hsep_compensator_valid(const void *block, const hsep_compensator_parameters *parameters, uint64_t k)
-{
-    const hsep_predictor_parameters *predictor = &parameters->predictor;
-    hsep_compensator got;
-    hsep_predictor online;
-    memcpy(&got, block, sizeof got);
-    (void)compensator_lay_out(&got, parameters); /* changes nothing where it is sound */
-    memcpy(&online, hsep_at_bytes(block, got.predictor), sizeof online);
-    return memcmp(&got, block, sizeof got) == 0 && got.state <= HSEP_SEP_HYBRID && got.solving <= 1 &&
-           (got.solving || online.n_published == predictor->settings.Np) &&
-           (online.divergence ||
-            hsep_within(hsep_at_bytes(block, got.x_dm), predictor->settings.Np, HSEP_PREDICTION_MAX)) &&
-           hsep_physics_valid(hsep_at_bytes(block, got.trial), predictor->n_modes, predictor->settings.dead_time) &&
-           hsep_planner_valid(hsep_at_bytes(block, got.planner), &parameters->planner) &&
-           hsep_predictor_valid(hsep_at_bytes(block, got.predictor), predictor, k);
+    hsep_predictor *predictor = hsep_compensator_predictor(self);
+    return (hsep_trusted_task){
+        .model = hsep_predictor_trusted(predictor),
+        .planner = hsep_compensator_planner(self),
+        .spline = hsep_at(self, self->spline_pb),
+        .x_d = hsep_at(predictor, predictor->x_d)};
 }
 
 /* target := x_d - the model's response to x_d with the decided part of delta; eq. (3) without a matrix. */
 static void compensator_target(hsep_compensator *self, hsep_sep_state state)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
-    const hsep_planner *planner = compensator_planner(self);
+    const hsep_planner *planner = hsep_compensator_planner(self);
     const hsep_features *f = &predictor->features;
     const uint64_t preview = predictor->preview, Np = predictor->Np;
     const double *x_d = hsep_at(predictor, predictor->x_d);
@@ -134,6 +74,14 @@ static int compensator_trusts(hsep_compensator *self)
            hsep_recursion_stable(&recursion, hsep_at(self, self->trial_e));
 }
 
+/* Samples of a window that follow the last plan while one is made. One alone is none: the spread of errors follows from
+ * differences. */
+static uint64_t compensator_pinned(hsep_compensator *self)
+{
+    const uint64_t pinned = hsep_planner_pinned(hsep_compensator_planner(self));
+    return pinned > 1 ? pinned : 0;
+}
+
 /* Set the commands of the window up to last - 1 and predict its position; eqs. (2) and (4). */
 static void compensator_publish(hsep_compensator *self, uint64_t last)
 {
@@ -141,29 +89,59 @@ static void compensator_publish(hsep_compensator *self, uint64_t last)
     const uint64_t Np = predictor->Np, first = predictor->n_published;
     const double *x_d = hsep_at(predictor, predictor->x_d);
     double *x_dm = hsep_at(self, self->x_dm), *past_x = hsep_at(predictor, predictor->past_x);
+    double *command = hsep_at(predictor, predictor->command);
     for (uint64_t k = first; k < last; k++) {
-        x_dm[k] = x_d[k] + hsep_planner_delta(compensator_planner(self), k);
-        const double command = x_dm[k] - predictor->start;
-        hsep_physics_forced_response(hsep_predictor_physics(predictor), &command, &past_x[Np - 1 - k], 1);
+        x_dm[k] = x_d[k] + hsep_planner_delta(hsep_compensator_planner(self), k);
+        command[Np - 1 - k] = x_dm[k] - predictor->start;
+        hsep_physics_forced_response(hsep_predictor_physics(predictor), &command[Np - 1 - k], &past_x[Np - 1 - k], 1);
     }
     if (!hsep_within(x_dm + first, last - first, HSEP_PREDICTION_MAX)) {
         predictor->divergence = HSEP_DIVERGES_X_DM;
     }
+    if (self->trusted) { /* the window's part of the preview */
+        const hsep_trusted_planner *trusted = hsep_compensator_trusted(self);
+        memcpy(
+            hsep_at(predictor, predictor->e_h), hsep_at_const(trusted, trusted->e_h) + (trusted->preview - Np),
+            (size_t)Np * sizeof(double));
+    }
     hsep_predictor_publish(predictor, last);
+    hsep_predictor_doubt(predictor, hsep_predictor_warm_up(predictor));
 }
 
-/* Solver steps of a bounded plan that are due before the next sample. */
+/* Do parts of a plan with trust, as much work as is due; return whether it is made. */
+static int compensator_advance(hsep_compensator *self, uint64_t due)
+{
+    hsep_trusted_planner *trusted = hsep_compensator_trusted(self);
+    const hsep_trusted_task task = compensator_task(self);
+    uint64_t next = hsep_trusted_planner_next(trusted), done = 0;
+    while (next > 0 && next <= due - done) {
+        hsep_trusted_planner_advance(trusted, &task);
+        done += next;
+        next = hsep_trusted_planner_next(trusted);
+    }
+    return next == 0;
+}
+
+/* Solver steps of a bounded plan; return whether it is solved. */
+static int compensator_step(hsep_compensator *self, uint64_t due)
+{
+    int done = 0;
+    for (uint64_t step = 0; !done && step < due; step++) {
+        done = hsep_planner_step(hsep_compensator_planner(self));
+    }
+    return done;
+}
+
+/* Work on a plan that is due before the next sample. */
 static void compensator_solve(hsep_compensator *self)
 {
     const hsep_predictor *predictor = hsep_compensator_predictor(self);
-    const uint64_t pinned = hsep_planner_pinned(compensator_planner(self)), i = predictor->k % predictor->Np;
-    const uint64_t steps = pinned > 0 ? (HSEP_INTERIOR_STEPS + pinned - 1) / pinned : HSEP_INTERIOR_STEPS;
-    int done = 0;
-    for (uint64_t step = 0; !done && (step < steps || i >= pinned); step++) {
-        done = hsep_planner_step(compensator_planner(self));
-    }
-    if (done) {
+    const uint64_t pinned = compensator_pinned(self), i = predictor->k % predictor->Np;
+    const uint64_t work = self->trusted ? HSEP_TRUSTED_WORK : HSEP_INTERIOR_STEPS;
+    const uint64_t due = i < pinned ? (work + pinned - 1) / pinned : UINT64_MAX;
+    if (self->trusted ? compensator_advance(self, due) : compensator_step(self, due)) {
         self->solving = 0;
+        self->state = self->trusted ? hsep_compensator_trusted(self)->planned : self->state;
         compensator_publish(self, predictor->Np);
     }
 }
@@ -174,18 +152,18 @@ static hsep_plan_status compensator_try(hsep_compensator *self, hsep_sep_state s
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     const uint64_t spline = state == HSEP_SEP_HYBRID ? self->spline_h : self->spline_pb;
     compensator_target(self, state);
-    const hsep_plan_status status = hsep_planner_begin(
-        compensator_planner(self), hsep_at(self, spline), hsep_at(self, self->target),
-        hsep_at(predictor, predictor->x_d));
+    hsep_planner_open(hsep_compensator_planner(self), hsep_at(predictor, predictor->x_d));
+    hsep_planner_aim(hsep_compensator_planner(self), hsep_at(self, spline), hsep_at(self, self->target));
+    const hsep_plan_status status = hsep_planner_solve(hsep_compensator_planner(self), 0);
     self->state = (uint64_t)(status == HSEP_PLAN_FAILED ? HSEP_SEP_OFF : state);
     return status;
 }
 
-HSEP_API void hsep_compensator_begin(hsep_compensator *self)
+/* Begin a plan by the paper's model, or by the physics model where that one is not trusted. */
+static void compensator_plan(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     hsep_plan_status status = HSEP_PLAN_FAILED;
-    hsep_predictor_begin(predictor);
     self->state = HSEP_SEP_OFF;
     if (compensator_trusts(self)) {
         compensator_filter_spline(self);
@@ -196,7 +174,33 @@ HSEP_API void hsep_compensator_begin(hsep_compensator *self)
     }
     predictor->n_physics = self->state == HSEP_SEP_HYBRID ? 0 : predictor->Np;
     self->solving = status == HSEP_PLAN_BOUNDED;
-    compensator_publish(self, self->solving ? hsep_planner_pinned(compensator_planner(self)) : predictor->Np);
+}
+
+/* Begin a plan by the residual model that can be trusted; what planned the window is known when it is made. */
+static void compensator_plan_trusted(hsep_compensator *self)
+{
+    hsep_predictor *predictor = hsep_compensator_predictor(self);
+    const hsep_trusted_task task = compensator_task(self);
+    const int warm = (double)predictor->k >= predictor->n_init;
+    const uint64_t best = self->compensate == HSEP_SEP_HYBRID && !warm ? HSEP_SEP_PHYSICS : self->compensate;
+    self->before = self->state;
+    predictor->n_physics = self->compensate == HSEP_SEP_HYBRID ? hsep_predictor_warm_up(predictor) : predictor->Np;
+    hsep_trusted_planner_begin(
+        hsep_compensator_trusted(self), &task, hsep_predictor_physics(predictor),
+        hsep_at(predictor, predictor->past_e) + predictor->Np, best);
+    self->solving = 1;
+}
+
+HSEP_API void hsep_compensator_begin(hsep_compensator *self)
+{
+    hsep_predictor *predictor = hsep_compensator_predictor(self);
+    hsep_predictor_begin(predictor);
+    if (self->trusted) {
+        compensator_plan_trusted(self);
+    } else {
+        compensator_plan(self);
+    }
+    compensator_publish(self, self->solving ? compensator_pinned(self) : predictor->Np);
     if (predictor->n_published == 0) {
         compensator_solve(self);
     }
@@ -208,13 +212,13 @@ static void compensator_next_window(hsep_compensator *self)
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     const uint64_t Np = predictor->Np;
     /* Predictions from few rows, before the warm-up is over, are not used: they are not judged. */
-    if (hsep_predictor_finish(predictor) && (double)(predictor->k - Np) >= predictor->n_init) {
+    if (hsep_predictor_finish(predictor) && !self->trusted && (double)(predictor->k - Np) >= predictor->n_init) {
         const hsep_regression *regression = hsep_predictor_regression(predictor);
         hsep_plan_monitor_observe(
             &self->monitor, hsep_at(predictor, predictor->past_e), hsep_at(predictor, predictor->e_h), Np,
             regression->residual_sum / (double)regression->n_samples);
     }
-    hsep_planner_next(compensator_planner(self), hsep_at(predictor, predictor->x_d));
+    hsep_planner_next(hsep_compensator_planner(self), hsep_at(predictor, predictor->x_d));
     hsep_compensator_begin(self);
 }
 
@@ -233,7 +237,13 @@ HSEP_API int hsep_compensator_sample(hsep_compensator *self, double x_d_ahead, d
 HSEP_API void hsep_compensator_read(const hsep_compensator *self, hsep_compensator_outputs *outputs)
 {
     const hsep_predictor *predictor = (const hsep_predictor *)hsep_at_const(self, self->predictor);
+    const hsep_planner *planner = (const hsep_planner *)hsep_at_const(self, self->planner);
+    const uint64_t i = predictor->k % predictor->Np;
+    const int follows = self->trusted && i < hsep_planner_pinned(planner);
     hsep_predictor_read(predictor, &outputs->predicted);
-    outputs->x_dm = hsep_at_const(self, self->x_dm)[predictor->k % predictor->Np];
-    outputs->state = (hsep_sep_state)self->state;
+    if (self->trusted ? self->compensate != HSEP_SEP_HYBRID : self->state != HSEP_SEP_HYBRID) {
+        outputs->predicted.x_h_std = 0.0; /* of x_pb it is not known */
+    }
+    outputs->x_dm = hsep_at_const(self, self->x_dm)[i];
+    outputs->state = (hsep_sep_state)(follows ? self->before : self->state);
 }

@@ -4,7 +4,8 @@
  * Sample k brings x_d_ahead = r(k) and x_meas = x(k); after it the outputs are those of k + 1. When k + 1 is a multiple
  * of Np, the whole preview of the next window and every measurement before it have arrived: the weights are solved and
  * the window is planned in that sample. A plan that the drive's limits bound is solved over the samples that follow,
- * while the command follows the last plan.
+ * while the command follows the last plan. With trust every plan is: HSEP_PINNED_WITH_TRUST samples, in each of them
+ * HSEP_TRUSTED_WORK / HSEP_PINNED_WITH_TRUST steps of the solver or as much of other work.
  *
  * Cost of a sample, with n features and m splines in a plan: that of hsep_regression_fold(n). At the end of a window on
  * top n^2 / 2 + p^2 / 2 + (2 preview + Np) (p + q) + m^3 / 6 + m preview multiply-adds, the last two twice if the
@@ -25,6 +26,7 @@
 #include "hsep_planner.h"
 #include "hsep_predictor.h"
 #include "hsep_plan_monitor.h"
+#include "hsep_trusted_planner.h"
 
 #include <stdint.h>
 
@@ -39,7 +41,8 @@ typedef struct {
 
 typedef struct {
     uint64_t compensate; /* hsep_sep_state, the best model allowed */
-    uint64_t state;      /* hsep_sep_state of the window */
+    uint64_t state;      /* hsep_sep_state of the window, */
+    uint64_t before;     /* and of the window before, whose plan the first samples follow with trust */
     uint64_t solving;    /* whether its plan is being solved */
     hsep_plan_monitor monitor;
     /* Offsets in doubles from the beginning of the struct */
@@ -51,14 +54,15 @@ typedef struct {
     uint64_t spline_h;  /* (preview,) m/m, and by the hybrid one */
     uint64_t trial;     /* the physics model of a trial */
     uint64_t planner, predictor;
+    uint64_t trusted; /* the planner on the residual model that can be trusted; 0: the paper's */
 } hsep_compensator;
 
-HSEP_ASSERT_WORDS(hsep_compensator, 13);
+HSEP_ASSERT_WORDS(hsep_compensator, 15);
 
 typedef struct {
-    hsep_predictor_outputs predicted; /* x_h: of the model that planned the window */
+    hsep_predictor_outputs predicted; /* x_h: of the model that planned the window; with trust that of its model */
     double x_dm;                      /* m, now */
-    hsep_sep_state state;
+    hsep_sep_state state;             /* of the plan that x_dm follows now */
 } hsep_compensator_outputs;
 
 /* Bytes of the block, counted in double so that no size can overflow. */
@@ -70,6 +74,11 @@ HSEP_API void hsep_compensator_init(
 
 /* The predictor, for a warm start between hsep_compensator_init and _begin. */
 HSEP_API hsep_predictor *hsep_compensator_predictor(hsep_compensator *self);
+
+HSEP_API hsep_planner *hsep_compensator_planner(hsep_compensator *self);
+
+/* The planner with trust, if there is one. */
+HSEP_API hsep_trusted_planner *hsep_compensator_trusted(hsep_compensator *self);
 
 /* Plan the first window. */
 HSEP_API void hsep_compensator_begin(hsep_compensator *self);

@@ -7,8 +7,6 @@
 #include <stddef.h>
 #include <string.h>
 
-#define PLANNER_PINNED 8 /* samples at the beginning of a window in which a bounded plan follows the last one */
-
 static const double planner_ridge = 1e-12; /* on the diagonal, relative to its largest entry */
 
 HSEP_API const hsep_splines *hsep_planner_splines(const hsep_planner *self)
@@ -25,7 +23,7 @@ static double planner_lay_out(hsep_planner *self, const hsep_planner_parameters 
     const uint64_t n = hsep_splines_count(parameters->preview, parameters->spacing), half = parameters->Np / 2;
     double end = HSEP_WORDS(hsep_planner);
     self->Np = parameters->Np;
-    self->n_pinned = (half < PLANNER_PINNED ? half : PLANNER_PINNED) / parameters->spacing;
+    self->n_pinned = (half < parameters->pinned ? half : parameters->pinned) / parameters->spacing;
     self->no_reversal = parameters->no_reversal != 0;
     self->jerk_weight = parameters->jerk_weight;
     self->c = hsep_take(&end, HSEP_DECIDED + (double)n);
@@ -94,24 +92,75 @@ static void planner_third(hsep_planner *self)
     }
 }
 
-/* P := W' W + jerk_weight D' D with a small ridge. */
-static void planner_quadratic(hsep_planner *self, const double filtered[])
+HSEP_API double *hsep_planner_coefficients(hsep_planner *self) { return hsep_at(self, self->c); }
+
+HSEP_API const double *hsep_planner_third(const hsep_planner *self) { return hsep_at_const(self, self->third); }
+
+HSEP_API double *hsep_planner_quadratic(hsep_planner *self) { return hsep_at(self, self->P); }
+
+HSEP_API double *hsep_planner_linear(hsep_planner *self)
+{
+    return hsep_interior_problem(planner_interior(self), hsep_planner_splines(self)).v;
+}
+
+HSEP_API void hsep_planner_open(hsep_planner *self, const double x_d[])
+{
+    planner_third(self);
+    hsep_constraints_total(self, x_d);
+}
+
+HSEP_API void hsep_planner_let_turn(hsep_planner *self)
+{
+    memset(hsep_at(self, self->moves), 0, (size_t)hsep_planner_splines(self)->preview * sizeof(double));
+}
+
+HSEP_API void hsep_planner_regularise(hsep_planner *self)
+{
+    const uint64_t n = hsep_planner_splines(self)->n;
+    double *P = hsep_at(self, self->P);
+    double largest = 0.0;
+    uint64_t place = 0;
+    for (uint64_t i = 0; i < n; i++) {
+        largest = fmax(largest, P[place]);
+        place += n - i;
+    }
+    place = 0;
+    for (uint64_t i = 0; i < n; i++) {
+        P[place] += planner_ridge * largest;
+        place += n - i;
+    }
+}
+
+HSEP_API void hsep_planner_aim(hsep_planner *self, const double filtered[], const double target[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     double *P = hsep_at(self, self->P);
     hsep_splines_filtered_gram(splines, filtered, P);
-    hsep_splines_jerk_gram(splines, self->jerk_weight, P);
-    double largest = 0.0;
-    uint64_t place = 0;
-    for (uint64_t i = 0; i < splines->n; i++) {
-        largest = fmax(largest, P[place]);
-        place += splines->n - i;
+    hsep_splines_difference_gram(splines, 3, self->jerk_weight, P);
+    hsep_planner_regularise(self);
+    hsep_splines_project(
+        splines, filtered, target, self->jerk_weight, hsep_at(self, self->third), hsep_planner_linear(self));
+}
+
+/* The rows of P from a spline on. */
+static double *planner_rows(hsep_planner *self, uint64_t first)
+{
+    return hsep_at(self, self->P) + (first * hsep_planner_splines(self)->n - first * (first - 1) / 2);
+}
+
+/* v := v_2 - P_21 pinned: the linear term of the splines that are not pinned. */
+static void planner_pin(hsep_planner *self)
+{
+    const uint64_t n = hsep_planner_splines(self)->n, first = self->n_pinned;
+    const double *rest = hsep_at(self, self->c) + HSEP_DECIDED, *P = hsep_at(self, self->P);
+    double *v = hsep_planner_linear(self);
+    for (uint64_t i = 0; i < first; i++) {
+        for (uint64_t j = first; j < n; j++) {
+            v[j] -= P[j - i] * rest[i];
+        }
+        P += n - i;
     }
-    place = 0;
-    for (uint64_t i = 0; i < splines->n; i++) {
-        P[place] += planner_ridge * largest;
-        place += splines->n - i;
-    }
+    memmove(v, v + first, (size_t)(n - first) * sizeof(double));
 }
 
 /* Hand the bounded problem over: x is what follows the pinned splines, its bounds are what the others leave. */
@@ -119,11 +168,10 @@ static void planner_bound(hsep_planner *self, double cost)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     hsep_interior *interior = planner_interior(self);
-    const uint64_t n = splines->n, first = self->n_pinned, preview = splines->preview;
-    const double *rest = hsep_at(self, self->c) + HSEP_DECIDED, *P = hsep_at(self, self->P);
-    const double *total = hsep_at(self, self->total);
+    const uint64_t first = self->n_pinned, preview = splines->preview;
+    const double *rest = hsep_at(self, self->c) + HSEP_DECIDED, *total = hsep_at(self, self->total);
     const hsep_problem problem = hsep_interior_problem(interior, splines);
-    double *x = problem.x, *v = problem.v, *low = problem.low, *high = problem.high;
+    double *low = problem.low, *high = problem.high;
     hsep_splines_rows(splines, rest + first, first, low);
     for (uint64_t r = 0; r < HSEP_ORDERS * preview; r++) {
         const double other = total[r] - low[r];
@@ -132,34 +180,23 @@ static void planner_bound(hsep_planner *self, double cost)
         low[r] = least - other + HSEP_INTERIOR_PRIMAL;
         high[r] = most - other - HSEP_INTERIOR_PRIMAL;
     }
-    for (uint64_t i = 0; i < first; i++) { /* v := v_2 - P_21 pinned */
-        for (uint64_t j = first; j < n; j++) {
-            v[j] -= P[j - i] * rest[i];
-        }
-        P += n - i;
-    }
-    for (uint64_t j = first; j < n; j++) {
-        v[j - first] = v[j];
-        x[j - first] = rest[j];
-    }
+    memcpy(problem.x, rest + first, (size_t)(splines->n - first) * sizeof(double));
     hsep_interior_begin(interior, splines, hsep_at(self, self->P), first, cost);
 }
 
-HSEP_API hsep_plan_status
-hsep_planner_begin(hsep_planner *self, const double filtered[], const double target[], const double x_d[])
+HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
-    const uint64_t n = splines->n;
-    double *c = hsep_at(self, self->c), *P = hsep_at(self, self->P);
-    double *factor = hsep_at(self, self->factor);
+    const uint64_t first = pinned ? self->n_pinned : 0, n = splines->n - first;
+    double *rest = hsep_at(self, self->c) + HSEP_DECIDED + first, *factor = hsep_at(self, self->factor);
+    const double *row = planner_rows(self, first);
     const hsep_problem problem = hsep_interior_problem(planner_interior(self), splines);
     double *free_minimum = problem.x, *v = problem.v, *rows = problem.low; /* work */
 
-    planner_third(self);
-    hsep_constraints_total(self, x_d);
-    planner_quadratic(self, filtered);
-    hsep_splines_project(splines, filtered, target, self->jerk_weight, hsep_at(self, self->third), v);
-    memcpy(factor, P, (size_t)hsep_triangle(n) * sizeof(double));
+    if (pinned) {
+        planner_pin(self);
+    }
+    memcpy(factor, row, (size_t)hsep_triangle(n) * sizeof(double));
     if (!hsep_cholesky_factor(factor, n)) {
         return HSEP_PLAN_FAILED;
     }
@@ -169,30 +206,36 @@ hsep_planner_begin(hsep_planner *self, const double filtered[], const double tar
     for (uint64_t j = 0; j < n; j++) {
         cost += v[j] * free_minimum[j];
         finite += fabs(free_minimum[j]);
-        free_minimum[j] -= c[HSEP_DECIDED + j]; /* the way there */
+        free_minimum[j] -= rest[j]; /* the way there */
     }
     if (!isfinite(finite)) {
         return HSEP_PLAN_FAILED;
     }
-    hsep_splines_rows(splines, free_minimum, 0, rows);
+    hsep_splines_rows(splines, free_minimum, first, rows);
     if (hsep_constraints_allow(self, rows)) {
         for (uint64_t j = 0; j < n; j++) {
-            c[HSEP_DECIDED + j] += free_minimum[j];
+            rest[j] += free_minimum[j];
         }
         return HSEP_PLAN_DONE;
     }
-    const double *row = P;
     for (uint64_t i = 0; i < n; i++) { /* cost += rest' P rest */
-        const double *rest = c + HSEP_DECIDED + i;
-        double sum = 0.5 * row[0] * rest[0];
+        double sum = 0.5 * row[0] * rest[i];
         for (uint64_t j = 1; j < n - i; j++) {
-            sum += row[j] * rest[j];
+            sum += row[j] * rest[i + j];
         }
-        cost += 2.0 * rest[0] * sum;
+        cost += 2.0 * rest[i] * sum;
         row += n - i;
+    }
+    if (!pinned) {
+        planner_pin(self);
     }
     planner_bound(self, cost);
     return HSEP_PLAN_BOUNDED;
+}
+
+HSEP_API uint64_t hsep_planner_steps(const hsep_planner *self)
+{
+    return ((const hsep_interior *)hsep_at_const(self, self->interior))->steps;
 }
 
 HSEP_API int hsep_planner_step(hsep_planner *self)

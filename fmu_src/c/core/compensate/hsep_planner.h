@@ -18,6 +18,11 @@
 
 #include <stdint.h>
 
+/* Samples at the beginning of a window in which a bounded plan follows the last one; with trust every plan does, as it
+ * takes more work. */
+#define HSEP_PINNED 8
+#define HSEP_PINNED_WITH_TRUST 20
+
 typedef struct {
     uint64_t Np;               /* samples of a window */
     uint64_t preview;          /* samples of a plan, at least Np + 4 spacing + 3 */
@@ -25,6 +30,7 @@ typedef struct {
     double jerk_weight;        /* of the third differences of delta against the tracking error, >= 0 */
     double limit[HSEP_ORDERS]; /* of |delta|, m, and of the differences of x_dm of orders 1 to 3, m; all > 0 */
     int no_reversal;           /* whether x_dm keeps the direction of x_d */
+    uint64_t pinned;           /* samples that follow the last plan: one of those above, or less if half of Np is */
 } hsep_planner_parameters;
 
 typedef enum {
@@ -69,13 +75,36 @@ HSEP_API uint64_t hsep_planner_pinned(const hsep_planner *self);
 /* The part of delta at sample k that is decided before a plan is made, m. */
 HSEP_API double hsep_planner_decided(const hsep_planner *self, uint64_t k);
 
-/* Plan. filtered: the spline behind the model, (preview,); target: x_d minus the model's response to x_d with what is
- * decided of delta, m; x_d: commanded positions, m, (preview,) both. Cost: n^3 / 6 + n preview multiply-adds. */
-HSEP_API hsep_plan_status
-hsep_planner_begin(hsep_planner *self, const double filtered[], const double target[], const double x_d[]);
+/* Begin plans of a window. x_d: commanded positions, m, (preview,). */
+HSEP_API void hsep_planner_open(hsep_planner *self, const double x_d[]);
+
+/* Let plans of this window turn where no_reversal forbids it: their model follows the friction. */
+HSEP_API void hsep_planner_let_turn(hsep_planner *self);
+
+/* Set the cost: of the tracking error of an affine model, and of the jerk. filtered: the spline behind the model,
+ * (preview,); target: x_d minus the model's response to x_d with what is decided of delta, m, (preview,). Cost:
+ * n preview multiply-adds. */
+HSEP_API void hsep_planner_aim(hsep_planner *self, const double filtered[], const double target[]);
+
+/* The cost 1/2 c' P c - v' c to be set otherwise: the triangle P of n rows, and v, (n,), m; hsep_planner_regularise
+ * makes P definite. The third differences of what is decided, (preview,), m. */
+HSEP_API double *hsep_planner_quadratic(hsep_planner *self);
+HSEP_API double *hsep_planner_linear(hsep_planner *self);
+HSEP_API void hsep_planner_regularise(hsep_planner *self);
+HSEP_API const double *hsep_planner_third(const hsep_planner *self);
+
+/* Coefficients of the plan, (3 + n,), m; before one is made those of the rest of the last one. */
+HSEP_API double *hsep_planner_coefficients(hsep_planner *self);
+
+/* Plan at this cost, which is used up. pinned: whether the first samples, hsep_planner_pinned, stay as they are in any
+ * case; else in a bounded plan only. Cost: n^3 / 6 multiply-adds. */
+HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned);
 
 /* Do a step of a bounded plan; return whether it was the last one. Cost: that of hsep_interior_step. */
 HSEP_API int hsep_planner_step(hsep_planner *self);
+
+/* Steps that the last bounded plan took. */
+HSEP_API uint64_t hsep_planner_steps(const hsep_planner *self);
 
 /* delta at sample k of the plan, m; of a bounded one that is not solved yet, at its first hsep_planner_pinned. */
 HSEP_API double hsep_planner_delta(const hsep_planner *self, uint64_t k);

@@ -189,19 +189,58 @@ HSEP_API void hsep_splines_filtered_gram(const hsep_splines *self, const double 
     }
 }
 
-HSEP_API void hsep_splines_jerk_gram(const hsep_splines *self, double weight, double triangle[])
+/* Sum over k of the differences of an order, m, of a spline and of the one d splines later. */
+static double splines_overlap(const hsep_splines *self, unsigned order, uint64_t d)
 {
-    const double *e = splines_differences(self, 3);
-    const double unit = 1.0 / self->share[3];
-    const uint64_t spacing = self->spacing, length = splines_length(self, 3);
-    for (uint64_t d = 0; d < self->n && d * spacing + 1 < length; d++) {
-        double sum = 0.0;
-        for (uint64_t k = d * spacing + 1; k < length; k++) {
-            sum += (e[k] * unit) * (e[k - d * spacing] * unit);
-        }
+    const double *e = splines_differences(self, order);
+    const double unit = 1.0 / self->share[order];
+    double sum = 0.0;
+    for (uint64_t k = d * self->spacing + 1; k < splines_length(self, order); k++) {
+        sum += (e[k] * unit) * (e[k - d * self->spacing] * unit);
+    }
+    return sum;
+}
+
+/* Splines behind one that overlap it in the differences of an order, and it itself. */
+static uint64_t splines_neighbours(const hsep_splines *self, unsigned order)
+{
+    const uint64_t count = (splines_length(self, order) - 2) / self->spacing + 1;
+    return count < self->n ? count : self->n;
+}
+
+HSEP_API void hsep_splines_difference_gram(const hsep_splines *self, unsigned order, double weight, double triangle[])
+{
+    for (uint64_t d = 0; d < splines_neighbours(self, order); d++) {
+        const double sum = splines_overlap(self, order, d);
         for (uint64_t i = 0; i + d < self->n; i++) {
             *splines_entry(triangle, self->n, i, i + d) += weight * sum;
         }
+    }
+}
+
+HSEP_API void hsep_splines_difference_product(
+    const hsep_splines *self, unsigned order, double weight, const double c[], double y[])
+{
+    for (uint64_t d = 0; d < splines_neighbours(self, order); d++) {
+        const double sum = weight * splines_overlap(self, order, d);
+        for (uint64_t i = 0; i + d < self->n; i++) {
+            y[i] += sum * c[i + d];
+            y[i + d] += d > 0 ? sum * c[i] : 0.0;
+        }
+    }
+}
+
+HSEP_API void hsep_splines_project_jerk(const hsep_splines *self, double weight, const double third[], double v[])
+{
+    const double *e = splines_differences(self, 3);
+    const double unit = weight / self->share[3];
+    for (uint64_t j = 0; j < self->n; j++) {
+        const double *past = third + j * self->spacing;
+        double jerk = 0.0;
+        for (uint64_t k = 1; k < splines_length(self, 3); k++) {
+            jerk += e[k] * past[k];
+        }
+        v[j] -= unit * jerk;
     }
 }
 
@@ -209,14 +248,8 @@ HSEP_API void hsep_splines_project(
     const hsep_splines *self, const double filtered[], const double target[], double weight, const double third[],
     double v[])
 {
-    const double *e = splines_differences(self, 3);
-    const double unit = weight / self->share[3];
     for (uint64_t j = 0; j < self->n; j++) {
-        const double *aim = target + j * self->spacing, *past = third + j * self->spacing;
-        double jerk = 0.0;
-        for (uint64_t k = 1; k < splines_length(self, 3); k++) {
-            jerk += e[k] * past[k];
-        }
-        v[j] = hsep_dot(filtered, aim, self->preview - j * self->spacing) - unit * jerk;
+        v[j] = hsep_dot(filtered, target + j * self->spacing, self->preview - j * self->spacing);
     }
+    hsep_splines_project_jerk(self, weight, third, v);
 }

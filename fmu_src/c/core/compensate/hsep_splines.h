@@ -65,13 +65,20 @@ HSEP_API double hsep_splines_energy(const hsep_splines *self);
  * (preview,), by one spacing. Each diagonal is a running sum: cost n preview / 2 multiply-adds. */
 HSEP_API void hsep_splines_filtered_gram(const hsep_splines *self, const double filtered[], double triangle[]);
 
-/* The triangle of n rows += weight D' D with the third differences D of the splines. */
-HSEP_API void hsep_splines_jerk_gram(const hsep_splines *self, double weight, double triangle[]);
+/* The triangle of n rows += weight D' D with the differences D of an order of the splines, m. */
+HSEP_API void hsep_splines_difference_gram(const hsep_splines *self, unsigned order, double weight, double triangle[]);
 
-/* v, (n,), := W' target - weight D' third, target and third (preview,). */
+/* What weight D' D, of hsep_splines_difference_gram, makes of coefficients: y, (n,), += weight D' D c. */
+HSEP_API void hsep_splines_difference_product(
+    const hsep_splines *self, unsigned order, double weight, const double c[], double y[]);
+
+/* v, (n,), := W' target - weight D' third with the third differences D, target and third (preview,). */
 HSEP_API void hsep_splines_project(
     const hsep_splines *self, const double filtered[], const double target[], double weight, const double third[],
     double v[]);
+
+/* v, (n,), -= weight D' third. */
+HSEP_API void hsep_splines_project_jerk(const hsep_splines *self, double weight, const double third[], double v[]);
 
 /* The spline itself, b, (4 spacing,). */
 HSEP_API const double *hsep_splines_shape(const hsep_splines *self);

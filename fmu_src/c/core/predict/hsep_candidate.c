@@ -71,7 +71,22 @@ HSEP_API int hsep_candidate_valid(const void *block, const hsep_candidate_shape 
            hsep_regression_valid(hsep_at_bytes(block, got.solved), shape->n_static + shape->p);
 }
 
-HSEP_API const double *hsep_candidate_prediction(const hsep_candidate *self) { return hsep_at_const(self, self->e_h); }
+/* The window's part of a signal of all predicted samples. */
+static const double *candidate_window(const hsep_candidate *self, uint64_t signal)
+{
+    return hsep_at_const(self, signal) + (self->n - self->Np);
+}
+
+HSEP_API const double *hsep_candidate_prediction(const hsep_candidate *self)
+{
+    return candidate_window(self, self->e_h);
+}
+
+HSEP_API double hsep_candidate_shrink(const hsep_candidate *self, uint64_t j)
+{
+    const double unshrunk = hsep_at_const(self, self->unshrunk)[j];
+    return unshrunk == 0.0 ? 0.0 : hsep_at_const(self, self->e_h)[j] / unshrunk;
+}
 
 HSEP_API void hsep_candidate_solve(
     hsep_candidate *self, const hsep_regression *regression, const double static_scales[], double least_variance)
@@ -148,13 +163,15 @@ static void candidate_spread(hsep_candidate *self, const double rows[], double m
 }
 
 HSEP_API void hsep_candidate_predict(
-    hsep_candidate *self, const double rows[], const double past[], const hsep_residual_scale *scale)
+    hsep_candidate *self, const double rows[], const double past[], const hsep_residual_scale *scale, int held)
 {
     const double largest = scale->largest;
     const double *unshrunk = hsep_at(self, self->unshrunk), *spread = hsep_at(self, self->spread);
     double *e_h = hsep_at(self, self->e_h);
     candidate_free_run(self, rows, past, candidate_lag_max * largest);
-    candidate_spread(self, rows, candidate_diverged * largest * largest);
+    if (!held) {
+        candidate_spread(self, rows, candidate_diverged * largest * largest);
+    }
     for (uint64_t j = 0; j < self->n; j++) {
         const double shrunk = unshrunk[j] * (scale->recent / (scale->recent + candidate_caution * spread[j]));
         e_h[j] = candidate_bounded(shrunk, candidate_prediction_max * largest);
@@ -163,7 +180,7 @@ HSEP_API void hsep_candidate_predict(
 
 HSEP_API void hsep_candidate_judge(hsep_candidate *self, const double measured[], const double accepted[])
 {
-    const double *unshrunk = hsep_at(self, self->unshrunk) + (self->n - self->Np);
+    const double *unshrunk = candidate_window(self, self->unshrunk);
     double sum = 0.0, n = 0.0;
     for (uint64_t j = 0; j < self->Np; j++) {
         sum += accepted[j] * (measured[j] - unshrunk[j]);
@@ -176,16 +193,13 @@ HSEP_API void hsep_candidate_judge(hsep_candidate *self, const double measured[]
 
 HSEP_API double hsep_candidate_surprise(const hsep_candidate *self, const double measured[], const double accepted[])
 {
-    const double *unshrunk = hsep_at_const(self, self->unshrunk) + (self->n - self->Np);
-    const double *spread = hsep_at_const(self, self->spread);
+    const double *unshrunk = candidate_window(self, self->unshrunk), *spread = candidate_window(self, self->spread);
     double squares = 0.0, expected = 0.0, n = 0.0;
     for (uint64_t j = 0; j < self->Np; j++) {
         const double error = measured[j] - unshrunk[j];
         squares += accepted[j] * error * error;
+        expected += spread[j];
         n += accepted[j];
     }
-    for (uint64_t j = 0; j < self->n; j++) {
-        expected += spread[j];
-    }
-    return squares / n / (self->variance + expected / (double)self->n);
+    return squares / n / (self->variance + expected / (double)self->Np);
 }

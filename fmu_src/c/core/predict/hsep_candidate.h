@@ -4,8 +4,8 @@
  * response. A prediction e of variance tau^2 is shrunk to e v / (v + 2 tau^2), v being the recent mean square of the
  * residual: at a first motion, a first reversal or in a region not seen yet the physics model remains.
  *
- * Signals are kept newest first: sample k of the n that are predicted is at place n - 1 - k. The first Np of them are
- * measured before the next prediction. Memory is one block, without pointers. Reentrant; allocates nothing.
+ * Signals are kept newest first: of the n samples that are predicted, sample k is at place n - 1 - k. The first Np of
+ * them are the window, which is measured then. Memory is one block, without pointers. Reentrant; allocates nothing.
  */
 #ifndef HSEP_CANDIDATE_H
 #define HSEP_CANDIDATE_H
@@ -24,8 +24,9 @@ typedef struct {
 } hsep_residual_scale;
 
 typedef struct {
-    uint64_t Np, n, n_static, p; /* samples measured and predicted, features without lags, lags */
-    double correlation_max;      /* beyond which the penalty does not grow; 1: rows are taken as independent */
+    uint64_t Np, n;         /* samples of a window, and of a prediction, n >= Np */
+    uint64_t n_static, p;   /* features without lags, lags */
+    double correlation_max; /* beyond which the penalty does not grow; 1: rows are taken as independent */
 } hsep_candidate_shape;
 
 typedef struct {
@@ -65,19 +66,23 @@ HSEP_API int hsep_candidate_valid(const void *block, const hsep_candidate_shape 
 HSEP_API void hsep_candidate_solve(
     hsep_candidate *self, const hsep_regression *regression, const double static_scales[], double least_variance);
 
-/* Predict a window in free run. rows: (n, n_static), sample after sample; past: (p,) m, the last residuals.
- * Cost: n times that of hsep_penalised_leverage, and n^2 / 2 multiply-adds. */
+/* Predict n samples in free run. rows: (n, n_static), sample after sample; past: (p,) m, the last residuals; held:
+ * whether the variance stays that of the last prediction. Cost: n times that of hsep_penalised_leverage, and n^2 / 2
+ * multiply-adds; with a variance held n (n_static + p). */
 HSEP_API void hsep_candidate_predict(
-    hsep_candidate *self, const double rows[], const double past[], const hsep_residual_scale *scale);
+    hsep_candidate *self, const double rows[], const double past[], const hsep_residual_scale *scale, int held);
 
-/* Estimate the correlation from the residuals of a window, (Np,), m, as measured; accepted: (Np,), 1 where it counts.
- */
+/* Estimate the correlation from the errors of a window, (Np,), m, that has been measured; accepted: (Np,), 1 where it
+ * counts. */
 HSEP_API void hsep_candidate_judge(hsep_candidate *self, const double measured[], const double accepted[]);
 
 /* Mean square error of the window relative to the one that was expected. */
 HSEP_API double hsep_candidate_surprise(const hsep_candidate *self, const double measured[], const double accepted[]);
 
-/* Prediction of a window, (n,), m. */
+/* Prediction of the window, (Np,), m. */
 HSEP_API const double *hsep_candidate_prediction(const hsep_candidate *self);
+
+/* Part of the recursion that the prediction of n samples has, at place j: what shrinking and bounds leave of it. */
+HSEP_API double hsep_candidate_shrink(const hsep_candidate *self, uint64_t j);
 
 #endif

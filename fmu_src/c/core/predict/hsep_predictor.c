@@ -89,11 +89,57 @@ static void predictor_unlearn(hsep_predictor *self)
     }
 }
 
+/* Correct the state at the beginning of the run, if its first residuals tell that it was in motion. */
+static void predictor_start(hsep_predictor *self)
+{
+    const uint64_t Np = self->Np, late = self->late;
+    hsep_start *motion = (hsep_start *)hsep_at(self, self->motion);
+    hsep_uncertainty *uncertainty = hsep_predictor_uncertainty(self);
+    hsep_trusted *trusted = hsep_predictor_trusted(self);
+    double *command = hsep_at(self, self->command), *past_x = hsep_at(self, self->past_x);
+    double *e = hsep_at(self, self->past_e) + late, *work = hsep_at(trusted, trusted->x);
+    const double *e_h = hsep_at(uncertainty, uncertainty->e_h) + late;
+    for (uint64_t j = 0; j < Np; j++) {
+        work[j] = e[j] - e_h[j];
+    }
+    if (hsep_start_estimate(motion, command, work)) {
+        for (uint64_t j = 0; j < Np; j++) {
+            e[j] += past_x[late + j];
+        }
+        hsep_start_apply(motion, command, past_x, hsep_at(self, self->ahead_pb), hsep_predictor_physics(self));
+        for (uint64_t j = 0; j < Np; j++) {
+            e[j] -= past_x[late + j];
+        }
+        hsep_trusted_begin_in_motion(trusted, command + late, past_x + late);
+    }
+}
+
+/* Learn the measured window: by the residual model that can be trusted, and its errors. A first fill that was predicted
+ * is not learned, but is what comes before. */
+static void predictor_learn_window(hsep_predictor *self)
+{
+    hsep_trusted *trusted = hsep_predictor_trusted(self);
+    double *past_e = hsep_at(self, self->past_e) + self->late;
+    if (self->motion && self->k == self->preview + self->Np) {
+        predictor_start(self);
+    }
+    if (trusted != NULL && (self->learning || self->preview > self->Np)) {
+        hsep_trusted_learn(
+            trusted, hsep_at(self, self->command) + self->late, hsep_at(self, self->past_x) + self->late, past_e,
+            self->learning != 0);
+    }
+    if (self->learning && !self->missing) {
+        hsep_uncertainty_learn(
+            hsep_predictor_uncertainty(self), past_e, trusted != NULL ? hsep_at(trusted, trusted->accepted) : NULL);
+    }
+}
+
 HSEP_API int hsep_predictor_finish(hsep_predictor *self)
 {
     const hsep_features *f = &self->features;
     const uint64_t n = self->n, late = self->late;
     double *past_x = hsep_at(self, self->past_x), *past_e = hsep_at(self, self->past_e);
+    predictor_learn_window(self);
     if (self->missing) {
         predictor_unlearn(self);
     }
@@ -199,66 +245,24 @@ HSEP_API void hsep_predictor_publish(hsep_predictor *self, uint64_t last)
     self->n_published = last;
 }
 
-/* Correct the state at the beginning of the run, if its first residuals tell that it was in motion. */
-static void predictor_start(hsep_predictor *self)
-{
-    const uint64_t Np = self->Np, late = self->late;
-    hsep_start *motion = (hsep_start *)hsep_at(self, self->motion);
-    hsep_uncertainty *uncertainty = hsep_predictor_uncertainty(self);
-    hsep_trusted *trusted = hsep_predictor_trusted(self);
-    double *command = hsep_at(self, self->command), *past_x = hsep_at(self, self->past_x);
-    double *e = hsep_at(self, self->past_e) + late, *work = hsep_at(trusted, trusted->x);
-    const double *e_h = hsep_at(uncertainty, uncertainty->e_h) + late;
-    for (uint64_t j = 0; j < Np; j++) {
-        work[j] = e[j] - e_h[j];
-    }
-    if (hsep_start_estimate(motion, command, work)) {
-        for (uint64_t j = 0; j < Np; j++) {
-            e[j] += past_x[late + j];
-        }
-        hsep_start_apply(motion, command, past_x, hsep_at(self, self->ahead_pb), hsep_predictor_physics(self));
-        for (uint64_t j = 0; j < Np; j++) {
-            e[j] -= past_x[late + j];
-        }
-        hsep_trusted_begin_in_motion(trusted, command, past_x);
-    }
-}
-
-/* Learn the measured window: by the residual model that can be trusted, and its errors. */
-static void predictor_learn_window(hsep_predictor *self)
-{
-    hsep_trusted *trusted = hsep_predictor_trusted(self);
-    double *past_e = hsep_at(self, self->past_e);
-    if (self->motion && self->k == self->preview + self->Np) {
-        predictor_start(self);
-    }
-    if (self->learning) {
-        if (trusted != NULL) {
-            hsep_trusted_learn(trusted, hsep_at(self, self->past_x), past_e);
-        }
-        hsep_uncertainty_learn(
-            hsep_predictor_uncertainty(self), past_e + self->late,
-            trusted != NULL ? hsep_at(trusted, trusted->accepted) : NULL);
-    }
-}
-
 /* Samples within the warm-up, of the window and the late ones before it. */
 static uint64_t predictor_warm_up(const hsep_predictor *self, uint64_t late)
 {
-    const double warm_up = self->n_init - (double)self->k + (double)late;
+    const double left = self->n_init - (double)(self->k - self->k % self->Np) + (double)late;
     const uint64_t n = self->Np + late;
-    return warm_up >= (double)n ? n : warm_up > 0.0 ? (uint64_t)warm_up : 0;
+    return left >= (double)n ? n : left > 0.0 ? (uint64_t)left : 0;
 }
 
-/* Predict the errors of the window that was published. */
-static void predictor_doubt(hsep_predictor *self)
+HSEP_API uint64_t hsep_predictor_warm_up(const hsep_predictor *self) { return predictor_warm_up(self, 0); }
+
+HSEP_API void hsep_predictor_doubt(hsep_predictor *self, uint64_t n_warm_up)
 {
     hsep_trusted *trusted = hsep_predictor_trusted(self);
     if (self->divergence == HSEP_CONVERGES) {
         hsep_uncertainty_predict(
             hsep_predictor_uncertainty(self), hsep_at(self, self->command), hsep_at(self, self->past_x),
-            hsep_at(self, self->e_h), predictor_warm_up(self, self->late),
-            trusted != NULL ? hsep_at(trusted, trusted->disagreement) : NULL);
+            hsep_at(self, self->e_h), n_warm_up,
+            trusted != NULL ? hsep_at(trusted, trusted->disagreement) + (trusted->n - self->n) : NULL);
     }
 }
 
@@ -289,16 +293,15 @@ HSEP_API int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, doubl
     if (!hsep_predictor_take_in(self, x_d_ahead, x_meas)) {
         return 0;
     }
-    predictor_learn_window(self);
     (void)hsep_predictor_finish(self);
     if (self->k == self->preview) { /* the first fill was not predicted */
         memset(hsep_at(self, self->past_e), 0, (size_t)(self->n + self->features.p) * sizeof(double));
     }
     hsep_predictor_begin(self);
     predictor_forecast(self);
-    self->n_physics = predictor_warm_up(self, 0);
+    self->n_physics = hsep_predictor_warm_up(self);
     hsep_predictor_publish(self, Np);
-    predictor_doubt(self);
+    hsep_predictor_doubt(self, predictor_warm_up(self, self->late));
     return 1;
 }
 

@@ -40,14 +40,15 @@
 
 typedef struct {
     hsep_predictor_settings settings;
-    hsep_trust_settings trust; /* alone */
-    double v_friction;         /* m/s, scale of friction's change of sign; 0: no features of the reference */
-    uint64_t preview;          /* samples from r(k) to the drive, >= Np; Np alone */
-    double n_init;             /* samples of warm-up from the beginning; whole, >= 0 */
-    int planned;               /* whether a compensator decides the commands of a window when it begins */
-    int unlearns;              /* whether a window with a missing sample is unlearned */
-    uint64_t n_modes;          /* >= 1 */
-    const hsep_mode *modes;    /* (n_modes,) */
+    hsep_trust_settings trust;
+    double v_friction;      /* m/s, scale of friction's change of sign; 0: no features of the reference */
+    uint64_t preview;       /* samples from r(k) to the drive, >= Np; Np alone */
+    uint64_t late;          /* samples by which the measurement is late; 0 but alone */
+    double n_init;          /* samples of warm-up from the beginning; whole, >= 0 */
+    int planned;            /* whether a compensator decides the commands of a window when it begins */
+    int unlearns;           /* whether a window with a missing sample is unlearned */
+    uint64_t n_modes;       /* >= 1 */
+    const hsep_mode *modes; /* (n_modes,) */
 } hsep_predictor_parameters;
 
 typedef struct {
@@ -74,7 +75,7 @@ typedef struct {
     uint64_t x_h;      /* (Np,) m, hybrid predictions, */
     uint64_t x_hold;   /* (Np,) m, and the last residual held; before all four the last samples not measured yet */
     uint64_t ahead_pb; /* (Np,) m, response of the physics model to ahead, relative to start; alone */
-    uint64_t command;  /* (n,) m, commands of the window relative to start, newest first; alone */
+    uint64_t command;  /* (n,) m, commands of the window relative to start, newest first */
     uint64_t past_x;   /* (n + q,) m, x_pb of this window and of the q samples before it, newest first */
     uint64_t past_e;   /* (n + p,) m, e_pb likewise, as measured */
     uint64_t e_h;      /* (n + p,) m, e_pb as predicted, behind it the measured ones; alone it is past_e */
@@ -111,12 +112,15 @@ HSEP_API int hsep_predictor_valid(const void *block, const hsep_predictor_parame
 /* The regression, for a warm start by hsep_regression_load before the first sample. */
 HSEP_API hsep_regression *hsep_predictor_regression(hsep_predictor *self);
 
+/* Parameters of the residual model that can be trusted. */
+HSEP_API hsep_trusted_parameters hsep_predictor_trusted_parameters(const hsep_predictor_parameters *parameters);
+
 /* The residual model that can be trusted; NULL for the paper's. */
 HSEP_API hsep_trusted *hsep_predictor_trusted(hsep_predictor *self);
 
 HSEP_API hsep_physics *hsep_predictor_physics(hsep_predictor *self);
 
-/* What is known of the errors of x_h; predicted and learned by a predictor alone. */
+/* What is known of the errors of x_h. */
 HSEP_API hsep_uncertainty *hsep_predictor_uncertainty(hsep_predictor *self);
 
 /* Process sample k, both inputs finite, m, and advance to k + 1; return whether a new window has begun. */
@@ -131,8 +135,8 @@ HSEP_API double hsep_predictor_std(const hsep_predictor *self, uint64_t i);
 /* Process sample k: learn it, update the error sums, advance to k + 1; return whether the window has ended. */
 HSEP_API int hsep_predictor_take_in(hsep_predictor *self, double x_d_ahead, double x_meas);
 
-/* Finish a window: its residuals, as measured, or as predicted where missing, become the past of the next one. Return
- * whether it was learned. */
+/* Finish a window: learn it with trust, and its errors; its residuals, as measured, or as predicted where missing, become
+ * the past of the next one. Return whether it was learned. */
 HSEP_API int hsep_predictor_finish(hsep_predictor *self);
 
 /* Begin a window: commands, weights, and the part of the features of the reference. */
@@ -140,6 +144,13 @@ HSEP_API void hsep_predictor_begin(hsep_predictor *self);
 
 /* Predict the samples of the window up to last - 1, whose x_pb are in past_x; eq. (4). */
 HSEP_API void hsep_predictor_publish(hsep_predictor *self, uint64_t last);
+
+/* Predict the errors of the samples that were published, whose commands are in command. n_warm_up: leading samples of
+ * the window in the warm-up. */
+HSEP_API void hsep_predictor_doubt(hsep_predictor *self, uint64_t n_warm_up);
+
+/* Leading samples of the window in the warm-up. */
+HSEP_API uint64_t hsep_predictor_warm_up(const hsep_predictor *self);
 
 /* The learned recursion, with its bias or without. */
 HSEP_API hsep_recursion hsep_predictor_recursion(const hsep_predictor *self, int with_bias);

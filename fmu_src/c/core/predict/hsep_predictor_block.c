@@ -29,13 +29,15 @@ HSEP_API hsep_regression *hsep_predictor_regression(hsep_predictor *self)
                          : (hsep_regression *)hsep_at(self, self->regression);
 }
 
-static hsep_trusted_parameters predictor_trusted_parameters(const hsep_predictor_parameters *parameters)
+HSEP_API hsep_trusted_parameters hsep_predictor_trusted_parameters(const hsep_predictor_parameters *parameters)
 {
     return (hsep_trusted_parameters){
         .settings = &parameters->settings,
         .trust = &parameters->trust,
         .modes = parameters->modes,
-        .n_modes = parameters->n_modes};
+        .n_modes = parameters->n_modes,
+        .preview = parameters->preview + parameters->late,
+        .planned = parameters->planned};
 }
 
 static hsep_start_parameters predictor_start_parameters(const hsep_predictor_parameters *parameters)
@@ -43,7 +45,7 @@ static hsep_start_parameters predictor_start_parameters(const hsep_predictor_par
     const hsep_predictor_settings *settings = &parameters->settings;
     return (hsep_start_parameters){
         .Np = settings->Np,
-        .late = parameters->trust.measurement_delay,
+        .late = parameters->late,
         .n_modes = parameters->n_modes,
         .dead_time = settings->dead_time,
         .modes = parameters->modes,
@@ -61,18 +63,18 @@ static uint64_t predictor_take(double *end, double late, double count)
 static double predictor_lay_out(hsep_predictor *self, const hsep_predictor_parameters *parameters)
 {
     const double Np = (double)parameters->settings.Np, preview = (double)parameters->preview;
-    const double late = (double)parameters->trust.measurement_delay, n = Np + late;
+    const double late = (double)parameters->late, n = Np + late;
     const double p = (double)parameters->settings.p, q = (double)parameters->settings.q;
     const int has_reference = parameters->v_friction > 0.0;
     double end = HSEP_WORDS(hsep_predictor);
     hsep_features_lay_out(
         &self->features, parameters->settings.p, parameters->settings.q, has_reference ? HSEP_N_REFERENCE : 0);
-    const hsep_trusted_parameters trusted = predictor_trusted_parameters(parameters);
+    const hsep_trusted_parameters trusted = hsep_predictor_trusted_parameters(parameters);
     const hsep_start_parameters start = predictor_start_parameters(parameters);
     const double regression = parameters->trust.trust ? 0.0 : hsep_regression_size(self->features.n);
     self->Np = parameters->settings.Np;
-    self->late = parameters->trust.measurement_delay;
-    self->n = parameters->settings.Np + parameters->trust.measurement_delay;
+    self->late = parameters->late;
+    self->n = parameters->settings.Np + parameters->late;
     self->preview = parameters->preview;
     self->n_init = parameters->n_init;
     self->sign_step = parameters->v_friction * parameters->settings.T_s;
@@ -82,7 +84,7 @@ static double predictor_lay_out(hsep_predictor *self, const hsep_predictor_param
     self->x_h = predictor_take(&end, late, Np);
     self->x_hold = predictor_take(&end, late, Np);
     self->ahead_pb = hsep_take(&end, parameters->planned ? 0.0 : Np);
-    self->command = hsep_take(&end, parameters->planned ? 0.0 : n);
+    self->command = hsep_take(&end, n);
     self->past_x = hsep_take(&end, n + q);
     self->past_e = hsep_take(&end, n + p);
     self->e_h = parameters->planned ? hsep_take(&end, n + p) : self->past_e;
@@ -120,7 +122,7 @@ HSEP_API void hsep_predictor_init(hsep_predictor *self, const hsep_predictor_par
     hsep_uncertainty_init(
         hsep_predictor_uncertainty(self), self->Np, self->n, fmax(parameters->settings.lambda, noise_std * noise_std));
     if (self->trusted) {
-        const hsep_trusted_parameters trusted = predictor_trusted_parameters(parameters);
+        const hsep_trusted_parameters trusted = hsep_predictor_trusted_parameters(parameters);
         hsep_trusted_init(hsep_predictor_trusted(self), &trusted);
         if (self->motion) {
             const hsep_start_parameters motion = predictor_start_parameters(parameters);
@@ -136,7 +138,7 @@ HSEP_API int hsep_predictor_valid(const void *block, const hsep_predictor_parame
     hsep_predictor got;
     memcpy(&got, block, sizeof got);
     (void)predictor_lay_out(&got, parameters); /* changes nothing where it is sound */
-    const hsep_trusted_parameters trusted = predictor_trusted_parameters(parameters);
+    const hsep_trusted_parameters trusted = hsep_predictor_trusted_parameters(parameters);
     const hsep_start_parameters motion = predictor_start_parameters(parameters);
     const double sums[4] = {got.sum_e, got.sum_pb, got.sum_h, got.sum_hold};
     int sound =

@@ -32,9 +32,7 @@
     /* standard deviation of the measurement noise, with trust; 0: estimated, m */ \
     SETTING(double, noise_std) \
     /* time after which samples have lost 63 % of their weight, with trust; 0: never, s */ \
-    SETTING(double, forgetting) \
-    /* whole samples by which the measured position is late */ \
-    SETTING(uint64_t, measurement_delay)
+    SETTING(double, forgetting)
 
 #define HSEP_COMPENSATOR_SETTINGS(SETTING) \
     /* velocity over which friction changes its sign, for features of the reference; 0: none of them, m/s */ \

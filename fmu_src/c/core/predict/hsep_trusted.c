@@ -1,3 +1,4 @@
+/* Learning of a residual model that can be trusted. */
 #include "hsep_trusted.h"
 
 #include "hsep_vector.h"
@@ -9,99 +10,15 @@
 /* Factor by which the mean square of the residual fades from window to window. */
 static const double trusted_recent = 0.9;
 
-/* Growth of the commanded velocity from which on what was learned at lower ones counts for nothing. */
-static const double trusted_growth = 30.0;
-
-/* Bound on the variance of the noise relative to the largest mean square of the residual: a larger one would prevent
- * any learning. */
-static const double trusted_least_noise = 1e-4;
-
-/* Velocity, m/s, below which a command is at rest: ratios of smaller ones may underflow. */
-static const double trusted_least_velocity = 1e-200;
-
-/* Bound on the last residual held, relative to the largest one. */
-static const double trusted_hold_max = 1.2;
-
 /* Lags of a row that may stand for samples without a measurement. */
 static const double trusted_bridged_max = 3.0;
 
-/* Largest weight of earlier runs when another begins, in windows. */
+/* Largest weight of earlier runs when another begins, in predictions. */
 static const double trusted_carried = 10.0;
 
 /* Mean square error of a window, relative to the expected one, above which the machine has changed; and what then
  * remains at least of the weight of all samples before, in windows. */
 static const double trusted_surprise = 10.0, trusted_surprised = 0.1;
-
-static const double trusted_least_magnitude = 1e-150; /* of a feature */
-
-/* Begin the window: its features, at the position x_pb, and their largest magnitudes. Return whether the commanded
- * velocity has outgrown what was learned. */
-static int trusted_begin(hsep_trusted *self, const double x_d[], const double x_pb[])
-{
-    hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
-    const double peak = hsep_disturbances_peak_velocity(disturbances, x_d);
-    const int outgrown = peak > fmax(trusted_growth * self->velocity_scale, trusted_least_velocity);
-    double *rows = hsep_at(self, self->rows), *largest = hsep_at(self, self->forecast_largest);
-    self->forecast_scale = outgrown ? peak : self->velocity_scale;
-    hsep_disturbances_begin(disturbances, x_d, x_pb, self->forecast_scale, rows);
-    hsep_disturbances_stiffness(disturbances, x_pb, rows, self->n);
-    for (uint64_t i = 0; i < self->n_static; i++) {
-        largest[i] = outgrown ? 0.0 : hsep_at(self, self->largest)[i];
-    }
-    for (uint64_t k = 0; k < self->n; k++, rows += self->n_static) {
-        for (uint64_t i = 0; i < self->n_static; i++) {
-            largest[i] = fmax(largest[i], fabs(rows[i]));
-        }
-    }
-    return outgrown;
-}
-
-/* Predict the window by the candidates. past: (p,), m. */
-static void trusted_predict(hsep_trusted *self, const double x_pb[], const double past[])
-{
-    const double effect = self->effect > 0.0 ? self->effect : sqrt(self->scale.largest_square);
-    const double least = fmin(self->least_variance, trusted_least_noise * self->scale.largest_square);
-    const double *largest = hsep_at(self, self->forecast_largest);
-    double *scales = hsep_at(self, self->scales), *x = hsep_at(self, self->x), *rows = hsep_at(self, self->rows);
-    for (uint64_t i = 0; i < self->n_static; i++) {
-        const double share = hsep_disturbances_share(hsep_trusted_disturbances(self), i);
-        scales[i] = effect * share / fmax(largest[i], trusted_least_magnitude);
-    }
-    for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
-        hsep_candidate_solve(hsep_trusted_candidate(self, i), hsep_trusted_regression(self), scales, least);
-    }
-    /* The stiffness acts at the position, which the physics model alone does not give well enough. */
-    hsep_candidate_predict(hsep_trusted_candidate(self, 0), rows, past, &self->scale);
-    for (uint64_t j = 0; j < self->n; j++) {
-        x[j] = x_pb[j] + hsep_candidate_prediction(hsep_trusted_candidate(self, 0))[j];
-    }
-    hsep_disturbances_stiffness(hsep_trusted_disturbances(self), x, rows, self->n);
-    for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
-        hsep_candidate_predict(hsep_trusted_candidate(self, i), rows, past, &self->scale);
-    }
-}
-
-HSEP_API void hsep_trusted_forecast(hsep_trusted *self, const double x_d[], const double x_pb[], double e[])
-{
-    const double *past = e + self->n, *weights = self->blend.weights, bound = trusted_hold_max * self->scale.largest;
-    const int outgrown = trusted_begin(self, x_d, x_pb);
-    double *disagreement = hsep_at(self, self->disagreement);
-    self->hold = fmin(fmax(past[0], -bound), bound);
-    self->predicted = self->n_rows > 0.0 && !outgrown && self->scale.largest_square > 0.0;
-    if (self->predicted) {
-        trusted_predict(self, x_pb, past);
-    }
-    for (uint64_t j = 0; j < self->n; j++) {
-        double square = weights[0] * self->hold * self->hold;
-        e[j] = weights[0] * self->hold;
-        for (uint64_t i = 0; self->predicted && i < HSEP_N_CANDIDATES; i++) {
-            const double candidate = hsep_candidate_prediction(hsep_trusted_candidate(self, i))[j];
-            e[j] += weights[1 + i] * candidate;
-            square += weights[1 + i] * candidate * candidate;
-        }
-        disagreement[j] = fmax(square - e[j] * e[j], 0.0);
-    }
-}
 
 /* Weigh all samples so far by kept. */
 static void trusted_discount(hsep_trusted *self, double kept)
@@ -114,7 +31,7 @@ static void trusted_discount(hsep_trusted *self, double kept)
 
 HSEP_API void hsep_trusted_restart(hsep_trusted *self)
 {
-    const double most = trusted_carried * (double)self->Np;
+    const double most = trusted_carried * (double)self->n;
     trusted_discount(self, most / fmax(self->n_rows, most));
 }
 
@@ -240,7 +157,7 @@ static void trusted_assess(hsep_trusted *self, const double e[], double count)
     scale->largest_square = fmax(scale->largest_square, mean_square);
     signals[HSEP_N_BLENDED] = e;
     for (uint64_t i = 0; self->predicted && i < HSEP_N_CANDIDATES; i++) {
-        signals[1 + i] = hsep_candidate_prediction(hsep_trusted_candidate(self, i)) + (self->n - self->Np);
+        signals[1 + i] = hsep_candidate_prediction(hsep_trusted_candidate(self, i));
     }
     for (uint64_t i = 1; i <= HSEP_N_BLENDED; i++) {
         double sum = 0.0;
@@ -259,15 +176,14 @@ static void trusted_assess(hsep_trusted *self, const double e[], double count)
 HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const double x_d[], const double x_pb[])
 {
     hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
-    hsep_disturbances_restart(disturbances, x_d, x_pb);
-    hsep_disturbances_begin(disturbances, x_d, x_pb, self->forecast_scale, hsep_at(self, self->rows));
+    hsep_disturbances_restart(disturbances, x_d, x_pb, self->Np);
+    hsep_disturbances_command(disturbances, x_d, x_pb, self->Np, self->forecast_scale, hsep_at(self, self->rows));
 }
 
-HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double predicted[], double residuals[])
+HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_d[], const double x_pb[], double e[], int fold)
 {
     hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
-    const double *x_pb = predicted + (self->n - self->Np); /* of the samples that are measured */
-    double *e = residuals + (self->n - self->Np), *x = hsep_at(self, self->x), *bridged = hsep_at(self, self->bridged);
+    double *x = hsep_at(self, self->x), *bridged = hsep_at(self, self->bridged);
     const double n_rows = self->n_rows;                 /* of the prediction */
     if (self->forecast_scale != self->velocity_scale) { /* outgrown */
         hsep_regression_init(hsep_trusted_regression(self), self->n_static + self->p, HSEP_NO_PENALTY);
@@ -284,9 +200,12 @@ HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double predicted[], d
     for (uint64_t j = 0; j < self->Np; j++) {
         x[j] = x_pb[j] + e[j];
     }
-    hsep_disturbances_stiffness(disturbances, x, hsep_at(self, self->rows), self->Np);
+    if (self->n > self->Np) { /* what was tried last went beyond the window */
+        hsep_disturbances_command(disturbances, x_d, x_pb, self->Np, self->velocity_scale, hsep_at(self, self->rows));
+    }
+    hsep_disturbances_motion(disturbances, x_pb, x, self->Np, hsep_at(self, self->rows));
     hsep_disturbances_end(disturbances);
-    if (count > 0.0) {
+    if (fold && count > 0.0) {
         trusted_fold(self, e);
         trusted_judge(self, n_rows, e);
         trusted_assess(self, e, count);

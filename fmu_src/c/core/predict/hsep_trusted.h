@@ -3,11 +3,11 @@
  * Where the paper's regression has one bare penalty lambda on every weight, here each weight has a prior from the
  * effect that its feature may have, and lambda is the variance of the noise, estimated from the residuals.
  *
- * A window is predicted by hsep_trusted_forecast, and learned by hsep_trusted_learn once it is measured. Where the
- * measurement is late, n samples are predicted from the first one that is not measured yet, and the first Np of them
- * are learned. Signals are kept newest first: sample k is at place n - 1 - k, and what was before the window is behind
- * it. Positions are relative to the start. Memory is one block, without pointers; a window predicted and not measured yet is part of it.
- * Reentrant; allocates nothing.
+ * A window is predicted by hsep_trusted_forecast, and learned by hsep_trusted_learn once it is measured. A compensator,
+ * which decides the commands of a window, calls hsep_trusted_scale and, for commands that it tries over its preview,
+ * hsep_trusted_predict; the last ones count. Signals are kept newest first: of n samples, sample k is at place
+ * n - 1 - k, and what was before them is behind them. Positions are relative to the start. Memory is one block, without
+ * pointers; a window predicted and not measured yet is part of it. Reentrant; allocates nothing.
  */
 #ifndef HSEP_TRUSTED_H
 #define HSEP_TRUSTED_H
@@ -32,14 +32,16 @@ typedef struct {
     const hsep_trust_settings *trust;
     const hsep_mode *modes; /* (n_modes,) */
     uint64_t n_modes;
+    uint64_t preview; /* samples of a prediction, >= Np; more in a compensator, or where the measurement is late */
+    int planned;      /* whether a compensator decides the commands */
 } hsep_trusted_parameters;
 
 typedef struct {
-    uint64_t Np, n, p, n_static;
-    double least_variance; /* m2, of the noise */
-    double effect;         /* m, prior standard deviation of a feature's effect; 0: from the residuals */
-    double given_variance; /* m2, of the noise; 0: estimated */
-    double kept;           /* weight of earlier rows, from window to window */
+    uint64_t Np, n, p, n_static; /* samples of a window and of a prediction, lags, features without lags */
+    double least_variance;       /* m2, of the noise */
+    double effect;               /* m, prior standard deviation of a feature's effect; 0: from the residuals */
+    double given_variance;       /* m2, of the noise; 0: estimated */
+    double kept;                 /* weight of earlier rows, from window to window */
     /* Learned */
     double n_rows;         /* weighted */
     double velocity_scale; /* m/s */
@@ -95,20 +97,29 @@ HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i);
 /* Whether these numbers are finite and in range. */
 HSEP_API int hsep_trusted_sound(hsep_trusted *self);
 
-/* Predict the residual e, (n + p,), m, over the next window; behind it the last ones, as measured. x_d: commands,
- * x_pb: physics-based prediction, (n,), m. Cost: m^3 / 6 multiply-adds for each candidate's m features, four times
- * n m^2 / 2, n^2 / 2, and 6 n tanh. */
+/* Predict the residual e, (Np + p,), m, over the next window; behind it the last ones, as measured. x_d: commands,
+ * x_pb: physics-based prediction, (Np,), m. Cost: m^3 / 6 multiply-adds for each candidate's m features, four times
+ * Np m^2 / 2, Np^2 / 2, and 6 Np tanh. */
 HSEP_API void hsep_trusted_forecast(hsep_trusted *self, const double x_d[], const double x_pb[], double e[]);
+
+/* Its two parts over n samples. Take the scales of the features from the samples that come next, and solve for the
+ * weights; path: unmodified commands, (n,), m, which a compensator knows, or NULL. */
+HSEP_API void hsep_trusted_scale(
+    hsep_trusted *self, const double x_d[], const double x_pb[], const double path[], double last_residual);
+
+/* Predict with them. e: (n + p,), m; held: whether the variances stay those of the last prediction. */
+HSEP_API void hsep_trusted_predict(hsep_trusted *self, const double x_d[], const double x_pb[], double e[], int held);
 
 /* Take the measured position of sample k of the window that was predicted, m, relative to the start; NaN: missing. */
 HSEP_API void hsep_trusted_measure(hsep_trusted *self, uint64_t k, double x);
 
-/* Begin the run of that window, its first one, in motion: x_d and x_pb, (n,), m, with the motion before it. */
+/* Begin the run of that window, its first one, in motion: x_d and x_pb, (Np,), m, with the motion before it. */
 HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const double x_d[], const double x_pb[]);
 
-/* Learn that window. predicted: x_pb, (n,), m; residuals: (n + p,), m: the first Np samples become its residuals; where the measurement is not plausible,
- * between those beside it; behind it those before it. Cost: Np times that of hsep_regression_fold. */
-HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double predicted[], double residuals[]);
+/* Learn that window. x_d: its commands, (Np,), m; e: (Np + p,), m, becomes its residuals; where the measurement is not
+ * plausible, between those beside it; behind it those before it; fold: whether it is learned, the next window starts
+ * from it in any case. Cost: Np times that of hsep_regression_fold. */
+HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_d[], const double x_pb[], double e[], int fold);
 
 /* Discount what earlier runs have learned: a machine may have changed meanwhile. */
 HSEP_API void hsep_trusted_restart(hsep_trusted *self);

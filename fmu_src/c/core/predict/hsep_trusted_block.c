@@ -40,11 +40,11 @@ static double trusted_lay_out(hsep_trusted *self, const hsep_trusted_parameters 
 {
     const hsep_predictor_settings *settings = parameters->settings;
     const hsep_trust_settings *trust = parameters->trust;
-    const double Np = (double)settings->Np, n = Np + (double)trust->measurement_delay;
+    const double Np = (double)settings->Np, n = (double)parameters->preview;
     const double n_static = (double)hsep_disturbances_n(settings->q);
     double end = HSEP_WORDS(hsep_trusted);
     self->Np = settings->Np;
-    self->n = settings->Np + trust->measurement_delay;
+    self->n = parameters->preview;
     self->p = settings->p;
     self->n_static = hsep_disturbances_n(settings->q);
     self->least_variance = settings->lambda;
@@ -60,8 +60,7 @@ static double trusted_lay_out(hsep_trusted *self, const hsep_trusted_parameters 
     self->bridged = hsep_take(&end, Np + (double)settings->p);
     self->disagreement = hsep_take(&end, n);
     self->rows = hsep_take(&end, n * n_static);
-    self->disturbances =
-        hsep_take_block(&end, hsep_disturbances_size(settings, parameters->n_modes, trust->measurement_delay));
+    self->disturbances = hsep_take_block(&end, hsep_disturbances_size(settings, parameters->n_modes));
     self->regression = hsep_take_block(&end, hsep_regression_size(hsep_trusted_n(settings)));
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
         const hsep_candidate_shape shape = trusted_shape(self, i);
@@ -83,7 +82,7 @@ HSEP_API void hsep_trusted_init(hsep_trusted *self, const hsep_trusted_parameter
     hsep_guard_init(&self->guard, 2 * self->Np);
     hsep_disturbances_init(
         hsep_trusted_disturbances(self), parameters->settings, parameters->modes, parameters->n_modes,
-        parameters->trust->measurement_delay);
+        parameters->planned);
     hsep_regression_init(hsep_trusted_regression(self), self->n_static + self->p, HSEP_NO_PENALTY);
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
         const hsep_candidate_shape shape = trusted_shape(self, i);
@@ -96,11 +95,11 @@ HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters
     hsep_trusted got;
     memcpy(&got, block, sizeof got);
     (void)trusted_lay_out(&got, parameters); /* changes nothing where it is sound */
-    const uint64_t late = parameters->trust->measurement_delay;
-    int sound = memcmp(&got, block, sizeof got) == 0 && got.predicted <= 1 && got.guard.patience == 2 * got.Np &&
-                hsep_disturbances_valid(
-                    hsep_at_bytes(block, got.disturbances), parameters->settings, parameters->n_modes, late) &&
-                hsep_regression_valid(hsep_at_bytes(block, got.regression), got.n_static + got.p);
+    int sound =
+        memcmp(&got, block, sizeof got) == 0 && got.predicted <= 1 && got.guard.patience == 2 * got.Np &&
+        hsep_disturbances_valid(
+            hsep_at_bytes(block, got.disturbances), parameters->settings, parameters->n_modes, parameters->planned) &&
+        hsep_regression_valid(hsep_at_bytes(block, got.regression), got.n_static + got.p);
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
         const void *candidate = hsep_at_bytes(block, got.candidates[i]);
         const hsep_candidate_shape shape = trusted_shape(&got, i);

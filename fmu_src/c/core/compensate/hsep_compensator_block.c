@@ -1,0 +1,93 @@
+/* Memory of a compensator: its layout, beginning and check. */
+#include "hsep_compensator.h"
+
+#include "hsep_range.h"
+
+#include <stddef.h>
+#include <string.h>
+
+HSEP_API hsep_planner *hsep_compensator_planner(hsep_compensator *self)
+{
+    return (hsep_planner *)hsep_at(self, self->planner);
+}
+
+HSEP_API hsep_predictor *hsep_compensator_predictor(hsep_compensator *self)
+{
+    return (hsep_predictor *)hsep_at(self, self->predictor);
+}
+
+HSEP_API hsep_trusted_planner *hsep_compensator_trusted(hsep_compensator *self)
+{
+    return (hsep_trusted_planner *)hsep_at(self, self->trusted);
+}
+
+/* Set what follows from the parameters; return the bytes of the block. */
+static double compensator_lay_out(hsep_compensator *self, const hsep_compensator_parameters *parameters)
+{
+    const hsep_predictor_parameters *predictor = &parameters->predictor;
+    const double preview = (double)predictor->preview;
+    const hsep_trusted_parameters trusted = hsep_predictor_trusted_parameters(predictor);
+    double end = HSEP_WORDS(hsep_compensator);
+    self->compensate = (uint64_t)parameters->compensate;
+    self->x_dm = hsep_take(&end, (double)predictor->settings.Np);
+    self->trial_x = hsep_take(&end, preview + (double)predictor->settings.q);
+    self->trial_e = hsep_take(&end, preview + (double)predictor->settings.p);
+    self->target = hsep_take(&end, preview);
+    self->spline_pb = hsep_take(&end, preview);
+    self->spline_h = hsep_take(&end, preview);
+    self->trial = hsep_take_block(&end, hsep_physics_size(predictor->n_modes, predictor->settings.dead_time));
+    self->planner = hsep_take_block(&end, hsep_planner_size(&parameters->planner));
+    self->predictor = hsep_take_block(&end, hsep_predictor_size(predictor));
+    self->trusted =
+        predictor->trust.trust ? hsep_take_block(&end, hsep_trusted_planner_size(&trusted, &parameters->planner)) : 0;
+    return end * sizeof(double);
+}
+
+HSEP_API double hsep_compensator_size(const hsep_compensator_parameters *parameters)
+{
+    return compensator_lay_out(&(hsep_compensator){0}, parameters);
+}
+
+HSEP_API void hsep_compensator_init(hsep_compensator *self, const hsep_compensator_parameters *parameters, double start)
+{
+    const hsep_predictor_parameters *predictor = &parameters->predictor;
+    memset(self, 0, (size_t)hsep_compensator_size(parameters));
+    (void)compensator_lay_out(self, parameters);
+    hsep_predictor_init(hsep_compensator_predictor(self), predictor, start);
+    hsep_planner_init(hsep_compensator_planner(self), &parameters->planner, start);
+    if (self->trusted) {
+        const hsep_trusted_parameters trusted = hsep_predictor_trusted_parameters(predictor);
+        hsep_trusted_planner_init(hsep_compensator_trusted(self), &trusted, &parameters->planner, start);
+    }
+    self->state = self->before = self->compensate > HSEP_SEP_PHYSICS ? HSEP_SEP_PHYSICS : self->compensate;
+    /* The spline filtered by the physics model from rest, which is constant. */
+    hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
+    double *spline = hsep_at(self, self->spline_pb);
+    hsep_physics_init(
+        trial, predictor->modes, predictor->n_modes, predictor->settings.dead_time, predictor->settings.T_s,
+        (hsep_hold)predictor->settings.input_hold);
+    memcpy(
+        spline, hsep_splines_shape(hsep_planner_splines(hsep_compensator_planner(self))),
+        (size_t)(4 * parameters->planner.spacing) * sizeof(double));
+    hsep_physics_forced_response(trial, spline, spline, (size_t)predictor->preview);
+}
+
+HSEP_API int hsep_compensator_valid(const void *block, const hsep_compensator_parameters *parameters, uint64_t k)
+{
+    const hsep_predictor_parameters *predictor = &parameters->predictor;
+    const hsep_trusted_parameters trusted = hsep_predictor_trusted_parameters(predictor);
+    hsep_compensator got;
+    hsep_predictor online;
+    memcpy(&got, block, sizeof got);
+    (void)compensator_lay_out(&got, parameters); /* changes nothing where it is sound */
+    memcpy(&online, hsep_at_bytes(block, got.predictor), sizeof online);
+    return memcmp(&got, block, sizeof got) == 0 && got.state <= HSEP_SEP_HYBRID && got.before <= HSEP_SEP_HYBRID &&
+           got.solving <= 1 && (got.solving || online.n_published == predictor->settings.Np) &&
+           (online.divergence ||
+            hsep_within(hsep_at_bytes(block, got.x_dm), predictor->settings.Np, HSEP_PREDICTION_MAX)) &&
+           hsep_physics_valid(hsep_at_bytes(block, got.trial), predictor->n_modes, predictor->settings.dead_time) &&
+           hsep_planner_valid(hsep_at_bytes(block, got.planner), &parameters->planner) &&
+           (!got.trusted ||
+            hsep_trusted_planner_valid(hsep_at_bytes(block, got.trusted), &trusted, &parameters->planner)) &&
+           hsep_predictor_valid(hsep_at_bytes(block, got.predictor), predictor, k);
+}

@@ -1,0 +1,298 @@
+#include "hsep_trusted_planner.h"
+
+#include "hsep_cholesky.h"
+#include "hsep_vector.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+/* Reach of friction's slope in each Newton step, relative to the model's velocity scale: a tangent is blind to a sign
+ * that changes nearby. */
+static const double trusted_planner_reaches[HSEP_TRUSTED_STEPS] = {0.1, 0.03, 0.01, 0.0};
+
+/* Penalty on the change of velocity: its first value, and how it follows success. */
+static const double trusted_planner_first = 1.0, trusted_planner_raise = 8.0, trusted_planner_lower = 0.25;
+
+/* Relative gain of a step below which it is the last one. */
+static const double trusted_planner_gain = 1e-3;
+
+static void trusted_planner_copy(hsep_trusted_planner *self, double to[], const double from[])
+{
+    memcpy(to, from, (size_t)(HSEP_DECIDED + self->n) * sizeof(double));
+}
+
+/* Commands under the first count coefficients of a plan, and the response of the physics model to them. */
+static void trusted_planner_command(
+    hsep_trusted_planner *self, const hsep_trusted_task *task, const double c[], uint64_t count)
+{
+    const hsep_splines *splines = hsep_planner_splines(task->planner);
+    double *command = hsep_at(self, self->command), *x_pb = hsep_at(self, self->x_pb);
+    hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
+    memcpy(trial, hsep_at(self, self->physics), (size_t)(self->trial - self->physics) * sizeof(double));
+    for (uint64_t k = 0; k < self->preview; k++) {
+        const uint64_t j = self->preview - 1 - k;
+        command[j] = task->x_d[k] - self->start + hsep_splines_sum(splines, c, count, k);
+        hsep_physics_forced_response(trial, &command[j], &x_pb[j], 1);
+    }
+}
+
+/* Predict these commands; return the cost of the plan, m2; not finite if the prediction overflows. held: whether the
+ * variances are those under the rest of the last plan. */
+static double trusted_planner_predict(
+    hsep_trusted_planner *self, const hsep_trusted_task *task, const double c[], int held)
+{
+    const hsep_splines *splines = hsep_planner_splines(task->planner);
+    const uint64_t count = HSEP_DECIDED + self->n;
+    const double *x_pb = hsep_at(self, self->x_pb), *before = task->planner->delta_before;
+    double *e_h = hsep_at(self, self->e_h), d[4] = {before[0], before[1], before[2], 0.0}, error = 0.0, jerk = 0.0;
+    hsep_trusted_predict(task->model, hsep_at(self, self->command), x_pb, e_h, held);
+    for (uint64_t k = 0; k < self->preview; k++) {
+        const uint64_t j = self->preview - 1 - k;
+        const double e = task->x_d[k] - self->start - (x_pb[j] + e_h[j]);
+        d[3] = hsep_splines_sum(splines, c, count, k);
+        const double third = ((d[3] - d[2]) - (d[2] - d[1])) - ((d[2] - d[1]) - (d[1] - d[0]));
+        error += e * e;
+        jerk += third * third;
+        d[0] = d[1], d[1] = d[2], d[2] = d[3];
+    }
+    return error + task->planner->jerk_weight * jerk;
+}
+
+/* The same of the commands of a plan. */
+static double trusted_planner_at(hsep_trusted_planner *self, const hsep_trusted_task *task, const double c[], int held)
+{
+    trusted_planner_command(self, task, c, HSEP_DECIDED + self->n);
+    return trusted_planner_predict(self, task, c, held);
+}
+
+/* The physics model's plan is made: try a better one, if there may be one. */
+static void trusted_planner_continue(hsep_trusted_planner *self, const hsep_trusted_task *task)
+{
+    double *c = hsep_planner_coefficients(task->planner), *rest = hsep_at(self, self->rest);
+    self->planned = 1;
+    self->stage = self->follows ? HSEP_TRUSTED_REST : HSEP_TRUSTED_PREDICT;
+    if (self->follows) {
+        trusted_planner_copy(self, hsep_at(self, self->of_physics), c);
+        trusted_planner_copy(self, hsep_at(self, self->best), rest);
+        trusted_planner_copy(self, c, rest);
+        hsep_planner_let_turn(task->planner);
+    }
+}
+
+/* Begin the physics model's plan; without one the rest of the last plan goes on, which is predicted. */
+static void trusted_planner_physics(hsep_trusted_planner *self, const hsep_trusted_task *task)
+{
+    const double *x_pb = hsep_at(self, self->x_pb);
+    double *target = hsep_at(self, self->target); /* x_d minus its response to x_d with what is decided of delta */
+    trusted_planner_command(self, task, hsep_at(self, self->rest), HSEP_DECIDED);
+    for (uint64_t k = 0; k < self->preview; k++) {
+        target[k] = task->x_d[k] - self->start - x_pb[self->preview - 1 - k];
+    }
+    hsep_planner_open(task->planner, task->x_d);
+    hsep_planner_aim(task->planner, task->spline, target);
+    const hsep_plan_status status = hsep_planner_solve(task->planner, 1);
+    if (status == HSEP_PLAN_DONE) {
+        trusted_planner_continue(self, task);
+    } else {
+        self->stage = status == HSEP_PLAN_BOUNDED ? HSEP_TRUSTED_PHYSICS : HSEP_TRUSTED_DONE;
+    }
+}
+
+HSEP_API void hsep_trusted_planner_begin(
+    hsep_trusted_planner *self, const hsep_trusted_task *task, const hsep_physics *physics, const double past[],
+    uint64_t best)
+{
+    double *path = hsep_at(self, self->target), *rest = hsep_at(self, self->rest);
+    self->steps = self->tries = self->tries_in_all = self->solver_steps = self->planned = 0;
+    self->penalty = 0.0;
+    trusted_planner_copy(self, rest, hsep_planner_coefficients(task->planner));
+    memcpy(hsep_at(self, self->physics), physics, (size_t)(self->trial - self->physics) * sizeof(double));
+    memcpy(hsep_at(self, self->e_h) + self->preview, past, (size_t)self->p * sizeof(double));
+    for (uint64_t k = 0; k < self->preview; k++) {
+        path[self->preview - 1 - k] = task->x_d[k] - self->start;
+    }
+    trusted_planner_command(self, task, rest, HSEP_DECIDED + self->n);
+    hsep_trusted_scale(task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb), path, past[0]);
+    (void)trusted_planner_predict(self, task, rest, 0);
+    self->follows = best > 1 && task->model->predicted;
+    self->stage = best > 0 ? HSEP_TRUSTED_BEGIN : HSEP_TRUSTED_DONE;
+}
+
+/* Begin a Newton step: linearise at the best plan, which was predicted last. */
+static void trusted_planner_step(hsep_trusted_planner *self, const hsep_trusted_task *task)
+{
+    const double *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
+    double *target = hsep_at(self, self->target);
+    hsep_linearised_at(
+        (hsep_linearised *)hsep_at(self, self->linearised), task->model, hsep_at(self, self->command), x_pb,
+        task->spline, trusted_planner_reaches[self->steps]);
+    for (uint64_t k = 0; k < self->preview; k++) { /* x_d - x_h, to which W c is added */
+        const uint64_t j = self->preview - 1 - k;
+        target[k] = task->x_d[k] - self->start - (x_pb[j] + e_h[j]);
+    }
+    self->steps++;
+    self->columns = 0;
+    self->tries = 0;
+    self->stage = HSEP_TRUSTED_COLUMN;
+}
+
+/* Change of x_h by a spline; W is kept without the zeros before the splines begin. */
+static double *trusted_planner_column_of(hsep_trusted_planner *self, uint64_t j, uint64_t spacing)
+{
+    return hsep_at(self, self->W) + (j * self->preview - spacing * (j * (j - 1) / 2));
+}
+
+/* Changes of x_h by some of the splines, as much work as in each of the parts. */
+static void trusted_planner_columns(hsep_trusted_planner *self, const hsep_trusted_task *task)
+{
+    const hsep_splines *splines = hsep_planner_splines(task->planner);
+    const double *at = hsep_at(self, self->best) + HSEP_DECIDED;
+    const uint64_t n = self->n, spacing = splines->spacing;
+    const uint64_t all = n * self->preview - spacing * (n * (n - 1) / 2);
+    double *target = hsep_at(self, self->target);
+    for (uint64_t done = 0; self->columns < n && done * HSEP_TRUSTED_COLUMNS < all;) {
+        const uint64_t j = self->columns++, first = j * spacing, length = self->preview - first;
+        double *column = trusted_planner_column_of(self, j, spacing);
+        hsep_linearised_column(
+            (hsep_linearised *)hsep_at(self, self->linearised), task->model, hsep_splines_shape(splines), 4 * spacing,
+            task->spline, first, column);
+        hsep_axpy(target + first, at[j], column, length);
+        done += length;
+    }
+    self->stage = self->columns < n ? HSEP_TRUSTED_COLUMN : HSEP_TRUSTED_PRODUCT;
+}
+
+/* Programme of a Newton step: P = W' W + jerk_weight D' D, and its linear term. */
+static void trusted_planner_products(hsep_trusted_planner *self, const hsep_trusted_task *task)
+{
+    const hsep_splines *splines = hsep_planner_splines(task->planner);
+    const uint64_t n = self->n, preview = self->preview, spacing = splines->spacing;
+    double *P = hsep_at(self, self->P), *v = hsep_at(self, self->v), *target = hsep_at(self, self->target);
+    for (uint64_t i = 0; i < n; i++) {
+        const double *left = trusted_planner_column_of(self, i, spacing);
+        for (uint64_t j = i; j < n; j++) { /* column j begins (j - i) spacing later */
+            const double *right = trusted_planner_column_of(self, j, spacing);
+            *P++ = hsep_dot(left + (j - i) * spacing, right, preview - j * spacing);
+        }
+        v[i] = hsep_dot(left, target + i * spacing, preview - i * spacing);
+    }
+    hsep_splines_difference_gram(splines, 3, task->planner->jerk_weight, hsep_at(self, self->P));
+    hsep_splines_project_jerk(splines, task->planner->jerk_weight, hsep_planner_third(task->planner), v);
+    self->stage = HSEP_TRUSTED_TRY;
+}
+
+/* Solve the programme with a penalty on the change of velocity. */
+static void trusted_planner_try(hsep_trusted_planner *self, const hsep_trusted_task *task)
+{
+    const hsep_splines *splines = hsep_planner_splines(task->planner);
+    const double *at = hsep_at(self, self->best) + HSEP_DECIDED;
+    double *P = hsep_planner_quadratic(task->planner), *v = hsep_planner_linear(task->planner);
+    memcpy(P, hsep_at(self, self->P), (size_t)hsep_triangle(self->n) * sizeof(double));
+    memcpy(v, hsep_at(self, self->v), (size_t)self->n * sizeof(double));
+    hsep_splines_difference_gram(splines, 1, self->penalty, P);
+    hsep_splines_difference_product(splines, 1, self->penalty, at, v);
+    hsep_planner_regularise(task->planner);
+    self->tries++;
+    self->tries_in_all++;
+    const hsep_plan_status status = hsep_planner_solve(task->planner, 1);
+    self->stage = status == HSEP_PLAN_DONE ? HSEP_TRUSTED_JUDGE : HSEP_TRUSTED_COMPARE;
+    if (status == HSEP_PLAN_BOUNDED && self->solver_steps < HSEP_TRUSTED_SOLVER) {
+        self->stage = HSEP_TRUSTED_BOUNDED;
+    }
+}
+
+/* Judge a try, and take it if it is better. */
+static void trusted_planner_judge(hsep_trusted_planner *self, const hsep_trusted_task *task)
+{
+    double *c = hsep_planner_coefficients(task->planner);
+    const double cost = trusted_planner_at(self, task, c, 1), gain = self->cost - cost;
+    const int may_try = self->tries_in_all < HSEP_TRUSTED_TOGETHER;
+    self->stage = HSEP_TRUSTED_COMPARE;
+    if (cost < self->cost) {
+        const int is_last = gain < trusted_planner_gain * (gain + cost) || self->steps == HSEP_TRUSTED_STEPS;
+        trusted_planner_copy(self, hsep_at(self, self->best), c);
+        self->cost = cost;
+        self->penalty *= trusted_planner_lower;
+        self->stage = is_last || !may_try ? HSEP_TRUSTED_COMPARE : HSEP_TRUSTED_STEP;
+    } else {
+        self->penalty = fmax(trusted_planner_raise * self->penalty, trusted_planner_first);
+        self->stage = self->tries < HSEP_TRUSTED_TRIES && may_try ? HSEP_TRUSTED_TRY : HSEP_TRUSTED_COMPARE;
+    }
+    trusted_planner_copy(self, c, hsep_at(self, self->rest));
+}
+
+/* Take the plan whose cost is lower. */
+static void trusted_planner_compare(hsep_trusted_planner *self, const hsep_trusted_task *task)
+{
+    const double cost = trusted_planner_at(self, task, hsep_at(self, self->of_physics), 1);
+    const int is_better = self->cost < cost; /* not if it is NaN */
+    self->planned = is_better ? 2 : 1;
+    self->stage = HSEP_TRUSTED_PREDICT;
+    trusted_planner_copy(
+        self, hsep_planner_coefficients(task->planner), hsep_at(self, is_better ? self->best : self->of_physics));
+}
+
+HSEP_API uint64_t hsep_trusted_planner_next(const hsep_trusted_planner *self)
+{
+    switch ((hsep_trusted_stage)self->stage) {
+    case HSEP_TRUSTED_DONE:
+        return 0;
+    case HSEP_TRUSTED_BEGIN:
+    case HSEP_TRUSTED_PRODUCT:
+        return 2;
+    case HSEP_TRUSTED_PREDICT: /* with its variance */
+        return 4;
+    default:
+        return 1;
+    }
+}
+
+HSEP_API void hsep_trusted_planner_advance(hsep_trusted_planner *self, const hsep_trusted_task *task)
+{
+    double *c = hsep_planner_coefficients(task->planner);
+    switch ((hsep_trusted_stage)self->stage) {
+    case HSEP_TRUSTED_DONE:
+        break;
+    case HSEP_TRUSTED_BEGIN:
+        trusted_planner_physics(self, task);
+        break;
+    case HSEP_TRUSTED_PHYSICS:
+        if (hsep_planner_step(task->planner)) {
+            trusted_planner_continue(self, task);
+        }
+        break;
+    case HSEP_TRUSTED_REST:
+        self->cost = trusted_planner_at(self, task, hsep_at(self, self->rest), 1);
+        self->stage = HSEP_TRUSTED_STEP;
+        break;
+    case HSEP_TRUSTED_STEP:
+        trusted_planner_step(self, task);
+        break;
+    case HSEP_TRUSTED_COLUMN:
+        trusted_planner_columns(self, task);
+        break;
+    case HSEP_TRUSTED_PRODUCT:
+        trusted_planner_products(self, task);
+        break;
+    case HSEP_TRUSTED_TRY:
+        trusted_planner_try(self, task);
+        break;
+    case HSEP_TRUSTED_BOUNDED:
+        if (hsep_planner_step(task->planner)) {
+            self->solver_steps += hsep_planner_steps(task->planner);
+            self->stage = HSEP_TRUSTED_JUDGE;
+        }
+        break;
+    case HSEP_TRUSTED_JUDGE:
+        trusted_planner_judge(self, task);
+        break;
+    case HSEP_TRUSTED_COMPARE:
+        trusted_planner_compare(self, task);
+        break;
+    case HSEP_TRUSTED_PREDICT:
+        (void)trusted_planner_at(self, task, c, 0);
+        self->stage = HSEP_TRUSTED_DONE;
+        break;
+    }
+}

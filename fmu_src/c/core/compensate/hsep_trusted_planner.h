@@ -1,0 +1,115 @@
+/* Planner on the residual model that can be trusted, by Newton steps that follow the slope of its disturbances.
+ *
+ * min |x_d - x_h(x_d + delta)|^2 + jerk_weight |D^3 delta|^2 within the drive's limits, where x_h is not affine in delta.
+ * Each step solves the quadratic programme of the linearised model (Gauss-Newton); a step that does not lower the cost is
+ * repeated with a penalty on the change of velocity (Levenberg-Marquardt). The plan is compared with that of the physics
+ * model, and the better one is taken.
+ *
+ * Nothing of it is long: hsep_trusted_planner_advance does a part of it, hsep_trusted_planner_next tells how much work
+ * that is. All of it is at most HSEP_TRUSTED_WORK. Memory is one block, without pointers. Reentrant; allocates nothing.
+ */
+#ifndef HSEP_TRUSTED_PLANNER_H
+#define HSEP_TRUSTED_PLANNER_H
+
+#include "hsep_api.h"
+#include "hsep_layout.h"
+#include "hsep_linearised.h"
+#include "hsep_physics.h"
+#include "hsep_planner.h"
+#include "hsep_trusted.h"
+
+#include <stdint.h>
+
+#define HSEP_TRUSTED_STEPS 4    /* Newton steps of a plan at most, */
+#define HSEP_TRUSTED_TRIES 6    /* tries of each, */
+#define HSEP_TRUSTED_TOGETHER 8 /* tries of all, */
+#define HSEP_TRUSTED_SOLVER 60  /* and solver steps after which no bounded try is begun */
+#define HSEP_TRUSTED_COLUMNS 10 /* parts in which the changes of x_h by the splines are computed */
+
+/* Work of a plan at most, in steps of the interior-point solver: the physics model's programme, Newton steps, tries with
+ * their programmes, predictions; and 8 because a part is not divided between samples. */
+#define HSEP_TRUSTED_WORK \
+    ((2 + HSEP_INTERIOR_STEPS) + HSEP_TRUSTED_STEPS * (1 + HSEP_TRUSTED_COLUMNS + 2) + 2 * HSEP_TRUSTED_TOGETHER + \
+     (HSEP_TRUSTED_SOLVER - 1 + HSEP_INTERIOR_STEPS) + (1 + 1 + 4) + 8)
+
+typedef enum {
+    HSEP_TRUSTED_DONE = 0,
+    HSEP_TRUSTED_BEGIN,   /* the physics model's plan begins, */
+    HSEP_TRUSTED_PHYSICS, /* it is bounded and being solved */
+    HSEP_TRUSTED_REST,    /* the rest of the last plan is to be judged */
+    HSEP_TRUSTED_STEP,    /* a Newton step begins, */
+    HSEP_TRUSTED_COLUMN,  /* changes of x_h by the splines are to be computed, */
+    HSEP_TRUSTED_PRODUCT, /* and their products */
+    HSEP_TRUSTED_TRY,     /* a try of it begins */
+    HSEP_TRUSTED_BOUNDED, /* a try is bounded and being solved */
+    HSEP_TRUSTED_JUDGE,   /* a try is to be judged */
+    HSEP_TRUSTED_COMPARE, /* the physics model's plan is to be judged */
+    HSEP_TRUSTED_PREDICT  /* the plan is to be predicted */
+} hsep_trusted_stage;
+
+typedef struct {
+    uint64_t preview, p, Np;
+    uint64_t n;            /* splines of a plan */
+    uint64_t stage;        /* hsep_trusted_stage */
+    uint64_t follows;      /* whether the trusted model may plan */
+    uint64_t steps;        /* Newton steps begun */
+    uint64_t columns;      /* splines whose change of x_h is computed */
+    uint64_t tries;        /* of this step, and */
+    uint64_t tries_in_all; /* of all */
+    uint64_t solver_steps; /* of all bounded tries */
+    uint64_t planned;      /* model of the plan: 0 none, 1 physics, 2 trusted */
+    double cost;           /* m2, of the best plan so far */
+    double penalty;        /* on the change of velocity, in the unit of the jerk's weight */
+    double start;          /* m, position of rest */
+    /* Offsets in doubles from the beginning of the struct */
+    uint64_t rest;       /* (3 + n,) m, coefficients of the rest of the last plan */
+    uint64_t best;       /* (3 + n,) m, those of the best plan so far */
+    uint64_t of_physics; /* (3 + n,) m, those of the physics model's */
+    uint64_t command;    /* (preview,) m, commands that were predicted last, relative to the start, newest first */
+    uint64_t x_pb;       /* (preview,) m, their prediction by the physics model, */
+    uint64_t e_h;        /* (preview + p,) m, and what the trusted model adds; behind it the last residuals */
+    uint64_t target;     /* (preview,) m, work */
+    uint64_t W;          /* changes of x_h by the splines: of spline j from sample j spacing on, behind each other */
+    uint64_t P;          /* triangle of n rows: W' W + jerk_weight D' D */
+    uint64_t v;          /* (n,) m, linear term of it */
+    uint64_t linearised;
+    uint64_t physics; /* G_pb at the beginning of the window, */
+    uint64_t trial;   /* and for a trial */
+} hsep_trusted_planner;
+
+HSEP_ASSERT_WORDS(hsep_trusted_planner, 28);
+
+/* What it plans with: other blocks, and the window's data. */
+typedef struct {
+    hsep_trusted *model;
+    hsep_planner *planner;
+    const double *spline; /* (preview,) m/m, a spline filtered by the physics model */
+    const double *x_d;    /* (preview,) m, commanded positions */
+} hsep_trusted_task;
+
+/* Bytes of the block, counted in double so that no size can overflow. */
+HSEP_API double hsep_trusted_planner_size(
+    const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner);
+
+/* Fill the block for a drive at rest at start, m. */
+HSEP_API void hsep_trusted_planner_init(
+    hsep_trusted_planner *self, const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner,
+    double start);
+
+/* Whether a block, in any alignment, is one that hsep_trusted_planner_init with these parameters began. */
+HSEP_API int hsep_trusted_planner_valid(
+    const void *block, const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner);
+
+/* Begin a window: predict it under the rest of the last plan. physics: G_pb there; past: (p,) m, the last residuals;
+ * best: best model allowed, 0 none, 1 physics, 2 the trusted one. Cost: that of hsep_trusted_scale and a prediction. */
+HSEP_API void hsep_trusted_planner_begin(
+    hsep_trusted_planner *self, const hsep_trusted_task *task, const hsep_physics *physics, const double past[],
+    uint64_t best);
+
+/* Work of the part that is next, in steps of the interior-point solver; 0: the plan is made and predicted. */
+HSEP_API uint64_t hsep_trusted_planner_next(const hsep_trusted_planner *self);
+
+/* Do that part. */
+HSEP_API void hsep_trusted_planner_advance(hsep_trusted_planner *self, const hsep_trusted_task *task);
+
+#endif

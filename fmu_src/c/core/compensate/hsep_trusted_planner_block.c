@@ -1,0 +1,73 @@
+/* Memory of a planner on the residual model that can be trusted: its layout, beginning and check. */
+#include "hsep_trusted_planner.h"
+
+#include "hsep_cholesky.h"
+
+#include <stddef.h>
+#include <string.h>
+
+/* Set what follows from the parameters; return the bytes of the block. */
+static double trusted_planner_lay_out(
+    hsep_trusted_planner *self, const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner)
+{
+    const uint64_t n = hsep_splines_count(planner->preview, planner->spacing);
+    const double preview = (double)planner->preview,
+                 filter = hsep_physics_size(parameters->n_modes, parameters->settings->dead_time);
+    const double columns = (double)n, coefficients = HSEP_DECIDED + columns;
+    double end = HSEP_WORDS(hsep_trusted_planner);
+    self->preview = planner->preview;
+    self->p = parameters->settings->p;
+    self->Np = planner->Np;
+    self->n = n;
+    self->rest = hsep_take(&end, coefficients);
+    self->best = hsep_take(&end, coefficients);
+    self->of_physics = hsep_take(&end, coefficients);
+    self->command = hsep_take(&end, preview);
+    self->x_pb = hsep_take(&end, preview);
+    self->e_h = hsep_take(&end, preview + (double)self->p);
+    self->target = hsep_take(&end, preview);
+    self->W = hsep_take(&end, columns * preview - (double)planner->spacing * 0.5 * columns * (columns - 1.0));
+    self->P = hsep_take(&end, hsep_triangle(n));
+    self->v = hsep_take(&end, columns);
+    self->linearised = hsep_take_block(&end, hsep_linearised_size(parameters));
+    self->physics = hsep_take_block(&end, filter);
+    self->trial = hsep_take_block(&end, filter);
+    return end * sizeof(double);
+}
+
+HSEP_API double hsep_trusted_planner_size(
+    const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner)
+{
+    return trusted_planner_lay_out(&(hsep_trusted_planner){0}, parameters, planner);
+}
+
+HSEP_API void hsep_trusted_planner_init(
+    hsep_trusted_planner *self, const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner,
+    double start)
+{
+    const hsep_predictor_settings *settings = parameters->settings;
+    memset(self, 0, (size_t)hsep_trusted_planner_size(parameters, planner));
+    (void)trusted_planner_lay_out(self, parameters, planner);
+    self->start = start;
+    hsep_linearised_init((hsep_linearised *)hsep_at(self, self->linearised), parameters);
+    for (int i = 0; i < 2; i++) {
+        hsep_physics_init(
+            (hsep_physics *)hsep_at(self, i == 0 ? self->physics : self->trial), parameters->modes, parameters->n_modes,
+            settings->dead_time, settings->T_s, (hsep_hold)settings->input_hold);
+    }
+}
+
+HSEP_API int hsep_trusted_planner_valid(
+    const void *block, const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner)
+{
+    const uint64_t n_modes = parameters->n_modes, dead_time = parameters->settings->dead_time;
+    hsep_trusted_planner got;
+    memcpy(&got, block, sizeof got);
+    (void)trusted_planner_lay_out(&got, parameters, planner); /* changes nothing where it is sound */
+    return memcmp(&got, block, sizeof got) == 0 && got.stage <= HSEP_TRUSTED_PREDICT && got.follows <= 1 &&
+           got.steps <= HSEP_TRUSTED_STEPS && got.columns <= got.n && got.tries <= HSEP_TRUSTED_TRIES &&
+           got.tries_in_all <= HSEP_TRUSTED_TOGETHER && got.solver_steps < HSEP_TRUSTED_SOLVER + HSEP_INTERIOR_STEPS &&
+           got.planned <= 2 && hsep_linearised_valid(hsep_at_bytes(block, got.linearised), parameters) &&
+           hsep_physics_valid(hsep_at_bytes(block, got.physics), n_modes, dead_time) &&
+           hsep_physics_valid(hsep_at_bytes(block, got.trial), n_modes, dead_time);
+}

@@ -1,0 +1,132 @@
+/* Prediction by a residual model that can be trusted. */
+#include "hsep_trusted.h"
+
+#include <math.h>
+#include <stddef.h>
+
+/* Growth of the commanded velocity from which on what was learned at lower ones counts for nothing. */
+static const double trusted_growth = 30.0;
+
+/* Bound on the variance of the noise relative to the largest mean square of the residual: a larger one would prevent
+ * any learning. */
+static const double trusted_least_noise = 1e-4;
+
+/* Velocity, m/s, below which a command is at rest: ratios of smaller ones may underflow. */
+static const double trusted_least_velocity = 1e-200;
+
+/* Bound on the last residual held, relative to the largest one. */
+static const double trusted_hold_max = 1.2;
+
+static const double trusted_least_magnitude = 1e-150; /* of a feature */
+
+/* Whether the commanded velocity outgrows what was learned; the velocity scale with it. A compensator begins to move
+ * before the path, with a creep: its first scale is the path's. */
+static int trusted_outgrown(hsep_trusted *self, const double x_d[], const double path[])
+{
+    const hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
+    double peak = hsep_disturbances_peak_velocity(disturbances, x_d, self->n);
+    double most = trusted_growth * self->velocity_scale;
+    if (path != NULL && self->n_rows == 0.0) {
+        peak = 0.0;
+        for (uint64_t j = 0; j + 1 < self->n; j++) {
+            peak = fmax(peak, fabs(path[j] - path[j + 1]));
+        }
+        peak = fmax(peak / disturbances->T_s, self->velocity_scale);
+        most = self->velocity_scale;
+    }
+    const int outgrown = peak > fmax(most, trusted_least_velocity);
+    self->forecast_scale = outgrown ? peak : self->velocity_scale;
+    return outgrown;
+}
+
+/* Solve for the weights of the candidates. */
+static void trusted_solve(hsep_trusted *self)
+{
+    const double effect = self->effect > 0.0 ? self->effect : sqrt(self->scale.largest_square);
+    const double least = fmin(self->least_variance, trusted_least_noise * self->scale.largest_square);
+    const double *largest = hsep_at(self, self->forecast_largest);
+    double *scales = hsep_at(self, self->scales);
+    for (uint64_t i = 0; i < self->n_static; i++) {
+        const double share = hsep_disturbances_share(hsep_trusted_disturbances(self), i);
+        scales[i] = effect * share / fmax(largest[i], trusted_least_magnitude);
+    }
+    for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
+        hsep_candidate_solve(hsep_trusted_candidate(self, i), hsep_trusted_regression(self), scales, least);
+    }
+}
+
+HSEP_API void hsep_trusted_scale(
+    hsep_trusted *self, const double x_d[], const double x_pb[], const double path[], double last_residual)
+{
+    hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
+    const double bound = trusted_hold_max * self->scale.largest;
+    const int outgrown = trusted_outgrown(self, x_d, path);
+    double *rows = hsep_at(self, self->rows), *largest = hsep_at(self, self->forecast_largest);
+    hsep_disturbances_command(disturbances, x_d, x_pb, self->n, self->forecast_scale, rows);
+    hsep_disturbances_motion(disturbances, x_pb, x_pb, self->n, rows);
+    for (uint64_t i = 0; i < self->n_static; i++) {
+        largest[i] = outgrown ? 0.0 : hsep_at(self, self->largest)[i];
+    }
+    for (uint64_t k = 0; k < self->n; k++, rows += self->n_static) {
+        for (uint64_t i = 0; i < self->n_static; i++) {
+            largest[i] = fmax(largest[i], fabs(rows[i]));
+        }
+    }
+    self->hold = fmin(fmax(last_residual, -bound), bound);
+    self->predicted = self->n_rows > 0.0 && !outgrown && self->scale.largest_square > 0.0;
+    if (self->predicted) {
+        trusted_solve(self);
+    }
+}
+
+/* Predict by the candidates, whose rows hold the commands and stiffness and damping at x_pb. past: (p,), m. */
+static void trusted_candidates(hsep_trusted *self, const double x_pb[], const double past[], int held)
+{
+    double *x = hsep_at(self, self->x), *rows = hsep_at(self, self->rows);
+    hsep_candidate *first = hsep_trusted_candidate(self, 0);
+    /* The stiffness acts at the position, which the physics model alone does not give well enough. */
+    hsep_candidate_predict(first, rows, past, &self->scale, held);
+    for (uint64_t j = 0; j < self->n; j++) {
+        x[j] = x_pb[j] + hsep_at(first, first->e_h)[j];
+    }
+    hsep_disturbances_motion(hsep_trusted_disturbances(self), x_pb, x, self->n, rows);
+    for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
+        hsep_candidate_predict(hsep_trusted_candidate(self, i), rows, past, &self->scale, held);
+    }
+}
+
+/* e: the blend of the candidates, which have predicted. */
+static void trusted_blend(hsep_trusted *self, const double x_pb[], double e[], int held)
+{
+    const double *weights = self->blend.weights;
+    double *disagreement = hsep_at(self, self->disagreement);
+    if (self->predicted) {
+        trusted_candidates(self, x_pb, e + self->n, held);
+    }
+    for (uint64_t j = 0; j < self->n; j++) {
+        double square = weights[0] * self->hold * self->hold;
+        e[j] = weights[0] * self->hold;
+        for (uint64_t i = 0; self->predicted && i < HSEP_N_CANDIDATES; i++) {
+            hsep_candidate *one = hsep_trusted_candidate(self, i);
+            const double candidate = hsep_at(one, one->e_h)[j];
+            e[j] += weights[1 + i] * candidate;
+            square += weights[1 + i] * candidate * candidate;
+        }
+        disagreement[j] = fmax(square - e[j] * e[j], 0.0);
+    }
+}
+
+HSEP_API void hsep_trusted_predict(hsep_trusted *self, const double x_d[], const double x_pb[], double e[], int held)
+{
+    hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
+    double *rows = hsep_at(self, self->rows);
+    hsep_disturbances_command(disturbances, x_d, x_pb, self->n, self->forecast_scale, rows);
+    hsep_disturbances_motion(disturbances, x_pb, x_pb, self->n, rows);
+    trusted_blend(self, x_pb, e, held);
+}
+
+HSEP_API void hsep_trusted_forecast(hsep_trusted *self, const double x_d[], const double x_pb[], double e[])
+{
+    hsep_trusted_scale(self, x_d, x_pb, NULL, e[self->n]);
+    trusted_blend(self, x_pb, e, 0); /* the rows are those of the scales */
+}
