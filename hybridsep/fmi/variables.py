@@ -15,6 +15,7 @@ from ..base.settings import PARAMETERS, CompensatorSettings, PredictorSettings, 
 from .angular_units import angular_unit
 
 __all__ = [
+    "ALONE_SETTINGS",
     "COMPENSATOR_SETTINGS",
     "INTERPOLATED",
     "MODELS",
