@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from random_loops import random_loop, run_library
 
 from hybridsep.compensate import constraints as _constraints
-from hybridsep.compensate.interior import PRIMAL_RESIDUAL, minimise
+from hybridsep.compensate.interior import PRIMAL_RESIDUAL, Minimum, minimise
 
 Array = NDArray[np.float64]
 
@@ -20,10 +20,10 @@ def problems_of(monkeypatch: pytest.MonkeyPatch, seed: int, n: int, **fixed: flo
     """Return the bounded problems of a closed loop on the staircase drive, and what was found of them."""
     found = []
 
-    def spy(*problem: object) -> Array:
-        x = minimise(*problem).x  # type: ignore[arg-type]
-        found.append((problem, x))
-        return x
+    def spy(*problem: object) -> Minimum:
+        minimum = minimise(*problem)  # type: ignore[arg-type]
+        found.append((problem, minimum.x))
+        return minimum
 
     monkeypatch.setattr(_constraints, "minimise", spy)
     run_library(random_loop(seed, n, "spring_mass_damper", **fixed))

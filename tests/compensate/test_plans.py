@@ -176,8 +176,8 @@ def test_a_refused_solve_falls_back_to_physics_then_to_the_rest(monkeypatch: pyt
         state = sep.plan(ahead[:200]).state
         sep.update(1e-5 + 1e-6 * rng.normal(size=50))
     assert state is SepState.HYBRID
-    answers: list[Callable[..., Any]] = [lambda *_: None, solve]
-    monkeypatch.setattr("hybridsep.compensate.compensator.solve", lambda *a: answers.pop(0)(*a))
+    answers: list[Callable[..., Any]] = [lambda *_, **__: None, solve]
+    monkeypatch.setattr("hybridsep.compensate.compensator.solve", lambda *a, **more: answers.pop(0)(*a, **more))
     assert sep.plan(ahead[:200]).state is SepState.PHYSICS
-    monkeypatch.setattr("hybridsep.compensate.compensator.solve", lambda *_: None)
+    monkeypatch.setattr("hybridsep.compensate.compensator.solve", lambda *_, **__: None)
     assert sep.plan(ahead[:200]).state is SepState.OFF

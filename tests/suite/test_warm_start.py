@@ -53,7 +53,7 @@ def test_a_warm_run_is_the_librarys_second_run(new_stream: StreamMaker, weights:
         assert (loop.column(model, "hybrid_active")[100:] == 1.0).all()
         assert loop.column(model, "rms_h")[-1] == pytest.approx(8.9e-6, abs=2e-7)
     else:
-        assert (loop.column(model, "sep_state") == 2.0).all()
+        assert (loop.column(model, "sep_state")[20:] == 2.0).all()  # the first samples follow no plan yet
         assert loop.outputs[0, OUTPUTS[model].index("x_h")] != 0.0
         assert loop.column(model, "rms_e")[-1] < 5.5e-6  # the encoder's noise is 5 µm
 
@@ -99,7 +99,7 @@ def test_a_warm_state_is_saved_and_an_instance_reset(new_stream: StreamMaker, we
 
 LEARNED: dict[str, dict[str, Value]] = {
     PREDICTOR: {"p": 50, "q": 3, "lambda": 1e-12, "T_s": 0.001, "input_hold": 0, "dead_time": 0},
-    COMPENSATOR: {"p": 50, "q": 40, "lambda": 1e-8, "T_s": 0.001, "input_hold": 0, "dead_time": 0, "v_friction": 0.002},
+    COMPENSATOR: {"p": 50, "q": 3, "lambda": 1e-12, "T_s": 0.001, "input_hold": 0, "dead_time": 0, "v_friction": 0.002},
 }
 OTHERS: list[dict[str, Value]] = [
     {"p": 40},
@@ -166,4 +166,4 @@ def test_what_was_learned_with_trust_is_for_no_other_model(new_stream: StreamMak
     stream = new_stream.planted(learned_with_trust())
     said = "trust must be 1, with which weights.bin was learned, got 0"
     with pytest.raises(RefusedStreamError, match=re.escape(said)):
-        stream.initialise({"p": 20})
+        stream.initialise({"p": 20, "trust": False})

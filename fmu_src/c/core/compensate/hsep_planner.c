@@ -160,7 +160,9 @@ static void planner_pin(hsep_planner *self)
         }
         P += n - i;
     }
-    memmove(v, v + first, (size_t)(n - first) * sizeof(double));
+    for (uint64_t j = first; j < n; j++) {
+        v[j - first] = v[j];
+    }
 }
 
 /* Hand the bounded problem over: x is what follows the pinned splines, its bounds are what the others leave. */

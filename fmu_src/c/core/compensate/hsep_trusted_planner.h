@@ -1,9 +1,9 @@
 /* Planner on the residual model that can be trusted, by Newton steps that follow the slope of its disturbances.
  *
- * min |x_d - x_h(x_d + delta)|^2 + jerk_weight |D^3 delta|^2 within the drive's limits, where x_h is not affine in delta.
- * Each step solves the quadratic programme of the linearised model (Gauss-Newton); a step that does not lower the cost is
- * repeated with a penalty on the change of velocity (Levenberg-Marquardt). The plan is compared with that of the physics
- * model, and the better one is taken.
+ * min |x_d - x_h(x_d + delta)|^2 + jerk_weight |D^3 delta|^2 within the drive's limits, where x_h is not affine in
+ * delta. Each step solves the quadratic programme of the linearised model (Gauss-Newton); a step that does not lower
+ * the cost is repeated with a penalty on the change of velocity (Levenberg-Marquardt). The plan is compared with that
+ * of the physics model, and the better one is taken.
  *
  * Nothing of it is long: hsep_trusted_planner_advance does a part of it, hsep_trusted_planner_next tells how much work
  * that is. All of it is at most HSEP_TRUSTED_WORK. Memory is one block, without pointers. Reentrant; allocates nothing.
@@ -26,8 +26,8 @@
 #define HSEP_TRUSTED_SOLVER 60  /* and solver steps after which no bounded try is begun */
 #define HSEP_TRUSTED_COLUMNS 10 /* parts in which the changes of x_h by the splines are computed */
 
-/* Work of a plan at most, in steps of the interior-point solver: the physics model's programme, Newton steps, tries with
- * their programmes, predictions; and 8 because a part is not divided between samples. */
+/* Work of a plan at most, in steps of the interior-point solver: the physics model's programme, Newton steps, tries
+ * with their programmes, predictions; and 8 because a part is not divided between samples. */
 #define HSEP_TRUSTED_WORK \
     ((2 + HSEP_INTERIOR_STEPS) + HSEP_TRUSTED_STEPS * (1 + HSEP_TRUSTED_COLUMNS + 2) + 2 * HSEP_TRUSTED_TOGETHER + \
      (HSEP_TRUSTED_SOLVER - 1 + HSEP_INTERIOR_STEPS) + (1 + 1 + 4) + 8)

@@ -2,7 +2,8 @@
  *
  * Disturbances of the commands are no affine functions of them, so a plan follows their slope: at given commands the
  * prediction changes with them as an affine map does, friction by sech^2(v / v_i), stiffness by 2 |x|. Weights, their
- * blend and the shrinking by the variance are held. Memory is one block, without pointers. Reentrant; allocates nothing.
+ * blend and the shrinking by the variance are held. Memory is one block, without pointers. Reentrant; allocates
+ * nothing.
  */
 #ifndef HSEP_LINEARISED_H
 #define HSEP_LINEARISED_H
@@ -15,7 +16,7 @@
 
 typedef struct {
     uint64_t n; /* samples of the preview */
-    /* Offsets in doubles from the beginning of the struct; signals of each candidate, behind each other, oldest first */
+    /* Offsets in doubles from the beginning of the struct; signals of each candidate behind each other, oldest first */
     uint64_t slopes;  /* (n, HSEP_N_DISTURBANCES) slopes of the disturbances, sample after sample */
     uint64_t gains;   /* (HSEP_N_CANDIDATES, 6, n) what friction, stiffness and damping give of changes of v_d, x and v,
                        * the disturbances themselves and then their differences */

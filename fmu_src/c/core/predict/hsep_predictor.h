@@ -135,8 +135,8 @@ HSEP_API double hsep_predictor_std(const hsep_predictor *self, uint64_t i);
 /* Process sample k: learn it, update the error sums, advance to k + 1; return whether the window has ended. */
 HSEP_API int hsep_predictor_take_in(hsep_predictor *self, double x_d_ahead, double x_meas);
 
-/* Finish a window: learn it with trust, and its errors; its residuals, as measured, or as predicted where missing, become
- * the past of the next one. Return whether it was learned. */
+/* Finish a window: learn it with trust, and its errors; its residuals, as measured, or as predicted where missing,
+ * become the past of the next one. Return whether it was learned. */
 HSEP_API int hsep_predictor_finish(hsep_predictor *self);
 
 /* Begin a window: commands, weights, and the part of the features of the reference. */
