@@ -12,38 +12,29 @@ from ..base.output import written_text
 from .failures import loading
 from .options import (
     AsIsOption,
-    AxisOption,
-    CommandColumnOption,
     FixOption,
     ForceOption,
     JsonOption,
     LogArgument,
     MachineOption,
-    MeasuredColumnOption,
     SavedOption,
-    TimeColumnOption,
-    TsOption,
-    UnitOption,
 )
 from .parameter_options import PREDICTOR_ENTRIES, takes_parameters
+from .reading_options import ReadingOptions, takes_reading
 
 __all__ = ["backtest"]
 
 
+@takes_reading
 @takes_parameters(PREDICTOR_ENTRIES)
 def backtest(
     log: LogArgument,
     machine: MachineOption,
-    unit: UnitOption = None,
-    T_s: TsOption = None,
-    axis: AxisOption = None,
-    t: TimeColumnOption = None,
-    x_d: CommandColumnOption = None,
-    x: MeasuredColumnOption = None,
     fix: FixOption = False,
     as_is: AsIsOption = False,
     weights: SavedOption = None,
     *,
+    reading: ReadingOptions,
     parameters: dict[str, Any],
     out: Annotated[Path | None, typer.Option(help="CSV for the RMS errors batch by batch.")] = None,
     figure: Annotated[
@@ -84,8 +75,7 @@ def backtest(
         check_ending(path, "--save", (".state", ".csv", ".npz"))
     changed = axis_machine.changed("predictor", parameters)
     predictor = changed.new_predictor()
-    may_miss = predictor.settings.trust
-    reading = reading_of(axis_machine, {"t": t, "x_d": x_d, "x": x}, unit=unit, T_s=T_s, axis=axis, may_miss=may_miss)
+    how = reading_of(axis_machine, reading, may_miss=predictor.settings.trust)
     if weights is not None:
         predictor = load_trained(weights, changed, "HybridPredictor")
         predictor.restart()
@@ -93,7 +83,7 @@ def backtest(
     outputs += [Output("--figure", figure, BY_ENDING[figure.suffix.lower()])] if figure is not None else []
     outputs += [Output("--save", path, BY_ENDING[path.suffix.lower()]) for path in saved]
     inputs = {"log": log, "machine file": machine_path(machine), "saved predictor": weights}
-    opened, intake = open_checked(log, reading, axis_machine, fix=fix, as_is=as_is)
+    opened, intake = open_checked(log, how, axis_machine, fix=fix, as_is=as_is)
     check_outputs(outputs, inputs, force=force)
     n_samples = len(opened.t) if isinstance(opened, Log) else opened.n_samples
     rows: list[tuple[float, ...]] = []

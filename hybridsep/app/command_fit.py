@@ -9,20 +9,16 @@ import typer
 
 from .failures import loading
 from .options import (
-    AxisOption,
-    CommandColumnOption,
     FigurePagesOption,
     ForceOption,
     JsonOption,
-    MeasuredColumnOption,
-    TimeColumnOption,
-    TsOption,
-    UnitOption,
 )
+from .reading_options import ReadingOptions, takes_reading
 
 __all__ = ["fit"]
 
 
+@takes_reading
 def fit(
     logs: Annotated[list[Path], typer.Argument(help="Recorded logs of one axis: commanded and measured positions.")],
     out: Annotated[
@@ -35,12 +31,8 @@ def fit(
         ),
     ] = None,
     name: Annotated[str | None, typer.Option(help="Name of the axis; that of the log if left out.")] = None,
-    unit: UnitOption = None,
-    T_s: TsOption = None,
-    t: TimeColumnOption = None,
-    x_d: CommandColumnOption = None,
-    x: MeasuredColumnOption = None,
-    axis: AxisOption = None,
+    *,
+    reading: ReadingOptions,
     fix: Annotated[
         bool, typer.Option("--fix", help="Apply what puts a finding of the checks right, and go on.")
     ] = False,
@@ -63,7 +55,6 @@ def fit(
         from .report_sections import recommendation
         from .tables import console, print_json
 
-    columns = {role: column for role, column in (("t", t), ("x_d", x_d), ("x", x)) if column}
     name = checked_name(name) if name else machine_name(logs[0])
     folder = out or Path(name)
     files = fit_files(folder, name)
@@ -72,7 +63,10 @@ def fit(
     outputs = [Output("--out", path, FIT_FILES[path.suffix]) for path in files.values()]
     outputs += [Output("--figure", figure, BY_ENDING[".pdf"])] if figure is not None else []
     check_outputs(outputs, inputs, force=force)
-    found = [read_log(path, columns=columns, unit=unit, T_s=T_s, axis=axis, uniform=False) for path in logs]
+    found = [
+        read_log(path, columns=reading.columns, unit=reading.unit, T_s=reading.T_s, axis=reading.axis, uniform=False)
+        for path in logs
+    ]
     used, findings = take_in(found, fix=fix)
     with progress_bar(as_json) as advance:
         result = fit_logs(used, folder, FitOptions(Np, name), advance)

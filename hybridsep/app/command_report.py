@@ -10,24 +10,20 @@ import typer
 from .failures import loading
 from .options import (
     AsIsOption,
-    AxisOption,
-    CommandColumnOption,
     FigurePagesOption,
     FixOption,
     ForceOption,
     LogArgument,
     MachineOption,
-    MeasuredColumnOption,
     SavedOption,
-    TimeColumnOption,
-    TsOption,
-    UnitOption,
 )
 from .parameter_options import PREDICTOR_ENTRIES, takes_parameters
+from .reading_options import ReadingOptions, takes_reading
 
 __all__ = ["report"]
 
 
+@takes_reading
 @takes_parameters(PREDICTOR_ENTRIES)
 def report(
     log: LogArgument,
@@ -35,16 +31,11 @@ def report(
     out: Annotated[Path | None, typer.Option(help="The HTML file; named after the log if left out.")] = None,
     figure: FigurePagesOption = None,
     fmu: Annotated[Path | None, typer.Option(help="A HybridPredictor whose steps are timed with the log.")] = None,
-    unit: UnitOption = None,
-    T_s: TsOption = None,
-    axis: AxisOption = None,
-    t: TimeColumnOption = None,
-    x_d: CommandColumnOption = None,
-    x: MeasuredColumnOption = None,
     fix: FixOption = False,
     as_is: AsIsOption = False,
     weights: SavedOption = None,
     *,
+    reading: ReadingOptions,
     parameters: dict[str, Any],
     force: ForceOption = False,
 ) -> None:
@@ -73,12 +64,11 @@ def report(
     axis_machine = load_machine(machine)
     changed = axis_machine.changed("predictor", parameters)
     predictor = changed.new_predictor()
-    may_miss = predictor.settings.trust
-    reading = reading_of(axis_machine, {"t": t, "x_d": x_d, "x": x}, unit=unit, T_s=T_s, axis=axis, may_miss=may_miss)
+    how = reading_of(axis_machine, reading, may_miss=predictor.settings.trust)
     if weights is not None:
         predictor = load_trained(weights, changed, "HybridPredictor")
         predictor.restart()
-    opened, intake = open_checked(log, reading, axis_machine, fix=fix, as_is=as_is)
+    opened, intake = open_checked(log, how, axis_machine, fix=fix, as_is=as_is)
     check_outputs(outputs, inputs, force=force)
     whole = opened if isinstance(opened, Log) else opened.read()
     with progress_bar(False) as advance:

@@ -14,35 +14,26 @@ from ..base.settings import PredictorSettings
 from .failures import loading
 from .options import (
     AsIsOption,
-    AxisOption,
-    CommandColumnOption,
     FixOption,
     ForceOption,
     JsonOption,
     MachineOption,
-    MeasuredColumnOption,
-    TimeColumnOption,
-    TsOption,
-    UnitOption,
 )
 from .parameter_options import PREDICTOR_ENTRIES, takes_parameters
+from .reading_options import ReadingOptions, takes_reading
 
 __all__ = ["tune"]
 
 
+@takes_reading
 @takes_parameters(PREDICTOR_ENTRIES, ranges=PredictorSettings.TUNED)
 def tune(
     logs: Annotated[list[Path], typer.Argument(help="Recorded logs of one axis: commanded and measured positions.")],
     machine: MachineOption,
-    unit: UnitOption = None,
-    T_s: TsOption = None,
-    axis: AxisOption = None,
-    t: TimeColumnOption = None,
-    x_d: CommandColumnOption = None,
-    x: MeasuredColumnOption = None,
     fix: FixOption = False,
     as_is: AsIsOption = False,
     *,
+    reading: ReadingOptions,
     parameters: dict[str, Any],
     jobs: Annotated[
         int | None, typer.Option(min=1, help="Processes; as many as there are processors if left out.")
@@ -92,11 +83,10 @@ def tune(
     outputs += [Output("--figure", figure, BY_ENDING[figure.suffix.lower()])] if figure is not None else []
     inputs: dict[str, str | Path | None] = {f"log {path}": path for path in logs}
     check_outputs(outputs, {**inputs, "machine file": machine_path(machine)}, force=force)
-    columns = {"t": t, "x_d": x_d, "x": x}
-    reading = reading_of(given, columns, unit=unit, T_s=T_s, axis=axis, may_miss=settings.trust)
+    how = reading_of(given, reading, may_miss=settings.trust)
     pieces, findings = {}, {}
     for name, path in _named(logs).items():
-        opened, intake = open_checked(path, reading, given, fix=fix, as_is=as_is, segments=True)
+        opened, intake = open_checked(path, how, given, fix=fix, as_is=as_is, segments=True)
         log = opened if isinstance(opened, Log) else opened.read()
         pieces[name] = [(segment.x_d, segment.x_meas) for segment in log.segments()]
         findings[name] = findings_table(intake.findings)

@@ -14,6 +14,7 @@ from ..logs.log import Log, LogReader, open_log
 from ..machine import Machine
 from .arguments import check_interval, check_unit
 from .failures import errors_console
+from .reading_options import ReadingOptions
 
 __all__ = ["Reading", "findings_table", "open_checked", "reading_of"]
 
@@ -24,36 +25,25 @@ Reading = Mapping[str, Any]
 """Arguments of :func:`~hybridsep.logs.log.open_log`."""
 
 
-def reading_of(
-    machine: Machine,
-    columns: Mapping[str, str | None],
-    *,
-    unit: str | None,
-    T_s: float | None,
-    axis: str | None,
-    may_miss: bool,
-) -> Reading:
+def reading_of(machine: Machine, options: ReadingOptions, *, may_miss: bool) -> Reading:
     """Return how a log of a machine is read: as its machine file says, where an option does not say otherwise.
 
     Parameters
     ----------
     machine : Machine
-    columns : mapping
-        Column of ``t``, ``x_d`` and ``x``; None where it is not given.
-    unit, T_s, axis
-        As given.
+    options : ReadingOptions
     may_miss : bool
         Whether positions may be missing.
     """
     own = machine.log
-    names = {**own.columns, **{role: column for role, column in columns.items() if column}}
-    if T_s is not None and columns["t"] is None:
+    names = {**own.columns, **options.columns}
+    if options.T_s is not None and options.t is None:
         names.pop("t", None)  # there may be none
     return {
         "columns": names,
-        "unit": unit or own.unit,
-        "T_s": T_s,
-        "axis": axis or own.axis,
+        "unit": options.unit or own.unit,
+        "T_s": options.T_s,
+        "axis": options.axis or own.axis,
         "may_miss": may_miss,
     }
 
