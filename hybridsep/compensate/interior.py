@@ -86,7 +86,7 @@ def minimise(P: Array, v: Array, rows: Array, low: Array, high: Array, start: Ar
         r_d = v - gradient + force
         largest = max(float(np.max(np.abs(term))) for term in (v, gradient, force))
         feasible = np.max(np.abs(r_p)) < PRIMAL_RESIDUAL and np.max(np.abs(r_d)) < _DUAL_RESIDUAL * largest
-        if mu < _MU * share and feasible:
+        if (mu < _MU * share and feasible) or mu == 0.0:  # it underflows
             break
         steps += 1
         inverse = 1.0 / (s + rho * z)

@@ -19,6 +19,7 @@ from command_line import Run, write_log
 
 from hybridsep import cosimulate
 from hybridsep.base.interrupt import interrupts_between_calls, uninterrupted
+from hybridsep.cosim.run import PREDICTOR
 from hybridsep.fmi.processes import run_together
 
 MACHINE = "spring_mass_damper"
@@ -87,7 +88,7 @@ def test_ctrl_c_during_a_build_ends_the_compilers(tmp_path: Path) -> None:
 def test_ctrl_c_in_a_terminal_ends_the_processes_of_tune(tmp_path: Path) -> None:
     """A terminal sends it to all of them; half a minute of replays, two at a time."""
     log, out = write_log(tmp_path / "log.csv", n=6000), tmp_path / "tuned.toml"
-    arguments = ("tune", log, "-m", MACHINE, "--trust", "true", "--p", "5:100:5", "--jobs", "2", "--out", out)
+    arguments = ("tune", log, "-m", MACHINE, "--trust", "true", "--p", "3:50:3", "--jobs", "2", "--out", out)
     process = subprocess.Popen(
         [*MAIN, *map(str, arguments)],
         stdout=subprocess.DEVNULL,
@@ -138,7 +139,7 @@ def test_ctrl_c_in_the_middle_of_a_step_of_a_python_fmu(
     hybridsep: Run, tmp_path: Path, python_fmu: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = tmp_path / "run.csv"
-    out.write_bytes(b"t,x_d,x,x_meas,x_pb,x_hold,x_h,active\r\n")
+    out.write_bytes(",".join(PREDICTOR.columns).encode() + b"\r\n")
     before, calls, original = out.read_bytes(), 0, scipy.signal.lfilter
 
     def lfilter(*arguments: Any, **keywords: Any) -> Any:

@@ -91,7 +91,7 @@ def test_results_as_csv_and_npz(run: Run, tmp_path: Path) -> None:
     with (tmp_path / "run.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     with np.load(tmp_path / "run.npz") as arrays:
-        assert set(arrays) == set(rows[0]) == {"t", "x_d", "x", "x_meas", "x_pb", "x_hold", "x_h", "active"}
+        assert set(arrays) == set(rows[0]) == {"t", "x_d", "x", "x_meas", "x_pb", "x_hold", "x_h", "x_h_std", "active"}
         for name in ("t", "x_meas", "x_h"):
             np.testing.assert_array_equal(arrays[name], [float(row[name]) for row in rows])
             np.testing.assert_array_equal(arrays[name], getattr(run, name))

@@ -25,7 +25,8 @@ from hybridsep.machine import load_machine
 
 MACHINE = load_machine("spring_mass_damper")
 TS = 1e-3
-OUTPUTS = ("x_dm", "x_d", "x_pb", "x_h", "e_servo", "sep_state", "rms_e", "rms_pb", "rms_h", "batch")
+OUTPUTS = ("x_dm", "x_d", "x_pb", "x_h", "x_h_std", "e_servo", "sep_state")
+OUTPUTS += ("rms_e", "rms_pb", "rms_h", "rms_hold", "batch", "n_rejected")
 
 Fmu = Callable[[str], Path]
 
@@ -47,18 +48,22 @@ def test_the_interface_is_the_contract(compensator: FmuInstance) -> None:
     expected = [
         ("x_d_ahead", "input", "Real", "m", "0.0"),
         ("x_meas", "input", "Real", "m", "0.0"),
-        *((name, "output", "Real", "m", None) for name in ("x_dm", "x_d", "x_pb", "x_h", "e_servo")),
+        *((name, "output", "Real", "m", None) for name in ("x_dm", "x_d", "x_pb", "x_h", "x_h_std", "e_servo")),
         ("sep_state", "output", "Enumeration", None, None),
-        *((name, "output", "Real", "m", None) for name in ("rms_e", "rms_pb", "rms_h")),
-        ("batch", "output", "Integer", None, None),
+        *((name, "output", "Real", "m", None) for name in ("rms_e", "rms_pb", "rms_h", "rms_hold")),
+        *((name, "output", "Integer", None, None) for name in ("batch", "n_rejected")),
         ("Np", "parameter", "Integer", None, "50"),
         ("p", "parameter", "Integer", None, "50"),
-        ("q", "parameter", "Integer", None, "40"),
-        ("lambda", "parameter", "Real", "m2", "1e-08"),
+        ("q", "parameter", "Integer", None, "3"),
+        ("lambda", "parameter", "Real", "m2", "1e-12"),
         ("T_s", "parameter", "Real", "s", "0.001"),
-        ("t_init", "parameter", "Real", "s", "0.1"),
+        ("t_init", "parameter", "Real", "s", "-1.0"),
         ("input_hold", "parameter", "Enumeration", None, "0"),
         ("dead_time", "parameter", "Integer", None, "0"),
+        ("trust", "parameter", "Boolean", None, "true"),
+        ("effect", "parameter", "Real", "m", "0.0"),
+        ("noise_std", "parameter", "Real", "m", "0.0"),
+        ("forgetting", "parameter", "Real", "s", "0.0"),
         ("v_friction", "parameter", "Real", "m/s", "0.002"),
         ("preview", "parameter", "Integer", None, "200"),
         ("spacing", "parameter", "Integer", None, "2"),
@@ -79,9 +84,10 @@ def test_the_interface_is_the_contract(compensator: FmuInstance) -> None:
     assert [unknown.variable.name for unknown in compensator.description.outputs] == list(OUTPUTS)
     assert all(unknown.dependencies == [] for unknown in compensator.description.outputs)
     initial = {u.variable.name: [v.name for v in u.dependencies] for u in compensator.description.initialUnknowns}
-    assert initial["sep_state"] == ["t_init", "compensate"]
+    assert initial["sep_state"] == ["t_init", "compensate", "trust"]
     assert initial["x_dm"] == ["x_d_ahead"]
-    assert initial["x_h"] == ["x_d_ahead", "t_init", "compensate"]
+    assert initial["x_h"] == ["x_d_ahead", "t_init", "compensate", "trust"]
+    assert initial["x_h_std"] == [*initial["x_h"], "lambda", "noise_std"]
     assert initial["rms_e"] == initial["batch"] == []
 
 
@@ -90,7 +96,7 @@ def test_both_flavours_have_the_table_and_the_page_shows_the_wiring(python_fmu: 
         description = json.loads(archive.read("resources/machine.json"))
         page = archive.read("documentation/index.html").decode()
     header = c_header(description, "{0}")
-    for line in ("HSEP_MODEL_SEP_COMPENSATOR 1", "HSEP_VR_x_dm = 2,", "HSEP_VR_preview = 21,", "HSEP_VR_mode = 30"):
+    for line in ("HSEP_MODEL_SEP_COMPENSATOR 1", "HSEP_VR_x_dm = 2,", "HSEP_VR_preview = 28,", "HSEP_VR_mode = 37"):
         assert line in header
     assert "SepCompensator</text>" in page
     assert "x_dm → x_d" in page
@@ -126,9 +132,9 @@ def test_parameters_may_be_set_one_after_the_other(compensator: FmuInstance) -> 
     compensator.slave.enterInitializationMode()
     compensator.set("x_d_ahead", 0.1)
     compensator.set("Np", 75)  # which spacing = 2 does not divide
-    assert outputs(compensator) == [0.1, 0.1, 0.1, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    assert outputs(compensator) == [0.1] * 4 + [0.0] * 9
     compensator.set("spacing", 3)
-    assert outputs(compensator)[5] == SepState.PHYSICS
+    assert outputs(compensator)[6] == SepState.PHYSICS
     compensator.slave.exitInitializationMode()
     compensator.step(0.0, TS)
 
@@ -155,8 +161,7 @@ def test_weights_of_other_settings_are_refused(trained: Path, tmp_path: Path) ->
             build_fmu(MACHINE, name, tmp_path, "python", weights=weights)
         return str(caught.value)
 
-    differing = "Np = 100 instead of 50, q = 3 instead of 40, lambda = 1e-12 instead of 1e-08"
-    differing += ", v_friction = 0.0 instead of 0.002"
+    differing = "Np = 100 instead of 50, trust = False instead of True, v_friction = 0.0 instead of 0.002"
     assert refused("SepCompensatorPy", tmp_path / "other.state").startswith(
         f"other.state was not trained for machine spring_mass_damper's compensator: it has {differing}; "
     )

@@ -29,7 +29,8 @@ def plans(values: Mapping[str, Value], r: Array, x: Array) -> dict[str, Array]:
     columns: dict[str, list[Array]] = {name: [] for name in ("x_dm", "x_d", "x_pb", "x_h", "sep_state")}
     for k in range(0, len(r), Np):
         plan = compensator.plan(x_d[k : k + preview])
-        window = (plan.x_dm, x_d[k : k + Np], plan.x_pb, plan.x_h, np.full(Np, float(plan.state)))
+        state = np.where(np.arange(Np) < plan.n_followed, plan.state_before, plan.state).astype(np.float64)
+        window = (plan.x_dm, x_d[k : k + Np], plan.x_pb, plan.x_h, state)
         for column, samples in zip(columns.values(), window, strict=True):
             column.append(samples)
         compensator.update(x[k : k + Np])

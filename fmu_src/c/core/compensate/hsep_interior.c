@@ -172,7 +172,7 @@ HSEP_API int hsep_interior_step(hsep_interior *self, const hsep_splines *splines
     hsep_splines_rows(splines, a.x, self->first, a.slacks.Ax);
     const double mu = hsep_slacks_residuals(&a.slacks, &r_p);
     const double r_d = interior_dual_residual(&a, splines, self->first, P);
-    if (self->steps == HSEP_INTERIOR_STEPS ||
+    if (self->steps == HSEP_INTERIOR_STEPS || mu == 0.0 || /* it underflows */
         (mu < interior_mu * self->cost && r_p < HSEP_INTERIOR_PRIMAL && r_d < interior_dual_residual_max)) {
         return 1;
     }

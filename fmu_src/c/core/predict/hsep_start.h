@@ -4,8 +4,8 @@
  * its state follows from the residuals of the first window by least squares, near that of a motion at the first
  * commanded velocity. The residuals decide between this motion and rest.
  *
- * Positions are relative to the start, signals newest first. Memory is one block, without pointers. Reentrant; allocates
- * nothing.
+ * Positions are relative to the start, signals newest first. Memory is one block, without pointers. Reentrant;
+ * allocates nothing.
  */
 #ifndef HSEP_START_H
 #define HSEP_START_H

@@ -55,8 +55,8 @@ HSEP_API void hsep_uncertainty_predict(
     hsep_uncertainty *self, const double x_d[], const double x_pb[], const double e_h[], uint64_t n_physics,
     const double disagreement[]);
 
-/* Learn from the measured residuals e, (Np,), m, of its first samples; accepted: (Np,), 1 where they count, or NULL for all
- * of them. */
+/* Learn from the measured residuals e, (Np,), m, of its first samples; accepted: (Np,), 1 where they count, or NULL for
+ * all of them. */
 HSEP_API void hsep_uncertainty_learn(hsep_uncertainty *self, const double e[], const double accepted[]);
 
 #endif
