@@ -25,8 +25,10 @@ from hybridsep.machine import load_machine
 
 MACHINE = load_machine("spring_mass_damper")
 TS = 1e-3
-OUTPUTS = ("x_dm", "x_d", "x_pb", "x_h", "x_h_std", "e_servo", "sep_state")
-OUTPUTS += ("rms_e", "rms_pb", "rms_h", "rms_hold", "batch", "n_rejected")
+OUTPUTS = (
+    *("x_dm", "x_d", "x_pb", "x_h", "x_h_std", "e_servo", "sep_state"),
+    *("rms_e", "rms_pb", "rms_h", "rms_hold", "batch", "n_rejected"),
+)
 
 Fmu = Callable[[str], Path]
 
