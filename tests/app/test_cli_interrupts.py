@@ -88,7 +88,22 @@ def test_ctrl_c_during_a_build_ends_the_compilers(tmp_path: Path) -> None:
 def test_ctrl_c_in_a_terminal_ends_the_processes_of_tune(tmp_path: Path) -> None:
     """A terminal sends it to all of them; half a minute of replays, two at a time."""
     log, out = write_log(tmp_path / "log.csv", n=6000), tmp_path / "tuned.toml"
-    arguments = ("tune", log, "-m", MACHINE, "--trust", "true", "--p", "3:50:3", "--jobs", "2", "--out", out)
+    arguments = (
+        "tune",
+        log,
+        "-m",
+        MACHINE,
+        "--trust",
+        "true",
+        "--p",
+        "1:50:1",
+        "--q",
+        "0:8:1",
+        "--jobs",
+        "2",
+        "--out",
+        out,
+    )
     process = subprocess.Popen(
         [*MAIN, *map(str, arguments)],
         stdout=subprocess.DEVNULL,
@@ -103,6 +118,7 @@ def test_ctrl_c_in_a_terminal_ends_the_processes_of_tune(tmp_path: Path) -> None
         time.sleep(0.05)
         if not children.exists() and time.monotonic() > begun + 5.0:  # no /proc
             break
+    time.sleep(5.0)  # one that comes while they start is lost
     os.killpg(process.pid, signal.SIGINT)
     _, err = process.communicate(timeout=60)
     assert (process.returncode, err.strip()) == (130, SAID)
