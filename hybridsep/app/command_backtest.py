@@ -56,7 +56,7 @@ def backtest(
         from ..evaluate.backtest import backtest as backtest_whole
         from ..evaluate.replayed import replayed_run
         from ..evaluate.scores import Scores
-        from ..fmi.warm_start import load_trained
+        from ..fmi.warm_start import begun_predictor
         from ..logs.log import Log
         from ..machine import load_machine, machine_path
         from .arguments import check_ending
@@ -74,11 +74,8 @@ def backtest(
     for path in saved:
         check_ending(path, "--save", (".state", ".csv", ".npz"))
     changed = axis_machine.changed("predictor", parameters)
-    predictor = changed.new_predictor()
+    predictor = begun_predictor(changed, weights)
     how = reading_of(axis_machine, reading, may_miss=predictor.settings.trust)
-    if weights is not None:
-        predictor = load_trained(weights, changed, "HybridPredictor")
-        predictor.restart()
     outputs = [] if out is None else [Output("--out", out, BATCHES)]
     outputs += [Output("--figure", figure, BY_ENDING[figure.suffix.lower()])] if figure is not None else []
     outputs += [Output("--save", path, BY_ENDING[path.suffix.lower()]) for path in saved]

@@ -41,8 +41,10 @@ def report(
 ) -> None:
     """Check and replay a recorded log as backtest does, and write one self-contained HTML file about it."""
     with loading():
+        from ..cosim.fmus import check_controller
+        from ..cosim.run import PREDICTOR
         from ..evaluate.report import Report
-        from ..fmi.warm_start import load_trained
+        from ..fmi.warm_start import begun_predictor
         from ..logs.log import Log
         from ..machine import load_machine, machine_path
         from ..tune.halves import Recording, replay
@@ -61,13 +63,12 @@ def report(
     outputs = [Output("--out", page, REPORT)]
     outputs += [Output("--figure", figure, BY_ENDING[".pdf"])] if figure is not None else []
     inputs = {"log": log, "machine file": machine_path(machine), "saved predictor": weights, "FMU": fmu}
+    if fmu is not None:
+        check_controller(fmu, PREDICTOR)
     axis_machine = load_machine(machine)
     changed = axis_machine.changed("predictor", parameters)
-    predictor = changed.new_predictor()
+    predictor = begun_predictor(changed, weights)
     how = reading_of(axis_machine, reading, may_miss=predictor.settings.trust)
-    if weights is not None:
-        predictor = load_trained(weights, changed, "HybridPredictor")
-        predictor.restart()
     opened, intake = open_checked(log, how, axis_machine, fix=fix, as_is=as_is)
     check_outputs(outputs, inputs, force=force)
     whole = opened if isinstance(opened, Log) else opened.read()
@@ -85,7 +86,7 @@ def report(
     )
     written.paragraph(recommendation(judged), "verdict")
     learned = "began with what an earlier run had learned" if weights is not None else "began without any knowledge"
-    write_errors(report=written, judged=judged, title="Errors of the replay", how=f"The predictor {learned}.")
+    write_errors(written, judged, "Errors of the replay", f"The predictor {learned}.")
     write_findings(written, {log.name: intake.findings})
     if fmu is not None:
         write_use(written, [fmu.name], steps, whole.T_s)

@@ -50,7 +50,8 @@ def tune(
         from ..logs.log import Log
         from ..machine import load_machine, machine_path
         from ..machine_text import machine_text
-        from ..tune.grid import TUNED, candidates, default_values, own_settings
+        from ..tune.choice import with_window
+        from ..tune.grid import TUNED, candidates, default_values
         from ..tune.joint import n_processors, over_windows
         from ..tune.joint import tune as tune_on
         from .arguments import check_ending
@@ -72,7 +73,7 @@ def tune(
         if parameter.name in parameters
     }
     fixed = {name: value for name, value in parameters.items() if name in ("Np", "t_init", "trust")}
-    fitting = own_settings(given.predictor_settings, fixed.get("Np", given.predictor_settings.Np))
+    fitting = with_window(given.predictor_settings, fixed.get("Np", given.predictor_settings.Np))
     changed = given.changed("predictor", {"p": fitting.p, "q": fitting.q, **fixed})
     settings = changed.predictor_settings
     values = {**default_values(settings), **ranges}

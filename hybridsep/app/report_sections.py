@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.signal import welch
@@ -49,7 +50,7 @@ class Judged:
     si: str
     part: str
 
-    @property
+    @cached_property
     def unit(self) -> tuple[float, str]:
         """Factor and name of the unit in which errors are shown."""
         return shown_unit(self.replay.rms()[0], self.si)
@@ -107,12 +108,11 @@ def _write_figures(report: Report, judged: Judged, title: str, how: str) -> None
 def _write_time(report: Report, judged: Judged) -> None:
     scale, unit = judged.unit
     replay = judged.replay
-    errors = scale * replay.errors()
+    errors, std = scale * replay.errors(), scale * replay.joined("x_h_std")
     t = judged.T_s * np.arange(errors.shape[1])
     x_d = np.concatenate([recording.x_d[recording.n_taught :] for recording in replay.recordings])
     lines = [Line("command", t, 1e3 * x_d, _COMMAND)]
-    std = scale * replay.joined("x_h_std")
-    within = coverage(errors[2] / scale, std / scale, 0.95)
+    within = coverage(errors[2], std, 0.95)
     for name, row, colour in zip(NAMES, errors, COLOURS, strict=True):
         if name != NAMES[1]:
             lines.append(Line(name, t, row, colour, panel=1))

@@ -250,7 +250,7 @@ class SepCompensator:
         cost = self._basis.cost(g, free, command, rest[:N_DECIDED], self._delta_before, self.settings.jerk_weight)
         always = self.predictor.trusted is not None
         found = solve(cost, bounds, rest[N_DECIDED:], self._n_pinned, always=always)
-        return None if found is None else np.concatenate((rest[:N_DECIDED], found))
+        return None if found is None else np.concatenate((rest[:N_DECIDED], found.x))
 
     def _plan_model(self, trusted: TrustedModel, path: Array) -> PlanModel:
         """Return the trusted model over the preview, with the scales of the rest of the last plan."""

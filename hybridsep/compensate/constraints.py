@@ -16,7 +16,7 @@ from ..base.signals import Array
 from .interior import PRIMAL_RESIDUAL, Minimum, minimise
 from .splines import N_DECIDED, PlanCost, SplineBasis
 
-__all__ = ["Bounds", "DriveBounds", "bounded", "cost_scale", "solve", "unbounded"]
+__all__ = ["Bounds", "DriveBounds", "solve"]
 
 _ROUNDING = 1e-9
 """Tolerance for rounding, as a share of a limit: bounds are tightened by it; rows that change by less do not bind."""
@@ -130,7 +130,9 @@ class DriveBounds:
         return Bounds(rows=self._free, low=low, high=high)
 
 
-def solve(cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int, *, always: bool = False) -> Array | None:
+def solve(
+    cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int, *, always: bool = False, may_bind: bool = True
+) -> Minimum | None:
     """Return the minimiser of the cost within the bounds.
 
     The unconstrained minimiser if it is feasible. Otherwise the first ``n_pinned`` coefficients stay as they are in
@@ -146,20 +148,24 @@ def solve(cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int, *, always:
         Coefficients that a bounded plan does not change, < n.
     always : bool
         Whether no plan changes them.
+    may_bind : bool
+        Whether the bounds may be active: that takes steps of the interior point.
 
     Returns
     -------
-    c : (n,) array, m, or None
-        None if there is no finite minimiser.
+    Minimum or None
+        ``(n,)``, m; None if there is no finite minimiser, or none within bounds that may not be active.
     """
     n_kept = n_pinned if always else 0
-    c = unbounded(cost, rest, n_kept)
-    if c is None or bounds.allow(c):
-        return c
-    return bounded(cost, bounds, rest, n_pinned, cost_scale(cost, c, rest, n_kept)).x
+    c = _unbounded(cost, rest, n_kept)
+    if c is None:
+        return None
+    if bounds.allow(c):
+        return Minimum(c, 0)
+    return _bounded(cost, bounds, rest, n_pinned, _cost_scale(cost, c, rest, n_kept)) if may_bind else None
 
 
-def unbounded(cost: PlanCost, rest: Array, n_pinned: int) -> Array | None:
+def _unbounded(cost: PlanCost, rest: Array, n_pinned: int) -> Array | None:
     """Return the minimiser of the cost, ``(n,)``, m, with the first ``n_pinned`` coefficients those of ``rest``."""
     left = cost.without(rest[:n_pinned])
     try:
@@ -169,13 +175,13 @@ def unbounded(cost: PlanCost, rest: Array, n_pinned: int) -> Array | None:
     return np.concatenate((rest[:n_pinned], c)) if np.isfinite(c).all() else None
 
 
-def cost_scale(cost: PlanCost, c: Array, rest: Array, n_pinned: int) -> float:
-    """Return the scale of the cost, m², between ``rest`` and its minimiser of :func:`unbounded`."""
+def _cost_scale(cost: PlanCost, c: Array, rest: Array, n_pinned: int) -> float:
+    """Return the scale of the cost, m², between ``rest`` and its minimiser of :func:`_unbounded`."""
     left, at_rest = cost.without(rest[:n_pinned]), rest[n_pinned:]
     return float(left.v @ c[n_pinned:] + at_rest @ left.P @ at_rest)
 
 
-def bounded(cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int, scale: float) -> Minimum:
+def _bounded(cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int, scale: float) -> Minimum:
     """Return the minimiser of the cost within the bounds, as far as it is feasible from ``rest``, and solver steps.
 
     Parameters
@@ -183,7 +189,7 @@ def bounded(cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int, scale: f
     cost, bounds, rest, n_pinned
         As those of :func:`solve`.
     scale : float, m²
-        :func:`cost_scale`.
+        :func:`_cost_scale`.
     """
     pinned, problem = rest[:n_pinned], cost.without(rest[:n_pinned])
     rows, taken = bounds.rows[:, n_pinned:], bounds.rows[:, :n_pinned] @ pinned

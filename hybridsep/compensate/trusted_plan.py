@@ -17,7 +17,7 @@ import numpy as np
 from ..base.signals import Array
 from ..predict.forecast import Forecast
 from ..predict.linearised import PlanModel
-from .constraints import Bounds, bounded, cost_scale, unbounded
+from .constraints import Bounds, solve
 from .splines import N_DECIDED, PlanCost, SplineBasis
 
 __all__ = ["TrustedPlanner"]
@@ -92,8 +92,7 @@ class TrustedPlanner:
         splines, third = self._basis.values[:, N_DECIDED:], self._basis.third[:, N_DECIDED:]
         velocity = np.diff(splines, axis=0, prepend=0.0)
         damping = velocity.T @ velocity
-        here, penalty, tries = self._at(rest), 0.0, 0
-        self._solver_steps = 0
+        here, penalty, tries, steps = self._at(rest), 0.0, 0, 0
         for reach in _REACHES:
             W = self._model.slope(here.prediction, splines, passed, reach)
             at = here.coefficients[N_DECIDED:]
@@ -104,10 +103,12 @@ class TrustedPlanner:
             for _ in range(min(_TRIES, _TRIES_TOGETHER - tries)):
                 tries += 1
                 cost = PlanCost.regular(P + penalty * damping, v + penalty * (damping @ at))
-                found = self._solve(cost, rest[N_DECIDED:], bounds, n_pinned)
+                may_bind = steps < _SOLVER_STEPS
+                found = solve(cost, bounds, rest[N_DECIDED:], n_pinned, always=True, may_bind=may_bind)
                 if found is None:
                     break
-                there = self._at(np.concatenate((rest[:N_DECIDED], found)))
+                steps += found.steps
+                there = self._at(np.concatenate((rest[:N_DECIDED], found.x)))
                 if there.cost < here.cost:
                     best = there
                     break
@@ -118,17 +119,6 @@ class TrustedPlanner:
             if gain < _GAIN * (gain + here.cost):
                 break
         return here.coefficients, here.cost
-
-    def _solve(self, cost: PlanCost, free: Array, bounds: Bounds, n_pinned: int) -> Array | None:
-        """Return the minimiser within the bounds; None if there is none, or no bounded programme is left."""
-        found = unbounded(cost, free, n_pinned)
-        if found is None or bounds.allow(found):
-            return found
-        if self._solver_steps >= _SOLVER_STEPS:
-            return None
-        minimum = bounded(cost, bounds, free, n_pinned, cost_scale(cost, found, free, n_pinned))
-        self._solver_steps += minimum.steps
-        return minimum.x
 
     def _at(self, coefficients: Array) -> _Point:
         prediction = self._model.predict(self._x_d + self._basis.values @ coefficients)

@@ -9,7 +9,22 @@ from ..machine import Machine
 from ..predict.predictor import HybridPredictor
 from .weights import learned_settings
 
-__all__ = ["load_trained"]
+__all__ = ["begun_predictor", "load_trained"]
+
+
+def begun_predictor(machine: Machine, weights: str | Path | None) -> HybridPredictor:
+    """Return a machine's predictor at the beginning of a run, with what a saved one has learned where it is given.
+
+    Raises
+    ------
+    StateError
+        As :func:`load_trained`.
+    """
+    if weights is None:
+        return machine.new_predictor()
+    predictor = load_trained(weights, machine, "HybridPredictor")
+    predictor.restart()
+    return predictor
 
 
 def load_trained(path: str | Path, machine: Machine, model: str) -> HybridPredictor:

@@ -28,6 +28,7 @@ __all__ = [
     "settings_to_try",
     "window_scores",
     "window_sizes",
+    "with_window",
 ]
 
 WORTH = 0.05
@@ -93,9 +94,12 @@ class WindowScore:
 
 def settings_for(Np: int, T_s: float, input_hold: str) -> PredictorSettings:
     """Return the default settings for a window, with as many lags as fit into it."""
-    default = PredictorSettings()
-    p, q = min(default.p, Np), min(default.q, Np - 1)
-    return replace(default, Np=Np, p=p, q=q, T_s=T_s, input_hold=input_hold)
+    return with_window(PredictorSettings(T_s=T_s, input_hold=input_hold), Np)
+
+
+def with_window(settings: PredictorSettings, Np: int) -> PredictorSettings:
+    """Return settings for another window, with as many of their lags as fit into it."""
+    return replace(settings, Np=Np, p=min(settings.p, Np), q=min(settings.q, Np - 1))
 
 
 def settings_to_try(settings: PredictorSettings) -> list[PredictorSettings]:
@@ -166,7 +170,7 @@ def window_scores(
     sizes = window_sizes(settings.Np, min(len(recording.x) for recording in recordings))
     scores = []
     for i, Np in enumerate(sizes):
-        fitted = replace(settings, Np=Np, p=min(settings.p, Np), q=min(settings.q, Np - 1))
-        scores.append(WindowScore(Np, *replay(HybridPredictor(model, fitted), recordings).rms()))
+        predictor = HybridPredictor(model, with_window(settings, Np))
+        scores.append(WindowScore(Np, *replay(predictor, recordings).rms()))
         progress((i + 1) / len(sizes))
     return tuple(scores)

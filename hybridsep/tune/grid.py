@@ -12,7 +12,7 @@ from ..base.errors import ParameterError
 from ..base.settings import PredictorSettings
 from .choice import settings_to_try
 
-__all__ = ["TUNED", "candidates", "default_values", "own_settings"]
+__all__ = ["TUNED", "candidates", "default_values"]
 
 Values = Mapping[str, Sequence[Any]]
 
@@ -31,11 +31,6 @@ _LAMBDA_FACTORS = tuple(10.0**i for i in range(-2, 7))
 
 _FORGETTING = 30
 """Windows after which samples are forgotten in half of the candidates with trust."""
-
-
-def own_settings(settings: PredictorSettings, Np: int) -> PredictorSettings:
-    """Return settings for another look-ahead, with as many of their lags as fit into it."""
-    return replace(settings, Np=Np, p=min(settings.p, Np), q=min(settings.q, Np - 1))
 
 
 def default_values(settings: PredictorSettings) -> dict[str, tuple[Any, ...]]:

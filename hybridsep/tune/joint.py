@@ -16,8 +16,7 @@ from ..base.metrics import rms_ratio
 from ..base.settings import PredictorSettings
 from ..base.signals import Array
 from ..model.physics import ModalModel
-from .choice import WORTH, window_sizes
-from .grid import own_settings
+from .choice import WORTH, window_sizes, with_window
 from .losses import Losses, Piece, nested_losses, replayed_losses, share_a_pass
 
 __all__ = ["Tuning", "joint_ratio", "n_processors", "over_windows", "tune"]
@@ -159,7 +158,7 @@ def over_windows(
         Of the controller's window; others have as many of the lags as fit into them.
     """
     sizes = window_sizes(settings.Np, min(sum(len(x) for _, x in pieces) for pieces in logs.values()))
-    tried = [own_settings(settings, Np) for Np in sizes]
+    tried = [with_window(settings, Np) for Np in sizes]
     found = _losses(model, [(name, pieces, (one,)) for one in tried for name, pieces in logs.items()], jobs, progress)
     n = len(logs)
     return {one.Np: _tuning(logs, (one,), found[i * n : (i + 1) * n]) for i, one in enumerate(tried)}

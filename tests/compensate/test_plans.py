@@ -19,6 +19,7 @@ from hybridsep.base.settings import Limits, PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepState, direct_samples
 from hybridsep.compensate.constraints import Bounds, DriveBounds, solve
+from hybridsep.compensate.interior import Minimum
 from hybridsep.compensate.splines import N_DECIDED, PlanCost, SplineBasis
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.plants.encoder import Encoder
@@ -78,8 +79,9 @@ def test_a_bounded_plan_satisfies_the_optimality_conditions(seed: int, tightness
     change_max = tightness * float(np.max(np.abs(basis.values[:, N_DECIDED:] @ free)))
     rest = np.zeros(basis.values.shape[1])
     bounds = DriveBounds(basis, TS, None, change_max).bounds(x_d, np.zeros(3), np.zeros(3), rest)
-    c = solve(cost, bounds, rest[N_DECIDED:], 0)
-    assert c is not None
+    found = solve(cost, bounds, rest[N_DECIDED:], 0)
+    assert found is not None
+    c = found.x
     assert bounds.allow(c)
     values, gradient = bounds.rows @ c, cost.P @ c - cost.v
     upper = np.flatnonzero(values > bounds.high - 3e-3)
@@ -95,26 +97,27 @@ def test_a_bounded_plan_costs_what_another_solver_finds(
 ) -> None:
     bounded = []
 
-    def compare(cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int, *, always: bool) -> Array | None:
+    def compare(cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int, *, always: bool) -> Minimum | None:
         assert not always
-        c = solve(cost, bounds, rest, n_pinned)
-        assert c is not None
+        found = solve(cost, bounds, rest, n_pinned)
+        assert found is not None
+        c = found.x
         assert np.max(np.maximum(bounds.rows @ c - bounds.high, bounds.low - bounds.rows @ c)) <= 1e-12
         free = np.asarray(np.linalg.solve(cost.P, cost.v), dtype=np.float64)
         if bounds.allow(free):
             np.testing.assert_allclose(c, free, rtol=0, atol=1e-9)
-            return c
+            return found
         np.testing.assert_allclose(c[:n_pinned], rest[:n_pinned], rtol=0, atol=1e-15)
         P, rows = cost.P[n_pinned:, n_pinned:], bounds.rows[:, n_pinned:]
         v = cost.v[n_pinned:] - cost.P[n_pinned:, :n_pinned] @ rest[:n_pinned]
         taken = bounds.rows[:, :n_pinned] @ rest[:n_pinned]
-        found = clarabel_minimum(P, v, rows, bounds.low - taken, bounds.high - taken)
+        other = clarabel_minimum(P, v, rows, bounds.low - taken, bounds.high - taken)
 
         def value(x: Array) -> float:
             return float(0.5 * x @ P @ x - v @ x)
 
-        bounded.append((value(c[n_pinned:]) - value(found)) / float(cost.v @ free))
-        return c
+        bounded.append((value(c[n_pinned:]) - value(other)) / float(cost.v @ free))
+        return found
 
     monkeypatch.setattr("hybridsep.compensate.compensator.solve", compare)
     cosimulate(compensator(limits=limits), plant(), commanded()[:4000], encoder=Encoder(5e-6, 0))

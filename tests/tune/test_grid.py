@@ -8,7 +8,8 @@ import pytest
 
 from hybridsep.base.errors import ParameterError
 from hybridsep.base.settings import PredictorSettings
-from hybridsep.tune.grid import TUNED, candidates, default_values, own_settings
+from hybridsep.tune.choice import with_window
+from hybridsep.tune.grid import TUNED, candidates, default_values
 from hybridsep.tune.losses import share_a_pass
 
 PAPER = PredictorSettings(Np=100, p=50, q=3, lam=1e-12, trust=False)
@@ -28,7 +29,7 @@ def test_the_defaults_are_hundreds_that_share_a_pass_or_a_few_replays() -> None:
 @pytest.mark.parametrize("trust", [False, True])
 @pytest.mark.parametrize("Np", [1, 2, 19, 5000])
 def test_all_fit_the_window_and_the_machines_own_come_first(Np: int, trust: bool) -> None:
-    own = replace(own_settings(PAPER, Np), trust=trust, forgetting=7.0)
+    own = replace(with_window(PAPER, Np), trust=trust, forgetting=7.0)
     assert (own.p, own.q) == (min(50, Np), min(3, Np - 1))
     tried = candidates(own, default_values(own))
     assert tried[0] == own
