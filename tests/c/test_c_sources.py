@@ -19,6 +19,8 @@ from places import ROOT
 
 from hybridsep.fmi.native_flavour import all_c
 
+SANITISED = ("-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer")
+
 
 def test_the_c_files_are_formatted() -> None:
     command = shutil.which("clang-format", path=str(Path(sys.executable).parent))
@@ -91,6 +93,17 @@ def test_one_header_serves_c_plus_plus() -> None:
     assert done.stdout == "9 1\n"
 
 
+def sanitised_program(driver: str, folder: Path) -> Path:
+    """Return the program of a C file of these tests and the core with a model's header, built when first asked for."""
+    program = folder / driver
+    if not program.exists():
+        command = tuple(sanitising_compiler())
+        files = [*c_core.model_sources(), str(ROOT / "tests" / "c" / f"{driver}.c")]
+        files += c_core.object_files(SANITISED, command)
+        run_compiler([*SANITISED, f"-I{folder}", *include_flags(), *files, "-lm", "-o", program], command=command)
+    return program
+
+
 @needs_sanitisers
 @pytest.mark.parametrize(
     ("name", "arguments"),
@@ -119,13 +132,7 @@ def test_one_header_serves_c_plus_plus() -> None:
 def test_the_sanitisers_find_nothing(name: str, arguments: list[list[str]], tmp_path: Path) -> None:
     folder = build_folder() / f"sanitise_{name}"
     c_core.write_header(name, folder)
-    flags = ["-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer"]
-    driver = ROOT / "tests" / "c" / "sanitise.c"
-    program = folder / "sanitise"
-    run_compiler(
-        [*flags, f"-I{folder}", *include_flags(), *c_core.sources(), driver, "-lm", "-o", program],
-        command=sanitising_compiler(),
-    )
+    program = sanitised_program("sanitise", folder)
     write_trajectory(tmp_path, staircase.commanded()[:600])
     for pairs in arguments:
         done = subprocess.run([program, f"{tmp_path}/", *pairs], capture_output=True, text=True, check=False)
@@ -146,14 +153,7 @@ def test_the_sanitisers_find_nothing(name: str, arguments: list[list[str]], tmp_
 def test_a_trajectory_that_changes_while_it_is_read(n_samples: int, said: str, tmp_path: Path) -> None:
     folder = build_folder() / "changing_resource"
     c_core.write_header("trajectory", folder)
-    program = folder / "changing_resource"
-    if not program.exists():
-        driver = ROOT / "tests" / "c" / "changing_resource.c"
-        flags = ["-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", f"-I{folder}"]
-        run_compiler(
-            [*flags, *include_flags(), *c_core.sources(), driver, "-lm", "-o", program],
-            command=sanitising_compiler(),
-        )
+    program = sanitised_program("changing_resource", folder)
     write_trajectory(tmp_path, np.full(n_samples, 0.2))
     file = (tmp_path / "trajectory_3.bin").rename(tmp_path / "other.bin")
     write_trajectory(tmp_path, np.full(100, 0.1))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import zipfile
 from pathlib import Path
@@ -10,14 +11,13 @@ import elf
 import fmpy
 import numpy as np
 import pytest
+from built_once import BuiltFmus
 from c_compiler import FMI_HEADERS, compiler, run_compiler
 from places import ROOT
 
 from hybridsep.base.signals import Array
 from hybridsep.cosim.importer import FmuInstance
-from hybridsep.fmi.archive import build_fmu
 from hybridsep.fmi.compiler import compile_flags
-from hybridsep.machine import load_machine
 
 ROLES = {"REFERENCE": "ReferenceTrajectory", "PREDICTOR": "HybridPredictor", "PLANT": "FeedDrive"}
 MODELS = (*ROLES.values(), "SepCompensator")
@@ -30,14 +30,14 @@ WITH_PREFIX = """#define fmi2Paste(a, b) a##b
 
 
 @pytest.fixture(scope="module")
-def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+def archives(fmus: BuiltFmus, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """The FMUs of one machine, each with its unpacked archive beside it."""
-    out, machine = tmp_path_factory.mktemp("static"), load_machine("spring_mass_damper")
-    built = {model: build_fmu(machine, model, out, targets=("host",)) for model in MODELS}
-    for model, path in built.items():
+    out = tmp_path_factory.mktemp("static")
+    copies = {model: Path(shutil.copy(fmus(model), out)) for model in MODELS}
+    for path in copies.values():
         with zipfile.ZipFile(path) as archive:
-            archive.extractall(out / model)
-    return built
+            archive.extractall(path.with_suffix(""))
+    return copies
 
 
 @pytest.fixture(scope="module")
@@ -72,24 +72,24 @@ def compile_all(fmu: Path, headers: Path, out: Path, *flags: str) -> Path:
     return built
 
 
-def wiring(fmus: dict[str, Path]) -> str:
+def wiring(archives: dict[str, Path]) -> str:
     """Return wiring.h: GUIDs and value references."""
     lines = []
     for role, model in ROLES.items():
-        description = fmpy.read_model_description(str(fmus[model]))
+        description = fmpy.read_model_description(str(archives[model]))
         lines.append(f'#define {role}_GUID "{description.guid}"')
         ports = [v for v in description.modelVariables if v.causality in ("input", "output")]
         lines += [f"#define {role}_{port.name} {port.valueReference}" for port in ports]
     return "\n".join(lines) + "\n"
 
 
-def run_shared(fmus: dict[str, Path]) -> Array:
+def run_shared(archives: dict[str, Path]) -> Array:
     """Return what three_fmus.c prints, ``(STEPS, 4)``, from the shared libraries."""
     rows, h = [], 1e-3
     with (
-        FmuInstance(fmus["ReferenceTrajectory"]) as reference,
-        FmuInstance(fmus["HybridPredictor"]) as predictor,
-        FmuInstance(fmus["FeedDrive"]) as plant,
+        FmuInstance(archives["ReferenceTrajectory"]) as reference,
+        FmuInstance(archives["HybridPredictor"]) as predictor,
+        FmuInstance(archives["FeedDrive"]) as plant,
     ):
         for instance in (reference, predictor, plant):
             instance.initialise()
@@ -106,31 +106,31 @@ def run_shared(fmus: dict[str, Path]) -> Array:
 
 @pytest.mark.parametrize("model", MODELS)
 def test_nothing_but_the_fmi_functions_has_external_linkage(
-    fmus: dict[str, Path], headers: Path, tmp_path: Path, model: str
+    archives: dict[str, Path], headers: Path, tmp_path: Path, model: str
 ) -> None:
-    symbols = elf.symbols(compile_all(fmus[model], headers, tmp_path))
+    symbols = elf.symbols(compile_all(archives[model], headers, tmp_path))
     shown = [symbol.name for symbol in symbols if symbol.defined and symbol.exported]
     assert len(shown) == 34
     assert all(name.startswith(f"{model}_fmi2") for name in shown), shown
 
 
-def test_an_importer_may_choose_the_prefix(fmus: dict[str, Path], headers: Path, tmp_path: Path) -> None:
-    built = compile_all(fmus["ReferenceTrajectory"], headers, tmp_path, "-DFMI2_FUNCTION_PREFIX=")
+def test_an_importer_may_choose_the_prefix(archives: dict[str, Path], headers: Path, tmp_path: Path) -> None:
+    built = compile_all(archives["ReferenceTrajectory"], headers, tmp_path, "-DFMI2_FUNCTION_PREFIX=")
     shown = [symbol.name for symbol in elf.symbols(built) if symbol.defined and symbol.exported]
     assert len(shown) == 34
     assert all(name.startswith("fmi2") for name in shown)
 
 
-def test_three_fmus_run_in_one_program(fmus: dict[str, Path], headers: Path, tmp_path: Path) -> None:
-    objects = [compile_all(fmus[model], headers, tmp_path) for model in MODELS]
-    (tmp_path / "wiring.h").write_text(wiring(fmus))
+def test_three_fmus_run_in_one_program(archives: dict[str, Path], headers: Path, tmp_path: Path) -> None:
+    objects = [compile_all(archives[model], headers, tmp_path) for model in MODELS]
+    (tmp_path / "wiring.h").write_text(wiring(archives))
     program = tmp_path / "three_fmus"
     host = ROOT / "tests" / "c" / "three_fmus.c"
     run_compiler([f"-I{tmp_path}", f"-I{headers}", host, *objects, "-lm", "-o", program])
-    resources = (fmus["ReferenceTrajectory"].with_suffix("") / "resources").as_uri()
+    resources = (archives["ReferenceTrajectory"].with_suffix("") / "resources").as_uri()
     done = subprocess.run([program, str(STEPS), resources], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     printed = [[float.fromhex(number) for number in line.split()] for line in done.stdout.splitlines()]
-    shared = run_shared(fmus)
+    shared = run_shared(archives)
     assert np.ptp(shared, axis=0).min() > 1e-3  # m: the trajectory, and the plant behind it, have moved
     np.testing.assert_array_equal(np.array(printed), shared)

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from built_once import BuiltFmus
 
-from hybridsep import build_fmu, fmu_names, load_machine
+from hybridsep import fmu_names, load_machine
 from hybridsep.base.errors import FmuError, SignalError
 from hybridsep.base.settings import PARAMETERS, CompensatorSettings, PredictorSettings
 from hybridsep.cosim.fmus import check_controller
@@ -33,9 +34,8 @@ Fmu = Callable[[str], Path]
 Pair = tuple[Path, Path]
 
 
-def build(machine: Machine, flavour: str, model: str, out: Path, weights: Path | None = None) -> Path:
-    name = next(name for name, built in fmu_names(machine, flavour).items() if built == model)
-    return build_fmu(machine, name, out, flavour, targets=("host",), weights=weights)
+def name_of(model: str, machine: Machine, flavour: str) -> str:
+    return next(name for name, built in fmu_names(machine, flavour).items() if built == model)
 
 
 @pytest.fixture(scope="module", params=FLAVOURS)
@@ -44,9 +44,8 @@ def flavour(request: pytest.FixtureRequest) -> str:
 
 
 @pytest.fixture(scope="module")
-def pair(flavour: str, tmp_path_factory: pytest.TempPathFactory) -> Pair:
-    out = tmp_path_factory.mktemp(flavour)
-    return build(MACHINE, flavour, "SepCompensator", out), build(MACHINE, flavour, "FeedDrive", out)
+def pair(flavour: str, fmus: BuiltFmus) -> Pair:
+    return fmus(name_of("SepCompensator", MACHINE, flavour)), fmus(name_of("FeedDrive", MACHINE, flavour))
 
 
 @pytest.fixture(scope="module")
@@ -105,16 +104,25 @@ def test_fmus_equal_the_library(runs: dict[str, Run], choice: str) -> None:
     assert runs[choice].t[0] == pytest.approx(0.2)
 
 
-def test_recommended_settings_cold_and_warm(flavour: str, pair: Pair, tmp_path: Path) -> None:
-    compensator = MACHINE.new_compensator()
-    first = cosimulate(compensator, MACHINE.new_plant(), staircase(), encoder=Encoder(5e-6, 1))
-    compensator.predictor.save(tmp_path / "trained.state")
+@pytest.fixture(scope="module")
+def by_library(tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Path, Run]:
+    """A cold run of the library with the machine's settings, the state it ends with, and the warm run after it."""
+    compensator, trained = MACHINE.new_compensator(), tmp_path_factory.mktemp("trained") / "trained.state"
+    cold = cosimulate(compensator, MACHINE.new_plant(), staircase(), encoder=Encoder(5e-6, 1))
+    compensator.predictor.save(trained)
+    warm = cosimulate(compensator, MACHINE.new_plant(), staircase(), encoder=Encoder(5e-6, 2), t_init=0.0)
+    return cold, trained, warm
+
+
+def test_recommended_settings_cold_and_warm(
+    flavour: str, pair: Pair, fmus: BuiltFmus, by_library: tuple[Run, Path, Run]
+) -> None:
+    first, weights, second = by_library
     cold = cosimulate(*pair, staircase(), plant_values={"seed": 1})
     assert_same(cold, first)
     assert cold.summary()["tracking_rms_um"] < 4.2
-    trained = build(MACHINE, flavour, "SepCompensator", tmp_path, tmp_path / "trained.state")
+    trained = fmus(name_of("SepCompensator", MACHINE, flavour), weights=weights)
     warm = cosimulate(trained, pair[1], staircase(), plant_values={"seed": 2})
-    second = cosimulate(compensator, MACHINE.new_plant(), staircase(), encoder=Encoder(5e-6, 2), t_init=0.0)
     assert_same(warm, second)
     assert warm.summary()["tracking_rms_um"] < 0.6
     assert warm.summary()["share_hybrid"] == 1.0
@@ -211,10 +219,10 @@ def test_figures(short: Run, tmp_path: Path) -> None:
         assert path.read_bytes().startswith(PNG)
 
 
-def test_the_direction_and_the_features_of_the_reference_can_be_turned_off(flavour: str, tmp_path: Path) -> None:
+def test_the_direction_and_the_features_of_the_reference_can_be_turned_off(flavour: str, fmus: BuiltFmus) -> None:
     """Fixed parameters of the FMU, without a rebuild; the library with the same settings commands the same."""
     machine, r = load_machine("als25010_y"), spiral()[1][:1500]
-    pair = build(machine, flavour, "SepCompensator", tmp_path), build(machine, flavour, "FeedDrive", tmp_path)
+    pair = fmus(name_of("SepCompensator", machine, flavour)), fmus(name_of("FeedDrive", machine, flavour))
     settings: tuple[dict[str, Any], ...] = (
         {},
         {"v_friction": 0.0},

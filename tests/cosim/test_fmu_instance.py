@@ -17,8 +17,9 @@ from typing import Any
 
 import fmpy.fmi1
 import pytest
+from built_once import BuiltFmus
 
-from hybridsep import FmuInstance, build_fmu, load_machine
+from hybridsep import FmuInstance
 from hybridsep.base.errors import FmuError
 
 TS = 1e-3
@@ -26,15 +27,14 @@ N_THREADS = 8
 
 
 @pytest.fixture(scope="module")
-def native(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    machine = load_machine("spring_mass_damper")
-    return build_fmu(machine, "FeedDrive", tmp_path_factory.mktemp("native"), targets=("host",))
+def native(fmus: BuiltFmus) -> Path:
+    return fmus("FeedDrive")
 
 
-@pytest.fixture(params=["native", "python"])
-def drive(request: pytest.FixtureRequest, native: Path, python_fmu: Callable[[str], Path]) -> Path:
+@pytest.fixture(params=["FeedDrive", "FeedDrivePy"], ids=["native", "python"])
+def drive(request: pytest.FixtureRequest, fmus: BuiltFmus) -> Path:
     """The plant in both flavours."""
-    return native if request.param == "native" else python_fmu("FeedDrivePy")
+    return fmus(request.param)
 
 
 def with_files(archive: Path, target: Path, change: Callable[[str, bytes], bytes | None]) -> Path:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import shutil
 import subprocess
 import sys
 import zipfile
@@ -13,13 +14,12 @@ from pathlib import Path
 import importers_closed_system as closed_system
 import numpy as np
 import pytest
+from built_once import NATIVE, BuiltFmus
 from importers_closed_system import SYSTEMS, Array, ClosedSystem, exists_here
 from places import SUPPORT
 
-from hybridsep import Run, build_fmu, cosimulate, load_machine, machine_names, staircase
-from hybridsep.fmi.archive import fmu_names
+from hybridsep import Run, build_fmu, cosimulate, load_machine, staircase
 
-NATIVE = {name: machine for machine in map(load_machine, machine_names()) for name in fmu_names(machine)}
 TOLERANCE = 1e-12  # m; libcosim's step sizes are rounded differences of times
 FOREIGN = [
     pytest.param(
@@ -32,22 +32,22 @@ SHIFT = 0.1  # m
 
 
 @pytest.fixture(scope="module")
-def fmus(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(fmus: BuiltFmus, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with all native FMUs of all machines, built for this machine."""
     folder = tmp_path_factory.mktemp("importers")
-    for name, machine in NATIVE.items():
-        build_fmu(machine, name, folder, targets=("host",))
+    for name in NATIVE:
+        shutil.copy(fmus(name), folder)
     return folder
 
 
 @pytest.fixture(scope="module")
-def moved(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def moved(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with closed systems whose staircase starts at another place than the FMUs' start values."""
-    folder, machine = tmp_path_factory.mktemp("moved"), load_machine("spring_mass_damper")
+    moved, machine = tmp_path_factory.mktemp("moved"), load_machine("spring_mass_damper")
     for name in ("HybridPredictor", "SepCompensator", "FeedDrive"):
-        (folder / f"{name}.fmu").write_bytes((fmus / f"{name}.fmu").read_bytes())
-    build_fmu(machine, "ReferenceTrajectory", folder, targets=("host",), samples=staircase(machine.T_s) + SHIFT)
-    return folder
+        shutil.copy(folder / f"{name}.fmu", moved)
+    build_fmu(machine, "ReferenceTrajectory", moved, targets=("host",), samples=staircase(machine.T_s) + SHIFT)
+    return moved
 
 
 @pytest.fixture(scope="module", params=SYSTEMS)
@@ -56,8 +56,8 @@ def system(request: pytest.FixtureRequest) -> ClosedSystem:
 
 
 @pytest.fixture(scope="module")
-def expected(fmus: Path, system: ClosedSystem) -> Array:
-    return closed_system.run("fmpy", system, fmus)
+def expected(folder: Path, system: ClosedSystem) -> Array:
+    return closed_system.run("fmpy", system, folder)
 
 
 def run_apart(importer: str, system: ClosedSystem, folder: Path, out: Path) -> Array:
@@ -94,8 +94,8 @@ def figures(system: ClosedSystem, rows: Array) -> list[str]:
 
 
 @pytest.mark.parametrize("system", ["predictor"], indirect=True)
-def test_the_loop_without_an_importer_is_cosimulate(fmus: Path, system: ClosedSystem, expected: Array) -> None:
-    run = cosimulate(fmus / "HybridPredictor.fmu", fmus / "FeedDrive.fmu", staircase())
+def test_the_loop_without_an_importer_is_cosimulate(folder: Path, system: ClosedSystem, expected: Array) -> None:
+    run = cosimulate(folder / "HybridPredictor.fmu", folder / "FeedDrive.fmu", staircase())
     assert_bit_for_bit(run, system, expected)
     summary = run.summary()
     assert figures(system, expected)[2:] == [f"{summary[name]:#.4g}" for name in ("rms_pb_um", "rms_h_um")]
@@ -104,9 +104,9 @@ def test_the_loop_without_an_importer_is_cosimulate(fmus: Path, system: ClosedSy
 
 @pytest.mark.parametrize("system", ["compensator"], indirect=True)
 def test_the_compensated_loop_without_an_importer_is_the_same(
-    fmus: Path, system: ClosedSystem, expected: Array
+    folder: Path, system: ClosedSystem, expected: Array
 ) -> None:
-    run = cosimulate(fmus / "SepCompensator.fmu", fmus / "FeedDrive.fmu", staircase())
+    run = cosimulate(folder / "SepCompensator.fmu", folder / "FeedDrive.fmu", staircase())
     assert_bit_for_bit(run, system, expected)
     summary = run.summary()
     assert figures(system, expected)[2:] == [f"{summary['tracking_rms_um']:#.4g}"]
@@ -123,9 +123,9 @@ def assert_bit_for_bit(run: Run, system: ClosedSystem, rows: Array) -> None:
 
 @pytest.mark.parametrize("importer", FOREIGN)
 def test_importers_come_to_the_same_figures(
-    fmus: Path, system: ClosedSystem, expected: Array, tmp_path: Path, importer: str
+    folder: Path, system: ClosedSystem, expected: Array, tmp_path: Path, importer: str
 ) -> None:
-    rows = run_apart(importer, system, fmus, tmp_path)
+    rows = run_apart(importer, system, folder, tmp_path)
     apart = f"at most {abs(rows - expected).max():.1e} m apart from fmpy"
     print(importer, system.look_ahead, *figures(system, rows), "µm;", apart)
     assert figures(system, rows) == figures(system, expected)
@@ -146,13 +146,13 @@ def test_the_start_goes_round_in_initialization_mode(
 
 
 @pytest.mark.skipif(not exists_here("ecos"), reason="ecos has no library for this machine")
-def test_the_script_of_the_guide(fmus: Path, system: ClosedSystem, expected: Array) -> None:
+def test_the_script_of_the_guide(folder: Path, system: ClosedSystem, expected: Array) -> None:
     (script,) = closed_system.blocks("python")
     if system.look_ahead == "compensator":  # what the guide says to change
         for old, new in (("6100", "6200"), ("predictor", "compensator"), ("rms_pb", "rms_e")):
             assert old in script
             script = script.replace(old, new)
-    folder = closed_system.system_structure(system, fmus).parent
+    folder = closed_system.system_structure(system, folder).parent
     printed = python(folder, "-c", f"import importers_closed_system as c; c.load_tbb()\n{script}")
     assert [f"{1e6 * float(number):#.4g}" for number in printed.split()] == figures(system, expected)[:2]
 
@@ -185,13 +185,13 @@ def findings(path: Path, caplog: pytest.LogCaptureFixture) -> list[str]:
 
 
 @pytest.mark.parametrize("name", NATIVE)
-def test_the_toolbox_has_no_finding(fmus: Path, caplog: pytest.LogCaptureFixture, name: str) -> None:
-    assert findings(fmus / f"{name}.fmu", caplog) == []
+def test_the_toolbox_has_no_finding(folder: Path, caplog: pytest.LogCaptureFixture, name: str) -> None:
+    assert findings(folder / f"{name}.fmu", caplog) == []
 
 
-def test_the_toolbox_would_find_something(fmus: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_the_toolbox_would_find_something(folder: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     broken = tmp_path / "broken.fmu"
-    with zipfile.ZipFile(fmus / "FeedDrive.fmu") as archive, zipfile.ZipFile(broken, "w") as copy:
+    with zipfile.ZipFile(folder / "FeedDrive.fmu") as archive, zipfile.ZipFile(broken, "w") as copy:
         description = archive.read("modelDescription.xml").decode()
         copy.writestr("modelDescription.xml", description.replace('name="v"', 'name="x"'))
     assert any("'x' is used by several variables" in finding for finding in findings(broken, caplog))

@@ -12,17 +12,17 @@ from pathlib import Path
 
 import fuzz_fmi2
 import pytest
-from c_compiler import FMI_HEADERS, address_sanitizer, needs_sanitisers, run_compiler, sanitising_compiler
+from c_compiler import C_SOURCES, FMI_HEADERS, address_sanitizer, needs_sanitisers, run_compiler, sanitising_compiler
 
 from hybridsep.fmi.native_flavour import sources
 from hybridsep.machine import load_machine
 
 FUZZED = {
-    "HybridPredictor": 16,
-    "SepCompensator": 12,
-    "FeedDrive": 6,
-    "FeedDrive_als25010_x": 6,
-    "ReferenceTrajectory": 6,
+    "HybridPredictor": 8,
+    "SepCompensator": 8,
+    "FeedDrive": 3,
+    "FeedDrive_als25010_x": 3,
+    "ReferenceTrajectory": 3,
 }
 
 
@@ -77,9 +77,12 @@ def test_each_source_compiles_alone_without_warnings(tmp_path: Path, compiler: l
         description = {"model": model, "name": model, "parameters": fmi, "modes": [mode]}
     for file, content in sources(description, "{}").items():
         (tmp_path / file).write_bytes(content)
+    # The core knows nothing of the model: it is compiled with the first of them
+    core = {path.name for path in (C_SOURCES / "core").rglob("*.c")} if model != "HybridPredictor" else set()
+    files = sorted(path for path in tmp_path.glob("*.c") if path.name not in core)
 
     def compile_alone(path: Path) -> None:
         run_compiler(["-O2", f"-I{FMI_HEADERS}", "-c", path, "-o", path.with_suffix(".o")], command=compiler)
 
     with ThreadPoolExecutor() as pool:
-        list(pool.map(compile_alone, sorted(tmp_path.glob("*.c"))))
+        list(pool.map(compile_alone, files))

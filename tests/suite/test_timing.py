@@ -68,7 +68,7 @@ def in_samples(new_stream: StreamMaker, points: Clock, start: float) -> list[lis
     ("pattern", "start"),
     [
         *((pattern, 0.0) for pattern in ("0.3", "0.4", "0.5", "1", "2", "3.7", "8", "12.2", "370", "mixture")),
-        *((pattern, start) for start in (1e6, 1e9) for pattern in ("0.3", "12.2", "mixture")),
+        *((pattern, 1e9) for pattern in ("12.2", "mixture")),
     ],
 )
 def test_outputs_are_those_of_the_last_instant(new_stream: StreamMaker, pattern: str, start: float) -> None:

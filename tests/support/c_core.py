@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import struct
+import tempfile
 import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
@@ -75,16 +76,19 @@ def sources() -> list[str]:
     return sorted(str(path) for folder in ("core", "model") for path in (C_SOURCES / folder).rglob("*.c"))
 
 
+def model_sources() -> list[str]:
+    """Return the C files that depend on an FMU's header."""
+    return [source for source in sources() if Path(source).name.startswith("model_")]
+
+
 @cache
-def object_files() -> list[str]:
-    """Compile what does not depend on an FMU's header, once."""
-    folder = build_folder() / "common"
-    folder.mkdir()
+def object_files(flags: tuple[str, ...] = ("-O2", "-fPIC"), command: tuple[str, ...] = ()) -> list[str]:
+    """Compile all other C files, once for each set of options, with the host's compiler if no other is asked for."""
+    folder = Path(tempfile.mkdtemp(dir=build_folder()))
     objects = []
-    for source in sources():
-        if not Path(source).name.startswith("model_"):
-            objects.append(str(folder / f"{Path(source).stem}.o"))
-            run_compiler(["-O2", "-fPIC", *include_flags(), "-c", source, "-o", objects[-1]])
+    for source in sorted(set(sources()) - set(model_sources())):
+        objects.append(str(folder / f"{Path(source).stem}.o"))
+        run_compiler([*flags, *include_flags(), "-c", source, "-o", objects[-1]], command=command)
     return objects
 
 
@@ -99,7 +103,6 @@ def library(name: str) -> ctypes.CDLL:
     """Return the shared library of one of :data:`DESCRIPTIONS`, built when first asked for."""
     folder = build_folder() / name
     write_header(name, folder)
-    models = [source for source in sources() if Path(source).name.startswith("model_")]
     built = folder / "model.so"
     run_compiler(
         [
@@ -108,7 +111,7 @@ def library(name: str) -> ctypes.CDLL:
             "-shared",
             f"-I{folder}",
             *include_flags(),
-            *models,
+            *model_sources(),
             EXPOSE,
             *object_files(),
             "-lm",
