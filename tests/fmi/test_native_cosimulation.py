@@ -88,7 +88,7 @@ TIGHT = {"v_max": 0.08, "a_max": 8.0, "j_max": 1000.0}
 def test_both_flavours_of_the_compensator_command_the_same(
     fmus: BuiltFmus, machine: str, values: dict[str, float]
 ) -> None:
-    command = {"": staircase(), "_als25010_x": spiral()[0], "_als25010_y": spiral()[1]}[machine][:4000]
+    command = {"": staircase(), "_als25010_x": spiral()[0], "_als25010_y": spiral()[1]}[machine][:2500]
     native, python = (
         cosimulate(
             fmus(f"SepCompensator{suffix}{machine}"), fmus(f"FeedDrive{machine}"), command, controller_values=values

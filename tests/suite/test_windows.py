@@ -51,8 +51,7 @@ def test_the_staircase_is_predicted_as_by_the_directly_solved_problem(new_stream
 
 
 @on_all((COMPENSATOR,))
-@pytest.mark.parametrize("preview", [200, 170])
-@pytest.mark.parametrize("start", [0.0, 0.1])
+@pytest.mark.parametrize(("preview", "start"), [(200, 0.0), (170, 0.1)])
 def test_commands_are_those_of_plans_made_window_by_window(new_stream: StreamMaker, preview: int, start: float) -> None:
     values: dict[str, Value] = {"Np": 50, "p": 20, "q": 3, "t_init": 0.1, "preview": preview}
     shown = shown_by(new_stream, 1500, values, start)
