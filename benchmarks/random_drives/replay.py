@@ -94,6 +94,9 @@ class FaultyReplay:
         Largest ``|x_h − x_pb|`` over the whole run relative to the largest residual of the sound measurement.
     refused : bool
         Whether the replay ended with an error.
+    own_noise : float
+        With jitter: the prediction of the run without it, judged by the jittered samples, in the same ratio. Jitter
+        that costs the prediction no accuracy comes to this: the noise of the samples themselves cannot be predicted.
     """
 
     index: int
@@ -101,6 +104,7 @@ class FaultyReplay:
     ratio: float
     change: float
     refused: bool
+    own_noise: float = math.nan
 
 
 def replay(drive: Drive, predictor: str, run: Replayed = library_replay) -> Replay:
@@ -131,15 +135,17 @@ def replay_faults(drive: Drive, seed: int, predictor: str, run: Replayed = libra
             sound, first = measured, 0
         try:
             x_h = run(predictor, drive.model, drive.x_d, measured)
-            peer = sound - x_pb
+            peer, own_noise = sound - x_pb, math.nan
             if name == JITTER:
-                peer = drive.x_meas - run(predictor, drive.model, drive.x_d, drive.x_meas)
+                without = run(predictor, drive.model, drive.x_d, drive.x_meas)
+                peer = drive.x_meas - without
+                own_noise = rms(measured - without) / rms(peer)
         except SignalError:
             replays.append(FaultyReplay(drive.index, name, math.inf, math.inf, refused=True))
             continue
         ratio = rms((sound - x_h)[first:]) / rms(peer[first:])
         change = float(np.abs(x_h - x_pb).max() / np.abs(sound - x_pb).max())
-        replays.append(FaultyReplay(drive.index, name, ratio, change, refused=False))
+        replays.append(FaultyReplay(drive.index, name, ratio, change, refused=False, own_noise=own_noise))
     return replays
 
 

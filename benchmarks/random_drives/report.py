@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from benchmarks.random_drives.faults import FAULTS
+from benchmarks.random_drives.faults import FAULTS, JITTER
 from benchmarks.random_drives.replay import FaultyReplay, Replay
 from hybridsep.base.signals import Array
 
@@ -50,6 +50,13 @@ def print_faults(replays: Sequence[FaultyReplay]) -> None:
         values = [f"{value:.3g}" for value in _quantiles(ratios, (0.5, 0.9, 0.99, 1.0))]
         values += [_share(ratios, 1.05), _share(ratios, 1.10), _share(changes, 2.0), str(sum(r.refused for r in group))]
         print(f"{fault:28}" + "".join(f"{value:>10}" for value in values))
+    jittered = [r for r in replays if r.fault == JITTER]
+    own = np.array([r.own_noise for r in jittered])
+    print(
+        f"the run without jitter, judged by the jittered samples: {_share(own, 1.10)} above 1.10, max {own.max():.3g};"
+    )
+    beyond = np.array([r.ratio for r in jittered]) / own
+    print(f"  jitter relative to that: {_share(beyond, 1.10)} above 1.10, max {beyond.max():.3g}")
 
 
 def _print_ratios(name: str, ratios: Sequence[float]) -> None:
