@@ -25,20 +25,13 @@ from rich.table import Table
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # benchmarks are no part of the package
 
 from benchmarks.step_time.host import PREDICTOR, Array, Host, build, instructions
+from hybridsep.base.settings import CompensatorSettings, Limits
 
-COMPENSATOR = {
-    **PREDICTOR,
-    "preview": 200,
-    "spacing": 2,
-    "jerk_weight": 1.0,
-    "v_max": 0.1,
-    "a_max": 16.0,
-    "j_max": 5000.0,
-    "change_max": 1e-3,
-    "v_friction": 0.0,
-    "no_reversal": 1,
-    "compensate": 2,
-}
+_LIMITS = Limits(velocity=0.1, acceleration=16.0, jerk=5000.0)
+_SETTINGS = CompensatorSettings(
+    preview=200, spacing=2, jerk_weight=1.0, change_max=1e-3, no_reversal=True, compensate="hybrid", limits=_LIMITS
+)
+COMPENSATOR = {**PREDICTOR, **_SETTINGS.to_fmi(), "v_friction": 0.0}
 PAPER, WITH_REFERENCE = "the paper's settings", "with features of the reference"
 TRUST = {"trust": 1, "Np": 50, "t_init": -1.0, "v_friction": 2e-3}
 WITH_TRUST, TIGHT_WITH_TRUST = "with trust", "with trust, limits of the trajectory"
@@ -54,8 +47,12 @@ REPETITIONS, COUNTED_STEPS = 5, 3500
 TAIL_MAX = 300e3
 """Limit of p99.9, ns."""
 MEDIAN_OVER_PREDICTOR_MAX = 2.0
+TRUST_MEDIAN_MAX = 6.0
+"""Limit of the median with trust, relative to the paper's settings."""
 TRUST_MOST = 10e6
 """Limit of the instructions of the most expensive step with trust."""
+TRUST_LONGEST = 0.5
+"""Limit of the longest step with trust, relative to T_s."""
 
 
 def summaries(hosts: dict[str, tuple[Host, dict[str, Any]]], steps: int) -> dict[str, dict[str, Any]]:
@@ -111,6 +108,12 @@ def main() -> int:
         text = f"{case}: median / HybridPredictor's median = {ratio:.2f}, limit ≤ {MEDIAN_OVER_PREDICTOR_MAX:g}"
         checks.append((ratio <= MEDIAN_OVER_PREDICTOR_MAX, text))
     for case in (WITH_TRUST, TIGHT_WITH_TRUST):
+        ratio = found[case]["median"] / found[PAPER]["median"]
+        text = f"{case}: median / that of {PAPER} = {ratio:.2f}, limit ≤ {TRUST_MEDIAN_MAX:g}"
+        checks.append((ratio <= TRUST_MEDIAN_MAX, text))
+        longest = found[case]["max"] * 1e-9 / float(COMPENSATOR["T_s"])
+        text = f"{case}: longest step {longest:.2f} T_s, limit ≤ {TRUST_LONGEST:g} (median of {REPETITIONS} turns)"
+        checks.append((longest <= TRUST_LONGEST, text))
         if case in counts:
             most = counts[case].max()
             text = f"{case}: most expensive step {most / 1e6:.1f} million instructions, limit ≤ {TRUST_MOST / 1e6:g}"

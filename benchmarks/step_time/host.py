@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridsep.base.settings import PredictorSettings
 from hybridsep.fmi.c_header import c_header
 from hybridsep.fmi.compiler import compile_flags
 from hybridsep.model.physics import ModalModel
@@ -28,8 +29,8 @@ Array = NDArray[np.float64]
 HERE = Path(__file__).parent
 C_SOURCES = HERE.parents[1] / "fmu_src" / "c"
 
-PREDICTOR = {"Np": 100, "p": 50, "q": 3, "lambda": 1e-12, "T_s": 1e-3, "t_init": 0.3, "input_hold": 0, "dead_time": 0}
-PREDICTOR |= {"trust": 0, "effect": 0.0, "noise_std": 0.0, "forgetting": 0.0}
+_PAPER = PredictorSettings(trust=False, Np=100, p=50, q=3, lam=1e-12, T_s=1e-3, t_init=0.3, input_hold="zoh")
+PREDICTOR = {**_PAPER.to_fmi(), "dead_time": 0}
 """The paper's settings."""
 
 
