@@ -26,7 +26,7 @@ from threadpoolctl import threadpool_limits
 
 from benchmarks.common import Array, staircase_log, staircase_predictor
 from hybridsep.compensate.compensator import SepCompensator
-from hybridsep.machine import load_machine
+from hybridsep.machines.machine import load_machine
 
 N_WINDOWS = 40
 REPETITIONS = 7

@@ -33,7 +33,7 @@ from hybridsep.base.metrics import rms
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.evaluate.backtest import backtest
-from hybridsep.machine import Machine, load_machine
+from hybridsep.machines.machine import Machine, load_machine
 from hybridsep.model.physics import ModalModel
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.plant import Plant, simulate

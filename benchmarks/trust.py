@@ -31,7 +31,7 @@ from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.logs.log import read_log
-from hybridsep.machine import Machine, load_machine
+from hybridsep.machines.machine import Machine, load_machine
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.plant import simulate

@@ -31,7 +31,7 @@ from benchmarks.common import Array, resident_bytes, staircase_log
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.logs.log import read_log
-from hybridsep.machine import Machine, load_machine
+from hybridsep.machines.machine import Machine, load_machine
 from hybridsep.predict.predictor import HybridPredictor
 from hybridsep.tune.losses import nested_losses
 

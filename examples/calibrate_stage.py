@@ -17,7 +17,7 @@ from hybridsep import Encoder, Machine, backtest, load_machine, simulate, spiral
 from hybridsep.app.printed import PRINTED
 from hybridsep.base.metrics import rms
 from hybridsep.base.signals import Array
-from hybridsep.machine_sections import StageSection
+from hybridsep.machines.sections import StageSection
 
 KAPPA_OVER_F = 1.5e3  # 1/m²
 ASSUMPTIONS = {

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from .evaluate.backtest import backtest, backtest_stream
     from .fmi.archive import build_fmu, fmu_names
     from .logs.log import open_log, read_log
-    from .machine import Machine, load_machine, machine_names
+    from .machines.machine import Machine, load_machine, machine_names
     from .model.physics import ModalModel, Mode
     from .plants.encoder import Encoder
     from .plants.plant import simulate
@@ -68,7 +68,7 @@ _MODULES = {
     "HybridPredictor": "predict.predictor",
     "HybridSepError": "base.errors",
     "Limits": "base.settings",
-    "Machine": "machine",
+    "Machine": "machines.machine",
     "ModalModel": "model.physics",
     "Mode": "model.physics",
     "Run": "cosim.run",
@@ -79,8 +79,8 @@ _MODULES = {
     "build_fmu": "fmi.archive",
     "cosimulate": "cosim.loop",
     "fmu_names": "fmi.archive",
-    "load_machine": "machine",
-    "machine_names": "machine",
+    "load_machine": "machines.machine",
+    "machine_names": "machines.machine",
     "open_log": "logs.log",
     "read_log": "logs.log",
     "rest_to_rest": "plants.trajectory",

@@ -16,7 +16,7 @@ from hybridsep.compensate.compensator import SepCompensator
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.cosim.run import Run
 from hybridsep.fmi.archive import build_fmu, fmu_names
-from hybridsep.machine import Machine, load_machine
+from hybridsep.machines.machine import Machine, load_machine
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.feed_drive import FeedDrive
 from hybridsep.plants.plant import Plant

@@ -7,8 +7,8 @@ import numpy as np
 from hybridsep.base.signals import Array
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.cosim.run import Run
-from hybridsep.machine import Machine
-from hybridsep.machine_sections import StageSection
+from hybridsep.machines.machine import Machine
+from hybridsep.machines.sections import StageSection
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.plant import Plant
 from hybridsep.plants.stage_drive import StageDrive

@@ -29,8 +29,8 @@ from hybridsep.base.metrics import contour_error, largest, peak_derivatives, rms
 from hybridsep.base.settings import Limits
 from hybridsep.base.signals import Array
 from hybridsep.cosim.run import Run
-from hybridsep.machine import Machine
-from hybridsep.machine_sections import CompensatorSection
+from hybridsep.machines.machine import Machine
+from hybridsep.machines.sections import CompensatorSection
 from hybridsep.plants.feed_drive import FeedDrive
 from hybridsep.plants.plant import simulate
 from hybridsep.plants.trajectory import archimedean_spiral, spiral, staircase

@@ -27,8 +27,8 @@ from benchmarks.compensation.run import CASES, LESS_THAN_5_PERCENT_WORSE, UM, ex
 from benchmarks.trust import circle, short_staircase
 from hybridsep.base.metrics import largest
 from hybridsep.base.signals import Array
-from hybridsep.machine import Machine, load_machine
-from hybridsep.machine_sections import StageSection
+from hybridsep.machines.machine import Machine, load_machine
+from hybridsep.machines.sections import StageSection
 from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest, spiral, staircase
 
 NO_WORSE = 1.02

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridsep.fmi.native_flavour import fmi_headers, sources
-from hybridsep.machine import load_machine
+from hybridsep.machines.machine import load_machine
 
 Array = NDArray[np.float64]
 

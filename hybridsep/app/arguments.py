@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..base.errors import ParameterError
 from ..logs.log import Log
-from ..machine import Machine
+from ..machines.machine import Machine
 
 __all__ = ["check_ending", "check_interval", "check_unit"]
 

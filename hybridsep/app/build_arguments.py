@@ -11,7 +11,7 @@ from ..fmi.archive import fmu_names
 from ..fmi.compiler import compilers
 from ..fmi.warm_start import load_trained
 from ..logs.log import check_reading
-from ..machine import Machine, load_machine, machine_names
+from ..machines.machine import Machine, load_machine, machine_names
 from ..plants.trajectory import read_trajectory
 from .arguments import check_interval
 

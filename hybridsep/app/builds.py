@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..fmi.archive import build_fmu, fmu_name
 from ..fmi.compiler import can_compile
-from ..machine import Machine
+from ..machines.machine import Machine
 
 __all__ = ["build_for_host", "build_pair", "default_flavour"]
 

@@ -58,7 +58,7 @@ def backtest(
         from ..evaluate.scores import Scores
         from ..fmi.warm_start import begun_predictor
         from ..logs.log import Log
-        from ..machine import load_machine, machine_path
+        from ..machines.machine import load_machine, machine_path
         from .arguments import check_ending
         from .log_intake import findings_table, open_checked, reading_of
         from .overwrite import BATCH_COLUMNS, BATCHES, BY_ENDING, Output, check_outputs

@@ -45,7 +45,7 @@ def build(
     """Build FMUs from machine files; the same machine gives the same bytes."""
     with loading():
         from ..fmi.archive import build_fmu
-        from ..machine import machine_path
+        from ..machines.machine import machine_path
         from .build_arguments import extras_of, jobs_of
         from .overwrite import FMU, Output, check_outputs
         from .progress import progress_bar

@@ -64,7 +64,7 @@ def cosim(
     with loading():
         from ..cosim.loop import cosimulate
         from ..cosim.run import RESULT_SUFFIXES
-        from ..machine import load_machine, machine_path
+        from ..machines.machine import load_machine, machine_path
         from .arguments import check_ending
         from .builds import build_for_host
         from .cosim_arguments import check_pair, checked_group, fitting, read_command

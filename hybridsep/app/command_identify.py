@@ -145,7 +145,7 @@ def _klipper_axis(axis: str | None) -> str:
 
 def _write_machine(found: IdentifiedModel | IdentifiedResponse, name: str, recording: str, out: Path) -> None:
     """Write the machine file, with the deviations and findings as comments."""
-    from ..machine_text import machine_text
+    from ..machines.text import machine_text
 
     deviations = [
         f"{e.name} = {e.value:.6g} ± {e.std:.2g}{'' if e.unit == '1' else ' ' + e.unit}" for e in found.parameters

@@ -61,7 +61,7 @@ def init(
     """Write an annotated machine file, by options or by a few questions where they are missing."""
     with loading():
         from ..identify.model import machine_of
-        from ..machine_text import machine_text
+        from ..machines.text import machine_text
         from ..model.physics import ModalModel
         from .arguments import check_ending
         from .overwrite import MACHINE, Output, check_outputs

@@ -46,7 +46,7 @@ def report(
         from ..evaluate.report import Report
         from ..fmi.warm_start import begun_predictor
         from ..logs.log import Log
-        from ..machine import load_machine, machine_path
+        from ..machines.machine import load_machine, machine_path
         from ..tune.halves import Recording, replay
         from .arguments import check_ending
         from .fit import machine_name

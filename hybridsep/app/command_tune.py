@@ -48,8 +48,8 @@ def tune(
     """Rank settings of the predictor by causal replays of logs, at the controller's look-ahead."""
     with loading():
         from ..logs.log import Log
-        from ..machine import load_machine, machine_path
-        from ..machine_text import machine_text
+        from ..machines.machine import load_machine, machine_path
+        from ..machines.text import machine_text
         from ..tune.choice import with_window
         from ..tune.grid import TUNED, candidates, default_values
         from ..tune.joint import n_processors, over_windows

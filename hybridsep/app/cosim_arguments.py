@@ -14,7 +14,7 @@ from ..fmi.archive import fmu_names
 from ..fmi.compiler import compilers
 from ..fmi.warm_start import load_trained
 from ..logs.log import check_reading
-from ..machine import Machine
+from ..machines.machine import Machine
 from ..plants.trajectory import PAPER_LIMITS, read_trajectory, spiral, staircase
 from .arguments import check_interval
 from .options import TRAJECTORIES

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..base.output import written_text
 from ..fmi.archive import fmu_names
-from ..machine import load_machine
+from ..machines.machine import load_machine
 from .builds import default_flavour
 from .demo_cases import MACHINES, Summary, read_recorded, recorded_case, spiral_case, staircase_case
 from .demo_compensation import COMPENSATED

@@ -17,7 +17,7 @@ from ..evaluate.replayed import replayed_run
 from ..evaluate.time_plots import prediction_figure, tracking_figure
 from ..evaluate.verdict import verdict_of
 from ..logs.log import Log, read_log
-from ..machine import load_machine
+from ..machines.machine import load_machine
 from ..plants.trajectory import spiral, staircase
 from .builds import build_pair
 from .demo_compensation import COMPENSATED, Runs, compensate, contour_errors, mean_summary

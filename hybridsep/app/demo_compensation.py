@@ -13,7 +13,7 @@ from ..base.settings import PARAMETERS
 from ..base.signals import Array
 from ..cosim.loop import cosimulate
 from ..cosim.run import Run
-from ..machine import Machine
+from ..machines.machine import Machine
 from ..plants.encoder import Encoder
 from ..plants.trajectory import archimedean_spiral
 from .builds import build_for_host

@@ -18,8 +18,8 @@ from ..fmi.flavours import FLAVOURS
 from ..identify.model import machine_of
 from ..identify.operation import identify_operation, unit_gain_model
 from ..logs.log import Log
-from ..machine import NAME_PATTERN, Machine
-from ..machine_text import machine_text
+from ..machines.machine import NAME_PATTERN, Machine
+from ..machines.text import machine_text
 from ..model.physics import ModalModel, Mode
 from ..predict.predictor import HybridPredictor
 from ..tune.choice import choose_settings, settings_for, window_scores

@@ -11,7 +11,7 @@ from ..base.errors import LogError, ParameterError
 from ..intake.check import Intake, check
 from ..intake.finding import Finding
 from ..logs.log import Log, LogReader, open_log
-from ..machine import Machine
+from ..machines.machine import Machine
 from .arguments import check_interval, check_unit
 from .failures import errors_console
 from .reading_options import ReadingOptions

@@ -17,8 +17,8 @@ from ..base.data_files import DEFAULT_MACHINE
 from ..base.errors import FmuError
 from ..base.output import written_whole
 from ..base.settings import PARAMETERS
-from ..machine import Machine
-from ..machine_sections import FeedDriveSection
+from ..machines.machine import Machine
+from ..machines.sections import FeedDriveSection
 from . import native_flavour, python_flavour
 from .flavours import FLAVOURS
 from .warm_start import load_trained

@@ -7,7 +7,7 @@ import json
 import uuid
 from collections.abc import Mapping
 
-from ..machine import Machine
+from ..machines.machine import Machine
 
 __all__ = ["content_guid", "fmu_title"]
 

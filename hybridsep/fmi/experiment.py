@@ -8,7 +8,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from ..base.signals import as_samples
-from ..machine import Machine
+from ..machines.machine import Machine
 from ..plants.trajectory import staircase
 
 __all__ = ["stop_time"]

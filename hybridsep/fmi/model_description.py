@@ -10,7 +10,7 @@ from xml.etree import ElementTree as ET
 from numpy.typing import ArrayLike
 
 from ..base.version import __version__
-from ..machine import Machine
+from ..machines.machine import Machine
 from .content import fmu_title
 from .experiment import stop_time
 from .variables import INTERPOLATED, Variable, variables_of

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from ..base.data_files import data_folder
 from ..base.signals import as_samples
 from ..base.version import __version__
-from ..machine import Machine
+from ..machines.machine import Machine
 from ..plants.trajectory import spiral, staircase
 from ..predict.predictor import HybridPredictor
 from .c_header import c_header

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from string import Template
 
-from ..machine import Machine
+from ..machines.machine import Machine
 from .content import fmu_title
 from .tables import interface_table
 from .variables import variables_of

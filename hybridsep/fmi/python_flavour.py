@@ -17,7 +17,7 @@ import pythonfmu
 
 from ..base.data_files import data_folder
 from ..base.version import __version__
-from ..machine import Machine
+from ..machines.machine import Machine
 from ..predict.predictor import HybridPredictor
 from .content import content_guid
 from .imported import imported_modules

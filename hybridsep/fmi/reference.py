@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from ..base.signals import Array, as_samples
 from ..compensate.compensator import SepCompensator
-from ..machine import Machine
+from ..machines.machine import Machine
 from ..plants.encoder import Encoder
 from ..plants.trajectory import staircase
 from ..predict.look_ahead import LookAhead

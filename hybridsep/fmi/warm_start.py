@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..base.errors import StateError
-from ..machine import Machine
+from ..machines.machine import Machine
 from ..predict.predictor import HybridPredictor
 from .weights import learned_settings
 

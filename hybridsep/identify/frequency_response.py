@@ -17,7 +17,7 @@ from ..base.errors import IdentificationError, ParameterError
 from ..base.settings import check
 from ..base.signals import Array
 from ..base.threads import one_blas_thread
-from ..machine import Machine
+from ..machines.machine import Machine
 from ..model.physics import ModalModel
 from .modal_fit import ModalFit
 from .model import machine_of

@@ -17,7 +17,7 @@ from .motion import moves
 from .relation import Line, fit_dead_time, line, line_at_best_lag, noise_std, shifted
 
 if TYPE_CHECKING:
-    from ..machine import Machine
+    from ..machines.machine import Machine
 
 __all__ = ["check_delay", "check_offset", "check_scale", "check_sign", "check_swapped", "check_velocity", "stretch"]
 

@@ -16,7 +16,7 @@ from .samples import check_missing, check_outliers, check_repeated, check_stuck
 from .times import check_gaps, check_jitter, check_order
 
 if TYPE_CHECKING:
-    from ..machine import Machine
+    from ..machines.machine import Machine
 
 __all__ = ["Intake", "apply", "check"]
 

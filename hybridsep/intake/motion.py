@@ -18,7 +18,7 @@ from .finding import ERROR, HOPELESS, NOTE, WARNING, Finding, Fix, Picture
 from .relation import noise_std
 
 if TYPE_CHECKING:
-    from ..machine import Machine
+    from ..machines.machine import Machine
 
 __all__ = ["check_motion", "check_rate", "check_start", "check_unit", "moves"]
 

@@ -15,7 +15,7 @@ from hybridsep import HybridPredictor, load_machine
 from hybridsep.app import demo
 from hybridsep.app.overwrite import BATCHES, FIGURE, FMU, RUN, STATE, SUMMARY
 from hybridsep.cosim.run import COMPENSATOR, PREDICTOR, save_columns
-from hybridsep.machine import machine_path
+from hybridsep.machines.machine import machine_path
 
 MACHINE = "spring_mass_damper"
 

@@ -15,7 +15,7 @@ from hybridsep.base.signals import Array
 from hybridsep.compensate.constraints import DriveBounds
 from hybridsep.compensate.splines import N_DECIDED, SplineBasis
 from hybridsep.cosim.loop import cosimulate
-from hybridsep.machine import load_machine
+from hybridsep.machines.machine import load_machine
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest, spiral
 

@@ -7,7 +7,7 @@ import pytest
 from compensator_cases import MODEL, TS, move
 
 from benchmarks.compensation.peers import input_shaper, shape, zero_phase_command
-from hybridsep.machine import load_machine
+from hybridsep.machines.machine import load_machine
 
 
 @pytest.mark.parametrize("kind", ["zv", "zvd"])

@@ -16,7 +16,7 @@ from hybridsep.compensate.compensator import SepCompensator, SepState
 from hybridsep.compensate.splines import SplineBasis
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.cosim.run import Run
-from hybridsep.machine import Machine
+from hybridsep.machines.machine import Machine
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest
 from hybridsep.predict.linearised import PlanModel

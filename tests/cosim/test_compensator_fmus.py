@@ -20,7 +20,7 @@ from hybridsep.cosim.run import COMPENSATOR, Run
 from hybridsep.evaluate.path_plots import contour_figure
 from hybridsep.evaluate.time_plots import tracking_figure
 from hybridsep.fmi.flavours import FLAVOURS
-from hybridsep.machine import Machine
+from hybridsep.machines.machine import Machine
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.trajectory import spiral, staircase
 

@@ -9,7 +9,7 @@ from benchmarks import conditions
 from benchmarks.trust import Case
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
-from hybridsep.machine import load_machine
+from hybridsep.machines.machine import load_machine
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.plants.trajectory import staircase
 

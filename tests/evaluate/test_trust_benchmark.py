@@ -12,7 +12,7 @@ from benchmarks.trust import circle, fitted_lag, recorded, replayed, short_stair
 from hybridsep.base.errors import SignalError
 from hybridsep.base.signals import Array
 from hybridsep.evaluate.backtest import Backtest, backtest
-from hybridsep.machine import load_machine
+from hybridsep.machines.machine import load_machine
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
 

@@ -11,7 +11,7 @@ from hybridsep.base.signals import Array
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.evaluate.verdict import Tally, Verdict, verdict_of
-from hybridsep.machine import load_machine
+from hybridsep.machines.machine import load_machine
 from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.predictor import HybridPredictor
 

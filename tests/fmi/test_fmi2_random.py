@@ -15,7 +15,7 @@ import pytest
 from c_compiler import C_SOURCES, FMI_HEADERS, address_sanitizer, needs_sanitisers, run_compiler, sanitising_compiler
 
 from hybridsep.fmi.native_flavour import sources
-from hybridsep.machine import load_machine
+from hybridsep.machines.machine import load_machine
 
 FUZZED = {
     "HybridPredictor": 8,

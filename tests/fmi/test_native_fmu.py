@@ -27,7 +27,7 @@ from hybridsep.fmi.compiler import ALL_TARGETS, TARGETS, compile_flags, host_tar
 from hybridsep.fmi.flavours import FLAVOURS
 from hybridsep.fmi.macho import universal
 from hybridsep.fmi.variables import Variable, variables_of
-from hybridsep.machine import load_machine
+from hybridsep.machines.machine import load_machine
 
 etree: Any = import_module("lxml.etree")  # comes with fmpy, has no types
 

@@ -21,7 +21,7 @@ from hybridsep.cosim.importer import FmuInstance
 from hybridsep.fmi.archive import build_fmu
 from hybridsep.fmi.c_header import c_header
 from hybridsep.fmi.reference import reference_files
-from hybridsep.machine import load_machine
+from hybridsep.machines.machine import load_machine
 
 MACHINE = load_machine("spring_mass_damper")
 TS = 1e-3
@@ -191,7 +191,7 @@ def test_each_fmu_carries_what_it_needs(python_fmu: Fmu, tmp_path: Path) -> None
     mine = travelling(python_fmu("SepCompensatorPy"))
     assert {"compensate/compensator.py", "predict/look_ahead.py", "base/settings.py", "fmi/slave.py"} < set(mine)
     assert {"predict/reference_features.py", "compensate/interior.py", "compensate/__init__.py"} < set(mine)
-    assert not {"machine.py", "plants/plant.py", "plants/trajectory.py", "fmi/archive.py"} & set(mine)
+    assert not {"machines/machine.py", "plants/plant.py", "plants/trajectory.py", "fmi/archive.py"} & set(mine)
     for name in ("HybridPredictorPy", "FeedDrivePy"):
         theirs = travelling(python_fmu(name))
         assert not any(module.startswith("compensate/") for module in theirs)

@@ -15,7 +15,7 @@ from fmpy.util import read_csv, read_ref_opt_file
 
 from hybridsep.fmi.archive import build_fmu, fmu_names
 from hybridsep.fmi.reference import reference_files
-from hybridsep.machine import load_machine, machine_names
+from hybridsep.machines.machine import load_machine, machine_names
 
 NAMES = [(machine, name) for machine in machine_names() for name in fmu_names(load_machine(machine))]
 TOLERANCE = {"HybridPredictor": 1e-11, "SepCompensator": 1e-9, "FeedDrive": 1e-11, "ReferenceTrajectory": 1e-11}

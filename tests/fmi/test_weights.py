@@ -27,7 +27,7 @@ from hybridsep.cosim.importer import FmuInstance
 from hybridsep.fmi.archive import build_fmu, fmu_names
 from hybridsep.fmi.flavours import FLAVOURS
 from hybridsep.fmi.weights import WEIGHTS_FILE, learned_settings, restore_weights, weights_file
-from hybridsep.machine import load_machine
+from hybridsep.machines.machine import load_machine
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
 from hybridsep.predict.uncertainty import N_LEARNED

@@ -23,7 +23,7 @@ from hybridsep.app import cli
 from hybridsep.base.errors import HybridSepError, MachineError, ParameterError
 from hybridsep.base.settings import PARAMETERS, Limits, PredictorSettings
 from hybridsep.fmi.variables import variables_of
-from hybridsep.machine import load_machine
+from hybridsep.machines.machine import load_machine
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.feed_drive import FeedDrive

@@ -11,7 +11,7 @@ from places import EMPS
 from hybridsep.base.signals import Array
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.logs.log import read_log
-from hybridsep.machine import Machine, load_machine
+from hybridsep.machines.machine import Machine, load_machine
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.plant import simulate
 from hybridsep.plants.trajectory import spiral, staircase

@@ -12,7 +12,7 @@ from hybridsep.base.metrics import coverage
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import PREDICTION_MAX, Array
 from hybridsep.evaluate.backtest import backtest
-from hybridsep.machine import load_machine
+from hybridsep.machines.machine import load_machine
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.plant import simulate
 from hybridsep.plants.trajectory import staircase

@@ -18,7 +18,7 @@ from streams import StreamMaker, on_all
 
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.fmi.weights import weights_file
-from hybridsep.machine import load_machine
+from hybridsep.machines.machine import load_machine
 from hybridsep.plants.plant import simulate
 from hybridsep.plants.trajectory import staircase
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from hybridsep import build_fmu, fmu_names, load_machine, machine_names
 from hybridsep.fmi.flavours import FLAVOURS
-from hybridsep.machine import Machine
+from hybridsep.machines.machine import Machine
 
 _FMUS = {
     name: (machine, flavour)

@@ -29,7 +29,7 @@ from hybridsep.fmi.variables import (
     TRUST_SETTINGS,
     variables_of,
 )
-from hybridsep.machine import load_machine
+from hybridsep.machines.machine import load_machine
 from hybridsep.predict.uncertainty import N_LEARNED, Uncertainty
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepCompensator
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.cosim.run import Run
-from hybridsep.machine import load_machine
+from hybridsep.machines.machine import load_machine
 from hybridsep.model.physics import ModalModel
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.plant import Plant

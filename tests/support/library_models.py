@@ -15,7 +15,7 @@ from hybridsep.cosim.loop import cosimulate
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.fmi.variables import modes_from
 from hybridsep.fmi.weights import restore_weights, weights_file
-from hybridsep.machine import load_machine
+from hybridsep.machines.machine import load_machine
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.feed_drive import FeedDrive

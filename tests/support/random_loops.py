@@ -10,7 +10,7 @@ from c_core import COMPENSATOR, DESCRIPTIONS, TS, CModel
 from library_models import library_compensator, numbered
 from numpy.typing import NDArray
 
-from hybridsep.machine import load_machine
+from hybridsep.machines.machine import load_machine
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.plant import Plant
 from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest

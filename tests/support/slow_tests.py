@@ -46,7 +46,7 @@ SLOW = (
     r"random_drives/test_trusted_drives\.py",
     r"random_drives/test_replay\.py::test_command_line",
     r"app/test_fit\.py::test_a_(rotary|second)",
-    r"test_machine\.py::test_the_stages_friction_is_calibrated",
+    r"machines/test_machine\.py::test_the_stages_friction_is_calibrated",
     r"predict/test_regression\.py::test_weights_after_the_staircase_against_extended_precision\[100",
     r"suite/test_rollback\.py::test_a_state_goes_on_in_a_second_instance\[(19|21|57|203)-",
     r"suite/test_agreement\.py::test_plants_move_as_the_librarys_do\[0\.00(25|025)-",

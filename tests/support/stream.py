@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hybridsep import load_machine
 from hybridsep.fmi.archive import fmu_description
-from hybridsep.machine import Machine
+from hybridsep.machines.machine import Machine
 
 Array = NDArray[np.float64]
 Value = float | int | bool

@@ -8,9 +8,9 @@ import pytest
 
 from hybridsep import load_machine, machine_names
 from hybridsep.base.settings import PARAMETERS
-from hybridsep.machine import Machine
-from hybridsep.machine_sections import Physics, SpringMassDamper
-from hybridsep.machine_text import machine_text
+from hybridsep.machines.machine import Machine
+from hybridsep.machines.sections import Physics, SpringMassDamper
+from hybridsep.machines.text import machine_text
 
 
 @pytest.mark.parametrize("name", machine_names())

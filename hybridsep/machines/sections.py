@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, create_model, model_validator
 
-from .base.parameters import Parameter
-from .base.settings import PARAMETERS, CompensatorSettings, Limits, PredictorSettings, Settings
+from ..base.parameters import Parameter
+from ..base.settings import PARAMETERS, CompensatorSettings, Limits, PredictorSettings, Settings
 
 __all__ = [
     "CompensatorSection",

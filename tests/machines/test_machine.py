@@ -12,8 +12,8 @@ from hybridsep import Encoder, Limits, load_machine, machine_names, simulate, sp
 from hybridsep.base.errors import MachineError
 from hybridsep.base.settings import CompensatorSettings, PredictorSettings
 from hybridsep.compensate.compensator import RECOMMENDED
-from hybridsep.machine import Machine
-from hybridsep.machine_sections import Physics, SpringMassDamper, StageSection
+from hybridsep.machines.machine import Machine
+from hybridsep.machines.sections import Physics, SpringMassDamper, StageSection
 
 GOOD = """
 name = "axis"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from .base.settings import PARAMETERS
+from ..base.settings import PARAMETERS
 from .machine import Machine
 
 __all__ = ["machine_text"]
@@ -15,7 +15,7 @@ _COLUMN = 32
 
 
 def machine_text(machine: Machine, comments: Iterable[str] = (), *, annotated: bool = False) -> str:
-    """Return a machine file; :func:`~hybridsep.machine.load_machine` reads the same machine.
+    """Return a machine file; :func:`~hybridsep.machines.machine.load_machine` reads the same machine.
 
     Parameters
     ----------

@@ -12,11 +12,16 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError, model_validator
 
-from .base.data_files import data_folder
-from .base.errors import MachineError, ParameterError, brief
-from .base.settings import PARAMETERS, CompensatorSettings, Limits, PredictorSettings, Settings
-from .compensate.compensator import SepCompensator
-from .machine_sections import (
+from ..base.data_files import data_folder
+from ..base.errors import MachineError, ParameterError, brief
+from ..base.settings import PARAMETERS, CompensatorSettings, Limits, PredictorSettings, Settings
+from ..compensate.compensator import SepCompensator
+from ..model.physics import ModalModel, Mode
+from ..plants.feed_drive import FeedDrive
+from ..plants.plant import Plant
+from ..plants.stage_drive import StageDrive
+from ..predict.predictor import HybridPredictor
+from .sections import (
     CompensatorSection,
     DriveLimitsSection,
     FeedDriveSection,
@@ -29,11 +34,6 @@ from .machine_sections import (
     Section,
     StageSection,
 )
-from .model.physics import ModalModel, Mode
-from .plants.feed_drive import FeedDrive
-from .plants.plant import Plant
-from .plants.stage_drive import StageDrive
-from .predict.predictor import HybridPredictor
 
 if sys.version_info >= (3, 11):
     import tomllib
