@@ -55,7 +55,7 @@ def fit_report(fit: Fit, logs: Sequence[Log], findings: Mapping[str, Sequence[Fi
     _write_identification(report, fit, judged)
     _write_settings(report, fit, judged)
     fmus = [path.name for path in fit.files if path.suffix == ".fmu"]
-    write_use(report, fmus, fit.steps, T_s)
+    write_use(report, fmus, fit.steps, T_s, Np)
     report.paragraph(f"{' and '.join(fmus)} start with what the log has taught.")
     return report
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import zipfile
 from collections.abc import Callable, Iterable, Mapping
@@ -19,7 +20,6 @@ __all__ = [
     "EXAMPLE_LOG",
     "FIGURE",
     "FIT_FILES",
-    "FIT_MARK",
     "FMU",
     "MACHINE",
     "REPORT",
@@ -27,6 +27,7 @@ __all__ = [
     "Kind",
     "Output",
     "check_outputs",
+    "fit_comment",
 ]
 
 BATCH_COLUMNS = ("t", "rms_pb", "rms_hold", "rms_h")
@@ -132,10 +133,22 @@ VECTOR_FIGURE = Kind("figure of hybridsep", _is_our_drawing)
 FMU = Kind("FMU of hybridsep", _is_our_fmu)
 EXAMPLE_LOG = Kind("example log of hybridsep", _is_example)
 STATE = Kind("saved predictor", _begins_with(b"HSEP"))
-FIT_MARK = "Identified by hybridsep fit"
+_FIT_MARK = "Identified by hybridsep fit"
 """How the comment begins that a machine file of ``hybridsep fit`` begins with."""
 
-FITTED = Kind("machine file of hybridsep fit", _begins_with(f"# {FIT_MARK}".encode()))
+
+def fit_comment(text: str) -> str:
+    """Return the first line of the machine file ``text`` of ``hybridsep fit``: its mark and the rest's checksum."""
+    return f"# {_FIT_MARK}; checksum {hashlib.sha256(text.encode()).hexdigest()[:12]}\n"
+
+
+def _is_unedited_fit(path: Path) -> bool:
+    """Return whether a machine file is as ``hybridsep fit`` wrote it; one that was edited since is the user's."""
+    first, _, rest = path.read_text(encoding="utf-8").partition("\n")
+    return f"{first}\n" == fit_comment(rest)
+
+
+FITTED = Kind("unedited machine file of hybridsep fit", _is_unedited_fit)
 STAGES = Kind("result of hybridsep fit", _begins_with(b'{\n  "hybridsep": "'))
 REPORT = Kind("report of hybridsep", _begins_with(b"<!DOCTYPE html>\n<!-- report of hybridsep -->"))
 SUMMARY = Kind("summary of hybridsep demo", _begins_with(b'{\n  "staircase": {'))
