@@ -12,7 +12,7 @@ import numpy as np
 from ..base.errors import LogError
 from ..base.settings import check
 from ..base.signals import POSITION_MAX, Array
-from .columns import Column, choose_columns
+from .columns import COUNT, Column, choose_columns
 from .formats import open_source
 from .source import NEEDS_TRUST, Block
 from .time_axis import TimeAxis
@@ -167,6 +167,7 @@ class LogReader:
         if span > largest:
             smaller = _SMALLER.get(column.unit.name)
             hint = f"; if the log is in {smaller}, say unit='{smaller}' (--unit {smaller})" if smaller else ""
+            hint += f", if it is in encoder counts, the length of one, {COUNT}" if smaller and si == "m" else ""
             raise LogError(
                 f"{self.path}: column {column.name!r} read in {column.unit.name} spans {span:.4g} {si}, more than "
                 f"{largest:g} {si}{hint}"
@@ -219,7 +220,9 @@ class LogReader:
 def check_reading(unit: str | None, T_s: float | None) -> float | None:
     """Return the given sampling interval, validated; LogError for an unknown unit."""
     if unit is not None and position_unit(unit) is None:
-        raise LogError(f"unit must be one of {', '.join(POSITION_UNITS)}, got {unit!r}")
+        raise LogError(
+            f"unit must be one of {', '.join(POSITION_UNITS)}, got {unit!r}; a multiple of one is said as 0.1um"
+        )
     return None if T_s is None else float(check("T_s", T_s, label="T_s"))
 
 
@@ -248,8 +251,8 @@ def open_log(
         ``{"x_d": "qg", "x": "qm"}``; units in them may be left out. Without a name for ``"x"``, ``x_meas`` is read
         where the file has it.
     unit : str, optional
-        Unit of the positions: m, mm, um, nm, in, or rad, mrad, urad, deg, rev for a rotary axis. If left out, that of
-        the columns' names (``x [mm]``), otherwise m.
+        Unit of the positions: m, mm, um, nm, in, or rad, mrad, urad, deg, rev for a rotary axis, or a multiple of
+        one, ``0.1um``, such as an encoder's count. If left out, that of the columns' names (``x [mm]``), otherwise m.
     T_s : float, optional
         Sampling interval, s; needed only if the file has no time column or an index in its place, checked against that
         if it has.

@@ -170,7 +170,7 @@ def test_kinds_are_recognised_and_others_are_not(tmp_path: Path, python_fmu: Cal
     ("arguments", "message"),
     [
         (["demo", "--emps", "missing.mat"], "missing.mat: there is no such file"),
-        (["demo", "--emps", "{log}"], "log.csv: column 'qg' (x_d) is missing"),
+        (["demo", "--emps", "{log}"], "log.csv: columns 'qg' (x_d), 'qm' (x) are missing"),
         (["demo", "--flavour", "cobol"], "flavour must be one of native, python, got 'cobol'"),
         (["build", "--target", "sparc"], "no target sparc; there are host"),
         (["build", "HybridPredictor", "--weights", "{log}"], "a saved state of kind 'predictor' was expected"),
