@@ -81,6 +81,6 @@ def fit(
         written = {what: str(path) for what, path in files.items()}
         print_json({**result.summary(), "findings": listed, "files": written})
         return
-    print_fit(result, findings, used[0].unit)
+    print_fit(result, used, findings)
     console.print(f"\n{recommendation(judged_by(result, used[0].unit))}", highlight=False)
     console.print("\n".join(f"{what}: {path}" for what, path in files.items()), highlight=False, soft_wrap=True)

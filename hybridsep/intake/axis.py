@@ -240,7 +240,10 @@ def check_delay(log: Log, machine: Machine | None = None) -> Iterator[Finding]:
     )
     # A whole number of samples leaves the measurement as it is.
     whole = round(delay) if abs(delay - round(delay)) < 0.15 else delay
-    fix = Fix(f"shift the measured position by {-whole:+.3g} samples", partial(fixes.shifted_back, delay=float(whole)))
+    shift = f"shift the measured position by {-whole:+.3g} samples"
+    if delay > 0:
+        shift += f"; where the controller gets it as late, say so to the predictor: measurement_delay = {round(delay)}"
+    fix = Fix(shift, partial(fixes.shifted_back, delay=float(whole)))
     severity = ERROR if delay < 0 else WARNING
     yield Finding("delay", severity, words, evidence, _over_time(log, part, x_d, x), fix)
 

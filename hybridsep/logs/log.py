@@ -16,7 +16,7 @@ from .columns import COUNT, Column, choose_columns
 from .formats import open_source
 from .source import NEEDS_TRUST, Block
 from .time_axis import TimeAxis
-from .units import POSITION_UNITS, position_unit
+from .units import POSITION_UNITS, position_unit, stated_unit
 
 __all__ = ["Log", "LogReader", "check_reading", "open_log", "read_log"]
 
@@ -28,6 +28,9 @@ TS_TOLERANCE = 0.01
 
 _SMALLER = {"m": "mm", "mm": "um", "um": "nm", "in": "mm", "rad": "deg"}
 """Unit that a log may be in if its travel is implausible in the key's."""
+
+_OWN_NAMES = ("x_d", "x", "x_meas")
+"""Names of columns of positions that leave no doubt."""
 
 _BLOCK = 10_000
 
@@ -115,7 +118,7 @@ class LogReader:
             self._source.choose_axis(axis)
         self._columns = choose_columns(self._source, columns, unit, time_needed=given is None)
         self.unit = self._columns["x_d"].unit.si
-        self.remarks = tuple(self._source.remarks)
+        self.remarks = (*self._source.remarks, *self._guessed(columns or {}))
         self._uniform, self._may_miss = uniform, may_miss
         self._source.measured, self._source.may_miss = self._columns["x"].name, may_miss
         self.n_samples, self.T_s = self._scan(given)
@@ -160,6 +163,16 @@ class LogReader:
             yield tuple(signals)
         if count != self.n_samples:
             raise LogError(f"{self.path}: the file had {self.n_samples} samples when opened, now it has {count}")
+
+    def _guessed(self, given: Mapping[str, str]) -> Iterator[str]:
+        """Yield a remark if a column of positions was recognised by a name other than the library's own."""
+        known = {*_OWN_NAMES, *self._source.roles.values()}
+        roles = [role for role in ("x_d", "x") if role not in given]
+        if any(stated_unit(self._columns[role].name)[0] not in known for role in roles):
+            yield (
+                f"columns {self._columns['x_d'].name!r} and {self._columns['x'].name!r} are read as the commanded and "
+                "the measured position; columns (--x-d, --x) name others"
+            )
 
     def _check_span(self, column: Column, span: float) -> None:
         """Raise LogError if the commanded position spans more than any axis does."""

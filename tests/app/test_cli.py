@@ -202,6 +202,7 @@ def test_help_shows_units_and_ranges(hybridsep: Run) -> None:
             "unit must be one of m, mm, um, nm, in, rad, mrad, urad, deg, rev, got 'furlong'",
         ),
         (["backtest", "nothing.csv", "-m", "spring_mass_damper"], "nothing.csv"),
+        (["build", "SepCompensatorPy", "-m", "emps", "--flavour", "python"], "; emps has no [drive_limits], which a"),
         (["build", "Robot", "--flavour", "python"], "no FMU Robot; there are HybridPredictorPy_als25010_x"),
         (["build", "--flavour", "cobol"], "flavour must be one of"),
         (["cosim", "-m", "emps", "--flavour", "python"], "machine emps has no plant; name a plant FMU with --plant"),

@@ -137,6 +137,9 @@ def test_the_command_line(hybridsep: Run, tmp_path: Path) -> None:
     status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", 40)
     assert status == 0, err
     assert "Np = 40" in out
+    assert "my axis.csv: 800 samples, 0.8 s at 1000 Hz, travel 10 mm, as the file states no unit" in " ".join(
+        out.split()
+    )
     assert "report: " in out
     machine = tmp_path / "fit" / "machine.toml"
     edited = machine.read_text(encoding="utf-8").replace("dead_time = ", "dead_time = 1")

@@ -153,7 +153,8 @@ def test_words() -> None:
         "rows lost"
     )
     assert "9.9 samples (9.91 ms) too late against the motion that a drive" in words("10 samples late")
-    assert "shift the measured position by -10 samples" in words("10 samples late")
+    assert "shift the measured position by -10 samples; where" in words("10 samples late")
+    assert "measurement_delay = 10" in words("10 samples late")
 
 
 def test_sampling_rate_against_the_machine() -> None:

@@ -175,3 +175,14 @@ def test_counts_are_read_with_their_length(tmp_path: Path) -> None:
     np.testing.assert_allclose(read_log(path, unit="0.1um").x_meas, [2e-6, 4e-6])
     path = write_csv(tmp_path / "log.csv", "t;x_d;x\ns;0.1um;0.1um\n0;10;20\n0.001;30;40\n")
     np.testing.assert_allclose(read_log(path).x_meas, [2e-6, 4e-6])
+
+
+def test_columns_that_were_recognised_are_said(tmp_path: Path) -> None:
+    text = "t [s],X_cmd [mm],X_act [mm],Y_cmd [mm],Y_act [mm]\n0,1,2,3,4\n0.001,1,2,3,4\n"
+    path = write_csv(tmp_path / "log.csv", text)
+    (remark,) = read_log(path).remarks
+    assert remark.startswith(
+        "columns 'X_cmd [mm]' and 'X_act [mm]' are read as the commanded and the measured position"
+    )
+    assert read_log(path, columns={"x_d": "Y_cmd", "x": "Y_act"}).remarks == ()
+    assert read_log(write_csv(path, "t,x_d [mm],x_meas\n0,1,2\n1,1,2\n")).remarks == ()
