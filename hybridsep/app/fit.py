@@ -139,13 +139,16 @@ def fit(logs: Sequence[Log], out: Path, options: FitOptions, progress: Progress 
         If a log is too short to be split.
     """
     T_s = _common(logs)
-    recordings = [piece for log in logs for piece in halves([(s.x_d, s.x_meas) for s in log.segments()], options.share)]
+    Np = _window(options.Np, T_s)
+    recordings = [
+        piece for log in logs for piece in halves([(s.x_d, s.x_meas) for s in log.segments()], options.share, Np)
+    ]
     judging = max(len(recording.x) - recording.n_taught for recording in recordings)
     if options.Np is not None and options.Np > judging:
         raise ParameterError(
             f"--Np must be at most {judging}, the longest stretch of samples that judges, got {options.Np}; record more"
         )
-    default = settings_for(_window(options.Np, T_s), T_s, "zoh")
+    default = settings_for(Np, T_s, "zoh")
     files = fit_files(out, options.name)
     stages = Stages(files["results"], key_of(recordings, (options, T_s, logs[0].unit)))
 

@@ -110,7 +110,7 @@ def _write_time(report: Report, judged: Judged) -> None:
     replay = judged.replay
     errors, std = scale * replay.errors(), scale * replay.joined("x_h_std")
     t = judged.T_s * np.arange(errors.shape[1])
-    x_d = np.concatenate([recording.x_d[recording.n_taught :] for recording in replay.recordings])
+    x_d = np.concatenate([recording.x_d[recording.judges_from :] for recording in replay.recordings])
     lines = [Line("command", t, 1e3 * x_d, _COMMAND)]
     within = coverage(errors[2], std, 0.95)
     for name, row, colour in zip(NAMES, errors, COLOURS, strict=True):

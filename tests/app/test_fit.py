@@ -177,6 +177,20 @@ def test_a_log_that_cannot_teach_a_model_is_predicted_by_its_command(tmp_path: P
     fit_report(found, used, findings).write(tmp_path / "report.html")
 
 
+def test_a_gap_in_motion_does_not_decide_the_verdict(tmp_path: Path) -> None:
+    x_d, x = commanded()[:N], measured(0)[:N]
+    k = np.flatnonzero((np.arange(N) < 2050) | (np.arange(N) >= 2070))  # the axis moves from 2.0 s to 2.14 s
+    log = replace(read_log(write_rows(tmp_path / "axis.csv", x_d, x)), x_d=x_d[k], x_meas=x[k], t=np.asarray(k * 1e-3))
+    used, findings = take_in([log], fix=False)
+    assert [finding.name for finding in findings["axis.csv"]] == ["gaps"]
+    found = fit(used, tmp_path, FitOptions(NP, "axis"))
+    pieces = [(one.x_d, one.x_meas) for one in used[0].segments()]
+    all_windows = replay(found.machine.new_predictor(), halves(pieces, 0.5)).rms()
+    assert found.judged.rms()[2] < 0.8 * all_windows[2]
+    fit_report(found, used, findings).write(tmp_path / "report.html")
+    assert "The window after a gap does not judge" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
 def test_what_is_kept_is_of_the_samples_as_they_are_read(log: Path) -> None:
     found = read_log(log)
     [recording] = halves([(found.x_d, found.x_meas)], 0.5)
