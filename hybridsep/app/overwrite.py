@@ -184,7 +184,7 @@ def check_outputs(outputs: Iterable[Output], inputs: Mapping[str, str | Path | N
     ------
     ParameterError
         If an output is an input, by whatever name, or another output; a folder; an existing file of another kind; or in
-        a folder that cannot be written to.
+        a folder that cannot be made or written to.
     """
     taken = [(f"the {what} {path}", Path(path)) for what, path in inputs.items() if path is not None]
     known = list(outputs)
@@ -202,7 +202,12 @@ def check_outputs(outputs: Iterable[Output], inputs: Mapping[str, str | Path | N
                 "with --force"
             )
     for output in known:
-        output.path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            output.path.parent.mkdir(parents=True, exist_ok=True)
+        except (FileExistsError, NotADirectoryError) as error:
+            raise ParameterError(
+                f"{output.option} {output.path}: a file has the name of the folder {output.path.parent}; choose another"
+            ) from error
         folder = Path(os.path.realpath(output.path)).parent
         if not os.access(folder, os.W_OK):
             raise ParameterError(f"{output.option} {output.path}: no file can be written in {folder}")
