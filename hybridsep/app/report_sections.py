@@ -217,8 +217,9 @@ def write_use(report: Report, fmus: Iterable[str], steps: Mapping[str, float], T
     report.heading("Use it")
     late = "" if max(steps["median"], steps["p99_9"]) <= T_s else _LATE
     report.paragraph(
-        f"Through Python on this machine a step of {names[0]} took {_duration(steps['median'])} (median; largest "
-        f"{_duration(steps['largest'])}, where a window ends), with a sampling interval of {_duration(T_s)}.{late}"
+        f"Through Python on this machine a step of {names[0]} took {_duration(steps['median'])} (median; 99.9 % at "
+        f"most {_duration(steps['p99_9'])}; the largest {_duration(steps['largest'])}, interruptions by the operating "
+        f"system included), with a sampling interval of {_duration(T_s)}. Steps that end a window take longest.{late}"
     )
     report.code(_REPLAY.format(fmu=names[0], T_s=T_s, Np=Np))
     report.bullets(
@@ -235,8 +236,7 @@ def write_use(report: Report, fmus: Iterable[str], steps: Mapping[str, float], T
 
 
 _LATE = (
-    " The step that ends a window takes longer than the sampling interval: in a real-time task of this interval it "
-    "would overrun on such a machine."
+    " They take longer than the sampling interval: a real-time task of this interval would overrun on such a machine."
 )
 """What is added where steps do not fit into the sampling interval."""
 
