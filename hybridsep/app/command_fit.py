@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .failures import loading
+from .failures import errors_console, loading
 from .options import (
     FigurePagesOption,
     ForceOption,
@@ -30,7 +30,9 @@ def fit(
             "--Np", "--np", min=1, help="Samples of the controller's look-ahead; those of 100 ms if left out."
         ),
     ] = None,
-    name: Annotated[str | None, typer.Option(help="Name of the axis; that of the log if left out.")] = None,
+    name: Annotated[
+        str | None, typer.Option(help="Name of the axis; that of the log, and of --axis, if left out.")
+    ] = None,
     *,
     reading: ReadingOptions,
     fix: Annotated[
@@ -55,7 +57,7 @@ def fit(
         from .report_sections import recommendation
         from .tables import console, print_json
 
-    name = checked_name(name) if name else machine_name(logs[0])
+    name = checked_name(name) if name else machine_name(logs[0], reading.axis)
     folder = out or Path(name)
     files = fit_files(folder, name)
     inputs: dict[str, str | Path | None] = {f"log {path.name}": path for path in logs}
@@ -67,6 +69,9 @@ def fit(
         read_log(path, columns=reading.columns, unit=reading.unit, T_s=reading.T_s, axis=reading.axis, uniform=False)
         for path in logs
     ]
+    for log in found:
+        for remark in log.remarks:
+            errors_console.print(f"note: {log.path.name}: {remark}", markup=False, highlight=False, soft_wrap=True)
     used, findings = take_in(found, fix=fix)
     with progress_bar(as_json) as advance:
         result = fit_logs(used, folder, FitOptions(Np, name), advance)
@@ -76,6 +81,6 @@ def fit(
         written = {what: str(path) for what, path in files.items()}
         print_json({**result.summary(), "findings": listed, "files": written})
         return
-    print_fit(result, findings, used[0].unit)
+    print_fit(result, used, findings)
     console.print(f"\n{recommendation(judged_by(result, used[0].unit))}", highlight=False)
     console.print("\n".join(f"{what}: {path}" for what, path in files.items()), highlight=False, soft_wrap=True)

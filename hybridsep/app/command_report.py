@@ -89,7 +89,7 @@ def report(
     write_errors(written, judged, "Errors of the replay", f"The predictor {learned}.")
     write_findings(written, {log.name: intake.findings})
     if fmu is not None:
-        write_use(written, [fmu.name], steps, whole.T_s)
+        write_use(written, [fmu.name], steps, whole.T_s, settings.Np)
     written.write(page, figure)
     console.print(recommendation(judged), highlight=False)
     console.print(f"report: {page}", highlight=False, soft_wrap=True)

@@ -26,7 +26,7 @@ from ..tune.choice import choose_settings, settings_for, window_scores
 from ..tune.halves import Recording, Replay, halves, replay
 from .builds import build_for_host
 from .fit_stages import Stages, key_of
-from .overwrite import FIT_MARK
+from .overwrite import fit_comment
 from .step_times import step_times
 
 __all__ = ["Fit", "FitOptions", "checked_name", "fit", "fit_files", "machine_name"]
@@ -90,9 +90,9 @@ class Fit:
         return {"judged": judged, "settings": settings, **parts, "step_times": self.steps}
 
 
-def machine_name(path: Path) -> str:
-    """Return a machine's name from that of a log."""
-    name = re.sub(r"[^A-Za-z0-9]+", "_", path.name.partition(".")[0]).strip("_")
+def machine_name(path: Path, axis: str | None = None) -> str:
+    """Return a machine's name from that of a log, and of the axis that is read of it."""
+    name = re.sub(r"[^A-Za-z0-9]+", "_", f"{path.name.partition('.')[0]} {axis or ''}").strip("_")
     return name if re.match(r"[A-Za-z]", name) else f"axis_{name}".rstrip("_")
 
 
@@ -134,13 +134,21 @@ def fit(logs: Sequence[Log], out: Path, options: FitOptions, progress: Progress 
     Raises
     ------
     ParameterError
-        If the logs are sampled differently or in different units, or ``Np`` does not fit.
+        If the logs are sampled differently or in different units, or ``Np`` does not fit into what judges.
     SignalError
         If a log is too short to be split.
     """
     T_s = _common(logs)
-    recordings = [piece for log in logs for piece in halves([(s.x_d, s.x_meas) for s in log.segments()], options.share)]
-    default = settings_for(_window(options.Np, T_s), T_s, "zoh")
+    Np = _window(options.Np, T_s)
+    recordings = [
+        piece for log in logs for piece in halves([(s.x_d, s.x_meas) for s in log.segments()], options.share, Np)
+    ]
+    judging = max(len(recording.x) - recording.n_taught for recording in recordings)
+    if options.Np is not None and options.Np > judging:
+        raise ParameterError(
+            f"--Np must be at most {judging}, the longest stretch of samples that judges, got {options.Np}; record more"
+        )
+    default = settings_for(Np, T_s, "zoh")
     files = fit_files(out, options.name)
     stages = Stages(files["results"], key_of(recordings, (options, T_s, logs[0].unit)))
 
@@ -163,7 +171,8 @@ def fit(logs: Sequence[Log], out: Path, options: FitOptions, progress: Progress 
     judged = replay(predictor, recordings, progress=within(0.8, 0.85, "judge on the second half"))
     machine = _machine(options.name, logs, model, settings)
     with written_text(files["machine file"]) as file:
-        file.write(machine_text(machine, comments=[f"{FIT_MARK}; {found['structure']}"]))
+        text = machine_text(machine, comments=[found["structure"]])
+        file.write(fit_comment(text) + text)
     predictor.save(files["trained predictor"])
     for i, flavour in enumerate(_flavours()):
         progress(f"build the {flavour} FMU", 0.85 + 0.05 * i)

@@ -18,6 +18,11 @@ from .report_sections import COLOURS, NAMES, Judged, recommendation, write_error
 __all__ = ["fit_report", "judged_by"]
 
 
+_SETTLING = (
+    " The window after a gap does not judge: there no model knows the state of the axis, and a controller has no gaps."
+)
+
+
 def judged_by(fit: Fit, unit: str) -> Judged:
     """Return the replay that judges a fit as it is reported; ``unit`` is m or rad."""
     return Judged(fit.judged, fit.machine.T_s, unit, "the log's second half")
@@ -48,14 +53,14 @@ def fit_report(fit: Fit, logs: Sequence[Log], findings: Mapping[str, Sequence[Fi
         judged,
         "Judged on samples that taught nothing",
         "The first half of each log taught the physics model and chose the settings; these are the errors of the "
-        "second half.",
+        "second half." + (_SETTLING if any(one.n_settling > one.n_taught for one in fit.judged.recordings) else ""),
     )
     _write_other_windows(report, fit, judged)
     write_findings(report, findings)
     _write_identification(report, fit, judged)
     _write_settings(report, fit, judged)
     fmus = [path.name for path in fit.files if path.suffix == ".fmu"]
-    write_use(report, fmus, fit.steps, T_s)
+    write_use(report, fmus, fit.steps, T_s, Np)
     report.paragraph(f"{' and '.join(fmus)} start with what the log has taught.")
     return report
 

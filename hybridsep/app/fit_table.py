@@ -4,18 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
+import numpy as np
 from rich import box
 from rich.table import Table
 
 from ..intake.finding import Finding
+from ..logs.log import Log
 from .fit import Fit
 from .tables import console, shown_figure, shown_unit
 
 __all__ = ["print_fit"]
 
 
-def print_fit(fit: Fit, findings: Mapping[str, Iterable[Finding]], unit: str) -> None:
-    """Print what the intake of logs found, what was identified and how it was judged; ``unit`` is m or rad."""
+def print_fit(fit: Fit, logs: Iterable[Log], findings: Mapping[str, Iterable[Finding]]) -> None:
+    """Print what was read and what the intake found, what was identified and how it was judged."""
+    unit = "m"
+    for log in logs:
+        unit, travel = log.unit, float(np.ptp(log.x_d))
+        stated = "" if log.unit_stated else f", as the file states no unit of positions: taken as {unit} (--unit)"
+        console.print(
+            f"{log.path.name}: {len(log.t)} samples, {len(log.t) * log.T_s:.4g} s at {1 / log.T_s:.4g} Hz, travel "
+            f"{1e3 * travel:.4g} m{unit}{stated}",
+            highlight=False,
+            markup=False,
+        )
     for name, found in findings.items():
         for finding in found:
             console.print(f"{name}: {finding}", highlight=False, markup=False)

@@ -51,8 +51,8 @@ TsOption = Annotated[
 UnitOption = Annotated[
     str | None,
     typer.Option(
-        help="Unit of the positions in the file: m, mm, um, nm, in, or of a rotary axis rad, mrad, urad, deg, rev; "
-        "that of the columns' names (x [mm]) or m if left out."
+        help="Unit of the positions in the file: m, mm, um, nm, in, or of a rotary axis rad, mrad, urad, deg, rev, or "
+        "a multiple of one (0.1um), such as an encoder's count; that of the columns' names (x [mm]) or m if left out."
     ),
 ]
 TimeColumnOption = Annotated[str | None, typer.Option("--t", help="Name of the time column.")]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import zipfile
 from collections.abc import Callable, Iterable, Mapping
@@ -19,7 +20,6 @@ __all__ = [
     "EXAMPLE_LOG",
     "FIGURE",
     "FIT_FILES",
-    "FIT_MARK",
     "FMU",
     "MACHINE",
     "REPORT",
@@ -27,6 +27,7 @@ __all__ = [
     "Kind",
     "Output",
     "check_outputs",
+    "fit_comment",
 ]
 
 BATCH_COLUMNS = ("t", "rms_pb", "rms_hold", "rms_h")
@@ -132,10 +133,22 @@ VECTOR_FIGURE = Kind("figure of hybridsep", _is_our_drawing)
 FMU = Kind("FMU of hybridsep", _is_our_fmu)
 EXAMPLE_LOG = Kind("example log of hybridsep", _is_example)
 STATE = Kind("saved predictor", _begins_with(b"HSEP"))
-FIT_MARK = "Identified by hybridsep fit"
+_FIT_MARK = "Identified by hybridsep fit"
 """How the comment begins that a machine file of ``hybridsep fit`` begins with."""
 
-FITTED = Kind("machine file of hybridsep fit", _begins_with(f"# {FIT_MARK}".encode()))
+
+def fit_comment(text: str) -> str:
+    """Return the first line of the machine file ``text`` of ``hybridsep fit``: its mark and the rest's checksum."""
+    return f"# {_FIT_MARK}; checksum {hashlib.sha256(text.encode()).hexdigest()[:12]}\n"
+
+
+def _is_unedited_fit(path: Path) -> bool:
+    """Return whether a machine file is as ``hybridsep fit`` wrote it; one that was edited since is the user's."""
+    first, _, rest = path.read_text(encoding="utf-8").partition("\n")
+    return f"{first}\n" == fit_comment(rest)
+
+
+FITTED = Kind("unedited machine file of hybridsep fit", _is_unedited_fit)
 STAGES = Kind("result of hybridsep fit", _begins_with(b'{\n  "hybridsep": "'))
 REPORT = Kind("report of hybridsep", _begins_with(b"<!DOCTYPE html>\n<!-- report of hybridsep -->"))
 SUMMARY = Kind("summary of hybridsep demo", _begins_with(b'{\n  "staircase": {'))
@@ -171,7 +184,7 @@ def check_outputs(outputs: Iterable[Output], inputs: Mapping[str, str | Path | N
     ------
     ParameterError
         If an output is an input, by whatever name, or another output; a folder; an existing file of another kind; or in
-        a folder that cannot be written to.
+        a folder that cannot be made or written to.
     """
     taken = [(f"the {what} {path}", Path(path)) for what, path in inputs.items() if path is not None]
     known = list(outputs)
@@ -189,7 +202,12 @@ def check_outputs(outputs: Iterable[Output], inputs: Mapping[str, str | Path | N
                 "with --force"
             )
     for output in known:
-        output.path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            output.path.parent.mkdir(parents=True, exist_ok=True)
+        except (FileExistsError, NotADirectoryError) as error:
+            raise ParameterError(
+                f"{output.option} {output.path}: a file has the name of the folder {output.path.parent}; choose another"
+            ) from error
         folder = Path(os.path.realpath(output.path)).parent
         if not os.access(folder, os.W_OK):
             raise ParameterError(f"{output.option} {output.path}: no file can be written in {folder}")

@@ -110,7 +110,7 @@ def _write_time(report: Report, judged: Judged) -> None:
     replay = judged.replay
     errors, std = scale * replay.errors(), scale * replay.joined("x_h_std")
     t = judged.T_s * np.arange(errors.shape[1])
-    x_d = np.concatenate([recording.x_d[recording.n_taught :] for recording in replay.recordings])
+    x_d = np.concatenate([recording.x_d[recording.judges_from :] for recording in replay.recordings])
     lines = [Line("command", t, 1e3 * x_d, _COMMAND)]
     within = coverage(errors[2], std, 0.95)
     for name, row, colour in zip(NAMES, errors, COLOURS, strict=True):
@@ -198,7 +198,7 @@ def write_findings(report: Report, findings: Mapping[str, Iterable[Finding]]) ->
             report.chart(Chart(picture.x_label, (picture.y_label,), lines, picture.title))
 
 
-def write_use(report: Report, fmus: Iterable[str], steps: Mapping[str, float], T_s: float) -> None:
+def write_use(report: Report, fmus: Iterable[str], steps: Mapping[str, float], T_s: float, Np: int) -> None:
     """Write how FMUs are used, and how long a step of the first takes.
 
     Parameters
@@ -210,19 +210,18 @@ def write_use(report: Report, fmus: Iterable[str], steps: Mapping[str, float], T
         As of :func:`~hybridsep.app.step_times.step_times`.
     T_s : float
         Sampling interval, s.
+    Np : int
+        Samples of the look-ahead.
     """
     names = list(fmus)
     report.heading("Use it")
+    late = "" if max(steps["median"], steps["p99_9"]) <= T_s else _LATE
     report.paragraph(
-        f"Through Python on this machine a step of {names[0]} took {_duration(steps['median'])} (median; largest "
-        f"{_duration(steps['largest'])}, where a window ends), with a sampling interval of {_duration(T_s)}."
+        f"Through Python on this machine a step of {names[0]} took {_duration(steps['median'])} (median; 99.9 % at "
+        f"most {_duration(steps['p99_9'])}; the largest {_duration(steps['largest'])}, interruptions by the operating "
+        f"system included), with a sampling interval of {_duration(T_s)}. Steps that end a window take longest.{late}"
     )
-    report.code(
-        "from fmpy import simulate_fmu\n\n"
-        f'result = simulate_fmu("{names[0]}", step_size={T_s!r}, output_interval={T_s!r}, input=signals,\n'
-        '                      output=["x_d", "x_h", "x_h_std", "e_servo"])\n'
-        "# signals: a structured array with the columns time, x_d_ahead, x_meas"
-    )
+    report.code(_REPLAY.format(fmu=names[0], T_s=T_s, Np=Np))
     report.bullets(
         [
             "OMSimulator: add the FMU to a system, connect x_d to the drive and its measured position to x_meas, fixed "
@@ -234,6 +233,25 @@ def write_use(report: Report, fmus: Iterable[str], steps: Mapping[str, float], T
             "FMU is the look-ahead buffer",
         ]
     )
+
+
+_LATE = (
+    " They take longer than the sampling interval: a real-time task of this interval would overrun on such a machine."
+)
+"""What is added where steps do not fit into the sampling interval."""
+
+_REPLAY = """\
+import numpy as np
+from fmpy import simulate_fmu
+
+# x_d, x_meas: commanded and measured positions of a log, one sample every {T_s!r} s
+signals = np.zeros(len(x_d) + {Np}, [("time", float), ("x_d_ahead", float), ("x_meas", float)])
+signals["time"] = {T_s!r} * np.arange(len(signals))
+signals["x_d_ahead"] = np.pad(x_d, (0, {Np}), mode="edge")  # enters {Np} samples before it is commanded ...
+signals["x_meas"] = np.pad(x_meas, ({Np}, 0), mode="edge")  # ... and measured
+result = simulate_fmu("{fmu}", stop_time=signals["time"][-1], step_size={T_s!r},
+                      output_interval={T_s!r}, input=signals, output=["x_d", "x_h", "x_h_std", "e_servo"])"""
+"""Replay of a log with fmpy."""
 
 
 def _duration(seconds: float) -> str:

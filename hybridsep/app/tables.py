@@ -42,7 +42,7 @@ def print_predictions(summary: Mapping[str, Mapping[str, Any]]) -> None:
         table.add_row(name, *_figures(case), _printed(PRINTED[name]))
         for part in ("friction_alone", "stiffness_alone"):
             if part in case:
-                table.add_row(f"  {part.replace('_', ' ')}", *_figures(case[part]))
+                table.add_row(f" {part.replace('_', ' ')}", *_figures(case[part]))
     console.print(table)
     console.print(
         "The stage has the paper's Table 1 and a simulated disturbance, scaled to the printed physics figures: these "
@@ -75,8 +75,16 @@ def print_compensation(summary: Mapping[str, Mapping[str, Any]]) -> None:
 
 
 def _table_of_cases(title: str, caption: str, columns: Iterable[str]) -> Table:
-    """Return an empty table of the demo's cases, in the first column, and their figures."""
-    table = Table("case", title=title, caption=caption, box=box.SIMPLE, pad_edge=False)
+    """Return an empty table of the demo's cases, in the first column, and their figures; it fits 80 columns."""
+    table = Table(
+        "case",
+        title=title,
+        caption=caption,
+        box=box.SIMPLE,
+        pad_edge=False,
+        collapse_padding=True,
+        show_edge=False,
+    )
     table.columns[0].no_wrap = True
     for column in columns:
         table.add_column(column, justify="right", no_wrap=True)

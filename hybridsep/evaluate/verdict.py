@@ -70,7 +70,7 @@ class Verdict:
     def __str__(self) -> str:
         ratios = (self.ratio_pb, self.ratio_hold)
         lines = [
-            f"{_comparison(value)} {peer}: {value:.3g} × its RMS error{_where(value, places, self.judged)}"
+            f"{_comparison(value)} {peer}: {_times(value)}{_where(value, places, self.judged)}"
             for peer, value, places in zip(_PEERS, ratios, self.worse, strict=True)
         ]
         lines += [f"Why: {cause}" for cause in self.causes]
@@ -212,6 +212,10 @@ class Tally:
 def _ratio(own: float, other: float) -> float:
     """Return the ratio of two RMS errors from their sums of squares."""
     return rms_ratio(math.sqrt(own), math.sqrt(other))
+
+
+def _times(value: float) -> str:
+    return f"{value:.3g} × its RMS error" if math.isfinite(value) else "its RMS error is 0"
 
 
 def _comparison(value: float) -> str:

@@ -1,4 +1,4 @@
-"""Checks of the measured position against the commanded one: swap, velocity, sign, scale, offset, delay."""
+"""Checks of the measured position against the commanded one: the same, swap, velocity, sign, scale, offset, delay."""
 
 from __future__ import annotations
 
@@ -19,7 +19,16 @@ from .relation import Line, fit_dead_time, line, line_at_best_lag, noise_std, sh
 if TYPE_CHECKING:
     from ..machines.machine import Machine
 
-__all__ = ["check_delay", "check_offset", "check_scale", "check_sign", "check_swapped", "check_velocity", "stretch"]
+__all__ = [
+    "check_delay",
+    "check_offset",
+    "check_same",
+    "check_scale",
+    "check_sign",
+    "check_swapped",
+    "check_velocity",
+    "stretch",
+]
 
 _STRETCH = 8000
 """Samples that relations are fitted to: those with most motion."""
@@ -89,6 +98,18 @@ def stretch(log: Log) -> slice:
             if last - first > 2 and moved[last - 2] - moved[first] > most:
                 best, most = slice(first, last), float(moved[last - 2] - moved[first])
     return best
+
+
+def check_same(log: Log) -> Iterator[Finding]:
+    """Find a measured position that is the commanded one in every sample; no axis follows like that."""
+    if not np.array_equal(log.x_d, log.x_meas):
+        return
+    words = (
+        "the measured position is the commanded one in every sample: one column is read for both, or the axis was "
+        "simulated; name the measured position's column (--x)"
+    )
+    part = stretch(log)
+    yield Finding("same column", ERROR, words, {}, _over_time(log, part, log.x_d[part], log.x_meas[part]), None)
 
 
 def check_swapped(log: Log) -> Iterator[Finding]:
@@ -219,7 +240,10 @@ def check_delay(log: Log, machine: Machine | None = None) -> Iterator[Finding]:
     )
     # A whole number of samples leaves the measurement as it is.
     whole = round(delay) if abs(delay - round(delay)) < 0.15 else delay
-    fix = Fix(f"shift the measured position by {-whole:+.3g} samples", partial(fixes.shifted_back, delay=float(whole)))
+    shift = f"shift the measured position by {-whole:+.3g} samples"
+    if delay > 0:
+        shift += f"; where the controller gets it as late, say so to the predictor: measurement_delay = {round(delay)}"
+    fix = Fix(shift, partial(fixes.shifted_back, delay=float(whole)))
     severity = ERROR if delay < 0 else WARNING
     yield Finding("delay", severity, words, evidence, _over_time(log, part, x_d, x), fix)
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..logs.log import Log
-from .axis import check_delay, check_offset, check_scale, check_sign, check_swapped, check_velocity
+from .axis import check_delay, check_offset, check_same, check_scale, check_sign, check_swapped, check_velocity
 from .finding import ERROR, HOPELESS, NAMES, Finding
 from .motion import check_motion, check_rate, check_start, check_unit
 from .samples import check_missing, check_outliers, check_repeated, check_stuck
@@ -24,7 +24,15 @@ _Check = Callable[[Log], Iterator[Finding]]
 
 _TIMES: tuple[_Check, ...] = (check_order, check_gaps, check_jitter)
 _SAMPLES: tuple[_Check, ...] = (check_missing, check_outliers, check_stuck, check_repeated)
-_AXIS: tuple[_Check, ...] = (check_swapped, check_velocity, check_sign, check_scale, check_offset, check_unit)
+_AXIS: tuple[_Check, ...] = (
+    check_same,
+    check_swapped,
+    check_velocity,
+    check_sign,
+    check_scale,
+    check_offset,
+    check_unit,
+)
 
 
 _FEW = 50

@@ -27,6 +27,7 @@ NAMES = (
     "stuck samples",
     "repeated samples",
     HOPELESS,
+    "same column",
     "columns swapped",
     "velocity for position",
     "sign",

@@ -7,9 +7,15 @@ from dataclasses import dataclass
 
 from ..base.errors import LogError
 from .source import Source
-from .units import POSITION_UNITS, TIME_UNITS, Unit, position_unit, stated_unit, time_unit
+from .units import POSITION_UNITS, TIME_UNITS, Unit, plain_name, position_unit, stated_unit, time_unit
 
-__all__ = ["ROLES", "Column", "choose_columns"]
+__all__ = ["COUNT", "ROLES", "Column", "choose_columns"]
+
+COUNT = "such as unit='0.1um' (--unit 0.1um)"
+"""Example of the unit of a log in encoder counts, for messages."""
+
+_COUNTS = ("count", "counts", "cts", "inc", "incr", "increment", "increments", "pulse", "pulses")
+"""Spellings of an encoder's count where a unit is stated, in small letters; its length must be given."""
 
 ROLES = ("t", "x_d", "x")
 """Time, commanded and measured position."""
@@ -70,13 +76,14 @@ def choose_columns(
     for role in columns or ():
         if role not in ROLES:
             raise LogError(f"{source.path}: columns may name {', '.join(ROLES)}, got {role!r}")
-    names = {role: _name(source, role, (columns or {}).get(role)) for role in ROLES}
-    if names["t"] is None and "t" not in (columns or {}) and not time_needed:
-        del names["t"]
+    chosen = {role: _name(source, role, (columns or {}).get(role)) for role in ROLES}
+    if chosen["t"] is None and "t" not in (columns or {}) and not time_needed:
+        del chosen["t"]
     found: dict[str, Column] = {}
+    names = {role: name for role, name in chosen.items() if name is not None}
+    if len(names) < len(chosen):
+        raise _missing(source, {role: (columns or {}).get(role, role) for role in chosen if role not in names})
     for role, name in names.items():
-        if name is None:
-            raise _missing(source, role, (columns or {}).get(role, role))
         if source.names.count(name) > 1:
             raise LogError(f"{source.path}: column {name!r} must occur once, got it {source.names.count(name)} times")
         found[role] = _time(source, name) if role == "t" else _position(source, name, unit)
@@ -122,12 +129,14 @@ def _option(role: str) -> str:
     return role.replace("_", "-")
 
 
-def _missing(source: Source, role: str, name: str) -> LogError:
+def _missing(source: Source, names: Mapping[str, str]) -> LogError:
+    """Return the error of columns that are not there, by role."""
     there = ", ".join(repr(other) for other in source.names) or "none"
-    ways = f"; give its name in columns{', or T_s' if role == 't' else ''}"
-    options = f" (--{_option(role)}{', --T_s' if role == 't' else ''})"
-    what = repr(name) if name == role else f"{name!r} ({role})"
-    return LogError(f"{source.path}: column {what} is missing, the file has {there}{ways}{options}{source.advice}")
+    what = ", ".join(repr(name) if name == role else f"{name!r} ({role})" for role, name in names.items())
+    which, its = (f"column {what} is", "its name") if len(names) == 1 else (f"columns {what} are", "their names")
+    ways = f"; give {its} in columns{', or T_s' if 't' in names else ''}"
+    options = ", ".join(f"--{_option(role)}{', --T_s' if role == 't' else ''}" for role in names)
+    return LogError(f"{source.path}: {which} missing, the file has {there}{ways} ({options}){source.advice}")
 
 
 def _stated(source: Source, name: str) -> str:
@@ -149,7 +158,10 @@ def _time(source: Source, name: str) -> Column:
 def _position(source: Source, name: str, given: str | None) -> Column:
     text = _stated(source, name)
     unit = position_unit(text) if text else None
-    if text and unit is None:
+    counts = plain_name(text) in _COUNTS
+    if counts and given is None:
+        raise LogError(f"{source.path}: column {name!r} is in encoder counts; give the length of one, {COUNT}")
+    if text and unit is None and not counts:
         raise LogError(
             f"{source.path}: column {name!r} must be a position in one of {', '.join(POSITION_UNITS)}, its unit is "
             f"{text!r}; is it another quantity? Name another column in columns (--x-d, --x), or correct the unit"

@@ -12,11 +12,11 @@ import numpy as np
 from ..base.errors import LogError
 from ..base.settings import check
 from ..base.signals import POSITION_MAX, Array
-from .columns import Column, choose_columns
+from .columns import COUNT, Column, choose_columns
 from .formats import open_source
 from .source import NEEDS_TRUST, Block
 from .time_axis import TimeAxis
-from .units import POSITION_UNITS, position_unit
+from .units import POSITION_UNITS, position_unit, stated_unit
 
 __all__ = ["Log", "LogReader", "check_reading", "open_log", "read_log"]
 
@@ -28,6 +28,9 @@ TS_TOLERANCE = 0.01
 
 _SMALLER = {"m": "mm", "mm": "um", "um": "nm", "in": "mm", "rad": "deg"}
 """Unit that a log may be in if its travel is implausible in the key's."""
+
+_OWN_NAMES = ("x_d", "x", "x_meas")
+"""Names of columns of positions that leave no doubt."""
 
 _BLOCK = 10_000
 
@@ -115,7 +118,7 @@ class LogReader:
             self._source.choose_axis(axis)
         self._columns = choose_columns(self._source, columns, unit, time_needed=given is None)
         self.unit = self._columns["x_d"].unit.si
-        self.remarks = tuple(self._source.remarks)
+        self.remarks = (*self._source.remarks, *self._guessed(columns or {}))
         self._uniform, self._may_miss = uniform, may_miss
         self._source.measured, self._source.may_miss = self._columns["x"].name, may_miss
         self.n_samples, self.T_s = self._scan(given)
@@ -161,12 +164,23 @@ class LogReader:
         if count != self.n_samples:
             raise LogError(f"{self.path}: the file had {self.n_samples} samples when opened, now it has {count}")
 
+    def _guessed(self, given: Mapping[str, str]) -> Iterator[str]:
+        """Yield a remark if a column of positions was recognised by a name other than the library's own."""
+        known = {*_OWN_NAMES, *self._source.roles.values()}
+        roles = [role for role in ("x_d", "x") if role not in given]
+        if any(stated_unit(self._columns[role].name)[0] not in known for role in roles):
+            yield (
+                f"columns {self._columns['x_d'].name!r} and {self._columns['x'].name!r} are read as the commanded and "
+                "the measured position; columns (--x-d, --x) name others"
+            )
+
     def _check_span(self, column: Column, span: float) -> None:
         """Raise LogError if the commanded position spans more than any axis does."""
         si, largest = column.unit.si, SPAN_MAX[column.unit.si]
         if span > largest:
             smaller = _SMALLER.get(column.unit.name)
             hint = f"; if the log is in {smaller}, say unit='{smaller}' (--unit {smaller})" if smaller else ""
+            hint += f", if it is in encoder counts, the length of one, {COUNT}" if smaller and si == "m" else ""
             raise LogError(
                 f"{self.path}: column {column.name!r} read in {column.unit.name} spans {span:.4g} {si}, more than "
                 f"{largest:g} {si}{hint}"
@@ -219,7 +233,9 @@ class LogReader:
 def check_reading(unit: str | None, T_s: float | None) -> float | None:
     """Return the given sampling interval, validated; LogError for an unknown unit."""
     if unit is not None and position_unit(unit) is None:
-        raise LogError(f"unit must be one of {', '.join(POSITION_UNITS)}, got {unit!r}")
+        raise LogError(
+            f"unit must be one of {', '.join(POSITION_UNITS)}, got {unit!r}; a multiple of one is said as 0.1um"
+        )
     return None if T_s is None else float(check("T_s", T_s, label="T_s"))
 
 
@@ -248,8 +264,8 @@ def open_log(
         ``{"x_d": "qg", "x": "qm"}``; units in them may be left out. Without a name for ``"x"``, ``x_meas`` is read
         where the file has it.
     unit : str, optional
-        Unit of the positions: m, mm, um, nm, in, or rad, mrad, urad, deg, rev for a rotary axis. If left out, that of
-        the columns' names (``x [mm]``), otherwise m.
+        Unit of the positions: m, mm, um, nm, in, or rad, mrad, urad, deg, rev for a rotary axis, or a multiple of
+        one, ``0.1um``, such as an encoder's count. If left out, that of the columns' names (``x [mm]``), otherwise m.
     T_s : float, optional
         Sampling interval, s; needed only if the file has no time column or an index in its place, checked against that
         if it has.

@@ -166,7 +166,7 @@ def _hint(field: str) -> str:
     if is_number(field.replace(".", "").replace(",", ".")) or is_number(field.replace(",", "")):
         return "; write numbers without separators of thousands"
     if ":" in field and is_number(decimal_points(field.rsplit(":", 1)[1])):
-        return "; write times of day as seconds"
+        return "; write times of day as seconds, or take the column out and give T_s (--T_s)"
     return ""
 
 

@@ -74,6 +74,7 @@ _SUFFIXES = ("mm", "um", "nm", "rad", "mrad", "urad", "deg", "s", "ms", "us", "n
 
 _BRACKETS = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))\s*$")
 _SLASH = re.compile(r"^(?P<name>.*?\S)\s*(?:/|\bin\b)\s*(?P<unit>\S+)\s*$")
+_MULTIPLE = re.compile(r"^\s*(?P<times>\d*\.?\d+(?:[eE][+-]?\d+)?)\s*(?P<unit>\S+)\s*$")
 _SUFFIX = re.compile(r"^(?P<name>.*?[^_\s])[_\s](?P<unit>[^_\s]+)$")
 
 
@@ -84,8 +85,13 @@ def plain_name(text: str) -> str:
 
 
 def position_unit(text: str) -> Unit | None:
-    """Return the unit of a position of that spelling, None if there is none."""
-    return POSITION_UNITS.get(plain_name(text))
+    """Return the unit of a position of that spelling, or a multiple of one, ``0.1 um``; None if there is none."""
+    unit, multiple = POSITION_UNITS.get(plain_name(text)), _MULTIPLE.match(text)
+    if unit is not None or multiple is None:
+        return unit
+    unit, times = POSITION_UNITS.get(plain_name(multiple["unit"])), float(multiple["times"])
+    known = unit is not None and 0.0 < times * unit.factor < math.inf
+    return Unit(f"{times:g} {unit.name}", unit.si, times * unit.factor) if unit is not None and known else None
 
 
 def time_unit(text: str) -> Unit | None:
@@ -117,4 +123,4 @@ def stated_unit(name: str) -> tuple[str, str]:
 
 
 def _is_unit(text: str) -> bool:
-    return position_unit(text) is not None or time_unit(text) is not None
+    return plain_name(text) in POSITION_UNITS or time_unit(text) is not None

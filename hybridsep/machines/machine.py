@@ -240,11 +240,17 @@ def machine_path(machine: str | Path) -> Path:
         If there is none.
     """
     path = Path(machine)
-    if path.suffix != ".toml" and not path.is_file():
-        path = data_folder("models") / f"{machine}.toml"
-    if not path.is_file():
-        raise MachineError(f"no machine {str(machine)!r}: expected a .toml file or one of {', '.join(machine_names())}")
-    return path
+    if path.is_file():
+        return path
+    if path.suffix == ".toml":
+        raise MachineError(f"no machine {str(machine)!r}: there is no such file")
+    bundled = data_folder("models") / f"{machine}.toml"
+    if not bundled.is_file():
+        hint = f"; {path / 'machine.toml'} is there" if (path / "machine.toml").is_file() else ""
+        raise MachineError(
+            f"no machine {str(machine)!r}: expected a .toml file or one of {', '.join(machine_names())}{hint}"
+        )
+    return bundled
 
 
 def load_machine(machine: str | Path) -> Machine:

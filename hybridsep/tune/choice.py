@@ -13,7 +13,7 @@ import numpy as np
 
 from ..base.errors import SignalError
 from ..base.metrics import rms
-from ..base.settings import PredictorSettings
+from ..base.settings import PARAMETERS, PredictorSettings
 from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
 from .halves import Recording, replay
@@ -105,7 +105,8 @@ def with_window(settings: PredictorSettings, Np: int) -> PredictorSettings:
 def settings_to_try(settings: PredictorSettings) -> list[PredictorSettings]:
     """Return the settings themselves and others with the same window."""
     Np = settings.Np
-    lags = dict.fromkeys([settings.p, *(max(1, round(share * Np)) for share in _SHARES)])
+    most = int(PARAMETERS["p"].maximum)
+    lags = dict.fromkeys([settings.p, *(min(max(1, round(share * Np)), most) for share in _SHARES)])
     found = [replace(settings, p=p) for p in lags]
     found += [replace(settings, q=q) for q in _Q if q < Np and q != settings.q]
     return found

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,24 +30,40 @@ class Recording:
         Commanded and measured positions.
     n_taught : int
         Leading samples that teach; the others judge.
+    n_settling : int
+        Leading samples that do not judge, as after a gap no model knows the state of the axis.
     """
 
     x_d: Array
     x: Array
     n_taught: int
+    n_settling: int = 0
 
     @property
     def taught(self) -> tuple[Array, Array]:
         """Commanded and measured positions of the part that teaches."""
         return self.x_d[: self.n_taught], self.x[: self.n_taught]
 
+    @property
+    def judges_from(self) -> int:
+        """First sample that judges."""
+        return max(self.n_taught, self.n_settling)
+
     def first_judged(self, Np: int) -> int:
         """Return the first sample of the first window of ``Np`` that judges as a whole."""
-        return -(-self.n_taught // Np) * Np
+        return -(-self.judges_from // Np) * Np
 
 
-def halves(pieces: Iterable[tuple[Array, Array]], share: float) -> list[Recording]:
+def halves(pieces: Iterable[tuple[Array, Array]], share: float, n_settling: int = 0) -> list[Recording]:
     """Split one log, the pieces ``(x_d, x)`` between its gaps, where a share of its samples is over.
+
+    Parameters
+    ----------
+    pieces : iterable of two (n,) arrays, m
+    share : float
+        Share of the samples that teaches.
+    n_settling : int
+        Samples after each gap that do not judge, unless fewer than half of those that judge were left.
 
     Raises
     ------
@@ -63,7 +79,9 @@ def halves(pieces: Iterable[tuple[Array, Array]], share: float) -> list[Recordin
     for x_d, x in given:
         found.append(Recording(x_d, x, min(left, len(x_d))))
         left -= found[-1].n_taught
-    return found
+    settled = [*found[:1], *(replace(one, n_settling=min(n_settling, len(one.x))) for one in found[1:])]
+    left, most = (sum(len(one.x) - one.judges_from for one in each) for each in (settled, found))
+    return settled if 2 * left >= most else found
 
 
 @dataclass(frozen=True)
@@ -142,7 +160,7 @@ class Replay:
         before = 0
         for recording, result in zip(self.recordings, self.results, strict=True):
             predictions = np.stack([getattr(result, name) for name in PREDICTIONS])
-            before -= recording.n_taught
+            before -= recording.judges_from
             for i in range(recording.first_judged(self.Np), len(recording.x), self.Np):
                 window = slice(i, i + self.Np)
                 yield recording, window, predictions[:, window], before + i
@@ -150,7 +168,7 @@ class Replay:
 
     def _parts(self, signals: Sequence[Array], taught: bool) -> Array:
         parts = [
-            signal[: recording.n_taught] if taught else signal[recording.n_taught :]
+            signal[: recording.n_taught] if taught else signal[recording.judges_from :]
             for recording, signal in zip(self.recordings, signals, strict=True)
         ]
         return np.concatenate(parts)

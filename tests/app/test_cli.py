@@ -202,6 +202,7 @@ def test_help_shows_units_and_ranges(hybridsep: Run) -> None:
             "unit must be one of m, mm, um, nm, in, rad, mrad, urad, deg, rev, got 'furlong'",
         ),
         (["backtest", "nothing.csv", "-m", "spring_mass_damper"], "nothing.csv"),
+        (["build", "SepCompensatorPy", "-m", "emps", "--flavour", "python"], "; emps has no [drive_limits], which a"),
         (["build", "Robot", "--flavour", "python"], "no FMU Robot; there are HybridPredictorPy_als25010_x"),
         (["build", "--flavour", "cobol"], "flavour must be one of"),
         (["cosim", "-m", "emps", "--flavour", "python"], "machine emps has no plant; name a plant FMU with --plant"),
@@ -221,9 +222,9 @@ def test_help_shows_units_and_ranges(hybridsep: Run) -> None:
         (["cosim", "--weights", "w.state", "--predictor", "p.fmu"], "--weights go into an FMU that is built here"),
         (["cosim", "--figure", "run.pdf"], "--figure must end in .png, got 'run.pdf'"),
         (["cosim", "--seed", "99999999999"], "seed must be 0 … 2147483647, got 99999999999"),
-        (["cosim", "--out", "{log}/run.csv"], "cannot read or write"),
+        (["cosim", "--out", "{log}/run.csv"], "a file has the name of the folder"),
         (["backtest", "{log}", "-m", "spring_mass_damper", "--out", "."], "--out must be a file, got the folder ."),
-        (["build", "FeedDrivePy", "--flavour", "python", "--out", "{log}"], "cannot read or write"),
+        (["build", "FeedDrivePy", "--flavour", "python", "--out", "{log}"], "a file has the name of the folder"),
     ],
 )
 def test_errors_are_one_line_and_status_2(hybridsep: Run, tmp_path: Path, arguments: list[str], message: str) -> None:

@@ -170,7 +170,7 @@ def test_kinds_are_recognised_and_others_are_not(tmp_path: Path, python_fmu: Cal
     ("arguments", "message"),
     [
         (["demo", "--emps", "missing.mat"], "missing.mat: there is no such file"),
-        (["demo", "--emps", "{log}"], "log.csv: column 'qg' (x_d) is missing"),
+        (["demo", "--emps", "{log}"], "log.csv: columns 'qg' (x_d), 'qm' (x) are missing"),
         (["demo", "--flavour", "cobol"], "flavour must be one of native, python, got 'cobol'"),
         (["build", "--target", "sparc"], "no target sparc; there are host"),
         (["build", "HybridPredictor", "--weights", "{log}"], "a saved state of kind 'predictor' was expected"),
@@ -228,3 +228,11 @@ def test_a_log_that_ends_badly_costs_no_result(hybridsep: Run, tmp_path: Path, l
 def test_the_demos_list_of_files_needs_no_demo(tmp_path: Path) -> None:
     files = demo.demo_files(tmp_path, "python", emps=True)
     assert len(files) == len(set(files)) == 4 + 3 * (4 + 1 + 3 + 1)
+
+
+def test_a_file_that_has_the_folders_name_is_named(hybridsep: Run, tmp_path: Path, log: Path) -> None:
+    before = log.read_bytes()
+    for out in (log, log / "deeper"):
+        err = refusal(hybridsep, "fit", log, "--out", out)
+        assert f"--out {out / 'machine.toml'}: a file has the name of the folder {out}; choose another" in err
+    assert log.read_bytes() == before

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import re
 import subprocess
@@ -12,7 +13,9 @@ from typing import Any
 
 import pytest
 from places import EMPS, ROOT
+from rich.console import Console
 
+from hybridsep.app import tables
 from hybridsep.app.builds import default_flavour
 from hybridsep.app.demo import demo, demo_files
 from hybridsep.app.demo_compensation import COMPENSATED
@@ -128,3 +131,14 @@ def test_build_fmu_is_a_front_of_the_command_line(tmp_path: Path) -> None:
         "HybridPredictorPy_als25010_x.fmu",
         "SepCompensatorPy_als25010_x.fmu",
     ]
+
+
+def test_the_tables_fit_into_80_columns(shown: Demonstration, monkeypatch: pytest.MonkeyPatch) -> None:
+    narrow = Console(width=80, record=True, file=io.StringIO())
+    monkeypatch.setattr(tables, "console", narrow)
+    parts = {"friction_alone": shown.summary["spiral_y"], "stiffness_alone": shown.summary["spiral_y"]}
+    tables.print_predictions({**shown.summary, "spiral_y": {**shown.summary["spiral_y"], **parts}})
+    tables.print_compensation(shown.summary)
+    text = narrow.export_text()
+    assert "…" not in text
+    assert "130.2→94.5, 27 %" in text

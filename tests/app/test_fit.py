@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from html import unescape
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -98,6 +100,26 @@ def test_the_report_says_what_to_do_and_shows_the_figures(fitted: Fit, log: Path
     assert all(f"{1e6 * value:.4g}" in page for value in fitted.judged.rms())
     assert "HybridPredictor_axis.fmu" in page
     assert page.count('<div id="chart') == 5
+    slow = dict.fromkeys(fitted.steps, 2e-3)
+    fit_report(replace(fitted, steps=slow), used, findings).write(tmp_path / "slow.html")
+    assert "would overrun" in (tmp_path / "slow.html").read_text(encoding="utf-8")
+
+
+def test_the_reports_script_replays_a_log(
+    fitted: Fit, log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    used, findings = take_in([read_log(log, uniform=False)], fix=False)
+    fit_report(fitted, used, findings).write(tmp_path / "report.html")
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    script = unescape(page.partition("<pre>")[2].partition("</pre>")[0])
+    monkeypatch.chdir(log.parent / "out")
+    names: dict[str, Any] = {"x_d": used[0].x_d, "x_meas": used[0].x_meas}
+    exec(script, names)  # what a user copies
+    result = names["result"][NP:]
+    assert len(result) == len(used[0].x_d)
+    np.testing.assert_allclose(result["x_d"], used[0].x_d, rtol=0, atol=1e-15)
+    error = used[0].x_meas - result["x_h"]
+    assert np.sqrt(np.mean(error**2)) < 1.2 * fitted.judged.rms()[2]
 
 
 def test_the_command_line(hybridsep: Run, tmp_path: Path) -> None:
@@ -115,7 +137,19 @@ def test_the_command_line(hybridsep: Run, tmp_path: Path) -> None:
     status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", 40)
     assert status == 0, err
     assert "Np = 40" in out
+    assert "my axis.csv: 800 samples, 0.8 s at 1000 Hz, travel 10 mm, as the file states no unit" in " ".join(
+        out.split()
+    )
     assert "report: " in out
+    machine = tmp_path / "fit" / "machine.toml"
+    edited = machine.read_text(encoding="utf-8").replace("dead_time = ", "dead_time = 1")
+    machine.write_text(edited, encoding="utf-8")
+    status, _, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", 40)
+    assert status == 2
+    assert "--force" in err
+    assert machine.read_text(encoding="utf-8") == edited
+    assert hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", 40, "--force")[0] == 0
+    assert machine.read_text(encoding="utf-8") != edited
 
 
 def test_a_flipped_sign_is_refused_until_it_is_fixed(hybridsep: Run, tmp_path: Path) -> None:
@@ -141,6 +175,20 @@ def test_a_log_that_cannot_teach_a_model_is_predicted_by_its_command(tmp_path: P
     assert rms_pb == pytest.approx(1e-6, rel=0.1)
     assert rms_h <= 1.02 * rms_pb
     fit_report(found, used, findings).write(tmp_path / "report.html")
+
+
+def test_a_gap_in_motion_does_not_decide_the_verdict(tmp_path: Path) -> None:
+    x_d, x = commanded()[:N], measured(0)[:N]
+    k = np.flatnonzero((np.arange(N) < 2050) | (np.arange(N) >= 2070))  # the axis moves from 2.0 s to 2.14 s
+    log = replace(read_log(write_rows(tmp_path / "axis.csv", x_d, x)), x_d=x_d[k], x_meas=x[k], t=np.asarray(k * 1e-3))
+    used, findings = take_in([log], fix=False)
+    assert [finding.name for finding in findings["axis.csv"]] == ["gaps"]
+    found = fit(used, tmp_path, FitOptions(NP, "axis"))
+    pieces = [(one.x_d, one.x_meas) for one in used[0].segments()]
+    all_windows = replay(found.machine.new_predictor(), halves(pieces, 0.5)).rms()
+    assert found.judged.rms()[2] < 0.8 * all_windows[2]
+    fit_report(found, used, findings).write(tmp_path / "report.html")
+    assert "The window after a gap does not judge" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
 def test_what_is_kept_is_of_the_samples_as_they_are_read(log: Path) -> None:
@@ -180,11 +228,21 @@ def test_the_machine_is_named_after_the_log(file: str, name: str) -> None:
     assert machine_name(Path(file)) == name
 
 
+def test_axes_of_one_recording_have_names_of_their_own() -> None:
+    assert machine_name(Path("capture.json"), "Y1") == "capture_Y1"
+
+
+@pytest.mark.parametrize("Np", [1501, 100_000])
+def test_a_look_ahead_longer_than_what_judges_is_refused(log: Path, tmp_path: Path, Np: int) -> None:
+    with pytest.raises(ParameterError, match=rf"--Np must be at most 1500, .* got {Np}"):
+        fit([read_log(log)], tmp_path, FitOptions(Np, "axis"))
+
+
 def test_a_foreign_file_is_not_overwritten(hybridsep: Run, log: Path, tmp_path: Path) -> None:
     (tmp_path / "machine.toml").write_text("# mine\n")
     status, _, err = hybridsep("fit", log, "--out", tmp_path)
     assert status == 2
-    assert "machine.toml exists and is no machine file of hybridsep fit" in " ".join(err.split())
+    assert "machine.toml exists and is no unedited machine file of hybridsep fit" in " ".join(err.split())
     status, _, err = hybridsep("fit", log, "--out", tmp_path, "--name", "no name")
     assert status == 2
     assert "--name must be" in err

@@ -20,6 +20,7 @@ ELSEWHERE = {
     "machine.toml",
     "tuned.toml",
     "example_axis/machine.toml",
+    "my_axis/machine.toml",
     "all.c",
     "sources/all.c",
     "FMI.c",

@@ -65,7 +65,7 @@ def test_alike_is_neither_better_nor_worse() -> None:
         "As good as hold: 1 × its RMS error.",
     ]
     assert str(verdict(0, 0, 0)).startswith("As good as the physics model: 1 × its RMS error.")
-    assert str(verdict(0, 0, 1)).startswith("Worse than the physics model: inf × its RMS error, everywhere.")
+    assert str(verdict(0, 0, 1)).startswith("Worse than the physics model: its RMS error is 0, everywhere.")
 
 
 @pytest.mark.parametrize(

@@ -78,6 +78,14 @@ def test_a_fix_leaves_nothing_to_find(fault: str) -> None:
         assert np.abs(fixed.x_meas - np.interp(fixed.t, log.t, log.x_meas)).max() < 2e-4
 
 
+def test_one_column_for_both_positions_is_found() -> None:
+    log = needed("staircase")
+    intake = check(replace(log, x_meas=log.x_d))
+    assert names(intake.findings) == ["same column"]
+    assert intake.errors
+    assert not intake.usable
+
+
 @pytest.mark.parametrize("name", MACHINES)
 @pytest.mark.parametrize("delay", [10.0, 6.5, -8.0])
 def test_a_delay_is_measured_against_the_model(name: str, delay: float) -> None:
@@ -145,7 +153,8 @@ def test_words() -> None:
         "rows lost"
     )
     assert "9.9 samples (9.91 ms) too late against the motion that a drive" in words("10 samples late")
-    assert "shift the measured position by -10 samples" in words("10 samples late")
+    assert "shift the measured position by -10 samples; where" in words("10 samples late")
+    assert "measurement_delay = 10" in words("10 samples late")
 
 
 def test_sampling_rate_against_the_machine() -> None:

@@ -32,7 +32,9 @@ def test_version_4_of_matlab(tmp_path: Path) -> None:
 
 def test_structs(tmp_path: Path) -> None:
     io.savemat(tmp_path / "log.mat", {"rec": columns(), "name": "axis"})
-    with pytest.raises(LogError, match=r"column 't' is missing, the file has 'rec\.t', 'rec\.x_d', 'rec\.x', 'name'"):
+    with pytest.raises(
+        LogError, match=r"columns 't', 'x_d', 'x' are missing, the file has 'rec\.t', 'rec\.x_d', 'rec\.x', 'name'"
+    ):
         open_log(tmp_path / "log.mat")
     names = {role: f"rec.{role}" for role in ("t", "x_d", "x")}
     assert len(read_log(tmp_path / "log.mat", columns=names).t) == 50

@@ -67,7 +67,9 @@ def test_given_ts_must_agree_with_the_time(tmp_path: Path) -> None:
 def test_missing_columns(tmp_path: Path, suffix: str) -> None:
     data = columns()
     path = write(tmp_path / f"log{suffix}", {"x_d": data["x_d"], "qm": data["x"]})
-    with pytest.raises(LogError, match=r"column 't' is missing, the file has 'x_d', 'qm'; .*columns, or T_s"):
+    with pytest.raises(
+        LogError, match=r"columns 't', 'x' are missing, the file has 'x_d', 'qm'; .*, or T_s \(--t, --T_s"
+    ):
         open_log(path)
     with pytest.raises(LogError, match=r"column 'x' is missing, the file has 'x_d', 'qm'; give its name in columns"):
         open_log(path, T_s=1e-3)
@@ -153,6 +155,21 @@ def test_millimetres_taken_for_metres(tmp_path: Path, suffix: str) -> None:
     data["x_d"] = data["x_d"] * 1e3
     with pytest.raises(LogError, match=r"read in mm spans 120 m, .*--unit um"):
         read_log(write(path, data), unit="mm")
+
+
+@FORMATS
+def test_encoder_counts(tmp_path: Path, suffix: str) -> None:
+    data = columns()
+    data["x_d"], data["x"] = np.linspace(-6e5, 6e5, 50), np.linspace(-6e5, 6e5, 50)
+    path = write(tmp_path / f"log{suffix}", data)
+    with pytest.raises(LogError, match=r"spans 1.2e\+06 m, .* in encoder counts, the length of one, .*--unit 0\.1um"):
+        read_log(path)
+    assert read_log(path, unit="0.1um").x_d[-1] == pytest.approx(0.06)
+    assert read_log(path, unit="1e-4 deg").unit == "rad"
+    with pytest.raises(LogError, match=r"unit must be one of m, .*, got '0um'; a multiple of one is said as 0\.1um"):
+        read_log(path, unit="0um")
+    with pytest.raises(LogError, match=r"'x_d' read in 0\.5 mm spans 600 m"):
+        read_log(path, unit="0.5mm")
 
 
 # Files

@@ -89,6 +89,10 @@ def test_an_index_is_told_from_time(tmp_path: Path) -> None:
             "t,x_d [mm/s],x\n0,1,2\n",
             r"column 'x_d \[mm/s\]' must be a position in one of m, .* its unit is 'mm/s'; is it",
         ),
+        (
+            "t,x_d [counts],x\n0,1,2\n",
+            r"'x_d \[counts\]' is in encoder counts; give the length of one, .*--unit 0\.1um",
+        ),
         ("t,x_d,x (m/s)\n0,1,2\n", r"column 'x \(m/s\)' must be a position"),
         ("t,x_d [m],x [deg]\n0,1,2\n", r"'x_d \[m\]' is in m and column 'x \[deg\]' in deg; both must be lengths or"),
         (
@@ -101,8 +105,8 @@ def test_an_index_is_told_from_time(tmp_path: Path) -> None:
             r"line 3: column 'x_d' must be a number, got '1\.000,5'; write numbers without",
         ),
         ("t,x_d,x\n0,1,2\n12:00:01.5,1,2\n", r"line 3: column 't' must be a number, got '12:00:01\.5'; write times of"),
-        ("a\nb;c\n# d\n1;2\n", r"column 't' is missing, the file has 'b', 'c'"),
-        ("# nothing\n# else\n", r"column 't' is missing, the file has 'nothing'"),
+        ("a\nb;c\n# d\n1;2\n", r"columns 't', 'x_d', 'x' are missing, the file has 'b', 'c'"),
+        ("# nothing\n# else\n", r"columns 't', 'x_d', 'x' are missing, the file has 'nothing'"),
     ],
 )
 def test_refused_texts(tmp_path: Path, text: str, message: str) -> None:
@@ -164,3 +168,21 @@ def test_nothing_else_may_be_missing(tmp_path: Path, row: str, problem: str) -> 
     path = write_csv(tmp_path / "log.csv", f"t,x_d,x\n0,1,2\n{row}\n2,5,\n")
     with pytest.raises(LogError, match=f"line 3: {problem}"):
         read_log(path, may_miss=True)
+
+
+def test_counts_are_read_with_their_length(tmp_path: Path) -> None:
+    path = write_csv(tmp_path / "log.csv", "t,x_d [counts],x [inc]\n0,10,20\n0.001,30,40\n")
+    np.testing.assert_allclose(read_log(path, unit="0.1um").x_meas, [2e-6, 4e-6])
+    path = write_csv(tmp_path / "log.csv", "t;x_d;x\ns;0.1um;0.1um\n0;10;20\n0.001;30;40\n")
+    np.testing.assert_allclose(read_log(path).x_meas, [2e-6, 4e-6])
+
+
+def test_columns_that_were_recognised_are_said(tmp_path: Path) -> None:
+    text = "t [s],X_cmd [mm],X_act [mm],Y_cmd [mm],Y_act [mm]\n0,1,2,3,4\n0.001,1,2,3,4\n"
+    path = write_csv(tmp_path / "log.csv", text)
+    (remark,) = read_log(path).remarks
+    assert remark.startswith(
+        "columns 'X_cmd [mm]' and 'X_act [mm]' are read as the commanded and the measured position"
+    )
+    assert read_log(path, columns={"x_d": "Y_cmd", "x": "Y_act"}).remarks == ()
+    assert read_log(write_csv(path, "t,x_d [mm],x_meas\n0,1,2\n1,1,2\n")).remarks == ()

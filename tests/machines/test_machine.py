@@ -272,6 +272,15 @@ def test_without_drive_limits_there_is_a_compensator_but_no_fmu(tmp_path: Path) 
 def test_a_file_that_is_not_there() -> None:
     with pytest.raises(MachineError, match=r"no machine 'robot': expected a .toml file or one of als25010_x"):
         load_machine("robot")
+    with pytest.raises(MachineError, match=r"no machine 'robot\.toml': there is no such file"):
+        load_machine("robot.toml")
+
+
+def test_a_folder_of_fit_is_told_from_its_machine_file(tmp_path: Path) -> None:
+    path = write(tmp_path, GOOD)
+    path.rename(tmp_path / "machine.toml")
+    with pytest.raises(MachineError, match=r"expected a \.toml file or one of .*; .*machine\.toml is there"):
+        load_machine(tmp_path)
 
 
 def test_what_a_machine_does_not_have() -> None:

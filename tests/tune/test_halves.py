@@ -89,3 +89,26 @@ def test_the_verdict_is_on_what_judges() -> None:
     x[: N // 2] += 1e-2  # would make the hybrid look good
     verdict = replay(predictor(), halves([(x_d, x)], 0.5)).verdict()
     assert verdict.n_samples == N // 2
+
+
+def test_the_window_after_a_gap_does_not_judge() -> None:
+    x_d = 1e-3 * np.sin(0.05 * np.arange(900))
+    drive = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
+    x = HybridPredictor(drive, PredictorSettings(Np=900, p=5, q=2)).predict(x_d).x_pb
+    parts = [(x_d[:300], x[:300]), (x_d[320:600], x[320:600]), (x_d[640:], x[640:])]
+    judging = halves(parts, 0.5, 20)
+    assert [part.n_settling for part in judging] == [0, 20, 20]
+    assert [part.judges_from for part in judging] == [300, 120, 20]
+    found, everything = replay(predictor(), judging), replay(predictor(), halves(parts, 0.5))
+    assert found.errors().shape[1] == everything.errors().shape[1] - 20
+    begins, errors = found.window_errors()
+    assert begins[-1] == found.errors().shape[1] - 20
+    assert errors.shape == (3, len(everything.window_errors()[0]) - 1)
+    assert found.rms()[0] < 0.5 * everything.rms()[0]
+    for name in ("x_pb", "x_h"):
+        np.testing.assert_array_equal(found.joined(name)[:160], everything.joined(name)[:160])
+
+
+def test_the_window_after_a_gap_judges_where_little_else_would() -> None:
+    judging = halves(pieces(40, 10, 12), 0.6, 20)
+    assert sum(len(part.x) - part.judges_from for part in judging) == 25
