@@ -35,8 +35,13 @@ _DAMAGED = f"{WEIGHTS_FILE} must be a factor of learned rows; it is damaged or t
 
 
 def learned_settings(predictor: HybridPredictor) -> dict[str, float]:
-    """Return all settings on which the weights depend, by their names in the FMU."""
+    """Return all settings on which the weights depend, by their names in the FMU.
+
+    With trust ``v_friction`` has no effect; it is 0 here.
+    """
     numbers = predictor.settings.to_fmi()
+    if predictor.settings.trust:
+        numbers["v_friction"] = 0.0
     learned = [name for name, parameter in PredictorSettings.fmi_parameters().items() if parameter.learned]
     values: dict[str, float] = {name: numbers[name] for name in learned}
     values["dead_time"] = predictor.model.dead_time

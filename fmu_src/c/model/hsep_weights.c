@@ -87,9 +87,9 @@ static size_t weights_variable(const hsep_context *context, const char *name)
 }
 
 /* Read the settings of the file and compare them with those of the table: 0 if it is damaged. A setting that the table
- * has not is 0 here; modes that only one side has are told by their number. */
+ * has not is 0 here; modes that only one side has are told by their number. trust: whether v_friction has no effect. */
 static int weights_compare_settings(
-    FILE *file, const hsep_context *context, const double values[], uint64_t n_settings, char message[])
+    FILE *file, const hsep_context *context, const double values[], int trust, uint64_t n_settings, char message[])
 {
     uint64_t n_missing = 0;
     for (size_t i = 0; i < context->n_variables; i++) {
@@ -103,7 +103,9 @@ static int weights_compare_settings(
         const size_t place = weights_variable(context, setting.name);
         if (place < context->n_variables) {
             const hsep_variable *variable = &context->variables[place];
-            weights_compare(setting.name, setting.value, values[place], variable->kind, message);
+            if (!trust || strcmp(setting.name, "v_friction") != 0) {
+                weights_compare(setting.name, setting.value, values[place], variable->kind, message);
+            }
             n_missing -= variable->learned != 0;
         } else if (strncmp(setting.name, "mode[", 5) != 0) {
             const hsep_kind kind = strcmp(setting.name, "trust") == 0 ? HSEP_BOOLEAN : HSEP_REAL;
@@ -141,7 +143,8 @@ static int weights_take(
         return 0;
     }
     weights_compare("the number of modes", (double)head.n_modes, (double)n_modes, HSEP_INTEGER, message);
-    if (!weights_compare_settings(file, context, values, head.n_settings, message) || message[0] != '\0') {
+    if (!weights_compare_settings(file, context, values, trusted != NULL, head.n_settings, message) ||
+        message[0] != '\0') {
         return 0;
     }
     const uint64_t n_learned = HSEP_N_UNCERTAINTY + (trusted != NULL ? hsep_trusted_n_learned(trusted) : 0);
