@@ -11,13 +11,16 @@ from ..base.signals import PREDICTION_MAX, Array
 from ..base.state import pack, unpack
 from .blend import Blend
 from .candidates import CORRELATION_MAX, ResidualScale
+from .change import ChangeTest
 from .disturbances import LEAST_VELOCITY, N_DISTURBANCES, StaticState
 from .guard import N_STATE
 from .trusted import TrustedModel
 
 __all__ = ["restore_trusted", "trusted_blob", "trusted_fields"]
 
-_KIND = "trusted model"
+_KIND, _CHANGE = "trusted model", "change test"
+
+_CHANGE_NUMBERS = ("n_before", "n_after", "correlation", "peak", "largest_square", "largest")
 
 _ROUNDING = 1e-6
 """Relative tolerance of what rounding may have changed."""
@@ -44,7 +47,9 @@ def trusted_blob(model: TrustedModel) -> bytes:
         "past_bridged": model.past_bridged.astype(np.float64),
         "guard": np.array(model.guard.state()),
     }
-    return pack(_KIND, meta, arrays)
+    change = model.change
+    parts = {} if change is None else {"change": _change_blob(change)}
+    return pack(_KIND, meta, arrays, parts)
 
 
 def trusted_fields(blob: bytes, p: int) -> Saved:
@@ -92,6 +97,32 @@ def restore_trusted(model: TrustedModel, saved: Saved) -> None:
     model.n_rejected = saved.whole("n_rejected")
     with saved.consistent():
         model.guard.restore(saved.array("guard", N_STATE, finite=False))
+    model.change = None
+    if "change" in saved.parts:
+        model.change = _restored_change(model, Saved(_CHANGE, *unpack(_CHANGE, saved.part("change"))))
+
+
+def _change_blob(change: ChangeTest) -> bytes:
+    numbers = np.array([getattr(change, name) for name in _CHANGE_NUMBERS])
+    arrays = {"before": change.before.factor, "after": change.after.factor, "numbers": numbers}
+    return pack(_CHANGE, {"n_samples": change.after.n_samples}, arrays)
+
+
+def _restored_change(model: TrustedModel, saved: Saved) -> ChangeTest:
+    change = ChangeTest(model.static.n, model.regression, 0.0, 1.0)
+    with saved.consistent():
+        change.before.restore(saved.array("before", None, None), 0)
+        change.after.restore(saved.array("after", None, None), saved.whole("n_samples"))
+    numbers = _magnitudes(saved, "numbers", len(_CHANGE_NUMBERS)).tolist()
+    for name, number in zip(_CHANGE_NUMBERS, numbers, strict=True):
+        setattr(change, name, number)
+    if not 1.0 <= change.correlation <= CORRELATION_MAX:
+        raise saved.error(f"the correlation must be 1 … {CORRELATION_MAX:g}, got {change.correlation}")
+    if not (change.n_before > 0.0 and change.n_after <= change.after.n_samples):
+        raise saved.error("n_before must be > 0, and n_after at most n_samples")
+    if change.largest_square > (1.0 + _ROUNDING) * change.largest**2 + 1e-300:
+        raise saved.error("largest_square must be at most the square of largest")
+    return change
 
 
 def _scale(saved: Saved) -> ResidualScale:
