@@ -154,11 +154,6 @@ class Candidate:
         self.n_static, self.lag_scales, self.correlation_max = n_static, lag_scales, correlation_max
         self.noise_variance, self.correlation = 0.0, max(_FIRST_CORRELATION * Np, 1.0)
 
-    @property
-    def counted_correlation(self) -> float:
-        """Correlation as the penalty counts it."""
-        return min(self.correlation, self.correlation_max)
-
     def solve(self, regression: RidgeRegression, static_scales: Array, least_variance: float) -> SolvedCandidate:
         """Return the model with the weights that follow from all rows so far.
 
@@ -171,7 +166,7 @@ class Candidate:
         least_variance : float
             Least variance of the noise, m².
         """
-        variance = max(self.noise_variance, least_variance) * self.counted_correlation
+        variance = max(self.noise_variance, least_variance) * min(self.correlation, self.correlation_max)
         priors = np.concatenate((static_scales, self.lag_scales))
         return SolvedCandidate(self.n_static, regression.penalised(variance / priors**2), variance)
 

@@ -19,8 +19,8 @@ from .regression import RidgeRegression
 __all__ = ["ChangeTest"]
 
 _FALL = 60.0
-"""Fall of the log-likelihood ratio from its peak that tells a change: with 30 three of 41 unchanged plants are taken for
-changed ones, with 60 one, which loses nothing by it, with 80 none; changes are found some windows later."""
+"""Fall of the log-likelihood ratio from its peak that tells a change: with 30 three of 41 unchanged plants are taken
+for changed ones, with 60 one, which loses nothing by it, with 80 none; but changes are found later."""
 
 _OUTWEIGHED = 10.0
 """Rows of this run relative to those of earlier ones from which on there is little left to decide."""
@@ -47,8 +47,9 @@ class ChangeTest:
         Factor of the rows of earlier runs.
     n_rows : float
         Their weight.
-    correlation : float
-        Rows that count as one, as earlier runs have shown.
+    correlations : tuple of float
+        Of the candidates, as earlier runs have shown: windows that contradict what was carried over tell nothing of
+        them.
 
     Attributes
     ----------
@@ -64,11 +65,13 @@ class ChangeTest:
         Largest log-likelihood ratio so far of one plant to two, at least 0.
     """
 
-    def __init__(self, n_static: int, regression: RidgeRegression, n_rows: float, correlation: float) -> None:
+    def __init__(
+        self, n_static: int, regression: RidgeRegression, n_rows: float, correlations: tuple[float, ...]
+    ) -> None:
         self.before = RidgeRegression(n_static, regression.lam)
         self.before.restore(_leading(regression.factor, n_static), 0)
         self.after = RidgeRegression(regression.n_features, regression.lam)
-        self.n_before, self.n_after, self.correlation = n_rows, 0.0, correlation
+        self.n_before, self.n_after, self.correlations = n_rows, 0.0, correlations
         self.largest_square, self.largest, self.peak = 0.0, 0.0, 0.0
 
     @property
@@ -92,7 +95,9 @@ class ChangeTest:
         self.largest_square = max(self.largest_square, float(np.mean(residuals**2)))
         self.largest = max(self.largest, float(np.abs(residuals).max()))
 
-    def has_changed(self, both: RidgeRegression, scales: Array, variance: float, least: float) -> bool:
+    def has_changed(
+        self, both: RidgeRegression, scales: Array, variance: float, least: float, correlation: float
+    ) -> bool:
         """Return whether the rows so far tell that the plant is another one.
 
         Parameters
@@ -103,14 +108,16 @@ class ChangeTest:
             Prior standard deviations of the weights.
         variance, least : float, m²
             Variance of the noise that the penalties come from, and its least one.
+        correlation : float
+            Rows that count as one.
         """
         with np.errstate(all="ignore"):  # priors beyond the range of numbers tell nothing
-            penalties = variance * self.correlation / scales**2
-            A, B, AB = (_fit(regression, penalties) for regression in (self.before, self.after, both))
-            pooled = (A.residual_sum + B.residual_sum) / (self.n_before + self.n_after)
-            misfit = (AB.cost - A.cost - B.cost) / (max(pooled, least) * self.correlation)
+            penalties = variance * correlation / scales**2
+            earlier, later, one = (_fit(regression, penalties) for regression in (self.before, self.after, both))
+            pooled = (earlier.residual_sum + later.residual_sum) / (self.n_before + self.n_after)
+            misfit = (one.cost - earlier.cost - later.cost) / (max(pooled, least) * correlation)
             # ln p(B | A) − ln p(B); a factor of penalties alone has ln det = Σ ln penalties
-            log_ratio = -0.5 * (misfit + AB.log_det - A.log_det - B.log_det + float(np.log(penalties).sum()))
+            log_ratio = -0.5 * (misfit + one.log_det - earlier.log_det - later.log_det + float(np.log(penalties).sum()))
         self.peak = max(self.peak, log_ratio)
         return log_ratio < self.peak - _FALL
 

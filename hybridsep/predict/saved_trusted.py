@@ -20,7 +20,7 @@ __all__ = ["restore_trusted", "trusted_blob", "trusted_fields"]
 
 _KIND, _CHANGE = "trusted model", "change test"
 
-_CHANGE_NUMBERS = ("n_before", "n_after", "correlation", "peak", "largest_square", "largest")
+_CHANGE_NUMBERS = ("n_before", "n_after", "peak", "largest_square", "largest")
 
 _ROUNDING = 1e-6
 """Relative tolerance of what rounding may have changed."""
@@ -105,19 +105,21 @@ def restore_trusted(model: TrustedModel, saved: Saved) -> None:
 def _change_blob(change: ChangeTest) -> bytes:
     numbers = np.array([getattr(change, name) for name in _CHANGE_NUMBERS])
     arrays = {"before": change.before.factor, "after": change.after.factor, "numbers": numbers}
+    arrays["correlations"] = np.array(change.correlations)
     return pack(_CHANGE, {"n_samples": change.after.n_samples}, arrays)
 
 
 def _restored_change(model: TrustedModel, saved: Saved) -> ChangeTest:
-    change = ChangeTest(model.static.n, model.regression, 0.0, 1.0)
+    correlations = tuple(_magnitudes(saved, "correlations", len(model.candidates)).tolist())
+    change = ChangeTest(model.static.n, model.regression, 0.0, correlations)
     with saved.consistent():
         change.before.restore(saved.array("before", None, None), 0)
         change.after.restore(saved.array("after", None, None), saved.whole("n_samples"))
     numbers = _magnitudes(saved, "numbers", len(_CHANGE_NUMBERS)).tolist()
     for name, number in zip(_CHANGE_NUMBERS, numbers, strict=True):
         setattr(change, name, number)
-    if not 1.0 <= change.correlation <= CORRELATION_MAX:
-        raise saved.error(f"the correlation must be 1 … {CORRELATION_MAX:g}, got {change.correlation}")
+    if not 1.0 <= min(correlations) <= max(correlations) <= CORRELATION_MAX:
+        raise saved.error(f"the correlations must be 1 … {CORRELATION_MAX:g}, got {correlations}")
     if not (change.n_before > 0.0 and change.n_after <= change.after.n_samples):
         raise saved.error("n_before must be > 0, and n_after at most n_samples")
     if change.largest_square > (1.0 + _ROUNDING) * change.largest**2 + 1e-300:

@@ -103,8 +103,8 @@ class TrustedModel:
         self.change: ChangeTest | None = None
         self._discount(carried / max(self.n_rows, carried))
         if self.n_rows > 0.0:
-            correlation = self.candidates[0].counted_correlation
-            self.change = ChangeTest(self.static.n, self.regression, self.n_rows, correlation)
+            correlations = tuple(candidate.correlation for candidate in self.candidates)
+            self.change = ChangeTest(self.static.n, self.regression, self.n_rows, correlations)
 
     def begin_in_motion(self, x_d: Array, x_pb: Array) -> None:
         """Correct what was before a run in motion: commands and physics-based prediction went on as they begin."""
@@ -233,9 +233,10 @@ class TrustedModel:
         """Return whether the plant of this run is another one than that of earlier runs."""
         if self.change is None:
             return False
+        correlation = min(self.change.correlations[0], self.candidates[0].correlation_max)
         variance = max(self.candidates[0].noise_variance, self._least_variance)
         return self.change.has_changed(
-            self.regression, self._static_scales(self.largest), variance, self._least_variance
+            self.regression, self._static_scales(self.largest), variance, self._least_variance, correlation
         )
 
     def _conclude(self, changed: bool) -> None:
@@ -246,12 +247,12 @@ class TrustedModel:
             recent = min(self.scale.recent, change.largest_square)
             self.scale = ResidualScale(recent, change.largest_square, change.largest)
             self.blend = Blend(_FIRST_WEIGHTS, self.settings.Np)
+            for candidate, correlation in zip(self.candidates, change.correlations, strict=True):
+                candidate.correlation = correlation
         if change is not None and (changed or change.is_over):
             self.change = None
 
-    def _assess(
-        self, forecast: Forecast, measured: Array, accepted: NDArray[np.bool_], *, surprises: bool
-    ) -> None:
+    def _assess(self, forecast: Forecast, measured: Array, accepted: NDArray[np.bool_], *, surprises: bool) -> None:
         """Judge the candidates and their blend by the measurement of their window, which may surprise."""
         m = len(measured)
         self._judge(forecast, measured, accepted, surprises)

@@ -9,6 +9,8 @@
 #include "hsep_api.h"
 #include "hsep_regression.h"
 
+#define HSEP_NO_PENALTY 1e-40 /* lambda of the factor itself, m2: penalties come with each solution */
+
 /* Solve for the weights w of the first m features, as many as solved has, each with a penalty of its own:
  *   w = argmin_w sum_k [target(k) - w' phi(k)]^2 + sum_i penalties_i w_i^2 + lambda |w|^2
  * solved: another block, which holds the triangle with these penalties then; what it held before does not matter, and
@@ -16,6 +18,9 @@
  * Cost: m^3 / 6 times 2 multiplications and 5 additions. */
 HSEP_API double hsep_penalised_solve(
     const hsep_regression *self, const double penalties[], hsep_regression *solved, double w[]);
+
+/* Put the factor of the same rows for the first features, as many as to has, into to. Cost: n of it squared / 2. */
+HSEP_API void hsep_penalised_lead(const hsep_regression *self, hsep_regression *to);
 
 /* phi' (R' R)^-1 phi of the row phi, (n,), in hsep_regression_row, which is used up: the variance of w' phi relative to
  * that of the noise. Cost: n^2 / 2 multiply-adds. */
