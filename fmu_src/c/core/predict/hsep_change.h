@@ -41,10 +41,8 @@ HSEP_API void hsep_change_init(hsep_change *self, uint64_t n_static, uint64_t n)
 /* Whether a block, in any alignment, is one that hsep_change_init with these numbers began. */
 HSEP_API int hsep_change_valid(const void *block, uint64_t n_static, uint64_t n);
 
-/* Begin to compare with earlier runs. regression: factor of their rows; n_rows: their weight, > 0; correlation: rows
- * that count as one. */
-HSEP_API void hsep_change_begin(
-    hsep_change *self, const hsep_regression *regression, double n_rows, double correlation);
+/* Begin to compare with earlier runs. regression: factor of their rows; n_rows: their weight, > 0. */
+HSEP_API void hsep_change_begin(hsep_change *self, const hsep_regression *regression, double n_rows);
 
 /* Weigh all rows so far by kept. */
 HSEP_API void hsep_change_discount(hsep_change *self, double kept);
