@@ -9,6 +9,7 @@ what was carried over helps, and falls once it contradicts what is measured: a l
 
 from __future__ import annotations
 
+from copy import deepcopy
 from typing import NamedTuple
 
 import numpy as np
@@ -41,8 +42,6 @@ class ChangeTest:
 
     Parameters
     ----------
-    n_static : int
-        Static features, the first ones of a row.
     regression : RidgeRegression
         Factor of the rows of earlier runs.
     n_rows : float
@@ -53,10 +52,8 @@ class ChangeTest:
 
     Attributes
     ----------
-    before : RidgeRegression
-        Of the static features, with the rows of earlier runs.
-    after : RidgeRegression
-        Of all features, with the rows of this run.
+    before, after : RidgeRegression
+        With the rows of earlier runs, and of this one.
     n_before, n_after : float
         Weights of these rows.
     largest_square, largest : float, m², m
@@ -65,11 +62,8 @@ class ChangeTest:
         Largest log-likelihood ratio so far of one plant to two, at least 0.
     """
 
-    def __init__(
-        self, n_static: int, regression: RidgeRegression, n_rows: float, correlations: tuple[float, ...]
-    ) -> None:
-        self.before = RidgeRegression(n_static, regression.lam)
-        self.before.restore(_leading(regression.factor, n_static), 0)
+    def __init__(self, regression: RidgeRegression, n_rows: float, correlations: tuple[float, ...]) -> None:
+        self.before = deepcopy(regression)
         self.after = RidgeRegression(regression.n_features, regression.lam)
         self.n_before, self.n_after, self.correlations = n_rows, 0.0, correlations
         self.largest_square, self.largest, self.peak = 0.0, 0.0, 0.0
@@ -89,6 +83,12 @@ class ChangeTest:
         """Update with rows ``[Φ | e_pb]`` of this run, ``(m, n + 1)``, column-major; they are overwritten."""
         self.after.update_stacked(stacked)
         self.n_after += len(stacked)
+
+    def all_rows(self) -> RidgeRegression:
+        """Return a regression with the rows of all runs."""
+        both = deepcopy(self.before)
+        both.update_from(self.after)
+        return both
 
     def follow(self, residuals: Array) -> None:
         """Follow the size of the residuals of this run, ``(m,)``, m."""
@@ -120,14 +120,6 @@ class ChangeTest:
             log_ratio = -0.5 * (misfit + one.log_det - earlier.log_det - later.log_det + float(np.log(penalties).sum()))
         self.peak = max(self.peak, log_ratio)
         return log_ratio < self.peak - _FALL
-
-
-def _leading(factor: Array, m: int) -> Array:
-    """Return the factor ``[R z; 0 ρ]`` of the first ``m`` features, ``(m + 1, m + 1)``."""
-    leading = np.zeros((m + 1, m + 1))
-    leading[:m, :m], leading[:m, m] = factor[:m, :m], factor[:m, -1]
-    leading[m, m] = np.linalg.norm(factor[m:, -1])
-    return leading
 
 
 def _fit(regression: RidgeRegression, penalties: Array) -> _Fit:

@@ -106,14 +106,15 @@ def _change_blob(change: ChangeTest) -> bytes:
     numbers = np.array([getattr(change, name) for name in _CHANGE_NUMBERS])
     arrays = {"before": change.before.factor, "after": change.after.factor, "numbers": numbers}
     arrays["correlations"] = np.array(change.correlations)
-    return pack(_CHANGE, {"n_samples": change.after.n_samples}, arrays)
+    counts = {"n_samples": change.after.n_samples, "n_earlier": change.before.n_samples}
+    return pack(_CHANGE, counts, arrays)
 
 
 def _restored_change(model: TrustedModel, saved: Saved) -> ChangeTest:
     correlations = tuple(_magnitudes(saved, "correlations", len(model.candidates)).tolist())
-    change = ChangeTest(model.static.n, model.regression, 0.0, correlations)
+    change = ChangeTest(model.regression, 0.0, correlations)
     with saved.consistent():
-        change.before.restore(saved.array("before", None, None), 0)
+        change.before.restore(saved.array("before", None, None), saved.whole("n_earlier"))
         change.after.restore(saved.array("after", None, None), saved.whole("n_samples"))
     numbers = _magnitudes(saved, "numbers", len(_CHANGE_NUMBERS)).tolist()
     for name, number in zip(_CHANGE_NUMBERS, numbers, strict=True):

@@ -104,7 +104,7 @@ class TrustedModel:
         self._discount(carried / max(self.n_rows, carried))
         if self.n_rows > 0.0:
             correlations = tuple(candidate.correlation for candidate in self.candidates)
-            self.change = ChangeTest(self.static.n, self.regression, self.n_rows, correlations)
+            self.change = ChangeTest(self.regression, self.n_rows, correlations)
 
     def begin_in_motion(self, x_d: Array, x_pb: Array) -> None:
         """Correct what was before a run in motion: commands and physics-based prediction went on as they begin."""
@@ -340,9 +340,12 @@ class TrustedModel:
         rows[:, -1] = measured
         if self.settings.forgetting > 0.0:
             self._discount(math.exp(-m * self.settings.T_s / self.settings.forgetting))
-        if self.change is not None:
-            self.change.learn(np.asfortranarray(rows[learned]))
-        self.regression.update_stacked(np.asfortranarray(rows[learned]))
+        stacked = np.asfortranarray(rows[learned])
+        if self.change is None:
+            self.regression.update_stacked(stacked)
+        else:
+            self.change.learn(stacked)
+            self.regression = self.change.all_rows()
         self.n_rows += int(learned.sum())
 
 

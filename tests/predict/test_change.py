@@ -40,7 +40,7 @@ def test_its_ratio_is_that_of_the_densities(correlation: float, kept: float) -> 
     earlier, later = rows(weights, 80, rng), rows(weights, 60, rng)
     regression = RidgeRegression(5, NO_PENALTY)
     regression.update_stacked(earlier.copy(order="F"))
-    change = ChangeTest(3, regression, 80.0, (correlation,))
+    change = ChangeTest(regression, 80.0, (correlation,))
     change.learn(later.copy(order="F"))
     regression.update_stacked(later.copy(order="F"))
     for one in (change, regression):
@@ -63,7 +63,7 @@ def test_another_plant_is_told_from_the_same_one(seed: int) -> None:
     for factor, expected in ((1.0, False), (1.3, True)):
         regression = RidgeRegression(5, NO_PENALTY)
         regression.update_stacked(rows(weights, 300, rng))
-        change, told = ChangeTest(3, regression, 300.0, (1.0,)), False
+        change, told = ChangeTest(regression, 300.0, (1.0,)), False
         for _ in range(20):
             window = rows(factor * weights, 30, rng)
             change.learn(window.copy(order="F"))

@@ -152,8 +152,8 @@ def test_an_inconsistent_model(name: str, value: Any) -> None:
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        ("before", np.eye(20)),
-        ("before", np.zeros((21, 21))),
+        ("before", np.eye(26)),
+        ("before", np.zeros((27, 27))),
         ("after", np.eye(26)),
         ("after", np.full((27, 27), np.inf)),
         ("numbers", np.ones(4)),
@@ -165,6 +165,7 @@ def test_an_inconsistent_model(name: str, value: Any) -> None:
         ("correlations", np.ones(2)),
         ("after", None),
         ("n_samples", -1),
+        ("n_earlier", 0.5),
     ],
     ids=str,
 )

@@ -21,17 +21,6 @@ static void penalised_copy_leading(const hsep_regression *self, hsep_regression 
     }
 }
 
-HSEP_API void hsep_penalised_lead(const hsep_regression *self, hsep_regression *to)
-{
-    const double *inverse_d = hsep_at_const(self, self->inverse_d);
-    penalised_copy_leading(self, to);
-    to->residual_sum = self->residual_sum;
-    for (uint64_t i = to->n; i < self->n; i++) { /* what the other features explain */
-        const double z = *hsep_tile_entry_const(self, i, self->n);
-        to->residual_sum += z * z / inverse_d[i];
-    }
-}
-
 HSEP_API double hsep_penalised_solve(
     const hsep_regression *self, const double penalties[], hsep_regression *solved, double w[])
 {

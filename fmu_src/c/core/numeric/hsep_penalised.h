@@ -19,9 +19,6 @@
 HSEP_API double hsep_penalised_solve(
     const hsep_regression *self, const double penalties[], hsep_regression *solved, double w[]);
 
-/* Put the factor of the same rows for the first features, as many as to has, into to. Cost: n of it squared / 2. */
-HSEP_API void hsep_penalised_lead(const hsep_regression *self, hsep_regression *to);
-
 /* phi' (R' R)^-1 phi of the row phi, (n,), in hsep_regression_row, which is used up: the variance of w' phi relative to
  * that of the noise. Cost: n^2 / 2 multiply-adds. */
 HSEP_API double hsep_penalised_leverage(hsep_regression *self);

@@ -23,7 +23,7 @@ static double change_lay_out(hsep_change *self, uint64_t n_static, uint64_t n)
     double end = HSEP_WORDS(hsep_change);
     self->n = n;
     self->n_static = n_static;
-    self->before = hsep_take_block(&end, hsep_regression_size(n_static));
+    self->before = hsep_take_block(&end, hsep_regression_size(n));
     self->after = hsep_take_block(&end, hsep_regression_size(n));
     self->solved = hsep_take_block(&end, hsep_regression_size(n_static));
     self->penalties = hsep_take(&end, (double)n_static);
@@ -45,7 +45,7 @@ HSEP_API void hsep_change_init(hsep_change *self, uint64_t n_static, uint64_t n)
 {
     memset(self, 0, (size_t)hsep_change_size(n_static, n));
     (void)change_lay_out(self, n_static, n);
-    hsep_regression_init(change_at(self, self->before), n_static, HSEP_NO_PENALTY);
+    hsep_regression_init(change_at(self, self->before), n, HSEP_NO_PENALTY);
     hsep_regression_init(change_at(self, self->after), n, HSEP_NO_PENALTY);
     hsep_regression_init(change_at(self, self->solved), n_static, HSEP_NO_PENALTY);
 }
@@ -56,7 +56,7 @@ HSEP_API int hsep_change_valid(const void *block, uint64_t n_static, uint64_t n)
     memcpy(&got, block, sizeof got);
     (void)change_lay_out(&got, n_static, n); /* changes nothing where it is sound */
     return memcmp(&got, block, sizeof got) == 0 && got.active <= 1 &&
-           hsep_regression_valid(hsep_at_bytes(block, got.before), n_static) &&
+           hsep_regression_valid(hsep_at_bytes(block, got.before), n) &&
            hsep_regression_valid(hsep_at_bytes(block, got.after), n) &&
            hsep_regression_valid(hsep_at_bytes(block, got.solved), n_static);
 }
@@ -64,7 +64,7 @@ HSEP_API int hsep_change_valid(const void *block, uint64_t n_static, uint64_t n)
 HSEP_API void hsep_change_begin(hsep_change *self, const hsep_regression *regression, double n_rows)
 {
     hsep_change_init(self, self->n_static, self->n);
-    hsep_penalised_lead(regression, change_at(self, self->before));
+    memcpy(hsep_at(self, self->before), regression, (size_t)hsep_regression_size(self->n));
     self->active = 1;
     self->n_before = n_rows;
 }
@@ -83,6 +83,15 @@ HSEP_API void hsep_change_fold(hsep_change *self)
 {
     hsep_regression_fold(change_at(self, self->after));
     self->n_after += 1.0;
+}
+
+HSEP_API void hsep_change_join(const hsep_change *self, hsep_regression *both)
+{
+    /* Rows that outweigh those of the factor are the dearer ones to fold. */
+    const int later = self->n_after > self->n_before;
+    const double *most = hsep_at_const(self, later ? self->after : self->before);
+    memcpy(both, most, (size_t)hsep_regression_size(self->n));
+    hsep_regression_fold_all(both, (const hsep_regression *)hsep_at_const(self, later ? self->before : self->after));
 }
 
 static change_fit change_fit_to(hsep_change *self, const hsep_regression *regression)

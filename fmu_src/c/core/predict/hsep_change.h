@@ -24,8 +24,7 @@ typedef struct {
     double peak;                 /* largest log-likelihood ratio so far of one plant to two, at least 0 */
     double largest_square;       /* m2, largest mean square of the residual over a window of this run */
     double largest;              /* m, its largest magnitude in this run */
-    uint64_t before;             /* regression of the features without lags: rows of earlier runs */
-    uint64_t after;              /* regression of all features: rows of this run */
+    uint64_t before, after;      /* regressions: rows of earlier runs, and of this one */
     uint64_t solved;             /* regression of the features without lags, with penalties */
     uint64_t penalties, weights; /* (n_static,) */
 } hsep_change;
@@ -50,6 +49,9 @@ HSEP_API void hsep_change_discount(hsep_change *self, double kept);
 /* Where the next row of this run goes, (n + 1,), and take it in. Cost: that of hsep_regression_fold. */
 HSEP_API double *hsep_change_row(hsep_change *self);
 HSEP_API void hsep_change_fold(hsep_change *self);
+
+/* Put the rows of all runs into a regression. Cost: that of hsep_regression_fold_all. */
+HSEP_API void hsep_change_join(const hsep_change *self, hsep_regression *both);
 
 /* Whether the rows so far tell that the plant is another one. both: factor of all rows; scales: (n_static,) prior
  * standard deviations of the weights; variance, least: m2, of the noise that the penalties come from, and its least;

@@ -84,20 +84,12 @@ static double trusted_bridge(hsep_trusted *self, const double x_pb[], double e[]
     return count;
 }
 
-/* Put row j, [features without lags | lags | e_pb], where a regression takes it from. */
-static void trusted_put_row(
-    const hsep_trusted *self, const double features[], const double e[], uint64_t j, double *row)
-{
-    memcpy(row, features, (size_t)self->n_static * sizeof(double));
-    memcpy(row + self->n_static, e + j + 1, (size_t)self->p * sizeof(double));
-    row[self->n_static + self->p] = e[j];
-}
-
 /* Update the regression with the window's rows [features without lags | lags | e_pb]. */
 static void trusted_fold(hsep_trusted *self, const double e[])
 {
     hsep_regression *regression = hsep_trusted_regression(self);
     hsep_change *change = hsep_trusted_change(self);
+    const uint64_t n_static = self->n_static;
     const double *rows = hsep_at(self, self->rows), *accepted = hsep_at(self, self->accepted);
     const double *bridged = hsep_at(self, self->bridged);
     double n_bridged = 0.0; /* among the lags of the row */
@@ -105,17 +97,23 @@ static void trusted_fold(hsep_trusted *self, const double e[])
         n_bridged += bridged[self->Np + i];
     }
     trusted_discount(self, self->kept);
-    for (uint64_t j = self->Np; j-- > 0; rows += self->n_static) {
+    for (uint64_t j = self->Np; j-- > 0; rows += n_static) {
         if (accepted[j] > 0.0 && n_bridged <= trusted_bridged_max) {
-            trusted_put_row(self, rows, e, j, hsep_regression_row(regression));
-            hsep_regression_fold(regression);
-            self->n_rows += 1.0;
+            double *row = change->active ? hsep_change_row(change) : hsep_regression_row(regression);
+            memcpy(row, rows, (size_t)n_static * sizeof(double));
+            memcpy(row + n_static, e + j + 1, (size_t)self->p * sizeof(double));
+            row[n_static + self->p] = e[j];
             if (change->active) {
-                trusted_put_row(self, rows, e, j, hsep_change_row(change));
                 hsep_change_fold(change);
+            } else {
+                hsep_regression_fold(regression);
             }
+            self->n_rows += 1.0;
         }
         n_bridged += bridged[j] - bridged[j + self->p];
+    }
+    if (change->active) {
+        hsep_change_join(change, regression);
     }
 }
 

@@ -124,8 +124,8 @@ HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const double x_d[
 
 /* Learn that window. x_d: its commands, (Np,), m; e: (Np + p,), m, becomes its residuals; where the measurement is not
  * plausible, between those beside it; behind it those before it; fold: whether it is learned, the next window starts
- * from it in any case. Cost: Np times that of hsep_regression_fold; twice as much in a warm run, with that of
- * hsep_change_tells. */
+ * from it in any case. Cost: Np times that of hsep_regression_fold; in a warm run those of hsep_change_join and
+ * hsep_change_tells, too. */
 HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_d[], const double x_pb[], double e[], int fold);
 
 /* Discount what earlier runs have learned, and compare it with what this one teaches: a machine may have changed
