@@ -17,12 +17,14 @@ from numpy.typing import NDArray
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.fmi.c_header import c_header
 from hybridsep.fmi.compiler import compile_flags
+from hybridsep.fmi.weights import WEIGHTS_FILE, weights_file
 from hybridsep.model.physics import ModalModel
 from hybridsep.plants.feed_drive import FeedDrive
 from hybridsep.plants.plant import simulate
 from hybridsep.plants.trajectory import staircase
+from hybridsep.predict.predictor import HybridPredictor
 
-__all__ = ["PREDICTOR", "Array", "Host", "build", "drive_log", "instructions"]
+__all__ = ["PREDICTOR", "Array", "Host", "build", "drive_log", "instructions", "warm"]
 
 Array = NDArray[np.float64]
 
@@ -82,6 +84,13 @@ def build(folder: Path, model: str, parameters: dict[str, Any]) -> Host:
     log = folder / "log.bin"
     log.write_bytes(np.concatenate(drive_log()).astype("<f8").tobytes())
     return Host(program, log)
+
+
+def warm(predictor: HybridPredictor, folder: Path) -> dict[str, Any]:
+    """Return the values that make a run begin with what a predictor has learned, which is written to a new folder."""
+    folder.mkdir()
+    (folder / WEIGHTS_FILE).write_bytes(weights_file(predictor))
+    return {"resources": f"{folder}/"}
 
 
 def instructions(host: Host, values: dict[str, Any], steps: int, folder: Path) -> Array | None:

@@ -3,6 +3,7 @@
  *
  * Usage: step_time STEPS LOG TIMES name=value ...
  *   LOG    x_d, then x, doubles, m, as many of each; played over and over; in closed loop x_d alone is used
+ *   resources=FOLDER/ where weights.bin is: a warm run
  *   TIMES  written: STEPS doubles, ns, the steps; then STEPS doubles, ns, the empty loop; "-" for none
  * Prints one line of JSON. Pinned to the processor it starts on where the system allows it.
  */
@@ -108,11 +109,16 @@ int main(int n_arguments, char *arguments[])
 {
     static double values[HSEP_N_VALUES];
     char message[HSEP_MESSAGE_SIZE] = "";
-    const hsep_context context = {hsep_variables, HSEP_N_VARIABLES, NULL};
+    hsep_context context = {hsep_variables, HSEP_N_VARIABLES, NULL};
     if (n_arguments < 4) {
         fail("usage: step_time STEPS LOG TIMES name=value ...");
     }
     const size_t steps = strtoul(arguments[1], NULL, 10);
+    for (int a = 4; a < n_arguments; a++) {
+        if (strncmp(arguments[a], "resources=", strlen("resources=")) == 0) {
+            context.resources = arguments[a] + strlen("resources=");
+        }
+    }
     for (size_t i = 0; i < HSEP_N_VARIABLES; i++) {
         const size_t length = strlen(hsep_variables[i].name);
         values[i] = hsep_variables[i].start;

@@ -155,6 +155,13 @@ class RidgeRegression:
         self.n_samples += len(stacked)
         self._weights = None
 
+    def update_from(self, other: RidgeRegression) -> None:
+        """Update with all rows of another regression of the same features, its penalty with them."""
+        rows = np.asfortranarray(other.factor)
+        fold(self._factor, rows, n_triangular=len(rows))
+        self.n_samples += other.n_samples
+        self._weights = None
+
     def discount(self, weight: float) -> None:
         """Weigh all rows so far by ``weight``, 0 ≤ weight ≤ 1, in the sum of squares; λ with them.
 

@@ -11,13 +11,16 @@ from ..base.signals import PREDICTION_MAX, Array
 from ..base.state import pack, unpack
 from .blend import Blend
 from .candidates import CORRELATION_MAX, ResidualScale
+from .change import ChangeTest
 from .disturbances import LEAST_VELOCITY, N_DISTURBANCES, StaticState
 from .guard import N_STATE
 from .trusted import TrustedModel
 
 __all__ = ["restore_trusted", "trusted_blob", "trusted_fields"]
 
-_KIND = "trusted model"
+_KIND, _CHANGE = "trusted model", "change test"
+
+_CHANGE_NUMBERS = ("n_before", "n_after", "peak", "largest_square", "largest")
 
 _ROUNDING = 1e-6
 """Relative tolerance of what rounding may have changed."""
@@ -44,7 +47,9 @@ def trusted_blob(model: TrustedModel) -> bytes:
         "past_bridged": model.past_bridged.astype(np.float64),
         "guard": np.array(model.guard.state()),
     }
-    return pack(_KIND, meta, arrays)
+    change = model.change
+    parts = {} if change is None else {"change": _change_blob(change)}
+    return pack(_KIND, meta, arrays, parts)
 
 
 def trusted_fields(blob: bytes, p: int) -> Saved:
@@ -92,6 +97,35 @@ def restore_trusted(model: TrustedModel, saved: Saved) -> None:
     model.n_rejected = saved.whole("n_rejected")
     with saved.consistent():
         model.guard.restore(saved.array("guard", N_STATE, finite=False))
+    model.change = None
+    if "change" in saved.parts:
+        model.change = _restored_change(model, Saved(_CHANGE, *unpack(_CHANGE, saved.part("change"))))
+
+
+def _change_blob(change: ChangeTest) -> bytes:
+    numbers = np.array([getattr(change, name) for name in _CHANGE_NUMBERS])
+    arrays = {"before": change.before.factor, "after": change.after.factor, "numbers": numbers}
+    arrays["correlations"] = np.array(change.correlations)
+    counts = {"n_samples": change.after.n_samples, "n_earlier": change.before.n_samples}
+    return pack(_CHANGE, counts, arrays)
+
+
+def _restored_change(model: TrustedModel, saved: Saved) -> ChangeTest:
+    correlations = tuple(_magnitudes(saved, "correlations", len(model.candidates)).tolist())
+    change = ChangeTest(model.regression, 0.0, correlations)
+    with saved.consistent():
+        change.before.restore(saved.array("before", None, None), saved.whole("n_earlier"))
+        change.after.restore(saved.array("after", None, None), saved.whole("n_samples"))
+    numbers = _magnitudes(saved, "numbers", len(_CHANGE_NUMBERS)).tolist()
+    for name, number in zip(_CHANGE_NUMBERS, numbers, strict=True):
+        setattr(change, name, number)
+    if not 1.0 <= min(correlations) <= max(correlations) <= CORRELATION_MAX:
+        raise saved.error(f"the correlations must be 1 … {CORRELATION_MAX:g}, got {correlations}")
+    if not (change.n_before > 0.0 and change.n_after <= change.after.n_samples):
+        raise saved.error("n_before must be > 0, and n_after at most n_samples")
+    if change.largest_square > (1.0 + _ROUNDING) * change.largest**2 + 1e-300:
+        raise saved.error("largest_square must be at most the square of largest")
+    return change
 
 
 def _scale(saved: Saved) -> ResidualScale:

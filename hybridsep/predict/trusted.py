@@ -18,6 +18,7 @@ from ..base.signals import Array
 from ..model.discrete import DiscreteModel
 from .blend import Blend
 from .candidates import Candidate, CandidatePrediction, ResidualScale, SolvedCandidate, lags
+from .change import ChangeTest
 from .disturbances import LEAST_VELOCITY, StaticFeatures, StaticState
 from .forecast import FeatureScales, Forecast
 from .guard import SensorGuard
@@ -99,7 +100,11 @@ class TrustedModel:
         self.guard.restart()
         self.n_rejected = 0
         carried = _CARRIED * self.look_ahead
+        self.change: ChangeTest | None = None
         self._discount(carried / max(self.n_rows, carried))
+        if self.n_rows > 0.0:
+            correlations = tuple(candidate.correlation for candidate in self.candidates)
+            self.change = ChangeTest(self.regression, self.n_rows, correlations)
 
     def begin_in_motion(self, x_d: Array, x_pb: Array) -> None:
         """Correct what was before a run in motion: commands and physics-based prediction went on as they begin."""
@@ -206,6 +211,7 @@ class TrustedModel:
         if forecast.scales.velocity != self.velocity_scale:  # outgrown
             self.regression = RidgeRegression(self.regression.n_features, _NO_PENALTY)
             self.n_rows = 0.0
+            self.change = None
         self.velocity_scale, self.largest = forecast.scales
         x_d, x_pb = forecast.x_d[:m], forecast.x_pb[:m]
         accepted = self.guard.accepts(x, x_pb, self.scale.largest)
@@ -215,17 +221,44 @@ class TrustedModel:
         if fold and accepted.any():
             n_bridged = np.convolve(bridged[:-1].astype(np.float64), np.ones(p), "valid")
             self._fold(rows, e, accepted & (n_bridged <= _BRIDGED))
-            self._assess(forecast, e, accepted)
+            changed = bool(forecast.predictions) and self._has_changed()
+            self._assess(forecast, e, accepted, surprises=not changed)
+            self._conclude(changed)
         self.n_rejected += m - int(accepted.sum())
         self.past = np.concatenate((e[::-1], self.past))[:p]
         self.past_bridged = bridged[-p:]
         return accepted
 
-    def _assess(self, forecast: Forecast, measured: Array, accepted: NDArray[np.bool_]) -> None:
-        """Judge the candidates and their blend by the measurement of their window."""
+    def _has_changed(self) -> bool:
+        """Return whether the plant of this run is another one than that of earlier runs."""
+        if self.change is None:
+            return False
+        correlation = min(self.change.correlations[0], self.candidates[0].correlation_max)
+        variance = max(self.candidates[0].noise_variance, self._least_variance)
+        return self.change.has_changed(
+            self.regression, self._static_scales(self.largest), variance, self._least_variance, correlation
+        )
+
+    def _conclude(self, changed: bool) -> None:
+        """Forget what earlier runs have taught if the plant has changed, and end the comparison once it is decided."""
+        change = self.change
+        if change is not None and changed:
+            self.regression, self.n_rows = change.after, change.n_after
+            recent = min(self.scale.recent, change.largest_square)
+            self.scale = ResidualScale(recent, change.largest_square, change.largest)
+            self.blend = Blend(_FIRST_WEIGHTS, self.settings.Np)
+            for candidate, correlation in zip(self.candidates, change.correlations, strict=True):
+                candidate.correlation = correlation
+        if change is not None and (changed or change.is_over):
+            self.change = None
+
+    def _assess(self, forecast: Forecast, measured: Array, accepted: NDArray[np.bool_], *, surprises: bool) -> None:
+        """Judge the candidates and their blend by the measurement of their window, which may surprise."""
         m = len(measured)
-        self._judge(forecast, measured, accepted)
+        self._judge(forecast, measured, accepted, surprises)
         sound = measured[accepted]
+        if self.change is not None:
+            self.change.follow(sound)
         largest, mean_square = float(np.abs(sound).max()), float(np.mean(sound**2))
         recent = _RECENT * self.scale.recent + (1.0 - _RECENT) * mean_square if self.scale.recent else mean_square
         self.scale = ResidualScale(
@@ -248,10 +281,17 @@ class TrustedModel:
         largest : (n_static,) array
             Largest magnitudes of the static features, those of the window to predict included.
         """
-        scale = self.scale
-        effect = self.settings.effect or math.sqrt(scale.largest_square)
-        least = min(self.settings.lam, _LEAST_NOISE * scale.largest_square)
-        return candidate.solve(self.regression, effect * self.static.shares / np.maximum(largest, 1e-150), least)
+        return candidate.solve(self.regression, self._static_scales(largest), self._least_variance)
+
+    @property
+    def _least_variance(self) -> float:
+        """Least variance of the noise, m²."""
+        return min(self.settings.lam, _LEAST_NOISE * self.scale.largest_square)
+
+    def _static_scales(self, largest: Array) -> Array:
+        """Return the prior standard deviations of the weights of the static features, ``(n_static,)``."""
+        effect = self.settings.effect or math.sqrt(self.scale.largest_square)
+        return effect * self.static.shares / np.maximum(largest, 1e-150)
 
     def predict(self, solved: SolvedCandidate, rows: Array, spread: Array | None = None) -> CandidatePrediction:
         """Return the prediction of a candidate over a window, bounded by the residuals so far; ``spread`` if held."""
@@ -266,7 +306,7 @@ class TrustedModel:
         learned = [prediction.e_h[:m] for prediction in predictions] or [np.zeros(m)] * (len(_FIRST_WEIGHTS) - 1)
         return np.stack((np.full(m, hold), *learned))
 
-    def _judge(self, forecast: Forecast, measured: Array, accepted: NDArray[np.bool_]) -> None:
+    def _judge(self, forecast: Forecast, measured: Array, accepted: NDArray[np.bool_], surprises: bool) -> None:
         """Estimate the errors of the candidates from the measurement of their window."""
         m, given = len(measured), self.settings.noise_std**2
         if not forecast.predictions:
@@ -278,7 +318,7 @@ class TrustedModel:
         cautious = forecast.predictions[1]
         expected = cautious.variance + float(cautious.spread[:m].mean())
         surprise = float(np.mean((measured - cautious.unshrunk[:m])[accepted] ** 2)) / expected
-        if surprise > _SURPRISE:
+        if surprises and surprise > _SURPRISE:
             self._discount(min(max((_SURPRISE / surprise) ** 2, _SURPRISED * self.settings.Np / self.n_rows), 1.0))
         for candidate, prediction in zip(self.candidates, forecast.predictions, strict=True):
             candidate.judge(prediction.unshrunk[:m][accepted], measured[accepted])
@@ -288,6 +328,8 @@ class TrustedModel:
         """Weigh all samples so far by ``kept``."""
         self.regression.discount(kept)
         self.n_rows *= kept
+        if self.change is not None:
+            self.change.discount(kept)
 
     def _fold(self, static: Array, measured: Array, learned: NDArray[np.bool_]) -> None:
         """Update the regression with a window's rows ``[static features | lags | e_pb]``."""
@@ -298,7 +340,12 @@ class TrustedModel:
         rows[:, -1] = measured
         if self.settings.forgetting > 0.0:
             self._discount(math.exp(-m * self.settings.T_s / self.settings.forgetting))
-        self.regression.update_stacked(np.asfortranarray(rows[learned]))
+        stacked = np.asfortranarray(rows[learned])
+        if self.change is None:
+            self.regression.update_stacked(stacked)
+        else:
+            self.change.learn(stacked)
+            self.regression = self.change.all_rows()
         self.n_rows += int(learned.sum())
 
 

@@ -51,6 +51,29 @@ def test_rows_that_outweigh_all_before_them_lose_nothing() -> None:
     assert np.linalg.norm(regression.weights - exact) <= 1e-9 * np.linalg.norm(exact)
 
 
+@pytest.mark.parametrize("n", [1, 3, 4, 5, 8, 23])
+@pytest.mark.parametrize("size", [1e-6, 1.0, 100.0])
+def test_the_rows_of_another_regression_are_folded_as_they_are(n: int, size: float) -> None:
+    # 1e-9 relative against long double: rows that weigh as much, next to nothing, and far more than those before.
+    rng = np.random.default_rng(n)
+    rows = rng.normal(size=(90, n)) * np.where(np.arange(90) < 40, 1.0, size)[:, None]
+    target = rows @ rng.normal(size=n) + 0.1 * rng.normal(size=90)
+    both, other = CRegression(n, 1e-9), CRegression(n, 1e-9)
+    library, second = RidgeRegression(n, 1e-9), RidgeRegression(n, 1e-9)
+    for ours, peer, part in ((both, library, slice(None, 40)), (other, second, slice(40, None))):
+        ours.fold(rows[part], target[part])
+        peer.update(rows[part], target[part])
+    both.library.hsep_regression_fold_all(both._block, other._block)
+    library.update_from(second)
+    exact = oracle.ridge_extended(rows, target, 2e-9).astype(float)
+    for weights in (both.weights, library.weights):
+        assert np.linalg.norm(weights - exact) <= 1e-9 * np.linalg.norm(exact)
+    left = float(np.sum((target - rows @ exact) ** 2)) + 2e-9 * float(exact @ exact)
+    assert both.residual_sum == pytest.approx(left, rel=1e-9)
+    assert library.residual_sum == pytest.approx(left, rel=1e-9)
+    assert library.n_samples == 90
+
+
 def staircase_rows(p: int, q: int, n: int) -> tuple[Array, Array]:
     """Return rows of features, (n, 2 + q + p), and their targets, (n,), of the measured staircase; eq. (5)."""
     discrete = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0).discretise(TS)

@@ -30,23 +30,28 @@ def signals(n: int = 1500) -> tuple[Array, Array]:
     return x_d, physics(x_d) + friction(x_d) + 1e-6 * np.random.default_rng(3).normal(size=n)
 
 
-def in_mid_run(x: Array | None = None, **changes: Any) -> HybridPredictor:
-    """Return a small predictor after 400 samples, with a predicted window of 30."""
+def in_mid_run(x: Array | None = None, *, warm: bool = False, **changes: Any) -> HybridPredictor:
+    """Return a small predictor after 400 samples, of a second run if it is warm, with a predicted window of 30."""
     x_d, sound = signals()
     x = sound if x is None else x
     predictor = trusted(**{"Np": 20, "p": 6, "q": 2, "forgetting": 2.0} | changes)
+    if warm:
+        run(predictor, x_d, sound, 20)
+        predictor.restart(0.1)
     run(predictor, x_d[:400], x[:400], 20)
     predictor.predict(x_d[400:430])
     return predictor
 
 
+@pytest.mark.parametrize("warm", [True, False])
 @pytest.mark.parametrize("pending", [True, False])
 @pytest.mark.parametrize("way", WAYS)
-def test_a_restored_predictor_continues_bit_for_bit(way: str, pending: bool) -> None:
+def test_a_restored_predictor_continues_bit_for_bit(way: str, pending: bool, warm: bool) -> None:
     x_d, x = signals()
     x[[390, 395]], x[435:440] = np.nan, x[435] + 1e-2  # what the guard knows is part of the state, too
-    original = in_mid_run(x=x)
+    original = in_mid_run(x=x, warm=warm)
     assert original.trusted is not None
+    assert (original.trusted.change is not None) == warm
     assert original.trusted.n_rejected >= 2
     if not pending:
         original.update(x[400:430])
@@ -142,6 +147,41 @@ def test_an_inconsistent_model(name: str, value: Any) -> None:
         table[name] = value
     with pytest.raises(StateError, match=r"^the saved (trusted model|predictor) is inconsistent: "):
         HybridPredictor.from_bytes(pack("predictor", meta, arrays, {"trusted": pack("trusted model", own, inside)}))
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("before", np.eye(26)),
+        ("before", np.zeros((27, 27))),
+        ("after", np.eye(26)),
+        ("after", np.full((27, 27), np.inf)),
+        ("numbers", np.ones(4)),
+        ("numbers", np.array([0.0, 1.0, 0.0, 0.0, 0.0])),
+        ("numbers", np.array([1.0, 1e6, 0.0, 0.0, 0.0])),
+        ("numbers", np.array([1.0, 1.0, -1.0, 0.0, 0.0])),
+        ("numbers", np.array([1.0, 1.0, 0.0, 2.0, 1.0])),
+        ("correlations", np.array([0.5, 1.0, 1.0])),
+        ("correlations", np.ones(2)),
+        ("after", None),
+        ("n_samples", -1),
+        ("n_earlier", 0.5),
+    ],
+    ids=str,
+)
+def test_an_inconsistent_comparison_with_earlier_runs(name: str, value: Any) -> None:
+    meta, arrays, parts = unpack("predictor", in_mid_run(warm=True).to_bytes())
+    own, inside, nested = unpack("trusted model", parts["trusted"])
+    numbers, factors, _ = unpack("change test", nested["change"])
+    table: dict[str, Any] = numbers if name in numbers else factors
+    assert name in table
+    if value is None:
+        del table[name]
+    else:
+        table[name] = value
+    trusted_model = pack("trusted model", own, inside, {"change": pack("change test", numbers, factors)})
+    with pytest.raises(StateError, match=r"^the saved change test is inconsistent: "):
+        HybridPredictor.from_bytes(pack("predictor", meta, arrays, {"trusted": trusted_model}))
 
 
 def test_a_prediction_that_overflows_is_refused() -> None:

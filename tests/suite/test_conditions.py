@@ -1,4 +1,4 @@
-"""Late measurements and starts in motion, in every implementation.
+"""Late measurements, starts in motion and plants that have changed, in every implementation.
 
 Every implementation shows what the library shows: within 1e-12 m with trust, 1e-11 m with the paper's model, to the
 last bit in a pythonfmu FMU. That what it shows is good is tested beside it.
@@ -6,6 +6,8 @@ last bit in a pythonfmu FMU. That what it shows is good is tested beside it.
 
 from __future__ import annotations
 
+from copy import copy
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -17,6 +19,8 @@ from staircase_data import commanded
 from stream import OUTPUTS, PREDICTOR, PYTHON, STAGE_PREDICTOR, Array, Stream, Value, machine_of
 from streams import StreamMaker, on_all
 
+from hybridsep.evaluate.backtest import backtest
+from hybridsep.fmi.weights import weights_file
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.plant import simulate
 
@@ -49,6 +53,26 @@ def cut(model: str, Np: int, delay: int, n: int = 1500) -> tuple[Array, Array]:
     return x_d[CUT : CUT + n], x[CUT - Np - delay :][:n]
 
 
+@cache
+def learned(model: str) -> bytes:
+    """Return the ``weights.bin`` of the model's predictor with trust after the staircase."""
+    machine = machine_of(model)
+    predictor = machine.new_predictor(replace(machine.predictor_settings, trust=True))
+    backtest(predictor, *moved(model))
+    return weights_file(predictor)
+
+
+@cache
+def changed(model: str, name: str, factor: float) -> tuple[Array, Array]:
+    """Return the inputs of a look-ahead on the model's plant with another parameter, (n,), m, under other noise."""
+    machine, x_d = machine_of(model), commanded()[:3300]
+    assert machine.plant is not None
+    plant = copy(machine.new_plant())
+    setattr(plant, name, factor * getattr(plant, name))
+    x = Encoder(machine.plant.noise_std, 4).measure_all(simulate(plant, x_d, T_S))
+    return x_d, np.concatenate((np.full(100, x_d[0]), x))[: len(x_d)]
+
+
 def run(stream: Stream, inputs: tuple[Array, Array], values: dict[str, Value], *, saved_at: int = -1) -> Array:
     """Return the outputs before each sample and after the last; saved and restored once."""
     r, x = inputs
@@ -64,13 +88,17 @@ def run(stream: Stream, inputs: tuple[Array, Array], values: dict[str, Value], *
     return np.array(outputs)
 
 
-def assert_agreement(new_stream: StreamMaker, inputs: tuple[Array, Array], values: dict[str, Value]) -> None:
-    expected = run(LookAheadStream(new_stream.model), inputs, values)
-    shown = run(new_stream(), inputs, values, saved_at=733)
-    tolerance = 0.0 if new_stream.implementation == PYTHON else 1e-12 if values.get("trust") else 1e-11
+def assert_same(shown: Array, expected: Array, implementation: str, *, trust: bool = True) -> None:
+    tolerance = 0.0 if implementation == PYTHON else 1e-12 if trust else 1e-11
     for name, output, of_library in zip(OUTPUTS[PREDICTOR], shown.T, expected.T, strict=True):
         whole = name in ("batch", "n_rejected", "hybrid_active")
         np.testing.assert_allclose(output, of_library, rtol=0, atol=0 if whole else tolerance, err_msg=name)
+
+
+def assert_agreement(new_stream: StreamMaker, inputs: tuple[Array, Array], values: dict[str, Value]) -> None:
+    expected = run(LookAheadStream(new_stream.model), inputs, values)
+    shown = run(new_stream(), inputs, values, saved_at=733)
+    assert_same(shown, expected, new_stream.implementation, trust=bool(values.get("trust")))
 
 
 def last(outputs: Array, name: str) -> float:
@@ -133,3 +161,32 @@ def test_a_run_in_motion_is_no_worse_than_physics(new_stream: StreamMaker) -> No
     trusted, paper = (run(new_stream(), inputs, {**TRUST, "trust": trust}) for trust in (True, False))
     assert last(trusted, "rms_h") < 1.02 * last(trusted, "rms_pb")
     assert last(trusted, "rms_pb") < 0.97 * last(paper, "rms_pb")  # the state is found after the first window
+
+
+@on_all((PREDICTOR, STAGE_PREDICTOR), needs="agreement")
+@pytest.mark.parametrize(("name", "factor", "saved_at"), [("k", 1.2, 1333), ("c_nl", 3.0, 150), ("c", 1.0, 733)])
+def test_a_changed_plant_is_relearned_as_by_the_library(
+    new_stream: StreamMaker, name: str, factor: float, saved_at: int
+) -> None:
+    """The state that is saved has what earlier runs and this one have taught, or what is left of it."""
+    model = new_stream.model
+    name = {"k": "kappa", "c_nl": "f"}.get(name, "f") if model == STAGE_PREDICTOR else name
+    inputs, weights = changed(model, name, factor), learned(model)
+    expected = run(LookAheadStream(model, weights), inputs, TRUST)
+    assert_same(run(new_stream.planted(weights), inputs, TRUST, saved_at=saved_at), expected, new_stream.implementation)
+
+
+@on_all((PREDICTOR, STAGE_PREDICTOR))
+@pytest.mark.parametrize(("factor", "most"), [(2.0, 1.02), (0.3, 1.02), (1.0, 0.999)])
+def test_a_plant_that_has_changed_is_relearned_as_fast_as_cold(
+    new_stream: StreamMaker, factor: float, most: float
+) -> None:
+    """From 2 s on at most 1.02 times a run that begins cold; one that has not changed loses nothing."""
+    model = new_stream.model
+    inputs = changed(model, "f" if model == STAGE_PREDICTOR else "k_nl", factor)
+    error = []
+    for stream in (new_stream(), new_stream.planted(learned(model))):
+        shown = run(stream, inputs, TRUST)
+        x_h = shown[2000:-1, OUTPUTS[PREDICTOR].index("x_h")]
+        error.append(np.sqrt(np.mean((x_h - inputs[1][2000:]) ** 2)))
+    assert error[1] < most * error[0]

@@ -9,6 +9,8 @@
 #include "hsep_api.h"
 #include "hsep_regression.h"
 
+#define HSEP_NO_PENALTY 1e-40 /* lambda of the factor itself, m2: penalties come with each solution */
+
 /* Solve for the weights w of the first m features, as many as solved has, each with a penalty of its own:
  *   w = argmin_w sum_k [target(k) - w' phi(k)]^2 + sum_i penalties_i w_i^2 + lambda |w|^2
  * solved: another block, which holds the triangle with these penalties then; what it held before does not matter, and

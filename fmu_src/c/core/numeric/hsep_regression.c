@@ -155,6 +155,25 @@ HSEP_API void hsep_regression_fold(hsep_regression *self)
     self->n_samples++;
 }
 
+HSEP_API void hsep_regression_fold_all(hsep_regression *self, const hsep_regression *other)
+{
+    const uint64_t n = self->n;
+    const double *inverse_d = hsep_at_const(other, other->inverse_d);
+    double *row = hsep_regression_row(self);
+    for (uint64_t i = 0; i < n; i++) { /* row i of [R z] = D^(1/2) [U z] */
+        const uint64_t first = i / HSEP_TILE;
+        const double root = 1.0 / sqrt(inverse_d[i]);
+        memset(row + HSEP_TILE * first, 0, (size_t)(HSEP_TILE * (self->n_tiles - first)) * sizeof(double));
+        row[i] = root;
+        for (uint64_t j = i + 1; j <= n; j++) {
+            row[j] = root * *hsep_tile_entry_const(other, i, j);
+        }
+        hsep_regression_fold_from(self, first);
+    }
+    self->residual_sum += other->residual_sum;
+    self->n_samples += other->n_samples;
+}
+
 HSEP_API void hsep_regression_discount(hsep_regression *self, double weight)
 {
     double *inverse_d = hsep_at(self, self->inverse_d);

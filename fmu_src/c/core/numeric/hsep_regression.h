@@ -52,6 +52,10 @@ HSEP_API void hsep_regression_fold(hsep_regression *self);
 /* Fold the row, whose entries before 4 * first are 0, into the factor, without counting it. */
 HSEP_API void hsep_regression_fold_from(hsep_regression *self, uint64_t first);
 
+/* Fold all rows of another regression of as many features, its lambda with them, into the factor. Cost: that of n / 3
+ * rows, in scalar instructions where they outweigh those of the factor. */
+HSEP_API void hsep_regression_fold_all(hsep_regression *self, const hsep_regression *other);
+
 /* Solve R w = z for w, (n,). Cost: n^2 / 2 multiply-adds. */
 HSEP_API void hsep_regression_solve(const hsep_regression *self, double w[]);
 

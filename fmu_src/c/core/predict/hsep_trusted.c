@@ -20,19 +20,39 @@ static const double trusted_carried = 10.0;
  * remains at least of the weight of all samples before, in windows. */
 static const double trusted_surprise = 10.0, trusted_surprised = 0.1;
 
+/* Bound on the variance of the noise relative to the largest mean square of the residual: a larger one would prevent
+ * any learning. */
+static const double trusted_least_noise = 1e-4;
+
+HSEP_API double hsep_trusted_least_variance(const hsep_trusted *self)
+{
+    return fmin(self->least_variance, trusted_least_noise * self->scale.largest_square);
+}
+
 /* Weigh all samples so far by kept. */
 static void trusted_discount(hsep_trusted *self, double kept)
 {
     if (kept < 1.0) {
         hsep_regression_discount(hsep_trusted_regression(self), kept);
         self->n_rows *= kept;
+        if (hsep_trusted_change(self)->active) {
+            hsep_change_discount(hsep_trusted_change(self), kept);
+        }
     }
 }
 
 HSEP_API void hsep_trusted_restart(hsep_trusted *self)
 {
     const double most = trusted_carried * (double)self->n;
+    hsep_change *change = hsep_trusted_change(self);
+    change->active = 0;
     trusted_discount(self, most / fmax(self->n_rows, most));
+    for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
+        self->correlations[i] = hsep_trusted_candidate(self, i)->correlation;
+    }
+    if (self->n_rows > 0.0) {
+        hsep_change_begin(change, hsep_trusted_regression(self), self->n_rows);
+    }
 }
 
 HSEP_API void hsep_trusted_measure(hsep_trusted *self, uint64_t k, double x)
@@ -68,6 +88,7 @@ static double trusted_bridge(hsep_trusted *self, const double x_pb[], double e[]
 static void trusted_fold(hsep_trusted *self, const double e[])
 {
     hsep_regression *regression = hsep_trusted_regression(self);
+    hsep_change *change = hsep_trusted_change(self);
     const uint64_t n_static = self->n_static;
     const double *rows = hsep_at(self, self->rows), *accepted = hsep_at(self, self->accepted);
     const double *bridged = hsep_at(self, self->bridged);
@@ -78,14 +99,21 @@ static void trusted_fold(hsep_trusted *self, const double e[])
     trusted_discount(self, self->kept);
     for (uint64_t j = self->Np; j-- > 0; rows += n_static) {
         if (accepted[j] > 0.0 && n_bridged <= trusted_bridged_max) {
-            double *row = hsep_regression_row(regression);
+            double *row = change->active ? hsep_change_row(change) : hsep_regression_row(regression);
             memcpy(row, rows, (size_t)n_static * sizeof(double));
             memcpy(row + n_static, e + j + 1, (size_t)self->p * sizeof(double));
             row[n_static + self->p] = e[j];
-            hsep_regression_fold(regression);
+            if (change->active) {
+                hsep_change_fold(change);
+            } else {
+                hsep_regression_fold(regression);
+            }
             self->n_rows += 1.0;
         }
         n_bridged += bridged[j] - bridged[j + self->p];
+    }
+    if (change->active) {
+        hsep_change_join(change, regression);
     }
 }
 
@@ -105,14 +133,45 @@ static double trusted_first_variance(const hsep_trusted *self, const double e[])
     return sum / (double)(self->Np - 3) / 20.0;
 }
 
-/* Estimate the errors of the candidates from the measurement of their window. */
-static void trusted_judge(hsep_trusted *self, double n_rows, const double e[])
+/* Whether the plant of this run is another one than that of earlier runs. */
+static int trusted_has_changed(hsep_trusted *self)
+{
+    hsep_change *change = hsep_trusted_change(self);
+    const double least = hsep_trusted_least_variance(self);
+    const hsep_candidate *first = hsep_trusted_candidate(self, 0);
+    const double variance = fmax(first->noise_variance, least);
+    const double correlation = fmin(self->correlations[0], first->correlation_max);
+    return change->active && self->predicted &&
+           hsep_change_tells(
+               change, hsep_trusted_regression(self), hsep_at(self, self->scales), variance, least, correlation);
+}
+
+/* Forget what earlier runs have taught if the plant has changed, and end the comparison once it is decided. */
+static void trusted_conclude(hsep_trusted *self, int changed)
+{
+    hsep_change *change = hsep_trusted_change(self);
+    if (changed) {
+        self->n_rows = hsep_change_keep_after(change, hsep_trusted_regression(self));
+        self->scale = (hsep_residual_scale){
+            fmin(self->scale.recent, change->largest_square), change->largest_square, change->largest};
+        hsep_blend_init(&self->blend);
+        for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
+            hsep_trusted_candidate(self, i)->correlation = self->correlations[i];
+        }
+    }
+    if (changed || hsep_change_is_over(change)) {
+        change->active = 0;
+    }
+}
+
+/* Estimate the errors of the candidates from the measurement of their window, which may surprise. */
+static void trusted_judge(hsep_trusted *self, double n_rows, const double e[], int surprises)
 {
     const double *accepted = hsep_at(self, self->accepted);
     if (self->predicted) {
         const hsep_candidate *cautious = hsep_trusted_candidate(self, 1);
         const double surprise = hsep_candidate_surprise(cautious, e, accepted);
-        if (surprise > trusted_surprise) {
+        if (surprises && surprise > trusted_surprise) {
             const double kept = trusted_surprise / surprise * (trusted_surprise / surprise);
             trusted_discount(self, fmax(kept, trusted_surprised * (double)self->Np / self->n_rows));
         }
@@ -149,9 +208,12 @@ static void trusted_assess(hsep_trusted *self, const double e[], double count)
     const double *signals[HSEP_N_BLENDED + 1] = {NULL};
     double products[HSEP_N_BLENDED + 1][HSEP_N_BLENDED + 1] = {{0.0}};
     const double mean_square = trusted_product(self, e, e) / count;
+    double largest = 0.0;
     for (uint64_t j = 0; j < self->Np; j++) {
-        scale->largest = fmax(scale->largest, accepted[j] * fabs(e[j]));
+        largest = fmax(largest, accepted[j] * fabs(e[j]));
     }
+    hsep_change_follow(hsep_trusted_change(self), mean_square, largest);
+    scale->largest = fmax(scale->largest, largest);
     scale->recent =
         scale->recent > 0.0 ? trusted_recent * scale->recent + (1.0 - trusted_recent) * mean_square : mean_square;
     scale->largest_square = fmax(scale->largest_square, mean_square);
@@ -188,6 +250,7 @@ HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_d[], const d
     if (self->forecast_scale != self->velocity_scale) { /* outgrown */
         hsep_regression_init(hsep_trusted_regression(self), self->n_static + self->p, HSEP_NO_PENALTY);
         self->n_rows = 0.0;
+        hsep_trusted_change(self)->active = 0;
     }
     self->velocity_scale = self->forecast_scale;
     memcpy(
@@ -207,8 +270,10 @@ HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_d[], const d
     hsep_disturbances_end(disturbances);
     if (fold && count > 0.0) {
         trusted_fold(self, e);
-        trusted_judge(self, n_rows, e);
+        const int changed = trusted_has_changed(self);
+        trusted_judge(self, n_rows, e, !changed);
         trusted_assess(self, e, count);
+        trusted_conclude(self, changed);
     }
     memcpy(bridged + self->Np, bridged, (size_t)self->p * sizeof(double)); /* p <= Np: they do not overlap */
 }

@@ -15,17 +15,18 @@
 #include "hsep_api.h"
 #include "hsep_blend.h"
 #include "hsep_candidate.h"
+#include "hsep_change.h"
 #include "hsep_disturbances.h"
 #include "hsep_guard.h"
 #include "hsep_layout.h"
+#include "hsep_penalised.h"
 #include "hsep_physics.h"
 #include "hsep_regression.h"
 #include "hsep_settings.h"
 
 #include <stdint.h>
 
-#define HSEP_N_CANDIDATES 3   /* without lags, with lags, with lags and rows taken as independent */
-#define HSEP_NO_PENALTY 1e-40 /* lambda of the factor itself, m2: penalties come with each solution */
+#define HSEP_N_CANDIDATES 3 /* without lags, with lags, with lags and rows taken as independent */
 
 typedef struct {
     const hsep_predictor_settings *settings;
@@ -47,6 +48,7 @@ typedef struct {
     double velocity_scale; /* m/s */
     hsep_residual_scale scale;
     hsep_blend blend;
+    double correlations[HSEP_N_CANDIDATES]; /* of the candidates, as this run began */
     /* Of the window that is predicted */
     double hold;           /* m, last residual */
     double forecast_scale; /* m/s, its velocity scale */
@@ -63,11 +65,11 @@ typedef struct {
     uint64_t bridged;          /* (Np + p,) whether a residual stands for one that is not */
     uint64_t disagreement;     /* (n,) m2, variance of the candidates about their blend */
     uint64_t rows;             /* (n, n_static) features without lags, sample after sample */
-    uint64_t disturbances, regression;
+    uint64_t disturbances, regression, change;
     uint64_t candidates[HSEP_N_CANDIDATES];
 } hsep_trusted;
 
-HSEP_ASSERT_WORDS(hsep_trusted, 55 + sizeof(hsep_guard) / 8);
+HSEP_ASSERT_WORDS(hsep_trusted, 59 + sizeof(hsep_guard) / 8);
 
 /* Features, those without lags first. */
 HSEP_API uint64_t hsep_trusted_n(const hsep_predictor_settings *settings);
@@ -85,7 +87,11 @@ HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters
 HSEP_API hsep_regression *hsep_trusted_regression(hsep_trusted *self);
 
 HSEP_API hsep_disturbances *hsep_trusted_disturbances(hsep_trusted *self);
+HSEP_API hsep_change *hsep_trusted_change(hsep_trusted *self);
 HSEP_API hsep_candidate *hsep_trusted_candidate(hsep_trusted *self, uint64_t i);
+
+/* Least variance of the noise, m2. */
+HSEP_API double hsep_trusted_least_variance(const hsep_trusted *self);
 
 /* The numbers learned besides it, for a warm start before the first window: their count, and the place of one of them.
  * These are, each >= 0: n_rows, velocity_scale, the scale of the residuals as in its struct, the noise variances of the
@@ -118,10 +124,12 @@ HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const double x_d[
 
 /* Learn that window. x_d: its commands, (Np,), m; e: (Np + p,), m, becomes its residuals; where the measurement is not
  * plausible, between those beside it; behind it those before it; fold: whether it is learned, the next window starts
- * from it in any case. Cost: Np times that of hsep_regression_fold. */
+ * from it in any case. Cost: Np times that of hsep_regression_fold; in a warm run those of hsep_change_join and
+ * hsep_change_tells, too. */
 HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_d[], const double x_pb[], double e[], int fold);
 
-/* Discount what earlier runs have learned: a machine may have changed meanwhile. */
+/* Discount what earlier runs have learned, and compare it with what this one teaches: a machine may have changed
+ * meanwhile. */
 HSEP_API void hsep_trusted_restart(hsep_trusted *self);
 
 #endif

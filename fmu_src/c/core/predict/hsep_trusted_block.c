@@ -15,6 +15,8 @@ HSEP_API hsep_regression *hsep_trusted_regression(hsep_trusted *self)
     return (hsep_regression *)hsep_at(self, self->regression);
 }
 
+HSEP_API hsep_change *hsep_trusted_change(hsep_trusted *self) { return (hsep_change *)hsep_at(self, self->change); }
+
 HSEP_API hsep_candidate *hsep_trusted_candidate(hsep_trusted *self, uint64_t i)
 {
     return (hsep_candidate *)hsep_at(self, self->candidates[i]);
@@ -62,6 +64,7 @@ static double trusted_lay_out(hsep_trusted *self, const hsep_trusted_parameters 
     self->rows = hsep_take(&end, n * n_static);
     self->disturbances = hsep_take_block(&end, hsep_disturbances_size(settings, parameters->n_modes));
     self->regression = hsep_take_block(&end, hsep_regression_size(hsep_trusted_n(settings)));
+    self->change = hsep_take_block(&end, hsep_change_size(self->n_static, hsep_trusted_n(settings)));
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
         const hsep_candidate_shape shape = trusted_shape(self, i);
         self->candidates[i] = hsep_take_block(&end, hsep_candidate_size(&shape));
@@ -84,6 +87,7 @@ HSEP_API void hsep_trusted_init(hsep_trusted *self, const hsep_trusted_parameter
         hsep_trusted_disturbances(self), parameters->settings, parameters->modes, parameters->n_modes,
         parameters->planned);
     hsep_regression_init(hsep_trusted_regression(self), self->n_static + self->p, HSEP_NO_PENALTY);
+    hsep_change_init(hsep_trusted_change(self), self->n_static, self->n_static + self->p);
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
         const hsep_candidate_shape shape = trusted_shape(self, i);
         hsep_candidate_init(hsep_trusted_candidate(self, i), &shape);
@@ -99,7 +103,8 @@ HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters
         memcmp(&got, block, sizeof got) == 0 && got.predicted <= 1 && got.guard.patience == 2 * got.Np &&
         hsep_disturbances_valid(
             hsep_at_bytes(block, got.disturbances), parameters->settings, parameters->n_modes, parameters->planned) &&
-        hsep_regression_valid(hsep_at_bytes(block, got.regression), got.n_static + got.p);
+        hsep_regression_valid(hsep_at_bytes(block, got.regression), got.n_static + got.p) &&
+        hsep_change_valid(hsep_at_bytes(block, got.change), got.n_static, got.n_static + got.p);
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
         const void *candidate = hsep_at_bytes(block, got.candidates[i]);
         const hsep_candidate_shape shape = trusted_shape(&got, i);

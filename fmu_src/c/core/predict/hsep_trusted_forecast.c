@@ -7,10 +7,6 @@
 /* Growth of the commanded velocity from which on what was learned at lower ones counts for nothing. */
 static const double trusted_growth = 30.0;
 
-/* Bound on the variance of the noise relative to the largest mean square of the residual: a larger one would prevent
- * any learning. */
-static const double trusted_least_noise = 1e-4;
-
 /* Velocity, m/s, below which a command is at rest: ratios of smaller ones may underflow. */
 static const double trusted_least_velocity = 1e-200;
 
@@ -43,7 +39,7 @@ static int trusted_outgrown(hsep_trusted *self, const double x_d[], const double
 static void trusted_solve(hsep_trusted *self)
 {
     const double effect = self->effect > 0.0 ? self->effect : sqrt(self->scale.largest_square);
-    const double least = fmin(self->least_variance, trusted_least_noise * self->scale.largest_square);
+    const double least = hsep_trusted_least_variance(self);
     const double *largest = hsep_at(self, self->forecast_largest);
     double *scales = hsep_at(self, self->scales);
     for (uint64_t i = 0; i < self->n_static; i++) {

@@ -1,0 +1,124 @@
+"""A plant that has changed before a warm run: told by the marginal likelihoods, and relearned as fast as cold."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+from trusted_cases import PERIOD, cycles, friction, physics, run, trusted
+
+from hybridsep.base.signals import Array
+from hybridsep.predict.change import ChangeTest
+from hybridsep.predict.predictor import HybridPredictor
+from hybridsep.predict.regression import RidgeRegression
+
+NOISE = 1e-6  # m
+NO_PENALTY = 1e-40
+
+
+def rms(error: Array) -> float:
+    return float(np.sqrt(np.mean(error**2)))
+
+
+def rows(weights: Array, n: int, rng: np.random.Generator) -> Array:
+    """Return rows ``[Φ | target]`` with lags behind the static features, which the target does not depend on."""
+    phi = rng.normal(size=(n, len(weights) + 2)) * np.array([1.0, 1e-3, 1e2, 1.0, 1.0])
+    target = phi[:, : len(weights)] @ weights + 0.1 * rng.normal(size=n)
+    return np.asfortranarray(np.column_stack((phi, target)))
+
+
+def log_likelihood(stacked: Array, scales: Array, variance: float) -> float:
+    """Return the logarithm of the targets' density, ``N(0, σ²I + Φ S² Φᵀ)``, from the matrix itself."""
+    phi = stacked[:, : len(scales)] * scales
+    return float(multivariate_normal(cov=variance * np.eye(len(phi)) + phi @ phi.T).logpdf(stacked[:, -1]))
+
+
+@pytest.mark.parametrize("correlation", [1.0, 3.0])
+@pytest.mark.parametrize("kept", [1.0, 0.25])
+def test_its_ratio_is_that_of_the_densities(correlation: float, kept: float) -> None:
+    rng, scales, weights = np.random.default_rng(1), np.array([2.0, 1e3, 1e-2]), np.array([1.5, -700.0, 0.02])
+    earlier, later = rows(weights, 80, rng), rows(weights, 60, rng)
+    regression = RidgeRegression(5, NO_PENALTY)
+    regression.update_stacked(earlier.copy(order="F"))
+    change = ChangeTest(regression, 80.0, (correlation,))
+    change.learn(later.copy(order="F"))
+    regression.update_stacked(later.copy(order="F"))
+    for one in (change, regression):
+        one.discount(kept)
+    # A least variance above that of the residuals is the noise of both; rows that weigh less have more of it.
+    variance = 0.02
+    assert not change.has_changed(regression, scales, variance, variance, correlation)
+    noise = variance * correlation / kept
+    both, first, second = (
+        log_likelihood(part, scales, noise) for part in (np.vstack((earlier, later)), earlier, later)
+    )
+    assert change.peak == pytest.approx(both - first - second, rel=1e-9)
+    assert change.peak > 3.0
+    assert (change.n_before, change.n_after) == (80.0 * kept, 60.0 * kept)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_another_plant_is_told_from_the_same_one(seed: int) -> None:
+    rng, weights = np.random.default_rng(seed), np.array([1.5, -700.0, 0.02])
+    for factor, expected in ((1.0, False), (1.3, True)):
+        regression = RidgeRegression(5, NO_PENALTY)
+        regression.update_stacked(rows(weights, 300, rng))
+        change, told = ChangeTest(regression, 300.0, (1.0,)), False
+        for _ in range(20):
+            window = rows(factor * weights, 30, rng)
+            change.learn(window.copy(order="F"))
+            regression.update_stacked(window)
+            told |= change.has_changed(regression, np.array([2.0, 1e3, 1e-2]), 0.01, 1e-6, 1.0)
+        assert told == expected
+
+
+def learned(x_d: Array, e: Array) -> HybridPredictor:
+    """Return a predictor after a run with residuals ``e``, about to begin another."""
+    predictor = trusted()
+    run(predictor, x_d, physics(x_d) + e + NOISE * np.random.default_rng(7).normal(size=len(x_d)))
+    predictor.restart()
+    return predictor
+
+
+@pytest.mark.parametrize("factor", [-1.0, 0.2, 3.0])
+def test_what_has_changed_is_relearned_as_fast_as_cold(factor: float) -> None:
+    x_d = cycles(4 * PERIOD)
+    x = physics(x_d) + factor * friction(x_d) + NOISE * np.random.default_rng(8).normal(size=len(x_d))
+    warm = learned(x_d, friction(x_d))
+    found, cold = run(warm, x_d, x), run(trusted(), x_d, x)
+    late = slice(2000, None)
+    assert rms((x - found)[late]) <= 1.02 * rms((x - cold)[late])
+    assert warm.trusted is not None
+    assert warm.trusted.change is None
+    assert warm.trusted.n_rows <= len(x_d)  # those of earlier runs are gone
+
+
+def test_what_has_not_changed_keeps_what_was_learned() -> None:
+    x_d = cycles(4 * PERIOD)
+    x = physics(x_d) + friction(x_d) + NOISE * np.random.default_rng(8).normal(size=len(x_d))
+    warm = learned(x_d, friction(x_d))
+    assert warm.trusted is not None
+    carried = warm.trusted.n_rows
+    found, cold = run(warm, x_d, x), run(trusted(), x_d, x)
+    assert rms(x - found) < 1.1 * NOISE < 0.5 * rms(x - cold)
+    assert warm.trusted.n_rows == pytest.approx(carried + len(x_d))
+
+
+def test_the_comparison_ends_once_this_run_outweighs_the_earlier_ones() -> None:
+    x_d = cycles(12 * PERIOD)
+    e = friction(x_d)
+    warm = learned(x_d[: 2 * PERIOD], e[: 2 * PERIOD])
+    assert warm.trusted is not None
+    assert warm.trusted.change is not None
+    run(warm, x_d[: 9 * PERIOD], (physics(x_d) + e)[: 9 * PERIOD])
+    assert warm.trusted.change is not None
+    run(warm, x_d[9 * PERIOD :], (physics(x_d) + e)[9 * PERIOD :])
+    assert warm.trusted.change is None
+
+
+def test_a_cold_run_compares_nothing() -> None:
+    predictor = trusted()
+    assert predictor.trusted is not None
+    assert predictor.trusted.change is None
+    run(predictor, cycles(300), physics(cycles(300)) + friction(cycles(300)))
+    assert predictor.trusted.change is None
