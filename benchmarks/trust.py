@@ -98,7 +98,7 @@ class Row:
         cells = [self.physics, self.hold, *self.paper, *self.trust]
         ratios = [self.trust[0] / self.physics, self.trust[0] / self.hold]
         return (
-            f"{self.name:34}"
+            f"{self.name:40}"
             + "".join(f"{_micrometres(cell):>10}" for cell in cells)
             + "".join(f"{ratio:10.3f}" for ratio in ratios)
         )
@@ -111,7 +111,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--recordings", type=Path, help="folder of recordings, *.csv with the columns t, x_d, x")
     options = parser.parse_args(arguments)
     columns = ("physics", "hold", "paper", "warm", "trust", "warm", "× physics", "× hold")
-    print(f"{'µm; ratios: trust, cold':34}" + "".join(f"{column:>10}" for column in columns))
+    print(f"{'µm; ratios: trust, cold':40}" + "".join(f"{column:>10}" for column in columns))
     for case in cases(options.emps, options.recordings):
         print(replayed(case), flush=True)
 
