@@ -42,7 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "--cache", type=Path, help="file (.npz) of positions that benchmarks.random_drives.run has written"
     )
     chosen = parser.parse_args(arguments)
-    print(f"{'% within 50, 90, 95 %':26}" + "".join(f"{part:>22}" for part in THIRDS))
+    print(f"{'% within 50, 90, 95 %':40}" + "".join(f"{part:>22}" for part in THIRDS))
     for name, error, std in warm_runs(chosen.emps):
         print(row(name, error, std), flush=True)
     if chosen.n:
@@ -81,7 +81,7 @@ def row(name: str, error: Array, std: Array) -> str:
     """Return the coverage at each level, %, over the whole window and each third of it."""
     parts = [(error.ravel(), std.ravel()), *zip(error, std, strict=True)]
     cells = ["  ".join(f"{100 * coverage(*part, level):5.1f}" for level in LEVELS) for part in parts]
-    return f"{name:26}" + "".join(f"{cell:>22}" for cell in cells)
+    return f"{name:40}" + "".join(f"{cell:>22}" for cell in cells)
 
 
 if __name__ == "__main__":

@@ -1,11 +1,11 @@
 """Paper's model and predictor with trust beside the physics model and the hold, cold and warm.
 
-    python benchmarks/trust.py [--emps DATA_EMPS.mat] [--recordings FOLDER]      (half a minute)
+    python benchmarks/trust.py [--emps DATA_EMPS.mat] [--recordings FOLDER]      (two minutes)
 
 RMS of the prediction error against the measured position, µm, over the whole run from its first sample. A warm run goes
-on with what the cold one has learned, under other noise; over a recording it is a second pass. Recordings come with no
-model: a first-order lag with a whole number of samples of dead time is fitted to each by least squares. ``diverged``
-stands where a replay was refused.
+on with what the cold one has learned, under other noise; over a recording it is a second pass. The stage's friction
+follows the command, or the actual velocity. Recordings come with no model: a first-order lag with a whole number of
+samples of dead time is fitted to each by least squares. ``diverged`` stands where a replay was refused.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ from hybridsep.base.signals import Array
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.logs.log import read_log
 from hybridsep.machines.machine import Machine, load_machine
+from hybridsep.machines.sections import StageSection
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.plant import simulate
@@ -97,7 +98,7 @@ class Row:
         cells = [self.physics, self.hold, *self.paper, *self.trust]
         ratios = [self.trust[0] / self.physics, self.trust[0] / self.hold]
         return (
-            f"{self.name:34}"
+            f"{self.name:40}"
             + "".join(f"{_micrometres(cell):>10}" for cell in cells)
             + "".join(f"{ratio:10.3f}" for ratio in ratios)
         )
@@ -110,7 +111,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--recordings", type=Path, help="folder of recordings, *.csv with the columns t, x_d, x")
     options = parser.parse_args(arguments)
     columns = ("physics", "hold", "paper", "warm", "trust", "warm", "× physics", "× hold")
-    print(f"{'µm; ratios: trust, cold':34}" + "".join(f"{column:>10}" for column in columns))
+    print(f"{'µm; ratios: trust, cold':40}" + "".join(f"{column:>10}" for column in columns))
     for case in cases(options.emps, options.recordings):
         print(replayed(case), flush=True)
 
@@ -120,11 +121,11 @@ def cases(emps: Path | None = None, recordings: Path | None = None) -> Iterator[
     drive, stage = load_machine("spring_mass_damper"), [load_machine(f"als25010_{axis}") for axis in "xy"]
     yield simulated("staircase", drive, staircase())
     yield simulated("staircase of 7 mm", drive, short_staircase())
-    for name, path in (("spiral", spiral()), ("circle", circle())):
-        for axis, machine, x_d in zip("XY", stage, path, strict=True):
-            yield simulated(f"{name}, stage {axis}", machine, x_d)
-    for axis, machine in zip("XY", stage, strict=True):
-        yield simulated(f"staircase of 7 mm, stage {axis}", machine, short_staircase())
+    for friction_on in ("command", "motion"):
+        for name, path in stage_paths():
+            for axis, machine, x_d in zip("XY", stage, path, strict=True):
+                label = f"{axis}, friction on {friction_on}: {name}"
+                yield simulated(label, with_friction_on(machine, friction_on), x_d)
     if emps is not None:
         machine = load_machine("emps")
         log = read_log(emps, columns=machine.log.columns)
@@ -132,6 +133,20 @@ def cases(emps: Path | None = None, recordings: Path | None = None) -> Iterator[
     files = [] if recordings is None else sorted(recordings.glob("*.csv"))
     for Np in WINDOWS:
         yield from (recorded(file, Np) for file in files)
+
+
+def stage_paths() -> Iterator[tuple[str, tuple[Array, Array]]]:
+    """Yield names of paths of the stage, with the commands of X and Y, (n,), m."""
+    yield "spiral", spiral()
+    yield "circle", circle()
+    yield "7 mm staircase", (short_staircase(), short_staircase())
+    yield "random moves", (random_moves(1), random_moves(2))
+
+
+def with_friction_on(machine: Machine, friction_on: str) -> Machine:
+    """Return a stage whose friction follows the command or the motion."""
+    assert isinstance(machine.plant, StageSection)
+    return machine.model_copy(update={"plant": machine.plant.model_copy(update={"friction_on": friction_on})})
 
 
 def simulated(name: str, machine: Machine, x_d: Array) -> Case:
@@ -159,6 +174,12 @@ def circle(radius: float = 0.02, turns: float = 3.0) -> tuple[Array, Array]:
 
     points = along_path(position, derivative, 2 * np.pi * turns, PAPER_LIMITS)
     return np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1])
+
+
+def random_moves(seed: int) -> Array:
+    """Return ten moves from rest to rest within ±20 mm, one every 0.6 s, (n,), m."""
+    ends = np.random.default_rng(seed).uniform(-0.02, 0.02, 10)
+    return rest_to_rest([0.0, *ends.tolist()], PAPER_LIMITS, start_times=(0.6 * np.arange(10)).tolist())
 
 
 def recorded(path: Path, Np: int) -> Case:

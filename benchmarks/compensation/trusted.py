@@ -24,12 +24,11 @@ import numpy as np
 from benchmarks.compensation.loops import Case, LibraryLoops
 from benchmarks.compensation.report import Report
 from benchmarks.compensation.run import CASES, LESS_THAN_5_PERCENT_WORSE, UM, excess
-from benchmarks.trust import circle, short_staircase
+from benchmarks.trust import circle, random_moves, short_staircase, with_friction_on
 from hybridsep.base.metrics import largest
 from hybridsep.base.signals import Array
 from hybridsep.machines.machine import Machine, load_machine
-from hybridsep.machines.sections import StageSection
-from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest, spiral, staircase
+from hybridsep.plants.trajectory import spiral, staircase
 
 NO_WORSE = 1.02
 """Largest RMS relative to that of the physics model's plans, where there is no figure."""
@@ -48,18 +47,6 @@ class Row:
     limits: tuple[float, float] | None = None
     case: Case | None = None
     worse: float = NO_WORSE
-
-
-def with_friction_on(machine: Machine, friction_on: str) -> Machine:
-    """Return a stage whose friction follows the command or the motion."""
-    assert isinstance(machine.plant, StageSection)
-    return machine.model_copy(update={"plant": machine.plant.model_copy(update={"friction_on": friction_on})})
-
-
-def random_moves(seed: int) -> Array:
-    """Return ten moves from rest to rest within ±20 mm, one every 0.6 s."""
-    ends = np.random.default_rng(seed).uniform(-0.02, 0.02, 10)
-    return rest_to_rest([0.0, *ends.tolist()], PAPER_LIMITS, 1e-3, start_times=(0.6 * np.arange(10)).tolist())
 
 
 def rows() -> Iterator[Row]:

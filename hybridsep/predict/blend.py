@@ -16,12 +16,16 @@ _MEMORY = 0.97
 _CONFIDENCE = 0.3
 """Evidence that the first weights count for, in windows of the largest mean square error."""
 
+_EARLY = 3.0
+"""Windows learned from which on that evidence falls as their inverse: the candidates' own errors are far smaller then,
+and what tells them apart must not drown in it."""
+
 
 class Blend:
     """Weights ``π ≥ 0``, ``Σπ ≤ 1`` of candidates; the rest is the prediction 0, the physics model's.
 
     They minimise the squared error of the blend over the windows so far, exponentially forgotten, with a ridge about
-    their first values.
+    their first values that fades.
 
     Parameters
     ----------
@@ -37,7 +41,7 @@ class Blend:
         self.gram, self.cross = np.zeros((n, n)), np.zeros(n)
         self.weights = self.first.copy()
 
-    def update(self, candidates: Array, target: Array, scale: float) -> None:
+    def update(self, candidates: Array, target: Array, scale: float, n_rows: float) -> None:
         """Update the weights with a measured window.
 
         Parameters
@@ -48,10 +52,12 @@ class Blend:
             What was measured.
         scale : float
             Largest mean square of a measured window, m².
+        n_rows : float
+            Rows learned so far.
         """
         self.gram = _MEMORY * self.gram + candidates @ candidates.T
         self.cross = _MEMORY * self.cross + candidates @ target
-        ridge = _CONFIDENCE * scale * self.Np
+        ridge = _CONFIDENCE * scale * self.Np / max(n_rows / (_EARLY * self.Np), 1.0)
         if ridge > 0.0:
             hessian = self.gram + ridge * np.eye(len(self.first))
             self.weights = simplex_minimum(hessian, self.cross + ridge * self.first)

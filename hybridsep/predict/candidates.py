@@ -58,6 +58,8 @@ class CandidatePrediction(NamedTuple):
         Variance of ``unshrunk``.
     variance : float, m²
         Of the noise that the penalties come from.
+    mean_square : (n,) array, m²
+        That the residual may have, which the shrinking follows from.
     """
 
     e_h: Array
@@ -65,6 +67,7 @@ class CandidatePrediction(NamedTuple):
     noise_variance: float
     spread: Array
     variance: float
+    mean_square: Array
 
 
 class SolvedCandidate(NamedTuple):
@@ -90,14 +93,14 @@ class SolvedCandidate(NamedTuple):
         return self.solution.weights[self.n_static :]
 
     def predict(
-        self, rows: Array, past: Array, scale: ResidualScale, spread: Array | None = None
+        self, rows: Array, past: Array, scale: ResidualScale, held: CandidatePrediction | None = None
     ) -> CandidatePrediction:
         """Predict the residual over a window in free run.
 
         Weights have normal priors, so the variance of ``wᵀφ`` is known; it is carried through the recursion's impulse
-        response. A prediction ``e`` of variance ``τ²`` is shrunk to ``e·v/(v + 2τ²)``, ``v`` being the recent mean
-        square of the residual: at a first motion, a first reversal or in a region not seen yet the physics model
-        remains.
+        response. A prediction ``e`` of variance ``τ²`` is shrunk to ``e·v/(v + 2τ²)``, ``v`` being the mean square that
+        the residual may have: the recent one, or what the prediction's own is beyond ``τ²``. At a first motion, a first
+        reversal or in a region not seen yet the physics model remains.
 
         Parameters
         ----------
@@ -106,8 +109,8 @@ class SolvedCandidate(NamedTuple):
         past : (p,) array, m
             Last residuals, newest first.
         scale : ResidualScale
-        spread : (n,) array, m², optional
-            Variance of the prediction, if it is held; else it is computed.
+        held : CandidatePrediction, optional
+            Prediction whose variance, and with it the shrinking, is held; else both are computed.
         """
         w_e, largest = self.lag_weights, scale.largest
         p = len(w_e)
@@ -117,15 +120,18 @@ class SolvedCandidate(NamedTuple):
             drive, response = _recursion(w_e, drive, past)
         finite = np.isfinite(drive)
         e = np.clip(np.where(finite, drive, 0.0), -_BOUND * largest, _BOUND * largest)
-        if spread is None:
+        if held is not None:
+            spread, mean_square = held.spread, held.mean_square
+        else:
             phi = np.hstack((rows, lags(past, e))) if p else rows
             spread = self.variance * self.solution.leverage(phi)
             most = _DIVERGED * largest**2
             if p:
                 spread = np.minimum(lfilter(response**2, [1.0], spread), most)
             spread = np.where(finite, spread, most)
-        shrink = scale.recent / (scale.recent + _CAUTION * spread)
-        return CandidatePrediction(e * shrink, e, self.solution.residual_sum, spread, self.variance)
+            mean_square = _mean_square(e, spread, scale)
+        shrink = mean_square / (mean_square + _CAUTION * spread)
+        return CandidatePrediction(e * shrink, e, self.solution.residual_sum, spread, self.variance, mean_square)
 
 
 class Candidate:
@@ -176,6 +182,18 @@ class Candidate:
         seen = n * mean**2 / self.noise_variance if self.noise_variance > 0.0 else CORRELATION_MAX
         change = _CORRELATION_RATE * (min(seen, CORRELATION_MAX) - self.correlation)
         self.correlation = max(self.correlation + change, 1.0)
+
+
+def _mean_square(e: Array, spread: Array, scale: ResidualScale) -> Array:
+    """Return the mean square, m², that the residual may have, ``(n,)``, where ``e``, m, of a variance is predicted.
+
+    The recent one would do while the motion stays the same. Where a motion begins again, what is predicted so far
+    beyond its own variance counts, up to the largest mean square of a window, and less where it is larger than any
+    residual yet. It is causal, as a plan may change the end of a window whose beginning is published.
+    """
+    beyond = np.minimum(np.cumsum(e**2 - spread) / np.arange(1, len(e) + 1), scale.largest_square)
+    seen = scale.largest / np.maximum(np.maximum.accumulate(np.abs(e)), scale.largest)
+    return np.maximum(beyond * seen**2, scale.recent)
 
 
 def _recursion(w_e: Array, drive: Array, past: Array) -> tuple[Array, Array]:

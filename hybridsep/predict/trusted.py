@@ -144,15 +144,15 @@ class TrustedModel:
     ) -> Forecast:
         """Predict as :meth:`forecast` by the candidates of :meth:`solved`, with the variances ``held`` if there are."""
         predictions: tuple[CandidatePrediction, ...] = ()
-        spreads: Sequence[Array | None] = [one.spread for one in held] or [None] * len(solved)
+        before: Sequence[CandidatePrediction | None] = held or [None] * len(solved)
         x = x_pb
         if solved:
             rows, _ = self.static.rows(self.state, x_d, x_pb, x_pb, scales.velocity)
             # The stiffness acts at the position, which the physics model alone does not give well enough.
-            x = x_pb + self.predict(solved[0], rows, spreads[0]).e_h
+            x = x_pb + self.predict(solved[0], rows, before[0]).e_h
             rows, _ = self.static.rows(self.state, x_d, x_pb, x, scales.velocity)
             predictions = tuple(
-                self.predict(candidate, rows, spread) for candidate, spread in zip(solved, spreads, strict=True)
+                self.predict(candidate, rows, one) for candidate, one in zip(solved, before, strict=True)
             )
         hold = self.hold
         candidates = self._blended(hold, predictions, len(x_d))
@@ -265,7 +265,7 @@ class TrustedModel:
             recent, max(self.scale.largest_square, mean_square), max(self.scale.largest, largest)
         )
         candidates = self._blended(forecast.hold, forecast.predictions, m)
-        self.blend.update(candidates[:, accepted], sound, self.scale.largest_square)
+        self.blend.update(candidates[:, accepted], sound, self.scale.largest_square, self.n_rows)
 
     @property
     def bound(self) -> float:
@@ -293,9 +293,11 @@ class TrustedModel:
         effect = self.settings.effect or math.sqrt(self.scale.largest_square)
         return effect * self.static.shares / np.maximum(largest, 1e-150)
 
-    def predict(self, solved: SolvedCandidate, rows: Array, spread: Array | None = None) -> CandidatePrediction:
-        """Return the prediction of a candidate over a window, bounded by the residuals so far; ``spread`` if held."""
-        found = solved.predict(rows, self.past[: len(solved.lag_weights)], self.scale, spread)
+    def predict(
+        self, solved: SolvedCandidate, rows: Array, held: CandidatePrediction | None = None
+    ) -> CandidatePrediction:
+        """Return the prediction of a candidate over a window, bounded by the residuals so far."""
+        found = solved.predict(rows, self.past[: len(solved.lag_weights)], self.scale, held)
         return found._replace(
             e_h=np.clip(found.e_h, -self.bound, self.bound), noise_variance=found.noise_variance / self.n_rows
         )

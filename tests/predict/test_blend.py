@@ -63,7 +63,7 @@ def replayed(blend: Blend, errors: tuple[float, float, float], n_windows: int, s
     rng = np.random.default_rng(seed)
     for _ in range(n_windows):
         target = rng.normal(size=50)
-        blend.update(np.array([target + size * rng.normal(size=50) for size in errors]), target, 1.0)
+        blend.update(np.array([target + size * rng.normal(size=50) for size in errors]), target, 1.0, 0.0)
 
 
 def test_the_better_candidate_is_preferred_and_evidence_fades() -> None:
@@ -80,17 +80,29 @@ def test_the_better_candidate_is_preferred_and_evidence_fades() -> None:
 def test_physics_is_preferred_to_candidates_that_know_nothing() -> None:
     blend, rng = Blend(FIRST, NP), np.random.default_rng(2)
     for _ in range(60):
-        blend.update(rng.normal(size=(3, 50)), rng.normal(size=50), 1.0)
+        blend.update(rng.normal(size=(3, 50)), rng.normal(size=50), 1.0, 0.0)
     assert blend.weights.sum() < 0.1
 
 
 def test_one_window_of_little_evidence_moves_the_weights_little() -> None:
     blend = Blend(FIRST, NP)
-    blend.update(np.full((3, 50), 1e-3), np.full(50, -1e-3), 1.0)
+    blend.update(np.full((3, 50), 1e-3), np.full(50, -1e-3), 1.0, 0.0)
     np.testing.assert_allclose(blend.weights, FIRST, atol=1e-4)
+
+
+def test_the_first_weights_count_for_less_the_more_was_learned() -> None:
+    """A candidate whose errors are far smaller than the residuals were at first."""
+    early, late = Blend(FIRST, NP), Blend(FIRST, NP)
+    rng = np.random.default_rng(4)
+    for i in range(20):
+        target = 0.1 * rng.normal(size=NP)
+        candidates = target + np.array([[0.3], [0.2], [0.01]]) * rng.normal(size=(3, NP))
+        early.update(candidates, target, 1.0, 0.0)
+        late.update(candidates, target, 1.0, (i + 1) * NP)
+    assert early.weights[2] < 0.65 < 0.8 < late.weights[2]
 
 
 def test_without_a_scale_nothing_is_known() -> None:
     blend = Blend(FIRST, NP)
-    blend.update(np.zeros((3, 50)), np.zeros(50), 0.0)
+    blend.update(np.zeros((3, 50)), np.zeros(50), 0.0, 0.0)
     np.testing.assert_array_equal(blend.weights, FIRST)

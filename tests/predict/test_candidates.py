@@ -21,7 +21,7 @@ def learned(static: Array, lags: Array, target: Array) -> RidgeRegression:
 
 
 def written_out(
-    static: Array, lags: Array, target: Array, rows: Array, past: Array, variance: float, p: int, recent: float
+    static: Array, lags: Array, target: Array, rows: Array, past: Array, variance: float, p: int, scale: ResidualScale
 ) -> tuple[Array, Array]:
     """Return the free run and the shrunk prediction, sample by sample."""
     priors = np.concatenate((EFFECTS, LAG_PRIORS[:p]))
@@ -36,22 +36,28 @@ def written_out(
         response.append(sum(w[N_STATIC + i] * response[-1 - i] for i in range(min(p, len(response)))))
     free = np.array(e[len(past) :])
     spread = np.array([sum(response[k - j] ** 2 * own[j] for j in range(k + 1)) for k in range(len(rows))])
-    return free, free * recent / (recent + 2.0 * spread)
+    v = np.empty(len(rows))
+    for k in range(len(rows)):
+        beyond = min(float(np.mean(free[: k + 1] ** 2 - spread[: k + 1])), scale.largest_square)
+        v[k] = max(scale.recent, beyond * min(1.0, scale.largest / float(np.abs(free[: k + 1]).max())) ** 2)
+    return free, free * v / (v + 2.0 * spread)
 
 
+@pytest.mark.parametrize(
+    "scale", [ResidualScale(0.2, 0.3, 100.0), ResidualScale(0.01, 0.3, 0.8), ResidualScale(0.01, 100.0, 100.0)]
+)
 @pytest.mark.parametrize("correlation_max", [1.0, 4.0])
 @pytest.mark.parametrize("p", [0, 2])
 @pytest.mark.parametrize("k", [2, 300])
-def test_prediction_is_the_formulas(p: int, k: int, correlation_max: float) -> None:
+def test_prediction_is_the_formulas(p: int, k: int, correlation_max: float, scale: ResidualScale) -> None:
     rng = np.random.default_rng(k + p)
     static, lags = rng.normal(size=(k, N_STATIC)), 0.3 * rng.normal(size=(k, 2))
     target = static @ [0.5, -0.3, 0.1] + lags @ [0.7, 0.1] + 0.05 * rng.normal(size=k)
     rows, past = rng.normal(size=(N, N_STATIC)), np.array([0.2, -0.1])
     candidate = Candidate(N_STATIC, LAG_PRIORS[:p], correlation_max, 100)
     candidate.noise_variance, candidate.correlation = 0.05**2, 5.0
-    scale = ResidualScale(recent=0.2, largest_square=0.3, largest=100.0)
     found = candidate.solve(learned(static, lags, target), EFFECTS, 1e-9).predict(rows, past[:p], scale)
-    free, shrunk = written_out(static, lags, target, rows, past, correlation_max * 0.05**2, p, scale.recent)
+    free, shrunk = written_out(static, lags, target, rows, past, correlation_max * 0.05**2, p, scale)
     np.testing.assert_allclose(found.unshrunk, free, rtol=0, atol=1e-12)
     np.testing.assert_allclose(found.e_h, shrunk, rtol=0, atol=1e-12)
     assert (np.abs(found.e_h) < np.abs(found.unshrunk)).all()
@@ -68,6 +74,21 @@ def test_what_was_never_told_apart_is_shrunk_by_its_prior() -> None:
     assert seen == pytest.approx(1.0, abs=1e-6)
     # Weights 0.8 and 0.2; the variance of their difference is 4 · 1² · 0.5² / (1² + 0.5²) = 0.8.
     assert unseen == pytest.approx(0.6 / (1.0 + 2.0 * 0.8), rel=1e-6)
+
+
+def test_where_a_motion_begins_again_a_rest_before_it_does_not_count() -> None:
+    """The recent residual is small, but what is predicted has been seen, and is far beyond its own variance."""
+    rng = np.random.default_rng(3)
+    static = rng.normal(size=(500, N_STATIC))
+    candidate = Candidate(N_STATIC, LAG_PRIORS[:0], 1e4, 100)
+    candidate.noise_variance, candidate.correlation = 0.1, 1.0
+    solved = candidate.solve(learned(static, np.zeros((500, 2)), static @ [1.0, 0.5, 0.2]), EFFECTS, 0.0)
+    rows, rest = rng.normal(size=(N, N_STATIC)), 1e-5
+    seen = solved.predict(rows, np.zeros(0), ResidualScale(rest, 2.0, 5.0))
+    assert np.abs(seen.e_h / seen.unshrunk - 1.0).max() < 0.05
+    # A thousandth of it is all that was seen so far: it is not believed.
+    unseen = solved.predict(rows, np.zeros(0), ResidualScale(rest, 2e-6, 5e-3))
+    assert np.abs(unseen.e_h / unseen.unshrunk).mean() < 0.05
 
 
 def test_a_recursion_that_diverges_predicts_nothing() -> None:

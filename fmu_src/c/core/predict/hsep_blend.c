@@ -6,8 +6,9 @@
 /* Factor by which evidence fades from window to window. */
 static const double blend_memory = 0.97;
 
-/* Evidence that the first weights count for, in windows of the largest mean square error. */
-static const double blend_confidence = 0.3;
+/* Evidence that the first weights count for, in windows of the largest mean square error, and the windows learned from
+ * which on it falls as their inverse: the candidates' own errors are then far smaller. */
+static const double blend_confidence = 0.3, blend_early = 3.0;
 
 /* Hold, without lags, with lags, with lags and rows taken as independent: that is trusted once it has shown to be
  * better. */
@@ -103,9 +104,9 @@ static void blend_minimise(
 }
 
 HSEP_API void hsep_blend_update(
-    hsep_blend *self, double products[HSEP_N_BLENDED + 1][HSEP_N_BLENDED + 1], double scale, uint64_t n)
+    hsep_blend *self, double products[HSEP_N_BLENDED + 1][HSEP_N_BLENDED + 1], double scale, uint64_t n, double n_rows)
 {
-    const double ridge = blend_confidence * scale * (double)n;
+    const double size = (double)n, ridge = blend_confidence * scale * size / fmax(n_rows / (blend_early * size), 1.0);
     double H[HSEP_N_BLENDED][HSEP_N_BLENDED], l[HSEP_N_BLENDED];
     for (int i = 0; i < HSEP_N_BLENDED; i++) {
         for (int j = 0; j < HSEP_N_BLENDED; j++) {

@@ -1,8 +1,8 @@
 /* Convex blend of candidate predictions, weighted by their errors in the windows so far.
  *
  * Weights pi >= 0, sum pi <= 1; the rest is the prediction 0, the physics model's. They minimise the squared error of
- * the blend over the windows so far, exponentially forgotten, with a ridge about their first values. Plain data;
- * reentrant.
+ * the blend over the windows so far, exponentially forgotten, with a ridge about their first values that fades. Plain
+ * data; reentrant.
  */
 #ifndef HSEP_BLEND_H
 #define HSEP_BLEND_H
@@ -26,8 +26,8 @@ HSEP_API void hsep_blend_init(hsep_blend *self);
 
 /* Update the weights with a measured window. products: (HSEP_N_BLENDED + 1,) by as many, m2: the scalar products over
  * it of the candidates' predictions and, last, of what was measured; scale: the largest mean square of a window, m2; n:
- * samples. */
+ * samples; n_rows: rows learned so far. */
 HSEP_API void hsep_blend_update(
-    hsep_blend *self, double products[HSEP_N_BLENDED + 1][HSEP_N_BLENDED + 1], double scale, uint64_t n);
+    hsep_blend *self, double products[HSEP_N_BLENDED + 1][HSEP_N_BLENDED + 1], double scale, uint64_t n, double n_rows);
 
 #endif

@@ -40,6 +40,7 @@ static double candidate_lay_out(hsep_candidate *self, const hsep_candidate_shape
     self->response = hsep_take(&end, window + lags);
     self->squares = hsep_take(&end, window);
     self->spread = hsep_take(&end, window);
+    self->mean_square = hsep_take(&end, window);
     self->solved = hsep_take_block(&end, hsep_regression_size(shape->n_static + shape->p));
     return end * sizeof(double);
 }
@@ -162,18 +163,34 @@ static void candidate_spread(hsep_candidate *self, const double rows[], double m
     }
 }
 
+/* Mean square that the residual may have: the recent one, or where the prediction so far is beyond its own variance
+ * that, up to the largest one of a window, and less where it is larger than any residual yet. */
+static void candidate_mean_square(hsep_candidate *self, const hsep_residual_scale *scale)
+{
+    const double *unshrunk = hsep_at(self, self->unshrunk), *spread = hsep_at(self, self->spread);
+    double *mean_square = hsep_at(self, self->mean_square), sum = 0.0, largest = scale->largest;
+    for (uint64_t j = self->n; j-- > 0;) {
+        sum += unshrunk[j] * unshrunk[j] - spread[j];
+        largest = fmax(largest, fabs(unshrunk[j]));
+        const double seen = scale->largest / largest, beyond = fmin(sum / (double)(self->n - j), scale->largest_square);
+        mean_square[j] = fmax(beyond * (seen * seen), scale->recent);
+    }
+}
+
 HSEP_API void hsep_candidate_predict(
     hsep_candidate *self, const double rows[], const double past[], const hsep_residual_scale *scale, int held)
 {
     const double largest = scale->largest;
     const double *unshrunk = hsep_at(self, self->unshrunk), *spread = hsep_at(self, self->spread);
+    const double *mean_square = hsep_at(self, self->mean_square);
     double *e_h = hsep_at(self, self->e_h);
     candidate_free_run(self, rows, past, candidate_lag_max * largest);
     if (!held) {
         candidate_spread(self, rows, candidate_diverged * largest * largest);
+        candidate_mean_square(self, scale);
     }
     for (uint64_t j = 0; j < self->n; j++) {
-        const double shrunk = unshrunk[j] * (scale->recent / (scale->recent + candidate_caution * spread[j]));
+        const double shrunk = unshrunk[j] * (mean_square[j] / (mean_square[j] + candidate_caution * spread[j]));
         e_h[j] = candidate_bounded(shrunk, candidate_prediction_max * largest);
     }
 }

@@ -1,8 +1,9 @@
 /* Candidate model of the residual: the features without lags with some lags, trusted as far as its own variance allows.
  *
  * Weights have normal priors, so the variance of w' phi is known; it is carried through the recursion's impulse
- * response. A prediction e of variance tau^2 is shrunk to e v / (v + 2 tau^2), v being the recent mean square of the
- * residual: at a first motion, a first reversal or in a region not seen yet the physics model remains.
+ * response. A prediction e of variance tau^2 is shrunk to e v / (v + 2 tau^2). Here v is the mean square that the
+ * residual may have: the recent one, or what the prediction's own is beyond tau^2. At a first motion, a first reversal
+ * or in a region not seen yet the physics model remains.
  *
  * Signals are kept newest first: of the n samples that are predicted, sample k is at place n - 1 - k. The first Np of
  * them are the window, which is measured then. Memory is one block, without pointers. Reentrant; allocates nothing.
@@ -37,20 +38,21 @@ typedef struct {
     double variance;       /* m2, of the noise as the weights were solved */
     double residual_sum;   /* m2, of the rows so far about these weights */
     /* Offsets in doubles from the beginning of the struct */
-    uint64_t priors;   /* (n_static + p,) prior standard deviations, then penalties of the weights */
-    uint64_t weights;  /* (n_static + p,) */
-    uint64_t run;      /* (n + p,) m, the recursion, behind it measured residuals */
-    uint64_t unshrunk; /* (n + p,) m, the same within bounds */
-    uint64_t e_h;      /* (n,) m, shrunk */
-    uint64_t response; /* (n + p,) the recursion's impulse response, behind it 0 */
-    uint64_t squares;  /* (n,) its squares, oldest first */
-    uint64_t spread;   /* (n,) m2, variance of the prediction */
-    uint64_t solved;   /* the regression with penalties */
+    uint64_t priors;      /* (n_static + p,) prior standard deviations, then penalties of the weights */
+    uint64_t weights;     /* (n_static + p,) */
+    uint64_t run;         /* (n + p,) m, the recursion, behind it measured residuals */
+    uint64_t unshrunk;    /* (n + p,) m, the same within bounds */
+    uint64_t e_h;         /* (n,) m, shrunk */
+    uint64_t response;    /* (n + p,) the recursion's impulse response, behind it 0 */
+    uint64_t squares;     /* (n,) its squares, oldest first */
+    uint64_t spread;      /* (n,) m2, variance of the prediction */
+    uint64_t mean_square; /* (n,) m2, that the residual may have */
+    uint64_t solved;      /* the regression with penalties */
 } hsep_candidate;
 
 HSEP_ASSERT_WORDS(hsep_residual_scale, 3);
 HSEP_ASSERT_WORDS(hsep_candidate_shape, 5);
-HSEP_ASSERT_WORDS(hsep_candidate, 18);
+HSEP_ASSERT_WORDS(hsep_candidate, 19);
 
 /* Bytes of the block, counted in double so that no size can overflow. */
 HSEP_API double hsep_candidate_size(const hsep_candidate_shape *shape);
@@ -67,8 +69,8 @@ HSEP_API void hsep_candidate_solve(
     hsep_candidate *self, const hsep_regression *regression, const double static_scales[], double least_variance);
 
 /* Predict n samples in free run. rows: (n, n_static), sample after sample; past: (p,) m, the last residuals; held:
- * whether the variance stays that of the last prediction. Cost: n times that of hsep_penalised_leverage, and n^2 / 2
- * multiply-adds; with a variance held n (n_static + p). */
+ * whether the variance, and with it the shrinking, stays that of the last prediction. Cost: n times that of
+ * hsep_penalised_leverage, and n^2 / 2 multiply-adds; with a variance held n (n_static + p). */
 HSEP_API void hsep_candidate_predict(
     hsep_candidate *self, const double rows[], const double past[], const hsep_residual_scale *scale, int held);
 

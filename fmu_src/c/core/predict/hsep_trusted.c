@@ -232,7 +232,7 @@ static void trusted_assess(hsep_trusted *self, const double e[], double count)
         }
     }
     products[0][0] = self->hold * self->hold * count;
-    hsep_blend_update(&self->blend, products, scale->largest_square, self->Np);
+    hsep_blend_update(&self->blend, products, scale->largest_square, self->Np, self->n_rows);
 }
 
 HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const double x_d[], const double x_pb[])

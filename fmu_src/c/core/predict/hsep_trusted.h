@@ -113,7 +113,8 @@ HSEP_API void hsep_trusted_forecast(hsep_trusted *self, const double x_d[], cons
 HSEP_API void hsep_trusted_scale(
     hsep_trusted *self, const double x_d[], const double x_pb[], const double path[], double last_residual);
 
-/* Predict with them. e: (n + p,), m; held: whether the variances stay those of the last prediction. */
+/* Predict with them. e: (n + p,), m; held: whether variances and shrinking stay those of the last
+ * prediction. */
 HSEP_API void hsep_trusted_predict(hsep_trusted *self, const double x_d[], const double x_pb[], double e[], int held);
 
 /* Take the measured position of sample k of the window that was predicted, m, relative to the start; NaN: missing. */
