@@ -132,7 +132,7 @@ def test_a_restored_compensator_goes_on() -> None:
     plan = sep.plan(x_d[:200])
     restored = SepCompensator.from_bytes(sep.to_bytes())
     for one in (sep, restored):
-        one.update(plan.x_pb)
+        one.update(plan.x_h)
     again = [one.plan(x_d[50:250]) for one in (sep, restored)]
     assert again[0].state is SepState.HYBRID
     assert np.abs(again[0].x_dm - again[0].x_d).max() > 1e-6
