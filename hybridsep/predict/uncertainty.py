@@ -7,9 +7,9 @@ disagree. What errors come with is known before the window is measured, so that 
 large at a reversal. The published standard deviation is ``c·√v``.
 
 After each window every ``θ_i`` takes a step of expectation maximisation for normal errors of that variance (variance
-components: Dempster, Laird, Rubin, J. R. Stat. Soc. B 39 (1977)), and ``c`` moves until 5 % of all errors are beyond
-1.96 standard deviations (adaptive conformal inference: Gibbs, Candès, NeurIPS 2021): errors are not normal, and
-neighbouring ones are alike.
+components: Dempster, Laird, Rubin, J. R. Stat. Soc. B 39 (1977)), and ``c`` moves until 10 % of all errors are beyond
+1.645 standard deviations (adaptive conformal inference: Gibbs, Candès, NeurIPS 2021): errors are not normal, and
+neighbouring ones are alike. The tails are heavier than normal, so that 50 % cover a little more and 95 % a little less.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ _MEMORY, _FIRST_EVIDENCE, _STEP = 0.95, 0.2, 6.0
 """Factor by which evidence fades from window to window; evidence that the first values count for, in windows; and the
 step of expectation maximisation, which alone would be slow where components are alike."""
 
-_Z, _BEYOND = 1.96, 0.05
+_Z, _BEYOND = 1.645, 0.1
 """Standard deviations that a normal error exceeds with this probability."""
 
 _FAR, _FAR_SHARE = 4.0, 0.5

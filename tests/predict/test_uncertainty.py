@@ -68,15 +68,15 @@ def test_larger_noise_is_followed() -> None:
     np.testing.assert_allclose(window(changed).std, 3e-5, rtol=0.3)
 
 
-def test_heavy_tails_are_covered_at_95_percent() -> None:
+def test_heavy_tails_are_covered_at_90_percent() -> None:
     rng, uncertainty, inside = np.random.default_rng(3), Uncertainty(1e-12, N), []
     for k in range(300):
         predicted = window(uncertainty)
         errors = 1e-6 * rng.standard_t(2.5, N)
         if k >= 50:
-            inside.append(coverage(errors, predicted.std, 0.95))
+            inside.append(coverage(errors, predicted.std, 0.9))
         uncertainty.learn(predicted, errors, ALL)
-    assert np.mean(inside) == pytest.approx(0.95, abs=0.015)
+    assert np.mean(inside) == pytest.approx(0.9, abs=0.015)
 
 
 def test_it_is_invariant_to_the_unit() -> None:

@@ -27,7 +27,7 @@ static const double uncertainty_recent = 0.9;
 static const double uncertainty_memory = 0.95, uncertainty_first_evidence = 0.2, uncertainty_step = 6.0;
 
 /* Standard deviations that a normal error exceeds with this probability. */
-static const double uncertainty_z = 1.96, uncertainty_beyond = 0.05;
+static const double uncertainty_z = 1.645, uncertainty_beyond = 0.1;
 
 /* Standard deviations, and the share of a window's errors beyond them from which on all variances are too small by
  * their square: the machine or the sensor has changed. */

@@ -4,7 +4,7 @@
  * with: measurement noise and its growth over the window, wrong timing (the squared differences of x_pb and e_h), a
  * wrong share of the servo error, a change since the last measured residual, candidates that disagree. The standard
  * deviation is c sqrt(v). After each window theta takes a step of expectation maximisation for normal errors of that
- * variance, and c moves until 5 % of all errors are beyond 1.96 standard deviations.
+ * variance, and c moves until 10 % of all errors are beyond 1.645 standard deviations.
  *
  * Signals are kept newest first: sample k of the n that are predicted is at place n - 1 - k. The first Np of them are
  * learned. Memory is one block, without pointers. Reentrant; allocates nothing. Cost of a window: 50 n operations each.
