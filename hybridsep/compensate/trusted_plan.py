@@ -29,8 +29,9 @@ that changes nearby."""
 _TRIES, _TRIES_TOGETHER = 6, 8
 """Largest number of penalties tried in a step, and in all steps."""
 
-_LIMITED = 3
-"""Largest number of them that the drive's limits bound; after it the plan is what was found before."""
+_SOLVER_STEPS = 60
+"""Interior-point steps after which no further programme that the drive's limits bound is begun: the plan is what was
+found before."""
 
 _FIRST_PENALTY, _RAISE, _LOWER = 1.0, 8.0, 0.25
 """Penalty on the change of velocity, in the unit of the jerk's weight: its first value, and how it follows success."""
@@ -91,7 +92,7 @@ class TrustedPlanner:
         splines, third = self._basis.values[:, N_DECIDED:], self._basis.third[:, N_DECIDED:]
         velocity = np.diff(splines, axis=0, prepend=0.0)
         damping = velocity.T @ velocity
-        here, penalty, tries, limited = self._at(rest), 0.0, 0, 0
+        here, penalty, tries, steps = self._at(rest), 0.0, 0, 0
         for reach in _REACHES:
             W = self._model.slope(here.prediction, splines, passed, reach)
             at = here.coefficients[N_DECIDED:]
@@ -102,11 +103,11 @@ class TrustedPlanner:
             for _ in range(min(_TRIES, _TRIES_TOGETHER - tries)):
                 tries += 1
                 cost = PlanCost.regular(P + penalty * damping, v + penalty * (damping @ at))
-                may_bind = limited < _LIMITED
+                may_bind = steps < _SOLVER_STEPS
                 found = solve(cost, bounds, rest[N_DECIDED:], n_pinned, always=True, may_bind=may_bind)
                 if found is None:
                     break
-                limited += found.steps > 0
+                steps += found.steps
                 there = self._at(np.concatenate((rest[:N_DECIDED], found.x)))
                 if there.cost < here.cost:
                     best = there

@@ -220,7 +220,8 @@ def test_every_parameter_compensates_with_trust_as_in_the_library(
 
 @on_all((COMPENSATOR,), needs="agreement")
 def test_faulty_measurements_are_compensated_as_by_the_library(new_stream: StreamMaker) -> None:
-    loop = assert_agreement(new_stream, 2450, {"p": 20}, 1e-9, sensor=faulty)
+    # Not the window after these: 56 or, by rounding, 60 of at most 60 solver steps are spent there before the last try.
+    loop = assert_agreement(new_stream, 2400, {"p": 20}, 1e-9, sensor=faulty)
     assert np.isfinite(loop.outputs).all()
     assert 100 < loop.column(COMPENSATOR, "n_rejected")[-1] < 500
 

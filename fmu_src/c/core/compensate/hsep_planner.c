@@ -235,6 +235,11 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned)
     return HSEP_PLAN_BOUNDED;
 }
 
+HSEP_API uint64_t hsep_planner_steps(const hsep_planner *self)
+{
+    return ((const hsep_interior *)hsep_at_const(self, self->interior))->steps;
+}
+
 HSEP_API int hsep_planner_step(hsep_planner *self)
 {
     const hsep_splines *splines = hsep_planner_splines(self);

@@ -103,6 +103,9 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned);
 /* Do a step of a bounded plan; return whether it was the last one. Cost: that of hsep_interior_step. */
 HSEP_API int hsep_planner_step(hsep_planner *self);
 
+/* Steps that the last bounded plan took. */
+HSEP_API uint64_t hsep_planner_steps(const hsep_planner *self);
+
 /* delta at sample k of the plan, m; of a bounded one that is not solved yet, at its first hsep_planner_pinned. */
 HSEP_API double hsep_planner_delta(const hsep_planner *self, uint64_t k);
 

@@ -104,7 +104,7 @@ HSEP_API void hsep_trusted_planner_begin(
     uint64_t best)
 {
     double *path = hsep_at(self, self->target), *rest = hsep_at(self, self->rest);
-    self->steps = self->tries = self->tries_in_all = self->limited = self->planned = 0;
+    self->steps = self->tries = self->tries_in_all = self->solver_steps = self->planned = 0;
     self->penalty = 0.0;
     trusted_planner_copy(self, rest, hsep_planner_coefficients(task->planner));
     memcpy(hsep_at(self, self->physics), physics, (size_t)(self->trial - self->physics) * sizeof(double));
@@ -197,8 +197,7 @@ static void trusted_planner_try(hsep_trusted_planner *self, const hsep_trusted_t
     self->tries_in_all++;
     const hsep_plan_status status = hsep_planner_solve(task->planner, 1);
     self->stage = status == HSEP_PLAN_DONE ? HSEP_TRUSTED_JUDGE : HSEP_TRUSTED_COMPARE;
-    if (status == HSEP_PLAN_BOUNDED && self->limited < HSEP_TRUSTED_LIMITED) {
-        self->limited++;
+    if (status == HSEP_PLAN_BOUNDED && self->solver_steps < HSEP_TRUSTED_SOLVER) {
         self->stage = HSEP_TRUSTED_BOUNDED;
     }
 }
@@ -281,6 +280,7 @@ HSEP_API void hsep_trusted_planner_advance(hsep_trusted_planner *self, const hse
         break;
     case HSEP_TRUSTED_BOUNDED:
         if (hsep_planner_step(task->planner)) {
+            self->solver_steps += hsep_planner_steps(task->planner);
             self->stage = HSEP_TRUSTED_JUDGE;
         }
         break;

@@ -23,14 +23,14 @@
 #define HSEP_TRUSTED_STEPS 4    /* Newton steps of a plan at most, */
 #define HSEP_TRUSTED_TRIES 6    /* tries of each, */
 #define HSEP_TRUSTED_TOGETHER 8 /* tries of all, */
-#define HSEP_TRUSTED_LIMITED 3  /* and of those that the limits bound */
+#define HSEP_TRUSTED_SOLVER 60  /* and solver steps after which no bounded try is begun */
 #define HSEP_TRUSTED_COLUMNS 10 /* parts in which the changes of x_h by the splines are computed */
 
 /* Work of a plan at most, in steps of the interior-point solver: the physics model's programme, Newton steps, tries
  * with their programmes, predictions; and 8 because a part is not divided between samples. */
 #define HSEP_TRUSTED_WORK \
     ((2 + HSEP_INTERIOR_STEPS) + HSEP_TRUSTED_STEPS * (1 + HSEP_TRUSTED_COLUMNS + 2) + 2 * HSEP_TRUSTED_TOGETHER + \
-     HSEP_TRUSTED_LIMITED * HSEP_INTERIOR_STEPS + (1 + 1 + 4) + 8)
+     (HSEP_TRUSTED_SOLVER - 1 + HSEP_INTERIOR_STEPS) + (1 + 1 + 4) + 8)
 
 typedef enum {
     HSEP_TRUSTED_DONE = 0,
@@ -56,7 +56,7 @@ typedef struct {
     uint64_t columns;      /* splines whose change of x_h is computed */
     uint64_t tries;        /* of this step, and */
     uint64_t tries_in_all; /* of all */
-    uint64_t limited;      /* tries of all that the limits bound */
+    uint64_t solver_steps; /* of all bounded tries */
     uint64_t planned;      /* model of the plan: 0 none, 1 physics, 2 trusted */
     double cost;           /* m2, of the best plan so far */
     double penalty;        /* on the change of velocity, in the unit of the jerk's weight */
