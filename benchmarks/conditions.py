@@ -3,8 +3,9 @@
     python -m benchmarks.conditions [--emps DATA_EMPS.mat] [--recordings FOLDER] [--n 40]      (some minutes)
 
 1. Start in motion: runs cut in mid-motion, RMS relative to the physics model's, which starts at rest, too.
-2. Delay of the measurement: RMS relative to that of a run without delay at the same horizon, the samples from the last
-   measurement that has arrived to the end of the window.
+2. Delay of the measurement: RMS relative to that of a run without delay over the same samples, predicted at the same
+   horizon, the samples since the last measurement that has arrived: its windows begin the delay earlier. Then over
+   whole windows, where the run with delay predicts that much further.
 3. Plant changed before a warm run: RMS from 2 s on, relative to that of a cold run.
 4. Sampling rates: RMS of one plant at 250 Hz, 1 kHz and 8 kHz, windows of 0.1 s each, relative to 1 kHz.
 
@@ -82,7 +83,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--n", type=int, default=40, help="number of random drives")
     options = parser.parse_args(arguments)
     print_ratios("start in motion, × physics", starts_in_motion(options.emps, options.recordings, options.n))
-    print_ratios(f"delay of {DELAY} samples, × no delay", delays(options.emps, options.n))
+    late = f"delay of {DELAY} samples, × no delay"
+    print_ratios(f"{late} at one horizon", delays(options.emps, options.n, at_one_horizon=True))
+    print_ratios(f"{late}, {DELAY} samples further", delays(options.emps, options.n, at_one_horizon=False))
     print_ratios(f"changed plant, warm × cold from {SETTLED:g} s on", changes(options.n))
     print_ratios(f"windows of {HORIZON:g} s, × {RATES[1]:g} Hz", rates())
 
@@ -122,24 +125,38 @@ def random_cases(n: int) -> Iterator[Case]:
         yield Case(f"drive {drive.index}", drive.model, PredictorSettings(), drive.x_d, measured)
 
 
-def delays(emps: Path | None, n: int) -> Iterator[tuple[str, float, float]]:
-    """Yield names and RMS errors with a late measurement, and without delay with the same windows."""
+def delays(emps: Path | None, n: int, *, at_one_horizon: bool) -> Iterator[tuple[str, float, float]]:
+    """Yield names and RMS errors with a late measurement and without delay, over the same samples."""
     for case in (*cases(emps), *random_cases(n)):
-        usual = replace(case.settings, trust=True, t_init=-1.0)
-        late = replace(usual, measurement_delay=DELAY)
-        delayed = [np.concatenate((np.full(DELAY, x[0]), x[:-DELAY])) for x in case.x_meas]
-        runs = [_in_turn(case.model, usual, case.x_d, case.x_meas), _in_turn(case.model, late, case.x_d, delayed)]
-        for name, peer, error in zip(("cold", "warm"), *runs, strict=True):
-            yield f"{case.name}, {name}", error, peer
+        settings = replace(case.settings, trust=True, t_init=-1.0)
+        late = _in_turn(case, replace(settings, measurement_delay=DELAY), DELAY)
+        peer = _in_turn(case, settings, -DELAY if at_one_horizon else 0)
+        samples = slice(settings.Np - DELAY if at_one_horizon else settings.Np)
+        for name, one, other in zip(("cold", "warm"), late, peer, strict=True):
+            found, without = (rms(_of_windows(error, settings.Np, samples)) for error in (one, other))
+            yield f"{case.name}, {name}", found, without
 
 
-def _in_turn(model: ModalModel, settings: PredictorSettings, x_d: Array, runs: Sequence[Array]) -> list[float]:
-    """Return RMS errors, m, of runs of a predictor, each going on with what the ones before have taught."""
-    predictor, errors = HybridPredictor(model, settings), []
-    for x_meas in runs:
-        errors.append(backtest(predictor, x_d, x_meas).overall.rms_h)
+def _in_turn(case: Case, settings: PredictorSettings, late: int) -> list[Array]:
+    """Return the errors, m, of runs of a predictor, each going on with what the ones before have taught.
+
+    late: samples by which the measurement is late; negative: by which windows begin earlier, at rest.
+    """
+    predictor, errors = HybridPredictor(case.model, settings), []
+    before = abs(late)
+    for x in case.x_meas:
+        x_d, x_meas = (np.concatenate((np.full(before, signal[0]), signal)) for signal in (case.x_d, x))
+        if late > 0:
+            x_d, x_meas = case.x_d, x_meas[: len(x)]
+        found = backtest(predictor, x_d, x_meas)
+        errors.append((x_meas - found.x_h)[before:])  # with a delay x_h is that of the sample measured
         predictor.restart()
     return errors
+
+
+def _of_windows(error: Array, Np: int, samples: slice) -> Array:
+    """Return the errors at some samples of each whole window."""
+    return error[: len(error) // Np * Np].reshape(-1, Np)[:, samples]
 
 
 def changes(n: int) -> Iterator[tuple[str, float, float]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -41,3 +43,21 @@ def test_a_changed_plant_is_relearned_as_from_nothing() -> None:
     warm, cold = conditions._relearned(machine, changed, staircase()[:4000])
     assert warm < 1.02 * cold
     assert 5e-6 < cold < 1e-5  # the noise and more
+
+
+def test_a_delay_is_compared_at_one_horizon(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A drive that is its model: what is left is the noise of the same samples."""
+    model = ModalModel([Mode(30.0, 0.3, (2 * np.pi * 30) ** 2)])
+    x_d = np.concatenate((np.zeros(100), 1e-3 * np.sin(np.arange(500) / 40)))
+    x = model.discretise(1e-3).forced_response(model.discretise(1e-3).rest(), x_d)[0]
+    noise = 1e-6 * np.random.default_rng(0).standard_normal(600)
+    case = Case("sine", model, PredictorSettings(Np=50, p=5, q=1), x_d, (x + noise, x + noise))
+    late = conditions._in_turn(case, replace(case.settings, measurement_delay=5), 5)
+    early = conditions._in_turn(case, case.settings, -5)
+    for errors, n in ((late, 595), (early, 600)):
+        assert [len(error) for error in errors] == [n, n]
+        np.testing.assert_allclose(errors[0], noise[:n], rtol=0, atol=1e-6)
+    monkeypatch.setattr(conditions, "cases", lambda _: [case])
+    monkeypatch.setattr(conditions, "random_cases", lambda _: [])
+    ratios = [one / other for _, one, other in conditions.delays(None, 0, at_one_horizon=True)]
+    assert ratios == pytest.approx([1.0, 1.0], rel=0.02)
