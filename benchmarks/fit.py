@@ -22,8 +22,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # benchmarks are no part of the package
 
 from benchmarks.trust import fitted_lag
-from hybridsep.app.fit import FitOptions, fit, machine_name
-from hybridsep.app.fit_intake import take_in
+from hybridsep.app.arguments import machine_name
+from hybridsep.app.fit import FitOptions, fit
+from hybridsep.app.log_intake import take_in
 from hybridsep.base.errors import HybridSepError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.logs.log import Log, read_log

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .failures import errors_console, loading
+from .failures import loading
 from .options import (
     FigurePagesOption,
     ForceOption,
@@ -45,13 +45,12 @@ def fit(
     """From the log of an axis to its model, settings, FMUs and a report."""
     with loading():
         from ..logs.log import read_log
-        from .arguments import check_ending
-        from .fit import FitOptions, checked_name, fit_files, machine_name
+        from .arguments import check_ending, checked_name, machine_name
+        from .fit import FitOptions, fit_files
         from .fit import fit as fit_logs
-        from .fit_intake import take_in
         from .fit_report import fit_report, judged_by
         from .fit_table import print_fit
-        from .log_intake import findings_table
+        from .log_intake import findings_table, show, take_in
         from .overwrite import BY_ENDING, FIT_FILES, Output, check_outputs
         from .progress import progress_bar
         from .report_sections import recommendation
@@ -70,8 +69,7 @@ def fit(
         for path in logs
     ]
     for log in found:
-        for remark in log.remarks:
-            errors_console.print(f"note: {log.path.name}: {remark}", markup=False, highlight=False, soft_wrap=True)
+        show((f"{log.path.name}: {remark}" for remark in log.remarks), ())
     used, findings = take_in(found, fix=fix)
     with progress_bar(as_json) as advance:
         result = fit_logs(used, folder, FitOptions(Np, name), advance)

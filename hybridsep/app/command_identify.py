@@ -46,7 +46,12 @@ def identify(
     ] = "auto",
     out: Annotated[Path | None, typer.Option(help="Machine file to write.")] = None,
     figure: Annotated[Path | None, typer.Option(help="PNG to draw.")] = None,
-    name: Annotated[str, typer.Option(help="Name of the machine in its file.")] = "axis",
+    name: Annotated[
+        str | None, typer.Option(help="Name of the machine in its file; that of the file if left out.")
+    ] = None,
+    fix: Annotated[
+        bool, typer.Option("--fix", help="Apply what puts a finding of the checks of a log right, and go on.")
+    ] = False,
     unit_gain: Annotated[
         bool | None, typer.Option("--unit-gain/--free-gain", help="Static gain of 1, or estimated; chosen if left out.")
     ] = None,
@@ -72,8 +77,9 @@ def identify(
         from ..identify.response_files import has_response, read_response
         from ..identify.swept_sine import h1
         from ..logs.log import read_log
-        from .arguments import check_ending
+        from .arguments import check_ending, checked_name, machine_name
         from .identify_tables import print_identified
+        from .log_intake import show, take_in
         from .overwrite import FIGURE, MACHINE, Output, check_outputs
         from .progress import progress_bar
 
@@ -83,6 +89,7 @@ def identify(
     check_ending(figure, "--figure", (".png",))
     given = [("--out", out, MACHINE), ("--figure", figure, FIGURE)]
     outputs = [Output(option, path, what) for option, path, what in given if path is not None]
+    machine = checked_name(name) if name else machine_name(out or recording)
     check_outputs(outputs, {"recording": recording}, force=force)
     columns = {role: column for role, column in (("t", t), ("x_d", x_d), ("x", x)) if column}
     if kind == "auto":
@@ -91,6 +98,8 @@ def identify(
             kind = "klipper"
         elif not columns and has_response(recording):
             kind = "response"
+    if fix and kind != "operation":
+        raise ParameterError(f"--fix is for a log of operation, {recording.name} is read as --kind {kind}")
     interval = 1e-3 if T_s is None else T_s
     found: IdentifiedModel | IdentifiedResponse
     with progress_bar(as_json) as advance:
@@ -109,9 +118,13 @@ def identify(
                 progress=advance,
             )
         else:
-            log = read_log(recording, columns=columns, unit=unit, T_s=T_s, axis=axis)
+            sweeps = kind == "sweep"
+            log = read_log(recording, columns=columns, unit=unit, T_s=T_s, axis=axis, uniform=sweeps)
+            if not sweeps:
+                (log,), findings = take_in([log], fix=fix)
+                show(log.remarks, findings[recording.name])
             pieces = [(piece.x_d, piece.x_meas) for piece in log.segments()]
-            if kind == "sweep":
+            if sweeps:
                 if len(pieces) > 1:
                     raise ParameterError(f"{recording}: a swept sine must have no gap, got {len(pieces)} pieces")
                 lines = h1(*pieces[0], log.T_s)
@@ -133,7 +146,7 @@ def identify(
     if figure is not None and isinstance(found, IdentifiedResponse):
         response_figure(found, recording.name, figure)
     if out is not None:
-        _write_machine(found, name, recording.name, out)
+        _write_machine(found, machine, recording.name, out)
     print_identified(found, as_json, recording.name)
 
 

@@ -48,8 +48,7 @@ def report(
         from ..logs.log import Log
         from ..machines.machine import load_machine, machine_path
         from ..tune.halves import Recording, replay
-        from .arguments import check_ending
-        from .fit import machine_name
+        from .arguments import check_ending, machine_name
         from .log_intake import open_checked, reading_of
         from .overwrite import BY_ENDING, REPORT, Output, check_outputs
         from .progress import progress_bar

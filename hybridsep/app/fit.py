@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -18,7 +17,7 @@ from ..fmi.flavours import FLAVOURS
 from ..identify.model import machine_of
 from ..identify.operation import identify_operation, unit_gain_model
 from ..logs.log import Log
-from ..machines.machine import NAME_PATTERN, Machine
+from ..machines.machine import Machine
 from ..machines.text import machine_text
 from ..model.physics import ModalModel, Mode
 from ..predict.predictor import HybridPredictor
@@ -29,7 +28,7 @@ from .fit_stages import Stages, key_of
 from .overwrite import fit_comment
 from .step_times import step_times
 
-__all__ = ["Fit", "FitOptions", "checked_name", "fit", "fit_files", "machine_name"]
+__all__ = ["Fit", "FitOptions", "fit", "fit_files"]
 
 _MODEL = "HybridPredictor"
 
@@ -88,19 +87,6 @@ class Fit:
         settings = {name: getattr(self.machine.predictor_settings, name) for name in ("Np", "p", "q")}
         parts = {"identification": self.identification, "tried": self.choice, "over_Np": self.windows}
         return {"judged": judged, "settings": settings, **parts, "step_times": self.steps}
-
-
-def machine_name(path: Path, axis: str | None = None) -> str:
-    """Return a machine's name from that of a log, and of the axis that is read of it."""
-    name = re.sub(r"[^A-Za-z0-9]+", "_", f"{path.name.partition('.')[0]} {axis or ''}").strip("_")
-    return name if re.match(r"[A-Za-z]", name) else f"axis_{name}".rstrip("_")
-
-
-def checked_name(name: str) -> str:
-    """Return a machine's name; ParameterError if it cannot be one."""
-    if re.fullmatch(NAME_PATTERN, name):
-        return name
-    raise ParameterError(f"--name must be a letter, then letters, digits and _, got {name!r}")
 
 
 def fit_files(out: Path, name: str) -> dict[str, Path]:

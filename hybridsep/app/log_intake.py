@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from ..base.errors import LogError, ParameterError
-from ..intake.check import Intake, check
-from ..intake.finding import Finding
+from ..intake.check import Intake, apply, check
+from ..intake.finding import ERROR, Finding
 from ..logs.log import Log, LogReader, open_log
 from ..machines.machine import Machine
 from .arguments import check_interval, check_unit
 from .failures import errors_console
 from .reading_options import ReadingOptions
 
-__all__ = ["Reading", "findings_table", "open_checked", "reading_of"]
+__all__ = ["Reading", "findings_table", "open_checked", "reading_of", "show", "take_in"]
+
+_REPAIRED = ("time order", "gaps", "jitter", "outliers", "stuck samples", "repeated samples")
+"""Findings about samples, not about what they mean: their fixes lose nothing that could be learned from."""
+
+_HOPELESS = "too little motion"
+"""Finding that no fix helps; the physics model is then a gain of 1."""
 
 CHECKED_MAX = 2_000_000
 """Samples that are checked at most; a longer log is replayed in bounded memory all the same."""
@@ -93,13 +99,45 @@ def open_checked(
             f"{path}: figures from this log would mean nothing: {'; '.join(f.words for f in intake.errors)}. Apply the "
             "fixes with --fix, correct the log or the options it is read with, or go on with --as-is"
         )
-    _show(reader.remarks, intake.findings)
+    show(reader.remarks, intake.findings)
     if fix:
         if reader.n_samples > CHECKED_MAX:
             raise LogError(f"{path}: --fix takes at most {CHECKED_MAX} samples, the log has {reader.n_samples}; cut it")
         fixed = intake.fixed()
         return (fixed if segments else _longest_segment(fixed, path)), intake
     return (reader if as_is else open_log(path, **reading)), intake
+
+
+def take_in(logs: Sequence[Log], *, fix: bool) -> tuple[list[Log], Mapping[str, tuple[Finding, ...]]]:
+    """Return the logs to learn from and all findings, by the log's name: what samples suffer from is repaired.
+
+    Parameters
+    ----------
+    logs : sequence of Log
+        Read with ``uniform=False``.
+    fix : bool
+        Whether every fix is applied, also those that change what the columns mean.
+
+    Raises
+    ------
+    LogError
+        If the figures from a log would mean nothing, with what would put it right.
+    """
+    used, all_findings = [], {}
+    for log in logs:
+        findings = check(log).findings
+        applied = [finding for finding in findings if fix or finding.name in _REPAIRED]
+        left = [
+            finding
+            for finding in findings
+            if finding.severity == ERROR and finding.name != _HOPELESS and (finding not in applied or not finding.fix)
+        ]
+        if left:
+            hint = " (--fix does it)" if all(finding.fix for finding in left) else ""
+            raise LogError(f"{log.path}: " + "; ".join(str(finding) for finding in left) + hint)
+        used.append(apply(log, applied))
+        all_findings[log.path.name] = findings
+    return used, all_findings
 
 
 def findings_table(findings: Iterable[Finding]) -> list[dict[str, Any]]:
@@ -116,7 +154,7 @@ def findings_table(findings: Iterable[Finding]) -> list[dict[str, Any]]:
     ]
 
 
-def _show(remarks: Iterable[str], findings: Iterable[Finding]) -> None:
+def show(remarks: Iterable[str], findings: Iterable[Finding]) -> None:
     """Print remarks and findings on standard error."""
     for line in [f"note: {remark}" for remark in remarks] + [str(finding) for finding in findings]:
         errors_console.print(line, markup=False, highlight=False, soft_wrap=True)
@@ -127,7 +165,7 @@ def _longest_segment(log: Log, path: Path) -> Log:
     if len(segments) == 1:
         return log
     longest = max(segments, key=lambda segment: len(segment.t))
-    _show(
+    show(
         [f"{path.name}: of {len(segments)} segments the longest, {len(longest.t)} of {len(log.t)} samples, is read"], []
     )
     return longest

@@ -15,10 +15,11 @@ from staircase_data import commanded, measured
 
 from hybridsep import HybridPredictor, load_machine, read_log
 from hybridsep.app import fit as fitting
-from hybridsep.app.fit import Fit, FitOptions, fit, fit_files, machine_name
-from hybridsep.app.fit_intake import take_in
+from hybridsep.app.arguments import machine_name
+from hybridsep.app.fit import Fit, FitOptions, fit, fit_files
 from hybridsep.app.fit_report import fit_report, judged_by
 from hybridsep.app.fit_stages import key_of
+from hybridsep.app.log_intake import take_in
 from hybridsep.app.report_sections import recommendation
 from hybridsep.base.errors import LogError, ParameterError
 from hybridsep.cosim.fmus import FmuController

@@ -111,3 +111,29 @@ def test_what_is_refused(hybridsep: Run, log: Path, tmp_path: Path) -> None:
     status, _, err = hybridsep("identify", still)
     assert status == 2
     assert "cannot teach a model, because the commanded position does not move" in " ".join(err.split())
+
+
+def test_the_log_is_checked(hybridsep: Run, tmp_path: Path) -> None:
+    """Swapped columns gave a model of 290 Hz without a word."""
+    x_d = moves(1200)
+    swapped = tmp_path / "swapped.csv"
+    columns = (np.arange(len(x_d)) * T_S, measured(TRUTH, x_d, "zoh", 1e-6), x_d)
+    np.savetxt(swapped, np.column_stack(columns), delimiter=",", header="t,x_d,x", comments="", fmt="%.12g")
+    out = tmp_path / "my_axis.toml"
+    status, _, err = hybridsep("identify", swapped, "--out", out)
+    assert status == 2
+    assert "columns swapped" in " ".join(err.split())
+    assert "(--fix does it)" in " ".join(err.split())
+    assert not out.exists()
+    status, _, err = hybridsep("identify", swapped, "--out", out, "--fix")
+    assert status == 0
+    assert "columns swapped" in " ".join(err.split())
+    machine = load_machine(out)
+    assert machine.name == "my_axis"  # as the file
+    assert machine.model.modes[0].f_n == pytest.approx(20.0, abs=0.1)
+
+
+def test_only_a_log_is_put_right(hybridsep: Run, response: Path) -> None:
+    status, _, err = hybridsep("identify", response, "--fix")
+    assert status == 2
+    assert "--fix is for a log of operation, frf.csv is read as --kind response" in " ".join(err.split())
