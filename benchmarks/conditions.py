@@ -129,29 +129,32 @@ def delays(emps: Path | None, n: int, *, at_one_horizon: bool) -> Iterator[tuple
     """Yield names and RMS errors with a late measurement and without delay, over the same samples."""
     for case in (*cases(emps), *random_cases(n)):
         settings = replace(case.settings, trust=True, t_init=-1.0)
-        late = _in_turn(case, replace(settings, measurement_delay=DELAY), DELAY)
-        peer = _in_turn(case, settings, -DELAY if at_one_horizon else 0)
+        late = _in_turn(case, replace(settings, measurement_delay=DELAY))
+        peer = _in_turn(case, settings, earlier=DELAY if at_one_horizon else 0)
         samples = slice(settings.Np - DELAY if at_one_horizon else settings.Np)
         for name, one, other in zip(("cold", "warm"), late, peer, strict=True):
             found, without = (rms(_of_windows(error, settings.Np, samples)) for error in (one, other))
             yield f"{case.name}, {name}", found, without
 
 
-def _in_turn(case: Case, settings: PredictorSettings, late: int) -> list[Array]:
+def _in_turn(case: Case, settings: PredictorSettings, *, earlier: int = 0) -> list[Array]:
     """Return the errors, m, of runs of a predictor, each going on with what the ones before have taught.
 
-    late: samples by which the measurement is late; negative: by which windows begin earlier, at rest.
+    earlier: samples by which windows begin earlier, at rest.
     """
-    predictor, errors = HybridPredictor(case.model, settings), []
-    before = abs(late)
+    predictor, errors, late = HybridPredictor(case.model, settings), [], settings.measurement_delay
+    x_d = _after_rest(case.x_d, earlier)
     for x in case.x_meas:
-        x_d, x_meas = (np.concatenate((np.full(before, signal[0]), signal)) for signal in (case.x_d, x))
-        if late > 0:
-            x_d, x_meas = case.x_d, x_meas[: len(x)]
+        x_meas = _after_rest(x, earlier + late)[: len(x_d)]
         found = backtest(predictor, x_d, x_meas)
-        errors.append((x_meas - found.x_h)[before:])  # with a delay x_h is that of the sample measured
+        errors.append((x_meas - found.x_h)[earlier + late :])  # with a delay x_h is that of the sample measured
         predictor.restart()
     return errors
+
+
+def _after_rest(signal: Array, n: int) -> Array:
+    """Return a signal that rests for ``n`` samples where it begins."""
+    return np.concatenate((np.full(n, signal[0]), signal))
 
 
 def _of_windows(error: Array, Np: int, samples: slice) -> Array:

@@ -29,9 +29,10 @@ def jobs_of(fmus: Sequence[str], machines: Sequence[str], flavour: str, targets:
         for name, model in fmu_names(axis, flavour).items()
     ]
     if unknown := sorted(set(fmus) - {name for _, name, _ in jobs}):
-        without = [axis.name for axis in {axis.name: axis for axis, _, _ in jobs}.values() if axis.drive_limits is None]
-        hint = f"; {', '.join(without)} has no [drive_limits], which a compensator needs" if without else ""
-        hint = hint if any(name.startswith("SepCompensator") for name in unknown) else ""
+        without = dict.fromkeys(axis.name for axis, _, _ in jobs if axis.drive_limits is None)
+        hint = ""
+        if without and any(name.startswith("SepCompensator") for name in unknown):
+            hint = f"; {', '.join(without)} has no [drive_limits], which a compensator needs"
         raise ParameterError(f"no FMU {', '.join(unknown)}; there are {', '.join(name for _, name, _ in jobs)}{hint}")
     if targets and flavour != "native":
         raise ParameterError(f"--target is for native FMUs; with --flavour {flavour} leave it out")

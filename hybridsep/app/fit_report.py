@@ -53,7 +53,7 @@ def fit_report(fit: Fit, logs: Sequence[Log], findings: Mapping[str, Sequence[Fi
         judged,
         "Judged on samples that taught nothing",
         "The first half of each log taught the physics model and chose the settings; these are the errors of the "
-        "second half." + (_SETTLING if any(one.n_settling > one.n_taught for one in fit.judged.recordings) else ""),
+        "second half." + (_SETTLING if any(one.judges_from > one.n_taught for one in fit.judged.recordings) else ""),
     )
     _write_other_windows(report, fit, judged)
     write_findings(report, findings)

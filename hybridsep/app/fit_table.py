@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from rich import box
@@ -16,11 +16,11 @@ from .tables import console, shown_figure, shown_unit
 __all__ = ["print_fit"]
 
 
-def print_fit(fit: Fit, logs: Iterable[Log], findings: Mapping[str, Iterable[Finding]]) -> None:
+def print_fit(fit: Fit, logs: Sequence[Log], findings: Mapping[str, Iterable[Finding]]) -> None:
     """Print what was read and what the intake found, what was identified and how it was judged."""
-    unit = "m"
+    unit = logs[0].unit  # of all of them
     for log in logs:
-        unit, travel = log.unit, float(np.ptp(log.x_d))
+        travel = float(np.ptp(log.x_d))
         stated = "" if log.unit_stated else f", as the file states no unit of positions: taken as {unit} (--unit)"
         console.print(
             f"{log.path.name}: {len(log.t)} samples, {len(log.t) * log.T_s:.4g} s at {1 / log.T_s:.4g} Hz, travel "

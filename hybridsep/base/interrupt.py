@@ -58,7 +58,7 @@ def uninterrupted(function: Callable[P, Result]) -> Callable[P, Result]:
 
 @contextmanager
 def interrupts_between_calls(stop: type[BaseException] = KeyboardInterrupt) -> Iterator[None]:
-    """Raise ``stop`` on Ctrl-C, deferred to the end of an :func:`uninterrupted` function.
+    """Raise ``stop`` on Ctrl-C, deferred to the end of an :func:`uninterrupted` function; again where it is lost.
 
     Does nothing outside the main thread, or where Ctrl-C is handled in another way already.
     """

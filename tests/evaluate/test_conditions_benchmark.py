@@ -52,8 +52,8 @@ def test_a_delay_is_compared_at_one_horizon(monkeypatch: pytest.MonkeyPatch) -> 
     x = model.discretise(1e-3).forced_response(model.discretise(1e-3).rest(), x_d)[0]
     noise = 1e-6 * np.random.default_rng(0).standard_normal(600)
     case = Case("sine", model, PredictorSettings(Np=50, p=5, q=1), x_d, (x + noise, x + noise))
-    late = conditions._in_turn(case, replace(case.settings, measurement_delay=5), 5)
-    early = conditions._in_turn(case, case.settings, -5)
+    late = conditions._in_turn(case, replace(case.settings, measurement_delay=5))
+    early = conditions._in_turn(case, case.settings, earlier=5)
     for errors, n in ((late, 595), (early, 600)):
         assert [len(error) for error in errors] == [n, n]
         np.testing.assert_allclose(errors[0], noise[:n], rtol=0, atol=1e-6)

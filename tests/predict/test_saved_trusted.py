@@ -97,6 +97,16 @@ def test_memory_does_not_grow() -> None:
     assert abs(len(predictor.to_bytes()) - size) <= 200  # the digits of some numbers, and the pending window
 
 
+def change_entry(tables: tuple[dict[str, Any], dict[str, Any]], name: str, value: Any) -> None:
+    """Change an entry of the one of two tables that has it; None: delete it."""
+    table = tables[0] if name in tables[0] else tables[1]
+    assert name in table
+    if value is None:
+        del table[name]
+    else:
+        table[name] = value
+
+
 @pytest.mark.parametrize(
     ("name", "value"),
     [
@@ -139,12 +149,7 @@ def test_memory_does_not_grow() -> None:
 def test_an_inconsistent_model(name: str, value: Any) -> None:
     meta, arrays, parts = unpack("predictor", in_mid_run().to_bytes())
     own, inside, _ = unpack("trusted model", parts["trusted"])
-    table: dict[str, Any] = own if name in own else inside
-    assert name in table
-    if value is None:
-        del table[name]
-    else:
-        table[name] = value
+    change_entry((own, inside), name, value)
     with pytest.raises(StateError, match=r"^the saved (trusted model|predictor) is inconsistent: "):
         HybridPredictor.from_bytes(pack("predictor", meta, arrays, {"trusted": pack("trusted model", own, inside)}))
 
@@ -173,12 +178,7 @@ def test_an_inconsistent_comparison_with_earlier_runs(name: str, value: Any) -> 
     meta, arrays, parts = unpack("predictor", in_mid_run(warm=True).to_bytes())
     own, inside, nested = unpack("trusted model", parts["trusted"])
     numbers, factors, _ = unpack("change test", nested["change"])
-    table: dict[str, Any] = numbers if name in numbers else factors
-    assert name in table
-    if value is None:
-        del table[name]
-    else:
-        table[name] = value
+    change_entry((numbers, factors), name, value)
     trusted_model = pack("trusted model", own, inside, {"change": pack("change test", numbers, factors)})
     with pytest.raises(StateError, match=r"^the saved change test is inconsistent: "):
         HybridPredictor.from_bytes(pack("predictor", meta, arrays, {"trusted": trusted_model}))
