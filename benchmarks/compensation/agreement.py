@@ -1,6 +1,6 @@
 """Agreement of the library's compensator and the C core's, in closed loop with random parameters.
 
-    python benchmarks/compensation/agreement.py [--sets 100] [--first 0]
+    python benchmarks/compensation/agreement.py [--sets 100] [--first 0] [--trust]
 
 Each set has a machine, parameters, moves and noise of its own; two drives are run, one behind each implementation.
 Where ``x_dm`` differs by more than 1 nm, the C core is run again with its two inputs changed by 1e-15 of themselves, at
@@ -15,6 +15,7 @@ import os
 import sys
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -57,8 +58,8 @@ class Comparison:
     states_differ: bool
 
 
-def compare(seed: int) -> Comparison:
-    loop = random_loop(seed)
+def compare(seed: int, trust: bool) -> Comparison:
+    loop = random_loop(seed, trust=trust)
     (x_library, states_library), (x_c, states_c) = run_library(loop), run_c(loop)
     apart = float(np.max(np.abs(x_library - x_c)))
     own, growth = 0.0, 1.0
@@ -80,13 +81,14 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sets", type=int, default=100, help="random parameter sets")
     parser.add_argument("--first", type=int, default=0, help="seed of the first one")
+    parser.add_argument("--trust", action="store_true", help="plan with the trusted model instead of the paper's")
     options = parser.parse_args()
     seeds = range(options.first, options.first + options.sets)
     agreed, amplified, failed = 0, 0, 0
     for machine in MACHINES:
         library(f"compensator_{machine}")  # built once, before there are several processes
     with ProcessPoolExecutor() as pool:
-        for found in pool.map(compare, seeds):
+        for found in pool.map(partial(compare, trust=options.trust), seeds):
             if found.apart <= AGREED and not found.states_differ:
                 agreed += 1
                 continue

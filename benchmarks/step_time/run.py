@@ -47,8 +47,9 @@ MEDIAN_OVER_LAPACK_MAX = 5.0
 TAIL_OVER_MEDIAN_MAX = 15.0
 """Limit of p99.9 in time and of the most expensive step in instructions, both over the median step."""
 
-TRUST_MOST, TRUST_MEDIAN_OVER_PAPER_MAX = 10e6, 6.0
-"""Limits with trust: instructions of the most expensive step, and of the median one over that of the paper's model."""
+TRUST_MOST, TRUST_MEDIAN_OVER_PAPER_MAX, TRUST_LONGEST = 10e6, 6.0, 0.5
+"""Limits with trust: instructions of the most expensive step, and of the median one over that of the paper's model; the
+longest step relative to T_s."""
 
 
 def lapack_ns_per_sample(n: int) -> float:
@@ -173,6 +174,17 @@ def trust_limits(run: str, counts: Array, paper: Array) -> list[tuple[bool, str]
     ]
 
 
+def longest_with_trust(host: Host, run: str, values: dict[str, Any], steps: int) -> tuple[bool, str]:
+    """Compare the longest step of a run with trust, the median of some turns, with its limit."""
+    turns = []
+    for _ in range(REPETITIONS):
+        done = subprocess.run(host.command(values, steps, "-"), check=True, capture_output=True, text=True)
+        turns.append(json.loads(done.stdout)["step"]["max"])
+    longest = statistics.median(turns) * 1e-9 / float(PREDICTOR["T_s"])
+    text = f"trust, {run}: longest step = {longest:.2f} T_s, limit ≤ {TRUST_LONGEST:g} (median of {REPETITIONS} turns)"
+    return longest <= TRUST_LONGEST, text
+
+
 def draw(results: list[dict[str, Any]], path: Path) -> None:
     """Draw how many steps took longer than a time, beside the empty loop."""
     import matplotlib as mpl
@@ -209,11 +221,13 @@ def main() -> int:
                 counts = counts[NP:]  # learning has begun
             show(result, counts, console)
             checks = limits(result, counts)
-            if counts is not None and (p, q) == CASES[0]:
-                values = {"trust": 1, "t_init": -1.0}
+            if (p, q) == CASES[0]:
                 for run, begun in {"cold": {}, "warm": warm(trained(), folder / "warm")}.items():
-                    trusted = instructions(host, values | begun, TRUST_STEPS, folder / f"callgrind_{run}")
-                    checks += trust_limits(run, trusted[NP:], counts) if trusted is not None else []
+                    values = {"trust": 1, "t_init": -1.0, **begun}
+                    checks.append(longest_with_trust(host, run, values, options.steps))
+                    if counts is not None:
+                        trusted = instructions(host, values, TRUST_STEPS, folder / f"callgrind_{run}")
+                        checks += trust_limits(run, trusted[NP:], counts) if trusted is not None else []
             for held, text in checks:
                 console.print(f"{'held  ' if held else 'MISSED'} {text}", highlight=False)
                 missed += not held

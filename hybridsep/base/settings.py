@@ -158,6 +158,9 @@ class PredictorSettings(Settings):
         the residuals.
     forgetting : float
         With trust: time constant with which samples lose their weight, s; 0: never.
+    period : float
+        With trust: period of a disturbance that repeats with the position, m, as of cogging or a screw's pitch; 0:
+        none.
     measurement_delay : int
         Samples by which the measurement is late: the position that arrives at ``k`` is ``x(k − measurement_delay)``.
     v_friction : float
@@ -168,7 +171,7 @@ class PredictorSettings(Settings):
     NEEDS_PREVIEW: ClassVar[tuple[str, ...]] = ("v_friction",)
     """Fields of a predictor that a compensator holds: alone it has no reference beyond its window."""
 
-    TRUST: ClassVar[tuple[str, ...]] = ("trust", "effect", "noise_std", "forgetting")
+    TRUST: ClassVar[tuple[str, ...]] = ("trust", "effect", "noise_std", "forgetting", "period")
     """Fields of the residual model with trust."""
 
     ALONE: ClassVar[tuple[str, ...]] = ("measurement_delay",)
@@ -208,6 +211,13 @@ class PredictorSettings(Settings):
     forgetting: float = real(
         *(0.0, 0.0, 1e9, "s", "time after which samples have lost 63 % of their weight, with trust; 0: never"),
         nonzero=1e-3,
+    )
+    period: float = real(
+        *(0.0, 0.0, 100.0, "m"),
+        "period of a disturbance that repeats with the position (cogging, screw pitch), with trust; 0: none",
+        display_unit="mm",
+        nonzero=1e-9,
+        learned=True,
     )
     measurement_delay: int = whole(0, 0, 10_000, "whole samples by which the measured position is late")
     v_friction: float = real(

@@ -24,12 +24,13 @@ from ..predict.predictor import HybridPredictor
 from ..predict.trusted import TrustedModel
 from ..predict.window import PublishedWindow
 from .constraints import Bounds, DriveBounds, solve
+from .interior import EXACT
 from .plan import PendingPlan, SepState
 from .plan_monitor import PlanMonitor, has_stable_poles
 from .saved_compensator import compensator_blob, compensator_from
 from .sensor import SensorWatch
 from .splines import N_DECIDED, SplineBasis, direct_samples
-from .trusted_plan import TrustedPlanner
+from .trusted_plan import TOLERANCE, TrustedPlanner, is_better
 
 __all__ = ["RECOMMENDED", "SepCompensator", "SepState", "direct_samples"]
 
@@ -248,12 +249,15 @@ class SepCompensator:
         if not (np.isfinite(g).all() and np.isfinite(free).all()):
             return None
         cost = self._basis.cost(g, free, command, rest[:N_DECIDED], self._delta_before, self.settings.jerk_weight)
-        always = self.predictor.trusted is not None
-        found = solve(cost, bounds, rest[N_DECIDED:], self._n_pinned, always=always)
+        trusted = self.predictor.trusted is not None
+        tolerance = TOLERANCE if trusted else EXACT
+        found = solve(cost, bounds, rest[N_DECIDED:], self._n_pinned, always=trusted, tolerance=tolerance)
         return None if found is None else np.concatenate((rest[:N_DECIDED], found.x))
 
     def _plan_model(self, trusted: TrustedModel, path: Array) -> PlanModel:
         """Return the trusted model over the preview, with the scales of the rest of the last plan."""
+        assert self.predictor.start is not None
+        trusted.static.origin = self.predictor.start
         with np.errstate(all="ignore"):  # a prediction that is no candidate may overflow
             return PlanModel(trusted, self.predictor.state, path + self._basis.values @ self._rest, path)
 
@@ -273,7 +277,7 @@ class SepCompensator:
             planner = TrustedPlanner(self._basis, self.settings.jerk_weight, model, path, self._delta_before)
             bounds = self._bounds.bounds(*before, may_turn=True)
             hybrid, cost = planner.plan(rest, bounds, self._n_pinned, self._basis.filtered(g))
-            better = cost < planner.cost(physics)  # false for NaN
+            better = is_better(cost, planner.cost(physics))
         return (SepState.HYBRID, hybrid) if better else (SepState.PHYSICS, physics)
 
     def _candidates(self) -> list[SepState]:

@@ -13,7 +13,7 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from ..base.settings import Limits
 from ..base.signals import Array
-from .interior import PRIMAL_RESIDUAL, Minimum, minimise
+from .interior import EXACT, PRIMAL_RESIDUAL, Minimum, Tolerance, minimise
 from .splines import N_DECIDED, PlanCost, SplineBasis
 
 __all__ = ["Bounds", "DriveBounds", "solve"]
@@ -131,7 +131,14 @@ class DriveBounds:
 
 
 def solve(
-    cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int, *, always: bool = False, may_bind: bool = True
+    cost: PlanCost,
+    bounds: Bounds,
+    rest: Array,
+    n_pinned: int,
+    *,
+    always: bool = False,
+    may_bind: bool = True,
+    tolerance: Tolerance = EXACT,
 ) -> Minimum | None:
     """Return the minimiser of the cost within the bounds.
 
@@ -150,6 +157,8 @@ def solve(
         Whether no plan changes them.
     may_bind : bool
         Whether the bounds may be active: that takes steps of the interior point.
+    tolerance : Tolerance
+        Of these steps.
 
     Returns
     -------
@@ -162,7 +171,9 @@ def solve(
         return None
     if bounds.allow(c):
         return Minimum(c, 0)
-    return _bounded(cost, bounds, rest, n_pinned, _cost_scale(cost, c, rest, n_kept)) if may_bind else None
+    if not may_bind:
+        return None
+    return _bounded(cost, bounds, rest, n_pinned, _cost_scale(cost, c, rest, n_kept), tolerance)
 
 
 def _unbounded(cost: PlanCost, rest: Array, n_pinned: int) -> Array | None:
@@ -181,12 +192,12 @@ def _cost_scale(cost: PlanCost, c: Array, rest: Array, n_pinned: int) -> float:
     return float(left.v @ c[n_pinned:] + at_rest @ left.P @ at_rest)
 
 
-def _bounded(cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int, scale: float) -> Minimum:
+def _bounded(cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int, scale: float, tolerance: Tolerance) -> Minimum:
     """Return the minimiser of the cost within the bounds, as far as it is feasible from ``rest``, and solver steps.
 
     Parameters
     ----------
-    cost, bounds, rest, n_pinned
+    cost, bounds, rest, n_pinned, tolerance
         As those of :func:`solve`.
     scale : float, m²
         :func:`_cost_scale`.
@@ -202,6 +213,7 @@ def _bounded(cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int, scale: 
         (bounds.high - taken)[touched] - PRIMAL_RESIDUAL,
         rest[n_pinned:],
         scale,
+        tolerance,
     )
     best = np.concatenate((pinned, found.x))
     if not np.isfinite(best).all():

@@ -18,9 +18,13 @@ from ..base.signals import Array
 from ..predict.forecast import Forecast
 from ..predict.linearised import PlanModel
 from .constraints import Bounds, solve
+from .interior import Tolerance
 from .splines import N_DECIDED, PlanCost, SplineBasis
 
-__all__ = ["TrustedPlanner"]
+__all__ = ["TOLERANCE", "TrustedPlanner", "is_better"]
+
+TOLERANCE = Tolerance(1e-4, 1e-2, 10)
+"""Of the solver: a plan is judged by the model itself, and taken if it is better than the others."""
 
 _REACHES = (0.1, 0.03, 0.01, 0.0)
 """Reach of friction's slope in each Newton step, relative to the model's velocity scale: a tangent is blind to a sign
@@ -29,15 +33,21 @@ that changes nearby."""
 _TRIES, _TRIES_TOGETHER = 6, 8
 """Largest number of penalties tried in a step, and in all steps."""
 
-_SOLVER_STEPS = 60
+_SOLVER_STEPS = 34
 """Interior-point steps after which no further programme that the drive's limits bound is begun: the plan is what was
 found before."""
 
 _FIRST_PENALTY, _RAISE, _LOWER = 1.0, 8.0, 0.25
 """Penalty on the change of velocity, in the unit of the jerk's weight: its first value, and how it follows success."""
 
-_GAIN = 1e-3
-"""Relative gain of a step below which it is the last one."""
+_GAIN, _LEAST_GAIN = 1e-3, 1e-9
+"""Relative gain of a step below which it is the last one, and below which a plan is no better than another: costs that
+rounding tells apart are equal."""
+
+
+def is_better(cost: float, other: float) -> bool:
+    """Return whether a plan costs less, m², than another; not if it is NaN."""
+    return cost < (1.0 - _LEAST_GAIN) * other
 
 
 @dataclass(frozen=True)
@@ -104,12 +114,14 @@ class TrustedPlanner:
                 tries += 1
                 cost = PlanCost.regular(P + penalty * damping, v + penalty * (damping @ at))
                 may_bind = steps < _SOLVER_STEPS
-                found = solve(cost, bounds, rest[N_DECIDED:], n_pinned, always=True, may_bind=may_bind)
+                found = solve(
+                    cost, bounds, rest[N_DECIDED:], n_pinned, always=True, may_bind=may_bind, tolerance=TOLERANCE
+                )
                 if found is None:
                     break
                 steps += found.steps
                 there = self._at(np.concatenate((rest[:N_DECIDED], found.x)))
-                if there.cost < here.cost:
+                if is_better(there.cost, here.cost):
                     best = there
                     break
                 penalty = max(_RAISE * penalty, _FIRST_PENALTY)

@@ -1,6 +1,6 @@
 """Weights file ``resources/weights.bin`` of an FMU that starts warm: the factor of a trained predictor.
 
-Layout, little-endian: ``HSEPWGT6``; the numbers of settings, of modes, of learned samples and of what has been learned
+Layout, little-endian: ``HSEPWGT7``; the numbers of settings, of modes, of learned samples and of what has been learned
 besides the factor, as u64; each setting that shapes the features and the factor (with others the weights mean something
 else), its name in 24 bytes and its value as float64; as float64 the numbers of a residual model that can be trusted and
 those of the errors' variance; the upper triangle of the factor ``[R z; 0 ρ]`` by rows; the CRC-32 of all before as u64.
@@ -26,7 +26,7 @@ from ..predict.uncertainty import Uncertainty
 __all__ = ["WEIGHTS_FILE", "learned_settings", "restore_weights", "weights_file"]
 
 WEIGHTS_FILE = "weights.bin"
-_MAGIC = b"HSEPWGT6"
+_MAGIC = b"HSEPWGT7"
 _HEAD = struct.Struct("<8s4Q")
 _SETTING = struct.Struct("<24sd")
 _CHECKSUM = struct.Struct("<Q")

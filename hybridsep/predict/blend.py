@@ -10,8 +10,12 @@ from ..base.signals import Array
 
 __all__ = ["Blend", "simplex_minimum"]
 
-_MEMORY = 0.97
-"""Factor by which evidence fades from window to window."""
+_MEMORY_LEAST, _MEMORY = 0.7, 0.97
+"""Bounds on the factor by which evidence fades from window to window."""
+
+_OUTDATED = 1.5
+"""What that factor falls short of 1, times the windows learned from: how far a candidate erred when it knew little says
+little of what it knows now."""
 
 _CONFIDENCE = 0.3
 """Evidence that the first weights count for, in windows of the largest mean square error."""
@@ -20,23 +24,26 @@ _EARLY = 3.0
 """Windows learned from which on that evidence falls as their inverse: the candidates' own errors are far smaller then,
 and what tells them apart must not drown in it."""
 
+_EXPERIENCED = 15.0
+"""Windows learned after which the weights without evidence are halfway from the first to the later ones."""
+
 
 class Blend:
     """Weights ``π ≥ 0``, ``Σπ ≤ 1`` of candidates; the rest is the prediction 0, the physics model's.
 
-    They minimise the squared error of the blend over the windows so far, exponentially forgotten, with a ridge about
-    their first values that fades.
+    They minimise the squared error of the blend over the windows so far, forgotten as more was learned, with a ridge
+    about what they are without evidence, that fades.
 
     Parameters
     ----------
-    first : sequence of float
-        Weights before there is evidence.
+    first, later : sequence of float
+        Weights without evidence, before anything is learned and when much is.
     Np : int
         Samples of a usual window.
     """
 
-    def __init__(self, first: tuple[float, ...], Np: int) -> None:
-        self.first, self.Np = np.array(first), Np
+    def __init__(self, first: tuple[float, ...], later: tuple[float, ...], Np: int) -> None:
+        self.first, self.later, self.Np = np.array(first), np.array(later), Np
         n = len(first)
         self.gram, self.cross = np.zeros((n, n)), np.zeros(n)
         self.weights = self.first.copy()
@@ -55,12 +62,15 @@ class Blend:
         n_rows : float
             Rows learned so far.
         """
-        self.gram = _MEMORY * self.gram + candidates @ candidates.T
-        self.cross = _MEMORY * self.cross + candidates @ target
-        ridge = _CONFIDENCE * scale * self.Np / max(n_rows / (_EARLY * self.Np), 1.0)
+        n_windows = n_rows / self.Np
+        memory = min(max(1.0 - _OUTDATED / max(n_windows, 1.0), _MEMORY_LEAST), _MEMORY)
+        self.gram = memory * self.gram + candidates @ candidates.T
+        self.cross = memory * self.cross + candidates @ target
+        ridge = _CONFIDENCE * scale * self.Np / max(n_windows / _EARLY, 1.0)
         if ridge > 0.0:
+            without = self.first + n_windows / (n_windows + _EXPERIENCED) * (self.later - self.first)
             hessian = self.gram + ridge * np.eye(len(self.first))
-            self.weights = simplex_minimum(hessian, self.cross + ridge * self.first)
+            self.weights = simplex_minimum(hessian, self.cross + ridge * without)
 
 
 def simplex_minimum(hessian: Array, linear: Array) -> Array:

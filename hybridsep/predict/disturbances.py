@@ -2,8 +2,9 @@
 
 What the physics model misses acts where the command does, so ``e_pb = G_pb d(x, v)``. A feature is ``G_pb`` applied to
 a candidate disturbance ``d``: friction ``tanh(v/v_i)`` over a spread of velocities ``v_i``, stiffness ``x·|x|`` and
-damping ``v·|v|``. First differences of the features take up errors of ``G_pb`` in phase. As nothing here depends on the
-learned weights, no recursion can become unstable.
+damping ``v·|v|``; where a period is given, ``sin`` and ``cos`` of the position over it, as of cogging or a screw's
+pitch. First differences of the features take up errors of ``G_pb`` in phase. As nothing here depends on the learned
+weights, no recursion can become unstable.
 """
 
 from __future__ import annotations
@@ -15,12 +16,13 @@ import numpy as np
 from ..base.signals import Array
 from ..model.discrete import DiscreteModel
 
-__all__ = ["LEAST_VELOCITY", "N_DISTURBANCES", "StaticFeatures", "StaticState"]
+__all__ = ["LEAST_VELOCITY", "StaticFeatures", "StaticState"]
 
 _FRICTION_SPREAD = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
 """Velocities ``v_i`` of the friction's change of sign, relative to the velocity scale."""
 
-N_DISTURBANCES = len(_FRICTION_SPREAD) + 2
+_N_FRICTION, _N_LASTING, _N_PERIODIC = len(_FRICTION_SPREAD), len(_FRICTION_SPREAD) + 2, 2
+"""Disturbances by friction, with stiffness and damping, and those that repeat with the position."""
 
 LEAST_VELOCITY = 1e-200
 """Velocity, m/s, below which a command is at rest: ratios of smaller ones may underflow."""
@@ -37,9 +39,9 @@ class StaticState(NamedTuple):
 
     Attributes
     ----------
-    filters : (n_state, N_DISTURBANCES) array
+    filters : (n_state, n_disturbances) array
         State of ``G_pb`` for each disturbance.
-    filtered : (N_DISTURBANCES,) array
+    filtered : (n_disturbances,) array
         Last filtered disturbances.
     x_d : float, m
         Last command.
@@ -58,15 +60,36 @@ class DisturbanceSlopes(NamedTuple):
 
     Attributes
     ----------
-    friction : (n, N_DISTURBANCES − 2) array, s/m
+    friction : (n, 6) array, s/m
         Of each friction with the commanded velocity.
     stiffness, damping : (n,) array, m and m/s
         Of ``x·|x|`` with ``x`` and of ``v·|v|`` with ``v``.
+    periodic : (n, 2) or (n, 0) array, 1/m
+        Of ``sin`` and ``cos`` with ``x``.
     """
 
     friction: Array
     stiffness: Array
     damping: Array
+    periodic: Array
+
+    def change(self, weights: Array, velocity: Array, moved: Array, moved_velocity: Array) -> Array:
+        """Return what the disturbances change by, ``(n, m)``, with weights ``(n_disturbances,)``.
+
+        Parameters
+        ----------
+        weights : (n_disturbances,) array
+        velocity : (n, m) array, m/s
+            Changes of the commanded velocity, each a column.
+        moved, moved_velocity : (n, m) array, m and m/s
+            Changes of the position, and of its velocity.
+        """
+        of_position = weights[_N_FRICTION] * self.stiffness + self.periodic @ weights[_N_LASTING:]
+        return np.asarray(
+            (self.friction @ weights[:_N_FRICTION])[:, None] * velocity
+            + of_position[:, None] * moved
+            + (weights[_N_FRICTION + 1] * self.damping)[:, None] * moved_velocity
+        )
 
 
 class StaticFeatures:
@@ -78,11 +101,15 @@ class StaticFeatures:
         ``G_pb``.
     q : int
         Largest lag of ``x_pb``, as that many differences, at most three.
+    period : float, m
+        Of a disturbance that repeats with the position; 0: none.
 
     Attributes
     ----------
-    n : int
-        Number of features.
+    n, n_disturbances : int
+        Number of features, and of disturbances.
+    origin : float, m
+        The start, which positions are relative to: a disturbance that repeats does not know of it.
     shares : (n,) array
         Effect that a feature may have, relative to the largest.
     damping_of_motion : bool
@@ -90,19 +117,19 @@ class StaticFeatures:
         turns with every change of the command, and is far from the motion.
     """
 
-    def __init__(self, discrete: DiscreteModel, q: int) -> None:
-        self.discrete = discrete
+    def __init__(self, discrete: DiscreteModel, q: int, period: float = 0.0) -> None:
+        self.discrete, self.period, self.origin = discrete, period, 0.0
         self.damping_of_motion = False
         self.n_differences = min(q, _DIFFERENCES)
-        self.n = 2 + self.n_differences + 2 * N_DISTURBANCES
+        self.n_disturbances = _N_LASTING + (_N_PERIODIC if period > 0.0 else 0)
+        self.n = 2 + self.n_differences + 2 * self.n_disturbances
         self.shares = np.ones(self.n)
-        self.shares[-N_DISTURBANCES:] = _DIFFERENCE_SHARE
+        self.shares[-self.n_disturbances :] = _DIFFERENCE_SHARE
 
     def rest(self) -> StaticState:
         """Return the state at rest."""
-        return StaticState(
-            self.discrete.rest(N_DISTURBANCES), np.zeros(N_DISTURBANCES), 0.0, np.zeros(_DIFFERENCES + 1)
-        )
+        n = self.n_disturbances
+        return StaticState(self.discrete.rest(n), np.zeros(n), 0.0, np.zeros(_DIFFERENCES + 1))
 
     def peak_velocity(self, state: StaticState, x_d: Array) -> float:
         """Return the largest magnitude of the commanded velocity over a window, m/s."""
@@ -125,21 +152,25 @@ class StaticFeatures:
         velocity_scale : float
             Velocity, m/s, that the friction's change of sign is relative to; 0 before any motion.
         """
-        T_s, m = self.discrete.T_s, self.n_differences
+        T_s, first = self.discrete.T_s, 2 + self.n_differences
         v_d = np.diff(x_d, prepend=state.x_d) / T_s
         past = np.concatenate((state.x_pb, x_pb))
         v = self._damped_velocity(state, x_pb, x)
-        disturbances = np.empty((len(x_d), N_DISTURBANCES))
-        disturbances[:, :-2] = np.tanh(v_d[:, None] / _spread(velocity_scale))
-        disturbances[:, -2] = x * np.abs(x)
-        disturbances[:, -1] = v * np.abs(v)
+        disturbances = np.empty((len(x_d), self.n_disturbances))
+        disturbances[:, :_N_FRICTION] = np.tanh(v_d[:, None] / _spread(velocity_scale))
+        disturbances[:, _N_FRICTION] = x * np.abs(x)
+        disturbances[:, _N_FRICTION + 1] = v * np.abs(v)
+        if self.period > 0.0:
+            angle, at_start = self._angle(x), self._angle(0.0)
+            disturbances[:, -2] = np.sin(angle) - np.sin(at_start)
+            disturbances[:, -1] = np.cos(angle) - np.cos(at_start)
         filtered, filters = self.discrete.forced_response(state.filters, disturbances)
         rows = np.empty((len(x_d), self.n))
         rows[:, 0] = 1.0
-        for i in range(m + 1):
+        for i in range(self.n_differences + 1):
             rows[:, 1 + i] = np.diff(past, i)[_DIFFERENCES + 1 - i :]
-        rows[:, 2 + m : 2 + m + N_DISTURBANCES] = filtered
-        rows[:, 2 + m + N_DISTURBANCES :] = np.diff(filtered, axis=0, prepend=state.filtered[None])
+        rows[:, first : first + self.n_disturbances] = filtered
+        rows[:, first + self.n_disturbances :] = np.diff(filtered, axis=0, prepend=state.filtered[None])
         return rows, StaticState(filters, filtered[-1].copy(), float(x_d[-1]), past[-_DIFFERENCES - 1 :].copy())
 
     def slopes(
@@ -160,7 +191,16 @@ class StaticFeatures:
             friction = (np.tanh((v + half) / spread) - np.tanh((v - half) / spread)) / (2.0 * half)
         else:
             friction = (1.0 - np.tanh(v / spread) ** 2) / spread
-        return DisturbanceSlopes(friction, 2.0 * np.abs(x), 2.0 * np.abs(self._damped_velocity(state, x_pb, x)))
+        periodic = np.empty((len(x), 0))
+        if self.period > 0.0:
+            angle, turns = self._angle(x), 2.0 * np.pi / self.period
+            periodic = np.stack((turns * np.cos(angle), -turns * np.sin(angle)), axis=1)
+        damping = 2.0 * np.abs(self._damped_velocity(state, x_pb, x))
+        return DisturbanceSlopes(friction, 2.0 * np.abs(x), damping, periodic)
+
+    def _angle(self, x: Array | float) -> Array:
+        """Return the angle within the period, rad."""
+        return np.asarray(2.0 * np.pi / self.period * (self.origin + x))
 
     def _damped_velocity(self, state: StaticState, x_pb: Array, x: Array) -> Array:
         """Return the velocity of the damping over a window, ``(n,)``, m/s."""
@@ -173,7 +213,8 @@ class StaticFeatures:
     def split(self, weights: Array) -> tuple[Array, Array, Array]:
         """Return the weights of ``x_pb`` and its differences, of the disturbances, and of their first differences."""
         first = 2 + self.n_differences
-        return weights[1:first], weights[first : first + N_DISTURBANCES], weights[first + N_DISTURBANCES :]
+        second = first + self.n_disturbances
+        return weights[1:first], weights[first:second], weights[second:]
 
 
 def _spread(velocity_scale: float) -> Array:

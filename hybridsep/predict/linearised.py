@@ -80,11 +80,7 @@ class PlanModel:
             linear, own, differences = static.split(solved.solution.weights[: solved.n_static])
             disturbance = np.zeros_like(changes)
             for weights, is_difference in ((own, False), (differences, True)):
-                acts = (
-                    (slopes.friction @ weights[: slopes.friction.shape[1]])[:, None] * velocity
-                    + (weights[-2] * slopes.stiffness)[:, None] * passed
-                    + (weights[-1] * slopes.damping)[:, None] * moved
-                )
+                acts = slopes.change(weights, velocity, passed, moved)
                 disturbance += np.diff(acts, axis=0, prepend=0.0) if is_difference else acts
             drive, _ = discrete.forced_response(discrete.rest(changes.shape[1]), disturbance)
             difference = passed

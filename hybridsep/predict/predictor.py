@@ -27,7 +27,7 @@ from .regression import RidgeRegression
 from .saved_predictor import predictor_blob, predictor_from
 from .start_in_motion import motion_before
 from .trusted import TrustedModel
-from .uncertainty import Uncertainty
+from .uncertainty import Uncertainty, first_variance
 from .window import PredictedWindow, Prediction, WindowOperator
 
 __all__ = ["HybridPredictor"]
@@ -63,7 +63,7 @@ class HybridPredictor:
         self.past = PastSamples(self.layout, self.Np)
         self.trusted = TrustedModel(settings, self.discrete) if settings.trust else None
         self._regression = None if settings.trust else RidgeRegression(self.layout.n, settings.lam)
-        self.uncertainty = Uncertainty(max(settings.lam, settings.noise_std**2), settings.Np)
+        self.uncertainty = Uncertainty(first_variance(settings), settings.Np)
         self.restart(start, t_init=settings.warm_up)
 
     @property
@@ -167,6 +167,7 @@ class HybridPredictor:
         """
         n, forecast = len(x_d), None
         if self.trusted is not None:
+            self.trusted.static.origin = start
             forecast = self.trusted.forecast(x_d, x_pb, scales)
         features = self.reference_features.features(signs, n)
         e_h = self._free_run(x_pb, features) if forecast is None else forecast.e_h

@@ -12,7 +12,7 @@ from ..base.state import pack, unpack
 from .blend import Blend
 from .candidates import CORRELATION_MAX, ResidualScale
 from .change import ChangeTest
-from .disturbances import LEAST_VELOCITY, N_DISTURBANCES, StaticState
+from .disturbances import LEAST_VELOCITY, StaticState
 from .guard import N_STATE
 from .trusted import TrustedModel
 
@@ -20,7 +20,16 @@ __all__ = ["restore_trusted", "trusted_blob", "trusted_fields"]
 
 _KIND, _CHANGE = "trusted model", "change test"
 
-_CHANGE_NUMBERS = ("n_before", "n_after", "peak", "largest_square", "largest")
+_CHANGE_NUMBERS = (
+    "n_before",
+    "n_after",
+    "n_carried",
+    "peak",
+    "largest_square",
+    "largest",
+    "errors",
+    "errors_with_less",
+)
 
 _ROUNDING = 1e-6
 """Relative tolerance of what rounding may have changed."""
@@ -87,8 +96,8 @@ def restore_trusted(model: TrustedModel, saved: Saved) -> None:
         candidate.noise_variance, candidate.correlation = variance, correlation
     _restore_blend(model.blend, saved)
     model.state = StaticState(
-        saved.array("filters", model.static.discrete.n_state, N_DISTURBANCES),
-        saved.array("filtered", N_DISTURBANCES),
+        saved.array("filters", model.static.discrete.n_state, model.static.n_disturbances),
+        saved.array("filtered", model.static.n_disturbances),
         float(saved.array("x_d", 1)[0]),
         saved.array("x_pb", len(model.state.x_pb)),
     )
@@ -105,7 +114,7 @@ def restore_trusted(model: TrustedModel, saved: Saved) -> None:
 def _change_blob(change: ChangeTest) -> bytes:
     numbers = np.array([getattr(change, name) for name in _CHANGE_NUMBERS])
     arrays = {"before": change.before.factor, "after": change.after.factor, "numbers": numbers}
-    arrays["correlations"] = np.array(change.correlations)
+    arrays["correlations"], arrays["evidence"] = np.array(change.correlations), np.array([change.evidence])
     counts = {"n_samples": change.after.n_samples, "n_earlier": change.before.n_samples}
     return pack(_CHANGE, counts, arrays)
 
@@ -119,10 +128,11 @@ def _restored_change(model: TrustedModel, saved: Saved) -> ChangeTest:
     numbers = _magnitudes(saved, "numbers", len(_CHANGE_NUMBERS)).tolist()
     for name, number in zip(_CHANGE_NUMBERS, numbers, strict=True):
         setattr(change, name, number)
+    change.evidence = float(saved.array("evidence", 1)[0])
     if not 1.0 <= min(correlations) <= max(correlations) <= CORRELATION_MAX:
         raise saved.error(f"the correlations must be 1 … {CORRELATION_MAX:g}, got {correlations}")
-    if not (change.n_before > 0.0 and change.n_after <= change.after.n_samples):
-        raise saved.error("n_before must be > 0, and n_after at most n_samples")
+    if not (0.0 < change.n_before <= change.n_carried and change.n_after <= change.after.n_samples):
+        raise saved.error("n_before must be > 0 and at most n_carried, and n_after at most n_samples")
     if change.largest_square > (1.0 + _ROUNDING) * change.largest**2 + 1e-300:
         raise saved.error("largest_square must be at most the square of largest")
     return change

@@ -18,7 +18,7 @@ from ..base.signals import Array
 from ..model.discrete import DiscreteModel
 from .blend import Blend
 from .candidates import Candidate, CandidatePrediction, ResidualScale, SolvedCandidate, lags
-from .change import ChangeTest
+from .change import DOUBTED, ChangeTest
 from .disturbances import LEAST_VELOCITY, StaticFeatures, StaticState
 from .forecast import FeatureScales, Forecast
 from .guard import SensorGuard
@@ -32,9 +32,9 @@ _LAST_LAG = 0.005
 _CAUTIOUS = 100.0
 """Correlation beyond which the penalty of a cautious candidate does not grow: it would learn nothing at all."""
 
-_FIRST_WEIGHTS = (0.0, 0.5, 0.5, 0.0)
-"""Of the blend: hold, without lags, with lags, with lags and rows taken as independent. The last one learns fastest
-where G_pb is wrong, and is trusted once it has shown that."""
+_FIRST_WEIGHTS, _LATER_WEIGHTS = (0.0, 0.5, 0.5, 0.0), (0.0, 0.0, 0.5, 0.5)
+"""Of the blend without evidence: hold, without lags, with lags, with lags and rows taken as independent. The last one
+learns fastest where G_pb is wrong, but errs by far in the beginning."""
 
 _BOUND = 1.2
 """Largest prediction relative to the largest residual so far."""
@@ -75,7 +75,7 @@ class TrustedModel:
 
     def __init__(self, settings: PredictorSettings, discrete: DiscreteModel) -> None:
         self.settings, self.look_ahead = settings, settings.Np + settings.measurement_delay
-        self.static = StaticFeatures(discrete, settings.q)
+        self.static = StaticFeatures(discrete, settings.q, settings.period)
         p = settings.p
         self.regression = RidgeRegression(self.static.n + p, _NO_PENALTY)
         lag_scales = np.sqrt(_LAST_LAG ** (np.arange(p) / p))
@@ -84,7 +84,7 @@ class TrustedModel:
             Candidate(self.static.n, lag_scales, _CAUTIOUS, settings.Np),
             Candidate(self.static.n, lag_scales, 1.0, settings.Np),
         )
-        self.blend = Blend(_FIRST_WEIGHTS, settings.Np)
+        self.blend = Blend(_FIRST_WEIGHTS, _LATER_WEIGHTS, settings.Np)
         self.n_rows = 0.0
         self.largest = np.zeros(self.static.n)
         self.velocity_scale = 0.0
@@ -214,6 +214,7 @@ class TrustedModel:
             self.change = None
         self.velocity_scale, self.largest = forecast.scales
         x_d, x_pb = forecast.x_d[:m], forecast.x_pb[:m]
+        doubtful = self._with_less_of_earlier_runs(forecast)
         accepted = self.guard.accepts(x, x_pb, self.scale.largest)
         e = _bridged(float(self.past[0]), x - x_pb, accepted)
         rows, self.state = self.static.rows(self.state, x_d, x_pb, x_pb + e, self.velocity_scale)
@@ -222,12 +223,33 @@ class TrustedModel:
             n_bridged = np.convolve(bridged[:-1].astype(np.float64), np.ones(p), "valid")
             self._fold(rows, e, accepted & (n_bridged <= _BRIDGED))
             changed = bool(forecast.predictions) and self._has_changed()
-            self._assess(forecast, e, accepted, surprises=not changed)
-            self._conclude(changed)
+            doubted = self._is_doubted(forecast, doubtful, e, accepted)
+            self._assess(forecast, e, accepted, surprises=not (changed or doubted))
+            self._conclude(changed, doubted)
         self.n_rejected += m - int(accepted.sum())
         self.past = np.concatenate((e[::-1], self.past))[:p]
         self.past_bridged = bridged[-p:]
         return accepted
+
+    def _with_less_of_earlier_runs(self, forecast: Forecast) -> Array | None:
+        """Return the prediction with lags if earlier runs had less weight, ``(n,)``, m; None if there is no other."""
+        change = self.change
+        if change is None or change.n_after == 0.0 or not forecast.predictions:
+            return None
+        rows, _ = self.static.rows(self.state, forecast.x_d, forecast.x_pb, forecast.x, forecast.scales.velocity)
+        scales = self._static_scales(forecast.scales.largest)
+        solved = self.candidates[1].solve(change.all_rows(DOUBTED), scales, self._least_variance)
+        return self.predict(solved, rows).e_h
+
+    def _is_doubted(
+        self, forecast: Forecast, doubtful: Array | None, measured: Array, accepted: NDArray[np.bool_]
+    ) -> bool:
+        """Return whether earlier runs had better have less weight, as in the prediction ``doubtful``."""
+        if self.change is None or doubtful is None:
+            return False
+        m = len(measured)
+        predictions = (forecast.predictions[1].e_h[:m], doubtful[:m], np.zeros(m))
+        return self.change.is_doubted(*(float(np.sum((measured - e)[accepted] ** 2)) for e in predictions))
 
     def _has_changed(self) -> bool:
         """Return whether the plant of this run is another one than that of earlier runs."""
@@ -239,14 +261,17 @@ class TrustedModel:
             self.regression, self._static_scales(self.largest), variance, self._least_variance, correlation
         )
 
-    def _conclude(self, changed: bool) -> None:
+    def _conclude(self, changed: bool, doubted: bool) -> None:
         """Forget what earlier runs have taught if the plant has changed, and end the comparison once it is decided."""
         change = self.change
+        if change is not None and doubted and not changed:
+            change.doubt()
+            self.regression, self.n_rows = change.all_rows(), change.n_before + change.n_after
         if change is not None and changed:
             self.regression, self.n_rows = change.after, change.n_after
             recent = min(self.scale.recent, change.largest_square)
             self.scale = ResidualScale(recent, change.largest_square, change.largest)
-            self.blend = Blend(_FIRST_WEIGHTS, self.settings.Np)
+            self.blend = Blend(_FIRST_WEIGHTS, _LATER_WEIGHTS, self.settings.Np)
             for candidate, correlation in zip(self.candidates, change.correlations, strict=True):
                 candidate.correlation = correlation
         if change is not None and (changed or change.is_over):
@@ -265,7 +290,10 @@ class TrustedModel:
             recent, max(self.scale.largest_square, mean_square), max(self.scale.largest, largest)
         )
         candidates = self._blended(forecast.hold, forecast.predictions, m)
-        self.blend.update(candidates[:, accepted], sound, self.scale.largest_square, self.n_rows)
+        scale, change = self.scale.largest_square, self.change
+        if change is not None and change.n_after > change.n_before:
+            scale = change.largest_square  # what was larger in earlier runs says nothing of the blend any more
+        self.blend.update(candidates[:, accepted], sound, scale, self.n_rows)
 
     @property
     def bound(self) -> float:

@@ -3,13 +3,16 @@
 The variance at sample ``k`` of a window is a sum of components, ``v(k) = Σ_i θ_i f_i(k)``, each the square of something
 that errors come with: measurement noise and its growth over the window, wrong timing (the squared differences of
 ``x_pb`` and ``e_h``), a wrong share of the servo error, a change since the last measured residual, candidates that
-disagree. What errors come with is known before the window is measured, so that the variance is small at standstill and
-large at a reversal. The published standard deviation is ``c·√v``.
+disagree, slow motion, where friction on the actual velocity is least certain. What errors come with is known before the
+window is measured, so that the variance is small at standstill and large at a reversal. What is felt only after it has
+happened, and for a while, is averaged over the samples before, from the last measured one on. The published standard
+deviation is ``c(k)·√v``.
 
 After each window every ``θ_i`` takes a step of expectation maximisation for normal errors of that variance (variance
-components: Dempster, Laird, Rubin, J. R. Stat. Soc. B 39 (1977)), and ``c`` moves until 10 % of all errors are beyond
-1.645 standard deviations (adaptive conformal inference: Gibbs, Candès, NeurIPS 2021): errors are not normal, and
-neighbouring ones are alike. The tails are heavier than normal, so that 50 % cover a little more and 95 % a little less.
+components: Dempster, Laird, Rubin, J. R. Stat. Soc. B 39 (1977)). The factor ``c(k)``, which changes exponentially from
+the beginning to the end of a window, moves until intervals of 50, 90 and 95 % miss as many errors as they may, together
+(adaptive conformal inference: Gibbs, Candès, NeurIPS 2021): errors are not normal, and neighbouring ones are alike. The
+tails are heavier than normal, so that 50 % cover a little more and 95 % a little less.
 """
 
 from __future__ import annotations
@@ -19,22 +22,36 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
+from ..base.settings import PredictorSettings
 from ..base.signals import PREDICTION_MAX, Array
 
-__all__ = ["N_COMPONENTS", "N_LEARNED", "PredictedError", "Uncertainty"]
+__all__ = ["N_COMPONENTS", "N_LEARNED", "PredictedError", "Uncertainty", "first_variance"]
 
-_SHARES = (4.0, 9.0, 0.01, 0.3, 2.0)
+_SHARES = (4.0, 9.0, 0.01, 0.3, 2.0, 0.05)
 """First variance of the error relative to that of its causes: differences of ``x_pb`` and of ``e_h`` from sample to
-sample, servo error, change since the last residual, disagreement."""
+sample, servo error, change since the last residual, disagreement, slow motion."""
 
 N_COMPONENTS = 2 + len(_SHARES)
 
-N_LEARNED = 2 * N_COMPONENTS + 2
+N_LEARNED = 2 * N_COMPONENTS + 4
 """Numbers that :meth:`Uncertainty.learned` returns."""
+
+_UNKNOWN_NOISE = 25.0
+"""First variance of a noise that is not known, relative to λ."""
 
 _GROWTH = 0.3
 """First variance of the error's growth over a window, relative to the mean square error of the first window."""
+
+_FELT = (2, 3, 6, 7)
+"""Components that are felt for a while: differences, disagreement, slow motion."""
+
+_FELT_FOR = 0.2
+"""Time constant of their averaging, in windows."""
+
+_SLOW = 0.04
+"""Velocity relative to the largest one so far, below which motion is slow."""
 
 _SHARE_LEAST, _SHARE_MOST = 1e-9 * np.array(_SHARES), 1e4 * np.array(_SHARES)
 """Bounds on the variance relative to its cause."""
@@ -51,19 +68,23 @@ _OUTLYING, _VANISHING = 16.0, 0.01
 _RECENT = 0.9
 """Factor by which the mean square of the residual fades from window to window."""
 
-_MEMORY, _FIRST_EVIDENCE, _STEP = 0.95, 0.2, 6.0
+_MEMORY, _FIRST_EVIDENCE, _STEP = 0.97, 0.2, 6.0
 """Factor by which evidence fades from window to window; evidence that the first values count for, in windows; and the
 step of expectation maximisation, which alone would be slow where components are alike."""
 
-_Z, _BEYOND = 1.645, 0.1
-"""Standard deviations that a normal error exceeds with this probability."""
+_LEVELS = ((0.6745, 0.5), (1.645, 0.1), (1.96, 0.05))
+"""Standard deviations, and the probability that a normal error exceeds them."""
 
 _FAR, _FAR_SHARE = 4.0, 0.5
 """Standard deviations, and the share of a window's errors beyond them from which on all variances are too small by
 their square: the machine or the sensor has changed."""
 
-_FACTOR_RATE, _FACTOR_MAX = 0.2, 4.0
-"""Change of ``ln c`` from one window to the next per share of errors, and bound on ``c`` and ``1/c``."""
+_FACTOR_RATE, _FACTOR_MAX = 0.03, 4.0
+"""Change of ``ln c`` in the middle of a window from one window to the next per share of errors; bound on it."""
+
+_RATIO, _RATIO_RATE, _RATIO_MAX = 1.2, 0.8, 16.0
+"""``c`` at the end of a window relative to its beginning: the first one, the change of its logarithm per share of
+errors, weighted by their distance from the middle, and bound."""
 
 
 class PredictedError(NamedTuple):
@@ -77,11 +98,14 @@ class PredictedError(NamedTuple):
         ``f_i(k)``; m² but for the first two, which are relative.
     std : (n,) array, m
         Standard deviation of the error.
+    fastest : float, m
+        Largest change of ``x_pb`` from sample to sample, of earlier windows too.
     """
 
     e_h: Array
     components: Array
     std: Array
+    fastest: float
 
 
 class Uncertainty:
@@ -101,16 +125,20 @@ class Uncertainty:
     evidence : (N_COMPONENTS,) array
         Windows that each stands on, faded.
     factor : float
-        ``c``.
+        ``c`` in the middle of a window.
+    ratio : float
+        ``c`` at its end relative to that at its beginning.
     recent : float, m²
         Recent mean square of the residual; 0 before the first window.
+    fastest : float, m
+        Largest change of ``x_pb`` from sample to sample in a measured window.
     """
 
     def __init__(self, variance: float, Np: int) -> None:
         self.Np = Np
         self.theta = np.array([variance, 0.0, *_SHARES])
         self.evidence = np.zeros(N_COMPONENTS)
-        self.factor, self.recent = 1.0, 0.0
+        self.factor, self.ratio, self.recent, self.fastest = 1.0, 1.0, 0.0, 0.0
 
     def predict(
         self, x_d: Array, x_pb: Array, e_h: Array, *, last: float, disagreement: Array | float
@@ -139,8 +167,14 @@ class Uncertainty:
         components[:, 5] = bounded - last
         components[:, 2:6] = np.minimum(np.abs(components[:, 2:6]), PREDICTION_MAX) ** 2
         components[:, 6] = disagreement
-        std = np.minimum(self.factor * np.sqrt(self._variance(components)), PREDICTION_MAX)
-        return PredictedError(bounded, components, std)
+        fastest = np.maximum(np.maximum.accumulate(components[:, 2]), self.fastest**2)
+        slow = _SLOW**2 * fastest  # of the samples so far: a compensator still plans those after
+        components[:, 7] = self.recent * slow / (slow + components[:, 2] + _LEAST_VARIANCE)
+        gain = 1.0 / (1.0 + _FELT_FOR * self.Np)
+        components[:, _FELT] = lfilter([gain], [1.0, gain - 1.0], components[:, _FELT], axis=0)
+        c = self.factor * self.ratio ** self._from_middle(n)
+        std = np.minimum(c * np.sqrt(self._variance(components)), PREDICTION_MAX)
+        return PredictedError(bounded, components, std, math.sqrt(fastest[-1]))
 
     def learn(self, predicted: PredictedError, residuals: Array, accepted: NDArray[np.bool_]) -> None:
         """Learn from the measurement of a window.
@@ -155,22 +189,21 @@ class Uncertainty:
         """
         m = len(residuals)
         measured, e_h, components, std = residuals, predicted.e_h[:m], predicted.components[:m], predicted.std[:m]
+        place = self._from_middle(m)
         if not accepted.all():
-            measured, e_h, components, std = (signal[accepted] for signal in (measured, e_h, components, std))
+            measured, e_h, components, std, place = (
+                signal[accepted] for signal in (measured, e_h, components, std, place)
+            )
         if not measured.any():  # nothing to learn a scale from
             return
         error = measured - e_h
         mean_square = _mean_square(measured)
+        self.fastest = predicted.fastest
         if self.recent > 0.0:
-            relative = np.abs(error) / std
-            if np.count_nonzero(relative > _FAR) > _FAR_SHARE * len(error):
-                self.theta *= _FAR**2
-            else:
-                factor = self.factor * math.exp(_FACTOR_RATE * (np.count_nonzero(relative > _Z) / len(error) - _BEYOND))
-                self.factor = min(max(factor, 1.0 / _FACTOR_MAX), _FACTOR_MAX)
+            self._calibrate(np.abs(error) / std, place)
             self.recent = _RECENT * self.recent + (1.0 - _RECENT) * mean_square
         else:
-            self.recent = mean_square
+            self.recent, self.ratio = mean_square, _RATIO
             self.theta[:2] = _mean_square(error) * np.array([1.0, _GROWTH])
         variance = self._variance(components)
         share = components * self.theta / variance[:, None]  # of the variance, that is due to each component
@@ -185,12 +218,13 @@ class Uncertainty:
 
     def learned(self) -> Array:
         """Return what has been learned, ``(N_LEARNED,)``: all numbers are ≥ 0."""
-        return np.concatenate((self.theta, self.evidence, [self.factor, self.recent]))
+        others = [self.factor, self.ratio, self.recent, self.fastest]
+        return np.concatenate((self.theta, self.evidence, others))
 
     def restore(self, learned: Array) -> None:
         """Restore what :meth:`learned` returned and :meth:`is_sound` accepts."""
-        self.theta, self.evidence = learned[:N_COMPONENTS].copy(), learned[N_COMPONENTS:-2].copy()
-        self.factor, self.recent = learned[-2:].tolist()
+        self.theta, self.evidence = learned[:N_COMPONENTS].copy(), learned[N_COMPONENTS:-4].copy()
+        self.factor, self.ratio, self.recent, self.fastest = learned[-4:].tolist()
 
     @staticmethod
     def is_sound(learned: Array) -> bool:
@@ -199,11 +233,33 @@ class Uncertainty:
         return bool(
             ((shares >= _SHARE_LEAST) & (shares <= _SHARE_MOST)).all()
             and ((others >= 0.0) & (others <= PREDICTION_MAX)).all()
-            and 1.0 / _FACTOR_MAX <= learned[-2] <= _FACTOR_MAX
+            and 1.0 / _FACTOR_MAX <= learned[-4] <= _FACTOR_MAX
+            and 1.0 / _RATIO_MAX <= learned[-3] <= _RATIO_MAX
         )
+
+    def _calibrate(self, relative: Array, place: Array) -> None:
+        """Follow how many errors, relative to their deviations, are beyond the intervals, and where."""
+        if np.count_nonzero(relative > _FAR) > _FAR_SHARE * len(relative):
+            self.theta *= _FAR**2
+        missed = sum((relative > z) - beyond for z, beyond in _LEVELS)
+        factor = self.factor * math.exp(_FACTOR_RATE * float(np.mean(missed)))
+        ratio = self.ratio * math.exp(_RATIO_RATE * float(np.mean(missed * place)))
+        self.factor = min(max(factor, 1.0 / _FACTOR_MAX), _FACTOR_MAX)
+        self.ratio = min(max(ratio, 1.0 / _RATIO_MAX), _RATIO_MAX)
+
+    def _from_middle(self, n: int) -> Array:
+        """Return the places of samples in a usual window, ``(n,)``, from −½ at its beginning to ½ at its end."""
+        return np.minimum((np.arange(n) + 0.5) / self.Np, 1.0) - 0.5
 
     def _variance(self, components: Array) -> Array:
         return np.asarray(components @ self.theta + (_FLOOR * self.recent + _LEAST_VARIANCE))
+
+
+def first_variance(settings: PredictorSettings) -> float:
+    """Return the variance of the measurement noise, m², that is assumed before the first window is measured."""
+    if settings.noise_std > 0.0:
+        return max(settings.lam, settings.noise_std**2)
+    return min(_UNKNOWN_NOISE * settings.lam, PREDICTION_MAX)
 
 
 def _set_differences(changes: Array, signal: Array) -> None:

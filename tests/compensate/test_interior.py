@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from random_loops import random_loop, run_library
 
 from hybridsep.compensate import constraints as _constraints
-from hybridsep.compensate.interior import PRIMAL_RESIDUAL, Minimum, minimise
+from hybridsep.compensate.interior import EXACT, PRIMAL_RESIDUAL, Minimum, minimise
 
 Array = NDArray[np.float64]
 
@@ -21,8 +21,9 @@ def problems_of(monkeypatch: pytest.MonkeyPatch, seed: int, n: int, **fixed: flo
     found = []
 
     def spy(*problem: object) -> Minimum:
+        assert problem[-1] == EXACT
         minimum = minimise(*problem)  # type: ignore[arg-type]
-        found.append((problem, minimum.x))
+        found.append((problem[:-1], minimum.x))
         return minimum
 
     monkeypatch.setattr(_constraints, "minimise", spy)

@@ -19,7 +19,7 @@ from hybridsep.base.settings import Limits, PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepState, direct_samples
 from hybridsep.compensate.constraints import Bounds, DriveBounds, solve
-from hybridsep.compensate.interior import Minimum
+from hybridsep.compensate.interior import EXACT, Minimum, Tolerance
 from hybridsep.compensate.splines import N_DECIDED, PlanCost, SplineBasis
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.plants.encoder import Encoder
@@ -97,8 +97,11 @@ def test_a_bounded_plan_costs_what_another_solver_finds(
 ) -> None:
     bounded = []
 
-    def compare(cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int, *, always: bool) -> Minimum | None:
+    def compare(
+        cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int, *, always: bool, tolerance: Tolerance
+    ) -> Minimum | None:
         assert not always
+        assert tolerance == EXACT
         found = solve(cost, bounds, rest, n_pinned)
         assert found is not None
         c = found.x

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -26,9 +27,11 @@ TRUSTED = PredictorSettings(Np=50, p=20)
 STAGE = load_machine("als25010_x")
 
 
-def compensator(machine: Machine = STAGE, compensate: str = "hybrid", **changes: object) -> SepCompensator:
+def compensator(
+    machine: Machine = STAGE, compensate: str = "hybrid", predictor: PredictorSettings = TRUSTED, **changes: object
+) -> SepCompensator:
     settings = CompensatorSettings(limits=DRIVE_LIMITS, compensate=compensate, **changes)  # type: ignore[arg-type]
-    return machine.new_compensator(settings, predictor=TRUSTED)
+    return machine.new_compensator(settings, predictor=predictor)
 
 
 def moves() -> Array:
@@ -42,9 +45,9 @@ def run(sep: SepCompensator, machine: Machine = STAGE, **more: object) -> Run:
 
 
 @cache
-def learned() -> bytes:
+def learned(period: float = 0.0) -> bytes:
     """Return a compensator that has learned the moves."""
-    sep = compensator()
+    sep = compensator(predictor=replace(TRUSTED, period=period))
     run(sep)
     sep.restart(0.0)
     return sep.to_bytes()
@@ -55,8 +58,9 @@ def plan_model(sep: SepCompensator, x_d: Array) -> PlanModel:
     return PlanModel(sep.predictor.trusted, sep.predictor.state, x_d, x_d)
 
 
-def test_the_slope_is_that_of_the_prediction() -> None:
-    sep = SepCompensator.from_bytes(learned())
+@pytest.mark.parametrize("period", [0.0, 2e-3])
+def test_the_slope_is_that_of_the_prediction(period: float) -> None:
+    sep = SepCompensator.from_bytes(learned(period))
     x_d = moves()[:200]
     model, basis = plan_model(sep, x_d), SplineBasis(200, 2)
     changes = basis.values[:, 10:60:7]

@@ -96,6 +96,7 @@ def test_interface_of_the_predictor(predictor: FmuInstance) -> None:
         "effect": ("parameter", "Real", "m"),
         "noise_std": ("parameter", "Real", "m"),
         "forgetting": ("parameter", "Real", "s"),
+        "period": ("parameter", "Real", "m"),
         "mode[1].f_n": ("parameter", "Real", "Hz"),
         "mode[1].zeta": ("parameter", "Real", None),
         "mode[1].alpha": ("parameter", "Real", "1/s2"),
@@ -103,7 +104,7 @@ def test_interface_of_the_predictor(predictor: FmuInstance) -> None:
     }
     found = {name: (v.causality, v.type, v.unit) for name, v in variables.items()}
     assert {name: found[name] for name in expected} == expected
-    assert len(found) == 30 + 400
+    assert len(found) == 31 + 400
     starts = {name: variables[name].start for name in ("Np", "p", "q", "lambda", "T_s", "t_init", "input_hold")}
     assert starts == {
         "Np": "100",

@@ -66,6 +66,7 @@ def test_the_interface_is_the_contract(compensator: FmuInstance) -> None:
         ("effect", "parameter", "Real", "m", "0.0"),
         ("noise_std", "parameter", "Real", "m", "0.0"),
         ("forgetting", "parameter", "Real", "s", "0.0"),
+        ("period", "parameter", "Real", "m", "0.0"),
         ("v_friction", "parameter", "Real", "m/s", "0.002"),
         ("preview", "parameter", "Integer", None, "200"),
         ("spacing", "parameter", "Integer", None, "2"),
@@ -98,7 +99,7 @@ def test_both_flavours_have_the_table_and_the_page_shows_the_wiring(python_fmu: 
         description = json.loads(archive.read("resources/machine.json"))
         page = archive.read("documentation/index.html").decode()
     header = c_header(description, "{0}")
-    for line in ("HSEP_MODEL_SEP_COMPENSATOR 1", "HSEP_VR_x_dm = 2,", "HSEP_VR_preview = 28,", "HSEP_VR_mode = 37"):
+    for line in ("HSEP_MODEL_SEP_COMPENSATOR 1", "HSEP_VR_x_dm = 2,", "HSEP_VR_preview = 29,", "HSEP_VR_mode = 38"):
         assert line in header
     assert "SepCompensator</text>" in page
     assert "x_dm → x_d" in page

@@ -118,6 +118,7 @@ def test_a_file_with_defaults(tmp_path: Path) -> None:
         "effect": 0.0,
         "noise_std": 0.0,
         "forgetting": 0.0,
+        "period": 0.0,
         "measurement_delay": 0,
         "dead_time": 0,
     }
@@ -189,6 +190,7 @@ def test_what_the_compensator_section_leaves_out_is_the_predictors(tmp_path: Pat
         "effect": 0.0,
         "noise_std": 0.0,
         "forgetting": 0.0,
+        "period": 0.0,
         "preview": 200,
         "spacing": 2,
         "jerk_weight": 1.0,

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from hybridsep.predict.blend import Blend, simplex_minimum
 
-FIRST = (0.0, 0.5, 0.5)
+FIRST, LATER = (0.0, 0.5, 0.5), (0.5, 0.0, 0.5)
 NP = 50
 
 
@@ -58,16 +58,18 @@ def test_a_singular_problem_has_a_minimum() -> None:
     np.testing.assert_array_equal(simplex_minimum(np.zeros((2, 2)), np.array([-1.0, -1.0])), 0.0)
 
 
-def replayed(blend: Blend, errors: tuple[float, float, float], n_windows: int, seed: int = 0) -> None:
+def replayed(
+    blend: Blend, errors: tuple[float, float, float], n_windows: int, seed: int = 0, n_rows: float = 1e6
+) -> None:
     """Update with windows of a target of RMS 1 and candidates off it by independent errors of given RMS."""
     rng = np.random.default_rng(seed)
     for _ in range(n_windows):
         target = rng.normal(size=50)
-        blend.update(np.array([target + size * rng.normal(size=50) for size in errors]), target, 1.0, 0.0)
+        blend.update(np.array([target + size * rng.normal(size=50) for size in errors]), target, 1.0, n_rows)
 
 
 def test_the_better_candidate_is_preferred_and_evidence_fades() -> None:
-    blend = Blend(FIRST, NP)
+    blend = Blend(FIRST, LATER, NP)
     np.testing.assert_array_equal(blend.weights, FIRST)
     replayed(blend, (3.0, 0.02, 3.0), 60)
     assert blend.weights[1] > 0.95
@@ -77,32 +79,49 @@ def test_the_better_candidate_is_preferred_and_evidence_fades() -> None:
     assert blend.weights.sum() <= 1.0 + 1e-12
 
 
+def test_evidence_of_the_time_when_little_was_known_fades_sooner() -> None:
+    weights = []
+    for n_rows in (1e6, 5 * NP):
+        blend = Blend(FIRST, FIRST, NP)
+        replayed(blend, (3.0, 0.1, 1.0), 10, n_rows=n_rows)
+        replayed(blend, (3.0, 1.0, 0.1), 8, seed=1, n_rows=n_rows)
+        weights.append(blend.weights[2])
+    assert weights[0] < 0.5 < 0.75 < weights[1]
+
+
+def test_without_evidence_the_weights_go_from_the_first_to_the_later_ones() -> None:
+    blend = Blend(FIRST, LATER, NP)
+    for n_windows, later in ((0.0, 0.0), (15.0, 0.5), (1e6, 1.0)):
+        blend.update(np.zeros((3, NP)), np.zeros(NP), 1.0, n_windows * NP)
+        np.testing.assert_allclose(blend.weights, (1.0 - later) * np.array(FIRST) + later * np.array(LATER), atol=1e-4)
+
+
 def test_physics_is_preferred_to_candidates_that_know_nothing() -> None:
-    blend, rng = Blend(FIRST, NP), np.random.default_rng(2)
+    blend, rng = Blend(FIRST, LATER, NP), np.random.default_rng(2)
     for _ in range(60):
         blend.update(rng.normal(size=(3, 50)), rng.normal(size=50), 1.0, 0.0)
     assert blend.weights.sum() < 0.1
 
 
 def test_one_window_of_little_evidence_moves_the_weights_little() -> None:
-    blend = Blend(FIRST, NP)
+    blend = Blend(FIRST, LATER, NP)
     blend.update(np.full((3, 50), 1e-3), np.full(50, -1e-3), 1.0, 0.0)
     np.testing.assert_allclose(blend.weights, FIRST, atol=1e-4)
 
 
 def test_the_first_weights_count_for_less_the_more_was_learned() -> None:
     """A candidate whose errors are far smaller than the residuals were at first."""
-    early, late = Blend(FIRST, NP), Blend(FIRST, NP)
+    early, late = Blend(FIRST, FIRST, NP), Blend(FIRST, FIRST, NP)
     rng = np.random.default_rng(4)
     for i in range(20):
         target = 0.1 * rng.normal(size=NP)
         candidates = target + np.array([[0.3], [0.2], [0.01]]) * rng.normal(size=(3, NP))
         early.update(candidates, target, 1.0, 0.0)
         late.update(candidates, target, 1.0, (i + 1) * NP)
-    assert early.weights[2] < 0.65 < 0.8 < late.weights[2]
+    assert early.weights[2] < 0.65 < 0.75 < late.weights[2]
 
 
 def test_without_a_scale_nothing_is_known() -> None:
-    blend = Blend(FIRST, NP)
+    blend = Blend(FIRST, LATER, NP)
     blend.update(np.zeros((3, 50)), np.zeros(50), 0.0, 0.0)
     np.testing.assert_array_equal(blend.weights, FIRST)

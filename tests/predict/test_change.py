@@ -1,14 +1,19 @@
-"""A plant that has changed before a warm run: told by the marginal likelihoods, and relearned as fast as cold."""
+"""A plant that has changed before a warm run: told by likelihoods and errors, and relearned as fast as cold."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 from trusted_cases import PERIOD, cycles, friction, physics, run, trusted
 
+from benchmarks.random_drives.generator import random_drive
+from benchmarks.random_drives.simulation import simulate
 from hybridsep.base.signals import Array
-from hybridsep.predict.change import ChangeTest
+from hybridsep.model.physics import ModalModel
+from hybridsep.predict.change import DOUBTED, ChangeTest
 from hybridsep.predict.predictor import HybridPredictor
 from hybridsep.predict.regression import RidgeRegression
 
@@ -70,6 +75,83 @@ def test_another_plant_is_told_from_the_same_one(seed: int) -> None:
             regression.update_stacked(window)
             told |= change.has_changed(regression, np.array([2.0, 1e3, 1e-2]), 0.01, 1e-6, 1.0)
         assert told == expected
+
+
+def two_runs() -> ChangeTest:
+    """Return a comparison of 80 rows with 60 of another plant."""
+    rng, weights = np.random.default_rng(1), np.array([1.5, -700.0, 0.02])
+    regression = RidgeRegression(5, NO_PENALTY)
+    regression.update_stacked(rows(weights, 80, rng))
+    change = ChangeTest(regression, 80.0, (1.0,))
+    change.learn(rows(1.2 * weights, 60, rng))
+    return change
+
+
+@pytest.mark.parametrize(
+    ("errors", "n"),
+    [
+        ((4.0, 1.0, 100.0), 3),  # half the error: three windows
+        ((1e9, 1.0, 1e10), 2),  # one window alone never tells, however much it says
+        ((4.0, 1.0, 4.0), 4),  # counts by the part that the better one explains
+        ((4.0, 1.0, 1.0), 0),  # no better than the physics model
+        ((1.1, 1.0, 100.0), 0),  # it fades faster than it grows
+        ((1.0, 4.0, 100.0), 0),
+        ((0.0, 0.0, 0.0), 0),
+    ],
+)
+def test_less_weight_is_taken_when_it_is_better_for_some_windows(errors: tuple[float, float, float], n: int) -> None:
+    change = two_runs()
+    told = [change.is_doubted(*errors) for _ in range(40)]
+    assert (told.index(True) + 1 if any(told) else 0) == n
+
+
+def test_less_weight_is_not_taken_where_it_costs_more_than_it_gains() -> None:
+    change = two_runs()
+    assert not change.is_doubted(1e4, 2e4, 1e6)
+    assert not any(change.is_doubted(4.0, 1.0, 100.0) for _ in range(30))
+    assert any(change.is_doubted(4.0, 1.0, 100.0) for _ in range(60))  # by then the one window has faded
+
+
+def test_less_weight_is_not_taken_where_the_likelihood_supports_one_plant() -> None:
+    change = two_runs()
+    change.log_ratio = 20.0
+    assert not any(change.is_doubted(4.0, 1.0, 100.0) for _ in range(40))
+    change.log_ratio = 10.0
+    assert change.is_doubted(4.0, 1.0, 100.0)
+
+
+def test_doubt_weighs_the_rows_of_earlier_runs() -> None:
+    change, weighed = two_runs(), two_runs()
+    tried = change.all_rows(DOUBTED).factor
+    for _ in range(3):
+        change.is_doubted(4.0, 1.0, 100.0)
+    change.doubt()
+    weighed.before.discount(DOUBTED)
+    np.testing.assert_allclose(np.abs(tried), np.abs(weighed.all_rows().factor), rtol=1e-12, atol=1e-300)
+    np.testing.assert_array_equal(tried, change.all_rows().factor)
+    assert (change.n_before, change.n_after, change.n_carried) == (80.0 * DOUBTED, 60.0, 80.0)
+    assert (change.evidence, change.errors, change.errors_with_less) == (0.0, 0.0, 0.0)
+    for _ in range(5):
+        assert not change.is_over
+        change.doubt()
+    change.doubt()
+    assert change.is_over  # nothing of them is left
+
+
+@pytest.mark.parametrize(("index", "most"), [(18, 1.02), (26, 1.02), (40, 1.3)])
+def test_a_change_that_the_likelihood_does_not_tell_is_relearned(index: int, most: float) -> None:
+    """A random drive whose frequencies have fallen by a tenth; from 2 s on a warm run was at 2.5, 1.95 and 3.8."""
+    drive = random_drive(index)
+    modes = [replace(mode, f_n=0.9 * mode.f_n, alpha=0.81 * mode.alpha) for mode in drive.true_model.modes]
+    x = simulate([ModalModel(modes)], [drive.disturbances], [drive.x_d])[0]
+    x_meas = x + drive.noise_std * np.random.default_rng(index).standard_normal(len(x))
+    warm = HybridPredictor(drive.model)
+    run(warm, drive.x_d, drive.x_meas)
+    warm.restart()
+    assert warm.trusted is not None
+    assert warm.trusted.change is not None
+    error, cold = (rms((x_meas - run(one, drive.x_d, x_meas))[2000:]) for one in (warm, HybridPredictor(drive.model)))
+    assert error <= most * cold
 
 
 def learned(x_d: Array, e: Array) -> HybridPredictor:

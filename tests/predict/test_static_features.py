@@ -8,18 +8,21 @@ import pytest
 
 from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel, Mode
-from hybridsep.predict.disturbances import N_DISTURBANCES, StaticFeatures
+from hybridsep.predict.disturbances import StaticFeatures
 
 TS, N = 1e-3, 800
 MODES = [(25.0, 0.05, 24674.0, 15.7), (90.0, 0.6, -400.0, 3.0)]
 SCALE = 0.05  # m/s
 SPREAD = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
+PERIOD, ORIGIN = 1.7e-3, 0.0123  # m
 LENGTHS = (100, 1, 7, 2, 300, 3, 387)
 
 
-def features(hold: str, dead_time: int, q: int) -> StaticFeatures:
+def features(hold: str, dead_time: int, q: int, period: float = 0.0) -> StaticFeatures:
     model = ModalModel([Mode(*one) for one in MODES], dead_time)
-    return StaticFeatures(model.discretise(TS, hold, block=100), q)
+    static = StaticFeatures(model.discretise(TS, hold, block=100), q, period)
+    static.origin = ORIGIN
+    return static
 
 
 def signals() -> tuple[Array, Array]:
@@ -29,11 +32,14 @@ def signals() -> tuple[Array, Array]:
     return x_d, 0.98 * x_d + 2e-5 * np.sin(80 * t)
 
 
-def formula(x_d: Array, x_pb: Array, x: Array, hold: str, dead_time: int) -> tuple[Array, Array]:
-    """Return the filtered disturbances and their first differences, (N, 8) each."""
+def formula(x_d: Array, x_pb: Array, x: Array, hold: str, dead_time: int, period: float = 0.0) -> tuple[Array, Array]:
+    """Return the filtered disturbances and their first differences, (N, 8) each, (N, 10) with a period."""
     numerator, denominator = oracle.transfer_function(MODES)
     v_d, v_pb = np.diff(x_d, prepend=0.0) / TS, np.diff(x_pb, prepend=0.0) / TS
     disturbances = [*(np.tanh(v_d / (SCALE * one)) for one in SPREAD), x * abs(x), v_pb * abs(v_pb)]
+    if period:
+        angle, at_start = 2 * np.pi * (ORIGIN + x) / period, 2 * np.pi * ORIGIN / period
+        disturbances += [np.sin(angle) - np.sin(at_start), np.cos(angle) - np.cos(at_start)]
     filtered = np.column_stack(
         [
             oracle.physics(numerator, denominator, one.tolist(), T_s=TS, hold=hold, dead_time=dead_time)
@@ -43,9 +49,10 @@ def formula(x_d: Array, x_pb: Array, x: Array, hold: str, dead_time: int) -> tup
     return filtered, np.diff(filtered, axis=0, prepend=np.zeros((1, len(disturbances))))
 
 
+@pytest.mark.parametrize("period", [0.0, PERIOD])
 @pytest.mark.parametrize(("hold", "dead_time", "q"), [("zoh", 0, 3), ("foh", 0, 0), ("zoh", 5, 1), ("foh", 3, 40)])
-def test_each_column_in_windows_of_any_length(hold: str, dead_time: int, q: int) -> None:
-    static = features(hold, dead_time, q)
+def test_each_column_in_windows_of_any_length(hold: str, dead_time: int, q: int, period: float) -> None:
+    static, count = features(hold, dead_time, q, period), 10 if period else 8
     x_d, x = signals()
     x_pb, _ = static.discrete.forced_response(static.discrete.rest(), x_d)
     state, rows, first = static.rest(), [], 0
@@ -60,17 +67,17 @@ def test_each_column_in_windows_of_any_length(hold: str, dead_time: int, q: int)
     assert first == N
     found = np.concatenate(rows)
     differences, column = min(q, 3), 1
-    assert found.shape == (N, static.n) == (N, 2 + differences + 2 * N_DISTURBANCES)
+    assert found.shape == (N, static.n) == (N, 2 + differences + 2 * count)
     np.testing.assert_array_equal(found[:, 0], 1.0)
     padded = np.concatenate((np.zeros(3), x_pb))  # at rest before
     for order in range(differences + 1):
         np.testing.assert_allclose(found[:, column], np.diff(padded, order)[3 - order :], rtol=0, atol=1e-15)
         column += 1
-    filtered, differenced = formula(x_d, x_pb, x, hold, dead_time)
+    filtered, differenced = formula(x_d, x_pb, x, hold, dead_time, period)
     size = np.abs(filtered).max(axis=0)
     assert (size > 0.0).all()
-    np.testing.assert_allclose(found[:, column : column + N_DISTURBANCES] / size, filtered / size, rtol=0, atol=1e-9)
-    np.testing.assert_allclose(found[:, column + N_DISTURBANCES :] / size, differenced / size, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found[:, column : column + count] / size, filtered / size, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found[:, column + count :] / size, differenced / size, rtol=0, atol=1e-9)
 
 
 def test_peak_velocity_looks_back_to_the_last_command() -> None:

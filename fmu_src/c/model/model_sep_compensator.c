@@ -85,8 +85,8 @@ HSEP_API void hsep_model_start_values(const hsep_context *context, double values
     (void)context;
     const double start = values[HSEP_VR_x_d_ahead]; /* the drive rests there */
     values[HSEP_VR_x_dm] = values[HSEP_VR_x_d] = values[HSEP_VR_x_pb] = values[HSEP_VR_x_h] = start;
-    /* The model with trust predicts from the beginning, with the least noise. */
-    const double noise = fmax(values[HSEP_VR_lambda], values[HSEP_VR_noise_std] * values[HSEP_VR_noise_std]);
+    /* The model with trust predicts from the beginning, with the noise that is assumed. */
+    const double noise = hsep_uncertainty_first_variance(values[HSEP_VR_lambda], values[HSEP_VR_noise_std]);
     const int predicts = values[HSEP_VR_trust] > 0.0 && values[HSEP_VR_compensate] > 1.0;
     values[HSEP_VR_x_h_std] = predicts && noise > 0.0 && noise < HUGE_VAL ? sqrt(noise) : 0.0;
     values[HSEP_VR_e_servo] = values[HSEP_VR_rms_e] = 0.0;

@@ -6,6 +6,9 @@
 #include <stddef.h>
 #include <string.h>
 
+/* A plan starts from the last one: what is far from the minimum would let differences of rounding grow. */
+static const hsep_tolerance compensator_tolerance = {1e-15, 1e-9, HSEP_INTERIOR_STEPS};
+
 static hsep_trusted_task compensator_task(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
@@ -154,7 +157,7 @@ static hsep_plan_status compensator_try(hsep_compensator *self, hsep_sep_state s
     compensator_target(self, state);
     hsep_planner_open(hsep_compensator_planner(self), hsep_at(predictor, predictor->x_d));
     hsep_planner_aim(hsep_compensator_planner(self), hsep_at(self, spline), hsep_at(self, self->target));
-    const hsep_plan_status status = hsep_planner_solve(hsep_compensator_planner(self), 0);
+    const hsep_plan_status status = hsep_planner_solve(hsep_compensator_planner(self), 0, &compensator_tolerance);
     self->state = (uint64_t)(status == HSEP_PLAN_FAILED ? HSEP_SEP_OFF : state);
     return status;
 }

@@ -7,9 +7,7 @@
 #include <stddef.h>
 #include <string.h>
 
-static const double interior_mu = 1e-15;               /* mu at the end, as a share of the cost per bound */
-static const double interior_dual_residual_max = 1e-9; /* dual residual at the end, as a share of its largest term */
-static const double interior_regularisation = 1e-14;   /* proximal term of z, relative to rows and P */
+static const double interior_regularisation = 1e-14; /* proximal term of z, relative to rows and P */
 
 /* The arrays behind the struct. */
 typedef struct {
@@ -62,7 +60,7 @@ HSEP_API int hsep_interior_valid(const void *block, uint64_t first_max)
 {
     hsep_interior got;
     memcpy(&got, block, sizeof got);
-    return got.first <= first_max && got.steps <= HSEP_INTERIOR_STEPS;
+    return got.first <= first_max && got.steps <= got.tolerance.steps && got.tolerance.steps <= HSEP_INTERIOR_STEPS;
 }
 
 static interior_arrays interior_open(hsep_interior *self, const hsep_splines *splines)
@@ -106,8 +104,10 @@ static double interior_proximal(const hsep_splines *splines, const double *P, ui
 }
 
 HSEP_API void hsep_interior_begin(
-    hsep_interior *self, const hsep_splines *splines, const double P[], uint64_t first, double cost)
+    hsep_interior *self, const hsep_splines *splines, const double P[], uint64_t first, double cost,
+    const hsep_tolerance *tolerance)
 {
+    self->tolerance = *tolerance;
     self->first = first;
     self->steps = 0;
     self->sides = 0.0;
@@ -172,8 +172,8 @@ HSEP_API int hsep_interior_step(hsep_interior *self, const hsep_splines *splines
     hsep_splines_rows(splines, a.x, self->first, a.slacks.Ax);
     const double mu = hsep_slacks_residuals(&a.slacks, &r_p);
     const double r_d = interior_dual_residual(&a, splines, self->first, P);
-    if (self->steps == HSEP_INTERIOR_STEPS || mu == 0.0 || /* it underflows */
-        (mu < interior_mu * self->cost && r_p < HSEP_INTERIOR_PRIMAL && r_d < interior_dual_residual_max)) {
+    if (self->steps == self->tolerance.steps || mu == 0.0 || /* it underflows */
+        (mu < self->tolerance.mu * self->cost && r_p < HSEP_INTERIOR_PRIMAL && r_d < self->tolerance.dual_residual)) {
         return 1;
     }
     self->steps++;
@@ -185,7 +185,7 @@ HSEP_API int hsep_interior_step(hsep_interior *self, const hsep_splines *splines
     /* Newton: P dx - B' dz = r_d,  ds = B dx + r_p + rho dz,  z ds + s dz = r_c (s + rho z) */
     interior_direction(&a, splines, self->first);
     const double ratio = hsep_slacks_predicted(&a.slacks) / mu; /* mu_aff / mu; sigma = ratio^3 */
-    hsep_slacks_correct(&a.slacks, fmax(mu * ratio * ratio * ratio, 0.1 * interior_mu * self->cost));
+    hsep_slacks_correct(&a.slacks, fmax(mu * ratio * ratio * ratio, 0.1 * self->tolerance.mu * self->cost));
     interior_direction(&a, splines, self->first);
     const double alpha = hsep_slacks_move(&a.slacks);
     for (uint64_t j = 0; j < a.n; j++) {

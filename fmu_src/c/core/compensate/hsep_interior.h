@@ -12,10 +12,19 @@
 
 #include <stdint.h>
 
-#define HSEP_INTERIOR_STEPS 24     /* at most, for one plan */
 #define HSEP_INTERIOR_PRIMAL 1e-11 /* share of a bound by which it may be exceeded at the end */
 
+/* Where the solver ends. */
 typedef struct {
+    double mu;            /* complementarity mu at the end, as a share of the cost per bound */
+    double dual_residual; /* dual residual at the end, as a share of its largest term */
+    uint64_t steps;       /* at most */
+} hsep_tolerance;
+
+#define HSEP_INTERIOR_STEPS 24 /* the most of any tolerance */
+
+typedef struct {
+    hsep_tolerance tolerance;
     uint64_t first; /* the splines before it are fixed; x is (n - first,) */
     uint64_t steps; /* done for this plan */
     double cost;    /* m2, scale of the cost per bound */
@@ -24,7 +33,7 @@ typedef struct {
     /* followed by arrays, see interior_lay_out */
 } hsep_interior;
 
-HSEP_ASSERT_WORDS(hsep_interior, 5);
+HSEP_ASSERT_WORDS(hsep_interior, 8);
 
 HSEP_API double hsep_interior_size(uint64_t preview, uint64_t n); /* bytes of the block, counted in double */
 
@@ -42,9 +51,10 @@ HSEP_API hsep_problem hsep_interior_problem(hsep_interior *self, const hsep_spli
 HSEP_API int hsep_interior_valid(const void *block, uint64_t first_max);
 
 /* Begin with x and the bounds as they are. P: the triangle of all n rows; cost: scale of the cost, m2, > 0, for the
- * stopping criterion. */
+ * tolerance. */
 HSEP_API void hsep_interior_begin(
-    hsep_interior *self, const hsep_splines *splines, const double P[], uint64_t first, double cost);
+    hsep_interior *self, const hsep_splines *splines, const double P[], uint64_t first, double cost,
+    const hsep_tolerance *tolerance);
 
 /* Do a step; P as in hsep_interior_begin. Returns whether it was the last one.
  * Cost: n^3 / 6 multiply-adds for a factor and 2 n^2 with it, about 900 operations and 8 divisions a sample of the

@@ -166,7 +166,7 @@ static void planner_pin(hsep_planner *self)
 }
 
 /* Hand the bounded problem over: x is what follows the pinned splines, its bounds are what the others leave. */
-static void planner_bound(hsep_planner *self, double cost)
+static void planner_bound(hsep_planner *self, double cost, const hsep_tolerance *tolerance)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     hsep_interior *interior = planner_interior(self);
@@ -183,10 +183,10 @@ static void planner_bound(hsep_planner *self, double cost)
         high[r] = most - other - HSEP_INTERIOR_PRIMAL;
     }
     memcpy(problem.x, rest + first, (size_t)(splines->n - first) * sizeof(double));
-    hsep_interior_begin(interior, splines, hsep_at(self, self->P), first, cost);
+    hsep_interior_begin(interior, splines, hsep_at(self, self->P), first, cost, tolerance);
 }
 
-HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned)
+HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, const hsep_tolerance *tolerance)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     const uint64_t first = pinned ? self->n_pinned : 0, n = splines->n - first;
@@ -231,7 +231,7 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned)
     if (!pinned) {
         planner_pin(self);
     }
-    planner_bound(self, cost);
+    planner_bound(self, cost, tolerance);
     return HSEP_PLAN_BOUNDED;
 }
 

@@ -97,8 +97,8 @@ HSEP_API const double *hsep_planner_third(const hsep_planner *self);
 HSEP_API double *hsep_planner_coefficients(hsep_planner *self);
 
 /* Plan at this cost, which is used up. pinned: whether the first samples, hsep_planner_pinned, stay as they are in any
- * case; else in a bounded plan only. Cost: n^3 / 6 multiply-adds. */
-HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned);
+ * case; else in a bounded plan only, which is solved within the tolerance. Cost: n^3 / 6 multiply-adds. */
+HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, const hsep_tolerance *tolerance);
 
 /* Do a step of a bounded plan; return whether it was the last one. Cost: that of hsep_interior_step. */
 HSEP_API int hsep_planner_step(hsep_planner *self);

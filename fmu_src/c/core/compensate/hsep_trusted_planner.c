@@ -14,8 +14,18 @@ static const double trusted_planner_reaches[HSEP_TRUSTED_STEPS] = {0.1, 0.03, 0.
 /* Penalty on the change of velocity: its first value, and how it follows success. */
 static const double trusted_planner_first = 1.0, trusted_planner_raise = 8.0, trusted_planner_lower = 0.25;
 
-/* Relative gain of a step below which it is the last one. */
-static const double trusted_planner_gain = 1e-3;
+/* Tolerance of a programme, which is judged by the model itself. */
+static const hsep_tolerance trusted_planner_tolerance = {1e-4, 1e-2, HSEP_TRUSTED_SOLVED};
+
+/* Relative gain of a step below which it is the last one, and below which a plan is no better than another: costs that
+ * rounding tells apart are equal. */
+static const double trusted_planner_gain = 1e-3, trusted_planner_least_gain = 1e-9;
+
+/* Whether a plan costs less than another; not if it is NaN. */
+static int trusted_planner_better(double cost, double other)
+{
+    return cost < (1.0 - trusted_planner_least_gain) * other;
+}
 
 static void trusted_planner_copy(hsep_trusted_planner *self, double to[], const double from[])
 {
@@ -37,16 +47,16 @@ static void trusted_planner_command(
     }
 }
 
-/* Predict these commands; return the cost of the plan, m2; not finite if the prediction overflows. held: whether the
- * variances are those under the rest of the last plan. */
+/* Predict these commands; return the cost of the plan, m2; not finite if the prediction overflows. varied: samples
+ * whose variance is computed; 0: it is that under the rest of the last plan. */
 static double trusted_planner_predict(
-    hsep_trusted_planner *self, const hsep_trusted_task *task, const double c[], int held)
+    hsep_trusted_planner *self, const hsep_trusted_task *task, const double c[], uint64_t varied)
 {
     const hsep_splines *splines = hsep_planner_splines(task->planner);
     const uint64_t count = HSEP_DECIDED + self->n;
     const double *x_pb = hsep_at(self, self->x_pb), *before = task->planner->delta_before;
     double *e_h = hsep_at(self, self->e_h), d[4] = {before[0], before[1], before[2], 0.0}, error = 0.0, jerk = 0.0;
-    hsep_trusted_predict(task->model, hsep_at(self, self->command), x_pb, e_h, held);
+    hsep_trusted_predict(task->model, hsep_at(self, self->command), x_pb, e_h, varied);
     for (uint64_t k = 0; k < self->preview; k++) {
         const uint64_t j = self->preview - 1 - k;
         const double e = task->x_d[k] - self->start - (x_pb[j] + e_h[j]);
@@ -60,10 +70,11 @@ static double trusted_planner_predict(
 }
 
 /* The same of the commands of a plan. */
-static double trusted_planner_at(hsep_trusted_planner *self, const hsep_trusted_task *task, const double c[], int held)
+static double trusted_planner_at(
+    hsep_trusted_planner *self, const hsep_trusted_task *task, const double c[], uint64_t varied)
 {
     trusted_planner_command(self, task, c, HSEP_DECIDED + self->n);
-    return trusted_planner_predict(self, task, c, held);
+    return trusted_planner_predict(self, task, c, varied);
 }
 
 /* The physics model's plan is made: try a better one, if there may be one. */
@@ -80,7 +91,7 @@ static void trusted_planner_continue(hsep_trusted_planner *self, const hsep_trus
     }
 }
 
-/* Begin the physics model's plan; without one the rest of the last plan goes on, which is predicted. */
+/* Begin the physics model's plan; without one the rest of the last plan goes on. */
 static void trusted_planner_physics(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
     const double *x_pb = hsep_at(self, self->x_pb);
@@ -91,11 +102,11 @@ static void trusted_planner_physics(hsep_trusted_planner *self, const hsep_trust
     }
     hsep_planner_open(task->planner, task->x_d);
     hsep_planner_aim(task->planner, task->spline, target);
-    const hsep_plan_status status = hsep_planner_solve(task->planner, 1);
+    const hsep_plan_status status = hsep_planner_solve(task->planner, 1, &trusted_planner_tolerance);
     if (status == HSEP_PLAN_DONE) {
         trusted_planner_continue(self, task);
     } else {
-        self->stage = status == HSEP_PLAN_BOUNDED ? HSEP_TRUSTED_PHYSICS : HSEP_TRUSTED_DONE;
+        self->stage = status == HSEP_PLAN_BOUNDED ? HSEP_TRUSTED_PHYSICS : HSEP_TRUSTED_PREDICT;
     }
 }
 
@@ -114,9 +125,25 @@ HSEP_API void hsep_trusted_planner_begin(
     }
     trusted_planner_command(self, task, rest, HSEP_DECIDED + self->n);
     hsep_trusted_scale(task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb), path, past[0]);
-    (void)trusted_planner_predict(self, task, rest, 0);
+    const uint64_t pinned = hsep_planner_pinned(task->planner); /* they are published now */
+    self->varied = pinned > 0 ? pinned : 1;
+    (void)trusted_planner_predict(self, task, rest, self->varied);
     self->follows = best > 1 && task->model->predicted;
-    self->stage = best > 0 ? HSEP_TRUSTED_BEGIN : HSEP_TRUSTED_DONE;
+    if (best == 0) {
+        self->stage = HSEP_TRUSTED_PREDICT;
+    } else {
+        self->stage = self->follows ? HSEP_TRUSTED_VARY : HSEP_TRUSTED_BEGIN;
+    }
+}
+
+/* Variances of some of the samples under the rest of the last plan. */
+static void trusted_planner_vary(hsep_trusted_planner *self, const hsep_trusted_task *task)
+{
+    const uint64_t left = self->preview - self->varied, part = (self->preview - 1) / HSEP_TRUSTED_VARIANCES + 1;
+    const uint64_t last = self->varied + (left < part ? left : part);
+    hsep_trusted_vary(task->model, self->varied, last);
+    self->varied = last;
+    self->stage = last < self->preview ? HSEP_TRUSTED_VARY : HSEP_TRUSTED_BEGIN;
 }
 
 /* Begin a Newton step: linearise at the best plan, which was predicted last. */
@@ -195,7 +222,7 @@ static void trusted_planner_try(hsep_trusted_planner *self, const hsep_trusted_t
     hsep_planner_regularise(task->planner);
     self->tries++;
     self->tries_in_all++;
-    const hsep_plan_status status = hsep_planner_solve(task->planner, 1);
+    const hsep_plan_status status = hsep_planner_solve(task->planner, 1, &trusted_planner_tolerance);
     self->stage = status == HSEP_PLAN_DONE ? HSEP_TRUSTED_JUDGE : HSEP_TRUSTED_COMPARE;
     if (status == HSEP_PLAN_BOUNDED && self->solver_steps < HSEP_TRUSTED_SOLVER) {
         self->stage = HSEP_TRUSTED_BOUNDED;
@@ -206,10 +233,10 @@ static void trusted_planner_try(hsep_trusted_planner *self, const hsep_trusted_t
 static void trusted_planner_judge(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
     double *c = hsep_planner_coefficients(task->planner);
-    const double cost = trusted_planner_at(self, task, c, 1), gain = self->cost - cost;
+    const double cost = trusted_planner_at(self, task, c, 0), gain = self->cost - cost;
     const int may_try = self->tries_in_all < HSEP_TRUSTED_TOGETHER;
     self->stage = HSEP_TRUSTED_COMPARE;
-    if (cost < self->cost) {
+    if (trusted_planner_better(cost, self->cost)) {
         const int is_last = gain < trusted_planner_gain * (gain + cost) || self->steps == HSEP_TRUSTED_STEPS;
         trusted_planner_copy(self, hsep_at(self, self->best), c);
         self->cost = cost;
@@ -225,8 +252,8 @@ static void trusted_planner_judge(hsep_trusted_planner *self, const hsep_trusted
 /* Take the plan whose cost is lower. */
 static void trusted_planner_compare(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
-    const double cost = trusted_planner_at(self, task, hsep_at(self, self->of_physics), 1);
-    const int is_better = self->cost < cost; /* not if it is NaN */
+    const double cost = trusted_planner_at(self, task, hsep_at(self, self->of_physics), 0);
+    const int is_better = trusted_planner_better(self->cost, cost);
     self->planned = is_better ? 2 : 1;
     self->stage = HSEP_TRUSTED_PREDICT;
     trusted_planner_copy(
@@ -240,9 +267,8 @@ HSEP_API uint64_t hsep_trusted_planner_next(const hsep_trusted_planner *self)
         return 0;
     case HSEP_TRUSTED_BEGIN:
     case HSEP_TRUSTED_PRODUCT:
-        return 2;
     case HSEP_TRUSTED_PREDICT: /* with its variance */
-        return 4;
+        return 2;
     default:
         return 1;
     }
@@ -254,6 +280,9 @@ HSEP_API void hsep_trusted_planner_advance(hsep_trusted_planner *self, const hse
     switch ((hsep_trusted_stage)self->stage) {
     case HSEP_TRUSTED_DONE:
         break;
+    case HSEP_TRUSTED_VARY:
+        trusted_planner_vary(self, task);
+        break;
     case HSEP_TRUSTED_BEGIN:
         trusted_planner_physics(self, task);
         break;
@@ -263,7 +292,7 @@ HSEP_API void hsep_trusted_planner_advance(hsep_trusted_planner *self, const hse
         }
         break;
     case HSEP_TRUSTED_REST:
-        self->cost = trusted_planner_at(self, task, hsep_at(self, self->rest), 1);
+        self->cost = trusted_planner_at(self, task, hsep_at(self, self->rest), 0);
         self->stage = HSEP_TRUSTED_STEP;
         break;
     case HSEP_TRUSTED_STEP:
@@ -291,7 +320,7 @@ HSEP_API void hsep_trusted_planner_advance(hsep_trusted_planner *self, const hse
         trusted_planner_compare(self, task);
         break;
     case HSEP_TRUSTED_PREDICT:
-        (void)trusted_planner_at(self, task, c, 0);
+        (void)trusted_planner_at(self, task, c, self->Np);
         self->stage = HSEP_TRUSTED_DONE;
         break;
     }

@@ -20,20 +20,23 @@
 
 #include <stdint.h>
 
-#define HSEP_TRUSTED_STEPS 4    /* Newton steps of a plan at most, */
-#define HSEP_TRUSTED_TRIES 6    /* tries of each, */
-#define HSEP_TRUSTED_TOGETHER 8 /* tries of all, */
-#define HSEP_TRUSTED_SOLVER 60  /* and solver steps after which no bounded try is begun */
-#define HSEP_TRUSTED_COLUMNS 10 /* parts in which the changes of x_h by the splines are computed */
+#define HSEP_TRUSTED_STEPS 4     /* Newton steps of a plan at most, */
+#define HSEP_TRUSTED_TRIES 6     /* tries of each, */
+#define HSEP_TRUSTED_TOGETHER 8  /* tries of all, */
+#define HSEP_TRUSTED_SOLVER 34   /* solver steps after which no bounded try is begun, */
+#define HSEP_TRUSTED_SOLVED 10   /* and those of one programme at most */
+#define HSEP_TRUSTED_COLUMNS 5   /* parts in which the changes of x_h by the splines are computed */
+#define HSEP_TRUSTED_VARIANCES 5 /* parts in which the variances over the preview are computed */
 
 /* Work of a plan at most, in steps of the interior-point solver: the physics model's programme, Newton steps, tries
  * with their programmes, predictions; and 8 because a part is not divided between samples. */
 #define HSEP_TRUSTED_WORK \
-    ((2 + HSEP_INTERIOR_STEPS) + HSEP_TRUSTED_STEPS * (1 + HSEP_TRUSTED_COLUMNS + 2) + 2 * HSEP_TRUSTED_TOGETHER + \
-     (HSEP_TRUSTED_SOLVER - 1 + HSEP_INTERIOR_STEPS) + (1 + 1 + 4) + 8)
+    ((2 + HSEP_TRUSTED_SOLVED) + HSEP_TRUSTED_STEPS * (1 + HSEP_TRUSTED_COLUMNS + 2) + 2 * HSEP_TRUSTED_TOGETHER + \
+     (HSEP_TRUSTED_SOLVER - 1 + HSEP_TRUSTED_SOLVED) + (HSEP_TRUSTED_VARIANCES + 1 + 1 + 2) + 8)
 
 typedef enum {
     HSEP_TRUSTED_DONE = 0,
+    HSEP_TRUSTED_VARY,    /* variances under the rest of the last plan are to be computed */
     HSEP_TRUSTED_BEGIN,   /* the physics model's plan begins, */
     HSEP_TRUSTED_PHYSICS, /* it is bounded and being solved */
     HSEP_TRUSTED_REST,    /* the rest of the last plan is to be judged */
@@ -53,6 +56,7 @@ typedef struct {
     uint64_t stage;        /* hsep_trusted_stage */
     uint64_t follows;      /* whether the trusted model may plan */
     uint64_t steps;        /* Newton steps begun */
+    uint64_t varied;       /* samples whose variance under the rest of the last plan is computed */
     uint64_t columns;      /* splines whose change of x_h is computed */
     uint64_t tries;        /* of this step, and */
     uint64_t tries_in_all; /* of all */
@@ -77,7 +81,7 @@ typedef struct {
     uint64_t trial;   /* and for a trial */
 } hsep_trusted_planner;
 
-HSEP_ASSERT_WORDS(hsep_trusted_planner, 28);
+HSEP_ASSERT_WORDS(hsep_trusted_planner, 29);
 
 /* What it plans with: other blocks, and the window's data. */
 typedef struct {
@@ -101,7 +105,8 @@ HSEP_API int hsep_trusted_planner_valid(
     const void *block, const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner);
 
 /* Begin a window: predict it under the rest of the last plan. physics: G_pb there; past: (p,) m, the last residuals;
- * best: best model allowed, 0 none, 1 physics, 2 the trusted one. Cost: that of hsep_trusted_scale and a prediction. */
+ * best: best model allowed, 0 none, 1 physics, 2 the trusted one. Only the samples that the plan leaves as they are
+ * have their variance then. Cost: that of hsep_trusted_scale and a prediction. */
 HSEP_API void hsep_trusted_planner_begin(
     hsep_trusted_planner *self, const hsep_trusted_task *task, const hsep_physics *physics, const double past[],
     uint64_t best);

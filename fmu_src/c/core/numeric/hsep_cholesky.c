@@ -21,6 +21,29 @@ static void cholesky_take(
     }
 }
 
+/* The same for row i, y, and row i + 1, z, from its diagonal on: x_r are loaded once for both. n: of y, at least 2. */
+static void cholesky_take_two(
+    double *restrict y, double *restrict z, const double a[4], const double *restrict x0, const double *restrict x1,
+    const double *restrict x2, const double *restrict x3, uint64_t n)
+{
+    const double a0 = a[0], a1 = a[1], a2 = a[2], a3 = a[3];
+    const double b0 = x0[1], b1 = x1[1], b2 = x2[1], b3 = x3[1];
+    uint64_t j = 1;
+    y[0] -= (a0 * x0[0] + a1 * x1[0]) + (a2 * x2[0] + a3 * x3[0]);
+    for (; j + 2 <= n; j += 2) {
+        const double p0 = x0[j], p1 = x1[j], p2 = x2[j], p3 = x3[j];
+        const double q0 = x0[j + 1], q1 = x1[j + 1], q2 = x2[j + 1], q3 = x3[j + 1];
+        const double s0 = (a0 * p0 + a1 * p1) + (a2 * p2 + a3 * p3), s1 = (a0 * q0 + a1 * q1) + (a2 * q2 + a3 * q3);
+        const double t0 = (b0 * p0 + b1 * p1) + (b2 * p2 + b3 * p3), t1 = (b0 * q0 + b1 * q1) + (b2 * q2 + b3 * q3);
+        y[j] -= s0, y[j + 1] -= s1;
+        z[j - 1] -= t0, z[j] -= t1;
+    }
+    for (; j < n; j++) {
+        y[j] -= (a0 * x0[j] + a1 * x1[j]) + (a2 * x2[j] + a3 * x3[j]);
+        z[j - 1] -= (b0 * x0[j] + b1 * x1[j]) + (b2 * x2[j] + b3 * x3[j]);
+    }
+}
+
 /* Divide row k, (length,), by the root of its pivot; return whether there is one. */
 static int cholesky_pivot(double row[], uint64_t length)
 {
@@ -50,11 +73,16 @@ HSEP_API int hsep_cholesky_factor(double triangle[], uint64_t n)
             }
         }
         double *y = x[3] + (n - k - 3);
-        for (uint64_t i = k + 4; i < n; i++) { /* and what they leave of the rows below */
+        for (uint64_t i = k + 4; i < n; i += 2) { /* and what they leave of the rows below */
             const uint64_t at = i - k;
             const double a[4] = {x[0][at], x[1][at - 1], x[2][at - 2], x[3][at - 3]};
-            cholesky_take(y, a, x[0] + at, x[1] + at - 1, x[2] + at - 2, x[3] + at - 3, n - i);
-            y += n - i;
+            const double *from[4] = {x[0] + at, x[1] + at - 1, x[2] + at - 2, x[3] + at - 3};
+            if (i + 1 < n) {
+                cholesky_take_two(y, y + (n - i), a, from[0], from[1], from[2], from[3], n - i);
+            } else {
+                cholesky_take(y, a, from[0], from[1], from[2], from[3], n - i);
+            }
+            y += (n - i) + (n - i - 1);
         }
         row = x[3] + (n - k - 3);
     }

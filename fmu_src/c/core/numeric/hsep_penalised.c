@@ -13,10 +13,7 @@ static void penalised_copy_leading(const hsep_regression *self, hsep_regression 
     memcpy(hsep_at(to, to->inverse_d), hsep_at_const(self, self->inverse_d), (size_t)n * sizeof(double));
     for (uint64_t i = 0; i < n; i++) {
         for (uint64_t j = i + 1; j <= n; j++) {
-            const double *from = hsep_tile_entry_const(self, i, j < n ? j : self->n);
-            double *entry = hsep_tile_entry(to, i, j);
-            entry[0] = from[0];
-            entry[HSEP_TILE_ENTRIES] = from[HSEP_TILE_ENTRIES];
+            *hsep_tile_entry(to, i, j) = *hsep_tile_entry_const(self, i, j < n ? j : self->n);
         }
     }
 }
@@ -32,7 +29,7 @@ HSEP_API double hsep_penalised_solve(
         const uint64_t first = i / HSEP_TILE;
         memset(row + HSEP_TILE * first, 0, (size_t)(m + 1 - HSEP_TILE * first) * sizeof(double));
         row[i] = sqrt(penalties[i]);
-        hsep_regression_fold_from(solved, first);
+        hsep_regression_fold_once(solved, first);
     }
     hsep_regression_solve(solved, w);
     double sum = self->residual_sum;

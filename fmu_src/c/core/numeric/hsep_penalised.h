@@ -15,7 +15,7 @@
  *   w = argmin_w sum_k [target(k) - w' phi(k)]^2 + sum_i penalties_i w_i^2 + lambda |w|^2
  * solved: another block, which holds the triangle with these penalties then; what it held before does not matter, and
  * its diagonal is that of hsep_regression_init. Return the first sum, lambda |w|^2 with it.
- * Cost: m^3 / 6 times 2 multiplications and 5 additions. */
+ * Cost: m^3 / 6 times 2 multiplications and 2 additions. */
 HSEP_API double hsep_penalised_solve(
     const hsep_regression *self, const double penalties[], hsep_regression *solved, double w[]);
 

@@ -71,6 +71,15 @@ static inline void regression_four(double *restrict u, double *restrict x, doubl
     x[0] = x0, x[1] = x1, x[2] = x2, x[3] = x3;
 }
 
+/* The same without carries. */
+static inline void regression_four_once(double *restrict u, double *restrict x, double pivot, double gain)
+{
+    const double u0 = u[0], u1 = u[1], u2 = u[2], u3 = u[3];
+    const double x0 = x[0] - pivot * u0, x1 = x[1] - pivot * u1, x2 = x[2] - pivot * u2, x3 = x[3] - pivot * u3;
+    u[0] = u0 + gain * x0, u[1] = u1 + gain * x1, u[2] = u2 + gain * x2, u[3] = u3 + gain * x3;
+    x[0] = x0, x[1] = x1, x[2] = x2, x[3] = x3;
+}
+
 /* Rotate the row x, (4 n,), with 4 rows of U in n tiles. */
 static void regression_sweep(
     double *restrict tile, double *restrict x, uint64_t n, const double pivot[4], const double gain[4])
@@ -83,6 +92,22 @@ static void regression_sweep(
         regression_four(tile + 4, y, p1, g1);
         regression_four(tile + 8, y, p2, g2);
         regression_four(tile + 12, y, p3, g3);
+        x[0] = y[0], x[1] = y[1], x[2] = y[2], x[3] = y[3];
+    }
+}
+
+/* The same without carries. */
+static void regression_sweep_once(
+    double *restrict tile, double *restrict x, uint64_t n, const double pivot[4], const double gain[4])
+{
+    const double p0 = pivot[0], p1 = pivot[1], p2 = pivot[2], p3 = pivot[3];
+    const double g0 = gain[0], g1 = gain[1], g2 = gain[2], g3 = gain[3];
+    for (uint64_t t = 0; t < n; t++, tile += HSEP_TILE_STRIDE, x += 4) {
+        double y[4] = {x[0], x[1], x[2], x[3]};
+        regression_four_once(tile, y, p0, g0);
+        regression_four_once(tile + 4, y, p1, g1);
+        regression_four_once(tile + 8, y, p2, g2);
+        regression_four_once(tile + 12, y, p3, g3);
         x[0] = y[0], x[1] = y[1], x[2] = y[2], x[3] = y[3];
     }
 }
@@ -101,7 +126,7 @@ static void regression_rotate(double *tile, int place, double *x, double pivot, 
     }
 }
 
-HSEP_API void hsep_regression_fold_from(hsep_regression *self, uint64_t first)
+static inline void regression_fold(hsep_regression *self, uint64_t first, int carries)
 {
     double *inverse_d = hsep_at(self, self->inverse_d) + HSEP_TILE * first;
     double *x = hsep_regression_row(self) + HSEP_TILE * first;
@@ -133,8 +158,10 @@ HSEP_API void hsep_regression_fold_from(hsep_regression *self, uint64_t first)
                 regression_rotate(tile, (int)(4 * r + c), &x[c], pivot[r], gain[r], keep[r], large[r]);
             }
         }
-        if (left > 1 && !any_large) { /* only the last row of tiles has a height below 4 */
+        if (left > 1 && !any_large && carries) { /* only the last row of tiles has a height below 4 */
             regression_sweep(tile + HSEP_TILE_STRIDE, x + 4, left - 1, pivot, gain);
+        } else if (left > 1 && !any_large) {
+            regression_sweep_once(tile + HSEP_TILE_STRIDE, x + 4, left - 1, pivot, gain);
         } else if (left > 1) {
             for (uint64_t j = 0; j < 4 * (left - 1); j++) {
                 double *entries = tile + HSEP_TILE_STRIDE * (j / 4 + 1);
@@ -148,6 +175,10 @@ HSEP_API void hsep_regression_fold_from(hsep_regression *self, uint64_t first)
         tile += HSEP_TILE_STRIDE * left;
     }
 }
+
+HSEP_API void hsep_regression_fold_from(hsep_regression *self, uint64_t first) { regression_fold(self, first, 1); }
+
+HSEP_API void hsep_regression_fold_once(hsep_regression *self, uint64_t first) { regression_fold(self, first, 0); }
 
 HSEP_API void hsep_regression_fold(hsep_regression *self)
 {

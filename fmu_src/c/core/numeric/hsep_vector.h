@@ -22,6 +22,20 @@ static inline double hsep_dot(const double a[], const double b[], uint64_t n)
     return (s0 + s1) + (s2 + s3);
 }
 
+/* start + sum_i w_i e_i, both (n,), e a recursion's own values, newest first: the newest, which are only just computed,
+ * come last, and older ones need not wait for them. */
+static inline double hsep_recur(double start, const double w[], const double e[], uint64_t n)
+{
+    if (n < 4) {
+        for (uint64_t i = n; i-- > 0;) {
+            start += w[i] * e[i];
+        }
+        return start;
+    }
+    start += hsep_dot(w + 4, e + 4, n - 4);
+    return (((start + w[3] * e[3]) + w[2] * e[2]) + w[1] * e[1]) + w[0] * e[0];
+}
+
 /* y += a x, both (n,). */
 static inline void hsep_axpy(double *restrict y, double a, const double *restrict x, uint64_t n)
 {

@@ -3,16 +3,24 @@
 #include <math.h>
 #include <string.h>
 
-/* Factor by which evidence fades from window to window. */
-static const double blend_memory = 0.97;
+/* Bounds on the factor by which evidence fades from window to window. */
+static const double blend_memory_least = 0.7, blend_memory = 0.97;
 
-/* Evidence that the first weights count for, in windows of the largest mean square error, and the windows learned from
- * which on it falls as their inverse: the candidates' own errors are then far smaller. */
+/* What that factor falls short of 1, times the windows learned from: how far a candidate erred when it knew little says
+ * little of what it knows now. */
+static const double blend_outdated = 1.5;
+
+/* Evidence that the weights without evidence count for, in windows of the largest mean square error, and the windows
+ * learned from which on it falls as their inverse: the candidates' own errors are then far smaller. */
 static const double blend_confidence = 0.3, blend_early = 3.0;
 
-/* Hold, without lags, with lags, with lags and rows taken as independent: that is trusted once it has shown to be
- * better. */
+/* Windows learned after which the weights without evidence are halfway from the first to the later ones. */
+static const double blend_experienced = 15.0;
+
+/* Weights without evidence, before anything is learned and when much is: hold, without lags, with lags, with lags and
+ * rows taken as independent. The last one learns fastest where G_pb is wrong, but errs by far in the beginning. */
 static const double blend_first[HSEP_N_BLENDED] = {0.0, 0.5, 0.5, 0.0};
+static const double blend_later[HSEP_N_BLENDED] = {0.0, 0.0, 0.5, 0.5};
 
 HSEP_API void hsep_blend_init(hsep_blend *self)
 {
@@ -106,16 +114,20 @@ static void blend_minimise(
 HSEP_API void hsep_blend_update(
     hsep_blend *self, double products[HSEP_N_BLENDED + 1][HSEP_N_BLENDED + 1], double scale, uint64_t n, double n_rows)
 {
-    const double size = (double)n, ridge = blend_confidence * scale * size / fmax(n_rows / (blend_early * size), 1.0);
+    const double size = (double)n, n_windows = n_rows / size;
+    const double recent = 1.0 - blend_outdated / fmax(n_windows, 1.0);
+    const double memory = fmin(fmax(recent, blend_memory_least), blend_memory);
+    const double ridge = blend_confidence * scale * size / fmax(n_windows / blend_early, 1.0);
+    const double later = n_windows / (n_windows + blend_experienced);
     double H[HSEP_N_BLENDED][HSEP_N_BLENDED], l[HSEP_N_BLENDED];
     for (int i = 0; i < HSEP_N_BLENDED; i++) {
         for (int j = 0; j < HSEP_N_BLENDED; j++) {
             double *gram = &self->gram[HSEP_N_BLENDED * i + j];
-            *gram = blend_memory * *gram + products[i][j];
+            *gram = memory * *gram + products[i][j];
             H[i][j] = *gram + (i == j ? ridge : 0.0);
         }
-        self->cross[i] = blend_memory * self->cross[i] + products[i][HSEP_N_BLENDED];
-        l[i] = self->cross[i] + ridge * blend_first[i];
+        self->cross[i] = memory * self->cross[i] + products[i][HSEP_N_BLENDED];
+        l[i] = self->cross[i] + ridge * (blend_first[i] + later * (blend_later[i] - blend_first[i]));
     }
     if (ridge > 0.0) {
         blend_minimise(H, l, self->weights);

@@ -1,8 +1,8 @@
 /* Convex blend of candidate predictions, weighted by their errors in the windows so far.
  *
  * Weights pi >= 0, sum pi <= 1; the rest is the prediction 0, the physics model's. They minimise the squared error of
- * the blend over the windows so far, exponentially forgotten, with a ridge about their first values that fades. Plain
- * data; reentrant.
+ * the blend over the windows so far, forgotten as more was learned, with a ridge about what they are without evidence,
+ * that fades. Plain data; reentrant.
  */
 #ifndef HSEP_BLEND_H
 #define HSEP_BLEND_H

@@ -39,6 +39,7 @@ static double candidate_lay_out(hsep_candidate *self, const hsep_candidate_shape
     self->e_h = hsep_take(&end, window);
     self->response = hsep_take(&end, window + lags);
     self->squares = hsep_take(&end, window);
+    self->leverage = hsep_take(&end, window);
     self->spread = hsep_take(&end, window);
     self->mean_square = hsep_take(&end, window);
     self->solved = hsep_take_block(&end, hsep_regression_size(shape->n_static + shape->p));
@@ -112,7 +113,7 @@ static void candidate_run(const hsep_candidate *self, double e[])
 {
     const double *lag_weights = hsep_at_const(self, self->weights) + self->n_static;
     for (uint64_t j = self->n; self->p > 0 && j-- > 0;) {
-        e[j] += hsep_dot(lag_weights, e + j + 1, self->p);
+        e[j] = hsep_recur(e[j], lag_weights, e + j + 1, self->p);
     }
 }
 
@@ -133,32 +134,35 @@ static void candidate_free_run(hsep_candidate *self, const double rows[], const 
     }
 }
 
-/* Variance of the prediction: that of the rows, carried through the impulse response; at most most. */
-static void candidate_spread(hsep_candidate *self, const double rows[], double most)
+/* Squares of the recursion's impulse response. */
+static void candidate_respond(hsep_candidate *self)
+{
+    const uint64_t n = self->n;
+    double *response = hsep_at(self, self->response), *squares = hsep_at(self, self->squares);
+    memset(response, 0, (size_t)(n + self->p) * sizeof(double));
+    response[n - 1] = 1.0;
+    candidate_run(self, response);
+    for (uint64_t i = 0; i < n; i++) {
+        const double at = response[n - 1 - i];
+        const double within = isnan(at) ? candidate_diverged : candidate_bounded(at, candidate_diverged);
+        squares[i] = within * within;
+    }
+}
+
+/* Variance of samples first ... last - 1: that of the rows, carried through the impulse response; at most most. */
+static void candidate_spread(hsep_candidate *self, const double rows[], double most, uint64_t first, uint64_t last)
 {
     const uint64_t n = self->n, n_static = self->n_static, p = self->p;
     const double *run = hsep_at(self, self->run), *unshrunk = hsep_at(self, self->unshrunk);
-    double *spread = hsep_at(self, self->spread), *response = hsep_at(self, self->response);
-    double *squares = hsep_at(self, self->squares), *row = hsep_regression_row(candidate_solved(self));
-    for (uint64_t j = n; j-- > 0; rows += n_static) {
-        memcpy(row, rows, (size_t)n_static * sizeof(double));
+    const double *squares = hsep_at(self, self->squares);
+    double *spread = hsep_at(self, self->spread), *leverage = hsep_at(self, self->leverage);
+    double *row = hsep_regression_row(candidate_solved(self));
+    for (uint64_t k = first; k < last; k++) {
+        const uint64_t j = n - 1 - k;
+        memcpy(row, rows + k * n_static, (size_t)n_static * sizeof(double));
         memcpy(row + n_static, unshrunk + j + 1, (size_t)p * sizeof(double));
-        spread[j] = self->variance * hsep_penalised_leverage(candidate_solved(self));
-    }
-    if (p > 0) {
-        memset(response, 0, (size_t)(n + p) * sizeof(double));
-        response[n - 1] = 1.0;
-        candidate_run(self, response);
-        for (uint64_t i = 0; i < n; i++) {
-            const double at = response[n - 1 - i];
-            const double within = isnan(at) ? candidate_diverged : candidate_bounded(at, candidate_diverged);
-            squares[i] = within * within;
-        }
-        for (uint64_t j = 0; j < n; j++) { /* from the newest on: what a sum needs is not overwritten yet */
-            spread[j] = fmin(hsep_dot(squares, spread + j, n - j), most);
-        }
-    }
-    for (uint64_t j = 0; j < n; j++) {
+        leverage[j] = self->variance * hsep_penalised_leverage(candidate_solved(self));
+        spread[j] = p > 0 ? fmin(hsep_dot(squares, leverage + j, k + 1), most) : leverage[j];
         spread[j] = isfinite(run[j]) ? spread[j] : most;
     }
 }
@@ -177,17 +181,31 @@ static void candidate_mean_square(hsep_candidate *self, const hsep_residual_scal
     }
 }
 
+HSEP_API void hsep_candidate_vary(
+    hsep_candidate *self, const double rows[], const hsep_residual_scale *scale, uint64_t first, uint64_t last)
+{
+    const double most = candidate_diverged * scale->largest * scale->largest;
+    double *spread = hsep_at(self, self->spread);
+    if (first == 0 && self->p > 0) {
+        candidate_respond(self);
+    }
+    candidate_spread(self, rows, most, first, last);
+    for (uint64_t j = 0; j < self->n - last; j++) {
+        spread[j] = most;
+    }
+    candidate_mean_square(self, scale);
+}
+
 HSEP_API void hsep_candidate_predict(
-    hsep_candidate *self, const double rows[], const double past[], const hsep_residual_scale *scale, int held)
+    hsep_candidate *self, const double rows[], const double past[], const hsep_residual_scale *scale, uint64_t varied)
 {
     const double largest = scale->largest;
     const double *unshrunk = hsep_at(self, self->unshrunk), *spread = hsep_at(self, self->spread);
     const double *mean_square = hsep_at(self, self->mean_square);
     double *e_h = hsep_at(self, self->e_h);
     candidate_free_run(self, rows, past, candidate_lag_max * largest);
-    if (!held) {
-        candidate_spread(self, rows, candidate_diverged * largest * largest);
-        candidate_mean_square(self, scale);
+    if (varied > 0) {
+        hsep_candidate_vary(self, rows, scale, 0, varied);
     }
     for (uint64_t j = 0; j < self->n; j++) {
         const double shrunk = unshrunk[j] * (mean_square[j] / (mean_square[j] + candidate_caution * spread[j]));

@@ -45,6 +45,7 @@ typedef struct {
     uint64_t e_h;         /* (n,) m, shrunk */
     uint64_t response;    /* (n + p,) the recursion's impulse response, behind it 0 */
     uint64_t squares;     /* (n,) its squares, oldest first */
+    uint64_t leverage;    /* (n,) m2, variance of the rows */
     uint64_t spread;      /* (n,) m2, variance of the prediction */
     uint64_t mean_square; /* (n,) m2, that the residual may have */
     uint64_t solved;      /* the regression with penalties */
@@ -52,7 +53,7 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_residual_scale, 3);
 HSEP_ASSERT_WORDS(hsep_candidate_shape, 5);
-HSEP_ASSERT_WORDS(hsep_candidate, 19);
+HSEP_ASSERT_WORDS(hsep_candidate, 20);
 
 /* Bytes of the block, counted in double so that no size can overflow. */
 HSEP_API double hsep_candidate_size(const hsep_candidate_shape *shape);
@@ -68,11 +69,17 @@ HSEP_API int hsep_candidate_valid(const void *block, const hsep_candidate_shape 
 HSEP_API void hsep_candidate_solve(
     hsep_candidate *self, const hsep_regression *regression, const double static_scales[], double least_variance);
 
-/* Predict n samples in free run. rows: (n, n_static), sample after sample; past: (p,) m, the last residuals; held:
- * whether the variance, and with it the shrinking, stays that of the last prediction. Cost: n times that of
- * hsep_penalised_leverage, and n^2 / 2 multiply-adds; with a variance held n (n_static + p). */
+/* Predict n samples in free run. rows: (n, n_static), sample after sample; past: (p,) m, the last residuals; varied:
+ * samples whose variance is computed, the first ones, while those behind them are taken as unknown; 0: the variance,
+ * and with it the shrinking, stays that of the last prediction. Cost: n (n_static + p) multiply-adds, and that of
+ * hsep_candidate_vary. */
 HSEP_API void hsep_candidate_predict(
-    hsep_candidate *self, const double rows[], const double past[], const hsep_residual_scale *scale, int held);
+    hsep_candidate *self, const double rows[], const double past[], const hsep_residual_scale *scale, uint64_t varied);
+
+/* Compute the variance of samples first ... last - 1 of that prediction, if those before them have theirs; the next
+ * one may hold it. Cost for each: that of hsep_penalised_leverage, and last multiply-adds. */
+HSEP_API void hsep_candidate_vary(
+    hsep_candidate *self, const double rows[], const hsep_residual_scale *scale, uint64_t first, uint64_t last);
 
 /* Estimate the correlation from the errors of a window, (Np,), m, that has been measured; accepted: (Np,), 1 where it
  * counts. */

@@ -3,25 +3,29 @@
 #include <math.h>
 #include <string.h>
 
-#define DISTURBANCES_FRICTION 6 /* the first ones */
-#define DISTURBANCES_STIFFNESS 6
-#define DISTURBANCES_DAMPING 7
 #define DISTURBANCES_DIFFERENCES 3
 
 /* Velocities v_i of the friction's change of sign, relative to the velocity scale. */
-static const double disturbances_spread[DISTURBANCES_FRICTION] = {0.01, 0.03, 0.1, 0.3, 1.0, 3.0};
+static const double disturbances_spread[HSEP_DISTURBANCES_FRICTION] = {0.01, 0.03, 0.1, 0.3, 1.0, 3.0};
 
 /* Effect of a disturbance's first difference relative to its own: they only correct its timing. */
 static const double disturbances_difference_share = 0.03;
 
-HSEP_API uint64_t hsep_disturbances_n(uint64_t q)
+static const double disturbances_turn = 6.283185307179586; /* rad */
+
+HSEP_API uint64_t hsep_disturbances_count(double period)
 {
-    return 2 + (q < DISTURBANCES_DIFFERENCES ? q : DISTURBANCES_DIFFERENCES) + 2 * HSEP_N_DISTURBANCES;
+    return period > 0.0 ? HSEP_DISTURBANCES_MAX : HSEP_DISTURBANCES_PERIODIC;
+}
+
+HSEP_API uint64_t hsep_disturbances_n(uint64_t q, double period)
+{
+    return 2 + (q < DISTURBANCES_DIFFERENCES ? q : DISTURBANCES_DIFFERENCES) + 2 * hsep_disturbances_count(period);
 }
 
 HSEP_API double hsep_disturbances_share(const hsep_disturbances *self, uint64_t feature)
 {
-    return feature + HSEP_N_DISTURBANCES < self->n ? 1.0 : disturbances_difference_share;
+    return feature + self->count < self->n ? 1.0 : disturbances_difference_share;
 }
 
 static hsep_physics *disturbances_filter(hsep_disturbances *self, uint64_t i)
@@ -36,32 +40,36 @@ static hsep_physics *disturbances_tried(hsep_disturbances *self, uint64_t i)
 
 /* Set what follows from the parameters; return the bytes of the block. */
 static double disturbances_lay_out(
-    hsep_disturbances *self, const hsep_predictor_settings *settings, uint64_t n_modes, int of_motion)
+    hsep_disturbances *self, const hsep_predictor_settings *settings, double period, uint64_t n_modes, int of_motion)
 {
-    const double filters = HSEP_N_DISTURBANCES * hsep_physics_size(n_modes, settings->dead_time);
+    const uint64_t count = hsep_disturbances_count(period);
+    const double filters = (double)count * hsep_physics_size(n_modes, settings->dead_time);
     double end = HSEP_WORDS(hsep_disturbances);
-    self->n = hsep_disturbances_n(settings->q);
-    self->n_differences = self->n - 2 - 2 * HSEP_N_DISTURBANCES;
+    self->count = count;
+    self->period = period;
+    self->n = hsep_disturbances_n(settings->q, period);
+    self->n_differences = self->n - 2 - 2 * count;
     self->of_motion = of_motion != 0;
     self->T_s = settings->T_s;
     self->filters = hsep_take_block(&end, filters);
     self->tried = hsep_take_block(&end, filters);
-    self->filter_words = (self->tried - self->filters) / HSEP_N_DISTURBANCES;
+    self->filter_words = (self->tried - self->filters) / count;
     return end * sizeof(double);
 }
 
-HSEP_API double hsep_disturbances_size(const hsep_predictor_settings *settings, uint64_t n_modes)
+HSEP_API double hsep_disturbances_size(const hsep_predictor_settings *settings, double period, uint64_t n_modes)
 {
-    return disturbances_lay_out(&(hsep_disturbances){0}, settings, n_modes, 0);
+    return disturbances_lay_out(&(hsep_disturbances){0}, settings, period, n_modes, 0);
 }
 
 HSEP_API void hsep_disturbances_init(
-    hsep_disturbances *self, const hsep_predictor_settings *settings, const hsep_mode modes[], uint64_t n_modes,
-    int of_motion)
+    hsep_disturbances *self, const hsep_predictor_settings *settings, double period, const hsep_mode modes[],
+    uint64_t n_modes, int of_motion, double start)
 {
-    memset(self, 0, (size_t)hsep_disturbances_size(settings, n_modes));
-    (void)disturbances_lay_out(self, settings, n_modes, of_motion);
-    for (uint64_t i = 0; i < 2 * HSEP_N_DISTURBANCES; i++) { /* those that were tried behind them */
+    memset(self, 0, (size_t)hsep_disturbances_size(settings, period, n_modes));
+    (void)disturbances_lay_out(self, settings, period, n_modes, of_motion);
+    self->origin = start;
+    for (uint64_t i = 0; i < 2 * self->count; i++) { /* those that were tried behind them */
         hsep_physics_init(
             disturbances_filter(self, i), modes, n_modes, settings->dead_time, settings->T_s,
             (hsep_hold)settings->input_hold);
@@ -69,13 +77,13 @@ HSEP_API void hsep_disturbances_init(
 }
 
 HSEP_API int hsep_disturbances_valid(
-    const void *block, const hsep_predictor_settings *settings, uint64_t n_modes, int of_motion)
+    const void *block, const hsep_predictor_settings *settings, double period, uint64_t n_modes, int of_motion)
 {
     hsep_disturbances got;
     memcpy(&got, block, sizeof got);
-    (void)disturbances_lay_out(&got, settings, n_modes, of_motion); /* changes nothing where it is sound */
+    (void)disturbances_lay_out(&got, settings, period, n_modes, of_motion); /* changes nothing where it is sound */
     int sound = memcmp(&got, block, sizeof got) == 0;
-    for (uint64_t i = 0; i < 2 * HSEP_N_DISTURBANCES; i++) {
+    for (uint64_t i = 0; i < 2 * got.count; i++) {
         const void *filter = hsep_at_bytes(block, got.filters + i * got.filter_words);
         sound = sound && hsep_physics_valid(filter, n_modes, settings->dead_time);
     }
@@ -85,7 +93,7 @@ HSEP_API int hsep_disturbances_valid(
 HSEP_API void hsep_disturbances_restart(hsep_disturbances *self, const double x_d[], const double x_pb[], uint64_t n)
 {
     hsep_disturbed *before = &self->before;
-    for (uint64_t i = 0; i < HSEP_N_DISTURBANCES; i++) {
+    for (uint64_t i = 0; i < self->count; i++) {
         hsep_physics_begin(disturbances_filter(self, i), NULL);
         before->filtered[i] = 0.0;
     }
@@ -110,7 +118,7 @@ static void disturbances_filter_sample(hsep_disturbances *self, uint64_t i, doub
 {
     double *entry = row + 2 + self->n_differences + i, *filtered = &self->after.filtered[i];
     hsep_physics_forced_response(disturbances_tried(self, i), &disturbance, entry, 1);
-    entry[HSEP_N_DISTURBANCES] = *entry - *filtered;
+    entry[self->count] = *entry - *filtered;
     *filtered = *entry;
 }
 
@@ -149,7 +157,7 @@ HSEP_API void hsep_disturbances_command(
     hsep_disturbances *self, const double x_d[], const double x_pb[], uint64_t n, double velocity_scale, double rows[])
 {
     hsep_disturbed *now = &self->after;
-    disturbances_rewind(self, 0, DISTURBANCES_FRICTION);
+    disturbances_rewind(self, 0, HSEP_DISTURBANCES_FRICTION);
     now->x_d = self->before.x_d;
     memcpy(now->x_pb, self->before.x_pb, sizeof now->x_pb);
     for (uint64_t j = n; j-- > 0; rows += self->n) {
@@ -160,7 +168,7 @@ HSEP_API void hsep_disturbances_command(
         }
         now->x_pb[0] = x_pb[j];
         disturbances_differences(self, now->x_pb, rows);
-        for (uint64_t i = 0; i < DISTURBANCES_FRICTION; i++) {
+        for (uint64_t i = 0; i < HSEP_DISTURBANCES_FRICTION; i++) {
             disturbances_filter_sample(self, i, tanh(v_d / disturbances_sign_velocity(velocity_scale, i)), rows);
         }
     }
@@ -178,14 +186,26 @@ static double disturbances_velocity(
     return step / self->T_s;
 }
 
+/* Angle within the period at a position relative to the start, rad; 0 without a period. */
+static double disturbances_angle(const hsep_disturbances *self, double x)
+{
+    return self->period > 0.0 ? disturbances_turn / self->period * (self->origin + x) : 0.0;
+}
+
 HSEP_API void hsep_disturbances_motion(
     hsep_disturbances *self, const double x_pb[], const double x[], uint64_t n, double rows[])
 {
-    disturbances_rewind(self, DISTURBANCES_STIFFNESS, HSEP_N_DISTURBANCES);
+    const double s = sin(disturbances_angle(self, 0.0)), c = cos(disturbances_angle(self, 0.0));
+    disturbances_rewind(self, HSEP_DISTURBANCES_STIFFNESS, self->count);
     for (uint64_t j = n; j-- > 0; rows += self->n) {
         const double v = disturbances_velocity(self, x_pb, x, n, j);
-        disturbances_filter_sample(self, DISTURBANCES_STIFFNESS, x[j] * fabs(x[j]), rows);
-        disturbances_filter_sample(self, DISTURBANCES_DAMPING, v * fabs(v), rows);
+        disturbances_filter_sample(self, HSEP_DISTURBANCES_STIFFNESS, x[j] * fabs(x[j]), rows);
+        disturbances_filter_sample(self, HSEP_DISTURBANCES_DAMPING, v * fabs(v), rows);
+        if (self->count > HSEP_DISTURBANCES_PERIODIC) {
+            const double angle = disturbances_angle(self, x[j]);
+            disturbances_filter_sample(self, HSEP_DISTURBANCES_PERIODIC, sin(angle) - s, rows);
+            disturbances_filter_sample(self, HSEP_DISTURBANCES_PERIODIC + 1, cos(angle) - c, rows);
+        }
     }
 }
 
@@ -193,7 +213,7 @@ HSEP_API void hsep_disturbances_end(hsep_disturbances *self)
 {
     memcpy(
         disturbances_filter(self, 0), disturbances_tried(self, 0),
-        (size_t)(HSEP_N_DISTURBANCES * self->filter_words) * sizeof(double));
+        (size_t)(self->count * self->filter_words) * sizeof(double));
     self->before = self->after;
 }
 
@@ -203,10 +223,10 @@ HSEP_API void hsep_disturbances_slopes(
 {
     const double half = reach * velocity_scale;
     double last = self->before.x_d;
-    for (uint64_t j = n; j-- > 0; slopes += HSEP_N_DISTURBANCES) {
+    for (uint64_t j = n; j-- > 0; slopes += self->count) {
         const double v_d = (x_d[j] - last) / self->T_s;
         last = x_d[j];
-        for (uint64_t i = 0; i < DISTURBANCES_FRICTION; i++) {
+        for (uint64_t i = 0; i < HSEP_DISTURBANCES_FRICTION; i++) {
             const double spread = disturbances_sign_velocity(velocity_scale, i);
             if (half > 0.0) {
                 slopes[i] = (tanh((v_d + half) / spread) - tanh((v_d - half) / spread)) / (2.0 * half);
@@ -215,7 +235,12 @@ HSEP_API void hsep_disturbances_slopes(
                 slopes[i] = (1.0 - sign * sign) / spread;
             }
         }
-        slopes[DISTURBANCES_STIFFNESS] = 2.0 * fabs(x[j]);
-        slopes[DISTURBANCES_DAMPING] = 2.0 * fabs(disturbances_velocity(self, x_pb, x, n, j));
+        slopes[HSEP_DISTURBANCES_STIFFNESS] = 2.0 * fabs(x[j]);
+        slopes[HSEP_DISTURBANCES_DAMPING] = 2.0 * fabs(disturbances_velocity(self, x_pb, x, n, j));
+        if (self->count > HSEP_DISTURBANCES_PERIODIC) {
+            const double angle = disturbances_angle(self, x[j]), turns = disturbances_turn / self->period;
+            slopes[HSEP_DISTURBANCES_PERIODIC] = turns * cos(angle);
+            slopes[HSEP_DISTURBANCES_PERIODIC + 1] = -turns * sin(angle);
+        }
     }
 }

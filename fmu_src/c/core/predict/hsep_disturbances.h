@@ -1,7 +1,8 @@
 /* Features without lags: the physics-based prediction, and disturbances filtered by the physics model.
  *
  * What the physics model misses acts where the command does, so e_pb = G_pb d(x, v). A feature is G_pb applied to a
- * candidate disturbance d: friction tanh(v / v_i) over a spread of velocities v_i, stiffness x |x| and damping v |v|.
+ * candidate disturbance d: friction tanh(v / v_i) over a spread of velocities v_i, stiffness x |x| and damping v |v|;
+ * where a period is given, sine and cosine of the position over it, as of cogging or a screw's pitch.
  * A row is [1 | x_pb and its differences | filtered disturbances | their first differences].
  *
  * Positions are relative to the start. Of n samples, sample k is at place n - 1 - k: newest first, as their past is
@@ -17,18 +18,25 @@
 
 #include <stdint.h>
 
-#define HSEP_N_DISTURBANCES 8
+#define HSEP_DISTURBANCES_FRICTION 6 /* disturbances of friction, the first ones, */
+#define HSEP_DISTURBANCES_STIFFNESS 6
+#define HSEP_DISTURBANCES_DAMPING 7
+#define HSEP_DISTURBANCES_PERIODIC 8 /* sine and cosine, where there is a period */
+#define HSEP_DISTURBANCES_MAX 10
 
 /* What was before a sample. */
 typedef struct {
-    double x_d;                           /* m, last command */
-    double x_pb[4];                       /* m, last predictions, newest first */
-    double filtered[HSEP_N_DISTURBANCES]; /* last filtered disturbances */
+    double x_d;                             /* m, last command */
+    double x_pb[4];                         /* m, last predictions, newest first */
+    double filtered[HSEP_DISTURBANCES_MAX]; /* last filtered disturbances */
 } hsep_disturbed;
 
 typedef struct {
     uint64_t n_differences; /* of x_pb, at most 3 */
+    uint64_t count;         /* disturbances, at most HSEP_DISTURBANCES_MAX */
     uint64_t n;             /* features */
+    double period;          /* m, of a disturbance that repeats with the position; 0: none */
+    double origin;          /* m, the start: what repeats does not know of it */
     uint64_t of_motion;     /* whether the damping is that of the position's own velocity; else that of x_pb */
     double T_s;             /* s */
     hsep_disturbed before;  /* the window that comes next */
@@ -38,27 +46,30 @@ typedef struct {
     uint64_t tried;         /* and after the samples that were tried last */
 } hsep_disturbances;
 
-HSEP_ASSERT_WORDS(hsep_disturbed, 13);
-HSEP_ASSERT_WORDS(hsep_disturbances, 33);
+HSEP_ASSERT_WORDS(hsep_disturbed, 15);
+HSEP_ASSERT_WORDS(hsep_disturbances, 40);
 
-/* Features for the largest lag q. */
-HSEP_API uint64_t hsep_disturbances_n(uint64_t q);
+/* Disturbances with a period, or without one, 0. */
+HSEP_API uint64_t hsep_disturbances_count(double period);
+
+/* Features for the largest lag q, and a period or none, 0. */
+HSEP_API uint64_t hsep_disturbances_n(uint64_t q, double period);
 
 /* Effect that a feature may have, relative to the largest. */
 HSEP_API double hsep_disturbances_share(const hsep_disturbances *self, uint64_t feature);
 
 /* Bytes of the block, counted in double so that no size can overflow. */
-HSEP_API double hsep_disturbances_size(const hsep_predictor_settings *settings, uint64_t n_modes);
+HSEP_API double hsep_disturbances_size(const hsep_predictor_settings *settings, double period, uint64_t n_modes);
 
-/* Fill the block, at rest. modes: (n_modes,); of_motion: whether the damping is that of the position's own velocity:
- * behind a compensator x_pb turns with every change of the command, and is far from the motion. */
+/* Fill the block, at rest at start, m. modes: (n_modes,); of_motion: whether the damping is that of the position's own
+ * velocity: behind a compensator x_pb turns with every change of the command, and is far from the motion. */
 HSEP_API void hsep_disturbances_init(
-    hsep_disturbances *self, const hsep_predictor_settings *settings, const hsep_mode modes[], uint64_t n_modes,
-    int of_motion);
+    hsep_disturbances *self, const hsep_predictor_settings *settings, double period, const hsep_mode modes[],
+    uint64_t n_modes, int of_motion, double start);
 
 /* Whether a block, in any alignment, is one that hsep_disturbances_init with these parameters began. */
 HSEP_API int hsep_disturbances_valid(
-    const void *block, const hsep_predictor_settings *settings, uint64_t n_modes, int of_motion);
+    const void *block, const hsep_predictor_settings *settings, double period, uint64_t n_modes, int of_motion);
 
 /* Begin again, at rest but for a motion that went on as the n samples begin, (n,) m each. */
 HSEP_API void hsep_disturbances_restart(hsep_disturbances *self, const double x_d[], const double x_pb[], uint64_t n);
@@ -66,21 +77,23 @@ HSEP_API void hsep_disturbances_restart(hsep_disturbances *self, const double x_
 /* Largest magnitude of the commanded velocity over the n samples that come next, m/s. x_d: (n,), m, newest first. */
 HSEP_API double hsep_disturbances_peak_velocity(const hsep_disturbances *self, const double x_d[], uint64_t n);
 
-/* Fill the rows of the n samples that come next, (n, self->n), sample after sample, but for stiffness and damping; may
- * be tried again with others. velocity_scale: m/s, 0 before any motion. Cost: 6 tanh and 9 (6 n_modes) multiply-adds a
- * sample. */
+/* Fill the rows of the n samples that come next, (n, self->n), sample after sample, but for those that
+ * hsep_disturbances_motion fills; may be tried again with others. velocity_scale: m/s, 0 before any motion. Cost: 6
+ * tanh and 9 (6 n_modes) multiply-adds a sample. */
 HSEP_API void hsep_disturbances_command(
     hsep_disturbances *self, const double x_d[], const double x_pb[], uint64_t n, double velocity_scale, double rows[]);
 
-/* Fill stiffness and damping of these samples in the rows, which act at the position x, (n,), m; may be tried again. */
+/* Fill stiffness, damping and what repeats of these samples in the rows, which act at the position x, (n,), m; may be
+ * tried again. */
 HSEP_API void hsep_disturbances_motion(
     hsep_disturbances *self, const double x_pb[], const double x[], uint64_t n, double rows[]);
 
 /* End the window, which are the samples that were tried last. */
 HSEP_API void hsep_disturbances_end(hsep_disturbances *self);
 
-/* Slopes of the disturbances at these samples, (n, HSEP_N_DISTURBANCES), sample after sample: of each friction with the
- * commanded velocity, s/m, of the stiffness with the position, m, of the damping with its velocity, m/s. reach: half of
+/* Slopes of the disturbances at these samples, (n, self->count), sample after sample: of each friction with the
+ * commanded velocity, s/m, of the stiffness with the position, m, of the damping with its velocity, m/s, and of what
+ * repeats with the position, 1/m. reach: half of
  * the change of velocity that the friction's slope is taken over, relative to the velocity scale; 0: the tangent. */
 HSEP_API void hsep_disturbances_slopes(
     const hsep_disturbances *self, const double x_d[], const double x_pb[], const double x[], uint64_t n,

@@ -5,7 +5,6 @@
 #include <string.h>
 
 #define LINEARISED_GAINS 6 /* signals of a candidate in gains: three of the disturbances, three of their differences */
-#define LINEARISED_FRICTION (HSEP_N_DISTURBANCES - 2)
 
 /* Set what follows from the parameters; return the bytes of the block. */
 static double linearised_lay_out(hsep_linearised *self, const hsep_trusted_parameters *parameters)
@@ -14,7 +13,8 @@ static double linearised_lay_out(hsep_linearised *self, const hsep_trusted_param
     const double filter = hsep_physics_size(parameters->n_modes, parameters->settings->dead_time);
     double end = HSEP_WORDS(hsep_linearised);
     self->n = parameters->preview;
-    self->slopes = hsep_take(&end, n * HSEP_N_DISTURBANCES);
+    self->count = hsep_disturbances_count(parameters->trust->period);
+    self->slopes = hsep_take(&end, n * (double)self->count);
     self->gains = hsep_take(&end, n * HSEP_N_CANDIDATES * LINEARISED_GAINS);
     self->shrink = hsep_take(&end, n * HSEP_N_CANDIDATES);
     self->passed = hsep_take(&end, n * HSEP_N_CANDIDATES);
@@ -54,23 +54,30 @@ HSEP_API int hsep_linearised_valid(const void *block, const hsep_trusted_paramet
 }
 
 /* Place of the weights of the disturbances among those of a candidate. */
-static uint64_t linearised_first(const hsep_trusted *model) { return model->n_static - 2 * HSEP_N_DISTURBANCES; }
+static uint64_t linearised_first(const hsep_linearised *self, const hsep_trusted *model)
+{
+    return model->n_static - 2 * self->count;
+}
 
 /* What the slopes give of a change, by the weights of a candidate. gains: (6, n). */
 static void linearised_gains(const hsep_linearised *self, const double weights[], double gains[])
 {
     const double *slopes = hsep_at_const(self, self->slopes);
     const uint64_t n = self->n;
-    for (uint64_t k = 0; k < n; k++, slopes += HSEP_N_DISTURBANCES) {
+    for (uint64_t k = 0; k < n; k++, slopes += self->count) {
         for (uint64_t part = 0; part < 2; part++) { /* the disturbances, their differences */
-            const double *w = weights + part * HSEP_N_DISTURBANCES;
+            const double *w = weights + part * self->count;
             double *gain = gains + 3 * part * n + k, friction = 0.0;
-            for (uint64_t i = 0; i < LINEARISED_FRICTION; i++) {
+            double of_position = w[HSEP_DISTURBANCES_STIFFNESS] * slopes[HSEP_DISTURBANCES_STIFFNESS];
+            for (uint64_t i = 0; i < HSEP_DISTURBANCES_FRICTION; i++) {
                 friction += slopes[i] * w[i];
             }
+            for (uint64_t i = HSEP_DISTURBANCES_PERIODIC; i < self->count; i++) {
+                of_position += w[i] * slopes[i];
+            }
             gain[0] = friction;
-            gain[n] = w[LINEARISED_FRICTION] * slopes[LINEARISED_FRICTION];
-            gain[2 * n] = w[LINEARISED_FRICTION + 1] * slopes[LINEARISED_FRICTION + 1];
+            gain[n] = of_position;
+            gain[2 * n] = w[HSEP_DISTURBANCES_DAMPING] * slopes[HSEP_DISTURBANCES_DAMPING];
         }
     }
 }
@@ -95,7 +102,7 @@ HSEP_API void hsep_linearised_at(
     hsep_linearised *self, hsep_trusted *model, const double x_d[], const double x_pb[], const double passed[],
     double reach)
 {
-    const uint64_t n = self->n, first = linearised_first(model);
+    const uint64_t n = self->n, first = linearised_first(self, model);
     hsep_disturbances_slopes(
         hsep_trusted_disturbances(model), x_d, x_pb, hsep_at(model, model->x), n, model->forecast_scale, reach,
         hsep_at(self, self->slopes));
@@ -139,7 +146,7 @@ static void linearised_run(
     double *run = hsep_at(self, self->run);
     for (uint64_t u = 0; u < count; u++) {
         double *e = run + (count - 1 - u);
-        *e = drive[u] + own[u] + hsep_dot(lag_weights, e + 1, u < candidate->p ? u : candidate->p);
+        *e = hsep_recur(drive[u] + own[u], lag_weights, e + 1, u < candidate->p ? u : candidate->p);
         column[u] += shrink[u] * *e;
     }
 }

@@ -15,10 +15,11 @@
 #include <stdint.h>
 
 typedef struct {
-    uint64_t n; /* samples of the preview */
+    uint64_t n;     /* samples of the preview */
+    uint64_t count; /* disturbances */
     /* Offsets in doubles from the beginning of the struct; signals of each candidate behind each other, oldest first */
-    uint64_t slopes;  /* (n, HSEP_N_DISTURBANCES) slopes of the disturbances, sample after sample */
-    uint64_t gains;   /* (HSEP_N_CANDIDATES, 6, n) what friction, stiffness and damping give of changes of v_d, x and v,
+    uint64_t slopes;  /* (n, count) slopes of the disturbances, sample after sample */
+    uint64_t gains;   /* (HSEP_N_CANDIDATES, 6, n) what friction, position and damping give of changes of v_d, x and v,
                        * the disturbances themselves and then their differences */
     uint64_t shrink;  /* (HSEP_N_CANDIDATES, n) part of each candidate in the blend */
     uint64_t passed;  /* (HSEP_N_CANDIDATES, n) what the features of x_pb give of a change */
@@ -28,7 +29,7 @@ typedef struct {
     uint64_t filter;  /* and for one change */
 } hsep_linearised;
 
-HSEP_ASSERT_WORDS(hsep_linearised, 9);
+HSEP_ASSERT_WORDS(hsep_linearised, 10);
 
 /* Bytes of the block, counted in double so that no size can overflow. */
 HSEP_API double hsep_linearised_size(const hsep_trusted_parameters *parameters);

@@ -86,6 +86,8 @@ HSEP_API void hsep_discretise(hsep_discrete_mode *mode, const hsep_mode *continu
     mode->s[0] = mode->s[1] = 0.0;
 }
 
+#define PHYSICS_TOGETHER 64 /* samples whose response is computed mode by mode */
+
 /* Set what follows from the parameters; return the bytes of the block. */
 static double physics_lay_out(hsep_physics *self, uint64_t n_modes, uint64_t dead_time)
 {
@@ -151,28 +153,45 @@ HSEP_API void hsep_physics_add(hsep_physics *self, const hsep_physics *other)
     }
 }
 
+/* The command that leaves the dead time as another one enters it. */
+static double physics_delay(hsep_physics *self, double u)
+{
+    double *oldest = hsep_at(self, self->ring) + self->oldest;
+    const double delayed = *oldest;
+    *oldest = u;
+    self->oldest = self->oldest + 1 == self->dead_time ? 0 : self->oldest + 1;
+    return delayed;
+}
+
+/* Add the response of one mode to commands u, (n,), its state in registers. */
+static void physics_respond(hsep_discrete_mode *m, const double *restrict u, double *restrict x_pb, size_t n)
+{
+    const double a00 = m->A[0], a01 = m->A[1], a10 = m->A[2], a11 = m->A[3], b0 = m->b[0], b1 = m->b[1];
+    const double c0 = m->c[0], c1 = m->c[1], d = m->d;
+    double s0 = m->s[0], s1 = m->s[1];
+    for (size_t k = 0; k < n; k++) {
+        /* x_pb = c s + d u */
+        x_pb[k] += c0 * s0 + c1 * s1 + d * u[k];
+        /* s := A s + b u */
+        const double next = a00 * s0 + a01 * s1 + b0 * u[k];
+        s1 = a10 * s0 + a11 * s1 + b1 * u[k];
+        s0 = next;
+    }
+    m->s[0] = s0;
+    m->s[1] = s1;
+}
+
 HSEP_API void hsep_physics_forced_response(hsep_physics *self, const double x_d[], double x_pb[], size_t n)
 {
-    hsep_discrete_mode *modes = physics_modes(self);
-    double *ring = hsep_at(self, self->ring);
-    for (size_t k = 0; k < n; k++) {
-        double u = x_d[k];
-        if (self->dead_time > 0) {
-            const double delayed = ring[self->oldest];
-            ring[self->oldest] = u;
-            u = delayed;
-            self->oldest = self->oldest + 1 == self->dead_time ? 0 : self->oldest + 1;
+    double u[PHYSICS_TOGETHER]; /* x_pb may be x_d */
+    for (size_t first = 0; first < n; first += PHYSICS_TOGETHER) {
+        const size_t count = n - first < PHYSICS_TOGETHER ? n - first : PHYSICS_TOGETHER;
+        for (size_t k = 0; k < count; k++) {
+            u[k] = self->dead_time > 0 ? physics_delay(self, x_d[first + k]) : x_d[first + k];
         }
-        double sum = 0.0;
+        memset(x_pb + first, 0, count * sizeof(double));
         for (uint64_t i = 0; i < self->n_modes; i++) {
-            hsep_discrete_mode *m = &modes[i];
-            const double s0 = m->s[0], s1 = m->s[1];
-            /* x_pb = c s + d u */
-            sum += m->c[0] * s0 + m->c[1] * s1 + m->d * u;
-            /* s := A s + b u */
-            m->s[0] = m->A[0] * s0 + m->A[1] * s1 + m->b[0] * u;
-            m->s[1] = m->A[2] * s0 + m->A[3] * s1 + m->b[1] * u;
+            physics_respond(&physics_modes(self)[i], u, x_pb + first, count);
         }
-        x_pb[k] = sum;
     }
 }

@@ -51,6 +51,13 @@ static void predictor_learn(hsep_predictor *self, uint64_t i)
     hsep_regression_fold(hsep_predictor_regression(self));
 }
 
+/* Whether the work for a comparison of the window is done with its sample i: the last one that does not end it, when a
+ * compensator has planned. */
+static int predictor_doubts(const hsep_predictor *self, uint64_t i)
+{
+    return self->trusted && i + 2 == (self->Np > 2 ? self->Np : 2);
+}
+
 HSEP_API int hsep_predictor_take_in(hsep_predictor *self, double x_d_ahead, double x_meas)
 {
     const uint64_t i = self->k % self->Np, j = self->n - 1 - i, late = self->late;
@@ -61,6 +68,9 @@ HSEP_API int hsep_predictor_take_in(hsep_predictor *self, double x_d_ahead, doub
     hsep_at(self, self->past_e)[j] = x_meas - self->start - hsep_at(self, self->past_x)[j]; /* e_pb = x - x_pb */
     if (self->trusted) {
         hsep_trusted_measure(hsep_predictor_trusted(self), i, x_meas - self->start);
+    }
+    if (predictor_doubts(self, i)) {
+        hsep_trusted_doubt(hsep_predictor_trusted(self), hsep_at(self, self->past_e) + self->n);
     }
     if (predictor_guard(self, x_meas, x_pb)) {
         predictor_learn(self, i);

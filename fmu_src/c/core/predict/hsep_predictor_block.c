@@ -118,12 +118,12 @@ HSEP_API void hsep_predictor_init(hsep_predictor *self, const hsep_predictor_par
     hsep_physics_init(
         hsep_predictor_physics(self), parameters->modes, parameters->n_modes, parameters->settings.dead_time,
         parameters->settings.T_s, (hsep_hold)parameters->settings.input_hold);
-    const double noise_std = parameters->trust.noise_std;
     hsep_uncertainty_init(
-        hsep_predictor_uncertainty(self), self->Np, self->n, fmax(parameters->settings.lambda, noise_std * noise_std));
+        hsep_predictor_uncertainty(self), self->Np, self->n,
+        hsep_uncertainty_first_variance(parameters->settings.lambda, parameters->trust.noise_std));
     if (self->trusted) {
         const hsep_trusted_parameters trusted = hsep_predictor_trusted_parameters(parameters);
-        hsep_trusted_init(hsep_predictor_trusted(self), &trusted);
+        hsep_trusted_init(hsep_predictor_trusted(self), &trusted, start);
         if (self->motion) {
             const hsep_start_parameters motion = predictor_start_parameters(parameters);
             hsep_start_init((hsep_start *)hsep_at(self, self->motion), &motion);

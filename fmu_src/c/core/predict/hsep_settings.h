@@ -32,7 +32,9 @@
     /* standard deviation of the measurement noise, with trust; 0: estimated, m */ \
     SETTING(double, noise_std) \
     /* time after which samples have lost 63 % of their weight, with trust; 0: never, s */ \
-    SETTING(double, forgetting)
+    SETTING(double, forgetting) \
+    /* period of a disturbance that repeats with the position (cogging, screw pitch), with trust; 0: none, m */ \
+    SETTING(double, period)
 
 #define HSEP_COMPENSATOR_SETTINGS(SETTING) \
     /* velocity over which friction changes its sign, for features of the reference; 0: none of them, m/s */ \

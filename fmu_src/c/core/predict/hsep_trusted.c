@@ -133,6 +133,42 @@ static double trusted_first_variance(const hsep_trusted *self, const double e[])
     return sum / (double)(self->Np - 3) / 20.0;
 }
 
+HSEP_API void hsep_trusted_doubt(hsep_trusted *self, const double past[])
+{
+    hsep_change *change = hsep_trusted_change(self);
+    change->doubted = 0;
+    if (change->active && self->predicted && change->n_after > 0.0) {
+        hsep_change_predict(
+            change, hsep_trusted_candidate(self, 1), hsep_at(self, self->scales), hsep_trusted_least_variance(self),
+            hsep_at(self, self->rows), past, &self->scale);
+    }
+}
+
+/* Sum of squared errors of a prediction, of 0 if missing, over the accepted samples. */
+static double trusted_error(const hsep_trusted *self, const double e[], const double predicted[])
+{
+    const double *accepted = hsep_at_const(self, self->accepted);
+    double sum = 0.0;
+    for (uint64_t j = 0; j < self->Np; j++) {
+        const double error = e[j] - (predicted != NULL ? predicted[j] : 0.0);
+        sum += accepted[j] * error * error;
+    }
+    return sum;
+}
+
+/* Whether earlier runs had better have less weight. */
+static int trusted_is_doubted(hsep_trusted *self, const double e[])
+{
+    hsep_change *change = hsep_trusted_change(self);
+    const double *all = hsep_candidate_prediction(hsep_trusted_candidate(self, 1));
+    const double *less = hsep_candidate_prediction(hsep_change_candidate(change));
+    const int compared = change->active && change->doubted;
+    change->doubted = 0;
+    return compared &&
+           hsep_change_is_doubted(
+               change, trusted_error(self, e, all), trusted_error(self, e, less), trusted_error(self, e, NULL));
+}
+
 /* Whether the plant of this run is another one than that of earlier runs. */
 static int trusted_has_changed(hsep_trusted *self)
 {
@@ -147,9 +183,12 @@ static int trusted_has_changed(hsep_trusted *self)
 }
 
 /* Forget what earlier runs have taught if the plant has changed, and end the comparison once it is decided. */
-static void trusted_conclude(hsep_trusted *self, int changed)
+static void trusted_conclude(hsep_trusted *self, int changed, int doubted)
 {
     hsep_change *change = hsep_trusted_change(self);
+    if (doubted && !changed) {
+        self->n_rows = hsep_change_doubt(change, hsep_trusted_regression(self));
+    }
     if (changed) {
         self->n_rows = hsep_change_keep_after(change, hsep_trusted_regression(self));
         self->scale = (hsep_residual_scale){
@@ -232,7 +271,11 @@ static void trusted_assess(hsep_trusted *self, const double e[], double count)
         }
     }
     products[0][0] = self->hold * self->hold * count;
-    hsep_blend_update(&self->blend, products, scale->largest_square, self->Np, self->n_rows);
+    /* What was larger in earlier runs says nothing of the blend once this one outweighs them. */
+    const hsep_change *change = hsep_trusted_change(self);
+    const int outweighs = change->active && change->n_after > change->n_before;
+    const double largest_square = outweighs ? change->largest_square : scale->largest_square;
+    hsep_blend_update(&self->blend, products, largest_square, self->Np, self->n_rows);
 }
 
 HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const double x_d[], const double x_pb[])
@@ -271,9 +314,10 @@ HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_d[], const d
     if (fold && count > 0.0) {
         trusted_fold(self, e);
         const int changed = trusted_has_changed(self);
-        trusted_judge(self, n_rows, e, !changed);
+        const int doubted = trusted_is_doubted(self, e);
+        trusted_judge(self, n_rows, e, !changed && !doubted);
         trusted_assess(self, e, count);
-        trusted_conclude(self, changed);
+        trusted_conclude(self, changed, doubted);
     }
     memcpy(bridged + self->Np, bridged, (size_t)self->p * sizeof(double)); /* p <= Np: they do not overlap */
 }

@@ -72,13 +72,13 @@ typedef struct {
 HSEP_ASSERT_WORDS(hsep_trusted, 59 + sizeof(hsep_guard) / 8);
 
 /* Features, those without lags first. */
-HSEP_API uint64_t hsep_trusted_n(const hsep_predictor_settings *settings);
+HSEP_API uint64_t hsep_trusted_n(const hsep_predictor_settings *settings, const hsep_trust_settings *trust);
 
 /* Bytes of the block, counted in double so that no size can overflow. */
 HSEP_API double hsep_trusted_size(const hsep_trusted_parameters *parameters);
 
-/* Fill the block, at rest, with nothing learned. */
-HSEP_API void hsep_trusted_init(hsep_trusted *self, const hsep_trusted_parameters *parameters);
+/* Fill the block, at rest at start, m, with nothing learned. */
+HSEP_API void hsep_trusted_init(hsep_trusted *self, const hsep_trusted_parameters *parameters, double start);
 
 /* Whether a block, in any alignment, is one that hsep_trusted_init with these parameters began. */
 HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters *parameters);
@@ -113,9 +113,18 @@ HSEP_API void hsep_trusted_forecast(hsep_trusted *self, const double x_d[], cons
 HSEP_API void hsep_trusted_scale(
     hsep_trusted *self, const double x_d[], const double x_pb[], const double path[], double last_residual);
 
-/* Predict with them. e: (n + p,), m; held: whether variances and shrinking stay those of the last
- * prediction. */
-HSEP_API void hsep_trusted_predict(hsep_trusted *self, const double x_d[], const double x_pb[], double e[], int held);
+/* Predict with them. e: (n + p,), m; varied: samples whose variance is computed, the first ones, while the prediction
+ * of those behind them means nothing yet; 0: variances and shrinking stay those of the last prediction. */
+HSEP_API void hsep_trusted_predict(
+    hsep_trusted *self, const double x_d[], const double x_pb[], double e[], uint64_t varied);
+
+/* Compute the variances of samples first ... last - 1 of that prediction, which the next one may hold. */
+HSEP_API void hsep_trusted_vary(hsep_trusted *self, uint64_t first, uint64_t last);
+
+/* In a warm run: predict the window once more, with less weight of earlier runs, for comparison. It is done after the
+ * beginning of a window, where it is predicted and planned, to spread the work. past: (p,) m, the residuals before the
+ * window. Cost: that of hsep_change_predict. */
+HSEP_API void hsep_trusted_doubt(hsep_trusted *self, const double past[]);
 
 /* Take the measured position of sample k of the window that was predicted, m, relative to the start; NaN: missing. */
 HSEP_API void hsep_trusted_measure(hsep_trusted *self, uint64_t k, double x);

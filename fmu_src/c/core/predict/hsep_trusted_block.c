@@ -22,9 +22,9 @@ HSEP_API hsep_candidate *hsep_trusted_candidate(hsep_trusted *self, uint64_t i)
     return (hsep_candidate *)hsep_at(self, self->candidates[i]);
 }
 
-HSEP_API uint64_t hsep_trusted_n(const hsep_predictor_settings *settings)
+HSEP_API uint64_t hsep_trusted_n(const hsep_predictor_settings *settings, const hsep_trust_settings *trust)
 {
-    return hsep_disturbances_n(settings->q) + settings->p;
+    return hsep_disturbances_n(settings->q, trust->period) + settings->p;
 }
 
 /* Correlation beyond which the penalty of a cautious candidate does not grow: it would learn nothing at all. */
@@ -37,18 +37,24 @@ static hsep_candidate_shape trusted_shape(const hsep_trusted *self, uint64_t can
         self->Np, self->n, self->n_static, candidate > 0 ? self->p : 0, candidate > 1 ? 1.0 : trusted_cautious};
 }
 
+/* The candidate that predicts windows, no more, with less weight of earlier runs. */
+static hsep_candidate_shape trusted_doubtful_shape(const hsep_trusted *self)
+{
+    return (hsep_candidate_shape){self->Np, self->Np, self->n_static, self->p, trusted_cautious};
+}
+
 /* Set what follows from the parameters; return the bytes of the block. */
 static double trusted_lay_out(hsep_trusted *self, const hsep_trusted_parameters *parameters)
 {
     const hsep_predictor_settings *settings = parameters->settings;
     const hsep_trust_settings *trust = parameters->trust;
     const double Np = (double)settings->Np, n = (double)parameters->preview;
-    const double n_static = (double)hsep_disturbances_n(settings->q);
+    const double n_static = (double)hsep_disturbances_n(settings->q, trust->period);
     double end = HSEP_WORDS(hsep_trusted);
     self->Np = settings->Np;
     self->n = parameters->preview;
     self->p = settings->p;
-    self->n_static = hsep_disturbances_n(settings->q);
+    self->n_static = hsep_disturbances_n(settings->q, trust->period);
     self->least_variance = settings->lambda;
     self->effect = trust->effect;
     self->given_variance = trust->noise_std * trust->noise_std;
@@ -62,9 +68,10 @@ static double trusted_lay_out(hsep_trusted *self, const hsep_trusted_parameters 
     self->bridged = hsep_take(&end, Np + (double)settings->p);
     self->disagreement = hsep_take(&end, n);
     self->rows = hsep_take(&end, n * n_static);
-    self->disturbances = hsep_take_block(&end, hsep_disturbances_size(settings, parameters->n_modes));
-    self->regression = hsep_take_block(&end, hsep_regression_size(hsep_trusted_n(settings)));
-    self->change = hsep_take_block(&end, hsep_change_size(self->n_static, hsep_trusted_n(settings)));
+    self->disturbances = hsep_take_block(&end, hsep_disturbances_size(settings, trust->period, parameters->n_modes));
+    self->regression = hsep_take_block(&end, hsep_regression_size(hsep_trusted_n(settings, trust)));
+    const hsep_candidate_shape doubtful = trusted_doubtful_shape(self);
+    self->change = hsep_take_block(&end, hsep_change_size(&doubtful));
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
         const hsep_candidate_shape shape = trusted_shape(self, i);
         self->candidates[i] = hsep_take_block(&end, hsep_candidate_size(&shape));
@@ -77,17 +84,18 @@ HSEP_API double hsep_trusted_size(const hsep_trusted_parameters *parameters)
     return trusted_lay_out(&(hsep_trusted){0}, parameters);
 }
 
-HSEP_API void hsep_trusted_init(hsep_trusted *self, const hsep_trusted_parameters *parameters)
+HSEP_API void hsep_trusted_init(hsep_trusted *self, const hsep_trusted_parameters *parameters, double start)
 {
     memset(self, 0, (size_t)hsep_trusted_size(parameters));
     (void)trusted_lay_out(self, parameters);
     hsep_blend_init(&self->blend);
     hsep_guard_init(&self->guard, 2 * self->Np);
     hsep_disturbances_init(
-        hsep_trusted_disturbances(self), parameters->settings, parameters->modes, parameters->n_modes,
-        parameters->planned);
+        hsep_trusted_disturbances(self), parameters->settings, parameters->trust->period, parameters->modes,
+        parameters->n_modes, parameters->planned, start);
     hsep_regression_init(hsep_trusted_regression(self), self->n_static + self->p, HSEP_NO_PENALTY);
-    hsep_change_init(hsep_trusted_change(self), self->n_static, self->n_static + self->p);
+    const hsep_candidate_shape doubtful = trusted_doubtful_shape(self);
+    hsep_change_init(hsep_trusted_change(self), &doubtful);
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
         const hsep_candidate_shape shape = trusted_shape(self, i);
         hsep_candidate_init(hsep_trusted_candidate(self, i), &shape);
@@ -99,12 +107,13 @@ HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters
     hsep_trusted got;
     memcpy(&got, block, sizeof got);
     (void)trusted_lay_out(&got, parameters); /* changes nothing where it is sound */
-    int sound =
-        memcmp(&got, block, sizeof got) == 0 && got.predicted <= 1 && got.guard.patience == 2 * got.Np &&
-        hsep_disturbances_valid(
-            hsep_at_bytes(block, got.disturbances), parameters->settings, parameters->n_modes, parameters->planned) &&
-        hsep_regression_valid(hsep_at_bytes(block, got.regression), got.n_static + got.p) &&
-        hsep_change_valid(hsep_at_bytes(block, got.change), got.n_static, got.n_static + got.p);
+    const hsep_candidate_shape doubtful = trusted_doubtful_shape(&got);
+    int sound = memcmp(&got, block, sizeof got) == 0 && got.predicted <= 1 && got.guard.patience == 2 * got.Np &&
+                hsep_disturbances_valid(
+                    hsep_at_bytes(block, got.disturbances), parameters->settings, parameters->trust->period,
+                    parameters->n_modes, parameters->planned) &&
+                hsep_regression_valid(hsep_at_bytes(block, got.regression), got.n_static + got.p) &&
+                hsep_change_valid(hsep_at_bytes(block, got.change), &doubtful);
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
         const void *candidate = hsep_at_bytes(block, got.candidates[i]);
         const hsep_candidate_shape shape = trusted_shape(&got, i);

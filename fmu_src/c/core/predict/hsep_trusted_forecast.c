@@ -76,28 +76,28 @@ HSEP_API void hsep_trusted_scale(
 }
 
 /* Predict by the candidates, whose rows hold the commands and stiffness and damping at x_pb. past: (p,), m. */
-static void trusted_candidates(hsep_trusted *self, const double x_pb[], const double past[], int held)
+static void trusted_candidates(hsep_trusted *self, const double x_pb[], const double past[], uint64_t varied)
 {
     double *x = hsep_at(self, self->x), *rows = hsep_at(self, self->rows);
     hsep_candidate *first = hsep_trusted_candidate(self, 0);
     /* The stiffness acts at the position, which the physics model alone does not give well enough. */
-    hsep_candidate_predict(first, rows, past, &self->scale, held);
+    hsep_candidate_predict(first, rows, past, &self->scale, varied > 0 ? self->n : 0);
     for (uint64_t j = 0; j < self->n; j++) {
         x[j] = x_pb[j] + hsep_at(first, first->e_h)[j];
     }
     hsep_disturbances_motion(hsep_trusted_disturbances(self), x_pb, x, self->n, rows);
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
-        hsep_candidate_predict(hsep_trusted_candidate(self, i), rows, past, &self->scale, held);
+        hsep_candidate_predict(hsep_trusted_candidate(self, i), rows, past, &self->scale, varied);
     }
 }
 
 /* e: the blend of the candidates, which have predicted. */
-static void trusted_blend(hsep_trusted *self, const double x_pb[], double e[], int held)
+static void trusted_blend(hsep_trusted *self, const double x_pb[], double e[], uint64_t varied)
 {
     const double *weights = self->blend.weights;
     double *disagreement = hsep_at(self, self->disagreement);
     if (self->predicted) {
-        trusted_candidates(self, x_pb, e + self->n, held);
+        trusted_candidates(self, x_pb, e + self->n, varied);
     }
     for (uint64_t j = 0; j < self->n; j++) {
         double square = weights[0] * self->hold * self->hold;
@@ -112,17 +112,25 @@ static void trusted_blend(hsep_trusted *self, const double x_pb[], double e[], i
     }
 }
 
-HSEP_API void hsep_trusted_predict(hsep_trusted *self, const double x_d[], const double x_pb[], double e[], int held)
+HSEP_API void hsep_trusted_predict(
+    hsep_trusted *self, const double x_d[], const double x_pb[], double e[], uint64_t varied)
 {
     hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
     double *rows = hsep_at(self, self->rows);
     hsep_disturbances_command(disturbances, x_d, x_pb, self->n, self->forecast_scale, rows);
     hsep_disturbances_motion(disturbances, x_pb, x_pb, self->n, rows);
-    trusted_blend(self, x_pb, e, held);
+    trusted_blend(self, x_pb, e, varied);
+}
+
+HSEP_API void hsep_trusted_vary(hsep_trusted *self, uint64_t first, uint64_t last)
+{
+    for (uint64_t i = 0; self->predicted && i < HSEP_N_CANDIDATES; i++) {
+        hsep_candidate_vary(hsep_trusted_candidate(self, i), hsep_at(self, self->rows), &self->scale, first, last);
+    }
 }
 
 HSEP_API void hsep_trusted_forecast(hsep_trusted *self, const double x_d[], const double x_pb[], double e[])
 {
     hsep_trusted_scale(self, x_d, x_pb, NULL, e[self->n]);
-    trusted_blend(self, x_pb, e, 0); /* the rows are those of the scales */
+    trusted_blend(self, x_pb, e, self->n); /* the rows are those of the scales */
 }

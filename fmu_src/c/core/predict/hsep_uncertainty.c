@@ -7,9 +7,19 @@
 #include <string.h>
 
 /* First variance of the error relative to that of its causes: differences of x_pb and of e_h, servo error, change since
- * the last residual, disagreement; bounds relative to it. */
-static const double uncertainty_shares[HSEP_N_COMPONENTS] = {0.0, 0.0, 4.0, 9.0, 0.01, 0.3, 2.0};
+ * the last residual, disagreement, slow motion; bounds relative to it. */
+static const double uncertainty_shares[HSEP_N_COMPONENTS] = {0.0, 0.0, 4.0, 9.0, 0.01, 0.3, 2.0, 0.05};
 static const double uncertainty_share_least = 1e-9, uncertainty_share_most = 1e4;
+
+/* Components that are felt for a while, as a motion that is slow; time constant of their averaging, in windows. */
+static const int uncertainty_felt[] = {2, 3, 6, 7};
+static const double uncertainty_felt_for = 0.2;
+
+/* Velocity relative to the largest one so far, below which motion is slow. */
+static const double uncertainty_slow = 0.04;
+
+/* First variance of a noise that is not known, relative to lambda. */
+static const double uncertainty_unknown_noise = 25.0;
 
 /* First variance of the growth, relative to the mean square error of the first window. */
 static const double uncertainty_growth = 0.3;
@@ -24,17 +34,21 @@ static const double uncertainty_outlying = 16.0, uncertainty_vanishing = 0.01;
 static const double uncertainty_recent = 0.9;
 
 /* The same of evidence; evidence that the first values count for, in windows; step of expectation maximisation. */
-static const double uncertainty_memory = 0.95, uncertainty_first_evidence = 0.2, uncertainty_step = 6.0;
+static const double uncertainty_memory = 0.97, uncertainty_first_evidence = 0.2, uncertainty_step = 6.0;
 
-/* Standard deviations that a normal error exceeds with this probability. */
-static const double uncertainty_z = 1.645, uncertainty_beyond = 0.1;
+/* Standard deviations, and the probability that a normal error exceeds them. */
+static const double uncertainty_levels[][2] = {{0.6745, 0.5}, {1.645, 0.1}, {1.96, 0.05}};
 
 /* Standard deviations, and the share of a window's errors beyond them from which on all variances are too small by
  * their square: the machine or the sensor has changed. */
 static const double uncertainty_far = 4.0, uncertainty_far_share = 0.5;
 
-/* Change of ln c from one window to the next per share of errors; bound on c and 1/c. */
-static const double uncertainty_factor_rate = 0.2, uncertainty_factor_max = 4.0;
+/* Change of ln c in the middle of a window from one window to the next per share of errors; bound on it. */
+static const double uncertainty_factor_rate = 0.03, uncertainty_factor_max = 4.0;
+
+/* c at the end of a window relative to its beginning: the first one, the change of its logarithm per share of errors,
+ * weighted by their distance from the middle, and bound. */
+static const double uncertainty_ratio = 1.2, uncertainty_ratio_rate = 0.8, uncertainty_ratio_max = 16.0;
 
 /* Set what follows from the parameters; return the bytes of the block. */
 static double uncertainty_lay_out(hsep_uncertainty *self, uint64_t Np, uint64_t n)
@@ -53,13 +67,19 @@ HSEP_API double hsep_uncertainty_size(uint64_t Np, uint64_t n)
     return uncertainty_lay_out(&(hsep_uncertainty){0}, Np, n);
 }
 
+HSEP_API double hsep_uncertainty_first_variance(double lambda, double noise_std)
+{
+    return noise_std > 0.0 ? fmax(lambda, noise_std * noise_std)
+                           : fmin(uncertainty_unknown_noise * lambda, HSEP_PREDICTION_MAX);
+}
+
 HSEP_API void hsep_uncertainty_init(hsep_uncertainty *self, uint64_t Np, uint64_t n, double variance)
 {
     memset(self, 0, (size_t)hsep_uncertainty_size(Np, n));
     (void)uncertainty_lay_out(self, Np, n);
     memcpy(self->theta, uncertainty_shares, sizeof self->theta);
     self->theta[0] = variance;
-    self->factor = 1.0;
+    self->factor = self->ratio = 1.0;
 }
 
 HSEP_API int hsep_uncertainty_valid(const void *block, uint64_t Np, uint64_t n)
@@ -67,7 +87,8 @@ HSEP_API int hsep_uncertainty_valid(const void *block, uint64_t Np, uint64_t n)
     hsep_uncertainty got;
     memcpy(&got, block, sizeof got);
     (void)uncertainty_lay_out(&got, Np, n); /* changes nothing where it is sound */
-    return memcmp(&got, block, sizeof got) == 0 && hsep_uncertainty_sound(&got);
+    return memcmp(&got, block, sizeof got) == 0 && hsep_uncertainty_sound(&got) && got.fastest_ahead >= 0.0 &&
+           got.fastest_ahead <= HSEP_PREDICTION_MAX;
 }
 
 HSEP_API double *hsep_uncertainty_learned(hsep_uncertainty *self) { return self->theta; }
@@ -76,7 +97,8 @@ HSEP_API int hsep_uncertainty_sound(const hsep_uncertainty *self)
 {
     double learned[HSEP_N_UNCERTAINTY];
     memcpy(learned, (const char *)self + sizeof self->Np, sizeof learned);
-    int sound = self->factor >= 1.0 / uncertainty_factor_max && self->factor <= uncertainty_factor_max;
+    int sound = self->factor >= 1.0 / uncertainty_factor_max && self->factor <= uncertainty_factor_max &&
+                self->ratio >= 1.0 / uncertainty_ratio_max && self->ratio <= uncertainty_ratio_max;
     for (int i = 0; i < HSEP_N_UNCERTAINTY; i++) {
         const double share = i < HSEP_N_COMPONENTS ? uncertainty_shares[i] : 0.0;
         const double least = uncertainty_share_least * share;
@@ -99,14 +121,20 @@ static double uncertainty_square(double value)
     return magnitude * magnitude;
 }
 
+/* Place of sample k in a usual window, from -1/2 at its beginning to 1/2 at its end. */
+static double uncertainty_from_middle(const hsep_uncertainty *self, uint64_t k)
+{
+    return fmin(((double)k + 0.5) / (double)self->Np, 1.0) - 0.5;
+}
+
 HSEP_API void hsep_uncertainty_predict(
     hsep_uncertainty *self, const double x_d[], const double x_pb[], const double e_h[], uint64_t n_physics,
     const double disagreement[])
 {
     const uint64_t n = self->n;
-    const double last = e_h[n];
+    const double last = e_h[n], gain = 1.0 / (1.0 + uncertainty_felt_for * (double)self->Np);
     double *published = hsep_at(self, self->e_h), *std = hsep_at(self, self->std);
-    double *f = hsep_at(self, self->components);
+    double *f = hsep_at(self, self->components), fastest = uncertainty_square(self->fastest);
     for (uint64_t j = 0; j < n; j++) {
         published[j] = n - 1 - j < n_physics ? 0.0 : e_h[j];
     }
@@ -120,29 +148,64 @@ HSEP_API void hsep_uncertainty_predict(
         f[4] = uncertainty_square(x_d[j] - x_pb[j]);
         f[5] = uncertainty_square(published[j] - last);
         f[6] = disagreement == NULL || n - 1 - j < n_physics ? 0.0 : disagreement[j];
-        std[j] = fmin(self->factor * sqrt(uncertainty_variance(self, f)), HSEP_PREDICTION_MAX);
     }
+    double felt[HSEP_N_COMPONENTS] = {0.0};
+    for (uint64_t k = 0; k < n; k++) { /* in time, from the last measured sample on */
+        f -= HSEP_N_COMPONENTS;
+        fastest = fmax(fastest, f[2]); /* of the samples so far: a compensator still plans those after */
+        const double slow = uncertainty_slow * uncertainty_slow * fastest;
+        f[7] = self->recent * slow / (slow + f[2] + uncertainty_least);
+        for (size_t i = 0; i < sizeof uncertainty_felt / sizeof *uncertainty_felt; i++) {
+            const int place = uncertainty_felt[i];
+            felt[place] += gain * (f[place] - felt[place]);
+            f[place] = felt[place];
+        }
+        const double c = self->factor * pow(self->ratio, uncertainty_from_middle(self, k));
+        std[n - 1 - k] = fmin(c * sqrt(uncertainty_variance(self, f)), HSEP_PREDICTION_MAX);
+    }
+    self->fastest_ahead = sqrt(fastest);
 }
 
-/* Follow the size of the residuals and the share of errors beyond the interval; after the first window, begin with its
- * mean square error. The sums are those of count samples. */
-static void uncertainty_follow(
-    hsep_uncertainty *self, double count, double squares, double errors, double beyond, double far)
+/* What is summed over the samples that count. */
+typedef struct {
+    double count, squares, errors, far; /* samples; squares of residuals and errors, m2; errors far beyond */
+    double missed, missed_late;         /* beyond the intervals, more than there may be; weighted by their place */
+} uncertainty_sums;
+
+/* Add a sample that is measured. */
+static void uncertainty_add(uncertainty_sums *sums, double e, double error, double std, double place)
 {
-    const double mean_square = fmin(squares / count, HSEP_PREDICTION_MAX);
+    double missed = 0.0;
+    for (size_t i = 0; i < sizeof uncertainty_levels / sizeof *uncertainty_levels; i++) {
+        missed += (fabs(error) / std > uncertainty_levels[i][0] ? 1.0 : 0.0) - uncertainty_levels[i][1];
+    }
+    sums->count += 1.0;
+    sums->squares += e * e;
+    sums->errors += error * error;
+    sums->far += fabs(error) / std > uncertainty_far ? 1.0 : 0.0;
+    sums->missed += missed;
+    sums->missed_late += missed * place;
+}
+
+/* Follow the size of the residuals and the shares of errors beyond the intervals; after the first window, begin with
+ * its mean square error. */
+static void uncertainty_follow(hsep_uncertainty *self, const uncertainty_sums *sums)
+{
+    const double count = sums->count, mean_square = fmin(sums->squares / count, HSEP_PREDICTION_MAX);
+    self->fastest = self->fastest_ahead;
     if (self->recent > 0.0) {
-        if (far / count > uncertainty_far_share) {
-            for (int i = 0; i < HSEP_N_COMPONENTS; i++) {
-                self->theta[i] *= uncertainty_far * uncertainty_far;
-            }
-        } else {
-            const double factor = self->factor * exp(uncertainty_factor_rate * (beyond / count - uncertainty_beyond));
-            self->factor = fmin(fmax(factor, 1.0 / uncertainty_factor_max), uncertainty_factor_max);
+        for (int i = 0; i < HSEP_N_COMPONENTS && sums->far / count > uncertainty_far_share; i++) {
+            self->theta[i] *= uncertainty_far * uncertainty_far;
         }
+        const double factor = self->factor * exp(uncertainty_factor_rate * (sums->missed / count));
+        const double ratio = self->ratio * exp(uncertainty_ratio_rate * (sums->missed_late / count));
+        self->factor = fmin(fmax(factor, 1.0 / uncertainty_factor_max), uncertainty_factor_max);
+        self->ratio = fmin(fmax(ratio, 1.0 / uncertainty_ratio_max), uncertainty_ratio_max);
         self->recent = uncertainty_recent * self->recent + (1.0 - uncertainty_recent) * mean_square;
     } else {
         self->recent = mean_square;
-        self->theta[0] = fmin(errors / count, HSEP_PREDICTION_MAX);
+        self->ratio = uncertainty_ratio;
+        self->theta[0] = fmin(sums->errors / count, HSEP_PREDICTION_MAX);
         self->theta[1] = self->theta[0] * uncertainty_growth;
     }
 }
@@ -169,22 +232,17 @@ HSEP_API void hsep_uncertainty_learn(hsep_uncertainty *self, const double e[], c
     const uint64_t newest = self->n - self->Np; /* place of the last one that is measured */
     const double *e_h = hsep_at(self, self->e_h) + newest, *std = hsep_at(self, self->std) + newest;
     const double *f = hsep_at(self, self->components) + newest * HSEP_N_COMPONENTS;
-    double count = 0.0, squares = 0.0, errors = 0.0, beyond = 0.0, far = 0.0, seen[HSEP_N_COMPONENTS] = {0.0},
-           total[HSEP_N_COMPONENTS] = {0.0};
+    double seen[HSEP_N_COMPONENTS] = {0.0}, total[HSEP_N_COMPONENTS] = {0.0};
+    uncertainty_sums sums = {0};
     for (uint64_t j = 0; j < self->Np; j++) {
         if (accepted == NULL || accepted[j] > 0.0) {
-            const double error = e[j] - e_h[j];
-            count += 1.0;
-            squares += e[j] * e[j];
-            errors += error * error;
-            beyond += fabs(error) / std[j] > uncertainty_z ? 1.0 : 0.0;
-            far += fabs(error) / std[j] > uncertainty_far ? 1.0 : 0.0;
+            uncertainty_add(&sums, e[j], e[j] - e_h[j], std[j], uncertainty_from_middle(self, self->Np - 1 - j));
         }
     }
-    if (!(squares > 0.0)) { /* nothing to learn a scale from */
+    if (!(sums.squares > 0.0)) { /* nothing to learn a scale from */
         return;
     }
-    uncertainty_follow(self, count, squares, errors, beyond, far);
+    uncertainty_follow(self, &sums);
     for (uint64_t j = 0; j < self->Np; j++, f += HSEP_N_COMPONENTS) {
         if (accepted == NULL || accepted[j] > 0.0) {
             const double variance = uncertainty_variance(self, f);

@@ -1,13 +1,15 @@
 /* Uncertainty of a prediction: the variance of its error against the measured position, learned from earlier windows.
  *
- * The variance of a sample is a sum of components, v = sum_i theta_i f_i, each the square of something that errors come
- * with: measurement noise and its growth over the window, wrong timing (the squared differences of x_pb and e_h), a
- * wrong share of the servo error, a change since the last measured residual, candidates that disagree. The standard
- * deviation is c sqrt(v). After each window theta takes a step of expectation maximisation for normal errors of that
- * variance, and c moves until 10 % of all errors are beyond 1.645 standard deviations.
+ * The variance of a sample is a sum of components, v = sum_i theta_i f_i, each the square of something that errors
+ * come with: measurement noise and its growth over the window, wrong timing (the squared differences of x_pb and e_h),
+ * a wrong share of the servo error, a change since the last measured residual, candidates that disagree, slow motion.
+ * What is felt only after it has happened, and for a while, is averaged over the samples before, from the last
+ * measured one on. The standard deviation is c sqrt(v). After each window theta takes a step of expectation
+ * maximisation for normal errors of that variance, and c, which changes exponentially from the beginning to the end of
+ * a window, moves until intervals of 50, 90 and 95 % miss as many errors as they may, together.
  *
  * Signals are kept newest first: sample k of the n that are predicted is at place n - 1 - k. The first Np of them are
- * learned. Memory is one block, without pointers. Reentrant; allocates nothing. Cost of a window: 50 n operations each.
+ * learned. Memory is one block, without pointers. Reentrant; allocates nothing. Cost of a window: 70 n operations each.
  */
 #ifndef HSEP_UNCERTAINTY_H
 #define HSEP_UNCERTAINTY_H
@@ -17,28 +19,35 @@
 
 #include <stdint.h>
 
-#define HSEP_N_COMPONENTS 7
-#define HSEP_N_UNCERTAINTY (2 * HSEP_N_COMPONENTS + 2) /* numbers that are learned, each >= 0 */
+#define HSEP_N_COMPONENTS 8
+#define HSEP_N_UNCERTAINTY (2 * HSEP_N_COMPONENTS + 4) /* numbers that are learned, each >= 0 */
 
 typedef struct {
     uint64_t Np;
     double theta[HSEP_N_COMPONENTS];    /* variances, m2, of noise and growth; those relative to their causes */
     double evidence[HSEP_N_COMPONENTS]; /* windows that each stands on, faded */
-    double factor;                      /* c */
+    double factor;                      /* c in the middle of a window */
+    double ratio;                       /* c at its end relative to that at its beginning */
     double recent;                      /* m2, recent mean square of the residual; 0 before the first window */
+    double fastest;                     /* m, largest change of x_pb from sample to sample in a measured window */
     uint64_t n;                         /* samples that are predicted */
+    double fastest_ahead;               /* m, fastest with those of the predicted window */
     /* Offsets in doubles from the beginning of the struct */
     uint64_t e_h;        /* (n,) m, residual of the window as published */
     uint64_t components; /* (n, HSEP_N_COMPONENTS) m2 but for the first two */
     uint64_t std;        /* (n,) m, standard deviation of the error */
 } hsep_uncertainty;
 
-HSEP_ASSERT_WORDS(hsep_uncertainty, 5 + HSEP_N_UNCERTAINTY);
+HSEP_ASSERT_WORDS(hsep_uncertainty, 6 + HSEP_N_UNCERTAINTY);
 
 /* Bytes of the block, counted in double so that no size can overflow. */
 HSEP_API double hsep_uncertainty_size(uint64_t Np, uint64_t n);
 
-/* Fill the block. variance: of the measurement noise, m2, assumed before the first window is measured. */
+/* Variance of the measurement noise, m2, that is assumed before the first window is measured. lambda: m2; noise_std:
+ * given standard deviation, m, or 0. */
+HSEP_API double hsep_uncertainty_first_variance(double lambda, double noise_std);
+
+/* Fill the block. variance: that first one. */
 HSEP_API void hsep_uncertainty_init(hsep_uncertainty *self, uint64_t Np, uint64_t n, double variance);
 
 /* Whether a block, in any alignment, is one that hsep_uncertainty_init with these parameters began. */

@@ -1,0 +1,44 @@
+"""A drive whose force repeats with the position, as of cogging or a screw's pitch, predicted with its period known."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from benchmarks.periodic import errors, moves, new_predictor
+from hybridsep.base.errors import ParameterError
+from hybridsep.base.settings import PredictorSettings
+from hybridsep.evaluate.backtest import backtest
+from hybridsep.predict.predictor import HybridPredictor
+
+COGGING = 20e-6, 0.005
+"""Amplitude and pitch, m; the noise is 1 µm."""
+
+
+@pytest.mark.parametrize("second_start", [0.0, 0.0313])
+def test_what_repeats_is_predicted_to_the_noise_wherever_a_run_starts(second_start: float) -> None:
+    cold, warm = errors(*COGGING, COGGING[1], (0.0, second_start))
+    without = errors(*COGGING, 0.0, (0.0, second_start))
+    assert cold < 0.7 * without[0]
+    assert warm < 1.2 < 10.0 < without[1]
+
+
+def test_another_period_does_no_harm() -> None:
+    for wrong, without in zip(errors(*COGGING, 0.83 * COGGING[1]), errors(*COGGING, 0.0), strict=True):
+        assert wrong < 1.05 * without
+
+
+def test_a_saved_predictor_goes_on_the_same() -> None:
+    x_d, x = moves(*COGGING, 0.0, 1)
+    first = new_predictor(COGGING[1])
+    backtest(first, x_d[:700], x[:700])
+    second = HybridPredictor.from_bytes(first.to_bytes())
+    np.testing.assert_array_equal(second.predict(x_d[700:800]).x_h, first.predict(x_d[700:800]).x_h)
+
+
+@pytest.mark.parametrize("period", [-1e-3, 1e-12, 1e3, math.nan])
+def test_illegal_periods_are_refused(period: float) -> None:
+    with pytest.raises(ParameterError, match="period must be"):
+        PredictorSettings(period=period)
