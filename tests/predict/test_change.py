@@ -120,6 +120,24 @@ def test_less_weight_is_not_taken_where_the_likelihood_supports_one_plant() -> N
     assert change.is_doubted(4.0, 1.0, 100.0)
 
 
+@pytest.mark.parametrize(
+    ("log_ratio", "errors", "expected"),
+    [
+        (-11.0, (1.0, 1.0, 100.0), True),
+        (-11.0, (1.0, 2.0, 100.0), True),
+        (-11.0, (1.0, 4.0, 100.0), False),  # less weight is worse
+        (-11.0, (60.0, 60.0, 100.0), False),  # there is little to explain
+        (-9.0, (1.0, 1.0, 100.0), False),
+    ],
+)
+def test_earlier_runs_are_doubted_where_two_plants_are_far_likelier_than_one(
+    log_ratio: float, errors: tuple[float, float, float], expected: bool
+) -> None:
+    change = two_runs()
+    change.log_ratio = log_ratio
+    assert change.is_doubted(*errors) == expected
+
+
 def test_doubt_weighs_the_rows_of_earlier_runs() -> None:
     change, weighed = two_runs(), two_runs()
     tried = change.all_rows(DOUBTED).factor
