@@ -13,12 +13,15 @@ from that remainder: there is always a feasible plan, and where no other can be 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.errors import ParameterError, SignalError
 from ..base.settings import CompensatorSettings, PredictorSettings
 from ..base.signals import Array, as_published, as_samples
+from ..predict.disturbances import Disturbance
 from ..predict.linearised import PlanModel
 from ..predict.predictor import HybridPredictor
 from ..predict.trusted import TrustedModel
@@ -298,15 +301,15 @@ class SepCompensator:
         return compensator_blob(self)
 
     @classmethod
-    def from_bytes(cls, blob: bytes) -> SepCompensator:
-        """Return the compensator of :meth:`to_bytes`.
+    def from_bytes(cls, blob: bytes, disturbances: Sequence[Disturbance] = ()) -> SepCompensator:
+        """Return the compensator of :meth:`to_bytes`, given the ``disturbances`` of its predictor.
 
         Raises
         ------
         StateError
-            If the blob is foreign, truncated or of another version.
+            If the blob is foreign, truncated or of another version, or the number of disturbances differs.
         """
-        return compensator_from(cls, blob)
+        return compensator_from(cls, blob, disturbances)
 
 
 def _last_three(before: Array, window: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from ..base.saved import Saved
 from ..base.settings import CompensatorSettings
 from ..base.state import pack, unpack
+from ..predict.disturbances import Disturbance
 from ..predict.predictor import HybridPredictor
 from ..predict.window import Prediction
 from .plan import PendingPlan, SepState
@@ -44,17 +46,19 @@ def compensator_blob(compensator: SepCompensator) -> bytes:
     return pack(_KIND, meta, arrays, {"predictor": compensator.predictor.to_bytes()})
 
 
-def compensator_from(kind: type[SepCompensator], blob: bytes) -> SepCompensator:
-    """Return the compensator of :func:`compensator_blob`.
+def compensator_from(
+    kind: type[SepCompensator], blob: bytes, disturbances: Sequence[Disturbance] = ()
+) -> SepCompensator:
+    """Return the compensator of :func:`compensator_blob`, given its predictor's disturbances of the user's own.
 
     Raises
     ------
     StateError
-        If the blob is foreign, truncated or of another version.
+        If the blob is foreign, truncated or of another version, or the number of disturbances differs.
     """
     saved = Saved(_KIND, *unpack(_KIND, blob))
-    predictor = HybridPredictor.from_bytes(saved.part("predictor"))
-    restored = HybridPredictor.from_bytes(saved.part("predictor"))
+    predictor = HybridPredictor.from_bytes(saved.part("predictor"), disturbances)
+    restored = HybridPredictor.from_bytes(saved.part("predictor"), disturbances)
     with saved.consistent():
         compensator = kind(predictor, CompensatorSettings.from_table(saved.table("settings")))
     compensator.predictor = restored  # the constructor has restarted the other one

@@ -43,8 +43,8 @@ _SUPPORT = 15.0
 then."""
 
 _CONTRADICTION, _EXPLAINED, _NO_WORSE = 10.0, 0.5, 0.5
-"""Log-likelihood ratio of two plants to one from which on earlier runs are doubted in a window of which more than a part
-is explained, unless the evidence is that less weight is worse by more than this."""
+"""Log-likelihood ratio of two plants to one from which on earlier runs are doubted, in a window of which more than this
+part is explained, unless the evidence is that less weight is worse by more than this."""
 
 _SPENT = 1e-6
 """Weight of earlier runs, relative to that they began with, below which there is nothing left of them."""

@@ -3,20 +3,27 @@
 What the physics model misses acts where the command does, so ``e_pb = G_pb d(x, v)``. A feature is ``G_pb`` applied to
 a candidate disturbance ``d``: friction ``tanh(v/v_i)`` over a spread of velocities ``v_i``, stiffness ``x·|x|`` and
 damping ``v·|v|``; where a period is given, ``sin`` and ``cos`` of the position over it, as of cogging or a screw's
-pitch. First differences of the features take up errors of ``G_pb`` in phase. As nothing here depends on the learned
-weights, no recursion can become unstable.
+pitch; and functions of the user's own. First differences of the features take up errors of ``G_pb`` in phase. As
+nothing here depends on the learned weights, no recursion can become unstable.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ..base.errors import SignalError
 from ..base.signals import Array
 from ..model.discrete import DiscreteModel
 
-__all__ = ["LEAST_VELOCITY", "StaticFeatures", "StaticState"]
+__all__ = ["LEAST_VELOCITY", "Disturbance", "StaticFeatures", "StaticState"]
+
+Disturbance: TypeAlias = Callable[[Array, Array], ArrayLike]
+"""Disturbance of the user's own, ``d(x, v)``, in any unit: a number for each position ``x``, m, and commanded velocity
+``v``, m/s, ``(n,)`` each. It knows nothing of other samples."""
 
 _FRICTION_SPREAD = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
 """Velocities ``v_i`` of the friction's change of sign, relative to the velocity scale."""
@@ -26,6 +33,12 @@ _N_FRICTION, _N_LASTING, _N_PERIODIC = len(_FRICTION_SPREAD), len(_FRICTION_SPRE
 
 LEAST_VELOCITY = 1e-200
 """Velocity, m/s, below which a command is at rest: ratios of smaller ones may underflow."""
+
+_OWN_MAX = 1e100
+"""Magnitude that a disturbance of the user's own must not exceed."""
+
+_OWN_REACH = 1e-3
+"""Change of velocity, relative to the velocity scale, that their slope is taken over where it is the tangent."""
 
 _DIFFERENCES = 3
 """Largest order of a difference of ``x_pb``: velocity, acceleration and jerk."""
@@ -64,14 +77,17 @@ class DisturbanceSlopes(NamedTuple):
         Of each friction with the commanded velocity.
     stiffness, damping : (n,) array, m and m/s
         Of ``x·|x|`` with ``x`` and of ``v·|v|`` with ``v``.
-    periodic : (n, 2) or (n, 0) array, 1/m
-        Of ``sin`` and ``cos`` with ``x``.
+    of_position : (n, n_disturbances − 8) array, 1/m
+        Of all others with ``x``.
+    of_velocity : (n, n_own) array, s/m
+        Of the user's own, the last ones, with the commanded velocity.
     """
 
     friction: Array
     stiffness: Array
     damping: Array
-    periodic: Array
+    of_position: Array
+    of_velocity: Array
 
     def change(self, weights: Array, velocity: Array, moved: Array, moved_velocity: Array) -> Array:
         """Return what the disturbances change by, ``(n, m)``, with weights ``(n_disturbances,)``.
@@ -84,9 +100,12 @@ class DisturbanceSlopes(NamedTuple):
         moved, moved_velocity : (n, m) array, m and m/s
             Changes of the position, and of its velocity.
         """
-        of_position = weights[_N_FRICTION] * self.stiffness + self.periodic @ weights[_N_LASTING:]
+        of_position = weights[_N_FRICTION] * self.stiffness + self.of_position @ weights[_N_LASTING:]
+        of_velocity = self.friction @ weights[:_N_FRICTION]
+        if n_own := self.of_velocity.shape[1]:
+            of_velocity = of_velocity + self.of_velocity @ weights[-n_own:]
         return np.asarray(
-            (self.friction @ weights[:_N_FRICTION])[:, None] * velocity
+            of_velocity[:, None] * velocity
             + of_position[:, None] * moved
             + (weights[_N_FRICTION + 1] * self.damping)[:, None] * moved_velocity
         )
@@ -103,6 +122,8 @@ class StaticFeatures:
         Largest lag of ``x_pb``, as that many differences, at most three.
     period : float, m
         Of a disturbance that repeats with the position; 0: none.
+    own : sequence of Disturbance
+        Those of the user's own.
 
     Attributes
     ----------
@@ -117,11 +138,11 @@ class StaticFeatures:
         turns with every change of the command, and is far from the motion.
     """
 
-    def __init__(self, discrete: DiscreteModel, q: int, period: float = 0.0) -> None:
-        self.discrete, self.period, self.origin = discrete, period, 0.0
+    def __init__(self, discrete: DiscreteModel, q: int, period: float = 0.0, own: Sequence[Disturbance] = ()) -> None:
+        self.discrete, self.period, self.own, self.origin = discrete, period, tuple(own), 0.0
         self.damping_of_motion = False
         self.n_differences = min(q, _DIFFERENCES)
-        self.n_disturbances = _N_LASTING + (_N_PERIODIC if period > 0.0 else 0)
+        self.n_disturbances = _N_LASTING + (_N_PERIODIC if period > 0.0 else 0) + len(self.own)
         self.n = 2 + self.n_differences + 2 * self.n_disturbances
         self.shares = np.ones(self.n)
         self.shares[-self.n_disturbances :] = _DIFFERENCE_SHARE
@@ -151,6 +172,11 @@ class StaticFeatures:
             that of the motion.
         velocity_scale : float
             Velocity, m/s, that the friction's change of sign is relative to; 0 before any motion.
+
+        Raises
+        ------
+        SignalError
+            If a disturbance of the user's own does not return a finite number for each sample.
         """
         T_s, first = self.discrete.T_s, 2 + self.n_differences
         v_d = np.diff(x_d, prepend=state.x_d) / T_s
@@ -162,8 +188,11 @@ class StaticFeatures:
         disturbances[:, _N_FRICTION + 1] = v * np.abs(v)
         if self.period > 0.0:
             angle, at_start = self._angle(x), self._angle(0.0)
-            disturbances[:, -2] = np.sin(angle) - np.sin(at_start)
-            disturbances[:, -1] = np.cos(angle) - np.cos(at_start)
+            disturbances[:, _N_LASTING] = np.sin(angle) - np.sin(at_start)
+            disturbances[:, _N_LASTING + 1] = np.cos(angle) - np.cos(at_start)
+        if self.own:
+            at_rest = self._own(np.zeros(1), np.zeros(1))
+            disturbances[:, -len(self.own) :] = self._own(x, v_d) - at_rest
         filtered, filters = self.discrete.forced_response(state.filters, disturbances)
         rows = np.empty((len(x_d), self.n))
         rows[:, 0] = 1.0
@@ -191,12 +220,35 @@ class StaticFeatures:
             friction = (np.tanh((v + half) / spread) - np.tanh((v - half) / spread)) / (2.0 * half)
         else:
             friction = (1.0 - np.tanh(v / spread) ** 2) / spread
-        periodic = np.empty((len(x), 0))
+        of_position = []
         if self.period > 0.0:
             angle, turns = self._angle(x), 2.0 * np.pi / self.period
-            periodic = np.stack((turns * np.cos(angle), -turns * np.sin(angle)), axis=1)
+            of_position += [(turns * np.cos(angle))[:, None], (-turns * np.sin(angle))[:, None]]
+        of_velocity = np.empty((len(x), 0))
+        if self.own:
+            step, half = velocity_scale * self.discrete.T_s, half or _OWN_REACH * velocity_scale
+            of_position.append((self._own(x + step, v_d) - self._own(x - step, v_d)) / (2.0 * step))
+            of_velocity = (self._own(x, v_d + half) - self._own(x, v_d - half)) / (2.0 * half)
         damping = 2.0 * np.abs(self._damped_velocity(state, x_pb, x))
-        return DisturbanceSlopes(friction, 2.0 * np.abs(x), damping, periodic)
+        return DisturbanceSlopes(
+            friction, 2.0 * np.abs(x), damping, np.hstack([np.empty((len(x), 0)), *of_position]), of_velocity
+        )
+
+    def _own(self, x: Array, v: Array) -> Array:
+        """Return the disturbances of the user's own at positions relative to the start, ``(n, n_own)``."""
+        found = np.empty((len(x), len(self.own)))
+        for i, disturbance in enumerate(self.own):
+            name = f"disturbances[{i}]"
+            try:
+                values = np.asarray(disturbance(self.origin + x, v.copy()), dtype=np.float64)
+            except (TypeError, ValueError) as error:
+                raise SignalError(f"{name} must return numbers for arrays x, m, and v, m/s: {error}") from error
+            if values.shape not in ((), x.shape):
+                raise SignalError(f"{name} must return a number for each of {len(x)} samples, got shape {values.shape}")
+            if not np.all(np.abs(values) <= _OWN_MAX):  # NaN too
+                raise SignalError(f"{name} must be finite and at most {_OWN_MAX:g} in magnitude")
+            found[:, i] = values
+        return found
 
     def _angle(self, x: Array | float) -> Array:
         """Return the angle within the period, rad."""

@@ -7,6 +7,7 @@ an ARX recursion from the last ``p`` measured residuals, affine in the command.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from ..base.output import written_whole
 from ..base.settings import PredictorSettings, samples_before
 from ..base.signals import Array, as_measured, as_samples
 from ..model.physics import ModalModel
+from .disturbances import Disturbance
 from .features import FeatureLayout, PastSamples
 from .forecast import FeatureScales
 from .reference_features import ReferenceFeatures
@@ -49,10 +51,24 @@ class HybridPredictor:
     start : float, optional
         Initial position, m, at rest; the first command if left out. Positions are relative to it internally, because
         ridge regression is not invariant to an offset.
+    disturbances : sequence of Disturbance, optional
+        With trust: more candidate disturbances, functions ``d(x, v)`` of positions, m, and commanded velocities, m/s,
+        ``(n,)`` each, in any unit; what they are worth is learned. A compensator follows their slopes, taken over the
+        motion of a sample. They are not part of a saved state, or of an FMU.
+
+    Raises
+    ------
+    ParameterError
+        If disturbances are given without trust, or are not functions.
     """
 
     def __init__(
-        self, model: ModalModel, settings: PredictorSettings | None = None, *, start: float | None = None
+        self,
+        model: ModalModel,
+        settings: PredictorSettings | None = None,
+        *,
+        start: float | None = None,
+        disturbances: Sequence[Disturbance] = (),
     ) -> None:
         self.settings = settings = PredictorSettings() if settings is None else settings
         self.Np, self.T_s = settings.Np, settings.T_s
@@ -61,7 +77,13 @@ class HybridPredictor:
         self.reference_features = ReferenceFeatures(settings.v_friction, self.T_s)
         self.layout = FeatureLayout(settings.p, settings.q, self.reference_features.n)
         self.past = PastSamples(self.layout, self.Np)
-        self.trusted = TrustedModel(settings, self.discrete) if settings.trust else None
+        self.disturbances = tuple(disturbances)
+        if self.disturbances and not settings.trust:
+            raise ParameterError("disturbances are learned with trust = true only")
+        for i, one in enumerate(self.disturbances):
+            if not callable(one):
+                raise ParameterError(f"disturbances[{i}] must be a function of x and v, got {one!r}")
+        self.trusted = TrustedModel(settings, self.discrete, self.disturbances) if settings.trust else None
         self._regression = None if settings.trust else RidgeRegression(self.layout.n, settings.lam)
         self.uncertainty = Uncertainty(first_variance(settings), settings.Np)
         self.restart(start, t_init=settings.warm_up)
@@ -300,19 +322,19 @@ class HybridPredictor:
         return predictor_blob(self)
 
     @classmethod
-    def from_bytes(cls, blob: bytes) -> HybridPredictor:
-        """Return the predictor of :meth:`to_bytes`.
+    def from_bytes(cls, blob: bytes, disturbances: Sequence[Disturbance] = ()) -> HybridPredictor:
+        """Return the predictor of :meth:`to_bytes`, given the ``disturbances`` that it was learned with.
 
         Raises
         ------
         StateError
-            If the blob is foreign, truncated or of another version.
+            If the blob is foreign, truncated or of another version, or the number of disturbances differs.
         """
-        return predictor_from(cls, blob)
+        return predictor_from(cls, blob, disturbances)
 
     def __reduce__(self) -> tuple[Any, ...]:
         # By the saved state: the lags are views, which a plain copy would detach.
-        return HybridPredictor.from_bytes, (self.to_bytes(),)
+        return HybridPredictor.from_bytes, (self.to_bytes(), self.disturbances)
 
     def save(self, path: str | Path) -> None:
         """Write :meth:`to_bytes` to a file."""
@@ -321,15 +343,15 @@ class HybridPredictor:
             file.write(blob)
 
     @classmethod
-    def load(cls, path: str | Path) -> HybridPredictor:
+    def load(cls, path: str | Path, disturbances: Sequence[Disturbance] = ()) -> HybridPredictor:
         """Return the predictor of :meth:`save`; :meth:`restart` then begins a warm-started run.
 
         Raises
         ------
         StateError
-            If the file is not a saved predictor.
+            If the file is not a saved predictor, or was learned with another number of disturbances.
         """
-        return cls.from_bytes(Path(path).read_bytes())
+        return cls.from_bytes(Path(path).read_bytes(), disturbances)
 
     def _warm_up(self, n: int, *, late: int = 0) -> int:
         """Return how many of ``n`` samples, the next ones or from ``late`` samples before, are within the warm-up."""

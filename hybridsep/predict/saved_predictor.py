@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.errors import StateError
 from ..base.saved import Saved
 from ..base.settings import PredictorSettings
 from ..base.state import pack, unpack
 from ..model.physics import ModalModel, Mode
+from .disturbances import Disturbance
 from .features import FeatureLayout
 from .forecast import FeatureScales
 from .reference_features import N_REFERENCE
@@ -32,6 +35,7 @@ def predictor_blob(predictor: HybridPredictor) -> bytes:
         "settings": predictor.settings.as_table(),
         **{name: getattr(predictor, name) for name in ("k", "n_init", "start")},
         "dead_time": predictor.model.dead_time,
+        "n_disturbances": len(predictor.disturbances),
         "pending_start": None if pending is None else pending.start,
     }
     learned = {}
@@ -58,15 +62,22 @@ def predictor_blob(predictor: HybridPredictor) -> bytes:
     return pack(_KIND, meta, arrays, parts)
 
 
-def predictor_from(kind: type[HybridPredictor], blob: bytes) -> HybridPredictor:
-    """Return the predictor of a :func:`predictor_blob`.
+def predictor_from(
+    kind: type[HybridPredictor], blob: bytes, disturbances: Sequence[Disturbance] = ()
+) -> HybridPredictor:
+    """Return the predictor of a :func:`predictor_blob`, given the disturbances of the user's own.
 
     Raises
     ------
     StateError
-        If the blob is foreign, truncated or of another version.
+        If the blob is foreign, truncated or of another version, or the number of disturbances differs.
     """
     saved = Saved(_KIND, *unpack(_KIND, blob))
+    if (n := saved.whole("n_disturbances")) != len(disturbances):
+        raise StateError(
+            f"the saved predictor was learned with {n} disturbances of the user's own, got {len(disturbances)}: they "
+            "are functions, which neither a state nor an FMU holds; in Python give them as disturbances="
+        )
     with saved.consistent():
         settings = PredictorSettings.from_table(saved.table("settings"))
         # Sizes are confirmed by the arrays before anything is allocated from them.
@@ -75,7 +86,7 @@ def predictor_from(kind: type[HybridPredictor], blob: bytes) -> HybridPredictor:
         factor = None if settings.trust else saved.array("factor", n + 1, n + 1)
         model = ModalModel([Mode(*row) for row in saved.array("modes", None, 4).tolist()], saved.field("dead_time"))
         trusted = trusted_fields(saved.part("trusted"), settings.p) if settings.trust else None
-        predictor = kind(model, settings, start=saved.number_or_none("start"))
+        predictor = kind(model, settings, start=saved.number_or_none("start"), disturbances=disturbances)
         if factor is not None:
             predictor.regression.restore(factor, saved.whole("n_samples"))
     predictor.k, predictor.n_init = saved.whole("k"), saved.whole("n_init")

@@ -19,7 +19,7 @@ from ..model.discrete import DiscreteModel
 from .blend import Blend
 from .candidates import Candidate, CandidatePrediction, ResidualScale, SolvedCandidate, lags
 from .change import DOUBTED, ChangeTest
-from .disturbances import LEAST_VELOCITY, StaticFeatures, StaticState
+from .disturbances import LEAST_VELOCITY, Disturbance, StaticFeatures, StaticState
 from .forecast import FeatureScales, Forecast
 from .guard import SensorGuard
 from .regression import RidgeRegression
@@ -73,9 +73,9 @@ class TrustedModel:
         ``G_pb``.
     """
 
-    def __init__(self, settings: PredictorSettings, discrete: DiscreteModel) -> None:
+    def __init__(self, settings: PredictorSettings, discrete: DiscreteModel, own: Sequence[Disturbance] = ()) -> None:
         self.settings, self.look_ahead = settings, settings.Np + settings.measurement_delay
-        self.static = StaticFeatures(discrete, settings.q, settings.period)
+        self.static = StaticFeatures(discrete, settings.q, settings.period, own)
         p = settings.p
         self.regression = RidgeRegression(self.static.n + p, _NO_PENALTY)
         lag_scales = np.sqrt(_LAST_LAG ** (np.arange(p) / p))

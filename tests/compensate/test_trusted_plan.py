@@ -11,6 +11,7 @@ import pytest
 from compensator_cases import DRIVE_LIMITS, TS, beyond
 
 from hybridsep import load_machine
+from hybridsep.base.errors import StateError
 from hybridsep.base.settings import CompensatorSettings, Limits, PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepCompensator, SepState
@@ -77,6 +78,30 @@ def test_the_slope_is_that_of_the_prediction(period: float) -> None:
         # Shrinking and the second pass of the stiffness are held in the slope.
         expected = (ahead - behind) / (2.0 * size)
         assert np.max(np.abs(slope - expected)) < 0.05 * np.max(np.abs(expected))
+
+
+def test_slopes_of_disturbances_of_the_user_are_followed() -> None:
+    """Sines of the position of the user's own are those of the period, and plans with them the same."""
+    turns = 2.0 * np.pi / 2e-3
+
+    def sine(x: Array, v: Array) -> Array:
+        return np.asarray(np.sin(turns * x))
+
+    def cosine(x: Array, v: Array) -> Array:
+        return np.asarray(np.cos(turns * x))
+
+    predictor = HybridPredictor(STAGE.model, TRUSTED, disturbances=(sine, cosine))
+    own = SepCompensator(predictor, CompensatorSettings(limits=DRIVE_LIMITS))
+    known = compensator(predictor=replace(TRUSTED, period=2e-3))
+    for sep in (own, known):
+        run(sep)
+        sep.restart(0.0)
+    x_d = moves()[:200]
+    plans = [sep.plan(x_d) for sep in (SepCompensator.from_bytes(own.to_bytes(), (sine, cosine)), known)]
+    assert np.abs(plans[1].x_dm - x_d[:50]).max() > 1e-6
+    np.testing.assert_allclose(plans[0].x_dm, plans[1].x_dm, rtol=0.0, atol=1e-9)
+    with pytest.raises(StateError, match="learned with 2 disturbances of the user's own, got 0"):
+        SepCompensator.from_bytes(own.to_bytes())
 
 
 def test_without_anything_learned_the_physics_model_plans() -> None:
