@@ -48,8 +48,8 @@ _GROWTH = 30.0
 _LEAST_NOISE = 1e-4
 """Bound on λ relative to the largest mean square of the residual: a larger λ would prevent any learning."""
 
-_CARRIED = 10.0
-"""Largest weight of earlier runs when another begins, in look-aheads: a machine may have changed meanwhile."""
+_CARRIED = 30.0
+"""Largest weight of earlier runs when another begins, in windows: a machine may have changed meanwhile."""
 
 _SURPRISE, _SURPRISED = 10.0, 0.1
 """Mean square error of a window, relative to the expected one, above which the machine has changed; and what then
@@ -99,7 +99,7 @@ class TrustedModel:
         self.past_bridged: NDArray[np.bool_] = np.zeros(self.settings.p, dtype=np.bool_)
         self.guard.restart()
         self.n_rejected = 0
-        carried = _CARRIED * self.look_ahead
+        carried = _CARRIED * self.settings.Np
         self.change: ChangeTest | None = None
         self._discount(carried / max(self.n_rows, carried))
         if self.n_rows > 0.0:

@@ -45,7 +45,7 @@ def test_processes_of_tests_tell_where_they_crash() -> None:
 
 
 def test_python_blocks_run(tmp_path: Path) -> None:
-    intake, block, closed_loop = blocks("python")
+    intake, block, disturbances, closed_loop = blocks("python")
     assert len(block.strip().splitlines()) <= 12
     done = subprocess.run([sys.executable, "-W", "error", "-c", intake], cwd=tmp_path, capture_output=True, text=True)
     assert (done.stdout, done.stderr) == ("1 True\n", "")
@@ -53,6 +53,9 @@ def test_python_blocks_run(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     rms_pb, rms_h = map(float, done.stdout.splitlines()[0].split())
     assert rms_h < 0.5 * rms_pb
+    command = [sys.executable, "-W", "error", "-c", disturbances]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", closed_loop], cwd=tmp_path, capture_output=True, text=True
     )

@@ -13,8 +13,8 @@ static const double trusted_recent = 0.9;
 /* Lags of a row that may stand for samples without a measurement. */
 static const double trusted_bridged_max = 3.0;
 
-/* Largest weight of earlier runs when another begins, in predictions. */
-static const double trusted_carried = 10.0;
+/* Largest weight of earlier runs when another begins, in windows. */
+static const double trusted_carried = 30.0;
 
 /* Mean square error of a window, relative to the expected one, above which the machine has changed; and what then
  * remains at least of the weight of all samples before, in windows. */
@@ -43,7 +43,7 @@ static void trusted_discount(hsep_trusted *self, double kept)
 
 HSEP_API void hsep_trusted_restart(hsep_trusted *self)
 {
-    const double most = trusted_carried * (double)self->n;
+    const double most = trusted_carried * (double)self->Np;
     hsep_change *change = hsep_trusted_change(self);
     change->active = 0;
     trusted_discount(self, most / fmax(self->n_rows, most));
