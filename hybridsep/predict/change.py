@@ -8,7 +8,7 @@ what was carried over helps, and falls once it contradicts what is measured: a l
 
 Where rows are alike, or the model with lags alone tells the difference, likelihood says little. What counts in the end
 is the error of the next window: each is also predicted with a tenth of the weight of A. While that is better, window
-after window, A is given this tenth; and while two plants are far likelier than one, though the fall does not tell yet.
+after window, A is given this tenth.
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ for changed ones, with 60 one, which loses nothing by it, with 80 none; but chan
 _OUTWEIGHED = 10.0
 """Rows of this run relative to those of earlier ones from which on there is little left to decide."""
 
+
 _EVIDENCE, _MEMORY, _EVIDENCE_OF_A_WINDOW = 1.5, 0.9, 1.0
 """Log ratio of RMS errors, summed over windows, from which on the smaller weight is taken, if the sum of squares is
 smaller, too; the factor by which they fade from window to window; and the most that a window adds."""
@@ -41,10 +42,6 @@ smaller, too; the factor by which they fade from window to window; and the most 
 _SUPPORT = 15.0
 """Log-likelihood ratio of one plant to two from which on earlier runs are not doubted: less of them is better by chance
 then."""
-
-_CONTRADICTION, _EXPLAINED, _NO_WORSE = 10.0, 0.5, 0.5
-"""Log-likelihood ratio of two plants to one from which on earlier runs are doubted, in a window of which more than this
-part is explained, unless the evidence is that less weight is worse by more than this."""
 
 _SPENT = 1e-6
 """Weight of earlier runs, relative to that they began with, below which there is nothing left of them."""
@@ -146,9 +143,8 @@ class ChangeTest:
         self.evidence = _MEMORY * self.evidence + explained * min(max(ratio, -most), most)
         self.errors = _MEMORY * self.errors + error
         self.errors_with_less = _MEMORY * self.errors_with_less + with_less
-        better = self.evidence > _EVIDENCE and self.errors_with_less < self.errors and self.log_ratio < _SUPPORT
-        contradicted = self.log_ratio < -_CONTRADICTION and explained > _EXPLAINED
-        return better or (contradicted and self.evidence > -_NO_WORSE)
+        better = self.evidence > _EVIDENCE and self.errors_with_less < self.errors
+        return better and self.log_ratio < _SUPPORT
 
     def follow(self, residuals: Array) -> None:
         """Follow the size of the residuals of this run, ``(m,)``, m."""

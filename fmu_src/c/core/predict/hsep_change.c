@@ -22,10 +22,6 @@ static const double change_evidence = 1.5, change_memory = 0.9, change_evidence_
  * then. */
 static const double change_support = 15.0;
 
-/* Log-likelihood ratio of two plants to one from which on earlier runs are doubted in a window of which more than a part
- * is explained, unless the evidence is that less weight is worse by more than this. */
-static const double change_contradiction = 10.0, change_explained = 0.5, change_no_worse = 0.5;
-
 /* Weight of earlier runs, relative to that they began with, below which there is nothing left of them. */
 static const double change_spent = 1e-6;
 
@@ -192,10 +188,8 @@ HSEP_API int hsep_change_is_doubted(hsep_change *self, double error, double with
     self->evidence = change_memory * self->evidence + explained * fmin(fmax(ratio, -most), most);
     self->errors = change_memory * self->errors + error;
     self->errors_with_less = change_memory * self->errors_with_less + with_less;
-    const int contradicted = self->log_ratio < -change_contradiction && explained > change_explained;
-    return (self->evidence > change_evidence && self->errors_with_less < self->errors &&
-            self->log_ratio < change_support) ||
-           (contradicted && self->evidence > -change_no_worse);
+    return self->evidence > change_evidence && self->errors_with_less < self->errors &&
+           self->log_ratio < change_support;
 }
 
 HSEP_API double hsep_change_doubt(hsep_change *self, hsep_regression *both)

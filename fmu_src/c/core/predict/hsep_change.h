@@ -8,7 +8,7 @@
  *
  * Where rows are alike, or the model with lags alone tells the difference, likelihood says little. So each window is
  * also predicted, by a candidate of its own, with a tenth of the weight of A. While that is better, window after
- * window, A is given this tenth; and while two plants are far likelier than one, though the fall does not tell yet.
+ * window, A is given this tenth.
  *
  * Memory is one block, without pointers. Reentrant; allocates nothing.
  */
@@ -82,9 +82,9 @@ HSEP_API void hsep_change_predict(
     hsep_change *self, const hsep_candidate *like, const double scales[], double least_variance, const double rows[],
     const double past[], const hsep_residual_scale *scale);
 
-/* Whether earlier runs had better have less weight, as the windows so far or the likelihood show; after
- * hsep_change_tells. Sums of squared errors of a window, m2: predicted with all rows, with less weight of the earlier
- * ones, and by the physics model. Where neither of the first two is better than that there is nothing to compare. */
+/* Whether earlier runs had better have less weight, as the windows so far show; after hsep_change_tells. Sums of
+ * squared errors of a window, m2: predicted with all rows, with less weight of the earlier ones, and by the physics
+ * model. Where neither of the first two is better than that there is nothing to compare. */
 HSEP_API int hsep_change_is_doubted(hsep_change *self, double error, double with_less, double physics);
 
 /* Give earlier runs that weight; return the weight of all rows. */
