@@ -8,6 +8,7 @@ an ARX recursion from the last ``p`` measured residuals, affine in the command.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -228,10 +229,16 @@ class HybridPredictor:
         accepted = np.ones(m, dtype=np.bool_)
         e_pb = measured - pending.start - pending.x_pb[:m]
         if self.trusted is not None and pending.forecast is not None:
-            if self.k == 0 and not self.trusted.plans:
-                pending, e_pb = self._as_it_began(pending, e_pb)
-            assert pending.forecast is not None
-            accepted = self.trusted.learn(pending.forecast, measured - pending.start, fold=learn)
+            before = deepcopy((self.trusted, self.state)) if self.disturbances else None
+            try:
+                if self.k == 0 and not self.trusted.plans:
+                    pending, e_pb = self._as_it_began(pending, e_pb)
+                assert pending.forecast is not None
+                accepted = self.trusted.learn(pending.forecast, measured - pending.start, fold=learn)
+            except BaseException:  # of a disturbance of the user's own, at a position that was not predicted
+                if before is not None:
+                    self.trusted, self.state = before
+                raise
         else:
             from_reference = self.reference_features.features(pending.signs, m)
             for i in range(0, m, self.Np):

@@ -118,6 +118,24 @@ def test_what_is_no_disturbance_is_refused_and_nothing_is_learned(returned: Arra
     assert one.to_bytes() == before
 
 
+def test_a_function_that_fails_where_the_drive_was_measured_changes_nothing() -> None:
+    x_d, x = into_the_buffer()
+
+    def fails_beyond(x: Array, v: Array) -> Array:
+        return np.where(x > START + 0.006, np.nan, spring(x, v))
+
+    one, twin = predictor(fails_beyond), predictor(spring)
+    one.predict(x_d[:100])
+    twin.predict(x_d[:100])
+    before = one.to_bytes()
+    with pytest.raises(SignalError, match=r"disturbances\[0\] must be finite"):
+        one.update(x[:100] + 0.004)  # the command goes to 5 mm at most
+    assert one.to_bytes() == before
+    for each in (one, twin):
+        each.update(x[:100])
+    np.testing.assert_array_equal(one.predict(x_d[100:200]).x_h, twin.predict(x_d[100:200]).x_h)
+
+
 def test_disturbances_need_trust_and_must_be_functions() -> None:
     with pytest.raises(ParameterError, match="with trust = true only"):
         HybridPredictor(MODEL, PredictorSettings(trust=False), disturbances=(spring,))
