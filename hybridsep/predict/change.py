@@ -34,7 +34,6 @@ for changed ones, with 60 one, which loses nothing by it, with 80 none; but chan
 _OUTWEIGHED = 10.0
 """Rows of this run relative to those of earlier ones from which on there is little left to decide."""
 
-
 _EVIDENCE, _MEMORY, _EVIDENCE_OF_A_WINDOW = 1.5, 0.9, 1.0
 """Log ratio of RMS errors, summed over windows, from which on the smaller weight is taken, if the sum of squares is
 smaller, too; the factor by which they fade from window to window; and the most that a window adds."""

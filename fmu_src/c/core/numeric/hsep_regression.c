@@ -56,58 +56,38 @@ static inline void regression_add(double *restrict u, double *restrict carry, do
 }
 
 /* Rotate 4 entries x of the row with 4 entries u of a row of U:  x := x - pivot u,  u := u + gain x.
- * Written out, as regression_add has it, for compilers to make vectors of it. */
-static inline void regression_four(double *restrict u, double *restrict x, double pivot, double gain)
+ * Written out, as regression_add has it, for compilers to make vectors of it. carries: a constant, whether what
+ * rounding takes is kept. */
+static inline void regression_four(double *restrict u, double *restrict x, double pivot, double gain, int carries)
 {
     double *restrict carry = u + HSEP_TILE_ENTRIES;
     const double u0 = u[0], u1 = u[1], u2 = u[2], u3 = u[3];
     const double x0 = x[0] - pivot * u0, x1 = x[1] - pivot * u1, x2 = x[2] - pivot * u2, x3 = x[3] - pivot * u3;
-    const double c0 = gain * x0 + carry[0], c1 = gain * x1 + carry[1];
-    const double c2 = gain * x2 + carry[2], c3 = gain * x3 + carry[3];
-    const double s0 = u0 + c0, s1 = u1 + c1, s2 = u2 + c2, s3 = u3 + c3;
-    const double e0 = c0 - (s0 - u0), e1 = c1 - (s1 - u1), e2 = c2 - (s2 - u2), e3 = c3 - (s3 - u3);
-    u[0] = s0, u[1] = s1, u[2] = s2, u[3] = s3;
-    carry[0] = e0, carry[1] = e1, carry[2] = e2, carry[3] = e3;
-    x[0] = x0, x[1] = x1, x[2] = x2, x[3] = x3;
-}
-
-/* The same without carries. */
-static inline void regression_four_once(double *restrict u, double *restrict x, double pivot, double gain)
-{
-    const double u0 = u[0], u1 = u[1], u2 = u[2], u3 = u[3];
-    const double x0 = x[0] - pivot * u0, x1 = x[1] - pivot * u1, x2 = x[2] - pivot * u2, x3 = x[3] - pivot * u3;
-    u[0] = u0 + gain * x0, u[1] = u1 + gain * x1, u[2] = u2 + gain * x2, u[3] = u3 + gain * x3;
+    if (carries) {
+        const double c0 = gain * x0 + carry[0], c1 = gain * x1 + carry[1];
+        const double c2 = gain * x2 + carry[2], c3 = gain * x3 + carry[3];
+        const double s0 = u0 + c0, s1 = u1 + c1, s2 = u2 + c2, s3 = u3 + c3;
+        const double e0 = c0 - (s0 - u0), e1 = c1 - (s1 - u1), e2 = c2 - (s2 - u2), e3 = c3 - (s3 - u3);
+        u[0] = s0, u[1] = s1, u[2] = s2, u[3] = s3;
+        carry[0] = e0, carry[1] = e1, carry[2] = e2, carry[3] = e3;
+    } else {
+        u[0] = u0 + gain * x0, u[1] = u1 + gain * x1, u[2] = u2 + gain * x2, u[3] = u3 + gain * x3;
+    }
     x[0] = x0, x[1] = x1, x[2] = x2, x[3] = x3;
 }
 
 /* Rotate the row x, (4 n,), with 4 rows of U in n tiles. */
-static void regression_sweep(
-    double *restrict tile, double *restrict x, uint64_t n, const double pivot[4], const double gain[4])
+static inline void regression_sweep(
+    double *restrict tile, double *restrict x, uint64_t n, const double pivot[4], const double gain[4], int carries)
 {
     const double p0 = pivot[0], p1 = pivot[1], p2 = pivot[2], p3 = pivot[3];
     const double g0 = gain[0], g1 = gain[1], g2 = gain[2], g3 = gain[3];
     for (uint64_t t = 0; t < n; t++, tile += HSEP_TILE_STRIDE, x += 4) {
         double y[4] = {x[0], x[1], x[2], x[3]};
-        regression_four(tile, y, p0, g0);
-        regression_four(tile + 4, y, p1, g1);
-        regression_four(tile + 8, y, p2, g2);
-        regression_four(tile + 12, y, p3, g3);
-        x[0] = y[0], x[1] = y[1], x[2] = y[2], x[3] = y[3];
-    }
-}
-
-/* The same without carries. */
-static void regression_sweep_once(
-    double *restrict tile, double *restrict x, uint64_t n, const double pivot[4], const double gain[4])
-{
-    const double p0 = pivot[0], p1 = pivot[1], p2 = pivot[2], p3 = pivot[3];
-    const double g0 = gain[0], g1 = gain[1], g2 = gain[2], g3 = gain[3];
-    for (uint64_t t = 0; t < n; t++, tile += HSEP_TILE_STRIDE, x += 4) {
-        double y[4] = {x[0], x[1], x[2], x[3]};
-        regression_four_once(tile, y, p0, g0);
-        regression_four_once(tile + 4, y, p1, g1);
-        regression_four_once(tile + 8, y, p2, g2);
-        regression_four_once(tile + 12, y, p3, g3);
+        regression_four(tile, y, p0, g0, carries);
+        regression_four(tile + 4, y, p1, g1, carries);
+        regression_four(tile + 8, y, p2, g2, carries);
+        regression_four(tile + 12, y, p3, g3, carries);
         x[0] = y[0], x[1] = y[1], x[2] = y[2], x[3] = y[3];
     }
 }
@@ -158,10 +138,8 @@ static inline void regression_fold(hsep_regression *self, uint64_t first, int ca
                 regression_rotate(tile, (int)(4 * r + c), &x[c], pivot[r], gain[r], keep[r], large[r]);
             }
         }
-        if (left > 1 && !any_large && carries) { /* only the last row of tiles has a height below 4 */
-            regression_sweep(tile + HSEP_TILE_STRIDE, x + 4, left - 1, pivot, gain);
-        } else if (left > 1 && !any_large) {
-            regression_sweep_once(tile + HSEP_TILE_STRIDE, x + 4, left - 1, pivot, gain);
+        if (left > 1 && !any_large) { /* only the last row of tiles has a height below 4 */
+            regression_sweep(tile + HSEP_TILE_STRIDE, x + 4, left - 1, pivot, gain, carries);
         } else if (left > 1) {
             for (uint64_t j = 0; j < 4 * (left - 1); j++) {
                 double *entries = tile + HSEP_TILE_STRIDE * (j / 4 + 1);

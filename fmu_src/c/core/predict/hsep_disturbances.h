@@ -93,8 +93,8 @@ HSEP_API void hsep_disturbances_end(hsep_disturbances *self);
 
 /* Slopes of the disturbances at these samples, (n, self->count), sample after sample: of each friction with the
  * commanded velocity, s/m, of the stiffness with the position, m, of the damping with its velocity, m/s, and of what
- * repeats with the position, 1/m. reach: half of
- * the change of velocity that the friction's slope is taken over, relative to the velocity scale; 0: the tangent. */
+ * repeats with the position, 1/m. reach: half of the change of velocity that the friction's slope is taken over,
+ * relative to the velocity scale; 0: the tangent. */
 HSEP_API void hsep_disturbances_slopes(
     const hsep_disturbances *self, const double x_d[], const double x_pb[], const double x[], uint64_t n,
     double velocity_scale, double reach, double slopes[]);

@@ -11,7 +11,8 @@
 static const double uncertainty_shares[HSEP_N_COMPONENTS] = {0.0, 0.0, 4.0, 9.0, 0.01, 0.3, 2.0, 0.05};
 static const double uncertainty_share_least = 1e-9, uncertainty_share_most = 1e4;
 
-/* Components that are felt for a while, as a motion that is slow; time constant of their averaging, in windows. */
+/* Components that are felt for a while: differences, disagreement, slow motion; time constant of their averaging, in
+ * windows. */
 static const int uncertainty_felt[] = {2, 3, 6, 7};
 static const double uncertainty_felt_for = 0.2;
 
