@@ -150,10 +150,16 @@ static void trusted_planner_vary(hsep_trusted_planner *self, const hsep_trusted_
 static void trusted_planner_step(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
     const double *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
+    const hsep_splines *splines = hsep_planner_splines(task->planner);
+    const hsep_linearised_change change = {
+        .commands = hsep_splines_shape(splines),
+        .n = 4 * splines->spacing,
+        .passed = task->spline,
+        .T_s = hsep_trusted_disturbances(task->model)->T_s};
     double *target = hsep_at(self, self->target);
     hsep_linearised_at(
-        (hsep_linearised *)hsep_at(self, self->linearised), task->model, hsep_at(self, self->command), x_pb,
-        task->spline, trusted_planner_reaches[self->steps]);
+        (hsep_linearised *)hsep_at(self, self->linearised), task->model, hsep_at(self, self->command), x_pb, &change,
+        trusted_planner_reaches[self->steps]);
     for (uint64_t k = 0; k < self->preview; k++) { /* x_d - x_h, to which W c is added */
         const uint64_t j = self->preview - 1 - k;
         target[k] = task->x_d[k] - self->start - (x_pb[j] + e_h[j]);
@@ -181,9 +187,7 @@ static void trusted_planner_columns(hsep_trusted_planner *self, const hsep_trust
     for (uint64_t done = 0; self->columns < n && done * HSEP_TRUSTED_COLUMNS < all;) {
         const uint64_t j = self->columns++, first = j * spacing, length = self->preview - first;
         double *column = trusted_planner_column_of(self, j, spacing);
-        hsep_linearised_column(
-            (hsep_linearised *)hsep_at(self, self->linearised), task->model, hsep_splines_shape(splines), 4 * spacing,
-            task->spline, first, column);
+        hsep_linearised_column((hsep_linearised *)hsep_at(self, self->linearised), task->model, first, column);
         hsep_axpy(target + first, at[j], column, length);
         done += length;
     }

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #define DISTURBANCES_DIFFERENCES 3
+#define DISTURBANCES_TOGETHER 64 /* samples that are filtered in one go */
 
 /* Velocities v_i of the friction's change of sign, relative to the velocity scale. */
 static const double disturbances_spread[HSEP_DISTURBANCES_FRICTION] = {0.01, 0.03, 0.1, 0.3, 1.0, 3.0};
@@ -113,13 +114,26 @@ HSEP_API double hsep_disturbances_peak_velocity(const hsep_disturbances *self, c
     return largest / self->T_s;
 }
 
-/* Filter a disturbance over one sample, and put the result and its first difference into a row. */
-static void disturbances_filter_sample(hsep_disturbances *self, uint64_t i, double disturbance, double row[])
+/* Filter the disturbances first ... first + count - 1, whose n samples are side by side in u, and put the results and
+ * their first differences into the rows. */
+static void disturbances_filter_samples(
+    hsep_disturbances *self, uint64_t first, uint64_t count, double u[], uint64_t n, double rows[])
 {
-    double *entry = row + 2 + self->n_differences + i, *filtered = &self->after.filtered[i];
-    hsep_physics_forced_response(disturbances_tried(self, i), &disturbance, entry, 1);
-    entry[self->count] = *entry - *filtered;
-    *filtered = *entry;
+    double x[HSEP_PHYSICS_ABREAST * DISTURBANCES_TOGETHER];
+    hsep_physics *filters[HSEP_PHYSICS_ABREAST] = {NULL};
+    for (uint64_t i = 0; i < count; i++) {
+        filters[i] = disturbances_tried(self, first + i);
+    }
+    hsep_physics_abreast(filters, count, u, x, n);
+    double *entry = rows + 2 + self->n_differences + first, *filtered = self->after.filtered + first;
+    for (uint64_t k = 0; k < n; k++, entry += self->n) {
+        for (uint64_t i = 0; i < count; i++) {
+            const double now = x[HSEP_PHYSICS_ABREAST * k + i];
+            entry[i] = now;
+            entry[self->count + i] = now - filtered[i];
+            filtered[i] = now;
+        }
+    }
 }
 
 /* Begin with the filters first ... last - 1 as they were before the window. */
@@ -153,24 +167,46 @@ static double disturbances_sign_velocity(double velocity_scale, uint64_t i)
     return (velocity_scale > 0.0 ? velocity_scale : 1.0) * disturbances_spread[i];
 }
 
+/* Friction of n samples of the velocity v_d, m/s, into the rows. */
+static void disturbances_friction(
+    hsep_disturbances *self, const double v_d[], uint64_t n, double velocity_scale, double rows[])
+{
+    double u[HSEP_PHYSICS_ABREAST * DISTURBANCES_TOGETHER] = {0.0};
+    for (uint64_t first = 0; first < HSEP_DISTURBANCES_FRICTION; first += HSEP_PHYSICS_ABREAST) {
+        const uint64_t left = HSEP_DISTURBANCES_FRICTION - first;
+        const uint64_t count = left < HSEP_PHYSICS_ABREAST ? left : HSEP_PHYSICS_ABREAST;
+        for (uint64_t i = 0; i < count; i++) {
+            const double spread = disturbances_sign_velocity(velocity_scale, first + i);
+            for (uint64_t k = 0; k < n; k++) {
+                u[HSEP_PHYSICS_ABREAST * k + i] = tanh(v_d[k] / spread);
+            }
+        }
+        disturbances_filter_samples(self, first, count, u, n, rows);
+    }
+}
+
 HSEP_API void hsep_disturbances_command(
     hsep_disturbances *self, const double x_d[], const double x_pb[], uint64_t n, double velocity_scale, double rows[])
 {
     hsep_disturbed *now = &self->after;
+    double v_d[DISTURBANCES_TOGETHER];
     disturbances_rewind(self, 0, HSEP_DISTURBANCES_FRICTION);
     now->x_d = self->before.x_d;
     memcpy(now->x_pb, self->before.x_pb, sizeof now->x_pb);
-    for (uint64_t j = n; j-- > 0; rows += self->n) {
-        const double v_d = (x_d[j] - now->x_d) / self->T_s;
-        now->x_d = x_d[j];
-        for (int i = DISTURBANCES_DIFFERENCES; i > 0; i--) {
-            now->x_pb[i] = now->x_pb[i - 1];
+    for (uint64_t j = n; j > 0;) {
+        const uint64_t count = j < DISTURBANCES_TOGETHER ? j : DISTURBANCES_TOGETHER;
+        for (uint64_t k = 0; k < count; k++) {
+            j--;
+            v_d[k] = (x_d[j] - now->x_d) / self->T_s;
+            now->x_d = x_d[j];
+            for (int i = DISTURBANCES_DIFFERENCES; i > 0; i--) {
+                now->x_pb[i] = now->x_pb[i - 1];
+            }
+            now->x_pb[0] = x_pb[j];
+            disturbances_differences(self, now->x_pb, rows + k * self->n);
         }
-        now->x_pb[0] = x_pb[j];
-        disturbances_differences(self, now->x_pb, rows);
-        for (uint64_t i = 0; i < HSEP_DISTURBANCES_FRICTION; i++) {
-            disturbances_filter_sample(self, i, tanh(v_d / disturbances_sign_velocity(velocity_scale, i)), rows);
-        }
+        disturbances_friction(self, v_d, count, velocity_scale, rows);
+        rows += count * self->n;
     }
 }
 
@@ -196,16 +232,25 @@ HSEP_API void hsep_disturbances_motion(
     hsep_disturbances *self, const double x_pb[], const double x[], uint64_t n, double rows[])
 {
     const double s = sin(disturbances_angle(self, 0.0)), c = cos(disturbances_angle(self, 0.0));
+    double disturbances[HSEP_PHYSICS_ABREAST * DISTURBANCES_TOGETHER] = {0.0};
     disturbances_rewind(self, HSEP_DISTURBANCES_STIFFNESS, self->count);
-    for (uint64_t j = n; j-- > 0; rows += self->n) {
-        const double v = disturbances_velocity(self, x_pb, x, n, j);
-        disturbances_filter_sample(self, HSEP_DISTURBANCES_STIFFNESS, x[j] * fabs(x[j]), rows);
-        disturbances_filter_sample(self, HSEP_DISTURBANCES_DAMPING, v * fabs(v), rows);
-        if (self->count > HSEP_DISTURBANCES_PERIODIC) {
-            const double angle = disturbances_angle(self, x[j]);
-            disturbances_filter_sample(self, HSEP_DISTURBANCES_PERIODIC, sin(angle) - s, rows);
-            disturbances_filter_sample(self, HSEP_DISTURBANCES_PERIODIC + 1, cos(angle) - c, rows);
+    for (uint64_t j = n; j > 0;) {
+        const uint64_t count = j < DISTURBANCES_TOGETHER ? j : DISTURBANCES_TOGETHER;
+        for (uint64_t k = 0; k < count; k++) {
+            double *of_sample = disturbances + HSEP_PHYSICS_ABREAST * k;
+            j--;
+            const double v = disturbances_velocity(self, x_pb, x, n, j);
+            of_sample[0] = x[j] * fabs(x[j]);
+            of_sample[1] = v * fabs(v);
+            if (self->count > HSEP_DISTURBANCES_PERIODIC) {
+                const double angle = disturbances_angle(self, x[j]);
+                of_sample[2] = sin(angle) - s;
+                of_sample[3] = cos(angle) - c;
+            }
         }
+        disturbances_filter_samples(
+            self, HSEP_DISTURBANCES_STIFFNESS, self->count - HSEP_DISTURBANCES_STIFFNESS, disturbances, count, rows);
+        rows += count * self->n;
     }
 }
 

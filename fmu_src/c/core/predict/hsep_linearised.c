@@ -4,7 +4,8 @@
 
 #include <string.h>
 
-#define LINEARISED_GAINS 6 /* signals of a candidate in gains: three of the disturbances, three of their differences */
+#define LINEARISED_CHANGES 3                      /* signals of a change: v_d, x, v */
+#define LINEARISED_GAINS (2 * LINEARISED_CHANGES) /* of a candidate: of the disturbances, of their differences */
 
 /* Set what follows from the parameters; return the bytes of the block. */
 static double linearised_lay_out(hsep_linearised *self, const hsep_trusted_parameters *parameters)
@@ -15,13 +16,15 @@ static double linearised_lay_out(hsep_linearised *self, const hsep_trusted_param
     self->n = parameters->preview;
     self->count = hsep_disturbances_count(parameters->trust->period);
     self->slopes = hsep_take(&end, n * (double)self->count);
-    self->gains = hsep_take(&end, n * HSEP_N_CANDIDATES * LINEARISED_GAINS);
+    self->gains = hsep_take(&end, n * LINEARISED_GAINS * HSEP_PHYSICS_ABREAST);
     self->shrink = hsep_take(&end, n * HSEP_N_CANDIDATES);
+    self->change = hsep_take(&end, n * LINEARISED_CHANGES);
     self->passed = hsep_take(&end, n * HSEP_N_CANDIDATES);
     self->run = hsep_take(&end, n);
-    self->drive = hsep_take(&end, n);
+    self->disturbance = hsep_take(&end, n * HSEP_PHYSICS_ABREAST);
+    self->drive = hsep_take(&end, n * HSEP_PHYSICS_ABREAST);
     self->physics = hsep_take_block(&end, filter);
-    self->filter = hsep_take_block(&end, filter);
+    self->filters = hsep_take_block(&end, HSEP_N_CANDIDATES * filter);
     return end * sizeof(double);
 }
 
@@ -33,13 +36,11 @@ HSEP_API double hsep_linearised_size(const hsep_trusted_parameters *parameters)
 HSEP_API void hsep_linearised_init(hsep_linearised *self, const hsep_trusted_parameters *parameters)
 {
     const hsep_predictor_settings *settings = parameters->settings;
+    memset(self, 0, (size_t)hsep_linearised_size(parameters)); /* gains of no candidate are 0 */
     (void)linearised_lay_out(self, parameters);
     hsep_physics_init(
         (hsep_physics *)hsep_at(self, self->physics), parameters->modes, parameters->n_modes, settings->dead_time,
         settings->T_s, (hsep_hold)settings->input_hold);
-    memcpy(
-        hsep_at(self, self->filter), hsep_at(self, self->physics),
-        (size_t)(self->filter - self->physics) * sizeof(double));
 }
 
 HSEP_API int hsep_linearised_valid(const void *block, const hsep_trusted_parameters *parameters)
@@ -49,8 +50,7 @@ HSEP_API int hsep_linearised_valid(const void *block, const hsep_trusted_paramet
     memcpy(&got, block, sizeof got);
     (void)linearised_lay_out(&got, parameters); /* changes nothing where it is sound */
     return memcmp(&got, block, sizeof got) == 0 &&
-           hsep_physics_valid(hsep_at_bytes(block, got.physics), n_modes, dead_time) &&
-           hsep_physics_valid(hsep_at_bytes(block, got.filter), n_modes, dead_time);
+           hsep_physics_valid(hsep_at_bytes(block, got.physics), n_modes, dead_time);
 }
 
 /* Place of the weights of the disturbances among those of a candidate. */
@@ -59,15 +59,16 @@ static uint64_t linearised_first(const hsep_linearised *self, const hsep_trusted
     return model->n_static - 2 * self->count;
 }
 
-/* What the slopes give of a change, by the weights of a candidate. gains: (6, n). */
-static void linearised_gains(const hsep_linearised *self, const double weights[], double gains[])
+/* What the slopes give of a change, by the weights of a candidate. gain: its first one of those abreast. */
+static void linearised_gains(const hsep_linearised *self, const double weights[], double *gain)
 {
     const double *slopes = hsep_at_const(self, self->slopes);
     const uint64_t n = self->n;
     for (uint64_t k = 0; k < n; k++, slopes += self->count) {
-        for (uint64_t part = 0; part < 2; part++) { /* the disturbances, their differences */
+        for (uint64_t part = 0; part < 2; part++, gain += LINEARISED_CHANGES * HSEP_PHYSICS_ABREAST) {
+            /* the disturbances, their differences */
             const double *w = weights + part * self->count;
-            double *gain = gains + 3 * part * n + k, friction = 0.0;
+            double friction = 0.0;
             double of_position = w[HSEP_DISTURBANCES_STIFFNESS] * slopes[HSEP_DISTURBANCES_STIFFNESS];
             for (uint64_t i = 0; i < HSEP_DISTURBANCES_FRICTION; i++) {
                 friction += slopes[i] * w[i];
@@ -76,8 +77,8 @@ static void linearised_gains(const hsep_linearised *self, const double weights[]
                 of_position += w[i] * slopes[i];
             }
             gain[0] = friction;
-            gain[n] = of_position;
-            gain[2 * n] = w[HSEP_DISTURBANCES_DAMPING] * slopes[HSEP_DISTURBANCES_DAMPING];
+            gain[HSEP_PHYSICS_ABREAST] = of_position;
+            gain[2 * HSEP_PHYSICS_ABREAST] = w[HSEP_DISTURBANCES_DAMPING] * slopes[HSEP_DISTURBANCES_DAMPING];
         }
     }
 }
@@ -98,9 +99,22 @@ static void linearised_pass(const double weights[], uint64_t count, const double
     }
 }
 
+/* A change as v_d, x and v. */
+static void linearised_signals(hsep_linearised *self, const hsep_linearised_change *change)
+{
+    double *signals = hsep_at(self, self->change), last_command = 0.0, last_passed = 0.0;
+    for (uint64_t u = 0; u < self->n; u++, signals += LINEARISED_CHANGES) {
+        const double now = u < change->n ? change->commands[u] : 0.0;
+        signals[0] = (now - last_command) / change->T_s;
+        signals[1] = change->passed[u];
+        signals[2] = (change->passed[u] - last_passed) / change->T_s;
+        last_command = now, last_passed = change->passed[u];
+    }
+}
+
 HSEP_API void hsep_linearised_at(
-    hsep_linearised *self, hsep_trusted *model, const double x_d[], const double x_pb[], const double passed[],
-    double reach)
+    hsep_linearised *self, hsep_trusted *model, const double x_d[], const double x_pb[],
+    const hsep_linearised_change *change, double reach)
 {
     const uint64_t n = self->n, first = linearised_first(self, model);
     hsep_disturbances_slopes(
@@ -113,26 +127,44 @@ HSEP_API void hsep_linearised_at(
         for (uint64_t k = 0; k < n; k++) {
             shrink[k] = part * hsep_candidate_shrink(candidate, n - 1 - k);
         }
-        linearised_gains(self, weights + first, hsep_at(self, self->gains) + i * n * LINEARISED_GAINS);
-        linearised_pass(weights + 1, first - 1, passed, n, hsep_at(self, self->passed) + i * n);
+        linearised_gains(self, weights + first, hsep_at(self, self->gains) + i);
+        linearised_pass(weights + 1, first - 1, change->passed, n, hsep_at(self, self->passed) + i * n);
+    }
+    linearised_signals(self, change);
+}
+
+/* The disturbances that a change makes of each candidate, in the last count samples. */
+static void linearised_disturbance(hsep_linearised *self, uint64_t count)
+{
+    const uint64_t stride = LINEARISED_GAINS * HSEP_PHYSICS_ABREAST;
+    const double *gain = hsep_at(self, self->gains) + (self->n - count) * stride;
+    const double *change = hsep_at(self, self->change);
+    double *disturbance = hsep_at(self, self->disturbance), last[HSEP_PHYSICS_ABREAST] = {0.0};
+    for (uint64_t u = 0; u < count; u++, gain += stride, change += LINEARISED_CHANGES) {
+        const double *of_difference = gain + stride / 2, v_d = change[0], x = change[1], v = change[2];
+        for (uint64_t i = 0; i < HSEP_PHYSICS_ABREAST; i++) {
+            const double difference = of_difference[i] * v_d + of_difference[HSEP_PHYSICS_ABREAST + i] * x +
+                                      of_difference[2 * HSEP_PHYSICS_ABREAST + i] * v;
+            *disturbance++ =
+                (gain[i] * v_d + gain[HSEP_PHYSICS_ABREAST + i] * x + gain[2 * HSEP_PHYSICS_ABREAST + i] * v) +
+                (difference - last[i]);
+            last[i] = difference;
+        }
     }
 }
 
-/* The disturbance that a change makes, in the last count samples, oldest first. */
-static void linearised_disturbance(
-    const hsep_linearised *self, const double gains[], const double change[], uint64_t n_change, const double passed[],
-    uint64_t count, double T_s, double disturbance[])
+/* These behind G_pb, from rest. */
+static void linearised_filter(hsep_linearised *self, uint64_t count)
 {
-    const uint64_t n = self->n;
-    const double *gain = gains + (n - count);
-    double last_change = 0.0, last_passed = 0.0, last_difference = 0.0;
-    for (uint64_t u = 0; u < count; u++, gain++) {
-        const double now = u < n_change ? change[u] : 0.0;
-        const double v_d = (now - last_change) / T_s, v = (passed[u] - last_passed) / T_s;
-        const double difference = gain[3 * n] * v_d + gain[4 * n] * passed[u] + gain[5 * n] * v;
-        disturbance[u] = (gain[0] * v_d + gain[n] * passed[u] + gain[2 * n] * v) + (difference - last_difference);
-        last_change = now, last_passed = passed[u], last_difference = difference;
+    const uint64_t words = self->filters - self->physics;
+    hsep_physics *filters[HSEP_N_CANDIDATES];
+    for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
+        double *filter = hsep_at(self, self->filters + i * words);
+        memcpy(filter, hsep_at(self, self->physics), (size_t)words * sizeof(double));
+        filters[i] = (hsep_physics *)filter;
     }
+    hsep_physics_abreast(
+        filters, HSEP_N_CANDIDATES, hsep_at(self, self->disturbance), hsep_at(self, self->drive), (size_t)count);
 }
 
 /* Run of the recursion of candidate i from rest, driven by the filtered disturbance and what the features of x_pb give,
@@ -141,31 +173,27 @@ static void linearised_run(
     hsep_linearised *self, const hsep_candidate *candidate, uint64_t i, uint64_t count, double column[])
 {
     const double *lag_weights = hsep_at_const(candidate, candidate->weights) + candidate->n_static;
-    const double *own = hsep_at(self, self->passed) + i * self->n, *drive = hsep_at(self, self->drive);
+    const double *own = hsep_at(self, self->passed) + i * self->n, *drive = hsep_at(self, self->drive) + i;
     const double *shrink = hsep_at(self, self->shrink) + i * self->n + (self->n - count);
     double *run = hsep_at(self, self->run);
-    for (uint64_t u = 0; u < count; u++) {
+    for (uint64_t u = 0; u < count; u++, drive += HSEP_PHYSICS_ABREAST) {
         double *e = run + (count - 1 - u);
-        *e = hsep_recur(drive[u] + own[u], lag_weights, e + 1, u < candidate->p ? u : candidate->p);
+        *e = hsep_recur(*drive + own[u], lag_weights, e + 1, u < candidate->p ? u : candidate->p);
         column[u] += shrink[u] * *e;
     }
 }
 
-HSEP_API void hsep_linearised_column(
-    hsep_linearised *self, hsep_trusted *model, const double change[], uint64_t n_change, const double passed[],
-    uint64_t first, double column[])
+HSEP_API void hsep_linearised_column(hsep_linearised *self, hsep_trusted *model, uint64_t first, double column[])
 {
-    const uint64_t n = self->n, count = n - first;
-    const double T_s = hsep_trusted_disturbances(model)->T_s;
-    hsep_physics *filter = (hsep_physics *)hsep_at(self, self->filter);
-    double *drive = hsep_at(self, self->drive);
-    memcpy(column, passed, (size_t)count * sizeof(double));
+    const uint64_t count = self->n - first;
+    const double *change = hsep_at(self, self->change);
+    for (uint64_t u = 0; u < count; u++) {
+        column[u] = change[LINEARISED_CHANGES * u + 1];
+    }
+    linearised_disturbance(self, count);
+    linearised_filter(self, count);
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
         if (model->blend.weights[1 + i] > 0.0) {
-            const double *gains = hsep_at(self, self->gains) + i * n * LINEARISED_GAINS;
-            linearised_disturbance(self, gains, change, n_change, passed, count, T_s, drive);
-            memcpy(filter, hsep_at(self, self->physics), (size_t)(self->filter - self->physics) * sizeof(double));
-            hsep_physics_forced_response(filter, drive, drive, (size_t)count);
             linearised_run(self, hsep_trusted_candidate(model, i), i, count, column);
         }
     }

@@ -69,4 +69,11 @@ HSEP_API void hsep_physics_add(hsep_physics *self, const hsep_physics *other);
  * The state is carried from call to call. Cost: 9 multiply-adds a mode and sample. */
 HSEP_API void hsep_physics_forced_response(hsep_physics *self, const double x_d[], double x_pb[], size_t n);
 
+#define HSEP_PHYSICS_ABREAST 4 /* signals side by side at most */
+
+/* Responses x, m, of count models with the same parameters to the signals u, m, both (n, HSEP_PHYSICS_ABREAST), sample
+ * after sample: the same numbers as one model after the other, whose every sample waits for the one before. u is
+ * delayed by the dead time; behind count it is finite. The states are carried from call to call. */
+HSEP_API void hsep_physics_abreast(hsep_physics *const models[], size_t count, double u[], double x[], size_t n);
+
 #endif
