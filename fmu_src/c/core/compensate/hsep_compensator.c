@@ -108,7 +108,7 @@ static void compensator_publish(hsep_compensator *self, uint64_t last)
             (size_t)Np * sizeof(double));
     }
     hsep_predictor_publish(predictor, last);
-    hsep_predictor_doubt(predictor, hsep_predictor_warm_up(predictor));
+    hsep_predictor_doubt(predictor, hsep_predictor_warm_up(predictor), 0, predictor->n);
 }
 
 /* Do parts of a plan with trust, as much work as is due; return whether it is made. */

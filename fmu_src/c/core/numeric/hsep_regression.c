@@ -92,7 +92,28 @@ static inline void regression_sweep(
     }
 }
 
-/* The same for one entry, or  u := keep u + gain x  of the x before, which loses nothing when keep is small. */
+/* The same where row r of U becomes  keep u + gain x  of the x before if large[r]: it loses nothing when keep is small. */
+static void regression_sweep_large(
+    double *restrict tile, double *restrict x, uint64_t n, const double pivot[4], const double gain[4],
+    const double keep[4], const int large[4])
+{
+    for (uint64_t t = 0; t < n; t++, tile += HSEP_TILE_STRIDE, x += 4) {
+        for (int r = 0; r < 4; r++) {
+            double *restrict u = tile + 4 * r;
+            if (!large[r]) {
+                regression_four(u, x, pivot[r], gain[r], 1);
+                continue;
+            }
+            const double k = keep[r], g = gain[r], p = pivot[r];
+            const double u0 = u[0], u1 = u[1], u2 = u[2], u3 = u[3], x0 = x[0], x1 = x[1], x2 = x[2], x3 = x[3];
+            u[0] = k * u0 + g * x0, u[1] = k * u1 + g * x1, u[2] = k * u2 + g * x2, u[3] = k * u3 + g * x3;
+            x[0] = x0 - p * u0, x[1] = x1 - p * u1, x[2] = x2 - p * u2, x[3] = x3 - p * u3;
+            memset(u + HSEP_TILE_ENTRIES, 0, 4 * sizeof(double));
+        }
+    }
+}
+
+/* The same for one entry. */
 static void regression_rotate(double *tile, int place, double *x, double pivot, double gain, double keep, int large)
 {
     double *u = &tile[place], *carry = &tile[HSEP_TILE_ENTRIES + place];
@@ -141,12 +162,7 @@ static inline void regression_fold(hsep_regression *self, uint64_t first, int ca
         if (left > 1 && !any_large) { /* only the last row of tiles has a height below 4 */
             regression_sweep(tile + HSEP_TILE_STRIDE, x + 4, left - 1, pivot, gain, carries);
         } else if (left > 1) {
-            for (uint64_t j = 0; j < 4 * (left - 1); j++) {
-                double *entries = tile + HSEP_TILE_STRIDE * (j / 4 + 1);
-                for (int r = 0; r < 4; r++) {
-                    regression_rotate(entries, 4 * r + (int)(j % 4), &x[4 + j], pivot[r], gain[r], keep[r], large[r]);
-                }
-            }
+            regression_sweep_large(tile + HSEP_TILE_STRIDE, x + 4, left - 1, pivot, gain, keep, large);
         } else {
             self->residual_sum += x[height] * (x[height] / v); /* rho'^2 = rho^2 + x_n^2 / v */
         }

@@ -196,21 +196,33 @@ HSEP_API void hsep_candidate_vary(
     candidate_mean_square(self, scale);
 }
 
-HSEP_API void hsep_candidate_predict(
-    hsep_candidate *self, const double rows[], const double past[], const hsep_residual_scale *scale, uint64_t varied)
+/* Shrink the free run by its variance, samples first ... last - 1. */
+static void candidate_shrink(hsep_candidate *self, double largest, uint64_t first, uint64_t last)
 {
-    const double largest = scale->largest;
     const double *unshrunk = hsep_at(self, self->unshrunk), *spread = hsep_at(self, self->spread);
     const double *mean_square = hsep_at(self, self->mean_square);
     double *e_h = hsep_at(self, self->e_h);
-    candidate_free_run(self, rows, past, candidate_lag_max * largest);
-    if (varied > 0) {
-        hsep_candidate_vary(self, rows, scale, 0, varied);
-    }
-    for (uint64_t j = 0; j < self->n; j++) {
+    for (uint64_t j = self->n - last; j < self->n - first; j++) {
         const double shrunk = unshrunk[j] * (mean_square[j] / (mean_square[j] + candidate_caution * spread[j]));
         e_h[j] = candidate_bounded(shrunk, candidate_prediction_max * largest);
     }
+}
+
+HSEP_API void hsep_candidate_predict(
+    hsep_candidate *self, const double rows[], const double past[], const hsep_residual_scale *scale, uint64_t varied)
+{
+    candidate_free_run(self, rows, past, candidate_lag_max * scale->largest);
+    if (varied > 0) {
+        hsep_candidate_vary(self, rows, scale, 0, varied);
+    }
+    candidate_shrink(self, scale->largest, 0, self->n);
+}
+
+HSEP_API void hsep_candidate_go_on(
+    hsep_candidate *self, const double rows[], const hsep_residual_scale *scale, uint64_t first, uint64_t last)
+{
+    hsep_candidate_vary(self, rows, scale, first, last);
+    candidate_shrink(self, scale->largest, first, last);
 }
 
 HSEP_API void hsep_candidate_judge(hsep_candidate *self, const double measured[], const double accepted[])

@@ -81,6 +81,10 @@ HSEP_API void hsep_candidate_predict(
 HSEP_API void hsep_candidate_vary(
     hsep_candidate *self, const double rows[], const hsep_residual_scale *scale, uint64_t first, uint64_t last);
 
+/* The same, and predict them. */
+HSEP_API void hsep_candidate_go_on(
+    hsep_candidate *self, const double rows[], const hsep_residual_scale *scale, uint64_t first, uint64_t last);
+
 /* Estimate the correlation from the errors of a window, (Np,), m, that has been measured; accepted: (Np,), 1 where it
  * counts. */
 HSEP_API void hsep_candidate_judge(hsep_candidate *self, const double measured[], const double accepted[]);

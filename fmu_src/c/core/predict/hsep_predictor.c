@@ -21,6 +21,7 @@ HSEP_API const double *hsep_predictor_drive(const hsep_predictor *self, uint64_t
     return has_reference ? hsep_at_const(self, self->drive) + (self->preview - n) : NULL;
 }
 
+static const uint64_t predictor_parts = 5;       /* samples over which the prediction of a window is spread */
 static const double predictor_first_step = 1e-5; /* m, resolution of the sensor assumed before its first change */
 static const double predictor_still = 1e-8;      /* m, motion below which the drive counts as at rest */
 
@@ -265,20 +266,22 @@ static uint64_t predictor_warm_up(const hsep_predictor *self, uint64_t late)
 
 HSEP_API uint64_t hsep_predictor_warm_up(const hsep_predictor *self) { return predictor_warm_up(self, 0); }
 
-HSEP_API void hsep_predictor_doubt(hsep_predictor *self, uint64_t n_warm_up)
+HSEP_API void hsep_predictor_doubt(hsep_predictor *self, uint64_t n_warm_up, uint64_t first, uint64_t last)
 {
     hsep_trusted *trusted = hsep_predictor_trusted(self);
+    const hsep_uncertainty_signals signals = {
+        .x_d = hsep_at(self, self->command),
+        .x_pb = hsep_at(self, self->past_x),
+        .e_h = hsep_at(self, self->e_h),
+        .n_physics = n_warm_up,
+        .disagreement = trusted != NULL ? hsep_at(trusted, trusted->disagreement) + (trusted->n - self->n) : NULL};
     if (self->divergence == HSEP_CONVERGES) {
-        hsep_uncertainty_predict(
-            hsep_predictor_uncertainty(self), hsep_at(self, self->command), hsep_at(self, self->past_x),
-            hsep_at(self, self->e_h), n_warm_up,
-            trusted != NULL ? hsep_at(trusted, trusted->disagreement) + (trusted->n - self->n) : NULL);
+        hsep_uncertainty_predict(hsep_predictor_uncertainty(self), &signals, first, last);
     }
 }
 
-/* Predict the residuals of the window that begins, with commands and x_pb as they came, eq. (2), behind those that are
- * not measured yet; with trust by the residual model that can be trusted. */
-static void predictor_forecast(hsep_predictor *self)
+/* Take in commands and x_pb of the window that begins as they came, eq. (2), behind those that are not measured yet. */
+static void predictor_open(hsep_predictor *self)
 {
     const uint64_t Np = self->Np, late = self->late;
     double *command = hsep_at(self, self->command), *past_x = hsep_at(self, self->past_x);
@@ -288,10 +291,34 @@ static void predictor_forecast(hsep_predictor *self)
         command[Np - 1 - i] = hsep_at(self, self->x_d)[i] - self->start;
         past_x[Np - 1 - i] = hsep_at(self, self->ahead_pb)[i];
     }
-    if (self->trusted) {
-        hsep_trusted_forecast(
-            hsep_predictor_trusted(self), command, hsep_at(self, self->past_x), hsep_at(self, self->e_h));
+    if (!hsep_within(past_x, self->n, HSEP_PREDICTION_MAX) && self->divergence == HSEP_CONVERGES) {
+        self->divergence = HSEP_DIVERGES_X_PB;
     }
+}
+
+/* Samples of the window that are predicted in one go: with trust a part of them, as variances are dear; at least two, as
+ * the spread of errors follows from differences. */
+static uint64_t predictor_part(const hsep_predictor *self)
+{
+    const uint64_t part = (self->Np - 1) / predictor_parts + 1;
+    return self->trusted ? (part > 2 ? part : 2) : self->Np;
+}
+
+/* Predict the next samples of the window; those that are not measured yet with the first of them. */
+static void predictor_go_on(hsep_predictor *self)
+{
+    const uint64_t late = self->late, published = self->n_published, left = self->Np - published;
+    const uint64_t part = predictor_part(self), last = published + (left < part ? left : part);
+    const uint64_t first = published > 0 ? late + published : 0;
+    hsep_trusted *trusted = hsep_predictor_trusted(self);
+    double *e_h = hsep_at(self, self->e_h);
+    if (trusted != NULL && first == 0) {
+        hsep_trusted_forecast(trusted, hsep_at(self, self->command), hsep_at(self, self->past_x), e_h, late + last);
+    } else if (trusted != NULL) {
+        hsep_trusted_go_on(trusted, e_h, first, late + last);
+    }
+    hsep_predictor_publish(self, last);
+    hsep_predictor_doubt(self, predictor_warm_up(self, late), first, late + last);
 }
 
 HSEP_API int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, double x_meas)
@@ -301,6 +328,9 @@ HSEP_API int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, doubl
     double *ahead_pb = hsep_at(self, self->ahead_pb);
     hsep_physics_forced_response(hsep_predictor_physics(self), &relative, ahead_pb + self->k % Np, 1);
     if (!hsep_predictor_take_in(self, x_d_ahead, x_meas)) {
+        if (self->n_published < Np) {
+            predictor_go_on(self);
+        }
         return 0;
     }
     (void)hsep_predictor_finish(self);
@@ -308,10 +338,9 @@ HSEP_API int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, doubl
         memset(hsep_at(self, self->past_e), 0, (size_t)(self->n + self->features.p) * sizeof(double));
     }
     hsep_predictor_begin(self);
-    predictor_forecast(self);
+    predictor_open(self);
     self->n_physics = hsep_predictor_warm_up(self);
-    hsep_predictor_publish(self, Np);
-    hsep_predictor_doubt(self, predictor_warm_up(self, self->late));
+    predictor_go_on(self);
     return 1;
 }
 

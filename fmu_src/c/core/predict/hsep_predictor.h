@@ -145,9 +145,9 @@ HSEP_API void hsep_predictor_begin(hsep_predictor *self);
 /* Predict the samples of the window up to last - 1, whose x_pb are in past_x; eq. (4). */
 HSEP_API void hsep_predictor_publish(hsep_predictor *self, uint64_t last);
 
-/* Predict the errors of the samples that were published, whose commands are in command. n_warm_up: leading samples of
- * the window in the warm-up. */
-HSEP_API void hsep_predictor_doubt(hsep_predictor *self, uint64_t n_warm_up);
+/* Predict the errors of samples first ... last - 1 of the n, which were published, their commands being in command.
+ * n_warm_up: leading samples of them in the warm-up. */
+HSEP_API void hsep_predictor_doubt(hsep_predictor *self, uint64_t n_warm_up, uint64_t first, uint64_t last);
 
 /* Leading samples of the window in the warm-up. */
 HSEP_API uint64_t hsep_predictor_warm_up(const hsep_predictor *self);

@@ -103,13 +103,17 @@ HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i);
 /* Whether these numbers are finite and in range. */
 HSEP_API int hsep_trusted_sound(hsep_trusted *self);
 
-/* Predict the residual e, (Np + p,), m, over the next window; behind it the last ones, as measured. x_d: commands,
- * x_pb: physics-based prediction, (Np,), m. Cost: m^3 / 6 multiply-adds for each candidate's m features, four times
- * Np m^2 / 2, Np^2 / 2, and 6 Np tanh. */
-HSEP_API void hsep_trusted_forecast(hsep_trusted *self, const double x_d[], const double x_pb[], double e[]);
+/* Predict the residual e, (n + p,), m, in samples 0 ... last - 1 of those that come next; behind it the last ones, as
+ * measured. x_d: commands, x_pb: physics-based prediction, (n,), m. Cost: m^3 / 6 multiply-adds for each candidate's m
+ * features, last m^2 / 2, last n / 2, and 6 n tanh. */
+HSEP_API void hsep_trusted_forecast(
+    hsep_trusted *self, const double x_d[], const double x_pb[], double e[], uint64_t last);
 
-/* Its two parts over n samples. Take the scales of the features from the samples that come next, and solve for the
- * weights; path: unmodified commands, (n,), m, which a compensator knows, or NULL. */
+/* Go on with samples first ... last - 1: what they need is dear, and nobody asks for it before. */
+HSEP_API void hsep_trusted_go_on(hsep_trusted *self, double e[], uint64_t first, uint64_t last);
+
+/* What a compensator needs of it, over n samples. Take the scales of the features from the samples that come next, and
+ * solve for the weights; path: unmodified commands, (n,), m, which a compensator knows, or NULL. */
 HSEP_API void hsep_trusted_scale(
     hsep_trusted *self, const double x_d[], const double x_pb[], const double path[], double last_residual);
 

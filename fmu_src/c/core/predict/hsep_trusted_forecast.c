@@ -91,15 +91,12 @@ static void trusted_candidates(hsep_trusted *self, const double x_pb[], const do
     }
 }
 
-/* e: the blend of the candidates, which have predicted. */
-static void trusted_blend(hsep_trusted *self, const double x_pb[], double e[], uint64_t varied)
+/* e: the blend of the candidates, which have predicted samples first ... last - 1. */
+static void trusted_blend(hsep_trusted *self, double e[], uint64_t first, uint64_t last)
 {
     const double *weights = self->blend.weights;
     double *disagreement = hsep_at(self, self->disagreement);
-    if (self->predicted) {
-        trusted_candidates(self, x_pb, e + self->n, varied);
-    }
-    for (uint64_t j = 0; j < self->n; j++) {
+    for (uint64_t j = self->n - last; j < self->n - first; j++) {
         double square = weights[0] * self->hold * self->hold;
         e[j] = weights[0] * self->hold;
         for (uint64_t i = 0; self->predicted && i < HSEP_N_CANDIDATES; i++) {
@@ -119,7 +116,10 @@ HSEP_API void hsep_trusted_predict(
     double *rows = hsep_at(self, self->rows);
     hsep_disturbances_command(disturbances, x_d, x_pb, self->n, self->forecast_scale, rows);
     hsep_disturbances_motion(disturbances, x_pb, x_pb, self->n, rows);
-    trusted_blend(self, x_pb, e, varied);
+    if (self->predicted) {
+        trusted_candidates(self, x_pb, e + self->n, varied);
+    }
+    trusted_blend(self, e, 0, self->n);
 }
 
 HSEP_API void hsep_trusted_vary(hsep_trusted *self, uint64_t first, uint64_t last)
@@ -129,8 +129,20 @@ HSEP_API void hsep_trusted_vary(hsep_trusted *self, uint64_t first, uint64_t las
     }
 }
 
-HSEP_API void hsep_trusted_forecast(hsep_trusted *self, const double x_d[], const double x_pb[], double e[])
+HSEP_API void hsep_trusted_forecast(
+    hsep_trusted *self, const double x_d[], const double x_pb[], double e[], uint64_t last)
 {
     hsep_trusted_scale(self, x_d, x_pb, NULL, e[self->n]);
-    trusted_blend(self, x_pb, e, self->n); /* the rows are those of the scales */
+    if (self->predicted) {
+        trusted_candidates(self, x_pb, e + self->n, last); /* the rows are those of the scales */
+    }
+    trusted_blend(self, e, 0, last);
+}
+
+HSEP_API void hsep_trusted_go_on(hsep_trusted *self, double e[], uint64_t first, uint64_t last)
+{
+    for (uint64_t i = 0; self->predicted && i < HSEP_N_CANDIDATES; i++) {
+        hsep_candidate_go_on(hsep_trusted_candidate(self, i), hsep_at(self, self->rows), &self->scale, first, last);
+    }
+    trusted_blend(self, e, first, last);
 }

@@ -128,31 +128,42 @@ static double uncertainty_from_middle(const hsep_uncertainty *self, uint64_t k)
     return fmin(((double)k + 0.5) / (double)self->Np, 1.0) - 0.5;
 }
 
+/* Components of the variance at place j, as they are at once. */
+static void uncertainty_at(
+    const hsep_uncertainty *self, const hsep_uncertainty_signals *signals, uint64_t j, double f[HSEP_N_COMPONENTS])
+{
+    const double *x_pb = signals->x_pb, *published = hsep_at_const(self, self->e_h);
+    const uint64_t n = self->n;
+    /* The difference of the first sample is that of the second. */
+    const uint64_t newer = j + 1 == n && j > 0 ? j - 1 : j, older = newer + 1 < n ? newer + 1 : newer;
+    const int blended = signals->disagreement != NULL && n - 1 - j >= signals->n_physics;
+    f[0] = 1.0;
+    f[1] = (double)(n - j) / (double)self->Np;
+    f[2] = uncertainty_square(x_pb[newer] - x_pb[older]);
+    f[3] = uncertainty_square(published[newer] - published[older]);
+    f[4] = uncertainty_square(signals->x_d[j] - x_pb[j]);
+    f[5] = uncertainty_square(published[j] - self->last);
+    f[6] = blended ? signals->disagreement[j] : 0.0;
+}
+
 HSEP_API void hsep_uncertainty_predict(
-    hsep_uncertainty *self, const double x_d[], const double x_pb[], const double e_h[], uint64_t n_physics,
-    const double disagreement[])
+    hsep_uncertainty *self, const hsep_uncertainty_signals *signals, uint64_t first, uint64_t last)
 {
     const uint64_t n = self->n;
-    const double last = e_h[n], gain = 1.0 / (1.0 + uncertainty_felt_for * (double)self->Np);
-    double *published = hsep_at(self, self->e_h), *std = hsep_at(self, self->std);
-    double *f = hsep_at(self, self->components), fastest = uncertainty_square(self->fastest);
-    for (uint64_t j = 0; j < n; j++) {
-        published[j] = n - 1 - j < n_physics ? 0.0 : e_h[j];
+    const double gain = 1.0 / (1.0 + uncertainty_felt_for * (double)self->Np);
+    double *published = hsep_at(self, self->e_h), *std = hsep_at(self, self->std), *felt = self->felt;
+    if (first == 0) {
+        memset(felt, 0, sizeof self->felt);
+        self->fastest_ahead = self->fastest;
+        self->last = signals->e_h[n];
     }
-    for (uint64_t j = 0; j < n; j++, f += HSEP_N_COMPONENTS) {
-        /* The difference of the first sample is that of the second. */
-        const uint64_t newer = j + 1 == n && j > 0 ? j - 1 : j, older = newer + 1 < n ? newer + 1 : newer;
-        f[0] = 1.0;
-        f[1] = (double)(n - j) / (double)self->Np;
-        f[2] = uncertainty_square(x_pb[newer] - x_pb[older]);
-        f[3] = uncertainty_square(published[newer] - published[older]);
-        f[4] = uncertainty_square(x_d[j] - x_pb[j]);
-        f[5] = uncertainty_square(published[j] - last);
-        f[6] = disagreement == NULL || n - 1 - j < n_physics ? 0.0 : disagreement[j];
+    double fastest = uncertainty_square(self->fastest_ahead);
+    for (uint64_t k = first; k < last; k++) {
+        published[n - 1 - k] = k < signals->n_physics ? 0.0 : signals->e_h[n - 1 - k];
     }
-    double felt[HSEP_N_COMPONENTS] = {0.0};
-    for (uint64_t k = 0; k < n; k++) { /* in time, from the last measured sample on */
-        f -= HSEP_N_COMPONENTS;
+    for (uint64_t k = first; k < last; k++) { /* in time, from the last measured sample on */
+        double *f = hsep_at(self, self->components) + (n - 1 - k) * HSEP_N_COMPONENTS;
+        uncertainty_at(self, signals, n - 1 - k, f);
         fastest = fmax(fastest, f[2]); /* of the samples so far: a compensator still plans those after */
         const double slow = uncertainty_slow * uncertainty_slow * fastest;
         f[7] = self->recent * slow / (slow + f[2] + uncertainty_least);

@@ -31,14 +31,16 @@ typedef struct {
     double recent;                      /* m2, recent mean square of the residual; 0 before the first window */
     double fastest;                     /* m, largest change of x_pb from sample to sample in a measured window */
     uint64_t n;                         /* samples that are predicted */
-    double fastest_ahead;               /* m, fastest with those of the predicted window */
+    double fastest_ahead;               /* m, fastest with those of the predicted samples */
+    double last;                        /* m, last measured residual before them */
+    double felt[HSEP_N_COMPONENTS];     /* m2, averages of what is felt for a while, up to the last one of them */
     /* Offsets in doubles from the beginning of the struct */
     uint64_t e_h;        /* (n,) m, residual of the window as published */
     uint64_t components; /* (n, HSEP_N_COMPONENTS) m2 but for the first two */
     uint64_t std;        /* (n,) m, standard deviation of the error */
 } hsep_uncertainty;
 
-HSEP_ASSERT_WORDS(hsep_uncertainty, 6 + HSEP_N_UNCERTAINTY);
+HSEP_ASSERT_WORDS(hsep_uncertainty, 7 + HSEP_N_COMPONENTS + HSEP_N_UNCERTAINTY);
 
 /* Bytes of the block, counted in double so that no size can overflow. */
 HSEP_API double hsep_uncertainty_size(uint64_t Np, uint64_t n);
@@ -57,12 +59,17 @@ HSEP_API int hsep_uncertainty_valid(const void *block, uint64_t Np, uint64_t n);
 HSEP_API double *hsep_uncertainty_learned(hsep_uncertainty *self);
 HSEP_API int hsep_uncertainty_sound(const hsep_uncertainty *self);
 
-/* Predict the error of a window. x_d: commands, x_pb: physics-based prediction, (n,), m; e_h: (n + 1,), m, predicted
- * residual, behind it the last measured one; n_physics: leading samples where it is not published; disagreement:
- * variance of the candidates about their blend, (n,), m2, or NULL. */
+/* Signals that tell of a prediction's error. */
+typedef struct {
+    const double *x_d, *x_pb;   /* (n,) m, commands and physics-based prediction */
+    const double *e_h;          /* (n + 1,) m, predicted residual, behind it the last measured one */
+    uint64_t n_physics;         /* leading samples where it is not published */
+    const double *disagreement; /* (n,) m2, variance of the candidates about their blend, or NULL */
+} hsep_uncertainty_signals;
+
+/* Predict the error of samples first ... last - 1, if it is that of those before them; last >= 2, or n. */
 HSEP_API void hsep_uncertainty_predict(
-    hsep_uncertainty *self, const double x_d[], const double x_pb[], const double e_h[], uint64_t n_physics,
-    const double disagreement[]);
+    hsep_uncertainty *self, const hsep_uncertainty_signals *signals, uint64_t first, uint64_t last);
 
 /* Learn from the measured residuals e, (Np,), m, of its first samples; accepted: (Np,), 1 where they count, or NULL for
  * all of them. */
