@@ -10,9 +10,7 @@ cost.
 from __future__ import annotations
 
 import argparse
-import json
 import statistics
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -24,7 +22,7 @@ from rich.table import Table
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # benchmarks are no part of the package
 
-from benchmarks.step_time.host import PREDICTOR, Array, Host, build, instructions, warm
+from benchmarks.step_time.host import PREDICTOR, Array, Host, build, instructions, longest_step, timed, warm
 from hybridsep.base.settings import CompensatorSettings, Limits
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.machines.machine import load_machine
@@ -58,19 +56,22 @@ TRUST_MEDIAN_MAX = 6.0
 TRUST_MOST = 10e6
 """Limit of the instructions of the most expensive step with trust."""
 TRUST_LONGEST = 0.5
-"""Limit of the longest step with trust, relative to T_s."""
+"""Limit of the longest step with trust, if nothing interrupts it, relative to T_s."""
 
 
-def summaries(hosts: dict[str, tuple[Host, dict[str, Any]]], steps: int) -> dict[str, dict[str, Any]]:
-    """Run all hosts by turns; return the medians of each one's figures over the turns."""
+def summaries(hosts: dict[str, tuple[Host, dict[str, Any]]], steps: int, folder: Path) -> dict[str, dict[str, Any]]:
+    """Run all hosts by turns; return the medians of each one's figures over the turns, and the longest step of all."""
     turns: dict[str, list[dict[str, Any]]] = {name: [] for name in hosts}
+    shortest: dict[str, list[Array]] = {name: [] for name in hosts}
     for _ in range(REPETITIONS):
         for name, (host, values) in hosts.items():
-            done = subprocess.run(host.command(values, steps, "-"), check=True, capture_output=True, text=True)
-            turns[name].append(json.loads(done.stdout))
+            printed, times = timed(host, values, steps, folder)
+            turns[name].append(printed)
+            shortest[name].append(times)
     return {
         name: {
             **{key: statistics.median(turn["step"][key] for turn in found) for key in found[0]["step"]},
+            "longest": longest_step(shortest[name]),
             "state_bytes": found[0]["state_bytes"],
             "rms_e": found[0].get("rms_e"),
             "empty": statistics.median(turn["empty"]["p99.9"] for turn in found),
@@ -100,17 +101,17 @@ def main() -> int:
         begun = warm(trained(), folder / "warm")
         cases = CASES | {WARM: CASES[WITH_TRUST] | begun, TIGHT_WARM: CASES[TIGHT_WITH_TRUST] | begun}
         hosts |= {case: (compensator, values) for case, values in cases.items()}
-        found = summaries(hosts, options.steps)
+        found = summaries(hosts, options.steps, folder)
         counts: dict[str, Array] = {}
         for i, (case, (host, values)) in enumerate(hosts.items()):
             counted = instructions(host, values, COUNTED_STEPS, folder / f"callgrind_{i}")
             if counted is not None:
                 counts[case] = counted[int(COMPENSATOR["preview"]) :]
     table = Table(title="one step: ns, and instructions in thousands; p = 50, q = 3, Np = 100")
-    for heading in ("", "median", "p99", "p99.9", "max", "instr. median", "p99", "p99.9", "most", "state, kB"):
+    for heading in ("", "median", "p99", "p99.9", "longest", "instr. median", "p99", "p99.9", "most", "state, kB"):
         table.add_column(heading, justify="right" if heading else "left")
     for case, figures in found.items():
-        times = [f"{figures[key]:.0f}" for key in ("median", "p99", "p99.9", "max")]
+        times = [f"{figures[key]:.0f}" for key in ("median", "p99", "p99.9", "longest")]
         shown = ["–"] * 4
         if case in counts:
             shown = [f"{level / 1e3:.1f}" for level in np.percentile(counts[case], [50, 99, 99.9, 100])]
@@ -127,8 +128,11 @@ def main() -> int:
         ratio = found[case]["median"] / found[PAPER]["median"]
         text = f"{case}: median / that of {PAPER} = {ratio:.2f}, limit ≤ {TRUST_MEDIAN_MAX:g}"
         checks.append((ratio <= TRUST_MEDIAN_MAX, text))
-        longest = found[case]["max"] * 1e-9 / float(COMPENSATOR["T_s"])
-        text = f"{case}: longest step {longest:.2f} T_s, limit ≤ {TRUST_LONGEST:g} (median of {REPETITIONS} turns)"
+        longest, interrupted = found[case]["longest"] * 1e-9 / float(COMPENSATOR["T_s"]), found[case]["max"] / 1e3
+        text = (
+            f"{case}: longest step {longest:.2f} T_s, limit ≤ {TRUST_LONGEST:g} "
+            f"(with what interrupts it {interrupted:.0f} µs)"
+        )
         checks.append((longest <= TRUST_LONGEST, text))
         if case in counts:
             most = counts[case].max()

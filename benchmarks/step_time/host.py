@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -24,7 +25,7 @@ from hybridsep.plants.plant import simulate
 from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.predictor import HybridPredictor
 
-__all__ = ["PREDICTOR", "Array", "Host", "build", "drive_log", "instructions", "warm"]
+__all__ = ["PREDICTOR", "Array", "Host", "build", "drive_log", "instructions", "longest_step", "timed", "warm"]
 
 Array = NDArray[np.float64]
 
@@ -91,6 +92,35 @@ def warm(predictor: HybridPredictor, folder: Path) -> dict[str, Any]:
     folder.mkdir()
     (folder / WEIGHTS_FILE).write_bytes(weights_file(predictor))
     return {"resources": f"{folder}/"}
+
+
+def timed(host: Host, values: dict[str, Any], steps: int, folder: Path) -> tuple[dict[str, Any], Array]:
+    """Run the host once; return what it prints, and the time of each step, (steps,), ns.
+
+    Parameters
+    ----------
+    host : Host
+    values : mapping
+        Parameters that differ from those the host was built with.
+    steps : int
+    folder : Path
+        Where the times are written; exists.
+    """
+    times = folder / "times.bin"
+    done = subprocess.run(host.command(values, steps, times), check=True, capture_output=True, text=True)
+    return json.loads(done.stdout), np.fromfile(times).reshape(2, steps)[0]
+
+
+def longest_step(turns: list[Array]) -> float:
+    """Return how long the longest step takes, ns, if nothing interrupts it.
+
+    Parameters
+    ----------
+    turns : list of array, (steps,)
+        Times of the same steps, ns. Of each step the shortest counts: what interrupts one turn, which an empty loop
+        shows as well, does not return at the same step of all others.
+    """
+    return float(np.min(turns, axis=0).max())
 
 
 def instructions(host: Host, values: dict[str, Any], steps: int, folder: Path) -> Array | None:

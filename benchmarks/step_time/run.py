@@ -27,7 +27,17 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.step_time.host import PREDICTOR, Array, Host, build, drive_log, instructions, warm
+from benchmarks.step_time.host import (
+    PREDICTOR,
+    Array,
+    Host,
+    build,
+    drive_log,
+    instructions,
+    longest_step,
+    timed,
+    warm,
+)
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.evaluate.canvas import save_figure
@@ -49,7 +59,7 @@ TAIL_OVER_MEDIAN_MAX = 15.0
 
 TRUST_MOST, TRUST_MEDIAN_OVER_PAPER_MAX, TRUST_LONGEST = 10e6, 6.0, 0.5
 """Limits with trust: instructions of the most expensive step, and of the median one over that of the paper's model; the
-longest step relative to T_s."""
+longest step, if nothing interrupts it, relative to T_s."""
 
 
 def lapack_ns_per_sample(n: int) -> float:
@@ -174,14 +184,17 @@ def trust_limits(run: str, counts: Array, paper: Array) -> list[tuple[bool, str]
     ]
 
 
-def longest_with_trust(host: Host, run: str, values: dict[str, Any], steps: int) -> tuple[bool, str]:
-    """Compare the longest step of a run with trust, the median of some turns, with its limit."""
-    turns = []
-    for _ in range(REPETITIONS):
-        done = subprocess.run(host.command(values, steps, "-"), check=True, capture_output=True, text=True)
-        turns.append(json.loads(done.stdout)["step"]["max"])
-    longest = statistics.median(turns) * 1e-9 / float(PREDICTOR["T_s"])
-    text = f"trust, {run}: longest step = {longest:.2f} T_s, limit ≤ {TRUST_LONGEST:g} (median of {REPETITIONS} turns)"
+def longest_with_trust(host: Host, run: str, values: dict[str, Any], steps: int, folder: Path) -> tuple[bool, str]:
+    """Compare the longest step of a run with trust with its limit; what interrupts single turns is shown beside it."""
+    turns = [timed(host, values, steps, folder) for _ in range(REPETITIONS)]
+    longest = longest_step([times for _, times in turns]) * 1e-9 / float(PREDICTOR["T_s"])
+    interrupted, empty = (
+        statistics.median(printed[kind]["max"] for printed, _ in turns) / 1e3 for kind in ("step", "empty")
+    )
+    text = (
+        f"trust, {run}: longest step = {longest:.2f} T_s, limit ≤ {TRUST_LONGEST:g} "
+        f"(with what interrupts it {interrupted:.0f} µs, an empty loop {empty:.0f} µs)"
+    )
     return longest <= TRUST_LONGEST, text
 
 
@@ -224,7 +237,7 @@ def main() -> int:
             if (p, q) == CASES[0]:
                 for run, begun in {"cold": {}, "warm": warm(trained(), folder / "warm")}.items():
                     values = {"trust": 1, "t_init": -1.0, **begun}
-                    checks.append(longest_with_trust(host, run, values, options.steps))
+                    checks.append(longest_with_trust(host, run, values, options.steps, folder))
                     if counts is not None:
                         trusted = instructions(host, values, TRUST_STEPS, folder / f"callgrind_{run}")
                         checks += trust_limits(run, trusted[NP:], counts) if trusted is not None else []
