@@ -15,7 +15,8 @@
  * Cost of a sample, with n features: that of hsep_regression_fold(n), and alone 9 multiply-adds a mode; at the end of a
  * window (Np (p + q + 2) + n^2 / 2) multiply-adds on top, the tanh of hsep_reference_features_signs(preview) and,
  * where windows are unlearned, a copy of the regression. Never more, at no sample number. With trust nothing is folded
- * but at the end of a window: hsep_trusted_learn and hsep_trusted_forecast.
+ * but at the end of a window: hsep_trusted_learn and hsep_trusted_forecast, which leaves four fifths of the window that
+ * begins to the next four samples.
  *
  * Memory is one block: the struct, then what its offsets tell; no pointers, so a copy of the block is the state.
  * Reentrant; allocates nothing. Once the parameters are in range nothing here fails but the prediction of a window:
