@@ -1,6 +1,6 @@
 """Weights file ``resources/weights.bin`` of an FMU that starts warm: the factor of a trained predictor.
 
-Layout, little-endian: ``HSEPWGT7``; the numbers of settings, of modes, of learned samples and of what has been learned
+Layout, little-endian: ``HSEPWGT8``; the numbers of settings, of modes, of learned samples and of what has been learned
 besides the factor, as u64; each setting that shapes the features and the factor (with others the weights mean something
 else), its name in 24 bytes and its value as float64; as float64 the numbers of a residual model that can be trusted and
 those of the errors' variance; the upper triangle of the factor ``[R z; 0 ρ]`` by rows; the CRC-32 of all before as u64.
@@ -26,7 +26,7 @@ from ..predict.uncertainty import Uncertainty
 __all__ = ["WEIGHTS_FILE", "learned_settings", "restore_weights", "weights_file"]
 
 WEIGHTS_FILE = "weights.bin"
-_MAGIC = b"HSEPWGT7"
+_MAGIC = b"HSEPWGT8"
 _HEAD = struct.Struct("<8s4Q")
 _SETTING = struct.Struct("<24sd")
 _CHECKSUM = struct.Struct("<Q")
@@ -126,7 +126,7 @@ def _learned(predictor: HybridPredictor) -> dict[str, Array]:
 
 def _learned_with_trust(trusted: TrustedModel) -> dict[str, Array]:
     """Return what the residual model has learned."""
-    blend, candidates = trusted.blend, trusted.candidates
+    blend, candidates, guard = trusted.blend, trusted.candidates, trusted.guard
     return {
         "n_rows": np.array([trusted.n_rows]),
         "velocity_scale": np.array([trusted.velocity_scale]),
@@ -137,7 +137,7 @@ def _learned_with_trust(trusted: TrustedModel) -> dict[str, Array]:
         "largest": trusted.largest,
         "gram": blend.gram,
         "cross": blend.cross,
-        "sensor": np.array([trusted.guard.spread, trusted.guard.held.step, trusted.guard.stuck]),
+        "sensor": np.array([guard.spread, guard.held.step, guard.stuck, guard.vibration]),
     }
 
 
@@ -147,8 +147,9 @@ def _are_sound(learned: Mapping[str, Array]) -> bool:
         return False
     least = {"gram": -np.inf, "cross": -np.inf, "correlations": 1.0}
     if "sensor" in learned:
-        spread, step, stuck = learned["sensor"].tolist()  # -1 and infinite where they are not known
-        if not (step > 0.0 and (spread == -1.0 or 0.0 <= spread < np.inf) and 0.0 <= stuck < np.inf):
+        spread, step, *motions = learned["sensor"].tolist()  # -1 and infinite where they are not known
+        known = step > 0.0 and (spread == -1.0 or 0.0 <= spread < np.inf)
+        if not (known and all(0.0 <= motion < np.inf for motion in motions)):
             return False
     return all(
         np.isfinite(part).all() and (part >= least.get(name, 0.0)).all()
@@ -166,7 +167,8 @@ def _restore_learned(trusted: TrustedModel, learned: Mapping[str, Array]) -> Non
         candidate.noise_variance, candidate.correlation = variance, correlation
     trusted.largest, blend = learned["largest"], trusted.blend
     blend.weights, blend.gram, blend.cross = learned["weights"], learned["gram"], learned["cross"]
-    trusted.guard.spread, trusted.guard.held.step, trusted.guard.stuck = learned["sensor"].tolist()
+    guard = trusted.guard
+    guard.spread, guard.held.step, guard.stuck, guard.vibration = learned["sensor"].tolist()
 
 
 def _differences(name: str, then: float, now: float) -> list[str]:

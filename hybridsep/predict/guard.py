@@ -23,7 +23,11 @@ _SPREADS, _RESOLUTION, _SMALL, _RIPPLE = 12.0, 3.0, 0.01, 0.1
 predicted motion of a sample: a drive at rest does not show the ripple that it has in motion."""
 
 _PACE = 2.0
-"""Plausible change of the residual from sample to sample, relative to the predicted motion."""
+"""Plausible change of the residual from sample to sample, relative to the predicted motion or the vibration."""
+
+_NOISE, _CHANGES = 2.0, 8
+"""Median change of the residual from sample to sample that noise may make, in mean deviations: white noise makes 1.6. And
+the changes that a window has to have to tell the vibration: most of fewer could be those of one wrong value."""
 
 _STOOD, _STUCK = 0.5, 2.0
 """Change at the end of a run of equal values, relative to the motion predicted since its beginning, below which the
@@ -34,13 +38,13 @@ _NEIGHBOURS = 2
 """Samples to either side that an isolated value is compared with."""
 
 _COUNTS = ("gap", "jumps", "holding")
-_NUMBERS = ("last", "spread", "pace", "last_x_pb", "first", "stuck")
+_NUMBERS = ("last", "spread", "pace", "last_x_pb", "first", "stuck", "vibration")
 
 N_STATE = len(_COUNTS) + len(_NUMBERS) + HeldValue.N_STATE + _NEIGHBOURS
 """Numbers of a state."""
 
 _RISE, _FALL = 0.5, 0.02
-"""Rates at which the mean deviation follows that of a window."""
+"""Rates at which the mean deviation follows that of a window; the vibration rises at once, and falls as it does."""
 
 
 class SensorGuard:
@@ -68,6 +72,9 @@ class SensorGuard:
         Mean deviation of a residual from the median of its neighbours; −1 before the first window.
     pace : float, m
         Largest predicted motion of a sample in the last window.
+    vibration : float, m
+        Median change of the residual from sample to sample, beyond that of noise: a drive that rings at rest is not at
+        rest, though its model is.
     jumps : int
         Jumping samples in a row.
     last_x_pb : float, m
@@ -78,7 +85,7 @@ class SensorGuard:
 
     def __init__(self, patience: int) -> None:
         self.patience = patience
-        self.held, self.spread, self.stuck = HeldValue(), -1.0, 0.0
+        self.held, self.spread, self.stuck, self.vibration = HeldValue(), -1.0, 0.0, 0.0
         self.restart()
 
     def restart(self) -> None:
@@ -107,7 +114,7 @@ class SensorGuard:
         first = x_pb[0] if math.isnan(self.last_x_pb) else self.last_x_pb
         pace = float(np.abs(np.diff(x_pb, prepend=first)).max())
         step = 0.0 if math.isinf(self.held.step) else self.held.step
-        motion = max(pace, self.pace)
+        motion = max(pace, self.pace, self.vibration)
         plausible = _SPREADS * self.spread + _RESOLUTION * step + _SMALL * largest + _RIPPLE * motion
         still = max(plausible, _STUCK * self.stuck)
         accepted = np.isfinite(x)
@@ -128,6 +135,7 @@ class SensorGuard:
                     continue
             self.last, self.gap, self.jumps = e, 0, 0
         self._follow(deviation[np.isfinite(x)], plausible)
+        self._follow_vibration(residuals)
         self.pace, self.last_x_pb = pace, float(x_pb[-1])
         self.before = np.concatenate((self.before, residuals))[-_NEIGHBOURS:]
         return accepted
@@ -155,7 +163,7 @@ class SensorGuard:
             raise SignalError("the guard's gap and jumps must be counts, and holding 0 or 1")
         if np.isinf(own).any() or np.isinf(before).any() or np.isnan([values["last"], values["first"]]).any():
             raise SignalError("the guard's residuals and positions must be finite")
-        if not (values["pace"] >= 0.0 and values["stuck"] >= 0.0):
+        if not all(values[name] >= 0.0 for name in ("pace", "stuck", "vibration")):
             raise SignalError("the guard's motions must be ≥ 0")
         if not (values["spread"] >= 0.0 or values["spread"] == -1.0):
             raise SignalError("the guard's spread must be ≥ 0 or −1")
@@ -188,3 +196,11 @@ class SensorGuard:
             return
         mean = float(np.minimum(deviations, plausible).mean())
         self.spread += (_RISE if mean > self.spread else _FALL) * (mean - self.spread)
+
+    def _follow_vibration(self, residuals: Array) -> None:
+        """Follow the median change of the residual, which no minority of wrong values moves."""
+        changes = np.abs(np.diff(residuals, prepend=self.before[-1]))
+        changes = changes[np.isfinite(changes)]
+        if len(changes) >= _CHANGES:
+            seen = max(float(np.median(changes)) - _NOISE * self.spread, 0.0)
+            self.vibration += (1.0 if seen > self.vibration else _FALL) * (seen - self.vibration)

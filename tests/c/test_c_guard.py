@@ -23,7 +23,20 @@ class Guard(ctypes.Structure):
         *((name, ctypes.c_uint64) for name in ("patience", "gap", "jumps", "holding")),
         *(
             (name, ctypes.c_double)
-            for name in ("stuck", "first", "last", "value", "repeats", "low", "high", "step", "spread", "pace", "x_pb")
+            for name in (
+                "stuck",
+                "vibration",
+                "first",
+                "last",
+                "value",
+                "repeats",
+                "low",
+                "high",
+                "step",
+                "spread",
+                "pace",
+                "x_pb",
+            )
         ),
         ("before", ctypes.c_double * NEIGHBOURS),
     )
@@ -74,3 +87,4 @@ def test_core_and_library_accept_the_same_samples(seed: int) -> None:
     assert (core.holding, core.stuck, core.first) == (guard.holding, guard.stuck, guard.first)
     assert (core.step, core.pace) == (guard.held.step, guard.pace)
     assert core.spread == pytest.approx(guard.spread, rel=1e-12)
+    assert core.vibration == pytest.approx(guard.vibration, rel=1e-12)

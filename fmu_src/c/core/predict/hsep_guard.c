@@ -1,5 +1,7 @@
 #include "hsep_guard.h"
 
+#include "hsep_median.h"
+
 #include <math.h>
 
 #define GUARD_WINDOW (2 * HSEP_GUARD_NEIGHBOURS + 1)
@@ -7,12 +9,17 @@
 /* Plausible deviation: in mean deviations, in resolution steps, and relative to the largest residual and to the
  * predicted motion of a sample. */
 static const double guard_spreads = 12.0, guard_resolution = 3.0, guard_small = 0.01, guard_ripple = 0.1;
-static const double guard_pace = 2.0; /* plausible change, relative to the predicted motion */
+static const double guard_pace = 2.0; /* plausible change, relative to the predicted motion or the vibration */
+/* Median change of the residual that noise may make, in mean deviations: white noise makes 1.6. And the changes that a
+ * window has to have to tell the vibration: most of fewer could be those of one wrong value. */
+static const double guard_noise = 2.0;
+static const uint64_t guard_changes = 8;
 /* Change at the end of a run of equal values, relative to the motion predicted since its beginning, below which the
  * axis itself stood still: a sensor that was held shows the whole motion then. And what is believed from then on,
  * relative to that motion. */
 static const double guard_stood = 0.5, guard_stuck = 2.0;
-static const double guard_rise = 0.5, guard_fall = 0.02; /* rates at which the mean deviation follows a window's */
+/* Rates at which the mean deviation follows that of a window; the vibration rises at once, and falls as it does. */
+static const double guard_rise = 0.5, guard_fall = 0.02;
 
 HSEP_API void hsep_guard_init(hsep_guard *self, uint64_t patience)
 {
@@ -68,6 +75,25 @@ static void guard_follow(
     }
 }
 
+/* Let the vibration follow the median change of the residual, which no minority of wrong values moves. */
+static void guard_follow_vibration(
+    hsep_guard *self, const double x[], const double x_pb[], double changes[], uint64_t n)
+{
+    double last = self->before[HSEP_GUARD_NEIGHBOURS - 1];
+    uint64_t count = 0;
+    for (uint64_t k = 0; k < n; k++) {
+        const double residual = guard_residual(self, x, x_pb, n, (int64_t)k), change = fabs(residual - last);
+        if (isfinite(change)) {
+            changes[count++] = change;
+        }
+        last = residual;
+    }
+    if (count >= guard_changes) {
+        const double seen = fmax(hsep_median(changes, count) - guard_noise * self->spread, 0.0);
+        self->vibration += (seen > self->vibration ? 1.0 : guard_fall) * (seen - self->vibration);
+    }
+}
+
 /* Judge who stood still where a run of equal values ends, and begin another. */
 static void guard_end_run(hsep_guard *self, double x, double x_pb)
 {
@@ -92,7 +118,7 @@ HSEP_API void hsep_guard_accept(
         deviation[n - 1 - k] = guard_deviation(self, x, x_pb, n, k);
     }
     const double step = self->held.step < HUGE_VAL ? self->held.step : 0.0;
-    const double motion = fmax(pace, self->pace);
+    const double motion = fmax(fmax(pace, self->pace), self->vibration);
     const double plausible =
         guard_spreads * self->spread + guard_resolution * step + guard_small * largest + guard_ripple * motion;
     const double still = fmax(plausible, guard_stuck * self->stuck);
@@ -126,6 +152,7 @@ HSEP_API void hsep_guard_accept(
         self->gap = self->jumps = 0;
     }
     guard_follow(self, x, deviation, n, known, plausible);
+    guard_follow_vibration(self, x, x_pb, deviation, n);
     for (uint64_t j = 0; j < HSEP_GUARD_NEIGHBOURS; j++) {
         self->before[j] = guard_residual(self, x, x_pb, n, (int64_t)n - HSEP_GUARD_NEIGHBOURS + (int64_t)j);
     }

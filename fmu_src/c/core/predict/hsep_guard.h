@@ -20,6 +20,7 @@ typedef struct {
     uint64_t jumps;    /* jumping samples in a row */
     uint64_t holding;  /* whether the last value was held */
     double stuck;      /* m, largest motion that was predicted while the axis itself stood still; 0 if it never did */
+    double vibration;  /* m, median change of the residual from sample to sample, beyond that of noise */
     double first;      /* m, prediction at the beginning of the run of equal values */
     double last;       /* m, the last accepted residual */
     hsep_sensor held;
@@ -29,14 +30,14 @@ typedef struct {
     double before[HSEP_GUARD_NEIGHBOURS]; /* m, the last residuals, oldest first */
 } hsep_guard;
 
-HSEP_ASSERT_WORDS(hsep_guard, 15 + HSEP_GUARD_NEIGHBOURS);
+HSEP_ASSERT_WORDS(hsep_guard, 16 + HSEP_GUARD_NEIGHBOURS);
 
 HSEP_API void hsep_guard_init(hsep_guard *self, uint64_t patience);
 
 /* Judge the samples of a window: accepted, (n,), becomes 1 where a sample is plausible and 0 elsewhere.
  * x: (n,) m, measured, NaN where missing; x_pb: (n,) m; largest: m, the largest accepted residual so far;
- * deviation: (n,) work. Signals are newest first: sample k is at place n - 1 - k. Cost: about 60 operations a sample,
- * and n more where a run of held values ends. */
+ * deviation: (n,) work. Signals are newest first: sample k is at place n - 1 - k. Cost: about 60 + 2 log2(n) operations a
+ * sample, and n more where a run of held values ends. */
 HSEP_API void hsep_guard_accept(
     hsep_guard *self, const double x[], const double x_pb[], uint64_t n, double largest, double deviation[],
     double accepted[]);

@@ -96,7 +96,7 @@ HSEP_API double hsep_trusted_least_variance(const hsep_trusted *self);
 /* The numbers learned besides it, for a warm start before the first window: their count, and the place of one of them.
  * These are, each >= 0: n_rows, velocity_scale, the scale of the residuals as in its struct, the noise variances of the
  * candidates, their correlations, the blend's weights and largest; then the blend's gram and cross, and what is known
- * of the sensor: its spread, -1 where it is not known, its step, then infinite, and its stuck. */
+ * of the sensor: its spread, -1 where it is not known, its step, then infinite, its stuck and vibration. */
 HSEP_API uint64_t hsep_trusted_n_learned(const hsep_trusted *self);
 HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i);
 

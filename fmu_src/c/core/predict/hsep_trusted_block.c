@@ -151,6 +151,7 @@ HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i)
         {&self->guard.spread, 1},
         {&self->guard.held.step, 1},
         {&self->guard.stuck, 1},
+        {&self->guard.vibration, 1},
     };
     size_t part = 0;
     for (; i >= parts[part].n; part++) {
@@ -161,10 +162,10 @@ HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i)
 
 HSEP_API int hsep_trusted_sound(hsep_trusted *self)
 {
-    const uint64_t n = hsep_trusted_n_learned(self) - 3, n_signed = HSEP_N_BLENDED * (HSEP_N_BLENDED + 1);
-    const double spread = self->guard.spread, stuck = self->guard.stuck;
+    const uint64_t n = hsep_trusted_n_learned(self) - 4, n_signed = HSEP_N_BLENDED * (HSEP_N_BLENDED + 1);
+    const double spread = self->guard.spread, stuck = self->guard.stuck, vibration = self->guard.vibration;
     int sound = self->guard.held.step > 0.0 && (spread == -1.0 || (spread >= 0.0 && isfinite(spread))) &&
-                stuck >= 0.0 && isfinite(stuck);
+                stuck >= 0.0 && isfinite(stuck) && vibration >= 0.0 && isfinite(vibration);
     for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
         sound = sound && hsep_trusted_candidate(self, i)->correlation >= 1.0;
     }
