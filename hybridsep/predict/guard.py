@@ -26,8 +26,8 @@ _PACE = 2.0
 """Plausible change of the residual from sample to sample, relative to the predicted motion or the vibration."""
 
 _NOISE, _CHANGES = 2.0, 8
-"""Median change of the residual from sample to sample that noise may make, in mean deviations: white noise makes 1.6. And
-the changes that a window has to have to tell the vibration: most of fewer could be those of one wrong value."""
+"""Median change of the residual from sample to sample that noise may make, in mean deviations: white noise makes 1.6.
+And the changes that a window has to have to tell the vibration: most of fewer could be those of one wrong value."""
 
 _STOOD, _STUCK = 0.5, 2.0
 """Change at the end of a run of equal values, relative to the motion predicted since its beginning, below which the

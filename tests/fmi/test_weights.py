@@ -201,15 +201,15 @@ def test_no_mutation_of_a_file_with_trust_is_accepted(tmp_path: Path) -> None:
     trusted = predictor.trusted
     assert trusted is not None
     n_blended, n_candidates = len(trusted.blend.first), len(trusted.candidates)
-    n_numbers = 5 + 2 * n_candidates + trusted.static.n + n_blended * (n_blended + 2) + 3 + N_LEARNED
+    n_numbers = 5 + 2 * n_candidates + trusted.static.n + n_blended * (n_blended + 2) + 4 + N_LEARNED
     errors, correlations = first + 8 * (n_numbers - N_LEARNED), first + 8 * (5 + n_candidates)
     assert struct.unpack_from("<Q", body, 32) == (n_numbers,)
-    spread, step, stuck = errors - 24, errors - 16, errors - 8
+    spread, step, stuck, vibration = errors - 32, errors - 24, errors - 16, errors - 8
     nonsense = [
         *(body[:i] + struct.pack("<d", wrong) + body[i + 8 :] for i in (spread, step) for wrong in (-2.0, np.nan)),
         body[:spread] + struct.pack("<d", np.inf) + body[spread + 8 :],
         body[:step] + struct.pack("<d", 0.0) + body[step + 8 :],
-        body[:stuck] + struct.pack("<d", -1.0) + body[stuck + 8 :],
+        *(body[:i] + struct.pack("<d", -1.0) + body[i + 8 :] for i in (stuck, vibration)),
         *(body[:i] + struct.pack("<d", wrong) + body[i + 8 :] for i in (first, first + 80) for wrong in (-1.0, np.nan)),
         *(body[:i] + struct.pack("<d", 0.5) + body[i + 8 :] for i in (correlations, correlations + 8)),
         *(body[:i] + struct.pack("<d", -1.0) + body[i + 8 :] for i in (errors, errors + 8 * (N_LEARNED - 2))),

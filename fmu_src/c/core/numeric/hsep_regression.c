@@ -92,7 +92,8 @@ static inline void regression_sweep(
     }
 }
 
-/* The same where row r of U becomes  keep u + gain x  of the x before if large[r]: it loses nothing when keep is small. */
+/* The same where row r of U becomes  keep u + gain x  of the x before if large[r]: that loses nothing when keep is
+ * small. */
 static void regression_sweep_large(
     double *restrict tile, double *restrict x, uint64_t n, const double pivot[4], const double gain[4],
     const double keep[4], const int large[4])

@@ -36,8 +36,8 @@ HSEP_API void hsep_guard_init(hsep_guard *self, uint64_t patience);
 
 /* Judge the samples of a window: accepted, (n,), becomes 1 where a sample is plausible and 0 elsewhere.
  * x: (n,) m, measured, NaN where missing; x_pb: (n,) m; largest: m, the largest accepted residual so far;
- * deviation: (n,) work. Signals are newest first: sample k is at place n - 1 - k. Cost: about 60 + 2 log2(n) operations a
- * sample, and n more where a run of held values ends. */
+ * deviation: (n,) work. Signals are newest first: sample k is at place n - 1 - k. Cost: about 60 + 2 log2(n) operations
+ * a sample, and n more where a run of held values ends. */
 HSEP_API void hsep_guard_accept(
     hsep_guard *self, const double x[], const double x_pb[], uint64_t n, double largest, double deviation[],
     double accepted[]);

@@ -296,8 +296,8 @@ static void predictor_open(hsep_predictor *self)
     }
 }
 
-/* Samples of the window that are predicted in one go: with trust a part of them, as variances are dear; at least two, as
- * the spread of errors follows from differences. */
+/* Samples of the window that are predicted in one go: with trust a part of them, as variances are dear; two at least,
+ * because the spread of errors follows from differences. */
 static uint64_t predictor_part(const hsep_predictor *self)
 {
     const uint64_t part = (self->Np - 1) / predictor_parts + 1;

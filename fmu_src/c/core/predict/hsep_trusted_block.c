@@ -124,7 +124,7 @@ HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters
 
 HSEP_API uint64_t hsep_trusted_n_learned(const hsep_trusted *self)
 {
-    return 2 + 3 + 2 * HSEP_N_CANDIDATES + self->n_static + HSEP_N_BLENDED * (HSEP_N_BLENDED + 2) + 3;
+    return 2 + 3 + 2 * HSEP_N_CANDIDATES + self->n_static + HSEP_N_BLENDED * (HSEP_N_BLENDED + 2) + 4;
 }
 
 HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i)
