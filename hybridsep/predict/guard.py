@@ -26,7 +26,7 @@ _PACE = 2.0
 """Plausible change of the residual from sample to sample, relative to the predicted motion or the vibration."""
 
 _NOISE, _CHANGES = 2.0, 8
-"""Median change of the residual from sample to sample that noise may make, in mean deviations: white noise makes 1.6.
+"""Median change of the residual from sample to sample that noise may make, in mean deviations: white noise makes 1.4.
 And the changes that a window has to have to tell the vibration: most of fewer could be those of one wrong value."""
 
 _STOOD, _STUCK = 0.5, 2.0

@@ -76,6 +76,8 @@ def test_core_and_library_accept_the_same_samples(seed: int) -> None:
     if seed % 2:  # the axis itself stands still at times
         for k in range(25 * n, 40 * n):
             x[k] = x[k - 1] if abs(x_pb[k] - x[k - 1]) < 2e-3 else x_pb[k] - 2e-3 * np.sign(x_pb[k] - x[k - 1])
+    if seed % 5 == 0:  # it rings
+        x[28 * n : 36 * n] += 2e-4 * np.sin(np.arange(8 * n) * 17.0 / n)
     guard, core = SensorGuard(2 * n), Guard.begin(2 * n)
     rejected = 0
     for i in range(0, 40 * n, n):

@@ -105,6 +105,47 @@ def test_a_new_level_is_believed_in_the_end() -> None:
     assert found[1205:].all()
 
 
+def ringing(frequency: float) -> tuple[Array, Array]:
+    """Return predicted and measured positions, m: from rest a drive rings, of which the model knows nothing."""
+    n = 20 * NP
+    rings = np.arange(n) >= 5 * NP
+    x = 1e-4 * np.sin(2.0 * np.pi * frequency * 1e-3 * np.arange(n)) * rings
+    return np.zeros(n), x + np.random.default_rng(2).normal(0.0, 2e-7, n)
+
+
+@pytest.mark.parametrize("frequency", [5.0, 20.0, 80.0])
+def test_a_drive_that_rings_at_rest_is_believed_after_a_window(frequency: float) -> None:
+    x_pb, x = ringing(frequency)
+    found = accepted(x, x_pb)
+    assert np.mean(found[5 * NP : 6 * NP]) < 0.7  # a sensor that goes wrong would look the same
+    assert np.mean(found[6 * NP :]) > 0.97
+
+
+def test_what_rings_is_learned() -> None:
+    _, x = ringing(20.0)
+    predictor = HybridPredictor(ModalModel.spring_mass_damper(m=1.0, c=15.7, k=24674.0))
+    errors = []
+    for i in range(0, len(x), NP):
+        errors.append(x[i : i + NP] - predictor.predict(np.zeros(NP)).x_h)
+        predictor.update(x[i : i + NP])
+    assert rms(np.concatenate(errors[10:])) < 0.1 * rms(x[10 * NP :])
+
+
+def test_wrong_values_are_rejected_while_a_drive_rings() -> None:
+    x_pb, x = ringing(20.0)
+    places = np.arange(7 * NP, 20 * NP, 37)
+    x[places] += 1e-3
+    assert not accepted(x, x_pb)[places].any()
+
+
+def test_a_wrong_value_in_a_short_window_is_no_vibration() -> None:
+    guard = SensorGuard(6)
+    for x in ([0.0, 1e-7, 0.0], [0.0, 1.0, 0.0], [1e-7, 0.0, 1e-7]):
+        found = guard.accepts(np.array(x), np.zeros(3), 1e-6)
+    assert guard.vibration == 0.0
+    assert found.all()
+
+
 def test_missing_samples_are_counted_and_bridged() -> None:
     model = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
     x_d = staircase()[:2000]

@@ -10,7 +10,7 @@
  * predicted motion of a sample. */
 static const double guard_spreads = 12.0, guard_resolution = 3.0, guard_small = 0.01, guard_ripple = 0.1;
 static const double guard_pace = 2.0; /* plausible change, relative to the predicted motion or the vibration */
-/* Median change of the residual that noise may make, in mean deviations: white noise makes 1.6. And the changes that a
+/* Median change of the residual that noise may make, in mean deviations: white noise makes 1.4. And the changes that a
  * window has to have to tell the vibration: most of fewer could be those of one wrong value. */
 static const double guard_noise = 2.0;
 static const uint64_t guard_changes = 8;
