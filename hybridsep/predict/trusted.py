@@ -42,8 +42,9 @@ _BOUND = 1.2
 _RECENT = 0.9
 """Factor by which the mean square of the residual fades from window to window."""
 
-_GROWTH = 30.0
-"""Growth of the commanded velocity from which on what was learned at lower ones counts for nothing."""
+_GROWTH, _GROWTH_LEARNED, _MOTION_LEARNED = 30.0, 1000.0, 15.0
+"""Growth of the commanded velocity from which on what was learned at lower ones counts for nothing: of a creep in the
+beginning, and once more than so many windows were learned since it began."""
 
 _LEAST_NOISE = 1e-4
 """Bound on λ relative to the largest mean square of the residual: a larger λ would prevent any learning."""
@@ -171,7 +172,8 @@ class TrustedModel:
             Commanded positions as far as they are known: a compensator begins to move before them, with a creep.
         """
         peak = self.static.peak_velocity(self.state, x_d)
-        outgrown = peak > max(_GROWTH * self.velocity_scale, LEAST_VELOCITY)
+        growth = _GROWTH_LEARNED if self.n_rows >= _MOTION_LEARNED * self.settings.Np else _GROWTH
+        outgrown = peak > max(growth * self.velocity_scale, LEAST_VELOCITY)
         if path is not None and self.n_rows == 0.0:
             peak = max(float(np.abs(np.diff(path)).max(initial=0.0)) / self.settings.T_s, self.velocity_scale)
             outgrown = peak > max(self.velocity_scale, LEAST_VELOCITY)

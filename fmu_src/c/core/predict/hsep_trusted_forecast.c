@@ -4,8 +4,9 @@
 #include <math.h>
 #include <stddef.h>
 
-/* Growth of the commanded velocity from which on what was learned at lower ones counts for nothing. */
-static const double trusted_growth = 30.0;
+/* Growth of the commanded velocity from which on what was learned at lower ones counts for nothing: of a creep in the
+ * beginning, and once more than so many windows were learned since it began. */
+static const double trusted_growth = 30.0, trusted_growth_learned = 1000.0, trusted_motion_learned = 15.0;
 
 /* Velocity, m/s, below which a command is at rest: ratios of smaller ones may underflow. */
 static const double trusted_least_velocity = 1e-200;
@@ -21,7 +22,8 @@ static int trusted_outgrown(hsep_trusted *self, const double x_d[], const double
 {
     const hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
     double peak = hsep_disturbances_peak_velocity(disturbances, x_d, self->n);
-    double most = trusted_growth * self->velocity_scale;
+    const int learned = self->n_rows >= trusted_motion_learned * (double)self->Np;
+    double most = (learned ? trusted_growth_learned : trusted_growth) * self->velocity_scale;
     if (path != NULL && self->n_rows == 0.0) {
         peak = 0.0;
         for (uint64_t j = 0; j + 1 < self->n; j++) {
