@@ -36,6 +36,18 @@ def test_a_residual_that_is_a_feature_is_predicted_to_the_noise() -> None:
     assert rms((x - x_h)[seen]) < 1.15 * NOISE
 
 
+def test_what_was_learned_is_kept_while_the_velocity_grows() -> None:
+    """Without that, physics alone is left in the window whose velocity is 30 times that of the first one."""
+    k = np.arange(4500.0)
+    x_d = np.asarray(5e-3 * (k / 4500.0) ** 2 * np.sin(2.0 * np.pi * 2e-3 * k))
+    x_pb = physics(x_d)
+    x = x_pb + friction(x_d) + NOISE * np.random.default_rng(0).normal(size=len(k))
+    x_h = run(trusted(), x_d, x)
+    for window in range(25, 45):
+        seen = slice(100 * window, 100 * (window + 1))
+        assert rms((x - x_h)[seen]) < 0.5 * rms((x - x_pb)[seen]), window
+
+
 @pytest.mark.parametrize(("rate", "grown"), [(1.03, 400), (1.06, 200)])
 def test_an_unstable_recursion_is_bounded_by_the_residuals_so_far(rate: float, grown: int) -> None:
     """A residual that grows, and then no more: without bounds the learned recursion goes on growing."""

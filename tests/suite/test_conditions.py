@@ -155,6 +155,22 @@ def test_a_known_delay_costs_little(new_stream: StreamMaker, trust: bool) -> Non
     assert last(unknown, "rms_pb") > 3 * last(sound, "rms_pb")
 
 
+@cache
+def growing(model: str) -> tuple[Array, Array]:
+    """Return the inputs of a look-ahead on a plant that rings, and whose motion grows from next to nothing, (n,), m."""
+    machine, k = machine_of(model), np.arange(3300.0)
+    assert machine.plant is not None
+    x_d = 1e-3 * (np.maximum(k - 300.0, 0.0) / 3000.0) ** 2 * np.sin(2.0 * np.pi * 2e-3 * (k - 300.0))
+    x = simulate(machine.new_plant(), x_d, T_S) + 4e-6 * np.sin(2.0 * np.pi * 0.03 * k) * (k > 200.0)
+    return np.append(x_d[100:], np.full(100, x_d[-1])), Encoder(1e-7, 5).measure_all(x)
+
+
+@on_all((PREDICTOR, STAGE_PREDICTOR), needs="agreement")
+@pytest.mark.parametrize("Np", [100, 50])
+def test_growing_and_ringing_are_predicted_as_by_the_library(new_stream: StreamMaker, Np: int) -> None:
+    assert_agreement(new_stream, growing(new_stream.model), TRUST | {"Np": Np, "p": 20})
+
+
 @on_all((PREDICTOR, STAGE_PREDICTOR))
 def test_a_run_in_motion_is_no_worse_than_physics(new_stream: StreamMaker) -> None:
     inputs = cut(new_stream.model, 100, 0, 2000)
