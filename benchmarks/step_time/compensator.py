@@ -62,16 +62,16 @@ TRUST_LONGEST = 0.5
 def summaries(hosts: dict[str, tuple[Host, dict[str, Any]]], steps: int, folder: Path) -> dict[str, dict[str, Any]]:
     """Run all hosts by turns; return the medians of each one's figures over the turns, and the longest step of all."""
     turns: dict[str, list[dict[str, Any]]] = {name: [] for name in hosts}
-    shortest: dict[str, list[Array]] = {name: [] for name in hosts}
+    times: dict[str, list[Array]] = {name: [] for name in hosts}
     for _ in range(REPETITIONS):
         for name, (host, values) in hosts.items():
-            printed, times = timed(host, values, steps, folder)
+            printed, (of_steps, _) = timed(host, values, steps, folder)
             turns[name].append(printed)
-            shortest[name].append(times)
+            times[name].append(of_steps)
     return {
         name: {
             **{key: statistics.median(turn["step"][key] for turn in found) for key in found[0]["step"]},
-            "longest": longest_step(shortest[name]),
+            "longest": longest_step(times[name]),
             "state_bytes": found[0]["state_bytes"],
             "rms_e": found[0].get("rms_e"),
             "empty": statistics.median(turn["empty"]["p99.9"] for turn in found),

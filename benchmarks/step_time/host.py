@@ -95,7 +95,7 @@ def warm(predictor: HybridPredictor, folder: Path) -> dict[str, Any]:
 
 
 def timed(host: Host, values: dict[str, Any], steps: int, folder: Path) -> tuple[dict[str, Any], Array]:
-    """Run the host once; return what it prints, and the time of each step, (steps,), ns.
+    """Run the host once; return what it prints, and the times of its steps and of an empty loop, (2, steps), ns.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def timed(host: Host, values: dict[str, Any], steps: int, folder: Path) -> tuple
     """
     times = folder / "times.bin"
     done = subprocess.run(host.command(values, steps, times), check=True, capture_output=True, text=True)
-    return json.loads(done.stdout), np.fromfile(times).reshape(2, steps)[0]
+    return json.loads(done.stdout), np.fromfile(times).reshape(2, steps)
 
 
 def longest_step(turns: list[Array]) -> float:

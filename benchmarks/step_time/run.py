@@ -8,11 +8,9 @@ distribution, and ends with 1 if a limit is missed.
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import shutil
 import statistics
-import subprocess
 import sys
 import tempfile
 import time
@@ -107,13 +105,12 @@ def padasip_ns(n: int) -> Array | None:
 
 def measure(host: Host, p: int, q: int, steps: int, folder: Path) -> dict[str, Any]:
     """Time host and LAPACK by turns; return medians over the turns, and the last turn's single times."""
-    n, times = 2 + q + p, folder / "times.bin"
+    n = 2 + q + p
     turns, lapack = [], []
     for _ in range(REPETITIONS):
         lapack.append(lapack_ns_per_sample(n))
-        done = subprocess.run(host.command({"p": p, "q": q}, steps, times), check=True, capture_output=True, text=True)
-        turns.append(json.loads(done.stdout))
-    both = np.fromfile(times).reshape(2, steps)
+        printed, both = timed(host, {"p": p, "q": q}, steps, folder)
+        turns.append(printed)
     middle: dict[str, Any] = {
         kind: {key: statistics.median(turn[kind][key] for turn in turns) for key in turns[0][kind]}
         for kind in ("step", "empty")
@@ -187,7 +184,7 @@ def trust_limits(run: str, counts: Array, paper: Array) -> list[tuple[bool, str]
 def longest_with_trust(host: Host, run: str, values: dict[str, Any], steps: int, folder: Path) -> tuple[bool, str]:
     """Compare the longest step of a run with trust with its limit; what interrupts single turns is shown beside it."""
     turns = [timed(host, values, steps, folder) for _ in range(REPETITIONS)]
-    longest = longest_step([times for _, times in turns]) * 1e-9 / float(PREDICTOR["T_s"])
+    longest = longest_step([times[0] for _, times in turns]) * 1e-9 / float(PREDICTOR["T_s"])
     interrupted, empty = (
         statistics.median(printed[kind]["max"] for printed, _ in turns) / 1e3 for kind in ("step", "empty")
     )

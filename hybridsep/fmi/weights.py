@@ -19,6 +19,7 @@ from ..base.errors import SignalError, StateError
 from ..base.settings import PredictorSettings
 from ..base.signals import Array
 from ..predict.candidates import ResidualScale
+from ..predict.guard import SensorGuard
 from ..predict.predictor import HybridPredictor
 from ..predict.trusted import TrustedModel
 from ..predict.uncertainty import Uncertainty
@@ -126,7 +127,7 @@ def _learned(predictor: HybridPredictor) -> dict[str, Array]:
 
 def _learned_with_trust(trusted: TrustedModel) -> dict[str, Array]:
     """Return what the residual model has learned."""
-    blend, candidates, guard = trusted.blend, trusted.candidates, trusted.guard
+    blend, candidates = trusted.blend, trusted.candidates
     return {
         "n_rows": np.array([trusted.n_rows]),
         "velocity_scale": np.array([trusted.velocity_scale]),
@@ -137,7 +138,7 @@ def _learned_with_trust(trusted: TrustedModel) -> dict[str, Array]:
         "largest": trusted.largest,
         "gram": blend.gram,
         "cross": blend.cross,
-        "sensor": np.array([guard.spread, guard.held.step, guard.stuck, guard.vibration]),
+        "sensor": trusted.guard.learned(),
     }
 
 
@@ -146,11 +147,8 @@ def _are_sound(learned: Mapping[str, Array]) -> bool:
     if not Uncertainty.is_sound(learned["errors"]):
         return False
     least = {"gram": -np.inf, "cross": -np.inf, "correlations": 1.0}
-    if "sensor" in learned:
-        spread, step, *motions = learned["sensor"].tolist()  # -1 and infinite where they are not known
-        known = step > 0.0 and (spread == -1.0 or 0.0 <= spread < np.inf)
-        if not (known and all(0.0 <= motion < np.inf for motion in motions)):
-            return False
+    if "sensor" in learned and not SensorGuard.is_sound(learned["sensor"]):
+        return False
     return all(
         np.isfinite(part).all() and (part >= least.get(name, 0.0)).all()
         for name, part in learned.items()
@@ -167,8 +165,7 @@ def _restore_learned(trusted: TrustedModel, learned: Mapping[str, Array]) -> Non
         candidate.noise_variance, candidate.correlation = variance, correlation
     trusted.largest, blend = learned["largest"], trusted.blend
     blend.weights, blend.gram, blend.cross = learned["weights"], learned["gram"], learned["cross"]
-    guard = trusted.guard
-    guard.spread, guard.held.step, guard.stuck, guard.vibration = learned["sensor"].tolist()
+    trusted.guard.restore_learned(learned["sensor"])
 
 
 def _differences(name: str, then: float, now: float) -> list[str]:

@@ -149,6 +149,21 @@ class SensorGuard:
             self.stuck = max(self.stuck, moved)
         self.first = position
 
+    def learned(self) -> Array:
+        """Return what is known of the sensor, for another run; a spread of −1 and an infinite step are not known."""
+        return np.array([self.spread, self.held.step, self.stuck, self.vibration])
+
+    def restore_learned(self, learned: Array) -> None:
+        """Restore :meth:`learned` numbers, which :meth:`is_sound`."""
+        self.spread, self.held.step, self.stuck, self.vibration = learned.tolist()
+
+    @staticmethod
+    def is_sound(learned: Array) -> bool:
+        """Return whether :meth:`learned` numbers are in range."""
+        spread, step, *motions = learned.tolist()
+        known = step > 0.0 and (spread == -1.0 or 0.0 <= spread < math.inf)
+        return known and all(0.0 <= motion < math.inf for motion in motions)
+
     def state(self) -> list[float]:
         """Return the state as plain numbers."""
         own = [float(getattr(self, name)) for name in (*_COUNTS, *_NUMBERS)]

@@ -43,8 +43,8 @@ _RECENT = 0.9
 """Factor by which the mean square of the residual fades from window to window."""
 
 _GROWTH, _GROWTH_LEARNED, _MOTION_LEARNED = 30.0, 1000.0, 15.0
-"""Growth of the commanded velocity from which on what was learned at lower ones counts for nothing: of a creep in the
-beginning, and once more than so many windows were learned since it began."""
+"""Growth of the commanded velocity by which what was learned at lower ones is forgotten: the first one, as that was a
+creep, and the second one when rows of so many windows are learned."""
 
 _LEAST_NOISE = 1e-4
 """Bound on λ relative to the largest mean square of the residual: a larger λ would prevent any learning."""

@@ -152,10 +152,7 @@ static void trusted_planner_step(hsep_trusted_planner *self, const hsep_trusted_
     const double *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
     const hsep_splines *splines = hsep_planner_splines(task->planner);
     const hsep_linearised_change change = {
-        .commands = hsep_splines_shape(splines),
-        .n = 4 * splines->spacing,
-        .passed = task->spline,
-        .T_s = hsep_trusted_disturbances(task->model)->T_s};
+        .commands = hsep_splines_shape(splines), .n = 4 * splines->spacing, .passed = task->spline};
     double *target = hsep_at(self, self->target);
     hsep_linearised_at(
         (hsep_linearised *)hsep_at(self, self->linearised), task->model, hsep_at(self, self->command), x_pb, &change,

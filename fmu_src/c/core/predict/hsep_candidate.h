@@ -81,7 +81,7 @@ HSEP_API void hsep_candidate_predict(
 HSEP_API void hsep_candidate_vary(
     hsep_candidate *self, const double rows[], const hsep_residual_scale *scale, uint64_t first, uint64_t last);
 
-/* The same, and predict them. */
+/* Compute these variances, and predict these samples with them. */
 HSEP_API void hsep_candidate_go_on(
     hsep_candidate *self, const double rows[], const hsep_residual_scale *scale, uint64_t first, uint64_t last);
 

@@ -100,14 +100,14 @@ static void linearised_pass(const double weights[], uint64_t count, const double
 }
 
 /* A change as v_d, x and v. */
-static void linearised_signals(hsep_linearised *self, const hsep_linearised_change *change)
+static void linearised_signals(hsep_linearised *self, const hsep_linearised_change *change, double T_s)
 {
     double *signals = hsep_at(self, self->change), last_command = 0.0, last_passed = 0.0;
     for (uint64_t u = 0; u < self->n; u++, signals += LINEARISED_CHANGES) {
         const double now = u < change->n ? change->commands[u] : 0.0;
-        signals[0] = (now - last_command) / change->T_s;
+        signals[0] = (now - last_command) / T_s;
         signals[1] = change->passed[u];
-        signals[2] = (change->passed[u] - last_passed) / change->T_s;
+        signals[2] = (change->passed[u] - last_passed) / T_s;
         last_command = now, last_passed = change->passed[u];
     }
 }
@@ -130,7 +130,7 @@ HSEP_API void hsep_linearised_at(
         linearised_gains(self, weights + first, hsep_at(self, self->gains) + i);
         linearised_pass(weights + 1, first - 1, change->passed, n, hsep_at(self, self->passed) + i * n);
     }
-    linearised_signals(self, change);
+    linearised_signals(self, change, hsep_trusted_disturbances(model)->T_s);
 }
 
 /* The disturbances that a change makes of each candidate, in the last count samples. */

@@ -48,7 +48,6 @@ typedef struct {
     const double *commands; /* (n,) m, oldest first, and nothing behind them */
     uint64_t n;
     const double *passed; /* (preview,) m, the same behind G_pb */
-    double T_s;           /* s */
 } hsep_linearised_change;
 
 /* Linearise at commands x_d that the model, which has learned, was last tried with, with the response x_pb, both

@@ -196,26 +196,30 @@ HSEP_API void hsep_physics_forced_response(hsep_physics *self, const double x_d[
     }
 }
 
-/* Add the responses of one mode to n samples of the signals u. s0, s1: its states. */
+/* Add the responses of one mode of count models to n samples of the signals u, their states in registers. */
 static void physics_respond_abreast(
-    const hsep_discrete_mode *m, double s0[HSEP_PHYSICS_ABREAST], double s1[HSEP_PHYSICS_ABREAST],
-    const double *restrict u, double *restrict x, size_t n)
+    hsep_physics *const models[], size_t count, uint64_t mode, const double *restrict u, double *restrict x, size_t n)
 {
+    const hsep_discrete_mode *m = &physics_modes(models[0])[mode];
     const double a00 = m->A[0], a01 = m->A[1], a10 = m->A[2], a11 = m->A[3], b0 = m->b[0], b1 = m->b[1];
     const double c0 = m->c[0], c1 = m->c[1], d = m->d;
-    double now0[HSEP_PHYSICS_ABREAST], now1[HSEP_PHYSICS_ABREAST];
-    memcpy(now0, s0, sizeof now0);
-    memcpy(now1, s1, sizeof now1);
+    double s0[HSEP_PHYSICS_ABREAST] = {0.0}, s1[HSEP_PHYSICS_ABREAST] = {0.0};
+    for (size_t i = 0; i < count; i++) {
+        s0[i] = physics_modes(models[i])[mode].s[0];
+        s1[i] = physics_modes(models[i])[mode].s[1];
+    }
     for (size_t k = 0; k < n; k++, u += HSEP_PHYSICS_ABREAST, x += HSEP_PHYSICS_ABREAST) {
         for (size_t i = 0; i < HSEP_PHYSICS_ABREAST; i++) {
-            const double next = a00 * now0[i] + a01 * now1[i] + b0 * u[i];
-            x[i] += c0 * now0[i] + c1 * now1[i] + d * u[i];
-            now1[i] = a10 * now0[i] + a11 * now1[i] + b1 * u[i];
-            now0[i] = next;
+            const double next = a00 * s0[i] + a01 * s1[i] + b0 * u[i];
+            x[i] += c0 * s0[i] + c1 * s1[i] + d * u[i];
+            s1[i] = a10 * s0[i] + a11 * s1[i] + b1 * u[i];
+            s0[i] = next;
         }
     }
-    memcpy(s0, now0, sizeof now0);
-    memcpy(s1, now1, sizeof now1);
+    for (size_t i = 0; i < count; i++) {
+        physics_modes(models[i])[mode].s[0] = s0[i];
+        physics_modes(models[i])[mode].s[1] = s1[i];
+    }
 }
 
 HSEP_API void hsep_physics_abreast(hsep_physics *const models[], size_t count, double u[], double x[], size_t n)
@@ -228,15 +232,6 @@ HSEP_API void hsep_physics_abreast(hsep_physics *const models[], size_t count, d
     }
     memset(x, 0, HSEP_PHYSICS_ABREAST * n * sizeof(double));
     for (uint64_t mode = 0; mode < models[0]->n_modes; mode++) {
-        double s0[HSEP_PHYSICS_ABREAST] = {0.0}, s1[HSEP_PHYSICS_ABREAST] = {0.0};
-        for (size_t i = 0; i < count; i++) {
-            s0[i] = physics_modes(models[i])[mode].s[0];
-            s1[i] = physics_modes(models[i])[mode].s[1];
-        }
-        physics_respond_abreast(&physics_modes(models[0])[mode], s0, s1, u, x, n);
-        for (size_t i = 0; i < count; i++) {
-            physics_modes(models[i])[mode].s[0] = s0[i];
-            physics_modes(models[i])[mode].s[1] = s1[i];
-        }
+        physics_respond_abreast(models, count, mode, u, x, n);
     }
 }

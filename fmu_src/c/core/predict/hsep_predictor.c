@@ -291,6 +291,7 @@ static void predictor_open(hsep_predictor *self)
         command[Np - 1 - i] = hsep_at(self, self->x_d)[i] - self->start;
         past_x[Np - 1 - i] = hsep_at(self, self->ahead_pb)[i];
     }
+    /* of the whole window at once, though parts of it are published later */
     if (!hsep_within(past_x, self->n, HSEP_PREDICTION_MAX) && self->divergence == HSEP_CONVERGES) {
         self->divergence = HSEP_DIVERGES_X_PB;
     }

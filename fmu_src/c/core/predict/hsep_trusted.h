@@ -109,7 +109,7 @@ HSEP_API int hsep_trusted_sound(hsep_trusted *self);
 HSEP_API void hsep_trusted_forecast(
     hsep_trusted *self, const double x_d[], const double x_pb[], double e[], uint64_t last);
 
-/* Go on with samples first ... last - 1: what they need is dear, and nobody asks for it before. */
+/* Predict samples first ... last - 1, too: their variances are dear, and nobody asks for them before. */
 HSEP_API void hsep_trusted_go_on(hsep_trusted *self, double e[], uint64_t first, uint64_t last);
 
 /* What a compensator needs of it, over n samples. Take the scales of the features from the samples that come next, and

@@ -122,9 +122,11 @@ HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters
     return sound;
 }
 
+#define TRUSTED_N_SENSOR 4 /* numbers of what is known of the sensor, the last ones */
+
 HSEP_API uint64_t hsep_trusted_n_learned(const hsep_trusted *self)
 {
-    return 2 + 3 + 2 * HSEP_N_CANDIDATES + self->n_static + HSEP_N_BLENDED * (HSEP_N_BLENDED + 2) + 4;
+    return 2 + 3 + 2 * HSEP_N_CANDIDATES + self->n_static + HSEP_N_BLENDED * (HSEP_N_BLENDED + 2) + TRUSTED_N_SENSOR;
 }
 
 HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i)
@@ -162,7 +164,8 @@ HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i)
 
 HSEP_API int hsep_trusted_sound(hsep_trusted *self)
 {
-    const uint64_t n = hsep_trusted_n_learned(self) - 4, n_signed = HSEP_N_BLENDED * (HSEP_N_BLENDED + 1);
+    const uint64_t n = hsep_trusted_n_learned(self) - TRUSTED_N_SENSOR;
+    const uint64_t n_signed = HSEP_N_BLENDED * (HSEP_N_BLENDED + 1);
     const double spread = self->guard.spread, stuck = self->guard.stuck, vibration = self->guard.vibration;
     int sound = self->guard.held.step > 0.0 && (spread == -1.0 || (spread >= 0.0 && isfinite(spread))) &&
                 stuck >= 0.0 && isfinite(stuck) && vibration >= 0.0 && isfinite(vibration);

@@ -4,8 +4,8 @@
 #include <math.h>
 #include <stddef.h>
 
-/* Growth of the commanded velocity from which on what was learned at lower ones counts for nothing: of a creep in the
- * beginning, and once more than so many windows were learned since it began. */
+/* Growth of the commanded velocity by which what was learned at lower ones is forgotten: the first one, as that was a
+ * creep, and the second one when rows of so many windows are learned. */
 static const double trusted_growth = 30.0, trusted_growth_learned = 1000.0, trusted_motion_learned = 15.0;
 
 /* Velocity, m/s, below which a command is at rest: ratios of smaller ones may underflow. */
@@ -77,9 +77,13 @@ HSEP_API void hsep_trusted_scale(
     }
 }
 
-/* Predict by the candidates, whose rows hold the commands and stiffness and damping at x_pb. past: (p,), m. */
+/* Predict by the candidates, if they have learned, whose rows hold the commands and stiffness and damping at x_pb.
+ * past: (p,), m. */
 static void trusted_candidates(hsep_trusted *self, const double x_pb[], const double past[], uint64_t varied)
 {
+    if (!self->predicted) {
+        return;
+    }
     double *x = hsep_at(self, self->x), *rows = hsep_at(self, self->rows);
     hsep_candidate *first = hsep_trusted_candidate(self, 0);
     /* The stiffness acts at the position, which the physics model alone does not give well enough. */
@@ -118,9 +122,7 @@ HSEP_API void hsep_trusted_predict(
     double *rows = hsep_at(self, self->rows);
     hsep_disturbances_command(disturbances, x_d, x_pb, self->n, self->forecast_scale, rows);
     hsep_disturbances_motion(disturbances, x_pb, x_pb, self->n, rows);
-    if (self->predicted) {
-        trusted_candidates(self, x_pb, e + self->n, varied);
-    }
+    trusted_candidates(self, x_pb, e + self->n, varied);
     trusted_blend(self, e, 0, self->n);
 }
 
@@ -135,9 +137,7 @@ HSEP_API void hsep_trusted_forecast(
     hsep_trusted *self, const double x_d[], const double x_pb[], double e[], uint64_t last)
 {
     hsep_trusted_scale(self, x_d, x_pb, NULL, e[self->n]);
-    if (self->predicted) {
-        trusted_candidates(self, x_pb, e + self->n, last); /* the rows are those of the scales */
-    }
+    trusted_candidates(self, x_pb, e + self->n, last); /* the rows are those of the scales */
     trusted_blend(self, e, 0, last);
 }
 

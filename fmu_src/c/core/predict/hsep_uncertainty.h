@@ -67,7 +67,8 @@ typedef struct {
     const double *disagreement; /* (n,) m2, variance of the candidates about their blend, or NULL */
 } hsep_uncertainty_signals;
 
-/* Predict the error of samples first ... last - 1, if it is that of those before them; last >= 2, or n. */
+/* Predict the errors of samples first ... last - 1; first is 0, or where the last call ended. The first samples are at
+ * least two, or n, as differences are taken. */
 HSEP_API void hsep_uncertainty_predict(
     hsep_uncertainty *self, const hsep_uncertainty_signals *signals, uint64_t first, uint64_t last);
 
