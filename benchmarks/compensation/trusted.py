@@ -36,6 +36,9 @@ NO_WORSE = 1.02
 OUTLIER_MOVES = 5.0
 """Largest change of x_dm by an outlier of 1 mm, µm."""
 
+LATE = 5
+"""Samples by which a late measurement is late, which the compensator knows; the same figures are asked of it."""
+
 
 @dataclass(frozen=True)
 class Row:
@@ -53,6 +56,7 @@ def rows() -> Iterator[Row]:
     """Yield the cases."""
     drive = load_machine("spring_mass_damper")
     yield Row("staircase", drive, staircase(), (4.2, 0.5))
+    yield Row(f"staircase, {LATE} samples late", _late(drive), staircase(), (4.2, 0.5), Case(late=LATE))
     yield Row("staircase of 7 mm", drive, short_staircase())
     for name, case in CASES.items():
         yield Row(name, drive, staircase(), case=case, worse=LESS_THAN_5_PERCENT_WORSE)
@@ -68,8 +72,14 @@ def rows() -> Iterator[Row]:
         for i, axis in enumerate("XY"):
             stage, label = with_friction_on(axes[i], kind), f"{axis}, friction on the {kind}"
             yield Row(f"{label}: spiral", stage, spiral()[i], limits[i])
+            name = f"{label}: spiral, {LATE} samples late"
+            yield Row(name, _late(stage), spiral()[i], limits[i], Case(late=LATE))
             for name, path in paths:
                 yield Row(f"{label}: {name}", stage, path[i])
+
+
+def _late(machine: Machine) -> Machine:
+    return machine.changed("compensator", {"measurement_delay": LATE})
 
 
 def measured(row: Row, seed: int) -> tuple[float, float, float, float]:

@@ -174,9 +174,6 @@ class PredictorSettings(Settings):
     TRUST: ClassVar[tuple[str, ...]] = ("trust", "effect", "noise_std", "forgetting", "period")
     """Fields of the residual model with trust."""
 
-    ALONE: ClassVar[tuple[str, ...]] = ("measurement_delay",)
-    """Fields of a predictor that no machine file's or FMU's compensator has: it plans from the state of ``G_pb``."""
-
     TUNED: ClassVar[tuple[str, ...]] = ("p", "q", "lam", "effect", "noise_std", "forgetting")
     """Fields that can be tuned on a log: ``Np`` is the controller's, and a warm-up hides errors."""
 
@@ -234,6 +231,21 @@ class PredictorSettings(Settings):
         """Warm-up, s: ``t_init``, or where that is automatic none with trust and 0.3 s without."""
         automatic = 0.0 if self.trust else 0.3
         return automatic if self.t_init < 0.0 else self.t_init
+
+    def for_planning(self) -> PredictorSettings:
+        """Return these settings, those of a compensator's predictor.
+
+        Raises
+        ------
+        ParameterError
+            If the measurement is late without trust: the paper's model is planned with from the last sample on.
+        """
+        if self.measurement_delay and not self.trust:
+            raise ParameterError(
+                f"measurement_delay of a compensator must be 0 with trust = false, got {self.measurement_delay}: only "
+                "the model with trust plans from a late measurement"
+            )
+        return self
 
     def _misfits(self) -> list[str]:
         problems = []

@@ -18,7 +18,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.errors import ParameterError, SignalError
+from ..base.errors import SignalError
 from ..base.settings import CompensatorSettings, PredictorSettings
 from ..base.signals import Array, as_published, as_samples
 from ..predict.disturbances import Disturbance
@@ -63,16 +63,13 @@ class SepCompensator:
     Raises
     ------
     ParameterError
-        If ``preview`` or ``spacing`` does not fit the predictor's ``Np``, or the predictor has a ``measurement_delay``.
+        If ``preview`` or ``spacing`` does not fit the predictor's ``Np``, or the predictor has a ``measurement_delay``
+        without trust.
     """
 
     def __init__(self, predictor: HybridPredictor, settings: CompensatorSettings | None = None) -> None:
         Np = predictor.Np
-        if predictor.settings.measurement_delay:
-            raise ParameterError(
-                "measurement_delay must be 0 for a compensator, which plans from the state of the physics model now, "
-                f"got {predictor.settings.measurement_delay} samples"
-            )
+        predictor.settings.for_planning()
         self.predictor = predictor
         self.settings = settings = (settings or CompensatorSettings()).for_window(Np)
         assert settings.preview is not None
@@ -262,7 +259,9 @@ class SepCompensator:
         assert self.predictor.start is not None
         trusted.static.origin = self.predictor.start
         with np.errstate(all="ignore"):  # a prediction that is no candidate may overflow
-            return PlanModel(trusted, self.predictor.state, path + self._basis.values @ self._rest, path)
+            return PlanModel(
+                trusted, self.predictor.state, self.predictor.late, path + self._basis.values @ self._rest, path
+            )
 
     def _trusted_plan(self, command: Array, path: Array, model: PlanModel) -> tuple[SepState, Array]:
         """Return the model and the coefficients of the best plan, with trust: the physics model's, or a better one."""

@@ -135,7 +135,7 @@ class TrustedPlanner:
     def _at(self, coefficients: Array) -> _Point:
         prediction = self._model.predict(self._x_d + self._basis.values @ coefficients)
         third = self._basis.third @ coefficients + self._third_before
-        x_h = prediction.x_pb + prediction.e_h
+        x_h = self._model.position(prediction)
         error = self._x_d - x_h
         cost = float(error @ error) + self._jerk_weight * float(third @ third)
         return _Point(coefficients, prediction, x_h, third, cost)

@@ -15,7 +15,6 @@ from ..base.settings import PARAMETERS, CompensatorSettings, PredictorSettings, 
 from .angular_units import angular_unit
 
 __all__ = [
-    "ALONE_SETTINGS",
     "COMPENSATOR_SETTINGS",
     "INTERPOLATED",
     "MODELS",
@@ -38,7 +37,7 @@ PREDICTOR_SETTINGS: Mapping[str, Parameter] = {
     **{
         name: parameter
         for name, parameter in _PREDICTOR.items()
-        if name not in (*PredictorSettings.NEEDS_PREVIEW, *PredictorSettings.TRUST, *PredictorSettings.ALONE)
+        if name not in (*PredictorSettings.NEEDS_PREVIEW, *PredictorSettings.TRUST)
     },
     "dead_time": PARAMETERS["dead_time"],
 }
@@ -46,9 +45,6 @@ PREDICTOR_SETTINGS: Mapping[str, Parameter] = {
 
 TRUST_SETTINGS: Mapping[str, Parameter] = {name: _PREDICTOR[name] for name in PredictorSettings.TRUST}
 """Parameters of the residual model with trust, of both."""
-
-ALONE_SETTINGS: Mapping[str, Parameter] = {name: _PREDICTOR[name] for name in PredictorSettings.ALONE}
-"""Parameters of a HybridPredictor that no SepCompensator has."""
 
 COMPENSATOR_SETTINGS: Mapping[str, Parameter] = {
     **{name: _PREDICTOR[name] for name in PredictorSettings.NEEDS_PREVIEW},
@@ -194,7 +190,7 @@ def predictor_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping
         Variable("batch", "Integer", "output", "discrete", "number of the window, floor(k / Np); 0 is the first fill"),
         Variable("n_rejected", "Integer", "output", "discrete", _REJECTED),
     ]
-    table += _parameters({**PREDICTOR_SETTINGS, **TRUST_SETTINGS, **ALONE_SETTINGS}, parameters)
+    table += _parameters({**PREDICTOR_SETTINGS, **TRUST_SETTINGS}, parameters)
     table += _modes(modes)
     for name, meaning in (
         ("x_d", "commanded positions"),

@@ -110,8 +110,7 @@ class Machine(Section):
     def compensator_predictor(self) -> PredictorSettings:
         """Settings of the compensator's own predictor: those of the predictor where the section has no others."""
         own = self._compensator_entries(PredictorSettings)
-        given = _without(PredictorSettings.ALONE, self.predictor.given())
-        return PredictorSettings(**{**given, **own}, **self._sampling)
+        return PredictorSettings(**{**self.predictor.given(), **own}, **self._sampling).for_planning()
 
     @property
     def compensator_settings(self) -> CompensatorSettings:
@@ -183,7 +182,7 @@ class Machine(Section):
         if self.drive_limits is None:
             raise MachineError(f"machine {self.name} has no [drive_limits] section, which a compensator FMU needs")
         return {
-            **_without(PredictorSettings.ALONE, self.compensator_predictor.to_fmi()),
+            **self.compensator_predictor.to_fmi(),
             **self.compensator_settings.to_fmi(),
             "dead_time": self.physics.dead_time,
         }

@@ -89,9 +89,7 @@ def _validator(parameter: Parameter) -> BeforeValidator:
     return BeforeValidator(checked)
 
 
-def _settings_section(
-    settings: type[Settings], *, inherits: bool = False, without: tuple[str, ...] = ()
-) -> dict[str, Any]:
+def _settings_section(settings: type[Settings], *, inherits: bool = False) -> dict[str, Any]:
     """Return pydantic fields for a section, by the names of the settings' fields.
 
     Parameters
@@ -99,12 +97,10 @@ def _settings_section(
     settings : type of Settings
     inherits : bool
         Whether a missing entry is taken from another section.
-    without : tuple of str
-        Fields that the section has not.
     """
     entries: dict[str, Any] = {}
     for field, parameter in ((field, settings.parameters().get(field.name)) for field in fields(settings)):
-        if parameter is not None and field.name not in (*settings.ELSEWHERE, *without):
+        if parameter is not None and field.name not in settings.ELSEWHERE:
             default = None if inherits else field.default
             kind: Any = parameter.kind if default is not None else parameter.kind | None
             kind = Annotated[kind, _validator(parameter)]
@@ -148,7 +144,7 @@ else:
         __base__=Entries,
         __doc__="Parameters of the compensator; the predictor's count where they are left out.",
         **{
-            **_settings_section(PredictorSettings, inherits=True, without=PredictorSettings.ALONE),
+            **_settings_section(PredictorSettings, inherits=True),
             **_settings_section(CompensatorSettings),
             **{name: (Number, PARAMETERS[name].default) for name in PredictorSettings.NEEDS_PREVIEW},
         },

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from ..base.signals import Array
+from .disturbances import DisturbanceSlopes
 from .forecast import Forecast
 from .trusted import TrustedModel
 
@@ -23,9 +24,11 @@ class PlanModel:
     Parameters
     ----------
     model : TrustedModel
-        At the beginning of the preview; not changed.
+        Where the measurements end, which is the beginning of the preview unless they are late; not changed.
     state : (n_state,) array
         State of ``G_pb`` there.
+    late : (measurement_delay,) array, m
+        Commands between there and the preview, relative to the start.
     x_d, path : (n,) array, m
         Commands that the scales of the features and the variances of predictions follow from, and unmodified ones,
         relative to the start.
@@ -35,12 +38,13 @@ class PlanModel:
     scales : FeatureScales
     """
 
-    def __init__(self, model: TrustedModel, state: Array, x_d: Array, path: Array) -> None:
-        self._model, self._discrete, self._state = model, model.static.discrete, state
-        x_pb, _ = self._discrete.forced_response(state, x_d)
-        self.scales = model.scales(x_d, x_pb, path)
+    def __init__(self, model: TrustedModel, state: Array, late: Array, x_d: Array, path: Array) -> None:
+        self._model, self._discrete, self._state, self._late = model, model.static.discrete, state, late
+        command = np.concatenate((late, x_d))
+        x_pb, _ = self._discrete.forced_response(state, command)
+        self.scales = model.scales(command, x_pb, np.concatenate((late, path)))
         self._solved = model.solved(self.scales)
-        self._held = model.forecast_by(self._solved, x_d, x_pb, self.scales).predictions
+        self._held = model.forecast_by(self._solved, command, x_pb, self.scales).predictions
 
     @property
     def has_learned(self) -> bool:
@@ -48,9 +52,14 @@ class PlanModel:
         return bool(self._solved)
 
     def predict(self, x_d: Array) -> Forecast:
-        """Predict the preview under commands ``x_d``, ``(n,)``, m, relative to the start."""
-        x_pb, _ = self._discrete.forced_response(self._state, x_d)
-        return self._model.forecast_by(self._solved, x_d, x_pb, self.scales, self._held)
+        """Predict the preview, and what is late before it, under commands ``x_d``, ``(n,)``, m."""
+        command = np.concatenate((self._late, x_d))
+        x_pb, _ = self._discrete.forced_response(self._state, command)
+        return self._model.forecast_by(self._solved, command, x_pb, self.scales, self._held)
+
+    def position(self, at: Forecast) -> Array:
+        """Return ``x_h`` of :meth:`predict` over the preview, ``(n,)``, m."""
+        return (at.x_pb + at.e_h)[len(self._late) :]
 
     def slope(self, at: Forecast, changes: Array, passed: Array, reach: float) -> Array:
         """Return the change of ``x_h`` with changes of the commands, ``(n, m)``, once something is learned.
@@ -58,7 +67,7 @@ class PlanModel:
         Parameters
         ----------
         at : Forecast
-            Where the model is linearised.
+            Of :meth:`predict`, where the model is linearised.
         changes : (n, m) array
             Changes of the commands, each a column.
         passed : (n, m) array
@@ -66,17 +75,18 @@ class PlanModel:
         reach : float
             Of the friction's slope, as that of :meth:`StaticFeatures.slopes`.
         """
-        static, discrete = self._model.static, self._discrete
+        static, discrete, n_late = self._model.static, self._discrete, len(self._late)
         total: Array = passed.copy()
         parts = self._model.blend.weights[1:].tolist()
-        slopes = static.slopes(self._model.state, at.x_d, at.x_pb, at.x, self.scales.velocity, reach)
+        over_all = static.slopes(self._model.state, at.x_d, at.x_pb, at.x, self.scales.velocity, reach)
+        slopes = DisturbanceSlopes(*(part[n_late:] for part in over_all))
         velocity = np.diff(changes, axis=0, prepend=0.0) / discrete.T_s
         moved = np.diff(passed, axis=0, prepend=0.0) / discrete.T_s
         for solved, found, part in zip(self._solved, at.predictions, parts, strict=True):
             if part == 0.0:
                 continue
-            e = found.unshrunk
-            shrink = part * np.divide(found.e_h, e, out=np.zeros_like(e), where=e != 0.0)
+            e = found.unshrunk[n_late:]
+            shrink = part * np.divide(found.e_h[n_late:], e, out=np.zeros_like(e), where=e != 0.0)
             linear, own, differences = static.split(solved.solution.weights[: solved.n_static])
             disturbance = np.zeros_like(changes)
             for weights, is_difference in ((own, False), (differences, True)):

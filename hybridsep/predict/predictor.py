@@ -307,8 +307,8 @@ class HybridPredictor:
         """Return the first column of ``G_pb``, m/m, and its free response, m, ``(n,)`` each; the start is known."""
         assert self.start is not None
         g_pb = self.discrete.impulse_response(n)
-        free, _ = self.discrete.forced_response(self.state, np.zeros(n))
-        return g_pb, free + self.start * (1.0 - np.cumsum(g_pb))
+        free, _ = self.discrete.forced_response(self.state, np.concatenate((self.late, np.zeros(n))))
+        return g_pb, free[len(self.late) :] + self.start * (1.0 - np.cumsum(g_pb))
 
     @property
     def n_pending(self) -> int:

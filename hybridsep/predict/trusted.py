@@ -75,7 +75,7 @@ class TrustedModel:
     """
 
     def __init__(self, settings: PredictorSettings, discrete: DiscreteModel, own: Sequence[Disturbance] = ()) -> None:
-        self.settings, self.look_ahead = settings, settings.Np + settings.measurement_delay
+        self.settings, self.preview = settings, settings.Np
         self.static = StaticFeatures(discrete, settings.q, settings.period, own)
         p = settings.p
         self.regression = RidgeRegression(self.static.n + p, _NO_PENALTY)
@@ -115,11 +115,11 @@ class TrustedModel:
     @property
     def plans(self) -> bool:
         """Whether a compensator plans with it."""
-        return self.look_ahead > self.settings.Np + self.settings.measurement_delay
+        return self.preview > self.settings.Np
 
     def plan_ahead(self, preview: int) -> None:
         """Adapt to a compensator, which plans over a preview, in samples, and moves the drive as it commands."""
-        self.look_ahead = preview
+        self.preview = preview
         self.static.damping_of_motion = self.plans
 
     def forecast(self, x_d: Array, x_pb: Array, scales: FeatureScales | None = None) -> Forecast:

@@ -54,9 +54,10 @@ def learned(period: float = 0.0) -> bytes:
     return sep.to_bytes()
 
 
-def plan_model(sep: SepCompensator, x_d: Array) -> PlanModel:
+def plan_model(sep: SepCompensator, x_d: Array, late: int = 0) -> PlanModel:
+    """Return the model over commands of which the first ones are late."""
     assert sep.predictor.trusted is not None
-    return PlanModel(sep.predictor.trusted, sep.predictor.state, x_d, x_d)
+    return PlanModel(sep.predictor.trusted, sep.predictor.state, x_d[:late], x_d[late:], x_d[late:])
 
 
 @pytest.mark.parametrize("period", [0.0, 2e-3])
@@ -78,6 +79,23 @@ def test_the_slope_is_that_of_the_prediction(period: float) -> None:
         # Shrinking and the second pass of the stiffness are held in the slope.
         expected = (ahead - behind) / (2.0 * size)
         assert np.max(np.abs(slope - expected)) < 0.05 * np.max(np.abs(expected))
+
+
+@pytest.mark.parametrize("late", [1, 30])
+def test_late_commands_are_predicted_and_not_changed(late: int) -> None:
+    """The preview after them is the end of a longer one, whose first commands stay as they are."""
+    sep, n = SepCompensator.from_bytes(learned(2e-3)), 200
+    x_d, basis = moves()[: late + n], SplineBasis(n, 2)
+    whole, model = plan_model(sep, x_d), plan_model(sep, x_d, late)
+    at, of_whole = model.predict(x_d[late:]), whole.predict(x_d)
+    np.testing.assert_array_equal(model.position(at), whole.position(of_whole)[late:])
+    changes = basis.values[:, 10:60:7]
+    passed = basis.filtered(sep.predictor.physics_operator(n)[0])[:, 7:57:7]
+    later = ((late, 0), (0, 0))
+    expected = whole.slope(of_whole, np.pad(changes, later), np.pad(passed, later), 0.01)
+    assert np.abs(expected[late:]).max() > 0.1
+    np.testing.assert_array_equal(expected[:late], 0.0)
+    np.testing.assert_allclose(model.slope(at, changes, passed, 0.01), expected[late:], rtol=0, atol=1e-12)
 
 
 def test_slopes_of_disturbances_of_the_user_are_followed() -> None:

@@ -61,6 +61,7 @@ def test_the_interface_is_the_contract(compensator: FmuInstance) -> None:
         ("T_s", "parameter", "Real", "s", "0.001"),
         ("t_init", "parameter", "Real", "s", "-1.0"),
         ("input_hold", "parameter", "Enumeration", None, "0"),
+        ("measurement_delay", "parameter", "Integer", None, "0"),
         ("dead_time", "parameter", "Integer", None, "0"),
         ("trust", "parameter", "Boolean", None, "true"),
         ("effect", "parameter", "Real", "m", "0.0"),
@@ -99,7 +100,7 @@ def test_both_flavours_have_the_table_and_the_page_shows_the_wiring(python_fmu: 
         description = json.loads(archive.read("resources/machine.json"))
         page = archive.read("documentation/index.html").decode()
     header = c_header(description, "{0}")
-    for line in ("HSEP_MODEL_SEP_COMPENSATOR 1", "HSEP_VR_x_dm = 2,", "HSEP_VR_preview = 29,", "HSEP_VR_mode = 38"):
+    for line in ("HSEP_MODEL_SEP_COMPENSATOR 1", "HSEP_VR_x_dm = 2,", "HSEP_VR_preview = 30,", "HSEP_VR_mode = 39"):
         assert line in header
     assert "SepCompensator</text>" in page
     assert "x_dm → x_d" in page

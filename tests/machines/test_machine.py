@@ -191,6 +191,7 @@ def test_what_the_compensator_section_leaves_out_is_the_predictors(tmp_path: Pat
         "noise_std": 0.0,
         "forgetting": 0.0,
         "period": 0.0,
+        "measurement_delay": 0,
         "preview": 200,
         "spacing": 2,
         "jerk_weight": 1.0,
@@ -219,6 +220,20 @@ def test_what_the_compensator_section_leaves_out_is_the_predictors(tmp_path: Pat
     assert without.predictor.n_features == 2 + 9 + 20
     assert machine.predictor_settings.v_friction == 0.0  # it predicts with the paper's features
     assert machine.fmi_parameters()["Np"] == 50
+
+
+def test_a_late_measurement_of_the_predictor_is_the_compensators(tmp_path: Path) -> None:
+    text = COMPENSATED.replace("p = 20", "p = 20\nmeasurement_delay = 3")
+    machine = load_machine(write(tmp_path, text))
+    assert machine.new_compensator().predictor.settings.measurement_delay == 3
+    assert machine.fmi_compensator_parameters()["measurement_delay"] == 3
+    own = load_machine(write(tmp_path, text + "measurement_delay = 0\n"))
+    assert own.fmi_compensator_parameters()["measurement_delay"] == 0
+    assert own.fmi_parameters()["measurement_delay"] == 3
+    with pytest.raises(
+        MachineError, match="compensator: measurement_delay of a compensator must be 0 with trust = false"
+    ):
+        load_machine(write(tmp_path, text + "trust = false\n"))
 
 
 @pytest.mark.parametrize(("Np", "preview", "spacing"), [(75, 200, 1), (150, 300, 2), (1500, 2000, 2)])

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+from collections import deque
 from typing import Any
 
 import numpy as np
 import pytest
+from compensator_cases import DRIVE_LIMITS, TS, beyond
 from predictor_cases import MODEL
 from trusted_cases import cycles, physics
 
 from hybridsep.base.errors import ParameterError
-from hybridsep.base.settings import PredictorSettings
+from hybridsep.base.settings import CompensatorSettings, PredictorSettings
 from hybridsep.base.signals import Array
-from hybridsep.compensate.compensator import SepCompensator
+from hybridsep.compensate.compensator import SepCompensator, SepState
+from hybridsep.cosim.loop import cosimulate
+from hybridsep.cosim.run import Run
 from hybridsep.evaluate.backtest import backtest
+from hybridsep.machines.machine import load_machine
+from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest
 from hybridsep.predict.predictor import HybridPredictor
 
 NP, DELAY, N = 40, 6, 400
@@ -99,6 +106,61 @@ def test_a_delay_of_chunks_is_that_of_the_whole() -> None:
     np.testing.assert_array_equal(parts[1].x_h[DELAY:], whole.x_h[200 + DELAY :])
 
 
-def test_a_compensator_refuses_a_delay() -> None:
-    with pytest.raises(ParameterError, match=r"measurement_delay must be 0 for a compensator.* got 6 samples"):
-        SepCompensator(new(DELAY))
+def test_the_papers_compensator_refuses_a_delay() -> None:
+    with pytest.raises(ParameterError, match="measurement_delay of a compensator must be 0 with trust = false, got 6"):
+        SepCompensator(new(DELAY, trust=False))
+
+
+def compensated(known: int, delay: int, compensate: str = "hybrid") -> list[Run]:
+    """Return a cold and a warm run behind a compensator whose sensor is late, by as much as it knows or not."""
+    machine = load_machine("als25010_x")
+    settings = CompensatorSettings(limits=DRIVE_LIMITS, compensate=compensate)
+    assert machine.plant is not None
+    sep = machine.new_compensator(settings, predictor=PredictorSettings(Np=50, p=20, measurement_delay=known))
+    runs = []
+    for seed in (0, 1):
+        on_the_way = deque([0.0] * delay)
+
+        def sensor(k: int, x_meas: float, on_the_way: deque[float] = on_the_way) -> float:
+            on_the_way.append(x_meas)
+            return on_the_way.popleft()
+
+        encoder = Encoder(machine.plant.noise_std, seed)
+        runs.append(cosimulate(sep, machine.new_plant(), moves(), encoder=encoder, sensor=sensor))
+        sep.restart(0.0)
+    return runs
+
+
+def moves() -> Array:
+    """Return a second and a half of 7 mm moves, there and back, (1500,), m."""
+    times = [0.05, 0.35, 0.65, 0.95]
+    return rest_to_rest([0.0, 0.007, 0.0, 0.007, 0.0], PAPER_LIMITS, TS, start_times=times, duration=1.5)
+
+
+def test_a_late_measurement_costs_a_compensator_little_once_it_is_known() -> None:
+    physics, sound = compensated(0, 0, "physics")[0], compensated(0, 0)
+    for delay in (DELAY, 60):
+        known = compensated(delay, delay)
+        assert known[0].tracking_rms < 0.8 * physics.tracking_rms
+        assert known[1].tracking_rms < 1.2 * sound[1].tracking_rms < 0.3 * physics.tracking_rms
+        assert all(beyond(run.x_dm, DRIVE_LIMITS) <= 1.0 + 1e-6 for run in known)
+    assert compensated(0, DELAY)[1].tracking_rms > physics.tracking_rms
+
+
+def test_a_restored_compensator_goes_on_with_late_measurements() -> None:
+    machine, x_d = load_machine("als25010_x"), moves()
+    sep = machine.new_compensator(CompensatorSettings(), predictor=PredictorSettings(Np=50, p=20, measurement_delay=7))
+    arrived = np.zeros(7)
+    for k in range(0, 500, 50):
+        plan = sep.plan(x_d[k : k + 200])
+        moved = plan.x_pb - 1e-5 * np.tanh(np.gradient(plan.x_d) / 2e-6)
+        sep.update(np.concatenate((arrived, moved))[:50])
+        arrived = moved[-7:]
+    plan = sep.plan(x_d[500:700])
+    restored = SepCompensator.from_bytes(sep.to_bytes())
+    for one in (sep, restored):
+        one.update(np.concatenate((arrived, plan.x_h))[:50])
+    again = [one.plan(x_d[550:750]) for one in (sep, restored)]
+    assert again[0].state is SepState.HYBRID
+    np.testing.assert_array_equal(again[0].x_dm, again[1].x_dm)
+    np.testing.assert_array_equal(again[0].x_h, again[1].x_h)

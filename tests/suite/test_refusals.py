@@ -65,6 +65,11 @@ PLANNING: list[tuple[dict[str, Value], str]] = [
     ({"preview": 60}, "preview must be ≥ Np + 4·spacing + 3 = 61, got 60"),
     ({"spacing": 0}, "spacing must be 1 … 1000, got 0"),
     ({"spacing": 3}, "spacing must be ≥ 1 and divide Np = 50, got 3"),
+    (
+        {"measurement_delay": 4, "trust": False},
+        "measurement_delay of a compensator must be 0 with trust = false, got 4: only the model with trust plans from "
+        "a late measurement",
+    ),
     ({"jerk_weight": -1.0}, "jerk_weight must be 0 … 1e+12, got -1.0"),
     ({"jerk_weight": math.nan}, "jerk_weight must be finite, got nan"),
     ({"jerk_weight": 1e300}, "jerk_weight must be 0 … 1e+12, got 1e+300"),

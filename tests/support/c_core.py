@@ -22,7 +22,6 @@ from hybridsep.base.parameters import Parameter
 from hybridsep.base.settings import PARAMETERS
 from hybridsep.fmi.c_header import c_header
 from hybridsep.fmi.variables import (
-    ALONE_SETTINGS,
     COMPENSATOR_SETTINGS,
     INTERPOLATED,
     PREDICTOR_SETTINGS,
@@ -53,7 +52,7 @@ SPRING_MASS_DAMPER = {"f_n": np.sqrt(24674.0) / (2 * np.pi), "zeta": 15.7 / (2 *
 
 STAGE_MODES = [asdict(mode) for mode in load_machine("als25010_x").model.modes]
 """The stage's X axis, Table 1."""
-PREDICTOR = {**defaults({**PREDICTOR_SETTINGS, **TRUST_SETTINGS, **ALONE_SETTINGS}), "trust": 0}  # the paper's model
+PREDICTOR = {**defaults({**PREDICTOR_SETTINGS, **TRUST_SETTINGS}), "trust": 0}  # the paper's model
 FEED_DRIVE = {"m": 1.0, "c": 15.7, "k": 24674.0, "c_nl": 100.0, "k_nl": 1000.0, "noise_std": 5e-6, "seed": 0}
 STAGE_DRIVE = {"f": 1.4211e-5, "kappa": 0.0213165, "friction_on": 0, "T_s": 1e-3, "noise_std": 1e-6, "seed": 7}
 

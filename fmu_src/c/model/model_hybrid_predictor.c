@@ -14,8 +14,8 @@ HSEP_API int hsep_online_check(const double values[], char message[])
 
 HSEP_API void hsep_online_read(const double values[], hsep_online_parameters *parameters)
 {
+    (void)values;
     parameters->preview = parameters->settings.Np;
-    parameters->late = (uint64_t)values[HSEP_VR_measurement_delay];
     /* The warm-up counts from the end of the first fill. */
     const hsep_predictor_settings *settings = &parameters->settings;
     const double t_init = hsep_warm_up(settings->t_init, parameters->trust.trust != 0);

@@ -23,6 +23,14 @@ HSEP_API int hsep_online_check(const double values[], char message[])
             preview);
         problems++;
     }
+    if (values[HSEP_VR_measurement_delay] > 0.0 && values[HSEP_VR_trust] == 0.0) {
+        hsep_message_add(
+            message,
+            "measurement_delay of a compensator must be 0 with trust = false, got %.0f: only the model with trust "
+            "plans from a late measurement",
+            values[HSEP_VR_measurement_delay]);
+        problems++;
+    }
     return problems;
 }
 

@@ -101,14 +101,14 @@ static void compensator_publish(hsep_compensator *self, uint64_t last)
     if (!hsep_within(x_dm + first, last - first, HSEP_PREDICTION_MAX)) {
         predictor->divergence = HSEP_DIVERGES_X_DM;
     }
-    if (self->trusted) { /* the window's part of the preview */
+    if (self->trusted) { /* the window's part of the preview, and what is late before it */
         const hsep_trusted_planner *trusted = hsep_compensator_trusted(self);
         memcpy(
             hsep_at(predictor, predictor->e_h), hsep_at_const(trusted, trusted->e_h) + (trusted->preview - Np),
-            (size_t)Np * sizeof(double));
+            (size_t)predictor->n * sizeof(double));
     }
     hsep_predictor_publish(predictor, last);
-    hsep_predictor_doubt(predictor, hsep_predictor_warm_up(predictor), 0, predictor->n);
+    hsep_predictor_doubt(predictor, 0, predictor->n);
 }
 
 /* Do parts of a plan with trust, as much work as is due; return whether it is made. */
@@ -188,9 +188,12 @@ static void compensator_plan_trusted(hsep_compensator *self)
     const uint64_t best = self->compensate == HSEP_SEP_HYBRID && !warm ? HSEP_SEP_PHYSICS : self->compensate;
     self->before = self->state;
     predictor->n_physics = self->compensate == HSEP_SEP_HYBRID ? hsep_predictor_warm_up(predictor) : predictor->Np;
-    hsep_trusted_planner_begin(
-        hsep_compensator_trusted(self), &task, hsep_predictor_physics(predictor),
-        hsep_at(predictor, predictor->past_e) + predictor->Np, best);
+    const hsep_trusted_before before = {
+        .physics = hsep_predictor_physics(predictor),
+        .late_command = hsep_at(predictor, predictor->command) + predictor->Np,
+        .late_x = hsep_at(predictor, predictor->past_x) + predictor->Np,
+        .residuals = hsep_at(predictor, predictor->past_e) + predictor->n};
+    hsep_trusted_planner_begin(hsep_compensator_trusted(self), &task, &before, best);
     self->solving = 1;
 }
 

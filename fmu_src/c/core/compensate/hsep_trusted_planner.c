@@ -111,22 +111,26 @@ static void trusted_planner_physics(hsep_trusted_planner *self, const hsep_trust
 }
 
 HSEP_API void hsep_trusted_planner_begin(
-    hsep_trusted_planner *self, const hsep_trusted_task *task, const hsep_physics *physics, const double past[],
-    uint64_t best)
+    hsep_trusted_planner *self, const hsep_trusted_task *task, const hsep_trusted_before *before, uint64_t best)
 {
+    const size_t late = (size_t)self->late * sizeof(double);
     double *path = hsep_at(self, self->target), *rest = hsep_at(self, self->rest);
     self->steps = self->tries = self->tries_in_all = self->solver_steps = self->planned = 0;
     self->penalty = 0.0;
     trusted_planner_copy(self, rest, hsep_planner_coefficients(task->planner));
-    memcpy(hsep_at(self, self->physics), physics, (size_t)(self->trial - self->physics) * sizeof(double));
-    memcpy(hsep_at(self, self->e_h) + self->preview, past, (size_t)self->p * sizeof(double));
+    memcpy(hsep_at(self, self->physics), before->physics, (size_t)(self->trial - self->physics) * sizeof(double));
+    memcpy(hsep_at(self, self->command) + self->preview, before->late_command, late);
+    memcpy(hsep_at(self, self->x_pb) + self->preview, before->late_x, late);
+    memcpy(path + self->preview, before->late_command, late);
+    memcpy(hsep_at(self, self->e_h) + self->preview + self->late, before->residuals, (size_t)self->p * sizeof(double));
     for (uint64_t k = 0; k < self->preview; k++) {
         path[self->preview - 1 - k] = task->x_d[k] - self->start;
     }
     trusted_planner_command(self, task, rest, HSEP_DECIDED + self->n);
-    hsep_trusted_scale(task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb), path, past[0]);
+    hsep_trusted_scale(
+        task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb), path, before->residuals[0]);
     const uint64_t pinned = hsep_planner_pinned(task->planner); /* they are published now */
-    self->varied = pinned > 0 ? pinned : 1;
+    self->varied = self->late + (pinned > 0 ? pinned : 1);
     (void)trusted_planner_predict(self, task, rest, self->varied);
     self->follows = best > 1 && task->model->predicted;
     if (best == 0) {
@@ -139,11 +143,12 @@ HSEP_API void hsep_trusted_planner_begin(
 /* Variances of some of the samples under the rest of the last plan. */
 static void trusted_planner_vary(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
-    const uint64_t left = self->preview - self->varied, part = (self->preview - 1) / HSEP_TRUSTED_VARIANCES + 1;
+    const uint64_t all = self->preview + self->late, left = all - self->varied;
+    const uint64_t part = (all - 1) / HSEP_TRUSTED_VARIANCES + 1;
     const uint64_t last = self->varied + (left < part ? left : part);
     hsep_trusted_vary(task->model, self->varied, last);
     self->varied = last;
-    self->stage = last < self->preview ? HSEP_TRUSTED_VARY : HSEP_TRUSTED_BEGIN;
+    self->stage = last < all ? HSEP_TRUSTED_VARY : HSEP_TRUSTED_BEGIN;
 }
 
 /* Begin a Newton step: linearise at the best plan, which was predicted last. */
@@ -321,7 +326,7 @@ HSEP_API void hsep_trusted_planner_advance(hsep_trusted_planner *self, const hse
         trusted_planner_compare(self, task);
         break;
     case HSEP_TRUSTED_PREDICT:
-        (void)trusted_planner_at(self, task, c, self->Np);
+        (void)trusted_planner_at(self, task, c, self->late + self->Np);
         self->stage = HSEP_TRUSTED_DONE;
         break;
     }

@@ -52,6 +52,7 @@ typedef enum {
 
 typedef struct {
     uint64_t preview, p, Np;
+    uint64_t late;         /* samples before the window that are not measured yet: they are predicted, too */
     uint64_t n;            /* splines of a plan */
     uint64_t stage;        /* hsep_trusted_stage */
     uint64_t follows;      /* whether the trusted model may plan */
@@ -69,10 +70,10 @@ typedef struct {
     uint64_t rest;       /* (3 + n,) m, coefficients of the rest of the last plan */
     uint64_t best;       /* (3 + n,) m, those of the best plan so far */
     uint64_t of_physics; /* (3 + n,) m, those of the physics model's */
-    uint64_t command;    /* (preview,) m, commands that were predicted last, relative to the start, newest first */
-    uint64_t x_pb;       /* (preview,) m, their prediction by the physics model, */
-    uint64_t e_h;        /* (preview + p,) m, and what the trusted model adds; behind it the last residuals */
-    uint64_t target;     /* (preview,) m, work */
+    uint64_t command;    /* (preview + late,) m, commands predicted last, relative to the start, newest first */
+    uint64_t x_pb;       /* (preview + late,) m, their prediction by the physics model, */
+    uint64_t e_h;        /* (preview + late + p,) m, and what the trusted model adds; behind it the last residuals */
+    uint64_t target;     /* (preview + late,) m, work */
     uint64_t W;          /* changes of x_h by the splines: of spline j from sample j spacing on, behind each other */
     uint64_t P;          /* triangle of n rows: W' W + jerk_weight D' D */
     uint64_t v;          /* (n,) m, linear term of it */
@@ -81,7 +82,7 @@ typedef struct {
     uint64_t trial;   /* and for a trial */
 } hsep_trusted_planner;
 
-HSEP_ASSERT_WORDS(hsep_trusted_planner, 29);
+HSEP_ASSERT_WORDS(hsep_trusted_planner, 30);
 
 /* What it plans with: other blocks, and the window's data. */
 typedef struct {
@@ -104,12 +105,18 @@ HSEP_API void hsep_trusted_planner_init(
 HSEP_API int hsep_trusted_planner_valid(
     const void *block, const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner);
 
-/* Begin a window: predict it under the rest of the last plan. physics: G_pb there; past: (p,) m, the last residuals;
- * best: best model allowed, 0 none, 1 physics, 2 the trusted one. Only the samples that the plan leaves as they are
- * have their variance then. Cost: that of hsep_trusted_scale and a prediction. */
+/* What is before a window. */
+typedef struct {
+    const hsep_physics *physics;         /* G_pb at its beginning */
+    const double *late_command, *late_x; /* (late,) m, command and x_pb of the samples not measured yet, newest first */
+    const double *residuals;             /* (p,) m, the last ones measured, newest first */
+} hsep_trusted_before;
+
+/* Begin a window: predict it under the rest of the last plan. best: best model allowed, 0 none, 1 physics, 2 trusted.
+ * Only the samples that the plan leaves as they are have their variance then. Cost: that of hsep_trusted_scale and a
+ * prediction. */
 HSEP_API void hsep_trusted_planner_begin(
-    hsep_trusted_planner *self, const hsep_trusted_task *task, const hsep_physics *physics, const double past[],
-    uint64_t best);
+    hsep_trusted_planner *self, const hsep_trusted_task *task, const hsep_trusted_before *before, uint64_t best);
 
 /* Work of the part that is next, in steps of the interior-point solver; 0: the plan is made and predicted. */
 HSEP_API uint64_t hsep_trusted_planner_next(const hsep_trusted_planner *self);

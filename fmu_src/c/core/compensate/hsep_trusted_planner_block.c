@@ -11,21 +11,22 @@ static double trusted_planner_lay_out(
     hsep_trusted_planner *self, const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner)
 {
     const uint64_t n = hsep_splines_count(planner->preview, planner->spacing);
-    const double preview = (double)planner->preview,
+    const double preview = (double)planner->preview, all = (double)parameters->preview,
                  filter = hsep_physics_size(parameters->n_modes, parameters->settings->dead_time);
     const double columns = (double)n, coefficients = HSEP_DECIDED + columns;
     double end = HSEP_WORDS(hsep_trusted_planner);
     self->preview = planner->preview;
+    self->late = parameters->settings->measurement_delay;
     self->p = parameters->settings->p;
     self->Np = planner->Np;
     self->n = n;
     self->rest = hsep_take(&end, coefficients);
     self->best = hsep_take(&end, coefficients);
     self->of_physics = hsep_take(&end, coefficients);
-    self->command = hsep_take(&end, preview);
-    self->x_pb = hsep_take(&end, preview);
-    self->e_h = hsep_take(&end, preview + (double)self->p);
-    self->target = hsep_take(&end, preview);
+    self->command = hsep_take(&end, all);
+    self->x_pb = hsep_take(&end, all);
+    self->e_h = hsep_take(&end, all + (double)self->p);
+    self->target = hsep_take(&end, all);
     self->W = hsep_take(&end, columns * preview - (double)planner->spacing * 0.5 * columns * (columns - 1.0));
     self->P = hsep_take(&end, hsep_triangle(n));
     self->v = hsep_take(&end, columns);
@@ -65,7 +66,7 @@ HSEP_API int hsep_trusted_planner_valid(
     memcpy(&got, block, sizeof got);
     (void)trusted_planner_lay_out(&got, parameters, planner); /* changes nothing where it is sound */
     return memcmp(&got, block, sizeof got) == 0 && got.stage <= HSEP_TRUSTED_PREDICT && got.follows <= 1 &&
-           got.varied <= got.preview && got.steps <= HSEP_TRUSTED_STEPS && got.columns <= got.n &&
+           got.varied <= got.preview + got.late && got.steps <= HSEP_TRUSTED_STEPS && got.columns <= got.n &&
            got.tries <= HSEP_TRUSTED_TRIES && got.tries_in_all <= HSEP_TRUSTED_TOGETHER &&
            got.solver_steps < HSEP_TRUSTED_SOLVER + HSEP_TRUSTED_SOLVED && got.planned <= 2 &&
            hsep_linearised_valid(hsep_at_bytes(block, got.linearised), parameters) &&

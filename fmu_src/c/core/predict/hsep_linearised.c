@@ -11,18 +11,20 @@
 static double linearised_lay_out(hsep_linearised *self, const hsep_trusted_parameters *parameters)
 {
     const double n = (double)parameters->preview;
+    const double preview = n - (double)parameters->settings->measurement_delay;
     const double filter = hsep_physics_size(parameters->n_modes, parameters->settings->dead_time);
     double end = HSEP_WORDS(hsep_linearised);
     self->n = parameters->preview;
+    self->preview = parameters->preview - parameters->settings->measurement_delay;
     self->count = hsep_disturbances_count(parameters->trust->period);
     self->slopes = hsep_take(&end, n * (double)self->count);
     self->gains = hsep_take(&end, n * LINEARISED_GAINS * HSEP_PHYSICS_ABREAST);
     self->shrink = hsep_take(&end, n * HSEP_N_CANDIDATES);
-    self->change = hsep_take(&end, n * LINEARISED_CHANGES);
-    self->passed = hsep_take(&end, n * HSEP_N_CANDIDATES);
-    self->run = hsep_take(&end, n);
-    self->disturbance = hsep_take(&end, n * HSEP_PHYSICS_ABREAST);
-    self->drive = hsep_take(&end, n * HSEP_PHYSICS_ABREAST);
+    self->change = hsep_take(&end, preview * LINEARISED_CHANGES);
+    self->passed = hsep_take(&end, preview * HSEP_N_CANDIDATES);
+    self->run = hsep_take(&end, preview);
+    self->disturbance = hsep_take(&end, preview * HSEP_PHYSICS_ABREAST);
+    self->drive = hsep_take(&end, preview * HSEP_PHYSICS_ABREAST);
     self->physics = hsep_take_block(&end, filter);
     self->filters = hsep_take_block(&end, HSEP_N_CANDIDATES * filter);
     return end * sizeof(double);
@@ -103,7 +105,7 @@ static void linearised_pass(const double weights[], uint64_t count, const double
 static void linearised_signals(hsep_linearised *self, const hsep_linearised_change *change, double T_s)
 {
     double *signals = hsep_at(self, self->change), last_command = 0.0, last_passed = 0.0;
-    for (uint64_t u = 0; u < self->n; u++, signals += LINEARISED_CHANGES) {
+    for (uint64_t u = 0; u < self->preview; u++, signals += LINEARISED_CHANGES) {
         const double now = u < change->n ? change->commands[u] : 0.0;
         signals[0] = (now - last_command) / T_s;
         signals[1] = change->passed[u];
@@ -128,7 +130,8 @@ HSEP_API void hsep_linearised_at(
             shrink[k] = part * hsep_candidate_shrink(candidate, n - 1 - k);
         }
         linearised_gains(self, weights + first, hsep_at(self, self->gains) + i);
-        linearised_pass(weights + 1, first - 1, change->passed, n, hsep_at(self, self->passed) + i * n);
+        linearised_pass(
+            weights + 1, first - 1, change->passed, self->preview, hsep_at(self, self->passed) + i * self->preview);
     }
     linearised_signals(self, change, hsep_trusted_disturbances(model)->T_s);
 }
@@ -173,7 +176,7 @@ static void linearised_run(
     hsep_linearised *self, const hsep_candidate *candidate, uint64_t i, uint64_t count, double column[])
 {
     const double *lag_weights = hsep_at_const(candidate, candidate->weights) + candidate->n_static;
-    const double *own = hsep_at(self, self->passed) + i * self->n, *drive = hsep_at(self, self->drive) + i;
+    const double *own = hsep_at(self, self->passed) + i * self->preview, *drive = hsep_at(self, self->drive) + i;
     const double *shrink = hsep_at(self, self->shrink) + i * self->n + (self->n - count);
     double *run = hsep_at(self, self->run);
     for (uint64_t u = 0; u < count; u++, drive += HSEP_PHYSICS_ABREAST) {
@@ -185,7 +188,7 @@ static void linearised_run(
 
 HSEP_API void hsep_linearised_column(hsep_linearised *self, hsep_trusted *model, uint64_t first, double column[])
 {
-    const uint64_t count = self->n - first;
+    const uint64_t count = self->preview - first;
     const double *change = hsep_at(self, self->change);
     for (uint64_t u = 0; u < count; u++) {
         column[u] = change[LINEARISED_CHANGES * u + 1];

@@ -15,24 +15,25 @@
 #include <stdint.h>
 
 typedef struct {
-    uint64_t n;     /* samples of the preview */
-    uint64_t count; /* disturbances */
+    uint64_t n;       /* samples of a prediction, */
+    uint64_t preview; /* and its last ones, which a change may reach: all but what is late */
+    uint64_t count;   /* disturbances */
     /* Offsets in doubles from the beginning of the struct; oldest first, if not said; of candidates: behind each other,
      * of candidates abreast: HSEP_PHYSICS_ABREAST numbers a sample */
     uint64_t slopes;      /* (n, count) slopes of the disturbances, sample after sample */
     uint64_t gains;       /* (n, 6) of candidates abreast: what friction, position and damping give of changes of v_d, x
                            * and v, the disturbances themselves and then their differences */
     uint64_t shrink;      /* (n,) of candidates: part of each one in the blend */
-    uint64_t change;      /* (n, 3) of a change: v_d, x and v, the latter two behind G_pb */
-    uint64_t passed;      /* (n,) of candidates: what the features of x_pb give of it */
-    uint64_t run;         /* (n,) work of a recursion, newest first */
-    uint64_t disturbance; /* (n,) of candidates abreast: disturbances that a change makes, */
+    uint64_t change;      /* (preview, 3) of a change: v_d, x and v, the latter two behind G_pb */
+    uint64_t passed;      /* (preview,) of candidates: what the features of x_pb give of it */
+    uint64_t run;         /* (preview,) work of a recursion, newest first */
+    uint64_t disturbance; /* (preview,) of candidates abreast: disturbances that a change makes, */
     uint64_t drive;       /* and these behind G_pb */
     uint64_t physics;     /* G_pb at rest, */
     uint64_t filters;     /* and of each candidate */
 } hsep_linearised;
 
-HSEP_ASSERT_WORDS(hsep_linearised, 12);
+HSEP_ASSERT_WORDS(hsep_linearised, 13);
 
 /* Bytes of the block, counted in double so that no size can overflow. */
 HSEP_API double hsep_linearised_size(const hsep_trusted_parameters *parameters);
@@ -43,7 +44,7 @@ HSEP_API void hsep_linearised_init(hsep_linearised *self, const hsep_trusted_par
 /* Whether a block, in any alignment, is one that hsep_linearised_init with these parameters began. */
 HSEP_API int hsep_linearised_valid(const void *block, const hsep_trusted_parameters *parameters);
 
-/* A change of the commands that begins at sample 0. */
+/* A change of the commands that begins at sample 0 of the preview. */
 typedef struct {
     const double *commands; /* (n,) m, oldest first, and nothing behind them */
     uint64_t n;
@@ -51,14 +52,14 @@ typedef struct {
 } hsep_linearised_change;
 
 /* Linearise at commands x_d that the model, which has learned, was last tried with, with the response x_pb, both
- * (preview,), m, newest first, for a change that may begin at any sample. reach: see hsep_disturbances_slopes.
+ * (n,), m, newest first, for a change that may begin at any sample of the preview. reach: see hsep_disturbances_slopes.
  * Cost: 12 tanh a sample. */
 HSEP_API void hsep_linearised_at(
     hsep_linearised *self, hsep_trusted *model, const double x_d[], const double x_pb[],
     const hsep_linearised_change *change, double reach);
 
-/* Change of x_h, (preview - first,), m, by that change of the commands where it begins at sample first. Cost: for each
- * candidate 8 n_modes + p + 10 multiply-adds a sample. */
+/* Change of x_h, (preview - first,), m, by that change of the commands where it begins at sample first of the preview.
+ * Cost: for each candidate 8 n_modes + p + 10 multiply-adds a sample. */
 HSEP_API void hsep_linearised_column(hsep_linearised *self, hsep_trusted *model, uint64_t first, double column[]);
 
 #endif

@@ -196,6 +196,9 @@ static void predictor_solve(hsep_predictor *self)
 static void predictor_keep(hsep_predictor *self)
 {
     const uint64_t late = self->late, signals[4] = {self->x_d, self->x_pb, self->x_h, self->x_hold};
+    double *command = hsep_at(self, self->command), *past_x = hsep_at(self, self->past_x);
+    memmove(command + self->Np, command, (size_t)late * sizeof(double));
+    memmove(past_x + self->Np, past_x, (size_t)late * sizeof(double));
     for (int i = 0; i < 4; i++) {
         double *kept = hsep_at(self, signals[i] - late);
         memmove(kept, kept + self->Np, (size_t)late * sizeof(double));
@@ -266,14 +269,14 @@ static uint64_t predictor_warm_up(const hsep_predictor *self, uint64_t late)
 
 HSEP_API uint64_t hsep_predictor_warm_up(const hsep_predictor *self) { return predictor_warm_up(self, 0); }
 
-HSEP_API void hsep_predictor_doubt(hsep_predictor *self, uint64_t n_warm_up, uint64_t first, uint64_t last)
+HSEP_API void hsep_predictor_doubt(hsep_predictor *self, uint64_t first, uint64_t last)
 {
     hsep_trusted *trusted = hsep_predictor_trusted(self);
     const hsep_uncertainty_signals signals = {
         .x_d = hsep_at(self, self->command),
         .x_pb = hsep_at(self, self->past_x),
         .e_h = hsep_at(self, self->e_h),
-        .n_physics = n_warm_up,
+        .n_physics = predictor_warm_up(self, self->late),
         .disagreement = trusted != NULL ? hsep_at(trusted, trusted->disagreement) + (trusted->n - self->n) : NULL};
     if (self->divergence == HSEP_CONVERGES) {
         hsep_uncertainty_predict(hsep_predictor_uncertainty(self), &signals, first, last);
@@ -283,10 +286,8 @@ HSEP_API void hsep_predictor_doubt(hsep_predictor *self, uint64_t n_warm_up, uin
 /* Take in commands and x_pb of the window that begins as they came, eq. (2), behind those that are not measured yet. */
 static void predictor_open(hsep_predictor *self)
 {
-    const uint64_t Np = self->Np, late = self->late;
+    const uint64_t Np = self->Np;
     double *command = hsep_at(self, self->command), *past_x = hsep_at(self, self->past_x);
-    memmove(command + Np, command, (size_t)late * sizeof(double));
-    memmove(past_x + Np, past_x, (size_t)late * sizeof(double));
     for (uint64_t i = 0; i < Np; i++) {
         command[Np - 1 - i] = hsep_at(self, self->x_d)[i] - self->start;
         past_x[Np - 1 - i] = hsep_at(self, self->ahead_pb)[i];
@@ -319,7 +320,7 @@ static void predictor_go_on(hsep_predictor *self)
         hsep_trusted_go_on(trusted, e_h, first, late + last);
     }
     hsep_predictor_publish(self, last);
-    hsep_predictor_doubt(self, predictor_warm_up(self, late), first, late + last);
+    hsep_predictor_doubt(self, first, late + last);
 }
 
 HSEP_API int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, double x_meas)

@@ -44,7 +44,6 @@ typedef struct {
     hsep_trust_settings trust;
     double v_friction;      /* m/s, scale of friction's change of sign; 0: no features of the reference */
     uint64_t preview;       /* samples from r(k) to the drive, >= Np; Np alone */
-    uint64_t late;          /* samples by which the measurement is late; 0 but alone */
     double n_init;          /* samples of warm-up from the beginning; whole, >= 0 */
     int planned;            /* whether a compensator decides the commands of a window when it begins */
     int unlearns;           /* whether a window with a missing sample is unlearned */
@@ -146,9 +145,8 @@ HSEP_API void hsep_predictor_begin(hsep_predictor *self);
 /* Predict the samples of the window up to last - 1, whose x_pb are in past_x; eq. (4). */
 HSEP_API void hsep_predictor_publish(hsep_predictor *self, uint64_t last);
 
-/* Predict the errors of samples first ... last - 1 of the n, which were published, their commands being in command.
- * n_warm_up: leading samples of them in the warm-up. */
-HSEP_API void hsep_predictor_doubt(hsep_predictor *self, uint64_t n_warm_up, uint64_t first, uint64_t last);
+/* Predict the errors of samples first ... last - 1 of the n, which were published, their commands being in command. */
+HSEP_API void hsep_predictor_doubt(hsep_predictor *self, uint64_t first, uint64_t last);
 
 /* Leading samples of the window in the warm-up. */
 HSEP_API uint64_t hsep_predictor_warm_up(const hsep_predictor *self);

@@ -36,7 +36,7 @@ HSEP_API hsep_trusted_parameters hsep_predictor_trusted_parameters(const hsep_pr
         .trust = &parameters->trust,
         .modes = parameters->modes,
         .n_modes = parameters->n_modes,
-        .preview = parameters->preview + parameters->late,
+        .preview = parameters->preview + parameters->settings.measurement_delay,
         .planned = parameters->planned};
 }
 
@@ -45,7 +45,7 @@ static hsep_start_parameters predictor_start_parameters(const hsep_predictor_par
     const hsep_predictor_settings *settings = &parameters->settings;
     return (hsep_start_parameters){
         .Np = settings->Np,
-        .late = parameters->late,
+        .late = settings->measurement_delay,
         .n_modes = parameters->n_modes,
         .dead_time = settings->dead_time,
         .modes = parameters->modes,
@@ -63,7 +63,7 @@ static uint64_t predictor_take(double *end, double late, double count)
 static double predictor_lay_out(hsep_predictor *self, const hsep_predictor_parameters *parameters)
 {
     const double Np = (double)parameters->settings.Np, preview = (double)parameters->preview;
-    const double late = (double)parameters->late, n = Np + late;
+    const double late = (double)parameters->settings.measurement_delay, n = Np + late;
     const double p = (double)parameters->settings.p, q = (double)parameters->settings.q;
     const int has_reference = parameters->v_friction > 0.0;
     double end = HSEP_WORDS(hsep_predictor);
@@ -73,8 +73,8 @@ static double predictor_lay_out(hsep_predictor *self, const hsep_predictor_param
     const hsep_start_parameters start = predictor_start_parameters(parameters);
     const double regression = parameters->trust.trust ? 0.0 : hsep_regression_size(self->features.n);
     self->Np = parameters->settings.Np;
-    self->late = parameters->late;
-    self->n = parameters->settings.Np + parameters->late;
+    self->late = parameters->settings.measurement_delay;
+    self->n = self->Np + self->late;
     self->preview = parameters->preview;
     self->n_init = parameters->n_init;
     self->sign_step = parameters->v_friction * parameters->settings.T_s;

@@ -21,6 +21,8 @@
     SETTING(double, t_init) \
     /* how x_d runs between samples, zero-order or first-order hold: 0 zoh, 1 foh */ \
     SETTING(uint64_t, input_hold) \
+    /* whole samples by which the measured position is late */ \
+    SETTING(uint64_t, measurement_delay) \
     /* whole samples of dead time in the physics model */ \
     SETTING(uint64_t, dead_time)
 
