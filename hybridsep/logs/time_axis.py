@@ -109,8 +109,9 @@ class TimeAxis:
         if not len(steps):
             raise LogError(f"{self._path}: time {self._name!r} must increase, it never does")
         median = float(np.median(steps))
+        near = steps[np.abs(steps - median) <= 0.5 * median]  # none where it is between two that differ much
         # The clock's mean, gaps and repeated times aside
-        return float(np.mean(steps[np.abs(steps - median) <= 0.5 * median]))
+        return float(np.mean(near)) if len(near) else median
 
     def _check_increasing(self, steps: Array, shift: int, block: Block) -> None:
         if steps.min() <= 0.0:
