@@ -92,7 +92,8 @@ def open_checked(
     checked = reader.read(CHECKED_MAX)
     check_unit(path.name, checked, machine)
     intake = check(replace(checked, unit=machine.unit), machine)
-    if not fix:
+    # Times that repeat, as those do that are rounded coarsely, tell no interval
+    if not fix and not any(finding.name == "time order" for finding in intake.errors):
         check_interval(path.name, reader.T_s, machine)
     if intake.errors and not (fix or as_is):
         raise LogError(

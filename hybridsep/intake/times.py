@@ -21,6 +21,9 @@ _GAP = 1.5
 _LATE = 0.6
 """The same of the times around it, on the whole: jitter alone does not last."""
 
+_ROUNDED = 0.2
+"""Share of times that repeat from which a coarse clock is likelier than samples that were written twice."""
+
 
 def check_order(log: Log) -> Iterator[Finding]:
     """Find times that repeat or run backwards."""
@@ -33,6 +36,8 @@ def check_order(log: Log) -> Iterator[Finding]:
         f"{len(wrong)} times are not above the one before, {back} of them run backwards; the first is sample "
         f"{wrong[0] + 1}, t = {log.t[wrong[0]]:.6g} s"
     )
+    if len(wrong) - back > _ROUNDED * len(log.t):
+        words += "; if they are rounded too coarsely, take the column out and give T_s"
     evidence = {"n": float(len(wrong)), "n_backwards": float(back), "first": float(wrong[0])}
     fix = Fix("sort the samples by time and keep one of each time", fixes.in_order)
     yield Finding("time order", ERROR, words, evidence, _intervals(log, wrong), fix)

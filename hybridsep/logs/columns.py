@@ -77,6 +77,8 @@ def choose_columns(
         if role not in ROLES:
             raise LogError(f"{source.path}: columns may name {', '.join(ROLES)}, got {role!r}")
     chosen = {role: _name(source, role, (columns or {}).get(role)) for role in ROLES}
+    if chosen["t"] is None and "t" not in (columns or {}) and time_needed:
+        chosen["t"] = _only_clock(source)
     if chosen["t"] is None and "t" not in (columns or {}) and not time_needed:
         del chosen["t"]
     found: dict[str, Column] = {}
@@ -121,6 +123,15 @@ def _name(source: Source, role: str, given: str | None) -> str | None:
     return None
 
 
+def _only_clock(source: Source) -> str | None:
+    """Return the only column of timestamps, whatever its name; None if there are none or several."""
+    clocks = [name for name in source.names if name in source.stamps]
+    if len(clocks) != 1:
+        return None
+    source.remarks = [*source.remarks, f"column {clocks[0]!r} is read as the time; columns (--t) names another"]
+    return clocks[0]
+
+
 def _spelling(name: str) -> str:
     return name.strip().lower().replace(" ", "_").replace("-", "_").replace(".", "_")
 
@@ -145,6 +156,8 @@ def _stated(source: Source, name: str) -> str:
 
 
 def _time(source: Source, name: str) -> Column:
+    if name in source.stamps:
+        return Column(name, TIME_UNITS["s"], True)  # whatever is stated, such as hh:mm:ss or UTC
     text = _stated(source, name)
     unit = time_unit(text) if text else TIME_UNITS["s"]
     if unit is None:
@@ -156,6 +169,11 @@ def _time(source: Source, name: str) -> Column:
 
 
 def _position(source: Source, name: str, given: str | None) -> Column:
+    if name in source.stamps:
+        raise LogError(
+            f"{source.path}: column {name!r} must be a position, it holds timestamps; name another in columns (--x-d, "
+            "--x)"
+        )
     text = _stated(source, name)
     unit = position_unit(text) if text else None
     counts = plain_name(text) in _COUNTS

@@ -45,7 +45,7 @@ class Log:
     Attributes
     ----------
     t : (n,) array, s
-        Times as recorded, or ``k·T_s`` if the file has no time column.
+        Times as recorded, from 0 where they are clock timestamps, or ``k·T_s`` if the file has no time column.
     x_d, x_meas : (n,) array, m or rad
         Commanded and measured positions.
     T_s : float
@@ -262,7 +262,8 @@ def open_log(
     columns : mapping, optional
         The file's names of ``"t"``, ``"x_d"`` and ``"x"``, the measured position, where they are others, such as
         ``{"x_d": "qg", "x": "qm"}``; units in them may be left out. Without a name for ``"x"``, ``x_meas`` is read
-        where the file has it.
+        where the file has it. In text a time may be a clock timestamp, ``2026-03-05 10:20:30.001`` or a time of day,
+        with its date in a column beside it or without; the only such column is ``"t"`` whatever its name.
     unit : str, optional
         Unit of the positions: m, mm, um, nm, in, or rad, mrad, urad, deg, rev for a rotary axis, or a multiple of
         one, ``0.1um``, such as an encoder's count. If left out, that of the columns' names (``x [mm]``), otherwise m.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -27,7 +27,8 @@ class Block:
     Attributes
     ----------
     columns : list of (m,) array
-        One for each requested name, as in the file, not checked for NaN; ``m ≥ 1``.
+        One for each requested name, as in the file, not checked for NaN, timestamps as seconds since the first one;
+        ``m ≥ 1``.
     where : callable
         Location of sample ``i`` of the block for messages: a line of the file, or a sample of the log.
     """
@@ -55,6 +56,8 @@ class Source(ABC):
         Name of a column → unit by the format's convention, which a given one overrides.
     roles : mapping
         ``"t"``, ``"x_d"``, ``"x"`` → the column that the format itself has for it.
+    stamps : set of str
+        Columns of clock timestamps, which become seconds since the first one.
     remarks : list of str
         What was chosen for the reader that the user may want to change.
     advice : str
@@ -74,6 +77,7 @@ class Source(ABC):
         self.units: Mapping[str, str] = {}
         self.assumed_units: Mapping[str, str] = {}
         self.roles: Mapping[str, str] = {}
+        self.stamps: Set[str] = frozenset()
         self.remarks: list[str] = []
         self.advice = ""
         self.measured, self.may_miss = "", False
@@ -102,7 +106,8 @@ def check_column(path: Path, name: str, shape: tuple[int, ...], dtype: np.dtype[
     if dtype.kind == "c":
         raise LogError(f"{path}: column {name!r} must be real, got complex numbers ({dtype})")
     if dtype.kind not in "fiu":
-        raise LogError(f"{path}: column {name!r} must be numbers, got {dtype}")
+        hint = "; save (t - t[0]) / numpy.timedelta64(1, 's') in its place" if dtype.kind == "M" else ""
+        raise LogError(f"{path}: column {name!r} must be numbers, got {dtype}{hint}")
     # Row and column vectors are accepted.
     lengths = [length for length in shape if length != 1]
     if len(shape) not in (1, 2) or (len(lengths) > 1 and 0 not in shape):

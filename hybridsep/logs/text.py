@@ -6,18 +6,19 @@ import codecs
 import gzip
 import math
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from functools import partial
 from itertools import islice
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.errors import LogError
-from ..base.signals import Array
 from .source import NEEDS_TRUST, Block, Source
 from .text_layout import COMMENTS, Layout, decimal_points, find_layout, is_number, split
+from .timestamps import CELL, Clock, cell, stamp_kind
 
 __all__ = ["TextSource"]
 
@@ -49,8 +50,8 @@ codecs.register_error(_FALLBACK, _as_latin_1)
 class TextSource(Source):
     """Text with a line of column names, then numbers, delimited by comma, semicolon, tab or blanks.
 
-    Preamble, comments and a row of units are skipped, decimal commas are read. UTF-8, UTF-16 with a byte-order mark or
-    Latin-1, plain or in gzip.
+    Preamble, comments and a row of units are skipped, decimal commas are read; columns of timestamps become seconds.
+    UTF-8, UTF-16 with a byte-order mark or Latin-1, plain or in gzip.
     """
 
     format = "text"
@@ -77,7 +78,9 @@ class TextSource(Source):
         self._layout: Layout = layout
         self.names = layout.names
         self.units = layout.units
-        if all(is_number(name) for name in self.names):
+        self.stamps = frozenset(self.names[i] for i in layout.clocks)
+        self._dates = {i: date for i, date in layout.clocks.items() if date is not None}
+        if all(is_number(name) or stamp_kind(name) for name in self.names):
             self.advice = f"; line {layout.header} must hold the column names, it holds numbers"
 
     @staticmethod
@@ -88,6 +91,11 @@ class TextSource(Source):
     def blocks(self, names: Sequence[str], n: int) -> Iterator[Block]:
         """Iterate over the columns ``names`` in blocks of at most ``n`` samples."""
         use = [self.names.index(name) for name in names]
+        clocks = {
+            i: Clock(self.path, self.names[i], self.names[self._dates[i]] if i in self._dates else "")
+            for i in use
+            if i in self._layout.clocks
+        }
         line = self._layout.first - 1
         try:
             with self._open() as file:
@@ -98,7 +106,7 @@ class TextSource(Source):
                     if len(numbers) < len(lines):
                         lines = [text for text in lines if not _is_skipped(text)]
                     if lines:
-                        yield self._block(lines, numbers, use)
+                        yield self._block(lines, numbers, use, clocks)
         except _DAMAGE as error:
             raise LogError(f"{self.path}: is truncated or damaged after line {line}: {error}") from error
 
@@ -118,7 +126,21 @@ class TextSource(Source):
                 raise LogError(f"{self.path}, line {i}: has {_LINE_MAX} characters or more; is the file a log?")
             yield line
 
-    def _block(self, lines: list[str], numbers: list[int], use: list[int]) -> Block:
+    def _block(self, lines: list[str], numbers: list[int], use: list[int], clocks: Mapping[int, Clock]) -> Block:
+        """Return a block of the columns ``use``, those of timestamps as seconds."""
+        dates = {i: self._dates[i] for i in clocks if i in self._dates}
+        read = [*use, *dates.values()]
+        found = dict(zip(read, self._columns(lines, numbers, read, {*clocks, *dates.values()}), strict=True))
+
+        def where(i: int) -> str:
+            return f"line {numbers[i]}"
+
+        for i, clock in clocks.items():
+            found[i] = clock.seconds(found[i], where, found[dates[i]] if i in dates else None)
+        return Block([found[i] for i in use], where)
+
+    def _columns(self, lines: list[str], numbers: list[int], use: list[int], stamps: Set[int]) -> list[NDArray[Any]]:
+        """Return the columns ``use``, those of ``stamps`` as text."""
         mark, expected = self._layout.delimiter, len(self.names)
         if self._layout.decimal_comma:
             lines = [decimal_points(text) for text in lines]
@@ -127,25 +149,29 @@ class TextSource(Source):
             widths = [len(split(text, mark)) for text in lines]  # without delimiters between quotation marks
         if min(widths) != expected or max(widths) != expected:
             i = next(i for i, width in enumerate(widths) if width != expected)
-            self._convert(lines[i], numbers[i], use)  # a decimal comma is the likelier fault
+            self._convert(lines[i], numbers[i], use, stamps)  # a decimal comma is the likelier fault
             raise LogError(
                 f"{self.path}, line {numbers[i]}: {expected} columns were expected as in line {self._layout.header}, "
                 f"got {widths[i]}"
             )
+        types = np.dtype([(str(k), CELL if i in stamps else np.dtype(np.float64)) for k, i in enumerate(use)])
         try:
-            values = np.loadtxt(lines, delimiter=mark, usecols=use, comments=None, quotechar='"', ndmin=2)
+            rows = np.loadtxt(lines, types, delimiter=mark, usecols=use, comments=None, quotechar='"', ndmin=1)
         except ValueError:
             # Line by line, for the message, or for a notation that only Python's float() accepts.
-            rows = [self._convert(text, number, use) for text, number in zip(lines, numbers, strict=True)]
-            values = np.array(rows)
-        columns: list[Array] = [np.ascontiguousarray(column) for column in values.T]
-        return Block(columns, lambda i: f"line {numbers[i]}")
+            converted = [self._convert(text, number, use, stamps) for text, number in zip(lines, numbers, strict=True)]
+            rows = np.array(converted, types)
+        return [np.ascontiguousarray(rows[name]) for name in types.names or ()]
 
-    def _convert(self, text: str, number: int, use: list[int]) -> list[float]:
-        """Return the numbers of one line in those of the columns ``use`` that it has."""
-        fields, row = split(text.strip(" \r\n"), self._layout.delimiter), []
+    def _convert(self, text: str, number: int, use: list[int], stamps: Set[int]) -> tuple[float | bytes, ...]:
+        """Return the numbers, and texts of ``stamps``, of one line in those of the columns ``use`` that it has."""
+        fields = split(text.strip(" \r\n"), self._layout.delimiter)
+        row: list[float | bytes] = []
         for i in use:
             if i >= len(fields):
+                continue
+            if i in stamps:
+                row.append(cell(fields[i]))
                 continue
             missing = not fields[i] and self.names[i] == self.measured
             if missing and self.may_miss:
@@ -156,17 +182,24 @@ class TextSource(Source):
                 came = repr(fields[i]) if fields[i] else "nothing"
                 raise LogError(
                     f"{self.path}, line {number}: column {self.names[i]!r} must be a number, got {came}"
-                    f"{NEEDS_TRUST if missing else _hint(fields[i])}"
+                    f"{NEEDS_TRUST if missing else _hint(fields[i], divided=len(fields) > len(self.names))}"
                 )
             row.append(float(number_there))
-        return row
+        return tuple(row)
 
 
-def _hint(field: str) -> str:
+def _hint(field: str, *, divided: bool) -> str:
     if is_number(field.replace(".", "").replace(",", ".")) or is_number(field.replace(",", "")):
         return "; write numbers without separators of thousands"
+    if stamp_kind(field) and divided:
+        return "; the line has more fields than names: put timestamps with blanks or commas between quotation marks"
+    if stamp_kind(field):
+        return "; a column of times has timestamps with the time of day in all lines, or in none; --t names another"
     if ":" in field and is_number(decimal_points(field.rsplit(":", 1)[1])):
-        return "; write times of day as seconds, or take the column out and give T_s (--T_s)"
+        return (
+            "; write times of day as hh:mm:ss with up to 9 decimals or as seconds, or take the column out and give T_s "
+            "(--T_s)"
+        )
     return ""
 
 

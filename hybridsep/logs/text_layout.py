@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
+from .timestamps import stamp_kind
 from .units import plain_name, position_unit, time_unit
 
 __all__ = ["COMMENTS", "Layout", "decimal_points", "find_layout", "is_number", "split"]
@@ -38,6 +41,9 @@ class Layout:
         Line number of the names, from 1.
     first : int
         Line number from which numbers are read.
+    clocks : mapping
+        Index of a column of timestamps with a time of day → that of the column with their dates, None if they hold
+        them or there are none.
     """
 
     names: list[str]
@@ -46,6 +52,7 @@ class Layout:
     decimal_comma: bool
     header: int
     first: int
+    clocks: Mapping[int, int | None]
 
 
 def is_number(text: str) -> bool:
@@ -74,9 +81,9 @@ def split(line: str, delimiter: str | None) -> list[str]:
 def find_layout(lines: Sequence[tuple[int, str]]) -> Layout | None:
     """Return the layout of a file that begins with these lines; None if they are all blank or comments.
 
-    The numbers are the longest run of lines with equally many fields, at least half of them numbers, below a line of
-    that many names. Where there is no such run, the first line that is no comment is taken for the names, so that the
-    reader's message names what is wrong below it.
+    The numbers are the longest run of lines with equally many fields, at least half of them numbers where timestamps
+    are not counted, below a line of that many names. Where there is no such run, the first line that is no comment is
+    taken for the names, so that the reader's message names what is wrong below it.
 
     Parameters
     ----------
@@ -87,8 +94,12 @@ def find_layout(lines: Sequence[tuple[int, str]]) -> Layout | None:
     for delimiter in _DELIMITERS:
         for start, end, width in _runs(lines, delimiter):
             layout = _with_names(lines, start, end, width, delimiter)
-            score = (end - start, width)  # of two readings of the same lines, the one with more columns
-            if layout is not None and (best is None or score > best[0]):
+            if layout is None:
+                continue
+            # Of two readings of the same lines, the one with more columns; that blanks divide a timestamp makes none
+            divided = delimiter is None and any(date is not None for date in layout.clocks.values())
+            score = (end - start, width - divided)
+            if best is None or score > best[0]:
                 best = (score, layout)
     return _first_line(lines) if best is None else best[1]
 
@@ -106,32 +117,54 @@ def _runs(lines: Sequence[tuple[int, str]], delimiter: str | None) -> list[tuple
 
 
 def _row_width(line: str, delimiter: str | None) -> int:
-    """Return the number of fields of a row of numbers, 0 if at least half of them are not."""
+    """Return the number of fields of a row of numbers, 0 if more than half of them are neither that nor timestamps."""
     fields = split(line.strip(" \r\n"), delimiter)
-    numbers = sum(is_number(decimal_points(field)) for field in fields)
-    return len(fields) if 2 * numbers >= len(fields) else 0
+    others = [text for text in fields if not is_number(decimal_points(text))]
+    numbers = len(fields) - len(others)
+    return len(fields) if numbers and numbers >= sum(not stamp_kind(text) for text in others) else 0
 
 
 def _with_names(
     lines: Sequence[tuple[int, str]], start: int, end: int, width: int, delimiter: str | None
 ) -> Layout | None:
     """Return the layout of a run below its names, and perhaps a row of units; None without them."""
+    rows = [split(line.strip(" \r\n"), delimiter) for _, line in lines[start:end]]
+    kinds = [_kind([row[i] for row in rows]) for i in range(width)]
     above: list[tuple[int, list[str]]] = []
     for number, line in reversed(lines[:start]):
         fields = _names(line, delimiter)
-        if len(fields) == width and not all(map(is_number, fields)):
+        if delimiter is None and len(fields) == width - 1 and ("date", "time") in pairwise(kinds):
+            i = list(pairwise(kinds)).index(("date", "time"))  # one name for both
+            fields = [*fields[:i], f"{fields[i]} (date)", *fields[i:]]
+        if len(fields) == width and not all(map(is_number, fields)) and not any(map(stamp_kind, fields)):
             above.append((number, fields))
         elif not _is_comment(line):
             break
     if not above:
         return None
-    has_units = len(above) > 1 and _is_row_of_units(above[0][1])
+    numeric = [i for i in range(width) if not kinds[i]]  # hh:mm:ss may stand above timestamps, or anything else
+    has_units = len(above) > 1 and _is_row_of_units([above[0][1][i] for i in numeric])
     header, names = above[1 if has_units else 0]
     units = dict(zip(names, above[0][1], strict=True)) if has_units else {}
-    rows = [split(line, delimiter) for _, line in lines[start:end]]
     comma = delimiter != "," and any("," in field for row in rows for field in row if is_number(decimal_points(field)))
     stated = {name: unit.strip("[]()") for name, unit in units.items() if unit not in _NO_UNITS}
-    return Layout(names, stated, delimiter, comma, header, lines[start][0])
+    return Layout(names, stated, delimiter, comma, header, lines[start][0], _clocks(kinds))
+
+
+def _kind(cells: Sequence[str]) -> str:
+    """Return which timestamps most cells of a column are, empty if they are none."""
+    ((kind, n),) = Counter(map(stamp_kind, cells)).most_common(1)
+    return kind if 2 * n > len(cells) else ""
+
+
+def _clocks(kinds: Sequence[str]) -> dict[int, int | None]:
+    """Return the columns with a time of day, each with the column beside it that holds the dates."""
+    clocks: dict[int, int | None] = {}
+    for i, kind in enumerate(kinds):
+        beside = [j for j in (i - 1, i + 1) if kind == "time" and 0 <= j < len(kinds) and kinds[j] == "date"]
+        if "time" in kind:
+            clocks[i] = beside[0] if beside else None
+    return clocks
 
 
 def _first_line(lines: Sequence[tuple[int, str]]) -> Layout | None:
@@ -141,7 +174,7 @@ def _first_line(lines: Sequence[tuple[int, str]]) -> Layout | None:
     number, line = known[0]
     delimiter = next((mark for mark in _DELIMITERS if mark and mark in line), None)
     names = _names(line, delimiter)
-    return Layout(names, {}, delimiter, False, number, number + 1)
+    return Layout(names, {}, delimiter, False, number, number + 1, {})
 
 
 def _is_comment(line: str) -> bool:

@@ -109,17 +109,20 @@ class TimeAxis:
         if not len(steps):
             raise LogError(f"{self._path}: time {self._name!r} must increase, it never does")
         median = float(np.median(steps))
+        near = steps[np.abs(steps - median) <= 0.5 * median]  # none where it is between two that differ much
         # The clock's mean, gaps and repeated times aside
-        return float(np.mean(steps[np.abs(steps - median) <= 0.5 * median]))
+        return float(np.mean(near)) if len(near) else median
 
     def _check_increasing(self, steps: Array, shift: int, block: Block) -> None:
         if steps.min() <= 0.0:
             i = int(np.argmax(steps <= 0.0))
             now = float(block.columns[0][i + shift])
-            what = "repeats" if steps[i] == 0.0 else "runs backwards"
+            what, hint = "runs backwards", ""
+            if steps[i] == 0.0:
+                what, hint = "repeats", "; if times are rounded too coarsely, take the column out and give T_s (--T_s)"
             raise LogError(
                 f"{self._path}, {block.where(i + shift)}: time {self._name!r} {what}: a value above "
-                f"{now - float(steps[i]):.9g} s was expected, got {now:.9g} s"
+                f"{now - float(steps[i]):.9g} s was expected, got {now:.9g} s{hint}"
             )
 
     def _check_uniform(self, steps: Array, shift: int, block: Block) -> None:

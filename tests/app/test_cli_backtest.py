@@ -141,3 +141,23 @@ def test_a_rotary_axis(hybridsep: Run, tmp_path: Path) -> None:
     status, _, err = hybridsep("backtest", log, "-m", linear, "--x", "angle")
     assert status == 2
     assert "log.csv is in rad, but machine emps has unit = 'm'; correct the machine file, or say" in err
+
+
+def test_clock_timestamps(hybridsep: Run, tmp_path: Path) -> None:
+    """The figures are those of the log with seconds; times of a tenth of a second repeat and are refused."""
+    good = json.loads(hybridsep("backtest", write_log(tmp_path / "log.csv"), *MACHINE, "--json")[1])
+    header, *rows = (tmp_path / "log.csv").read_text().splitlines()
+    at = np.datetime64("2026-03-05T23:59:59", "ms")  # midnight is passed
+    for digits, decimals in ((3, 1), (1, 100)):
+        lines = [header.replace(",", ";")]
+        for i, row in enumerate(rows):
+            time = str(at + i // decimals * decimals).split("T")[1][: 9 + digits]
+            lines.append(";".join([time, *row.split(",")[1:]]).replace(".", ","))
+        (tmp_path / f"stamps{digits}.csv").write_text("\n".join(lines))
+    status, out, _ = hybridsep("backtest", tmp_path / "stamps3.csv", *MACHINE, "--json")
+    assert status == 0
+    assert json.loads(out) == good
+    status, _, err = hybridsep("backtest", tmp_path / "stamps1.csv", *MACHINE)
+    assert status == 2
+    assert "2475 times are not above the one before, 0 of them run backwards" in err
+    assert "if they are rounded too coarsely, take the column out and give T_s" in err

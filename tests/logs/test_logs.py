@@ -132,6 +132,11 @@ def test_jitter_of_a_clock_does_not_move_the_interval(
     assert read_log(path).T_s == pytest.approx(1e-3, rel=2e-5)
 
 
+def test_a_median_between_two_intervals_that_differ_much(tmp_path: Path) -> None:
+    path = write_csv(tmp_path / "log.csv", "t,x_d,x\n0,0,0\n1,0,0\n11,0,0\n")
+    assert read_log(path, uniform=False).T_s == 5.5
+
+
 @pytest.mark.parametrize("suffix", [".csv", ".npz"])
 def test_memory_does_not_grow_with_the_log(tmp_path: Path, suffix: str) -> None:
     peaks = []

@@ -1,0 +1,380 @@
+"""Logs whose times are clock timestamps: the same log as with seconds, midnight, zones, and what is refused."""
+
+from __future__ import annotations
+
+import gzip
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from log_files import write_csv
+
+from hybridsep.base.errors import LogError
+from hybridsep.intake.check import check
+from hybridsep.logs.formats import open_source
+from hybridsep.logs.log import open_log, read_log
+
+SECOND = 1_000_000_000
+"""In nanoseconds, in which the truth is computed."""
+
+
+@dataclass(frozen=True)
+class Spelling:
+    """One way in which a recorder writes timestamps.
+
+    Attributes
+    ----------
+    date, time : str
+        The date and what stands before the time of day, as ``strftime`` takes them; the time of day.
+    end : str
+        What follows the decimals.
+    digits : int
+        Decimals; with none there is no decimal mark.
+    mark, delimiter : str
+        Decimal mark, of the timestamps and of the numbers, and delimiter.
+    """
+
+    date: str
+    time: str
+    end: str
+    digits: int
+    mark: str
+    delimiter: str
+
+    def __call__(self, ns: int) -> str:
+        """Return nanoseconds since 1970, a multiple of the last digit, as a timestamp."""
+        whole = np.datetime64(ns // SECOND, "s").item()
+        decimals = f"{ns % SECOND:09d}"[: self.digits]
+        stamp = whole.strftime(self.date + self.time) + (self.mark + decimals if self.digits else "")
+        return stamp + whole.strftime(self.end)
+
+    def log(self, times: Sequence[int]) -> str:
+        """Return a log of these times, ns since 1970, with the numbers in the same style."""
+        return table(map(self, times), self.delimiter, self.mark)
+
+
+def table(times: Iterable[str], delimiter: str = ",", mark: str = ".") -> str:
+    rows = [["t", "x_d", "x"]]
+    rows += [[time, f"{i % 10}{mark}25", f"-{i % 10}{mark}5"] for i, time in enumerate(times)]
+    return "".join(delimiter.join(row) + "\n" for row in rows)
+
+
+def in_seconds(times: Sequence[int]) -> str:
+    text = table(f"{(ns - times[0]) // SECOND}.{(ns - times[0]) % SECOND:09d}" for ns in times)
+    return text.replace("t", "t [s]", 1)
+
+
+SPELLINGS = st.builds(
+    Spelling,
+    date=st.sampled_from(
+        [
+            "%Y-%m-%dT",
+            "%Y-%m-%d ",
+            "%Y/%m/%d ",
+            "%d.%m.%Y ",
+            "%m/%d/%Y ",
+            "%d/%m/%Y ",
+            "%d-%b-%Y ",
+            "%Y%m%dT",
+            "%d.%m.%y  ",
+        ]
+    ),
+    time=st.just("%H:%M:%S"),
+    end=st.sampled_from(["", "Z", "+00:00", " -0000", " UTC", " "]),
+    digits=st.integers(0, 9),
+    mark=st.sampled_from([".", ","]),
+    delimiter=st.sampled_from([";", "\t"]),
+) | st.builds(
+    Spelling,
+    date=st.sampled_from(["%m/%d/%Y ", "%m/%d/%Y, ", "%Y-%m-%d "]),
+    time=st.just("%I:%M:%S"),
+    end=st.sampled_from([" %p", "%p"]),
+    digits=st.integers(0, 9),
+    mark=st.just("."),
+    delimiter=st.sampled_from([";", "\t"]),
+)
+START = st.integers(0, 2**31 * SECOND)  # 1970 to 2038
+
+
+# The same log as with seconds
+
+
+@given(spelling=SPELLINGS, start=START, steps=st.lists(st.integers(1, 40 * SECOND), min_size=1, max_size=30))
+@settings(max_examples=150)
+def test_stamps_are_seconds_since_the_first(
+    spelling: Spelling, start: int, steps: list[int], tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    last = 10 ** (9 - spelling.digits)
+    times = [start // last * last]
+    for step in steps:
+        times.append(times[-1] + -(-step // last) * last)
+    folder = tmp_path_factory.mktemp("stamps")
+    log = read_log(write_csv(folder / "log.csv", spelling.log(times)), uniform=False)
+    truth = read_log(write_csv(folder / "seconds.csv", in_seconds(times)), uniform=False)
+    np.testing.assert_array_equal(log.t, truth.t)
+    np.testing.assert_array_equal(log.x_d, truth.x_d)
+    np.testing.assert_array_equal(log.x_meas, truth.x_meas)
+    assert log.T_s == truth.T_s
+
+
+@given(start=START, n=st.integers(2, 60), step=st.integers(1, 20 * 3600 * SECOND), block=st.integers(1, 20))
+@settings(max_examples=50)
+@pytest.mark.parametrize("date", ["", "%d.%m.%Y ", "%d/%m/%Y ", "%m/%d/%y "])
+def test_midnights_in_blocks_of_any_size(
+    date: str, start: int, n: int, step: int, block: int, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """A time of day alone passes midnight where it falls by more than half a day."""
+    step = step if date else step % (SECOND * 3600 * 11) + 1
+    spelling = Spelling(date, "%H:%M:%S", "", 9, ".", ";")
+    times = [start + i * step for i in range(n)]
+    source = open_source(write_csv(tmp_path_factory.mktemp("midnight") / "log.csv", spelling.log(times)))
+    t = np.concatenate([part.columns[0] for part in source.blocks(["t"], block)])
+    np.testing.assert_array_equal(t, (np.array(times) - start) / 1e9)
+
+
+@pytest.mark.parametrize("rate", [8000, 4000, 3000, 1000, 1024])
+def test_intervals_at_the_end_of_a_day(tmp_path: Path, rate: int) -> None:
+    """Microseconds at the drives' rates, a day after the first sample."""
+    spelling = Spelling("%Y-%m-%d ", "%H:%M:%S", "", 6, ".", ";")
+    k = np.arange(25_000)
+    ns = 1_772_706_030 * SECOND + np.round(k * (1e6 / rate)).astype(np.int64) * 1000
+    log = read_log(write_csv(tmp_path / "log.csv", spelling.log(ns.tolist())))
+    assert log.T_s == 1 / rate
+    np.testing.assert_array_equal(np.round(1e9 * np.diff(log.t)), np.diff(ns))
+    late = np.concatenate((ns[:1], ns[1:] + 86_400 * SECOND))
+    log = read_log(write_csv(tmp_path / "log.csv", spelling.log(late.tolist())), uniform=False)
+    np.testing.assert_array_equal(np.round(1e9 * np.diff(log.t)), np.diff(late))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "t,x_d,x\n2026-03-05T10:20:30.5Z,1,2\n2026-03-05T10:20:31.5Z,3,4\n",
+        "t,x_d,x\n10:20:30.5,1,2\n10:20:31.500,3,4\n",
+        't,x_d,x\n"10:20:30,5","1,0",2\n"10:20:31,5",3,4\n',
+        "t,x_d,x\n'9:59:59','1',2\n'10:00:00',3,4\n",
+        "t, x_d, x\n 2026-03-05 10:20:30 , 1, 2\n 2026-03-05 10:20:31 , 3, 4\n",
+        "# t x_d x\n2026-03-05 10:20:30.25 1 2\n2026-03-05 10:20:31.25 3 4\n",
+        "Time stamp\tx_d\tx\n2026-03-05 10:20:30\t1\t2\n2026-03-05 10:20:31\t3\t4\n",
+        "t x_d x\n10:20:30 1 2\n10:20:31 3 4\n",
+        "Axis;A 12\nStart;2026-03-05 10:20:30\n\nt;x_d;x\n10:20:30,000;1,0;2\n10:20:31,000;3,0;4\n",
+        "t;x_d;x\nhh:mm:ss;mm;um\n10:20:30;1000;2e6\n10:20:31;3000;4e6\n",
+        "Time [UTC];x_d [mm];x\n10:20:30;1000;2\n10:20:31;3000;4\n",
+        "t,note,x_d,x\n10:20:30,on,1,2\n10:20:31,off,3,4\n",
+        "t,x_d,x\n11:59:59 a.m.,1,2\n12:00:00 p.m.,3,4\n",
+        "t,x_d,x\n3:59:59\xa0AM,1,2\n4:00:00\xa0AM,3,4\n",
+        # Dates in a column of their own, on either side
+        "Date;Time;x_d;x\n05.03.2026;23:59:59,5;1;2\n06.03.2026;00:00:00,5;3;4\n",
+        "Time,Date,x_d,x\n23:59:59.5,3/9/26,1,2\n00:00:00.5,3/10/26,3,4\n",
+        "Date Time x_d x\n2026-03-05 10:20:30 1 2\n2026-03-05 10:20:31 3 4\n",
+        # Zones: the clock is put back at 3 o'clock, a logger writes UTC and another local time
+        "t,x_d,x\n2026-10-25T02:59:59+02:00,1,2\n2026-10-25T02:00:00+01:00,3,4\n",
+        "t,x_d,x\n2026-03-06 00:29:59 +0530,1,2\n2026-03-05 19:00:00Z,3,4\n",
+        "t,x_d,x\n00:59:59+01:00,1,2\n01:00:00+01,3,4\n",
+    ],
+)
+@pytest.mark.parametrize("encoding", ["utf-8", "latin-1", "utf-16"])
+def test_layouts(tmp_path: Path, text: str, encoding: str) -> None:
+    log = read_log(write_csv(tmp_path / "log", text, encoding))
+    np.testing.assert_allclose([log.t, log.x_d, log.x_meas], [[0, 1], [1, 3], [2, 4]], rtol=1e-15)
+    assert (log.T_s, log.unit, log.remarks) == (1.0, "m", ())
+
+
+def test_a_blank_that_is_no_latin_1(tmp_path: Path) -> None:
+    path = write_csv(tmp_path / "log.csv", "t,x_d,x\n3:59:59\u202fPM,1,2\n4:00:00\u202fPM,3,4\n")
+    assert read_log(path).t.tolist() == [0.0, 1.0]
+
+
+def test_seconds_that_count_up_are_no_index(tmp_path: Path) -> None:
+    rows = [f"2026-03-05 10:20:{30 + i}" for i in range(20)]
+    log = read_log(write_csv(tmp_path / "log.csv", table(rows)))
+    assert (log.T_s, log.t[-1]) == (1.0, 19.0)
+
+
+def test_compressed_in_blocks(tmp_path: Path) -> None:
+    times = [1_772_700_000 * SECOND + k * 1_000_000 for k in range(25_000)]
+    path = tmp_path / "log.csv.gz"
+    path.write_bytes(gzip.compress(Spelling("", "%H:%M:%S", "", 3, ".", ";").log(times).encode()))
+    np.testing.assert_array_equal(read_log(path, T_s=1e-3).t, np.arange(25_000) / 1000)
+
+
+# Which column, and which date
+
+
+@pytest.mark.parametrize(
+    ("dates", "days"),
+    [
+        (["03/05/2026", "03/06/2026", "03/07/2026"], [0, 1, 2]),
+        (["03/05/2026", "04/05/2026", "05/05/2026"], [0, 1, 2]),
+        (["31/01/2026", "01/02/2026", "02/02/2026"], [0, 1, 2]),
+        (["01-31-2026", "02-01-2026", "02-02-2026"], [0, 1, 2]),
+        (["26/02/27", "26/02/28", "26/03/01"], [0, 1, 2]),
+        (["30.11.25", "01.12.25", "02.12.25"], [0, 1, 2]),
+        (["2024-02-28", "2024-02-29", "2024-03-01"], [0, 1, 2]),
+        (["31 Dec 1999", "01 Jan 2000", "1 Feb 2000"], [0, 1, 32]),
+        (["12/12/2026", "12/13/2026", "01/02/2027"], [0, 1, 21]),
+        (["0001-01-01", "0001-01-02", "0001-01-03"], [0, 1, 2]),
+    ],
+)
+def test_order_of_day_and_month(tmp_path: Path, dates: list[str], days: list[int]) -> None:
+    """The order that makes the first change of date the smallest step holds for all of them."""
+    for text in (
+        table(f"{date} 10:20:30.5" for date in dates),
+        table((f"{date};10:20:30.5" for date in dates), ";").replace("t;", "date;t;"),
+    ):
+        log = read_log(write_csv(tmp_path / "log.csv", text), uniform=False)
+        np.testing.assert_array_equal(log.t, 86_400.0 * np.array(days))
+
+
+def test_the_only_column_of_timestamps_is_the_time(tmp_path: Path) -> None:
+    text = "recorded,x_d,x\n10:20:30,1,2\n10:20:31,3,4\n"
+    path = write_csv(tmp_path / "log.csv", text)
+    assert read_log(path).t.tolist() == [0.0, 1.0]
+    assert read_log(path).remarks == ("column 'recorded' is read as the time; columns (--t) names another",)
+    assert read_log(path, columns={"t": "recorded"}).remarks == ()
+    assert read_log(path, T_s=0.5).t.tolist() == [0.0, 0.5]
+    both = "begun,ended,x_d,x\n10:20:30,10:20:31,1,2\n10:20:31,10:20:32,3,4\n"
+    with pytest.raises(LogError, match=r"column 't' is missing, the file has 'begun', 'ended', 'x_d', 'x'; .* \(--t"):
+        read_log(write_csv(path, both))
+    assert read_log(path, columns={"t": "ended"}).t.tolist() == [0.0, 1.0]
+
+
+def test_numbers_are_read_where_there_are_both(tmp_path: Path) -> None:
+    text = "recorded,t,x_d,x\n10:20:30,0.5,1,2\n10:20:30,0.75,3,4\n"
+    assert read_log(write_csv(tmp_path / "log.csv", text)).t.tolist() == [0.5, 0.75]
+
+
+# What is refused
+
+
+@pytest.mark.parametrize(
+    ("cell", "message"),
+    [
+        ("", r" such as '2026-03-05 10:20:00\.5', got nothing$"),
+        ("0.5", r" such as '2026-03-05 10:20:00\.5', got '0\.5'$"),
+        ("nan", "got 'nan'$"),
+        ("2026-03-05 24:20:00", r"got '2026-03-05 24:20:00'; there is no such time of day"),
+        ("2026-03-05 10:60:00", r"got '2026-03-05 10:60:00'; there is no such time of day"),
+        ("2026-03-05 10:20:60", r"got '2026-03-05 10:20:60'; there is no such time of day"),
+        ("2026-03-05 13:20:00 PM", r"got '2026-03-05 13:20:00 PM'; there is no such time of day"),
+        ("2026-03-05 00:20:00 AM", r"got '2026-03-05 00:20:00 AM'; there is no such time of day"),
+        ("2026-02-30 10:20:00", r"got '2026-02-30'; there is no such date"),
+        ("05-Foo-2026 10:20:00", r"got '05-Foo-2026'; there is no such date"),
+        ("1026-03-05 10:20:00", r"got '1026-03-05'; it is \d{6} days away from the first date"),
+        ("10:20:00", r"got '10:20:00'; it has no date, the first one has one"),
+        ("2026-03-05 10:20:00Z", r"got '2026-03-05 10:20:00Z'; it has a zone, the first one has none"),
+        ("2026-03-05 10:20:00.0123456789", r"got '.*0123456789'; at most 9 decimals are read"),
+        ("2026-03-05 10:20:00 CET", r"got '2026-03-05 10:20:00 CET'$"),
+        ("2026-03-05 10:20:00" + 60 * "z", "got '2026"),
+        ("2026-03-05 10:20:00 \u2212", "got '2026-03-05 10:20:00 [?]'$"),
+    ],
+)
+@pytest.mark.parametrize("at", [1, 7])
+def test_what_is_no_timestamp_is_refused_with_its_line(tmp_path: Path, cell: str, message: str, at: int) -> None:
+    rows = [f"2026-03-05 10:20:{i:02d}.5" for i in range(10)]
+    rows[at] = cell
+    path = write_csv(tmp_path / "log.csv", table(rows))
+    with pytest.raises(LogError, match=rf"log\.csv, line {at + 2}: column 't' must be a timestamp.*{message}"):
+        read_log(path)
+
+
+def test_a_first_cell_that_is_none(tmp_path: Path) -> None:
+    rows = ["-", *(f"10:20:{i}" for i in range(10, 20))]
+    with pytest.raises(
+        LogError, match=r"line 2: column 't' must be a timestamp such as '2026-03-05 10:20:30.001', got '-'"
+    ):
+        read_log(write_csv(tmp_path / "log.csv", table(rows)))
+
+
+@pytest.mark.parametrize(
+    ("date", "message"),
+    [
+        ("31.02.2026", "got '31.02.2026'; there is no such date"),
+        ("", "got nothing$"),
+        ("noon", "got 'noon'$"),
+        ("01.01.1000", "days away from the first date"),
+    ],
+)
+def test_what_is_no_date_is_refused_with_its_column(tmp_path: Path, date: str, message: str) -> None:
+    text = f"Date;Time;x_d;x\n05.03.2026;10:20:30;1;2\n05.03.2026;10:20:31;1;2\n{date};10:20:32;1;2\n"
+    with pytest.raises(
+        LogError, match=rf"line 4: column 'Date' must be a date such as '05\.03\.2026', {message}|{message}"
+    ):
+        read_log(write_csv(tmp_path / "log.csv", text))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            "t,x_d,x\n2026-03-05 10:20:30,001,1,2\n2026-03-05 10:20:30,002,1,2\n",
+            r"line 2: column 't' must be a number, got '2026-03-05 10:20:30'; the line has more fields than names: put",
+        ),
+        (
+            "t x_d x\n03/05/2026 10:20:30 AM 1 2\n03/05/2026 10:20:31 AM 1 2\n",
+            r"line 2: column 't' must be a number, got '03/05/2026'; the line has more fields than names: put",
+        ),
+        (
+            "t,x_d,x\n2026-03-05,1,2\n2026-03-06,3,4\n",
+            r"line 2: column 't' must be a number, got '2026-03-05'; a column of times has timestamps with the time of",
+        ),
+        (
+            "t,x_d,x\n0,1,2\n10:20:30,1,2\n",
+            r"line 3: column 't' must be a number, got '10:20:30'; a column of times has",
+        ),
+        (
+            "t,x_d,x\n20:30.5,1,2\n20:31.5,1,2\n",
+            r"line 2: column 't' must be a number, got '20:30\.5'; write times of day",
+        ),
+        (
+            "t,x_d,x\n0,10:20:30,2\n1,10:20:31,2\n",
+            r"column 'x_d' must be a position, it holds timestamps; name another",
+        ),
+        ("10:20:30,1,2\n10:20:31,3,4\n", r"line 1 must hold the column names, it holds numbers"),
+        ("t,x_d,x\n10:20:31,1,2\n10:20:30,3,4\n", r"line 3: time 't' runs backwards: a value above 0 s .* got -1 s"),
+    ],
+)
+def test_refused_texts(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(LogError, match=message):
+        read_log(write_csv(tmp_path / "log.csv", text))
+
+
+def test_milliseconds_at_4_khz(tmp_path: Path) -> None:
+    """Times that repeat are refused as repeated seconds are; the checks say what to do."""
+    spelling = Spelling("%Y-%m-%d ", "%H:%M:%S", "", 3, ".", ";")
+    text = spelling.log([1_772_706_030 * SECOND + k // 4 * 1_000_000 for k in range(400)])
+    path = write_csv(tmp_path / "log.csv", text)
+    with pytest.raises(
+        LogError, match=r"line 3: time 't' repeats: .* rounded too coarsely, take .* give T_s \(--T_s\)"
+    ):
+        open_log(path)
+    finding = next(one for one in check(read_log(path, uniform=False)).findings if one.name == "time order")
+    assert finding.evidence["n"] == 300
+    assert "300 times are not above the one before, 0 of them run backwards" in finding.words
+    assert finding.words.endswith("; if they are rounded too coarsely, take the column out and give T_s")
+
+
+def test_datetimes_of_numpy(tmp_path: Path) -> None:
+    t = np.datetime64("2026-03-05T10:20:30", "ns") + np.arange(5)
+    np.savez(tmp_path / "log.npz", t=t, x_d=np.arange(5.0), x=np.arange(5.0))
+    with pytest.raises(
+        LogError, match=r"column 't' must be numbers, got datetime64\[ns\]; save \(t - t\[0\]\) / numpy"
+    ):
+        read_log(tmp_path / "log.npz")
+
+
+@given(cells=st.lists(st.text("0123456789:./-, TZAPMapm+'", max_size=24), min_size=1, max_size=8))
+@settings(max_examples=300)
+def test_any_text_is_read_or_refused(cells: list[str], tmp_path_factory: pytest.TempPathFactory) -> None:
+    rows = [*(f"2026-03-05 10:20:{i:02d}" for i in range(12)), *(cell.strip() for cell in cells)]
+    path = write_csv(tmp_path_factory.mktemp("any") / "log.csv", table(rows, ";"))
+    try:
+        log = read_log(path, uniform=False)
+    except LogError as error:
+        assert "log.csv" in str(error)  # noqa: PT017
+    else:
+        assert np.isfinite(log.t).all()
