@@ -28,7 +28,7 @@ def test_weights_of_other_features_are_refused(learned: float, now: float, tmp_p
     n = 2 + 3 + 50 + (13 if learned else 0)
     write_weights(tmp_path, "compensator", np.eye(n + 1), 100, v_friction=learned)
     assert refusal(CModel("compensator", {"v_friction": now}, tmp_path).initialise) == (
-        f"v_friction must be {learned!r}, with which weights.bin was learned, got {now!r}"
+        f"v_friction must be {learned!r}, with which this FMU was trained (weights.bin), got {now!r}"
     )
     CModel("compensator", {"v_friction": learned}, tmp_path).initialise()
 

@@ -256,7 +256,7 @@ def test_both_flavours_say_the_same_of_other_settings(tmp_path: Path) -> None:
         assert str(caught.value).startswith(said)  # C cuts long messages off
         assert len(said) > 400
     (tmp_path / WEIGHTS_FILE).write_bytes(weights_file(learned))
-    assert "the number of modes must be 4, with which weights.bin was learned, got 1" in refusal(
+    assert "the number of modes must be 4, with which this FMU was trained (weights.bin), got 1" in refusal(
         CModel(
             "predictor",
             {"input_hold": 1, "dead_time": 7, **dict(zip(MODE_1, description["modes"][-1].values(), strict=True))},

@@ -118,7 +118,7 @@ def test_other_settings_than_learned_are_refused(new_stream: StreamMaker, weight
     stream, learned = new_stream(weights=weights(new_stream.model)), LEARNED[new_stream.model]
     for values in OTHERS:
         message = "; ".join(
-            f"{name} must be {learned.get(name, 24674.0)!r}, with which weights.bin was learned, got {now!r}"
+            f"{name} must be {learned.get(name, 24674.0)!r}, with which this FMU was trained (weights.bin), got {now!r}"
             for name, now in values.items()
         )
         with pytest.raises(RefusedStreamError, match=re.escape(message)):
@@ -159,7 +159,7 @@ def test_the_velocity_of_friction_is_the_learned_one_without_trust(new_stream: S
     stream = new_stream.planted(learned_with_trust())
     stream.initialise({"p": 20, "trust": True, "v_friction": 1e-3})
     stream = new_stream.planted(learned_by_the_papers_model())
-    said = "v_friction must be 0.002, with which weights.bin was learned, got 0.001"
+    said = "v_friction must be 0.002, with which this FMU was trained (weights.bin), got 0.001"
     with pytest.raises(RefusedStreamError, match=re.escape(said)):
         stream.initialise({"p": 20, "trust": False, "v_friction": 1e-3})
     stream.reset()
@@ -185,6 +185,6 @@ def test_what_was_learned_with_trust_is_all_there_again(new_stream: StreamMaker)
 @on_all(LOOK_AHEADS)
 def test_what_was_learned_with_trust_is_for_no_other_model(new_stream: StreamMaker) -> None:
     stream = new_stream.planted(learned_with_trust())
-    said = "trust must be 1, with which weights.bin was learned, got 0"
+    said = "trust must be 1, with which this FMU was trained (weights.bin), got 0"
     with pytest.raises(RefusedStreamError, match=re.escape(said)):
         stream.initialise({"p": 20, "trust": False})

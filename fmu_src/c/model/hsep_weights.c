@@ -71,7 +71,7 @@ static void weights_compare(const char *name, double learned, double got, hsep_k
     char then[HSEP_NUMBER_SIZE], now[HSEP_NUMBER_SIZE];
     if (learned != got) {
         hsep_message_add(
-            message, "%s must be %s, with which " WEIGHTS_FILE " was learned, got %s", name,
+            message, "%s must be %s, with which this FMU was trained (" WEIGHTS_FILE "), got %s", name,
             hsep_number(then, learned, kind), hsep_number(now, got, kind));
     }
 }
