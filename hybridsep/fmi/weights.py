@@ -174,6 +174,5 @@ def _differences(name: str, then: float, now: float) -> list[str]:
         return []
     whole = isinstance(now, int)
     shown = int(then) if whole and then == int(then) else then
-    return [
-        f"{name} must be {shown!r}, with which this FMU was trained ({WEIGHTS_FILE}), got {int(now) if whole else now!r}"
-    ]
+    came = int(now) if whole else now
+    return [f"{name} must be {shown!r}, with which this FMU was trained ({WEIGHTS_FILE}), got {came!r}"]
