@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tempfile
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -40,7 +39,6 @@ class Case:
     at: int = 3050
     held: tuple[int, int] | None = None
     outlier: tuple[int, float] | None = None
-    late: int = 0
     limits: Limits | None = None
     noise: float = 1.0
 
@@ -49,8 +47,6 @@ class Case:
         """What becomes of the measurement; None: nothing."""
         if self.held is not None:
             return HeldSensor(*self.held)
-        if self.late:
-            return LateSensor(self.late)
         return None if self.outlier is None else Outlier(*self.outlier)
 
 
@@ -63,18 +59,6 @@ class Outlier:
     def __call__(self, k: int, x_meas: float) -> float:
         """Return what arrives of the measurement at sample ``k``."""
         return x_meas + (self.size if k == self.k else 0.0)
-
-
-class LateSensor:
-    """Delivers each value so many samples later; at rest at 0, m, before."""
-
-    def __init__(self, late: int) -> None:
-        self._on_the_way = deque([0.0] * late)
-
-    def __call__(self, k: int, x_meas: float) -> float:
-        """Return what arrives of the measurement at sample ``k``."""
-        self._on_the_way.append(x_meas)
-        return self._on_the_way.popleft()
 
 
 class HeldSensor:

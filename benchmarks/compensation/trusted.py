@@ -56,7 +56,7 @@ def rows() -> Iterator[Row]:
     """Yield the cases."""
     drive = load_machine("spring_mass_damper")
     yield Row("staircase", drive, staircase(), (4.2, 0.5))
-    yield Row(f"staircase, {LATE} samples late", _late(drive), staircase(), (4.2, 0.5), Case(late=LATE))
+    yield Row(f"staircase, {LATE} samples late", _late(drive), staircase(), (4.2, 0.5))
     yield Row("staircase of 7 mm", drive, short_staircase())
     for name, case in CASES.items():
         yield Row(name, drive, staircase(), case=case, worse=LESS_THAN_5_PERCENT_WORSE)
@@ -72,8 +72,7 @@ def rows() -> Iterator[Row]:
         for i, axis in enumerate("XY"):
             stage, label = with_friction_on(axes[i], kind), f"{axis}, friction on the {kind}"
             yield Row(f"{label}: spiral", stage, spiral()[i], limits[i])
-            name = f"{label}: spiral, {LATE} samples late"
-            yield Row(name, _late(stage), spiral()[i], limits[i], Case(late=LATE))
+            yield Row(f"{label}: spiral, {LATE} samples late", _late(stage), spiral()[i], limits[i])
             for name, path in paths:
                 yield Row(f"{label}: {name}", stage, path[i])
 

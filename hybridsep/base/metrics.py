@@ -103,8 +103,8 @@ class RunningErrors:
         return list(self._peaks) if self.n else [math.nan] * len(self._peaks)
 
 
-def hold(x_pb: Array, x_meas: Array, active: NDArray[np.bool_], Np: int) -> Array:
-    """Return the hold baseline: ``x_pb`` plus the last residual before each window; ``x_pb`` in the warm-up.
+def hold(x_pb: Array, x_meas: Array, active: NDArray[np.bool_], Np: int, *, late: int = 0) -> Array:
+    """Return the hold baseline: ``x_pb`` plus the last residual known before each window; ``x_pb`` in the warm-up.
 
     Parameters
     ----------
@@ -114,8 +114,10 @@ def hold(x_pb: Array, x_meas: Array, active: NDArray[np.bool_], Np: int) -> Arra
         Whether the warm-up is over.
     Np : int
         Samples in a window.
+    late : int
+        Samples by which measurements were late.
     """
-    last = np.arange(len(x_meas)) // Np * Np - 1
+    last = np.arange(len(x_meas)) // Np * Np - 1 - late
     residual = np.where(last >= 0, (x_meas - x_pb)[last], 0.0)
     return np.where(active, x_pb + residual, x_pb)
 

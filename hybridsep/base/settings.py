@@ -163,6 +163,7 @@ class PredictorSettings(Settings):
         none.
     measurement_delay : int
         Samples by which the measurement is late: the position that arrives at ``k`` is ``x(k − measurement_delay)``.
+        A compensator's predictor needs trust for it.
     v_friction : float
         Velocity scale of the friction's change of sign, m/s, for additional features of the reference
         (:mod:`~hybridsep.predict.reference_features`); 0, as in the paper: none.
@@ -232,20 +233,13 @@ class PredictorSettings(Settings):
         automatic = 0.0 if self.trust else 0.3
         return automatic if self.t_init < 0.0 else self.t_init
 
-    def for_planning(self) -> PredictorSettings:
-        """Return these settings, those of a compensator's predictor.
-
-        Raises
-        ------
-        ParameterError
-            If the measurement is late without trust: the paper's model is planned with from the last sample on.
-        """
+    def check_planning(self) -> None:
+        """Raise ParameterError if no compensator can plan with these settings: a late measurement needs trust."""
         if self.measurement_delay and not self.trust:
             raise ParameterError(
                 f"measurement_delay of a compensator must be 0 with trust = false, got {self.measurement_delay}: only "
                 "the model with trust plans from a late measurement"
             )
-        return self
 
     def _misfits(self) -> list[str]:
         problems = []

@@ -69,7 +69,7 @@ class SepCompensator:
 
     def __init__(self, predictor: HybridPredictor, settings: CompensatorSettings | None = None) -> None:
         Np = predictor.Np
-        predictor.settings.for_planning()
+        predictor.settings.check_planning()
         self.predictor = predictor
         self.settings = settings = (settings or CompensatorSettings()).for_window(Np)
         assert settings.preview is not None

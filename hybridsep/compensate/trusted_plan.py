@@ -52,7 +52,7 @@ def is_better(cost: float, other: float) -> bool:
 
 @dataclass(frozen=True)
 class _Point:
-    """Coefficients ``(3 + n_free,)``; prediction, position, third differences, ``(n,)``, and cost under them."""
+    """Coefficients ``(3 + n_free,)``; prediction, position and third differences, ``(preview,)``, and cost, m²."""
 
     coefficients: Array
     prediction: Forecast
@@ -69,7 +69,7 @@ class TrustedPlanner:
     basis : SplineBasis
     jerk_weight : float
     model : PlanModel
-        At the beginning of the window.
+        Of the preview that the window begins.
     x_d : (preview,) array, m
         Commanded positions, relative to the start.
     delta_before : (3,) array, m

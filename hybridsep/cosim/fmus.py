@@ -67,6 +67,7 @@ class FmuController(_OpenedFmu):
         fmu = self.fmu
         self._initialise({"x_d_ahead": start, "x_meas": start})
         self.delay, self.Np, self.T_s = int(fmu.get(self.kind.delay)), int(fmu.get("Np")), float(fmu.get("T_s"))
+        self.late = int(fmu.get("measurement_delay")) if "measurement_delay" in fmu.variables else 0
         self._get, self._set = fmu.real_reader(self.kind.outputs), fmu.real_writer(["x_d_ahead", "x_meas"])
 
     def outputs(self) -> tuple[tuple[float, ...], int]:

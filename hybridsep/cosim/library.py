@@ -32,9 +32,10 @@ class LibraryController:
         Name in error messages.
     kind : Kind
     T_s : float
-        Sampling interval, s; an FMU's, like the next two, is known after :meth:`initialise`.
-    Np, delay : int
-        Samples in a window; samples by which it delays the trajectory.
+        Sampling interval, s; an FMU's, like the next three, is known after :meth:`initialise`.
+    Np, delay, late : int
+        Samples in a window; samples by which it delays the trajectory, and by which it is told that measurements are
+        late.
     """
 
     name: str = "the controller"
@@ -46,7 +47,7 @@ class LibraryController:
             self.kind, predictor, self.delay = COMPENSATOR, controller.predictor, controller.preview
         else:
             self.kind, predictor, self.delay = PREDICTOR, controller, controller.Np
-        self.T_s, self.Np = predictor.T_s, predictor.Np
+        self.T_s, self.Np, self.late = predictor.T_s, predictor.Np, predictor.settings.measurement_delay
 
     def initialise(self, start: float) -> None:
         """Begin a run at rest at ``start``, m, with what was learned kept."""

@@ -2,11 +2,13 @@
 
 The Jacobi wiring: at ``t_k`` the drive gets the command that the controller gives it, the controller gets ``x_meas``
 and ``x_d_ahead = r(k)``; then both step. The controller delays the trajectory, so ``r`` is held at its end for as many
-samples more, and a run is recorded without the first fill.
+samples more, and a run is recorded without the first fill. If the controller has a ``measurement_delay``, what is
+measured arrives so many samples later; a run has it as it was measured.
 """
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
@@ -32,7 +34,7 @@ if TYPE_CHECKING:
 __all__ = ["Disturb", "Progress", "Sensor", "cosimulate"]
 
 Sensor = Callable[[int, float], float]
-"""Called as ``sensor(k, x_meas)``, ``k`` counted from the end of the fill; returns what arrives in its place."""
+"""Called as ``sensor(k, x_meas)``, ``k`` counted from the end of the fill; returns what is measured in its place."""
 
 Disturb = Callable[[int, Any], object]
 """Called as ``disturb(k, plant)`` before sample ``k``, counted likewise; may change the plant."""
@@ -74,7 +76,7 @@ def cosimulate(
     start_time : float
         Start of the experiment, s.
     sensor : callable, optional
-        Called as ``sensor(k, x_meas)``, ``k`` counted from the end of the fill; returns what arrives in its place.
+        Called as ``sensor(k, x_meas)``, ``k`` counted from the end of the fill; returns what is measured in its place.
     disturb : callable, optional
         Called as ``disturb(k, plant)`` before sample ``k``, counted likewise, with the plant or its ``FmuInstance``,
         which it may change.
@@ -110,7 +112,7 @@ def cosimulate(
             raise FmuError(f"{drive.name} has T_s = {drive.T_s:g} s, but {ahead.name} has {T_s:g} s; they must agree")
         kind, n = ahead.kind, len(command) + delay
         signals, state = np.empty((n, len(kind.outputs) + 2)), np.empty(n, dtype=np.int64)
-        every = max(1, n // 100)
+        on_the_way, every = deque([start] * ahead.late), max(1, n // 100)
         for k in range(n):
             if disturb is not None:
                 disturb(k - delay, drive.plant)
@@ -119,15 +121,25 @@ def cosimulate(
             if sensor is not None:
                 x_meas = sensor(k - delay, x_meas)
             signals[k] = *outputs, x, x_meas
+            on_the_way.append(x_meas)
             drive.step(k, outputs[0], T_s)
-            ahead.step(k, float(command[min(k, len(command) - 1)]), x_meas)
+            ahead.step(k, float(command[min(k, len(command) - 1)]), on_the_way.popleft())
             if progress is not None and (k % every == 0 or k == n - 1):
                 progress(k + 1, n)
         n_rejected = ahead.n_rejected()
     found = dict(zip((*kind.outputs, "x", "x_meas"), signals[delay:].T.copy(), strict=True))
     found.setdefault("x_dm", found["x_d"])
     t = np.asarray(start_time + np.arange(delay, n) * T_s, dtype=np.float64)
-    return Run(kind=kind, t=t, **found, state=state[delay:], T_s=T_s, Np=ahead.Np, n_rejected=n_rejected)
+    return Run(
+        kind=kind,
+        t=t,
+        **found,
+        state=state[delay:],
+        T_s=T_s,
+        Np=ahead.Np,
+        n_rejected=n_rejected,
+        measurement_delay=ahead.late,
+    )
 
 
 def _controller(

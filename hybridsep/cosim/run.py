@@ -97,6 +97,8 @@ class Run:
         Samples in a window.
     n_rejected : int
         Measurements that were missing or not plausible, as far as the controller tells.
+    measurement_delay : int
+        Samples by which measurements arrived late at the controller.
     """
 
     kind: Kind
@@ -112,6 +114,7 @@ class Run:
     T_s: float
     Np: int
     n_rejected: int = 0
+    measurement_delay: int = 0
 
     @property
     def active(self) -> NDArray[np.bool_]:
@@ -121,7 +124,7 @@ class Run:
     @property
     def x_hold(self) -> Array:
         """Hold baseline, ``(n,)``, m."""
-        return hold(self.x_pb, self.x_meas, self.active, self.Np)
+        return hold(self.x_pb, self.x_meas, self.active, self.Np, late=self.measurement_delay)
 
     @property
     def change(self) -> Array:

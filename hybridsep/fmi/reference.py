@@ -7,6 +7,7 @@ parameters have their start values. The result is the library's: a second implem
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -112,12 +113,14 @@ def _look_ahead_run(
     n = min(max(least, 3 * predictor.Np + max(predictor.n_init, warm_up)), _SAMPLES_MAX)
     command = _command(machine, n + 1)
     measure = _drive(machine, predictor)
+    on_the_way = deque([0.0] * predictor.settings.measurement_delay)
     inputs: Columns = {"x_d_ahead": command.tolist(), "x_meas": []}
     outputs: Columns = {name: [] for name in names}
     for k in range(n + 1):
         for name in names:
             outputs[name].append(getattr(look_ahead, name))
-        inputs["x_meas"].append(round(measure(getattr(look_ahead, sent)), _RESOLUTION))
+        on_the_way.append(round(measure(getattr(look_ahead, sent)), _RESOLUTION))
+        inputs["x_meas"].append(on_the_way.popleft())
         look_ahead.sample(inputs["x_d_ahead"][k], inputs["x_meas"][k])
     return inputs, outputs
 

@@ -82,7 +82,7 @@ class Machine(Section):
         if self.drive_limits is None and "compensator" not in self.model_fields_set:
             return self  # no compensator is configured
         problems, Np = [], self._entry("Np")
-        for fit in (lambda: self.compensator_predictor, lambda: self._compensation().for_window(Np)):
+        for fit in (self._compensator_plans, lambda: self._compensation().for_window(Np)):
             try:
                 fit()
             except ParameterError as error:
@@ -92,6 +92,15 @@ class Machine(Section):
             origin = f" ({', '.join(inherited)} of [predictor])" if inherited else ""
             raise ValueError(f"compensator: {'; '.join(problems)}{origin}")
         return self
+
+    def _compensator_plans(self) -> None:
+        """Raise ParameterError if the compensator's predictor is out of range, or cannot plan by its own entries.
+
+        A delay of the predictor's is refused where a compensator is made: the file may be for a predictor alone.
+        """
+        settings = self.compensator_predictor
+        if "measurement_delay" in self.compensator.given():
+            settings.check_planning()
 
     @property
     def model(self) -> ModalModel:
@@ -110,7 +119,7 @@ class Machine(Section):
     def compensator_predictor(self) -> PredictorSettings:
         """Settings of the compensator's own predictor: those of the predictor where the section has no others."""
         own = self._compensator_entries(PredictorSettings)
-        return PredictorSettings(**{**self.predictor.given(), **own}, **self._sampling).for_planning()
+        return PredictorSettings(**{**self.predictor.given(), **own}, **self._sampling)
 
     @property
     def compensator_settings(self) -> CompensatorSettings:
@@ -177,12 +186,19 @@ class Machine(Section):
         Raises
         ------
         MachineError
-            If the file has no ``[drive_limits]``.
+            If the file has no ``[drive_limits]``, or the measurement is late without trust.
         """
         if self.drive_limits is None:
             raise MachineError(f"machine {self.name} has no [drive_limits] section, which a compensator FMU needs")
+        predictor = self.compensator_predictor
+        try:
+            predictor.check_planning()
+        except ParameterError as error:
+            raise MachineError(
+                f"machine {self.name}: {error}; set trust = true or measurement_delay = 0 in [compensator]"
+            ) from error
         return {
-            **self.compensator_predictor.to_fmi(),
+            **predictor.to_fmi(),
             **self.compensator_settings.to_fmi(),
             "dead_time": self.physics.dead_time,
         }

@@ -42,7 +42,7 @@ class PlanModel:
         self._model, self._discrete, self._state, self._late = model, model.static.discrete, state, late
         command = np.concatenate((late, x_d))
         x_pb, _ = self._discrete.forced_response(state, command)
-        self.scales = model.scales(command, x_pb, np.concatenate((late, path)))
+        self.scales = model.scales(command, x_pb, path)
         self._solved = model.solved(self.scales)
         self._held = model.forecast_by(self._solved, command, x_pb, self.scales).predictions
 

@@ -40,7 +40,8 @@ def trusted_blob(model: TrustedModel) -> bytes:
     state, blend = model.state, model.blend
     meta = {
         "n_samples": model.regression.n_samples,
-        **{name: getattr(model, name) for name in ("n_rows", "velocity_scale", "n_rejected", "preview")},
+        **{name: getattr(model, name) for name in ("n_rows", "velocity_scale", "n_rejected")},
+        "look_ahead": model.preview + model.settings.measurement_delay,
     }
     arrays = {
         "factor": model.regression.factor,
@@ -80,7 +81,7 @@ def restore_trusted(model: TrustedModel, saved: Saved) -> None:
     """
     with saved.consistent():
         model.regression.restore(saved.array("factor", None, None), saved.whole("n_samples"))
-    model.plan_ahead(saved.whole("preview"))
+    model.plan_ahead(saved.whole("look_ahead") - model.settings.measurement_delay)
     model.n_rows, model.velocity_scale = saved.real("n_rows"), saved.real("velocity_scale")
     if not 0.0 <= model.n_rows <= model.regression.n_samples:
         raise saved.error("n_rows must be from 0 to n_samples")

@@ -124,6 +124,8 @@ def sanitised_program(driver: str, folder: Path) -> Path:
                 ["trust=1", "Np=50", "p=20", "t_init=-1", "v_max=0.08", "a_max=8", "j_max=1000"],
                 ["trust=1", "Np=12", "p=7", "q=2", "spacing=3", "preview=77", "dead_time=13", "t_init=0"],
                 ["trust=1", "Np=1", "p=1", "q=0", "spacing=1", "preview=8", "t_init=0"],
+                ["trust=1", "Np=12", "p=7", "q=2", "spacing=3", "preview=77", "measurement_delay=7", "t_init=0"],
+                ["trust=1", "Np=50", "p=20", "measurement_delay=300", "t_init=0"],
             ],
         ),
         ("feed_drive", [[]]),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,23 @@ def test_a_warm_predictor_is_active_at_once() -> None:
     predictor = MACHINE.new_predictor()
     assert not cosimulate(predictor, MACHINE.new_plant(), R).active[:300].any()
     assert cosimulate(predictor, MACHINE.new_plant(), R, t_init=0.0).active.all()
+
+
+def test_what_the_controller_takes_for_late_arrives_late(python_fmu: Fmu) -> None:
+    late = 5
+    settings = replace(MACHINE.predictor_settings, measurement_delay=late)
+    run = cosimulate(MACHINE.new_predictor(settings), MACHINE.new_plant(), R)
+    sound = cosimulate(MACHINE.new_predictor(), MACHINE.new_plant(), R)
+    np.testing.assert_array_equal(run.x_meas, sound.x_meas)  # as it was measured
+    arrived = np.concatenate((np.full(late, R[0]), run.x_meas))[: len(R)]
+    result = backtest(MACHINE.new_predictor(settings), R, arrived)
+    for name in ("x_pb", "x_hold", "x_h"):
+        found, expected = getattr(run, name)[:-late], getattr(result, name)[late:]
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-15, err_msg=name)
+    values = {"measurement_delay": late}
+    fmu = cosimulate(python_fmu("HybridPredictorPy"), MACHINE.new_plant(), R, controller_values=values)
+    np.testing.assert_array_equal(fmu.x_h, run.x_h)
+    assert fmu.measurement_delay == late
 
 
 @pytest.mark.parametrize("model", ["HybridPredictor", "SepCompensator"])

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 import zipfile
 from collections.abc import Callable
+from dataclasses import asdict
+from io import BytesIO
 from pathlib import Path
 
 import fmpy
@@ -70,6 +72,21 @@ def test_the_reference_is_short_and_the_same_every_time() -> None:
     assert sorted(files) == [f"documentation/reference/H_{kind}" for kind in ("in.csv", "ref.csv", "ref.opt")]
     assert b"StopTime, 0.6\n" in files["documentation/reference/H_ref.opt"]
     assert sum(map(len, files.values())) < 120_000
+
+
+def test_the_reference_of_a_late_measurement_is_late() -> None:
+    """Its compensator does as well as without delay: it is told what it gets."""
+    machine = load_machine("spring_mass_damper")
+    rms = []
+    for late in (0, 5):
+        changed = machine.changed("compensator", {"measurement_delay": late})
+        modes = [asdict(mode) for mode in changed.model.modes]
+        parameters = changed.fmi_compensator_parameters()
+        description = {"model": "SepCompensator", "name": "C", "parameters": parameters, "modes": modes}
+        files = reference_files(changed, description)
+        table = np.genfromtxt(BytesIO(files["documentation/reference/C_ref.csv"]), delimiter=",", names=True)
+        rms.append(float(table["rms_e"][-1]))
+    assert rms[1] == pytest.approx(rms[0], rel=0.2)
 
 
 def test_given_samples_are_the_reference_of_their_trajectory(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hybridsep import Encoder, Limits, load_machine, machine_names, simulate, spiral
-from hybridsep.base.errors import MachineError
+from hybridsep.base.errors import MachineError, ParameterError
 from hybridsep.base.settings import CompensatorSettings, PredictorSettings
 from hybridsep.compensate.compensator import RECOMMENDED
 from hybridsep.machines.machine import Machine
@@ -230,10 +230,20 @@ def test_a_late_measurement_of_the_predictor_is_the_compensators(tmp_path: Path)
     own = load_machine(write(tmp_path, text + "measurement_delay = 0\n"))
     assert own.fmi_compensator_parameters()["measurement_delay"] == 0
     assert own.fmi_parameters()["measurement_delay"] == 3
-    with pytest.raises(
-        MachineError, match="compensator: measurement_delay of a compensator must be 0 with trust = false"
+    refused = "measurement_delay of a compensator must be 0 with trust = false, got 3"
+    with pytest.raises(MachineError, match=f"compensator: {refused}"):
+        load_machine(write(tmp_path, text + "trust = false\nmeasurement_delay = 3\n"))
+    for predictor_alone in (
+        load_machine(write(tmp_path, text + "trust = false\n")),
+        machine.changed("predictor", {"trust": False}),
     ):
-        load_machine(write(tmp_path, text + "trust = false\n"))
+        assert predictor_alone.new_predictor().settings.measurement_delay == 3
+        with pytest.raises(
+            MachineError, match=rf"{refused}.* set trust = true or measurement_delay = 0 in \[compensator"
+        ):
+            predictor_alone.fmi_compensator_parameters()
+        with pytest.raises(ParameterError, match=refused):
+            predictor_alone.new_compensator()
 
 
 @pytest.mark.parametrize(("Np", "preview", "spacing"), [(75, 200, 1), (150, 300, 2), (1500, 2000, 2)])

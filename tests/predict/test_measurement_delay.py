@@ -112,14 +112,14 @@ def test_the_papers_compensator_refuses_a_delay() -> None:
 
 
 def compensated(known: int, delay: int, compensate: str = "hybrid") -> list[Run]:
-    """Return a cold and a warm run behind a compensator whose sensor is late, by as much as it knows or not."""
+    """Return a cold and a warm run behind a compensator that knows, or not, by how much its sensor is late."""
     machine = load_machine("als25010_x")
     settings = CompensatorSettings(limits=DRIVE_LIMITS, compensate=compensate)
     assert machine.plant is not None
     sep = machine.new_compensator(settings, predictor=PredictorSettings(Np=50, p=20, measurement_delay=known))
     runs = []
     for seed in (0, 1):
-        on_the_way = deque([0.0] * delay)
+        on_the_way = deque([0.0] * (delay - known))  # the loop itself delays by what is known
 
         def sensor(k: int, x_meas: float, on_the_way: deque[float] = on_the_way) -> float:
             on_the_way.append(x_meas)

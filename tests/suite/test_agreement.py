@@ -220,15 +220,15 @@ def test_every_parameter_compensates_with_trust_as_in_the_library(
     assert_agreement(new_stream, 550 if values.get("Np") == 2 else 1100, values, 1e-9)
 
 
-def late(delay: int) -> Sensor:
-    """Return a sensor whose values arrive so many samples late; at rest at 0 before."""
-    measured = [0.0] * delay
+def late(delay: int, start: float = 0.0, sensor: Sensor | None = None) -> Sensor:
+    """Return a sensor whose values arrive so many samples late; at rest at ``start`` before."""
+    measured = [start] * delay
 
-    def sensor(k: int, x_meas: float, last: float) -> float:
-        measured.append(x_meas)
+    def late_sensor(k: int, x_meas: float, last: float) -> float:
+        measured.append(x_meas if sensor is None else sensor(k, x_meas, last))
         return measured[k]
 
-    return sensor
+    return late_sensor
 
 
 @on_all((COMPENSATOR,), needs="agreement")
@@ -238,6 +238,7 @@ def late(delay: int) -> Sensor:
         {"measurement_delay": 1, "p": 20},
         {"measurement_delay": 5, "p": 10, "input_hold": 1, "dead_time": 3, "t_init": 0.25},
         {"measurement_delay": 70, "p": 10, "q": 40, "period": 3e-3},  # later than a window
+        {"measurement_delay": 250, "p": 10},  # and than a plan
         {"measurement_delay": 5, "p": 10, **TIGHT},
         {"Np": 12, "p": 7, "q": 2, "spacing": 3, "preview": 77, "measurement_delay": 12},
         {"Np": 16, "p": 5, "spacing": 16, "preview": 90, "no_reversal": 0, "measurement_delay": 3},
@@ -247,7 +248,16 @@ def late(delay: int) -> Sensor:
 )
 def test_a_late_measurement_is_compensated_as_by_the_library(new_stream: StreamMaker, values: dict[str, Value]) -> None:
     delay = int(values["measurement_delay"])
-    assert_agreement(new_stream, 1400, values, 1e-9, sensor=late(delay))
+    start = 0.1 if "spacing" in values else 0.0
+    assert_agreement(new_stream, 1400, values, 1e-9, start=start, sensor=late(delay, start))
+
+
+@on_all((COMPENSATOR,), needs="agreement")
+def test_late_and_faulty_measurements_are_compensated_as_by_the_library(new_stream: StreamMaker) -> None:
+    values: dict[str, Value] = {"p": 20, "measurement_delay": 5}
+    loop = assert_agreement(new_stream, 2450, values, 1e-9, sensor=late(5, sensor=faulty))
+    assert np.isfinite(loop.outputs).all()
+    assert loop.column(COMPENSATOR, "n_rejected")[-1] > 100
 
 
 @on_all((COMPENSATOR,), needs="agreement")

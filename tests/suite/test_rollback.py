@@ -81,6 +81,14 @@ def test_rollback_is_exact_while_a_bounded_plan_is_solved(new_stream: StreamMake
     assert_exact(new_stream, SHORT[COMPENSATOR] | TIGHT)
 
 
+@on_all((COMPENSATOR,))
+@pytest.mark.parametrize("limits", [{}, TIGHT])
+def test_rollback_is_exact_while_a_late_measurement_is_planned_from(
+    new_stream: StreamMaker, limits: dict[str, Value]
+) -> None:
+    assert_exact(new_stream, SHORT[COMPENSATOR] | {"trust": True, "measurement_delay": 35} | limits)
+
+
 @every
 @pytest.mark.parametrize("cut", [1, 19, 20, 21, 57, 203])
 def test_a_state_goes_on_in_a_second_instance(new_stream: StreamMaker, cut: int) -> None:

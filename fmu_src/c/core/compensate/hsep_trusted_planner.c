@@ -121,14 +121,14 @@ HSEP_API void hsep_trusted_planner_begin(
     memcpy(hsep_at(self, self->physics), before->physics, (size_t)(self->trial - self->physics) * sizeof(double));
     memcpy(hsep_at(self, self->command) + self->preview, before->late_command, late);
     memcpy(hsep_at(self, self->x_pb) + self->preview, before->late_x, late);
-    memcpy(path + self->preview, before->late_command, late);
     memcpy(hsep_at(self, self->e_h) + self->preview + self->late, before->residuals, (size_t)self->p * sizeof(double));
     for (uint64_t k = 0; k < self->preview; k++) {
         path[self->preview - 1 - k] = task->x_d[k] - self->start;
     }
     trusted_planner_command(self, task, rest, HSEP_DECIDED + self->n);
     hsep_trusted_scale(
-        task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb), path, before->residuals[0]);
+        task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb), path, self->preview,
+        before->residuals[0]);
     const uint64_t pinned = hsep_planner_pinned(task->planner); /* they are published now */
     self->varied = self->late + (pinned > 0 ? pinned : 1);
     (void)trusted_planner_predict(self, task, rest, self->varied);

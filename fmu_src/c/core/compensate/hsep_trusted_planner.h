@@ -73,7 +73,7 @@ typedef struct {
     uint64_t command;    /* (preview + late,) m, commands predicted last, relative to the start, newest first */
     uint64_t x_pb;       /* (preview + late,) m, their prediction by the physics model, */
     uint64_t e_h;        /* (preview + late + p,) m, and what the trusted model adds; behind it the last residuals */
-    uint64_t target;     /* (preview + late,) m, work */
+    uint64_t target;     /* (preview,) m, work */
     uint64_t W;          /* changes of x_h by the splines: of spline j from sample j spacing on, behind each other */
     uint64_t P;          /* triangle of n rows: W' W + jerk_weight D' D */
     uint64_t v;          /* (n,) m, linear term of it */
@@ -113,8 +113,9 @@ typedef struct {
 } hsep_trusted_before;
 
 /* Begin a window: predict it under the rest of the last plan. best: best model allowed, 0 none, 1 physics, 2 trusted.
- * Only the samples that the plan leaves as they are have their variance then. Cost: that of hsep_trusted_scale and a
- * prediction. */
+ * Only the samples that the plan leaves as they are, and the late ones before them, have their variance then. Cost:
+ * that of hsep_trusted_scale and a prediction; with a late measurement its variances, late^2 / 2 multiply-adds for each
+ * candidate, here and in the last part. */
 HSEP_API void hsep_trusted_planner_begin(
     hsep_trusted_planner *self, const hsep_trusted_task *task, const hsep_trusted_before *before, uint64_t best);
 

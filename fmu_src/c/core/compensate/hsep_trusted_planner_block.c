@@ -11,7 +11,7 @@ static double trusted_planner_lay_out(
     hsep_trusted_planner *self, const hsep_trusted_parameters *parameters, const hsep_planner_parameters *planner)
 {
     const uint64_t n = hsep_splines_count(planner->preview, planner->spacing);
-    const double preview = (double)planner->preview, all = (double)parameters->preview,
+    const double preview = (double)planner->preview, all = (double)parameters->n,
                  filter = hsep_physics_size(parameters->n_modes, parameters->settings->dead_time);
     const double columns = (double)n, coefficients = HSEP_DECIDED + columns;
     double end = HSEP_WORDS(hsep_trusted_planner);
@@ -26,7 +26,7 @@ static double trusted_planner_lay_out(
     self->command = hsep_take(&end, all);
     self->x_pb = hsep_take(&end, all);
     self->e_h = hsep_take(&end, all + (double)self->p);
-    self->target = hsep_take(&end, all);
+    self->target = hsep_take(&end, preview);
     self->W = hsep_take(&end, columns * preview - (double)planner->spacing * 0.5 * columns * (columns - 1.0));
     self->P = hsep_take(&end, hsep_triangle(n));
     self->v = hsep_take(&end, columns);

@@ -10,12 +10,11 @@
 /* Set what follows from the parameters; return the bytes of the block. */
 static double linearised_lay_out(hsep_linearised *self, const hsep_trusted_parameters *parameters)
 {
-    const double n = (double)parameters->preview;
-    const double preview = n - (double)parameters->settings->measurement_delay;
+    const double n = (double)parameters->n, preview = n - (double)parameters->settings->measurement_delay;
     const double filter = hsep_physics_size(parameters->n_modes, parameters->settings->dead_time);
     double end = HSEP_WORDS(hsep_linearised);
-    self->n = parameters->preview;
-    self->preview = parameters->preview - parameters->settings->measurement_delay;
+    self->n = parameters->n;
+    self->preview = self->n - parameters->settings->measurement_delay;
     self->count = hsep_disturbances_count(parameters->trust->period);
     self->slopes = hsep_take(&end, n * (double)self->count);
     self->gains = hsep_take(&end, n * LINEARISED_GAINS * HSEP_PHYSICS_ABREAST);

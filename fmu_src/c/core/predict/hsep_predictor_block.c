@@ -36,7 +36,7 @@ HSEP_API hsep_trusted_parameters hsep_predictor_trusted_parameters(const hsep_pr
         .trust = &parameters->trust,
         .modes = parameters->modes,
         .n_modes = parameters->n_modes,
-        .preview = parameters->preview + parameters->settings.measurement_delay,
+        .n = parameters->preview + parameters->settings.measurement_delay,
         .planned = parameters->planned};
 }
 

@@ -33,8 +33,9 @@ typedef struct {
     const hsep_trust_settings *trust;
     const hsep_mode *modes; /* (n_modes,) */
     uint64_t n_modes;
-    uint64_t preview; /* samples of a prediction, >= Np; more in a compensator, or where the measurement is late */
-    int planned;      /* whether a compensator decides the commands */
+    uint64_t
+        n; /* samples of a prediction: of a window, or a compensator's preview, and before it those that are late */
+    int planned; /* whether a compensator decides the commands */
 } hsep_trusted_parameters;
 
 typedef struct {
@@ -113,9 +114,10 @@ HSEP_API void hsep_trusted_forecast(
 HSEP_API void hsep_trusted_go_on(hsep_trusted *self, double e[], uint64_t first, uint64_t last);
 
 /* What a compensator needs of it, over n samples. Take the scales of the features from the samples that come next, and
- * solve for the weights; path: unmodified commands, (n,), m, which a compensator knows, or NULL. */
+ * solve for the weights; path: unmodified commands of the last n_path of these, m, of a compensator; or NULL. */
 HSEP_API void hsep_trusted_scale(
-    hsep_trusted *self, const double x_d[], const double x_pb[], const double path[], double last_residual);
+    hsep_trusted *self, const double x_d[], const double x_pb[], const double path[], uint64_t n_path,
+    double last_residual);
 
 /* Predict with them. e: (n + p,), m; varied: samples whose variance is computed, the first ones, while the prediction
  * of those behind them means nothing yet; 0: variances and shrinking stay those of the last prediction. */

@@ -48,11 +48,11 @@ static double trusted_lay_out(hsep_trusted *self, const hsep_trusted_parameters 
 {
     const hsep_predictor_settings *settings = parameters->settings;
     const hsep_trust_settings *trust = parameters->trust;
-    const double Np = (double)settings->Np, n = (double)parameters->preview;
+    const double Np = (double)settings->Np, n = (double)parameters->n;
     const double n_static = (double)hsep_disturbances_n(settings->q, trust->period);
     double end = HSEP_WORDS(hsep_trusted);
     self->Np = settings->Np;
-    self->n = parameters->preview;
+    self->n = parameters->n;
     self->p = settings->p;
     self->n_static = hsep_disturbances_n(settings->q, trust->period);
     self->least_variance = settings->lambda;

@@ -18,7 +18,7 @@ static const double trusted_least_magnitude = 1e-150; /* of a feature */
 
 /* Whether the commanded velocity outgrows what was learned; the velocity scale with it. A compensator begins to move
  * before the path, with a creep: its first scale is the path's. */
-static int trusted_outgrown(hsep_trusted *self, const double x_d[], const double path[])
+static int trusted_outgrown(hsep_trusted *self, const double x_d[], const double path[], uint64_t n_path)
 {
     const hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
     double peak = hsep_disturbances_peak_velocity(disturbances, x_d, self->n);
@@ -26,7 +26,7 @@ static int trusted_outgrown(hsep_trusted *self, const double x_d[], const double
     double most = (learned ? trusted_growth_learned : trusted_growth) * self->velocity_scale;
     if (path != NULL && self->n_rows == 0.0) {
         peak = 0.0;
-        for (uint64_t j = 0; j + 1 < self->n; j++) {
+        for (uint64_t j = 0; j + 1 < n_path; j++) {
             peak = fmax(peak, fabs(path[j] - path[j + 1]));
         }
         peak = fmax(peak / disturbances->T_s, self->velocity_scale);
@@ -54,11 +54,12 @@ static void trusted_solve(hsep_trusted *self)
 }
 
 HSEP_API void hsep_trusted_scale(
-    hsep_trusted *self, const double x_d[], const double x_pb[], const double path[], double last_residual)
+    hsep_trusted *self, const double x_d[], const double x_pb[], const double path[], uint64_t n_path,
+    double last_residual)
 {
     hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
     const double bound = trusted_hold_max * self->scale.largest;
-    const int outgrown = trusted_outgrown(self, x_d, path);
+    const int outgrown = trusted_outgrown(self, x_d, path, n_path);
     double *rows = hsep_at(self, self->rows), *largest = hsep_at(self, self->forecast_largest);
     hsep_disturbances_command(disturbances, x_d, x_pb, self->n, self->forecast_scale, rows);
     hsep_disturbances_motion(disturbances, x_pb, x_pb, self->n, rows);
@@ -136,7 +137,7 @@ HSEP_API void hsep_trusted_vary(hsep_trusted *self, uint64_t first, uint64_t las
 HSEP_API void hsep_trusted_forecast(
     hsep_trusted *self, const double x_d[], const double x_pb[], double e[], uint64_t last)
 {
-    hsep_trusted_scale(self, x_d, x_pb, NULL, e[self->n]);
+    hsep_trusted_scale(self, x_d, x_pb, NULL, 0, e[self->n]);
     trusted_candidates(self, x_pb, e + self->n, last); /* the rows are those of the scales */
     trusted_blend(self, e, 0, last);
 }
