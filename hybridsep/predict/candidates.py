@@ -69,6 +69,12 @@ class CandidatePrediction(NamedTuple):
     variance: float
     mean_square: Array
 
+    @property
+    def shrink(self) -> Array:
+        """What shrinking and bounds leave of ``unshrunk``, ``(n,)``."""
+        kept = _kept(self.mean_square, self.spread)
+        return np.divide(self.e_h, self.unshrunk, out=kept, where=self.unshrunk != 0.0)
+
 
 class SolvedCandidate(NamedTuple):
     """Candidate with weights.
@@ -130,8 +136,14 @@ class SolvedCandidate(NamedTuple):
                 spread = np.minimum(lfilter(response**2, [1.0], spread), most)
             spread = np.where(finite, spread, most)
             mean_square = _mean_square(e, spread, scale)
-        shrink = mean_square / (mean_square + _CAUTION * spread)
-        return CandidatePrediction(e * shrink, e, self.solution.residual_sum, spread, self.variance, mean_square)
+        return CandidatePrediction(
+            e * _kept(mean_square, spread), e, self.solution.residual_sum, spread, self.variance, mean_square
+        )
+
+
+def _kept(mean_square: Array, spread: Array) -> Array:
+    """Return what the variance leaves of a prediction, ``(n,)``."""
+    return mean_square / (mean_square + _CAUTION * spread)
 
 
 class Candidate:

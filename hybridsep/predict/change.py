@@ -38,9 +38,9 @@ _EVIDENCE, _MEMORY, _EVIDENCE_OF_A_WINDOW = 1.5, 0.9, 1.0
 """Log ratio of RMS errors, summed over windows, from which on the smaller weight is taken, if the sum of squares is
 smaller, too; the factor by which they fade from window to window; and the most that a window adds."""
 
-_SUPPORT = 15.0
-"""Log-likelihood ratio of one plant to two from which on earlier runs are not doubted: less of them is better by chance
-then."""
+_SUPPORT, _EVIDENCE_AGAINST_SUPPORT = 15.0, 3.0
+"""Log-likelihood ratio of one plant to two from which on it takes more evidence, and how much: less of earlier runs may
+be better by chance then."""
 
 _SPENT = 1e-6
 """Weight of earlier runs, relative to that they began with, below which there is nothing left of them."""
@@ -134,16 +134,19 @@ class ChangeTest:
         ----------
         error, with_less, physics : float, m²
             Sums of squared errors of the next window: predicted with all rows, with ``DOUBTED`` of the earlier ones,
-            and by the physics model. Where neither of the first two is better than that there is nothing to compare.
+            and by the physics model. Where all three are alike there is nothing to compare.
         """
         ratio = 0.5 * (math.log(max(error, _LEAST_SQUARE)) - math.log(max(with_less, _LEAST_SQUARE)))
-        explained = max(1.0 - min(error, with_less) / max(physics, _LEAST_SQUARE), 0.0)
+        # The part of the physics model's error that the better one explains, or of a worse error what is beyond that
+        explained = max(
+            1.0 - min(error, with_less) / max(physics, _LEAST_SQUARE), 1.0 - physics / max(error, _LEAST_SQUARE), 0.0
+        )
         most = _EVIDENCE_OF_A_WINDOW
         self.evidence = _MEMORY * self.evidence + explained * min(max(ratio, -most), most)
         self.errors = _MEMORY * self.errors + error
         self.errors_with_less = _MEMORY * self.errors_with_less + with_less
-        better = self.evidence > _EVIDENCE and self.errors_with_less < self.errors
-        return better and self.log_ratio < _SUPPORT
+        needed = _EVIDENCE if self.log_ratio < _SUPPORT else _EVIDENCE_AGAINST_SUPPORT
+        return self.evidence > needed and self.errors_with_less < self.errors
 
     def follow(self, residuals: Array) -> None:
         """Follow the size of the residuals of this run, ``(m,)``, m."""

@@ -20,10 +20,13 @@ class FeatureScales(NamedTuple):
         Velocity scale of the friction features.
     largest : (n_static,) array
         Largest magnitudes of the static features, those ahead included.
+    n_rest : int
+        Samples ahead before the first motion of the run.
     """
 
     velocity: float
     largest: Array
+    n_rest: int
 
 
 @dataclass(frozen=True)

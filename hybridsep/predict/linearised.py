@@ -85,8 +85,7 @@ class PlanModel:
         for solved, found, part in zip(self._solved, at.predictions, parts, strict=True):
             if part == 0.0:
                 continue
-            e = found.unshrunk[n_late:]
-            shrink = part * np.divide(found.e_h[n_late:], e, out=np.zeros_like(e), where=e != 0.0)
+            shrink = part * found.shrink[n_late:]
             linear, own, differences = static.split(solved.solution.weights[: solved.n_static])
             disturbance = np.zeros_like(changes)
             for weights, is_difference in ((own, False), (differences, True)):

@@ -57,7 +57,9 @@ def predictor_blob(predictor: HybridPredictor) -> bytes:
     if pending is not None:
         arrays |= {f"pending_{name}": getattr(pending, name) for name in ("x_d", "x_pb", "reference", "signs")}
         if pending.forecast is not None:
-            arrays["pending_scales"] = np.array([pending.forecast.scales.velocity, *pending.forecast.scales.largest])
+            scales = pending.forecast.scales
+            arrays["pending_scales"] = np.array([scales.velocity, *scales.largest])
+            meta["pending_rest"] = scales.n_rest
     parts = {} if predictor.trusted is None else {"trusted": trusted_blob(predictor.trusted)}
     return pack(_KIND, meta, arrays, parts)
 
@@ -120,7 +122,8 @@ def _pending(predictor: HybridPredictor, saved: Saved) -> PredictedWindow:
         velocity, *largest = saved.array("pending_scales", 1 + predictor.trusted.static.n).tolist()
         if min(velocity, *largest) < 0.0:
             raise saved.error("the scales of the pending window must be ≥ 0")
-        scales = FeatureScales(velocity, np.array(largest))
+        n_rest = saved.whole("pending_rest") if "pending_rest" in saved.meta else 0  # earlier builds have none
+        scales = FeatureScales(velocity, np.array(largest), n_rest)
     with np.errstate(all="ignore"):
         e_h, pending = predictor.predicted(x_d, x_pb, start, reference, signs, scales)  # follow from the state
     if predictor.trusted is not None and not np.isfinite(e_h).all():

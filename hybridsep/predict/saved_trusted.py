@@ -14,6 +14,7 @@ from .candidates import CORRELATION_MAX, ResidualScale
 from .change import ChangeTest
 from .disturbances import LEAST_VELOCITY, StaticState
 from .guard import N_STATE
+from .rest import N_REST
 from .trusted import TrustedModel
 
 __all__ = ["restore_trusted", "trusted_blob", "trusted_fields"]
@@ -56,6 +57,7 @@ def trusted_blob(model: TrustedModel) -> bytes:
         "past": model.past,
         "past_bridged": model.past_bridged.astype(np.float64),
         "guard": np.array(model.guard.state()),
+        "rest": np.array(model.rest.state()),
     }
     change = model.change
     parts = {} if change is None else {"change": _change_blob(change)}
@@ -107,6 +109,9 @@ def restore_trusted(model: TrustedModel, saved: Saved) -> None:
     model.n_rejected = saved.whole("n_rejected")
     with saved.consistent():
         model.guard.restore(saved.array("guard", N_STATE, finite=False))
+    if "rest" in saved.arrays:  # earlier builds have none
+        with saved.consistent():
+            model.rest.restore(saved.array("rest", N_REST))
     model.change = None
     if "change" in saved.parts:
         model.change = _restored_change(model, Saved(_CHANGE, *unpack(_CHANGE, saved.part("change"))))

@@ -23,6 +23,7 @@ from .disturbances import LEAST_VELOCITY, Disturbance, StaticFeatures, StaticSta
 from .forecast import FeatureScales, Forecast
 from .guard import SensorGuard
 from .regression import RidgeRegression
+from .rest import RestBefore
 
 __all__ = ["TrustedModel"]
 
@@ -100,6 +101,7 @@ class TrustedModel:
         self.past_bridged: NDArray[np.bool_] = np.zeros(self.settings.p, dtype=np.bool_)
         self.guard.restart()
         self.n_rejected = 0
+        self.rest = RestBefore(self.settings.measurement_delay)
         carried = _CARRIED * self.settings.Np
         self.change: ChangeTest | None = None
         self._discount(carried / max(self.n_rows, carried))
@@ -148,10 +150,10 @@ class TrustedModel:
         before: Sequence[CandidatePrediction | None] = held or [None] * len(solved)
         x = x_pb
         if solved:
-            rows, _ = self.static.rows(self.state, x_d, x_pb, x_pb, scales.velocity)
+            rows = self._rows(x_d, x_pb, x_pb, scales)
             # The stiffness acts at the position, which the physics model alone does not give well enough.
             x = x_pb + self.predict(solved[0], rows, before[0]).e_h
-            rows, _ = self.static.rows(self.state, x_d, x_pb, x, scales.velocity)
+            rows = self._rows(x_d, x_pb, x, scales)
             predictions = tuple(
                 self.predict(candidate, rows, one) for candidate, one in zip(solved, before, strict=True)
             )
@@ -160,6 +162,15 @@ class TrustedModel:
         e_h = self.blend.weights @ candidates
         disagreement = np.maximum(self.blend.weights @ candidates**2 - e_h**2, 0.0)
         return Forecast(x_d, x_pb, e_h, disagreement, x, hold, predictions, scales)
+
+    def _rows(self, x_d: Array, x_pb: Array, x: Array, scales: FeatureScales) -> Array:
+        """Return the static features to predict with, ``(n, n_static)``; ``x``: position that the stiffness acts at.
+
+        The constant is that of motion: before the first one of a run it is 0.
+        """
+        rows, _ = self.static.rows(self.state, x_d, x_pb, x, scales.velocity)
+        rows[: scales.n_rest, 0] = 0.0
+        return rows
 
     def scales(self, x_d: Array, x_pb: Array, path: Array | None = None) -> FeatureScales:
         """Return the scales of the features, those of the next window included.
@@ -180,7 +191,8 @@ class TrustedModel:
         velocity_scale = peak if outgrown else self.velocity_scale
         rows, _ = self.static.rows(self.state, x_d, x_pb, x_pb, velocity_scale)
         before = np.zeros(self.static.n) if outgrown else self.largest
-        return FeatureScales(velocity_scale, np.maximum(before, np.abs(rows).max(axis=0)))
+        n_rest = self.rest.ahead(x_d if path is None else path, len(x_d))
+        return FeatureScales(velocity_scale, np.maximum(before, np.abs(rows).max(axis=0)), n_rest)
 
     def has_learned(self, velocity_scale: float) -> bool:
         """Return whether there is something to predict with at a velocity scale of :meth:`scales`, m/s."""
@@ -214,7 +226,7 @@ class TrustedModel:
             self.regression = RidgeRegression(self.regression.n_features, _NO_PENALTY)
             self.n_rows = 0.0
             self.change = None
-        self.velocity_scale, self.largest = forecast.scales
+        self.velocity_scale, self.largest, n_rest = forecast.scales
         x_d, x_pb = forecast.x_d[:m], forecast.x_pb[:m]
         doubtful = self._with_less_of_earlier_runs(forecast)
         accepted = self.guard.accepts(x, x_pb, self.scale.largest)
@@ -228,6 +240,7 @@ class TrustedModel:
             doubted = self._is_doubted(forecast, doubtful, e, accepted)
             self._assess(forecast, e, accepted, surprises=not (changed or doubted))
             self._conclude(changed, doubted)
+        self.rest.pass_by(m, n_rest)
         self.n_rejected += m - int(accepted.sum())
         self.past = np.concatenate((e[::-1], self.past))[:p]
         self.past_bridged = bridged[-p:]
@@ -238,7 +251,7 @@ class TrustedModel:
         change = self.change
         if change is None or change.n_after == 0.0 or not forecast.predictions:
             return None
-        rows, _ = self.static.rows(self.state, forecast.x_d, forecast.x_pb, forecast.x, forecast.scales.velocity)
+        rows = self._rows(forecast.x_d, forecast.x_pb, forecast.x, forecast.scales)
         scales = self._static_scales(forecast.scales.largest)
         solved = self.candidates[1].solve(change.all_rows(DOUBTED), scales, self._least_variance)
         return self.predict(solved, rows).e_h
@@ -247,9 +260,9 @@ class TrustedModel:
         self, forecast: Forecast, doubtful: Array | None, measured: Array, accepted: NDArray[np.bool_]
     ) -> bool:
         """Return whether earlier runs had better have less weight, as in the prediction ``doubtful``."""
-        if self.change is None or doubtful is None:
-            return False
         m = len(measured)
+        if self.change is None or doubtful is None or forecast.scales.n_rest >= m:
+            return False
         predictions = (forecast.predictions[1].e_h[:m], doubtful[:m], np.zeros(m))
         return self.change.is_doubted(*(float(np.sum((measured - e)[accepted] ** 2)) for e in predictions))
 

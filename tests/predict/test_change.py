@@ -93,7 +93,8 @@ def two_runs() -> ChangeTest:
         ((4.0, 1.0, 100.0), 3),  # half the error: three windows
         ((1e9, 1.0, 1e10), 2),  # one window alone never tells, however much it says
         ((4.0, 1.0, 4.0), 4),  # counts by the part that the better one explains
-        ((4.0, 1.0, 1.0), 0),  # no better than the physics model
+        ((4.0, 1.0, 1.0), 4),  # or that is beyond the physics model's error
+        ((1.1, 0.9, 1.0), 0),  # all alike
         ((1.1, 1.0, 100.0), 0),  # it fades faster than it grows
         ((1.0, 4.0, 100.0), 0),
         ((0.0, 0.0, 0.0), 0),
@@ -112,12 +113,16 @@ def test_less_weight_is_not_taken_where_it_costs_more_than_it_gains() -> None:
     assert any(change.is_doubted(4.0, 1.0, 100.0) for _ in range(60))  # by then the one window has faded
 
 
-def test_less_weight_is_not_taken_where_the_likelihood_supports_one_plant() -> None:
+def test_less_weight_takes_more_evidence_where_the_likelihood_supports_one_plant() -> None:
     change = two_runs()
     change.log_ratio = 20.0
-    assert not any(change.is_doubted(4.0, 1.0, 100.0) for _ in range(40))
+    assert not any(change.is_doubted(2.0, 1.4, 100.0) for _ in range(40))  # half as much evidence as is needed then
     change.log_ratio = 10.0
-    assert change.is_doubted(4.0, 1.0, 100.0)
+    assert change.is_doubted(2.0, 1.4, 100.0)
+    change, told = two_runs(), []
+    change.log_ratio = 20.0
+    told = [change.is_doubted(4.0, 1.0, 100.0) for _ in range(10)]
+    assert told.index(True) == 5  # the sixth window
 
 
 def test_doubt_weighs_the_rows_of_earlier_runs() -> None:

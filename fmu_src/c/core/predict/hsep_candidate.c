@@ -84,10 +84,17 @@ HSEP_API const double *hsep_candidate_prediction(const hsep_candidate *self)
     return candidate_window(self, self->e_h);
 }
 
+/* What the variance leaves of sample j of a prediction. */
+static double candidate_kept(const hsep_candidate *self, uint64_t j)
+{
+    const double mean_square = hsep_at_const(self, self->mean_square)[j];
+    return mean_square / (mean_square + candidate_caution * hsep_at_const(self, self->spread)[j]);
+}
+
 HSEP_API double hsep_candidate_shrink(const hsep_candidate *self, uint64_t j)
 {
     const double unshrunk = hsep_at_const(self, self->unshrunk)[j];
-    return unshrunk == 0.0 ? 0.0 : hsep_at_const(self, self->e_h)[j] / unshrunk;
+    return unshrunk == 0.0 ? candidate_kept(self, j) : hsep_at_const(self, self->e_h)[j] / unshrunk;
 }
 
 HSEP_API void hsep_candidate_solve(
@@ -199,12 +206,10 @@ HSEP_API void hsep_candidate_vary(
 /* Shrink the free run by its variance, samples first ... last - 1. */
 static void candidate_shrink(hsep_candidate *self, double largest, uint64_t first, uint64_t last)
 {
-    const double *unshrunk = hsep_at(self, self->unshrunk), *spread = hsep_at(self, self->spread);
-    const double *mean_square = hsep_at(self, self->mean_square);
+    const double *unshrunk = hsep_at(self, self->unshrunk);
     double *e_h = hsep_at(self, self->e_h);
     for (uint64_t j = self->n - last; j < self->n - first; j++) {
-        const double shrunk = unshrunk[j] * (mean_square[j] / (mean_square[j] + candidate_caution * spread[j]));
-        e_h[j] = candidate_bounded(shrunk, candidate_prediction_max * largest);
+        e_h[j] = candidate_bounded(unshrunk[j] * candidate_kept(self, j), candidate_prediction_max * largest);
     }
 }
 

@@ -18,9 +18,9 @@ static const double change_doubted = 0.1;
  * window; and the most that a window adds. */
 static const double change_evidence = 1.5, change_memory = 0.9, change_evidence_of_a_window = 1.0;
 
-/* Log-likelihood ratio of one plant to two from which on earlier runs are not doubted: less of them is better by chance
- * then. */
-static const double change_support = 15.0;
+/* Log-likelihood ratio of one plant to two from which on it takes more evidence, and how much: less of earlier runs may
+ * be better by chance then. */
+static const double change_support = 15.0, change_evidence_against_support = 3.0;
 
 /* Weight of earlier runs, relative to that they began with, below which there is nothing left of them. */
 static const double change_spent = 1e-6;
@@ -184,12 +184,14 @@ HSEP_API int hsep_change_is_doubted(hsep_change *self, double error, double with
 {
     const double most = change_evidence_of_a_window, least = change_least_square;
     const double ratio = 0.5 * (log(fmax(error, least)) - log(fmax(with_less, least)));
-    const double explained = fmax(1.0 - fmin(error, with_less) / fmax(physics, least), 0.0);
+    /* The part of the physics model's error that the better one explains, or of a worse error what is beyond that */
+    const double beyond = fmax(1.0 - physics / fmax(error, least), 0.0);
+    const double explained = fmax(1.0 - fmin(error, with_less) / fmax(physics, least), beyond);
     self->evidence = change_memory * self->evidence + explained * fmin(fmax(ratio, -most), most);
     self->errors = change_memory * self->errors + error;
     self->errors_with_less = change_memory * self->errors_with_less + with_less;
-    return self->evidence > change_evidence && self->errors_with_less < self->errors &&
-           self->log_ratio < change_support;
+    const double needed = self->log_ratio < change_support ? change_evidence : change_evidence_against_support;
+    return self->evidence > needed && self->errors_with_less < self->errors;
 }
 
 HSEP_API double hsep_change_doubt(hsep_change *self, hsep_regression *both)

@@ -84,7 +84,7 @@ HSEP_API void hsep_change_predict(
 
 /* Whether earlier runs had better have less weight, as the windows so far show; after hsep_change_tells. Sums of
  * squared errors of a window, m2: predicted with all rows, with less weight of the earlier ones, and by the physics
- * model. Where neither of the first two is better than that there is nothing to compare. */
+ * model. Where all three are alike there is nothing to compare. */
 HSEP_API int hsep_change_is_doubted(hsep_change *self, double error, double with_less, double physics);
 
 /* Give earlier runs that weight; return the weight of all rows. */

@@ -162,7 +162,7 @@ static int trusted_is_doubted(hsep_trusted *self, const double e[])
     hsep_change *change = hsep_trusted_change(self);
     const double *all = hsep_candidate_prediction(hsep_trusted_candidate(self, 1));
     const double *less = hsep_candidate_prediction(hsep_change_candidate(change));
-    const int compared = change->active && change->doubted;
+    const int compared = change->active && change->doubted && self->n_rest < self->Np;
     change->doubted = 0;
     return compared &&
            hsep_change_is_doubted(
@@ -310,6 +310,9 @@ HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_d[], const d
         hsep_disturbances_command(disturbances, x_d, x_pb, self->Np, self->velocity_scale, hsep_at(self, self->rows));
     }
     hsep_disturbances_motion(disturbances, x_pb, x, self->Np, hsep_at(self, self->rows));
+    for (uint64_t k = 0; k < self->n_rest && k < self->Np; k++) { /* learned, but not used, at rest */
+        hsep_at(self, self->rows)[k * self->n_static] = 1.0;
+    }
     hsep_disturbances_end(disturbances);
     if (fold && count > 0.0) {
         trusted_fold(self, e);
@@ -319,5 +322,7 @@ HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_d[], const d
         trusted_assess(self, e, count);
         trusted_conclude(self, changed, doubted);
     }
+    self->at_rest = self->n_rest >= self->Np;
+    self->known_rest = self->n_rest > self->Np ? self->n_rest - self->Np : 0;
     memcpy(bridged + self->Np, bridged, (size_t)self->p * sizeof(double)); /* p <= Np: they do not overlap */
 }

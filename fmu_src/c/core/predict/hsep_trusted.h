@@ -56,6 +56,9 @@ typedef struct {
     uint64_t predicted;    /* whether the candidates predicted it */
     hsep_guard guard;
     uint64_t n_rejected; /* samples of this run that were not accepted */
+    uint64_t at_rest;    /* whether the command has not moved in this run yet, in what was learned, */
+    uint64_t known_rest; /* how many samples behind these are at rest as well, */
+    uint64_t n_rest;     /* and how many of those predicted, the first ones */
     /* Offsets in doubles from the beginning of the struct */
     uint64_t largest;          /* (n_static,) largest magnitudes of the features without lags */
     uint64_t forecast_largest; /* (n_static,) those with the window that is predicted */
@@ -70,7 +73,7 @@ typedef struct {
     uint64_t candidates[HSEP_N_CANDIDATES];
 } hsep_trusted;
 
-HSEP_ASSERT_WORDS(hsep_trusted, 59 + sizeof(hsep_guard) / 8);
+HSEP_ASSERT_WORDS(hsep_trusted, 62 + sizeof(hsep_guard) / 8);
 
 /* Features, those without lags first. */
 HSEP_API uint64_t hsep_trusted_n(const hsep_predictor_settings *settings, const hsep_trust_settings *trust);

@@ -88,6 +88,8 @@ HSEP_API void hsep_trusted_init(hsep_trusted *self, const hsep_trusted_parameter
 {
     memset(self, 0, (size_t)hsep_trusted_size(parameters));
     (void)trusted_lay_out(self, parameters);
+    self->at_rest = 1;
+    self->known_rest = parameters->settings->measurement_delay;
     hsep_blend_init(&self->blend);
     hsep_guard_init(&self->guard, 2 * self->Np);
     hsep_disturbances_init(
@@ -108,7 +110,8 @@ HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters
     memcpy(&got, block, sizeof got);
     (void)trusted_lay_out(&got, parameters); /* changes nothing where it is sound */
     const hsep_candidate_shape doubtful = trusted_doubtful_shape(&got);
-    int sound = memcmp(&got, block, sizeof got) == 0 && got.predicted <= 1 && got.guard.patience == 2 * got.Np &&
+    int sound = memcmp(&got, block, sizeof got) == 0 && got.predicted <= 1 && got.at_rest <= 1 &&
+                got.known_rest <= got.n && got.n_rest <= got.n && got.guard.patience == 2 * got.Np &&
                 hsep_disturbances_valid(
                     hsep_at_bytes(block, got.disturbances), parameters->settings, parameters->trust->period,
                     parameters->n_modes, parameters->planned) &&

@@ -37,6 +37,20 @@ static int trusted_outgrown(hsep_trusted *self, const double x_d[], const double
     return outgrown;
 }
 
+/* How many of the next samples are before the first motion of the run. path: commands of the last n_path of them. */
+static uint64_t trusted_rest_ahead(const hsep_trusted *self, const double path[], uint64_t n_path)
+{
+    const uint64_t late = self->n - n_path;
+    uint64_t k = 0;
+    if (!self->at_rest || self->known_rest < late) {
+        return self->at_rest ? self->known_rest : 0;
+    }
+    while (k < n_path && !(fabs(path[n_path - 1 - k]) > 0.0)) {
+        k++;
+    }
+    return late + k;
+}
+
 /* Solve for the weights of the candidates. */
 static void trusted_solve(hsep_trusted *self)
 {
@@ -71,6 +85,7 @@ HSEP_API void hsep_trusted_scale(
             largest[i] = fmax(largest[i], fabs(rows[i]));
         }
     }
+    self->n_rest = trusted_rest_ahead(self, path != NULL ? path : x_d, path != NULL ? n_path : self->n);
     self->hold = fmin(fmax(last_residual, -bound), bound);
     self->predicted = self->n_rows > 0.0 && !outgrown && self->scale.largest_square > 0.0;
     if (self->predicted) {
@@ -87,6 +102,9 @@ static void trusted_candidates(hsep_trusted *self, const double x_pb[], const do
     }
     double *x = hsep_at(self, self->x), *rows = hsep_at(self, self->rows);
     hsep_candidate *first = hsep_trusted_candidate(self, 0);
+    for (uint64_t k = 0; k < self->n_rest; k++) { /* the constant is that of motion */
+        rows[k * self->n_static] = 0.0;
+    }
     /* The stiffness acts at the position, which the physics model alone does not give well enough. */
     hsep_candidate_predict(first, rows, past, &self->scale, varied > 0 ? self->n : 0);
     for (uint64_t j = 0; j < self->n; j++) {
