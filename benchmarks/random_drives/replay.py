@@ -97,6 +97,8 @@ class FaultyReplay:
     own_noise : float
         With jitter: the prediction of the run without it, judged by the jittered samples, in the same ratio. Jitter
         that costs the prediction no accuracy comes to this: the noise of the samples themselves cannot be predicted.
+    true_ratio : float
+        With jitter: both predictions judged by the samples without it, in the same ratio.
     """
 
     index: int
@@ -105,6 +107,7 @@ class FaultyReplay:
     change: float
     refused: bool
     own_noise: float = math.nan
+    true_ratio: float = math.nan
 
 
 def replay(drive: Drive, predictor: str, run: Replayed = library_replay) -> Replay:
@@ -135,17 +138,17 @@ def replay_faults(drive: Drive, seed: int, predictor: str, run: Replayed = libra
             sound, first = measured, 0
         try:
             x_h = run(predictor, drive.model, drive.x_d, measured)
-            peer, own_noise = sound - x_pb, math.nan
+            peer, own_noise, true_ratio = sound - x_pb, math.nan, math.nan
             if name == JITTER:
                 without = run(predictor, drive.model, drive.x_d, drive.x_meas)
                 peer = drive.x_meas - without
-                own_noise = rms(measured - without) / rms(peer)
+                own_noise, true_ratio = rms(measured - without) / rms(peer), rms(drive.x_meas - x_h) / rms(peer)
         except SignalError:
             replays.append(FaultyReplay(drive.index, name, math.inf, math.inf, refused=True))
             continue
         ratio = rms((sound - x_h)[first:]) / rms(peer[first:])
         change = float(np.abs(x_h - x_pb).max() / np.abs(sound - x_pb).max())
-        replays.append(FaultyReplay(drive.index, name, ratio, change, refused=False, own_noise=own_noise))
+        replays.append(FaultyReplay(drive.index, name, ratio, change, False, own_noise, true_ratio))
     return replays
 
 

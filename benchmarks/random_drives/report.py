@@ -57,6 +57,8 @@ def print_faults(replays: Sequence[FaultyReplay]) -> None:
     )
     beyond = np.array([r.ratio for r in jittered]) / own
     print(f"  jitter relative to that: {_share(beyond, 1.10)} above 1.10, max {beyond.max():.3g}")
+    true = np.array([r.true_ratio for r in jittered])
+    print(f"  both judged by the samples without jitter: {_share(true, 1.10)} above 1.10, max {true.max():.3g}")
 
 
 def _print_ratios(name: str, ratios: Sequence[float]) -> None:
