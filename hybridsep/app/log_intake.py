@@ -21,6 +21,9 @@ __all__ = ["Reading", "findings_table", "open_checked", "reading_of", "show", "t
 _REPAIRED = ("time order", "gaps", "jitter", "outliers", "stuck samples", "repeated samples")
 """Findings about samples, not about what they mean: their fixes lose nothing that could be learned from."""
 
+_MISSING = "missing samples"
+"""Finding whose fix interpolates what a replay with trust takes as missing, and an identification leaves out."""
+
 _HOPELESS = "too little motion"
 """Finding that no fix helps; the physics model is then a gain of 1."""
 
@@ -104,7 +107,7 @@ def open_checked(
     if fix:
         if reader.n_samples > CHECKED_MAX:
             raise LogError(f"{path}: --fix takes at most {CHECKED_MAX} samples, the log has {reader.n_samples}; cut it")
-        fixed = intake.fixed()
+        fixed = apply(intake.log, (finding for finding in intake.findings if finding.name != _MISSING))
         return (fixed if segments else _longest_segment(fixed, path)), intake
     return (reader if as_is else open_log(path, **reading)), intake
 
@@ -117,7 +120,7 @@ def take_in(logs: Sequence[Log], *, fix: bool) -> tuple[list[Log], Mapping[str, 
     logs : sequence of Log
         Read with ``uniform=False``.
     fix : bool
-        Whether every fix is applied, also those that change what the columns mean.
+        Whether every fix is applied, also those that change what the columns mean. Missing measurements stay missing.
 
     Raises
     ------
@@ -127,7 +130,7 @@ def take_in(logs: Sequence[Log], *, fix: bool) -> tuple[list[Log], Mapping[str, 
     used, all_findings = [], {}
     for log in logs:
         findings = check(log).findings
-        applied = [finding for finding in findings if fix or finding.name in _REPAIRED]
+        applied = [finding for finding in findings if (fix and finding.name != _MISSING) or finding.name in _REPAIRED]
         left = [
             finding
             for finding in findings

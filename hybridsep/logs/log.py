@@ -47,7 +47,7 @@ class Log:
     t : (n,) array, s
         Times as recorded, from 0 where they are clock timestamps, or ``k·T_s`` if the file has no time column.
     x_d, x_meas : (n,) array, m or rad
-        Commanded and measured positions.
+        Commanded and measured positions; ``x_meas`` is NaN where it is missing, if it may be.
     T_s : float
         Sampling interval, s.
     path : Path
@@ -109,7 +109,7 @@ class LogReader:
         T_s: float | None = None,
         axis: str | None = None,
         uniform: bool = True,
-        may_miss: bool = False,
+        may_miss: bool | None = None,
     ) -> None:
         self.path = Path(path)
         given = check_reading(unit, T_s)
@@ -119,8 +119,9 @@ class LogReader:
         self._columns = choose_columns(self._source, columns, unit, time_needed=given is None)
         self.unit = self._columns["x_d"].unit.si
         self.remarks = (*self._source.remarks, *self._guessed(columns or {}))
-        self._uniform, self._may_miss = uniform, may_miss
-        self._source.measured, self._source.may_miss = self._columns["x"].name, may_miss
+        self._uniform = uniform
+        self._may_miss = not uniform if may_miss is None else may_miss
+        self._source.measured, self._source.may_miss = self._columns["x"].name, self._may_miss
         self.n_samples, self.T_s = self._scan(given)
 
     def chunks(self, n: int = _BLOCK) -> Iterator[tuple[Array, Array]]:
@@ -247,7 +248,7 @@ def open_log(
     T_s: float | None = None,
     axis: str | None = None,
     uniform: bool = True,
-    may_miss: bool = False,
+    may_miss: bool | None = None,
 ) -> LogReader:
     """Open a log for reading in bounded memory.
 
@@ -275,8 +276,9 @@ def open_log(
     uniform : bool
         Whether an uneven time axis is refused; otherwise ``T_s`` is its median interval, for
         :func:`hybridsep.intake.check.check`.
-    may_miss : bool
-        Whether measured positions may be missing: NaN, in text ``nan`` or nothing. With trust a predictor replays them.
+    may_miss : bool, optional
+        Whether measured positions may be missing: NaN, in text ``nan`` or nothing. With trust a predictor replays them,
+        and they are left out of an identification. If left out, where ``uniform`` is false, as the checks find them.
 
     Returns
     -------
@@ -298,7 +300,7 @@ def read_log(
     T_s: float | None = None,
     axis: str | None = None,
     uniform: bool = True,
-    may_miss: bool = False,
+    may_miss: bool | None = None,
 ) -> Log:
     """Return a whole log; parameters and errors as for :func:`open_log`."""
     return LogReader(path, columns=columns, unit=unit, T_s=T_s, axis=axis, uniform=uniform, may_miss=may_miss).read()

@@ -16,7 +16,7 @@ from ..base.signals import Array
 __all__ = ["NEEDS_TRUST", "Block", "Source", "check_column", "check_lengths", "sample_number"]
 
 
-NEEDS_TRUST = "; missing measurements are replayed with trust alone (--trust true)"
+NEEDS_TRUST = "; missing measurements are replayed with trust alone: read them with may_miss=True (--trust true)"
 """End of the message about a measured position that is missing."""
 
 

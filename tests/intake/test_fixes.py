@@ -49,6 +49,35 @@ def test_a_shift_leaves_the_ends_out(delay: float) -> None:
     np.testing.assert_allclose(log.x_meas, 10 * (log.x_d + delay), atol=1e-9)
 
 
+def test_missing_measurements_stay_missing() -> None:
+    log = ramp()
+    x = log.x_meas.copy()
+    x[[0, 7, 8, 15]] = np.nan
+    log = replace(log, x_meas=x)
+
+    def missing(changed: Log, column: str = "x_meas") -> list[int]:
+        return [k for k, value in enumerate(getattr(changed, column)) if np.isnan(value)]
+
+    np.testing.assert_allclose(fixes.without_missing(log).x_meas[1:], ramp().x_meas[1:])
+    assert missing(fixes.bridge(log, "x_meas", np.array([6, 9]))) == [0, 7, 8, 15]
+    np.testing.assert_allclose(fixes.bridge(log, "x_meas", np.array([6, 9])).x_meas[[6, 9]], [60.0, 90.0])
+    assert missing(fixes.shifted_back(log, 2.0)) == [5, 6, 13]
+    half = fixes.shifted_back(log, 1.5)
+    assert missing(half) == [5, 6, 7, 13, 14]  # before and behind each missing one; the first is left out
+    known = ~np.isnan(half.x_meas)
+    np.testing.assert_allclose(half.x_meas[known], 10 * (half.x_d[known] + 1.5), atol=0.2)
+    assert missing(fixes.swapped(log), "x_d") == []
+    velocity = replace(log, x_meas=np.where(np.isnan(x), np.nan, 2.0))
+    whole = fixes.integrated(velocity, "x_meas", 1.0)
+    assert missing(whole) == [0, 7, 8, 15]
+    np.testing.assert_allclose(whole.x_meas[1], 2e-3)
+    assert missing(fixes.resampled(replace(log, t=log.t + 2e-4))) == [0, 7, 8, 15]
+    nothing = replace(log, x_meas=np.full(20, np.nan))
+    for change in (fixes.without_missing, lambda log: fixes.bridge(log, "x_meas", np.array([3]))):
+        assert missing(change(nothing)) == list(range(20))
+    assert len(missing(fixes.shifted_back(nothing, 1.5))) == 18
+
+
 def test_the_others() -> None:
     log = ramp(9)
     thin = fixes.thinned(log, 3, 2)
