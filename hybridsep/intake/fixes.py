@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from ..base.signals import Array, Indices
 from ..logs.log import Log
@@ -14,6 +14,7 @@ __all__ = [
     "begin_at",
     "bridge",
     "cut_out",
+    "filled",
     "in_order",
     "integrated",
     "offset_removed",
@@ -36,6 +37,36 @@ def in_order(log: Log) -> Log:
 def split(log: Log, starts: Indices) -> Log:
     """Begin a segment at each of these samples."""
     return replace(log, starts=tuple(sorted({*log.starts, *(int(k) for k in starts)})))
+
+
+def filled(log: Log, starts: Indices, lost: Indices, most: int) -> Log:
+    """Fill short gaps, and begin a segment behind the others.
+
+    The command is interpolated by cubics that do not overshoot, times are evenly spaced, measurements missing.
+
+    Parameters
+    ----------
+    log : Log
+    starts : (n,) array of int
+        Samples behind the gaps.
+    lost : (n,) array of int
+        Samples missing in each.
+    most : int
+        Samples in a gap up to which it is filled.
+    """
+    short = lost <= most
+    inserted = np.zeros(len(log.t), dtype=np.intp)
+    inserted[starts[short]] = lost[short]
+    place = np.arange(len(log.t)) + np.cumsum(inserted)
+    k = np.arange(place[-1] + 1)
+    x_d, x_meas = log.x_d, np.full(len(k), np.nan)
+    x_meas[place] = log.x_meas
+    if short.any():
+        with np.errstate(over="ignore"):  # a slope of next to nothing has no reciprocal, and is taken as 0
+            x_d = PchipInterpolator(place, log.x_d)(k)
+        x_d[place] = log.x_d
+    begins = {int(place[start]) for start in (*log.starts, *starts[~short])}
+    return replace(log, t=np.interp(k, place, log.t), x_d=x_d, x_meas=x_meas, starts=tuple(sorted(begins)))
 
 
 def resampled(log: Log) -> Log:

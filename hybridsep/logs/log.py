@@ -90,10 +90,12 @@ class LogReader:
     path : Path
         The file.
     T_s : float
-        Sampling interval, s: the given one, or the mean of the time column's, rounded to its significant digits; the
-        median one where ``uniform`` is false.
+        Sampling interval, s: the given one, or the mean of the time column's, gaps aside, rounded to the fewest digits
+        within three of its standard errors.
     n_samples : int
         Samples in the log.
+    is_even : bool
+        Whether its times increase and none is missing; jitter counts only where ``uniform`` is true, and is refused.
     unit : {"m", "rad"}
         Unit of the positions that are returned.
     remarks : tuple of str
@@ -122,6 +124,7 @@ class LogReader:
         self._uniform = uniform
         self._may_miss = not uniform if may_miss is None else may_miss
         self._source.measured, self._source.may_miss = self._columns["x"].name, self._may_miss
+        self.is_even = True
         self.n_samples, self.T_s = self._scan(given)
 
     def chunks(self, n: int = _BLOCK) -> Iterator[tuple[Array, Array]]:
@@ -213,6 +216,7 @@ class LogReader:
             del self._columns["t"]
             return count, given
         found = axis.interval()
+        self.is_even = self._uniform or axis.is_even
         if given is not None and abs(found - given) > TS_TOLERANCE * given:
             raise LogError(
                 f"{self.path}: T_s = {given:g} s was given, but column {column.name!r} has an interval of "
@@ -274,7 +278,7 @@ def open_log(
     axis : str, optional
         Axis of a file that holds several, such as ``"X1"``.
     uniform : bool
-        Whether an uneven time axis is refused; otherwise ``T_s`` is its median interval, for
+        Whether an uneven time axis is refused; otherwise gaps, jitter and times out of order are left to
         :func:`hybridsep.intake.check.check`.
     may_miss : bool, optional
         Whether measured positions may be missing: NaN, in text ``nan`` or nothing. With trust a predictor replays them,

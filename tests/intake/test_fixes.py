@@ -31,6 +31,19 @@ def test_stretches_are_cut_out_and_kept_apart() -> None:
     assert starts_of(fixes.begin_at(cut, 1)) == [1, 4, 5]
 
 
+def test_short_gaps_are_filled_and_long_ones_cut() -> None:
+    keep = np.r_[0:3, 4:8, 13:20]
+    log = replace(ramp(), t=ramp().t[keep], x_d=ramp().x_d[keep], x_meas=ramp().x_meas[keep])
+    filled = fixes.filled(log, np.array([3, 7]), np.array([1, 5]), 4)
+    np.testing.assert_allclose(filled.x_d, np.r_[0:8, 13:20])
+    np.testing.assert_allclose(filled.t, 1e-3 * np.r_[0:8, 13:20])
+    np.testing.assert_array_equal(np.isnan(filled.x_meas), np.arange(15) == 3)
+    assert filled.starts == (0, 8)
+    apart = fixes.filled(log, np.array([3, 7]), np.array([1, 5]), 0)
+    np.testing.assert_array_equal(apart.x_meas, log.x_meas)
+    assert apart.starts == (0, 3, 7)
+
+
 def test_each_segment_is_resampled_by_itself() -> None:
     log = ramp()
     uneven = replace(log, t=log.t * 1.5 + np.where(np.arange(20) >= 10, 0.1, 0.0), starts=(0, 10))
