@@ -124,6 +124,7 @@ class LogReader:
         self._uniform = uniform
         self._may_miss = not uniform if may_miss is None else may_miss
         self._source.measured, self._source.may_miss = self._columns["x"].name, self._may_miss
+        self._check_twins()
         self.is_even = True
         self.n_samples, self.T_s = self._scan(given)
 
@@ -189,6 +190,25 @@ class LogReader:
                 f"{self.path}: column {column.name!r} read in {column.unit.name} spans {span:.4g} {si}, more than "
                 f"{largest:g} {si}{hint}"
             )
+
+    def _check_twins(self) -> None:
+        """Raise LogError if a column that is read occurs several times, with values that differ.
+
+        Scopes write the time again beside each channel.
+        """
+        for role, column in self._columns.items():
+            twins = self._source.twins.get(column.name, ())
+            for block in self._source.blocks([column.name, *twins], _BLOCK) if twins else ():
+                values = np.stack(block.columns)
+                differ = ~((values == values[0]) | np.isnan(values) & np.isnan(values[0])).all(axis=0)
+                if differ.any():
+                    i = int(np.argmax(differ))
+                    other = next(value for value in values[1:, i] if value != values[0, i])
+                    ways = "export all channels with one common time, or remove" if role == "t" else "rename or remove"
+                    raise LogError(
+                        f"{self.path}, {block.where(i)}: column {column.name!r} occurs {1 + len(twins)} times, with "
+                        f"different values, {values[0, i]:.9g} and {other:.9g}; {ways} those that are not meant"
+                    )
 
     def _scan(self, given: float | None) -> tuple[int, float]:
         """Scan one column; return the number of samples and the sampling interval.
