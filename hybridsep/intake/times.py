@@ -81,8 +81,9 @@ def check_jitter(log: Log) -> Iterator[Finding]:
     if not len(uneven):
         return
     words = (
-        f"{len(uneven)} of {len(steps)} intervals differ by more than {100 * TOLERANCE:g} % from {log.T_s:.6g} s, by "
-        f"up to {100 * deviations.max():.3g} %; the model takes them as equal"
+        f"{len(uneven)} of {len(steps)} intervals differ{'' if len(uneven) > 1 else 's'} by more than "
+        f"{100 * TOLERANCE:g} % from {log.T_s:.6g} s, by up to {100 * deviations.max():.3g} %; the model takes them as "
+        "equal"
     )
     evidence = {"n": float(len(uneven)), "largest": float(deviations.max()), "std": float(np.std(deviations))}
     fix = Fix(f"resample at {log.T_s:.6g} s, linearly between samples", fixes.resampled)

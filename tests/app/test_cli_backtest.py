@@ -87,7 +87,8 @@ def test_single_rows_that_are_missing(hybridsep: Run, tmp_path: Path) -> None:
     keep = np.setdiff1d(np.arange(3000), np.random.default_rng(5).integers(1, 2999, 30))
     log = tmp_path / "log.csv"
     np.savetxt(log, rows[keep], delimiter=",", header="t,x_d,x", comments="", fmt="%.17g")
-    status, out, err = hybridsep("backtest", log, *MACHINE, "--trust", "true", "--fix", "--json")
+    figure, saved = ["--figure", tmp_path / "figure.png"], ["--save", tmp_path / "predicted.csv"]
+    status, out, err = hybridsep("backtest", log, *MACHINE, "--trust", "true", "--fix", "--json", *figure, *saved)
     assert status == 0
     assert "segments" not in err
     assert json.loads(out)["n_samples"] == len(keep)
