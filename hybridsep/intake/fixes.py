@@ -21,7 +21,6 @@ __all__ = [
     "resampled",
     "scaled",
     "shifted_back",
-    "split",
     "swapped",
     "thinned",
     "without_missing",
@@ -32,11 +31,6 @@ def in_order(log: Log) -> Log:
     """Sort by time and drop samples whose time repeats."""
     _, keep = np.unique(log.t, return_index=True)
     return replace(log, t=log.t[keep], x_d=log.x_d[keep], x_meas=log.x_meas[keep], starts=(0,))
-
-
-def split(log: Log, starts: Indices) -> Log:
-    """Begin a segment at each of these samples."""
-    return replace(log, starts=tuple(sorted({*log.starts, *(int(k) for k in starts)})))
 
 
 def filled(log: Log, starts: Indices, lost: Indices, most: int) -> Log:

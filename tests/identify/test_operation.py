@@ -16,7 +16,7 @@ from hybridsep.base.errors import IdentificationError
 from hybridsep.base.signals import Array
 from hybridsep.identify.model import IdentifiedModel
 from hybridsep.identify.operation import identify_operation, unit_gain_model
-from hybridsep.identify.output_error import Delay, fit_structure
+from hybridsep.identify.output_error import Delay, fit_structure, without
 from hybridsep.identify.segments import as_segments
 from hybridsep.identify.structure import Structure, lag_mode
 from hybridsep.identify.uncertainty import estimates
@@ -130,6 +130,12 @@ def test_pieces_of_few_samples_do_no_harm() -> None:
     with_nothing = [*pieces, (x_d[:50], np.full(50, np.nan))]
     f_n, std = value(identify_operation(with_nothing, T_S), "mode[1].f_n")
     assert abs(f_n - 20.0) < 4 * std
+
+
+def test_an_initial_state_that_shows_nowhere_explains_nothing() -> None:
+    ones = np.ones((3, 1))
+    np.testing.assert_array_equal(without(np.zeros((3, 1)), ones), ones)
+    np.testing.assert_allclose(without(np.column_stack((ones, np.zeros(3))), ones), 0.0 * ones, atol=1e-15)
 
 
 def test_too_many_missing_measurements_are_refused() -> None:

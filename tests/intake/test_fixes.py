@@ -22,7 +22,7 @@ def starts_of(log: Log) -> list[float]:
 
 
 def test_stretches_are_cut_out_and_kept_apart() -> None:
-    log = fixes.split(ramp(), np.array([5]))
+    log = replace(ramp(), starts=(0, 5))
     cut = fixes.cut_out(log, np.array([2, 10]), np.array([4, 20]))
     np.testing.assert_array_equal(cut.x_d, [0, 1, 4, 5, 6, 7, 8, 9])
     assert cut.starts == (0, 2, 3)
@@ -56,7 +56,7 @@ def test_each_segment_is_resampled_by_itself() -> None:
 
 @pytest.mark.parametrize("delay", [3.0, 2.25, -4.0])
 def test_a_shift_leaves_the_ends_out(delay: float) -> None:
-    log = fixes.shifted_back(fixes.split(ramp(), np.array([10])), delay)
+    log = fixes.shifted_back(replace(ramp(), starts=(0, 10)), delay)
     assert len(log.segments()) == 2
     assert len(log.t) == 20 - 2 * int(np.ceil(abs(delay)))
     np.testing.assert_allclose(log.x_meas, 10 * (log.x_d + delay), atol=1e-9)
