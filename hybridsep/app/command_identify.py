@@ -70,6 +70,8 @@ def identify(
 ) -> None:
     """Identify the physics model: from a log, a frequency response or a swept sine."""
     with loading():
+        import numpy as np
+
         from ..identify.figures import operation_figure, response_figure
         from ..identify.frequency_response import IdentifiedResponse, identify_frequency_response
         from ..identify.klipper import identify_resonance, is_klipper, read_klipper
@@ -119,7 +121,13 @@ def identify(
             )
         else:
             sweeps = kind == "sweep"
-            log = read_log(recording, columns=columns, unit=unit, T_s=T_s, axis=axis, uniform=sweeps)
+            log = read_log(recording, columns=columns, unit=unit, T_s=T_s, axis=axis, uniform=sweeps, may_miss=True)
+            n_missing = int(np.isnan(log.x_meas).sum())
+            if sweeps and n_missing:
+                raise ParameterError(
+                    f"{recording}: a swept sine must be measured in every sample, {n_missing} measured positions are "
+                    "missing; record it again, or read it as a log of operation (--kind operation)"
+                )
             if not sweeps:
                 (log,), findings = take_in([log], fix=fix)
                 show(log.remarks, findings[recording.name])

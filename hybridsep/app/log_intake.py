@@ -10,6 +10,7 @@ from typing import Any
 from ..base.errors import LogError, ParameterError
 from ..intake.check import Intake, apply, check
 from ..intake.finding import ERROR, Finding
+from ..intake.times import BRIDGED_MAX
 from ..logs.log import Log, LogReader, open_log
 from ..machines.machine import Machine
 from .arguments import check_interval, check_unit
@@ -20,6 +21,9 @@ __all__ = ["Reading", "findings_table", "open_checked", "reading_of", "show", "t
 
 _REPAIRED = ("time order", "gaps", "jitter", "outliers", "stuck samples", "repeated samples")
 """Findings about samples, not about what they mean: their fixes lose nothing that could be learned from."""
+
+_MISSING = "missing samples"
+"""Finding whose fix interpolates what a replay with trust takes as missing, and an identification leaves out."""
 
 _HOPELESS = "too little motion"
 """Finding that no fix helps; the physics model is then a gain of 1."""
@@ -91,7 +95,8 @@ def open_checked(
     reader = open_log(path, **reading, uniform=False)
     checked = reader.read(CHECKED_MAX)
     check_unit(path.name, checked, machine)
-    intake = check(replace(checked, unit=machine.unit), machine)
+    trust = bool(reading.get("may_miss"))
+    intake = check(replace(checked, unit=machine.unit), machine, bridged=BRIDGED_MAX if trust else 0)
     # Times that repeat, as those do that are rounded coarsely, tell no interval
     if not fix and not any(finding.name == "time order" for finding in intake.errors):
         check_interval(path.name, reader.T_s, machine)
@@ -104,9 +109,14 @@ def open_checked(
     if fix:
         if reader.n_samples > CHECKED_MAX:
             raise LogError(f"{path}: --fix takes at most {CHECKED_MAX} samples, the log has {reader.n_samples}; cut it")
-        fixed = intake.fixed()
+        if not trust and any(finding.name == "gaps" for finding in intake.findings):
+            bridged = f"with trust (--trust true) those of at most {BRIDGED_MAX} samples are bridged"
+            show([f"every gap cuts, as the model has trust = false; {bridged}"], [])
+        fixed = apply(intake.log, (finding for finding in intake.findings if finding.name != _MISSING))
         return (fixed if segments else _longest_segment(fixed, path)), intake
-    return (reader if as_is else open_log(path, **reading)), intake
+    if not (as_is or reader.is_even):  # behind what was checked
+        open_log(path, **reading)
+    return reader, intake
 
 
 def take_in(logs: Sequence[Log], *, fix: bool) -> tuple[list[Log], Mapping[str, tuple[Finding, ...]]]:
@@ -117,7 +127,7 @@ def take_in(logs: Sequence[Log], *, fix: bool) -> tuple[list[Log], Mapping[str, 
     logs : sequence of Log
         Read with ``uniform=False``.
     fix : bool
-        Whether every fix is applied, also those that change what the columns mean.
+        Whether every fix is applied, also those that change what the columns mean. Missing measurements stay missing.
 
     Raises
     ------
@@ -127,7 +137,7 @@ def take_in(logs: Sequence[Log], *, fix: bool) -> tuple[list[Log], Mapping[str, 
     used, all_findings = [], {}
     for log in logs:
         findings = check(log).findings
-        applied = [finding for finding in findings if fix or finding.name in _REPAIRED]
+        applied = [finding for finding in findings if (fix and finding.name != _MISSING) or finding.name in _REPAIRED]
         left = [
             finding
             for finding in findings

@@ -123,10 +123,15 @@ def hold(x_pb: Array, x_meas: Array, active: NDArray[np.bool_], Np: int, *, late
 
 
 def batch_rms(error: Array, Np: int) -> Array:
-    """Return the RMS per batch, ``(n_batches,)``, of an error ``(n,)``; the last may be shorter."""
+    """Return the RMS per batch, ``(n_batches,)``, of an error ``(n,)``; the last may be shorter.
+
+    Samples that are NaN, not measured, do not count; a batch of nothing else is NaN.
+    """
     starts = np.arange(0, len(error), Np)
-    lengths = np.diff(np.append(starts, len(error)))
-    return np.sqrt(np.add.reduceat(error**2, starts) / lengths)
+    known = ~np.isnan(error)
+    counts = np.add.reduceat(known.astype(np.float64), starts)
+    squares = np.add.reduceat(np.where(known, error, 0.0) ** 2, starts)
+    return np.where(counts > 0, np.sqrt(squares / np.maximum(counts, 1.0)), np.nan)
 
 
 def peak_derivatives(x: Array, T_s: float) -> tuple[float, float, float]:

@@ -165,7 +165,7 @@ def backtest_stream(
         learned.
     """
     overall, after, tally = RunningErrors(3), RunningErrors(3), Tally(predictor.Np)
-    j = k = n_rejected = 0
+    j = k = n_rejected = n_missing = 0
     late: Array | None = None
     for commands, x in _windows(predictor, chunks):
         window = _predicted(predictor, commands)
@@ -190,12 +190,13 @@ def backtest_stream(
         n_before = predictor.n_rejected
         predictor.update(x)
         n_rejected += predictor.n_rejected - n_before
+        n_missing += int(np.isnan(x).sum())
         j, k = j + 1, k + n
         if on_batch is not None:
             on_batch(batch)
     if j == 0:
         raise SignalError("a log must have at least one sample, got none")
-    return Scores(Score.of(overall), Score.of(after), j, tally.verdict(n_rejected=n_rejected))
+    return Scores(Score.of(overall), Score.of(after), j, tally.verdict(n_rejected=n_rejected, n_missing=n_missing))
 
 
 _X_D, _STD, _ACTIVE, _PREDICTED = 0, 1, 2, slice(3, 6)

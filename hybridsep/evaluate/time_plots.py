@@ -74,7 +74,7 @@ def _draw_windows(axes: Axes, run: Run, unit: str) -> None:
     worse = errors["x_h"] > errors["x_pb"]
     for begin, end in zip(edges[:-1][worse], edges[1:][worse], strict=True):
         axes.axvspan(begin, end, color=PHYSICS, alpha=0.15, linewidth=0)
-    axes.set_ylim(0.0, 1.35 * max(float(values.max()) for values in errors.values()))
+    axes.set_ylim(0.0, 1.35 * max(float(np.nan_to_num(values).max()) for values in errors.values()))
     axes.set_ylabel(f"RMS of each\nwindow [µ{unit}]")
     axes.legend(loc="upper right", ncols=3, frameon=False, title="shaded: hybrid worse than physics", title_fontsize=8)
 

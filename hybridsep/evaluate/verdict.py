@@ -55,8 +55,8 @@ class Verdict:
         Places with enough samples.
     causes : tuple of str
         What explains it where it is worse, as far as the run shows.
-    n_rejected, n_samples : int
-        Measurements that were not learned, as they were missing or not plausible, and all of them.
+    n_rejected, n_missing, n_samples : int
+        Measurements that were not learned, as they were missing or not plausible; those missing; and all of them.
     """
 
     ratio_pb: float
@@ -65,6 +65,7 @@ class Verdict:
     judged: tuple[str, ...]
     causes: tuple[str, ...]
     n_rejected: int
+    n_missing: int
     n_samples: int
 
     def __str__(self) -> str:
@@ -75,9 +76,7 @@ class Verdict:
         ]
         lines += [f"Why: {cause}" for cause in self.causes]
         if self.n_rejected:
-            lines.append(
-                f"{self.n_rejected} of {self.n_samples} measurements were missing or not plausible, and not learned"
-            )
+            lines.append(_not_learned(self.n_rejected, self.n_missing, self.n_samples))
         return "\n".join(f"{line}." for line in lines)
 
 
@@ -141,13 +140,15 @@ class Tally:
             self._early += squares.sum(axis=1)
         self._n_windows += 1
 
-    def verdict(self, *, n_rejected: int = 0) -> Verdict:
+    def verdict(self, *, n_rejected: int = 0, n_missing: int | None = None) -> Verdict:
         """Return the verdict on the windows so far.
 
         Parameters
         ----------
         n_rejected : int
             Measurements that were not learned, missing ones included.
+        n_missing : int, optional
+            Those that were missing; as many as the windows lack, if left out.
         """
         pb, hold, h = self._squares
         ratios = [_ratio(h.sum(), peer.sum()) for peer in (pb, hold)]
@@ -160,6 +161,7 @@ class Tally:
             tuple(self._places()),
             tuple(self._causes(ratios)),
             n_rejected,
+            min(self._n_missing if n_missing is None else n_missing, n_rejected),
             n_samples,
         )
 
@@ -207,6 +209,18 @@ class Tally:
         """Return whether the hybrid is worse than a peer in the beginning of the run and not in the rest."""
         rest = np.maximum(self._squares.sum(axis=(1, 2)) - self._early, 0.0)
         return self._n_windows > 2 * _N_EARLY and _ratio(rest[2], rest[peer]) <= 1.0 + ALIKE
+
+
+def _not_learned(n_rejected: int, n_missing: int, n_samples: int) -> str:
+    """Return how many measurements were not learned, and why."""
+    n_implausible = n_rejected - n_missing
+    if n_missing and n_implausible:
+        return (
+            f"{n_rejected} of {n_samples} measurements were not learned: {n_missing} missing, {n_implausible} not "
+            "plausible"
+        )
+    were, why = "was" if n_rejected == 1 else "were", "missing" if n_missing else "not plausible"
+    return f"{n_rejected} of {n_samples} measurements {were} {why}, and not learned"
 
 
 def _ratio(own: float, other: float) -> float:

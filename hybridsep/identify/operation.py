@@ -15,8 +15,8 @@ from ..model.physics import ModalModel
 from .model import Alternative, IdentifiedModel
 from .output_error import Delay, Fit, fit_structure, simulated
 from .search import fit_near
-from .segments import Segment, as_segments
-from .selection import Candidate, choose, compare_structures
+from .segments import Segment, as_segments, motion_split
+from .selection import HELD_OUT, Candidate, choose, compare_structures, held_out
 from .structure import STRUCTURES, Structure
 from .uncertainty import estimates
 
@@ -57,7 +57,8 @@ def identify_operation(
     Parameters
     ----------
     recordings : iterable of pairs ``(x_d, x)`` of (n,) array_like, m
-        Commanded and measured positions, one pair for each piece without a gap, sampled alike.
+        Commanded and measured positions, one pair for each piece without a gap, sampled alike; ``x`` is NaN where it
+        is missing. Such samples are left out of the error, the model runs over them.
     T_s : float
         Sampling interval, s.
     unit_gain : bool, optional
@@ -112,7 +113,7 @@ def identify_operation(
         offset=fit.offset,
         rms=fit.rms,
         rms_held_out=chosen.rms_held_out,
-        n_samples=sum(len(segment.u) for segment in segments),
+        n_samples=sum(int(segment.known.sum()) for segment in segments),
         n_effective=n_effective,
         alternatives=tuple(_alternative(candidate, T_s) for candidate in candidates),
         findings=tuple(findings),
@@ -129,15 +130,24 @@ def unit_gain_model(T_s: float, reason: str) -> IdentifiedModel:
 
 def _require_motion(segments: Sequence[Segment]) -> None:
     """Raise IdentificationError if there is nothing to learn from."""
-    n = sum(len(segment.u) for segment in segments)
+    n = sum(int(segment.known.sum()) for segment in segments)
     if n < SAMPLES_MIN:
         raise _refusal(f"it has {n} samples, at least {SAMPLES_MIN} are needed")
     if all(np.ptp(segment.u) == 0 for segment in segments):
         raise _refusal("the commanded position does not move; record the axis while it works")
-    if all(np.ptp(segment.y) == 0 for segment in segments):
+    measured = [(segment.u[segment.known], segment.y[segment.known]) for segment in segments]
+    if all(np.ptp(y) == 0 for _, y in measured):
         raise _refusal("the measured position does not move")
-    u = np.concatenate([segment.u - segment.u.mean() for segment in segments])
-    y = np.concatenate([segment.y - segment.y.mean() for segment in segments])
+    split = motion_split(segments, 1.0 - HELD_OUT)
+    n_fitted = sum(int(segment.known[: segment.stop].sum()) for segment in split)
+    n_judging = sum(len(held_out(segment)) for segment in split)
+    if n < sum(len(segment.u) for segment in segments) and min(n_fitted, n_judging) < SAMPLES_MIN // 4:
+        raise _refusal(
+            f"too many measured positions are missing: {n_fitted} are left in the part that is fitted to, {n_judging} "
+            "in the part that judges"
+        )
+    u = np.concatenate([u - u.mean() for u, _ in measured])
+    y = np.concatenate([y - y.mean() for _, y in measured])
     correlation = float(u @ y / np.sqrt((u @ u) * (y @ y)))
     if correlation < OPPOSED:
         raise _refusal(
@@ -152,7 +162,7 @@ def _refusal(reason: str) -> IdentificationError:
 
 def _is_weak(fit: Fit, segments: Sequence[Segment], T_s: float) -> bool:
     """Return whether the commanded motion is hardly larger than what no model explains."""
-    residual = np.concatenate([s.y - simulated(fit, s, T_s) for s in segments])
+    residual = np.concatenate([(s.y - simulated(fit, s, T_s))[s.known] for s in segments])
     return _spread(segments) < WEAK * float(np.std(residual))
 
 
@@ -189,8 +199,8 @@ def _findings(
 ) -> list[str]:
     """Return what a user should know of the identification, in words."""
     findings = []
-    n = sum(len(segment.u) for segment in segments)
-    moving = sum(int(np.count_nonzero(np.diff(segment.u))) for segment in segments) / n
+    n = sum(int(segment.known.sum()) for segment in segments)
+    moving = sum(np.count_nonzero(np.diff(s.u)) for s in segments) / sum(len(s.u) for s in segments)
     if moving < 0.25:
         findings.append(f"the command moves in {100 * moving:.0f} % of the samples")
     started = [segment for segment in segments if _starts_in_motion(segment.u)]

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from ..base.signals import Array
+from ..base.signals import Array, Indices
 from .responses import free_responses, responses, sections_of
 from .segments import Segment, delayed
 from .structure import Structure
@@ -92,23 +92,29 @@ class _Problem:
         self, segments: Sequence[Segment], T_s: float, structure: Structure, delay: Delay, rows_max: int
     ) -> None:
         self._structure, self._T_s, self._delay = structure, T_s, delay
-        used = [segment for segment in segments if segment.stop > 1]
-        self._data = [(delayed(s.u[: s.stop], delay.samples), s.y[: s.stop]) for s in used]
-        self._rows = slice(None, None, max(1, sum(s.stop for s in used) // rows_max))
+        used = [segment for segment in segments if segment.known[: segment.stop].sum() > 1]
+        step = max(1, sum(s.stop for s in used) // rows_max)
+        self._data = [
+            (delayed(s.u[: s.stop], delay.samples), s.y[: s.stop], np.flatnonzero(s.known[: s.stop])[::step])
+            for s in used
+        ]
 
     def solve(self, theta: Array) -> tuple[Array, Array, float]:
         """Return residual, linear parameters and mean offset for one set of poles."""
-        blocks = [self._projected(theta, u, y) for u, y in self._data]
+        blocks = [self._projected(theta, u, y, rows) for u, y, rows in self._data]
         Phi, target = (np.concatenate(parts) for parts in zip(*((b[0], b[1]) for b in blocks), strict=True))
         linear = _least_squares(Phi, target)
         offset = float(np.mean([target - columns @ linear for _, _, target, columns in blocks]))
         return target - Phi @ linear, linear, offset
 
-    def _projected(self, theta: Array, u: Array, y: Array) -> tuple[Array, Array, Array, Array]:
-        """Return columns and target less what offset and initial state explain, then the means of both."""
+    def _projected(self, theta: Array, u: Array, y: Array, rows: Indices) -> tuple[Array, Array, Array, Array]:
+        """Return columns and target less what offset and initial state explain, then the means of both.
+
+        The filters run over every sample; the samples ``rows``, all of them measured, have residuals.
+        """
         sections = sections_of(self._structure, theta, self._T_s, self._delay.input_hold)
-        columns, target = affine(self._structure, responses(self._structure, sections, u)[self._rows], y[self._rows])
-        free = free_responses(sections, len(u))[self._rows]
+        columns, target = affine(self._structure, responses(self._structure, sections, u)[rows], y[rows])
+        free = free_responses(sections, len(u))[rows]
         nuisance = np.column_stack((np.ones(len(free)), free))
         both = without(nuisance, np.column_stack((columns, target)))
         return both[:, :-1], both[:, -1], target.mean(keepdims=True), columns.mean(axis=0)
@@ -116,7 +122,9 @@ class _Problem:
 
 def without(nuisance: Array, signals: Array) -> Array:
     """Return signals, ``(n, m)``, less their least-squares projection onto the nuisance columns, ``(n, k)``."""
-    basis = np.linalg.qr(nuisance / np.linalg.norm(nuisance, axis=0))[0]
+    norms = np.linalg.norm(nuisance, axis=0)
+    there = norms > 0.0  # in few samples an initial state may show nowhere, and explains nothing then
+    basis = np.linalg.qr(nuisance[:, there] / norms[there])[0]
     return np.asarray(signals - basis @ (basis.T @ signals))
 
 

@@ -111,8 +111,9 @@ def _bandwidth(segments: Sequence[Segment], T_s: float, known: Mapping[Structure
     if lags:
         lag = min(lags, key=lambda fit: fit.rms)
         return float(1.0 / (np.exp(-lag.theta[0]) + T_s * lag.delay.halves / 2))
-    velocity = np.concatenate([np.gradient(s.u[: s.stop], T_s) for s in segments if s.stop > 1])
-    error = np.concatenate([(s.u - s.y)[: s.stop] for s in segments if s.stop > 1])
+    used = [s for s in segments if s.stop > 1]
+    velocity = np.concatenate([np.gradient(s.u[: s.stop], T_s)[s.known[: s.stop]] for s in used])
+    error = np.concatenate([(s.u - s.y)[: s.stop][s.known[: s.stop]] for s in used])
     power = float(velocity @ velocity)
     tau = float(velocity @ (error - error.mean())) / power if power > 0 else 0.0
     return 1.0 / min(max(tau, 2 * T_s), 1.0)

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from ..base.signals import Array, as_samples
+from ..base.signals import Array, as_measured, as_samples
 
 __all__ = ["Segment", "as_segments", "delayed", "motion_split"]
 
@@ -26,7 +26,7 @@ class Segment:
     Attributes
     ----------
     u, y : (n,) array, m
-        Commanded and measured positions.
+        Commanded and measured positions; ``y`` is NaN where it is missing.
     stop : int
         Samples before this one are fitted to.
     """
@@ -40,17 +40,22 @@ class Segment:
         """Commanded path up to each sample, ``(n,)``, m."""
         return np.concatenate(([0.0], np.cumsum(np.abs(np.diff(self.u)))))
 
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """Samples with a measured position, ``(n,)``; the others have no residual."""
+        return np.asarray(~np.isnan(self.y))
+
 
 def as_segments(recordings: Iterable[tuple[ArrayLike, ArrayLike]], samples_max: int = SAMPLES_MAX) -> list[Segment]:
-    """Return the segments of pairs ``(x_d, x)``, of long ones the parts with most motion."""
+    """Return the segments of pairs ``(x_d, x)``, of long ones the parts with most motion; none without measurements."""
     segments = []
     for x_d, x in recordings:
         u = as_samples(x_d, "x_d")
-        y = as_samples(x, "x", len(u))
+        y = as_measured(x, "x", len(u))
         segments.append((u, y))
     if sum(len(u) for u, _ in segments) > samples_max:
         segments = _liveliest(segments, samples_max // PIECE)
-    return [Segment(u - u[0], y - u[0], len(u)) for u, y in segments if len(u) > 1]
+    return [Segment(u - u[0], y - u[0], len(u)) for u, y in segments if np.count_nonzero(~np.isnan(y)) > 1]
 
 
 def _liveliest(segments: list[tuple[Array, Array]], n: int) -> list[tuple[Array, Array]]:

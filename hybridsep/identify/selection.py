@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.signals import Array
+from ..base.signals import Array, Indices
 from .output_error import Fit, simulated
 from .search import fit_delay
 from .segments import Segment, motion_split
 from .structure import DECAY_MIN, STRUCTURES, Structure
 from .uncertainty import estimates
 
-__all__ = ["HELD_OUT", "Candidate", "choose", "compare_structures"]
+__all__ = ["HELD_OUT", "Candidate", "choose", "compare_structures", "held_out"]
 
 HELD_OUT = 0.35
 """Part of the commanded motion that is held out."""
@@ -110,7 +110,7 @@ def compare_structures(
             break
         progress(structure.name, i / len(structures))
         fit = known[structure] = fit_delay(split, T_s, structure, known)
-        residual = np.concatenate([(s.y - simulated(fit, s, T_s))[max(s.stop, len(s.u) // SETTLING) :] for s in split])
+        residual = np.concatenate([(s.y - simulated(fit, s, T_s))[held_out(s)] for s in split])
         found.append((fit, residual, _objection(fit, split, T_s)))
         rms = float(np.std(residual))
         if not found[-1][2] and rms < best * (1 - TOLERANCE):
@@ -118,6 +118,12 @@ def compare_structures(
     offsets = [fit.offset for fit, _, _ in found if fit.structure.order] or [found[0][0].offset]
     common = float(np.median(offsets))
     return [Candidate(fit, residual - common, objection) for fit, residual, objection in found]
+
+
+def held_out(segment: Segment) -> Indices:
+    """Return the samples of a split segment that judge: behind the fitted ones, settled, and measured."""
+    first = max(segment.stop, len(segment.u) // SETTLING)
+    return first + np.flatnonzero(segment.known[first:])
 
 
 def choose(candidates: Sequence[Candidate]) -> Candidate:
@@ -183,7 +189,7 @@ def _objection(fit: Fit, segments: Sequence[Segment], T_s: float) -> str:
     if structure.decay(fit.theta) < DECAY_MIN / (T_s * max(segment.stop for segment in segments)):
         return "a pole slower than the recording shows"
     if structure.order > 2:
-        fitted = [Segment(s.u[: s.stop], s.y[: s.stop], s.stop) for s in segments if s.stop > 1]
+        fitted = [Segment(s.u[: s.stop], s.y[: s.stop], s.stop) for s in segments if s.known[: s.stop].sum() > 1]
         spreads = [e.std / e.value for e in estimates(fit, fitted, T_s)[0] if e.name.endswith(("f_n", "tau"))]
         if max(spreads) > SPREAD_MAX:
             return "poles that the recording does not determine"

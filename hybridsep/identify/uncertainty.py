@@ -88,10 +88,10 @@ def _jacobian(fit: Fit, segments: Sequence[Segment], T_s: float) -> tuple[Array,
     for segment in segments:
         u, y = delayed(segment.u, fit.delay.samples), segment.y
 
-        def position(theta: Array, u: Array = u, y: Array = y) -> tuple[Array, Array]:
+        def position(theta: Array, u: Array = u) -> tuple[Array, Array]:
             sections = sections_of(fit.structure, theta, T_s, fit.delay.input_hold)
-            columns, target = affine(fit.structure, responses(fit.structure, sections, u), y)
-            return columns @ fit.linear + (y - target), columns
+            columns, less = affine(fit.structure, responses(fit.structure, sections, u), np.zeros(len(u)))
+            return columns @ fit.linear - less, columns
 
         x, columns = position(fit.theta)
         slopes = [
@@ -100,8 +100,9 @@ def _jacobian(fit: Fit, segments: Sequence[Segment], T_s: float) -> tuple[Array,
         ]
         by_delay = -np.gradient(x)
         block = np.column_stack((*slopes, columns, by_delay, np.ones(len(x))))
-        free = free_responses(sections_of(fit.structure, fit.theta, T_s, "zoh"), len(x))
-        both = np.column_stack((block, y - x))
+        known = segment.known
+        free = free_responses(sections_of(fit.structure, fit.theta, T_s, "zoh"), len(x))[known]
+        both = np.column_stack((block, y - x))[known]
         if free.size:
             both = without(free, both)
         blocks.append(both[:, :-1])

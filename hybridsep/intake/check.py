@@ -11,9 +11,10 @@ import numpy as np
 from ..logs.log import Log
 from .axis import check_delay, check_offset, check_same, check_scale, check_sign, check_swapped, check_velocity
 from .finding import ERROR, HOPELESS, NAMES, Finding
+from .fixes import without_missing
 from .motion import check_motion, check_rate, check_start, check_unit
 from .samples import check_missing, check_outliers, check_repeated, check_stuck
-from .times import check_gaps, check_jitter, check_order
+from .times import BRIDGED_MAX, check_gaps, check_jitter, check_order
 
 if TYPE_CHECKING:
     from ..machines.machine import Machine
@@ -22,8 +23,7 @@ __all__ = ["Intake", "apply", "check"]
 
 _Check = Callable[[Log], Iterator[Finding]]
 
-_TIMES: tuple[_Check, ...] = (check_order, check_gaps, check_jitter)
-_SAMPLES: tuple[_Check, ...] = (check_missing, check_outliers, check_stuck, check_repeated)
+_SAMPLES: tuple[_Check, ...] = (check_outliers, check_stuck, check_repeated)
 _AXIS: tuple[_Check, ...] = (
     check_same,
     check_swapped,
@@ -71,7 +71,7 @@ class Intake:
 
 
 @np.errstate(all="ignore")  # a log may hold any finite number
-def check(log: Log, machine: Machine | None = None) -> Intake:
+def check(log: Log, machine: Machine | None = None, *, bridged: int = BRIDGED_MAX) -> Intake:
     """Check a log.
 
     Times first, then single samples, then the motion, then the columns against each other, each on the log that the
@@ -83,6 +83,9 @@ def check(log: Log, machine: Machine | None = None) -> Intake:
         Read with ``uniform=False``, so that gaps and jitter reach the checks.
     machine : Machine, optional
         Its model makes the check of the delay exact, and says which sampling rate is needed.
+    bridged : int
+        Samples missing in a gap up to which its fix fills it in, the measured position NaN, as a predictor with trust
+        and an identification take it. Longer gaps separate segments; 0 for all of them, as without trust.
 
     Returns
     -------
@@ -98,7 +101,10 @@ def check(log: Log, machine: Machine | None = None) -> Intake:
             log = apply(log, found)
 
     given = log
-    look(_TIMES)
+    look((check_order,))
+    findings.extend(check_missing(log))
+    look((lambda log: check_gaps(log, bridged), check_jitter))
+    log = without_missing(log)  # what is missing, and in gaps, is no fault to find again
     if len(log.t) >= _FEW and np.isfinite(log.x_meas).any():
         look(_SAMPLES)
     hopeless = list(check_motion(log))

@@ -5,24 +5,25 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, PchipInterpolator
 
-from ..base.signals import Indices
+from ..base.signals import Array, Indices
 from ..logs.log import Log
 
 __all__ = [
     "begin_at",
     "bridge",
     "cut_out",
+    "filled",
     "in_order",
     "integrated",
     "offset_removed",
     "resampled",
     "scaled",
     "shifted_back",
-    "split",
     "swapped",
     "thinned",
+    "without_missing",
 ]
 
 
@@ -32,9 +33,34 @@ def in_order(log: Log) -> Log:
     return replace(log, t=log.t[keep], x_d=log.x_d[keep], x_meas=log.x_meas[keep], starts=(0,))
 
 
-def split(log: Log, starts: Indices) -> Log:
-    """Begin a segment at each of these samples."""
-    return replace(log, starts=tuple(sorted({*log.starts, *(int(k) for k in starts)})))
+def filled(log: Log, starts: Indices, lost: Indices, most: int) -> Log:
+    """Fill short gaps, and begin a segment behind the others.
+
+    The command is interpolated by cubics that do not overshoot, times are evenly spaced, measurements missing.
+
+    Parameters
+    ----------
+    log : Log
+    starts : (n,) array of int
+        Samples behind the gaps.
+    lost : (n,) array of int
+        Samples missing in each.
+    most : int
+        Samples in a gap up to which it is filled.
+    """
+    short = lost <= most
+    inserted = np.zeros(len(log.t), dtype=np.intp)
+    inserted[starts[short]] = lost[short]
+    place = np.arange(len(log.t)) + np.cumsum(inserted)
+    k = np.arange(place[-1] + 1)
+    x_d, x_meas = log.x_d, np.full(len(k), np.nan)
+    x_meas[place] = log.x_meas
+    if short.any():
+        with np.errstate(over="ignore"):  # a slope of next to nothing has no reciprocal, and is taken as 0
+            x_d = PchipInterpolator(place, log.x_d)(k)
+        x_d[place] = log.x_d
+    begins = {int(place[start]) for start in (*log.starts, *starts[~short])}
+    return replace(log, t=np.interp(k, place, log.t), x_d=x_d, x_meas=x_meas, starts=tuple(sorted(begins)))
 
 
 def resampled(log: Log) -> Log:
@@ -58,11 +84,21 @@ def thinned(log: Log, step: int, first: int) -> Log:
 
 
 def bridge(log: Log, column: str, wrong: Indices) -> Log:
-    """Interpolate linearly over the samples ``wrong``, indices, of ``x_d`` or ``x_meas``."""
-    signal, known = getattr(log, column), np.ones(len(log.t), dtype=np.bool_)
+    """Interpolate linearly over the samples ``wrong``, indices, of ``x_d`` or ``x_meas``; missing ones stay missing."""
+    signal = getattr(log, column)
+    known = ~np.isnan(signal)
+    there = known.copy()
     known[wrong] = False
     k = np.arange(len(signal))
-    return replace(log, **{column: np.interp(k, k[known], signal[known])})
+    if not known.any():
+        return log
+    bridged = np.where(there, np.interp(k, k[known], signal[known]), np.nan)
+    return replace(log, x_d=bridged) if column == "x_d" else replace(log, x_meas=bridged)
+
+
+def without_missing(log: Log) -> Log:
+    """Interpolate linearly in time over missing measurements; a log without any measurement stays as it is."""
+    return replace(log, x_meas=_interpolated(log.t, log.x_meas))
 
 
 def cut_out(log: Log, begins: Indices, ends: Indices) -> Log:
@@ -85,7 +121,7 @@ def begin_at(log: Log, first: int) -> Log:
 
 def swapped(log: Log) -> Log:
     """Exchange commanded and measured positions."""
-    return replace(log, x_d=log.x_meas, x_meas=log.x_d)
+    return replace(log, x_d=_interpolated(log.t, log.x_meas), x_meas=log.x_d)
 
 
 def integrated(log: Log, column: str, factor: float) -> Log:
@@ -93,9 +129,11 @@ def integrated(log: Log, column: str, factor: float) -> Log:
     other = "x_d" if column == "x_meas" else "x_meas"
     parts = []
     for segment in log.segments():
-        velocity = factor * getattr(segment, column)
+        velocity = factor * _interpolated(segment.t, getattr(segment, column))
         position = np.concatenate(([0.0], np.cumsum((velocity[1:] + velocity[:-1]) / 2))) * log.T_s
-        parts.append(replace(segment, **{column: getattr(segment, other)[0] + position}))
+        first = _interpolated(segment.t, getattr(segment, other))[0]
+        position[np.isnan(getattr(segment, column))] = np.nan
+        parts.append(replace(segment, **{column: first + position}))
     return _joined(log, parts)
 
 
@@ -114,7 +152,7 @@ def offset_removed(log: Log, offset: float) -> Log:
 def shifted_back(log: Log, delay: float) -> Log:
     """Advance the measured position by ``delay`` samples, and leave out the ends where it is not known then.
 
-    Fractions of a sample are interpolated by a cubic spline.
+    Fractions of a sample are interpolated by a cubic spline, and missing beside a missing sample.
     """
     parts = []
     for segment in log.segments():
@@ -124,9 +162,24 @@ def shifted_back(log: Log, delay: float) -> Log:
             continue
         at = (k + delay)[inside]
         whole = delay == round(delay)
-        x = segment.x_meas[at.astype(np.intp)] if whole else CubicSpline(k, segment.x_meas)(at)
+        before = at.astype(np.intp)
+        x = segment.x_meas[before]
+        if not whole:
+            known = ~np.isnan(segment.x_meas)
+            beside = known[before] & known[np.minimum(before + 1, n - 1)]
+            x = np.full(len(at), np.nan)
+            if beside.any():
+                x[beside] = CubicSpline(k[known], segment.x_meas[known])(at[beside])
         parts.append(replace(segment, t=segment.t[inside], x_d=segment.x_d[inside], x_meas=x))
     return _joined(log, parts)
+
+
+def _interpolated(t: Array, signal: Array) -> Array:
+    """Return a signal with what is NaN interpolated linearly in time, unless all of it is."""
+    known = ~np.isnan(signal)
+    if known.all() or not known.any():
+        return signal
+    return np.asarray(np.where(known, signal, np.interp(t, t[known], signal[known])))
 
 
 def _joined(log: Log, parts: list[Log]) -> Log:

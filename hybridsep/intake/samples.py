@@ -48,11 +48,12 @@ def check_missing(log: Log) -> Iterator[Finding]:
     if not len(wrong) or len(wrong) == len(log.t):
         return
     words = (
-        f"{len(wrong)} of {len(log.t)} measured positions are missing; the first is sample {wrong[0] + 1}, t = "
-        f"{log.t[wrong[0]]:.6g} s; with trust they are replayed as such"
+        f"{len(wrong)} of {len(log.t)} measured positions {'are' if len(wrong) > 1 else 'is'} missing; the first is "
+        f"sample {wrong[0] + 1}, t = {log.t[wrong[0]]:.6g} s; an identification leaves them out, and with trust they "
+        "are replayed as missing"
     )
     evidence = {"n": float(len(wrong)), "first": float(wrong[0])}
-    fix = Fix("interpolate the measured position over them", partial(fixes.bridge, column="x_meas", wrong=wrong))
+    fix = Fix("interpolate over them, where a model without trust needs it", fixes.without_missing)
     yield Finding("missing samples", NOTE, words, evidence, _signals(log, _COLUMNS["x_meas"], wrong), fix)
 
 

@@ -125,7 +125,8 @@ def _name(source: Source, role: str, given: str | None) -> str | None:
 
 def _only_clock(source: Source) -> str | None:
     """Return the only column of timestamps, whatever its name; None if there are none or several."""
-    clocks = [name for name in source.names if name in source.stamps]
+    twins = {twin for one in source.twins.values() for twin in one}
+    clocks = [name for name in source.names if name in source.stamps and name not in twins]
     if len(clocks) != 1:
         return None
     source.remarks = [*source.remarks, f"column {clocks[0]!r} is read as the time; columns (--t) names another"]

@@ -47,7 +47,7 @@ class Log:
     t : (n,) array, s
         Times as recorded, from 0 where they are clock timestamps, or ``k·T_s`` if the file has no time column.
     x_d, x_meas : (n,) array, m or rad
-        Commanded and measured positions.
+        Commanded and measured positions; ``x_meas`` is NaN where it is missing, if it may be.
     T_s : float
         Sampling interval, s.
     path : Path
@@ -90,10 +90,12 @@ class LogReader:
     path : Path
         The file.
     T_s : float
-        Sampling interval, s: the given one, or the mean of the time column's, rounded to its significant digits; the
-        median one where ``uniform`` is false.
+        Sampling interval, s: the given one, or the mean of the time column's, gaps aside, rounded to the fewest digits
+        within three of its standard errors.
     n_samples : int
         Samples in the log.
+    is_even : bool
+        Whether its times increase and none is missing; jitter counts only where ``uniform`` is true, and is refused.
     unit : {"m", "rad"}
         Unit of the positions that are returned.
     remarks : tuple of str
@@ -109,7 +111,7 @@ class LogReader:
         T_s: float | None = None,
         axis: str | None = None,
         uniform: bool = True,
-        may_miss: bool = False,
+        may_miss: bool | None = None,
     ) -> None:
         self.path = Path(path)
         given = check_reading(unit, T_s)
@@ -119,8 +121,11 @@ class LogReader:
         self._columns = choose_columns(self._source, columns, unit, time_needed=given is None)
         self.unit = self._columns["x_d"].unit.si
         self.remarks = (*self._source.remarks, *self._guessed(columns or {}))
-        self._uniform, self._may_miss = uniform, may_miss
-        self._source.measured, self._source.may_miss = self._columns["x"].name, may_miss
+        self._uniform = uniform
+        self._may_miss = not uniform if may_miss is None else may_miss
+        self._source.measured, self._source.may_miss = self._columns["x"].name, self._may_miss
+        self._check_twins()
+        self.is_even = True
         self.n_samples, self.T_s = self._scan(given)
 
     def chunks(self, n: int = _BLOCK) -> Iterator[tuple[Array, Array]]:
@@ -186,6 +191,25 @@ class LogReader:
                 f"{largest:g} {si}{hint}"
             )
 
+    def _check_twins(self) -> None:
+        """Raise LogError if a column that is read occurs several times, with values that differ.
+
+        Scopes write the time again beside each channel.
+        """
+        for role, column in self._columns.items():
+            twins = self._source.twins.get(column.name, ())
+            for block in self._source.blocks([column.name, *twins], _BLOCK) if twins else ():
+                values = np.stack(block.columns)
+                differ = ~((values == values[0]) | np.isnan(values) & np.isnan(values[0])).all(axis=0)
+                if differ.any():
+                    i = int(np.argmax(differ))
+                    other = next(value for value in values[1:, i] if value != values[0, i])
+                    ways = "export all channels with one common time, or remove" if role == "t" else "rename or remove"
+                    raise LogError(
+                        f"{self.path}, {block.where(i)}: column {column.name!r} occurs {1 + len(twins)} times, with "
+                        f"different values, {values[0, i]:.9g} and {other:.9g}; {ways} those that are not meant"
+                    )
+
     def _scan(self, given: float | None) -> tuple[int, float]:
         """Scan one column; return the number of samples and the sampling interval.
 
@@ -212,6 +236,7 @@ class LogReader:
             del self._columns["t"]
             return count, given
         found = axis.interval()
+        self.is_even = self._uniform or axis.is_even
         if given is not None and abs(found - given) > TS_TOLERANCE * given:
             raise LogError(
                 f"{self.path}: T_s = {given:g} s was given, but column {column.name!r} has an interval of "
@@ -247,7 +272,7 @@ def open_log(
     T_s: float | None = None,
     axis: str | None = None,
     uniform: bool = True,
-    may_miss: bool = False,
+    may_miss: bool | None = None,
 ) -> LogReader:
     """Open a log for reading in bounded memory.
 
@@ -273,10 +298,11 @@ def open_log(
     axis : str, optional
         Axis of a file that holds several, such as ``"X1"``.
     uniform : bool
-        Whether an uneven time axis is refused; otherwise ``T_s`` is its median interval, for
+        Whether an uneven time axis is refused; otherwise gaps, jitter and times out of order are left to
         :func:`hybridsep.intake.check.check`.
-    may_miss : bool
-        Whether measured positions may be missing: NaN, in text ``nan`` or nothing. With trust a predictor replays them.
+    may_miss : bool, optional
+        Whether measured positions may be missing: NaN, in text ``nan`` or nothing. With trust a predictor replays them,
+        and they are left out of an identification. If left out, where ``uniform`` is false, as the checks find them.
 
     Returns
     -------
@@ -298,7 +324,7 @@ def read_log(
     T_s: float | None = None,
     axis: str | None = None,
     uniform: bool = True,
-    may_miss: bool = False,
+    may_miss: bool | None = None,
 ) -> Log:
     """Return a whole log; parameters and errors as for :func:`open_log`."""
     return LogReader(path, columns=columns, unit=unit, T_s=T_s, axis=axis, uniform=uniform, may_miss=may_miss).read()

@@ -16,7 +16,7 @@ from ..base.signals import Array
 __all__ = ["NEEDS_TRUST", "Block", "Source", "check_column", "check_lengths", "sample_number"]
 
 
-NEEDS_TRUST = "; missing measurements are replayed with trust alone (--trust true)"
+NEEDS_TRUST = "; missing measurements are replayed with trust alone: read them with may_miss=True (--trust true)"
 """End of the message about a measured position that is missing."""
 
 
@@ -50,6 +50,8 @@ class Source(ABC):
         The file.
     names : list of str
         Available columns.
+    twins : mapping
+        Name of a column → the further columns that the file gives the same name, under names of their own: ``Time#2``.
     units : mapping
         Name of a column → unit that the file states beside it, where it does so outside the name.
     assumed_units : mapping
@@ -74,6 +76,7 @@ class Source(ABC):
     def __init__(self, path: Path) -> None:
         self.path = path
         self.names: list[str] = []
+        self.twins: Mapping[str, Sequence[str]] = {}
         self.units: Mapping[str, str] = {}
         self.assumed_units: Mapping[str, str] = {}
         self.roles: Mapping[str, str] = {}

@@ -76,8 +76,10 @@ class TextSource(Source):
         if layout is None:
             raise LogError(f"{path}: the file is empty, a line of column names was expected")
         self._layout: Layout = layout
-        self.names = layout.names
-        self.units = layout.units
+        self.names, self.twins = _with_own_names(layout.names)
+        self.units = layout.units | {
+            twin: layout.units[name] for name, twins in self.twins.items() if name in layout.units for twin in twins
+        }
         self.stamps = frozenset(self.names[i] for i in layout.clocks)
         self._dates = {i: date for i, date in layout.clocks.items() if date is not None}
         if all(is_number(name) or stamp_kind(name) for name in self.names):
@@ -173,7 +175,7 @@ class TextSource(Source):
             if i in stamps:
                 row.append(cell(fields[i]))
                 continue
-            missing = not fields[i] and self.names[i] == self.measured
+            missing = not fields[i] and self.names[i] in (self.measured, *self.twins.get(self.measured, ()))
             if missing and self.may_miss:
                 row.append(math.nan)
                 continue
@@ -186,6 +188,19 @@ class TextSource(Source):
                 )
             row.append(float(number_there))
         return tuple(row)
+
+
+def _with_own_names(names: Sequence[str]) -> tuple[list[str], dict[str, list[str]]]:
+    """Return names that occur once, ``Time#2`` for the second ``Time``, and those by the name that they had."""
+    own: list[str] = []
+    twins: dict[str, list[str]] = {}
+    for i, name in enumerate(names):
+        if name and name in names[:i]:
+            twins.setdefault(name, []).append(f"{name}#{names[: i + 1].count(name)}")
+            own.append(twins[name][-1])
+        else:
+            own.append(name)
+    return own, twins
 
 
 def _hint(field: str, *, divided: bool) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from ..base.errors import LogError
 from ..base.signals import Array
+from .gaps import gap_starts, mean_interval, rounded_interval, standard_error
 from .source import Block
 
 __all__ = ["COUNTED", "TOLERANCE", "TimeAxis"]
@@ -23,9 +25,6 @@ and 1 kHz, 5 % of an interval are 4 µm of travel, comparable to encoder noise.
 COUNTED = 10
 """Fewest times that count samples before they are taken for an index: a log with an interval of 1 s is none yet."""
 
-_ROUNDING = 1e-8
-"""Relative tolerance when the interval is rounded: 0.001000000003 s becomes 0.001 s."""
-
 
 class TimeAxis:
     """Time axis that arrives in blocks, checked in constant memory.
@@ -39,15 +38,15 @@ class TimeAxis:
     name : str
         The column, for messages.
     uniform : bool
-        Whether an interval that is not the median one is refused; otherwise all of them are kept, for their median.
+        Whether an interval that is not the median one is refused; otherwise all times are kept, to tell gaps.
     """
 
     def __init__(self, path: Path, name: str, *, uniform: bool = True) -> None:
         self._path, self._name, self._uniform = path, name, uniform
         self._n = 0
         self._counts = True
-        self._intervals: list[Array] = []
-        self._first = self._last = self._median = self._jitter = 0.0
+        self._times: list[Array] = []
+        self._first = self._last = self._median = self._squares = 0.0
 
     @np.errstate(over="ignore", invalid="ignore")  # an interval that overflows is reported at the end
     def extend(self, block: Block) -> None:
@@ -68,7 +67,7 @@ class TimeAxis:
         shift = len(t) - len(steps)
         self._counts = self._counts and self._first in (0.0, 1.0) and bool((steps == 1.0).all())
         if not self._uniform:
-            self._intervals.append(steps)
+            self._times.append(t)
         elif len(steps):
             self._check_increasing(steps, shift, block)
             if self._median == 0.0:
@@ -83,35 +82,31 @@ class TimeAxis:
         return self._counts and self._n >= COUNTED
 
     def interval(self) -> float:
-        """Return the mean interval, s, rounded to its significant digits under the jitter; needs two samples.
+        """Return the mean interval, s, gaps aside, rounded within its standard error; needs two samples.
 
         Raises
         ------
         LogError
-            If the interval or its reciprocal underflows.
+            If the times never increase, or the interval or its reciprocal underflows.
         """
-        mean = (self._last - self._first) / (self._n - 1) if self._uniform else self._median_interval()
+        if self._uniform:
+            n = self._n - 1
+            mean = (self._last - self._first) / n
+            variance = self._squares / n - (mean / self._median - 1.0) ** 2 if self._median else 0.0
+            error = standard_error(max(variance, 0.0) ** 0.5, n)
+        else:
+            mean, error = mean_interval(np.concatenate(self._times))
+        if math.isnan(mean):
+            raise LogError(f"{self._path}: time {self._name!r} must increase, it never does")
         if not sys.float_info.min <= mean <= 1 / sys.float_info.min:
             raise LogError(f"{self._path}: time {self._name!r} must be in seconds, got an interval of {mean:g} s")
-        tolerance = _ROUNDING + min(1e-4, self._jitter / (self._n - 1))
-        # The interval or rate with the fewest digits within the tolerance: 0.001 s, or 1/3000 s; ten digits always are
-        candidates = (
-            candidate
-            for digits in range(10)
-            for candidate in (float(f"{mean:.{digits}e}"), 1 / float(f"{1 / mean:.{digits}e}"))
-        )
-        return next(candidate for candidate in candidates if abs(candidate - mean) <= tolerance * mean)
+        return rounded_interval(mean, error)
 
-    @np.errstate(over="ignore", invalid="ignore")
-    def _median_interval(self) -> float:
-        steps = np.concatenate(self._intervals)
-        steps = steps[steps > 0.0]
-        if not len(steps):
-            raise LogError(f"{self._path}: time {self._name!r} must increase, it never does")
-        median = float(np.median(steps))
-        near = steps[np.abs(steps - median) <= 0.5 * median]  # none where it is between two that differ much
-        # The clock's mean, gaps and repeated times aside
-        return float(np.mean(near)) if len(near) else median
+    @property
+    def is_even(self) -> bool:
+        """Whether times increase and none is missing, jitter aside; the intervals must have been kept."""
+        t = np.concatenate(self._times)
+        return bool((np.diff(t) > 0.0).all()) and not len(gap_starts(t, mean_interval(t)[0]))
 
     def _check_increasing(self, steps: Array, shift: int, block: Block) -> None:
         if steps.min() <= 0.0:
@@ -137,4 +132,4 @@ class TimeAxis:
                 f"{self._median:.6g} s ± {100 * TOLERANCE:g} % was expected, got {steps[i]:.6g} s{samples}; "
                 f"resample the log, or remove the time column and give T_s (--fix, --T_s)"
             )
-        self._jitter = max(self._jitter, worst)
+        self._squares += float(deviations @ deviations)

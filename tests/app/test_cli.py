@@ -46,10 +46,14 @@ def test_backtest_of_a_log_with_missing_measurements(hybridsep: Run, tmp_path: P
     status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--trust", "true", "--json")
     assert status == 0
     assert json.loads(out)["n_samples"] == 1999
-    assert "measurements were missing or not plausible" in json.loads(out)["verdict"]
+    assert "1 of 2000 measurements was missing, and not learned" in json.loads(out)["verdict"]
     status, _, said = hybridsep("backtest", log, "-m", "spring_mass_damper")
     assert status == 2
     assert "line 1501: column 'x' must be a number, got nothing; missing measurements are replayed with trust" in said
+    assert "(--trust true)" in said
+    status, _, said = hybridsep("backtest", log, "-m", "spring_mass_damper", "--trust", "true", "--fix")
+    assert status == 0
+    assert "1 of 2000 measured positions is missing; the first is sample 1500" in said
 
 
 def test_backtest_takes_units_columns_and_parameters(hybridsep: Run, tmp_path: Path) -> None:

@@ -70,14 +70,50 @@ def test_gaps_and_jitter(hybridsep: Run, tmp_path: Path) -> None:
     assert "60 samples are missing in 1 gap" in err
     np.savetxt(tmp_path / "jitter.csv", rows, delimiter=",", header="t,x_d,x", comments="", fmt="%.17g")
     status, _, err = hybridsep("backtest", tmp_path / "jitter.csv", *MACHINE)
-    assert status == 2
-    assert "time 't' must be uniform" in err
-    assert "(--fix, --T_s)" in err
+    assert status == 0
+    assert "intervals differ by more than 5 % from 0.001 s" in err
+    assert "the model takes them as equal" in err
+    status, _, err = hybridsep("backtest", tmp_path / "log.csv", *MACHINE, "--as-is")
+    assert status == 0
     status, out, err = hybridsep("backtest", tmp_path / "log.csv", *MACHINE, "--fix", "--json")
     assert status == 0
     assert json.loads(out)["n_samples"] == pytest.approx(2040, abs=1)
     assert "log.csv: of 2 segments the longest, 20" in err
     assert [finding["name"] for finding in json.loads(out)["findings"]] == ["gaps", "jitter"]
+
+
+def test_single_rows_that_are_missing(hybridsep: Run, tmp_path: Path) -> None:
+    rows = np.column_stack((np.arange(3000) * 1e-3, commanded()[:3000], measured(0)[:3000]))
+    keep = np.setdiff1d(np.arange(3000), np.random.default_rng(5).integers(1, 2999, 30))
+    log = tmp_path / "log.csv"
+    np.savetxt(log, rows[keep], delimiter=",", header="t,x_d,x", comments="", fmt="%.17g")
+    figure, saved = ["--figure", tmp_path / "figure.png"], ["--save", tmp_path / "predicted.csv"]
+    status, out, err = hybridsep("backtest", log, *MACHINE, "--trust", "true", "--fix", "--json", *figure, *saved)
+    assert status == 0
+    assert "segments" not in err
+    assert json.loads(out)["n_samples"] == len(keep)
+    whole = tmp_path / "whole.csv"
+    np.savetxt(whole, rows, delimiter=",", header="t,x_d,x", comments="", fmt="%.17g")
+    of_whole = json.loads(hybridsep("backtest", whole, *MACHINE, "--trust", "true", "--json")[1])
+    assert json.loads(out)["rms_h_um"] == pytest.approx(of_whole["rms_h_um"], rel=0.1)
+    status, out, err = hybridsep("backtest", log, *MACHINE, "--trust", "false", "--fix", "--json")
+    assert status == 0
+    assert "as the model has trust = false; with trust (--trust true) those of at most 10 samples are bridged" in err
+    assert "segments the longest" in err
+
+
+def test_rows_that_are_missing_behind_what_is_checked(
+    hybridsep: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("hybridsep.app.log_intake.CHECKED_MAX", 1500)
+    rows = np.column_stack(
+        (np.arange(30_000) * 1e-3, *(np.resize(f[:6000], 30_000) for f in (commanded(), measured(0))))
+    )
+    log = tmp_path / "log.csv"
+    np.savetxt(log, np.delete(rows, 25_000, axis=0), delimiter=",", header="t,x_d,x", comments="", fmt="%.17g")
+    status, _, err = hybridsep("backtest", log, *MACHINE)
+    assert status == 2
+    assert "1 sample may be lost" in err
 
 
 @pytest.mark.parametrize("suffix", [".png", ".pdf", ".svg"])

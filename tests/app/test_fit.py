@@ -192,6 +192,27 @@ def test_a_gap_in_motion_does_not_decide_the_verdict(tmp_path: Path) -> None:
     assert "The window after a gap does not judge" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
+def test_missing_measurements(hybridsep: Run, tmp_path: Path) -> None:
+    x_d, x = commanded()[:N], measured(0)[:N]
+    x[np.random.default_rng(3).integers(0, N, 25)] = np.nan
+    x[2050:2070] = np.nan  # in motion, in the half that judges
+    n = int(np.isnan(x).sum())
+    rows = "\n".join(f"{k * 1e-3:.3f},{x_d[k]:.9f},{'' if np.isnan(x[k]) else f'{x[k]:.9f}'}" for k in range(N))
+    path = tmp_path / "axis.csv"
+    path.write_text(f"t,x_d,x\n{rows}\n")
+    for fix in ([], ["--fix"]):
+        out = tmp_path / f"out{len(fix)}"
+        status, said, err = hybridsep("fit", path, "--out", out, "--Np", NP, "--json", *fix)
+        assert (status, err) == (0, "")
+        found = json.loads(said)
+        [finding] = found["findings"]["axis.csv"]
+        assert finding["name"] == "missing samples"
+        assert finding["words"].startswith(f"{n} of {N} measured positions are missing")
+        rms_pb, rms_hold, rms_h = (found["judged"][name] for name in ("rms_pb", "rms_hold", "rms_h"))
+        assert rms_h < 0.7 * min(rms_pb, rms_hold)
+        assert rms_h < 14e-6  # noise is 5 µm
+
+
 def test_what_is_kept_is_of_the_samples_as_they_are_read(log: Path) -> None:
     found = read_log(log)
     [recording] = halves([(found.x_d, found.x_meas)], 0.5)

@@ -133,6 +133,26 @@ def test_the_log_is_checked(hybridsep: Run, tmp_path: Path) -> None:
     assert machine.model.modes[0].f_n == pytest.approx(20.0, abs=0.1)
 
 
+def test_missing_measurements(hybridsep: Run, tmp_path: Path) -> None:
+    x_d = moves(1200)
+    x = measured(TRUTH, x_d, "zoh", 1e-6)
+    x[np.random.default_rng(2).integers(0, len(x), 20)] = np.nan
+    n = int(np.isnan(x).sum())
+    rows = "\n".join(f"{k * T_S:.6f},{x_d[k]:.9f},{'' if np.isnan(x[k]) else f'{x[k]:.9f}'}" for k in range(len(x)))
+    path = tmp_path / "log.csv"
+    path.write_text(f"t,x_d,x\n{rows}\n")
+    out = tmp_path / "axis.toml"
+    for fix in ([], ["--fix"]):
+        status, _, err = hybridsep("identify", path, "--out", out, "--figure", tmp_path / "log.png", *fix)
+        assert status == 0
+        assert f"{n} of {len(x)} measured positions are missing" in " ".join(err.split())
+        assert load_machine(out).model.modes[0].f_n == pytest.approx(20.0, abs=0.1)
+    status, _, err = hybridsep("identify", path, "--kind", "sweep")
+    assert status == 2
+    assert f"{n} measured positions are missing; record it again, or read it as a log" in " ".join(err.split())
+    assert "--trust" not in err
+
+
 def test_only_a_log_is_put_right(hybridsep: Run, response: Path) -> None:
     status, _, err = hybridsep("identify", response, "--fix")
     assert status == 2

@@ -71,6 +71,8 @@ def test_hold_keeps_the_last_residual_over_the_next_batch() -> None:
 
 def test_batch_rms_with_a_short_last_batch() -> None:
     np.testing.assert_allclose(batch_rms(np.array([3.0, 4.0, 1.0, -1.0, 2.0]), 2), [math.sqrt(12.5), 1.0, 2.0])
+    missing = np.array([3.0, np.nan, np.nan, np.nan, 2.0])
+    np.testing.assert_allclose(batch_rms(missing, 2), [3.0, np.nan, 2.0])
 
 
 def test_peak_derivatives_of_a_cubic() -> None:

@@ -11,7 +11,8 @@ from hybridsep.base.signals import Array
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.evaluate.verdict import Tally, Verdict, verdict_of
-from hybridsep.machines.machine import load_machine
+from hybridsep.machines.machine import Machine, load_machine
+from hybridsep.plants.plant import simulate
 from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.predictor import HybridPredictor
 
@@ -97,7 +98,27 @@ def test_a_bad_beginning_is_told_from_a_bad_model() -> None:
 
 def test_rejected_measurements_are_told() -> None:
     said = str(verdict(10, 10, 5, n_rejected=7))
-    assert said.endswith("\n7 of 1200 measurements were missing or not plausible, and not learned.")
+    assert said.endswith("\n7 of 1200 measurements were not plausible, and not learned.")
+    said = str(verdict(10, 10, 5, n_rejected=1))
+    assert said.endswith("\n1 of 1200 measurements was not plausible, and not learned.")
+
+
+def test_missing_measurements_are_told_from_implausible_ones() -> None:
+    machine = load_machine("spring_mass_damper")
+    x_d = staircase()[:2000]
+    x = simulate(machine.new_plant(), x_d, machine.T_s)
+    x[[700, 701, 1500]] = np.nan
+    assert said_of(machine, x_d, x).endswith("\n3 of 2000 measurements were missing, and not learned.")
+    x[1300] += 1e-3
+    said = said_of(machine, x_d, x)
+    assert said.endswith("\n4 of 2000 measurements were not learned: 3 missing, 1 not plausible.")
+    one = np.where(np.isnan(x), 0.0, x)
+    one[[700, 701, 1500]], one[1300] = one[[699, 702, 1499]], np.nan
+    assert said_of(machine, x_d, one).endswith("\n1 of 2000 measurements was missing, and not learned.")
+
+
+def said_of(machine: Machine, x_d: Array, x: Array) -> str:
+    return str(backtest(HybridPredictor(machine.model), x_d, x).verdict)
 
 
 def test_missing_measurements_are_not_judged() -> None:
@@ -144,4 +165,4 @@ def test_outliers_of_a_run_are_told() -> None:
         predictor, machine.new_plant(), staircase()[:1000], sensor=lambda k, x: x + 1e-3 if k in (555, 666) else x
     )
     assert run.n_rejected == 2
-    assert str(verdict_of(run)).endswith("2 of 1000 measurements were missing or not plausible, and not learned.")
+    assert str(verdict_of(run)).endswith("2 of 1000 measurements were not plausible, and not learned.")

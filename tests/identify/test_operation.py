@@ -16,7 +16,7 @@ from hybridsep.base.errors import IdentificationError
 from hybridsep.base.signals import Array
 from hybridsep.identify.model import IdentifiedModel
 from hybridsep.identify.operation import identify_operation, unit_gain_model
-from hybridsep.identify.output_error import Delay, fit_structure
+from hybridsep.identify.output_error import Delay, fit_structure, without
 from hybridsep.identify.segments import as_segments
 from hybridsep.identify.structure import Structure, lag_mode
 from hybridsep.identify.uncertainty import estimates
@@ -99,6 +99,51 @@ def test_pieces_between_gaps_count_together() -> None:
     found = identify_operation([(x_d[:900], x[:900]), (x_d[1000:], x[1000:])], T_S)
     assert value(found, "mode[1].f_n")[0] == pytest.approx(20.0, rel=0.002)
     assert found.n_samples == 1900
+
+
+def test_missing_measurements_are_left_out() -> None:
+    """What is interpolated over a stretch in motion is wrong by up to millimetres."""
+    x_d = moves(3000)
+    x = measured(SECOND, x_d, "foh", 1e-6)
+    whole = identify_operation([(x_d, x)], T_S)
+    fast = int(np.argmax(np.abs(np.gradient(x_d))))
+    x[np.random.default_rng(1).integers(0, len(x), 60)] = np.nan
+    x[fast - 30 : fast + 30] = np.nan
+    found = identify_operation([(x_d, x)], T_S)
+    assert found.structure == whole.structure
+    assert found.n_samples == np.count_nonzero(~np.isnan(x))
+    assert found.rms == pytest.approx(1e-6, rel=0.05)
+    f_n, std = value(found, "mode[1].f_n")
+    assert abs(f_n - 20.0) < 4 * std
+    assert std == pytest.approx(value(whole, "mode[1].f_n")[1], rel=0.3)
+    k = np.arange(len(x), dtype=np.float64)
+    known = ~np.isnan(x)
+    bridged = identify_operation([(x_d, np.interp(k, k[known], x[known]))], T_S)
+    assert bridged.rms > 3 * found.rms
+
+
+def test_pieces_of_few_samples_do_no_harm() -> None:
+    x_d = moves(3000)
+    x = measured(SECOND, x_d, "foh", 1e-6)
+    ends = [*range(2, 40, 2), 41, 44, len(x_d)]
+    pieces = [(x_d[i:j], x[i:j]) for i, j in zip([0, *ends], ends, strict=False)]
+    with_nothing = [*pieces, (x_d[:50], np.full(50, np.nan))]
+    f_n, std = value(identify_operation(with_nothing, T_S), "mode[1].f_n")
+    assert abs(f_n - 20.0) < 4 * std
+
+
+def test_an_initial_state_that_shows_nowhere_explains_nothing() -> None:
+    ones = np.ones((3, 1))
+    np.testing.assert_array_equal(without(np.zeros((3, 1)), ones), ones)
+    np.testing.assert_allclose(without(np.column_stack((ones, np.zeros(3))), ones), 0.0 * ones, atol=1e-15)
+
+
+def test_too_many_missing_measurements_are_refused() -> None:
+    x_d = moves(2000)
+    x = measured(SECOND, x_d, "foh", 1e-6)
+    x[200:] = np.nan
+    with pytest.raises(IdentificationError, match="too many measured positions are missing: 200 are left in the part"):
+        identify_operation([(x_d, x)], T_S)
 
 
 def test_the_parts_with_most_motion_are_taken_of_a_long_recording() -> None:

@@ -112,9 +112,10 @@ def test_several_faults_at_once() -> None:
         spoiled = FAULTS[fault][1](spoiled)
     intake = check(spoiled)
     assert names(intake.findings) == ["gaps", "outliers", "sign", "scale"]
-    assert len(intake.fixed().segments()) == 3
+    assert len(intake.fixed().segments()) == 2  # 40 rows are a gap, 7 are missing measurements
+    assert len(check(spoiled, bridged=0).fixed().segments()) == 3
     some = apply(spoiled, intake.findings[:1])
-    assert names(check(some).findings) == ["outliers", "sign", "scale"]
+    assert names(check(some).findings) == ["missing samples", "outliers", "sign", "scale"]
 
 
 def test_what_no_fix_helps() -> None:
@@ -138,6 +139,49 @@ def test_missing_measurements() -> None:
     assert np.isfinite(apply(replace(log, x_meas=x), [finding]).x_meas).all()
     nothing = check(replace(log, x_meas=np.full_like(x, np.nan)))
     assert "every measured position is missing" in nothing.findings[0].words
+
+
+def test_short_gaps_are_bridged() -> None:
+    log = needed("staircase")
+    numbers = np.random.default_rng(3)
+    keep = np.ones(len(log.t), dtype=np.bool_)
+    keep[numbers.integers(20, len(log.t) - 20, 40)] = False
+    keep[2050:2060] = False  # in motion
+    holed = replace(log, t=log.t[keep], x_d=log.x_d[keep], x_meas=log.x_meas[keep])
+    [finding] = check(holed).findings
+    assert finding.name == "gaps"
+    assert finding.evidence["n_lost"] == np.count_nonzero(~keep)
+    assert finding.evidence["n_bridged"] == finding.evidence["n"]
+    fixed = apply(holed, [finding])
+    assert len(fixed.segments()) == 1
+    np.testing.assert_allclose(fixed.t, log.t, atol=1e-12)
+    np.testing.assert_array_equal(np.isnan(fixed.x_meas), ~keep)
+    np.testing.assert_array_equal(fixed.x_meas[keep], log.x_meas[keep])
+    np.testing.assert_array_equal(fixed.x_d[keep], log.x_d[keep])
+    assert np.abs(fixed.x_d - log.x_d).max() < 1e-4 * np.ptp(log.x_d)
+    assert names(check(fixed).findings) == ["missing samples"]
+    assert len(check(holed, bridged=0).fixed().segments()) > 30
+    keep[4000:4011] = False
+    longer = replace(log, t=log.t[keep], x_d=log.x_d[keep], x_meas=log.x_meas[keep])
+    [finding] = check(longer).findings
+    assert finding.fix is not None
+    assert finding.fix.words.endswith(
+        "where at most 10 samples are missing, and keep the segments apart at longer ones"
+    )
+    assert [len(segment.t) for segment in apply(longer, [finding]).segments()] == [4000, len(log.t) - 4011]
+
+
+def test_missing_measurements_and_rows_are_told_apart() -> None:
+    log = needed("staircase")
+    x = log.x_meas.copy()
+    x[500] = np.nan
+    keep = np.arange(len(x)) != 700
+    missing, gap = check(replace(log, t=log.t[keep], x_d=log.x_d[keep], x_meas=x[keep])).findings[::-1]
+    assert (gap.name, missing.name) == ("gaps", "missing samples")
+    assert gap.words.startswith("1 sample is missing in 1 gap of 0.002 s; the first is before sample 701")
+    assert missing.words.startswith("1 of 6000 measured positions is missing; the first is sample 501")
+    fixed = apply(replace(log, t=log.t[keep], x_d=log.x_d[keep], x_meas=x[keep]), [gap])
+    assert np.flatnonzero(np.isnan(fixed.x_meas)).tolist() == [500, 700]
 
 
 def test_words() -> None:

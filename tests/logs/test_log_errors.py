@@ -86,9 +86,40 @@ def test_csv_without_names(tmp_path: Path) -> None:
 
 
 def test_column_named_twice(tmp_path: Path) -> None:
-    path = write_csv(tmp_path / "log.csv", "t,x_d,x,x\n0,1,2,3\n1,1,2,3\n")
+    path = write_csv(tmp_path / "log.csv", "t,x,x_d,x\n0,1,2,1\n1,3,4,\n2,5,6,7\n")
+    with pytest.raises(LogError, match=r"line 3: column 'x#2' must be a number, got nothing"):
+        read_log(path)
+    with pytest.raises(LogError, match=r"line 3: column 'x' occurs 2 times, with different values, 3 and nan; rename"):
+        read_log(path, may_miss=True)
+    path = write_csv(tmp_path / "log.csv", "t;x_d;t;x\n0;1;0;3\n1;1;1;3\n2;1;2,5;3\n")
+    with pytest.raises(
+        LogError, match=r"line 4: column 't' occurs 2 times, .* 2 and 2.5; export all channels with one common time, or"
+    ):
+        read_log(path)
+    assert read_log(path, columns={"t": "t#2"}, uniform=False).t.tolist() == [0.0, 1.0, 2.5]
+    twice = {"t": np.arange(3.0), "x_d": np.arange(3.0), "x": np.arange(3.0)}
+    with zipfile.ZipFile(write(tmp_path / "log.npz", twice), "a") as archive, pytest.warns(UserWarning, match="Dup"):
+        archive.writestr("x.npy", archive.read("x.npy"))
     with pytest.raises(LogError, match="column 'x' must occur once, got it 2 times"):
-        open_log(path)
+        read_log(tmp_path / "log.npz")
+
+
+def test_a_time_beside_each_channel(tmp_path: Path) -> None:
+    """As TwinCAT Scope exports it."""
+    head = "Name;Scope\nFile;C:\\x.tcscopex\nStarttime of export;133500000000\n\n"
+    rows = "".join(f"{k};{k / 8:g};{k};{k / 4:g}\n".replace(".", ",") for k in range(30))
+    names = {"x_d": "SetPos", "x": "ActPos"}
+    for header in ("Time [ms];SetPos;Time [ms];ActPos\n", "Time;SetPos;Time;ActPos\nms;m;ms;m\n"):
+        log = read_log(write_csv(tmp_path / "log.csv", head + header + rows), columns=names)
+        assert log.T_s == 1e-3
+        np.testing.assert_array_equal(log.x_meas, np.arange(30) / 4)
+    path = write_csv(tmp_path / "log.csv", f"{head}Time;SetPos;Time;ActPos\n{rows}")
+    with pytest.raises(LogError, match=r"counts samples: it is an index, or a time in ms; give T_s"):
+        read_log(path, columns=names)
+    assert read_log(path, columns=names, T_s=1e-3).T_s == 1e-3
+    stamps = "".join(f"12:00:0{k}.5;{k};12:00:0{k}.5;{k}\n" for k in range(9))
+    path = write_csv(tmp_path / "log.csv", f"Uhr;x_d;Uhr;x\n{stamps}")
+    assert read_log(path).T_s == 1.0
 
 
 @pytest.mark.parametrize(

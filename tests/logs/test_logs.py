@@ -132,6 +132,34 @@ def test_jitter_of_a_clock_does_not_move_the_interval(
     assert read_log(path).T_s == pytest.approx(1e-3, rel=2e-5)
 
 
+@given(seed=st.integers(0, 2**32 - 1), n=st.integers(1000, 20_000), rows_lost=st.sampled_from([0, 100]))
+@settings(max_examples=30)
+def test_the_interval_of_a_clock_that_jitters(
+    seed: int, n: int, rows_lost: int, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    numbers = np.random.default_rng(seed)
+    t = np.arange(n) * 1e-3 + np.clip(numbers.normal(0.0, 1e-4, n), -4e-4, 4e-4)
+    t = np.delete(t, numbers.integers(1, n - 1, rows_lost))
+    t[n // 2 :] += 7.77  # recording stopped, and went on
+    path = write(tmp_path_factory.mktemp("jitter") / "log.npz", {"t": t, "x_d": t, "x": t})
+    T_s = read_log(path, uniform=False).T_s
+    # Standard error of the mean: that of two ends for each piece between gaps, √2 · 0.1 ms
+    assert T_s == pytest.approx(1e-3, rel=5 * 0.1414 * np.sqrt(rows_lost + 2) / (n - rows_lost))
+    if rows_lost == 0 and n > 15_000:
+        assert T_s == 1e-3 or abs(T_s - 1e-3) > 2e-8
+
+
+def test_an_interval_that_is_not_round_stays(tmp_path: Path) -> None:
+    t = np.arange(12_000) * 1.0002e-3
+    jitter = np.random.default_rng(0).normal(0.0, 1e-4, len(t))
+    path = write(tmp_path / "log.npz", {"t": t + jitter, "x_d": t, "x": t})
+    assert read_log(path, uniform=False).T_s == pytest.approx(1.0002e-3, rel=1e-6)
+    t[7000:] += 0.3e-3  # one late sample tells nothing of the others
+    for uneven in (t, np.delete(t, 5000)):
+        path = write(tmp_path / "log.npz", {"t": uneven, "x_d": uneven, "x": uneven})
+        assert read_log(path, uniform=False).T_s == pytest.approx(1.0002e-3, rel=3e-5)
+
+
 def test_a_median_between_two_intervals_that_differ_much(tmp_path: Path) -> None:
     path = write_csv(tmp_path / "log.csv", "t,x_d,x\n0,0,0\n1,0,0\n11,0,0\n")
     assert read_log(path, uniform=False).T_s == 5.5

@@ -145,13 +145,14 @@ def test_a_line_without_end_does_not_fill_the_memory(tmp_path: Path) -> None:
 @pytest.mark.parametrize("nothing", ["", "nan", "NaN"])
 def test_missing_measurements(tmp_path: Path, nothing: str) -> None:
     path = write_csv(tmp_path / "log.csv", f"t,x_d,x\n0,1,2\n1,3,{nothing}\n2,5,6\n")
-    with pytest.raises(
-        LogError, match=r"line 3: column 'x' must be .*got n.*missing measurements .* \(--trust true\)$"
-    ):
+    refused = r"line 3: column 'x' must be .*got n.*missing measurements .*with may_miss=True \(--trust true\)$"
+    with pytest.raises(LogError, match=refused):
         read_log(path)
-    log = read_log(path, may_miss=True)
-    np.testing.assert_array_equal(log.x_meas, [2.0, np.nan, 6.0])
-    np.testing.assert_array_equal(log.x_d, [1.0, 3.0, 5.0])
+    with pytest.raises(LogError, match=refused):
+        read_log(path, uniform=False, may_miss=False)
+    for log in (read_log(path, may_miss=True), read_log(path, uniform=False)):
+        np.testing.assert_array_equal(log.x_meas, [2.0, np.nan, 6.0])
+        np.testing.assert_array_equal(log.x_d, [1.0, 3.0, 5.0])
 
 
 @pytest.mark.parametrize(
