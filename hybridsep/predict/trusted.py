@@ -166,10 +166,11 @@ class TrustedModel:
     def _rows(self, x_d: Array, x_pb: Array, x: Array, scales: FeatureScales) -> Array:
         """Return the static features to predict with, ``(n, n_static)``; ``x``: position that the stiffness acts at.
 
-        The constant is that of motion: before the first one of a run it is 0.
+        The constant that earlier runs have taught is that of motion: before the first one of this run it is 0.
         """
         rows, _ = self.static.rows(self.state, x_d, x_pb, x, scales.velocity)
-        rows[: scales.n_rest, 0] = 0.0
+        if self.change is not None:
+            rows[: scales.n_rest, 0] = 0.0
         return rows
 
     def scales(self, x_d: Array, x_pb: Array, path: Array | None = None) -> FeatureScales:

@@ -102,7 +102,8 @@ static void trusted_candidates(hsep_trusted *self, const double x_pb[], const do
     }
     double *x = hsep_at(self, self->x), *rows = hsep_at(self, self->rows);
     hsep_candidate *first = hsep_trusted_candidate(self, 0);
-    for (uint64_t k = 0; k < self->n_rest; k++) { /* the constant is that of motion */
+    const uint64_t n_rest = hsep_trusted_change(self)->active ? self->n_rest : 0;
+    for (uint64_t k = 0; k < n_rest; k++) { /* the constant that earlier runs have taught is that of motion */
         rows[k * self->n_static] = 0.0;
     }
     /* The stiffness acts at the position, which the physics model alone does not give well enough. */
