@@ -11,6 +11,7 @@ from ..base.errors import IdentificationError
 from ..base.settings import check
 from ..base.signals import Array
 from ..base.threads import one_blas_thread
+from ..intake.gain import runs_against
 from ..model.physics import ModalModel
 from .model import Alternative, IdentifiedModel
 from .output_error import Delay, Fit, fit_structure, simulated
@@ -29,7 +30,7 @@ WEAK = 3.0
 """Commanded motion in multiples of the unexplained one (standard deviations) below which only a gain of 1 is taken."""
 
 OPPOSED = -0.7
-"""Correlation of commanded and measured motion below which one of them has the wrong sign."""
+"""Correlation of commanded and measured motion below which one of them may have the wrong sign."""
 
 GAIN_RANGE = (0.1, 10.0)
 """Static gains outside of which a unit is probably wrong."""
@@ -139,7 +140,9 @@ def _require_motion(segments: Sequence[Segment]) -> None:
     u = np.concatenate([segment.u - segment.u.mean() for segment in segments])
     y = np.concatenate([segment.y - segment.y.mean() for segment in segments])
     correlation = float(u @ y / np.sqrt((u @ u) * (y @ y)))
-    if correlation < OPPOSED:
+    longest = max(segments, key=lambda segment: float(np.ptp(segment.u)))
+    # Beyond its bandwidth, where a swept sine ends, a drive moves against its command with no sign wrong.
+    if correlation < OPPOSED and runs_against(longest.u, longest.y) is not None:
         raise _refusal(
             f"the measured position moves against the commanded one (correlation {correlation:.2f}); turn the sign of "
             "one of them"

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..logs.log import Log
-from .axis import check_delay, check_offset, check_same, check_scale, check_sign, check_swapped, check_velocity
+from .axis import check_delay, check_offset, check_same, check_swapped, check_velocity
 from .finding import ERROR, HOPELESS, NAMES, Finding
+from .gain import check_scale, check_sign
 from .motion import check_motion, check_rate, check_start, check_unit
 from .samples import check_missing, check_outliers, check_repeated, check_stuck
 from .times import check_gaps, check_jitter, check_order
