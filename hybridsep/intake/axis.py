@@ -12,7 +12,7 @@ import numpy as np
 from ..base.signals import Array
 from ..logs.log import Log
 from . import fixes
-from .finding import ERROR, WARNING, Finding, Fix
+from .finding import ERROR, NOTE, WARNING, Finding, Fix
 from .relation import fit_dead_time, line, line_at_best_lag, noise_std, shifted
 from .stretch import against_command, over_time, stretch
 
@@ -40,7 +40,7 @@ _DELAY_MIN = 3.0
 """Dead time, in samples, below which a drive may have it."""
 
 _DELAYS = ((4.5, 0.4, 1.0), (2.0, 1.1, 0.2), (1.1, 2.5, 1.0))
-"""What a dead time must do to be a fault of the log, one of: divide the squared residual of one mode by the first
+"""What a dead time must do to be noted, one of: divide the squared residual of one mode by the first
 number, be the second one times the mode's lag, and leave the third one of what a mere lag leaves. Further modes look
 like a dead time, too."""
 
@@ -146,19 +146,29 @@ def check_delay(log: Log, machine: Machine | None = None) -> Iterator[Finding]:
     if found is None:
         return
     delay, evidence, against = found
+    samples = f"{abs(delay):.1f} samples ({1e3 * abs(delay) * log.T_s:.3g} ms)"
+    picture = over_time(log, part, x_d, x)
+    if delay > 0 and machine is None:
+        words = (
+            f"the measured position lags {samples} beyond what one mode explains: dead time of the drive, a late "
+            "encoder, or another mode, which the log alone cannot tell apart; an identified model takes it in, and "
+            "measurement_delay stays 0 with it, unless the encoder is known to be late"
+        )
+        yield Finding("delay", NOTE, words, evidence, picture)
+        return
     late = "late" if delay > 0 else "early"
-    words = (
-        f"the measured position is recorded {abs(delay):.1f} samples ({1e3 * abs(delay) * log.T_s:.3g} ms) too {late} "
-        f"against {against}"
-    )
+    words = f"the measured position is recorded {samples} too {late} against {against}"
     # A whole number of samples leaves the measurement as it is.
     whole = round(delay) if abs(delay - round(delay)) < 0.15 else delay
     shift = f"shift the measured position by {-whole:+.3g} samples"
     if delay > 0:
-        shift += f"; where the controller gets it as late, say so to the predictor: measurement_delay = {round(delay)}"
+        shift += (
+            f"; where the controller gets it as late, say so to the predictor: measurement_delay = {round(delay)}, "
+            "which replaces as much of the model's dead_time (never both)"
+        )
     fix = Fix(shift, partial(fixes.shifted_back, delay=float(whole)))
     severity = ERROR if delay < 0 else WARNING
-    yield Finding("delay", severity, words, evidence, over_time(log, part, x_d, x), fix)
+    yield Finding("delay", severity, words, evidence, picture, fix)
 
 
 def _delay_of_mode(x_d: Array, x: Array) -> tuple[float, dict[str, float], str] | None:

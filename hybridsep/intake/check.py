@@ -11,10 +11,12 @@ import numpy as np
 from ..logs.log import Log
 from .axis import check_delay, check_offset, check_same, check_swapped, check_velocity
 from .finding import ERROR, HOPELESS, NAMES, Finding
+from .following import check_following_error
 from .gain import check_scale, check_sign
 from .motion import check_motion, check_rate, check_start, check_unit
 from .samples import check_missing, check_outliers, check_repeated, check_stuck
 from .times import check_gaps, check_jitter, check_order
+from .turns import check_turns
 
 if TYPE_CHECKING:
     from ..machines.machine import Machine
@@ -24,10 +26,11 @@ __all__ = ["Intake", "apply", "check"]
 _Check = Callable[[Log], Iterator[Finding]]
 
 _TIMES: tuple[_Check, ...] = (check_order, check_gaps, check_jitter)
-_SAMPLES: tuple[_Check, ...] = (check_missing, check_outliers, check_stuck, check_repeated)
+_SAMPLES: tuple[_Check, ...] = (check_turns, check_missing, check_outliers, check_stuck, check_repeated)
 _AXIS: tuple[_Check, ...] = (
     check_same,
     check_swapped,
+    check_following_error,
     check_velocity,
     check_sign,
     check_scale,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 
 from ..base.signals import Array
@@ -85,13 +86,14 @@ def _modes(x_d: Array, x: Array) -> tuple[DeadTime, DeadTime]:
 
 def check_sign(log: Log) -> Iterator[Finding]:
     """Find a measured position that runs against the command."""
-    x_d, x = averaged(log)
+    x_d, x, width = averaged(log)
     mode = runs_against(x_d, x)
     if mode is None:
         return
     at_lag = line_at_best_lag(x_d, x)
     # The mode knows the sign; how large the gain is, the line knows as well where it explains the motion.
     fit = at_lag if at_lag.gain < 0.0 and not _mode_counts(mode, at_lag) else _as_line(mode, x_d, x)
+    fit = replace(fit, lag=width * fit.lag)
     words = (
         f"the measured position runs against the command (gain {fit.gain:.4g}): its sign is flipped, or the axis "
         "counts the other way"
@@ -103,10 +105,12 @@ def check_sign(log: Log) -> Iterator[Finding]:
 
 def _relation(log: Log) -> tuple[Line, bool]:
     """Return gain and lag of the measured position, and whether they are a mode's, as a line does not explain it."""
-    x_d, x = averaged(log)
+    x_d, x, width = averaged(log)
     at_lag = line_at_best_lag(x_d, x)
     mode, _ = _modes(x_d, x)
-    return (_as_line(mode, x_d, x), True) if _mode_counts(mode, at_lag) else (at_lag, False)
+    dynamic = _mode_counts(mode, at_lag)
+    fit = _as_line(mode, x_d, x) if dynamic else at_lag
+    return replace(fit, lag=width * fit.lag), dynamic
 
 
 def _mode_counts(mode: DeadTime, at_lag: Line) -> bool:
@@ -120,7 +124,7 @@ def _explains(mode: DeadTime) -> bool:
 
 
 def _as_line(mode: DeadTime, x_d: Array, x: Array) -> Line:
-    return Line(mode.lag, mode.gain, float(x.mean() - mode.gain * x_d.mean()), mode.unexplained)
+    return Line(mode.dead_time + mode.lag, mode.gain, float(x.mean() - mode.gain * x_d.mean()), mode.unexplained)
 
 
 def check_scale(log: Log) -> Iterator[Finding]:

@@ -34,8 +34,8 @@ def stretch(log: Log) -> slice:
     return best
 
 
-def averaged(log: Log) -> tuple[Array, Array]:
-    """Return means of the commanded and of the measured position, at most :data:`_STRETCH` each.
+def averaged(log: Log) -> tuple[Array, Array, int]:
+    """Return means of the commanded and of the measured position, at most :data:`_STRETCH` each, and of how many.
 
     They span the segment with most motion, at most :data:`_SPAN` samples of it: a stretch of :func:`stretch` may hold
     nothing but fast motion, as the end of a swept sine does, in which a drive's phase is not near zero.
@@ -49,7 +49,7 @@ def averaged(log: Log) -> tuple[Array, Array]:
     width = -(-(end - start) // _STRETCH)
     n = (end - start) // width
     x_d, x = (signal[start : start + n * width].reshape(n, width).mean(axis=1) for signal in (log.x_d, log.x_meas))
-    return x_d, x
+    return x_d, x, width
 
 
 def against_command(log: Log, part: slice, fit: Line) -> Picture:
