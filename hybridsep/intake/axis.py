@@ -109,7 +109,7 @@ def check_velocity(log: Log) -> Iterator[Finding]:
         )
         evidence = {"explained": explained, "explained_by_position": 1 - position, "factor": factor}
         change = partial(fixes.integrated, column=column, factor=factor)
-        fix = Fix(f"integrate the {sense} velocity, or better name a column of positions", change)
+        fix = Fix(f"integrate the {sense} velocity, or better name a column of positions", change, meaning=True)
         picture = over_time(log, part, fit.gain * cause + fit.offset, effect, ("derivative of the other", sense))
         yield Finding("velocity for position", ERROR, words, evidence, picture, fix)
         return
@@ -133,7 +133,9 @@ def check_offset(log: Log) -> Iterator[Finding]:
     )
     evidence = {"offset": offset, "spread": spread, "travel": travel}
     fix = Fix(
-        f"subtract {offset:.6g} {log.unit} from the measured position", partial(fixes.offset_removed, offset=offset)
+        f"subtract {offset:.6g} {log.unit} from the measured position",
+        partial(fixes.offset_removed, offset=offset),
+        meaning=True,
     )
     yield Finding("offset", ERROR, words, evidence, against_command(log, part, fit), fix)
 
@@ -166,7 +168,7 @@ def check_delay(log: Log, machine: Machine | None = None) -> Iterator[Finding]:
             f"; where the controller gets it as late, say so to the predictor: measurement_delay = {round(delay)}, "
             "which replaces as much of the model's dead_time (never both)"
         )
-    fix = Fix(shift, partial(fixes.shifted_back, delay=float(whole)))
+    fix = Fix(shift, partial(fixes.shifted_back, delay=float(whole)), meaning=True)
     severity = ERROR if delay < 0 else WARNING
     yield Finding("delay", severity, words, evidence, picture, fix)
 

@@ -99,7 +99,7 @@ def check_sign(log: Log) -> Iterator[Finding]:
         "counts the other way"
     )
     change = partial(fixes.scaled, factor=-1.0, column="x_meas")
-    fix = Fix("turn the measured position's sign", change)
+    fix = Fix("turn the measured position's sign", change, meaning=True)
     yield Finding("sign", ERROR, words, _numbers(fit), against_command(log, stretch(log), fit), fix)
 
 
@@ -150,7 +150,7 @@ def check_scale(log: Log) -> Iterator[Finding]:
     reason = _KNOWN_GAINS[known] if meant else "a wrong unit, gear ratio or encoder resolution"
     words = f"the measured position is {gain:.6g} times the commanded one: {reason}"
     change = partial(fixes.scaled, factor=factor, column="x_meas")
-    fix = Fix(f"multiply the measured position by {factor:.6g}", change)
+    fix = Fix(f"multiply the measured position by {factor:.6g}", change, meaning=True)
     yield Finding("scale", ERROR, words, {**_numbers(fit), "factor": factor}, against_command(log, part, fit), fix)
 
 

@@ -186,6 +186,27 @@ def test_words() -> None:
     assert "measurement_delay = 10, which replaces as much of the model's dead_time (never both)" in str(finding)
 
 
+def test_a_flicker_at_rest_is_no_motion() -> None:
+    """A command in counts that rests, and flickers by one, before it moves by three a sample."""
+    steps = np.concatenate((np.tile([1.0, -1.0], 200), np.tile([3.0, 2.0], 400), np.zeros(300)))
+    x_d = 1e-6 * np.cumsum(np.concatenate(([0.0], steps)))
+    assert "start in motion" not in names(check(log_of(x_d, shifted(x_d, 2.0))).findings)
+    moving = log_of(x_d[450:], shifted(x_d, 2.0)[450:])
+    (finding,) = [finding for finding in check(moving).findings if finding.name == "start in motion"]
+    assert "is estimated from its first samples" in finding.words
+
+
+def test_an_applied_fix_says_so() -> None:
+    log = needed("staircase")
+    for fault, words in (("rows lost", "handled: gaps: "), ("flipped", "fixed: sign: ")):
+        (finding,) = check(FAULTS[fault][1](log)).findings
+        assert str(finding).startswith("error: ")
+        done = str(replace(finding, applied=True))
+        assert done.startswith(words)
+        assert "Done: " in done
+        assert ("your controller must do the same" in done) == (fault == "flipped")
+
+
 def test_sampling_rate_against_the_machine() -> None:
     machine = load_machine("spring_mass_damper")
     log = needed("staircase")
