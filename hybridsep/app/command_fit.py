@@ -50,7 +50,7 @@ def fit(
         from .fit import fit as fit_logs
         from .fit_report import fit_report, judged_by
         from .fit_table import print_fit
-        from .log_intake import findings_table, show, take_in
+        from .log_intake import changes, findings_table, show, take_in
         from .overwrite import BY_ENDING, FIT_FILES, Output, check_outputs
         from .progress import progress_bar
         from .report_sections import recommendation
@@ -72,7 +72,7 @@ def fit(
         show((f"{log.path.name}: {remark}" for remark in log.remarks), ())
     used, findings = take_in(found, fix=fix)
     with progress_bar(as_json) as advance:
-        result = fit_logs(used, folder, FitOptions(Np, name), advance)
+        result = fit_logs(used, folder, FitOptions(Np, name), advance, changes=changes(findings))
         fit_report(result, used, findings).write(files["report"], figure)
     if as_json:
         listed = {log_name: findings_table(one) for log_name, one in findings.items()}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -81,7 +82,7 @@ def identify(
         from ..logs.log import read_log
         from .arguments import check_ending, checked_name, machine_name
         from .identify_tables import print_identified
-        from .log_intake import show, take_in
+        from .log_intake import changes, show, take_in
         from .overwrite import FIGURE, MACHINE, Output, check_outputs
         from .progress import progress_bar
 
@@ -104,6 +105,7 @@ def identify(
         raise ParameterError(f"--fix is for a log of operation, {recording.name} is read as --kind {kind}")
     interval = 1e-3 if T_s is None else T_s
     found: IdentifiedModel | IdentifiedResponse
+    changed: list[str] = []
     with progress_bar(as_json) as advance:
         if kind == "klipper":
             found = identify_resonance(read_klipper(recording), _klipper_axis(axis), T_s=interval)
@@ -131,6 +133,7 @@ def identify(
             if not sweeps:
                 (log,), findings = take_in([log], fix=fix)
                 show(log.remarks, findings[recording.name])
+                changed = changes(findings)
             pieces = [(piece.x_d, piece.x_meas) for piece in log.segments()]
             if sweeps:
                 if len(pieces) > 1:
@@ -154,7 +157,7 @@ def identify(
     if figure is not None and isinstance(found, IdentifiedResponse):
         response_figure(found, recording.name, figure)
     if out is not None:
-        _write_machine(found, machine, recording.name, out)
+        _write_machine(found, machine, recording.name, changed, out)
     print_identified(found, as_json, recording.name)
 
 
@@ -164,7 +167,9 @@ def _klipper_axis(axis: str | None) -> str:
     return axis
 
 
-def _write_machine(found: IdentifiedModel | IdentifiedResponse, name: str, recording: str, out: Path) -> None:
+def _write_machine(
+    found: IdentifiedModel | IdentifiedResponse, name: str, recording: str, changed: Sequence[str], out: Path
+) -> None:
     """Write the machine file, with the deviations and findings as comments."""
     from ..machines.text import machine_text
 
@@ -172,6 +177,7 @@ def _write_machine(found: IdentifiedModel | IdentifiedResponse, name: str, recor
         f"{e.name} = {e.value:.6g} ± {e.std:.2g}{'' if e.unit == '1' else ' ' + e.unit}" for e in found.parameters
     ]
     comments = [f"Identified by hybridsep from {recording}.", *deviations, *found.findings]
-    machine = found.machine(name, f"Axis identified from {recording}")
+    sources = {"sources": [f"identified from {recording}", *changed]} if changed else {}
+    machine = found.machine(name, f"Axis identified from {recording}", **sources)
     with written_text(out) as file:
         file.write(machine_text(machine, comments))

@@ -49,10 +49,10 @@ def report(
         from ..machines.machine import load_machine, machine_path
         from ..tune.halves import Recording, replay
         from .arguments import check_ending, machine_name
-        from .log_intake import open_checked, reading_of
+        from .log_intake import changes, open_checked, reading_of
         from .overwrite import BY_ENDING, REPORT, Output, check_outputs
         from .progress import progress_bar
-        from .report_sections import Judged, recommendation, write_errors, write_findings, write_use
+        from .report_sections import Judged, recommendation, write_changes, write_errors, write_findings, write_use
         from .step_times import step_times
         from .tables import console
 
@@ -84,6 +84,7 @@ def report(
         f"{1e3 * settings.Np * whole.T_s:.4g} ms · p = {settings.p}, q = {settings.q}",
     )
     written.paragraph(recommendation(judged), "verdict")
+    write_changes(written, changes({log.name: intake.findings}))
     learned = "began with what an earlier run had learned" if weights is not None else "began without any knowledge"
     write_errors(written, judged, "Errors of the replay", f"The predictor {learned}.")
     write_findings(written, {log.name: intake.findings})

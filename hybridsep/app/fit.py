@@ -100,7 +100,14 @@ def fit_files(out: Path, name: str) -> dict[str, Path]:
     }
 
 
-def fit(logs: Sequence[Log], out: Path, options: FitOptions, progress: Progress = lambda _message, _done: None) -> Fit:
+def fit(
+    logs: Sequence[Log],
+    out: Path,
+    options: FitOptions,
+    progress: Progress = lambda _message, _done: None,
+    *,
+    changes: Sequence[str] = (),
+) -> Fit:
     """Identify an axis from its logs, choose settings, judge them, and build its FMUs.
 
     The first half of each log teaches: the physics model is identified from it, and settings are chosen by causal
@@ -116,6 +123,8 @@ def fit(logs: Sequence[Log], out: Path, options: FitOptions, progress: Progress 
     options : FitOptions
     progress : callable, optional
         Called with a message and the fraction done.
+    changes : sequence of str
+        What was done to the logs' positions before, for the machine file's ``sources``.
 
     Raises
     ------
@@ -155,7 +164,7 @@ def fit(logs: Sequence[Log], out: Path, options: FitOptions, progress: Progress 
     )
     predictor = HybridPredictor(model, settings)
     judged = replay(predictor, recordings, progress=within(0.8, 0.85, "judge on the second half"))
-    machine = _machine(options.name, logs, model, settings)
+    machine = _machine(options.name, logs, model, settings, changes)
     with written_text(files["machine file"]) as file:
         text = machine_text(machine, comments=[found["structure"]])
         file.write(fit_comment(text) + text)
@@ -226,11 +235,13 @@ def _chosen(choice: Sequence[dict[str, Any]]) -> tuple[int, int]:
     return int(chosen["p"]), int(chosen["q"])
 
 
-def _machine(name: str, logs: Sequence[Log], model: ModalModel, settings: PredictorSettings) -> Machine:
+def _machine(
+    name: str, logs: Sequence[Log], model: ModalModel, settings: PredictorSettings, changes: Sequence[str]
+) -> Machine:
     return machine_of(
         *(model, settings.input_hold, settings.T_s, name, f"Axis {name}, identified"),
         unit=logs[0].unit,
-        sources=[f"identified from {log.path.name}, {len(log.t)} samples" for log in logs],
+        sources=[f"identified from {log.path.name}, {len(log.t)} samples" for log in logs] + list(changes),
         predictor={"Np": settings.Np, "p": settings.p, "q": settings.q},
     )
 

@@ -13,7 +13,18 @@ from ..intake.finding import Finding
 from ..logs.log import Log
 from ..tune.choice import WORTH
 from .fit import Fit
-from .report_sections import COLOURS, NAMES, Judged, recommendation, write_errors, write_findings, write_use
+from .log_intake import changes
+from .report_sections import (
+    COLOURS,
+    NAMES,
+    Judged,
+    recommendation,
+    write_changes,
+    write_errors,
+    write_findings,
+    write_use,
+)
+from .tables import span
 
 __all__ = ["fit_report", "judged_by"]
 
@@ -44,10 +55,11 @@ def fit_report(fit: Fit, logs: Sequence[Log], findings: Mapping[str, Sequence[Fi
     judged = judged_by(fit, logs[0].unit)
     report = Report(
         f"Axis {fit.machine.name}: from its log to its FMU",
-        f"{', '.join(log.path.name for log in logs)} · {n} samples, {n * T_s:.4g} s at {1 / T_s:.4g} Hz · look-ahead "
+        f"{', '.join(log.path.name for log in logs)} · {n} samples, {span(logs)} · look-ahead "
         f"{Np} samples, {1e3 * Np * T_s:.4g} ms",
     )
     report.paragraph(recommendation(judged), "verdict")
+    write_changes(report, changes(findings))
     write_errors(
         report,
         judged,

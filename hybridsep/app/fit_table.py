@@ -11,7 +11,7 @@ from rich.table import Table
 from ..intake.finding import Finding
 from ..logs.log import Log
 from .fit import Fit
-from .tables import console, shown_figure, shown_unit
+from .tables import console, shown_figure, shown_unit, span
 
 __all__ = ["print_fit"]
 
@@ -23,8 +23,7 @@ def print_fit(fit: Fit, logs: Sequence[Log], findings: Mapping[str, Iterable[Fin
         travel = float(np.ptp(log.x_d))
         stated = "" if log.unit_stated else f", as the file states no unit of positions: taken as {unit} (--unit)"
         console.print(
-            f"{log.path.name}: {len(log.t)} samples, {len(log.t) * log.T_s:.4g} s at {1 / log.T_s:.4g} Hz, travel "
-            f"{1e3 * travel:.4g} m{unit}{stated}",
+            f"{log.path.name}: {len(log.t)} samples, {span([log])}, travel {1e3 * travel:.4g} m{unit}{stated}",
             highlight=False,
             markup=False,
         )

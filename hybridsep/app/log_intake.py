@@ -17,7 +17,7 @@ from .arguments import check_interval, check_unit
 from .failures import errors_console
 from .reading_options import ReadingOptions
 
-__all__ = ["Reading", "findings_table", "open_checked", "reading_of", "show", "take_in"]
+__all__ = ["Reading", "changes", "findings_table", "open_checked", "reading_of", "show", "take_in"]
 
 _REPAIRED = ("time order", "gaps", "jitter", "outliers", "stuck samples", "repeated samples")
 """Findings about samples, not about what they mean: their fixes lose nothing that could be learned from."""
@@ -105,6 +105,8 @@ def open_checked(
             f"{path}: figures from this log would mean nothing: {'; '.join(f.words for f in intake.errors)}. Apply the "
             "fixes with --fix, correct the log or the options it is read with, or go on with --as-is"
         )
+    if fix:
+        intake = replace(intake, findings=tuple(_applied(finding) for finding in intake.findings))
     show(reader.remarks, intake.findings)
     if fix:
         if reader.n_samples > CHECKED_MAX:
@@ -147,8 +149,22 @@ def take_in(logs: Sequence[Log], *, fix: bool) -> tuple[list[Log], Mapping[str, 
             hint = " (--fix does it)" if all(finding.fix for finding in left) else ""
             raise LogError(f"{log.path}: " + "; ".join(str(finding) for finding in left) + hint)
         used.append(apply(log, applied))
-        all_findings[log.path.name] = findings
+        all_findings[log.path.name] = tuple(_applied(one) if one in applied else one for one in findings)
     return used, all_findings
+
+
+def _applied(finding: Finding) -> Finding:
+    return replace(finding, applied=finding.fix is not None)
+
+
+def changes(findings: Mapping[str, Iterable[Finding]]) -> list[str]:
+    """Return the fixes, by log, after which positions mean something else: the controller's must be changed alike."""
+    return [
+        f"{name}: {finding.name}: {finding.fix.words}; the controller must do the same"
+        for name, found in findings.items()
+        for finding in found
+        if finding.applied and finding.fix is not None and finding.fix.meaning
+    ]
 
 
 def findings_table(findings: Iterable[Finding]) -> list[dict[str, Any]]:
@@ -160,6 +176,7 @@ def findings_table(findings: Iterable[Finding]) -> list[dict[str, Any]]:
             "words": finding.words,
             "evidence": dict(finding.evidence),
             "fix": finding.fix.words if finding.fix else None,
+            "applied": finding.applied,
         }
         for finding in findings
     ]

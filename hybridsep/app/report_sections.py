@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -19,7 +19,16 @@ from ..intake.finding import Finding
 from ..tune.halves import Replay
 from .tables import shown_unit
 
-__all__ = ["COLOURS", "NAMES", "Judged", "recommendation", "write_errors", "write_findings", "write_use"]
+__all__ = [
+    "COLOURS",
+    "NAMES",
+    "Judged",
+    "recommendation",
+    "write_changes",
+    "write_errors",
+    "write_findings",
+    "write_use",
+]
 
 NAMES = ("physics model", "hold the last residual", "hybrid")
 """Names of :data:`~hybridsep.tune.halves.PREDICTIONS`."""
@@ -68,6 +77,13 @@ def recommendation(judged: Judged) -> str:
     if ratio <= 1.0 + ALIKE:
         return f"The hybrid does no harm and no good here: {ratio:.2f} × the error of {peer}."
     return f"Do not use the hybrid on what this log shows: {ratio:.2f} × the error of {peer}; record more motion."
+
+
+def write_changes(report: Report, changes: Sequence[str]) -> None:
+    """Write what was done to the log's positions that a controller must do as well."""
+    if changes:
+        report.paragraph("These figures, and the FMUs, are of positions that were changed before:")
+        report.bullets(changes)
 
 
 def write_errors(report: Report, judged: Judged, title: str, how: str) -> None:
@@ -182,7 +198,11 @@ def write_findings(report: Report, findings: Mapping[str, Iterable[Finding]]) ->
         report.paragraph("Nothing: time axis, samples, signs, scales, delay and motion are plausible.")
     for name, found in listed.items():
         rows = [
-            [finding.name, finding.severity, finding.words + (f". {finding.fix.words}" if finding.fix else "")]
+            [
+                finding.name,
+                str(finding).partition(":")[0],
+                finding.words + (f". {finding.fix.words}" if finding.fix else ""),
+            ]
             for finding in found
         ]
         if rows:

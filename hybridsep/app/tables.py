@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from rich.table import Table
 
 from ..cosim.run import PREDICTOR, Run
 from ..evaluate.verdict import Verdict, verdict_of
+from ..logs.log import Log
 from .printed import PRINTED
 
 __all__ = [
@@ -25,6 +26,7 @@ __all__ = [
     "print_scores",
     "shown_figure",
     "shown_unit",
+    "span",
 ]
 
 console = Console(emoji=False)
@@ -32,6 +34,17 @@ console = Console(emoji=False)
 _UNITS = {"m": ((1e6, "µm"), (1e3, "mm")), "rad": ((1e6, "µrad"), (1e3, "mrad"))}
 
 PAPER_COLUMN = "× hold: RMS relative to holding the last residual; paper: physics → hybrid, reduction, as printed there"
+
+
+def span(logs: Sequence[Log]) -> str:
+    """Return how long logs of one sampling interval are, in words, and over what time their segments spread."""
+    T_s, n = logs[0].T_s, sum(len(log.t) for log in logs)
+    words = f"{n * T_s:.4g} s at {1 / T_s:.4g} Hz"
+    segments = sum(len(log.starts) for log in logs)
+    if segments == len(logs):
+        return words
+    lasted = sum(float(log.t[-1] - log.t[0]) + T_s for log in logs)
+    return f"{words} in {segments} segments of a record of {lasted:.4g} s"
 
 
 def print_predictions(summary: Mapping[str, Mapping[str, Any]]) -> None:

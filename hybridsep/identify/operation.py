@@ -11,6 +11,8 @@ from ..base.errors import IdentificationError
 from ..base.settings import check
 from ..base.signals import Array
 from ..base.threads import one_blas_thread
+from ..intake.gain import runs_against
+from ..intake.motion import starts_in_motion
 from ..model.physics import ModalModel
 from .model import Alternative, IdentifiedModel
 from .output_error import Delay, Fit, fit_structure, simulated
@@ -29,7 +31,7 @@ WEAK = 3.0
 """Commanded motion in multiples of the unexplained one (standard deviations) below which only a gain of 1 is taken."""
 
 OPPOSED = -0.7
-"""Correlation of commanded and measured motion below which one of them has the wrong sign."""
+"""Correlation of commanded and measured motion below which one of them may have the wrong sign."""
 
 GAIN_RANGE = (0.1, 10.0)
 """Static gains outside of which a unit is probably wrong."""
@@ -101,7 +103,10 @@ def identify_operation(
             f"deviation), and {rest} of the measured one are not explained by it; a gain of 1 without lag is taken"
         )
     parameters, n_effective = estimates(fit, segments, T_s, unit)
-    findings += _findings(fit, chosen, segments, parameters[0].std, n_effective, unit)
+    findings += _findings(
+        *(fit, chosen, segments, parameters[0].std, n_effective, unit),
+        [np.asarray(x_d, dtype=np.float64) for x_d, _ in given],
+    )
     progress("identified", 1.0)
     return IdentifiedModel(
         model=_modal(fit, T_s),
@@ -149,7 +154,9 @@ def _require_motion(segments: Sequence[Segment]) -> None:
     u = np.concatenate([u - u.mean() for u, _ in measured])
     y = np.concatenate([y - y.mean() for _, y in measured])
     correlation = float(u @ y / np.sqrt((u @ u) * (y @ y)))
-    if correlation < OPPOSED:
+    longest = max(segments, key=lambda segment: float(np.ptp(segment.u)))
+    # Beyond its bandwidth, where a swept sine ends, a drive moves against its command with no sign wrong.
+    if correlation < OPPOSED and runs_against(longest.u, longest.y) is not None:
         raise _refusal(
             f"the measured position moves against the commanded one (correlation {correlation:.2f}); turn the sign of "
             "one of them"
@@ -195,7 +202,13 @@ def _alternative(candidate: Candidate, T_s: float) -> Alternative:
 
 
 def _findings(
-    fit: Fit, chosen: Candidate, segments: Sequence[Segment], gain_std: float, n_effective: float, unit: str
+    fit: Fit,
+    chosen: Candidate,
+    segments: Sequence[Segment],
+    gain_std: float,
+    n_effective: float,
+    unit: str,
+    commands: Sequence[Array],
 ) -> list[str]:
     """Return what a user should know of the identification, in words."""
     findings = []
@@ -203,9 +216,12 @@ def _findings(
     moving = sum(np.count_nonzero(np.diff(s.u)) for s in segments) / sum(len(s.u) for s in segments)
     if moving < 0.25:
         findings.append(f"the command moves in {100 * moving:.0f} % of the samples")
-    started = [segment for segment in segments if _starts_in_motion(segment.u)]
-    if started:
+    # Of the recordings, not of the pieces that are fitted to: the liveliest of a long one start in motion always.
+    started = [starts_in_motion(x_d) for x_d in commands]
+    if started[0]:
         findings.append("the recording starts in motion: the state at its start was estimated")
+    elif any(started):
+        findings.append("a piece behind a gap starts in motion: the state at its start was estimated")
     if n_effective < 0.2 * n:
         findings.append(
             f"the residual is not white (friction and the like): {n} samples tell as much as {n_effective:.0f} "
@@ -223,12 +239,6 @@ def _findings(
             "kind, or the axis is not linear"
         )
     return findings
-
-
-def _starts_in_motion(u: Array) -> bool:
-    """Return whether the command moves in the first interval with a tenth of its largest velocity."""
-    velocity = np.abs(np.diff(u))
-    return bool(velocity[0] > 0.1 * velocity.max()) if velocity.max() > 0 else False
 
 
 def _micro(value: float, unit: str) -> str:

@@ -1,4 +1,4 @@
-"""Checks of the measured position against the commanded one: the same, swap, velocity, sign, scale, offset, delay."""
+"""Checks of the measured position against the commanded one: the same, swap, velocity, offset, delay."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ import numpy as np
 from ..base.signals import Array
 from ..logs.log import Log
 from . import fixes
-from .finding import ERROR, WARNING, Finding, Fix, Picture
-from .motion import moves
-from .relation import Line, fit_dead_time, line, line_at_best_lag, noise_std, shifted
+from .finding import ERROR, NOTE, WARNING, Finding, Fix
+from .relation import fit_dead_time, line, line_at_best_lag, noise_std, shifted
+from .stretch import against_command, over_time, stretch
 
 if TYPE_CHECKING:
     from ..machines.machine import Machine
@@ -23,47 +23,15 @@ __all__ = [
     "check_delay",
     "check_offset",
     "check_same",
-    "check_scale",
-    "check_sign",
     "check_swapped",
     "check_velocity",
-    "stretch",
 ]
-
-_STRETCH = 8000
-"""Samples that relations are fitted to: those with most motion."""
 
 _NOISIER = 3.0
 """Ratio of the columns' noise from which the noisier one is the measured one."""
 
 _VELOCITY_SHARE, _VELOCITY_LEFT = 0.5, 0.3
 """Variance that a velocity must explain at least, and what it may leave of what the position leaves."""
-
-_GAINS = (0.2, 5.0)
-"""Gains outside which no position loop is: a small servo under load was recorded at 0.3."""
-
-_GAIN_CLOSE, _LEFT_CLOSE = 0.15, 3e-3
-"""Distance from 1 of the gain of an axis that follows its command within this share of the variance."""
-
-_KNOWN_GAINS = {
-    1e3: "measured in mm, commanded in m",
-    1e-3: "measured in m, commanded in mm",
-    1e6: "measured in µm, commanded in m",
-    1e-6: "measured in m, commanded in µm",
-    180 / math.pi: "measured in deg, commanded in rad",
-    math.pi / 180: "measured in rad, commanded in deg",
-    1 / 0.0254: "measured in inches, commanded in m",
-    25.4: "measured in mm, commanded in inches",
-    1 / 25.4: "measured in inches, commanded in mm",
-    2 * math.pi: "measured in rad, commanded in revolutions",
-    1 / (2 * math.pi): "measured in revolutions, commanded in rad",
-    360.0: "measured in deg, commanded in revolutions",
-    1 / 360.0: "measured in revolutions, commanded in deg",
-}
-"""Gains that two units make, and which."""
-
-_KNOWN_WITHIN = 0.03
-"""Relative distance from a known gain within which it is meant."""
 
 _OFFSET_TRAVEL, _OFFSET_SPREAD = 0.02, 6.0
 """Offset, in travels and in spreads of the error around it, from which it is no servo error."""
@@ -72,7 +40,7 @@ _DELAY_MIN = 3.0
 """Dead time, in samples, below which a drive may have it."""
 
 _DELAYS = ((4.5, 0.4, 1.0), (2.0, 1.1, 0.2), (1.1, 2.5, 1.0))
-"""What a dead time must do to be a fault of the log, one of: divide the squared residual of one mode by the first
+"""What a dead time must do to be noted, one of: divide the squared residual of one mode by the first
 number, be the second one times the mode's lag, and leave the third one of what a mere lag leaves. Further modes look
 like a dead time, too."""
 
@@ -87,19 +55,6 @@ _MODEL_DELAY, _MODEL_SHARE, _MODEL_GAIN = 0.4, 0.4, 10.0
 error by."""
 
 
-def stretch(log: Log) -> slice:
-    """Return the samples of one segment, at most :data:`_STRETCH`, in which the command moves most."""
-    ends = (*log.starts[1:], len(log.t))
-    moved = np.concatenate((np.cumsum(moves(log.x_d)) if len(log.x_d) > 1 else [], [0]))
-    best, most = slice(0, len(log.t)), -1.0
-    for start, end in zip(log.starts, ends, strict=True):
-        for first in range(start, max(end - _STRETCH, start) + 1, 1000):
-            last = min(end, first + _STRETCH)
-            if last - first > 2 and moved[last - 2] - moved[first] > most:
-                best, most = slice(first, last), float(moved[last - 2] - moved[first])
-    return best
-
-
 def check_same(log: Log) -> Iterator[Finding]:
     """Find a measured position that is the commanded one in every sample; no axis follows like that."""
     if not np.array_equal(log.x_d, log.x_meas):
@@ -109,7 +64,7 @@ def check_same(log: Log) -> Iterator[Finding]:
         "simulated; name the measured position's column (--x)"
     )
     part = stretch(log)
-    yield Finding("same column", ERROR, words, {}, _over_time(log, part, log.x_d[part], log.x_meas[part]), None)
+    yield Finding("same column", ERROR, words, {}, over_time(log, part, log.x_d[part], log.x_meas[part]), None)
 
 
 def check_swapped(log: Log) -> Iterator[Finding]:
@@ -126,7 +81,7 @@ def check_swapped(log: Log) -> Iterator[Finding]:
     )
     evidence = {"lag": lag, "noise_x_d": noise[0], "noise_x": noise[1]}
     fix = Fix("exchange the commanded and the measured position", fixes.swapped)
-    yield Finding("columns swapped", ERROR, words, evidence, _over_time(log, part, x_d, x), fix)
+    yield Finding("columns swapped", ERROR, words, evidence, over_time(log, part, x_d, x), fix)
 
 
 def check_velocity(log: Log) -> Iterator[Finding]:
@@ -154,52 +109,10 @@ def check_velocity(log: Log) -> Iterator[Finding]:
         )
         evidence = {"explained": explained, "explained_by_position": 1 - position, "factor": factor}
         change = partial(fixes.integrated, column=column, factor=factor)
-        fix = Fix(f"integrate the {sense} velocity, or better name a column of positions", change)
-        picture = _over_time(log, part, fit.gain * cause + fit.offset, effect, ("derivative of the other", sense))
+        fix = Fix(f"integrate the {sense} velocity, or better name a column of positions", change, meaning=True)
+        picture = over_time(log, part, fit.gain * cause + fit.offset, effect, ("derivative of the other", sense))
         yield Finding("velocity for position", ERROR, words, evidence, picture, fix)
         return
-
-
-def check_sign(log: Log) -> Iterator[Finding]:
-    """Find a measured position that runs against the command."""
-    part = stretch(log)
-    fit = line_at_best_lag(log.x_d[part], log.x_meas[part])
-    if fit.gain >= 0.0 or fit.unexplained > 0.5:
-        return
-    words = (
-        f"the measured position runs against the command (gain {fit.gain:.4g}): its sign is flipped, or the axis "
-        "counts the other way"
-    )
-    picture = _against(log, part, fit)
-    change = partial(fixes.scaled, factor=-1.0, column="x_meas")
-    yield Finding("sign", ERROR, words, _numbers(fit), picture, Fix("turn the measured position's sign", change))
-
-
-def check_scale(log: Log) -> Iterator[Finding]:
-    """Find a measured position in another unit than the commanded one."""
-    part = stretch(log)
-    fit = line_at_best_lag(log.x_d[part], log.x_meas[part])
-    gain = abs(fit.gain)
-    follows = fit.unexplained < 0.7
-    off = (
-        not follows
-        or not _GAINS[0] <= gain <= _GAINS[1]
-        or (abs(gain - 1) > _GAIN_CLOSE and fit.unexplained < _LEFT_CLOSE)
-    )
-    if not off:
-        return
-    if not follows or gain == 0.0:
-        words = f"the measured position hardly follows the command (gain {fit.gain:.3g}): is it another axis, or unit?"
-        yield Finding("scale", ERROR, words, _numbers(fit), _against(log, part, fit))
-        return
-    known = min(_KNOWN_GAINS, key=lambda value: abs(math.log(gain / value)))
-    meant = abs(math.log(gain / known)) < _KNOWN_WITHIN
-    factor = 1.0 / (known if meant else gain)
-    reason = _KNOWN_GAINS[known] if meant else "a wrong unit, gear ratio or encoder resolution"
-    words = f"the measured position is {gain:.6g} times the commanded one: {reason}"
-    change = partial(fixes.scaled, factor=factor, column="x_meas")
-    fix = Fix(f"multiply the measured position by {factor:.6g}", change)
-    yield Finding("scale", ERROR, words, {**_numbers(fit), "factor": factor}, _against(log, part, fit), fix)
 
 
 def check_offset(log: Log) -> Iterator[Finding]:
@@ -220,9 +133,11 @@ def check_offset(log: Log) -> Iterator[Finding]:
     )
     evidence = {"offset": offset, "spread": spread, "travel": travel}
     fix = Fix(
-        f"subtract {offset:.6g} {log.unit} from the measured position", partial(fixes.offset_removed, offset=offset)
+        f"subtract {offset:.6g} {log.unit} from the measured position",
+        partial(fixes.offset_removed, offset=offset),
+        meaning=True,
     )
-    yield Finding("offset", ERROR, words, evidence, _against(log, part, fit), fix)
+    yield Finding("offset", ERROR, words, evidence, against_command(log, part, fit), fix)
 
 
 def check_delay(log: Log, machine: Machine | None = None) -> Iterator[Finding]:
@@ -233,19 +148,29 @@ def check_delay(log: Log, machine: Machine | None = None) -> Iterator[Finding]:
     if found is None:
         return
     delay, evidence, against = found
+    samples = f"{abs(delay):.1f} samples ({1e3 * abs(delay) * log.T_s:.3g} ms)"
+    picture = over_time(log, part, x_d, x)
+    if delay > 0 and machine is None:
+        words = (
+            f"the measured position lags {samples} beyond what one mode explains: dead time of the drive, a late "
+            "encoder, or another mode, which the log alone cannot tell apart; an identified model takes it in, and "
+            "measurement_delay stays 0 with it, unless the encoder is known to be late"
+        )
+        yield Finding("delay", NOTE, words, evidence, picture)
+        return
     late = "late" if delay > 0 else "early"
-    words = (
-        f"the measured position is recorded {abs(delay):.1f} samples ({1e3 * abs(delay) * log.T_s:.3g} ms) too {late} "
-        f"against {against}"
-    )
+    words = f"the measured position is recorded {samples} too {late} against {against}"
     # A whole number of samples leaves the measurement as it is.
     whole = round(delay) if abs(delay - round(delay)) < 0.15 else delay
     shift = f"shift the measured position by {-whole:+.3g} samples"
     if delay > 0:
-        shift += f"; where the controller gets it as late, say so to the predictor: measurement_delay = {round(delay)}"
-    fix = Fix(shift, partial(fixes.shifted_back, delay=float(whole)))
+        shift += (
+            f"; where the controller gets it as late, say so to the predictor: measurement_delay = {round(delay)}, "
+            "which replaces as much of the model's dead_time (never both)"
+        )
+    fix = Fix(shift, partial(fixes.shifted_back, delay=float(whole)), meaning=True)
     severity = ERROR if delay < 0 else WARNING
-    yield Finding("delay", severity, words, evidence, _over_time(log, part, x_d, x), fix)
+    yield Finding("delay", severity, words, evidence, picture, fix)
 
 
 def _delay_of_mode(x_d: Array, x: Array) -> tuple[float, dict[str, float], str] | None:
@@ -285,28 +210,3 @@ def _delay_of_model(log: Log, part: slice, machine: Machine | None) -> tuple[flo
 def _smooth(x: Array) -> Array:
     """Return the mean of fifteen neighbours."""
     return np.asarray(np.convolve(np.pad(x, 7, mode="edge"), np.full(15, 1 / 15), "valid"))
-
-
-def _numbers(fit: Line) -> dict[str, float]:
-    return {"gain": fit.gain, "lag": fit.lag, "unexplained": fit.unexplained}
-
-
-def _against(log: Log, part: slice, fit: Line) -> Picture:
-    """Return the picture of measured over commanded positions, and the line through them."""
-    x_d, x = log.x_d[part], log.x_meas[part]
-    ends = np.array([x_d.min(), x_d.max()])
-    lines = {"log": (shifted(x_d, fit.lag), x), "fit": (ends, fit.gain * ends + fit.offset), "equal": (ends, ends)}
-    title = "Measured over commanded position"
-    return Picture(title, f"commanded [{log.unit}]", f"measured [{log.unit}]", lines)
-
-
-def _over_time(
-    log: Log, part: slice, one: Array, other: Array, names: tuple[str, str] = ("commanded", "measured")
-) -> Picture:
-    """Return the picture of two signals around the fastest motion."""
-    t = log.t[part] - log.t[0]
-    steps = np.abs(np.diff(log.x_d[part]))
-    middle = int(np.argmax(steps)) if len(steps) else 0
-    near = slice(max(0, middle - 150), middle + 150)
-    lines = {names[0]: (t[near], one[near]), names[1]: (t[near], other[near])}
-    return Picture("Around the fastest motion", "time [s]", f"position [{log.unit}]", lines)

@@ -9,12 +9,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..logs.log import Log
-from .axis import check_delay, check_offset, check_same, check_scale, check_sign, check_swapped, check_velocity
+from .axis import check_delay, check_offset, check_same, check_swapped, check_velocity
 from .finding import ERROR, HOPELESS, NAMES, Finding
 from .fixes import without_missing
+from .following import check_following_error
+from .gain import check_scale, check_sign
 from .motion import check_motion, check_rate, check_start, check_unit
 from .samples import check_missing, check_outliers, check_repeated, check_stuck
 from .times import BRIDGED_MAX, check_gaps, check_jitter, check_order
+from .turns import check_turns
 
 if TYPE_CHECKING:
     from ..machines.machine import Machine
@@ -27,6 +30,7 @@ _SAMPLES: tuple[_Check, ...] = (check_outliers, check_stuck, check_repeated)
 _AXIS: tuple[_Check, ...] = (
     check_same,
     check_swapped,
+    check_following_error,
     check_velocity,
     check_sign,
     check_scale,
@@ -101,7 +105,7 @@ def check(log: Log, machine: Machine | None = None, *, bridged: int = BRIDGED_MA
             log = apply(log, found)
 
     given = log
-    look((check_order,))
+    look((check_order, check_turns))
     findings.extend(check_missing(log))
     look((lambda log: check_gaps(log, bridged), check_jitter))
     log = without_missing(log)  # what is missing, and in gaps, is no fault to find again

@@ -20,6 +20,7 @@ HOPELESS = "too little motion"
 
 NAMES = (
     "time order",
+    "whole turns",
     "gaps",
     "jitter",
     "missing samples",
@@ -29,6 +30,7 @@ NAMES = (
     HOPELESS,
     "same column",
     "columns swapped",
+    "following error",
     "velocity for position",
     "sign",
     "scale",
@@ -51,10 +53,13 @@ class Fix:
         What it does, as an imperative.
     change : callable
         Log → log.
+    meaning : bool
+        Whether positions mean something else afterwards, so that a controller must change its own alike.
     """
 
     words: str
     change: Callable[[Log], Log] = field(repr=False)
+    meaning: bool = False
 
 
 @dataclass(frozen=True)
@@ -95,6 +100,8 @@ class Finding:
     picture : Picture
     fix : Fix, optional
         None where only another recording helps.
+    applied : bool
+        Whether the fix was applied to the log that is used.
     """
 
     name: str
@@ -103,7 +110,11 @@ class Finding:
     evidence: Mapping[str, float]
     picture: Picture = field(repr=False)
     fix: Fix | None = None
+    applied: bool = False
 
     def __str__(self) -> str:
+        if self.applied and self.fix is not None:
+            how, also = ("fixed", "; your controller must do the same") if self.fix.meaning else ("handled", "")
+            return f"{how}: {self.name}: {self.words}. Done: {self.fix.words}{also}."
         fix = f" Fix: {self.fix.words}." if self.fix else ""
         return f"{self.severity}: {self.name}: {self.words}.{fix}"

@@ -15,6 +15,7 @@ __all__ = [
     "bridge",
     "cut_out",
     "filled",
+    "from_error",
     "in_order",
     "integrated",
     "offset_removed",
@@ -23,6 +24,7 @@ __all__ = [
     "shifted_back",
     "swapped",
     "thinned",
+    "unwrapped",
     "without_missing",
 ]
 
@@ -180,6 +182,24 @@ def _interpolated(t: Array, signal: Array) -> Array:
     if known.all() or not known.any():
         return signal
     return np.asarray(np.where(known, signal, np.interp(t, t[known], signal[known])))
+
+
+def from_error(log: Log, sign: float) -> Log:
+    """Take the measured position for the following error: ``x = x_d − sign·x``."""
+    return replace(log, x_meas=log.x_d - sign * log.x_meas)
+
+
+def unwrapped(log: Log, turn: float) -> Log:
+    """Add whole turns so that no position jumps by one, and the measured one stays by its command.
+
+    Measured positions that are missing, NaN, remain so.
+    """
+    x_d, x_meas = np.unwrap(log.x_d, period=turn), log.x_meas.copy()
+    known = np.isfinite(x_meas)
+    x_meas[known] = np.unwrap(x_meas[known], period=turn)
+    if known.any():
+        x_meas -= turn * np.round(np.median(x_meas[known] - x_d[known]) / turn)
+    return replace(log, x_d=x_d, x_meas=x_meas)
 
 
 def _joined(log: Log, parts: list[Log]) -> Log:

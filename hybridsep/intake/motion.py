@@ -20,7 +20,7 @@ from .relation import noise_std
 if TYPE_CHECKING:
     from ..machines.machine import Machine
 
-__all__ = ["check_motion", "check_rate", "check_start", "check_unit", "moves"]
+__all__ = ["check_motion", "check_rate", "check_start", "check_unit", "moves", "starts_in_motion"]
 
 _SAMPLES_MIN = 200
 """Samples below which nothing can be learned and judged: two windows of the default length."""
@@ -33,6 +33,9 @@ _NOISE_TIMES = 3.0
 
 _START = 0.25
 """Velocity between the first samples, in the largest one, from which a start is in motion; EMPS, 0.12, is not."""
+
+_FIRST = 10
+"""Samples whose mean velocity must say so as well: at rest a command may flicker by one count."""
 
 _LARGEST = {"travel": (20.0, "m"), "velocity": (20.0, "m/s"), "acceleration": (500.0, "m/s²")}
 """What a feed axis travels and does at most; more of it is read in too large a unit."""
@@ -76,15 +79,24 @@ def _mean(x: Array) -> Array:
     return np.asarray(np.convolve(x, np.full(25, 0.04), "valid") if len(x) > 25 else x)
 
 
+def starts_in_motion(x_d: Array) -> bool:
+    """Return whether a command, (n,), moves from its first sample on, and not only flickers at rest."""
+    n = min(_FIRST, len(x_d) - 1)
+    if n < 1:
+        return False
+    steps, means = np.abs(np.diff(x_d)), np.abs(x_d[n:] - x_d[:-n])
+    return bool(steps[0] > _START * steps.max() and means[0] > _START * means.max())
+
+
 def check_start(log: Log) -> Iterator[Finding]:
-    """Find a log that begins in motion: the model takes it to begin at rest."""
-    largest = float(np.abs(np.diff(log.x_d)).max(initial=0.0))
-    first = float(np.abs(np.diff(log.x_d[:2])).max(initial=0.0))
-    if first <= _START * largest:
+    """Find a log that begins in motion, in a state that must be estimated."""
+    if not starts_in_motion(log.x_d):
         return
+    largest = float(np.abs(np.diff(log.x_d)).max())
+    first = float(abs(log.x_d[1] - log.x_d[0]))
     words = (
         f"the log begins in motion, at {first / log.T_s:.3g} {log.unit}/s of {largest / log.T_s:.3g} at most; the "
-        "model begins at rest, and its first second or so is wrong"
+        "state in which the axis begins is estimated from its first samples, which a log that begins at rest needs not"
     )
     rest = _first_rest(log.x_d, largest)
     fix = None
@@ -116,7 +128,7 @@ def check_unit(log: Log) -> Iterator[Finding]:
         f"read in m there are {shown}, more than a feed axis has: the positions are rather in mm (--unit mm), µm "
         "(--unit um), or deg of a rotary axis (--unit deg)"
     )
-    fix = Fix("read both positions as mm", partial(fixes.scaled, factor=1e-3))
+    fix = Fix("read both positions as mm", partial(fixes.scaled, factor=1e-3), meaning=True)
     yield Finding("unit", ERROR, words, {**evidence, "factor": 1e-3}, _positions(log, "Positions as read"), fix)
 
 

@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 
 from ..base.signals import Array
 
-__all__ = ["DeadTime", "Line", "fit_dead_time", "line", "line_at_best_lag", "noise_std", "shifted"]
+__all__ = ["LAG_MAX", "DeadTime", "Line", "fit_dead_time", "line", "line_at_best_lag", "noise_std", "shifted"]
 
 LAG_MAX = 300
 """Largest lag that is looked for, in samples: 0.3 s at 1 kHz is beyond any drive and any bus."""
@@ -52,11 +52,14 @@ class DeadTime:
         Steady lag of the mode behind a constant velocity, ``2ζ/ω``, samples.
     unexplained : float
         Share of the variance of x that is left.
+    gain : float
+        Static gain.
     """
 
     dead_time: float
     lag: float
     unexplained: float
+    gain: float
 
 
 def shifted(u: Array, lag: float) -> Array:
@@ -95,7 +98,7 @@ def noise_std(x: Array) -> float:
     return float(np.median(np.abs(np.diff(x, 5)))) / (0.6745 * math.sqrt(252.0))
 
 
-def fit_dead_time(u: Array, x: Array, first: float | None) -> DeadTime:
+def fit_dead_time(u: Array, x: Array, first: float | None, sign: float = 0.0) -> DeadTime:
     """Return the output-error fit of one mode of free gain and offset, after a dead time.
 
     Parameters
@@ -104,15 +107,19 @@ def fit_dead_time(u: Array, x: Array, first: float | None) -> DeadTime:
         Commanded and measured positions.
     first : float, optional
         Dead time, samples, that the search also begins with; None if it is to be 0.
+    sign : {0, 1, −1}
+        Sign that the gain must have; 0 if either will do.
     """
     scale = float(np.ptp(u))
-    command, response = (u - u[0]) / scale, (x - x.mean()) / float(np.ptp(x))
+    height = float(np.ptp(x))
+    command, response = (u - u[0]) / scale, (x - x.mean()) / height
     total = float(response @ response)
 
     def residual(parameters: Array) -> Array:
         y = _mode(parameters, command)
         fit = line(y, response)
-        left = response - fit.gain * y - fit.offset
+        # Of the other sign the best gain is none, and the response's own mean, which is 0, its offset.
+        left = response - fit.gain * y - fit.offset if fit.gain * sign >= 0.0 else response
         return np.asarray(np.nan_to_num(left, nan=1e3, posinf=1e3, neginf=-1e3))
 
     best = None
@@ -126,7 +133,9 @@ def fit_dead_time(u: Array, x: Array, first: float | None) -> DeadTime:
             best = found
     assert best is not None
     lag = 2 * math.exp(best.x[1] - best.x[0])
-    return DeadTime(0.0 if first is None else float(best.x[2]), lag, 2 * best.cost / total)
+    gain = line(_mode(best.x, command), response).gain * height / scale
+    gain = gain if gain * sign >= 0.0 else 0.0
+    return DeadTime(0.0 if first is None else float(best.x[2]), lag, 2 * best.cost / total, gain)
 
 
 def _mode(parameters: Array, u: Array) -> Array:

@@ -161,6 +161,13 @@ def test_a_flipped_sign_is_refused_until_it_is_fixed(hybridsep: Run, tmp_path: P
     assert "--fix" in err
     used, findings = take_in([read_log(log, uniform=False)], fix=True)
     assert [finding.name for finding in findings["axis.csv"]] == ["sign"]
+    status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", 40, "--fix")
+    assert status == 0, err
+    assert "axis.csv: fixed: sign: " in " ".join(out.split())
+    done = "axis.csv: sign: turn the measured position's sign; the controller must do the same"
+    assert load_machine(tmp_path / "fit" / "machine.toml").sources == ("identified from axis.csv, 800 samples", done)
+    page = unescape((tmp_path / "fit" / "report.html").read_text(encoding="utf-8"))
+    assert page.index(done) < page.index("Judged on samples that taught nothing")
     np.testing.assert_allclose(used[0].x_meas, measured(0)[:800], atol=1e-15)
 
 
@@ -211,6 +218,37 @@ def test_missing_measurements(hybridsep: Run, tmp_path: Path) -> None:
         rms_pb, rms_hold, rms_h = (found["judged"][name] for name in ("rms_pb", "rms_hold", "rms_h"))
         assert rms_h < 0.7 * min(rms_pb, rms_hold)
         assert rms_h < 14e-6  # noise is 5 µm
+
+
+def test_a_gap_is_said_to_be_handled(hybridsep: Run, tmp_path: Path) -> None:
+    log = write_rows(tmp_path / "axis.csv", commanded()[:1200], measured(0)[:1200])
+    lines = log.read_text().splitlines(keepends=True)
+    log.write_text("".join(lines[:400] + lines[800:]))
+    status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", 40)
+    assert status == 0, err
+    words = " ".join(out.split())
+    assert "error:" not in words
+    assert "axis.csv: handled: gaps: 400 samples are missing in 1 gap" in words
+    assert "Done: keep the segments apart." in words
+    assert "axis.csv: 800 samples, 0.8 s at 1000 Hz in 2 segments of a record of 1.2 s, travel" in words
+    page = unescape((tmp_path / "fit" / "report.html").read_text(encoding="utf-8"))
+    assert "800 samples, 0.8 s at 1000 Hz in 2 segments of a record of 1.2 s · look-ahead" in page
+    assert "changed before" not in page
+
+
+def test_a_rotary_axis_modulo_one_turn_is_unwrapped(hybridsep: Run, tmp_path: Path) -> None:
+    """The staircase as four turns."""
+    scale = 8 * np.pi / np.ptp(commanded()[:3000])
+    rows = [np.mod(np.degrees(scale * x[:3000]), 360.0) for x in (commanded(), measured(0))]
+    log = write_rows(tmp_path / "axis.csv", *rows, header="t,x_d [deg],x_meas [deg]")
+    status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", 40)
+    assert (status, out) == (2, "")
+    assert "whole turns" in err
+    assert "(--fix does it)" in " ".join(err.split())
+    status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", 40, "--fix")
+    assert status == 0, err
+    assert "Done: unwrap both positions; your controller must do the same." in " ".join(out.split())
+    assert json.loads((tmp_path / "fit" / "fit.json").read_text())["judged"]["rms_h"] < 12e-6 * scale
 
 
 def test_what_is_kept_is_of_the_samples_as_they_are_read(log: Path) -> None:

@@ -130,6 +130,7 @@ def test_the_log_is_checked(hybridsep: Run, tmp_path: Path) -> None:
     assert "columns swapped" in " ".join(err.split())
     machine = load_machine(out)
     assert machine.name == "my_axis"  # as the file
+    assert machine.sources == ()  # nothing was done that a controller must do, too
     assert machine.model.modes[0].f_n == pytest.approx(20.0, abs=0.1)
 
 
@@ -151,6 +152,17 @@ def test_missing_measurements(hybridsep: Run, tmp_path: Path) -> None:
     assert status == 2
     assert f"{n} measured positions are missing; record it again, or read it as a log" in " ".join(err.split())
     assert "--trust" not in err
+
+
+def test_a_changed_position_is_a_source_of_the_machine(hybridsep: Run, tmp_path: Path) -> None:
+    x_d = moves(1200)
+    log, out = tmp_path / "flipped.csv", tmp_path / "axis.toml"
+    columns = (np.arange(len(x_d)) * T_S, x_d, -measured(TRUTH, x_d, "zoh", 1e-6))
+    np.savetxt(log, np.column_stack(columns), delimiter=",", header="t,x_d,x", comments="", fmt="%.12g")
+    status, _, err = hybridsep("identify", log, "--out", out, "--fix")
+    assert status == 0
+    assert "your controller must do the same" in " ".join(err.split())
+    assert "sign; the controller must do the same" in load_machine(out).sources[1]
 
 
 def test_only_a_log_is_put_right(hybridsep: Run, response: Path) -> None:

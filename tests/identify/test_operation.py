@@ -10,6 +10,7 @@ import pytest
 from identification_cases import T_S, correlated, measured, moves
 from places import EMPS, ROOT
 from scipy import io
+from scipy.signal import chirp
 
 from hybridsep import ModalModel, Mode
 from hybridsep.base.errors import IdentificationError
@@ -81,8 +82,30 @@ def test_a_recording_that_starts_in_motion_is_used() -> None:
     x = measured(SECOND, x_d, "foh", 1e-6)
     start = int(np.argmax(np.abs(np.diff(x_d)))) - 5
     found = identify_operation([(x_d[start:], x[start:])], T_S)
-    assert "starts in motion" in " ".join(found.findings)
+    assert "the recording starts in motion" in " ".join(found.findings)
+    behind = identify_operation([(x_d[:start], x[:start]), (x_d[start:], x[start:])], T_S, order_max=1)
+    assert "a piece behind a gap starts in motion" in " ".join(behind.findings)
     assert value(found, "mode[1].f_n")[0] == pytest.approx(20.0, rel=0.002)
+
+
+def test_a_drive_beyond_its_bandwidth_has_no_wrong_sign() -> None:
+    """There it moves against its command; a correlation of -0.7 was taken for a flipped sign."""
+    t = T_S * np.arange(4000)
+    x_d = 1e-3 * chirp(t, 30.0, t[-1], 60.0, phi=-90)
+    light = ModalModel([Mode(20.0, 0.1, (40 * np.pi) ** 2)])
+    x = measured(light, x_d, "foh", 1e-7)
+    assert np.corrcoef(x_d, x)[0, 1] < -0.7
+    found = identify_operation([(x_d, x)], T_S)
+    assert value(found, "mode[1].f_n")[0] == pytest.approx(20.0, rel=0.01)
+
+
+def test_the_pieces_of_a_long_recording_are_no_starts() -> None:
+    """Of more than 60 000 samples the liveliest pieces are fitted to, and those begin anywhere."""
+    x_d = np.concatenate([0.01 * i + moves(2000) for i in range(35)])
+    x_d = np.concatenate((np.full(500, x_d[0]), x_d))
+    assert len(x_d) > 60_000
+    found = identify_operation([(x_d, measured(SECOND, x_d, "foh", 1e-6))], T_S, order_max=1)
+    assert "starts in motion" not in " ".join(found.findings)
 
 
 def test_a_recording_that_rests_most_of_the_time_is_used() -> None:
