@@ -26,11 +26,10 @@ def print_fit(fit: Fit, logs: Sequence[Log], findings: Mapping[str, Iterable[Fin
             f"{log.path.name}: {len(log.t)} samples, {len(log.t) * log.T_s:.4g} s at {1 / log.T_s:.4g} Hz, travel "
             f"{1e3 * travel:.4g} m{unit}{stated}",
             highlight=False,
-            markup=False,
         )
     for name, found in findings.items():
         for finding in found:
-            console.print(f"{name}: {finding}", highlight=False, markup=False)
+            console.print(f"{name}: {finding}", highlight=False)
     scale, shown = shown_unit(fit.judged.rms()[0], unit)
     model, settings = fit.identification, fit.machine.predictor_settings
     table = Table(
@@ -41,7 +40,7 @@ def print_fit(fit: Fit, logs: Sequence[Log], findings: Mapping[str, Iterable[Fin
         table.add_row(label, shown_figure(scale * value))
     console.print(f"{model['structure']}, dead time {model['dead_time']} samples", highlight=False)
     for line in model["findings"]:
-        console.print(f"  {line}", highlight=False, markup=False)
+        console.print(f"  {line}", highlight=False)
     console.print(f"Np = {settings.Np}, p = {settings.p}, q = {settings.q}", highlight=False)
     console.print(table)
     console.print(str(fit.judged.verdict()), highlight=False)

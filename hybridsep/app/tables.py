@@ -27,7 +27,8 @@ __all__ = [
     "shown_unit",
 ]
 
-console = Console(emoji=False)
+console = Console(emoji=False, markup=False)
+"""Standard output. Units and names of files may have brackets, which are text there, as in the tables."""
 
 _UNITS = {"m": ((1e6, "µm"), (1e3, "mm")), "rad": ((1e6, "µrad"), (1e3, "mrad"))}
 

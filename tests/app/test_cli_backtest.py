@@ -120,6 +120,21 @@ def test_saved_state_and_predictions(hybridsep: Run, tmp_path: Path) -> None:
     assert "--save must end in .state or .csv or .npz" in hybridsep("backtest", log, *MACHINE, "--save", "a.bin")[2]
 
 
+def test_brackets_are_text(hybridsep: Run, tmp_path: Path) -> None:
+    """Brackets of a name are no markup: not in titles and cells, not in notes and errors."""
+    log = write_log(tmp_path / "x[b]axis[red].csv", n=1000)
+    status, out, err = hybridsep("backtest", log, *MACHINE)
+    assert status == 0, err
+    assert "x[b]axis[red].csv: prediction error in µm" in " ".join(out.split())
+    status, out, err = hybridsep("tune", log, *MACHINE, "--Np", 50, "--p", 5, "--q", 0, "--lambda", 1e-9, "--jobs", 1)
+    assert status == 0, err
+    assert "x[b]axis[red].csv" in out
+    status, _, err = hybridsep("backtest", log, *MACHINE, "--x", "[bold]")
+    assert status == 2
+    assert "x[b]axis[red].csv" in err
+    assert "[bold]" in err
+
+
 def test_a_rotary_axis(hybridsep: Run, tmp_path: Path) -> None:
     text = (data_folder("models") / "emps.toml").read_text(encoding="utf-8").partition("[log]")[0]
     linear, rotary = tmp_path / "axis.toml", tmp_path / "table.toml"

@@ -142,6 +142,7 @@ def test_the_command_line(hybridsep: Run, tmp_path: Path) -> None:
         out.split()
     )
     assert "report: " in out
+    assert "taught nothing [µm]" in " ".join(out.split())
     machine = tmp_path / "fit" / "machine.toml"
     edited = machine.read_text(encoding="utf-8").replace("dead_time = ", "dead_time = 1")
     machine.write_text(edited, encoding="utf-8")
