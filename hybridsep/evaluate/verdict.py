@@ -15,10 +15,16 @@ from ..base.metrics import rms_ratio
 from ..base.signals import Array
 from ..cosim.run import Run
 
-__all__ = ["ALIKE", "Tally", "Verdict", "verdict_of"]
+__all__ = ["ALIKE", "WINDOWS_ENOUGH", "WINDOWS_MIN", "Tally", "Verdict", "counted", "verdict_of"]
 
 ALIKE = 0.02
 """Relative difference of two RMS errors below which they count as equal."""
+
+WINDOWS_MIN = 3
+"""Windows below which nothing is judged: what one or two of them show is chance."""
+
+WINDOWS_ENOUGH = 20
+"""Windows from which on a judgement is stated without caution: some moves, each with its beginning and its end."""
 
 _LEAST_SHARE = 0.01
 """Share of the samples from which on a place is judged."""
@@ -57,6 +63,8 @@ class Verdict:
         What explains it where it is worse, as far as the run shows.
     n_rejected, n_samples : int
         Measurements that were not learned, as they were missing or not plausible, and all of them.
+    n_windows : int
+        Whole windows with measurements, which were judged.
     """
 
     ratio_pb: float
@@ -66,14 +74,19 @@ class Verdict:
     causes: tuple[str, ...]
     n_rejected: int
     n_samples: int
+    n_windows: int
 
     def __str__(self) -> str:
+        if self.n_windows < WINDOWS_MIN:
+            return f"Nothing is judged: {counted(self.n_windows)}, at least {WINDOWS_MIN} are needed."
         ratios = (self.ratio_pb, self.ratio_hold)
         lines = [
             f"{_comparison(value)} {peer}: {_times(value)}{_where(value, places, self.judged)}"
             for peer, value, places in zip(_PEERS, ratios, self.worse, strict=True)
         ]
         lines += [f"Why: {cause}" for cause in self.causes]
+        if self.n_windows < WINDOWS_ENOUGH:
+            lines.append(f"Judged by {counted(self.n_windows)} only")
         if self.n_rejected:
             lines.append(
                 f"{self.n_rejected} of {self.n_samples} measurements were missing or not plausible, and not learned"
@@ -103,7 +116,7 @@ class Tally:
         self.Np = Np
         self._squares = np.zeros((3, len(_MOTIONS), _N_THIRDS))
         self._counts = np.zeros((len(_MOTIONS), _N_THIRDS))
-        self._early, self._n_windows = np.zeros(3), 0
+        self._early, self._n_windows, self._n_whole = np.zeros(3), 0, 0
         self._last_x_d = math.nan
         self._fastest = 0.0
         self._largest_residual = self._largest_change = 0.0
@@ -140,6 +153,7 @@ class Tally:
         if self._n_windows < _N_EARLY:
             self._early += squares.sum(axis=1)
         self._n_windows += 1
+        self._n_whole += int(len(x) == self.Np and known.any())
 
     def verdict(self, *, n_rejected: int = 0) -> Verdict:
         """Return the verdict on the windows so far.
@@ -161,6 +175,7 @@ class Tally:
             tuple(self._causes(ratios)),
             n_rejected,
             n_samples,
+            self._n_whole,
         )
 
     def _places(self) -> dict[str, tuple[int, int]]:
@@ -207,6 +222,11 @@ class Tally:
         """Return whether the hybrid is worse than a peer in the beginning of the run and not in the rest."""
         rest = np.maximum(self._squares.sum(axis=(1, 2)) - self._early, 0.0)
         return self._n_windows > 2 * _N_EARLY and _ratio(rest[2], rest[peer]) <= 1.0 + ALIKE
+
+
+def counted(n: int) -> str:
+    """Return a number of windows as text."""
+    return f"{n} window{'' if n == 1 else 's'}"
 
 
 def _ratio(own: float, other: float) -> float:

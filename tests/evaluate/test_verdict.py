@@ -100,6 +100,19 @@ def test_rejected_measurements_are_told() -> None:
     assert said.endswith("\n7 of 1200 measurements were missing or not plausible, and not learned.")
 
 
+def test_few_windows_are_told_and_fewer_judge_nothing() -> None:
+    assert "only" not in str(verdict(10, 8, 4, n=20))
+    said = str(verdict(10, 8, 4, n=19))
+    assert said.startswith("Better than the physics model: 0.4")
+    assert said.endswith("\nJudged by 19 windows only.")
+    assert str(verdict(10, 8, 4, n=2)) == "Nothing is judged: 2 windows, at least 3 are needed."
+    tally = Tally(NP)
+    for window in (np.full(NP, np.nan), np.zeros(NP), np.zeros(NP - 1)):  # nothing measured, whole, cut
+        n = len(window)
+        tally.add(MOVING[:n], window, errors(10, 8, 4)[:, :n])
+    assert tally.verdict().n_windows == 1
+
+
 def test_missing_measurements_are_not_judged() -> None:
     tally, x = Tally(NP), np.zeros(NP)
     x[:3] = np.nan
