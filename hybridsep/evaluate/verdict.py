@@ -256,7 +256,7 @@ def _listed(places: tuple[str, ...]) -> str:
     shown = [text for place, text in zip(_MOTIONS, ("at standstill", "in motion"), strict=True) if place in places]
     thirds = [place.partition(" ")[0] for place in places if place in _THIRDS]
     if len(thirds) == _N_THIRDS:
-        return f"{' and '.join(shown)}{', ' if shown else ''}over the whole window"
+        return f"{' and '.join(shown)}{', ' if shown else ''}in every third of the window"
     if thirds:
         shown.append(f"in the {' and '.join(thirds)} third of the window")
     return " and ".join(shown)

@@ -43,8 +43,8 @@ def test_better_everywhere() -> None:
     found = verdict(10, 8, 4)
     assert (found.ratio_pb, found.ratio_hold) == pytest.approx((0.4, 0.5))
     assert str(found) == (
-        "Better than the physics model: 0.4 × its RMS error, in motion, over the whole window.\n"
-        "Better than hold: 0.5 × its RMS error, in motion, over the whole window."
+        "Better than the physics model: 0.4 × its RMS error, in motion, in every third of the window.\n"
+        "Better than hold: 0.5 × its RMS error, in motion, in every third of the window."
     )
 
 
@@ -53,7 +53,7 @@ def test_places_where_it_is_worse() -> None:
     said = str(verdict(10, 10, np.where(HALF, 11, 1), motion=motion))
     assert said.splitlines()[0].endswith("; worse at standstill and in the first third of the window.")
     said = str(verdict(10, np.where(HALF, 1, 20), 5, motion=motion))
-    assert "Better than the physics model: 0.5 × its RMS error, at standstill and in motion, over the whole" in said
+    assert "Better than the physics model: 0.5 × its RMS error, at standstill and in motion, in every third" in said
     assert "Better than hold" in said
     assert said.endswith("; worse at standstill and in the first third of the window.")
     assert str(verdict(10, 10, 20, motion=motion)).startswith("Worse than the physics model: 2 × its RMS error, every")
