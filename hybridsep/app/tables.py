@@ -153,7 +153,9 @@ def print_scores(
     table = Table(title=f"{title}: prediction error in µ{unit} against the measured position")
     for column in ("", "physics", "hold", "hybrid", "reduction", "× hold"):
         table.add_column(column, justify="right")
-    for suffix, label in (("", ""), ("_after_warm_up", " after warm-up")):
+    warmed_up = summary.get("n_samples_after_warm_up") != summary["n_samples"]
+    parts = (("", ""), ("_after_warm_up", " after warm-up"))
+    for suffix, label in parts if warmed_up else parts[:1]:
         for quantity in ("rms", "max"):
             figures = [summary.get(f"{quantity}_{name}_um{suffix}") for name in ("pb", "hold", "h")]
             if all(figure is not None for figure in figures):

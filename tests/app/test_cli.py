@@ -36,6 +36,10 @@ def test_backtest_of_a_csv(hybridsep: Run, tmp_path: Path) -> None:
     assert "after warm-up" in out
     assert " ".join(summary["verdict"].split()) in " ".join(out.split())
     assert summary["verdict"].startswith("Better than the physics model: 0.4")
+    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--trust", "true", "--t_init", 0)
+    assert status == 0
+    assert "RMS" in out
+    assert "after warm-up" not in out
 
 
 def test_backtest_of_a_log_with_missing_measurements(hybridsep: Run, tmp_path: Path) -> None:

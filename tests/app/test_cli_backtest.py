@@ -96,6 +96,18 @@ def test_figures(hybridsep: Run, tmp_path: Path, suffix: str) -> None:
     assert "--figure must end in .png or .pdf or .svg" in hybridsep("backtest", log, *MACHINE, "--figure", "a.jpg")[2]
 
 
+def test_the_legend_names_a_warm_up_where_there_is_one(hybridsep: Run, tmp_path: Path) -> None:
+    log = write_log(tmp_path / "log.csv", n=1000)
+    drawn = []
+    for t_init in (0.0, 0.3):
+        figure = tmp_path / "figure.svg"
+        status, _, err = hybridsep("backtest", log, *MACHINE, "--trust", "true", "--t_init", t_init, "--figure", figure)
+        assert status == 0, err
+        drawn.append(figure.read_text(encoding="utf-8"))
+    assert "<!-- linear hybrid model -->" in drawn[0]
+    assert "<!-- linear hybrid model, after the warm-up -->" in drawn[1]
+
+
 def test_saved_state_and_predictions(hybridsep: Run, tmp_path: Path) -> None:
     log, state, table = write_log(tmp_path / "log.csv"), tmp_path / "my.state", tmp_path / "my.csv"
     cold = json.loads(hybridsep("backtest", log, *MACHINE, "--save", state, "--save", table, "--json")[1])
