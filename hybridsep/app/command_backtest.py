@@ -50,7 +50,10 @@ def backtest(
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Check a recorded log and replay it causally: physics model, hold baseline and hybrid."""
+    """Check a recorded log and replay it causally.
+
+    Physics model, hold baseline and hybrid are compared.
+    """
     with loading():
         from ..evaluate.backtest import Batch, backtest_stream
         from ..evaluate.backtest import backtest as backtest_whole

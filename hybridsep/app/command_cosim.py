@@ -60,7 +60,10 @@ def cosim(
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Co-simulate a predictor FMU, or a compensator FMU, with a plant FMU over a trajectory."""
+    """Co-simulate a predictor or compensator FMU with a plant FMU.
+
+    Over the staircase, a spiral's axis or a trajectory in a file.
+    """
     with loading():
         from ..cosim.loop import cosimulate
         from ..cosim.run import RESULT_SUFFIXES

@@ -42,7 +42,7 @@ def fit(
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """From the log of an axis to its model, settings, FMUs and a report."""
+    """From the log of an axis to its model, FMUs and a report."""
     with loading():
         from ..logs.log import read_log
         from .arguments import check_ending, checked_name, machine_name

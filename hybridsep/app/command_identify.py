@@ -68,7 +68,10 @@ def identify(
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Identify the physics model: from a log, a frequency response or a swept sine."""
+    """Identify the physics model of an axis.
+
+    From a log, a frequency response, a swept sine or Klipper's accelerometers.
+    """
     with loading():
         from ..identify.figures import operation_figure, response_figure
         from ..identify.frequency_response import IdentifiedResponse, identify_frequency_response

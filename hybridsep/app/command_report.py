@@ -39,7 +39,10 @@ def report(
     parameters: dict[str, Any],
     force: ForceOption = False,
 ) -> None:
-    """Check and replay a recorded log as backtest does, and write one self-contained HTML file about it."""
+    """Replay a recorded log and write an HTML report about it.
+
+    It is checked and replayed as by backtest. The file needs no network.
+    """
     with loading():
         from ..cosim.fmus import check_controller
         from ..cosim.run import PREDICTOR

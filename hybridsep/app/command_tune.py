@@ -45,7 +45,10 @@ def tune(
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Rank settings of the predictor by causal replays of logs, at the controller's look-ahead."""
+    """Rank settings of the predictor by causal replays of logs.
+
+    The look-ahead is the controller's.
+    """
     with loading():
         from ..logs.log import Log
         from ..machines.machine import load_machine, machine_path

@@ -191,6 +191,9 @@ def test_help_shows_units_and_ranges(hybridsep: Run) -> None:
     assert "[m2]" in text
     status, out, _ = hybridsep("--help")
     assert all(command in out for command in ("demo", "build", "cosim", "backtest", "identify", "init", "tune"))
+    listed = out.partition("Commands:")[2].partition("An error is")[0]
+    assert "From the log of an axis to its model, FMUs and a report." in listed
+    assert "..." not in listed
     assert hybridsep("--version")[1].strip() == __version__
 
 
