@@ -85,6 +85,7 @@ def identify(
         from .log_intake import show, take_in
         from .overwrite import FIGURE, MACHINE, Output, check_outputs
         from .progress import progress_bar
+        from .tables import print_written
 
     if kind not in KINDS:
         raise ParameterError(f"--kind must be one of {', '.join(KINDS)}, got {kind!r}")
@@ -151,6 +152,8 @@ def identify(
     if out is not None:
         _write_machine(found, machine, recording.name, out)
     print_identified(found, as_json, recording.name)
+    if not as_json:
+        print_written(out, figure)
 
 
 def _klipper_axis(axis: str | None) -> str:

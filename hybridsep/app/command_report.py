@@ -57,7 +57,7 @@ def report(
         from .progress import progress_bar
         from .report_sections import Judged, recommendation, write_errors, write_findings, write_use
         from .step_times import step_times
-        from .tables import console
+        from .tables import console, print_written
 
     page = out or Path(f"{machine_name(log)}_report.html")
     check_ending(page, "--out", (".html",))
@@ -95,3 +95,4 @@ def report(
     written.write(page, figure)
     console.print(recommendation(judged), highlight=False)
     console.print(f"report: {page}", highlight=False, soft_wrap=True)
+    print_written(figure)

@@ -61,7 +61,7 @@ def tune(
         from .log_intake import findings_table, open_checked, reading_of
         from .overwrite import BY_ENDING, MACHINE, Output, check_outputs
         from .progress import progress_bar
-        from .tables import print_json
+        from .tables import print_json, print_written
         from .tune_table import entries, print_tuning, tuning_summary
 
         if figure is not None:
@@ -116,6 +116,8 @@ def tune(
         comment = f"Settings of [predictor] from hybridsep tune on {', '.join(path.name for path in logs)}."
         with written_text(out) as file:
             file.write(machine_text(best, [comment]))
+    if not as_json:
+        print_written(out, figure)
 
 
 def _named(logs: Sequence[Path]) -> dict[str, Path]:

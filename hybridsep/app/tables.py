@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ __all__ = [
     "print_predictions",
     "print_run",
     "print_scores",
+    "print_written",
     "shown_figure",
     "shown_unit",
 ]
@@ -197,6 +199,13 @@ def _print_tracking(summary: Mapping[str, float | int], as_json: bool, title: st
         f"not compensated {summary['share_off']:.1%} of the samples",
         highlight=False,
     )
+
+
+def print_written(*paths: Path | None) -> None:
+    """Print the names of files that were written, None being none."""
+    for path in paths:
+        if path is not None:
+            console.print(f"wrote {path}", highlight=False, soft_wrap=True)
 
 
 def print_json(result: Any) -> None:

@@ -132,6 +132,18 @@ def test_saved_state_and_predictions(hybridsep: Run, tmp_path: Path) -> None:
     assert "--save must end in .state or .csv or .npz" in hybridsep("backtest", log, *MACHINE, "--save", "a.bin")[2]
 
 
+def test_the_files_that_were_written_are_named(hybridsep: Run, tmp_path: Path) -> None:
+    log = write_log(tmp_path / "log.csv", n=1000)
+    files = {name: tmp_path / name for name in ("batches.csv", "errors.png", "my.state", "run.npz")}
+    options = ("--out", files["batches.csv"], "--figure", files["errors.png"])
+    options += ("--save", files["my.state"], "--save", files["run.npz"])
+    status, out, _ = hybridsep("backtest", log, *MACHINE, *options)
+    assert status == 0
+    assert out.splitlines()[-4:] == [f"wrote {path}" for path in files.values()]
+    assert all(path.exists() for path in files.values())
+    assert "wrote" not in hybridsep("backtest", log, *MACHINE, *options, "--json")[1]
+
+
 def test_brackets_are_text(hybridsep: Run, tmp_path: Path) -> None:
     """Brackets of a name are no markup: not in titles and cells, not in notes and errors."""
     log = write_log(tmp_path / "x[b]axis[red].csv", n=1000)
