@@ -50,7 +50,10 @@ def backtest(
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Check a recorded log and replay it causally: physics model, hold baseline and hybrid."""
+    """Check a recorded log and replay it causally.
+
+    Physics model, hold baseline and hybrid are compared.
+    """
     with loading():
         from ..evaluate.backtest import Batch, backtest_stream
         from ..evaluate.backtest import backtest as backtest_whole
@@ -63,7 +66,7 @@ def backtest(
         from .log_intake import findings_table, open_checked, reading_of
         from .overwrite import BATCH_COLUMNS, BATCHES, BY_ENDING, Output, check_outputs
         from .progress import progress_bar
-        from .tables import print_scores
+        from .tables import print_scores, print_written
 
         if figure is not None:
             from ..evaluate.time_plots import prediction_figure
@@ -113,3 +116,5 @@ def backtest(
             csv.writer(file).writerows([BATCH_COLUMNS, *rows])
     findings = findings_table(intake.findings)
     print_scores(scores.summary(), scores.verdict, as_json, title, unit=axis_machine.unit, more={"findings": findings})
+    if not as_json:
+        print_written(out, figure, *saved)

@@ -42,7 +42,10 @@ def build(
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Build FMUs from machine files; the same machine gives the same bytes."""
+    """Build FMUs from machine files.
+
+    The same machine gives the same bytes.
+    """
     with loading():
         from ..fmi.archive import build_fmu
         from ..machines.machine import machine_path

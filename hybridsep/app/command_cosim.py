@@ -60,7 +60,10 @@ def cosim(
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Co-simulate a predictor FMU, or a compensator FMU, with a plant FMU over a trajectory."""
+    """Co-simulate a predictor or compensator FMU with a plant FMU.
+
+    Over the staircase, a spiral's axis or a trajectory in a file.
+    """
     with loading():
         from ..cosim.loop import cosimulate
         from ..cosim.run import RESULT_SUFFIXES
@@ -70,7 +73,7 @@ def cosim(
         from .cosim_arguments import check_pair, checked_group, fitting, read_command
         from .overwrite import FIGURE, RUN, Output, check_outputs
         from .progress import progress_bar
-        from .tables import print_run
+        from .tables import print_run, print_written
 
         if figure is not None:
             from ..evaluate.time_plots import prediction_figure, tracking_figure
@@ -116,3 +119,5 @@ def cosim(
         else:
             tracking_figure({compensate: run}, title, figure)
     print_run(run, as_json, title)
+    if not as_json:
+        print_written(out, figure)

@@ -25,7 +25,10 @@ def demo(
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Build the FMUs, co-simulate the paper's staircase and spiral, draw and score them."""
+    """Co-simulate the paper's cases, draw and score them.
+
+    The FMUs of the staircase and the spiral are built first.
+    """
     with loading():
         from .builds import default_flavour
         from .demo import demo as run_demo

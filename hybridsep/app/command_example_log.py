@@ -17,7 +17,10 @@ def example_log(
     out: Annotated[Path, typer.Option(help="File for the log, .csv or .csv.gz.")] = Path("example_axis.csv"),
     force: ForceOption = False,
 ) -> None:
-    """Write the example log that comes with the library: 20 s of a simulated axis at 1 kHz, in mm."""
+    """Write the example log that comes with the library.
+
+    20 s of a simulated axis at 1 kHz, in mm.
+    """
     with loading():
         from ..logs.example import write_example
         from .arguments import check_ending

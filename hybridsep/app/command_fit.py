@@ -42,7 +42,7 @@ def fit(
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """From the log of an axis to its model, settings, FMUs and a report."""
+    """From the log of an axis to its model, FMUs and a report."""
     with loading():
         from ..logs.log import read_log
         from .arguments import check_ending, checked_name, machine_name
@@ -54,7 +54,7 @@ def fit(
         from .overwrite import BY_ENDING, FIT_FILES, Output, check_outputs
         from .progress import progress_bar
         from .report_sections import recommendation
-        from .tables import console, print_json
+        from .tables import console, print_json, print_written
 
     name = checked_name(name) if name else machine_name(logs[0], reading.axis)
     folder = out or Path(name)
@@ -82,3 +82,4 @@ def fit(
     print_fit(result, used, findings)
     console.print(f"\n{recommendation(judged_by(result, used[0].unit))}", highlight=False)
     console.print("\n".join(f"{what}: {path}" for what, path in files.items()), highlight=False, soft_wrap=True)
+    print_written(figure)

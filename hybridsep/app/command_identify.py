@@ -69,7 +69,10 @@ def identify(
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Identify the physics model: from a log, a frequency response or a swept sine."""
+    """Identify the physics model of an axis.
+
+    From a log, a frequency response, a swept sine or Klipper's accelerometers.
+    """
     with loading():
         import numpy as np
 
@@ -85,6 +88,7 @@ def identify(
         from .log_intake import changes, show, take_in
         from .overwrite import FIGURE, MACHINE, Output, check_outputs
         from .progress import progress_bar
+        from .tables import print_written
 
     if kind not in KINDS:
         raise ParameterError(f"--kind must be one of {', '.join(KINDS)}, got {kind!r}")
@@ -159,6 +163,8 @@ def identify(
     if out is not None:
         _write_machine(found, machine, recording.name, changed, out)
     print_identified(found, as_json, recording.name)
+    if not as_json:
+        print_written(out, figure)
 
 
 def _klipper_axis(axis: str | None) -> str:

@@ -58,7 +58,10 @@ def init(
     Np: Annotated[int | None, typer.Option("--Np", help="Samples in a look-ahead window.")] = None,
     force: ForceOption = False,
 ) -> None:
-    """Write an annotated machine file, by options or by a few questions where they are missing."""
+    """Write an annotated machine file, by options or questions.
+
+    What no option says is asked.
+    """
     with loading():
         from ..identify.model import machine_of
         from ..machines.text import machine_text

@@ -39,7 +39,10 @@ def report(
     parameters: dict[str, Any],
     force: ForceOption = False,
 ) -> None:
-    """Check and replay a recorded log as backtest does, and write one self-contained HTML file about it."""
+    """Replay a recorded log and write an HTML report about it.
+
+    It is checked and replayed as by backtest. The file needs no network.
+    """
     with loading():
         from ..cosim.fmus import check_controller
         from ..cosim.run import PREDICTOR
@@ -54,7 +57,7 @@ def report(
         from .progress import progress_bar
         from .report_sections import Judged, recommendation, write_changes, write_errors, write_findings, write_use
         from .step_times import step_times
-        from .tables import console
+        from .tables import console, print_written
 
     page = out or Path(f"{machine_name(log)}_report.html")
     check_ending(page, "--out", (".html",))
@@ -93,3 +96,4 @@ def report(
     written.write(page, figure)
     console.print(recommendation(judged), highlight=False)
     console.print(f"report: {page}", highlight=False, soft_wrap=True)
+    print_written(figure)

@@ -45,7 +45,10 @@ def tune(
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Rank settings of the predictor by causal replays of logs, at the controller's look-ahead."""
+    """Rank settings of the predictor by causal replays of logs.
+
+    The look-ahead is the controller's.
+    """
     with loading():
         from ..logs.log import Log
         from ..machines.machine import load_machine, machine_path
@@ -58,7 +61,7 @@ def tune(
         from .log_intake import findings_table, open_checked, reading_of
         from .overwrite import BY_ENDING, MACHINE, Output, check_outputs
         from .progress import progress_bar
-        from .tables import print_json
+        from .tables import print_json, print_written
         from .tune_table import entries, print_tuning, tuning_summary
 
         if figure is not None:
@@ -113,6 +116,8 @@ def tune(
         comment = f"Settings of [predictor] from hybridsep tune on {', '.join(path.name for path in logs)}."
         with written_text(out) as file:
             file.write(machine_text(best, [comment]))
+    if not as_json:
+        print_written(out, figure)
 
 
 def _named(logs: Sequence[Path]) -> dict[str, Path]:

@@ -23,7 +23,7 @@ __all__ = ["DEBUG_VARIABLE", "errors_console", "loading", "run"]
 DEBUG_VARIABLE = "HYBRIDSEP_DEBUG"
 """Environment variable: if it is set, an unexpected error shows its traceback."""
 
-errors_console = Console(stderr=True, emoji=False)
+errors_console = Console(stderr=True, emoji=False, markup=False)
 
 _PLAIN = str.maketrans(
     {"µ": "u", "→": "->", "–": "-", "−": "-", "…": "...", "²": "2", "³": "3", "·": "*", "λ": "lambda"}
@@ -107,8 +107,8 @@ def _status(app: Callable[[], object]) -> int:
 
 
 def _fail(message: str) -> int:
-    errors_console.print("[bold red]error:[/] ", end="")
-    errors_console.print(message, markup=False, highlight=False, soft_wrap=True)
+    errors_console.print("error: ", style="bold red", end="")
+    errors_console.print(message, highlight=False, soft_wrap=True)
     return 2
 
 

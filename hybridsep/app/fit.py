@@ -15,7 +15,7 @@ from ..fmi.archive import fmu_name
 from ..fmi.compiler import can_compile
 from ..fmi.flavours import FLAVOURS
 from ..identify.model import machine_of
-from ..identify.operation import identify_operation, unit_gain_model
+from ..identify.operation import SAMPLES_MIN, identify_operation, unit_gain_model
 from ..logs.log import Log
 from ..machines.machine import Machine
 from ..machines.text import machine_text
@@ -66,6 +66,8 @@ class Fit:
     machine : Machine
     identification, choice, windows, steps : plain values
         As in ``fit.json``.
+    share : float
+        Share of each log's samples that taught.
     judged : Replay
         Replay of the logs; what judges taught neither the physics model nor the choice.
     files : tuple of Path
@@ -77,13 +79,21 @@ class Fit:
     choice: list[dict[str, Any]]
     windows: list[dict[str, Any]]
     steps: dict[str, float]
+    share: float
     judged: Replay
     files: tuple[Path, ...]
 
     def summary(self) -> dict[str, Any]:
         """Return plain values: errors in m over the samples that judge, settings, identification, step times in s."""
         rms_pb, rms_hold, rms_h = self.judged.rms()
-        judged = {"rms_pb": rms_pb, "rms_hold": rms_hold, "rms_h": rms_h, "verdict": str(self.judged.verdict())}
+        verdict = self.judged.verdict()
+        judged = {
+            "rms_pb": rms_pb,
+            "rms_hold": rms_hold,
+            "rms_h": rms_h,
+            "n_windows": verdict.n_windows,
+            "verdict": str(verdict),
+        }
         settings = {name: getattr(self.machine.predictor_settings, name) for name in ("Np", "p", "q")}
         parts = {"identification": self.identification, "tried": self.choice, "over_Np": self.windows}
         return {"judged": judged, "settings": settings, **parts, "step_times": self.steps}
@@ -175,7 +185,7 @@ def fit(
     progress("time the FMU's steps", 0.95)
     fmu = files[f"{_flavours()[0]} FMU"]
     steps = step_times(fmu, recordings[0].x_d, recordings[0].x)
-    result = Fit(machine, found, choice, windows, steps, judged, tuple(files.values()))
+    result = Fit(machine, found, choice, windows, steps, options.share, judged, tuple(files.values()))
     stages.keep("judged", result.summary()["judged"])
     progress("done", 1.0)
     return result
@@ -202,7 +212,13 @@ def _identified(
 ) -> dict[str, Any]:
     """Return the identification from the samples that teach, as plain values."""
     taught = [recording.taught for recording in recordings if recording.n_taught > 1]
+    n, n_all = (sum(lengths) for lengths in zip(*((one.n_taught, len(one.x)) for one in recordings), strict=True))
     try:
+        if n < SAMPLES_MIN:
+            raise IdentificationError(
+                f"this log cannot teach a model, because {n} of its {n_all} samples teach, at least {SAMPLES_MIN} are "
+                "needed"
+            )
         found = identify_operation(taught, T_s, unit=unit, progress=lambda _message, done: progress(done))
     except IdentificationError as error:
         found = unit_gain_model(T_s, f"{error}; a gain of 1 without lag is taken")

@@ -36,7 +36,7 @@ _SETTLING = (
 
 def judged_by(fit: Fit, unit: str) -> Judged:
     """Return the replay that judges a fit as it is reported; ``unit`` is m or rad."""
-    return Judged(fit.judged, fit.machine.T_s, unit, "the log's second half")
+    return Judged(fit.judged, fit.machine.T_s, unit, "the log's second half", share=1.0 - fit.share)
 
 
 def fit_report(fit: Fit, logs: Sequence[Log], findings: Mapping[str, Sequence[Finding]]) -> Report:

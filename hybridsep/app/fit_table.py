@@ -25,11 +25,10 @@ def print_fit(fit: Fit, logs: Sequence[Log], findings: Mapping[str, Iterable[Fin
         console.print(
             f"{log.path.name}: {len(log.t)} samples, {span([log])}, travel {1e3 * travel:.4g} m{unit}{stated}",
             highlight=False,
-            markup=False,
         )
     for name, found in findings.items():
         for finding in found:
-            console.print(f"{name}: {finding}", highlight=False, markup=False)
+            console.print(f"{name}: {finding}", highlight=False)
     scale, shown = shown_unit(fit.judged.rms()[0], unit)
     model, settings = fit.identification, fit.machine.predictor_settings
     table = Table(
@@ -40,7 +39,7 @@ def print_fit(fit: Fit, logs: Sequence[Log], findings: Mapping[str, Iterable[Fin
         table.add_row(label, shown_figure(scale * value))
     console.print(f"{model['structure']}, dead time {model['dead_time']} samples", highlight=False)
     for line in model["findings"]:
-        console.print(f"  {line}", highlight=False, markup=False)
+        console.print(f"  {line}", highlight=False)
     console.print(f"Np = {settings.Np}, p = {settings.p}, q = {settings.q}", highlight=False)
     console.print(table)
     console.print(str(fit.judged.verdict()), highlight=False)

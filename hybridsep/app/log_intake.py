@@ -185,7 +185,7 @@ def findings_table(findings: Iterable[Finding]) -> list[dict[str, Any]]:
 def show(remarks: Iterable[str], findings: Iterable[Finding]) -> None:
     """Print remarks and findings on standard error."""
     for line in [f"note: {remark}" for remark in remarks] + [str(finding) for finding in findings]:
-        errors_console.print(line, markup=False, highlight=False, soft_wrap=True)
+        errors_console.print(line, highlight=False, soft_wrap=True)
 
 
 def _longest_segment(log: Log, path: Path) -> Log:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,7 +15,7 @@ from ..base.signals import Array
 from ..evaluate.canvas import HOLD, HYBRID, PHYSICS
 from ..evaluate.chart import Chart, Line
 from ..evaluate.report import Report
-from ..evaluate.verdict import ALIKE
+from ..evaluate.verdict import ALIKE, WINDOWS_ENOUGH, WINDOWS_MIN, counted
 from ..intake.finding import Finding
 from ..tune.halves import Replay
 from .tables import shown_unit
@@ -52,12 +53,15 @@ class Judged:
         Unit of the positions.
     part : str
         What judges, such as "the log's second half".
+    share : float
+        Share of a log's samples that judges.
     """
 
     replay: Replay
     T_s: float
     si: str
     part: str
+    share: float = 1.0
 
     @cached_property
     def unit(self) -> tuple[float, str]:
@@ -65,18 +69,36 @@ class Judged:
         return shown_unit(self.replay.rms()[0], self.si)
 
 
+def _enough(judged: Judged) -> str:
+    """Return how long a recording would do, in words: its windows that judge, and one that began before."""
+    seconds = (WINDOWS_ENOUGH + 1) * judged.replay.Np * judged.T_s / judged.share
+    return f"record at least {math.ceil(round(10 * seconds, 6)) / 10:g} s"
+
+
 def recommendation(judged: Judged) -> str:
-    """Return what to do, in words."""
+    """Return what to do, in words; with caution where few windows judge."""
+    n = judged.replay.verdict().n_windows
+    if n < WINDOWS_MIN:
+        return (
+            f"Nothing could be judged: {judged.part} has {counted(n)} of {judged.replay.Np} samples; {_enough(judged)}."
+        )
     pb, hold, h = judged.replay.rms()
     peer, value = min(("the physics model alone", pb), ("holding the last residual", hold), key=lambda one: one[1])
     if value == 0.0:
         return f"There is no error to predict in {judged.part}: record the axis while it works."
     ratio = h / value
+    if n < WINDOWS_ENOUGH:
+        how = "better than" if ratio < 1.0 - ALIKE else "worse than" if ratio > 1.0 + ALIKE else "as good as"
+        return (
+            f"So far the hybrid is {how} {peer}, {ratio:.2f} × its error, but judged by {counted(n)} only: "
+            f"{_enough(judged)}."
+        )
+    by = f"judged by {counted(n)}"
     if ratio < 1.0 - ALIKE:
-        return f"Use the hybrid: its error is {ratio:.2f} × that of {peer}, the best without learning."
+        return f"Use the hybrid: its error is {ratio:.2f} × that of {peer}, the best without learning, {by}."
     if ratio <= 1.0 + ALIKE:
-        return f"The hybrid does no harm and no good here: {ratio:.2f} × the error of {peer}."
-    return f"Do not use the hybrid on what this log shows: {ratio:.2f} × the error of {peer}; record more motion."
+        return f"The hybrid does no harm and no good here: {ratio:.2f} × the error of {peer}, {by}."
+    return f"Do not use the hybrid on what this log shows: {ratio:.2f} × the error of {peer}, {by}; record more motion."
 
 
 def write_changes(report: Report, changes: Sequence[str]) -> None:

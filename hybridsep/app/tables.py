@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,12 +25,14 @@ __all__ = [
     "print_predictions",
     "print_run",
     "print_scores",
+    "print_written",
     "shown_figure",
     "shown_unit",
     "span",
 ]
 
-console = Console(emoji=False)
+console = Console(emoji=False, markup=False)
+"""Standard output. Units and names of files may have brackets, which are text there, as in the tables."""
 
 _UNITS = {"m": ((1e6, "µm"), (1e3, "mm")), "rad": ((1e6, "µrad"), (1e3, "mrad"))}
 
@@ -165,7 +168,9 @@ def print_scores(
     table = Table(title=f"{title}: prediction error in µ{unit} against the measured position")
     for column in ("", "physics", "hold", "hybrid", "reduction", "× hold"):
         table.add_column(column, justify="right")
-    for suffix, label in (("", ""), ("_after_warm_up", " after warm-up")):
+    warmed_up = summary.get("n_samples_after_warm_up") != summary["n_samples"]
+    parts = (("", ""), ("_after_warm_up", " after warm-up"))
+    for suffix, label in parts if warmed_up else parts[:1]:
         for quantity in ("rms", "max"):
             figures = [summary.get(f"{quantity}_{name}_um{suffix}") for name in ("pb", "hold", "h")]
             if all(figure is not None for figure in figures):
@@ -207,6 +212,13 @@ def _print_tracking(summary: Mapping[str, float | int], as_json: bool, title: st
         f"not compensated {summary['share_off']:.1%} of the samples",
         highlight=False,
     )
+
+
+def print_written(*paths: Path | None) -> None:
+    """Print the names of files that were written, None being none."""
+    for path in paths:
+        if path is not None:
+            console.print(f"wrote {path}", highlight=False, soft_wrap=True)
 
 
 def print_json(result: Any) -> None:

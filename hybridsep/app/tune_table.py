@@ -77,10 +77,10 @@ def print_tuning(tuning: Tuning, windows: Mapping[int, Tuning], values: Values, 
     """Print a tuning; ``unit`` of the positions is m or rad."""
     chosen = tuning.candidates[tuning.chosen]
     heading = f"{title}: RMS in µ{unit} against the measured position, Np = {chosen.Np}"
-    console.print(heading, highlight=False, markup=False)
+    console.print(heading, highlight=False)
     console.print(_ranked(tuning, values))
     for line in _words(tuning, values):
-        console.print(line, highlight=False, markup=False)
+        console.print(line, highlight=False)
     console.print(
         f"\nThe same settings over other look-aheads, RMS in µ{unit}; no choice: the look-ahead is the controller's, "
         "and a shorter one is always predicted better",
@@ -89,7 +89,7 @@ def print_tuning(tuning: Tuning, windows: Mapping[int, Tuning], values: Values, 
     console.print(_over_windows(windows))
     console.print("For the machine file:\n", highlight=False)
     lines = {"Np": chosen.Np, **entries(chosen, values), "trust": str(chosen.trust).lower()}
-    console.print("[predictor]", markup=False, highlight=False)
+    console.print("[predictor]", highlight=False)
     for name, value in lines.items():
         console.print(f"{name} = {value}", highlight=False)
 

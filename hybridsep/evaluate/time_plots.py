@@ -43,8 +43,9 @@ def prediction_figure(run: Run, title: str, path: str | Path, unit: str = "m") -
     command.plot(t, 1e3 * run.x_d, color="black", linewidth=1.2)
     command.set_ylabel(f"commanded\nposition [m{unit}]")
     error.plot(t, 1e6 * (run.x_meas - run.x_pb), color=PHYSICS, linewidth=0.8, label="physics-based model")
+    label = f"linear hybrid model{'' if run.active.all() else ', after the warm-up'}"
     hybrid = np.where(run.active, 1e6 * (run.x_meas - run.x_h), np.nan)
-    error.plot(t, hybrid, color=HYBRID, linewidth=0.8, label="linear hybrid model, after the warm-up")
+    error.plot(t, hybrid, color=HYBRID, linewidth=0.8, label=label)
     if not run.active.all():
         t_init = float(t[np.argmax(run.active)])
         for axes in (error, windows):

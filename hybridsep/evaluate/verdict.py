@@ -15,10 +15,16 @@ from ..base.metrics import rms_ratio
 from ..base.signals import Array
 from ..cosim.run import Run
 
-__all__ = ["ALIKE", "Tally", "Verdict", "verdict_of"]
+__all__ = ["ALIKE", "WINDOWS_ENOUGH", "WINDOWS_MIN", "Tally", "Verdict", "counted", "verdict_of"]
 
 ALIKE = 0.02
 """Relative difference of two RMS errors below which they count as equal."""
+
+WINDOWS_MIN = 3
+"""Windows below which nothing is judged: what one or two of them show is chance."""
+
+WINDOWS_ENOUGH = 20
+"""Windows from which on a judgement is stated without caution: some moves, each with its beginning and its end."""
 
 _LEAST_SHARE = 0.01
 """Share of the samples from which on a place is judged."""
@@ -57,6 +63,8 @@ class Verdict:
         What explains it where it is worse, as far as the run shows.
     n_rejected, n_missing, n_samples : int
         Measurements that were not learned, as they were missing or not plausible; those missing; and all of them.
+    n_windows : int
+        Whole windows with measurements, which were judged.
     """
 
     ratio_pb: float
@@ -67,14 +75,19 @@ class Verdict:
     n_rejected: int
     n_missing: int
     n_samples: int
+    n_windows: int
 
     def __str__(self) -> str:
+        if self.n_windows < WINDOWS_MIN:
+            return f"Nothing is judged: {counted(self.n_windows)}, at least {WINDOWS_MIN} are needed."
         ratios = (self.ratio_pb, self.ratio_hold)
         lines = [
             f"{_comparison(value)} {peer}: {_times(value)}{_where(value, places, self.judged)}"
             for peer, value, places in zip(_PEERS, ratios, self.worse, strict=True)
         ]
         lines += [f"Why: {cause}" for cause in self.causes]
+        if self.n_windows < WINDOWS_ENOUGH:
+            lines.append(f"Judged by {counted(self.n_windows)} only")
         if self.n_rejected:
             lines.append(_not_learned(self.n_rejected, self.n_missing, self.n_samples))
         return "\n".join(f"{line}." for line in lines)
@@ -102,7 +115,7 @@ class Tally:
         self.Np = Np
         self._squares = np.zeros((3, len(_MOTIONS), _N_THIRDS))
         self._counts = np.zeros((len(_MOTIONS), _N_THIRDS))
-        self._early, self._n_windows = np.zeros(3), 0
+        self._early, self._n_windows, self._n_whole = np.zeros(3), 0, 0
         self._last_x_d = math.nan
         self._fastest = 0.0
         self._largest_residual = self._largest_change = 0.0
@@ -139,6 +152,7 @@ class Tally:
         if self._n_windows < _N_EARLY:
             self._early += squares.sum(axis=1)
         self._n_windows += 1
+        self._n_whole += int(len(x) == self.Np and known.any())
 
     def verdict(self, *, n_rejected: int = 0, n_missing: int | None = None) -> Verdict:
         """Return the verdict on the windows so far.
@@ -163,6 +177,7 @@ class Tally:
             n_rejected,
             min(self._n_missing if n_missing is None else n_missing, n_rejected),
             n_samples,
+            self._n_whole,
         )
 
     def _places(self) -> dict[str, tuple[int, int]]:
@@ -223,6 +238,11 @@ def _not_learned(n_rejected: int, n_missing: int, n_samples: int) -> str:
     return f"{n_rejected} of {n_samples} measurements {were} {why}, and not learned"
 
 
+def counted(n: int) -> str:
+    """Return a number of windows as text."""
+    return f"{n} window{'' if n == 1 else 's'}"
+
+
 def _ratio(own: float, other: float) -> float:
     """Return the ratio of two RMS errors from their sums of squares."""
     return rms_ratio(math.sqrt(own), math.sqrt(other))
@@ -250,7 +270,7 @@ def _listed(places: tuple[str, ...]) -> str:
     shown = [text for place, text in zip(_MOTIONS, ("at standstill", "in motion"), strict=True) if place in places]
     thirds = [place.partition(" ")[0] for place in places if place in _THIRDS]
     if len(thirds) == _N_THIRDS:
-        return f"{' and '.join(shown)}{', ' if shown else ''}over the whole window"
+        return f"{' and '.join(shown)}{', ' if shown else ''}in every third of the window"
     if thirds:
         shown.append(f"in the {' and '.join(thirds)} third of the window")
     return " and ".join(shown)

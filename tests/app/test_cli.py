@@ -36,6 +36,10 @@ def test_backtest_of_a_csv(hybridsep: Run, tmp_path: Path) -> None:
     assert "after warm-up" in out
     assert " ".join(summary["verdict"].split()) in " ".join(out.split())
     assert summary["verdict"].startswith("Better than the physics model: 0.4")
+    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--trust", "true", "--t_init", 0)
+    assert status == 0
+    assert "RMS" in out
+    assert "after warm-up" not in out
 
 
 def test_backtest_of_a_log_with_missing_measurements(hybridsep: Run, tmp_path: Path) -> None:
@@ -191,6 +195,9 @@ def test_help_shows_units_and_ranges(hybridsep: Run) -> None:
     assert "[m2]" in text
     status, out, _ = hybridsep("--help")
     assert all(command in out for command in ("demo", "build", "cosim", "backtest", "identify", "init", "tune"))
+    listed = out.partition("Commands:")[2].partition("An error is")[0]
+    assert "From the log of an axis to its model, FMUs and a report." in listed
+    assert "..." not in listed
     assert hybridsep("--version")[1].strip() == __version__
 
 

@@ -132,6 +132,18 @@ def test_figures(hybridsep: Run, tmp_path: Path, suffix: str) -> None:
     assert "--figure must end in .png or .pdf or .svg" in hybridsep("backtest", log, *MACHINE, "--figure", "a.jpg")[2]
 
 
+def test_the_legend_names_a_warm_up_where_there_is_one(hybridsep: Run, tmp_path: Path) -> None:
+    log = write_log(tmp_path / "log.csv", n=1000)
+    drawn = []
+    for t_init in (0.0, 0.3):
+        figure = tmp_path / "figure.svg"
+        status, _, err = hybridsep("backtest", log, *MACHINE, "--trust", "true", "--t_init", t_init, "--figure", figure)
+        assert status == 0, err
+        drawn.append(figure.read_text(encoding="utf-8"))
+    assert "<!-- linear hybrid model -->" in drawn[0]
+    assert "<!-- linear hybrid model, after the warm-up -->" in drawn[1]
+
+
 def test_saved_state_and_predictions(hybridsep: Run, tmp_path: Path) -> None:
     log, state, table = write_log(tmp_path / "log.csv"), tmp_path / "my.state", tmp_path / "my.csv"
     cold = json.loads(hybridsep("backtest", log, *MACHINE, "--save", state, "--save", table, "--json")[1])
@@ -154,6 +166,33 @@ def test_saved_state_and_predictions(hybridsep: Run, tmp_path: Path) -> None:
         assert f"{option} {other} exists and is no" in err
     assert "is the same file as the log" in hybridsep("backtest", log, *MACHINE, "--save", log)[2]
     assert "--save must end in .state or .csv or .npz" in hybridsep("backtest", log, *MACHINE, "--save", "a.bin")[2]
+
+
+def test_the_files_that_were_written_are_named(hybridsep: Run, tmp_path: Path) -> None:
+    log = write_log(tmp_path / "log.csv", n=1000)
+    files = {name: tmp_path / name for name in ("batches.csv", "errors.png", "my.state", "run.npz")}
+    named = zip(("--out", "--figure", "--save", "--save"), files.values(), strict=True)
+    options = [part for pair in named for part in pair]
+    status, out, _ = hybridsep("backtest", log, *MACHINE, *options)
+    assert status == 0
+    assert out.splitlines()[-4:] == [f"wrote {path}" for path in files.values()]
+    assert all(path.exists() for path in files.values())
+    assert "wrote" not in hybridsep("backtest", log, *MACHINE, *options, "--json")[1]
+
+
+def test_brackets_are_text(hybridsep: Run, tmp_path: Path) -> None:
+    """Brackets of a name are no markup: not in titles and cells, not in notes and errors."""
+    log = write_log(tmp_path / "x[b]axis[red].csv", n=1000)
+    status, out, err = hybridsep("backtest", log, *MACHINE)
+    assert status == 0, err
+    assert "x[b]axis[red].csv: prediction error in µm" in " ".join(out.split())
+    status, out, err = hybridsep("tune", log, *MACHINE, "--Np", 50, "--p", 5, "--q", 0, "--lambda", 1e-9, "--jobs", 1)
+    assert status == 0, err
+    assert "x[b]axis[red].csv" in out
+    status, _, err = hybridsep("backtest", log, *MACHINE, "--x", "[bold]")
+    assert status == 2
+    assert "x[b]axis[red].csv" in err
+    assert "[bold]" in err
 
 
 def test_a_rotary_axis(hybridsep: Run, tmp_path: Path) -> None:

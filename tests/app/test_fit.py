@@ -97,6 +97,7 @@ def test_the_report_says_what_to_do_and_shows_the_figures(fitted: Fit, log: Path
     advice = recommendation(judged_by(fitted, "m"))
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert advice.startswith("Use the hybrid: its error is 0.")
+    assert advice.endswith("the best without learning, judged by 30 windows.")
     assert advice in page
     assert all(f"{1e6 * value:.4g}" in page for value in fitted.judged.rms())
     assert "HybridPredictor_axis.fmu" in page
@@ -142,6 +143,11 @@ def test_the_command_line(hybridsep: Run, tmp_path: Path) -> None:
         out.split()
     )
     assert "report: " in out
+    assert result["judged"]["n_windows"] == 10
+    assert "Judged by 10 windows only." in out
+    assert "So far the hybrid is " in out
+    assert "judged by 10 windows only: record at least 1.7 s." in " ".join(out.split())
+    assert "taught nothing [µm]" in " ".join(out.split())
     machine = tmp_path / "fit" / "machine.toml"
     edited = machine.read_text(encoding="utf-8").replace("dead_time = ", "dead_time = 1")
     machine.write_text(edited, encoding="utf-8")
@@ -183,6 +189,24 @@ def test_a_log_that_cannot_teach_a_model_is_predicted_by_its_command(tmp_path: P
     assert rms_pb == pytest.approx(1e-6, rel=0.1)
     assert rms_h <= 1.02 * rms_pb
     fit_report(found, used, findings).write(tmp_path / "report.html")
+
+
+@pytest.mark.parametrize(
+    ("n", "Np", "words"),
+    [
+        (2, None, "0 windows of 100 samples; record at least 4.2 s"),
+        (250, NP, "2 windows of 50 samples; record at least 2.1 s"),
+    ],
+)
+def test_too_short_a_log_judges_nothing(tmp_path: Path, n: int, Np: int | None, words: str) -> None:
+    log = write_rows(tmp_path / "short.csv", commanded()[500 : 500 + n], measured(0)[500 : 500 + n])
+    used, _ = take_in([read_log(log, uniform=False)], fix=False)
+    found = fit(used, tmp_path, FitOptions(Np, "short"))
+    if n == 2:
+        [reason] = found.identification["findings"]
+        assert "because 1 of its 2 samples teach, at least 100 are needed; a gain of 1" in reason
+    assert recommendation(judged_by(found, "m")) == f"Nothing could be judged: the log's second half has {words}."
+    assert found.summary()["judged"]["verdict"].startswith("Nothing is judged: ")
 
 
 def test_a_gap_in_motion_does_not_decide_the_verdict(tmp_path: Path) -> None:

@@ -43,6 +43,7 @@ def test_a_log(hybridsep: Run, log: Path, tmp_path: Path) -> None:
     status, printed, err = hybridsep("identify", log, "--out", out, "--figure", figure, "--name", "my_axis")
     assert (status, err) == (0, "")
     assert "second order, gain 1" in printed
+    assert printed.splitlines()[-2:] == [f"wrote {out}", f"wrote {figure}"]
     assert "chosen" in printed
     machine = load_machine(out)
     assert (machine.name, machine.T_s, machine.physics.input_hold) == ("my_axis", T_S, "foh")

@@ -25,6 +25,7 @@ def test_candidates_are_ranked_with_the_baselines_beside_and_the_best_written(hy
     before = log.read_bytes()
     status, text, err = hybridsep("tune", log, *PAPER, *FEW, "--out", out, "--figure", figure)
     assert status == 0, err
+    assert text.splitlines()[-2:] == [f"wrote {out}", f"wrote {figure}"]
     text = " ".join(text.split())
     assert "RMS in µm against the measured position, Np = 50" in text
     for words in (

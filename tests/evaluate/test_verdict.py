@@ -44,8 +44,8 @@ def test_better_everywhere() -> None:
     found = verdict(10, 8, 4)
     assert (found.ratio_pb, found.ratio_hold) == pytest.approx((0.4, 0.5))
     assert str(found) == (
-        "Better than the physics model: 0.4 × its RMS error, in motion, over the whole window.\n"
-        "Better than hold: 0.5 × its RMS error, in motion, over the whole window."
+        "Better than the physics model: 0.4 × its RMS error, in motion, in every third of the window.\n"
+        "Better than hold: 0.5 × its RMS error, in motion, in every third of the window."
     )
 
 
@@ -54,7 +54,7 @@ def test_places_where_it_is_worse() -> None:
     said = str(verdict(10, 10, np.where(HALF, 11, 1), motion=motion))
     assert said.splitlines()[0].endswith("; worse at standstill and in the first third of the window.")
     said = str(verdict(10, np.where(HALF, 1, 20), 5, motion=motion))
-    assert "Better than the physics model: 0.5 × its RMS error, at standstill and in motion, over the whole" in said
+    assert "Better than the physics model: 0.5 × its RMS error, at standstill and in motion, in every third" in said
     assert "Better than hold" in said
     assert said.endswith("; worse at standstill and in the first third of the window.")
     assert str(verdict(10, 10, 20, motion=motion)).startswith("Worse than the physics model: 2 × its RMS error, every")
@@ -119,6 +119,19 @@ def test_missing_measurements_are_told_from_implausible_ones() -> None:
 
 def said_of(machine: Machine, x_d: Array, x: Array) -> str:
     return str(backtest(HybridPredictor(machine.model), x_d, x).verdict)
+
+
+def test_few_windows_are_told_and_fewer_judge_nothing() -> None:
+    assert "only" not in str(verdict(10, 8, 4, n=20))
+    said = str(verdict(10, 8, 4, n=19))
+    assert said.startswith("Better than the physics model: 0.4")
+    assert said.endswith("\nJudged by 19 windows only.")
+    assert str(verdict(10, 8, 4, n=2)) == "Nothing is judged: 2 windows, at least 3 are needed."
+    tally = Tally(NP)
+    for window in (np.full(NP, np.nan), np.zeros(NP), np.zeros(NP - 1)):  # nothing measured, whole, cut
+        n = len(window)
+        tally.add(MOVING[:n], window, errors(10, 8, 4)[:, :n])
+    assert tally.verdict().n_windows == 1
 
 
 def test_missing_measurements_are_not_judged() -> None:
