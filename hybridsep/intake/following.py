@@ -31,7 +31,7 @@ def check_following_error(log: Log) -> Iterator[Finding]:
     It is nearly proportional to the velocity, as the following error of a drive without feed-forward is, but a velocity
     of the same numbers would put the axis seconds behind its command, or before it.
     """
-    x_d, x, width = averaged(log)
+    x_d, x, _ = averaged(log)
     travel, size = float(np.ptp(x_d)), float(np.ptp(x))
     if travel == 0.0 or not 0.0 < size < _TRAVEL * travel or line_at_best_lag(x_d, x).unexplained < _POSITION_LEFT:
         return
@@ -40,7 +40,8 @@ def check_following_error(log: Log) -> Iterator[Finding]:
     sign = min(left, key=lambda one: left[one])
     if left[sign] > _EXPLAINED or left[-sign] < _OTHER * left[sign] or abs(drives[sign].gain - 1.0) > 0.1:
         return
-    lag = width * drives[sign].lag
+    part = stretch(log)
+    lag = line_at_best_lag(log.x_d[part], log.x_d[part] - sign * log.x_meas[part]).lag
     words = (
         f"this looks like the following error, not like the measured position: it spans {size / travel:.2g} of the "
         f"travel, and the command {'minus' if sign > 0 else 'plus'} it follows the command as a drive does, "
@@ -49,7 +50,6 @@ def check_following_error(log: Log) -> Iterator[Finding]:
     evidence = {"sign": sign, "unexplained": left[sign], "lag": lag}
     formula = "x = x_d − x" if sign > 0 else "x = x_d + x"
     fix = Fix(f"reckon the measured position from it, {formula}", partial(fixes.from_error, sign=sign), meaning=True)
-    part = stretch(log)
     picture = over_time(log, part, log.x_d[part], log.x_meas[part])
     yield Finding("following error", ERROR, words, evidence, picture, fix)
 
