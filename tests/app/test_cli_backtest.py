@@ -135,8 +135,8 @@ def test_saved_state_and_predictions(hybridsep: Run, tmp_path: Path) -> None:
 def test_the_files_that_were_written_are_named(hybridsep: Run, tmp_path: Path) -> None:
     log = write_log(tmp_path / "log.csv", n=1000)
     files = {name: tmp_path / name for name in ("batches.csv", "errors.png", "my.state", "run.npz")}
-    options = ("--out", files["batches.csv"], "--figure", files["errors.png"])
-    options += ("--save", files["my.state"], "--save", files["run.npz"])
+    saved = ("--save", files["my.state"], "--save", files["run.npz"])
+    options = ("--out", files["batches.csv"], "--figure", files["errors.png"], *saved)
     status, out, _ = hybridsep("backtest", log, *MACHINE, *options)
     assert status == 0
     assert out.splitlines()[-4:] == [f"wrote {path}" for path in files.values()]
