@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from ..fmi.compiler import TARGET_NAMES
+from ..fmi.compiler import TARGET_NAMES, default_targets
 from ..fmi.flavours import FLAVOURS
-from .failures import loading
+from .failures import errors_console, loading
 from .options import FlavourOption, ForceOption, JsonOption, TsOption, UnitOption, WeightsOption
 
 __all__ = ["build"]
@@ -50,6 +50,7 @@ def build(
         from ..fmi.archive import build_fmu
         from ..machines.machine import machine_path
         from .build_arguments import extras_of, jobs_of
+        from .log_intake import show
         from .overwrite import FMU, Output, check_outputs
         from .progress import progress_bar
         from .tables import console, print_json
@@ -62,11 +63,24 @@ def build(
         {**inputs, "saved predictor": weights, "trajectory": trajectory},
         force=force,
     )
+    platforms = default_targets() if flavour == "native" else ()
     paths = []
     with progress_bar(as_json) as advance:
+        if len(platforms) > 1 and not target and not as_json:
+            show(
+                [f"each FMU gets binaries for {len(platforms)} platforms; with --target host for this machine alone"],
+                (),
+            )
         for i, (axis, name, model) in enumerate(jobs):
             advance(name, i / len(jobs))
-            paths.append(build_fmu(axis, name, out, flavour, targets=target or None, **extras.get(model, {})))
+
+            def on_target(platform: str, name: str = name, done: float = i / len(jobs)) -> None:
+                advance(f"{name}, {platform}", done)
+                if not as_json and not errors_console.is_terminal:  # where no progress bar shows it
+                    errors_console.print(f"{name}: compile for {platform}", highlight=False, soft_wrap=True)
+
+            given = extras.get(model, {})
+            paths.append(build_fmu(axis, name, out, flavour, targets=target or None, on_target=on_target, **given))
         advance("done", 1.0)
     if as_json:
         print_json([str(path) for path in paths])

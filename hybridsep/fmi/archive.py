@@ -7,7 +7,7 @@ The content follows from the flavour: :mod:`hybridsep.fmi.native_flavour` compil
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -69,6 +69,7 @@ def build_fmu(
     targets: Sequence[str] | None = None,
     samples: ArrayLike | None = None,
     weights: str | Path | None = None,
+    on_target: Callable[[str], object] = lambda _target: None,
 ) -> Path:
     """Build one FMU.
 
@@ -90,6 +91,8 @@ def build_fmu(
     weights : str or Path, optional
         File of :meth:`HybridPredictor.save`, trained with the settings of this FMU, for a SepCompensator best in
         closed loop (``compensator.predictor.save(...)``): the FMU starts with these weights, without a warm-up.
+    on_target : callable, optional
+        Called with each platform of a native FMU, as ``x86_64-linux``, when its compilation begins.
 
     Returns
     -------
@@ -123,7 +126,8 @@ def build_fmu(
     if trained is not None:
         description["parameters"] = {**description["parameters"], "t_init": 0.0}
     if flavour == "native":
-        files = native_flavour.files(machine, description, targets=targets, samples=samples, trained=trained)
+        how: dict[str, Any] = {"targets": targets, "samples": samples, "trained": trained, "on_target": on_target}
+        files = native_flavour.files(machine, description, **how)
     else:
         files = python_flavour.files(machine, description, trained=trained)
     path = Path(out) / f"{name}.fmu"

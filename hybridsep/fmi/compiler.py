@@ -17,7 +17,7 @@ import platform
 import shutil
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
@@ -38,6 +38,7 @@ __all__ = [
     "can_compile",
     "compile_flags",
     "compilers",
+    "default_targets",
     "host_target",
 ]
 
@@ -112,7 +113,17 @@ def host_target() -> str:
     return name
 
 
-def binaries(sources: Mapping[str, bytes], name: str, targets: Sequence[str]) -> dict[str, bytes]:
+def default_targets() -> tuple[str, ...]:
+    """Return the targets where none are asked for: all platforms where ``ziglang`` is installed, else this machine."""
+    return ALL_TARGETS if find_spec("ziglang") is not None else ("host",)
+
+
+def binaries(
+    sources: Mapping[str, bytes],
+    name: str,
+    targets: Sequence[str],
+    on_target: Callable[[str], object] = lambda _target: None,
+) -> dict[str, bytes]:
     """Compile ``all.c`` of the sources.
 
     Parameters
@@ -123,6 +134,8 @@ def binaries(sources: Mapping[str, bytes], name: str, targets: Sequence[str]) ->
         Model identifier: the libraries' stem.
     targets : sequence of str
         Of :data:`TARGET_NAMES`; for any but ``"host"``, ``ziglang`` must be installed.
+    on_target : callable, optional
+        Called with each platform, a key of :data:`TARGETS`, when its compilation begins.
 
     Returns
     -------
@@ -135,7 +148,7 @@ def binaries(sources: Mapping[str, bytes], name: str, targets: Sequence[str]) ->
         If a target is unknown, there is no compiler, or it refuses.
     """
     commands = {host_target() if key == "host" else key: command for key, command in compilers(targets).items()}
-    built = _compiled(commands, sources, name)
+    built = _compiled(commands, sources, name, on_target)
     placed = {
         f"{place}/{name}{TARGETS[key].suffix}": library
         for key, library in built.items()
@@ -213,7 +226,12 @@ def _zig(triple: str) -> list[str]:
     return [sys.executable, "-m", "ziglang", "cc", "-target", triple, "-fno-sanitize=undefined"]
 
 
-def _compiled(commands: Mapping[str, Sequence[str]], sources: Mapping[str, bytes], name: str) -> dict[str, bytes]:
+def _compiled(
+    commands: Mapping[str, Sequence[str]],
+    sources: Mapping[str, bytes],
+    name: str,
+    on_target: Callable[[str], object],
+) -> dict[str, bytes]:
     """Compile and link ``all.c`` into a stripped shared library for each target, by its compiler's command."""
     with TemporaryDirectory() as place:
         jobs = []
@@ -225,7 +243,9 @@ def _compiled(commands: Mapping[str, Sequence[str]], sources: Mapping[str, bytes
                     (folder / file).write_bytes(text)
             flags = [*compile_flags(command), "-g0", "-s", "-shared", "-I."]
             jobs.append(([*command, *flags, "all.c", "-o", f"{name}{target.suffix}", *target.flags], folder))
-        for key, (arguments, _), (status, complaint) in zip(commands, jobs, run_together(jobs), strict=False):
+        keys = list(commands)
+        done = run_together(jobs, lambda i: on_target(keys[i]))
+        for key, (arguments, _), (status, complaint) in zip(keys, jobs, done, strict=False):
             if status != 0:
                 said = f"{' '.join(arguments)}\n{complaint.strip()}"
                 raise FmuError(f"{name} cannot be compiled for {TARGETS[key].triple}: {said}")

@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Mapping, Sequence
-from importlib.util import find_spec
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from numpy.typing import ArrayLike
@@ -23,7 +22,7 @@ from ..machines.machine import Machine
 from ..plants.trajectory import spiral, staircase
 from ..predict.predictor import HybridPredictor
 from .c_header import c_header
-from .compiler import ALL_TARGETS, binaries
+from .compiler import binaries, default_targets
 from .content import content_guid
 from .model_description import build_description, model_description
 from .pages import icon, index_page
@@ -43,6 +42,7 @@ def files(
     targets: Sequence[str] | None = None,
     samples: ArrayLike | None = None,
     trained: HybridPredictor | None = None,
+    on_target: Callable[[str], object] = lambda _target: None,
 ) -> dict[str, bytes]:
     """Return all files of one FMU: archive name → content.
 
@@ -51,7 +51,7 @@ def files(
     machine : Machine
     description : mapping
         ``model``, ``name``, ``parameters`` and ``modes``.
-    targets, samples
+    targets, samples, on_target
         As in :func:`hybridsep.fmi.archive.build_fmu`.
     trained : HybridPredictor, optional
         Trained predictor with which a HybridPredictor or SepCompensator starts warm.
@@ -79,12 +79,10 @@ def files(
     content["sources/buildDescription.xml"] = build_description(name)
     tool = f"hybridsep {__version__}"
     content["modelDescription.xml"] = model_description(machine, description, guid, tool, native=True, samples=samples)
-    if targets is None:
-        targets = ALL_TARGETS if find_spec("ziglang") is not None else ("host",)
     folder = "sources/"
     unit = {file.removeprefix(folder): text for file, text in content.items() if file.startswith(folder)}
     unit |= fmi_headers()
-    for path, binary in binaries(unit, name, targets).items():
+    for path, binary in binaries(unit, name, targets or default_targets(), on_target).items():
         content[f"binaries/{path}"] = binary
     return content
 

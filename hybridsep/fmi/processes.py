@@ -6,7 +6,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -15,8 +15,16 @@ from ..base.interrupt import uninterrupted
 __all__ = ["run_together"]
 
 
-def run_together(commands: Sequence[tuple[Sequence[str], Path]]) -> list[tuple[int, str]]:
+def run_together(
+    commands: Sequence[tuple[Sequence[str], Path]], on_start: Callable[[int], object] = lambda _i: None
+) -> list[tuple[int, str]]:
     """Run commands, each in its folder, as many at a time as there are processors.
+
+    Parameters
+    ----------
+    commands : sequence of pairs
+    on_start : callable, optional
+        Called with the number of each command, from 0, before it starts.
 
     Returns
     -------
@@ -27,7 +35,8 @@ def run_together(commands: Sequence[tuple[Sequence[str], Path]]) -> list[tuple[i
     running: list[subprocess.Popen[str]] = []
     try:
         for i in range(0, len(commands), at_a_time):
-            for command, folder in commands[i : i + at_a_time]:
+            for j, (command, folder) in enumerate(commands[i : i + at_a_time], i):
+                on_start(j)
                 _start(command, folder, running)
             for process in running[i:]:
                 _, complaint = process.communicate()
