@@ -159,6 +159,7 @@ def _klipper_axis(axis: str | None) -> str:
 def _write_machine(found: IdentifiedModel | IdentifiedResponse, name: str, recording: str, out: Path) -> None:
     """Write the machine file, with the deviations and findings as comments."""
     from ..machines.text import machine_text
+    from .overwrite import sealed
 
     deviations = [
         f"{e.name} = {e.value:.6g} ± {e.std:.2g}{'' if e.unit == '1' else ' ' + e.unit}" for e in found.parameters
@@ -166,4 +167,4 @@ def _write_machine(found: IdentifiedModel | IdentifiedResponse, name: str, recor
     comments = [f"Identified by hybridsep from {recording}.", *deviations, *found.findings]
     machine = found.machine(name, f"Axis identified from {recording}")
     with written_text(out) as file:
-        file.write(machine_text(machine, comments))
+        file.write(sealed(machine_text(machine, comments), "identify"))
