@@ -178,6 +178,7 @@ def _write_machine(
 ) -> None:
     """Write the machine file, with the deviations and findings as comments."""
     from ..machines.text import machine_text
+    from .overwrite import sealed
 
     deviations = [
         f"{e.name} = {e.value:.6g} ± {e.std:.2g}{'' if e.unit == '1' else ' ' + e.unit}" for e in found.parameters
@@ -186,4 +187,4 @@ def _write_machine(
     sources = {"sources": [f"identified from {recording}", *changed]} if changed else {}
     machine = found.machine(name, f"Axis identified from {recording}", **sources)
     with written_text(out) as file:
-        file.write(machine_text(machine, comments))
+        file.write(sealed(machine_text(machine, comments), "identify"))

@@ -67,7 +67,7 @@ def init(
         from ..machines.text import machine_text
         from ..model.physics import ModalModel
         from .arguments import check_ending
-        from .overwrite import MACHINE, Output, check_outputs
+        from .overwrite import MACHINE, Output, check_outputs, sealed
 
     check_ending(out, "OUT", (".toml",))
     check_outputs([Output("OUT", out, MACHINE)], {}, force=force)
@@ -98,7 +98,7 @@ def init(
         f"Next: hybridsep backtest LOG --machine {out}",
     ]
     with written_text(out) as file:
-        file.write(machine_text(machine, comments, annotated=True))
+        file.write(sealed(machine_text(machine, comments, annotated=True), "init"))
     typer.echo(f"{out} written: {model}, {said}")
 
 

@@ -59,7 +59,7 @@ def tune(
         from ..tune.joint import tune as tune_on
         from .arguments import check_ending
         from .log_intake import findings_table, open_checked, reading_of
-        from .overwrite import BY_ENDING, MACHINE, Output, check_outputs
+        from .overwrite import BY_ENDING, MACHINE, Output, check_outputs, sealed
         from .progress import progress_bar
         from .tables import print_json, print_written
         from .tune_table import entries, print_tuning, tuning_summary
@@ -115,7 +115,7 @@ def tune(
         best = changed.changed("predictor", {"Np": chosen.Np, **entries(chosen, values)})
         comment = f"Settings of [predictor] from hybridsep tune on {', '.join(path.name for path in logs)}."
         with written_text(out) as file:
-            file.write(machine_text(best, [comment]))
+            file.write(sealed(machine_text(best, [comment]), "tune"))
     if not as_json:
         print_written(out, figure)
 

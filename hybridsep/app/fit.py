@@ -25,7 +25,7 @@ from ..tune.choice import choose_settings, settings_for, window_scores
 from ..tune.halves import Recording, Replay, halves, replay
 from .builds import build_for_host
 from .fit_stages import Stages, key_of
-from .overwrite import fit_comment
+from .overwrite import sealed
 from .step_times import step_times
 
 __all__ = ["Fit", "FitOptions", "fit", "fit_files"]
@@ -176,8 +176,7 @@ def fit(
     judged = replay(predictor, recordings, progress=within(0.8, 0.85, "judge on the second half"))
     machine = _machine(options.name, logs, model, settings, changes)
     with written_text(files["machine file"]) as file:
-        text = machine_text(machine, comments=[found["structure"]])
-        file.write(fit_comment(text) + text)
+        file.write(sealed(machine_text(machine, comments=[found["structure"]]), "fit"))
     predictor.save(files["trained predictor"])
     for i, flavour in enumerate(_flavours()):
         progress(f"build the {flavour} FMU", 0.85 + 0.05 * i)

@@ -1,13 +1,18 @@
-"""Checks of output files: an input is never overwritten, an existing file only by one of its kind unless forced."""
+"""Checks of output files: an input is never overwritten, an existing file only by one of its kind unless forced.
+
+A machine file is overwritten only as it was written: one that was edited since, or that the user wrote, is the user's.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import os
+import re
 import zipfile
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 from ..base.errors import ParameterError
 from ..cosim.run import COMPENSATOR, PREDICTOR
@@ -27,8 +32,10 @@ __all__ = [
     "Kind",
     "Output",
     "check_outputs",
-    "fit_comment",
+    "sealed",
 ]
+
+_Answer = TypeVar("_Answer")
 
 BATCH_COLUMNS = ("t", "rms_pb", "rms_hold", "rms_h")
 """Columns of the CSV of ``hybridsep backtest``."""
@@ -44,10 +51,13 @@ class Kind:
         Name in messages.
     recognises : callable
         Whether an existing file is of that kind.
+    changed : callable, optional
+        What has happened to an existing file that was of that kind, in words; empty if it never was.
     """
 
     name: str
     recognises: Callable[[Path], bool]
+    changed: Callable[[Path], str] = lambda _path: ""
 
 
 @dataclass(frozen=True)
@@ -89,17 +99,6 @@ def _has_columns(*tables: tuple[str, ...]) -> Callable[[Path], bool]:
     return recognises
 
 
-def _contains(*parts: bytes) -> Callable[[Path], bool]:
-    """Return a test for a small file with one of the parts in it."""
-
-    def recognises(path: Path) -> bool:
-        with path.open("rb") as file:
-            content = file.read(100_000)
-        return any(part in content for part in parts)
-
-    return recognises
-
-
 def _is_our_fmu(path: Path) -> bool:
     if not zipfile.is_zipfile(path) or "modelDescription.xml" not in _members(path):
         return False
@@ -127,28 +126,49 @@ def _members(path: Path) -> list[str]:
 
 BATCHES = Kind("CSV of hybridsep backtest", _has_columns(BATCH_COLUMNS))
 RUN = Kind("result of hybridsep cosim", _has_columns(PREDICTOR.columns, COMPENSATOR.columns))
-MACHINE = Kind("machine file", _contains(b"\n[physics", b"\n[[physics"))
 FIGURE = Kind("PNG", _begins_with(b"\x89PNG\r\n\x1a\n"))
 VECTOR_FIGURE = Kind("figure of hybridsep", _is_our_drawing)
 FMU = Kind("FMU of hybridsep", _is_our_fmu)
 EXAMPLE_LOG = Kind("example log of hybridsep", _is_example)
 STATE = Kind("saved predictor", _begins_with(b"HSEP"))
-_FIT_MARK = "Identified by hybridsep fit"
-"""How the comment begins that a machine file of ``hybridsep fit`` begins with."""
+
+_SEAL = re.compile(r"# Written by (?P<command>hybridsep \w+); checksum (?P<checksum>[0-9a-f]{12})")
+"""First line of a machine file that a command wrote."""
 
 
-def fit_comment(text: str) -> str:
-    """Return the first line of the machine file ``text`` of ``hybridsep fit``: its mark and the rest's checksum."""
-    return f"# {_FIT_MARK}; checksum {hashlib.sha256(text.encode()).hexdigest()[:12]}\n"
+def sealed(text: str, command: str) -> str:
+    """Return the text of a machine file under a line with the command that writes it and the text's checksum.
+
+    Parameters
+    ----------
+    text : str
+    command : str
+        Name after ``hybridsep``.
+    """
+    return f"# Written by hybridsep {command}; checksum {_checksum(text)}\n{text}"
 
 
-def _is_unedited_fit(path: Path) -> bool:
-    """Return whether a machine file is as ``hybridsep fit`` wrote it; one that was edited since is the user's."""
+def _checksum(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+def _seal_of(path: Path) -> tuple[re.Match[str] | None, str]:
+    """Return the seal of a machine file, if it has one, and the text below its first line."""
     first, _, rest = path.read_text(encoding="utf-8").partition("\n")
-    return f"{first}\n" == fit_comment(rest)
+    return _SEAL.fullmatch(first), rest
 
 
-FITTED = Kind("unedited machine file of hybridsep fit", _is_unedited_fit)
+def _is_as_written(path: Path) -> bool:
+    seal, rest = _seal_of(path)
+    return seal is not None and seal["checksum"] == _checksum(rest)
+
+
+def _edited_since(path: Path) -> str:
+    seal, _ = _seal_of(path)
+    return f"has been edited since `{seal['command']}` wrote it" if seal else ""
+
+
+MACHINE = Kind("machine file that hybridsep wrote", _is_as_written, _edited_since)
 STAGES = Kind("result of hybridsep fit", _begins_with(b'{\n  "hybridsep": "'))
 REPORT = Kind("report of hybridsep", _begins_with(b"<!DOCTYPE html>\n<!-- report of hybridsep -->"))
 SUMMARY = Kind("summary of hybridsep demo", _begins_with(b'{\n  "staircase": {'))
@@ -165,7 +185,7 @@ BY_ENDING = {
 }
 """Kinds of the files that the library names itself."""
 
-FIT_FILES = {".toml": FITTED, ".json": STAGES, ".html": REPORT, ".fmu": FMU, ".state": STATE}
+FIT_FILES = {".toml": MACHINE, ".json": STAGES, ".html": REPORT, ".fmu": FMU, ".state": STATE}
 """Kinds of the files of ``hybridsep fit``."""
 
 
@@ -196,10 +216,11 @@ def check_outputs(outputs: Iterable[Output], inputs: Mapping[str, str | Path | N
         taken.append((f"{output.option} {path}", path))
         if path.is_dir():
             raise ParameterError(f"{output.option} must be a file, got the folder {path}")
-        if path.is_file() and path.stat().st_size and not force and not _recognised(output):
+        if path.is_file() and path.stat().st_size and not force and not _asked(output, output.kind.recognises, False):
+            changed = _asked(output, output.kind.changed, "")
             raise ParameterError(
-                f"{output.option} {path} exists and is no {output.kind.name}; choose another name, or overwrite it "
-                "with --force"
+                f"{output.option} {path} exists and {changed or f'is no {output.kind.name}'}; choose another name, or "
+                f"overwrite it{' and lose the edits' if changed else ''} with --force"
             )
     for output in known:
         try:
@@ -221,8 +242,9 @@ def _same_file(one: Path, other: Path) -> bool:
         return os.path.realpath(one) == os.path.realpath(other)
 
 
-def _recognised(output: Output) -> bool:
+def _asked(output: Output, question: Callable[[Path], _Answer], otherwise: _Answer) -> _Answer:
+    """Return what a kind says of the existing file."""
     try:
-        return output.kind.recognises(output.path)
+        return question(output.path)
     except (zipfile.BadZipFile, OSError, ValueError, KeyError, RuntimeError, NotImplementedError):
-        return False  # damaged or unreadable: not known to be ours
+        return otherwise  # damaged or unreadable: not known to be ours

@@ -142,6 +142,34 @@ def test_cosim_and_build_ask_too(hybridsep: Run, tmp_path: Path) -> None:
     assert hybridsep(*build)[0] == 0
 
 
+@pytest.mark.parametrize(
+    "arguments",
+    [("init", "{out}", "--tau", "0.006"), ("identify", "{log}", "--out", "{out}")],
+    ids=["init", "identify"],
+)
+def test_an_edited_machine_file_needs_force(
+    hybridsep: Run, tmp_path: Path, log: Path, arguments: tuple[str, ...]
+) -> None:
+    out = tmp_path / "axis.toml"
+    again = [part.format(out=out, log=log) for part in arguments]
+    for _ in range(2):  # as it was written it may be replaced
+        assert hybridsep(*again)[0] == 0
+    assert hybridsep("init", out, "--tau", "0.007")[0] == 0
+    written = out.read_text(encoding="utf-8")
+    out.write_bytes(written.replace("\n", "\r\n").encode())  # line ends are no edit
+    assert hybridsep(*again)[0] == 0
+    edited = out.read_text(encoding="utf-8") + "\n[drive_limits]\nv_max = 0.5\n"
+    out.write_text(edited, encoding="utf-8")
+    err = refusal(hybridsep, *again)
+    assert f"{out} exists and has been edited since `hybridsep {arguments[0]}` wrote it; choose another name" in err
+    assert "or overwrite it and lose the edits with --force" in err
+    assert out.read_text(encoding="utf-8") == edited
+    assert hybridsep(*again, "--force")[0] == 0
+    assert "v_max" not in out.read_text(encoding="utf-8")
+    own_machine(tmp_path).rename(out)
+    assert f"{out} exists and is no machine file that hybridsep wrote" in refusal(hybridsep, *again)
+
+
 def test_demo_asks_before_it_works(hybridsep: Run, tmp_path: Path) -> None:
     (tmp_path / "summary.json").write_text('{"my": "results"}')
     assert "summary.json exists and is no summary of hybridsep demo" in refusal(hybridsep, "demo", "--out", tmp_path)
