@@ -19,11 +19,12 @@ from .command_identify import identify
 from .command_init import init
 from .command_report import report
 from .command_tune import tune
-from .failures import DEBUG_VARIABLE, run
+from .failures import DEBUG_VARIABLE, Commands, run
 
 __all__ = ["app", "main"]
 
 app = typer.Typer(
+    cls=Commands,
     help="Predict a CNC feed drive's servo error one look-ahead window early, with a linear hybrid model.",
     epilog=f"An error is one line and exit status 2, Ctrl-C 130. {DEBUG_VARIABLE}=1 in the environment shows "
     "the traceback of an unexpected error.",

@@ -1,4 +1,4 @@
-"""Failures of a command, reported as one line on standard error and an exit status.
+"""Failures of a command, reported as one line on standard error and an exit status; refused values of options by value.
 
 Status 2 for an error, 130 after Ctrl-C, 1 where the reader of standard output has gone.
 """
@@ -11,14 +11,17 @@ import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from typing import Any
 
+import typer
 from rich.console import Console
+from typer.core import TyperGroup
 
-from ..base.errors import HybridSepError
+from ..base.errors import HybridSepError, brief
 from ..base.interrupt import interrupts_between_calls
 from ..base.version import __version__
 
-__all__ = ["DEBUG_VARIABLE", "errors_console", "loading", "run"]
+__all__ = ["DEBUG_VARIABLE", "Commands", "errors_console", "loading", "run"]
 
 DEBUG_VARIABLE = "HYBRIDSEP_DEBUG"
 """Environment variable: if it is set, an unexpected error shows its traceback."""
@@ -29,6 +32,28 @@ _PLAIN = str.maketrans(
     {"µ": "u", "→": "->", "–": "-", "−": "-", "…": "...", "²": "2", "³": "3", "·": "*", "λ": "lambda"}
 )
 """Substitutes for characters that a terminal's encoding lacks."""
+
+
+_WANTED = {"int": "must be a whole number", "float": "must be a number"}
+"""What an option takes, by the beginning of a type of pydantic's errors."""
+
+
+class Commands(TyperGroup):
+    """Commands whose refusal of an option's value names the value."""
+
+    def invoke(self, ctx: typer.Context) -> Any:  # type: ignore[override]
+        """Run the command that the arguments name."""
+        try:
+            return super().invoke(ctx)
+        except typer.BadParameter as error:
+            from pydantic import ValidationError
+
+            cause = error.__cause__
+            if isinstance(cause, ValidationError):  # in older versions of typer the message has the value
+                first = cause.errors()[0]
+                wanted = _WANTED.get(first["type"].partition("_")[0], error.message)
+                error.message = f"{wanted}, got {brief(first['input'])}"
+            raise
 
 
 class _Interrupted(BaseException):
@@ -81,7 +106,7 @@ def run(app: Callable[[], object], leave: Callable[..., object] | None = None) -
         _abandon_stdout()
         return 1
     except HybridSepError as error:
-        return _fail(f"{type(error).__name__}: {error}")
+        return _fail(str(error))
     except OSError as error:
         if error.filename is None:  # files name theirs
             _abandon_stdout()

@@ -115,9 +115,7 @@ def _name(source: Source, role: str, given: str | None) -> str | None:
             known = [name for name in source.names if spelled[name] == key]
             if len(set(known)) > 1:
                 there = ", ".join(map(repr, known))
-                raise LogError(
-                    f"{source.path}: column {role} may be {there}; give its name in columns (--{_option(role)})"
-                )
+                raise LogError(f"{source.path}: column {role} may be {there}; name it: --{_option(role)} NAME")
             if known:
                 return known[0]
     return None
@@ -145,10 +143,10 @@ def _missing(source: Source, names: Mapping[str, str]) -> LogError:
     """Return the error of columns that are not there, by role."""
     there = ", ".join(repr(other) for other in source.names) or "none"
     what = ", ".join(repr(name) if name == role else f"{name!r} ({role})" for role, name in names.items())
-    which, its = (f"column {what} is", "its name") if len(names) == 1 else (f"columns {what} are", "their names")
-    ways = f"; give {its} in columns{', or T_s' if 't' in names else ''}"
-    options = ", ".join(f"--{_option(role)}{', --T_s' if role == 't' else ''}" for role in names)
-    return LogError(f"{source.path}: {which} missing, the file has {there}{ways} ({options}){source.advice}")
+    which, it = (f"column {what} is", "it") if len(names) == 1 else (f"columns {what} are", "them")
+    options = " ".join(f"--{_option(role)} NAME" for role in names)
+    other = " (or --T_s SECONDS instead of --t)" if "t" in names else ""
+    return LogError(f"{source.path}: {which} missing, the file has {there}; name {it}: {options}{other}{source.advice}")
 
 
 def _stated(source: Source, name: str) -> str:
@@ -172,8 +170,8 @@ def _time(source: Source, name: str) -> Column:
 def _position(source: Source, name: str, given: str | None) -> Column:
     if name in source.stamps:
         raise LogError(
-            f"{source.path}: column {name!r} must be a position, it holds timestamps; name another in columns (--x-d, "
-            "--x)"
+            f"{source.path}: column {name!r} must be a position, it holds timestamps; name another: --x-d NAME, "
+            "--x NAME"
         )
     text = _stated(source, name)
     unit = position_unit(text) if text else None
@@ -183,7 +181,7 @@ def _position(source: Source, name: str, given: str | None) -> Column:
     if text and unit is None and not counts:
         raise LogError(
             f"{source.path}: column {name!r} must be a position in one of {', '.join(POSITION_UNITS)}, its unit is "
-            f"{text!r}; is it another quantity? Name another column in columns (--x-d, --x), or correct the unit"
+            f"{text!r}; is it another quantity? Name another column (--x-d NAME, --x NAME), or correct the unit"
         )
     chosen = position_unit(given) if given is not None else None
     if unit is not None and chosen not in (None, unit):

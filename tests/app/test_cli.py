@@ -214,7 +214,7 @@ def test_help_shows_units_and_ranges(hybridsep: Run) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["backtest", "{log}", "-m", "robot"], "MachineError: no machine 'robot'"),
+        (["backtest", "{log}", "-m", "robot"], "error: no machine 'robot'"),
         (["backtest", "{log}", "-m", "spring_mass_damper", "--p", "200"], "p must be 1 … Np = 100, got 200"),
         (["backtest", "{log}", "-m", "spring_mass_damper", "--lam", "0"], "lambda must be 1e-40 … 1e+12 m2, got 0"),
         (["backtest", "{log}", "-m", "spring_mass_damper", "--x", "pos"], "column 'pos'"),
@@ -256,6 +256,26 @@ def test_errors_are_one_line_and_status_2(hybridsep: Run, tmp_path: Path, argume
     assert message.replace(" ", "") in "".join(err.split())
     assert "Traceback" not in err
     assert len(err.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "message"),
+    [
+        ("--p", "10.5", "Invalid value for '--p': must be a whole number, got '10.5'"),
+        ("--lam", "1,5", "Invalid value for '--lambda' / '--lam': must be a number, got '1,5'"),
+    ],
+)
+def test_a_value_that_is_no_number_is_named(hybridsep: Run, option: str, value: str, message: str) -> None:
+    status, out, err = hybridsep("backtest", "log.csv", "-m", "spring_mass_damper", option, value)
+    assert (status, out) == (2, "")
+    assert message in " ".join(err.split())
+
+
+def test_missing_columns_are_named_by_options(hybridsep: Run, tmp_path: Path) -> None:
+    log = write_log(tmp_path / "log.csv", n=300, header="t,one,two")
+    err = hybridsep("backtest", log, "-m", "spring_mass_damper")[2]
+    assert err.startswith(f"error: {log}: columns 'x_d', 'x' are missing, the file has 't', 'one', 'two'")
+    assert err.endswith("; name them: --x-d NAME --x NAME\n")
 
 
 def test_a_log_in_milliseconds_gets_a_hint(hybridsep: Run, tmp_path: Path) -> None:

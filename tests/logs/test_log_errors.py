@@ -68,10 +68,11 @@ def test_missing_columns(tmp_path: Path, suffix: str) -> None:
     data = columns()
     path = write(tmp_path / f"log{suffix}", {"x_d": data["x_d"], "qm": data["x"]})
     with pytest.raises(
-        LogError, match=r"columns 't', 'x' are missing, the file has 'x_d', 'qm'; .*, or T_s \(--t, --T_s"
+        LogError,
+        match=r"columns 't', 'x' are missing, the file has 'x_d', 'qm'; name them: --t NAME --x NAME \(or --T_s",
     ):
         open_log(path)
-    with pytest.raises(LogError, match=r"column 'x' is missing, the file has 'x_d', 'qm'; give its name in columns"):
+    with pytest.raises(LogError, match=r"column 'x' is missing, the file has 'x_d', 'qm'; name it: --x NAME"):
         open_log(path, T_s=1e-3)
     with pytest.raises(LogError, match=r"column 'time' \(t\) is missing"):
         open_log(path, columns={"t": "time", "x": "qm"}, T_s=1e-3)
