@@ -86,4 +86,4 @@ def build(
         print_json([str(path) for path in paths])
     else:
         for path in paths:
-            console.print(f"{path}  {path.stat().st_size / 1024:.0f} KiB", highlight=False)
+            console.print(f"{path}  {path.stat().st_size / 1024:.0f} KiB", highlight=False, soft_wrap=True)

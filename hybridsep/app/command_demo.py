@@ -47,4 +47,4 @@ def demo(
         return
     print_predictions(summary)
     print_compensation(summary)
-    console.print(f"\nFigures, FMUs, results and summary.json are in {out}")
+    console.print(f"\nFigures, FMUs, results and summary.json are in {out}", soft_wrap=True)
