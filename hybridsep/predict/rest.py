@@ -27,7 +27,7 @@ class RestBefore:
     lasts : bool
         Whether the command has not moved yet, in what was measured.
     known : int
-        Samples behind these that are known to be at rest.
+        Samples behind these that are known to be at rest; 0 once the command has moved.
     """
 
     def __init__(self, late: int) -> None:
@@ -44,7 +44,7 @@ class RestBefore:
         """
         late = n - len(path)
         if not self.lasts or self.known < late:
-            return self.known if self.lasts else 0
+            return self.known
         moving = np.flatnonzero(path)
         return late + int(moving[0]) if len(moving) else n
 

@@ -57,7 +57,7 @@ typedef struct {
     hsep_guard guard;
     uint64_t n_rejected; /* samples of this run that were not accepted */
     uint64_t at_rest;    /* whether the command has not moved in this run yet, in what was learned, */
-    uint64_t known_rest; /* how many samples behind these are at rest as well, */
+    uint64_t known_rest; /* how many samples behind these are at rest as well (0 if it has), */
     uint64_t n_rest;     /* and how many of those predicted, the first ones */
     /* Offsets in doubles from the beginning of the struct */
     uint64_t largest;          /* (n_static,) largest magnitudes of the features without lags */

@@ -43,7 +43,7 @@ static uint64_t trusted_rest_ahead(const hsep_trusted *self, const double path[]
     const uint64_t late = self->n - n_path;
     uint64_t k = 0;
     if (!self->at_rest || self->known_rest < late) {
-        return self->at_rest ? self->known_rest : 0;
+        return self->known_rest;
     }
     while (k < n_path && !(fabs(path[n_path - 1 - k]) > 0.0)) {
         k++;
