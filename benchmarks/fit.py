@@ -21,7 +21,7 @@ from time import perf_counter
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # benchmarks are no part of the package
 
-from benchmarks.trust import fitted_lag
+from benchmarks.trust import fitted_model
 from hybridsep.app.arguments import machine_name
 from hybridsep.app.fit import FitOptions, fit
 from hybridsep.app.log_intake import take_in
@@ -83,7 +83,7 @@ def row(log: Log, Np: int) -> str:
 def peers(log: Log, Np: int) -> tuple[float, float]:
     """Return the RMS errors, m, of a lag with dead time and of hold on it, over the second half."""
     [recording] = halves([(log.x_d, log.x_meas)], 0.5)
-    model = fitted_lag(*recording.taught, log.T_s)
+    model = fitted_model(*recording.taught, log.T_s)
     settings: PredictorSettings = settings_for(Np, log.T_s, "zoh")
     lag, hold, _ = replay(HybridPredictor(model, settings), [recording]).rms()
     return lag, hold

@@ -22,14 +22,13 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # benchmarks are no part of the package
 
 import numpy as np
-from scipy.optimize import minimize_scalar
-from scipy.signal import lfilter
 
 from hybridsep.base.errors import SignalError
 from hybridsep.base.metrics import rms
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.evaluate.backtest import backtest
+from hybridsep.evaluate.lag import fitted_lag
 from hybridsep.logs.log import read_log
 from hybridsep.machines.machine import Machine, load_machine
 from hybridsep.machines.sections import StageSection
@@ -41,12 +40,6 @@ from hybridsep.predict.predictor import HybridPredictor
 
 SEEDS = (0, 1000)
 """Seeds of the encoder noise, cold and warm."""
-
-DEAD_TIME_MAX = 20
-"""Largest dead time, samples, that is tried for a recording."""
-
-TIME_CONSTANTS = (0.05, 1e4)
-"""Least and largest time constant that are tried for a recording, in samples."""
 
 WINDOWS = (100, 20)
 """Samples in a window, ``Np``, over a recording; ``p`` is 50 where it fits."""
@@ -190,10 +183,10 @@ def recorded(path: Path, Np: int) -> Case:
         even = np.arange(t[0], t[-1], T_s)
         x_d, x = np.interp(even, t, x_d), np.interp(even, t, x)
     settings = PredictorSettings(trust=False, Np=Np, p=min(50, Np), T_s=T_s)
-    return Case(f"{path.stem}, Np = {Np}", fitted_lag(x_d, x, T_s), settings, x_d, (x, x))
+    return Case(f"{path.stem}, Np = {Np}", fitted_model(x_d, x, T_s), settings, x_d, (x, x))
 
 
-def fitted_lag(x_d: Array, x: Array, T_s: float) -> ModalModel:
+def fitted_model(x_d: Array, x: Array, T_s: float) -> ModalModel:
     """Return the first-order lag with whole samples of dead time that fits a recording best by least squares.
 
     Parameters
@@ -203,22 +196,10 @@ def fitted_lag(x_d: Array, x: Array, T_s: float) -> ModalModel:
     T_s : float
         Sampling interval, s.
     """
-    command, measured = x_d - x_d[0], x - x_d[0]
-
-    def misfit(log_tau: float, dead_time: int) -> float:
-        pole = math.exp(-T_s / math.exp(log_tau))
-        delayed = np.concatenate((np.zeros(dead_time), command[: len(command) - dead_time]))
-        return float(np.sum((measured - lfilter([0.0, 1.0 - pole], [1.0, -pole], delayed)) ** 2))
-
-    bounds = [math.log(samples * T_s) for samples in TIME_CONSTANTS]
-    fits = [
-        (minimize_scalar(misfit, bounds=bounds, args=(dead_time,), method="bounded"), dead_time)
-        for dead_time in range(DEAD_TIME_MAX + 1)
-    ]
-    best, dead_time = min(fits, key=lambda fit: float(fit[0].fun))
-    omega = 1.0 / math.exp(best.x)
+    lag = fitted_lag([(x_d, x)])
+    omega = 1.0 / (lag.tau * T_s)
     # 1/(τs + 1) = (ω² + ω s)/(s + ω)²
-    return ModalModel([Mode(omega / (2 * math.pi), 1.0, omega**2, omega)], dead_time)
+    return ModalModel([Mode(omega / (2 * math.pi), 1.0, omega**2, omega)], lag.dead_time)
 
 
 def replayed(case: Case) -> Row:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks import trust
-from benchmarks.trust import circle, fitted_lag, recorded, replayed, short_staircase, simulated
+from benchmarks.trust import circle, fitted_model, recorded, replayed, short_staircase, simulated
 from hybridsep.base.errors import SignalError
 from hybridsep.base.signals import Array
 from hybridsep.evaluate.backtest import Backtest, backtest
@@ -32,7 +32,7 @@ def lagging(x_d: Array) -> Array:
 
 def test_the_fit_finds_lag_and_dead_time() -> None:
     x_d = moves(900)
-    model = fitted_lag(x_d, lagging(x_d), TS)
+    model = fitted_model(x_d, lagging(x_d), TS)
     assert model.dead_time == DEAD_TIME
     assert model.modes[0].omega == pytest.approx(OMEGA, rel=1e-4)
     assert model.dc_gain == pytest.approx(1.0)

@@ -1,0 +1,157 @@
+"""Peers on the raw columns: ARX and lag + hold against slow copies of their definitions, on recordings and by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from places import RECORDINGS
+from scipy.signal import lfilter
+
+from hybridsep.base.signals import Array
+from hybridsep.evaluate.arx import ArxRun, MinimumNorm
+from hybridsep.evaluate.lag import FirstOrderLag, fitted_lag
+from hybridsep.evaluate.peers import FROZEN, LAG_HOLD, REFITTED, Peer, Piece, predict_peers
+
+NP = 25
+
+
+def columns(name: str) -> tuple[Array, Array]:
+    _, x_d, x = np.loadtxt(RECORDINGS / f"{name}.csv", delimiter=",", skiprows=1, unpack=True)
+    return x_d, x
+
+
+def axis(n: int = 600, seed: int = 0) -> tuple[Array, Array]:
+    """Command and measurement of an axis of second order under a random, smooth command."""
+    rng = np.random.default_rng(seed)
+    x_d = np.cumsum(lfilter([0.02], [1.0, -0.98], rng.normal(0.0, 1e-3, n))) + 0.1
+    x = x_d[0] + lfilter([0.05, 0.02], [1.0, -1.6, 0.67], x_d - x_d[0]) + rng.normal(0.0, 1e-6, n)
+    return x_d, np.asarray(x)
+
+
+def arx_by_definition(x_d: Array, x: Array, n: int, n_fitted: int) -> Array:
+    """Return the coefficients from the samples before ``n_fitted``, row by row."""
+    y, rows, targets = x - x_d, [], []
+    for k in range(n + 1, n_fitted):
+        steps = [x_d[k - j] - x_d[k - j - 1] for j in range(n + 1)]
+        row = [y[k - i] for i in range(1, n + 1)] + steps + [1.0]
+        if not np.isnan([*row, y[k]]).any():
+            rows.append(row)
+            targets.append(y[k])
+    return np.asarray(np.linalg.lstsq(np.array(rows), np.array(targets), rcond=None)[0])
+
+
+def free_run_by_definition(w: Array, x_d: Array, x: Array, n: int, begin: int, end: int) -> Array:
+    """Return the positions predicted from what is measured before ``begin``, sample by sample."""
+    y = (x - x_d)[:begin].tolist()
+    for k in range(n + 1, end):
+        if k >= len(y) or np.isnan(y[k]):
+            steps = [x_d[k - j] - x_d[k - j - 1] for j in range(n + 1)]
+            value = float(np.dot(w, [y[k - i] for i in range(1, n + 1)] + steps + [1.0]))
+            y[k : k + 1] = [value]
+    return np.asarray(x_d[begin:end] + np.array(y[begin:end]))
+
+
+def peer(found: tuple[Peer, ...], name: str, way: str) -> Peer:
+    [one] = [peer for peer in found if (peer.name, peer.way) == (name, way)]
+    return one
+
+
+@pytest.mark.skipif(not RECORDINGS.is_dir(), reason=f"the recordings are not at {RECORDINGS}")
+@pytest.mark.parametrize("name", ["cnc_a_axis2", "cnc_b_axis2", "xl330_sin_sin_kp200"])
+@pytest.mark.parametrize("n", [20, 40])
+def test_coefficients_of_rows_in_blocks_are_those_of_lstsq(name: str, n: int) -> None:
+    x_d, x = columns(name)
+    least_squares, run = MinimumNorm(2 * n + 2), ArxRun(x_d, x, n)
+    for k in range(0, len(x), 100):
+        least_squares.add(run.rows(k, k + 100))
+    rows = run.rows(0, len(x))
+    direct, found = arx_by_definition(x_d, x, n, len(x)), least_squares.solution()
+    # Of nearly dependent columns coefficients are not, but what they predict is, determined to rounding
+    misfits = [np.linalg.norm(rows[:, -1] - rows[:, :-1] @ w) for w in (found, direct)]
+    assert misfits[0] == pytest.approx(misfits[1], rel=1e-9)
+    np.testing.assert_allclose(rows[:, :-1] @ found, rows[:, :-1] @ direct, rtol=0, atol=1e-7 * np.ptp(rows[:, -1]))
+
+
+def test_of_dependent_columns_the_solution_is_of_minimum_norm() -> None:
+    rng = np.random.default_rng(0)
+    rows = rng.normal(size=(60, 7))
+    rows[:, 3] = 2.0 * rows[:, 1]
+    rows[:, 5] = 0.0
+    least_squares = MinimumNorm(6)
+    for i in range(0, 60, 7):
+        least_squares.add(rows[i : i + 7])
+        direct = np.linalg.lstsq(rows[: i + 7, :-1], rows[: i + 7, -1], rcond=None)[0]
+        np.testing.assert_allclose(least_squares.solution(), direct, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("missing", [(), range(290, 312), range(395, 405)])
+def test_windows_are_free_runs_from_what_was_measured_before(missing: range) -> None:
+    x_d, x = axis()
+    x[list(missing)] = np.nan
+    found = predict_peers([Piece(x_d, x, 300, 300)], NP)
+    frozen, refitted = peer(found, "ARX20", FROZEN).predictions[0], peer(found, "ARX20", REFITTED).predictions[0]
+    assert np.isnan(frozen[:300]).all()
+    assert not np.isnan(frozen[300:]).any()
+    w = arx_by_definition(x_d, x, 20, 300)
+    for k in range(300, 600, NP):
+        window = slice(k, k + NP)
+        expected = free_run_by_definition(w, x_d, x, 20, k, k + NP)
+        np.testing.assert_allclose(frozen[window], expected, rtol=0, atol=1e-9)
+    if not missing:  # a gap is bridged by the coefficients that were known when it ended
+        for k in range(300, 600, NP):
+            expected = free_run_by_definition(arx_by_definition(x_d, x, 20, k), x_d, x, 20, k, k + NP)
+            np.testing.assert_allclose(refitted[k : k + NP], expected, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("delay", [0, 7, 40])
+def test_no_prediction_knows_its_window(delay: int) -> None:
+    x_d, x = axis()
+    late = np.concatenate((np.full(delay, x[0]), x))[: len(x)]
+    other = late.copy()
+    other[450:] += 1e-5
+    one, two = (predict_peers([Piece(x_d, given, 300, 300)], NP, delay=delay) for given in (late, other))
+    for first, second in zip(one, two, strict=True):
+        assert not first.diverged
+        changed = first.predictions[0] != second.predictions[0]
+        assert not changed[300 : 450 + delay].any()  # predictions stand where their measurements do
+        assert changed[450 + NP + delay :].all()
+
+
+@pytest.mark.parametrize("delay", [3, 30])
+def test_late_measurements_are_those_of_earlier_positions(delay: int) -> None:
+    x_d, x = axis()
+    late = np.concatenate((np.full(delay, x[0]), x[:-delay]))
+    found = peer(predict_peers([Piece(x_d, late, 300, 300)], NP, delay=delay), "ARX20", FROZEN).predictions[0]
+    w = arx_by_definition(x_d, x, 20, 300 - delay)
+    for k in range(300, 600 - NP - delay, NP):  # the window's predictions stand where its measurements do
+        expected = free_run_by_definition(w, x_d, x, 20, k - delay, k + NP)[delay:]
+        np.testing.assert_allclose(found[k + delay : k + delay + NP], expected, rtol=0, atol=1e-9)
+    assert not np.isnan(found[300:]).any()
+
+
+def test_without_samples_that_teach_there_are_refitted_models_alone() -> None:
+    x_d, x = axis()
+    found = predict_peers([Piece(x_d, x, 0, 0)], NP)
+    assert [one.title for one in found] == ["ARX20, refitted", "ARX40, refitted"]
+    np.testing.assert_array_equal(found[0].predictions[0][:NP], x_d[:NP])  # nothing is known
+
+
+def test_an_unstable_model_diverges() -> None:
+    x_d = 0.01 * np.sin(0.05 * np.arange(900))
+    x = x_d + 1e-9 * 1.08 ** np.arange(900.0).clip(max=150)  # what teaches grows by 8 % a sample
+    found = predict_peers([Piece(x_d, x, 140, 150)], 700)
+    assert peer(found, "ARX20", FROZEN).diverged
+
+
+def test_a_lag_is_found_and_its_last_measured_residual_held() -> None:
+    x_d, _ = axis(2000)
+    true = FirstOrderLag(12.0, 3)
+    x = true.position(x_d) + 5e-6
+    x[1190:1200] = np.nan
+    lag = fitted_lag([(x_d[:1000], x[:1000])])
+    assert lag.tau == pytest.approx(12.0, rel=1e-2)
+    assert lag.dead_time == 3
+    held = peer(predict_peers([Piece(x_d, x, 1000, 1000)], 100), LAG_HOLD, "").predictions[0]
+    x_lag = lag.position(x_d)
+    np.testing.assert_allclose(held[1200:1300], x_lag[1200:1300] + (x - x_lag)[1189], rtol=0, atol=1e-15)
+    np.testing.assert_allclose(held[1300:1400], x_lag[1300:1400] + (x - x_lag)[1299], rtol=0, atol=1e-15)
