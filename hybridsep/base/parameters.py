@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -37,6 +38,8 @@ class Parameter:
         Value out of the range that stands for an automatic choice.
     choices : tuple of str
         Items in the order of their values in the FMU, where it is an Enumeration.
+    meanings : tuple of str
+        What each item means, in the same order.
     learned : bool
         Whether weights learned with one value are invalid for another: it shapes the features or the factor.
     """
@@ -52,6 +55,7 @@ class Parameter:
     nonzero: float = 0.0
     automatic: float | None = None
     choices: tuple[str, ...] = ()
+    meanings: tuple[str, ...] = ()
     learned: bool = False
 
     @property
@@ -148,9 +152,10 @@ def flag(default: bool, description: str, **more: Any) -> Any:
     return _declared(bool, default, 0, 1, "1", description, **more)
 
 
-def choice(default: str, choices: tuple[str, ...], description: str, **more: Any) -> Any:
-    """Declare one of several names as a field of settings."""
-    return _declared(str, default, 0, len(choices) - 1, "1", description, choices=choices, **more)
+def choice(default: str, choices: Mapping[str, str], description: str, **more: Any) -> Any:
+    """Declare one of several names as a field of settings; ``choices`` says what each means."""
+    more |= {"choices": tuple(choices), "meanings": tuple(choices.values())}
+    return _declared(str, default, 0, len(choices) - 1, "1", description, **more)
 
 
 def _declared(

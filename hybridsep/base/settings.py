@@ -189,7 +189,10 @@ class PredictorSettings(Settings):
         *(-1.0, 0.0, 1e6, "s", "warm-up: until then x_h = x_pb, while learning goes on"), automatic=-1.0
     )
     input_hold: str = choice(
-        "zoh", ("zoh", "foh"), "how x_d runs between samples, zero-order or first-order hold", learned=True
+        "zoh",
+        {"zoh": "zero-order hold: constant until the next sample", "foh": "first-order hold: a straight line to it"},
+        "how x_d runs between samples, zero-order or first-order hold",
+        learned=True,
     )
     trust: bool = flag(
         True,
@@ -315,7 +318,15 @@ class CompensatorSettings(Settings):
     limits: Limits | None = None
     change_max: float | None = real(1e-3, 1e-12, 10.0, "m", "largest change of the command", display_unit="mm")
     no_reversal: bool = flag(True, "whether x_dm never turns while the commanded position moves")
-    compensate: str = choice("hybrid", ("off", "physics", "hybrid"), "best model to compensate with")
+    compensate: str = choice(
+        "hybrid",
+        {
+            "off": "none: the command is not modified",
+            "physics": "the physics-based model",
+            "hybrid": "the hybrid model",
+        },
+        "best model to compensate with",
+    )
 
     def for_window(self, Np: int) -> CompensatorSettings:
         """Return these settings for windows of ``Np`` samples, defaults filled in.
@@ -379,11 +390,26 @@ _OTHERS = (
     # The stage's disturbance and the encoder.
     real(0.0, 0.0, 1.0, "m", "friction of the carriage, as an offset of the command", name="f", display_unit="um"),
     real(0.0, 0.0, 1e6, "1/m", "cable stiffness, an offset kappa·x·|x| of the command", name="kappa"),
-    choice("command", ("command", "motion"), "velocity of the friction: commanded or actual", name="friction_on"),
+    choice(
+        "command",
+        {"command": "the commanded velocity", "motion": "the actual velocity"},
+        "velocity of the friction: commanded or actual",
+        name="friction_on",
+    ),
     real(0.0, 0.0, 1.0, "m", "standard deviation of the encoder noise", name="noise_std", display_unit="um"),
     whole(0, 0, 2**31 - 1, "seed of the encoder noise", name="seed"),
     # The source of commands.
-    choice("staircase", ("staircase", "spiral_x", "spiral_y", "samples"), "what is played", name="trajectory"),
+    choice(
+        "staircase",
+        {
+            "staircase": "moves of 10 mm, three up and three down",
+            "spiral_x": "X axis of an Archimedean spiral",
+            "spiral_y": "Y axis of an Archimedean spiral",
+            "samples": "the samples with which the FMU was built",
+        },
+        "what is played",
+        name="trajectory",
+    ),
 )
 """Parameters of models, plants and trajectories."""
 

@@ -107,11 +107,12 @@ def _text(value: object) -> str:
 
 
 def _add_types(definitions: ET.Element, table: Sequence[Variable]) -> None:
-    """Name the values of the enumerations; each variable has a type of its own, called like it."""
+    """Name the values of the enumerations; each variable has a type of its own."""
     for variable in (variable for variable in table if variable.items):
-        element = ET.SubElement(ET.SubElement(definitions, "SimpleType", name=variable.name), "Enumeration")
-        for value, item in enumerate(variable.items):
-            ET.SubElement(element, "Item", name=item, value=str(value))
+        attributes = {"name": variable.type_name, "description": variable.description}
+        element = ET.SubElement(ET.SubElement(definitions, "SimpleType", attributes), "Enumeration")
+        for value, (item, meaning) in enumerate(zip(variable.items, variable.item_meanings, strict=True)):
+            ET.SubElement(element, "Item", name=item, value=str(value), description=meaning)
 
 
 def _add_variable(parent: ET.Element, reference: int, variable: Variable) -> None:
@@ -127,7 +128,7 @@ def _add_variable(parent: ET.Element, reference: int, variable: Variable) -> Non
     elif variable.causality != "input":
         attributes["initial"] = "calculated"
     element = ET.SubElement(parent, "ScalarVariable", attributes)
-    values = {"declaredType": variable.name} if variable.items else {}
+    values = {"declaredType": variable.type_name} if variable.items else {}
     if variable.unit not in (None, "1"):
         values["unit"] = str(variable.unit)
         if variable.display_unit:

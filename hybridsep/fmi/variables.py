@@ -54,7 +54,7 @@ COMPENSATOR_SETTINGS: Mapping[str, Parameter] = {
 
 _HOLD = "the same for x_pb plus the residual before the window, held"
 _REJECTED = "measurements that were missing or not plausible, with trust; counted window by window"
-_SEP_MODELS = CompensatorSettings.parameters()["compensate"].choices
+_COMPENSATE = CompensatorSettings.parameters()["compensate"]
 _KINDS = {int: "Integer", float: "Real", bool: "Boolean", str: "Enumeration"}
 
 
@@ -81,6 +81,8 @@ class Variable:
     nominal : float or None
     items : tuple of str
         Names of an Enumeration's values, which count from 0.
+    item_meanings : tuple of str
+        What each of them means.
     learned : bool
         Whether a warm start needs the value with which the weights were learned.
     initially_from : tuple of str
@@ -102,7 +104,13 @@ class Variable:
     nominal: float | None = None
     initially_from: tuple[str, ...] = ()
     items: tuple[str, ...] = ()
+    item_meanings: tuple[str, ...] = ()
     learned: bool = False
+
+    @property
+    def type_name(self) -> str:
+        """Name of an Enumeration's type: ``SepState`` for ``sep_state``, as none may be called like a variable."""
+        return "".join(part.capitalize() for part in self.name.split("_"))
 
 
 def _position(name: str, causality: str, description: str, *, display_unit: str = "mm", **more: Any) -> Variable:
@@ -127,6 +135,7 @@ def _parameter(parameter: Parameter, start: Value, *, label: str | None = None) 
         nonzero=parameter.nonzero,
         automatic=parameter.automatic,
         items=parameter.choices,
+        item_meanings=parameter.meanings,
         learned=parameter.learned,
     )
 
@@ -244,7 +253,16 @@ def compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mappi
             display_unit="um",
             initially_from=(*ahead, *model),
         ),
-        Variable("sep_state", "Enumeration", "output", "discrete", state, initially_from=model, items=_SEP_MODELS),
+        Variable(
+            "sep_state",
+            "Enumeration",
+            "output",
+            "discrete",
+            state,
+            initially_from=model,
+            items=_COMPENSATE.choices,
+            item_meanings=_COMPENSATE.meanings,
+        ),
         _position("rms_e", "output", "running RMS of x_d - x_meas since t_init", display_unit="um"),
         _position("rms_pb", "output", "running RMS of x_meas - x_pb since t_init", display_unit="um"),
         _position("rms_h", "output", "running RMS of x_meas - x_h since t_init", display_unit="um"),

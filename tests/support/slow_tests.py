@@ -20,8 +20,8 @@ SLOW = (
     r"c/test_c_sources\.py",
     r"c/test_static_linking\.py",
     # FMUs of other machines, which differ from the default one's in modes and settings; of the stage, the X drive stays
-    r"fmi/test_(native|python)_fmu\.py::\w+\[\w+_(als25010_y|emps)",
-    r"fmi/test_(native|python)_fmu\.py::\w+\[(HybridPredictor|SepCompensator)(Py)?_als25010_x",
+    r"fmi/test_(native_fmu|python_fmu|model_description)\.py::\w+\[\w+_(als25010_y|emps)",
+    r"fmi/test_(native_fmu|python_fmu|model_description)\.py::\w+\[(HybridPredictor|SepCompensator)(Py)?_als25010_x",
     r"suite/test_\w+\.py::.*(HybridPredictor|SepCompensator|FMU-FeedDrive)_als25010_x\]",
     # Whole trajectories, or every parameter
     r"fmi/test_native_cosimulation\.py::(?!test_every_pairing_agrees_with_the_library_on_the_staircase\[native-native)",
