@@ -101,7 +101,14 @@ def backtest(
             whole = opened if isinstance(opened, Log) else opened.read()
             found = backtest_whole(predictor, whole.x_d, whole.x_meas, on_batch=on_batch)
             scores: Scores = found
-            run = replayed_run(found, whole.x_d, whole.x_meas, whole.T_s, predictor.Np)
+            run = replayed_run(
+                found,
+                whole.x_d,
+                whole.x_meas,
+                whole.T_s,
+                predictor.Np,
+                measurement_delay=predictor.settings.measurement_delay,
+            )
             for path in predictions:
                 run.save(path)
             if figure is not None:

@@ -19,6 +19,7 @@ __all__ = [
     "coverage",
     "hold",
     "largest",
+    "last_residual",
     "peak_derivatives",
     "reduction_percent",
     "rms",
@@ -104,12 +105,14 @@ class RunningErrors:
 
 
 def hold(x_pb: Array, x_meas: Array, active: NDArray[np.bool_], Np: int, *, late: int = 0) -> Array:
-    """Return the hold baseline: ``x_pb`` plus the last residual known before each window; ``x_pb`` in the warm-up.
+    """Return the hold baseline: ``x_pb`` plus the last residual measured before each window; ``x_pb`` in the warm-up.
+
+    It follows from what was published and measured, no model or guard has a part in it.
 
     Parameters
     ----------
     x_pb, x_meas : (n,) array, m
-        Physics-based prediction and measured position.
+        Physics-based prediction as published, and measured position, NaN where missing.
     active : (n,) array of bool
         Whether the warm-up is over.
     Np : int
@@ -117,9 +120,18 @@ def hold(x_pb: Array, x_meas: Array, active: NDArray[np.bool_], Np: int, *, late
     late : int
         Samples by which measurements were late.
     """
-    last = np.arange(len(x_meas)) // Np * Np - 1 - late
+    samples = np.arange(len(x_meas))
+    measured = np.maximum.accumulate(np.where(np.isnan(x_meas), -1, samples))
+    begin = samples // Np * Np - late  # what is measured from here on has not arrived yet
+    last = np.where(begin > 0, measured[begin - 1], -1)
     residual = np.where(last >= 0, (x_meas - x_pb)[last], 0.0)
     return np.where(active, x_pb + residual, x_pb)
+
+
+def last_residual(x_meas: Array, x_pb: Array, before: float) -> float:
+    """Return the residual of the last sample measured, m, or the one ``before`` if none was; NaN is missing."""
+    known = np.flatnonzero(~np.isnan(x_meas))
+    return float(x_meas[known[-1]] - x_pb[known[-1]]) if len(known) else before
 
 
 def batch_rms(error: Array, Np: int) -> Array:

@@ -147,7 +147,8 @@ class Run:
 
     def prediction_figures(self) -> dict[str, float | int]:
         """Return RMS errors in µm over the whole trajectory, against the measured position unless named true."""
-        rms_pb, rms_hold, rms_h = (rms(self.x_meas - x) for x in (self.x_pb, self.x_hold, self.x_h))
+        known = ~np.isnan(self.x_meas)
+        rms_pb, rms_hold, rms_h = (rms((self.x_meas - x)[known]) for x in (self.x_pb, self.x_hold, self.x_h))
         return {
             "rms_pb_um": 1e6 * rms_pb,
             "rms_hold_um": 1e6 * rms_hold,
@@ -157,7 +158,7 @@ class Run:
             "rms_pb_true_um": 1e6 * rms(self.x - self.x_pb),
             "rms_h_true_um": 1e6 * rms(self.x - self.x_h),
             "servo_error_rms_um": 1e6 * rms(self.error),
-            "max_h_um": 1e6 * largest(self.x_meas - self.x_h),
+            "max_h_um": 1e6 * largest((self.x_meas - self.x_h)[known]),
             "n_samples": len(self.t),
         }
 

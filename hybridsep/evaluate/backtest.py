@@ -1,8 +1,8 @@
 """Causal replay over a recorded log: each window is predicted first, then revealed and learned.
 
 Three predictors are scored against the measured position: the physics model ``x_pb``, the hold baseline ``x_hold``
-(``x_pb`` plus the last measured residual, held over the window) and the hybrid ``x_h`` of eq. (4). During the warm-up
-all three publish ``x_pb``.
+(``x_pb`` plus the residual of the last sample measured before the window, held over it; 0 before any was measured in
+this replay) and the hybrid ``x_h`` of eq. (4). During the warm-up all three publish ``x_pb``.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base.errors import SignalError
-from ..base.metrics import RunningErrors
+from ..base.metrics import RunningErrors, last_residual
 from ..base.signals import PREDICTION_MAX, Array, as_measured, as_samples
 from ..base.threads import one_blas_thread
 from ..predict.predictor import HybridPredictor
@@ -167,8 +167,9 @@ def backtest_stream(
     overall, after, tally = RunningErrors(3), RunningErrors(3), Tally(predictor.Np)
     j = k = n_rejected = n_missing = 0
     late: Array | None = None
+    residual = 0.0
     for commands, x in _windows(predictor, chunks):
-        window = _predicted(predictor, commands)
+        window = _predicted(predictor, commands, residual)
         if late is None:
             late = _at_rest(commands[0] if predictor.start is None else predictor.start, predictor.late)
         n = len(x)
@@ -178,6 +179,7 @@ def backtest_stream(
         warm = n - int(signals[_ACTIVE, :n].sum())
         compared = np.where(np.arange(k, k + n) < late.shape[1], np.nan, x)
         error = compared - predicted
+        residual = last_residual(compared, predicted[0], residual)
         n_known, squares, peaks = _measure(error, k)
         if warm == 0:
             after.add(n_known, squares, peaks)
@@ -203,9 +205,8 @@ _X_D, _STD, _ACTIVE, _PREDICTED = 0, 1, 2, slice(3, 6)
 """Rows of the signals of a window: command, standard deviation, whether the hybrid is published, the predictions."""
 
 
-def _predicted(predictor: HybridPredictor, x_d: Array) -> Array:
-    """Predict a window, and return its signals, ``(6, n)``."""
-    residual = predictor.last_residual()
+def _predicted(predictor: HybridPredictor, x_d: Array, residual: float) -> Array:
+    """Predict a window, and return its signals, ``(6, n)``, hold with the ``residual`` measured before it, m."""
     prediction = predictor.predict(x_d)
     active, x_pb = prediction.active, prediction.x_pb
     hold, x_h = x_pb + residual, x_pb + prediction.e_h  # Eq. (4)

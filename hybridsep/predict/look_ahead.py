@@ -103,8 +103,9 @@ class LookAhead:
         self.start = start
         self.k = 0
         late = self.predictor.settings.measurement_delay
-        self._first_scored = self.delay + late + samples_before(warm_up, self.predictor.T_s)
+        self._first_scored = self._first_compared + samples_before(warm_up, self.predictor.T_s)
         self._n_scored, self._sums = 0, np.zeros(4)
+        self._residual = 0.0  # of the last sample measured, as published; 0 before any but those of the first fill
         # Commanded position, x_pb, x_h and hold, as predicted for the samples whose measurement is still to come
         self._compared = np.full((4, late + self.Np), self.start)
         # The last commands, r(k − delay) … r(k − 1), which is x_d(k) … x_d(k + delay − 1)
@@ -196,7 +197,7 @@ class LookAhead:
 
     @property
     def rms_hold(self) -> float:
-        """Running RMS of hold, ``x_pb`` plus the residual before a window, since ``t_init``, m; 0 before."""
+        """Running RMS of hold, ``x_pb`` plus the last residual measured before a window, since ``t_init``, m."""
         return self._rms(3)
 
     def sample(self, x_d_ahead: float, x_meas: float) -> None:
@@ -217,6 +218,8 @@ class LookAhead:
         """
         self.check(x_d_ahead, x_meas)
         self._ahead[self.k % self.delay], self._measured[self.k % self.Np] = x_d_ahead, x_meas
+        if self.k >= self._first_compared and not math.isnan(x_meas):
+            self._residual = float(x_meas - self._compared[1, self.k % self.Np])
         if self.k >= self._first_scored and not math.isnan(x_meas):
             self._n_scored += 1
             self._sums += np.square(x_meas - self._compared[:, self.k % self.Np])
@@ -247,7 +250,13 @@ class LookAhead:
             "state_before": int(self.window.state_before),
             "diverged": self.diverged,
         }
-        arrays = {"sums": self._sums, "ahead": self._ahead, "measured": self._measured, "compared": self._compared}
+        arrays = {
+            "sums": self._sums,
+            "residual": np.array([self._residual]),
+            "ahead": self._ahead,
+            "measured": self._measured,
+            "compared": self._compared,
+        }
         arrays |= {name: getattr(self.window, name) for name in PublishedWindow.SIGNALS}
         return pack(_KIND, meta, arrays, {"model": self.model.to_bytes()})
 
@@ -277,6 +286,7 @@ class LookAhead:
         look_ahead._first_scored, look_ahead._n_scored = saved.whole("first_scored"), saved.whole("n_scored")
         look_ahead.diverged = saved.text("diverged")
         look_ahead._sums = np.abs(saved.array("sums", 4))
+        look_ahead._residual = float(saved.array("residual", 1)[0])
         late = look_ahead.predictor.settings.measurement_delay
         look_ahead._compared = saved.array("compared", 4, late + Np)
         look_ahead._ahead = saved.array("ahead", look_ahead.delay)
@@ -293,6 +303,11 @@ class LookAhead:
         if not (look_ahead._is_predicted or look_ahead.diverged):
             raise saved.error("the current window must be predicted, and planned if there is a planner")
         return look_ahead
+
+    @property
+    def _first_compared(self) -> int:
+        """First sample that is compared: with what was published behind the first fill, as it was measured."""
+        return self.delay + self.predictor.settings.measurement_delay
 
     @property
     def _is_predicted(self) -> bool:
@@ -324,7 +339,7 @@ class LookAhead:
     def _compare(self) -> None:
         """Append the window to what measurements are compared with."""
         window, Np = self.window, self.Np
-        hold = window.x_pb + self.predictor.last_residual()
+        hold = window.x_pb + self._residual
         self._compared = np.hstack((self._compared[:, Np:], np.stack((window.x_d, window.x_pb, window.x_h, hold))))
 
     def _now(self, signal: Array) -> float:

@@ -199,7 +199,7 @@ class HybridPredictor:
             x_d,
             x_pb,
             np.where(active, e_h, 0.0),
-            last=self.last_residual(),
+            last=self.last_accepted_residual(),
             disagreement=0.0 if forecast is None else np.where(active, forecast.disagreement, 0.0),
         )
         return e_h, PredictedWindow(x_d, x_pb, start, reference, signs, error, forecast)
@@ -320,8 +320,8 @@ class HybridPredictor:
         """Measurements of this run that were missing or not plausible; 0 without trust."""
         return 0 if self.trusted is None else self.trusted.n_rejected
 
-    def last_residual(self) -> float:
-        """Return the last measured residual ``e_pb``, m, which the hold baseline holds over a window."""
+    def last_accepted_residual(self) -> float:
+        """Return the residual ``e_pb``, m, that the next window starts from: with trust the last one accepted."""
         return float(self.past.e_pb[-1] if self.trusted is None else self.trusted.past[0])
 
     def to_bytes(self) -> bytes:

@@ -15,6 +15,7 @@ from hybridsep.base.metrics import (
     coverage,
     hold,
     largest,
+    last_residual,
     peak_derivatives,
     reduction_percent,
     rms,
@@ -67,6 +68,21 @@ def test_hold_keeps_the_last_residual_over_the_next_batch() -> None:
     np.testing.assert_array_equal(hold(x_pb, x_pb + residual, active, 3), expected)
     everywhere = np.ones(8, dtype=np.bool_)
     np.testing.assert_array_equal(hold(x_pb, x_pb + residual, everywhere, 3)[:4] - x_pb[:4], [0.0, 0.0, 0.0, 3.0])
+
+
+def test_hold_skips_what_is_missing_and_what_has_not_arrived() -> None:
+    x_pb, x = np.arange(10.0), np.arange(10.0) + np.array([1.0, 2.0, 3.0, np.nan, 5.0, 6.0, np.nan, np.nan, 9.0, 10.0])
+    active = np.ones(10, dtype=np.bool_)
+    for late, residuals in (
+        (0, [0.0, 2.0, 3.0, 6.0, 6.0]),
+        (1, [0.0, 1.0, 3.0, 5.0, 6.0]),
+        (5, [0.0, 0.0, 0.0, 1.0, 3.0]),
+    ):
+        np.testing.assert_array_equal(hold(x_pb, x, active, 2, late=late), x_pb + np.repeat(residuals, 2))
+    nothing = np.full(10, np.nan)
+    np.testing.assert_array_equal(hold(x_pb, nothing, active, 2), x_pb)
+    assert last_residual(x[:4], x_pb[:4], 7.0) == 3.0
+    assert last_residual(x[6:8], x_pb[6:8], 7.0) == 7.0
 
 
 def test_batch_rms_with_a_short_last_batch() -> None:

@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from hold_oracle import held
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from places import EMPS
@@ -17,6 +18,7 @@ from hybridsep.base.errors import SignalError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.evaluate.backtest import Backtest, Batch, backtest, backtest_stream
+from hybridsep.evaluate.replayed import replayed_run
 from hybridsep.logs.log import Log, open_log, read_log
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
@@ -93,7 +95,7 @@ def test_scores_are_those_of_the_predictions() -> None:
     assert result.overall.reduction_percent == pytest.approx(expected)
 
 
-def test_predictions_are_the_predictor_s_own_and_the_hold_its_last_residual() -> None:
+def test_predictions_are_the_predictor_s_own_and_hold_the_last_residual_measured() -> None:
     x_d, x = log()
     result = backtest(predictor(), x_d, x)
     replayed, residual = predictor(), 0.0
@@ -106,6 +108,27 @@ def test_predictions_are_the_predictor_s_own_and_the_hold_its_last_residual() ->
         np.testing.assert_allclose(result.x_hold[window], hold, rtol=1e-15)
         replayed.update(x[window])
         residual = float(x[window][-1] - prediction.x_pb[-1])
+
+
+@pytest.mark.parametrize("delay", [0, 3, 25])
+def test_hold_is_the_last_sample_measured_whatever_the_guard_accepts(delay: int) -> None:
+    """On an axis in motion at the start, which stands, changes its level, and is missing for a while."""
+    x_d, x = (signal[180:] for signal in log(1190))
+    x = x.copy()
+    x[300:420] = x[300]
+    x[500:] += 2e-4
+    x[599::100] += 1e-3
+    x[700:745] = np.nan
+    settings = PredictorSettings(Np=20, p=5, q=2, t_init=0.0, measurement_delay=delay)
+    result = backtest(HybridPredictor(predictor().model, settings), x_d, x)
+    assert result.verdict.n_rejected > 100
+    expected = held(result.x_pb[delay:], x[delay:], 20, delay=delay)
+    np.testing.assert_allclose(result.x_hold[delay:], expected, rtol=0, atol=1e-15)
+    error = (x - result.x_hold)[delay:]
+    assert result.overall.rms_hold == pytest.approx(rms(error[~np.isnan(error)]), abs=1e-15)
+    run = replayed_run(result, x_d, x, 1e-3, 20, measurement_delay=delay)
+    np.testing.assert_allclose(run.x_hold, expected, rtol=0, atol=1e-15)
+    assert run.prediction_figures()["rms_hold_um"] == pytest.approx(1e6 * result.overall.rms_hold, rel=1e-12)
 
 
 def test_warm_up_publishes_the_physics_model() -> None:

@@ -76,6 +76,9 @@ HSEP_API int hsep_predictor_take_in(hsep_predictor *self, double x_d_ahead, doub
     if (predictor_guard(self, x_meas, x_pb)) {
         predictor_learn(self, i);
     }
+    if (self->k >= self->preview + late && !isnan(x_meas)) {
+        self->residual = x_meas - x_pb;
+    }
     if (self->k >= self->preview + late && (double)self->k >= self->n_init + (double)late && !isnan(x_meas)) {
         self->n_measured++;
         self->sum_e += (x_meas - x_d) * (x_meas - x_d);
@@ -218,6 +221,7 @@ HSEP_API void hsep_predictor_begin(hsep_predictor *self)
     }
     predictor_solve(self);
     self->n_published = 0;
+    self->held = self->residual;
     self->learning = !self->missing && self->k >= self->preview; /* the first fill is not learned */
     self->missing = 0;
     if (self->saved) {
@@ -253,7 +257,7 @@ HSEP_API void hsep_predictor_publish(hsep_predictor *self, uint64_t last)
     for (uint64_t i = first; i < last; i++) {
         x_pb[i] = past_x[Np - 1 - i] + self->start;
         x_h[i] = i < self->n_physics ? x_pb[i] : x_pb[i] + e_h[Np - 1 - i]; /* Eq. (4) */
-        x_hold[i] = x_pb[i] + hsep_at(self, self->past_e)[self->n];
+        x_hold[i] = x_pb[i] + self->held;
     }
     predictor_bound(self, first, last);
     self->n_published = last;

@@ -65,7 +65,9 @@ typedef struct {
     uint64_t missing;            /* whether a sample of it is missing */
     uint64_t n_measured;         /* samples since t_init */
     double sum_e, sum_pb, sum_h; /* m2, sums of squared servo and prediction errors over them */
-    double sum_hold;             /* m2, the same if the last residual before each window were held */
+    double sum_hold;             /* m2, the same if the last residual measured before each window were held */
+    double residual;             /* m, of the last sample measured, as published; 0 before any behind the first fill */
+    double held;                 /* m, that before the window */
     uint64_t divergence;         /* hsep_divergence of the first window that diverged; latched */
     hsep_sensor sensor;
     /* Offsets in doubles from the beginning of the struct */
@@ -73,7 +75,7 @@ typedef struct {
     uint64_t x_d;      /* (preview,) m, commands of the window and what follows it */
     uint64_t x_pb;     /* (Np,) m, the window: physics-based predictions, */
     uint64_t x_h;      /* (Np,) m, hybrid predictions, */
-    uint64_t x_hold;   /* (Np,) m, and the last residual held; before all four the last samples not measured yet */
+    uint64_t x_hold;   /* (Np,) m, and held added to x_pb; before all four the last samples not measured yet */
     uint64_t ahead_pb; /* (Np,) m, response of the physics model to ahead, relative to start; alone */
     uint64_t command;  /* (n,) m, commands of the window relative to start, newest first */
     uint64_t past_x;   /* (n + q,) m, x_pb of this window and of the q samples before it, newest first */
@@ -88,7 +90,7 @@ typedef struct {
     uint64_t saved;   /* the regression as it was before this window; 0: no window is unlearned */
 } hsep_predictor;
 
-HSEP_ASSERT_WORDS(hsep_predictor, 49);
+HSEP_ASSERT_WORDS(hsep_predictor, 51);
 
 typedef struct {
     double x_d, x_pb, x_h;                 /* m, now */

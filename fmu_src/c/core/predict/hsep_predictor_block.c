@@ -152,6 +152,8 @@ HSEP_API int hsep_predictor_valid(const void *block, const hsep_predictor_parame
         (got.trusted ? hsep_trusted_valid(hsep_at_bytes(block, got.trusted), &trusted)
                      : hsep_regression_valid(hsep_at_bytes(block, got.regression), got.features.n)) &&
         (!got.saved || hsep_regression_valid(hsep_at_bytes(block, got.saved), got.features.n));
+    const double residuals[2] = {got.residual, got.held};
+    sound = sound && hsep_within(residuals, 2, HSEP_PREDICTION_MAX);
     for (int i = 0; i < 4; i++) {
         sound = sound && sums[i] >= 0.0 && isfinite(sums[i]);
     }
