@@ -4,20 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.signals import Array, Indices
-
-__all__ = ["BAND_OPACITY", "Chart", "Line", "drawn_places"]
+__all__ = ["BAND_OPACITY", "Chart", "Line"]
 
 BAND_OPACITY = 0.18
 """Opacity of a band's area."""
-
-_POINTS = 6000
-"""Points of a line that are drawn; of a longer one the extremes of each stretch are."""
 
 
 @dataclass(frozen=True)
@@ -70,15 +63,3 @@ class Chart:
     caption: str = ""
     x_log: bool = False
     y_log: bool = False
-
-
-def drawn_places(y: Array) -> Indices:
-    """Return the indices of a line ``y``, ``(n,)``, that are drawn: the extremes of each stretch of a long one."""
-    if len(y) <= _POINTS:
-        return np.arange(len(y))
-    known = np.where(np.isnan(y), 0.0, y)
-    keep = {0, len(y) - 1}
-    for begin, end in pairwise(np.linspace(0, len(y), _POINTS // 2 + 1).astype(np.intp).tolist()):
-        stretch = known[begin:end]
-        keep |= {begin + int(stretch.argmin()), begin + int(stretch.argmax())}
-    return np.array(sorted(keep))

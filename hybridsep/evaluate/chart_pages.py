@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 
 from ..base.output import written_whole
 from .canvas import CREATOR, finish_panels
-from .chart import BAND_OPACITY, Chart, Line, drawn_places
+from .chart import BAND_OPACITY, Chart, Line
+from .decimation import drawn_places
 
 __all__ = ["COLUMN_WIDTH", "write_pages"]
 
@@ -23,6 +24,12 @@ COLUMN_WIDTH = 88.0
 _HEIGHT = 58.0
 """Height of a chart of one panel, mm; each further panel is another 60 % of it."""
 
+_COLUMNS = 600
+"""Columns of pixels across a chart, at the resolution of a printer for pictures."""
+
+_WIDTH, _WIDTH_OF_LONG = 0.8, 0.5
+"""Width of a line, and of one of which the extremes are drawn, pt."""
+
 _NAMES_A_ROW = 3
 """Names in one row of a legend; of more there are two in each."""
 
@@ -30,7 +37,7 @@ _NAMES_A_ROW = 3
 def write_pages(charts: Iterable[Chart], path: str | Path) -> None:
     """Write charts to a PDF, vector graphics; the same charts give the same bytes."""
     with (
-        rc_context({"font.size": 8.0, "lines.linewidth": 0.8, "axes.linewidth": 0.6, "lines.markersize": 3.0}),
+        rc_context({"font.size": 8.0, "axes.linewidth": 0.6, "lines.markersize": 3.0}),
         written_whole(path) as file,
         PdfPages(file, metadata={"Creator": CREATOR, "CreationDate": None}) as pages,
     ):
@@ -61,12 +68,12 @@ def _drawn(chart: Chart) -> Figure:
 
 
 def _draw(axes: Axes, line: Line) -> None:
-    y = np.asarray(line.y, dtype=np.float64)
-    places = drawn_places(y)
-    x, y = np.asarray(line.x, dtype=np.float64)[places], y[places]
+    edges = [np.asarray(edge, dtype=np.float64) for edge in (line.y, *([] if line.upper is None else [line.upper]))]
+    places = drawn_places(_COLUMNS, *edges)
+    x, y = np.asarray(line.x, dtype=np.float64)[places], edges[0][places]
     label = line.name or "_"
     if line.upper is not None:
-        upper = np.asarray(line.upper, dtype=np.float64)[places]
-        axes.fill_between(x, y, upper, color=line.colour, alpha=BAND_OPACITY, linewidth=0.0, label=label)
+        axes.fill_between(x, y, edges[1][places], color=line.colour, alpha=BAND_OPACITY, linewidth=0.0, label=label)
     else:
-        axes.plot(x, y, "o" if line.points else "-", color=line.colour, label=label)
+        width = _WIDTH if len(places) == len(edges[0]) else _WIDTH_OF_LONG
+        axes.plot(x, y, "o" if line.points else "-", color=line.colour, linewidth=width, label=label)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from built_once import BuiltFmus
 from command_line import Run, write_log, write_rows
@@ -39,6 +40,19 @@ def test_the_page_has_the_figures_of_backtest(hybridsep: Run, log: Path, tmp_pat
     status, _, err = hybridsep("report", *options, "--out", page, "--figure", charts)
     assert status == 2
     assert "exists and is no figure of hybridsep" in " ".join(err.split())
+
+
+def test_a_page_about_60_000_samples_stays_below_2_mb(hybridsep: Run, tmp_path: Path) -> None:
+    lift = np.repeat(np.arange(10.0), 6000) * 1e-3
+    x_d = np.tile(commanded()[:6000], 10) + lift
+    x = np.tile(measured(0)[:6000], 10) + lift + np.random.default_rng(0).normal(0.0, 2e-6, 60_000)
+    log = write_rows(tmp_path / "long.csv", x_d, x)
+    page, charts = tmp_path / "page.html", tmp_path / "charts.pdf"
+    status, _, err = hybridsep("report", log, *MACHINE, "--out", page, "--figure", charts)
+    assert status == 0, err
+    assert "60000 samples" in page.read_text(encoding="utf-8")
+    assert page.stat().st_size < 2_000_000
+    assert charts.stat().st_size < 500_000
 
 
 def test_warm_start_and_step_times(hybridsep: Run, log: Path, fmus: BuiltFmus, tmp_path: Path) -> None:

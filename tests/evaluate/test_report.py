@@ -11,9 +11,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from hybridsep.evaluate.chart import Chart, Line
 from hybridsep.evaluate.chart_pages import COLUMN_WIDTH, write_pages
+from hybridsep.evaluate.chart_script import chart_script
 from hybridsep.evaluate.report import Report
 
 
@@ -60,9 +62,22 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> str:
 def charts(page: str) -> list[Any]:
     """Return the traces of each chart."""
     decoder = json.JSONDecoder()
-    return [
-        decoder.raw_decode(page, match.end())[0] for match in re.finditer(r'Plotly\.newPlot\(\s*"chart\d+",\s*', page)
-    ]
+    return [decoder.raw_decode(page, match.end())[0] for match in re.finditer(r'Plotly\.newPlot\("chart\d+", ', page)]
+
+
+def values(packed: dict[str, str]) -> NDArray[np.float64]:
+    """Return the values of a trace's axis."""
+    return np.frombuffer(base64.b64decode(packed["bdata"]), dtype=packed["dtype"]).astype(np.float64)
+
+
+def rules(page: str, medium: str) -> dict[str, str]:
+    """Return the style of each selector within a medium's block."""
+    block = page.partition(f"@media {medium} {{")[2].partition("\n}")[0]
+    found: dict[str, str] = {}
+    for selectors, style in re.findall(r"([^{}]+)\{([^{}]*)\}", block):
+        for selector in selectors.split(","):
+            found[selector.strip()] = found.get(selector.strip(), "") + style
+    return found
 
 
 def test_the_page_is_well_formed_and_needs_no_network(page: str) -> None:
@@ -85,10 +100,46 @@ def test_long_lines_keep_their_extremes(page: str) -> None:
     assert [trace["showlegend"] for trace in first] == [True, False, True]
     assert second[0]["mode"] == "markers"
     assert first[2]["fillcolor"] == "rgba(1, 2, 3, 0.18)"
-    assert len(page) < 6_500_000  # of which plotly.js has 4.9 million
-    y = np.frombuffer(base64.b64decode(first[0]["y"]["bdata"]), dtype=first[0]["y"]["dtype"])
-    assert len(y) <= 6002
+    y = values(first[0]["y"])
+    assert len(y) <= 2002
     assert np.nanmax(y) == 7.0
+    assert len(page) < 1_400_000  # of which plotly.js has 1.2 million
+
+
+def test_an_offset_costs_no_digits() -> None:
+    t = np.arange(3000) * 1e-4
+    chart = Chart("t [s]", ("y",), [Line("y", 1.7e9 + t, 500.0 + 1e-6 * np.sin(t), "#123456")])
+    packed = json.JSONDecoder().raw_decode(chart_script(chart, "chart1"), len('Plotly.newPlot("chart1", '))[0][0]
+    shown = values(packed["x"])
+    assert (np.diff(shown) > 0).all()
+    assert np.ptp(values(packed["y"])) == pytest.approx(1e-6 * np.ptp(np.sin(t)), rel=1e-2)
+
+
+def test_names_cannot_end_the_script() -> None:
+    chart = Chart("</script><script>", ("<!--",), [Line("</script>", [0.0], [1.0], "#123456")])
+    assert "<" not in chart_script(chart, "chart1")
+
+
+def test_on_paper_nothing_scrolls_and_nothing_is_cut(page: str) -> None:
+    paper = rules(page, "print")
+    assert "white-space: pre-wrap" in paper["pre"]
+    assert "overflow-wrap: anywhere" in paper["pre"]
+    for selector in ("pre", ".tables"):
+        assert "overflow: visible" in paper[selector]
+    assert "white-space: normal" in paper["td"]
+    for selector in ("figure", "pre", "tr"):
+        assert "break-inside: avoid" in paper[selector]
+    assert "break-after: avoid" in paper["h2"]
+    assert "h2" not in [selector for selector, style in paper.items() if "break-inside" in style]
+    assert 'addEventListener("beforeprint"' in page  # charts get the paper's width
+    assert "<thead><tr><th>name</th>" in page  # repeated on the next page
+
+
+def test_a_phone_shows_that_a_table_goes_on(page: str) -> None:
+    phone = rules(page, "(max-width: 40rem)")
+    assert "white-space: normal" in phone["th"]
+    assert "white-space: normal" in phone["td:first-child"]
+    assert re.search(r"\.tables \{[^}]*overflow-x: auto;[^}]*\blocal\b[^}]*\bscroll;", page)
 
 
 def test_a_file_that_cannot_be_written_is_named(tmp_path: Path) -> None:
