@@ -12,9 +12,10 @@ import numpy as np
 from ..base.signals import Array
 from ..logs.log import Log
 from . import fixes
+from .drives import NO_BETTER, drive_explaining
 from .finding import ERROR, NOTE, WARNING, Finding, Fix
-from .relation import fit_dead_time, line, line_at_best_lag, noise_std, shifted
-from .stretch import against_command, over_time, stretch
+from .relation import LAG_MAX, fit_dead_time, line, line_at_best_lag, noise_std, shifted
+from .stretch import against_command, averaged, over_time, stretch
 
 if TYPE_CHECKING:
     from ..machines.machine import Machine
@@ -30,11 +31,23 @@ __all__ = [
 _NOISIER = 3.0
 """Ratio of the columns' noise from which the noisier one is the measured one."""
 
+_EARLY = (-1.0, 0.5)
+"""Lag of the measured position, samples, up to which the command is late, and up to which it may be."""
+
+_LEFT_BY_DRIVE = 0.3
+"""Share of the variance that a drive may leave if it is to explain one column by the other."""
+
+_NOISY = -0.5
+"""Correlation of neighbouring fifth differences, -5/6 in white noise, above which they are those of a motion."""
+
 _VELOCITY_SHARE, _VELOCITY_LEFT = 0.5, 0.3
 """Variance that a velocity must explain at least, and what it may leave of what the position leaves."""
 
 _OFFSET_TRAVEL, _OFFSET_SPREAD = 0.02, 6.0
 """Offset, in travels and in spreads of the error around it, from which it is no servo error."""
+
+_OFFSET_REST = 2.0
+"""Offset, in what the gain leaves of the travel, below which an axis at rest may have it."""
 
 _DELAY_MIN = 3.0
 """Dead time, in samples, below which a drive may have it."""
@@ -68,19 +81,37 @@ def check_same(log: Log) -> Iterator[Finding]:
 
 
 def check_swapped(log: Log) -> Iterator[Finding]:
-    """Find a commanded position that is noisy and late where the measured one is smooth: the columns are swapped."""
+    """Find a commanded position that is noisy and late where the measured one is smooth: the columns are swapped.
+
+    All of it must be so, as an exchange makes nonsense of a good log: noise, lateness, and a drive that explains the
+    exchanged columns and not the given ones. Noise alone is noted.
+    """
     part = stretch(log)
     x_d, x = log.x_d[part], log.x_meas[part]
     noise = noise_std(x_d) / max(float(np.ptp(x_d)), 1e-300), noise_std(x) / max(float(np.ptp(x)), 1e-300)
+    if not (noise[0] > _NOISIER * noise[1] and noise[0] > 1e-9 and _is_noise(x_d) and np.ptp(x) > 0.0):
+        return
     lag = line_at_best_lag(x_d, x).lag
-    if not (noise[0] > _NOISIER * noise[1] and noise[0] > 1e-9 and lag < 0.5 and np.diff(x_d).any()):
+    if lag > _EARLY[1]:
+        return
+    means, means_x, _ = averaged(log)
+    given, exchanged = (drive_explaining(*each).unexplained for each in ((means, means_x), (means_x, means)))
+    if min(given, exchanged) > _LEFT_BY_DRIVE or given * NO_BETTER < exchanged:
+        return
+    evidence = {"lag": lag, "noise_x_d": noise[0], "noise_x": noise[1]}
+    noisier = f"({noise[0]:.1e} of its travel against {noise[1]:.1e})"
+    if lag > _EARLY[0] or given < NO_BETTER * exchanged:
+        words = (
+            f"x_d is noisier than x {noisier}, and not clearly ahead of it ({lag:.1f} samples): the columns may be "
+            "swapped; they are taken as they are"
+        )
+        yield Finding("columns swapped", NOTE, words, evidence, over_time(log, part, x_d, x))
         return
     words = (
-        f"x_d follows x, {-lag:.1f} samples later, and is the noisier one ({noise[0]:.1e} of its travel against "
-        f"{noise[1]:.1e}): the columns are swapped"
+        f"x_d follows x, {-lag:.1f} samples later, and is the noisier one {noisier}, and a drive explains it by x, not "
+        "x by it: the columns are swapped"
     )
-    evidence = {"lag": lag, "noise_x_d": noise[0], "noise_x": noise[1]}
-    fix = Fix("exchange the commanded and the measured position", fixes.swapped)
+    fix = Fix("exchange the commanded and the measured position", fixes.swapped, meaning=True)
     yield Finding("columns swapped", ERROR, words, evidence, over_time(log, part, x_d, x), fix)
 
 
@@ -96,6 +127,9 @@ def check_velocity(log: Log) -> Iterator[Finding]:
         fit = line_at_best_lag(cause, effect)
         explained = 1.0 - fit.unexplained
         if explained < _VELOCITY_SHARE or fit.unexplained > _VELOCITY_LEFT * position:
+            continue
+        drive = drive_explaining(*averaged(log)[:2])
+        if drive.lag <= LAG_MAX and drive.unexplained < NO_BETTER * fit.unexplained:
             continue
         # The derivative of noise biases its gain, the integral does not.
         travelled = log.T_s * np.cumsum(effect if column == "x_meas" else x_d)
@@ -125,6 +159,9 @@ def check_offset(log: Log) -> Iterator[Finding]:
     spread = float(np.quantile(np.abs(error - offset), 0.9))
     travel = float(np.ptp(x_d))
     if abs(offset) < _OFFSET_TRAVEL * travel or abs(offset) < _OFFSET_SPREAD * spread:
+        return
+    # An axis that reaches a share of its command is as far from it wherever it rests.
+    if abs(offset) < _OFFSET_REST * abs(1.0 - fit.gain) * travel:
         return
     words = (
         f"the measured position is {offset:+.6g} {log.unit} away from the commanded one throughout, "
@@ -210,3 +247,9 @@ def _delay_of_model(log: Log, part: slice, machine: Machine | None) -> tuple[flo
 def _smooth(x: Array) -> Array:
     """Return the mean of fifteen neighbours."""
     return np.asarray(np.convolve(np.pad(x, 7, mode="edge"), np.full(15, 1 / 15), "valid"))
+
+
+def _is_noise(x: Array) -> bool:
+    """Return whether the fifth differences of a signal are those of noise, and not of a motion."""
+    steps = np.diff(x, 5)
+    return bool(steps[1:] @ steps[:-1] < _NOISY * float(steps @ steps))

@@ -10,7 +10,8 @@ from functools import partial
 from ..base.signals import Array
 from ..logs.log import Log
 from . import fixes
-from .finding import ERROR, Finding, Fix
+from .drives import NO_BETTER, drive_explaining
+from .finding import ERROR, NOTE, Finding, Fix
 from .relation import LAG_MAX, DeadTime, Line, fit_dead_time, line_at_best_lag
 from .stretch import against_command, averaged, stretch
 
@@ -24,6 +25,9 @@ where the right one leaves so little, over random drives eight times."""
 _LOOSE = 0.7
 """Share of the variance that is left where the measured position hardly follows the command."""
 
+_LEFT_BY_DRIVE = 0.3
+"""The same where a drive far above its bandwidth does not follow either: what it leaves there is its friction's."""
+
 _LATE = 4.0
 """Dead time, in samples, that a search for one begins with."""
 
@@ -31,11 +35,12 @@ _LEFT_BY_MODE, _GAIN_OTHER = 0.25, 0.2
 """Share of what a line leaves that a mode must leave, and relative distance of their gains, from which the mode's
 static gain counts: along a swept sine no lag is the right one for all frequencies."""
 
-_GAINS = (0.2, 5.0)
-"""Gains outside which no position loop is: a small servo under load was recorded at 0.3."""
+_GAINS = (0.15, 5.0)
+"""Gains outside which no position loop is: a small servo under load was recorded at 0.25."""
 
 _GAIN_CLOSE, _LEFT_CLOSE = 0.15, 3e-3
-"""Distance from 1 of the gain of an axis that follows its command within this share of the variance."""
+"""Distance from 1 of the gain of an axis that follows its command within this share of the variance. One that reaches
+further than its command is in another unit; one that reaches less far may be a servo under load."""
 
 _KNOWN_GAINS = {
     1e3: "measured in mm, commanded in m",
@@ -63,7 +68,8 @@ def runs_against(x_d: Array, x: Array) -> DeadTime | None:
 
     The regression at the best lag is no judge of it: above a drive's bandwidth a correct position is late by half a
     period, and one that is flipped looks like one that is late. A mode has the phase of its static gain where it is
-    slow.
+    slow. Where a drive of positive gain explains the motion, driven far above its bandwidth for example, nothing is
+    wrong with the sign.
 
     Parameters
     ----------
@@ -73,7 +79,7 @@ def runs_against(x_d: Array, x: Array) -> DeadTime | None:
     same, against = _modes(x_d, x)
     if not _explains(against) or same.unexplained < _OPPOSITE * against.unexplained:
         return None
-    return against
+    return None if drive_explaining(x_d, x).unexplained < NO_BETTER * against.unexplained else against
 
 
 def _modes(x_d: Array, x: Array) -> tuple[DeadTime, DeadTime]:
@@ -128,17 +134,26 @@ def _as_line(mode: DeadTime, x_d: Array, x: Array) -> Line:
 
 
 def check_scale(log: Log) -> Iterator[Finding]:
-    """Find a measured position in another unit than the commanded one."""
+    """Find a measured position in another unit than the commanded one.
+
+    A servo that reaches less far than its command is only noted: load and a small gain of the loop do that.
+    """
     fit, dynamic = _relation(log)
     part = stretch(log)
     gain = abs(fit.gain)
     follows = fit.unexplained < _LOOSE
-    off = (
-        not follows
-        or not _GAINS[0] <= gain <= _GAINS[1]
-        or (not dynamic and abs(gain - 1) > _GAIN_CLOSE and fit.unexplained < _LEFT_CLOSE)
-    )
-    if not off:
+    close = not dynamic and fit.unexplained < _LEFT_CLOSE
+    if follows and _GAINS[0] <= gain <= _GAINS[1] and not (close and abs(gain - 1) > _GAIN_CLOSE):
+        return
+    drive = drive_explaining(*averaged(log)[:2])
+    if drive.lag <= LAG_MAX and drive.unexplained < (NO_BETTER * fit.unexplained if follows else _LEFT_BY_DRIVE):
+        if close and abs(drive.gain - 1) > _GAIN_CLOSE:
+            words = (
+                f"the axis reaches {drive.gain:.2g} of its command, as a servo under load or with a small gain does; "
+                "where it should reach all of it, the measured position is in another unit"
+            )
+            picture = against_command(log, part, fit)
+            yield Finding("scale", NOTE, words, {**_numbers(fit), "gain": drive.gain}, picture)
         return
     if not follows or gain == 0.0:
         words = f"the measured position hardly follows the command (gain {fit.gain:.3g}): is it another axis, or unit?"

@@ -19,6 +19,7 @@ from .relation import noise_std
 
 if TYPE_CHECKING:
     from ..machines.machine import Machine
+    from ..model.physics import Mode
 
 __all__ = ["check_motion", "check_rate", "check_start", "check_unit", "moves", "starts_in_motion"]
 
@@ -42,6 +43,9 @@ _LARGEST = {"travel": (20.0, "m"), "velocity": (20.0, "m/s"), "acceleration": (5
 
 _PER_PERIOD = 4.0
 """Samples a period of the fastest mode below which its motion is not resolved."""
+
+_DECAYED = 0.05
+"""Share of a mode's motion that one sample leaves, below which it does not oscillate between samples."""
 
 
 def moves(x_d: Array) -> NDArray[np.bool_]:
@@ -145,8 +149,14 @@ def _fastest(log: Log) -> dict[str, float]:
 
 
 def check_rate(log: Log, machine: Machine) -> Iterator[Finding]:
-    """Find a sampling interval that does not resolve the machine's fastest mode, or is not the machine's."""
-    fastest = max(mode.f_n for mode in machine.model.modes)
+    """Find a sampling interval that does not resolve the machine's fastest oscillation, or is not the machine's.
+
+    A mode that does not oscillate between samples needs none: a lag may be written as one mode, however fast, of a
+    large damping ratio.
+    """
+    modes = machine.model.modes
+    oscillating = [mode for mode in modes if _oscillates(mode, log.T_s)]
+    fastest = max(mode.f_n for mode in oscillating or modes)
     per_period = 1.0 / (fastest * log.T_s)
     evidence = {"f_n": fastest, "samples_per_period": per_period, "T_s": log.T_s, "machine_T_s": machine.T_s}
     t = np.arange(0.0, 2.0 / fastest, log.T_s)
@@ -156,7 +166,7 @@ def check_rate(log: Log, machine: Machine) -> Iterator[Finding]:
         "as sampled": (t, np.sin(2 * math.pi * fastest * t)),
     }
     picture = Picture("Fastest mode of the machine, and its samples", "time [s]", "", lines)
-    if per_period < _PER_PERIOD:
+    if oscillating and per_period < _PER_PERIOD:
         words = (
             f"the log has {per_period:.2g} samples a period of the machine's mode at {fastest:.4g} Hz, which needs "
             f"{_PER_PERIOD:g} at least; record faster, or leave that mode out of the model"
@@ -167,6 +177,11 @@ def check_rate(log: Log, machine: Machine) -> Iterator[Finding]:
         severity = NOTE if log.T_s < machine.T_s else ERROR
         fix = Fix(f"resample at {machine.T_s:g} s", partial(_at_interval, T_s=machine.T_s))
         yield Finding("sampling rate", severity, words, evidence, picture, fix)
+
+
+def _oscillates(mode: Mode, T_s: float) -> bool:
+    """Return whether a mode oscillates, and for longer than a sample."""
+    return mode.zeta < 1.0 and math.exp(-2 * math.pi * mode.zeta * mode.f_n * T_s) > _DECAYED
 
 
 def _at_interval(log: Log, T_s: float) -> Log:

@@ -11,7 +11,17 @@ from scipy.signal import lfilter
 
 from ..base.signals import Array
 
-__all__ = ["LAG_MAX", "DeadTime", "Line", "fit_dead_time", "line", "line_at_best_lag", "noise_std", "shifted"]
+__all__ = [
+    "LAG_MAX",
+    "DeadTime",
+    "Line",
+    "fit_dead_time",
+    "line",
+    "line_at_best_lag",
+    "noise_std",
+    "poles_of",
+    "shifted",
+]
 
 LAG_MAX = 300
 """Largest lag that is looked for, in samples: 0.3 s at 1 kHz is beyond any drive and any bus."""
@@ -140,14 +150,17 @@ def fit_dead_time(u: Array, x: Array, first: float | None, sign: float = 0.0) ->
 
 def _mode(parameters: Array, u: Array) -> Array:
     """Return the response of a mode of unit gain, matched poles; ``log ω``, ``log ζ`` and perhaps the dead time."""
-    omega, zeta = math.exp(parameters[0]), math.exp(parameters[1])
-    if zeta < 1.0:
-        radius, angle = math.exp(-zeta * omega), omega * math.sqrt(1 - zeta * zeta)
-        poles = [1.0, -2 * radius * math.cos(angle), radius * radius]
-    else:
-        root = math.sqrt(zeta * zeta - 1.0)
-        slow, fast = math.exp(-omega * (zeta - root)), math.exp(-omega * (zeta + root))
-        poles = [1.0, -slow - fast, slow * fast]
+    poles = poles_of(math.exp(parameters[0]), math.exp(parameters[1]))
     late = shifted(u, float(parameters[2])) if len(parameters) > 2 else u
     # Held over a sample, the command acts from the next one on.
     return np.asarray(lfilter([0.0, sum(poles)], poles, late))
+
+
+def poles_of(omega: float, zeta: float) -> list[float]:
+    """Return the denominator of a sampled mode, highest power first, from rad a sample and the damping ratio."""
+    if zeta < 1.0:
+        radius, angle = math.exp(-zeta * omega), omega * math.sqrt(1 - zeta * zeta)
+        return [1.0, -2 * radius * math.cos(angle), radius * radius]
+    root = math.sqrt(zeta * zeta - 1.0)
+    slow, fast = math.exp(-omega * (zeta - root)), math.exp(-omega * (zeta + root))
+    return [1.0, -slow - fast, slow * fast]

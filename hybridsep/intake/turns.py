@@ -20,6 +20,9 @@ _TURN = 2 * math.pi
 _STEPS = 3.0
 """Steps between samples, in the largest of those that are no jump, that a jump may be off a whole turn."""
 
+_SPAN = 1.05
+"""Range, in turns, of a position modulo one turn and its noise; one that goes further is not recorded so."""
+
 
 def check_turns(log: Log) -> Iterator[Finding]:
     """Find jumps of one whole turn in the positions of a rotary axis, which are those of a position modulo 360 deg."""
@@ -55,6 +58,8 @@ def _jumps(x: Array) -> Indices:
     """Return the samples at which a position, NaN where it is missing, is one turn away from where it was before."""
     known = np.flatnonzero(np.isfinite(x))
     steps = np.diff(x[known])
+    if len(known) < 2 or np.ptp(x[known]) > _SPAN * _TURN:
+        return np.empty(0, dtype=np.intp)
     far = np.abs(steps) > _TURN / 2
     usual = float(np.abs(steps[~far]).max(initial=0.0))
     off = np.abs(np.abs(steps) - _TURN)
