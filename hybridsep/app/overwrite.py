@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from ..base.errors import ParameterError
+from ..base.zip_files import ZIP_DAMAGE
 from ..cosim.run import COMPENSATOR, PREDICTOR
 from ..logs.example import EXAMPLE, HEAD
 
@@ -246,5 +247,5 @@ def _asked(output: Output, question: Callable[[Path], _Answer], otherwise: _Answ
     """Return what a kind says of the existing file."""
     try:
         return question(output.path)
-    except (zipfile.BadZipFile, OSError, ValueError, KeyError, RuntimeError, NotImplementedError):
+    except ZIP_DAMAGE:
         return otherwise  # damaged or unreadable: not known to be ours

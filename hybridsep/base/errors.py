@@ -17,6 +17,9 @@ Each message names the thing, what was expected, what came and, where there is o
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection
+from itertools import islice
+
 __all__ = [
     "FmuError",
     "HybridSepError",
@@ -28,7 +31,15 @@ __all__ = [
     "SignalError",
     "StateError",
     "brief",
+    "first_line",
+    "listed",
 ]
+
+_LINE_MAX = 200
+"""Largest length of another library's message within one of ours, in characters."""
+
+_LISTED_MAX = 12
+"""Most names or problems that a message lists; more are counted."""
 
 
 def brief(value: object) -> str:
@@ -38,6 +49,18 @@ def brief(value: object) -> str:
     except (ValueError, RecursionError):  # an integer of more than 4300 digits; lists in lists in lists
         return f"a value of type {type(value).__name__} that is too long to show"
     return text if len(text) <= 80 else f"{text[:60]}… ({len(text)} characters)"
+
+
+def listed(values: Collection[object], show: Callable[[object], str] = brief, separator: str = ", ") -> str:
+    """Return the first values, each as ``show`` gives it, and how many more there are; ``none`` if there are none."""
+    shown = separator.join(map(show, islice(values, _LISTED_MAX))) or "none"
+    return shown if len(values) <= _LISTED_MAX else f"{shown} … and {len(values) - _LISTED_MAX} more"
+
+
+def first_line(error: Exception | str) -> str:
+    """Return the first line of another library's message, cut; the error's type where it has none."""
+    line = next((line for line in str(error).splitlines() if line.strip()), type(error).__name__)
+    return line if len(line) <= _LINE_MAX else f"{line[:_LINE_MAX]}…"
 
 
 class HybridSepError(Exception):

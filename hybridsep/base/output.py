@@ -1,7 +1,8 @@
 """Atomic file output: written beside the target, flushed to the disk, and moved over it.
 
 The target is unchanged until the last byte is on the disk, so that a full disk, an exception, Ctrl-C or the end of the
-process loses the new file only. A killed process leaves ``.hybridsep-….tmp`` in the target's folder.
+process loses the new file only. A killed process leaves ``.hybridsep-….tmp`` in the target's folder, which the next
+write there removes: while a process lives, it holds a lock on its own.
 """
 
 from __future__ import annotations
@@ -9,15 +10,25 @@ from __future__ import annotations
 import errno
 import io
 import os
+import re
 import stat
 import sys
+import time
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
+if sys.platform != "win32":
+    import fcntl
+
 __all__ = ["named_errors", "written_text", "written_whole"]
+
+_PART = re.compile(r"\.hybridsep-[0-9a-f]{32}\.tmp")
+
+_ORPHAN_AGE = 3600.0
+"""Time without a write after which a file is taken for left behind where there are no locks, on Windows, s."""
 
 
 @contextmanager
@@ -34,7 +45,6 @@ def written_whole(path: str | Path) -> Iterator[IO[bytes]]:
         unchanged.
     """
     target = Path(os.path.realpath(path))
-    part = target.parent / f".hybridsep-{uuid.uuid4().hex}.tmp"
     try:
         before = Path(path).stat() if Path(path).exists() else None
         if before is not None and not os.access(path, os.W_OK):
@@ -43,20 +53,69 @@ def written_whole(path: str | Path) -> Iterator[IO[bytes]]:
             with Path(path).open("wb") as device:
                 yield device
             return
-        with part.open("xb") as file:
-            yield file
-            file.flush()
-            if before is not None:
-                _take_over(file.fileno(), before)
-            os.fsync(file.fileno())
-        part.replace(target)
+        _remove_orphans(target.parent)
+        with _new_part(target.parent) as part:
+            with part.open("wb") as file:
+                yield file
+                file.flush()
+                if before is not None:
+                    _take_over(file.fileno(), before)
+                os.fsync(file.fileno())
+            part.replace(target)
         _sync_folder(target.parent)
     except BaseException as error:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
-        if isinstance(error, OSError) and error.filename in (None, str(part)):
+        if isinstance(error, OSError) and (error.filename is None or _PART.fullmatch(Path(str(error.filename)).name)):
             raise OSError(error.errno, error.strerror or str(error), str(path)) from error
         raise
+
+
+def _remove_orphans(folder: Path) -> None:
+    """Remove what killed processes have left in a folder; what another process writes now stays."""
+    with suppress(OSError):
+        for part in [entry for entry in folder.iterdir() if _PART.fullmatch(entry.name)]:
+            with suppress(OSError), _orphan(part):
+                part.unlink()
+
+
+@contextmanager
+def _new_part(folder: Path) -> Iterator[Path]:
+    """Make a file for new content, which :func:`_remove_orphans` of other processes leaves; remove it if it is left."""
+    while True:
+        part = folder / f".hybridsep-{uuid.uuid4().hex}.tmp"
+        descriptor = os.open(str(part), os.O_CREAT | os.O_EXCL | os.O_RDWR, 0o666)
+        try:
+            if sys.platform == "win32":
+                os.close(descriptor)
+            else:
+                with suppress(OSError):  # some network file systems have no locks
+                    fcntl.flock(descriptor, fcntl.LOCK_EX)
+                if not os.fstat(descriptor).st_nlink:  # removed before it was locked
+                    continue
+            try:
+                yield part
+            finally:
+                with suppress(OSError):
+                    part.unlink(missing_ok=True)
+            return
+        finally:
+            if sys.platform != "win32":
+                os.close(descriptor)
+
+
+@contextmanager
+def _orphan(part: Path) -> Iterator[None]:
+    """Hold a file that no living process writes; OSError if one may."""
+    if sys.platform == "win32":
+        if time.time() - part.stat().st_mtime < _ORPHAN_AGE:
+            raise BlockingIOError
+        yield
+        return
+    descriptor = os.open(part, os.O_RDONLY | os.O_NONBLOCK)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    finally:
+        os.close(descriptor)
 
 
 @contextmanager

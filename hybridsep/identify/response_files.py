@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.errors import LogError
+from ..base.errors import LogError, brief, listed
 from ..base.signals import Array
 from ..logs.formats import open_source
 from ..logs.source import Source
@@ -78,7 +78,7 @@ def read_response(path: str | Path, columns: Mapping[str, str] | None = None) ->
     pair = ("real", "imag") if "real" in found else ("magnitude", "phase")
     missing = [role for role in ("frequency", *pair) if role not in found]
     if missing:
-        there = ", ".join(repr(name) for name in source.names) or "none"
+        there = listed(source.names)
         raise LogError(
             f"{path}: a frequency response needs the columns frequency and real, imag or magnitude, phase; "
             f"{', '.join(missing)} was not found, the file has {there}; give its name in columns"
@@ -117,7 +117,7 @@ def _plain(name: str) -> str:
 def _columns(source: Source, names: list[str]) -> list[Array]:
     for name in names:
         if name not in source.names:
-            raise LogError(f"{source.path}: column {name!r} is missing, the file has {', '.join(source.names)}")
+            raise LogError(f"{source.path}: column {brief(name)} is missing, the file has {listed(source.names)}")
     blocks = [block.columns for block in source.blocks(names, _ALL)]
     if not blocks:
         raise LogError(f"{source.path}: a frequency response needs lines, got none")
@@ -137,5 +137,7 @@ def _phase(path: Path, name: str, values: Array) -> Array:
     if "rad" in words:
         return values
     if "deg" not in words and "°" not in name and np.nanmax(np.abs(values)) <= 2 * np.pi:
-        raise LogError(f"{path}: column {name!r} may be in degrees or radians; call it 'phase [deg]' or 'phase [rad]'")
+        raise LogError(
+            f"{path}: column {brief(name)} may be in degrees or radians; call it 'phase [deg]' or 'phase [rad]'"
+        )
     return np.deg2rad(values)

@@ -66,7 +66,9 @@ def main(kind: str, paths: str, file: str, folder: str) -> dict[str, Any]:
     try:
         for i, (name, value) in enumerate({"mat": mat, "hdf5": hdf5}[kind](file)):
             variables[name] = {"type": type(value).__name__}
-            if isinstance(value, np.ndarray):
+            if isinstance(value, np.ndarray) and value.dtype.names is not None:
+                variables[name] = {"type": "structs"}
+            elif isinstance(value, np.ndarray):
                 variables[name] |= {"dtype": str(value.dtype), "shape": value.shape}
                 if value.dtype.kind in "fiu":
                     np.save(Path(folder) / f"{i}.npy", value)

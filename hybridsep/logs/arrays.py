@@ -17,7 +17,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..base.errors import LogError
+from ..base.errors import LogError, brief, first_line
 from .source import Block, Source, check_column, check_lengths, sample_number
 
 __all__ = ["ArraysSource"]
@@ -60,12 +60,14 @@ class ArraysSource(Source):
             raise LogError(f"{damaged}: {self.library} crashed on it with {end}")
         if done.returncode:
             reason = "".join(done.stderr.strip().splitlines()[-1:])
-            raise LogError(f"{self.path}: the process that reads it ended with status {done.returncode}: {reason}")
+            raise LogError(
+                f"{self.path}: the process that reads it ended with status {done.returncode}: {first_line(reason)}"
+            )
         answer = json.loads(done.stdout)
         if "missing" in answer:
             raise LogError(f"{self.path}: {self.without_library()}")
         if "damage" in answer:
-            raise LogError(f"{damaged}: {answer['damage']}")
+            raise LogError(f"{damaged}: {first_line(answer['damage'])}")
         variables: dict[str, Any] = answer["variables"]
         for variable in variables.values():
             if "i" in variable:
@@ -78,7 +80,7 @@ class ArraysSource(Source):
         for name in names:
             variable = self._variables[name]
             if "shape" not in variable:
-                raise LogError(f"{self.path}: column {name!r} must be a full matrix, got {variable['type']}")
+                raise LogError(f"{self.path}: column {brief(name)} must be a full matrix, got {variable['type']}")
             lengths[name] = check_column(self.path, name, tuple(variable["shape"]), np.dtype(variable["dtype"]))
             columns.append(variable["value"].astype(np.float64).ravel())
         check_lengths(self.path, lengths)

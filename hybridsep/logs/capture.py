@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.errors import LogError
+from ..base.errors import LogError, brief, first_line, listed
 from ..base.signals import Array
 from .source import Block, Source, sample_number
 
@@ -40,16 +40,18 @@ class CaptureSource(Source):
         try:
             content = json.loads(path.read_bytes())
         except (ValueError, RecursionError) as error:
-            raise LogError(f"{path}: is truncated, damaged or not JSON: {error}") from error
+            raise LogError(f"{path}: is truncated, damaged or not JSON: {first_line(error)}") from error
         header = _entry(path, content, "Header", dict)
         signals = _entry(path, header, "SignalListHFData", list, "Header.")
         for i, signal in enumerate(signals):
             if not (isinstance(signal, dict) and all(isinstance(signal.get(key), str) for key in ("Name", "Axis"))):
-                raise LogError(f"{path}: Header.SignalListHFData[{i}] must have a Name and an Axis, got {signal!r:.60}")
+                raise LogError(
+                    f"{path}: Header.SignalListHFData[{i}] must have a Name and an Axis, got {brief(signal)}"
+                )
         names = [signal["Name"] for signal in signals]
         cycle = header.get("CycleTimeMs")
         if isinstance(cycle, bool) or not isinstance(cycle, (int, float)) or not 0 < cycle < math.inf:
-            raise LogError(f"{path}: Header.CycleTimeMs must be a number of milliseconds above 0, got {cycle!r:.60}")
+            raise LogError(f"{path}: Header.CycleTimeMs must be a number of milliseconds above 0, got {brief(cycle)}")
         self._values = _rows(path, _entry(path, content, "Payload", list), len(names))
         self._columns = {name: self._values[:, i] for i, name in enumerate(names)}
         self.names = list(names)
@@ -79,8 +81,10 @@ class CaptureSource(Source):
         known = {name.lower(): number for name, number in self._axes.items()}
         number = known.get(axis.lower(), axis if axis in self._axes.values() else None)
         if number is None:
-            there = ", ".join(f"{name} ({number})" for name, number in self._axes.items()) or "none"
-            raise LogError(f"{self.path}: axis {axis!r} is missing; {_COMMANDED} and {_MEASURED} are there for {there}")
+            there = listed([f"{name:.20} ({number:.20})" for name, number in self._axes.items()], str)
+            raise LogError(
+                f"{self.path}: axis {brief(axis)} is missing; {_COMMANDED} and {_MEASURED} are there for {there}"
+            )
         self._choose(number)
         self.remarks = []
 
@@ -123,9 +127,9 @@ def _rows(path: Path, payload: Sequence[Any], width: int) -> Array:
                 raise LogError(f"{path}: Payload[{i}].HFData[{j}] must have {width} values, one a signal, got {came}")
             wrong = next((k for k, value in enumerate(row) if type(value) not in (int, float)), None)
             if wrong is not None:
-                raise LogError(f"{path}: Payload[{i}].HFData[{j}][{wrong}] must be a number, got {row[wrong]!r:.60}")
+                raise LogError(f"{path}: Payload[{i}].HFData[{j}][{wrong}] must be a number, got {brief(row[wrong])}")
             rows.append(row)
     try:
         return np.array(rows, dtype=np.float64).reshape(len(rows), width)
     except OverflowError as error:
-        raise LogError(f"{path}: a value is no floating-point number: {error}") from error
+        raise LogError(f"{path}: a value is no floating-point number: {first_line(error)}") from error

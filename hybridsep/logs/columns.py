@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ..base.errors import LogError
+from ..base.errors import LogError, brief, listed
 from .source import Source
 from .units import POSITION_UNITS, TIME_UNITS, Unit, plain_name, position_unit, stated_unit, time_unit
 
@@ -75,7 +75,7 @@ def choose_columns(
     """
     for role in columns or ():
         if role not in ROLES:
-            raise LogError(f"{source.path}: columns may name {', '.join(ROLES)}, got {role!r}")
+            raise LogError(f"{source.path}: columns may name {', '.join(ROLES)}, got {brief(role)}")
     chosen = {role: _name(source, role, (columns or {}).get(role)) for role in ROLES}
     if chosen["t"] is None and "t" not in (columns or {}) and time_needed:
         chosen["t"] = _only_clock(source)
@@ -87,13 +87,15 @@ def choose_columns(
         raise _missing(source, {role: (columns or {}).get(role, role) for role in chosen if role not in names})
     for role, name in names.items():
         if source.names.count(name) > 1:
-            raise LogError(f"{source.path}: column {name!r} must occur once, got it {source.names.count(name)} times")
+            raise LogError(
+                f"{source.path}: column {brief(name)} must occur once, got it {source.names.count(name)} times"
+            )
         found[role] = _time(source, name) if role == "t" else _position(source, name, unit)
     x_d, x = found["x_d"], found["x"]
     if x_d.unit.si != x.unit.si:
         raise LogError(
-            f"{source.path}: column {x_d.name!r} is in {x_d.unit.name} and column {x.name!r} in {x.unit.name}; both "
-            "must be lengths or both angles"
+            f"{source.path}: column {brief(x_d.name)} is in {x_d.unit.name} and column {brief(x.name)} in "
+            f"{x.unit.name}; both must be lengths or both angles"
         )
     return found
 
@@ -114,7 +116,7 @@ def _name(source: Source, role: str, given: str | None) -> str | None:
         for key in _NAMES[role]:
             known = [name for name in source.names if spelled[name] == key]
             if len(set(known)) > 1:
-                there = ", ".join(map(repr, known))
+                there = listed(known)
                 raise LogError(f"{source.path}: column {role} may be {there}; name it: --{_option(role)} NAME")
             if known:
                 return known[0]
@@ -127,7 +129,7 @@ def _only_clock(source: Source) -> str | None:
     clocks = [name for name in source.names if name in source.stamps and name not in twins]
     if len(clocks) != 1:
         return None
-    source.remarks = [*source.remarks, f"column {clocks[0]!r} is read as the time; columns (--t) names another"]
+    source.remarks = [*source.remarks, f"column {brief(clocks[0])} is read as the time; columns (--t) names another"]
     return clocks[0]
 
 
@@ -141,8 +143,8 @@ def _option(role: str) -> str:
 
 def _missing(source: Source, names: Mapping[str, str]) -> LogError:
     """Return the error of columns that are not there, by role."""
-    there = ", ".join(repr(other) for other in source.names) or "none"
-    what = ", ".join(repr(name) if name == role else f"{name!r} ({role})" for role, name in names.items())
+    there = listed(source.names)
+    what = ", ".join(repr(name) if name == role else f"{brief(name)} ({role})" for role, name in names.items())
     which, it = (f"column {what} is", "it") if len(names) == 1 else (f"columns {what} are", "them")
     options = " ".join(f"--{_option(role)} NAME" for role in names)
     other = " (or --T_s SECONDS instead of --t)" if "t" in names else ""
@@ -161,8 +163,8 @@ def _time(source: Source, name: str) -> Column:
     unit = time_unit(text) if text else TIME_UNITS["s"]
     if unit is None:
         raise LogError(
-            f"{source.path}: time {name!r} must be in one of {', '.join(TIME_UNITS)}, its unit is {text!r}; correct "
-            "it, or remove the column and give T_s (--T_s)"
+            f"{source.path}: time {brief(name)} must be in one of {', '.join(TIME_UNITS)}, its unit is {brief(text)}; "
+            "correct it, or remove the column and give T_s (--T_s)"
         )
     return Column(name, unit, bool(text))
 
@@ -170,24 +172,24 @@ def _time(source: Source, name: str) -> Column:
 def _position(source: Source, name: str, given: str | None) -> Column:
     if name in source.stamps:
         raise LogError(
-            f"{source.path}: column {name!r} must be a position, it holds timestamps; name another: --x-d NAME, "
+            f"{source.path}: column {brief(name)} must be a position, it holds timestamps; name another: --x-d NAME, "
             "--x NAME"
         )
     text = _stated(source, name)
     unit = position_unit(text) if text else None
     counts = plain_name(text) in _COUNTS
     if counts and given is None:
-        raise LogError(f"{source.path}: column {name!r} is in encoder counts; give the length of one, {COUNT}")
+        raise LogError(f"{source.path}: column {brief(name)} is in encoder counts; give the length of one, {COUNT}")
     if text and unit is None and not counts:
         raise LogError(
-            f"{source.path}: column {name!r} must be a position in one of {', '.join(POSITION_UNITS)}, its unit is "
-            f"{text!r}; is it another quantity? Name another column (--x-d NAME, --x NAME), or correct the unit"
+            f"{source.path}: column {brief(name)} must be a position in one of {', '.join(POSITION_UNITS)}, its unit "
+            f"is {brief(text)}; is it another quantity? Name another column (--x-d NAME, --x NAME), or correct the unit"
         )
     chosen = position_unit(given) if given is not None else None
     if unit is not None and chosen not in (None, unit):
         raise LogError(
-            f"{source.path}: unit={given!r} (--unit {given}) was given, but column {name!r} states {text!r}; leave the "
-            "unit out, or correct the file"
+            f"{source.path}: unit={brief(given)} (--unit {given}) was given, but column {brief(name)} states "
+            f"{brief(text)}; leave the unit out, or correct the file"
         )
     chosen = chosen or unit or position_unit(source.assumed_units.get(name, ""))
     return Column(name, chosen or POSITION_UNITS["m"], chosen is not None)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..base.errors import LogError
+from ..base.errors import LogError, brief
 from ..base.settings import check
 from ..base.signals import POSITION_MAX, Array
 from .columns import COUNT, Column, choose_columns
@@ -174,9 +174,10 @@ class LogReader:
         known = {*_OWN_NAMES, *self._source.roles.values()}
         roles = [role for role in ("x_d", "x") if role not in given]
         if any(stated_unit(self._columns[role].name)[0] not in known for role in roles):
+            x_d, x = brief(self._columns["x_d"].name), brief(self._columns["x"].name)
             yield (
-                f"columns {self._columns['x_d'].name!r} and {self._columns['x'].name!r} are read as the commanded and "
-                "the measured position; columns (--x-d, --x) name others"
+                f"columns {x_d} and {x} are read as the commanded and the measured position; columns (--x-d, --x) name "
+                "others"
             )
 
     def _check_span(self, column: Column, span: float) -> None:
@@ -187,7 +188,7 @@ class LogReader:
             hint = f"; if the log is in {smaller}, say unit='{smaller}' (--unit {smaller})" if smaller else ""
             hint += f", if it is in encoder counts, the length of one, {COUNT}" if smaller and si == "m" else ""
             raise LogError(
-                f"{self.path}: column {column.name!r} read in {column.unit.name} spans {span:.4g} {si}, more than "
+                f"{self.path}: column {brief(column.name)} read in {column.unit.name} spans {span:.4g} {si}, more than "
                 f"{largest:g} {si}{hint}"
             )
 
@@ -206,8 +207,8 @@ class LogReader:
                     other = next(value for value in values[1:, i] if value != values[0, i])
                     ways = "export all channels with one common time, or remove" if role == "t" else "rename or remove"
                     raise LogError(
-                        f"{self.path}, {block.where(i)}: column {column.name!r} occurs {1 + len(twins)} times, with "
-                        f"different values, {values[0, i]:.9g} and {other:.9g}; {ways} those that are not meant"
+                        f"{self.path}, {block.where(i)}: column {brief(column.name)} occurs {1 + len(twins)} times, "
+                        f"with different values, {values[0, i]:.9g} and {other:.9g}; {ways} those that are not meant"
                     )
 
     def _scan(self, given: float | None) -> tuple[int, float]:
@@ -230,8 +231,8 @@ class LogReader:
         if axis.counts_samples and not column.stated:
             if given is None:
                 raise LogError(
-                    f"{self.path}: column {column.name!r} counts samples: it is an index, or a time in ms; give T_s "
-                    f"(--T_s), or name its unit in the file, '{column.name} [ms]'"
+                    f"{self.path}: column {brief(column.name)} counts samples: it is an index, or a time in ms; "
+                    f"give T_s (--T_s), or name its unit in the file, '{column.name:.60} [ms]'"
                 )
             del self._columns["t"]
             return count, given
@@ -239,7 +240,7 @@ class LogReader:
         self.is_even = self._uniform or axis.is_even
         if given is not None and abs(found - given) > TS_TOLERANCE * given:
             raise LogError(
-                f"{self.path}: T_s = {given:g} s was given, but column {column.name!r} has an interval of "
+                f"{self.path}: T_s = {given:g} s was given, but column {brief(column.name)} has an interval of "
                 f"{found:g} s; leave T_s out, or correct it or the column"
             )
         return count, found if given is None else given
@@ -252,14 +253,14 @@ class LogReader:
                 return
             i = int(np.argmax(np.isinf(column) if measured and self._may_miss else ~finite))
             hint = NEEDS_TRUST if measured and np.isnan(column[i]) else ""
-            raise LogError(f"{self.path}, {block.where(i)}: column {name!r} must be finite, got {column[i]}{hint}")
+            raise LogError(f"{self.path}, {block.where(i)}: column {brief(name)} must be finite, got {column[i]}{hint}")
 
 
 def check_reading(unit: str | None, T_s: float | None) -> float | None:
     """Return the given sampling interval, validated; LogError for an unknown unit."""
     if unit is not None and position_unit(unit) is None:
         raise LogError(
-            f"unit must be one of {', '.join(POSITION_UNITS)}, got {unit!r}; a multiple of one is said as 0.1um"
+            f"unit must be one of {', '.join(POSITION_UNITS)}, got {brief(unit)}; a multiple of one is said as 0.1um"
         )
     return None if T_s is None else float(check("T_s", T_s, label="T_s"))
 

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import zipfile
-import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
-from numpy.lib import format as npy
 
-from ..base.errors import LogError
+from ..base.errors import LogError, brief, first_line
 from ..base.signals import Array
+from ..base.zip_files import ZIP_DAMAGE
+from .npy_header import NpyHeader, read_npy_header
 from .source import Block, Source, check_column, check_lengths, sample_number
 
 __all__ = ["NpzSource"]
-
-_DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError, ValueError, MemoryError)
-"""Exceptions raised by damaged archives."""
 
 
 class NpzSource(Source):
@@ -30,11 +27,8 @@ class NpzSource(Source):
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        try:
-            with zipfile.ZipFile(path) as archive:
-                members = archive.namelist()
-        except _DAMAGE as error:
-            raise LogError(f"{path}: is truncated, damaged or not an .npz file: {error}") from error
+        with self._archive() as archive:
+            members = archive.namelist()
         self.names = [member.removesuffix(".npy") for member in members if member.endswith(".npy")]
 
     @staticmethod
@@ -46,11 +40,11 @@ class NpzSource(Source):
     def blocks(self, names: Sequence[str], n: int) -> Iterator[Block]:
         """Iterate over the columns ``names`` in blocks of at most ``n`` samples."""
         with ExitStack() as stack:
-            archive = stack.enter_context(zipfile.ZipFile(self.path))
+            archive = stack.enter_context(self._archive())
             streams, dtypes, lengths = [], [], {}
             for name in names:
-                stream, shape, dtype = self._open(archive, name)
-                streams.append(stack.enter_context(stream))
+                streams.append(stack.enter_context(self._open(archive, name)))
+                shape, dtype = self._header(streams[-1], name)
                 dtypes.append(dtype)
                 lengths[name] = check_column(self.path, name, shape, dtype)
             check_lengths(self.path, lengths)
@@ -60,26 +54,38 @@ class NpzSource(Source):
                 columns = [self._read(*what, m) for what in zip(names, streams, dtypes, strict=True)]
                 yield Block(columns, sample_number(i))
 
-    def _open(self, archive: zipfile.ZipFile, name: str) -> tuple[IO[bytes], tuple[int, ...], np.dtype[Any]]:
-        """Open a member and read its header."""
+    def _archive(self) -> zipfile.ZipFile:
         try:
-            stream = archive.open(f"{name}.npy")
-            version = npy.read_magic(stream)
-            read_header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-            shape, _, dtype = read_header(stream)
-        except _DAMAGE as error:
-            raise LogError(f"{self.path}: column {name!r} is truncated or damaged: {error}") from error
-        return stream, shape, dtype
+            return zipfile.ZipFile(self.path)
+        except ZIP_DAMAGE as error:
+            raise LogError(f"{self.path}: is truncated, damaged or not an .npz file: {first_line(error)}") from error
+
+    def _open(self, archive: zipfile.ZipFile, name: str) -> IO[bytes]:
+        """Open a member."""
+        try:
+            return archive.open(f"{name}.npy")
+        except ZIP_DAMAGE as error:
+            raise self._damaged(name, error) from error
+
+    def _header(self, stream: IO[bytes], name: str) -> NpyHeader:
+        """Read a member's header."""
+        try:
+            return read_npy_header(stream)
+        except ZIP_DAMAGE as error:
+            raise self._damaged(name, error) from error
 
     def _read(self, name: str, stream: IO[bytes], dtype: np.dtype[Any], m: int) -> Array:
         """Read the next ``m`` values of a member."""
         try:
             data = stream.read(m * dtype.itemsize)
-        except _DAMAGE as error:
-            raise LogError(f"{self.path}: column {name!r} is truncated or damaged: {error}") from error
+        except ZIP_DAMAGE as error:
+            raise self._damaged(name, error) from error
         if len(data) < m * dtype.itemsize:
             raise LogError(
-                f"{self.path}: column {name!r} is truncated: {m * dtype.itemsize} more bytes were expected, "
+                f"{self.path}: column {brief(name)} is truncated: {m * dtype.itemsize} more bytes were expected, "
                 f"got {len(data)}"
             )
         return np.frombuffer(data, dtype).astype(np.float64)
+
+    def _damaged(self, name: str, error: Exception) -> LogError:
+        return LogError(f"{self.path}: column {brief(name)} is truncated or damaged: {first_line(error)}")

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..base.errors import LogError
+from ..base.errors import LogError, brief
 from ..base.signals import Array
 
 __all__ = ["NEEDS_TRUST", "Block", "Source", "check_column", "check_lengths", "sample_number"]
@@ -96,7 +96,7 @@ class Source(ABC):
 
     def choose_axis(self, axis: str) -> None:
         """Choose one of several axes by its name; LogError if the format holds a single one."""
-        raise LogError(f"{self.path}: axis {axis!r} was named, but a {self.format} file holds columns: name those")
+        raise LogError(f"{self.path}: axis {brief(axis)} was named, but a {self.format} file holds columns: name those")
 
 
 def sample_number(offset: int) -> Callable[[int], str]:
@@ -107,19 +107,19 @@ def sample_number(offset: int) -> Callable[[int], str]:
 def check_column(path: Path, name: str, shape: tuple[int, ...], dtype: np.dtype[Any]) -> int:
     """Return the number of samples of a column of that shape and type; LogError if it is not one."""
     if dtype.kind == "c":
-        raise LogError(f"{path}: column {name!r} must be real, got complex numbers ({dtype})")
+        raise LogError(f"{path}: column {brief(name)} must be real, got complex numbers ({dtype})")
     if dtype.kind not in "fiu":
         hint = "; save (t - t[0]) / numpy.timedelta64(1, 's') in its place" if dtype.kind == "M" else ""
-        raise LogError(f"{path}: column {name!r} must be numbers, got {dtype}{hint}")
+        raise LogError(f"{path}: column {brief(name)} must be numbers, got {dtype}{hint}")
     # Row and column vectors are accepted.
     lengths = [length for length in shape if length != 1]
     if len(shape) not in (1, 2) or (len(lengths) > 1 and 0 not in shape):
-        raise LogError(f"{path}: column {name!r} must have shape (n,), (n, 1) or (1, n), got {shape}")
+        raise LogError(f"{path}: column {brief(name)} must have shape (n,), (n, 1) or (1, n), got {brief(shape)}")
     return 0 if 0 in lengths else max(lengths, default=1)
 
 
 def check_lengths(path: Path, lengths: dict[str, int]) -> None:
     """Raise LogError if columns differ in length."""
     if len(set(lengths.values())) > 1:
-        text = ", ".join(f"{name!r} has {length}" for name, length in lengths.items())
+        text = ", ".join(f"{brief(name)} has {length}" for name, length in lengths.items())
         raise LogError(f"{path}: all columns must have the same number of samples, got: {text}")

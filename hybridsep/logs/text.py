@@ -15,7 +15,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.errors import LogError
+from ..base.errors import LogError, brief, first_line
 from .source import NEEDS_TRUST, Block, Source
 from .text_layout import COMMENTS, Layout, decimal_points, find_layout, is_number, split
 from .timestamps import CELL, Clock, cell, stamp_kind
@@ -72,7 +72,7 @@ class TextSource(Source):
                 numbered = ((i, line) for i, line in enumerate(self._lines(file), 1) if not line.isspace())
                 layout = find_layout(list(islice(numbered, _HEAD_LINES)))
         except _DAMAGE as error:
-            raise LogError(f"{path}: is truncated or damaged: {error}") from error
+            raise LogError(f"{path}: is truncated or damaged: {first_line(error)}") from error
         if layout is None:
             raise LogError(f"{path}: the file is empty, a line of column names was expected")
         self._layout: Layout = layout
@@ -110,7 +110,7 @@ class TextSource(Source):
                     if lines:
                         yield self._block(lines, numbers, use, clocks)
         except _DAMAGE as error:
-            raise LogError(f"{self.path}: is truncated or damaged after line {line}: {error}") from error
+            raise LogError(f"{self.path}: is truncated or damaged after line {line}: {first_line(error)}") from error
 
     def _open(self) -> IO[str]:
         if self._compressed:
@@ -181,9 +181,9 @@ class TextSource(Source):
                 continue
             number_there = decimal_points(fields[i])
             if not is_number(number_there):
-                came = repr(fields[i]) if fields[i] else "nothing"
+                came = brief(fields[i]) if fields[i] else "nothing"
                 raise LogError(
-                    f"{self.path}, line {number}: column {self.names[i]!r} must be a number, got {came}"
+                    f"{self.path}, line {number}: column {brief(self.names[i])} must be a number, got {came}"
                     f"{NEEDS_TRUST if missing else _hint(fields[i], divided=len(fields) > len(self.names))}"
                 )
             row.append(float(number_there))

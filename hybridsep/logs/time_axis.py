@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..base.errors import LogError
+from ..base.errors import LogError, brief
 from ..base.signals import Array
 from .gaps import gap_starts, mean_interval, rounded_interval, standard_error
 from .source import Block
@@ -97,9 +97,9 @@ class TimeAxis:
         else:
             mean, error = mean_interval(np.concatenate(self._times))
         if math.isnan(mean):
-            raise LogError(f"{self._path}: time {self._name!r} must increase, it never does")
+            raise LogError(f"{self._path}: time {brief(self._name)} must increase, it never does")
         if not sys.float_info.min <= mean <= 1 / sys.float_info.min:
-            raise LogError(f"{self._path}: time {self._name!r} must be in seconds, got an interval of {mean:g} s")
+            raise LogError(f"{self._path}: time {brief(self._name)} must be in seconds, got an interval of {mean:g} s")
         return rounded_interval(mean, error)
 
     @property
@@ -116,7 +116,7 @@ class TimeAxis:
             if steps[i] == 0.0:
                 what, hint = "repeats", "; if times are rounded too coarsely, take the column out and give T_s (--T_s)"
             raise LogError(
-                f"{self._path}, {block.where(i + shift)}: time {self._name!r} {what}: a value above "
+                f"{self._path}, {block.where(i + shift)}: time {brief(self._name)} {what}: a value above "
                 f"{now - float(steps[i]):.9g} s was expected, got {now:.9g} s{hint}"
             )
 
@@ -128,7 +128,7 @@ class TimeAxis:
             lost = round(float(steps[i]) / self._median) - 1
             samples = f"; {lost} sample{'s' if lost > 1 else ''} may be lost" if lost >= 1 else ""
             raise LogError(
-                f"{self._path}, {block.where(i + shift)}: time {self._name!r} must be uniform: an interval of "
+                f"{self._path}, {block.where(i + shift)}: time {brief(self._name)} must be uniform: an interval of "
                 f"{self._median:.6g} s ± {100 * TOLERANCE:g} % was expected, got {steps[i]:.6g} s{samples}; "
                 f"resample the log, or remove the time column and give T_s (--fix, --T_s)"
             )

@@ -12,7 +12,7 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.errors import LogError
+from ..base.errors import LogError, brief
 from ..base.signals import Array
 
 __all__ = ["CELL", "Cells", "Clock", "cell", "stamp_kind"]
@@ -197,8 +197,8 @@ class Clock:
 
     def _refuse(self, text: bytes, place: str, hint: str) -> NoReturn:
         raise LogError(
-            f"{self._path}, {place}: column {self._name!r} must be a timestamp such as {self._example!r}, got "
-            f"{_came(text)}{hint}"
+            f"{self._path}, {place}: column {brief(self._name)} must be a timestamp such as {brief(self._example)}, "
+            f"got {_came(text)}{hint}"
         )
 
     def _refuse_date(self, text: bytes, place: str, hint: str) -> NoReturn:
@@ -206,13 +206,13 @@ class Clock:
             self._refuse(text, place, hint)
         example = next(iter(self._days), "2026-03-05")
         raise LogError(
-            f"{self._path}, {place}: column {self._date_name!r} must be a date such as {example!r}, got "
+            f"{self._path}, {place}: column {brief(self._date_name)} must be a date such as {brief(example)}, got "
             f"{_came(text)}{hint}"
         )
 
 
 def _came(text: bytes) -> str:
-    return repr(text.decode("latin-1").strip(" '\"")) if text.strip() else "nothing"
+    return brief(text.decode("latin-1").strip(" '\"")) if text.strip() else "nothing"
 
 
 @dataclass(frozen=True)

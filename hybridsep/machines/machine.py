@@ -5,7 +5,6 @@ An invalid file is refused with a message that names the file, the entry, what w
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -13,7 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, ValidationError, model_validator
 
 from ..base.data_files import data_folder
-from ..base.errors import MachineError, ParameterError, brief
+from ..base.errors import MachineError, ParameterError, brief, first_line, listed
 from ..base.settings import PARAMETERS, CompensatorSettings, Limits, PredictorSettings, Settings
 from ..compensate.compensator import SepCompensator
 from ..model.physics import ModalModel, Mode
@@ -34,16 +33,15 @@ from .sections import (
     Section,
     StageSection,
 )
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
+from .toml import read_toml
 
 __all__ = ["NAME_PATTERN", "Machine", "load_machine", "machine_from_table", "machine_names", "machine_path"]
 
 NAME_PATTERN = r"^[A-Za-z][A-Za-z0-9_]*$"
 """Names of machines; they become parts of FMUs' names."""
+
+_PLACE_MAX = 60
+"""Largest length of an entry's name in a message; the known ones are shorter."""
 
 
 class Machine(Section):
@@ -283,9 +281,9 @@ def load_machine(machine: str | Path) -> Machine:
     """
     path = machine_path(machine)
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        content = read_toml(path)
     except (ValueError, RecursionError) as error:  # an integer of 5000 digits is a ValueError, too
-        raise MachineError(f"{path.name} is not valid TOML: {error}") from error
+        raise MachineError(f"{path.name} is not valid TOML: {first_line(error)}") from error
     try:
         return machine_from_table(content)
     except ParameterError as error:
@@ -301,9 +299,9 @@ def machine_from_table(content: Mapping[str, Any]) -> Machine:
     try:
         return Machine(**content)
     except ValidationError as error:
-        raise ParameterError("; ".join(_describe(problem) for problem in error.errors())) from error
+        raise ParameterError(listed(error.errors(), _describe, "; ")) from error
     except TypeError as error:
-        raise ParameterError(str(error)) from error
+        raise ParameterError(first_line(error)) from error
 
 
 def _describe(problem: Any) -> str:
@@ -312,6 +310,7 @@ def _describe(problem: Any) -> str:
     where = ""
     for step in steps:
         where += f"[{step + 1}]" if isinstance(step, int) else f".{step}" if where else str(step)
+    where = where if len(where) <= _PLACE_MAX and where.isprintable() else brief(where)
     kind = problem["type"]
     if kind == "tuple_type" and where.endswith(".mode"):
         return f"{where} must be a list of modes: write [[{where}]], with double brackets"
