@@ -64,7 +64,7 @@ def warm_runs(emps: Path | None) -> Iterator[tuple[str, Array, Array]]:
 
 def random_runs(n: int, seed: int, cache: Path | None) -> Iterator[tuple[Array, Array]]:
     """Yield errors and standard deviations, m, of the cold runs of random drives."""
-    x = read_positions(cache, seed, n) if cache else None
+    x = read_positions(cache, "modal", seed, n) if cache else None
     for drive in drives_at(range(n), true_positions(range(n), seed) if x is None else x, seed):
         yield run(HybridPredictor(drive.model), drive.x_d, drive.x_meas)
 

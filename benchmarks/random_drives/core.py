@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests" / "support"
 
 from c_core import DESCRIPTIONS, CModel, RefusedError
 
-from benchmarks.random_drives.commands import T_S
+from benchmarks.random_drives.replay import PREDICTORS
 from hybridsep.base.errors import SignalError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
@@ -21,25 +21,28 @@ from hybridsep.model.physics import ModalModel
 __all__ = ["core_replay"]
 
 
-def core_replay(predictor: str, model: ModalModel, x_d: Array, x_meas: Array) -> Array:
+def core_replay(predictor: str, model: ModalModel, settings: PredictorSettings, x_d: Array, x_meas: Array) -> Array:
     """Return ``x_h`` of the C core's predictor, ``(n,)``, m; with trust ``x_meas`` is NaN where missing.
 
     A last window that is cut off is predicted as part of a whole one, beyond whose end the command rests; the library
     predicts it alone.
     """
-    Np, n, modes = PredictorSettings().Np, len(x_d), model.modes
+    used = PREDICTORS[predictor](settings)
+    Np, n, modes = used.Np, len(x_d), model.modes
     name = f"predictor of {len(modes)} modes"
     any_modes = DESCRIPTIONS["predictor"]["modes"] * len(modes)
     DESCRIPTIONS.setdefault(name, {**DESCRIPTIONS["predictor"], "modes": any_modes})
     start = {f"mode[{i}].{key}": value for i, mode in enumerate(modes, 1) for key, value in asdict(mode).items()}
-    core = CModel(name, {**start, "trust": predictor == "default", "x_d_ahead": x_d[0], "x_meas": x_d[0]}).initialise()
+    alone = {key: value for key, value in used.to_fmi().items() if key not in used.NEEDS_PREVIEW}
+    start |= {**alone, "dead_time": model.dead_time, "x_d_ahead": x_d[0], "x_meas": x_d[0]}
+    core = CModel(name, start).initialise()
     x_h = np.empty(n)
     x_d_ahead, measured, predicted = (core.place[key] for key in ("x_d_ahead", "x_meas", "x_h"))
     try:
         for k in range(n + Np - 1):
             core.values[x_d_ahead] = x_d[min(k, n - 1)]
             core.values[measured] = x_meas[k - Np] if k >= Np else x_d[0]
-            core.step(k * T_S, T_S)
+            core.step(k * used.T_s, used.T_s)
             if k + 1 >= Np:
                 x_h[k + 1 - Np] = core.values[predicted]
     except RefusedError as error:

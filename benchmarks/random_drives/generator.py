@@ -10,12 +10,14 @@ import numpy as np
 from benchmarks.random_drives.commands import T_S, random_command
 from benchmarks.random_drives.disturbances import Disturbances, random_disturbances
 from benchmarks.random_drives.draws import Draws
+from benchmarks.random_drives.drive import Drive
 from benchmarks.random_drives.modes import ModalDrive, nominal_drive, random_modes
 from benchmarks.random_drives.simulation import simulate
+from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel
 
-__all__ = ["CHUNK", "SEED", "Drive", "drives_at", "random_drive", "random_drives", "true_positions"]
+__all__ = ["CHUNK", "SEED", "RandomDrive", "drives_at", "random_drive", "random_drives", "true_positions"]
 
 SEED = 1
 """Seed of the 1 000 drives that figures are given for."""
@@ -25,38 +27,22 @@ CHUNK = 125
 
 
 @dataclass(frozen=True)
-class Drive:
-    """A drive, what it was commanded and what was measured.
+class RandomDrive(Drive):
+    """A drive of modes.
 
     Attributes
     ----------
-    index : int
-    x_d, x, x_meas : (n,) array, m
-        Commanded, true and measured positions, at rest at first; ``x(k)`` before ``x_d(k)`` acts.
-    model : ModalModel
-        ``G_pb``, up to 20 % wrong.
     true_model : ModalModel
-        The drive's linear part.
-    kind : str
-        Of the trajectory.
+        The drive's linear part; ``model`` is up to 20 % wrong.
     disturbances : Disturbances
     noise_std, quantum : float, m
         Of the encoder: white noise, and resolution (0: none).
-    text : str
-        Description.
     """
 
-    index: int
-    x_d: Array
-    x: Array
-    x_meas: Array
-    model: ModalModel
     true_model: ModalModel
-    kind: str
     disturbances: Disturbances
     noise_std: float
     quantum: float
-    text: str
 
 
 @dataclass(frozen=True)
@@ -86,7 +72,7 @@ class Recipe:
         noise = noise_std * draws.normal(len(x_d))
         return cls(index, kind, x_d, true, nominal, disturbances, noise_std, quantum, noise)
 
-    def drive(self, x: Array) -> Drive:
+    def drive(self, x: Array) -> RandomDrive:
         """Return the drive with its true positions, ``(n,)``, m."""
         x_meas = x + self.noise
         if self.quantum:
@@ -98,12 +84,13 @@ class Recipe:
             self.disturbances.text,
             f"noise {1e6 * self.noise_std:.2g} µm" + (f", resolution {1e6 * self.quantum:.2g} µm" * bool(self.quantum)),
         )
-        return Drive(
+        return RandomDrive(
             index=self.index,
             x_d=self.x_d,
             x=x,
             x_meas=x_meas,
             model=self.nominal.model,
+            settings=PredictorSettings(),
             true_model=self.true.model,
             kind=self.kind,
             disturbances=self.disturbances,
@@ -126,16 +113,16 @@ def true_positions(indices: Sequence[int], seed: int = SEED) -> list[Array]:
     return positions
 
 
-def drives_at(indices: Sequence[int], x: Sequence[Array], seed: int = SEED) -> list[Drive]:
+def drives_at(indices: Sequence[int], x: Sequence[Array], seed: int = SEED) -> list[RandomDrive]:
     """Return drives whose :func:`true_positions` are known."""
     return [Recipe.draw(index, seed).drive(positions) for index, positions in zip(indices, x, strict=True)]
 
 
-def random_drives(indices: Sequence[int], seed: int = SEED) -> list[Drive]:
+def random_drives(indices: Sequence[int], seed: int = SEED) -> list[RandomDrive]:
     """Return several drives, each as :func:`random_drive` returns it."""
     return drives_at(indices, true_positions(indices, seed), seed)
 
 
-def random_drive(index: int, seed: int = SEED) -> Drive:
+def random_drive(index: int, seed: int = SEED) -> RandomDrive:
     """Return the drive of an index, the same for ever for the same seed."""
     return random_drives([index], seed)[0]

@@ -4,39 +4,50 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.random_drives.commands import T_S
+from benchmarks.random_drives.drive import Drive
 from benchmarks.random_drives.faults import FAULTS, JITTER, OFFSET_STEP
-from benchmarks.random_drives.generator import Drive
 from hybridsep.base.errors import SignalError
 from hybridsep.base.metrics import rms
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.evaluate.backtest import backtest
+from hybridsep.evaluate.peers import Piece, predict_peers
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.predictor import HybridPredictor
 
-__all__ = ["DIVERGED", "PREDICTORS", "FaultyReplay", "Replay", "Replayed", "library_replay", "replay", "replay_faults"]
+__all__ = [
+    "DIVERGED",
+    "PREDICTORS",
+    "FaultyReplay",
+    "Replay",
+    "Replayed",
+    "library_replay",
+    "replay",
+    "replay_faults",
+]
 
 DIVERGED = 1.0
 """Largest prediction error, m, beyond which a prediction counts as diverged: beyond any of the strokes."""
 
-Replayed = Callable[[str, ModalModel, Array, Array], Array]
-"""Replay of a predictor of :data:`PREDICTORS`, with the physics model, over commanded and measured positions, (n,), m.
-It returns x_h, (n,), m, each window predicted before its measurement is known; SignalError if it refuses a sample."""
+Replayed = Callable[[str, ModalModel, PredictorSettings, Array, Array], Array]
+"""Replay of a predictor of :data:`PREDICTORS`, with the physics model and the drive's settings, over commanded and
+measured positions, (n,), m. It returns x_h, (n,), m, each window predicted before its measurement is known; SignalError
+if it refuses a sample."""
 
-PREDICTORS: dict[str, Callable[[ModalModel], HybridPredictor]] = {
-    "default": HybridPredictor,
-    "paper": lambda model: HybridPredictor(model, PredictorSettings(trust=False)),
+PREDICTORS: dict[str, Callable[[PredictorSettings], PredictorSettings]] = {
+    "default": lambda settings: settings,
+    "paper": lambda settings: replace(settings, trust=False),
 }
+"""Settings of a predictor, from those of a drive."""
 
 
-def library_replay(predictor: str, model: ModalModel, x_d: Array, x_meas: Array) -> Array:
+def library_replay(predictor: str, model: ModalModel, settings: PredictorSettings, x_d: Array, x_meas: Array) -> Array:
     """Return ``x_h`` of the library's predictor, ``(n,)``, m; with trust ``x_meas`` is NaN where missing."""
-    return backtest(PREDICTORS[predictor](model), x_d, x_meas).x_h
+    return backtest(HybridPredictor(model, PREDICTORS[predictor](settings)), x_d, x_meas).x_h
 
 
 @dataclass(frozen=True)
@@ -53,6 +64,8 @@ class Replay:
         with an error.
     largest : float
         Largest error of ``x_h``, m.
+    rms_arx : tuple of float
+        RMS errors of the refitted ARX peers, m, if they were asked for; infinite where one diverged.
     """
 
     index: int
@@ -62,6 +75,7 @@ class Replay:
     rms_hold: float
     rms_h: float
     largest: float
+    rms_arx: tuple[float, ...] = ()
 
     @property
     def ratio(self) -> float:
@@ -72,6 +86,11 @@ class Replay:
     def hold_ratio(self) -> float:
         """RMS relative to the hold's."""
         return self.rms_h / self.rms_hold
+
+    @property
+    def peer_ratio(self) -> float:
+        """RMS relative to the best of hold and the ARX peers, in hindsight."""
+        return self.rms_h / min(self.rms_hold, *self.rms_arx)
 
     @property
     def diverged(self) -> bool:
@@ -110,37 +129,38 @@ class FaultyReplay:
     true_ratio: float = math.nan
 
 
-def replay(drive: Drive, predictor: str, run: Replayed = library_replay) -> Replay:
-    """Return the result of a predictor on a drive."""
-    x_pb = _physics(drive)
-    x_hold = _hold(x_pb, drive.x_meas, PredictorSettings().Np)
+def replay(drive: Drive, predictor: str, run: Replayed = library_replay, *, peers: bool = False) -> Replay:
+    """Return the result of a predictor on a drive, with ``peers`` beside the ARX models refitted before each window."""
+    x_pb, Np = _physics(drive), drive.settings.Np
+    x_hold = _hold(x_pb, drive.x_meas, Np)
+    arx = predict_peers([Piece(drive.x_d, drive.x_meas, 0, 0)], Np) if peers else ()
     try:
-        error = drive.x_meas - run(predictor, drive.model, drive.x_d, drive.x_meas)
+        error = drive.x_meas - run(predictor, drive.model, drive.settings, drive.x_d, drive.x_meas)
         rms_h, largest = rms(error), float(np.abs(error).max())
     except SignalError:
         rms_h = largest = math.inf
     rms_pb, rms_hold = rms(drive.x_meas - x_pb), rms(drive.x_meas - x_hold)
-    return Replay(drive.index, drive.kind, drive.text, rms_pb, rms_hold, rms_h, largest)
+    rms_arx = tuple(math.inf if one.diverged else rms(drive.x_meas - one.predictions[0]) for one in arx)
+    return Replay(drive.index, drive.kind, drive.text, rms_pb, rms_hold, rms_h, largest, rms_arx)
 
 
 def replay_faults(drive: Drive, seed: int, predictor: str, run: Replayed = library_replay) -> list[FaultyReplay]:
     """Return the results of a predictor on a drive with each of the faults, which follow from ``seed``."""
     x_pb = _physics(drive)
-    settings = PredictorSettings()
-    replays = []
+    settings, T_s, replays = drive.settings, drive.settings.T_s, []
     for number, (name, fault) in enumerate(FAULTS.items()):
-        measured, last = fault(drive.x_meas, T_S, np.random.default_rng((seed, drive.index, number)))
+        measured, last = fault(drive.x_meas, T_s, np.random.default_rng((seed, drive.index, number)))
         # What a prediction should agree with, and from which sample on
         sound, first = drive.x_meas, last + 1 + settings.p + 2 * settings.Np
         if name == OFFSET_STEP:
-            sound, first = measured, last + round(1.0 / T_S)
+            sound, first = measured, last + round(1.0 / T_s)
         if name == JITTER:
             sound, first = measured, 0
         try:
-            x_h = run(predictor, drive.model, drive.x_d, measured)
+            x_h = run(predictor, drive.model, settings, drive.x_d, measured)
             peer, own_noise, true_ratio = sound - x_pb, math.nan, math.nan
             if name == JITTER:
-                without = run(predictor, drive.model, drive.x_d, drive.x_meas)
+                without = run(predictor, drive.model, settings, drive.x_d, drive.x_meas)
                 peer = drive.x_meas - without
                 own_noise, true_ratio = rms(measured - without) / rms(peer), rms(drive.x_meas - x_h) / rms(peer)
         except SignalError:
@@ -154,7 +174,7 @@ def replay_faults(drive: Drive, seed: int, predictor: str, run: Replayed = libra
 
 def _physics(drive: Drive) -> Array:
     """Return ``x_pb`` from rest, ``(n,)``, m."""
-    discrete = drive.model.discretise(T_S)
+    discrete = drive.model.discretise(drive.settings.T_s)
     start = drive.x_d[0]
     return np.asarray(start + discrete.forced_response(discrete.rest(), drive.x_d - start)[0])
 

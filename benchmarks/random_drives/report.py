@@ -25,10 +25,12 @@ def print_replays(replays: Sequence[Replay], predictor: str) -> None:
     for name in ("rms_pb", "rms_hold", "rms_h"):
         values = _quantiles([getattr(r, name) for r in replays], quantiles)
         print(f"  {name:9}" + "".join(f"{UM * value:12.4g}" for value in values))
-    columns = ("median", "90 %", "95 %", "99 %", "99.5 %", "max", "> 1.02", "> 1.10")
-    print(f"{'ratio to':28}" + "".join(f"{column:>9}" for column in columns))
+    columns = ("mean", "median", "90 %", "95 %", "99 %", "99.5 %", "max", "> 1.02", "> 1.10")
+    print(f"{'ratio to (mean: geometric)':28}" + "".join(f"{column:>9}" for column in columns))
     _print_ratios("physics", [r.ratio for r in replays])
     _print_ratios("hold", [r.hold_ratio for r in replays])
+    if any(r.rms_arx for r in replays):
+        _print_ratios("best of hold, ARX20, ARX40", [r.peer_ratio for r in replays])
     for kind in sorted({r.kind for r in replays}):
         group = [r.ratio for r in replays if r.kind == kind]
         _print_ratios(f"physics, {kind} ({len(group)})", group)
@@ -64,7 +66,8 @@ def print_faults(replays: Sequence[FaultyReplay]) -> None:
 def _print_ratios(name: str, ratios: Sequence[float]) -> None:
     values = np.array(ratios)
     quantiles = "".join(f"{value:9.3g}" for value in _quantiles(values, QUANTILES))
-    print(f"{name:28}{quantiles}{_share(values, 1.02):>9}{_share(values, 1.10):>9}")
+    mean = float(np.exp(np.mean(np.log(values))))
+    print(f"{name:28}{mean:9.3g}{quantiles}{_share(values, 1.02):>9}{_share(values, 1.10):>9}")
 
 
 def _quantiles(values: Sequence[float] | Array, quantiles: Sequence[float]) -> Array:

@@ -13,7 +13,7 @@ from scipy.signal import cont2discrete, dlsim
 from benchmarks.random_drives.cache import read_positions, write_positions
 from benchmarks.random_drives.commands import KINDS
 from benchmarks.random_drives.disturbances import Disturbances
-from benchmarks.random_drives.generator import Drive, Recipe, drives_at, random_drive, random_drives
+from benchmarks.random_drives.generator import RandomDrive, Recipe, drives_at, random_drive, random_drives
 from benchmarks.random_drives.simulation import simulate
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest
@@ -32,7 +32,7 @@ EXPECTED_RMS = [51.24528299, 580.85925701, 30.61436502]
 
 
 @pytest.fixture(scope="module")
-def drives() -> list[Drive]:
+def drives() -> list[RandomDrive]:
     return random_drives(SHORTEST, SEED)
 
 
@@ -46,7 +46,7 @@ def simulated(recipes: list[Recipe], commands: list[Array], **changes: Any) -> l
     return simulate([recipe.true.model for recipe in recipes], disturbances, commands)
 
 
-def test_shape(drives: list[Drive]) -> None:
+def test_shape(drives: list[RandomDrive]) -> None:
     for drive in drives:
         assert 6000 <= len(drive.x_d) <= 10000
         for signal in (drive.x_d, drive.x, drive.x_meas):
@@ -56,7 +56,7 @@ def test_shape(drives: list[Drive]) -> None:
         assert drive.x_d[1] == drive.x_d[0]
 
 
-def test_a_drive_does_not_depend_on_the_others(drives: list[Drive]) -> None:
+def test_a_drive_does_not_depend_on_the_others(drives: list[RandomDrive]) -> None:
     alone = random_drive(57, SEED)
     for name in ("x_d", "x", "x_meas"):
         assert np.array_equal(getattr(alone, name), getattr(drives[2], name))
@@ -71,7 +71,7 @@ def test_a_position_does_not_depend_on_the_number_of_others(recipes: list[Recipe
             assert np.array_equal(x, y)
 
 
-def test_the_drives_stay_what_they_are(drives: list[Drive]) -> None:
+def test_the_drives_stay_what_they_are(drives: list[RandomDrive]) -> None:
     """Figures are given for the drives of a seed, so a change of the generator must not pass unseen."""
     assert [drive.kind for drive in drives] == EXPECTED_KINDS
     found = [1e6 * float(np.sqrt(np.mean((drive.x_meas - drive.x_d) ** 2))) for drive in drives]
@@ -158,13 +158,14 @@ def test_distributions(recipes: list[Recipe]) -> None:
     assert 0.2 < np.mean([recipe.true.in_antiphase for recipe in recipes]) < 0.5
 
 
-def test_positions_are_kept_in_a_file(drives: list[Drive], tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_positions_are_kept_in_a_file(drives: list[RandomDrive], tmp_path_factory: pytest.TempPathFactory) -> None:
     path = tmp_path_factory.mktemp("drives") / "positions.npz"
-    assert read_positions(path, SEED, 2) is None
-    write_positions(path, SEED, [drive.x for drive in drives])
-    assert read_positions(path, SEED + 1, 2) is None
-    assert read_positions(path, SEED, len(drives) + 1) is None
-    x = read_positions(path, SEED, 2)
+    assert read_positions(path, "modal", SEED, 2) is None
+    write_positions(path, "modal", SEED, [drive.x for drive in drives])
+    assert read_positions(path, "modal", SEED + 1, 2) is None
+    assert read_positions(path, "two_mass", SEED, 2) is None
+    assert read_positions(path, "modal", SEED, len(drives) + 1) is None
+    x = read_positions(path, "modal", SEED, 2)
     assert x is not None
     for drive, again in zip(drives, drives_at(SHORTEST[:2], x, SEED), strict=False):
         assert np.array_equal(drive.x_meas, again.x_meas)

@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.random_drives.core import core_replay
 from benchmarks.random_drives.faults import FAULTS, JITTER, OFFSET_STEP
-from benchmarks.random_drives.generator import Drive, Recipe
+from benchmarks.random_drives.generator import RandomDrive, Recipe
 from benchmarks.random_drives.replay import _hold, library_replay, replay, replay_faults
 from benchmarks.random_drives.run import main
 from benchmarks.random_drives.simulation import simulate
@@ -22,26 +22,26 @@ from hybridsep.predict.predictor import HybridPredictor
 
 
 @pytest.fixture(scope="module")
-def drive() -> Drive:
+def drive() -> RandomDrive:
     recipe = Recipe.draw(0, 1)
     short = replace(recipe, x_d=recipe.x_d[:3000], noise=recipe.noise[:3000])
     return short.drive(*simulate([short.true.model], [short.disturbances], [short.x_d]))
 
 
-def physics_only(predictor: str, model: ModalModel, x_d: Array, x_meas: Array) -> Array:
+def physics_only(predictor: str, model: ModalModel, settings: PredictorSettings, x_d: Array, x_meas: Array) -> Array:
     discrete = model.discretise(1e-3)
     return np.asarray(x_d[0] + discrete.forced_response(discrete.rest(), x_d - x_d[0])[0])
 
 
-def refusing(predictor: str, model: ModalModel, x_d: Array, x_meas: Array) -> Array:
+def refusing(predictor: str, model: ModalModel, settings: PredictorSettings, x_d: Array, x_meas: Array) -> Array:
     raise SignalError("x_h diverges")
 
 
-def diverging(predictor: str, model: ModalModel, x_d: Array, x_meas: Array) -> Array:
+def diverging(predictor: str, model: ModalModel, settings: PredictorSettings, x_d: Array, x_meas: Array) -> Array:
     return x_meas + np.linspace(0.0, 1.1, len(x_d))
 
 
-def test_figures_are_those_of_backtest(drive: Drive) -> None:
+def test_figures_are_those_of_backtest(drive: RandomDrive) -> None:
     result = replay(drive, "paper")
     scores = backtest(HybridPredictor(drive.model, PredictorSettings(trust=False)), drive.x_d, drive.x_meas)
     assert result.rms_pb == pytest.approx(scores.overall.rms_pb, rel=1e-9)
@@ -53,18 +53,18 @@ def test_figures_are_those_of_backtest(drive: Drive) -> None:
 
 
 @pytest.mark.parametrize("predictor", ["default", "paper"])
-def test_the_c_core_replays_as_the_library(drive: Drive, predictor: str) -> None:
-    given = predictor, drive.model, drive.x_d, drive.x_meas
+def test_the_c_core_replays_as_the_library(drive: RandomDrive, predictor: str) -> None:
+    given = predictor, drive.model, drive.settings, drive.x_d, drive.x_meas
     np.testing.assert_allclose(core_replay(*given), library_replay(*given), rtol=0, atol=1e-12)
 
 
-def test_physics_is_the_measure(drive: Drive) -> None:
+def test_physics_is_the_measure(drive: RandomDrive) -> None:
     result = replay(drive, "", physics_only)
     assert result.ratio == pytest.approx(1.0, rel=1e-9)
     assert not result.diverged
 
 
-def test_divergence_and_refusal_are_counted(drive: Drive) -> None:
+def test_divergence_and_refusal_are_counted(drive: RandomDrive) -> None:
     assert replay(drive, "", diverging).diverged
     refused = replay(drive, "", refusing)
     assert refused.diverged
@@ -76,14 +76,14 @@ def test_hold_before_the_first_measurement_is_physics() -> None:
     assert _hold(x_pb, x_meas, 3).tolist() == [0, 0, 0, 3, 3, 3, 6]
 
 
-def test_faults_are_scored_after_the_last_faulty_sample(drive: Drive) -> None:
+def test_faults_are_scored_after_the_last_faulty_sample(drive: RandomDrive) -> None:
     for result in replay_faults(drive, 1, "", physics_only):
         assert result.ratio == pytest.approx(1.0, rel=0.05 if result.fault == JITTER else 1e-9)
         assert result.change < 1e-9
         assert not result.refused
 
 
-def test_missing_samples_are_refused_by_the_paper_s_model(drive: Drive) -> None:
+def test_missing_samples_are_refused_by_the_paper_s_model(drive: RandomDrive) -> None:
     results = {result.fault: result for result in replay_faults(drive, 1, "paper", library_replay)}
     assert set(results) == set(FAULTS)
     assert results["1 % missing"].refused

@@ -11,7 +11,7 @@ import numpy as np
 import staircase_data
 from places import EMPS, RECORDINGS
 
-from benchmarks.random_drives.generator import Drive, random_drives
+from benchmarks.random_drives.generator import RandomDrive, random_drives
 from hybridsep import load_machine, simulate, spiral
 from hybridsep.base.signals import Array
 from hybridsep.intake.relation import shifted
@@ -28,7 +28,7 @@ def log_of(x_d: Array, x_meas: Array, T_s: float = 1e-3) -> Log:
 
 
 @lru_cache(maxsize=1)
-def _random_drives() -> dict[int, Drive]:
+def _random_drives() -> dict[int, RandomDrive]:
     return {drive.index: drive for drive in random_drives(_RANDOM)}
 
 

@@ -1,0 +1,219 @@
+"""Drives of two masses: fixed by seed and index, exact where they are linear, friction as in closed forms."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.random_drives.draws import Draws
+from benchmarks.random_drives.drive import Drive
+from benchmarks.random_drives.replay import replay
+from benchmarks.two_mass.axes import LEAST_DAMPING, RATES
+from benchmarks.two_mass.axis import Axis, Friction, LinearLoop
+from benchmarks.two_mass.commands import KINDS
+from benchmarks.two_mass.generator import LOOK_AHEAD, NP_RANGE, Recipe, drives_at, random_drives, true_positions
+from benchmarks.two_mass.nominal import MODEL_ERROR, nominal_model
+from benchmarks.two_mass.plant import INTERNAL_STEP, TwoMassDrive
+from hybridsep.base.metrics import rms
+from hybridsep.base.signals import Array
+
+SEED = 1
+N = 120
+
+FEW = (0, 1, 2, 3)
+EXPECTED_KINDS = ["segments", "moves", "circle", "sweep"]
+EXPECTED_RMS = [749.80903542, 21.72408038, 921.53684028, 802.28915573]
+"""Their servo errors, µm, against the measured position."""
+
+LOOP = LinearLoop(
+    load=0.4,
+    stiffness=1.4e4,
+    damping=5.0,
+    viscous=1.5,
+    k_v=20.0,
+    k_p=120.0,
+    t_i=0.0,
+    feedforward=0.0,
+    tau=5e-4,
+    at_load=True,
+    closed_at_load=False,
+)
+FRICTION = Friction(coulomb=0.6, stribeck=1.4, v_stribeck=2e-3, presliding=1e-5, micro_damping=100.0)
+
+
+@pytest.fixture(scope="module")
+def recipes() -> list[Recipe]:
+    return [Recipe.draw(index, SEED) for index in range(N)]
+
+
+@pytest.fixture(scope="module")
+def drives() -> list[Drive]:
+    return random_drives(FEW, SEED)
+
+
+def axis(loop: LinearLoop = LOOP, T_s: float = 1e-3, **values: float | Friction) -> Axis:
+    return replace(Axis(loop, loop, change_at=10**9, T_s=T_s), **values)  # type: ignore[arg-type]
+
+
+def response(recipe: Recipe, axis: Axis, step: float = INTERNAL_STEP) -> Array:
+    return TwoMassDrive(axis, float(recipe.x_d[0]), step).run(recipe.x_d)
+
+
+def test_the_drives_stay_what_they_are(drives: list[Drive]) -> None:
+    """Figures are given for the drives of a seed, so a change of the generator must not pass unseen."""
+    assert [drive.kind for drive in drives] == EXPECTED_KINDS
+    assert [1e6 * rms(drive.x_meas - drive.x_d) for drive in drives] == pytest.approx(EXPECTED_RMS, rel=1e-6)
+
+
+def test_a_drive_does_not_depend_on_the_others(drives: list[Drive]) -> None:
+    alone = random_drives([2], SEED)[0]
+    for name in ("x_d", "x", "x_meas"):
+        assert np.array_equal(getattr(alone, name), getattr(drives[2], name))
+    assert (alone.model, alone.settings, alone.text) == (drives[2].model, drives[2].settings, drives[2].text)
+    again = drives_at([2], true_positions([2], SEED), SEED)[0]
+    assert np.array_equal(again.x_meas, alone.x_meas)
+
+
+def test_distributions(recipes: list[Recipe]) -> None:
+    assert {recipe.kind for recipe in recipes} == set(KINDS)
+    assert {round(1 / recipe.axis.T_s) for recipe in recipes} == set(RATES)
+    assert {recipe.encoder.bits for recipe in recipes} == set(range(12, 21))
+    assert 0.35 < np.mean([recipe.encoder.bits == 12 for recipe in recipes]) < 0.65
+    assert 0.2 < np.mean([recipe.axis.changed != recipe.axis.loop for recipe in recipes]) < 0.5
+    for recipe in recipes:
+        axis, settings = recipe.axis, recipe.settings
+        assert min(axis.loop.least_damping, axis.changed.least_damping) >= LEAST_DAMPING
+        assert NP_RANGE[0] <= settings.Np <= NP_RANGE[1]
+        assert settings.p == min(50, settings.Np)
+        if NP_RANGE[0] < settings.Np:
+            assert 0.5 * LOOK_AHEAD[0] <= settings.Np * settings.T_s <= 1.2 * LOOK_AHEAD[1]
+        assert 2.9 <= len(recipe.x_d) * axis.T_s <= 5.1
+        assert recipe.x_d[1] == recipe.x_d[0]
+        assert abs(recipe.model.dead_time - axis.dead_time) <= 3
+        assert 1 - MODEL_ERROR - 1e-9 <= recipe.model.dc_gain <= 1 + MODEL_ERROR + 1e-9
+
+
+def test_the_encoder_has_its_resolution(recipes: list[Recipe], drives: list[Drive]) -> None:
+    for recipe, drive in zip(recipes, drives, strict=False):
+        counts = drive.x_meas / recipe.encoder.quantum
+        assert np.abs(counts - np.rint(counts)).max() < 1e-4
+        off = drive.x_meas - drive.x
+        expected = np.sqrt(recipe.encoder.noise_std**2 + recipe.encoder.quantum**2 / 12)
+        assert np.sqrt(np.mean(off**2)) < 2.5 * expected
+        assert recipe.measured(7, float(drive.x[7])) == drive.x_meas[7]
+
+
+@pytest.mark.parametrize("t_i", [0.0, 0.05])
+@pytest.mark.parametrize("at_load", [False, True])
+def test_a_linear_drive_is_its_modal_model(t_i: float, at_load: bool) -> None:
+    loop = replace(LOOP, t_i=t_i, at_load=at_load)
+    x_d = 0.01 * np.sin(0.02 * np.arange(2000))
+    late = axis(loop, dead_time=2)
+    delayed = np.concatenate((np.zeros(2), x_d[:-2]))
+    model = loop.model.discretise(1e-3)
+    expected = model.forced_response(model.rest(), delayed)[0]
+    assert np.abs(TwoMassDrive(late).run(x_d) - expected).max() < 1e-12
+    assert np.abs(TwoMassDrive(late, step=2e-5).run(x_d) - expected).max() < 1e-12
+
+
+def test_feedforward_is_that_of_the_model_to_first_order_in_the_sampling_interval() -> None:
+    loop = replace(LOOP, feedforward=0.8)
+    errors = []
+    for T_s in (1e-3, 5e-4, 2.5e-4):
+        x_d = np.asarray(0.01 * np.sin(20.0 * T_s * np.arange(round(1.5 / T_s))) ** 2, dtype=np.float64)
+        model = loop.model.discretise(T_s)
+        expected = model.forced_response(model.rest(), x_d)[0]
+        errors.append(rms(TwoMassDrive(axis(loop, T_s)).run(x_d) - expected))
+    assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.1)
+    assert errors[1] / errors[2] == pytest.approx(2.0, rel=0.1)
+
+
+def test_sliding_friction_holds_the_axis_back_by_its_closed_form() -> None:
+    """P/P: ``K_p (K_v e − v) = F_c + 2 b v`` where the velocity is constant, and both bodies move alike."""
+    v = 0.05
+    x_d = v * 1e-3 * np.arange(4000)
+    drive = TwoMassDrive(axis(replace(LOOP, at_load=False), motor=FRICTION, interpolates=1.0))
+    drive.run(x_d)
+    x_motor, v_motor, _, v_load, _, force = drive.states()
+    assert [v_motor, v_load] == pytest.approx([v, v], rel=1e-5)
+    sliding = FRICTION.coulomb * (1 + (FRICTION.stribeck - 1) / (1 + (v / FRICTION.v_stribeck) ** 2))
+    assert force == pytest.approx(sliding + 2 * LOOP.viscous * v, rel=1e-4)
+    assert x_d[-1] - x_motor == pytest.approx((v + force / LOOP.k_p) / LOOP.k_v, rel=1e-4)
+
+
+@pytest.mark.parametrize(("share", "slides"), [(0.9, False), (1.1, True)])
+def test_an_axis_breaks_away_at_the_static_friction(share: float, slides: bool) -> None:
+    static = FRICTION.coulomb * FRICTION.stribeck
+    x_d = np.linspace(0.0, share * static / (LOOP.k_p * LOOP.k_v), 4000)
+    x = TwoMassDrive(axis(motor=FRICTION)).run(x_d)
+    assert bool(x[-1] > 3 * FRICTION.presliding * FRICTION.stribeck) is slides
+
+
+def test_backlash_is_the_play_of_the_load() -> None:
+    steps = np.repeat([0.0, 0.01, 0.0], 1500)
+    x_d = np.asarray(np.convolve(steps, np.full(300, 1 / 300))[: len(steps)], dtype=np.float64)
+    slow = replace(LOOP, k_v=8.0)
+    bearing = Friction(coulomb=0.05, presliding=1e-6, micro_damping=50.0)
+    tight, loose = (TwoMassDrive(axis(slow, play=play, bearing=bearing)).run(x_d) for play in (0.0, 2e-4))
+    assert tight[2999] - loose[2999] == pytest.approx(1e-4, rel=0.05)
+    assert tight[-1] - loose[-1] == pytest.approx(-1e-4, rel=0.05)
+
+
+def test_the_motor_has_no_more_force_than_its_limit() -> None:
+    drive = TwoMassDrive(axis(replace(LOOP, t_i=0.05), force_max=0.5))
+    largest = 0.0
+    for k in range(1500):
+        drive.step(0.02 * float(k > 10))
+        largest = max(largest, abs(float(drive.states()[5])))
+    assert largest == pytest.approx(0.5, rel=0.02)
+    assert drive.x == pytest.approx(0.02, abs=1e-3)  # it arrives, without windup
+
+
+def test_internal_steps_are_short_enough(recipes: list[Recipe]) -> None:
+    for recipe in recipes[:30]:
+        coarse, fine = response(recipe, recipe.axis), response(recipe, recipe.axis, INTERNAL_STEP / 4)
+        linear = response(recipe, recipe.axis.linear())
+        assert rms(coarse - fine) <= 0.05 * rms(fine - linear) + 3e-8, recipe.index
+
+
+def test_no_friction_feeds_energy_into_a_drive(recipes: list[Recipe]) -> None:
+    """A P/P loop comes to rest after a move, within what its friction holds."""
+    for recipe in [recipe for recipe in recipes if not recipe.axis.loop.t_i][:25]:
+        moved = replace(recipe.axis, change_at=10**9, cogging=0.0, play=0.0, lead=0.0)
+        T_s, loop = moved.T_s, moved.loop
+        x_d = np.concatenate((np.zeros(10), np.full(round(3.0 / T_s), 1e-3)))
+        drive = TwoMassDrive(moved)
+        x = drive.run(x_d)
+        still = moved.motor.coulomb * moved.motor.stribeck + moved.bearing.coulomb * moved.bearing.stribeck
+        assert np.ptp(x[-round(0.2 / T_s) :]) < 2e-6, recipe.index
+        assert abs(drive.states()[5]) <= still + 1e-3 * loop.k_p * loop.k_v * 1e-3
+
+
+def test_steps_and_a_run_are_the_same(recipes: list[Recipe]) -> None:
+    recipe = recipes[3]
+    x = response(recipe, recipe.axis)
+    drive = TwoMassDrive(recipe.axis, float(recipe.x_d[0]))
+    for k, command in enumerate(recipe.x_d[:500].tolist()):
+        assert drive.x == x[k]
+        drive.step(command)
+
+
+def test_models_are_wrong_by_40_percent_at_most() -> None:
+    lags = 0
+    for index in range(40):
+        model, text = nominal_model(Draws(index), LOOP, 1)
+        assert model.dc_gain == pytest.approx(1.0, abs=MODEL_ERROR + 1e-9)
+        if text.startswith("lag"):
+            lags += 1
+            assert model.modes[0].omega / LOOP.k_v == pytest.approx(1.0, abs=MODEL_ERROR)
+    assert 3 <= lags <= 18
+
+
+def test_peers_are_scored_beside_the_predictor(drives: list[Drive]) -> None:
+    slowest = max(drives, key=lambda drive: drive.settings.T_s)
+    result = replay(slowest, "default", peers=True)
+    assert len(result.rms_arx) == 2
+    assert result.peer_ratio >= result.hold_ratio
+    assert not result.diverged
