@@ -133,7 +133,7 @@ def test_feedforward_is_that_of_the_model_to_first_order_in_the_sampling_interva
 def test_sliding_friction_holds_the_axis_back_by_its_closed_form() -> None:
     """P/P: ``K_p (K_v e − v) = F_c + 2 b v`` where the velocity is constant, and both bodies move alike."""
     v = 0.05
-    x_d = v * 1e-3 * np.arange(4000)
+    x_d = np.asarray(v * 1e-3 * np.arange(4000), dtype=np.float64)
     drive = TwoMassDrive(axis(replace(LOOP, at_load=False), motor=FRICTION, interpolates=1.0))
     drive.run(x_d)
     x_motor, v_motor, _, v_load, _, force = drive.states()
