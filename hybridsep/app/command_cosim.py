@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -65,6 +66,7 @@ def cosim(
     Over the staircase, a spiral's axis or a trajectory in a file.
     """
     with loading():
+        from ..cosim.apart import run_apart
         from ..cosim.loop import cosimulate
         from ..cosim.run import RESULT_SUFFIXES
         from ..machines.machine import load_machine, machine_path
@@ -103,7 +105,9 @@ def cosim(
         folder = Path(place)
         ahead = predictor or build_for_host(axis, model, folder, flavour, weights=weights)
         drive = plant or build_for_host(axis, "FeedDrive", folder, flavour)
-        run = cosimulate(
+        given = [path.name for path in (predictor, plant) if path is not None]
+        call = partial(run_apart, " or ".join(given), cosimulate) if given else cosimulate
+        run = call(
             ahead,
             drive,
             command,

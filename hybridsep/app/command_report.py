@@ -44,6 +44,7 @@ def report(
     It is checked and replayed as by backtest. The file needs no network.
     """
     with loading():
+        from ..cosim.apart import run_apart
         from ..cosim.fmus import check_controller
         from ..cosim.run import PREDICTOR
         from ..evaluate.report import Report
@@ -56,7 +57,7 @@ def report(
         from .overwrite import BY_ENDING, REPORT, Output, check_outputs
         from .progress import progress_bar
         from .report_sections import Judged, recommendation, write_changes, write_errors, write_findings, write_use
-        from .step_times import step_times
+        from .step_times import SAMPLES_MAX, step_times
         from .tables import console, print_written
 
     page = out or Path(f"{machine_name(log)}_report.html")
@@ -78,7 +79,9 @@ def report(
         recording = Recording(whole.x_d, whole.x_meas, 0)
         replayed = replay(predictor, [recording], progress=lambda done: advance("replay", 0.9 * done))
         advance("time the FMU's steps", 0.95)
-        steps = step_times(fmu, whole.x_d, whole.x_meas) if fmu is not None else {}
+        steps = {}
+        if fmu is not None:
+            steps = run_apart(fmu.name, step_times, fmu, whole.x_d[:SAMPLES_MAX], whole.x_meas[:SAMPLES_MAX])
     judged = Judged(replayed, whole.T_s, axis_machine.unit, "the log")
     n, settings = len(whole.t), predictor.settings
     written = Report(

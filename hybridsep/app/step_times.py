@@ -10,9 +10,10 @@ import numpy as np
 from ..base.signals import Array
 from ..cosim.fmus import FmuController
 
-__all__ = ["step_times"]
+__all__ = ["SAMPLES_MAX", "step_times"]
 
-_SAMPLES_MAX = 5000
+SAMPLES_MAX = 5000
+"""Samples that are timed, at most."""
 
 
 def step_times(fmu: Path, x_d: Array, x: Array) -> dict[str, float]:
@@ -30,7 +31,7 @@ def step_times(fmu: Path, x_d: Array, x: Array) -> dict[str, float]:
     dict
         ``median``, ``p99_9`` and ``largest``.
     """
-    n = min(len(x_d), _SAMPLES_MAX)
+    n = min(len(x_d), SAMPLES_MAX)
     taken = np.empty(n)
     controller = FmuController(fmu, {}, 0.0)
     with controller:

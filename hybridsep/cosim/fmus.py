@@ -7,11 +7,15 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
-from ..base.errors import FmuError
+from ..base.errors import FmuError, brief
+from ..base.settings import check
 from .importer import FmuInstance, read_description
 from .run import COMPENSATOR, PREDICTOR, Kind
 
 __all__ = ["FmuController", "FmuDrive", "check_controller", "check_plant"]
+
+_SAMPLES_MAX = 1_000_000
+"""Most samples of an FMU's window or delay; a hybridsep FMU's have at most a tenth."""
 
 
 class _OpenedFmu(AbstractContextManager["_OpenedFmu"]):
@@ -43,6 +47,17 @@ class _OpenedFmu(AbstractContextManager["_OpenedFmu"]):
     def _initialise(self, inputs: Mapping[str, float]) -> None:
         self.fmu.initialise({**self._values, **inputs}, start_time=self._start_time)
 
+    def _samples(self, name: str) -> int:
+        """Return a number of samples that the FMU tells, checked."""
+        value = self.fmu.get(name)
+        if not 0 <= value <= _SAMPLES_MAX:  # NaN too
+            raise FmuError(f"{self.name}: {name} must be 0 … {_SAMPLES_MAX} samples, got {brief(value)}")
+        return int(value)
+
+    def _interval(self) -> float:
+        """Return the sampling interval that the FMU tells, s, checked."""
+        return float(check("T_s", self.fmu.get("T_s"), label=f"{self.name}: T_s"))
+
     def _step(self, k: int, h: float) -> None:
         self.fmu.step(self._start_time + k * h, h)
 
@@ -66,8 +81,8 @@ class FmuController(_OpenedFmu):
         """Begin a run at rest at ``start``, m."""
         fmu = self.fmu
         self._initialise({"x_d_ahead": start, "x_meas": start})
-        self.delay, self.Np, self.T_s = int(fmu.get(self.kind.delay)), int(fmu.get("Np")), float(fmu.get("T_s"))
-        self.late = int(fmu.get("measurement_delay")) if "measurement_delay" in fmu.variables else 0
+        self.delay, self.Np, self.T_s = self._samples(self.kind.delay), self._samples("Np"), self._interval()
+        self.late = self._samples("measurement_delay") if "measurement_delay" in fmu.variables else 0
         self._get, self._set = fmu.real_reader(self.kind.outputs), fmu.real_writer(["x_d_ahead", "x_meas"])
 
     def outputs(self) -> tuple[tuple[float, ...], int]:
@@ -104,7 +119,7 @@ class FmuDrive(_OpenedFmu):
         self.plant: Any = self.fmu
         self._initialise({"x_d": start})
         if "T_s" in self.fmu.variables:
-            self.T_s = float(self.fmu.get("T_s"))
+            self.T_s = self._interval()
         self._get, self._set = self.fmu.real_reader(["x", "x_meas"]), self.fmu.real_writer(["x_d"])
 
     def outputs(self) -> tuple[float, float]:

@@ -24,10 +24,13 @@ from fmpy.fmi2 import (
     fmi2CallbackLoggerTYPE,
 )
 
-from ..base.errors import FmuError
+from ..base.errors import FmuError, first_line, listed
 from ..base.interrupt import uninterrupted
 from ..base.output import named_errors
 from ..fmi.pythonfmu_limits import check_unpacked
+from .archive_check import read_description_text
+from .binary_check import check_binary
+from .description_check import check_description
 
 __all__ = ["FmuInstance", "read_description"]
 
@@ -46,16 +49,15 @@ def read_description(path: str | Path) -> Any:
     path = Path(path)
     if not path.is_file():
         raise FmuError(f"no FMU at {path}; build it first (hybridsep build)")
+    check_description(path.name, read_description_text(path))
     try:
-        description = fmpy.read_model_description(str(path), validate=False)
+        return fmpy.read_model_description(str(path), validate=False)
     except Exception as error:  # fmpy raises bare Exceptions here
-        raise FmuError(f"{path.name} is not a readable FMU: {_first_line(error)}") from error
-    if description.fmiVersion != "2.0":
-        raise FmuError(f"{path.name} must be an FMI 2.0 FMU, got FMI {description.fmiVersion}")
-    if description.coSimulation is None:
-        raise FmuError(f"{path.name} must be a co-simulation FMU, got one for model exchange only")
-    return description
+        raise FmuError(f"{path.name} is not a readable FMU: {first_line(error)}") from error
 
+
+_WORDS_MAX = 1000
+"""Most characters of an FMU's message in an error."""
 
 _LOADING = threading.Lock()
 
@@ -101,7 +103,9 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
     Raises
     ------
     FmuError
-        If the archive cannot be read, is no FMI 2.0 co-simulation FMU, or refuses to be instantiated.
+        If the archive cannot be read, must not be unpacked, is no FMI 2.0 co-simulation FMU, has no intact library for
+        this platform, or refuses to be instantiated. A library's code runs in this process, and may still end it; for
+        a process of its own see :func:`~hybridsep.cosim.apart.run_apart`.
     """
 
     def __init__(self, path: str | Path, instance_name: str | None = None) -> None:
@@ -129,18 +133,21 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
         except OSError:  # the disk's, with a name
             raise
         except Exception as error:  # fmpy raises bare Exceptions here
-            raise FmuError(f"{self.path.name} cannot be loaded: {_first_line(error)}") from error
+            raise FmuError(f"{self.path.name} cannot be loaded: {first_line(error)}") from error
+        identifier = self.description.coSimulation.modelIdentifier
         try:
+            self._check_library(folder, identifier)
             check_unpacked(folder, self.description.generationTool or "")
             with _working_directory():
                 slave = FMU2Slave(
                     guid=self.description.guid,
                     unzipDirectory=str(folder),
-                    modelIdentifier=self.description.coSimulation.modelIdentifier,
+                    modelIdentifier=identifier,
                     instanceName=instance_name,
                 )
         except Exception as error:  # fmpy raises bare Exceptions here
-            raise FmuError(f"{self.path.name} cannot be loaded: {_first_line(error)}") from error
+            reason = error if isinstance(error, FmuError) else first_line(error)
+            raise FmuError(f"{self.path.name} cannot be loaded: {reason}") from error
         try:
             slave.instantiate(callbacks=_callbacks(self.log), loggingOn=True)
         except Exception as error:
@@ -149,6 +156,17 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
         self._slave = slave
         # Also for an instance that nobody closes: pythonfmu 0.7 corrupts the heap where the process exits before
         self._release = weakref.finalize(self, _release, slave, folder)
+
+    def _check_library(self, folder: Path, identifier: str) -> None:
+        """Raise FmuError if there is no library for this platform, or one that must not be loaded."""
+        place = f"binaries/{fmpy.platform}/{identifier}{fmpy.sharedLibraryExtension}"
+        if not (folder / place).is_file():
+            there = sorted(path.name for path in (folder / "binaries").glob("*") if path.is_dir())
+            raise FmuError(f"{place} is missing, there are binaries for {listed(there, str)}")
+        try:
+            check_binary(folder / place)
+        except ValueError as error:
+            raise FmuError(f"{place} {error}") from error
 
     @property
     def slave(self) -> FMU2Slave:
@@ -200,6 +218,8 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
     def get(self, name: str) -> Any:
         """Return one variable."""
         variable = self._variable(name)
+        if variable.type not in _ACCESS:
+            raise FmuError(f"{self.path.name}: {name} is a {variable.type}, which is not supported here")
         return self._call(getattr(self.slave, f"get{_ACCESS[variable.type]}"), [variable.valueReference])[0]
 
     def real_writer(self, names: Sequence[str]) -> Callable[[Sequence[float]], None]:
@@ -245,7 +265,7 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
     def _call(self, function: Callable[..., Any], *arguments: Any, **keywords: Any) -> Any:
         try:
             return function(*arguments, **keywords)
-        except FMICallException as error:
+        except (FMICallException, OSError) as error:  # on Windows ctypes raises OSError where others have a signal
             raise FmuError(f"{self.path.name}: {error}{self._last_words()}") from error
 
     def _last_words(self) -> str:
@@ -254,12 +274,7 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
             return ""
         text = self.log[-1][1]
         framed = re.search(r"\w+Error\(([\"'])(.*)\1\)", text, re.DOTALL)
-        return f": {framed[2] if framed else text}"
-
-
-def _first_line(error: Exception) -> str:
-    """Return the first line of an error's message, or its type where it has none."""
-    return (str(error).splitlines() or [type(error).__name__])[0]
+        return f": {' '.join((framed[2] if framed else text).split())[:_WORDS_MAX]}"
 
 
 def _callbacks(log: list[tuple[int, str]]) -> fmi2CallbackFunctions:
