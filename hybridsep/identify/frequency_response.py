@@ -20,6 +20,7 @@ from ..base.threads import one_blas_thread
 from ..machines.machine import Machine
 from ..model.physics import ModalModel
 from .modal_fit import ModalFit
+from .mode_count import best_fit, doubtful_modes
 from .model import machine_of
 from .response_fit import MODES_MAX, Lines, fits_by_size
 from .uncertainty import Estimate
@@ -112,7 +113,7 @@ def identify_frequency_response(
     std : (n,) array_like, optional
         Standard deviation of each line's complex error; a constant part of its magnitude if left out.
     n_modes : int, optional
-        Number of modes; by the Bayesian information criterion if left out.
+        Number of modes; by the Bayesian information criterion (:mod:`.mode_count`) if left out.
     unit_gain : bool
         Whether the static gain is 1.
     T_s : float
@@ -142,7 +143,7 @@ def identify_frequency_response(
     delay = np.exp(1j * omega * dead_time * T_s)
     lines = Lines(omega, G * delay, sigma, std is None, unit_gain, (T_s, input_hold) if sampled else None)
     fits = fits_by_size(lines, counts, progress)
-    best, part = min(fits, key=lambda found: lines.criterion(found[0]))
+    best, part = fits[best_fit(lines, fits)]
     model = ModalModel(best.modes(), dead_time)
     noise = float(np.sqrt(best.cost / max(1, 2 * len(f) - best.n_free))) * np.sqrt(2.0)
     return IdentifiedResponse(
@@ -157,7 +158,7 @@ def identify_frequency_response(
         criteria=tuple(
             (len(fit.parameters), lines.relative_error(fit, part), lines.criterion(fit)) for fit, part in fits
         ),
-        findings=tuple(_findings(best, f, noise, std is not None)),
+        findings=tuple(_findings(best, f, noise, std is not None) + _doubts(best, lines)),
     )
 
 
@@ -203,6 +204,16 @@ def _estimates(fit: ModalFit, noise: float) -> tuple[Estimate, ...]:
     variance = float(covariance[np.ix_(gains, gains)].sum())
     found.append(Estimate("gain", float(fit.parameters[:, 2].sum()), float(np.sqrt(max(variance, 0.0))), "1"))
     return tuple(found)
+
+
+def _doubts(fit: ModalFit, lines: Lines) -> list[str]:
+    """Return findings on modes that may be errors of single lines, as where their number is given."""
+    frequencies = np.exp(fit.parameters[:, 0]) / (2 * np.pi)
+    return [
+        f"the damping of mode[{i + 1}], {frequencies[i]:.4g} Hz, is not significantly above 0: the mode may be one "
+        "line's error"
+        for i in doubtful_modes(fit, lines)
+    ]
 
 
 def _findings(fit: ModalFit, f: Array, noise: float, std_given: bool) -> list[str]:

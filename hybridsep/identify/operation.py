@@ -14,6 +14,7 @@ from ..base.threads import one_blas_thread
 from ..intake.gain import runs_against
 from ..intake.motion import starts_in_motion
 from ..model.physics import ModalModel
+from .delay import delay_finding
 from .model import Alternative, IdentifiedModel
 from .output_error import Delay, Fit, fit_structure, simulated
 from .search import fit_near
@@ -107,6 +108,7 @@ def identify_operation(
         *(fit, chosen, segments, parameters[0].std, n_effective, unit),
         [np.asarray(x_d, dtype=np.float64) for x_d, _ in given],
     )
+    findings += delay_finding(fit, segments, T_s)
     progress("identified", 1.0)
     return IdentifiedModel(
         model=_modal(fit, T_s),
@@ -120,7 +122,7 @@ def identify_operation(
         rms_held_out=chosen.rms_held_out,
         n_samples=sum(int(segment.known.sum()) for segment in segments),
         n_effective=n_effective,
-        alternatives=tuple(_alternative(candidate, T_s) for candidate in candidates),
+        alternatives=tuple(_alternative(candidate, chosen, T_s) for candidate in candidates),
         findings=tuple(findings),
     )
 
@@ -187,9 +189,12 @@ def _modal(fit: Fit, T_s: float) -> ModalModel:
     return ModalModel(fit.structure.modes(fit.theta, fit.linear, T_s), fit.delay.samples)
 
 
-def _alternative(candidate: Candidate, T_s: float) -> Alternative:
+def _alternative(candidate: Candidate, chosen: Candidate, T_s: float) -> Alternative:
     fit = candidate.fit
     possible = not candidate.objection
+    objection = candidate.objection
+    if possible and candidate is not chosen and candidate.slow_parts:
+        objection = f"zeros all but cancel a slow part of {candidate.slow_parts[0]:.3g} Hz, and it explains too little"
     return Alternative(
         name=fit.structure.name,
         n_parameters=fit.structure.n_parameters,
@@ -197,7 +202,7 @@ def _alternative(candidate: Candidate, T_s: float) -> Alternative:
         input_hold=fit.delay.input_hold,
         rms_fitted=fit.rms,
         rms_held_out=candidate.rms_held_out,
-        objection=candidate.objection,
+        objection=objection,
     )
 
 

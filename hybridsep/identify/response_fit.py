@@ -13,7 +13,7 @@ from ..model.physics import ModalModel
 from .modal_fit import ModalFit, polish, quadratics_of
 from .vector_fitting import starting_poles, vector_fit
 
-__all__ = ["MODES_MAX", "Lines", "fits_by_size"]
+__all__ = ["MODES_MAX", "Complex", "Lines", "fits_by_size"]
 
 Complex = NDArray[np.complex128]
 
@@ -80,10 +80,11 @@ class Lines:
             fit = polish(*(self.omega, self.response / part, weight, fit.parameters[:, :2]), unit_gain=self.unit_gain)
         return fit, part
 
-    def criterion(self, fit: ModalFit) -> float:
-        """Return the Bayesian information criterion."""
+    def criterion(self, fit: ModalFit, n_effective: float | None = None) -> float:
+        """Return the Bayesian information criterion; of as many independent values where they are fewer."""
         n = 2 * len(self.omega)
-        return float(n * np.log(max(fit.cost, 1e-300) / n) + fit.parameters.size * np.log(n))
+        counted = n if n_effective is None else n_effective
+        return float(counted * np.log(max(fit.cost, 1e-300) / n) + fit.parameters.size * np.log(counted))
 
     def relative_error(self, fit: ModalFit, part: Complex) -> float:
         """Return the RMS of the relative error."""

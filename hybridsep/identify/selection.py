@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.signals import Array, Indices
+from .cancelling import slow_parts
 from .output_error import Fit, simulated
 from .search import fit_delay
 from .segments import Segment, motion_split
@@ -43,6 +44,10 @@ FITTED_BETTER = 0.7
 """Ratio of the fitted errors at which a larger structure is taken though the held-out ones are alike: what no structure
 explains, such as a first reversal, may be most of these."""
 
+CANCELLING_WORTH = 0.6
+"""Ratio of the errors, geometric mean of the fitted and the held-out ones, at which a model with a slow part that its
+zeros all but cancel is taken: of friction and cables such parts leave 0.64 to 0.85, of a drive's loops less."""
+
 GROWTH = 2
 """Orders above the best one that are tried before the search ends."""
 
@@ -71,6 +76,12 @@ class Candidate:
     def structure(self) -> Structure:
         """Its structure."""
         return self.fit.structure
+
+    @property
+    def slow_parts(self) -> list[float]:
+        """Frequencies of slow parts that its zeros all but cancel, Hz."""
+        fit = self.fit
+        return slow_parts(fit.structure.modes(fit.theta, fit.linear, 1.0)) if fit.structure.order > 1 else []
 
     @property
     def rms_held_out(self) -> float:
@@ -134,6 +145,17 @@ def choose(candidates: Sequence[Candidate]) -> Candidate:
     later one.
     """
     usable = [candidate for candidate in candidates if not candidate.objection] or list(candidates[:1])
+    chosen = _chosen_of(usable)
+    plain = [candidate for candidate in usable if not candidate.slow_parts]
+    if not chosen.slow_parts or not plain:
+        return chosen
+    other = _chosen_of(plain)
+    ratio = np.sqrt(chosen.fit.rms / other.fit.rms * chosen.rms_held_out / other.rms_held_out)
+    return chosen if ratio < CANCELLING_WORTH else other
+
+
+def _chosen_of(usable: Sequence[Candidate]) -> Candidate:
+    """Return the simplest of these candidates that is as good as the best, as :func:`choose` does."""
     best = min(usable, key=lambda candidate: candidate.rms_held_out)
     by_size = sorted(usable, key=lambda candidate: candidate.structure.n_parameters)
     alike = [candidate for candidate in by_size if _as_good(candidate, best)]

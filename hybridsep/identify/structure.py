@@ -18,6 +18,10 @@ ZETA_RANGE = (0.003, 5.0)
 SLOWEST = 0.1
 """Slowest pole in multiples of the bandwidth: friction and the like, which are not linear, look like slower ones."""
 
+FASTEST = 0.25
+"""Highest natural frequency in multiples of the sampling frequency: with fewer than four samples a period a log does
+not resolve a mode, and its replay is refused."""
+
 DECAY_MIN = 5.0
 """Time constants of a pole within the recording, at least; a slower one cannot be told from drift."""
 
@@ -77,7 +81,7 @@ class Structure:
     def bounds(self, T_s: float, slowest: float) -> tuple[Array, Array]:
         """Return the range of the nonlinear parameters with poles no slower than ``slowest``, rad/s."""
         slowest = min(slowest, 1.0 / T_s)
-        mode_low, mode_high = [slowest, ZETA_RANGE[0]], [np.pi / T_s, ZETA_RANGE[1]]
+        mode_low, mode_high = [slowest, ZETA_RANGE[0]], [2 * np.pi * FASTEST / T_s, ZETA_RANGE[1]]
         low = mode_low * self.n_modes + [slowest] * self.lag
         high = mode_high * self.n_modes + [10.0 / T_s] * self.lag
         return np.log(low), np.log(high)

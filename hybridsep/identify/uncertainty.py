@@ -12,12 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.signals import Array
+from ..base.signals import Array, Indices
 from .output_error import Fit, affine, without
 from .responses import free_responses, responses, sections_of
 from .segments import Segment, delayed
 
-__all__ = ["Estimate", "estimates"]
+__all__ = ["Estimate", "estimates", "full_covariance"]
 
 BATCHES = 30
 """Batches of the residual: enough for a variance, and each long beside a servo's memory."""
@@ -57,11 +57,8 @@ def estimates(fit: Fit, segments: Sequence[Segment], T_s: float, unit: str = "m"
     unit : {"m", "rad"}
         Unit of the positions.
     """
-    jacobian, residual = _jacobian(fit, segments, T_s)
-    scale = np.linalg.norm(jacobian, axis=0)
-    scale[scale == 0] = 1.0
-    jacobian = jacobian / scale
-    edges = np.linspace(0, len(residual), min(BATCHES, len(residual)) + 1).astype(int)[:-1]
+    jacobian, residual, scale = _scaled(fit, segments, T_s)
+    edges = _batches(residual)
     scores = np.add.reduceat(jacobian * residual[:, None], edges)
     given_delay = [i for i in range(jacobian.shape[1]) if i != jacobian.shape[1] - 2]
     covariance = np.zeros((len(scale), len(scale)))
@@ -71,6 +68,32 @@ def estimates(fit: Fit, segments: Sequence[Segment], T_s: float, unit: str = "m"
     white = float(residual @ residual)
     n_effective = len(residual) * min(1.0, white / max(float(sums @ sums), 1e-300))
     return _named(fit, covariance / np.outer(scale, scale), T_s, unit), n_effective
+
+
+def full_covariance(fit: Fit, segments: Sequence[Segment], T_s: float) -> Array:
+    """Return the covariance of θ, linear parameters, dead time in samples and offset, all of them free.
+
+    Parameters
+    ----------
+    fit, segments, T_s
+        As for :func:`estimates`.
+    """
+    jacobian, residual, scale = _scaled(fit, segments, T_s)
+    scores = np.add.reduceat(jacobian * residual[:, None], _batches(residual))
+    return _sandwich(jacobian, scores) / np.outer(scale, scale)
+
+
+def _scaled(fit: Fit, segments: Sequence[Segment], T_s: float) -> tuple[Array, Array, Array]:
+    """Return the Jacobian with columns of unit norm, the residual, and the norms."""
+    jacobian, residual = _jacobian(fit, segments, T_s)
+    scale = np.linalg.norm(jacobian, axis=0)
+    scale[scale == 0] = 1.0
+    return jacobian / scale, residual, scale
+
+
+def _batches(residual: Array) -> Indices:
+    """Return the first sample of each batch."""
+    return np.linspace(0, len(residual), min(BATCHES, len(residual)) + 1).astype(int)[:-1]
 
 
 def _sandwich(jacobian: Array, scores: Array) -> Array:

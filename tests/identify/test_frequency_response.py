@@ -90,6 +90,34 @@ def test_the_static_gain_can_be_one() -> None:
     assert gain.std < 1e-9
 
 
+def two_modes() -> ModalModel:
+    return ModalModel([Mode(35.0, 0.3, 0.9 * (70 * np.pi) ** 2), Mode(80.0, 0.05, 0.1 * (160 * np.pi) ** 2)])
+
+
+@pytest.mark.parametrize("seed", [0, 20])
+def test_errors_of_single_lines_are_no_modes(seed: int) -> None:
+    """Noise alike at all lines, where the response is small: once eight undamped modes, each on one line."""
+    f = np.linspace(1.0, 150.0, 600)
+    rng = np.random.default_rng(seed)
+    noise = 0.003 * (rng.standard_normal(len(f)) + 1j * rng.standard_normal(len(f)))
+    found = identify_frequency_response(f, two_modes().frequency_response(2 * np.pi * f) + noise)
+    assert [mode.f_n for mode in found.model.modes] == pytest.approx([35.0, 80.0], rel=0.01)
+    given = identify_frequency_response(f, two_modes().frequency_response(2 * np.pi * f) + noise, n_modes=4)
+    assert "is not significantly above 0: the mode may be one line's error" in " ".join(given.findings)
+
+
+def test_friction_in_a_swept_sine_is_no_mode() -> None:
+    truth, T_s = ModalModel([Mode(35.0, 0.3, (70 * np.pi) ** 2)]), 1e-3
+    t = np.arange(20_000) * T_s
+    x_d = 1e-3 * chirp(t, 1.0, t[-1], 150.0, phi=-90) * np.minimum(1.0, np.minimum(t, t[-1] - t) / 0.5)
+    x_d /= 1.0 + 8.0 * t / t[-1]
+    discrete = truth.discretise(T_s)
+    x = discrete.forced_response(discrete.rest(), x_d - 3e-6 * np.tanh(np.gradient(x_d, T_s) / 2e-3))[0]
+    lines = h1(x_d, x + 2e-7 * np.random.default_rng(0).standard_normal(len(x)), T_s)
+    found = identify_frequency_response(lines.frequency, lines.response, std=lines.std, T_s=T_s, sampled=True)
+    assert [mode.f_n for mode in found.model.modes] == pytest.approx([35.0], rel=0.01)
+
+
 def test_given_deviations_weigh_the_lines() -> None:
     truth = ModalModel([Mode(20.0, 0.1, (40 * np.pi) ** 2, 5.0)])
     G = truth.frequency_response(OMEGA)

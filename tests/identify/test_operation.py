@@ -15,6 +15,7 @@ from scipy.signal import chirp
 from hybridsep import ModalModel, Mode
 from hybridsep.base.errors import IdentificationError
 from hybridsep.base.signals import Array
+from hybridsep.identify.cancelling import slow_parts
 from hybridsep.identify.model import IdentifiedModel
 from hybridsep.identify.operation import identify_operation, unit_gain_model
 from hybridsep.identify.output_error import Delay, fit_structure, without
@@ -86,6 +87,63 @@ def test_a_recording_that_starts_in_motion_is_used() -> None:
     behind = identify_operation([(x_d[:start], x[:start]), (x_d[start:], x[start:])], T_S, order_max=1)
     assert "a piece behind a gap starts in motion" in " ".join(behind.findings)
     assert value(found, "mode[1].f_n")[0] == pytest.approx(20.0, rel=0.002)
+
+
+def rubbed(x_d: Array, friction: float) -> Array:
+    """Return a command less what rubs, which turns over 30 µm of way, m."""
+    z = np.zeros(len(x_d))
+    for k, step in enumerate(np.diff(x_d) / 30e-6, 1):
+        z[k] = np.clip(z[k - 1] + step - abs(step) * z[k - 1], -1.0, 1.0)
+    return np.asarray(x_d - friction * z)
+
+
+def test_friction_is_no_slow_part_of_the_model() -> None:
+    """A lag of 35 Hz became a mode of 4.8 Hz with ζ = 4 and a zero that cancels its slow pole."""
+    x_d = moves(5000)
+    x = measured(ModalModel([lag_mode(1 / (70 * np.pi))], dead_time=1), rubbed(x_d, 20e-6), "zoh", 5e-7)
+    found = identify_operation([(x_d, x)], T_S, order_max=2)
+    assert found.structure == "first-order lag, gain free"
+    assert found.model.modes[0].f_n == pytest.approx(35.0, rel=0.06)
+    refused = [other.objection for other in found.alternatives if other.name == "second order with zero, gain 1"]
+    assert refused[0].startswith("zeros all but cancel a slow part of 0.")
+
+
+def test_slow_parts_that_cancel() -> None:
+    def mode(f_n: float, zeta: float, gain: float, beta: float = 0.0) -> Mode:
+        omega = 2 * np.pi * f_n
+        return Mode(f_n, zeta, gain * omega**2, beta * omega)
+
+    assert slow_parts([mode(35.0, 0.3, 0.96), mode(3.0, 0.7, 0.04)]) == [3.0]
+    assert slow_parts([mode(35.0, 0.3, 0.6), mode(3.0, 0.7, 0.4)]) == []
+    assert slow_parts([mode(35.0, 0.3, 1.0), mode(3.0, 0.7, 0.0, 0.5)]) == []  # a resonance of its own
+    assert slow_parts([mode(35.0, 0.3, 0.9), mode(60.0, 0.02, 0.1)]) == []
+    assert slow_parts([lag_mode(5e-3)]) == []
+    # (s + 21)/(s + 20) times a lag of 200 1/s, as one over-damped mode; without the zero it is slow by itself
+    omega, zeta = np.sqrt(20.0 * 200.0), 220.0 / (2 * np.sqrt(20.0 * 200.0))
+    f_n, gain = omega / (2 * np.pi), omega**2
+    assert slow_parts([Mode(f_n, zeta, gain, gain / 21.0)]) == pytest.approx([20.0 / (2 * np.pi)])
+    assert slow_parts([Mode(f_n, zeta, gain, 0.0)]) == []
+
+
+def test_lag_and_dead_time_that_cannot_be_told_apart() -> None:
+    """A slow command tells their sum alone; the moves tell each."""
+    t = T_S * np.arange(6000)
+    slow = 5e-3 * (1 - np.cos(2 * np.pi * 0.25 * t))
+    found = identify_operation([(slow, measured(LAG, slow, "zoh", 10e-6))], T_S, order_max=1, unit_gain=True)
+    [told] = [finding for finding in found.findings if finding.startswith("lag and dead time cannot be told apart")]
+    delay, std = (float(word) for word in told.partition("together they delay by ")[2].split(" ")[0:3:2])
+    assert 0 < std < 0.1
+    assert abs(delay - 11.5) < 4 * std  # lag, three samples, half a sample of the hold
+    x_d = moves(2000)
+    assert "told apart" not in " ".join(identify_operation([(x_d, measured(LAG, x_d, "zoh", 1e-7))], T_S).findings)
+
+
+def test_a_mode_that_the_log_does_not_resolve_is_not_chosen() -> None:
+    """With fewer than four samples a period a replay of the log would be refused."""
+    x_d = moves(3000)
+    fast = ModalModel([Mode(330.0, 0.05, (660 * np.pi) ** 2)])
+    found = identify_operation([(x_d, measured(fast, x_d, "foh", 1e-8))], T_S)
+    assert all(mode.zeta >= 1.0 or mode.f_n <= 0.25 / T_S for mode in found.model.modes)
 
 
 def test_a_drive_beyond_its_bandwidth_has_no_wrong_sign() -> None:
