@@ -77,23 +77,24 @@ class Recipe:
         noise = machine.encoder.noise_std * draws.normal(len(x_d))
         return cls(index, kind, x_d, noise, axis, machine.encoder, model, settings, text)
 
-    def measured(self, k: int, x: float) -> float:
-        """Return what the encoder reads at sample ``k`` where the position is ``x``, m."""
-        quantum = self.encoder.quantum
-        return float(quantum * np.rint((x + self.noise[k]) / quantum))
-
-    def drive(self, x: Array) -> Drive:
-        """Return the drive with its true positions, ``(n,)``, m."""
-        quantum = self.encoder.quantum
-        x_meas = quantum * np.rint((x + self.noise) / quantum)
+    @property
+    def description(self) -> str:
+        """Description of the drive and its model."""
+        encoder = self.encoder
         parts = (
             f"{self.kind} of {1e3 * np.ptp(self.x_d):.3g} mm in {len(self.x_d) * self.axis.T_s:.1f} s",
             f"{1 / self.axis.T_s:.0f} Hz, Np = {self.settings.Np}",
             self.axis.text,
             f"model {self.text}",
-            f"{self.encoder.bits} bits of {1e6 * quantum:.2g} µm, noise {1e6 * self.encoder.noise_std:.2g} µm",
+            f"{encoder.bits} bits of {1e6 * encoder.quantum:.2g} µm, noise {1e6 * encoder.noise_std:.2g} µm",
         )
-        return Drive(self.index, self.kind, self.x_d, x, x_meas, self.model, self.settings, "; ".join(parts))
+        return "; ".join(parts)
+
+    def drive(self, x: Array) -> Drive:
+        """Return the drive with its true positions, ``(n,)``, m."""
+        quantum = self.encoder.quantum
+        x_meas = quantum * np.rint((x + self.noise) / quantum)
+        return Drive(self.index, self.kind, self.x_d, x, x_meas, self.model, self.settings, self.description)
 
 
 def true_positions(indices: Sequence[int], seed: int = SEED) -> list[Array]:

@@ -45,6 +45,7 @@ SLOW = (
     r"predict/test_trusted_figures\.py::test_(spiral|recorded)",
     r"random_drives/test_trusted_drives\.py",
     r"random_drives/test_two_mass_drives\.py::test_internal_steps",
+    r"random_drives/test_two_mass_loops\.py::test_(off|the_physics|command)",
     r"random_drives/test_replay\.py::test_command_line",
     r"app/test_fit\.py::test_(a_rotary|a_second|a_gap|the_command_line|the_figures)",
     r"cosim/test_loop\.py::test_library_and_fmu_take_each_others_place\[Sep",
