@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 
+from ..base.saved import COUNT_MAX
 from ..base.signals import Indices
 from ..logs.gaps import gap_starts
 from ..logs.log import Log
@@ -55,7 +56,7 @@ def check_gaps(log: Log, bridged: int = BRIDGED_MAX) -> Iterator[Finding]:
     gaps = np.setdiff1d(gap_starts(log.t, log.T_s), np.array(log.starts, dtype=np.intp))
     if not len(gaps):
         return
-    lost = np.round(steps[gaps - 1]) - 1
+    lost = np.minimum(np.round(steps[gaps - 1]) - 1, COUNT_MAX)
     longest, n = float(steps[gaps - 1].max() * log.T_s), int(lost.sum())
     many = f"{n} samples are missing in {len(gaps)} gap{'s' if len(gaps) > 1 else ''}, the longest"
     words = (

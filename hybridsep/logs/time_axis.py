@@ -22,6 +22,9 @@ A recorder's clock jitters by a few per cent at most; a lost sample doubles an i
 and 1 kHz, 5 % of an interval are 4 µm of travel, comparable to encoder noise.
 """
 
+TIME_MAX = 1e15
+"""Largest time, s: that of a clock in ns since 1970 that is read in ms; differences of larger ones may overflow."""
+
 COUNTED = 10
 """Fewest times that count samples before they are taken for an index: a log with an interval of 1 s is none yet."""
 
@@ -58,6 +61,12 @@ class TimeAxis:
             If an interval is not the median one within :data:`TOLERANCE`.
         """
         t = block.columns[0]
+        if not np.abs(t).max() <= TIME_MAX:
+            i = int(np.argmax(~(np.abs(t) <= TIME_MAX)))
+            raise LogError(
+                f"{self._path}, {block.where(i)}: time {brief(self._name)} must be within "
+                f"±{TIME_MAX:g} s, got {t[i]:g} s"
+            )
         if self._n == 0:
             self._first = self._last = float(t[0])
             steps = np.diff(t)

@@ -80,6 +80,7 @@ SLOW = (
     r"predict/test_extremes\.py",
     r"fmi/test_hostile_states\.py",
     r"cosim/test_instances\.py",
+    r"app/test_hostile_input\.py::test_damaged",
     # Other programs and processes: importers, demonstrations, documents, the child that reads .mat files
     r"intake/test_intake\.py::test_a_good_log_is_not_accused\[(random|stage)",
     r"intake/test_intake\.py::test_a_delay_is_measured_against_the_model\[.*stage",
