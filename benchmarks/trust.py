@@ -30,7 +30,8 @@ from hybridsep.base.signals import Array
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.evaluate.lag import fitted_lag
 from hybridsep.logs.log import read_log
-from hybridsep.machines.machine import Machine, load_machine
+from hybridsep.machines.machine import Machine
+from hybridsep.machines.paper import paper_machine
 from hybridsep.machines.sections import StageSection
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.plants.encoder import Encoder
@@ -111,7 +112,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def cases(emps: Path | None = None, recordings: Path | None = None) -> Iterator[Case]:
     """Yield the simulated drives, the EMPS axis and the recordings."""
-    drive, stage = load_machine("spring_mass_damper"), [load_machine(f"als25010_{axis}") for axis in "xy"]
+    drive, stage = paper_machine("spring_mass_damper"), [paper_machine(f"als25010_{axis}") for axis in "xy"]
     yield simulated("staircase", drive, staircase())
     yield simulated("staircase of 7 mm", drive, short_staircase())
     for friction_on in ("command", "motion"):
@@ -120,7 +121,7 @@ def cases(emps: Path | None = None, recordings: Path | None = None) -> Iterator[
                 label = f"{axis}, friction on {friction_on}: {name}"
                 yield simulated(label, with_friction_on(machine, friction_on), x_d)
     if emps is not None:
-        machine = load_machine("emps")
+        machine = paper_machine("emps")
         log = read_log(emps, columns=machine.log.columns)
         yield Case("EMPS", machine.model, machine.predictor_settings, log.x_d, (log.x_meas, log.x_meas))
     files = [] if recordings is None else sorted(recordings.glob("*.csv"))

@@ -31,7 +31,8 @@ from benchmarks.common import Array, resident_bytes, staircase_log
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.logs.log import read_log
-from hybridsep.machines.machine import Machine, load_machine
+from hybridsep.machines.machine import Machine
+from hybridsep.machines.paper import paper_machine
 from hybridsep.predict.predictor import HybridPredictor
 from hybridsep.tune.losses import nested_losses
 
@@ -61,13 +62,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def recorded(path: Path) -> tuple[Machine, Array, Array]:
-    machine = load_machine("emps")
+    machine = paper_machine("emps")
     log = read_log(path, columns=machine.log.columns)
     return machine, log.x_d, log.x_meas
 
 
 def simulated(n: int) -> tuple[Machine, Array, Array]:
-    return load_machine("spring_mass_damper"), *staircase_log(n)
+    return paper_machine("spring_mass_damper"), *staircase_log(n)
 
 
 def compare(machine: Machine, x_d: Array, x: Array) -> bool:

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 from scipy.optimize import brentq
 
-from hybridsep import Encoder, Machine, backtest, load_machine, simulate, spiral
+from hybridsep import Encoder, Machine, backtest, paper_machine, simulate, spiral
 from hybridsep.app.printed import PRINTED
 from hybridsep.base.metrics import rms
 from hybridsep.base.signals import Array
@@ -46,7 +46,7 @@ def measured(machine: Machine, command: Array, f: float, ratio: float) -> Array:
 
 def calibrate(axis: str, command: Array, ratio: float = KAPPA_OVER_F) -> float:
     """Return ``f`` in metres for one axis; ``command`` is ``(n,)``, m, and ``ratio`` is ``κ/f``, 1/m²."""
-    machine, aim = load_machine(f"als25010_{axis}"), printed(axis)
+    machine, aim = paper_machine(f"als25010_{axis}"), printed(axis)
     discrete = machine.model.discretise(machine.T_s)
     x_pb, _ = discrete.forced_response(discrete.rest(), command)
 
@@ -60,7 +60,7 @@ def compare_assumptions() -> None:
     """Print the hybrid's error under each of the assumptions, ``f`` being calibrated anew."""
     for name, (radius, turns, ratio) in ASSUMPTIONS.items():
         for axis, command in zip("xy", spiral(radius=radius, turns=turns), strict=True):
-            machine, f = load_machine(f"als25010_{axis}"), calibrate(axis, command, ratio)
+            machine, f = paper_machine(f"als25010_{axis}"), calibrate(axis, command, ratio)
             # The warm-up is 5 % of the trajectory, as in the paper
             predictor = machine.new_predictor(
                 replace(machine.predictor_settings, t_init=0.05 * machine.T_s * len(command))

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from mechanism import Drive, simulate
 
-from hybridsep import Encoder, backtest, load_machine, staircase
+from hybridsep import Encoder, backtest, paper_machine, staircase
 from hybridsep.base.metrics import rms
 from hybridsep.base.signals import Array
 
@@ -61,7 +61,7 @@ def main() -> None:
         e_pb = residual(force, x_d)
         measured, true = (1e6 * rms(e) for e in (e_pb + noise, e_pb))
         print(f"  {name:<52}{measured:9.2f}{true:10.3f}")
-    machine = load_machine("spring_mass_damper")
+    machine = paper_machine("spring_mass_damper")
     discrete = machine.model.discretise(machine.T_s)
     x = discrete.forced_response(discrete.rest(), x_d)[0] + residual(in_mm(eq_12), x_d) + noise
     print("Hybrid RMS, µm, over λ, m² (printed 14.7)")

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridsep import PAPER_LIMITS, Encoder, Machine, backtest, load_machine, rest_to_rest, simulate, spiral
+from hybridsep import PAPER_LIMITS, Encoder, Machine, backtest, paper_machine, rest_to_rest, simulate, spiral
 from hybridsep.base.metrics import rms
 from hybridsep.base.signals import Array
 from hybridsep.evaluate.backtest import Backtest, Batch
@@ -47,7 +47,7 @@ def parts_of_the_spiral() -> None:
     """Print both models' errors on parts of the spiral."""
     print("Spiral, RMS in µm                     samples  physics   hybrid  share of the hybrid's mean square")
     for axis, x_d in zip("xy", spiral(), strict=True):
-        x, result, _ = replay(load_machine(f"als25010_{axis}"), x_d)
+        x, result, _ = replay(paper_machine(f"als25010_{axis}"), x_d)
         k, near = np.arange(len(x)), near_reversals(x_d)
         learned = result.active
         for name, part in (
@@ -69,7 +69,7 @@ def other_paths() -> None:
     """Print both models' errors where the stage moves between two points, with and without rests."""
     print("\nThere and back, RMS in µm              physics   hybrid   ratio  batch at which the hybrid is worst")
     for axis in "xy":
-        machine = load_machine(f"als25010_{axis}")
+        machine = paper_machine(f"als25010_{axis}")
         for length, dwell in ((0.030, 0.3), (0.030, 0.0), (0.013, 0.3), (0.013, 0.0)):
             x_d = rest_to_rest(np.resize([0.0, length], 8), PAPER_LIMITS, machine.T_s, dwell=dwell)
             x, result, poles = replay(machine, x_d)

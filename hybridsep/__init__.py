@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from .fmi.archive import build_fmu, fmu_names
     from .logs.log import open_log, read_log
     from .machines.machine import Machine, load_machine, machine_names
+    from .machines.paper import paper_machine
     from .model.physics import ModalModel, Mode
     from .plants.encoder import Encoder
     from .plants.plant import simulate
@@ -54,6 +55,7 @@ __all__ = [
     "load_machine",
     "machine_names",
     "open_log",
+    "paper_machine",
     "read_log",
     "rest_to_rest",
     "simulate",
@@ -82,6 +84,7 @@ _MODULES = {
     "load_machine": "machines.machine",
     "machine_names": "machines.machine",
     "open_log": "logs.log",
+    "paper_machine": "machines.paper",
     "read_log": "logs.log",
     "rest_to_rest": "plants.trajectory",
     "simulate": "plants.plant",

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridsep.fmi.native_flavour import fmi_headers, sources
-from hybridsep.machines.machine import load_machine
+from hybridsep.machines.paper import paper_machine
 
 Array = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ class Host:
 
     def __init__(self, folder: Path, compiler: list[str], flags: list[str]) -> None:
         self.folder, self.program = folder, folder / "long_run"
-        machine = load_machine("spring_mass_damper")
+        machine = paper_machine("spring_mass_damper")
         mode = machine.model.modes[0]
         description: dict[str, Any] = {"model": "HybridPredictor", "name": "HybridPredictor"}
         description["parameters"] = machine.fmi_parameters()

@@ -1,4 +1,4 @@
-"""Cases of the demonstration: the paper's staircase and spiral, and a recorded axis."""
+"""Cases of the demonstration: the paper's staircase and spiral, and a recorded axis, predicted with its settings."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from ..evaluate.time_plots import prediction_figure, tracking_figure
 from ..evaluate.verdict import verdict_of
 from ..logs.log import Log, read_log
 from ..machines.machine import load_machine
+from ..machines.paper import PAPER_SETTINGS, paper_machine
 from ..plants.trajectory import spiral, staircase
 from .builds import build_pair
 from .demo_compensation import COMPENSATED, Runs, compensate, contour_errors, mean_summary
@@ -38,7 +39,8 @@ def staircase_case(out: Path, seeds: int, flavour: str, advance: Callable[[str],
     runs = []
     for seed in range(seeds):
         advance(f"staircase, FMU against FMU, noise seed {seed}")
-        runs.append(cosimulate(*fmus, command, plant_values={"seed": seed}))
+        values = PAPER_SETTINGS[machine.name]
+        runs.append(cosimulate(*fmus, command, controller_values=values, plant_values={"seed": seed}))
     runs[0].save(out / "staircase.csv")
     title = "Staircase (cf. the paper's Fig. 4), FMU against FMU, noise seed 0"
     prediction_figure(runs[0], title, out / "staircase.png")
@@ -67,12 +69,14 @@ def spiral_case(out: Path, flavour: str, advance: Callable[[str], None]) -> Summ
         machine, label = load_machine(MACHINES[f"spiral_{axis}"]), f"spiral, {axis.upper()} axis"
         fmus = build_pair(machine, out / "fmus", flavour)
         advance(label)
-        axes[axis] = run = cosimulate(*fmus, command)
+        values = PAPER_SETTINGS[machine.name]
+        axes[axis] = run = cosimulate(*fmus, command, controller_values=values)
         case = summary[f"spiral_{axis}"] = {**run.summary(), "physics_tuned_to_printed": True, **_worse(run)}
         case["verdict"] = str(verdict_of(run))
         for name, off in (("friction_alone", "kappa"), ("stiffness_alone", "f")):
             advance(f"{label}, {name.replace('_', ' ')}")
-            case[name] = cosimulate(*fmus, command, plant_values={off: 0.0}).summary()
+            alone = cosimulate(*fmus, command, controller_values=values, plant_values={off: 0.0})
+            case[name] = alone.summary()
         run.save(out / f"spiral_{axis}.csv")
         title = f"Spiral, {axis.upper()} axis (cf. the paper's Fig. 8), FMU against FMU"
         prediction_figure(run, title, out / f"spiral_{axis}.png")
@@ -108,7 +112,7 @@ def read_recorded(path: str | Path) -> Log:
 
 def recorded_case(log: Log, out: Path) -> dict[str, Any]:
     """Replay the EMPS recording with its published constants."""
-    predictor = load_machine("emps").new_predictor()
+    predictor = paper_machine("emps").new_predictor()
     found = backtest(predictor, log.x_d, log.x_meas)
     run = replayed_run(found, log.x_d, log.x_meas, log.T_s, predictor.Np)
     prediction_figure(run, "EMPS, a recorded axis: causal replay", out / "emps.png")

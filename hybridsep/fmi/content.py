@@ -8,8 +8,9 @@ import uuid
 from collections.abc import Mapping
 
 from ..machines.machine import Machine
+from ..machines.paper import PAPER_SETTINGS
 
-__all__ = ["content_guid", "fmu_title"]
+__all__ = ["content_guid", "fmu_title", "paper_note"]
 
 _TITLES = {
     "HybridPredictor": "linear hybrid model: predicts the drive's position one look-ahead window early",
@@ -22,6 +23,14 @@ _TITLES = {
 def fmu_title(machine: Machine, model: str) -> str:
     """Return an FMU's title; ReferenceTrajectory's is the same for every machine."""
     return _TITLES[model] if model == "ReferenceTrajectory" else f"{machine.title}: {_TITLES[model]}"
+
+
+def paper_note(machine: Machine, model: str) -> str:
+    """Return which settings of a predictor are the paper's, of a machine that it has figures for; else nothing."""
+    if model != "HybridPredictor" or machine.name not in PAPER_SETTINGS:
+        return ""
+    settings = ", ".join(f"{name} = {json.dumps(value)}" for name, value in PAPER_SETTINGS[machine.name].items())
+    return f"; the paper's settings are {settings}"
 
 
 def content_guid(files: Mapping[str, bytes], description: Mapping[str, object]) -> str:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..base.version import __version__
 from ..machines.machine import Machine
-from .content import fmu_title
+from .content import fmu_title, paper_note
 from .experiment import stop_time
 from .variables import INTERPOLATED, Variable, variables_of
 
@@ -52,7 +52,7 @@ def model_description(
     root.attrib |= {
         "modelName": name,
         "guid": guid,
-        "description": fmu_title(machine, model),
+        "description": fmu_title(machine, model) + paper_note(machine, model),
         "version": __version__,
         "generationTool": generation_tool,
     }

@@ -8,7 +8,7 @@ from pathlib import Path
 from string import Template
 
 from ..machines.machine import Machine
-from .content import fmu_title
+from .content import fmu_title, paper_note
 from .tables import interface_table
 from .variables import variables_of
 
@@ -74,7 +74,7 @@ def index_page(
     page = filled(
         "index",
         name=name,
-        title=html.escape(fmu_title(machine, model)),
+        title=html.escape(fmu_title(machine, model) + paper_note(machine, model)),
         needs=html.escape(needs),
         computes=filled(model, steps=filled("steps")),
         partner=partner,

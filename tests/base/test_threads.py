@@ -17,7 +17,16 @@ import pytest
 from places import SUPPORT
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from hybridsep import Encoder, HybridPredictor, backtest, backtest_stream, cosimulate, load_machine, simulate, staircase
+from hybridsep import (
+    Encoder,
+    HybridPredictor,
+    backtest,
+    backtest_stream,
+    cosimulate,
+    paper_machine,
+    simulate,
+    staircase,
+)
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.threads import one_blas_thread
 
@@ -40,7 +49,7 @@ def two_threads() -> Iterator[None]:
 
 def results() -> dict[str, str]:
     """Return checksums of a replay and a closed loop that are large enough for OpenBLAS to use threads."""
-    machine = load_machine("spring_mass_damper")
+    machine = paper_machine("spring_mass_damper")
     x_d = staircase()[:N]
     noise = Encoder(5e-6, 0)
     x = simulate(machine.new_plant(), x_d, machine.T_s) + noise.measure_all(np.zeros(N))
@@ -64,7 +73,7 @@ def test_results_do_not_depend_on_the_number_of_threads() -> None:
 
 
 def test_replays_and_loops_use_one_thread(two_threads: None, python_fmu: Callable[[str], Path]) -> None:
-    machine = load_machine("spring_mass_damper")
+    machine = paper_machine("spring_mass_damper")
     x_d = staircase()[:300]
     seen: list[set[int]] = []
 
@@ -85,7 +94,7 @@ def test_replays_and_loops_use_one_thread(two_threads: None, python_fmu: Callabl
 
 
 def test_the_users_setting_returns_after_an_error(two_threads: None) -> None:
-    machine = load_machine("spring_mass_damper")
+    machine = paper_machine("spring_mass_damper")
 
     def fail(*_: object) -> None:
         raise KeyboardInterrupt

@@ -17,7 +17,7 @@ from fmi2_library import OK, Library
 from numpy.typing import NDArray
 from places import SUPPORT
 
-from hybridsep import load_machine
+from hybridsep import paper_machine
 from hybridsep.fmi.variables import variables_of
 
 N_INSTANCES = 1000
@@ -51,7 +51,7 @@ def array_bytes() -> int:
     in the order of their use; for the uncertainty two windows and one of each of its seven components; per mode a
     matrix, two vectors, the feed-through and the state; and one number for each FMI variable.
     """
-    machine = load_machine("spring_mass_damper")
+    machine = paper_machine("spring_mass_damper")
     values = machine.fmi_parameters()
     Np, p, q = (int(values[name]) for name in ("Np", "p", "q"))
     n = 2 + p + q

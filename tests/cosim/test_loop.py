@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hybridsep import Encoder, FmuInstance, backtest, cosimulate, load_machine, simulate, staircase
+from hybridsep import Encoder, FmuInstance, backtest, cosimulate, load_machine, paper_machine, simulate, staircase
 from hybridsep.base.errors import ParameterError
 from hybridsep.cosim.run import COMPENSATOR, PREDICTOR
 
@@ -39,7 +39,7 @@ def test_a_predictor_of_the_library_is_an_open_loop() -> None:
 
 
 def test_a_warm_predictor_is_active_at_once() -> None:
-    predictor = MACHINE.new_predictor()
+    predictor = paper_machine("spring_mass_damper").new_predictor()
     assert not cosimulate(predictor, MACHINE.new_plant(), R).active[:300].any()
     assert cosimulate(predictor, MACHINE.new_plant(), R, t_init=0.0).active.all()
 

@@ -11,6 +11,7 @@ import pytest
 
 from hybridsep import Encoder, Run, backtest, cosimulate, load_machine, simulate
 from hybridsep.base.errors import FmuError, SignalError
+from hybridsep.machines.paper import PAPER_SETTINGS
 from hybridsep.plants.trajectory import spiral, staircase
 
 Fmu = Callable[[str], Path]
@@ -28,7 +29,11 @@ def run(pair: tuple[Path, Path]) -> Run:
 
 def test_staircase_error_reduction(pair: tuple[Path, Path]) -> None:
     """Printed: physics 33.7 µm, hybrid 14.7 µm, reduction 56.4 %."""
-    runs = [cosimulate(*pair, staircase(), plant_values={"seed": seed}).summary() for seed in range(10)]
+    values = PAPER_SETTINGS["spring_mass_damper"]
+    runs = [
+        cosimulate(*pair, staircase(), controller_values=values, plant_values={"seed": seed}).summary()
+        for seed in range(10)
+    ]
     mean = {key: float(np.mean([summary[key] for summary in runs])) for key in runs[0]}
     assert 33.6 < mean["rms_pb_um"] < 34.3
     assert 14.5 < mean["rms_h_um"] < 15.2
@@ -45,12 +50,13 @@ def test_spiral_error_reduction(python_fmu: Fmu, axis: str, printed: float, tole
     """Printed: X 22 → 13.7 µm, 38 %; Y 130.2 → 94.5 µm, 27 %; with Table 1 and friction scaled to the first figures."""
     r = dict(zip("xy", spiral(), strict=True))[axis]
     fmus = python_fmu(f"HybridPredictorPy_als25010_{axis}"), python_fmu(f"FeedDrivePy_als25010_{axis}")
-    both = cosimulate(*fmus, r).summary()
+    values = PAPER_SETTINGS[f"als25010_{axis}"]
+    both = cosimulate(*fmus, r, controller_values=values).summary()
     assert both["rms_pb_um"] == pytest.approx(printed, abs=tolerance)
     assert 0.9 * most < both["rms_h_um"] <= most
     # What one cause alone leaves to learn: the cable's stiffness is smooth, the friction jumps.
-    friction = cosimulate(*fmus, r, plant_values={"kappa": 0.0}).summary()
-    stiffness = cosimulate(*fmus, r, plant_values={"f": 0.0}).summary()
+    friction = cosimulate(*fmus, r, controller_values=values, plant_values={"kappa": 0.0}).summary()
+    stiffness = cosimulate(*fmus, r, controller_values=values, plant_values={"f": 0.0}).summary()
     assert stiffness["reduction_percent"] > 70.0 > both["reduction_percent"] > friction["reduction_percent"] > 15.0
 
 

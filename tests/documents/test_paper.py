@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from places import ROOT
 
-from hybridsep import PAPER_LIMITS, load_machine, rest_to_rest, spiral, staircase
+from hybridsep import PAPER_LIMITS, paper_machine, rest_to_rest, spiral, staircase
 
 PAGE = (ROOT / "docs" / "paper.md").read_text(encoding="utf-8")
 
@@ -36,14 +36,14 @@ def test_readings_of_eqs_12_and_13() -> None:
 @pytest.mark.parametrize(("length", "ratio"), [(0.030, 1.1), (0.013, 1.02)])
 def test_the_hybrid_can_be_worse_on_the_whole(length: float, ratio: float) -> None:
     x_d = rest_to_rest(np.resize([0.0, length], 8), PAPER_LIMITS, dwell=0.3)
-    x, result, poles = example("section_4_2")["replay"](load_machine("als25010_y"), x_d)
+    x, result, poles = example("section_4_2")["replay"](paper_machine("als25010_y"), x_d)
     assert rms(x - result.x_h) > ratio * rms(x - result.x_pb)
     assert poles[int(np.argmax(result.batch_rms_h))] > 1.0
 
 
 def test_where_on_the_spiral_the_hybrid_errs() -> None:
     section, x_d = example("section_4_2"), spiral()[1]
-    x, result, _ = section["replay"](load_machine("als25010_y"), x_d)
+    x, result, _ = section["replay"](paper_machine("als25010_y"), x_d)
     physics, hybrid = x - result.x_pb, x - result.x_h
     near = section["near_reversals"](x_d) & result.active
     elsewhere = ~near & result.active
@@ -53,7 +53,7 @@ def test_where_on_the_spiral_the_hybrid_errs() -> None:
 
 
 def test_hz_read_as_rad_per_second_is_no_drive() -> None:
-    model = load_machine("als25010_x").model
+    model = paper_machine("als25010_x").model
     assert sum(mode.alpha / mode.f_n**2 for mode in model.modes) == pytest.approx((2 * np.pi) ** 2, rel=1e-4)
 
 

@@ -12,7 +12,7 @@ from benchmarks.trust import circle, fitted_model, recorded, replayed, short_sta
 from hybridsep.base.errors import SignalError
 from hybridsep.base.signals import Array
 from hybridsep.evaluate.backtest import Backtest, backtest
-from hybridsep.machines.machine import load_machine
+from hybridsep.machines.paper import paper_machine
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
 
@@ -59,7 +59,7 @@ def test_paths_begin_and_end_at_rest() -> None:
 
 
 def test_errors_of_a_drive(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    case = simulated("short", load_machine("spring_mass_damper"), short_staircase()[:2500])
+    case = simulated("short", paper_machine("spring_mass_damper"), short_staircase()[:2500])
     row = replayed(case)
     assert row.trust[0] < 0.6 * row.physics
     assert row.trust[1] < row.trust[0] < row.paper[0]
@@ -75,7 +75,7 @@ def test_a_refused_replay_has_diverged(monkeypatch: pytest.MonkeyPatch) -> None:
         raise SignalError("the prediction diverges")
 
     monkeypatch.setattr(trust, "backtest", refusing)
-    row = replayed(simulated("short", load_machine("spring_mass_damper"), short_staircase()[:600]))
+    row = replayed(simulated("short", paper_machine("spring_mass_damper"), short_staircase()[:600]))
     assert str(row).count("diverged") == 2
     assert row.paper == (np.inf, np.inf)
     assert row.trust[0] < row.physics

@@ -12,6 +12,7 @@ from hybridsep.cosim.loop import cosimulate
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.evaluate.verdict import Tally, Verdict, verdict_of
 from hybridsep.machines.machine import Machine, load_machine
+from hybridsep.machines.paper import paper_machine
 from hybridsep.plants.plant import simulate
 from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.predictor import HybridPredictor
@@ -162,7 +163,7 @@ def test_of_replays() -> None:
 
 
 def test_of_a_run() -> None:
-    machine = load_machine("spring_mass_damper")
+    machine = paper_machine("spring_mass_damper")
     run = cosimulate(machine.new_predictor(), machine.new_plant(), staircase()[:2500])
     found = verdict_of(run)
     assert found.ratio_pb == pytest.approx(run.summary()["rms_h_um"] / run.summary()["rms_pb_um"])

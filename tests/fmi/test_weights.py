@@ -28,11 +28,12 @@ from hybridsep.fmi.archive import build_fmu, fmu_names
 from hybridsep.fmi.flavours import FLAVOURS
 from hybridsep.fmi.weights import WEIGHTS_FILE, learned_settings, restore_weights, weights_file
 from hybridsep.machines.machine import load_machine
+from hybridsep.machines.paper import paper_machine
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
 from hybridsep.predict.uncertainty import N_LEARNED
 
-MACHINE = load_machine("spring_mass_damper")
+MACHINE = paper_machine("spring_mass_damper")
 
 
 @pytest.fixture(scope="module")

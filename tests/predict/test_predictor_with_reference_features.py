@@ -18,7 +18,7 @@ from reference_feature_cases import TS, V_S, formula, reversing
 from hybridsep.base.errors import ParameterError, SignalError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
-from hybridsep.machines.machine import load_machine
+from hybridsep.machines.paper import paper_machine
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.plant import simulate
@@ -205,7 +205,7 @@ def test_friction_is_predicted_better(v_friction: float, most: float) -> None:
 
 @lru_cache(maxsize=4)
 def stage_y_prediction_error(v_friction: float) -> float:
-    machine = load_machine("als25010_y")
+    machine = paper_machine("als25010_y")
     r, encoder = spiral()[1], Encoder(1e-6, 0)
     x = encoder.measure_all(simulate(machine.new_plant(), r, TS))
     predictor = machine.new_predictor(replace(machine.predictor_settings, v_friction=v_friction))

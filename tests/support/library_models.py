@@ -15,7 +15,7 @@ from hybridsep.cosim.loop import cosimulate
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.fmi.variables import modes_from
 from hybridsep.fmi.weights import restore_weights, weights_file
-from hybridsep.machines.machine import load_machine
+from hybridsep.machines.paper import paper_machine
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.feed_drive import FeedDrive
@@ -85,7 +85,7 @@ def learned_file(saved: Path | None) -> bytes:
 
 def trained_predictor(kind: str) -> HybridPredictor:
     """Return the predictor of the default machine's FMU ``kind`` after one staircase."""
-    machine, encoder = load_machine("spring_mass_damper"), Encoder(5e-6, 7)
+    machine, encoder = paper_machine("spring_mass_damper"), Encoder(5e-6, 7)
     if kind == "HybridPredictor":
         predictor = machine.new_predictor()
         backtest(predictor, staircase(), encoder.measure_all(simulate(machine.new_plant(), staircase(), machine.T_s)))
@@ -100,7 +100,7 @@ def runaway_predictor() -> HybridPredictor:
 
     It has a bias and one past residual, so firmly learned that a run changes nothing.
     """
-    machine = load_machine("spring_mass_damper")
+    machine = paper_machine("spring_mass_damper")
     predictor = machine.new_predictor(replace(machine.predictor_settings, t_init=0.0))
     weights = np.zeros(predictor.n_features)
     weights[0], weights[predictor.layout.e_pb.start] = 1e-3, RUNAWAY

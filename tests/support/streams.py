@@ -16,7 +16,7 @@ from core_stream import CoreStream
 from fmu_stream import FmuStream
 from library_models import learned_file
 from library_stream import LookAheadStream, PlantStream
-from stream import CANNOT, CORE, IMPLEMENTATIONS, LIBRARY, NATIVE, TRAJECTORY, Stream
+from stream import CANNOT, CORE, IMPLEMENTATIONS, LIBRARY, NATIVE, TRAJECTORY, Stream, machine_of
 
 from hybridsep.fmi.weights import WEIGHTS_FILE
 from hybridsep.plants.trajectory import staircase
@@ -56,7 +56,7 @@ class StreamMaker:
     def _new(self, model: str, weights: Path | None, planted: bytes = b"") -> Stream:
         folder = Path(tempfile.mkdtemp(dir=self.folder))
         if self.implementation not in (LIBRARY, CORE):
-            archive = self.fmus(fmu_name(model, self.implementation), weights=weights)
+            archive = self.fmus(fmu_name(model, self.implementation), machine=machine_of(model), weights=weights)
             if planted:
                 archive = Path(shutil.copy(archive, folder))
                 with zipfile.ZipFile(archive, "a") as content:
