@@ -22,7 +22,8 @@ from hybridsep.fmi.compiler import host_target
 
 def test_backtest_of_a_csv(hybridsep: Run, tmp_path: Path) -> None:
     log = write_log(tmp_path / "log.csv", n=6001)
-    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--json", "--out", tmp_path / "batches.csv")
+    paper = ("-m", "spring_mass_damper", "--trust", "false")
+    status, out, _ = hybridsep("backtest", log, *paper, "--json", "--out", tmp_path / "batches.csv")
     summary = json.loads(out)
     assert status == 0
     assert summary["rms_pb_um"] == pytest.approx(33.94, abs=0.1)
@@ -30,7 +31,7 @@ def test_backtest_of_a_csv(hybridsep: Run, tmp_path: Path) -> None:
     assert (summary["n_samples"], summary["n_batches"]) == (6001, 61)
     rows = (tmp_path / "batches.csv").read_text().splitlines()
     assert (rows[0], len(rows)) == ("t,rms_pb,rms_hold,rms_h", 62)
-    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper")
+    status, out, _ = hybridsep("backtest", log, *paper)
     assert status == 0
     assert f"{summary['rms_h_um']:.2f}" in out
     assert f"{summary['ratio_to_hold']:.2f}" in out
@@ -52,7 +53,7 @@ def test_backtest_of_a_log_with_missing_measurements(hybridsep: Run, tmp_path: P
     assert status == 0
     assert json.loads(out)["n_samples"] == 1999
     assert "1 of 2000 measurements was missing, and not learned" in json.loads(out)["verdict"]
-    status, _, said = hybridsep("backtest", log, "-m", "spring_mass_damper")
+    status, _, said = hybridsep("backtest", log, "-m", "spring_mass_damper", "--trust", "false")
     assert status == 2
     assert "line 1501: column 'x' must be a number, got nothing; missing measurements are replayed with trust" in said
     assert "(--trust true)" in said
@@ -93,7 +94,7 @@ def test_backtest_of_what_cosim_writes(hybridsep: Run, tmp_path: Path, suffix: s
 @pytest.mark.skipif(not EMPS.exists(), reason="needs ../shared/data/emps beside the repository")
 def test_backtest_of_a_recorded_axis(hybridsep: Run) -> None:
     """Published constants, paper's settings: physics 15.45 µm, hold 5.93 µm, hybrid at most 5.55 µm."""
-    status, out, _ = hybridsep("backtest", EMPS, "-m", "emps", "--json")
+    status, out, _ = hybridsep("backtest", EMPS, "-m", "emps", "--trust", "false", "--t_init", 1.242, "--json")
     summary = json.loads(out)
     assert status == 0
     assert summary["rms_pb_um"] == pytest.approx(15.45, abs=0.05)
@@ -103,7 +104,7 @@ def test_backtest_of_a_recorded_axis(hybridsep: Run) -> None:
 
 def test_json_has_null_where_there_is_no_figure(hybridsep: Run, tmp_path: Path) -> None:
     log = write_log(tmp_path / "short.csv", n=150)
-    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--json")
+    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", "--trust", "false", "--json")
     assert status == 0
     assert json.loads(out)["rms_h_um_after_warm_up"] is None
 

@@ -16,7 +16,8 @@ from hybridsep.base.settings import PredictorSettings
 from hybridsep.tune.figures import tuning_figure
 from hybridsep.tune.joint import Tuning
 
-PAPER = ("-m", "spring_mass_damper", "--jobs", "1")  # its machine file says trust = false
+MACHINE = ("-m", "spring_mass_damper", "--jobs", "1")
+PAPER = (*MACHINE, "--trust", "false")
 FEW = ("--Np", "50", "--p", "5,40", "--q", "0:1", "--lambda", "1e-12:1e-8:x100", "--t_init", "0.1")
 
 
@@ -63,7 +64,7 @@ def test_several_logs_and_trust(hybridsep: Run, tmp_path: Path) -> None:
     (tmp_path / "sub").mkdir()
     logs.append(write_log(tmp_path / "sub" / "a.csv", n=300))
     few = ("--trust", "true", "--p", "10", "--q", "1", "--effect", "0,1e-5", "--forgetting", "0", "--Np", "50")
-    status, text, err = hybridsep("tune", *logs, *PAPER, *few, "--json")
+    status, text, err = hybridsep("tune", *logs, *MACHINE, *few, "--json")
     assert status == 0, err
     found = json.loads(text)
     assert list(found["logs"]) == [str(logs[0]), "b.csv", str(logs[2])]
@@ -71,7 +72,7 @@ def test_several_logs_and_trust(hybridsep: Run, tmp_path: Path) -> None:
     for one in found["candidates"]:
         rms = [one["rms_h"][name] / figures["rms_hold"] for name, figures in found["logs"].items()]
         assert one["ratio_to_hold"] == pytest.approx(np.prod(rms) ** (1 / 3))
-    text = " ".join(hybridsep("tune", *logs, *PAPER, *few)[1].split())
+    text = " ".join(hybridsep("tune", *logs, *MACHINE, *few)[1].split())
     assert "ranked by the geometric mean over the logs of RMS relative to hold" in text
 
 

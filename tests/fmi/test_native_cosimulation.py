@@ -19,6 +19,7 @@ from hybridsep.cosim.run import Run
 from hybridsep.fmi.archive import build_fmu, fmu_names
 from hybridsep.fmi.flavours import FLAVOURS
 from hybridsep.machines.machine import Machine, load_machine
+from hybridsep.machines.paper import PAPER_SETTINGS
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.trajectory import spiral, staircase
 
@@ -26,7 +27,7 @@ TOLERANCE = 1e-11  # m
 
 
 def reference(machine: Machine, r: Array) -> dict[str, Array]:
-    """Return what the library alone computes in the same wiring, without the first fill."""
+    """Return what the library alone computes in the same wiring, with the paper's settings, without the first fill."""
     assert machine.plant is not None
     plant, encoder = machine.new_plant(), Encoder(machine.plant.noise_std, machine.plant.seed)
     model = next(iter(fmu_names(machine)))
@@ -53,7 +54,8 @@ def assert_equal(run: Run, expected: dict[str, Array]) -> None:
 def test_every_pairing_agrees_with_the_library_on_the_staircase(fmus: BuiltFmus, predictor: str, plant: str) -> None:
     machine = load_machine("spring_mass_damper")
     suffix = {"native": "", "python": "Py"}
-    run = cosimulate(fmus(f"HybridPredictor{suffix[predictor]}"), fmus(f"FeedDrive{suffix[plant]}"), staircase())
+    pair = fmus(f"HybridPredictor{suffix[predictor]}"), fmus(f"FeedDrive{suffix[plant]}")
+    run = cosimulate(*pair, staircase(), controller_values=PAPER_SETTINGS[machine.name])
     assert_equal(run, reference(machine, staircase()))
     assert run.summary()["reduction_percent"] > 50
 
@@ -70,7 +72,9 @@ def test_every_pairing_agrees_with_the_library_on_the_spiral(
         for b, model in ((predictor, "HybridPredictor"), (plant, "FeedDrive"))
     ]
     command = spiral()[axis][: None if predictor == plant == "native" else 2000]
-    assert_equal(cosimulate(fmus(names[0]), fmus(names[1]), command), reference(machine, command))
+    values = PAPER_SETTINGS[machine.name]
+    run = cosimulate(fmus(names[0]), fmus(names[1]), command, controller_values=values)
+    assert_equal(run, reference(machine, command))
 
 
 PAPER = {"Np": 100, "p": 50, "q": 3, "lambda": 1e-12, "t_init": 0.3}
@@ -103,8 +107,10 @@ def test_both_flavours_of_the_compensator_command_the_same(
 
 def test_another_start_and_start_time(fmus: BuiltFmus) -> None:
     command = 0.1 + staircase()[:2001]
-    run = cosimulate(fmus("HybridPredictor"), fmus("FeedDrive"), command, start_time=1234.5)
-    assert_equal(run, reference(load_machine("spring_mass_damper"), command))
+    machine = load_machine("spring_mass_damper")
+    values = PAPER_SETTINGS[machine.name]
+    run = cosimulate(fmus("HybridPredictor"), fmus("FeedDrive"), command, controller_values=values, start_time=1234.5)
+    assert_equal(run, reference(machine, command))
     assert run.t[0] == pytest.approx(1234.6)
 
 
@@ -117,8 +123,9 @@ def test_the_whole_system_without_a_script(fmus: BuiltFmus) -> None:
         FmuInstance(fmus("HybridPredictor")) as predictor,
         FmuInstance(fmus("FeedDrive")) as plant,
     ):
-        for instance in (source, predictor, plant):
+        for instance in (source, plant):
             instance.initialise()
+        predictor.initialise(PAPER_SETTINGS["spring_mass_damper"])
         for k in range(2000):
             x_d, x_h, x_meas = predictor.get("x_d"), predictor.get("x_h"), plant.get("x_meas")
             rows.append((x_d, x_h, x_meas))
@@ -172,3 +179,30 @@ def test_a_run_with_the_importers_defaults_reaches_the_end(fmus: BuiltFmus, name
         assert result["time"][-1] == pytest.approx(stop, abs=1e-9)
         assert len(result) >= 500
         assert all(np.isfinite(result[column].astype(float)).all() for column in result.dtype.names)
+
+
+def test_the_default_step_of_an_importer_does_no_harm(fmus: BuiltFmus) -> None:
+    """fmpy's step for a run of 4 s is 4 ms; the paper's model goes to 20 mm then, on a sine of 10 mm."""
+    t = np.arange(0.0, 4.1, 1e-3)
+    signals = np.zeros(len(t), dtype=[("time", float), ("x_d_ahead", float), ("x_meas", float)])
+    signals["time"], signals["x_d_ahead"] = t, 0.01 * np.sin(2 * np.pi * t)
+    signals["x_meas"] = np.where(t > 0.1, 0.0101 * np.sin(2 * np.pi * (t - 0.1) - 0.02), 0.0)
+    path = str(fmus("HybridPredictor"))
+    default, paper = (
+        np.abs(fmpy.simulate_fmu(path, stop_time=4.0, input=signals, start_values=values, output=["x_h"])["x_h"]).max()
+        for values in ({}, PAPER_SETTINGS["spring_mass_damper"])
+    )
+    assert 9.9e-3 < default < 10.2e-3
+    assert paper > 15e-3
+
+
+def test_the_description_names_the_papers_settings(fmus: BuiltFmus) -> None:
+    for name, settings in (
+        ("HybridPredictor", "; the paper's settings are trust = false, t_init = 0.3"),
+        ("HybridPredictorPy_emps", "; the paper's settings are trust = false, t_init = 1.242"),
+        ("SepCompensator", ""),
+    ):
+        description = fmpy.read_model_description(str(fmus(name)))
+        assert description.description.endswith(settings or "so that the drive follows it")
+        starts = {v.name: v.start for v in description.modelVariables}
+        assert (starts["trust"], float(starts["t_init"])) == ("true", -1.0)

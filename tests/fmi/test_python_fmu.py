@@ -112,7 +112,7 @@ def test_interface_of_the_predictor(predictor: FmuInstance) -> None:
         "q": "3",
         "lambda": "1e-12",
         "T_s": "0.001",
-        "t_init": "0.3",
+        "t_init": "-1.0",
         "input_hold": "0",
     }
     assert predictor.description.defaultExperiment.stepSize == "0.001"
