@@ -21,7 +21,7 @@ __all__ = ["contour_figure", "spiral_figure"]
 
 def spiral_figure(x: Run, y: Run, path: str | Path) -> None:
     """Draw each model's prediction error along the spiral, both axes together, to a PNG."""
-    figure = Figure(figsize=(11.0, 4.6), layout="constrained")
+    figure = Figure(figsize=(9.6, 4.6), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
     figure.suptitle("Spiral: distance between the measured and the predicted point")
     errors = [1e6 * np.hypot(x.x_meas - getattr(x, name), y.x_meas - getattr(y, name)) for name in ("x_pb", "x_h")]
@@ -31,7 +31,7 @@ def spiral_figure(x: Run, y: Run, path: str | Path) -> None:
         axes.set_title(f"{label}, RMS {rms(distance):.1f} µm", fontsize=10)
         axes.set_xlabel("X [mm]")
     panels[0].set_ylabel("Y [mm]")
-    figure.colorbar(points, ax=panels, label="prediction error [µm]")
+    figure.colorbar(points, ax=panels, label="prediction error [µm]", extend="max")
     save_figure(figure, path)
 
 

@@ -14,7 +14,7 @@ from ..base.metrics import rms
 from ..base.signals import Array
 from ..compensate.plan import SepState
 from ..cosim.run import Run
-from .canvas import CASES, HOLD, HYBRID, PHYSICS, finish_panels, save_figure
+from .canvas import CASES, HOLD, HYBRID, PHYSICS, draw_line, finish_panels, legend_above, save_figure
 
 __all__ = ["prediction_figure", "tracking_figure"]
 
@@ -40,12 +40,12 @@ def prediction_figure(run: Run, title: str, path: str | Path, unit: str = "m") -
     command, error, windows = figure.subplots(3, 1, sharex=True, height_ratios=[1.0, 2.0, 1.4])
     figure.suptitle(title)
     t = run.t - run.t[0]
-    command.plot(t, 1e3 * run.x_d, color="black", linewidth=1.2)
+    draw_line(command, t, 1e3 * run.x_d, 1.2, color="black")
     command.set_ylabel(f"commanded\nposition [m{unit}]")
-    error.plot(t, 1e6 * (run.x_meas - run.x_pb), color=PHYSICS, linewidth=0.8, label="physics-based model")
+    draw_line(error, t, 1e6 * (run.x_meas - run.x_pb), 0.8, color=PHYSICS, label="physics-based model")
     label = f"linear hybrid model{'' if run.active.all() else ', after the warm-up'}"
     hybrid = np.where(run.active, 1e6 * (run.x_meas - run.x_h), np.nan)
-    error.plot(t, hybrid, color=HYBRID, linewidth=0.8, label=label)
+    draw_line(error, t, hybrid, 0.8, color=HYBRID, label=label)
     if not run.active.all():
         t_init = float(t[np.argmax(run.active)])
         for axes in (error, windows):
@@ -54,11 +54,11 @@ def prediction_figure(run: Run, title: str, path: str | Path, unit: str = "m") -
             "t_init", (t_init, 0.02), xycoords=("data", "axes fraction"), xytext=(4, 0), textcoords="offset points"
         )
     error.set_ylabel(f"prediction error\nx − x̂ [µ{unit}]")
-    error.margins(y=0.15)
-    error.legend(loc="upper right", ncols=2, frameon=False)
+    legend_above(error)
     _draw_windows(windows, run, unit)
     windows.set_xlabel("time [s]")
     finish_panels((command, error, windows))
+    figure.align_ylabels()
     save_figure(figure, path)
 
 
@@ -75,9 +75,12 @@ def _draw_windows(axes: Axes, run: Run, unit: str) -> None:
     worse = errors["x_h"] > errors["x_pb"]
     for begin, end in zip(edges[:-1][worse], edges[1:][worse], strict=True):
         axes.axvspan(begin, end, color=PHYSICS, alpha=0.15, linewidth=0)
-    axes.set_ylim(0.0, 1.35 * max(float(np.nan_to_num(values).max()) for values in errors.values()))
+    axes.set_ylim(0.0, 1.05 * max(float(np.nan_to_num(values).max()) for values in errors.values()))
     axes.set_ylabel(f"RMS of each\nwindow [µ{unit}]")
-    axes.legend(loc="upper right", ncols=3, frameon=False, title="shaded: hybrid worse than physics", title_fontsize=8)
+    handles = axes.get_legend_handles_labels()[0]
+    if worse.any():
+        handles.append(Patch(color=PHYSICS, alpha=0.15, linewidth=0, label="hybrid worse than physics"))
+    legend_above(axes, handles)
 
 
 def tracking_figure(runs: Mapping[str, Run], title: str, path: str | Path) -> None:
@@ -100,7 +103,7 @@ def tracking_figure(runs: Mapping[str, Run], title: str, path: str | Path) -> No
     panels: Sequence[Axes] = figure.subplots(len(ratios), 1, sharex=True, height_ratios=ratios)
     figure.suptitle(title)
     first = next(iter(runs.values()))
-    panels[0].plot(first.t - first.t[0], 1e3 * first.x_d, color="black", linewidth=1.2)
+    draw_line(panels[0], first.t - first.t[0], 1e3 * first.x_d, 1.2, color="black")
     panels[0].set_ylabel("commanded\nposition [mm]")
     _draw_signals(panels[1], {key: run.error for key, run in runs.items()}, runs)
     panels[1].set_ylabel("tracking error\nx_d − x [µm]")
@@ -130,7 +133,7 @@ def _draw_signals(axes: Axes, signals: Mapping[str, Array], runs: Mapping[str, R
         label, color = CASES[key]
         run = runs[key]
         label = f"{label}: {1e6 * rms(run.error):.1f} µm"
-        axes.plot(run.t - run.t[0], 1e6 * signal, color=color, linewidth=0.9, label=label)
+        draw_line(axes, run.t - run.t[0], 1e6 * signal, color=color, label=label)
 
 
 def _shade(panels: Sequence[Axes], run: Run) -> list[Patch]:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatter
 
 from ..base.signals import Array
-from ..evaluate.canvas import HOLD, HYBRID, PHYSICS, finish_panels, save_figure
+from ..evaluate.canvas import HOLD, HYBRID, PHYSICS, draw_line, finish_panels, legend_above, save_figure
 from .frequency_response import IdentifiedResponse
 from .model import IdentifiedModel
 
@@ -40,16 +42,17 @@ def operation_figure(
     for x_d, x in recordings:
         x_pb = discrete.forced_response(discrete.rest(), x_d - x_d[0])[0] + x_d[0]
         t = start + np.arange(len(x)) * found.T_s
-        servo.plot(t, 1e6 * (x_d - x), color=HOLD, linewidth=2.5, alpha=0.6)
-        servo.plot(t, 1e6 * (x_d - x_pb), color=PHYSICS, linewidth=0.8)
-        residual.plot(t, 1e6 * (x - x_pb), color=PHYSICS, linewidth=0.8)
+        draw_line(servo, t, 1e6 * (x_d - x), 2.5, color=HOLD, alpha=0.6, label="measured")
+        draw_line(servo, t, 1e6 * (x_d - x_pb), 0.8, color=PHYSICS, label=found.structure)
+        draw_line(residual, t, 1e6 * (x - x_pb), 0.8, color=PHYSICS)
         start = float(t[-1]) + found.T_s
     micro = f"µ{found.unit}"
     servo.set_ylabel(f"servo error [{micro}]")
-    servo.legend(["measured", found.structure], frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
+    legend_above(servo, servo.get_lines()[:2])
     residual.set_ylabel(f"measured −\nmodelled [{micro}]")
     residual.set_xlabel("time [s]")
     servo.sharex(residual)
+    servo.tick_params(labelbottom=False)
     _draw_structures(structures, found, micro)
     finish_panels((servo, residual, structures))
     save_figure(figure, path)
@@ -67,13 +70,16 @@ def _draw_structures(axes: Axes, found: IdentifiedModel, micro: str) -> None:
     axes.invert_yaxis()
     if found.alternatives:
         axes.set_xscale("log")
-        handles, labels = axes.get_legend_handles_labels()
-        axes.legend(handles[:2], labels[:2], frameon=False, loc="lower right")
+        axes.xaxis.set_major_formatter("{x:g}")
+        axes.xaxis.set_minor_formatter(LogFormatter(minor_thresholds=(2.0, 0.5)))
+        legend_above(axes, axes.get_lines()[:2])
     axes.set_xlabel(f"RMS error of the simulated position [{micro}]; pale: not to be chosen")
 
 
 def response_figure(found: IdentifiedResponse, title: str, path: str | Path) -> None:
     """Draw magnitude, phase and error of a frequency response and its fit to a PNG.
+
+    Where no phase was measured there is none, and the error is that of the magnitude.
 
     Parameters
     ----------
@@ -83,26 +89,37 @@ def response_figure(found: IdentifiedResponse, title: str, path: str | Path) -> 
     path : str or Path
         The PNG.
     """
-    figure = Figure(figsize=(9.0, 8.0), layout="constrained")
-    magnitude, phase, error = figure.subplots(3, 1, sharex=True, height_ratios=[1.6, 1.2, 1.0])
+    ratios = [1.6, 1.2, 1.0] if found.phase_measured else [1.6, 1.0]
+    figure = Figure(figsize=(9.0, 2.0 + 1.6 * sum(ratios)), layout="constrained")
+    panels = figure.subplots(len(ratios), 1, sharex=True, height_ratios=ratios)
+    magnitude, error = panels[0], panels[-1]
     figure.suptitle(title)
     f = found.frequency
-    for values, color, width in ((found.response, HOLD, 4.0), (found.fitted, PHYSICS, 1.2)):
-        alpha = 0.6 if width > 2 else 1.0
-        magnitude.plot(f, 20 * np.log10(np.abs(values)), color=color, linewidth=width, alpha=alpha)
-        phase.plot(f, np.rad2deg(np.unwrap(np.angle(values))), color=color, linewidth=width, alpha=alpha)
-    magnitude.set_ylabel("magnitude [dB]")
     n = len(found.model.modes)
-    magnitude.legend(["measured", f"{n} mode{'s' if n > 1 else ''}"], frameon=False, loc="lower left")
-    phase.set_ylabel("phase [°]")
-    relative = np.maximum(np.abs(found.fitted / found.response - 1), 1e-16)
-    error.plot(f, 100 * relative, ".", color=PHYSICS, markersize=2)
+    labels = ("measured", f"{n} mode{'s' if n > 1 else ''}")
+    for values, label, style in zip((found.response, found.fitted), labels, (_MEASURED, _FITTED), strict=True):
+        magnitude.plot(f, 20 * np.log10(np.abs(values)), label=label, **style)
+        if found.phase_measured:
+            panels[1].plot(f, np.rad2deg(np.unwrap(np.angle(values))), **style)
+            panels[1].set_ylabel("phase [°]")
+    magnitude.set_ylabel("magnitude [dB]")
+    relative = found.fitted / found.response if found.phase_measured else np.abs(found.fitted) / np.abs(found.response)
+    error.plot(f, 100 * np.maximum(np.abs(relative - 1), 1e-16), ".", color=PHYSICS, markersize=2)
     error.set_yscale("log")
-    error.set_ylabel("error [%]")
+    error.yaxis.set_major_formatter("{x:g}")
+    error.set_ylabel("error [%]" if found.phase_measured else "error of the\nmagnitude [%]")
     error.set_xlabel("frequency [Hz]")
+    label = "natural frequency" if n == 1 else "natural frequencies"
     for mode in found.model.modes:
         if f[0] <= mode.f_n <= f[-1]:
-            for axes in (magnitude, phase, error):
-                axes.axvline(mode.f_n, color="black", linewidth=0.7, linestyle=":")
-    finish_panels((magnitude, phase, error))
+            for axes in panels:
+                axes.axvline(mode.f_n, color="black", linewidth=0.7, linestyle=":", label=label)
+    handles = dict(zip(*reversed(magnitude.get_legend_handles_labels()), strict=True))
+    legend_above(magnitude, list(handles.values()))
+    finish_panels(panels)
+    figure.align_ylabels()
     save_figure(figure, path)
+
+
+_MEASURED: dict[str, Any] = {"color": HOLD, "linewidth": 4.0, "alpha": 0.6}
+_FITTED: dict[str, Any] = {"color": PHYSICS, "linewidth": 1.2}

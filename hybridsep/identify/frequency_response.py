@@ -57,6 +57,8 @@ class IdentifiedResponse:
         Number of modes, RMS of the relative error, Bayesian information criterion.
     findings : tuple of str
         What a user should know, in words.
+    phase_measured : bool
+        Whether the response has the phase that was measured; else it is the magnitude alone.
     """
 
     model: ModalModel
@@ -69,6 +71,7 @@ class IdentifiedResponse:
     noise: float
     criteria: tuple[tuple[int, float, float], ...]
     findings: tuple[str, ...]
+    phase_measured: bool = True
 
     def machine(self, name: str, title: str, **entries: Any) -> Machine:
         """Return the machine with this model, as :meth:`IdentifiedModel.machine` does."""

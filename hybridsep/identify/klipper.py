@@ -118,7 +118,8 @@ def identify_resonance(
     a = recording.axes[axis]
     n = min(len(a), max(16, round(WINDOW / recording.T_s)))
     f, power = welch(a - a.mean(), fs=1 / recording.T_s, nperseg=n)
-    low, high = band[0] + 2 / WINDOW, min(band[1], 0.4 / recording.T_s)
+    # windows at both ends of the test hold a part of it only
+    low, high = band[0] + 2 / WINDOW, min(band[1] - 2 / WINDOW, 0.4 / recording.T_s)
     used = (f >= low) & (f <= high) & (f > 0)
     if np.count_nonzero(used) < 8:
         raise IdentificationError(
@@ -152,6 +153,7 @@ def identify_resonance(
             "no commanded motion is in the file: one mode was fitted to the magnitude, with a static gain of 1 and "
             "no zero; phase and dead time are unknown",
         ),
+        phase_measured=False,
     )
 
 

@@ -18,6 +18,9 @@ __all__ = ["tuning_figure"]
 
 _COLUMNS = 2
 
+_VALUES_NAMED = 10
+"""Values that are named below a panel, the first and the last among them."""
+
 _SHOWN = 0.95
 """Share of the candidates that the span of the errors is chosen for; those beyond it are at its edge."""
 
@@ -89,8 +92,8 @@ def _draw_parameter(axes: Axes, tuning: Tuning, field: str, highest: float) -> N
             axes.axhline(level, color=color, linewidth=1.2, linestyle="--")
     margin = 0.05 * max(highest - min(best), 0.1 * highest)
     axes.set_ylim(max(min(best) - margin, 0.0), highest + 0.2 * margin)
-    every = -(-len(values) // 10)
-    axes.set_xticks(range(0, len(values), every), [f"{value:g}" for value in values[::every]], fontsize="small")
+    shown = np.unique(np.linspace(0, len(values) - 1, min(len(values), _VALUES_NAMED)).round().astype(np.intp)).tolist()
+    axes.set_xticks(shown, [f"{values[i]:g}" for i in shown], fontsize="small")
     unit = TUNED[field].unit
     name = "λ" if field == "lam" else field
     axes.set_xlabel(name if unit == "1" else f"{name} [{unit.replace('m2', 'm²')}]")
@@ -105,14 +108,15 @@ def _draw_windows(axes: Axes, windows: Mapping[int, Tuning], Np: int) -> None:
     axes.plot(sizes, physics, color=PHYSICS, linewidth=1.2, linestyle="--", label="physics")
     axes.axhline(1.0, color=HOLD, linewidth=1.2, linestyle="--", label="hold")
     axes.axvline(Np, color="black", linewidth=0.8, linestyle=":")
+    left = Np > 0.5 * (sizes[0] + sizes[-1])  # beside the line there is room to the inside
     axes.annotate(
         "the controller's",
-        (Np, 0.98),
+        (Np, 0.02),
         xycoords=("data", "axes fraction"),
         fontsize="small",
-        va="top",
-        xytext=(4, 0),
+        ha="right" if left else "left",
+        xytext=(-4 if left else 4, 0),
         textcoords="offset points",
     )
     axes.set_ylim(bottom=0.0)
-    axes.set_xlabel("chosen settings over Np, the look-ahead: given, no choice")
+    axes.set_xlabel("look-ahead Np: given, no choice\n(with the chosen settings)")

@@ -1,0 +1,66 @@
+"""Figures of runs: nothing is cut off or hidden, long lines keep their peaks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from drawn import cut_off, figures_drawn, hiding_legends
+
+from hybridsep.compensate.plan import SepState
+from hybridsep.cosim.run import COMPENSATOR, PREDICTOR, Kind, Run
+from hybridsep.evaluate.path_plots import contour_figure, spiral_figure
+from hybridsep.evaluate.time_plots import prediction_figure, tracking_figure
+
+
+def made_run(kind: Kind, n: int, peak: int | None = None) -> Run:
+    """Return a run of ``n`` samples whose hybrid is worse in some windows, with a peak of one sample."""
+    rng = np.random.default_rng(0)
+    t = np.linspace(0.0, 1e-3 * (n - 1), n)
+    x_d = 0.02 * np.sin(3.0 * t)
+    x = x_d + 3e-5 * np.sin(200.0 * t)
+    x_h = x + 2e-5 * rng.standard_normal(n) * (np.sin(0.5 * t) > 0.9)
+    if peak is not None:
+        x_h[peak] += 5e-3
+    state = np.where(t < 0.3, SepState.PHYSICS, SepState.HYBRID)
+    return Run(kind, t, x_d, x_d + 1e-5, x, x, x_d, x_h, np.full(n, 1e-6), state, T_s=1e-3, Np=100)
+
+
+@pytest.mark.parametrize("n", [6000, 60_000])
+def test_a_prediction_hides_and_cuts_nothing(n: int, tmp_path: Path) -> None:
+    with figures_drawn() as drawn:
+        prediction_figure(
+            made_run(PREDICTOR, n), "A drive of a long name, on a log of a long name.csv", tmp_path / "a.png"
+        )
+    (figure,) = drawn
+    assert cut_off(figure) == []
+    assert hiding_legends(figure) == 0
+    labels = [text.get_text() for axes in figure.axes if (legend := axes.get_legend()) for text in legend.get_texts()]
+    assert labels[-1] == "hybrid worse than physics"
+
+
+@pytest.mark.parametrize("peak", [31_234, 59_999])
+def test_of_60_000_samples_few_are_drawn_and_every_peak(peak: int, tmp_path: Path) -> None:
+    with figures_drawn() as drawn:
+        prediction_figure(made_run(PREDICTOR, 60_000, peak), "long", tmp_path / "a.png")
+    lines = [line for axes in drawn[0].axes for line in axes.get_lines()]
+    assert max(len(line.get_xdata(orig=True)) for line in lines) <= 2002  # type: ignore[arg-type]
+    (hybrid,) = [line for line in lines if str(line.get_label()).startswith("linear hybrid")]
+    assert np.nanmin(np.asarray(hybrid.get_ydata(), dtype=np.float64)) < -4900.0
+
+
+def test_tracking_and_paths_hide_and_cut_nothing(tmp_path: Path) -> None:
+    run = made_run(COMPENSATOR, 3000)
+    several = {"off": run, "physics": run, "hybrid_cold": run, "hybrid_warm": run}
+    with figures_drawn() as drawn:
+        tracking_figure(several, "Staircase, compensated", tmp_path / "a.png")
+        tracking_figure({"hybrid": run}, "Staircase, compensated", tmp_path / "a.png")
+        spiral_figure(run, run, tmp_path / "a.png")
+        contour_figure(
+            dict.fromkeys(several, (run, run)), {key: np.abs(run.error) for key in several}, "a", tmp_path / "a.png"
+        )
+    assert len(drawn) == 4
+    for figure in drawn:
+        assert cut_off(figure) == []
+        assert hiding_legends(figure) == 0
