@@ -91,6 +91,7 @@ def run(app: Callable[[], object], leave: Callable[..., object] | None = None) -
     """
     global _leave
     _leave = leave
+    _open_closed()
     for stream in (sys.stdout, sys.stderr):
         with suppress(AttributeError):  # a replaced stream, which cannot be reconfigured
             stream.reconfigure(errors=_PLAIN_ERRORS)  # type: ignore[union-attr]
@@ -121,6 +122,18 @@ def run(app: Callable[[], object], leave: Callable[..., object] | None = None) -
             f"unexpected {what if len(what) <= 300 else what[:300] + '…'}; this is a fault of hybridsep {__version__}: "
             f"please report it with the command and its files ({DEBUG_VARIABLE}=1 shows where it is)"
         )
+
+
+def _open_closed() -> None:
+    """Open the null device in the place of standard streams that the caller has closed (``>&-``).
+
+    Otherwise Python has None there, and the next file that is opened gets what an FMU prints.
+    """
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            descriptor = os.open(os.devnull, os.O_RDWR)
+            os.set_inheritable(descriptor, True)
+            setattr(sys, name, os.fdopen(descriptor, mode, encoding="utf-8"))
 
 
 def _status(app: Callable[[], object]) -> int:

@@ -256,12 +256,12 @@ def machine_path(machine: str | Path) -> Path:
     if path.is_file():
         return path
     if path.suffix == ".toml":
-        raise MachineError(f"no machine {str(machine)!r}: there is no such file")
+        raise MachineError(f"no machine {brief(str(machine))}: there is no such file")
     bundled = data_folder("models") / f"{machine}.toml"
     if not bundled.is_file():
         hint = f"; {path / 'machine.toml'} is there" if (path / "machine.toml").is_file() else ""
         raise MachineError(
-            f"no machine {str(machine)!r}: expected a .toml file or one of {', '.join(machine_names())}{hint}"
+            f"no machine {brief(str(machine))}: expected a .toml file or one of {', '.join(machine_names())}{hint}"
         )
     return bundled
 

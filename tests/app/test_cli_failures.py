@@ -194,3 +194,14 @@ def test_an_ascii_terminal(tmp_path: Path) -> None:
     done = command("backtest", log, "-m", MACHINE, "--p", 200, env=ascii_only)
     assert done.returncode == 2
     assert b"p must be 1 ... Np = 100, got 200" in done.stderr
+
+
+@POSIX
+@pytest.mark.parametrize("streams", [">&-", "2>&-", "<&- >&- 2>&-"])
+def test_closed_standard_streams(tmp_path: Path, streams: str) -> None:
+    out = tmp_path / "machine.toml"
+    answers = "--name axis --T_s 1e-3 --model lag --tau 0.01 --dead-time 0 --hold zoh --Np 100"
+    shell = f'exec "$0" -c "from hybridsep_main import main; main()" init "$1" {answers} {streams}'
+    done = subprocess.run(["sh", "-c", shell, sys.executable, str(out)], capture_output=True, check=False)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert "[physics" in out.read_text(encoding="utf-8")
