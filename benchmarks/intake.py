@@ -1,8 +1,8 @@
 """Faults in many logs, and what the intake says of them and of good logs.
 
 ``python -m benchmarks.intake --drives 150`` takes some minutes. The faults are those of tests/support/spoiled_logs.py.
-The thresholds of the checks were chosen on the logs named here and on the random drives 0 to 399: ``--first 1000
---spoil 20`` judges them on drives that took no part in it.
+The thresholds of the checks were chosen on the logs named here, on the random drives 0 to 399 and on the generated logs
+0 to 159 (tests/support/generated_logs.py): ``--first 1000 --spoil 20 --generated 200`` judges them on others.
 """
 
 from __future__ import annotations
@@ -10,12 +10,14 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
 
+from generated_logs import generated_log
 from spoiled_logs import FAULTS, GOOD, good, log_of
 
 from benchmarks.random_drives.commands import T_S
@@ -32,10 +34,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--drives", type=int, default=150, help="random drives that must not be accused")
     parser.add_argument("--first", type=int, default=0, help="index of the first of them")
     parser.add_argument("--spoil", type=int, default=0, help="how many of them are spoiled, besides the named logs")
+    parser.add_argument("--generated", type=int, default=0, help="generated logs, and as many that are spoiled")
     options = parser.parse_args(arguments)
     first = options.first
     report_faults("named logs", ((name, good(name)) for name in SPOILED))
     report_faults("random drives", ((name, log) for name, log, _ in random_logs(first, options.spoil)))
+    report_generated(range(first, first + options.generated))
     report("good logs", ((name, good(name), None) for name in GOOD))
     report("random drives", random_logs(first, options.drives))
     report("random drives, with a model that is 20 % wrong", random_logs(first, options.drives, with_model=True))
@@ -53,6 +57,29 @@ def report_faults(title: str, logs: Iterable[tuple[str, Log]]) -> None:
             if found != [expected]:
                 print(f"{name:20} {fault:22} is {expected}, found: {', '.join(found) or 'nothing'}", flush=True)
     print(f"{title}: {n} spoiled, {missed} faults not found, {others} with another finding besides", flush=True)
+
+
+def report_generated(seeds: Iterable[int]) -> None:
+    """Print how many generated logs are refused, and of how many, each spoiled by a fault, it is found."""
+    refused = n = 0
+    found = {fault: [0, 0] for fault in FAULTS}
+    for seed in seeds:
+        generated = generated_log(seed)
+        intake = check(generated.log)
+        errors = [finding.name for finding in intake.errors] + ([] if intake.usable else ["not usable"])
+        n, refused = n + 1, refused + bool(errors)
+        if errors:
+            print(f"{seed}: {generated}: refused: {', '.join(errors)}", flush=True)
+        fault = list(FAULTS)[seed % len(FAULTS)]
+        expected, spoil = FAULTS[fault]
+        log = replace(generated.log, unit="m", unit_stated=False) if expected == "unit" else generated.log
+        names = [finding.name for finding in check(spoil(log)).findings]
+        found[fault][0] += expected in names
+        found[fault][1] += 1
+        if expected not in names:
+            print(f"{seed}: {generated}: {fault} is {expected}, found: {', '.join(names) or 'nothing'}", flush=True)
+    print(f"generated logs: {refused} of {n} good ones refused; found of those spoiled, by fault:")
+    print(", ".join(f"{fault} {right} of {all_}" for fault, (right, all_) in found.items() if all_), flush=True)
 
 
 def report(title: str, logs: Iterator[tuple[str, Log, Any]]) -> None:

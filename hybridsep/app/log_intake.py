@@ -19,7 +19,7 @@ from .reading_options import ReadingOptions
 
 __all__ = ["Reading", "changes", "findings_table", "open_checked", "reading_of", "show", "take_in"]
 
-_REPAIRED = ("time order", "gaps", "jitter", "outliers", "stuck samples", "repeated samples")
+_REPAIRED = ("time order", "gaps", "jitter", "lost rows", "outliers", "stuck samples", "repeated samples")
 """Findings about samples, not about what they mean: their fixes lose nothing that could be learned from."""
 
 _MISSING = "missing samples"

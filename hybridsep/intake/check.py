@@ -10,10 +10,12 @@ import numpy as np
 
 from ..logs.log import Log
 from .axis import check_delay, check_offset, check_same, check_swapped, check_velocity
+from .clipped import check_clipped, filled_by_command
 from .finding import ERROR, HOPELESS, NAMES, Finding
-from .fixes import without_missing
 from .following import check_following_error
 from .gain import check_scale, check_sign
+from .jumps import check_jumps
+from .lost_rows import check_lost_rows
 from .motion import check_motion, check_rate, check_start, check_unit
 from .samples import check_missing, check_outliers, check_repeated, check_stuck
 from .times import BRIDGED_MAX, check_gaps, check_jitter, check_order
@@ -26,7 +28,7 @@ __all__ = ["Intake", "apply", "check"]
 
 _Check = Callable[[Log], Iterator[Finding]]
 
-_SAMPLES: tuple[_Check, ...] = (check_outliers, check_stuck, check_repeated)
+_SAMPLES: tuple[_Check, ...] = (check_stuck, check_repeated)
 _AXIS: tuple[_Check, ...] = (
     check_same,
     check_swapped,
@@ -108,8 +110,12 @@ def check(log: Log, machine: Machine | None = None, *, bridged: int = BRIDGED_MA
     look((check_order, check_turns))
     findings.extend(check_missing(log))
     look((lambda log: check_gaps(log, bridged), check_jitter))
-    log = without_missing(log)  # what is missing, and in gaps, is no fault to find again
+    log = filled_by_command(log)  # what is missing, and in gaps, is no fault to find again
     if len(log.t) >= _FEW and np.isfinite(log.x_meas).any():
+        look((lambda log: check_lost_rows(log, bridged),))
+        log = filled_by_command(log)
+        look((check_jumps, check_outliers, lambda log: check_clipped(log, bridged)))
+        log = filled_by_command(log)
         look(_SAMPLES)
     hopeless = list(check_motion(log))
     findings.extend(hopeless)

@@ -13,11 +13,14 @@ from ..logs.log import Log
 __all__ = [
     "begin_at",
     "bridge",
+    "cut_at",
     "cut_out",
     "filled",
     "from_error",
     "in_order",
+    "inserted",
     "integrated",
+    "missing_at",
     "offset_removed",
     "resampled",
     "scaled",
@@ -65,6 +68,27 @@ def filled(log: Log, starts: Indices, lost: Indices, most: int) -> Log:
     return replace(log, t=np.interp(k, place, log.t), x_d=x_d, x_meas=x_meas, starts=tuple(sorted(begins)))
 
 
+def inserted(log: Log, starts: Indices, lost: Indices, *, missing: bool) -> Log:
+    """Insert rows that are missing although the times go on evenly, and number the times again.
+
+    Parameters
+    ----------
+    log : Log
+    starts, lost : (n,) array of int
+        As for :func:`filled`.
+    missing : bool
+        Whether the measured position is missing there, or interpolated.
+    """
+    more = filled(log, starts, lost, int(lost.max()))
+    rows = np.ones(len(log.t), dtype=np.intp)
+    rows[starts] += lost
+    later = log.T_s * (np.cumsum(rows) - 1 - np.arange(len(log.t)))
+    t = np.repeat(log.t + later, rows)
+    t -= log.T_s * (np.repeat(np.cumsum(rows), rows) - 1 - np.arange(len(t)))  # rows before their sample
+    more = replace(more, t=t)
+    return more if missing else without_missing(more)
+
+
 def resampled(log: Log) -> Log:
     """Interpolate linearly at multiples of ``T_s``, each segment from its own first time on."""
     parts = []
@@ -101,6 +125,18 @@ def bridge(log: Log, column: str, wrong: Indices) -> Log:
 def without_missing(log: Log) -> Log:
     """Interpolate linearly in time over missing measurements; a log without any measurement stays as it is."""
     return replace(log, x_meas=_interpolated(log.t, log.x_meas))
+
+
+def missing_at(log: Log, where: Indices) -> Log:
+    """Take the measured position as missing in the samples ``where``, indices."""
+    x_meas = log.x_meas.copy()
+    x_meas[where] = np.nan
+    return replace(log, x_meas=x_meas)
+
+
+def cut_at(log: Log, first: Indices) -> Log:
+    """Begin a segment at each of the samples ``first``."""
+    return replace(log, starts=tuple(sorted({*log.starts, *(int(k) for k in first)})))
 
 
 def cut_out(log: Log, begins: Indices, ends: Indices) -> Log:

@@ -48,16 +48,17 @@ _DECAYED = 0.05
 """Share of a mode's motion that one sample leaves, below which it does not oscillate between samples."""
 
 
-def moves(x_d: Array) -> NDArray[np.bool_]:
-    """Return which samples of a command move, (n − 1,)."""
-    steps = np.abs(np.diff(x_d))
+def moves(log: Log) -> NDArray[np.bool_]:
+    """Return which samples of a command move, (n − 1,); the steps between segments do not."""
+    steps = np.abs(np.diff(log.x_d))
+    steps[np.array(log.starts[1:], dtype=np.intp) - 1] = 0.0
     return np.asarray(steps > 1e-3 * steps.max(initial=0.0))
 
 
 def check_motion(log: Log) -> Iterator[Finding]:
     """Find a log with too little motion to learn from."""
     travel, noise = float(np.ptp(log.x_d)), noise_std(log.x_meas)
-    moving, n = int(moves(log.x_d).sum()), len(log.t)
+    moving, n = int(moves(log).sum()), len(log.t)
     reasons = []
     if travel == 0.0:
         reasons.append("the command never moves")

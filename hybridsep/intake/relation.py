@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import least_squares, minimize_scalar
 from scipy.signal import lfilter
 
@@ -78,9 +79,11 @@ def shifted(u: Array, lag: float) -> Array:
     return np.asarray(np.interp(k - lag, k, u))
 
 
-def line(u: Array, x: Array, lag: float = 0.0) -> Line:
-    """Return the regression of ``x``, (n,), on ``u``, (n,), at a lag."""
+def line(u: Array, x: Array, lag: float = 0.0, known: NDArray[np.bool_] | None = None) -> Line:
+    """Return the regression of ``x``, (n,), on ``u``, (n,), at a lag, over all samples or those ``known``, (n,)."""
     moved = shifted(u, lag)
+    if known is not None:
+        moved, x = moved[known], x[known]
     du, dx = moved - moved.mean(), x - x.mean()
     squares, total, product = float(du @ du), float(dx @ dx), float(du @ dx)
     if squares == 0.0 or total == 0.0:
@@ -89,16 +92,16 @@ def line(u: Array, x: Array, lag: float = 0.0) -> Line:
     return Line(lag, gain, float(x.mean() - gain * moved.mean()), max(0.0, 1.0 - product * product / squares / total))
 
 
-def line_at_best_lag(u: Array, x: Array) -> Line:
+def line_at_best_lag(u: Array, x: Array, known: NDArray[np.bool_] | None = None) -> Line:
     """Return the regression at the lag, positive or negative, that leaves least."""
     largest = min(LAG_MAX, len(u) // 4)
     steps = np.unique(np.round(np.geomspace(1, max(largest, 1), 40)))
     lags = np.concatenate((-steps[::-1], [0.0], steps))
-    left = [line(u, x, lag).unexplained for lag in lags]
+    left = [line(u, x, lag, known).unexplained for lag in lags]
     i = int(np.argmin(left))
     between = (float(lags[max(i - 1, 0)]), float(lags[min(i + 1, len(lags) - 1)]))
-    found = minimize_scalar(lambda lag: line(u, x, lag).unexplained, bounds=between, method="bounded")
-    return min(line(u, x, float(found.x)), line(u, x, float(lags[i])), key=lambda fit: fit.unexplained)
+    found = minimize_scalar(lambda lag: line(u, x, lag, known).unexplained, bounds=between, method="bounded")
+    return min(line(u, x, float(found.x), known), line(u, x, float(lags[i]), known), key=lambda fit: fit.unexplained)
 
 
 def noise_std(x: Array) -> float:

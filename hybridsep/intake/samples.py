@@ -60,8 +60,7 @@ def check_missing(log: Log) -> Iterator[Finding]:
 def check_outliers(log: Log) -> Iterator[Finding]:
     """Find values that leave the signal for one or two samples."""
     for column, title in _COLUMNS.items():
-        x = getattr(log, column)
-        wrong, heights = outliers(x)
+        wrong, heights = outliers(_in_one_piece(getattr(log, column), log.starts))
         if not len(wrong):
             continue
         words = (
@@ -72,6 +71,14 @@ def check_outliers(log: Log) -> Iterator[Finding]:
         evidence = {"n": float(len(wrong)), "first": float(wrong[0]), "largest": float(heights.max())}
         fix = Fix(f"interpolate the {title} over them", partial(fixes.bridge, column=column, wrong=wrong))
         yield Finding("outliers", WARNING, words, evidence, _signals(log, title, wrong), fix)
+
+
+def _in_one_piece(x: Array, starts: tuple[int, ...]) -> Array:
+    """Return a signal without its jumps between segments, which are no outliers."""
+    jumps = np.zeros(len(x))
+    for start in starts[1:]:
+        jumps[start] = x[start] - x[start - 1]
+    return x - np.cumsum(jumps) if len(starts) > 1 else x
 
 
 def outliers(x: Array) -> tuple[Indices, Array]:

@@ -24,7 +24,7 @@ _SPAN = 10 * _STRETCH
 def stretch(log: Log) -> slice:
     """Return the samples of one segment, at most :data:`_STRETCH`, in which the command moves most."""
     ends = (*log.starts[1:], len(log.t))
-    moved = np.concatenate((np.cumsum(moves(log.x_d)) if len(log.x_d) > 1 else [], [0]))
+    moved = np.concatenate((np.cumsum(moves(log)) if len(log.x_d) > 1 else [], [0]))
     best, most = slice(0, len(log.t)), -1.0
     for start, end in zip(log.starts, ends, strict=True):
         for first in range(start, max(end - _STRETCH, start) + 1, 1000):

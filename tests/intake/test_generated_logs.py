@@ -1,12 +1,15 @@
-"""Intake of generated logs: forty good ones that are not refused."""
+"""Intake of generated logs: forty good ones that are not refused, and spoiled ones whose fault is named."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from generated_logs import ACCUSED_BEFORE, COMMANDS, DRIVES, generated_log
+from spoiled_logs import FAULTS
 
 from hybridsep import ModalModel, Mode
 from hybridsep.intake.check import check
@@ -14,6 +17,14 @@ from hybridsep.intake.finding import ERROR, NOTE
 
 SEEDS = range(1000, 1033)
 """Of logs on which no threshold was chosen."""
+
+MOVES = {fault: 1000 + 8 * i for i, fault in enumerate(FAULTS)}
+"""Seeds of moves with rests, an axis for each fault."""
+MOVES["offset of 0.25 m"] = 1016  # instead of an axis of 40 rad, on which it is little
+MOVES["8 samples early"] = 1032  # instead of an axis that lags by more, and now by less
+
+FOUND_BY_NOBODY = ("clipped", "logs pasted together", "rows lost, times anew")
+SPOILED = [*MOVES.items(), *((fault, seed) for fault in FOUND_BY_NOBODY for seed in (1002, 1003, 1011, 1023))]
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -56,3 +67,73 @@ def test_a_lag_written_as_one_fast_mode_needs_no_fast_sampling() -> None:
     )
     (finding,) = [one for one in check(log, ringing).findings if one.name == "sampling rate"]
     assert "2.5 samples a period" in finding.words
+
+
+@pytest.mark.parametrize(("fault", "seed"), SPOILED)
+def test_a_fault_is_named(fault: str, seed: int) -> None:
+    name, spoil = FAULTS[fault]
+    generated = generated_log(seed)
+    good = replace(generated.log, unit="m", unit_stated=False) if name == "unit" else generated.log
+    found = [finding.name for finding in check(spoil(good)).findings if finding.severity != NOTE or name == "delay"]
+    accompanied = {"start in motion", "gaps"} if name != "start in motion" else set()
+    assert set(found) - accompanied == {name} or found == [name], generated
+
+
+def test_rows_that_were_lost_are_inserted_where_they_were() -> None:
+    good = generated_log(1002).log
+    keep = np.ones(len(good.t), dtype=np.bool_)
+    keep[[700, 701, 1500, 1800, 2200]] = False
+    n = int(keep.sum())
+    spoiled = replace(good, t=good.t[:n], x_d=good.x_d[keep], x_meas=good.x_meas[keep])
+    (finding,) = [one for one in check(spoiled).findings if one.name == "lost rows"]
+    assert finding.words.startswith("5 rows are missing, and the times were numbered anew: in 4 samples (")
+    assert "before sample 701" in finding.words
+    assert finding.fix is not None
+    fixed = finding.fix.change(spoiled)
+    np.testing.assert_allclose(fixed.t, good.t)
+    np.testing.assert_array_equal(np.isnan(fixed.x_meas), ~keep)
+    np.testing.assert_allclose(fixed.x_d, good.x_d, atol=1e-3 * np.ptp(good.x_d))
+    (finding,) = [one for one in check(spoiled, bridged=0).findings if one.name == "lost rows"]
+    assert finding.fix is not None
+    np.testing.assert_allclose(finding.fix.change(spoiled).x_meas, good.x_meas, atol=0.01 * np.ptp(good.x_d))
+
+
+def test_what_is_clipped_is_missing_or_cut_out() -> None:
+    good = generated_log(1003).log
+    limit = float(np.quantile(good.x_meas, 0.9))
+    spoiled = replace(good, x_meas=np.minimum(good.x_meas, limit))
+    (finding,) = [one for one in check(spoiled).findings if one.name == "clipped"]
+    assert finding.severity == ERROR
+    assert f"clipped at {limit:.6g} {good.unit} in " in finding.words
+    fixed = check(spoiled).fixed()
+    assert np.nanmax(fixed.x_meas) < limit
+    known = np.isfinite(fixed.x_meas)
+    np.testing.assert_array_equal(fixed.x_meas[known], good.x_meas[known])
+    assert "clipped" not in [one.name for one in check(fixed).findings]
+    apart = check(spoiled, bridged=0).fixed()
+    assert np.isfinite(apart.x_meas).all()
+    assert len(apart.segments()) > 1
+
+
+def test_pasted_logs_are_kept_apart() -> None:
+    good, other = generated_log(1000).log, generated_log(1000).log
+    n, far = 1500, 2.0 * float(np.ptp(generated_log(1000).log.x_d))
+    x_d, x = (np.concatenate((a[:n], far + b[n:])) for a, b in ((good.x_d, other.x_d), (good.x_meas, other.x_meas)))
+    intake = check(replace(good, x_d=x_d, x_meas=x))
+    (finding,) = [one for one in intake.findings if one.severity == ERROR]
+    assert finding.name == "jumps"
+    assert "logs were pasted together" in finding.words
+    assert intake.fixed().starts == (0, n)
+    command_only = check(replace(good, x_d=x_d))
+    (finding,) = [one for one in command_only.findings if one.name == "jumps"]
+    assert (finding.severity, finding.fix) == ("warning", None)
+
+
+@pytest.mark.parametrize("seed", [1002, 1007])
+def test_steps_that_are_the_command_are_no_jumps(seed: int) -> None:
+    """Steps of a whole motion, as a step response is recorded, and a command that was held for eight samples."""
+    good = generated_log(seed).log
+    held = replace(good, x_d=good.x_d[np.arange(len(good.t)) // 8 * 8])
+    assert "jumps" not in [one.name for one in check(held).findings]
+    steps = np.where(np.arange(len(good.t)) // 500 % 2 == 1, 1.0, 0.0) * float(np.ptp(good.x_d))
+    assert "jumps" not in [one.name for one in check(replace(good, x_d=steps)).findings]

@@ -118,6 +118,27 @@ def _spikes(n: int, travels: float) -> Callable[[Array, Log], Array]:
     return change
 
 
+def _clipped(x: Array, log: Log) -> Array:
+    """Clip at limits that 31 % of the moving samples pass, as far as the motion has a middle."""
+    moving = np.abs(np.gradient(log.x_d)) > 1e-3 * np.abs(np.diff(log.x_d)).max()
+    return np.asarray(np.clip(x, *np.quantile(x[moving], [0.155, 0.845])))
+
+
+def _pasted(log: Log) -> Log:
+    """Paste three logs together whose axis stands 0.6 travels further on each time."""
+    n = len(log.t)
+    places = 0.6 * float(np.ptp(log.x_d)) * (np.arange(n) // (n // 3 + 1))
+    return replace(log, x_d=log.x_d + places, x_meas=log.x_meas + places)
+
+
+def _numbered_anew(log: Log) -> Log:
+    """Lose 2 % of the rows, and number the times of the rest."""
+    keep = _random_numbers().random(len(log.t)) > 0.02
+    keep[[0, *(_fast(log) + np.array([0, 1, 2, 4, 5, 6]))]] = True
+    keep[_fast(log) + 3] = False  # one in motion, at least
+    return replace(log, t=log.t[: keep.sum()], x_d=log.x_d[keep], x_meas=log.x_meas[keep])
+
+
 FAULTS: dict[str, tuple[str, Callable[[Log], Log]]] = {
     "flipped": ("sign", _measured(lambda x, _: -x)),
     "mm for m": ("scale", _measured(lambda x, _: 1e3 * x)),
@@ -139,6 +160,9 @@ FAULTS: dict[str, tuple[str, Callable[[Log], Log]]] = {
     "slow sensor": ("repeated samples", _measured(lambda x, _: x[np.arange(len(x)) // 4 * 4])),
     "five spikes": ("outliers", _measured(_spikes(5, 0.05))),
     "thirty large spikes": ("outliers", _measured(_spikes(30, 10.0))),
+    "clipped": ("clipped", _measured(_clipped)),
+    "logs pasted together": ("jumps", _pasted),
+    "rows lost, times anew": ("lost rows", _numbered_anew),
     "no motion": ("too little motion", lambda log: replace(log, x_d=np.full_like(log.x_d, log.x_d[0]))),
     "time repeats": ("time order", _repeated_time),
     "mm read as m": ("unit", lambda log: replace(log, x_d=1e3 * log.x_d, x_meas=1e3 * log.x_meas)),
