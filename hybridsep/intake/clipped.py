@@ -24,7 +24,7 @@ _RUN = 5
 _KNOWN = 50
 """Samples elsewhere below which nothing is known of the axis."""
 
-_SHARE = 0.005
+_SHARE = 0.01
 """Share of the samples at limits below which nothing is lost."""
 
 _BEYOND, _LEFT = 6.0, 3.0
