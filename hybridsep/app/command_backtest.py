@@ -63,7 +63,7 @@ def backtest(
         from ..logs.log import Log
         from ..machines.machine import load_machine, machine_path
         from .arguments import check_ending
-        from .log_intake import findings_table, open_checked, reading_of
+        from .log_intake import changed_by, findings_table, open_checked, reading_of
         from .overwrite import BATCH_COLUMNS, BATCHES, BY_ENDING, Output, check_outputs
         from .progress import progress_bar
         from .tables import print_scores, print_written
@@ -87,7 +87,7 @@ def backtest(
     check_outputs(outputs, inputs, force=force)
     n_samples = len(opened.t) if isinstance(opened, Log) else opened.n_samples
     rows: list[tuple[float, ...]] = []
-    title = f"{axis_machine.title}, {log.name}"
+    title = f"{axis_machine.title}, {log.name}{changed_by(intake.findings)}"
     with progress_bar(as_json) as advance:
 
         def on_batch(batch: Batch) -> None:

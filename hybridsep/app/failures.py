@@ -20,6 +20,7 @@ from typer.core import TyperGroup
 from ..base.errors import HybridSepError, brief
 from ..base.interrupt import interrupts_between_calls
 from ..base.version import __version__
+from .new_folders import remove_empty_folders
 
 __all__ = ["DEBUG_VARIABLE", "Commands", "errors_console", "loading", "run"]
 
@@ -54,6 +55,8 @@ class Commands(TyperGroup):
                 wanted = _WANTED.get(first["type"].partition("_")[0], error.message)
                 error.message = f"{wanted}, got {brief(first['input'])}"
             raise
+        finally:
+            remove_empty_folders()
 
 
 class _Interrupted(BaseException):

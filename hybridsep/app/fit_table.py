@@ -11,6 +11,7 @@ from rich.table import Table
 from ..intake.finding import Finding
 from ..logs.log import Log
 from .fit import Fit
+from .log_intake import changed_by
 from .tables import console, shown_figure, shown_unit, span
 
 __all__ = ["print_fit"]
@@ -23,7 +24,8 @@ def print_fit(fit: Fit, logs: Sequence[Log], findings: Mapping[str, Iterable[Fin
         travel = float(np.ptp(log.x_d))
         stated = "" if log.unit_stated else f", as the file states no unit of positions: taken as {unit} (--unit)"
         console.print(
-            f"{log.path.name}: {len(log.t)} samples, {span([log])}, travel {1e3 * travel:.4g} m{unit}{stated}",
+            f"{log.path.name}: {len(log.t)} samples, {span([log])}, travel {1e3 * travel:.4g} m{unit}{stated}"
+            f"{changed_by(findings.get(log.path.name, ()))}",
             highlight=False,
         )
     for name, found in findings.items():

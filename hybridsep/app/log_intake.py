@@ -7,6 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..base.errors import LogError, ParameterError
 from ..intake.check import Intake, apply, check
 from ..intake.finding import ERROR, Finding
@@ -17,7 +19,7 @@ from .arguments import check_interval, check_unit
 from .failures import errors_console
 from .reading_options import ReadingOptions
 
-__all__ = ["Reading", "changes", "findings_table", "open_checked", "reading_of", "show", "take_in"]
+__all__ = ["Reading", "changed_by", "changes", "findings_table", "open_checked", "reading_of", "show", "take_in"]
 
 _REPAIRED = ("time order", "gaps", "jitter", "lost rows", "outliers", "stuck samples", "repeated samples")
 """Findings about samples, not about what they mean: their fixes lose nothing that could be learned from."""
@@ -94,6 +96,7 @@ def open_checked(
         raise ParameterError("--fix and --as-is exclude each other")
     reader = open_log(path, **reading, uniform=False)
     checked = reader.read(CHECKED_MAX)
+    _check_measured(checked)
     check_unit(path.name, checked, machine)
     trust = bool(reading.get("may_miss"))
     intake = check(replace(checked, unit=machine.unit), machine, bridged=BRIDGED_MAX if trust else 0)
@@ -138,6 +141,7 @@ def take_in(logs: Sequence[Log], *, fix: bool) -> tuple[list[Log], Mapping[str, 
     """
     used, all_findings = [], {}
     for log in logs:
+        _check_measured(log)
         findings = check(log).findings
         applied = [finding for finding in findings if (fix and finding.name != _MISSING) or finding.name in _REPAIRED]
         left = [
@@ -153,6 +157,15 @@ def take_in(logs: Sequence[Log], *, fix: bool) -> tuple[list[Log], Mapping[str, 
     return used, all_findings
 
 
+def _check_measured(log: Log) -> None:
+    """Raise LogError if no position was measured at all."""
+    if np.isnan(log.x_meas).all():
+        raise LogError(
+            f"{log.path}: the measured position is missing (NaN) in all {len(log.t)} samples; name its column (--x), "
+            "or record it"
+        )
+
+
 def _applied(finding: Finding) -> Finding:
     return replace(finding, applied=finding.fix is not None)
 
@@ -165,6 +178,12 @@ def changes(findings: Mapping[str, Iterable[Finding]]) -> list[str]:
         for finding in found
         if finding.applied and finding.fix is not None and finding.fix.meaning
     ]
+
+
+def changed_by(findings: Iterable[Finding]) -> str:
+    """Return the names of the fixes after which positions mean something else, for a headline; empty without any."""
+    names = [one.name for one in findings if one.applied and one.fix is not None and one.fix.meaning]
+    return f", positions changed (--fix: {', '.join(names)})" if names else ""
 
 
 def findings_table(findings: Iterable[Finding]) -> list[dict[str, Any]]:

@@ -18,6 +18,7 @@ from ..base.errors import ParameterError
 from ..base.zip_files import ZIP_DAMAGE
 from ..cosim.run import COMPENSATOR, PREDICTOR
 from ..logs.example import EXAMPLE, HEAD
+from .new_folders import make_folder
 
 __all__ = [
     "BATCHES",
@@ -225,7 +226,7 @@ def check_outputs(outputs: Iterable[Output], inputs: Mapping[str, str | Path | N
             )
     for output in known:
         try:
-            output.path.parent.mkdir(parents=True, exist_ok=True)
+            make_folder(output.path.parent)
         except (FileExistsError, NotADirectoryError) as error:
             raise ParameterError(
                 f"{output.option} {output.path}: a file has the name of the folder {output.path.parent}; choose another"
