@@ -75,8 +75,9 @@ def build(
             advance(name, i / len(jobs))
 
             def on_target(platform: str, name: str = name, done: float = i / len(jobs)) -> None:
-                advance(f"{name}, {platform}", done)
-                if not as_json and not errors_console.is_terminal:  # where no progress bar shows it
+                if as_json or errors_console.is_terminal:
+                    advance(f"{name}, {platform}", done)
+                else:
                     errors_console.print(f"{name}: compile for {platform}", highlight=False, soft_wrap=True)
 
             given = extras.get(model, {})

@@ -32,7 +32,8 @@ def demo(
     with loading():
         from .builds import default_flavour
         from .demo import demo as run_demo
-        from .demo import demo_files
+        from .demo import demo_files, processor_time
+        from .log_intake import show
         from .overwrite import BY_ENDING, Output, check_outputs
         from .progress import progress_bar
         from .tables import console, print_compensation, print_json, print_predictions
@@ -40,6 +41,8 @@ def demo(
     flavour = flavour or default_flavour()
     files = demo_files(out, flavour, emps=emps is not None)
     check_outputs((Output("--out", path, BY_ENDING[path.suffix]) for path in files), {"recording": emps}, force=force)
+    if not as_json:
+        show([f"this takes {processor_time(seeds, flavour)} of processor time"], ())
     with progress_bar(as_json) as advance:
         summary = run_demo(out, emps=emps, seeds=seeds, flavour=flavour, progress=advance)
     if as_json:

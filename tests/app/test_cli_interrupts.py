@@ -59,7 +59,7 @@ def test_ctrl_c_while_the_library_is_loaded() -> None:
     begun = time.monotonic()
     status, err = interrupted(["demo"], lambda: time.monotonic() > begun + 0.5)
     assert status == 130
-    assert err in ("interrupted\n", f"{SAID}\n")  # the longer one between loading two parts of it
+    assert err.splitlines()[-1] in ("interrupted", SAID)  # the longer one between loading two parts of it
 
 
 @POSIX
@@ -68,7 +68,7 @@ def test_ctrl_c_during_the_demo(tmp_path: Path) -> None:
     out = tmp_path / "demo"
     last = out / "staircase.csv"
     status, err = interrupted(["demo", "--flavour", "python", "--seeds", 1, "--out", out], last.exists)
-    assert (status, err.strip()) == (130, SAID)
+    assert (status, err.strip().splitlines()[-1]) == (130, SAID)  # after the duration and the stages
     assert not [path for path in out.rglob("*") if path.name.startswith(".")]
     lines = last.read_text().splitlines()
     assert len({line.count(",") for line in lines}) == 1
@@ -131,7 +131,7 @@ def test_ctrl_c_in_a_terminal_ends_the_processes_of_tune(tmp_path: Path) -> None
     except subprocess.TimeoutExpired:  # on a busy machine they start later
         os.killpg(process.pid, signal.SIGINT)
         _, err = process.communicate(timeout=60)
-    assert (process.returncode, err.strip()) == (130, SAID)
+    assert (process.returncode, err.strip().splitlines()[-1]) == (130, SAID)
     assert not out.exists()
     while time.monotonic() < begun + 90.0 and group_lives(process.pid):
         time.sleep(0.05)
@@ -182,7 +182,7 @@ def test_ctrl_c_in_the_middle_of_a_step_of_a_python_fmu(
             monkeypatch.setattr(module, "lfilter", lfilter)
     status, _, err = hybridsep("cosim", "--flavour", "python", "--trust", "false", "--out", out)
     assert (status, calls) == (130, 6)  # the step was finished, the next one not begun
-    assert err.strip() == SAID
+    assert err.strip().splitlines()[-1] == SAID
     assert out.read_bytes() == before
     assert list(tmp_path.iterdir()) == [out]
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
