@@ -34,10 +34,13 @@ _STOOD, _STUCK = 0.5, 2.0
 axis itself stood still: a sensor that was held shows the whole motion then. And what is believed from then on,
 relative to that motion."""
 
+_DOUBTED = 3
+"""Doubtful samples in a row from which on they may be true; fewer are wrong values."""
+
 _NEIGHBOURS = 2
 """Samples to either side that an isolated value is compared with."""
 
-_COUNTS = ("gap", "jumps", "holding")
+_COUNTS = ("gap", "doubtful", "holding")
 _NUMBERS = ("last", "spread", "pace", "last_x_pb", "first", "stuck", "vibration")
 
 N_STATE = len(_COUNTS) + len(_NUMBERS) + HeldValue.N_STATE + _NEIGHBOURS
@@ -53,7 +56,7 @@ class SensorGuard:
     Parameters
     ----------
     patience : int
-        Jumping samples in a row after which the new level is believed.
+        Doubtful samples in a row after which they are believed: the level is another one, or the axis stands still.
 
     Attributes
     ----------
@@ -75,8 +78,8 @@ class SensorGuard:
     vibration : float, m
         Median change of the residual from sample to sample, beyond that of noise: a drive that rings at rest is not at
         rest, though its model is.
-    jumps : int
-        Jumping samples in a row.
+    doubtful : int
+        Held or jumping samples in a row.
     last_x_pb : float, m
         Last prediction; NaN before the first.
     before : (2,) array, m
@@ -90,7 +93,7 @@ class SensorGuard:
 
     def restart(self) -> None:
         """Begin another run; what is known of the sensor is kept."""
-        self.last, self.gap, self.jumps = 0.0, 0, 0
+        self.last, self.gap, self.doubtful = 0.0, 0, 0
         self.held.restart()
         self.holding, self.first = 0, 0.0
         self.pace = 0.0
@@ -113,9 +116,8 @@ class SensorGuard:
         deviation = self._deviations(residuals)
         first = x_pb[0] if math.isnan(self.last_x_pb) else self.last_x_pb
         pace = float(np.abs(np.diff(x_pb, prepend=first)).max())
-        step = 0.0 if math.isinf(self.held.step) else self.held.step
         motion = max(pace, self.pace, self.vibration)
-        plausible = _SPREADS * self.spread + _RESOLUTION * step + _SMALL * largest + _RIPPLE * motion
+        plausible = self._plausible(motion, largest)
         still = max(plausible, _STUCK * self.stuck)
         accepted = np.isfinite(x)
         for k, (value, position, e) in enumerate(zip(x.tolist(), x_pb.tolist(), residuals.tolist(), strict=True)):
@@ -125,20 +127,52 @@ class SensorGuard:
             self._end_run(value, position)
             self.holding = int(self.held.holds(value, position, still=still))
             if self.holding:
-                accepted[max(k - self.held.repeats + 1, 0) : k + 1] = False
+                self.doubtful += 1
+                if self.doubtful <= self.patience:
+                    accepted[max(k - self.held.repeats + 1, 0) : k + 1] = False
+                else:  # the axis itself stands still
+                    self.last, self.gap = e, 0
                 continue
             if self.spread >= 0.0:
-                jumping = abs(e - self.last) > plausible + self.gap * _PACE * motion
-                self.jumps = self.jumps + 1 if jumping else 0
-                if (jumping and self.jumps <= self.patience) or deviation[k] > plausible:
+                nearest = min(max(e, min(self.last, 0.0)), max(self.last, 0.0))  # towards the prediction is no jump
+                jumping = abs(e - nearest) > plausible + self.gap * _PACE * motion
+                self.doubtful = self.doubtful + 1 if jumping else 0
+                if (jumping and self.doubtful <= self.patience) or deviation[k] > plausible:
                     accepted[k] = False
                     continue
-            self.last, self.gap, self.jumps = e, 0, 0
+            self.last, self.gap, self.doubtful = e, 0, 0
         self._follow(deviation[np.isfinite(x)], plausible)
         self._follow_vibration(residuals)
         self.pace, self.last_x_pb = pace, float(x_pb[-1])
         self.before = np.concatenate((self.before, residuals))[-_NEIGHBOURS:]
         return accepted
+
+    def doubted(self, x_pb: Array, largest: float) -> Array | None:
+        """Return what the residual of the next window may be instead, ``(n,)``, m; None if nothing is doubted.
+
+        An axis that stands still, believed or not, stands until it does not; or the rejected level is the true one.
+
+        Parameters
+        ----------
+        x_pb : (n,) array, m
+            Physics-based prediction of the next window.
+        largest : float, m
+            Largest accepted residual so far.
+        """
+        held = self.held
+        motion = min(held.high - held.low, self.pace * min(held.repeats, self.patience))
+        plausible = self._plausible(max(self.pace, self.vibration), largest)
+        if self.holding or held.stays(motion, still=plausible):
+            return held.value - x_pb if math.isfinite(held.value) else None
+        last = float(self.before[-1])
+        if _DOUBTED <= self.doubtful <= self.patience and math.isfinite(last):
+            return np.full(len(x_pb), last)
+        return None
+
+    def _plausible(self, motion: float, largest: float) -> float:
+        """Return the plausible deviation, m, under a predicted motion of a sample, m."""
+        step = 0.0 if math.isinf(self.held.step) else self.held.step
+        return _SPREADS * self.spread + _RESOLUTION * step + _SMALL * largest + _RIPPLE * motion
 
     def _end_run(self, value: float, position: float) -> None:
         """Judge who stood still where a run of equal values ends, and begin another."""
@@ -175,7 +209,7 @@ class SensorGuard:
         counts, own, held, before = np.split(state, ends)
         values = dict(zip(_NUMBERS, own.tolist(), strict=True))
         if not all(0 <= count <= COUNT_MAX and count == int(count) for count in counts) or counts[2] > 1:
-            raise SignalError("the guard's gap and jumps must be counts, and holding 0 or 1")
+            raise SignalError("the guard's gap and doubtful samples must be counts, and holding 0 or 1")
         if np.isinf(own).any() or np.isinf(before).any() or np.isnan([values["last"], values["first"]]).any():
             raise SignalError("the guard's residuals and positions must be finite")
         if not all(values[name] >= 0.0 for name in ("pace", "stuck", "vibration")):

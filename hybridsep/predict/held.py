@@ -67,8 +67,12 @@ class HeldValue:
             self.value, self.repeats, self.low, self.high = value, 0, position, position
         self.repeats += 1
         self.low, self.high = min(self.low, position), max(self.high, position)
+        return self.stays(self.high - self.low, still=still, first_step=first_step)
+
+    def stays(self, motion: float, *, still: float, first_step: float = math.inf) -> bool:
+        """Return whether the last value has been equal under a predicted motion, m; the rest as for :meth:`holds`."""
         step = first_step if math.isinf(self.step) else self.step
-        return self.repeats >= _REPEATS and self.high - self.low > max(_STEPS * step, still)
+        return self.repeats >= _REPEATS and motion > max(_STEPS * step, still)
 
     def state(self) -> list[float]:
         """Return the state as plain numbers."""

@@ -201,6 +201,7 @@ class HybridPredictor:
             np.where(active, e_h, 0.0),
             last=self.last_accepted_residual(),
             disagreement=0.0 if forecast is None else np.where(active, forecast.disagreement, 0.0),
+            doubted=None if self.trusted is None else self.trusted.guard.doubted(x_pb, self.trusted.scale.largest),
         )
         return e_h, PredictedWindow(x_d, x_pb, start, reference, signs, error, forecast)
 

@@ -100,12 +100,15 @@ class PredictedError(NamedTuple):
         Standard deviation of the error.
     fastest : float, m
         Largest change of ``x_pb`` from sample to sample, of earlier windows too.
+    in_doubt : bool
+        Whether the measurement before it is doubted: what is wrong then tells nothing of the errors of other windows.
     """
 
     e_h: Array
     components: Array
     std: Array
     fastest: float
+    in_doubt: bool = False
 
 
 class Uncertainty:
@@ -141,7 +144,14 @@ class Uncertainty:
         self.factor, self.ratio, self.recent, self.fastest = 1.0, 1.0, 0.0, 0.0
 
     def predict(
-        self, x_d: Array, x_pb: Array, e_h: Array, *, last: float, disagreement: Array | float
+        self,
+        x_d: Array,
+        x_pb: Array,
+        e_h: Array,
+        *,
+        last: float,
+        disagreement: Array | float,
+        doubted: Array | None = None,
     ) -> PredictedError:
         """Return what is known of the error of the next window; nothing is changed.
 
@@ -153,6 +163,8 @@ class Uncertainty:
             Last measured residual.
         disagreement : (n,) array or float, m²
             Variance of the candidates about their blend.
+        doubted : (n,) array, m, optional
+            Residual if the rejected measurement before the window is true.
         """
         n = len(x_d)
         bounded = e_h
@@ -173,8 +185,11 @@ class Uncertainty:
         gain = 1.0 / (1.0 + _FELT_FOR * self.Np)
         components[:, _FELT] = lfilter([gain], [1.0, gain - 1.0], components[:, _FELT], axis=0)
         c = self.factor * self.ratio ** self._from_middle(n)
-        std = np.minimum(c * np.sqrt(self._variance(components)), PREDICTION_MAX)
-        return PredictedError(bounded, components, std, math.sqrt(fastest[-1]))
+        std = c * np.sqrt(self._variance(components))
+        if doubted is not None:
+            std = np.sqrt(std**2 + np.minimum(np.abs(doubted - bounded), PREDICTION_MAX) ** 2)
+        std = np.minimum(std, PREDICTION_MAX)
+        return PredictedError(bounded, components, std, math.sqrt(fastest[-1]), doubted is not None)
 
     def learn(self, predicted: PredictedError, residuals: Array, accepted: NDArray[np.bool_]) -> None:
         """Learn from the measurement of a window.
@@ -187,6 +202,8 @@ class Uncertainty:
         accepted : (m,) array of bool
             Whether they count.
         """
+        if predicted.in_doubt:
+            return
         m = len(residuals)
         measured, e_h, components, std = residuals, predicted.e_h[:m], predicted.components[:m], predicted.std[:m]
         place = self._from_middle(m)

@@ -16,11 +16,17 @@ Array = NDArray[np.float64]
 NEIGHBOURS = 2
 
 
+class Doubt(ctypes.Structure):
+    """hsep_doubt."""
+
+    _fields_ = (("kind", ctypes.c_int), ("value", ctypes.c_double))
+
+
 class Guard(ctypes.Structure):
     """hsep_guard."""
 
     _fields_ = (
-        *((name, ctypes.c_uint64) for name in ("patience", "gap", "jumps", "holding")),
+        *((name, ctypes.c_uint64) for name in ("patience", "gap", "doubtful", "holding")),
         *(
             (name, ctypes.c_double)
             for name in (
@@ -60,6 +66,17 @@ class Guard(ctypes.Structure):
         )
         return accepted[::-1] > 0.0
 
+    def doubted(self, x_pb: Array, largest: float) -> list[float] | None:
+        doubt = c_core.library("predictor").hsep_guard_doubt
+        doubt.restype = Doubt
+        found = doubt(ctypes.byref(self), ctypes.c_double(largest))
+        values: dict[int, list[float] | None] = {
+            0: None,
+            1: (found.value - x_pb).tolist(),
+            2: [found.value] * len(x_pb),
+        }
+        return values[found.kind]
+
 
 @pytest.mark.parametrize("seed", range(20))
 def test_core_and_library_accept_the_same_samples(seed: int) -> None:
@@ -84,9 +101,32 @@ def test_core_and_library_accept_the_same_samples(seed: int) -> None:
         expected = guard.accepts(x[i : i + n], x_pb[i : i + n], 1e-4)
         assert core.accepts(x[i : i + n], x_pb[i : i + n], 1e-4).tolist() == expected.tolist()
         rejected += n - int(expected.sum())
+        doubted = guard.doubted(x_pb[i : i + n], 1e-6)
+        assert core.doubted(x_pb[i : i + n], 1e-6) == (None if doubted is None else doubted.tolist())
     assert 0 < rejected < 20 * n
-    assert (core.gap, core.jumps, core.repeats) == (guard.gap, guard.jumps, guard.held.repeats)
+    assert (core.gap, core.doubtful, core.repeats) == (guard.gap, guard.doubtful, guard.held.repeats)
     assert (core.holding, core.stuck, core.first) == (guard.holding, guard.stuck, guard.first)
     assert (core.step, core.pace) == (guard.held.step, guard.pace)
     assert core.spread == pytest.approx(guard.spread, rel=1e-12)
     assert core.vibration == pytest.approx(guard.vibration, rel=1e-12)
+
+
+@pytest.mark.parametrize("fault", ["held", "another level", "missing"])
+def test_core_and_library_doubt_alike(fault: str) -> None:
+    n = 20
+    x_pb = 1e-3 * np.sin(0.05 * np.arange(12 * n))
+    x = x_pb + np.random.default_rng(1).normal(0.0, 1e-7, 12 * n)
+    x[95:] = {"held": np.full(145, x[94]), "another level": x[95:] + 1e-2, "missing": np.full(145, np.nan)}[fault]
+    guard, core, told = SensorGuard(2 * n), Guard.begin(2 * n), []
+    for i in range(0, 12 * n, n):
+        assert core.accepts(x[i : i + n], x_pb[i : i + n], 1e-6).tolist() == (
+            guard.accepts(x[i : i + n], x_pb[i : i + n], 1e-6).tolist()
+        )
+        doubted = guard.doubted(x_pb[i : i + n], 1e-6)
+        assert core.doubted(x_pb[i : i + n], 1e-6) == (None if doubted is None else doubted.tolist())
+        told.append(None if doubted is None else float(doubted[-1]))
+    in_doubt = {"held": [4, 5, 6, 7, 8, 9, 10, 11], "another level": [4, 5], "missing": []}[fault]
+    assert [i for i, one in enumerate(told) if one is not None] == in_doubt
+    for i in in_doubt:
+        expected = x[-1] - x_pb[20 * i + 19] if fault == "held" else 1e-2
+        assert told[i] == pytest.approx(expected, abs=1e-6)

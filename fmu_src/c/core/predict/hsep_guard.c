@@ -18,6 +18,7 @@ static const uint64_t guard_changes = 8;
  * axis itself stood still: a sensor that was held shows the whole motion then. And what is believed from then on,
  * relative to that motion. */
 static const double guard_stood = 0.5, guard_stuck = 2.0;
+static const uint64_t guard_doubted = 3; /* doubtful samples in a row from which on they may be true */
 /* Rates at which the mean deviation follows that of a window; the vibration rises at once, and falls as it does. */
 static const double guard_rise = 0.5, guard_fall = 0.02;
 
@@ -94,6 +95,13 @@ static void guard_follow_vibration(
     }
 }
 
+/* Plausible deviation, m, under a predicted motion of a sample, m. */
+static double guard_plausible(const hsep_guard *self, double motion, double largest)
+{
+    const double step = self->held.step < HUGE_VAL ? self->held.step : 0.0;
+    return guard_spreads * self->spread + guard_resolution * step + guard_small * largest + guard_ripple * motion;
+}
+
 /* Judge who stood still where a run of equal values ends, and begin another. */
 static void guard_end_run(hsep_guard *self, double x, double x_pb)
 {
@@ -117,10 +125,8 @@ HSEP_API void hsep_guard_accept(
         last = x_pb[n - 1 - k];
         deviation[n - 1 - k] = guard_deviation(self, x, x_pb, n, k);
     }
-    const double step = self->held.step < HUGE_VAL ? self->held.step : 0.0;
     const double motion = fmax(fmax(pace, self->pace), self->vibration);
-    const double plausible =
-        guard_spreads * self->spread + guard_resolution * step + guard_small * largest + guard_ripple * motion;
+    const double plausible = guard_plausible(self, motion, largest);
     const double still = fmax(plausible, guard_stuck * self->stuck);
     const int known = self->spread >= 0.0;
     for (uint64_t k = 0; k < n; k++) {
@@ -133,6 +139,12 @@ HSEP_API void hsep_guard_accept(
         }
         guard_end_run(self, x[place], x_pb[place]);
         self->holding = (uint64_t)hsep_sensor_misses(&self->held, x[place], x_pb[place], still, HUGE_VAL);
+        if (self->holding && ++self->doubtful > self->patience) { /* the axis itself stands still */
+            accepted[place] = 1.0;
+            self->last = residual;
+            self->gap = 0;
+            continue;
+        }
         if (self->holding) {
             const uint64_t repeats = (uint64_t)fmin(self->held.repeats, (double)(k + 1));
             for (uint64_t j = k + 1 - repeats; j < k; j++) {
@@ -141,15 +153,17 @@ HSEP_API void hsep_guard_accept(
             continue;
         }
         if (known) {
-            const int jumping = fabs(residual - self->last) > plausible + (double)self->gap * guard_pace * motion;
-            self->jumps = jumping ? self->jumps + 1 : 0;
-            if ((jumping && self->jumps <= self->patience) || deviation[place] > plausible) {
+            /* Towards the prediction is no jump. */
+            const double nearest = fmin(fmax(residual, fmin(self->last, 0.0)), fmax(self->last, 0.0));
+            const int jumping = fabs(residual - nearest) > plausible + (double)self->gap * guard_pace * motion;
+            self->doubtful = jumping ? self->doubtful + 1 : 0;
+            if ((jumping && self->doubtful <= self->patience) || deviation[place] > plausible) {
                 continue;
             }
         }
         accepted[place] = 1.0;
         self->last = residual;
-        self->gap = self->jumps = 0;
+        self->gap = self->doubtful = 0;
     }
     guard_follow(self, x, deviation, n, known, plausible);
     guard_follow_vibration(self, x, x_pb, deviation, n);
@@ -158,4 +172,19 @@ HSEP_API void hsep_guard_accept(
     }
     self->pace = pace;
     self->x_pb = last;
+}
+
+HSEP_API hsep_doubt hsep_guard_doubt(const hsep_guard *self, double largest)
+{
+    const double last = self->before[HSEP_GUARD_NEIGHBOURS - 1];
+    const double range = self->held.high - self->held.low;
+    const double motion = fmin(range, self->pace * fmin(self->held.repeats, (double)self->patience));
+    const double plausible = guard_plausible(self, fmax(self->pace, self->vibration), largest);
+    if (self->holding || hsep_sensor_stays(&self->held, motion, plausible, HUGE_VAL)) {
+        return (hsep_doubt){isfinite(self->held.value) ? HSEP_STANDS : HSEP_NO_DOUBT, self->held.value};
+    }
+    if (self->doubtful >= guard_doubted && self->doubtful <= self->patience && isfinite(last)) {
+        return (hsep_doubt){HSEP_OTHER_LEVEL, last};
+    }
+    return (hsep_doubt){HSEP_NO_DOUBT, 0.0};
 }

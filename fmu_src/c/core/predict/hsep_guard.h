@@ -15,9 +15,9 @@
 #define HSEP_GUARD_NEIGHBOURS 2 /* samples to either side that an isolated value is compared with */
 
 typedef struct {
-    uint64_t patience; /* jumping samples in a row after which the new level is believed */
+    uint64_t patience; /* doubtful samples in a row after which they are believed: another level, an axis that stands */
     uint64_t gap;      /* samples since the last accepted one */
-    uint64_t jumps;    /* jumping samples in a row */
+    uint64_t doubtful; /* held or jumping samples in a row */
     uint64_t holding;  /* whether the last value was held */
     double stuck;      /* m, largest motion that was predicted while the axis itself stood still; 0 if it never did */
     double vibration;  /* m, median change of the residual from sample to sample, beyond that of noise */
@@ -32,6 +32,11 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_guard, 16 + HSEP_GUARD_NEIGHBOURS);
 
+typedef struct {
+    enum { HSEP_NO_DOUBT = 0, HSEP_STANDS, HSEP_OTHER_LEVEL } kind;
+    double value; /* m, position where the axis stands, or residual at the other level */
+} hsep_doubt;
+
 HSEP_API void hsep_guard_init(hsep_guard *self, uint64_t patience);
 
 /* Judge the samples of a window: accepted, (n,), becomes 1 where a sample is plausible and 0 elsewhere.
@@ -41,5 +46,9 @@ HSEP_API void hsep_guard_init(hsep_guard *self, uint64_t patience);
 HSEP_API void hsep_guard_accept(
     hsep_guard *self, const double x[], const double x_pb[], uint64_t n, double largest, double deviation[],
     double accepted[]);
+
+/* What the next window may be otherwise than predicted: the axis stands still, believed or not, until it does not; or
+ * the rejected level is the true one. largest: m, the largest accepted residual so far. Constant cost. */
+HSEP_API hsep_doubt hsep_guard_doubt(const hsep_guard *self, double largest);
 
 #endif

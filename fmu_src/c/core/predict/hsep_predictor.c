@@ -281,7 +281,9 @@ HSEP_API void hsep_predictor_doubt(hsep_predictor *self, uint64_t first, uint64_
         .x_pb = hsep_at(self, self->past_x),
         .e_h = hsep_at(self, self->e_h),
         .n_physics = predictor_warm_up(self, self->late),
-        .disagreement = trusted != NULL ? hsep_at(trusted, trusted->disagreement) + (trusted->n - self->n) : NULL};
+        .disagreement = trusted != NULL ? hsep_at(trusted, trusted->disagreement) + (trusted->n - self->n) : NULL,
+        .doubt = trusted != NULL ? hsep_guard_doubt(&trusted->guard, trusted->scale.largest)
+                                 : (hsep_doubt){HSEP_NO_DOUBT, 0.0}};
     if (self->divergence == HSEP_CONVERGES) {
         hsep_uncertainty_predict(hsep_predictor_uncertainty(self), &signals, first, last);
     }

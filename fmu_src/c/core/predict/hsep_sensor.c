@@ -25,6 +25,11 @@ HSEP_API int hsep_sensor_misses(hsep_sensor *self, double x_meas, double x_pb, d
     self->repeats += 1.0;
     self->low = fmin(self->low, x_pb);
     self->high = fmax(self->high, x_pb);
+    return hsep_sensor_stays(self, self->high - self->low, still, first_step);
+}
+
+HSEP_API int hsep_sensor_stays(const hsep_sensor *self, double motion, double still, double first_step)
+{
     const double step = self->step < HUGE_VAL ? self->step : first_step;
-    return self->repeats >= sensor_repeats && self->high - self->low > fmax(sensor_steps * step, still);
+    return self->repeats >= sensor_repeats && motion > fmax(sensor_steps * step, still);
 }

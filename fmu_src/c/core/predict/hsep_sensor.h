@@ -25,4 +25,7 @@ HSEP_API void hsep_sensor_init(hsep_sensor *self);
  * values are plausible whatever the resolution; first_step: m, resolution assumed before the first change. */
 HSEP_API int hsep_sensor_misses(hsep_sensor *self, double x_meas, double x_pb, double still, double first_step);
 
+/* Whether the last value has been equal under a predicted motion, m; the rest as above. */
+HSEP_API int hsep_sensor_stays(const hsep_sensor *self, double motion, double still, double first_step);
+
 #endif

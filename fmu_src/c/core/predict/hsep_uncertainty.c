@@ -89,7 +89,7 @@ HSEP_API int hsep_uncertainty_valid(const void *block, uint64_t Np, uint64_t n)
     memcpy(&got, block, sizeof got);
     (void)uncertainty_lay_out(&got, Np, n); /* changes nothing where it is sound */
     return memcmp(&got, block, sizeof got) == 0 && hsep_uncertainty_sound(&got) && got.fastest_ahead >= 0.0 &&
-           got.fastest_ahead <= HSEP_PREDICTION_MAX;
+           got.fastest_ahead <= HSEP_PREDICTION_MAX && got.in_doubt <= 1;
 }
 
 HSEP_API double *hsep_uncertainty_learned(hsep_uncertainty *self) { return self->theta; }
@@ -156,6 +156,7 @@ HSEP_API void hsep_uncertainty_predict(
         memset(felt, 0, sizeof self->felt);
         self->fastest_ahead = self->fastest;
         self->last = signals->e_h[n];
+        self->in_doubt = signals->doubt.kind != HSEP_NO_DOUBT;
     }
     double fastest = uncertainty_square(self->fastest_ahead);
     for (uint64_t k = first; k < last; k++) {
@@ -173,7 +174,13 @@ HSEP_API void hsep_uncertainty_predict(
             f[place] = felt[place];
         }
         const double c = self->factor * pow(self->ratio, uncertainty_from_middle(self, k));
-        std[n - 1 - k] = fmin(c * sqrt(uncertainty_variance(self, f)), HSEP_PREDICTION_MAX);
+        double deviation = c * sqrt(uncertainty_variance(self, f));
+        if (self->in_doubt) {
+            const double x_pb = signals->doubt.kind == HSEP_STANDS ? signals->x_pb[n - 1 - k] : 0.0;
+            const double otherwise = uncertainty_square(signals->doubt.value - x_pb - published[n - 1 - k]);
+            deviation = sqrt(deviation * deviation + otherwise);
+        }
+        std[n - 1 - k] = fmin(deviation, HSEP_PREDICTION_MAX);
     }
     self->fastest_ahead = sqrt(fastest);
 }
@@ -251,7 +258,7 @@ HSEP_API void hsep_uncertainty_learn(hsep_uncertainty *self, const double e[], c
             uncertainty_add(&sums, e[j], e[j] - e_h[j], std[j], uncertainty_from_middle(self, self->Np - 1 - j));
         }
     }
-    if (!(sums.squares > 0.0)) { /* nothing to learn a scale from */
+    if (self->in_doubt || !(sums.squares > 0.0)) { /* nothing to learn a scale from */
         return;
     }
     uncertainty_follow(self, &sums);

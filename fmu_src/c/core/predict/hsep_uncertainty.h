@@ -15,6 +15,7 @@
 #define HSEP_UNCERTAINTY_H
 
 #include "hsep_api.h"
+#include "hsep_guard.h"
 #include "hsep_layout.h"
 
 #include <stdint.h>
@@ -31,6 +32,7 @@ typedef struct {
     double recent;                      /* m2, recent mean square of the residual; 0 before the first window */
     double fastest;                     /* m, largest change of x_pb from sample to sample in a measured window */
     uint64_t n;                         /* samples that are predicted */
+    uint64_t in_doubt;                  /* whether the guard doubted them */
     double fastest_ahead;               /* m, fastest with those of the predicted samples */
     double last;                        /* m, last measured residual before them */
     double felt[HSEP_N_COMPONENTS];     /* m2, averages of what is felt for a while, up to the last one of them */
@@ -40,7 +42,7 @@ typedef struct {
     uint64_t std;        /* (n,) m, standard deviation of the error */
 } hsep_uncertainty;
 
-HSEP_ASSERT_WORDS(hsep_uncertainty, 7 + HSEP_N_COMPONENTS + HSEP_N_UNCERTAINTY);
+HSEP_ASSERT_WORDS(hsep_uncertainty, 8 + HSEP_N_COMPONENTS + HSEP_N_UNCERTAINTY);
 
 /* Bytes of the block, counted in double so that no size can overflow. */
 HSEP_API double hsep_uncertainty_size(uint64_t Np, uint64_t n);
@@ -65,6 +67,7 @@ typedef struct {
     const double *e_h;          /* (n + 1,) m, predicted residual, behind it the last measured one */
     uint64_t n_physics;         /* leading samples where it is not published */
     const double *disagreement; /* (n,) m2, variance of the candidates about their blend, or NULL */
+    hsep_doubt doubt;           /* what the guard doubts; the same in all calls for a window */
 } hsep_uncertainty_signals;
 
 /* Predict the errors of samples first ... last - 1; first is 0, or where the last call ended. The first samples are at
