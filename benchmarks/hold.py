@@ -73,7 +73,7 @@ def of_log(log: Path, folder: Path, Np: int) -> Iterator[tuple[str, float]]:
     fixed = ["--fix"] if "jitter" in log.name else []
     fitted, written, batches = folder / "axis", folder / "predictions.csv", folder / "batches.csv"
     hybridsep("fit", log, *reading, *fixed, "--name", "axis", "--Np", Np, "--out", fitted)
-    command = (log, "-m", fitted / "machine.toml", *reading, *fixed)
+    command = (log, "-m", fitted / "machine.toml", *reading, *(fixed or ["--as-is"]))
     scores = json.loads(hybridsep("backtest", *command, "--save", written, "--out", batches, "--json"))
     x_pb, x_meas, x_hold = (column(written, name) for name in ("x_pb", "x_meas", "x_hold"))
     again, n = hold(x_pb, x_meas, Np), len(x_pb)
@@ -102,7 +102,7 @@ def of_fmu(archive: Path, x_d: Column, x_meas: Column, Np: int) -> float:
         for k in range(n + Np):
             x_pb.append(controller.outputs()[0][1])
             controller.step(k, x_d[min(k, n - 1)], x_meas[max(k - Np, 0)])
-        shown = float(controller.fmu.get("rms_hold"))
+        shown: float = controller.fmu.get("rms_hold")
     return abs(shown - rms_of(x_meas, hold(x_pb[Np:], x_meas, Np)))
 
 
