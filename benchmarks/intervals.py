@@ -1,6 +1,6 @@
 """Coverage of the intervals ``x_h ± z·x_h_std`` of the predictor with trust.
 
-    python benchmarks/intervals.py [--emps DATA_EMPS.mat] [--n 300] [--seed 1] [--cache FILE]
+    python benchmarks/intervals.py [--emps DATA_EMPS.mat] [--n 300] [--generator modal] [--seed 1] [--cache FILE]
 
 Percent of the measured positions within the intervals of 50, 90 and 95 %, over the whole window and over each third of
 it: of the warm runs of ``benchmarks/trust.py``, and pooled over cold runs of random drives.
@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # benchmarks are n
 import numpy as np
 
 from benchmarks.random_drives.cache import read_positions
-from benchmarks.random_drives.generator import SEED, drives_at, true_positions
+from benchmarks.random_drives.generators import GENERATORS
 from benchmarks.trust import cases
 from hybridsep.base.metrics import coverage
 from hybridsep.base.signals import Array
@@ -37,7 +37,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--emps", type=Path, help="DATA_EMPS.mat: the recorded axis, too")
     parser.add_argument("--n", type=int, default=0, help="number of random drives")
-    parser.add_argument("--seed", type=int, default=SEED)
+    parser.add_argument("--generator", choices=tuple(GENERATORS), default="modal", help="of the random drives")
+    parser.add_argument("--seed", type=int, help="the generator's own if left out")
     parser.add_argument(
         "--cache", type=Path, help="file (.npz) of positions that benchmarks.random_drives.run has written"
     )
@@ -48,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if chosen.n:
         pooled = [
             np.concatenate(parts, axis=1)
-            for parts in zip(*random_runs(chosen.n, chosen.seed, chosen.cache), strict=True)
+            for parts in zip(*random_runs(chosen.n, chosen.generator, chosen.seed, chosen.cache), strict=True)
         ]
         print(row(f"{chosen.n} random drives, cold", *pooled))
 
@@ -62,11 +63,13 @@ def warm_runs(emps: Path | None) -> Iterator[tuple[str, Array, Array]]:
         yield (case.name, *run(predictor, case.x_d, case.x_meas[1]))
 
 
-def random_runs(n: int, seed: int, cache: Path | None) -> Iterator[tuple[Array, Array]]:
+def random_runs(n: int, name: str, seed: int | None, cache: Path | None) -> Iterator[tuple[Array, Array]]:
     """Yield errors and standard deviations, m, of the cold runs of random drives."""
-    x = read_positions(cache, "modal", seed, n) if cache else None
-    for drive in drives_at(range(n), true_positions(range(n), seed) if x is None else x, seed):
-        yield run(HybridPredictor(drive.model), drive.x_d, drive.x_meas)
+    generator = GENERATORS[name]
+    seed = generator.seed if seed is None else seed
+    x = read_positions(cache, name, seed, n) if cache else None
+    for drive in generator.drives_at(range(n), generator.true_positions(range(n), seed=seed) if x is None else x, seed):
+        yield run(HybridPredictor(drive.model, drive.settings), drive.x_d, drive.x_meas)
 
 
 def run(predictor: HybridPredictor, x_d: Array, x: Array) -> tuple[Array, Array]:
