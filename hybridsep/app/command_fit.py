@@ -50,10 +50,10 @@ def fit(
         from .fit import fit as fit_logs
         from .fit_report import fit_report, judged_by
         from .fit_table import print_fit
+        from .judged import recommendation
         from .log_intake import changes, findings_table, show, take_in
         from .overwrite import BY_ENDING, FIT_FILES, Output, check_outputs
         from .progress import progress_bar
-        from .report_sections import recommendation
         from .tables import console, print_json, print_written
 
     name = checked_name(name) if name else machine_name(logs[0], reading.axis)

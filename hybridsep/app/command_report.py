@@ -53,10 +53,12 @@ def report(
         from ..machines.machine import load_machine, machine_path
         from ..tune.halves import Recording, replay
         from .arguments import check_ending, machine_name
+        from .judged import Judged, recommendation
         from .log_intake import changes, open_checked, reading_of
         from .overwrite import BY_ENDING, REPORT, Output, check_outputs
         from .progress import progress_bar
-        from .report_sections import Judged, recommendation, write_changes, write_errors, write_findings, write_use
+        from .report_sections import write_changes, write_errors, write_findings
+        from .report_use import write_use
         from .step_times import SAMPLES_MAX, step_times
         from .tables import console, print_written
 
@@ -77,7 +79,8 @@ def report(
     whole = opened if isinstance(opened, Log) else opened.read()
     with progress_bar(False) as advance:
         recording = Recording(whole.x_d, whole.x_meas, 0)
-        replayed = replay(predictor, [recording], progress=lambda done: advance("replay", 0.9 * done))
+        replayed = replay(predictor, [recording], progress=lambda done: advance("replay", 0.8 * done))
+        replayed = replayed.with_peers(lambda done: advance("peers", 0.8 + 0.1 * done))
         advance("time the FMU's steps", 0.95)
         steps = {}
         if fmu is not None:

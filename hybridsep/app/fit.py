@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..base.errors import IdentificationError, ParameterError
+from ..base.metrics import rms_ratio
 from ..base.output import written_text
 from ..base.settings import PredictorSettings
 from ..fmi.archive import fmu_name
@@ -84,13 +85,21 @@ class Fit:
     files: tuple[Path, ...]
 
     def summary(self) -> dict[str, Any]:
-        """Return plain values: errors in m over the samples that judge, settings, identification, step times in s."""
+        """Return plain values: errors in m over the samples that judge, settings, identification, step times in s.
+
+        The physics model is judged with the offset that was identified beside it, which the FMU's ``x_pb`` has not.
+        ``ratio`` is the hybrid's error relative to that of the best of physics model, hold and peers.
+        """
         rms_pb, rms_hold, rms_h = self.judged.rms()
-        verdict = self.judged.verdict()
+        verdict, best = self.judged.verdict(), self.judged.best()
+        peers = self.judged.scored()[2:-1]
         judged = {
-            "rms_pb": rms_pb,
-            "rms_hold": rms_hold,
-            "rms_h": rms_h,
+            "rms_pb": _known(rms_pb),
+            "rms_hold": _known(rms_hold),
+            "rms_h": _known(rms_h),
+            "peers": {one.name: "diverged" if one.diverged else _known(one.rms) for one in peers},
+            "best": best.name,
+            "ratio": _known(rms_ratio(rms_h, best.rms)),
             "n_windows": verdict.n_windows,
             "verdict": str(verdict),
         }
@@ -170,10 +179,16 @@ def fit(
     settings = replace(default, p=p, q=q)
     windows = stages.result(
         "windows",
-        lambda: [asdict(one) for one in window_scores(model, recordings, settings, within(0.6, 0.8, "error over Np"))],
+        lambda: [
+            {name: _known(value) for name, value in asdict(one).items()}
+            for one in window_scores(
+                *(model, recordings, settings, within(0.6, 0.8, "error over Np")), offset=found["offset"]
+            )
+        ],
     )
     predictor = HybridPredictor(model, settings)
-    judged = replay(predictor, recordings, progress=within(0.8, 0.85, "judge on the second half"))
+    replayed = replay(predictor, recordings, progress=within(0.8, 0.83, "judge on the second half"))
+    judged = replace(replayed, offset=found["offset"]).with_peers(within(0.83, 0.85, "peers on the second half"))
     machine = _machine(options.name, logs, model, settings, changes)
     with written_text(files["machine file"]) as file:
         file.write(sealed(machine_text(machine, comments=[found["structure"]]), "fit"))
@@ -222,7 +237,12 @@ def _identified(
     except IdentificationError as error:
         found = unit_gain_model(T_s, f"{error}; a gain of 1 without lag is taken")
     summary = dict(found.summary())
-    return {name: None if isinstance(value, float) and math.isnan(value) else value for name, value in summary.items()}
+    return {name: _known(value) for name, value in summary.items()}
+
+
+def _known(value: Any) -> Any:
+    """Return a value for JSON: None for a figure that is not finite."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _choice(
@@ -237,7 +257,7 @@ def _choice(
         {
             "p": one.settings.p,
             "q": one.settings.q,
-            "rms_h": one.rms_h if math.isfinite(one.rms_h) else None,
+            "rms_h": _known(one.rms_h),
             "chosen": one.settings == choice.settings,
         }
         for one in choice.tried

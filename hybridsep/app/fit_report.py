@@ -13,17 +13,10 @@ from ..intake.finding import Finding
 from ..logs.log import Log
 from ..tune.choice import WORTH
 from .fit import Fit
+from .judged import Judged, recommendation
 from .log_intake import changes
-from .report_sections import (
-    COLOURS,
-    NAMES,
-    Judged,
-    recommendation,
-    write_changes,
-    write_errors,
-    write_findings,
-    write_use,
-)
+from .report_sections import COLOURS, NAMES, write_changes, write_errors, write_findings
+from .report_use import write_use
 from .tables import span
 
 __all__ = ["fit_report", "judged_by"]
@@ -80,7 +73,9 @@ def fit_report(fit: Fit, logs: Sequence[Log], findings: Mapping[str, Sequence[Fi
 def _write_other_windows(report: Report, fit: Fit, judged: Judged) -> None:
     report.heading("Errors with other look-aheads")
     scale, unit = judged.unit
-    windows = np.array([[one["Np"], one["rms_pb"], one["rms_hold"], one["rms_h"]] for one in fit.windows])
+    windows = np.array(
+        [[one[name] for name in ("Np", "rms_pb", "rms_hold", "rms_h")] for one in fit.windows], np.float64
+    )
     lengths = 1e3 * judged.T_s * windows[:, 0]
     lines = [Line(name, lengths, scale * windows[:, 1 + i], COLOURS[i]) for i, name in enumerate(NAMES)]
     lines += [Line("", lengths, scale * windows[:, 3], HYBRID, points=True)]

@@ -15,9 +15,13 @@ from ..tune.halves import Recording
 __all__ = ["Stages", "key_of"]
 
 
+_FORMAT = 2
+"""Number of what the stages hold; it is counted up where that changes."""
+
+
 def key_of(recordings: Iterable[Recording], options: object) -> str:
     """Return what a result depends on as a hash: the samples as they are used, the options, the version."""
-    found = hashlib.sha256(f"{__version__} {options!r}".encode())
+    found = hashlib.sha256(f"{_FORMAT} {__version__} {options!r}".encode())
     for recording in recordings:
         found.update(f"{len(recording.x)} {recording.n_taught}".encode())
         found.update(recording.x_d.tobytes() + recording.x.tobytes())

@@ -37,8 +37,8 @@ def print_fit(fit: Fit, logs: Sequence[Log], findings: Mapping[str, Iterable[Fin
         "prediction by", title=f"Error on samples that taught nothing [{shown}]", box=box.SIMPLE, pad_edge=False
     )
     table.add_column("RMS", justify="right")
-    for label, value in zip(("physics model", "hold", "hybrid"), fit.judged.rms(), strict=True):
-        table.add_row(label, shown_figure(scale * value))
+    for one in fit.judged.scored():
+        table.add_row(one.name, "diverged" if one.diverged else shown_figure(scale * one.rms))
     console.print(f"{model['structure']}, dead time {model['dead_time']} samples", highlight=False)
     for line in model["findings"]:
         console.print(f"  {line}", highlight=False)

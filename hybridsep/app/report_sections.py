@@ -1,34 +1,26 @@
-"""Sections of a report that follow from a replay: judgement, errors, spectra, the log's findings, use of the FMU."""
+"""Sections of a report that follow from a replay: judgement, errors, spectra, the log's findings."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from scipy.signal import welch
 
-from ..base.metrics import coverage
+from ..base.metrics import coverage, rms_ratio
 from ..base.signals import Array
 from ..evaluate.canvas import HOLD, HYBRID, PHYSICS
 from ..evaluate.chart import Chart, Line
 from ..evaluate.report import Report
-from ..evaluate.verdict import ALIKE, WINDOWS_ENOUGH, WINDOWS_MIN, counted
 from ..intake.finding import Finding
-from ..tune.halves import Replay
-from .tables import shown_unit
+from .judged import Judged, peers_in_words
 
 __all__ = [
     "COLOURS",
     "NAMES",
-    "Judged",
-    "recommendation",
     "write_changes",
     "write_errors",
     "write_findings",
-    "write_use",
 ]
 
 NAMES = ("physics model", "hold the last residual", "hybrid")
@@ -38,67 +30,6 @@ COLOURS = (PHYSICS, HOLD, HYBRID)
 """Their colours."""
 
 _COMMAND = "#1d2733"
-
-
-@dataclass(frozen=True)
-class Judged:
-    """Replay as it is reported.
-
-    Attributes
-    ----------
-    replay : Replay
-    T_s : float
-        Sampling interval, s.
-    si : {"m", "rad"}
-        Unit of the positions.
-    part : str
-        What judges, such as "the log's second half".
-    share : float
-        Share of a log's samples that judges.
-    """
-
-    replay: Replay
-    T_s: float
-    si: str
-    part: str
-    share: float = 1.0
-
-    @cached_property
-    def unit(self) -> tuple[float, str]:
-        """Factor and name of the unit in which errors are shown."""
-        return shown_unit(self.replay.rms()[0], self.si)
-
-
-def _enough(judged: Judged) -> str:
-    """Return how long a recording would do, in words: its windows that judge, and one that began before."""
-    seconds = (WINDOWS_ENOUGH + 1) * judged.replay.Np * judged.T_s / judged.share
-    return f"record at least {math.ceil(round(10 * seconds, 6)) / 10:g} s"
-
-
-def recommendation(judged: Judged) -> str:
-    """Return what to do, in words; with caution where few windows judge."""
-    n = judged.replay.verdict().n_windows
-    if n < WINDOWS_MIN:
-        return (
-            f"Nothing could be judged: {judged.part} has {counted(n)} of {judged.replay.Np} samples; {_enough(judged)}."
-        )
-    pb, hold, h = judged.replay.rms()
-    peer, value = min(("the physics model alone", pb), ("holding the last residual", hold), key=lambda one: one[1])
-    if value == 0.0:
-        return f"There is no error to predict in {judged.part}: record the axis while it works."
-    ratio = h / value
-    if n < WINDOWS_ENOUGH:
-        how = "better than" if ratio < 1.0 - ALIKE else "worse than" if ratio > 1.0 + ALIKE else "as good as"
-        return (
-            f"So far the hybrid is {how} {peer}, {ratio:.2f} × its error, but judged by {counted(n)} only: "
-            f"{_enough(judged)}."
-        )
-    by = f"judged by {counted(n)}"
-    if ratio < 1.0 - ALIKE:
-        return f"Use the hybrid: its error is {ratio:.2f} × that of {peer}, the best without learning, {by}."
-    if ratio <= 1.0 + ALIKE:
-        return f"The hybrid does no harm and no good here: {ratio:.2f} × the error of {peer}, {by}."
-    return f"Do not use the hybrid on what this log shows: {ratio:.2f} × the error of {peer}, {by}; record more motion."
 
 
 def write_changes(report: Report, changes: Sequence[str]) -> None:
@@ -119,6 +50,8 @@ def write_errors(report: Report, judged: Judged, title: str, how: str) -> None:
         Heading of the figures, and how they came about.
     """
     _write_figures(report, judged, title, how)
+    if np.isnan(judged.replay.errors()[0]).all():  # nothing judges
+        return
     _write_time(report, judged)
     _write_windows(report, judged)
     _write_horizon(report, judged)
@@ -128,16 +61,20 @@ def write_errors(report: Report, judged: Judged, title: str, how: str) -> None:
 def _write_figures(report: Report, judged: Judged, title: str, how: str) -> None:
     report.heading(title)
     scale, unit = judged.unit
-    errors = judged.replay.errors()
-    known = errors[:, ~np.isnan(errors[0])]
+    scored = judged.replay.scored()
     rows = []
-    for name, row in zip(NAMES, known, strict=True):
-        ratio = np.sqrt(np.mean(row**2) / np.mean(known[0] ** 2)) if known[0].any() else np.nan
-        figures = (np.sqrt(np.mean(row**2)), np.quantile(np.abs(row), 0.95), np.abs(row).max())
-        rows.append([name, *(f"{scale * figure:.4g}" for figure in figures), f"{ratio:.3f}"])
+    for one in scored:
+        size = np.abs(one.errors[~np.isnan(one.errors)])
+        if one.diverged or not size.size:
+            rows.append([one.name, "diverged" if one.diverged else "–", "", "", ""])
+            continue
+        figures = (one.rms, np.quantile(size, 0.95), size.max())
+        ratio = rms_ratio(one.rms, scored[0].rms)
+        rows.append([one.name, *(f"{scale * figure:.4g}" for figure in figures), f"{ratio:.3f}"])
     report.table(["prediction by", f"RMS [{unit}]", "95 % below", "largest", "× physics"], rows)
     report.paragraph(
-        f"{how} Each window was predicted before any of its samples was known, as in the machine.",
+        f"{how} Each window was predicted before any of its samples was known, as in the machine. "
+        f"{peers_in_words(judged)}",
         "dim",
     )
     report.bullets(line.rstrip(".") for line in str(judged.replay.verdict()).splitlines())
@@ -148,8 +85,7 @@ def _write_time(report: Report, judged: Judged) -> None:
     replay = judged.replay
     errors, std = scale * replay.errors(), scale * replay.joined("x_h_std")
     t = judged.T_s * np.arange(errors.shape[1])
-    x_d = np.concatenate([recording.x_d[recording.judges_from :] for recording in replay.recordings])
-    lines = [Line("command", t, 1e3 * x_d, _COMMAND)]
+    lines = [Line("command", t, 1e3 * replay.commands(), _COMMAND)]
     within = coverage(errors[2], std, 0.95)
     for name, row, colour in zip(NAMES, errors, COLOURS, strict=True):
         if name != NAMES[1]:
@@ -172,7 +108,7 @@ def _write_windows(report: Report, judged: Judged) -> None:
     begins, errors = judged.replay.window_errors()
     if len(begins) < 2:
         return
-    t = np.repeat(judged.T_s * np.append(begins, begins[-1] + judged.replay.Np), 2)[1:-1]
+    t = np.repeat(judged.T_s * np.append(begins, len(judged.replay.commands())), 2)[1:-1]
     lines = [
         Line(name, t, scale * np.repeat(row, 2), colour)
         for name, row, colour in zip(NAMES, errors, COLOURS, strict=True)
@@ -238,64 +174,3 @@ def write_findings(report: Report, findings: Mapping[str, Iterable[Finding]]) ->
                 )
             ]
             report.chart(Chart(picture.x_label, (picture.y_label,), lines, picture.title))
-
-
-def write_use(report: Report, fmus: Iterable[str], steps: Mapping[str, float], T_s: float, Np: int) -> None:
-    """Write how FMUs are used, and how long a step of the first takes.
-
-    Parameters
-    ----------
-    report : Report
-    fmus : iterable of str
-        Names of their files.
-    steps : mapping
-        As of :func:`~hybridsep.app.step_times.step_times`.
-    T_s : float
-        Sampling interval, s.
-    Np : int
-        Samples of the look-ahead.
-    """
-    names = list(fmus)
-    report.heading("Use it")
-    late = "" if max(steps["median"], steps["p99_9"]) <= T_s else _LATE
-    report.paragraph(
-        f"Through Python on this machine a step of {names[0]} took {_duration(steps['median'])} (median; 99.9 % at "
-        f"most {_duration(steps['p99_9'])}; the largest {_duration(steps['largest'])}, interruptions by the operating "
-        f"system included), with a sampling interval of {_duration(T_s)}. Steps that end a window take longest.{late}"
-    )
-    report.code(_REPLAY.format(fmu=names[0], T_s=T_s, Np=Np))
-    report.bullets(
-        [
-            "OMSimulator: add the FMU to a system, connect x_d to the drive and its measured position to x_meas, fixed "
-            f"step size {T_s:g} s",
-            "OpenModelica: File > Import FMU; in an OMSimulator model as above",
-            f"Dymola: File > Open > Import FMU, co-simulation, communication step {T_s:g} s",
-            f"Simulink: FMU Import block (FMI 2.0, co-simulation), sample time {T_s:g} s",
-            "x_d_ahead is the trajectory, as many samples early as the look-ahead is long; wire x_d to the drive: the "
-            "FMU is the look-ahead buffer",
-        ]
-    )
-
-
-_LATE = (
-    " They take longer than the sampling interval: a real-time task of this interval would overrun on such a machine."
-)
-"""What is added where steps do not fit into the sampling interval."""
-
-_REPLAY = """\
-import numpy as np
-from fmpy import simulate_fmu
-
-# x_d, x_meas: commanded and measured positions of a log, one sample every {T_s!r} s
-signals = np.zeros(len(x_d) + {Np}, [("time", float), ("x_d_ahead", float), ("x_meas", float)])
-signals["time"] = {T_s!r} * np.arange(len(signals))
-signals["x_d_ahead"] = np.pad(x_d, (0, {Np}), mode="edge")  # enters {Np} samples before it is commanded ...
-signals["x_meas"] = np.pad(x_meas, ({Np}, 0), mode="edge")  # ... and measured
-result = simulate_fmu("{fmu}", stop_time=signals["time"][-1], step_size={T_s!r},
-                      output_interval={T_s!r}, input=signals, output=["x_d", "x_h", "x_h_std", "e_servo"])"""
-"""Replay of a log with fmpy."""
-
-
-def _duration(seconds: float) -> str:
-    """Return a duration in ms, or in µs if it is shorter."""
-    return f"{1e3 * seconds:.3g} ms" if seconds >= 1e-3 else f"{1e6 * seconds:.3g} µs"

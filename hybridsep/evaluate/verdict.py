@@ -1,4 +1,4 @@
-"""Verdict on a hybrid model in words: better or worse than the physics model and than hold, where, and why.
+"""Verdict on a hybrid model in words: better or worse than the physics model, hold and other peers, where, and why.
 
 The errors of a run are summed up by place: a third of the look-ahead window, and whether the axis is commanded to move.
 What is kept does not grow with the run.
@@ -7,6 +7,7 @@ What is kept does not grow with the run.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,7 @@ from ..base.metrics import rms_ratio
 from ..base.signals import Array
 from ..cosim.run import Run
 
-__all__ = ["ALIKE", "WINDOWS_ENOUGH", "WINDOWS_MIN", "Tally", "Verdict", "counted", "verdict_of"]
+__all__ = ["ALIKE", "PEERS", "WINDOWS_ENOUGH", "WINDOWS_MIN", "Tally", "Verdict", "counted", "verdict_of"]
 
 ALIKE = 0.02
 """Relative difference of two RMS errors below which they count as equal."""
@@ -44,19 +45,22 @@ _N_EARLY = 10
 _N_THIRDS = 3
 _THIRDS = ("first third", "second third", "last third")
 _MOTIONS = ("standstill", "motion")
-_PEERS = ("the physics model", "hold")
+PEERS = ("the physics model", "hold")
+"""Peers of every hybrid model, whose errors also tell why it is worse."""
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """Judgement of the hybrid model against its two peers.
+    """Judgement of the hybrid model against its peers.
 
     Attributes
     ----------
-    ratio_pb, ratio_hold : float
-        RMS error of the hybrid relative to that of the physics model, and to that of the hold baseline.
-    worse : tuple of tuples of two str
-        Places where it is worse than the physics model, and where it is worse than hold.
+    peers : tuple of str
+        Their names, :data:`PEERS` first.
+    ratios : tuple of float
+        RMS error of the hybrid relative to that of each peer.
+    worse : tuple of tuples of str
+        Places where it is worse than each peer.
     judged : tuple of str
         Places with enough samples.
     causes : tuple of str
@@ -67,9 +71,9 @@ class Verdict:
         Whole windows with measurements, which were judged.
     """
 
-    ratio_pb: float
-    ratio_hold: float
-    worse: tuple[tuple[str, ...], tuple[str, ...]]
+    peers: tuple[str, ...]
+    ratios: tuple[float, ...]
+    worse: tuple[tuple[str, ...], ...]
     judged: tuple[str, ...]
     causes: tuple[str, ...]
     n_rejected: int
@@ -77,13 +81,22 @@ class Verdict:
     n_samples: int
     n_windows: int
 
+    @property
+    def ratio_pb(self) -> float:
+        """RMS error of the hybrid relative to that of the physics model."""
+        return self.ratios[0]
+
+    @property
+    def ratio_hold(self) -> float:
+        """RMS error of the hybrid relative to that of the hold baseline."""
+        return self.ratios[1]
+
     def __str__(self) -> str:
         if self.n_windows < WINDOWS_MIN:
             return f"Nothing is judged: {counted(self.n_windows)}, at least {WINDOWS_MIN} are needed."
-        ratios = (self.ratio_pb, self.ratio_hold)
         lines = [
             f"{_comparison(value)} {peer}: {_times(value)}{_where(value, places, self.judged)}"
-            for peer, value, places in zip(_PEERS, ratios, self.worse, strict=True)
+            for peer, value, places in zip(self.peers, self.ratios, self.worse, strict=True)
         ]
         lines += [f"Why: {cause}" for cause in self.causes]
         if self.n_windows < WINDOWS_ENOUGH:
@@ -103,19 +116,22 @@ def verdict_of(run: Run) -> Verdict:
 
 
 class Tally:
-    """Running sums of the errors of physics model, hold and hybrid, by their place.
+    """Running sums of the errors of the peers and of the hybrid, by their place.
 
     Parameters
     ----------
     Np : int
         Samples in a window.
+    further : sequence of str
+        Names of peers besides :data:`PEERS`.
     """
 
-    def __init__(self, Np: int) -> None:
+    def __init__(self, Np: int, further: Sequence[str] = ()) -> None:
         self.Np = Np
-        self._squares = np.zeros((3, len(_MOTIONS), _N_THIRDS))
+        self._peers = (*PEERS, *further)
+        self._squares = np.zeros((len(self._peers) + 1, len(_MOTIONS), _N_THIRDS))
         self._counts = np.zeros((len(_MOTIONS), _N_THIRDS))
-        self._early, self._n_windows, self._n_whole = np.zeros(3), 0, 0
+        self._early, self._n_windows, self._n_whole = np.zeros(len(self._squares)), 0, 0
         self._last_x_d = math.nan
         self._fastest = 0.0
         self._largest_residual = self._largest_change = 0.0
@@ -128,8 +144,8 @@ class Tally:
         ----------
         x_d, x : (n,) array, m
             Commanded and measured positions, NaN where missing.
-        predictions : (3, n) array, m
-            ``x_pb``, ``x_hold`` and ``x_h``.
+        predictions : (3 or more, n) array, m
+            ``x_pb``, ``x_hold``, those of further peers, and ``x_h``.
         """
         speed = np.empty(len(x_d))
         speed[0] = 0.0 if math.isnan(self._last_x_d) else abs(x_d[0] - self._last_x_d)
@@ -146,7 +162,7 @@ class Tally:
         for total, weights in zip((*self._squares, self._counts), (*squares, known), strict=True):
             total += np.bincount(place, weights, total.size).reshape(total.shape)
         self._n_missing += int((~known).sum())
-        self._largest_change = max(self._largest_change, float(np.abs(predictions[2] - predictions[0]).max()))
+        self._largest_change = max(self._largest_change, float(np.abs(predictions[-1] - predictions[0]).max()))
         if known.any():
             self._largest_residual = max(self._largest_residual, float(np.sqrt(squares[0].max())))
         if self._n_windows < _N_EARLY:
@@ -164,16 +180,15 @@ class Tally:
         n_missing : int, optional
             Those that were missing; as many as the windows lack, if left out.
         """
-        pb, hold, h = self._squares
-        ratios = [_ratio(h.sum(), peer.sum()) for peer in (pb, hold)]
-        worse = tuple(self._worse(h, peer) for peer in (pb, hold))
+        *peers, h = self._squares
+        ratios = tuple(_ratio(h.sum(), peer.sum()) for peer in peers)
         n_samples = int(self._counts.sum()) + self._n_missing
         return Verdict(
-            ratios[0],
-            ratios[1],
-            (worse[0], worse[1]),
+            self._peers,
+            ratios,
+            tuple(self._worse(h, peer) for peer in peers),
             tuple(self._places()),
-            tuple(self._causes(ratios)),
+            tuple(self._causes(ratios[: len(PEERS)])),
             n_rejected,
             min(self._n_missing if n_missing is None else n_missing, n_rejected),
             n_samples,
@@ -194,7 +209,7 @@ class Tally:
             if _ratio(h.take(i, axis=axis).sum(), peer.take(i, axis=axis).sum()) > 1.0 + ALIKE
         )
 
-    def _causes(self, ratios: list[float]) -> list[str]:
+    def _causes(self, ratios: Sequence[float]) -> list[str]:
         """Return what explains a hybrid that is worse."""
         causes = []
         if self._largest_change > _UNSTABLE * self._largest_residual > 0.0:
@@ -206,7 +221,7 @@ class Tally:
             causes += self._causes_of_worse(ratios)
         return causes
 
-    def _causes_of_worse(self, ratios: list[float]) -> list[str]:
+    def _causes_of_worse(self, ratios: Sequence[float]) -> list[str]:
         moving = float(self._counts[1].sum() / max(self._counts.sum(), 1.0))
         causes = []
         if moving < _LITTLE_MOTION:
@@ -223,7 +238,7 @@ class Tally:
     def _worse_early(self, peer: int) -> bool:
         """Return whether the hybrid is worse than a peer in the beginning of the run and not in the rest."""
         rest = np.maximum(self._squares.sum(axis=(1, 2)) - self._early, 0.0)
-        return self._n_windows > 2 * _N_EARLY and _ratio(rest[2], rest[peer]) <= 1.0 + ALIKE
+        return self._n_windows > 2 * _N_EARLY and _ratio(rest[-1], rest[peer]) <= 1.0 + ALIKE
 
 
 def _not_learned(n_rejected: int, n_missing: int, n_samples: int) -> str:

@@ -112,6 +112,7 @@ class IdentifiedModel:
             "dead_time": self.model.dead_time,
             "modes": [vars(mode) for mode in self.model.modes],
             "parameters": [vars(estimate) for estimate in self.parameters],
+            "offset": self.offset,
             "rms": self.rms,
             "rms_held_out": self.rms_held_out,
             "n_samples": self.n_samples,

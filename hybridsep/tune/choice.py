@@ -83,7 +83,7 @@ class WindowScore:
     ----------
     Np : int
     rms_pb, rms_hold, rms_h : float
-        RMS over the samples that judge, m.
+        RMS over the samples that judge, m; of the physics model with its offset.
     """
 
     Np: int
@@ -160,6 +160,8 @@ def window_scores(
     recordings: Sequence[Recording],
     settings: PredictorSettings,
     progress: Callable[[float], object] = lambda _done: None,
+    *,
+    offset: float = 0.0,
 ) -> tuple[WindowScore, ...]:
     """Return the errors with shorter and longer windows than the controller's, for as much as the log has.
 
@@ -167,11 +169,13 @@ def window_scores(
     ----------
     model, recordings, settings, progress
         As for :func:`choose_settings`.
+    offset : float
+        As of :class:`~hybridsep.tune.halves.Replay`, m.
     """
     sizes = window_sizes(settings.Np, min(len(recording.x) for recording in recordings))
     scores = []
     for i, Np in enumerate(sizes):
         predictor = HybridPredictor(model, with_window(settings, Np))
-        scores.append(WindowScore(Np, *replay(predictor, recordings).rms()))
+        scores.append(WindowScore(Np, *replace(replay(predictor, recordings), offset=offset).rms()))
         progress((i + 1) / len(sizes))
     return tuple(scores)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -11,10 +13,11 @@ from ..base.errors import SignalError
 from ..base.metrics import rms
 from ..base.signals import Array, Indices
 from ..evaluate.backtest import Backtest, backtest
+from ..evaluate.peers import Peer, Piece, predict_peers
 from ..evaluate.verdict import Tally, Verdict
 from ..predict.predictor import HybridPredictor
 
-__all__ = ["PREDICTIONS", "Recording", "Replay", "halves", "replay"]
+__all__ = ["PREDICTIONS", "Recording", "Replay", "Scored", "halves", "replay"]
 
 PREDICTIONS = ("x_pb", "x_hold", "x_h")
 """What a replay predicts by: physics model, hold baseline, hybrid."""
@@ -50,7 +53,7 @@ class Recording:
         return max(self.n_taught, self.n_settling)
 
     def first_judged(self, Np: int) -> int:
-        """Return the first sample of the first window of ``Np`` that judges as a whole."""
+        """Return the first sample of the first window of ``Np`` that begins among those that judge."""
         return -(-self.judges_from // Np) * Np
 
 
@@ -85,8 +88,34 @@ def halves(pieces: Iterable[tuple[Array, Array]], share: float, n_settling: int 
 
 
 @dataclass(frozen=True)
+class Scored:
+    """Errors of a prediction over the samples that judge.
+
+    Attributes
+    ----------
+    name : str
+    errors : (n,) array, m
+        Measured minus predicted position, NaN where a measurement is missing.
+    diverged : bool
+        Whether the prediction diverged; then its errors mean nothing.
+    """
+
+    name: str
+    errors: Array
+    diverged: bool = False
+
+    @cached_property
+    def rms(self) -> float:
+        """RMS of the errors, m; infinite where it diverged, NaN without a measurement."""
+        return math.inf if self.diverged else _rms(self.errors)
+
+
+@dataclass(frozen=True)
 class Replay:
     """Causal replay of recordings one after the other, what is learned kept.
+
+    The same samples judge everywhere: the whole windows from the first one that begins among those that judge, and the
+    shorter one at a recording's end.
 
     Attributes
     ----------
@@ -95,27 +124,64 @@ class Replay:
         One a recording.
     Np : int
         Samples in a window.
+    delay : int
+        Samples by which the measurements are late; as many at a recording's beginning are of before it, and missing.
+    offset : float
+        Measured minus modelled position, m, that was identified beside the physics model, and is judged with it.
+    peers : tuple of Peer
+        What the hybrid is judged by besides physics model and hold.
     """
 
     recordings: tuple[Recording, ...]
     results: tuple[Backtest, ...]
     Np: int
+    delay: int = 0
+    offset: float = 0.0
+    peers: tuple[Peer, ...] = ()
+
+    def with_peers(self, progress: Callable[[float], object] = lambda _done: None) -> Replay:
+        """Return the replay with the peers' predictions of the samples that judge."""
+        pieces = [Piece(one.x_d, one.x, one.n_taught, one.first_judged(self.Np)) for one in self.recordings]
+        return replace(self, peers=predict_peers(pieces, self.Np, delay=self.delay, progress=progress))
 
     def joined(self, name: str, *, taught: bool = False) -> Array:
         """Return a signal of a :class:`Backtest` over all samples that judge, or over those that teach, ``(n,)``."""
         return self._parts([getattr(result, name) for result in self.results], taught)
 
+    def commands(self) -> Array:
+        """Return the commanded position over all samples that judge, ``(n,)``, m."""
+        return self._parts([recording.x_d for recording in self.recordings], False)
+
     def errors(self, *, taught: bool = False) -> Array:
         """Return ``x`` minus each of :data:`PREDICTIONS` over the samples that judge, or teach, ``(3, n)``, m.
 
-        NaN where a measurement is missing.
+        NaN where a measurement is missing. The physics model is judged with its offset.
         """
-        x = self._parts([recording.x for recording in self.recordings], taught)
-        return np.stack([x - self.joined(name, taught=taught) for name in PREDICTIONS])
+        x = self._measured(taught)
+        return np.stack([x - self._parts(list(rows), taught) for rows in zip(*self._predictions(), strict=True)])
 
     def rms(self, *, taught: bool = False) -> list[float]:
-        """Return the RMS of each of :meth:`errors`, m."""
-        return [rms(row[~np.isnan(row)]) for row in self.errors(taught=taught)]
+        """Return the RMS of each of :meth:`errors`, m; NaN without a measurement."""
+        return [_rms(row) for row in self.errors(taught=taught)]
+
+    def scored(self) -> list[Scored]:
+        """Return the errors of physics model, hold, every peer, and the hybrid, over the samples that judge."""
+        x, (pb, hold, h) = self._measured(False), self.errors()
+        peers = [Scored(one.title, x - self._parts(one.predictions, False), one.diverged) for one in self.peers]
+        return [Scored("physics model", pb), Scored("hold", hold), *peers, Scored("hybrid", h)]
+
+    def best_ways(self) -> list[Peer]:
+        """Return the peers, each fitted in the way that is better over the samples that judge; none that diverged."""
+        rms = {id(peer): one.rms for peer, one in zip(self.peers, self.scored()[2:-1], strict=True)}
+        best: dict[str, Peer] = {}
+        for peer in sorted(self.peers, key=lambda peer: rms[id(peer)]):
+            if not peer.diverged:
+                best.setdefault(peer.name, peer)
+        return [peer for peer in self.peers if best.get(peer.name) is peer]
+
+    def best(self) -> Scored:
+        """Return the best of physics model, hold and peers over the samples that judge."""
+        return min(self.scored()[:-1], key=lambda one: one.rms)
 
     def horizon(self) -> Array:
         """Return the RMS of each prediction at each sample of the window, judged, ``(3, Np)``, m; NaN without any."""
@@ -131,7 +197,7 @@ class Replay:
         return found
 
     def window_errors(self) -> tuple[Indices, Array]:
-        """Return the first sample of each window that judges as a whole, and the RMS of each prediction over it.
+        """Return the first sample of each window that judges, and the RMS of each prediction over it.
 
         Returns
         -------
@@ -141,37 +207,56 @@ class Replay:
             NaN where nothing was measured.
         """
         begins, found = [], []
-        for recording, window, predictions, begin in self._windows():
+        for _, x, predictions, begin in self._windows(()):
             begins.append(begin)
-            errors = recording.x[window] - predictions
-            known = errors[:, ~np.isnan(errors[0])]
-            found.append(np.sqrt(np.mean(known**2, axis=1)) if known.size else np.full(len(PREDICTIONS), np.nan))
+            found.append([_rms(x - row) for row in predictions])
         return np.array(begins, dtype=np.intp), np.reshape(found, (-1, len(PREDICTIONS))).T
 
     def verdict(self) -> Verdict:
         """Return the verdict on the samples that judge."""
-        tally = Tally(self.Np)
-        for recording, window, predictions, _ in self._windows():
-            tally.add(recording.x_d[window], recording.x[window], predictions)
+        peers = self.best_ways()
+        tally = Tally(self.Np, [peer.title for peer in peers])
+        for x_d, x, predictions, _ in self._windows(peers):
+            tally.add(x_d, x, predictions)
         return tally.verdict()
 
-    def _windows(self) -> Iterator[tuple[Recording, slice, Array, int]]:
-        """Yield recording, samples, predictions, ``(3, m)``, and place in what judges, of each window that judges."""
+    def _predictions(self) -> list[list[Array]]:
+        """Return what each of :data:`PREDICTIONS` is judged by, of each recording, ``(n,)``, m."""
+        return [[result.x_pb + self.offset, result.x_hold, result.x_h] for result in self.results]
+
+    def _windows(self, peers: Sequence[Peer]) -> Iterator[tuple[Array, Array, Array, int]]:
+        """Yield command, measurement, predictions and place in what judges, of each window that judges.
+
+        The predictions, ``(3 + peers, m)``, are in the order of a :class:`Tally`.
+        """
         before = 0
-        for recording, result in zip(self.recordings, self.results, strict=True):
-            predictions = np.stack([getattr(result, name) for name in PREDICTIONS])
-            before -= recording.judges_from
-            for i in range(recording.first_judged(self.Np), len(recording.x), self.Np):
-                window = slice(i, i + self.Np)
-                yield recording, window, predictions[:, window], before + i
-            before += len(recording.x)
+        for i, (recording, (pb, hold, h)) in enumerate(zip(self.recordings, self._predictions(), strict=True)):
+            rows = np.stack((pb, hold, *(peer.predictions[i] for peer in peers), h))
+            x, first = self._compared(recording), recording.first_judged(self.Np)
+            for begin in range(first, len(x), self.Np):
+                window = slice(begin, begin + self.Np)
+                yield recording.x_d[window], x[window], rows[:, window], before + begin - first
+            before += max(len(x) - first, 0)
+
+    def _compared(self, recording: Recording) -> Array:
+        """Return the measured position, ``(n,)``, NaN where it is of before the recording."""
+        return np.where(np.arange(len(recording.x)) < self.delay, np.nan, recording.x)
+
+    def _measured(self, taught: bool) -> Array:
+        return self._parts([self._compared(recording) for recording in self.recordings], taught)
 
     def _parts(self, signals: Sequence[Array], taught: bool) -> Array:
         parts = [
-            signal[: recording.n_taught] if taught else signal[recording.judges_from :]
+            signal[: recording.n_taught] if taught else signal[recording.first_judged(self.Np) :]
             for recording, signal in zip(self.recordings, signals, strict=True)
         ]
         return np.concatenate(parts)
+
+
+def _rms(errors: Array) -> float:
+    """Return the RMS of errors, NaN where there is no measurement; NaN without any."""
+    known = errors[~np.isnan(errors)]
+    return rms(known) if known.size else math.nan
 
 
 def replay(
@@ -217,4 +302,4 @@ def replay(
             )
         )
         done += len(recording.x)
-    return Replay(tuple(used), tuple(results), predictor.Np)
+    return Replay(tuple(used), tuple(results), predictor.Np, predictor.settings.measurement_delay)

@@ -1,0 +1,109 @@
+"""Replay as it is reported, and what it advises."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+from ..evaluate.peers import ARX_LAGS, LAG_HOLD
+from ..evaluate.verdict import ALIKE, WINDOWS_ENOUGH, WINDOWS_MIN, counted
+from ..tune.halves import Replay
+from .tables import shown_unit
+
+__all__ = ["Judged", "peers_in_words", "recommendation"]
+
+_IN_WORDS = {"physics model": "the physics model alone", "hold": "holding the last residual"}
+"""Names of what a hybrid is compared with, in a sentence; others are as they are."""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Replay as it is reported.
+
+    Attributes
+    ----------
+    replay : Replay
+    T_s : float
+        Sampling interval, s.
+    si : {"m", "rad"}
+        Unit of the positions.
+    part : str
+        What judges, such as "the log's second half".
+    share : float
+        Share of a log's samples that judges.
+    """
+
+    replay: Replay
+    T_s: float
+    si: str
+    part: str
+    share: float = 1.0
+
+    @cached_property
+    def unit(self) -> tuple[float, str]:
+        """Factor and name of the unit in which errors are shown."""
+        return shown_unit(self.replay.rms()[0], self.si)
+
+
+def recommendation(judged: Judged) -> str:
+    """Return what to do, in words; with caution where few windows judge.
+
+    The hybrid is recommended where it is better than each of physics model, hold and peers alone.
+    """
+    n = judged.replay.verdict().n_windows
+    if n < WINDOWS_MIN:
+        return (
+            f"Nothing could be judged: {judged.part} has {counted(n)} of {judged.replay.Np} samples; {_enough(judged)}."
+        )
+    *others, hybrid = judged.replay.scored()
+    best = judged.replay.best()
+    if best.rms == 0.0:
+        return f"There is no error to predict in {judged.part}: record the axis while it works."
+    ratio, peer = hybrid.rms / best.rms, _IN_WORDS.get(best.name, best.name)
+    if n < WINDOWS_ENOUGH:
+        how = "better than" if ratio < 1.0 - ALIKE else "worse than" if ratio > 1.0 + ALIKE else "as good as"
+        return (
+            f"So far the hybrid is {how} {peer}, {ratio:.2f} × its error, but judged by {counted(n)} only: "
+            f"{_enough(judged)}."
+        )
+    by = f"judged by {counted(n)}"
+    if ratio < 1.0 - ALIKE:
+        return f"Use the hybrid: its error is {ratio:.2f} × that of {peer}, the best of the others, {by}."
+    if ratio <= 1.0 + ALIKE:
+        return f"The hybrid does no harm and no good here: {ratio:.2f} × the error of {peer}, {by}."
+    plain = min(others[:2], key=lambda one: one.rms)  # physics model and hold, which need no other model
+    against = hybrid.rms / plain.rms
+    if best.name == plain.name or against >= 1.0 - ALIKE:
+        return (
+            f"Do not use the hybrid on what this log shows: {ratio:.2f} × the error of {peer}, which is best, {by}; "
+            "record more motion."
+        )
+    return (
+        f"Best on what this log shows is {peer}: the hybrid has {ratio:.2f} × its error, and {against:.2f} × that of "
+        f"{_IN_WORDS[plain.name]}, {by}; record more motion."
+    )
+
+
+def _enough(judged: Judged) -> str:
+    """Return how long a recording would do, in words: its windows that judge, and one that began before."""
+    seconds = (WINDOWS_ENOUGH + 1) * judged.replay.Np * judged.T_s / judged.share
+    return f"record at least {math.ceil(round(10 * seconds, 6)) / 10:g} s"
+
+
+def peers_in_words(judged: Judged) -> str:
+    """Return what the peers of a replay are, in words."""
+    names = {peer.name for peer in judged.replay.peers}
+    words = ["Hold: physics model plus its residual at the last sample measured before the window"]
+    if LAG_HOLD in names:
+        words.append(f"{LAG_HOLD}: the same on a first-order lag with dead time fitted to the first half")
+    ways = "frozen after the first half or " if LAG_HOLD in names else ""
+    words.append(
+        f"ARX: black-box models of {' and '.join(str(n) for n in ARX_LAGS)} lags of x − x_d and of the command's "
+        f"increments by least squares, {ways}refitted before each window to all samples so far"
+    )
+    if judged.replay.offset:
+        words.append(
+            "the physics model is judged with the offset that was identified beside it; the FMU's x_pb has none"
+        )
+    return "; ".join(words) + "."
