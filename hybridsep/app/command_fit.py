@@ -74,12 +74,13 @@ def fit(
     with progress_bar(as_json) as advance:
         result = fit_logs(used, folder, FitOptions(Np, name), advance, changes=changes(findings))
         fit_report(result, used, findings).write(files["report"], figure)
+    advice = recommendation(judged_by(result, used[0].unit))
     if as_json:
         listed = {log_name: findings_table(one) for log_name, one in findings.items()}
         written = {what: str(path) for what, path in files.items()}
-        print_json({**result.summary(), "findings": listed, "files": written})
+        print_json({**result.summary(), "advice": advice, "findings": listed, "files": written})
         return
     print_fit(result, used, findings)
-    console.print(f"\n{recommendation(judged_by(result, used[0].unit))}", highlight=False)
+    console.print(f"\n{advice}", highlight=False)
     console.print("\n".join(f"{what}: {path}" for what, path in files.items()), highlight=False, soft_wrap=True)
     print_written(figure)

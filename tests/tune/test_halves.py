@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -50,6 +53,49 @@ def test_a_replay_is_the_backtest_of_the_whole_judged_on_its_second_half() -> No
         np.testing.assert_array_equal(found.errors()[i], (x - getattr(whole, name))[half:])
         assert found.rms()[i] == pytest.approx(np.sqrt(np.mean((x - getattr(whole, name))[half:] ** 2)))
         assert found.rms(taught=True)[i] == pytest.approx(np.sqrt(np.mean((x - getattr(whole, name))[:half] ** 2)))
+
+
+def test_one_set_of_samples_judges() -> None:
+    (x_d, x), n, first = pieces(N + 13)[0], N + 13, 220  # 206 samples teach, which end within a window
+    x[300:305] = np.nan
+    whole = backtest(predictor(), x_d, x)
+    found = replace(replay(predictor(), halves([(x_d, x)], 0.5)), offset=2e-6).with_peers()
+    errors = x[first:] - np.stack((whole.x_pb + 2e-6, whole.x_hold, whole.x_h))[:, first:]
+    np.testing.assert_array_equal(found.errors(), errors)
+    *others, hybrid = found.scored()
+    assert [one.rms for one in (*others[:2], hybrid)] == found.rms()
+    assert found.rms() == pytest.approx(np.sqrt(np.nanmean(errors**2, axis=1)).tolist())
+    assert [one.name for one in others[2:]] == [peer.title for peer in found.peers]
+    for one, peer in zip(others[2:], found.peers, strict=True):
+        np.testing.assert_array_equal(one.errors, (x - peer.predictions[0])[first:])
+    verdict, rms = found.verdict(), {one.name: one.rms for one in others}
+    compared = ["physics model", "hold", *verdict.peers[2:]]
+    assert [name.partition(",")[0] for name in compared[2:]] == ["lag + hold", "ARX20", "ARX40"]
+    assert verdict.ratios == pytest.approx([hybrid.rms / rms[name] for name in compared])
+    assert found.best().rms == min(rms.values())
+    begins, windows = found.window_errors()
+    known = [np.count_nonzero(~np.isnan(part)) for part in np.split(errors[0], begins[1:])]
+    np.testing.assert_allclose(np.sqrt(windows**2 @ known / sum(known)), found.rms(), rtol=1e-12)
+    assert first + len(found.commands()) == n
+
+
+def test_of_two_ways_the_better_is_compared() -> None:
+    x_d, x = pieces(N)[0]
+    found = replay(predictor(), halves([(x_d, x)], 0.5)).with_peers()
+    rms = {one.name: one.rms for one in found.scored()}
+    for peer in found.best_ways()[1:]:
+        assert rms[peer.title] == min(rms[f"{peer.name}, frozen"], rms[f"{peer.name}, refitted"])
+    spoiled = tuple(replace(one, diverged=one.way == "frozen") for one in found.peers)
+    assert [one.way for one in replace(found, peers=spoiled).best_ways()] == ["", "refitted", "refitted"]
+    assert math.isinf(replace(found, peers=spoiled).scored()[3].rms)
+
+
+def test_late_measurements_are_judged_where_they_stand() -> None:
+    x_d, x = pieces(N)[0]
+    late = HybridPredictor(predictor().model, PredictorSettings(Np=20, p=5, q=2, measurement_delay=7))
+    found = replay(late, [Recording(x_d, x, 0)]).with_peers()
+    assert np.isnan(found.errors()[:, :7]).all()
+    assert not any(np.isnan(one.errors[7:]).any() for one in found.scored())
 
 
 def test_only_what_teaches_is_seen_where_asked() -> None:
