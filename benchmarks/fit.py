@@ -110,7 +110,7 @@ def row(log: Log, Np: int) -> Row:
     with tempfile.TemporaryDirectory() as folder:
         found = fit(used, Path(folder), FitOptions(Np, machine_name(log.path)))
     rms = {one.name: 1e6 * one.rms for one in found.judged.scored()}
-    return Row(log.path.stem, Np, rms, recommendation(judged_by(found, used[0].unit)))
+    return Row(log.path.stem, Np, rms, recommendation(judged_by(found, used[0].shown)))
 
 
 def summary(rows: Sequence[Row]) -> str:

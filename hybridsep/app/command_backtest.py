@@ -61,12 +61,14 @@ def backtest(
         from ..evaluate.scores import Scores
         from ..fmi.warm_start import begun_predictor
         from ..logs.log import Log
+        from ..logs.units import shown_of
         from ..machines.machine import load_machine, machine_path
         from .arguments import check_ending
+        from .extent import partly_used
         from .log_intake import changed_by, findings_table, open_checked, reading_of
         from .overwrite import BATCH_COLUMNS, BATCHES, BY_ENDING, Output, check_outputs
         from .progress import progress_bar
-        from .tables import print_scores, print_written
+        from .tables import console, print_scores, print_written
 
         if figure is not None:
             from ..evaluate.time_plots import prediction_figure
@@ -85,6 +87,7 @@ def backtest(
     inputs = {"log": log, "machine file": machine_path(machine), "saved predictor": weights}
     opened, intake = open_checked(log, how, axis_machine, fix=fix, as_is=as_is)
     check_outputs(outputs, inputs, force=force)
+    shown = shown_of(opened.file_unit, axis_machine.unit)
     n_samples = len(opened.t) if isinstance(opened, Log) else opened.n_samples
     rows: list[tuple[float, ...]] = []
     title = f"{axis_machine.title}, {log.name}{changed_by(intake.findings)}"
@@ -112,7 +115,7 @@ def backtest(
             for path in predictions:
                 run.save(path)
             if figure is not None:
-                prediction_figure(run, title, figure, unit=axis_machine.unit)
+                prediction_figure(run, title, figure, shown)
         else:
             scores = backtest_stream(predictor, opened.chunks(), on_batch=on_batch)
     for path in saved:
@@ -121,7 +124,9 @@ def backtest(
     if out is not None:
         with written_text(out) as file:
             csv.writer(file).writerows([BATCH_COLUMNS, *rows])
-    findings = findings_table(intake.findings)
-    print_scores(scores.summary(), scores.verdict, as_json, title, unit=axis_machine.unit, more={"findings": findings})
+    if isinstance(opened, Log) and not as_json and (line := partly_used(opened)):
+        console.print(line, highlight=False)
+    more = {"findings": findings_table(intake.findings)}
+    print_scores(scores.summary(), scores.verdict, as_json, title, unit=axis_machine.unit, shown=shown, more=more)
     if not as_json:
         print_written(out, figure, *saved)

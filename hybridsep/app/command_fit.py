@@ -74,7 +74,7 @@ def fit(
     with progress_bar(as_json) as advance:
         result = fit_logs(used, folder, FitOptions(Np, name), advance, changes=changes(findings))
         fit_report(result, used, findings).write(files["report"], figure)
-    advice = recommendation(judged_by(result, used[0].unit))
+    advice = recommendation(judged_by(result, used[0].shown))
     if as_json:
         listed = {log_name: findings_table(one) for log_name, one in findings.items()}
         written = {what: str(path) for what, path in files.items()}

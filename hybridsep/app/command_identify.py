@@ -83,12 +83,14 @@ def identify(
         from ..identify.response_files import has_response, read_response
         from ..identify.swept_sine import h1
         from ..logs.log import read_log
+        from ..logs.units import shown_in
         from .arguments import check_ending, checked_name, machine_name
+        from .extent import partly_used
         from .identify_tables import print_identified
         from .log_intake import changes, show, take_in
         from .overwrite import FIGURE, MACHINE, Output, check_outputs
         from .progress import progress_bar
-        from .tables import print_written
+        from .tables import console, print_written
 
     if kind not in KINDS:
         raise ParameterError(f"--kind must be one of {', '.join(KINDS)}, got {kind!r}")
@@ -110,6 +112,7 @@ def identify(
     interval = 1e-3 if T_s is None else T_s
     found: IdentifiedModel | IdentifiedResponse
     changed: list[str] = []
+    shown, partly = shown_in("m"), ""
     with progress_bar(as_json) as advance:
         if kind == "klipper":
             found = identify_resonance(read_klipper(recording), _klipper_axis(axis), T_s=interval)
@@ -128,6 +131,7 @@ def identify(
         else:
             sweeps = kind == "sweep"
             log = read_log(recording, columns=columns, unit=unit, T_s=T_s, axis=axis, uniform=sweeps, may_miss=True)
+            shown = log.shown
             n_missing = int(np.isnan(log.x_meas).sum())
             if sweeps and n_missing:
                 raise ParameterError(
@@ -137,7 +141,7 @@ def identify(
             if not sweeps:
                 (log,), findings = take_in([log], fix=fix)
                 show(log.remarks, findings[recording.name])
-                changed = changes(findings)
+                changed, partly = changes(findings), partly_used(log)
             pieces = [(piece.x_d, piece.x_meas) for piece in log.segments()]
             if sweeps:
                 if len(pieces) > 1:
@@ -155,14 +159,18 @@ def identify(
                     progress=advance,
                 )
             else:
-                found = identify_operation(pieces, log.T_s, unit_gain=unit_gain, unit=log.unit, progress=advance)
+                found = identify_operation(
+                    pieces, log.T_s, unit_gain=unit_gain, unit=log.unit, shown=log.shown, progress=advance
+                )
                 if figure is not None:
-                    operation_figure(found, pieces, recording.name, figure)
+                    operation_figure(found, pieces, recording.name, figure, log.shown)
     if figure is not None and isinstance(found, IdentifiedResponse):
         response_figure(found, recording.name, figure)
     if out is not None:
         _write_machine(found, machine, recording.name, changed, out)
-    print_identified(found, as_json, recording.name)
+    if partly and not as_json:
+        console.print(partly, highlight=False)
+    print_identified(found, as_json, recording.name, shown)
     if not as_json:
         print_written(out, figure)
 

@@ -50,9 +50,11 @@ def report(
         from ..evaluate.report import Report
         from ..fmi.warm_start import begun_predictor
         from ..logs.log import Log
+        from ..logs.units import shown_of
         from ..machines.machine import load_machine, machine_path
         from ..tune.halves import Recording, replay
         from .arguments import check_ending, machine_name
+        from .extent import extent, partly_used
         from .judged import Judged, recommendation
         from .log_intake import changes, open_checked, reading_of
         from .overwrite import BY_ENDING, REPORT, Output, check_outputs
@@ -85,11 +87,11 @@ def report(
         steps = {}
         if fmu is not None:
             steps = run_apart(fmu.name, step_times, fmu, whole.x_d[:SAMPLES_MAX], whole.x_meas[:SAMPLES_MAX])
-    judged = Judged(replayed, whole.T_s, axis_machine.unit, "the log")
-    n, settings = len(whole.t), predictor.settings
+    judged = Judged(replayed, whole.T_s, shown_of(whole.file_unit, axis_machine.unit), "the log")
+    settings = predictor.settings
     written = Report(
         f"{axis_machine.title}: {log.name}",
-        f"{n} samples, {n * whole.T_s:.4g} s at {1 / whole.T_s:.4g} Hz · look-ahead {settings.Np} samples, "
+        f"{extent([whole])} · look-ahead {settings.Np} samples, "
         f"{1e3 * settings.Np * whole.T_s:.4g} ms · p = {settings.p}, q = {settings.q}",
     )
     written.paragraph(recommendation(judged), "verdict")
@@ -100,6 +102,8 @@ def report(
     if fmu is not None:
         write_use(written, [fmu.name], steps, whole.T_s, settings.Np)
     written.write(page, figure)
-    console.print(recommendation(judged), highlight=False)
+    for line in (partly_used(whole), recommendation(judged)):
+        if line:
+            console.print(line, highlight=False)
     console.print(f"report: {page}", highlight=False, soft_wrap=True)
     print_written(figure)

@@ -51,6 +51,7 @@ def tune(
     """
     with loading():
         from ..logs.log import Log
+        from ..logs.units import shown_of
         from ..machines.machine import load_machine, machine_path
         from ..machines.text import machine_text
         from ..tune.choice import with_window
@@ -58,10 +59,11 @@ def tune(
         from ..tune.joint import n_processors, over_windows
         from ..tune.joint import tune as tune_on
         from .arguments import check_ending
+        from .extent import partly_used
         from .log_intake import findings_table, open_checked, reading_of
         from .overwrite import BY_ENDING, MACHINE, Output, check_outputs, sealed
         from .progress import progress_bar
-        from .tables import print_json, print_written
+        from .tables import console, print_json, print_written
         from .tune_table import entries, print_tuning, tuning_summary
 
         if figure is not None:
@@ -88,12 +90,14 @@ def tune(
     inputs: dict[str, str | Path | None] = {f"log {path}": path for path in logs}
     check_outputs(outputs, {**inputs, "machine file": machine_path(machine)}, force=force)
     how = reading_of(given, reading, may_miss=settings.trust)
-    pieces, findings = {}, {}
+    pieces, findings, partly = {}, {}, []
     for name, path in _named(logs).items():
         opened, intake = open_checked(path, how, given, fix=fix, as_is=as_is, segments=True)
         log = opened if isinstance(opened, Log) else opened.read()
         pieces[name] = [(segment.x_d, segment.x_meas) for segment in log.segments()]
         findings[name] = findings_table(intake.findings)
+        partly += [line] if (line := partly_used(log)) else []
+        shown = shown_of(log.file_unit, given.unit)  # that of the last log
     with progress_bar(as_json) as advance:
         jobs = n_processors() if jobs is None else jobs
         tuning = tune_on(
@@ -110,7 +114,9 @@ def tune(
     if as_json:
         print_json({**tuning_summary(tuning, windows, values), "findings": findings})
     else:
-        print_tuning(tuning, windows, values, given.title, given.unit)
+        for line in partly:
+            console.print(line, highlight=False)
+        print_tuning(tuning, windows, values, given.title, shown)
     if out is not None:
         best = changed.changed("predictor", {"Np": chosen.Np, **entries(chosen, values)})
         comment = f"Settings of [predictor] from hybridsep tune on {', '.join(path.name for path in logs)}."

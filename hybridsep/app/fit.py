@@ -164,13 +164,13 @@ def fit(
         )
     default = settings_for(Np, T_s, "zoh")
     files = fit_files(out, options.name)
-    stages = Stages(files["results"], key_of(recordings, (options, T_s, logs[0].unit)))
+    stages = Stages(files["results"], key_of(recordings, (options, T_s, logs[0].unit, logs[0].shown)))
 
     def within(begin: float, end: float, message: str) -> Callable[[float], object]:
         return lambda done: progress(message, begin + (end - begin) * done)
 
     found = stages.result(
-        "identification", lambda: _identified(recordings, T_s, logs[0].unit, within(0.0, 0.35, "identify"))
+        "identification", lambda: _identified(recordings, T_s, logs[0], within(0.0, 0.35, "identify"))
     )
     model = ModalModel([Mode(**mode) for mode in found["modes"]], found["dead_time"])
     default = replace(default, input_hold=found["input_hold"])
@@ -222,9 +222,9 @@ def _window(Np: int | None, T_s: float) -> int:
 
 
 def _identified(
-    recordings: Sequence[Recording], T_s: float, unit: str, progress: Callable[[float], object]
+    recordings: Sequence[Recording], T_s: float, log: Log, progress: Callable[[float], object]
 ) -> dict[str, Any]:
-    """Return the identification from the samples that teach, as plain values."""
+    """Return the identification from the samples that teach, as plain values, in the units of a log."""
     taught = [recording.taught for recording in recordings if recording.n_taught > 1]
     n, n_all = (sum(lengths) for lengths in zip(*((one.n_taught, len(one.x)) for one in recordings), strict=True))
     try:
@@ -233,7 +233,9 @@ def _identified(
                 f"this log cannot teach a model, because {n} of its {n_all} samples teach, at least {SAMPLES_MIN} are "
                 "needed"
             )
-        found = identify_operation(taught, T_s, unit=unit, progress=lambda _message, done: progress(done))
+        found = identify_operation(
+            *(taught, T_s), unit=log.unit, shown=log.shown, progress=lambda _message, done: progress(done)
+        )
     except IdentificationError as error:
         found = unit_gain_model(T_s, f"{error}; a gain of 1 without lag is taken")
     summary = dict(found.summary())

@@ -11,13 +11,15 @@ from ..evaluate.chart import Chart, Line
 from ..evaluate.report import Report
 from ..intake.finding import Finding
 from ..logs.log import Log
+from ..logs.units import Shown
 from ..tune.choice import WORTH
+from .extent import extent
 from .fit import Fit
+from .identify_tables import shown_estimates
 from .judged import Judged, recommendation
 from .log_intake import changes
 from .report_sections import COLOURS, NAMES, write_changes, write_errors, write_findings
 from .report_use import write_use
-from .tables import span
 
 __all__ = ["fit_report", "judged_by"]
 
@@ -27,9 +29,9 @@ _SETTLING = (
 )
 
 
-def judged_by(fit: Fit, unit: str) -> Judged:
-    """Return the replay that judges a fit as it is reported; ``unit`` is m or rad."""
-    return Judged(fit.judged, fit.machine.T_s, unit, "the log's second half", share=1.0 - fit.share)
+def judged_by(fit: Fit, shown: Shown) -> Judged:
+    """Return the replay that judges a fit as it is reported, in the units of its logs."""
+    return Judged(fit.judged, fit.machine.T_s, shown, "the log's second half", share=1.0 - fit.share)
 
 
 def fit_report(fit: Fit, logs: Sequence[Log], findings: Mapping[str, Sequence[Finding]]) -> Report:
@@ -44,11 +46,10 @@ def fit_report(fit: Fit, logs: Sequence[Log], findings: Mapping[str, Sequence[Fi
         Log's name → findings of its intake.
     """
     T_s, Np = fit.machine.T_s, fit.judged.Np
-    n = sum(len(log.t) for log in logs)
-    judged = judged_by(fit, logs[0].unit)
+    judged = judged_by(fit, logs[0].shown)
     report = Report(
         f"Axis {fit.machine.name}: from its log to its FMU",
-        f"{', '.join(log.path.name for log in logs)} · {n} samples, {span(logs)} · look-ahead "
+        f"{', '.join(log.path.name for log in logs)} · {extent(logs)} · look-ahead "
         f"{Np} samples, {1e3 * Np * T_s:.4g} ms",
     )
     report.paragraph(recommendation(judged), "verdict")
@@ -99,8 +100,8 @@ def _write_identification(report: Report, fit: Fit, judged: Judged) -> None:
     )
     if found["parameters"]:
         rows = [
-            [str(one["name"]), f"{one['value']:.6g}", f"± {one['std']:.2g}", str(one["unit"])]
-            for one in found["parameters"]
+            [name, f"{value:.6g}", f"± {std:.2g}", unit]
+            for name, value, std, unit in shown_estimates(found["parameters"], judged.shown)
         ]
         report.table(["parameter", "value", "standard deviation", "unit"], rows)
     if found["alternatives"]:

@@ -8,8 +8,8 @@ from functools import cached_property
 
 from ..evaluate.peers import ARX_LAGS, LAG_HOLD
 from ..evaluate.verdict import ALIKE, WINDOWS_ENOUGH, WINDOWS_MIN, counted
+from ..logs.units import Shown
 from ..tune.halves import Replay
-from .tables import shown_unit
 
 __all__ = ["Judged", "peers_in_words", "recommendation"]
 
@@ -26,8 +26,8 @@ class Judged:
     replay : Replay
     T_s : float
         Sampling interval, s.
-    si : {"m", "rad"}
-        Unit of the positions.
+    shown : Shown
+        Units in which positions are shown.
     part : str
         What judges, such as "the log's second half".
     share : float
@@ -36,14 +36,14 @@ class Judged:
 
     replay: Replay
     T_s: float
-    si: str
+    shown: Shown
     part: str
     share: float = 1.0
 
     @cached_property
     def unit(self) -> tuple[float, str]:
         """Factor and name of the unit in which errors are shown."""
-        return shown_unit(self.replay.rms()[0], self.si)
+        return self.shown.error(self.replay.rms()[0])
 
 
 def recommendation(judged: Judged) -> str:

@@ -85,7 +85,8 @@ def _write_time(report: Report, judged: Judged) -> None:
     replay = judged.replay
     errors, std = scale * replay.errors(), scale * replay.joined("x_h_std")
     t = judged.T_s * np.arange(errors.shape[1])
-    lines = [Line("command", t, 1e3 * replay.commands(), _COMMAND)]
+    factor, position = judged.shown.position
+    lines = [Line("command", t, factor * replay.commands(), _COMMAND)]
     within = coverage(errors[2], std, 0.95)
     for name, row, colour in zip(NAMES, errors, COLOURS, strict=True):
         if name != NAMES[1]:
@@ -94,7 +95,7 @@ def _write_time(report: Report, judged: Judged) -> None:
     lines.append(Line("95 % interval of the hybrid", t, -half, HYBRID, upper=half, panel=1))
     chart = Chart(
         f"time in {judged.part} [s]",
-        (f"command [m{judged.si}]", f"error x − x̂ [{unit}]"),
+        (f"command [{position}]", f"error x − x̂ [{unit}]"),
         lines,
         f"The hybrid states its own standard deviation with each window; {100 * within:.0f} % of the errors are within "
         "its 95 % interval.",

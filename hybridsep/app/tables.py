@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from rich.table import Table
 
 from ..cosim.run import PREDICTOR, Run
 from ..evaluate.verdict import Verdict, verdict_of
-from ..logs.log import Log
+from ..logs.units import Shown, shown_in
 from .printed import PRINTED
 
 __all__ = [
@@ -27,27 +27,12 @@ __all__ = [
     "print_scores",
     "print_written",
     "shown_figure",
-    "shown_unit",
-    "span",
 ]
 
 console = Console(emoji=False, markup=False)
 """Standard output. Units and names of files may have brackets, which are text there, as in the tables."""
 
-_UNITS = {"m": ((1e6, "µm"), (1e3, "mm")), "rad": ((1e6, "µrad"), (1e3, "mrad"))}
-
 PAPER_COLUMN = "× hold: RMS relative to holding the last residual; paper: physics → hybrid, reduction, as printed there"
-
-
-def span(logs: Sequence[Log]) -> str:
-    """Return how long logs of one sampling interval are, in words, and over what time their segments spread."""
-    T_s, n = logs[0].T_s, sum(len(log.t) for log in logs)
-    words = f"{n * T_s:.4g} s at {1 / T_s:.4g} Hz"
-    segments = sum(len(log.starts) for log in logs)
-    if segments == len(logs):
-        return words
-    lasted = sum(float(log.t[-1] - log.t[0]) + T_s for log in logs)
-    return f"{words} in {segments} segments of a record of {lasted:.4g} s"
 
 
 def print_predictions(summary: Mapping[str, Mapping[str, Any]]) -> None:
@@ -127,12 +112,6 @@ def shown_figure(value: float | None, unit: str = "") -> str:
     return f"{value:.1f}{unit}" if unit else f"{value:.2f}"
 
 
-def shown_unit(rms: float, si: str) -> tuple[float, str]:
-    """Return factor and name of the unit in which errors of about ``rms``, m or rad, are shown."""
-    small, large = _UNITS[si]
-    return small if small[0] * rms < 1e4 else large
-
-
 def print_scores(
     summary: Mapping[str, float | int],
     verdict: Verdict,
@@ -140,6 +119,7 @@ def print_scores(
     title: str,
     *,
     unit: str = "m",
+    shown: Shown | None = None,
     more: Mapping[str, Any] | None = None,
 ) -> None:
     """Print prediction errors, of a run or of a backtest, and what they mean.
@@ -154,6 +134,8 @@ def print_scores(
     title : str
     unit : {"m", "rad"}
         Unit of the axis's positions.
+    shown : Shown, optional
+        Units of the table; those of ``unit`` if left out.
     more : mapping, optional
     """
     if as_json:
@@ -165,19 +147,21 @@ def print_scores(
             }
         )
         return
-    table = Table(title=f"{title}: prediction error in µ{unit} against the measured position")
+    factor, name = (shown or shown_in(unit)).error(1e-6 * float(summary["rms_pb_um"]))
+    table = Table(title=f"{title}: prediction error in {name} against the measured position")
     for column in ("", "physics", "hold", "hybrid", "reduction", "× hold"):
         table.add_column(column, justify="right")
     warmed_up = summary.get("n_samples_after_warm_up") != summary["n_samples"]
     parts = (("", ""), ("_after_warm_up", " after warm-up"))
     for suffix, label in parts if warmed_up else parts[:1]:
         for quantity in ("rms", "max"):
-            figures = [summary.get(f"{quantity}_{name}_um{suffix}") for name in ("pb", "hold", "h")]
+            figures = [summary.get(f"{quantity}_{key}_um{suffix}") for key in ("pb", "hold", "h")]
             if all(figure is not None for figure in figures):
-                compared = [summary[f"{name}{suffix}"] for name in ("reduction_percent", "ratio_to_hold")]
-                shown = [shown_figure(compared[0], " %"), shown_figure(compared[1])] if quantity == "rms" else ["", ""]
+                compared = [summary[f"{key}{suffix}"] for key in ("reduction_percent", "ratio_to_hold")]
+                ratios = [shown_figure(compared[0], " %"), shown_figure(compared[1])] if quantity == "rms" else ["", ""]
                 label_text = f"{quantity.upper() if quantity == 'rms' else quantity}{label}"
-                table.add_row(label_text, *map(shown_figure, figures), *shown)
+                sizes = [1e-6 * factor * figure for figure in figures if figure is not None]
+                table.add_row(label_text, *map(shown_figure, sizes), *ratios)
     console.print(table)
     console.print(str(verdict), highlight=False)
 

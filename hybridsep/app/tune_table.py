@@ -6,12 +6,14 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
 from rich import box
 from rich.table import Table
 
 from ..base.metrics import reduction_percent
 from ..base.settings import PredictorSettings
 from ..base.signals import Array
+from ..logs.units import Shown
 from ..tune.choice import WORTH
 from ..tune.grid import TUNED
 from ..tune.joint import Tuning, joint_ratio
@@ -73,20 +75,21 @@ def tuning_summary(tuning: Tuning, windows: Mapping[int, Tuning], values: Values
     }
 
 
-def print_tuning(tuning: Tuning, windows: Mapping[int, Tuning], values: Values, title: str, unit: str) -> None:
-    """Print a tuning; ``unit`` of the positions is m or rad."""
+def print_tuning(tuning: Tuning, windows: Mapping[int, Tuning], values: Values, title: str, shown: Shown) -> None:
+    """Print a tuning in the units of its logs."""
     chosen = tuning.candidates[tuning.chosen]
-    heading = f"{title}: RMS in µ{unit} against the measured position, Np = {chosen.Np}"
+    factor, unit = shown.error(float(np.max(tuning.rms_pb)))
+    heading = f"{title}: RMS in {unit} against the measured position, Np = {chosen.Np}"
     console.print(heading, highlight=False)
-    console.print(_ranked(tuning, values))
+    console.print(_ranked(tuning, values, factor))
     for line in _words(tuning, values):
         console.print(line, highlight=False)
     console.print(
-        f"\nThe same settings over other look-aheads, RMS in µ{unit}; no choice: the look-ahead is the controller's, "
+        f"\nThe same settings over other look-aheads, RMS in {unit}; no choice: the look-ahead is the controller's, "
         "and a shorter one is always predicted better",
         highlight=False,
     )
-    console.print(_over_windows(windows))
+    console.print(_over_windows(windows, factor))
     console.print("For the machine file:\n", highlight=False)
     lines = {"Np": chosen.Np, **entries(chosen, values), "trust": str(chosen.trust).lower()}
     console.print("[predictor]", highlight=False)
@@ -94,7 +97,7 @@ def print_tuning(tuning: Tuning, windows: Mapping[int, Tuning], values: Values, 
         console.print(f"{name} = {value}", highlight=False)
 
 
-def _ranked(tuning: Tuning, values: Values) -> Table:
+def _ranked(tuning: Tuning, values: Values, factor: float) -> Table:
     """Return the table of the best candidates and of the machine's own, below the baselines."""
     table = Table("", box=box.SIMPLE, pad_edge=False)
     for field in values:
@@ -106,7 +109,7 @@ def _ranked(tuning: Tuning, values: Values) -> Table:
     table.add_column("× hold", justify="right")
 
     def row(label: str, cells: Sequence[str], rms: Array, ratio: float) -> None:
-        errors = [shown_figure(1e6 * value) for value in rms.tolist()] if names else []
+        errors = [shown_figure(factor * value) for value in rms.tolist()] if names else []
         reduction = reduction_percent(joint_ratio(rms, tuning.rms_hold), tuning.ratio_pb)
         last = ["diverges", ""] if math.isinf(ratio) else [shown_figure(reduction, " %"), f"{ratio:.3f}"]
         table.add_row(label, *cells, *errors, *last)
@@ -151,7 +154,7 @@ def _words(tuning: Tuning, values: Values) -> list[str]:
     return lines
 
 
-def _over_windows(windows: Mapping[int, Tuning]) -> Table:
+def _over_windows(windows: Mapping[int, Tuning], factor: float) -> Table:
     """Return the table of errors with shorter and longer windows."""
     table = Table(
         *("Np", "log", "physics", "hold", "hybrid", "× hold"),
@@ -163,7 +166,7 @@ def _over_windows(windows: Mapping[int, Tuning]) -> Table:
     for Np, found in windows.items():
         for i, name in enumerate(found.logs):
             hold, h = float(found.rms_hold[i]), float(found.rms_h[0, i])
-            figures = [shown_figure(1e6 * value) for value in (float(found.rms_pb[i]), hold, h)]
+            figures = [shown_figure(factor * value) for value in (float(found.rms_pb[i]), hold, h)]
             ratio = joint_ratio(found.rms_h[0, i : i + 1], found.rms_hold[i : i + 1])
             table.add_row("" if i else str(Np), name, *figures, "diverges" if math.isinf(h) else f"{ratio:.3f}")
     return table

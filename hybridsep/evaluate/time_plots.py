@@ -14,6 +14,7 @@ from ..base.metrics import rms
 from ..base.signals import Array
 from ..compensate.plan import SepState
 from ..cosim.run import Run
+from ..logs.units import Shown, shown_in
 from .canvas import CASES, HOLD, HYBRID, PHYSICS, draw_line, finish_panels, legend_above, save_figure
 
 __all__ = ["prediction_figure", "tracking_figure"]
@@ -22,7 +23,7 @@ _SPANS = {SepState.OFF: ("not compensated", HOLD), SepState.PHYSICS: ("planned b
 """Shading of spans that a lesser model planned than others of the run."""
 
 
-def prediction_figure(run: Run, title: str, path: str | Path, unit: str = "m") -> None:
+def prediction_figure(run: Run, title: str, path: str | Path, shown: Shown | None = None) -> None:
     """Draw the command, the two models' prediction errors and the RMS of each window to a PNG, PDF or SVG.
 
     Parameters
@@ -33,18 +34,20 @@ def prediction_figure(run: Run, title: str, path: str | Path, unit: str = "m") -
         Heading.
     path : str or Path
         The file.
-    unit : {"m", "rad"}
-        Unit of the positions.
+    shown : Shown, optional
+        Units in which positions are shown; mm and µm if left out.
     """
+    shown = shown or shown_in("m")
+    (factor, position), (scale, unit) = shown.position, shown.error(rms((run.x_meas - run.x_pb)[~np.isnan(run.x_meas)]))
     figure = Figure(figsize=(9.0, 8.0), layout="constrained")
     command, error, windows = figure.subplots(3, 1, sharex=True, height_ratios=[1.0, 2.0, 1.4])
     figure.suptitle(title)
     t = run.t - run.t[0]
-    draw_line(command, t, 1e3 * run.x_d, 1.2, color="black")
-    command.set_ylabel(f"commanded\nposition [m{unit}]")
-    draw_line(error, t, 1e6 * (run.x_meas - run.x_pb), 0.8, color=PHYSICS, label="physics-based model")
+    draw_line(command, t, factor * run.x_d, 1.2, color="black")
+    command.set_ylabel(f"commanded\nposition [{position}]")
+    draw_line(error, t, scale * (run.x_meas - run.x_pb), 0.8, color=PHYSICS, label="physics-based model")
     label = f"linear hybrid model{'' if run.active.all() else ', after the warm-up'}"
-    hybrid = np.where(run.active, 1e6 * (run.x_meas - run.x_h), np.nan)
+    hybrid = np.where(run.active, scale * (run.x_meas - run.x_h), np.nan)
     draw_line(error, t, hybrid, 0.8, color=HYBRID, label=label)
     if not run.active.all():
         t_init = float(t[np.argmax(run.active)])
@@ -53,18 +56,18 @@ def prediction_figure(run: Run, title: str, path: str | Path, unit: str = "m") -
         error.annotate(
             "t_init", (t_init, 0.02), xycoords=("data", "axes fraction"), xytext=(4, 0), textcoords="offset points"
         )
-    error.set_ylabel(f"prediction error\nx − x̂ [µ{unit}]")
+    error.set_ylabel(f"prediction error\nx − x̂ [{unit}]")
     legend_above(error)
-    _draw_windows(windows, run, unit)
+    _draw_windows(windows, run, scale, unit)
     windows.set_xlabel("time [s]")
     finish_panels((command, error, windows))
     figure.align_ylabels()
     save_figure(figure, path)
 
 
-def _draw_windows(axes: Axes, run: Run, unit: str) -> None:
+def _draw_windows(axes: Axes, run: Run, scale: float, unit: str) -> None:
     """Draw the RMS error of each window and mark the windows where the hybrid is worse than the physics model."""
-    errors = {name: 1e6 * values for name, values in run.batch_rms().items()}
+    errors = {name: scale * values for name, values in run.batch_rms().items()}
     edges = np.append(np.arange(len(errors["x_pb"])) * run.Np, len(run.t)) * run.T_s
     for name, color, label in (
         ("x_pb", PHYSICS, "physics"),
@@ -76,7 +79,7 @@ def _draw_windows(axes: Axes, run: Run, unit: str) -> None:
     for begin, end in zip(edges[:-1][worse], edges[1:][worse], strict=True):
         axes.axvspan(begin, end, color=PHYSICS, alpha=0.15, linewidth=0)
     axes.set_ylim(0.0, 1.05 * max(float(np.nan_to_num(values).max()) for values in errors.values()))
-    axes.set_ylabel(f"RMS of each\nwindow [µ{unit}]")
+    axes.set_ylabel(f"RMS of each\nwindow [{unit}]")
     handles = axes.get_legend_handles_labels()[0]
     if worse.any():
         handles.append(Patch(color=PHYSICS, alpha=0.15, linewidth=0, label="hybrid worse than physics"))

@@ -13,6 +13,7 @@ from ..base.signals import Array
 from ..base.threads import one_blas_thread
 from ..intake.gain import runs_against
 from ..intake.motion import starts_in_motion
+from ..logs.units import Shown, shown_in
 from ..model.physics import ModalModel
 from .delay import delay_finding
 from .model import Alternative, IdentifiedModel
@@ -48,6 +49,7 @@ def identify_operation(
     unit_gain: bool | None = None,
     order_max: int = 6,
     unit: str = "m",
+    shown: Shown | None = None,
     progress: Progress = lambda _message, _done: None,
 ) -> IdentifiedModel:
     """Identify the physics model from recordings of one axis in operation.
@@ -69,7 +71,9 @@ def identify_operation(
     order_max : int
         Largest number of poles, at least 1.
     unit : {"m", "rad"}
-        Unit of the positions, for findings and estimates.
+        Unit of the positions, for estimates.
+    shown : Shown, optional
+        Units in which findings say errors; those of ``unit`` if left out.
     progress : callable, optional
         Called with a message and the fraction done.
 
@@ -82,7 +86,7 @@ def identify_operation(
     ParameterError
         If ``T_s`` is out of its range.
     """
-    T_s = check("T_s", T_s)
+    T_s, shown = check("T_s", T_s), shown or shown_in(unit)
     given = [(x_d, x) for x_d, x in recordings]
     segments = as_segments(given)
     _require_motion(segments)
@@ -98,14 +102,14 @@ def identify_operation(
     findings = []
     if _is_weak(fit, segments, T_s):
         fit = _at_rest(segments, T_s)
-        spread, rest = _micro(_spread(segments), unit), _micro(fit.rms, unit)
+        spread, rest = _in_words(_spread(segments), shown), _in_words(fit.rms, shown)
         findings.append(
             f"too little motion to learn the dynamics from: the commanded position moves by {spread} (standard "
             f"deviation), and {rest} of the measured one are not explained by it; a gain of 1 without lag is taken"
         )
     parameters, n_effective = estimates(fit, segments, T_s, unit)
     findings += _findings(
-        *(fit, chosen, segments, parameters[0].std, n_effective, unit),
+        *(fit, chosen, segments, parameters[0].std, n_effective, shown),
         [np.asarray(x_d, dtype=np.float64) for x_d, _ in given],
     )
     findings += delay_finding(fit, segments, T_s)
@@ -212,7 +216,7 @@ def _findings(
     segments: Sequence[Segment],
     gain_std: float,
     n_effective: float,
-    unit: str,
+    shown: Shown,
     commands: Sequence[Array],
 ) -> list[str]:
     """Return what a user should know of the identification, in words."""
@@ -239,12 +243,13 @@ def _findings(
         findings.append(f"the static gain is {gain:.7g} ± {gain_std:.2g}")
     if fit.structure.order and chosen.rms_held_out > 2 * chosen.fit.rms:
         findings.append(
-            f"the error on the part that was held out, {_micro(chosen.rms_held_out, unit)}, is "
+            f"the error on the part that was held out, {_in_words(chosen.rms_held_out, shown)}, is "
             f"{chosen.rms_held_out / chosen.fit.rms:.1f} times that of the fit before: the later motion is of another "
             "kind, or the axis is not linear"
         )
     return findings
 
 
-def _micro(value: float, unit: str) -> str:
-    return f"{value * 1e6:.3g} µ{unit}"
+def _in_words(size: float, shown: Shown) -> str:
+    factor, name = shown.error(size)
+    return f"{size * factor:.3g} {name}"

@@ -9,7 +9,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from ..base.signals import Array, Indices
 
-__all__ = ["gap_starts", "mean_interval", "rounded_interval", "standard_error"]
+__all__ = ["gap_starts", "mean_interval", "rounded_interval", "row_interval", "standard_error"]
 
 _GAP = 1.5
 """Intervals, in sampling intervals, from which at least one sample is missing."""
@@ -67,6 +67,11 @@ def mean_interval(t: Array) -> tuple[float, float]:
             interval = float(steps[inner].sum() / inner.sum())
     n_pieces = len(steps) - int(inner.sum()) + 1
     return interval, standard_error(float(np.std(steps[inner] / interval)), int(inner.sum()), n_pieces)
+
+
+def row_interval(t: Array, T_s: float) -> float:
+    """Return the mean interval, s, of rows whose distinct times are ``T_s`` apart; those that repeat are rounded."""
+    return T_s * len(np.unique(t)) / len(t)
 
 
 def standard_error(deviation: float, n: int, n_pieces: int = 1) -> float:

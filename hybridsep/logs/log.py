@@ -14,9 +14,10 @@ from ..base.settings import check
 from ..base.signals import POSITION_MAX, Array
 from .columns import COUNT, Column, choose_columns
 from .formats import open_source
+from .gaps import row_interval
 from .source import NEEDS_TRUST, Block
 from .time_axis import TimeAxis
-from .units import POSITION_UNITS, position_unit, stated_unit
+from .units import POSITION_UNITS, Shown, position_unit, shown_of, stated_unit
 
 __all__ = ["Log", "LogReader", "check_reading", "open_log", "read_log"]
 
@@ -60,6 +61,12 @@ class Log:
         First samples of the segments, which gaps separate; the first is 0.
     remarks : tuple of str
         What the reader chose that the user may want to change.
+    file_unit : str
+        Unit of the positions in the file, in which they are shown; SI if left out.
+    n_recorded : int
+        Samples that were read from the file; as many as there are, if left out.
+    T_recorded : float
+        Mean interval between them, s, gaps aside; ``T_s`` if left out.
     """
 
     t: Array
@@ -71,6 +78,14 @@ class Log:
     unit_stated: bool = False
     starts: tuple[int, ...] = (0,)
     remarks: tuple[str, ...] = ()
+    file_unit: str = ""
+    n_recorded: int = 0
+    T_recorded: float = 0.0
+
+    @property
+    def shown(self) -> Shown:
+        """Units in which its positions are shown."""
+        return shown_of(self.file_unit, self.unit)
 
     def segments(self) -> list[Log]:
         """Return each stretch without a gap as a log of its own."""
@@ -98,6 +113,8 @@ class LogReader:
         Whether its times increase and none is missing; jitter counts only where ``uniform`` is true, and is refused.
     unit : {"m", "rad"}
         Unit of the positions that are returned.
+    file_unit : str
+        Their unit in the file.
     remarks : tuple of str
         What was chosen that the user may want to change.
     """
@@ -119,7 +136,7 @@ class LogReader:
         if axis is not None:
             self._source.choose_axis(axis)
         self._columns = choose_columns(self._source, columns, unit, time_needed=given is None)
-        self.unit = self._columns["x_d"].unit.si
+        self.unit, self.file_unit = self._columns["x_d"].unit.si, self._columns["x_d"].unit.name
         self.remarks = (*self._source.remarks, *self._guessed(columns or {}))
         self._uniform = uniform
         self._may_miss = not uniform if may_miss is None else may_miss
@@ -151,7 +168,13 @@ class LogReader:
             columns.append(np.arange(len(columns[0]), dtype=np.float64) * self.T_s)
         x_d, x_meas, t = columns
         stated = self._columns["x_d"].stated and self._columns["x"].stated
-        return Log(t, x_d, x_meas, self.T_s, self.path, self.unit, stated, remarks=self.remarks)
+        return Log(
+            *(t, x_d, x_meas, self.T_s, self.path, self.unit, stated),
+            remarks=self.remarks,
+            file_unit=self.file_unit,
+            n_recorded=len(t),
+            T_recorded=row_interval(t, self.T_s),
+        )
 
     def _signals(self, n: int, roles: tuple[str, ...]) -> Iterator[tuple[Array, ...]]:
         """Iterate over the columns ``roles``, the first being the commanded position, checked and in SI units."""

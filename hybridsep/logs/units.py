@@ -7,7 +7,18 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-__all__ = ["POSITION_UNITS", "TIME_UNITS", "Unit", "plain_name", "position_unit", "stated_unit", "time_unit"]
+__all__ = [
+    "POSITION_UNITS",
+    "TIME_UNITS",
+    "Shown",
+    "Unit",
+    "plain_name",
+    "position_unit",
+    "shown_in",
+    "shown_of",
+    "stated_unit",
+    "time_unit",
+]
 
 
 @dataclass(frozen=True)
@@ -41,6 +52,56 @@ POSITION_UNITS: Mapping[str, Unit] = {
 
 TIME_UNITS: Mapping[str, Unit] = _units("s", {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0})
 """Units of times by name."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """Units in which a log's positions and their errors are printed and drawn, each a factor from SI and a name.
+
+    Attributes
+    ----------
+    position : tuple of float and str
+        Of positions.
+    small, large : tuple of float and str
+        Of errors below and above :attr:`limit`.
+    limit : float
+        Error, in the small unit, from which on the large one is taken.
+    """
+
+    position: tuple[float, str]
+    small: tuple[float, str]
+    large: tuple[float, str]
+    limit: float = 1e4
+
+    def error(self, size: float) -> tuple[float, str]:
+        """Return factor and name of the unit of errors of about ``size``, m or rad."""
+        return self.large if self.small[0] * size >= self.limit else self.small
+
+
+_METRIC = Shown((1e3, "mm"), (1e6, "µm"), (1e3, "mm"))
+_ANGULAR = Shown((1e3, "mrad"), (1e6, "µrad"), (1e3, "mrad"))
+_INCH, _DEGREE, _TURN = (1.0 / POSITION_UNITS[name].factor for name in ("in", "deg", "rev"))
+_SHOWN = {
+    "in": Shown((_INCH, "in"), (1e6 * _INCH, "µin"), (_INCH, "in")),
+    "deg": Shown((_DEGREE, "deg"), (1e3 * _DEGREE, "mdeg"), (_DEGREE, "deg"), 1e3),
+    "rev": Shown((_TURN, "rev"), (1e3 * _TURN, "mrev"), (_TURN, "rev"), 1e3),
+}
+
+
+def shown_of(file_unit: str, si: str) -> Shown:
+    """Return the units in which positions in ``si``, m or rad, of a file in ``file_unit`` are shown.
+
+    They are those of the file, or SI where the file's is empty or of the other kind.
+    """
+    unit = position_unit(file_unit)
+    return shown_in(unit.name if unit is not None and unit.si == si else si)
+
+
+def shown_in(unit: str) -> Shown:
+    """Return the units in which the positions of a log in ``unit``, as of :func:`position_unit`, are shown."""
+    name = unit.split()[-1]  # of a multiple, "0.1 um"
+    return _SHOWN.get(name, _METRIC if POSITION_UNITS[name].si == "m" else _ANGULAR)
+
 
 _SPELLINGS = {
     "meter": "m",

@@ -23,6 +23,7 @@ from hybridsep.app.judged import recommendation
 from hybridsep.app.log_intake import take_in
 from hybridsep.base.errors import LogError, ParameterError
 from hybridsep.cosim.fmus import FmuController
+from hybridsep.logs.units import shown_in
 from hybridsep.tune.halves import halves, replay
 
 N = 3000
@@ -95,7 +96,7 @@ def test_a_second_run_goes_on_from_the_first(fitted: Fit, log: Path, monkeypatch
 def test_the_report_says_what_to_do_and_shows_the_figures(fitted: Fit, log: Path, tmp_path: Path) -> None:
     used, findings = take_in([read_log(log, uniform=False)], fix=False)
     fit_report(fitted, used, findings).write(tmp_path / "report.html")
-    advice = recommendation(judged_by(fitted, "m"))
+    advice = recommendation(judged_by(fitted, shown_in("m")))
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert advice.startswith("Use the hybrid: its error is 0.")
     assert advice.endswith("the best of the others, judged by 30 windows.")
@@ -206,7 +207,10 @@ def test_too_short_a_log_judges_nothing(tmp_path: Path, n: int, Np: int | None, 
     if n == 2:
         [reason] = found.identification["findings"]
         assert "because 1 of its 2 samples teach, at least 100 are needed; a gain of 1" in reason
-    assert recommendation(judged_by(found, "m")) == f"Nothing could be judged: the log's second half has {words}."
+    assert (
+        recommendation(judged_by(found, shown_in("m")))
+        == f"Nothing could be judged: the log's second half has {words}."
+    )
     assert found.summary()["judged"]["verdict"].startswith("Nothing is judged: ")
 
 

@@ -13,6 +13,7 @@ from command_line import Run, write_log
 from hybridsep import load_machine
 from hybridsep.app.tune_table import print_tuning
 from hybridsep.base.settings import PredictorSettings
+from hybridsep.logs.units import shown_in
 from hybridsep.tune.figures import tuning_figure
 from hybridsep.tune.joint import Tuning
 
@@ -147,7 +148,7 @@ def test_what_diverges_is_said(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     ):
         found = Tuning(("a.csv",), settings, 2 * hold, hold, np.array(losses)[:, None])
         windows = {100: Tuning(("a.csv",), settings[:1], 2 * hold, hold, found.rms_h[:1])}
-        print_tuning(found, windows, {"p": (20, 30, 50)}, "Axis", "rad")
+        print_tuning(found, windows, {"p": (20, 30, 50)}, "Axis", shown_in("rad"))
         text = " ".join(capsys.readouterr().out.split())
         assert "RMS in µrad" in text
         assert all(part in text for part in words)
