@@ -71,7 +71,7 @@ class Row:
         def shown(*names: str) -> str:
             return " / ".join(f"{self.rms[name]:.4g}".replace("inf", "diverged") for name in names)
 
-        ways = [shown(f"{name}, frozen", f"{name}, refitted") for name in ("ARX20", "ARX40")]
+        ways = [shown(f"{name} (frozen)", f"{name} (refitted)") for name in ("ARX20", "ARX40")]
         cells = [shown("lag + hold"), shown("hold"), *ways, shown("physics model"), shown("hybrid")]
         advice = self.advice.partition(", ")[0]
         return f"| {' | '.join([self.name, str(self.Np), *cells, self.best, f'{self.ratio:.3f}', advice])} |"

@@ -73,7 +73,7 @@ class Peer:
     @property
     def title(self) -> str:
         """Name, and how it was fitted."""
-        return f"{self.name}, {self.way}" if self.way else self.name
+        return f"{self.name} ({self.way})" if self.way else self.name
 
 
 @one_blas_thread

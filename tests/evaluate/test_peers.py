@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from arx_oracle import arx_by_definition, free_run_by_definition
 from places import RECORDINGS
 from scipy.signal import lfilter
 
@@ -26,29 +27,6 @@ def axis(n: int = 600, seed: int = 0) -> tuple[Array, Array]:
     x_d = np.cumsum(lfilter([0.02], [1.0, -0.98], rng.normal(0.0, 1e-3, n))) + 0.1
     x = x_d[0] + lfilter([0.05, 0.02], [1.0, -1.6, 0.67], x_d - x_d[0]) + rng.normal(0.0, 1e-6, n)
     return x_d, np.asarray(x)
-
-
-def arx_by_definition(x_d: Array, x: Array, n: int, n_fitted: int) -> Array:
-    """Return the coefficients from the samples before ``n_fitted``, row by row."""
-    y, rows, targets = x - x_d, [], []
-    for k in range(n + 1, n_fitted):
-        steps = [x_d[k - j] - x_d[k - j - 1] for j in range(n + 1)]
-        row = [y[k - i] for i in range(1, n + 1)] + steps + [1.0]
-        if not np.isnan([*row, y[k]]).any():
-            rows.append(row)
-            targets.append(y[k])
-    return np.asarray(np.linalg.lstsq(np.array(rows), np.array(targets), rcond=None)[0])
-
-
-def free_run_by_definition(w: Array, x_d: Array, x: Array, n: int, begin: int, end: int) -> Array:
-    """Return the positions predicted from what is measured before ``begin``, sample by sample."""
-    y = (x - x_d)[:begin].tolist()
-    for k in range(n + 1, end):
-        if k >= len(y) or np.isnan(y[k]):
-            steps = [x_d[k - j] - x_d[k - j - 1] for j in range(n + 1)]
-            value = float(np.dot(w, [y[k - i] for i in range(1, n + 1)] + steps + [1.0]))
-            y[k : k + 1] = [value]
-    return np.asarray(x_d[begin:end] + np.array(y[begin:end]))
 
 
 def peer(found: tuple[Peer, ...], name: str, way: str) -> Peer:
@@ -132,7 +110,7 @@ def test_late_measurements_are_those_of_earlier_positions(delay: int) -> None:
 def test_without_samples_that_teach_there_are_refitted_models_alone() -> None:
     x_d, x = axis()
     found = predict_peers([Piece(x_d, x, 0, 0)], NP)
-    assert [one.title for one in found] == ["ARX20, refitted", "ARX40, refitted"]
+    assert [one.title for one in found] == ["ARX20 (refitted)", "ARX40 (refitted)"]
     np.testing.assert_array_equal(found[0].predictions[0][:NP], x_d[:NP])  # nothing is known
 
 

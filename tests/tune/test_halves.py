@@ -70,7 +70,7 @@ def test_one_set_of_samples_judges() -> None:
         np.testing.assert_array_equal(one.errors, (x - peer.predictions[0])[first:])
     verdict, rms = found.verdict(), {one.name: one.rms for one in others}
     compared = ["physics model", "hold", *verdict.peers[2:]]
-    assert [name.partition(",")[0] for name in compared[2:]] == ["lag + hold", "ARX20", "ARX40"]
+    assert [name.partition(" (")[0] for name in compared[2:]] == ["lag + hold", "ARX20", "ARX40"]
     assert verdict.ratios == pytest.approx([hybrid.rms / rms[name] for name in compared])
     assert found.best().rms == min(rms.values())
     begins, windows = found.window_errors()
@@ -84,7 +84,7 @@ def test_of_two_ways_the_better_is_compared() -> None:
     found = replay(predictor(), halves([(x_d, x)], 0.5)).with_peers()
     rms = {one.name: one.rms for one in found.scored()}
     for peer in found.best_ways()[1:]:
-        assert rms[peer.title] == min(rms[f"{peer.name}, frozen"], rms[f"{peer.name}, refitted"])
+        assert rms[peer.title] == min(rms[f"{peer.name} (frozen)"], rms[f"{peer.name} (refitted)"])
     spoiled = tuple(replace(one, diverged=one.way == "frozen") for one in found.peers)
     assert [one.way for one in replace(found, peers=spoiled).best_ways()] == ["", "refitted", "refitted"]
     assert math.isinf(replace(found, peers=spoiled).scored()[3].rms)
