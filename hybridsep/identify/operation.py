@@ -102,7 +102,7 @@ def identify_operation(
     findings = []
     if _is_weak(fit, segments, T_s):
         fit = _at_rest(segments, T_s)
-        spread, rest = _in_words(_spread(segments), shown), _in_words(fit.rms, shown)
+        spread, rest = shown.words(_spread(segments)), shown.words(fit.rms)
         findings.append(
             f"too little motion to learn the dynamics from: the commanded position moves by {spread} (standard "
             f"deviation), and {rest} of the measured one are not explained by it; a gain of 1 without lag is taken"
@@ -243,13 +243,8 @@ def _findings(
         findings.append(f"the static gain is {gain:.7g} ± {gain_std:.2g}")
     if fit.structure.order and chosen.rms_held_out > 2 * chosen.fit.rms:
         findings.append(
-            f"the error on the part that was held out, {_in_words(chosen.rms_held_out, shown)}, is "
+            f"the error on the part that was held out, {shown.words(chosen.rms_held_out)}, is "
             f"{chosen.rms_held_out / chosen.fit.rms:.1f} times that of the fit before: the later motion is of another "
             "kind, or the axis is not linear"
         )
     return findings
-
-
-def _in_words(size: float, shown: Shown) -> str:
-    factor, name = shown.error(size)
-    return f"{size * factor:.3g} {name}"

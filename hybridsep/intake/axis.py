@@ -163,14 +163,15 @@ def check_offset(log: Log) -> Iterator[Finding]:
     # An axis that reaches a share of its command is as far from it wherever it rests.
     if abs(offset) < _OFFSET_REST * abs(1.0 - fit.gain) * travel:
         return
+    factor, unit = log.shown.position
     words = (
-        f"the measured position is {offset:+.6g} {log.unit} away from the commanded one throughout, "
-        f"{abs(offset) / travel:.2g} of the travel, while the error varies by {spread:.2g} {log.unit}: it counts "
+        f"the measured position is {factor * offset:+.6g} {unit} away from the commanded one throughout, "
+        f"{abs(offset) / travel:.2g} of the travel, while the error varies by {factor * spread:.2g} {unit}: it counts "
         "from another zero"
     )
     evidence = {"offset": offset, "spread": spread, "travel": travel}
     fix = Fix(
-        f"subtract {offset:.6g} {log.unit} from the measured position",
+        f"subtract {factor * offset:.6g} {unit} from the measured position",
         partial(fixes.offset_removed, offset=offset),
         meaning=True,
     )

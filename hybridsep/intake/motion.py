@@ -63,7 +63,7 @@ def check_motion(log: Log) -> Iterator[Finding]:
     if travel == 0.0:
         reasons.append("the command never moves")
     elif np.ptp(_mean(log.x_meas)) < _NOISE_TIMES * noise:
-        reasons.append(f"the measured position is noise, of a deviation of {noise:.3g} {log.unit}")
+        reasons.append(f"the measured position is noise, of a deviation of {log.shown.words(noise)}")
     elif moving < _MOVING_MIN:
         reasons.append(f"the command moves in {moving} samples only")
     if np.isnan(log.x_meas).all():
@@ -99,9 +99,11 @@ def check_start(log: Log) -> Iterator[Finding]:
         return
     largest = float(np.abs(np.diff(log.x_d)).max())
     first = float(abs(log.x_d[1] - log.x_d[0]))
+    factor, unit = log.shown.position
     words = (
-        f"the log begins in motion, at {first / log.T_s:.3g} {log.unit}/s of {largest / log.T_s:.3g} at most; the "
-        "state in which the axis begins is estimated from its first samples, which a log that begins at rest needs not"
+        f"the log begins in motion, at {factor * first / log.T_s:.3g} {unit}/s of {factor * largest / log.T_s:.3g} at "
+        "most; the state in which the axis begins is estimated from its first samples, which a log that begins at rest "
+        "needs not"
     )
     rest = _first_rest(log.x_d, largest)
     fix = None
@@ -191,5 +193,6 @@ def _at_interval(log: Log, T_s: float) -> Log:
 
 def _positions(log: Log, title: str, n: int | None = None) -> Picture:
     t = (log.t - log.t[0])[:n]
-    lines = {"commanded": (t, log.x_d[:n]), "measured": (t, log.x_meas[:n])}
-    return Picture(title, "time [s]", f"position [{log.unit}]", lines)
+    factor, unit = log.shown.position
+    lines = {"commanded": (t, factor * log.x_d[:n]), "measured": (t, factor * log.x_meas[:n])}
+    return Picture(title, "time [s]", f"position [{unit}]", lines)

@@ -65,7 +65,7 @@ def check_outliers(log: Log) -> Iterator[Finding]:
             continue
         words = (
             f"{len(wrong)} of the samples of the {title} leave{'' if len(wrong) > 1 else 's'} the "
-            f"signal by up to {heights.max():.4g} {log.unit}; the first is sample {wrong[0] + 1}, t = "
+            f"signal by up to {log.shown.words(heights.max(), '.4g')}; the first is sample {wrong[0] + 1}, t = "
             f"{log.t[wrong[0]]:.6g} s"
         )
         evidence = {"n": float(len(wrong)), "first": float(wrong[0]), "largest": float(heights.max())}
@@ -185,5 +185,6 @@ def check_repeated(log: Log) -> Iterator[Finding]:
 
 def _signals(log: Log, title: str, marks: Indices) -> Picture:
     t = log.t - log.t[0]
-    lines = {name: (t, getattr(log, column)) for column, name in _COLUMNS.items()}
-    return Picture(title.capitalize(), "time [s]", f"position [{log.unit}]", lines, t[marks])
+    factor, unit = log.shown.position
+    lines = {name: (t, factor * getattr(log, column)) for column, name in _COLUMNS.items()}
+    return Picture(title.capitalize(), "time [s]", f"position [{unit}]", lines, t[marks])

@@ -54,11 +54,13 @@ def averaged(log: Log) -> tuple[Array, Array, int]:
 
 def against_command(log: Log, part: slice, fit: Line) -> Picture:
     """Return the picture of measured over commanded positions, and the line through them."""
+    factor, unit = log.shown.position
     x_d, x = log.x_d[part], log.x_meas[part]
     ends = np.array([x_d.min(), x_d.max()])
     lines = {"log": (shifted(x_d, fit.lag), x), "fit": (ends, fit.gain * ends + fit.offset), "equal": (ends, ends)}
+    lines = {name: (factor * one, factor * other) for name, (one, other) in lines.items()}
     title = "Measured over commanded position"
-    return Picture(title, f"commanded [{log.unit}]", f"measured [{log.unit}]", lines)
+    return Picture(title, f"commanded [{unit}]", f"measured [{unit}]", lines)
 
 
 def over_time(
@@ -69,5 +71,6 @@ def over_time(
     steps = np.abs(np.diff(log.x_d[part]))
     middle = int(np.argmax(steps)) if len(steps) else 0
     near = slice(max(0, middle - 150), middle + 150)
-    lines = {names[0]: (t[near], one[near]), names[1]: (t[near], other[near])}
-    return Picture("Around the fastest motion", "time [s]", f"position [{log.unit}]", lines)
+    factor, unit = log.shown.position
+    lines = {names[0]: (t[near], factor * one[near]), names[1]: (t[near], factor * other[near])}
+    return Picture("Around the fastest motion", "time [s]", f"position [{unit}]", lines)

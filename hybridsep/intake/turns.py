@@ -48,8 +48,9 @@ def check_turns(log: Log) -> Iterator[Finding]:
         "first": float(where[0]),
     }
     t = log.t - log.t[0]
-    lines = {"commanded": (t, log.x_d), "measured": (t, log.x_meas)}
-    picture = Picture("Whole turns", "time [s]", f"position [{log.unit}]", lines, t[where])
+    factor, unit = log.shown.position
+    lines = {"commanded": (t, factor * log.x_d), "measured": (t, factor * log.x_meas)}
+    picture = Picture("Whole turns", "time [s]", f"position [{unit}]", lines, t[where])
     fix = Fix("unwrap both positions", partial(fixes.unwrapped, turn=_TURN), meaning=True)
     yield Finding("whole turns", ERROR, words, evidence, picture, fix)
 

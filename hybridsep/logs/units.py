@@ -75,7 +75,12 @@ class Shown:
 
     def error(self, size: float) -> tuple[float, str]:
         """Return factor and name of the unit of errors of about ``size``, m or rad."""
-        return self.large if self.small[0] * size >= self.limit else self.small
+        return self.large if self.small[0] * abs(size) >= self.limit else self.small
+
+    def words(self, size: float, form: str = ".3g") -> str:
+        """Return an error, m or rad, with its unit."""
+        factor, name = self.error(size)
+        return f"{factor * size:{form}} {name}"
 
 
 _METRIC = Shown((1e3, "mm"), (1e6, "µm"), (1e3, "mm"))
