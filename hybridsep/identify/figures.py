@@ -13,7 +13,7 @@ from matplotlib.ticker import LogFormatter
 
 from ..base.signals import Array
 from ..evaluate.canvas import HOLD, HYBRID, PHYSICS, draw_line, finish_panels, legend_above, save_figure
-from ..logs.units import Shown
+from ..logs.units import Shown, shown_in
 from .frequency_response import IdentifiedResponse
 from .model import IdentifiedModel
 
@@ -21,7 +21,11 @@ __all__ = ["operation_figure", "response_figure"]
 
 
 def operation_figure(
-    found: IdentifiedModel, recordings: Sequence[tuple[Array, Array]], title: str, path: str | Path, shown: Shown
+    found: IdentifiedModel,
+    recordings: Sequence[tuple[Array, Array]],
+    title: str,
+    path: str | Path,
+    shown: Shown | None = None,
 ) -> None:
     """Draw servo error, residual and the structures' errors to a PNG.
 
@@ -34,10 +38,10 @@ def operation_figure(
         Heading.
     path : str or Path
         The PNG.
-    shown : Shown
-        Units in which errors are drawn.
+    shown : Shown, optional
+        Units in which errors are drawn; those of the model if left out.
     """
-    scale, unit = shown.error(found.rms)
+    scale, unit = (shown or shown_in(found.unit)).error(found.rms)
     figure = Figure(figsize=(9.0, 8.5), layout="constrained")
     servo, residual, structures = figure.subplots(3, 1, height_ratios=[1.2, 1.2, 1.4])
     figure.suptitle(title)
