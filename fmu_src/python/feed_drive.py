@@ -22,6 +22,8 @@ from hybridsep.plants.stage_drive import StageDrive
 class FeedDrivePy(slave.TableSlave):
     """Drive with the command held over a step, and an encoder sampled at each communication point."""
 
+    command = "x_d"
+
     def initialise(self) -> None:
         """Create the plant, at rest at the start value of x_d, and its encoder."""
         check_position("the start value of x_d", self.values["x_d"])

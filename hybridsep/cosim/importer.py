@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import re
 import shutil
@@ -58,6 +59,8 @@ def read_description(path: str | Path) -> Any:
 
 _WORDS_MAX = 1000
 """Most characters of an FMU's message in an error."""
+
+logging.getLogger("hybridsep.fmu").addHandler(logging.NullHandler())  # our FMUs' refusals are part of our errors
 
 _LOADING = threading.Lock()
 

@@ -30,6 +30,7 @@ class LookAheadSlave(TableSlave):
         That of the look-ahead's predictor or planner.
     """
 
+    command = "x_d_ahead"
     model_type: ClassVar[type[HybridPredictor] | type[Planner]]
 
     @abstractmethod

@@ -22,7 +22,7 @@ from ..predict.predictor import HybridPredictor
 from .content import content_guid
 from .imported import imported_modules
 from .model_description import model_description
-from .pages import filled, index_page
+from .pages import filled, icon, index_page
 from .pythonfmu_limits import checked_version
 from .weights import WEIGHTS_FILE, weights_file
 
@@ -33,6 +33,9 @@ _SLAVES = {
     "SepCompensator": "sep_compensator.py",
     "FeedDrive": "feed_drive.py",
 }
+
+_LAUNCHER = "launcher.py"
+"""The module that pythonfmu loads first: an instance is refused where the slave cannot be loaded."""
 
 
 def files(
@@ -60,6 +63,7 @@ def files(
         content[f"resources/{WEIGHTS_FILE}"] = weights_file(trained)
     needs = "The FMU needs a Python 3 with NumPy and SciPy in the importing tool's process."
     limits = filled("pythonfmu_limits", version=version)
+    content["model.png"] = icon(model)
     content["documentation/index.html"] = index_page(machine, description, needs, limits=limits)
     for source in ("linux64/libpythonfmu-export.so", "win64/pythonfmu-export.dll"):
         binary = Path(pythonfmu.__file__).parent / "resources" / "binaries" / source
@@ -75,14 +79,16 @@ def _resources(model: str) -> dict[str, bytes]:
     """Return the Python side of an FMU: slave, library and pythonfmu, under names with a hash of their content."""
     slave = data_folder("fmu_src") / "python" / _SLAVES[model]
     library = imported_modules(slave)
-    digest = hashlib.sha256(slave.read_bytes())
+    launcher = slave.with_name(_LAUNCHER).read_text(encoding="utf-8")
+    digest = hashlib.sha256(slave.read_bytes() + launcher.encode())
     for module, text in library.items():
         digest.update(module.encode() + text)
     number = digest.hexdigest()[:12]
     package, module_name = f"hybridsep_{number}", f"{slave.stem}_{number}"
     source = re.sub(r"^from hybridsep\b", f"from {package}", slave.read_text(encoding="utf-8"), flags=re.MULTILINE)
     content = {
-        "resources/slavemodule.txt": module_name.encode(),
+        "resources/slavemodule.txt": f"launch_{module_name}".encode(),
+        f"resources/launch_{module_name}.py": launcher.replace("slave_module", module_name).encode(),
         f"resources/{module_name}.py": source.encode(),
     }
     content |= {f"resources/{package}/{module}": text for module, text in library.items()}

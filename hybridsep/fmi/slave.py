@@ -10,18 +10,20 @@ from __future__ import annotations
 
 import ctypes
 import json
+import logging
 import math
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from functools import wraps
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real
 from pythonfmu.enums import Fmi2Status
 
-from ..base.errors import FmuError, HybridSepError, StateError
+from ..base.errors import FmuError, HybridSepError, SignalError, StateError
 from ..base.saved import Saved
+from ..base.signals import check_position
 from ..base.state import pack, unpack
 from .variables import Variable, variables_of
 
@@ -32,6 +34,9 @@ DESCRIPTION_FILE = "machine.json"
 
 _LAST_READ: dict[str, dict[str, Any]] = {}
 """Descriptions by their resources' folder, for a reset: pythonfmu 0.7 does not survive a slave that fails then."""
+
+_LOG = logging.getLogger("hybridsep.fmu")
+"""Refusals, for stderr: where the importer's logging is off, pythonfmu passes on no message."""
 
 _KIND = "fmu"
 _STOP_TOLERANCE = 1e-6  # of a step: a last step that ended at the stop time but for rounding
@@ -52,7 +57,8 @@ def _surviving(method: _Method) -> _Method:
     def survive(self: TableSlave, *arguments: Any) -> Any:
         try:
             return method(self, *arguments)
-        except BaseException:  # KeyboardInterrupt, too
+        except BaseException as error:  # KeyboardInterrupt, too
+            _LOG.error("%s: %s", self.instance_name, error or type(error).__name__)
             for thing in (self, type(self), self.log_queue):
                 ctypes.pythonapi.Py_IncRef(ctypes.py_object(thing))
             raise
@@ -76,7 +82,14 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
 
     The machine's data are read from the instance's own resources: two FMUs that carry the same library share its
     modules within one process, so nothing of a machine may live at module level.
+
+    Attributes
+    ----------
+    command : str
+        The input whose start value is the position where a run begins, m.
     """
+
+    command: ClassVar[str]
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
@@ -147,6 +160,7 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
             self.advance(current_time, step_size)
         except HybridSepError as error:
             self.log(f"{self.instance_name}: {error}", Fmi2Status.error)
+            _LOG.error("%s: %s", self.instance_name, error)
             return False
         return True
 
@@ -222,7 +236,15 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
         name = variable.name
         if variable.causality in ("input", "parameter"):
             return lambda: self.values[name]
-        return lambda: self.current_value(name) if self.running else self.initial_value(name)
+        return lambda: self.current_value(name) if self.running else self._value_before(name)
+
+    def _value_before(self, name: str) -> float | int | bool:
+        """Return an output or local variable at ``t_0``, which the start value of the command must tell."""
+        try:
+            check_position(f"the start value of {self.command}", self.values[self.command])
+        except SignalError as error:
+            raise SignalError(f"{name} is not known yet: {error}") from error
+        return self.initial_value(name)
 
     def _setter(self, variable: Variable) -> Callable[[Any], None]:
         name, causality = variable.name, variable.causality

@@ -44,6 +44,13 @@ def test_what_the_slave_catches(folder: Path, case: str) -> None:
 
 
 @needs_linux
+def test_the_text_of_a_refusal_goes_to_stderr(folder: Path) -> None:
+    lines = outcome(folder, "refusals_with_logging_off").stderr.splitlines()
+    assert [line for line in lines if re.match(r".*: the communication step size must be .*, got nan", line)]
+    assert [line for line in lines if line.endswith(": the start time must be finite, got nan s")]
+
+
+@needs_linux
 @pytest.mark.parametrize("case", KILLING)
 def test_what_ends_the_process_is_on_the_page(folder: Path, case: str) -> None:
     """A test that fails here may mean that pythonfmu has been mended: then the page needs less."""
@@ -74,7 +81,7 @@ def test_only_the_pythonfmu_that_the_slave_was_made_for_is_packed(
 # Our own importer --------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("missing", [r"slavemodule\.txt", r"feed_drive_\w+\.py"])
+@pytest.mark.parametrize("missing", [r"slavemodule\.txt", r"launch_feed_drive_\w+\.py"])
 def test_our_importer_refuses_what_would_end_it(python_fmu: Fmu, tmp_path: Path, missing: str) -> None:
     damaged = tmp_path / "Damaged.fmu"
     with zipfile.ZipFile(python_fmu("FeedDrivePy")) as old, zipfile.ZipFile(damaged, "w") as new:
@@ -85,14 +92,31 @@ def test_our_importer_refuses_what_would_end_it(python_fmu: Fmu, tmp_path: Path,
         FmuInstance(damaged)
 
 
+@pytest.mark.parametrize("name", ["größer", "axis#1", "50%", "o'clock", "%C3%A4", "a?b"])
 def test_our_importer_refuses_a_folder_that_pythonfmu_cannot_read(
-    python_fmu: Fmu, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    python_fmu: Fmu, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    folder = tmp_path / "größer"
+    folder = tmp_path / name
     folder.mkdir()
     monkeypatch.setattr("tempfile.tempdir", str(folder))
-    with pytest.raises(FmuError, match=r"got .*größer.*; set TMPDIR to another one"):
+    with pytest.raises(FmuError, match=rf"got .*{re.escape(name)}.*; set TMPDIR to another one"):
         FmuInstance(python_fmu("FeedDrivePy"))
+
+
+def test_a_blank_in_a_folder_is_read(python_fmu: Fmu, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / "two words"
+    folder.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(folder))
+    with FmuInstance(python_fmu("FeedDrivePy")) as instance:
+        instance.initialise()
+
+
+def test_our_importer_says_a_refusal_once(python_fmu: Fmu, capfd: pytest.CaptureFixture[str]) -> None:
+    with FmuInstance(python_fmu("FeedDrivePy")) as instance:
+        instance.initialise()
+        with pytest.raises(FmuError, match="the communication step size must be"):
+            instance.step(0.0, float("nan"))
+    assert capfd.readouterr().err == ""
 
 
 def test_our_importer_leaves_no_removed_folder_in_the_path(python_fmu: Fmu) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -104,6 +105,30 @@ def test_outputs_right_after_the_initialization(new_stream: StreamMaker) -> None
 @on_all((*LOOK_AHEADS, DRIVE), needs="outputs before")
 def test_outputs_before_the_initialization_has_ended(new_stream: StreamMaker) -> None:
     shown = new_stream().outputs_before(AT_REST[new_stream.model])
+    assert shown == at_rest(new_stream.model, sep_state=1.0)
+
+
+@on_all((*LOOK_AHEADS, *PLANTS), needs="outputs before")
+@pytest.mark.parametrize(
+    ("start", "reason"),
+    [
+        (math.inf, "must be finite, got inf"),
+        (-math.inf, "must be finite, got -inf"),
+        (math.nan, "must be finite, got nan"),
+        (1e308, "must be within ±1000 m, got 1e+308"),
+    ],
+)
+def test_no_output_follows_from_a_start_value_that_is_no_position(
+    new_stream: StreamMaker, start: float, reason: str
+) -> None:
+    command = "x_d" if "FeedDrive" in new_stream.model else "x_d_ahead"
+    with pytest.raises(RefusedStreamError, match=re.escape(f"the start value of {command} {reason}")):
+        new_stream().outputs_before({command: start})
+
+
+@on_all(LOOK_AHEADS, needs="outputs before")
+def test_a_missing_first_measurement_hides_no_output(new_stream: StreamMaker) -> None:
+    shown = new_stream().outputs_before({**AT_REST[new_stream.model], "x_meas": math.nan})
     assert shown == at_rest(new_stream.model, sep_state=1.0)
 
 

@@ -41,7 +41,7 @@ class CoreStream:
 
     def outputs_before(self, values: Mapping[str, Value]) -> list[float]:
         self._take(values)
-        self._core.start_values()
+        self._refusing(self._core.start_values)
         return self.outputs()
 
     def set(self, name: str, value: Value) -> None:

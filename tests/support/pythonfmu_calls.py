@@ -152,9 +152,39 @@ def interrupted_steps(importer: Importer) -> None:
     importer.library.FreeInstance(component)
 
 
+def missing_library(importer: Importer) -> None:
+    """Without SciPy the slave cannot be loaded: no instance, but a reason."""
+    sys.modules["scipy"] = None  # type: ignore[assignment]  # importing it fails
+    for _ in range(3):
+        assert importer.library.instantiate(resources=f"file://{importer.resources}", logging_on=True) is None
+        message = importer.library.messages[-1][2]
+        assert "'scipy'" in message
+        assert "needs a Python with NumPy and SciPy" in message
+
+
+def lost_slave(importer: Importer) -> None:
+    (slave,) = importer.resources.glob("feed_drive_*.py")
+    slave.unlink()
+    assert importer.library.instantiate(resources=f"file://{importer.resources}", logging_on=True) is None
+    assert f"No module named '{slave.stem}'" in importer.library.messages[-1][2]
+
+
+def refusals_with_logging_off(importer: Importer) -> None:
+    """They have no message, so their text goes to stderr."""
+    component = importer.initialised(logging_on=False)
+    before = len(importer.library.messages)
+    assert importer.library.DoStep(component, 0.0, float("nan"), 1) == DISCARD
+    assert importer.library.SetupExperiment(component, 0, 0.0, float("nan"), 0, 0.0) == FATAL
+    assert not [message for _, _, message in importer.library.messages[before:] if message]
+    importer.library.FreeInstance(component)
+
+
 CAUGHT: dict[str, Callable[[Importer], object]] = {
     function.__name__: function
-    for function in (foreign_guid, freed_state, refused_experiments, lost_description, interrupted_steps)
+    for function in (
+        *(foreign_guid, freed_state, refused_experiments, lost_description, interrupted_steps),
+        *(missing_library, lost_slave, refusals_with_logging_off),
+    )
 }
 
 

@@ -49,11 +49,24 @@ HSEP_API hsep_status hsep_values_check_set(
     return HSEP_OK;
 }
 
-HSEP_API void hsep_values_prepare(hsep_instance *instance)
+HSEP_API hsep_status
+hsep_values_prepare(hsep_instance *instance, const char *call, const unsigned vr[], size_t n, char message[])
 {
-    if (instance->state == NULL) {
-        hsep_model_start_values(&instance->context, instance->values);
+    char reason[HSEP_MESSAGE_SIZE] = "";
+    if (instance->state != NULL) {
+        return HSEP_OK;
     }
+    if (hsep_model_check_start(instance->values, reason) == HSEP_OK) {
+        hsep_model_start_values(&instance->context, instance->values);
+        return HSEP_OK;
+    }
+    for (size_t i = 0; i < n; i++) {
+        const hsep_variable *variable = &hsep_variables[vr[i]];
+        if (variable->causality == HSEP_OUTPUT || variable->causality == HSEP_LOCAL) {
+            return hsep_message_add(message, "%s: %s is not known yet: %s", call, variable->name, reason);
+        }
+    }
+    return HSEP_OK;
 }
 
 HSEP_API int hsep_values_integer(double number)

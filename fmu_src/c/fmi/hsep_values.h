@@ -17,8 +17,10 @@ hsep_values_check(const char *call, hsep_kind kind, const unsigned vr[], size_t 
 HSEP_API hsep_status hsep_values_check_set(
     const hsep_instance *instance, const char *call, const char *reset, const unsigned vr[], size_t n, char message[]);
 
-/* Calculate what is read before the initialization has ended: it follows from the start values. */
-HSEP_API void hsep_values_prepare(hsep_instance *instance);
+/* Calculate what is read before the initialization has ended: it follows from the start values. Refused if one of the n
+ * is calculated from a start value that is no position. */
+HSEP_API hsep_status
+hsep_values_prepare(hsep_instance *instance, const char *call, const unsigned vr[], size_t n, char message[]);
 
 /* A value as a whole number of 32 bits. */
 HSEP_API int hsep_values_integer(double number);

@@ -19,12 +19,10 @@ static hsep_instance *hsep_access(
         return NULL;
     }
     if (hsep_values_check(name, kind, vr, n, value, message) != HSEP_OK ||
-        (sets && hsep_values_check_set(instance, name, "fmi2Reset", vr, n, message) != HSEP_OK)) {
+        (sets && hsep_values_check_set(instance, name, "fmi2Reset", vr, n, message) != HSEP_OK) ||
+        (gets && hsep_values_prepare(instance, name, vr, n, message) != HSEP_OK)) {
         (void)hsep_refuse(instance, "%s", message);
         return NULL;
-    }
-    if (gets) {
-        hsep_values_prepare(instance);
     }
     return instance;
 }

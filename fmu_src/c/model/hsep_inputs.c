@@ -6,8 +6,7 @@
 
 HSEP_API hsep_status hsep_inputs_init(hsep_inputs *self, double t_start, double T_s, double start, char message[])
 {
-    if (hsep_check_position("the start value of x_d_ahead", start, "", 0.0, message) != HSEP_OK ||
-        hsep_check_clock(&self->clock, t_start, T_s, message) != HSEP_OK) {
+    if (hsep_check_clock(&self->clock, t_start, T_s, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     self->x_d_ahead = self->x_meas = start;

@@ -49,7 +49,7 @@ HSEP_API hsep_status hsep_model_initialise(
     if (hsep_model_size(context, values, &needed, message) != HSEP_OK ||
         hsep_state_begin(&self->header, context, values, HSEP_DRIVE_KIND, needed, size, message) != HSEP_OK ||
         hsep_check_start_time(t_start, message) != HSEP_OK ||
-        hsep_check_position("the start value of x_d", values[HSEP_VR_x_d], "", 0.0, message) != HSEP_OK) {
+        hsep_model_check_start(values, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     hsep_encoder_init(&self->encoder, values[HSEP_VR_noise_std], (uint64_t)values[HSEP_VR_seed]);
@@ -107,6 +107,12 @@ static double drive_first_measurement(double noise_std, double seed, double x)
     hsep_encoder_init(&encoder, noise_std, (uint64_t)seed);
     const double measured = hsep_encoder_measure(&encoder, x);
     return isfinite(measured) ? measured : x;
+}
+
+HSEP_API hsep_status hsep_model_check_start(const double values[], char message[])
+{
+    message[0] = '\0';
+    return hsep_check_position("the start value of x_d", values[HSEP_VR_x_d], "", 0.0, message);
 }
 
 HSEP_API void hsep_model_start_values(const hsep_context *context, double values[])

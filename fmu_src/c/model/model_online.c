@@ -72,6 +72,7 @@ HSEP_API hsep_status hsep_model_initialise(
     if (online_checked(context, values, &parameters, modes, message) != HSEP_OK ||
         hsep_model_size(context, values, &needed, message) != HSEP_OK ||
         hsep_state_begin(&self->header, context, values, HSEP_ONLINE_KIND, needed, size, message) != HSEP_OK ||
+        hsep_model_check_start(values, message) != HSEP_OK ||
         hsep_inputs_init(&self->inputs, t_start, values[HSEP_VR_T_s], start, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
@@ -86,6 +87,12 @@ HSEP_API hsep_status hsep_model_initialise(
     }
     hsep_online_write(&self->online, 1, values);
     return HSEP_OK;
+}
+
+HSEP_API hsep_status hsep_model_check_start(const double values[], char message[])
+{
+    message[0] = '\0';
+    return hsep_check_position("the start value of x_d_ahead", values[HSEP_VR_x_d_ahead], "", 0.0, message);
 }
 
 HSEP_API hsep_status

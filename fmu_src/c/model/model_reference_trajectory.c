@@ -135,6 +135,13 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
     return HSEP_OK;
 }
 
+HSEP_API hsep_status hsep_model_check_start(const double values[], char message[])
+{
+    (void)values; /* it has no input */
+    message[0] = '\0';
+    return HSEP_OK;
+}
+
 HSEP_API void hsep_model_start_values(const hsep_context *context, double values[])
 {
     char message[HSEP_MESSAGE_SIZE] = "";
