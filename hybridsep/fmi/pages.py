@@ -9,7 +9,7 @@ from string import Template
 
 from ..machines.machine import Machine
 from .content import fmu_title, paper_note
-from .tables import interface_table
+from .tables import grouped_table
 from .variables import variables_of
 
 __all__ = ["filled", "icon", "index_page"]
@@ -63,8 +63,8 @@ def index_page(
     """
     model, name = str(description["model"]), str(description["name"])
     rows = "\n".join(
-        "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>"
-        for row in interface_table(variables_of(description))
+        f'<tbody>\n<tr><th colspan="5" scope="rowgroup">{html.escape(heading)}</th></tr>\n{_rows(group)}\n</tbody>'
+        for heading, group in grouped_table(variables_of(description)).items()
     )
     has_inputs = model != "ReferenceTrajectory"
     inputs = f', fed with <a href="reference/{name}_in.csv">reference/{name}_in.csv</a>' if has_inputs else ""
@@ -85,3 +85,7 @@ def index_page(
         sources="\n".join(f"<li>{html.escape(source)}</li>" for source in sources),
     )
     return f"{page}\n".encode()
+
+
+def _rows(group: list[tuple[str, str, str, str, str]]) -> str:
+    return "\n".join("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>" for row in group)

@@ -55,6 +55,7 @@ COMPENSATOR_SETTINGS: Mapping[str, Parameter] = {
 _HOLD = "the same for x_pb plus the residual before the window, held"
 _REJECTED = "measurements that were missing or not plausible, with trust; counted window by window"
 _COMPENSATE = CompensatorSettings.parameters()["compensate"]
+_HEADINGS = {"input": "Inputs", "output": "Outputs", "parameter": "Parameters", "local": "Current window"}
 _KINDS = {int: "Integer", float: "Real", bool: "Boolean", str: "Enumeration"}
 
 
@@ -87,6 +88,8 @@ class Variable:
         Whether a warm start needs the value with which the weights were learned.
     initially_from : tuple of str
         Inputs and parameters an output depends on during initialization; none at any later point.
+    group : str
+        Heading of a parameter in the documentation.
     """
 
     name: str
@@ -106,6 +109,12 @@ class Variable:
     items: tuple[str, ...] = ()
     item_meanings: tuple[str, ...] = ()
     learned: bool = False
+    group: str = ""
+
+    @property
+    def heading(self) -> str:
+        """Heading in the documentation."""
+        return self.group or _HEADINGS[self.causality]
 
     @property
     def type_name(self) -> str:
@@ -120,7 +129,7 @@ def _position(name: str, causality: str, description: str, *, display_unit: str 
     return Variable(name, "Real", causality, description=description, **more)
 
 
-def _parameter(parameter: Parameter, start: Value, *, label: str | None = None) -> Variable:
+def _parameter(parameter: Parameter, start: Value, *, group: str, label: str | None = None) -> Variable:
     return Variable(
         label or parameter.name,
         _KINDS[parameter.kind],
@@ -137,16 +146,25 @@ def _parameter(parameter: Parameter, start: Value, *, label: str | None = None) 
         items=parameter.choices,
         item_meanings=parameter.meanings,
         learned=parameter.learned,
+        group=group,
     )
 
 
-def _parameters(table: Mapping[str, Parameter], starts: Mapping[str, Value]) -> list[Variable]:
-    return [_parameter(parameter, starts[name]) for name, parameter in table.items()]
+def _parameters(group: str, table: Mapping[str, Parameter], starts: Mapping[str, Value]) -> list[Variable]:
+    return [_parameter(parameter, starts[name], group=group) for name, parameter in table.items()]
+
+
+def _look_ahead_parameters(starts: Mapping[str, Value]) -> list[Variable]:
+    """Return the parameters of a predictor, alone or within a compensator."""
+    return [
+        *_parameters("Look-ahead and residual model", PREDICTOR_SETTINGS, starts),
+        *_parameters("Residual model with trust", TRUST_SETTINGS, starts),
+    ]
 
 
 def _modes(modes: Sequence[Mapping[str, float]]) -> list[Variable]:
     return [
-        _parameter(PARAMETERS[name], mode[name], label=f"mode[{i}].{name}")
+        _parameter(PARAMETERS[name], mode[name], group="Physics model", label=f"mode[{i}].{name}")
         for i, mode in enumerate(modes, start=1)
         for name in ("f_n", "zeta", "alpha", "beta")
     ]
@@ -199,7 +217,7 @@ def predictor_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping
         Variable("batch", "Integer", "output", "discrete", "number of the window, floor(k / Np); 0 is the first fill"),
         Variable("n_rejected", "Integer", "output", "discrete", _REJECTED),
     ]
-    table += _parameters({**PREDICTOR_SETTINGS, **TRUST_SETTINGS}, parameters)
+    table += _look_ahead_parameters(parameters)
     table += _modes(modes)
     for name, meaning in (
         ("x_d", "commanded positions"),
@@ -269,7 +287,8 @@ def compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mappi
         _position("rms_hold", "output", _HOLD, display_unit="um"),
         Variable("batch", "Integer", "output", "discrete", "number of the window, floor(k / Np)"),
         Variable("n_rejected", "Integer", "output", "discrete", _REJECTED),
-        *_parameters({**PREDICTOR_SETTINGS, **TRUST_SETTINGS, **COMPENSATOR_SETTINGS}, parameters),
+        *_look_ahead_parameters(parameters),
+        *_parameters("Compensation", COMPENSATOR_SETTINGS, parameters),
         *_modes(modes),
     ]
 
@@ -289,6 +308,7 @@ def plant_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping[str
         "v", "Real", "output", "continuous", "true velocity", unit="m/s", display_unit="mm/s", nominal=1e-2
     )
     own = ("f", "kappa", "friction_on", "T_s") if modes else ("m", "c", "k", "c_nl", "k_nl")
+    groups = {"Disturbance" if modes else "Drive": own, "Encoder": ("noise_std", "seed")}
     return [
         _position("x_d", "input", "commanded position, constant over a step", start=0.0),
         _position("x", "output", "true position", variability="continuous", initially_from=("x_d",)),
@@ -297,7 +317,11 @@ def plant_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping[str
             "x_meas", "output", "measured position, with encoder noise", initially_from=("x_d", "noise_std", "seed")
         ),
         *_modes(modes),
-        *(_parameter(PARAMETERS[name], parameters[name]) for name in (*own, "noise_std", "seed")),
+        *(
+            _parameter(PARAMETERS[name], parameters[name], group=group)
+            for group, names in groups.items()
+            for name in names
+        ),
     ]
 
 
@@ -315,7 +339,7 @@ def trajectory_variables(parameters: Mapping[str, Value], modes: Sequence[Mappin
     return [
         _position("r", "output", meaning, initially_from=("trajectory",)),
         *_modes(modes),
-        *(_parameter(PARAMETERS[name], parameters[name]) for name in ("trajectory", "T_s")),
+        *(_parameter(PARAMETERS[name], parameters[name], group="Trajectory") for name in ("trajectory", "T_s")),
     ]
 
 
