@@ -32,8 +32,8 @@ def grouped_table(table: Iterable[Variable]) -> dict[str, list[tuple[str, str, s
     groups: dict[str, list[tuple[str, str, str, str, str]]] = {}
     for name, variable in _in_one_row(table).items():
         pairs = enumerate(zip(variable.items, variable.item_meanings, strict=True))
-        items = "; ".join(f"{number} {item}, {meaning}" for number, (item, meaning) in pairs)
-        meaning = f"{variable.description}. {items}" if items else variable.description
+        items = ", ".join(f"{number} {item} ({meaning})" for number, (item, meaning) in pairs)
+        meaning = f"{variable.description}: {items}" if items else variable.description
         row = (name, _kind(variable), variable.display_unit or "", _start(variable), meaning)
         groups.setdefault(variable.heading, []).append(row)
     return groups

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import re
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -36,7 +37,7 @@ def test_archives_keep_the_rules_of_the_standard(fmus: BuiltFmus, name: str) -> 
     assert [file for file in files if Path(file).stem == name and file.startswith("binaries/linux64/")]
     for source in root.iterfind("CoSimulation/SourceFiles/File"):
         assert f"sources/{source.get('name')}" in files
-    assert {"modelDescription.xml", "documentation/index.html"} <= set(files)
+    assert {"modelDescription.xml", "documentation/index.html", "model.png"} <= set(files)
 
 
 def test_a_rotary_axis_keeps_the_rules(rotary: Machine) -> None:
@@ -193,3 +194,15 @@ def test_each_item_of_an_enumeration_has_a_description(fmus: BuiltFmus, name: st
     assert [variable.name for variable in variables_of(root) if variable.base == "Enumeration"]
     for item in root.iterfind("TypeDefinitions/SimpleType/Enumeration/Item"):
         assert item.get("description")
+
+
+def test_the_page_has_groups_display_units_and_what_items_mean(fmus: BuiltFmus) -> None:
+    with zipfile.ZipFile(fmus("SepCompensator")) as archive:
+        page = archive.read("documentation/index.html").decode()
+    headings = re.findall(r'scope="rowgroup">([^<]+)</th>', page)
+    assert headings == [
+        *("Inputs", "Outputs", "Look-ahead and residual model", "Residual model with trust", "Compensation"),
+        "Physics model",
+    ]
+    assert "<td>x_h_std</td><td>Real, m</td><td>um</td>" in page
+    assert "0 zoh (zero-order hold: constant until the next sample), 1 foh (" in page

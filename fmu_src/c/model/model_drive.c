@@ -48,8 +48,7 @@ HSEP_API hsep_status hsep_model_initialise(
     drive_state *self = state;
     if (hsep_model_size(context, values, &needed, message) != HSEP_OK ||
         hsep_state_begin(&self->header, context, values, HSEP_DRIVE_KIND, needed, size, message) != HSEP_OK ||
-        hsep_check_start_time(t_start, message) != HSEP_OK ||
-        hsep_model_check_start(values, message) != HSEP_OK) {
+        hsep_check_start_time(t_start, message) != HSEP_OK || hsep_model_check_start(values, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     hsep_encoder_init(&self->encoder, values[HSEP_VR_noise_std], (uint64_t)values[HSEP_VR_seed]);
