@@ -50,7 +50,8 @@ def _layout(chart: Chart) -> dict[str, Any]:
     layout: dict[str, Any] = {
         "height": _HEIGHT if n == 1 else n * _HEIGHT_OF_SEVERAL,
         "margin": {"l": 10, "r": 10, "t": 30, "b": 10},
-        "legend": {"orientation": "h", "yanchor": "bottom", "y": 1.0, "x": 0.0},
+        # at the chart's top, not the panel's: a change of height, as for print, does not move it
+        "legend": {"orientation": "h", "yref": "container", "yanchor": "top", "y": 1.0, "x": 0.0},
         "font": {"family": "system-ui, sans-serif", "size": _FONT_SIZE, "color": _TEXT},
         "hovermode": "x",
         "xaxis": {**common, **_scale(chart.x_log), "title": _title(chart.x_label), "anchor": _axis("y", n - 1)},
