@@ -19,8 +19,10 @@ __all__ = ["demo", "demo_files", "processor_time"]
 SEEDS = 10
 
 _PROCESSOR_TIME = {"native": (100.0, 2.0), "python": (1000.0, 20.0)}
-"""Processor time of a demonstration without any noise seed and for each, s, by flavour: native took 112 s with one seed and
-114 s with ten; Python's FMUs take about ten times as long."""
+"""Processor time of a demonstration without any noise seed and for each, s, by flavour.
+
+Native took 112 s with one seed and 114 s with ten; Python's FMUs take about ten times as long.
+"""
 
 Progress = Callable[[str, float], object]
 
