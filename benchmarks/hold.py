@@ -69,28 +69,54 @@ def rms_of(x_meas: Column, predicted: Column) -> float:
 
 def of_log(log: Path, folder: Path, Np: int) -> Iterator[tuple[str, float]]:
     """Yield what is compared on a log, and the difference, m."""
-    reading = ["--x_d", "qg", "--x", "qm"] if log.suffix == ".mat" else []
+    fitted, written = folder / "axis", folder / "predictions.csv"
     fixed = ["--fix"] if "jitter" in log.name else []
-    fitted, written, batches = folder / "axis", folder / "predictions.csv", folder / "batches.csv"
-    hybridsep("fit", log, *reading, *fixed, "--name", "axis", "--Np", Np, "--out", fitted)
-    command = (log, "-m", fitted / "machine.toml", *reading, *(fixed or ["--as-is"]))
+    hybridsep("fit", log, *reading(log), *fixed, "--name", "axis", "--Np", Np, "--out", fitted)
+    yield from of_replay(log, fitted / "machine.toml", folder, Np)
+    x_d, x_pb, x_meas = (column(written, name) for name in ("x_d", "x_pb", "x_meas"))
+    judged = json.loads((fitted / "fit.json").read_text(encoding="utf-8"))["judged"]["rms_hold"]
+    half, again = round(0.5 * len(x_pb)), hold(x_pb, x_meas, Np)
+    yield "fit", abs(judged - rms_of(x_meas[half:], again[half:]))
+    for archive in sorted(fitted.glob("*.fmu")):
+        yield archive.name, of_fmu(archive, x_d, x_meas, Np)
+
+
+def of_replay(log: Path, machine: str | Path, folder: Path, Np: int) -> Iterator[tuple[str, float]]:
+    """Yield what backtest and report write and print of a log, and the difference, m; files stay in the folder."""
+    written, batches, page = folder / "predictions.csv", folder / "batches.csv", folder / "report.html"
+    fixed = "--fix" if "jitter" in log.name else "--as-is"
+    command = (
+        log,
+        "-m",
+        machine,
+        *reading(log),
+        fixed,
+        "--Np",
+        Np,
+        "--p",
+        min(Np, 50),
+        "--trust",
+        "true",
+        "--t_init",
+        0,
+    )
     scores = json.loads(hybridsep("backtest", *command, "--save", written, "--out", batches, "--json"))
     x_pb, x_meas, x_hold = (column(written, name) for name in ("x_pb", "x_meas", "x_hold"))
-    again, n = hold(x_pb, x_meas, Np), len(x_pb)
+    again = hold(x_pb, x_meas, Np)
+    rms = rms_of(x_meas, again)
     yield "columns", max(abs(one - other) for one, other in zip(again, x_hold, strict=True))
-    yield "backtest", abs(1e-6 * scores["rms_hold_um"] - rms_of(x_meas, again))
-    windows = [rms_of(x_meas[k : k + Np], again[k : k + Np]) for k in range(0, n, Np)]
+    yield "backtest", abs(1e-6 * scores["rms_hold_um"] - rms)
+    windows = [rms_of(x_meas[k : k + Np], again[k : k + Np]) for k in range(0, len(x_pb), Np)]
     printed = column(batches, "rms_hold")
     yield "windows", max(abs(one - other) for one, other in zip(printed, windows, strict=True))
-    judged = json.loads((fitted / "fit.json").read_text(encoding="utf-8"))["judged"]["rms_hold"]
-    half = round(0.5 * n)
-    yield "fit", abs(judged - rms_of(x_meas[half:], again[half:]))
-    page = folder / "report.html"
     hybridsep("report", *command, "--out", page)
-    text, value = page.read_text(encoding="utf-8"), rms_of(x_meas, again)
-    yield "report", 0.0 if any(f"<td>{scale * value:.4g}</td>" in text for scale in (1e3, 1e6, 1e9)) else math.inf
-    for archive in sorted(fitted.glob("*.fmu")):
-        yield archive.name, of_fmu(archive, column(written, "x_d"), x_meas, Np)
+    text = page.read_text(encoding="utf-8")
+    yield "report", 0.0 if any(f"<td>{scale * rms:.4g}</td>" in text for scale in (1e3, 1e6, 1e9)) else math.inf
+
+
+def reading(log: Path) -> list[str]:
+    """Return the options that a log is read with."""
+    return ["--x_d", "qg", "--x", "qm"] if log.suffix == ".mat" else []
 
 
 def of_fmu(archive: Path, x_d: Column, x_meas: Column, Np: int) -> float:
@@ -103,7 +129,7 @@ def of_fmu(archive: Path, x_d: Column, x_meas: Column, Np: int) -> float:
             x_pb.append(controller.outputs()[0][1])
             controller.step(k, x_d[min(k, n - 1)], x_meas[max(k - Np, 0)])
         shown: float = controller.fmu.get("rms_hold")
-    return abs(shown - rms_of(x_meas, hold(x_pb[Np:], x_meas, Np)))
+    return float(abs(shown - rms_of(x_meas, hold(x_pb[Np:], x_meas, Np))))
 
 
 def of_cosim(folder: Path) -> float:
@@ -113,7 +139,7 @@ def of_cosim(folder: Path) -> float:
     x_pb, x_meas, active = (column(written, name) for name in COLUMNS)
     again = hold(x_pb, x_meas, 100)
     published = [y if on else pb for y, pb, on in zip(again, x_pb, active, strict=True)]  # x_pb in the warm-up
-    return abs(1e-6 * scores["rms_hold_um"] - rms_of(x_meas, published))
+    return float(abs(1e-6 * scores["rms_hold_um"] - rms_of(x_meas, published)))
 
 
 def column(path: Path, name: str) -> Column:

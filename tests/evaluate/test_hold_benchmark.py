@@ -1,0 +1,27 @@
+"""Hold that backtest and report print of every recording, against three lines on the columns that are written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from places import EMPS, RECORDINGS
+
+from benchmarks import hold
+
+LOGS = [EMPS, *(sorted(RECORDINGS.glob("*.csv")) if RECORDINGS.is_dir() else []), RECORDINGS / "cnc_a_capture.json"]
+
+
+@pytest.mark.parametrize("log", LOGS, ids=lambda log: str(log.stem))
+def test_hold_is_what_follows_from_the_columns_of_a_recording(log: Path, tmp_path: Path) -> None:
+    if not log.is_file():
+        pytest.skip("the recorded axes are not here: ../shared/data, beside the repository")
+    machine: str | Path = "emps"
+    if log != EMPS:
+        machine = tmp_path / "lag.toml"
+        rate = 0.002 if log.stem.startswith("cnc") else 0.0053
+        lag = ("--name", "lag", "--model", "lag", "--tau", 0.05, "--dead-time", 1, "--hold", "zoh", "--Np", 20)
+        hold.hybridsep("init", machine, *lag, "--T_s", rate)
+    found = dict(hold.of_replay(log, machine, tmp_path, 20))
+    assert set(found) == {"columns", "backtest", "windows", "report"}
+    assert max(found.values()) < 1e-12
