@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -13,12 +13,14 @@ from .options import (
     ForceOption,
     JsonOption,
 )
+from .parameter_options import DRIVE_LIMIT_ENTRIES, KNOWN_ENTRIES, takes_parameters
 from .reading_options import ReadingOptions, takes_reading
 
 __all__ = ["fit"]
 
 
 @takes_reading
+@takes_parameters(KNOWN_ENTRIES, DRIVE_LIMIT_ENTRIES, otherwise="none, or the usual one")
 def fit(
     logs: Annotated[list[Path], typer.Argument(help="Recorded logs of one axis: commanded and measured positions.")],
     out: Annotated[
@@ -35,6 +37,7 @@ def fit(
     ] = None,
     *,
     reading: ReadingOptions,
+    parameters: dict[str, Any],
     fix: Annotated[
         bool, typer.Option("--fix", help="Apply what puts a finding of the checks right, and go on.")
     ] = False,
@@ -48,6 +51,7 @@ def fit(
         from .arguments import check_ending, checked_name, machine_name
         from .fit import FitOptions, fit_files
         from .fit import fit as fit_logs
+        from .fit_compensation import drive_limits
         from .fit_report import fit_report, judged_by
         from .fit_table import print_fit
         from .judged import recommendation
@@ -58,7 +62,9 @@ def fit(
 
     name = checked_name(name) if name else machine_name(logs[0], reading.axis)
     folder = out or Path(name)
-    files = fit_files(folder, name)
+    limits = drive_limits(parameters)
+    files = fit_files(folder, name, compensator=bool(limits))
+    known = {entry: parameters[entry] for entry in KNOWN_ENTRIES if entry in parameters}
     inputs: dict[str, str | Path | None] = {f"log {path.name}": path for path in logs}
     check_ending(figure, "--figure", (".pdf",))
     outputs = [Output("--out", path, FIT_FILES[path.suffix]) for path in files.values()]
@@ -72,7 +78,9 @@ def fit(
         show((f"{log.path.name}: {remark}" for remark in log.remarks), ())
     used, findings = take_in(found, fix=fix)
     with progress_bar(as_json) as advance:
-        result = fit_logs(used, folder, FitOptions(Np, name), advance, changes=changes(findings))
+        result = fit_logs(
+            used, folder, FitOptions(Np, name, known=known, drive_limits=limits), advance, changes=changes(findings)
+        )
         fit_report(result, used, findings).write(files["report"], figure)
     advice = recommendation(judged_by(result, used[0].shown))
     if as_json:

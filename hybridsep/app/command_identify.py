@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -59,6 +59,15 @@ def identify(
     modes: Annotated[int | None, typer.Option(help="Number of modes of a response; chosen if left out.")] = None,
     hold: Annotated[str, typer.Option(help="Hold of the command with a response: zoh or foh.")] = "zoh",
     dead_time: Annotated[int, typer.Option(help="Whole samples of dead time in a response.")] = 0,
+    measurement_delay: Annotated[
+        int,
+        typer.Option(
+            "--measurement-delay",
+            "--measurement_delay",
+            min=0,
+            help="Whole samples by which the measured position of a log is late; the model is then without them.",
+        ),
+    ] = 0,
     unit: UnitOption = None,
     T_s: TsOption = None,
     t: TimeColumnOption = None,
@@ -81,6 +90,7 @@ def identify(
         from ..identify.klipper import identify_resonance, is_klipper, read_klipper
         from ..identify.operation import identify_operation
         from ..identify.response_files import has_response, read_response
+        from ..identify.segments import in_time
         from ..identify.swept_sine import h1
         from ..logs.log import read_log
         from ..logs.units import shown_in
@@ -109,6 +119,8 @@ def identify(
             kind = "response"
     if fix and kind != "operation":
         raise ParameterError(f"--fix is for a log of operation, {recording.name} is read as --kind {kind}")
+    if measurement_delay and kind not in ("operation", "sweep"):
+        raise ParameterError(f"--measurement-delay is for a log, {recording.name} is read as --kind {kind}")
     interval = 1e-3 if T_s is None else T_s
     found: IdentifiedModel | IdentifiedResponse
     changed: list[str] = []
@@ -142,7 +154,8 @@ def identify(
                 (log,), findings = take_in([log], fix=fix)
                 show(log.remarks, findings[recording.name])
                 changed, partly = changes(findings), partly_used(log)
-            pieces = [(piece.x_d, piece.x_meas) for piece in log.segments()]
+            pieces = [in_time(piece.x_d, piece.x_meas, measurement_delay) for piece in log.segments()]
+            pieces = [piece for piece in pieces if len(piece[0])]
             if sweeps:
                 if len(pieces) > 1:
                     raise ParameterError(f"{recording}: a swept sine must have no gap, got {len(pieces)} pieces")
@@ -167,7 +180,9 @@ def identify(
     if figure is not None and isinstance(found, IdentifiedResponse):
         response_figure(found, recording.name, figure)
     if out is not None:
-        _write_machine(found, machine, recording.name, changed, out)
+        entries: dict[str, Any] = {"predictor": {"measurement_delay": measurement_delay}} if measurement_delay else {}
+        entries |= {"sources": [f"identified from {recording.name}", *changed]} if changed else {}
+        _write_machine(found, machine, recording.name, entries, out)
     if partly and not as_json:
         console.print(partly, highlight=False)
     print_identified(found, as_json, recording.name, shown)
@@ -182,7 +197,7 @@ def _klipper_axis(axis: str | None) -> str:
 
 
 def _write_machine(
-    found: IdentifiedModel | IdentifiedResponse, name: str, recording: str, changed: Sequence[str], out: Path
+    found: IdentifiedModel | IdentifiedResponse, name: str, recording: str, entries: Mapping[str, Any], out: Path
 ) -> None:
     """Write the machine file, with the deviations and findings as comments."""
     from ..machines.text import machine_text
@@ -192,7 +207,6 @@ def _write_machine(
         f"{e.name} = {e.value:.6g} ± {e.std:.2g}{'' if e.unit == '1' else ' ' + e.unit}" for e in found.parameters
     ]
     comments = [f"Identified by hybridsep from {recording}.", *deviations, *found.findings]
-    sources = {"sources": [f"identified from {recording}", *changed]} if changed else {}
-    machine = found.machine(name, f"Axis identified from {recording}", **sources)
+    machine = found.machine(name, f"Axis identified from {recording}", **entries)
     with written_text(out) as file:
         file.write(sealed(machine_text(machine, comments), "identify"))

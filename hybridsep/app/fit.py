@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from ..fmi.compiler import can_compile
 from ..fmi.flavours import FLAVOURS
 from ..identify.model import machine_of
 from ..identify.operation import SAMPLES_MIN, identify_operation, unit_gain_model
+from ..identify.segments import in_time
 from ..logs.log import Log
 from ..machines.machine import Machine
 from ..machines.text import machine_text
@@ -24,14 +25,17 @@ from ..model.physics import ModalModel, Mode
 from ..predict.predictor import HybridPredictor
 from ..tune.choice import choose_settings, settings_for, window_scores
 from ..tune.halves import Recording, Replay, halves, replay
+from ..tune.period import period_hint
 from .builds import build_for_host
+from .fit_compensation import COMPENSATE, expected_tracking
 from .fit_stages import Stages, key_of
 from .overwrite import sealed
 from .step_times import step_times
+from .tables import shown_figure
 
 __all__ = ["Fit", "FitOptions", "fit", "fit_files"]
 
-_MODEL = "HybridPredictor"
+_MODEL, _COMPENSATOR = "HybridPredictor", "SepCompensator"
 
 _LOOK_AHEAD = 0.1
 """Look-ahead, s, of a controller of which nothing is known."""
@@ -51,11 +55,17 @@ class FitOptions:
         The machine's.
     share : float
         Share of each log's samples that teaches; the rest judges.
+    known : mapping
+        What is known of the axis: entries of ``[predictor]`` such as ``period`` and ``measurement_delay``.
+    drive_limits : mapping
+        Entries of ``[drive_limits]``; with them a compensator is built, too.
     """
 
     Np: int | None
     name: str
     share: float = 0.5
+    known: Mapping[str, Any] = field(default_factory=dict)
+    drive_limits: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -73,6 +83,8 @@ class Fit:
         Replay of the logs; what judges taught neither the physics model nor the choice.
     files : tuple of Path
         Files that were written.
+    tracking : dict
+        Tracking errors to be expected, as of :func:`~.fit_compensation.expected_tracking`; empty without drive limits.
     """
 
     machine: Machine
@@ -83,6 +95,7 @@ class Fit:
     share: float
     judged: Replay
     files: tuple[Path, ...]
+    tracking: dict[str, float | None] = field(default_factory=dict)
 
     def summary(self) -> dict[str, Any]:
         """Return plain values: errors in m over the samples that judge, settings, identification, step times in s.
@@ -105,17 +118,22 @@ class Fit:
         }
         settings = {name: getattr(self.machine.predictor_settings, name) for name in ("Np", "p", "q")}
         parts = {"identification": self.identification, "tried": self.choice, "over_Np": self.windows}
-        return {"judged": judged, "settings": settings, **parts, "step_times": self.steps}
+        return {"judged": judged, "settings": settings, **parts, "step_times": self.steps, "tracking": self.tracking}
 
 
-def fit_files(out: Path, name: str) -> dict[str, Path]:
-    """Return the files that :func:`fit` writes and its report, by what they are."""
+def fit_files(out: Path, name: str, *, compensator: bool = False) -> dict[str, Path]:
+    """Return the files that :func:`fit` writes and its report, by what they are; a compensator's FMUs if it has one."""
+    models = {"": _MODEL, "compensator ": _COMPENSATOR} if compensator else {"": _MODEL}
     return {
         "machine file": out / "machine.toml",
         "trained predictor": out / "trained.state",
         "results": out / "fit.json",
         "report": out / "report.html",
-        **{f"{flavour} FMU": out / f"{fmu_name(_MODEL, name, flavour)}.fmu" for flavour in _flavours()},
+        **{
+            f"{flavour} {what}FMU": out / f"{fmu_name(model, name, flavour)}.fmu"
+            for what, model in models.items()
+            for flavour in _flavours()
+        },
     }
 
 
@@ -162,18 +180,22 @@ def fit(
         raise ParameterError(
             f"--Np must be at most {judging}, the longest stretch of samples that judges, got {options.Np}; record more"
         )
-    default = settings_for(Np, T_s, "zoh")
-    files = fit_files(out, options.name)
+    default = replace(settings_for(Np, T_s, "zoh"), **options.known)
+    compensates = bool(options.drive_limits)
+    files = fit_files(out, options.name, compensator=compensates)
     stages = Stages(files["results"], key_of(recordings, (options, T_s, logs[0].unit, logs[0].shown)))
 
     def within(begin: float, end: float, message: str) -> Callable[[float], object]:
         return lambda done: progress(message, begin + (end - begin) * done)
 
     found = stages.result(
-        "identification", lambda: _identified(recordings, T_s, logs[0], within(0.0, 0.35, "identify"))
+        "identification", lambda: _identified(recordings, default, logs[0], within(0.0, 0.33, "identify"))
     )
     model = ModalModel([Mode(**mode) for mode in found["modes"]], found["dead_time"])
     default = replace(default, input_hold=found["input_hold"])
+    progress("look for what repeats with the position", 0.33)
+    repeats = stages.result("period", lambda: _repeats(model, recordings, default, logs[0]))
+    found = {**found, "findings": [*found["findings"], *repeats]}
     choice = stages.result("choice", lambda: _choice(model, recordings, default, within(0.35, 0.6, "choose p and q")))
     p, q = _chosen(choice)
     settings = replace(default, p=p, q=q)
@@ -189,17 +211,22 @@ def fit(
     predictor = HybridPredictor(model, settings)
     replayed = replay(predictor, recordings, progress=within(0.8, 0.83, "judge on the second half"))
     judged = replace(replayed, offset=found["offset"]).with_peers(within(0.83, 0.85, "peers on the second half"))
-    machine = _machine(options.name, logs, model, settings, changes)
+    machine = _machine(options, logs, model, settings, changes)
     with written_text(files["machine file"]) as file:
         file.write(sealed(machine_text(machine, comments=[found["structure"]]), "fit"))
     predictor.save(files["trained predictor"])
+    tracking: dict[str, float | None] = {}
+    if compensates:
+        estimate = within(0.85, 0.87, "tracking error with compensation")
+        tracking = stages.result("tracking", lambda: expected_tracking(machine, recordings, estimate))
     for i, flavour in enumerate(_flavours()):
-        progress(f"build the {flavour} FMU", 0.85 + 0.05 * i)
-        build_for_host(machine, _MODEL, out, flavour, weights=files["trained predictor"])
+        progress(f"build the {flavour} FMU", 0.87 + 0.04 * i)
+        for built in (_MODEL, _COMPENSATOR) if compensates else (_MODEL,):
+            build_for_host(machine, built, out, flavour, weights=files["trained predictor"])
     progress("time the FMU's steps", 0.95)
     fmu = files[f"{_flavours()[0]} FMU"]
     steps = step_times(fmu, recordings[0].x_d, recordings[0].x)
-    result = Fit(machine, found, choice, windows, steps, options.share, judged, tuple(files.values()))
+    result = Fit(machine, found, choice, windows, steps, options.share, judged, tuple(files.values()), tracking)
     stages.keep("judged", result.summary()["judged"])
     progress("done", 1.0)
     return result
@@ -222,10 +249,10 @@ def _window(Np: int | None, T_s: float) -> int:
 
 
 def _identified(
-    recordings: Sequence[Recording], T_s: float, log: Log, progress: Callable[[float], object]
+    recordings: Sequence[Recording], settings: PredictorSettings, log: Log, progress: Callable[[float], object]
 ) -> dict[str, Any]:
     """Return the identification from the samples that teach, as plain values, in the units of a log."""
-    taught = [recording.taught for recording in recordings if recording.n_taught > 1]
+    taught = [in_time(*one.taught, settings.measurement_delay) for one in recordings if one.n_taught > 1]
     n, n_all = (sum(lengths) for lengths in zip(*((one.n_taught, len(one.x)) for one in recordings), strict=True))
     try:
         if n < SAMPLES_MIN:
@@ -234,10 +261,10 @@ def _identified(
                 "needed"
             )
         found = identify_operation(
-            *(taught, T_s), unit=log.unit, shown=log.shown, progress=lambda _message, done: progress(done)
+            *(taught, settings.T_s), unit=log.unit, shown=log.shown, progress=lambda _message, done: progress(done)
         )
     except IdentificationError as error:
-        found = unit_gain_model(T_s, f"{error}; a gain of 1 without lag is taken")
+        found = unit_gain_model(settings.T_s, f"{error}; a gain of 1 without lag is taken")
     summary = dict(found.summary())
     return {name: _known(value) for name, value in summary.items()}
 
@@ -245,6 +272,20 @@ def _identified(
 def _known(value: Any) -> Any:
     """Return a value for JSON: None for a figure that is not finite."""
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _repeats(model: ModalModel, recordings: Sequence[Recording], settings: PredictorSettings, log: Log) -> list[str]:
+    """Return the finding that the residual repeats with the position, where it does and no period is given."""
+    hint = period_hint(model, recordings, settings) if settings.period == 0.0 else None
+    if hint is None:
+        return []
+    factor, position = log.shown.position
+    scale, unit = log.shown.error(hint.rms_without)
+    before, after = shown_figure(scale * hint.rms_without), shown_figure(scale * hint.rms_with)
+    return [
+        f"the residual repeats every {factor * hint.period:.6g} {position}: with --period {hint.period:g} the hybrid's "
+        f"error would go from {before} to {after} {unit}, by replays of the half that teaches"
+    ]
 
 
 def _choice(
@@ -273,13 +314,19 @@ def _chosen(choice: Sequence[dict[str, Any]]) -> tuple[int, int]:
 
 
 def _machine(
-    name: str, logs: Sequence[Log], model: ModalModel, settings: PredictorSettings, changes: Sequence[str]
+    options: FitOptions, logs: Sequence[Log], model: ModalModel, settings: PredictorSettings, changes: Sequence[str]
 ) -> Machine:
+    name = options.name
+    sections: dict[str, Any] = {}
+    if options.drive_limits:
+        sections = {"drive_limits": dict(options.drive_limits), "compensator": {"compensate": COMPENSATE}}
+    known = {key: value for key in ("period", "measurement_delay") if (value := getattr(settings, key))}
     return machine_of(
         *(model, settings.input_hold, settings.T_s, name, f"Axis {name}, identified"),
         unit=logs[0].unit,
         sources=[f"identified from {log.path.name}, {len(log.t)} samples" for log in logs] + list(changes),
-        predictor={"Np": settings.Np, "p": settings.p, "q": settings.q},
+        predictor={"Np": settings.Np, "p": settings.p, "q": settings.q, **known},
+        **sections,
     )
 
 

@@ -15,6 +15,7 @@ from ..logs.units import Shown
 from ..tune.choice import WORTH
 from .extent import extent
 from .fit import Fit
+from .fit_compensation import write_tracking
 from .identify_tables import shown_estimates
 from .judged import Judged, recommendation
 from .log_intake import changes
@@ -65,6 +66,7 @@ def fit_report(fit: Fit, logs: Sequence[Log], findings: Mapping[str, Sequence[Fi
     write_findings(report, findings)
     _write_identification(report, fit, judged)
     _write_settings(report, fit, judged)
+    write_tracking(report, fit.tracking, judged.shown)
     fmus = [path.name for path in fit.files if path.suffix == ".fmu"]
     write_use(report, fmus, fit.steps, T_s, Np)
     report.paragraph(f"{' and '.join(fmus)} start with what the log has taught.")

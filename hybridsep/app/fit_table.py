@@ -12,6 +12,7 @@ from ..intake.finding import Finding
 from ..logs.log import Log
 from .extent import extent
 from .fit import Fit
+from .fit_compensation import tracking_lines
 from .log_intake import changed_by
 from .tables import console, shown_figure
 
@@ -48,3 +49,5 @@ def print_fit(fit: Fit, logs: Sequence[Log], findings: Mapping[str, Iterable[Fin
     console.print(f"Np = {settings.Np} ({window}), p = {settings.p}, q = {settings.q}", highlight=False)
     console.print(table)
     console.print(str(fit.judged.verdict()), highlight=False)
+    for line in tracking_lines(fit.tracking, logs[0].shown) if fit.tracking else ():
+        console.print(line, highlight=False)

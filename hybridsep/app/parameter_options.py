@@ -11,9 +11,16 @@ import typer
 
 from ..base.parameters import Parameter
 from ..base.ranges import GRAMMAR
-from ..base.settings import PARAMETERS, CompensatorSettings, PredictorSettings, Settings
+from ..base.settings import PARAMETERS, CompensatorSettings, Limits, PredictorSettings, Settings
 
-__all__ = ["COMPENSATOR_ENTRIES", "PREDICTOR_ENTRIES", "parameter_help", "takes_parameters"]
+__all__ = [
+    "COMPENSATOR_ENTRIES",
+    "DRIVE_LIMIT_ENTRIES",
+    "KNOWN_ENTRIES",
+    "PREDICTOR_ENTRIES",
+    "parameter_help",
+    "takes_parameters",
+]
 
 
 def _entries(settings: type[Settings]) -> dict[str, Parameter]:
@@ -23,20 +30,26 @@ def _entries(settings: type[Settings]) -> dict[str, Parameter]:
 PREDICTOR_ENTRIES = _entries(PredictorSettings)
 """Parameters that the section ``[predictor]`` of a machine file may have, by the names of the settings' fields."""
 
+KNOWN_ENTRIES = {name: PREDICTOR_ENTRIES[name] for name in ("period", "measurement_delay")}
+"""Those that are known of an axis, which no log is fitted for."""
+
 COMPENSATOR_ENTRIES = {
-    **_entries(CompensatorSettings),
+    **{name: entry for name, entry in _entries(CompensatorSettings).items() if name != "compensate"},
     **{name: PARAMETERS[name] for name in PredictorSettings.NEEDS_PREVIEW},
 }
-"""Parameters that the section ``[compensator]`` may have besides."""
+"""Parameters that the section ``[compensator]`` may have besides, less the model, which commands choose themselves."""
+
+DRIVE_LIMIT_ENTRIES = {**Limits.parameters(), "change_max": PARAMETERS["change_max"]}
+"""Parameters of the section ``[drive_limits]``."""
 
 
-def parameter_help(parameter: Parameter) -> str:
+def parameter_help(parameter: Parameter, otherwise: str = "the machine's own") -> str:
     """Return the help of an option that changes a parameter of the machine."""
-    return parameter.help + "; the machine's own if left out"
+    return f"{parameter.help}; {otherwise} if left out"
 
 
 def takes_parameters(
-    *groups: dict[str, Parameter], ranges: Collection[str] = ()
+    *groups: dict[str, Parameter], ranges: Collection[str] = (), otherwise: str = "the machine's own"
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Return a decorator that gives a command an option for each parameter.
 
@@ -48,6 +61,8 @@ def takes_parameters(
         Of :data:`PREDICTOR_ENTRIES` and :data:`COMPENSATOR_ENTRIES`.
     ranges : collection of str
         Fields of those that take several values; theirs are given as text.
+    otherwise : str
+        What counts where an option is left out.
     """
     options = {field: parameter for group in groups for field, parameter in group.items()}
 
@@ -58,7 +73,7 @@ def takes_parameters(
             command(**arguments, parameters={name: value for name, value in given.items() if value is not None})
 
         signature = inspect.signature(command, eval_str=True)
-        arguments = list(_with_options(signature, options, ranges))
+        arguments = list(_with_options(signature, options, ranges, otherwise))
         run.__signature__ = signature.replace(parameters=arguments)  # type: ignore[attr-defined]
         run.__annotations__ = {argument.name: argument.annotation for argument in arguments}
         return run
@@ -67,7 +82,7 @@ def takes_parameters(
 
 
 def _with_options(
-    signature: inspect.Signature, options: dict[str, Parameter], ranges: Collection[str]
+    signature: inspect.Signature, options: dict[str, Parameter], ranges: Collection[str], otherwise: str
 ) -> Iterator[inspect.Parameter]:
     """Yield a command's arguments, the options in the place of ``parameters``."""
     for name, argument in signature.parameters.items():
@@ -76,11 +91,11 @@ def _with_options(
             continue
         for field, parameter in options.items():
             kind: Any = str if parameter.kind is bool or field in ranges else parameter.kind
-            annotation = Annotated[kind | None, _option(field, parameter, several=field in ranges)]
+            annotation = Annotated[kind | None, _option(field, parameter, otherwise, several=field in ranges)]
             yield inspect.Parameter(field, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
 
 
-def _option(field: str, parameter: Parameter, *, several: bool) -> Any:
+def _option(field: str, parameter: Parameter, otherwise: str, *, several: bool) -> Any:
     """Return the option, under the FMU's name; with hyphens or by the field's name it is accepted, too."""
     names = dict.fromkeys(f"--{name}" for name in (parameter.name, parameter.name.replace("_", "-"), field))
     if several:
@@ -88,7 +103,7 @@ def _option(field: str, parameter: Parameter, *, several: bool) -> Any:
             *names, help=f"{parameter.help}; several as {GRAMMAR}; a default range if left out", metavar="RANGE"
         )
     more: dict[str, Any] = {"parser": _truth_value, "metavar": "true|false"} if parameter.kind is bool else {}
-    return typer.Option(*names, help=parameter_help(parameter), **more)
+    return typer.Option(*names, help=parameter_help(parameter, otherwise), **more)
 
 
 def _truth_value(text: str | bool) -> bool:

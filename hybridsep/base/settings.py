@@ -306,7 +306,7 @@ class CompensatorSettings(Settings):
     """
 
     OPTIONAL: ClassVar[tuple[str, ...]] = ("preview", "spacing", "change_max")
-    ELSEWHERE: ClassVar[tuple[str, ...]] = ("limits", "change_max", "compensate")
+    ELSEWHERE: ClassVar[tuple[str, ...]] = ("limits", "change_max")
 
     preview: int | None = whole(
         *(200, 8, 2000, "samples planned ahead, at least Np + 4·spacing + 3"), unless_given=None

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base.signals import Array, as_measured, as_samples
 
-__all__ = ["Segment", "as_segments", "delayed", "motion_split"]
+__all__ = ["Segment", "as_segments", "delayed", "in_time", "motion_split"]
 
 SAMPLES_MAX = 60_000
 """Samples that are used of long recordings: the parts in which the axis moves most."""
@@ -88,3 +88,8 @@ def delayed(u: Array, n: int) -> Array:
     if n <= 0:
         return u
     return np.concatenate((np.full(min(n, len(u)), u[0]), u[: max(0, len(u) - n)]))
+
+
+def in_time(x_d: Array, x: Array, n_late: int) -> tuple[Array, Array]:
+    """Return commands and the positions of the same instants, of measurements that are ``n_late`` samples late."""
+    return x_d[: max(0, len(x_d) - n_late)], x[n_late:]

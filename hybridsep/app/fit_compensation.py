@@ -1,0 +1,98 @@
+"""Compensation in ``hybridsep fit``: the drive's limits, and the tracking error to be expected without and with it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..base.errors import ParameterError, SignalError
+from ..base.metrics import rms
+from ..base.settings import Limits
+from ..compensate.expected import expected_errors
+from ..evaluate.report import Report
+from ..logs.units import Shown
+from ..machines.machine import Machine
+from ..tune.halves import Recording
+from .parameter_options import DRIVE_LIMIT_ENTRIES
+
+__all__ = ["COMPENSATE", "drive_limits", "expected_tracking", "tracking_lines", "write_tracking"]
+
+COMPENSATE = "physics"
+"""Model that a new compensator starts with: that of the hybrid is chosen when it has been seen to be the better one."""
+
+_HOW = (
+    "An estimate: the compensator plans in closed loop on the identified model, to which the residual of the log is "
+    "added as it was recorded; that the residual changes with the command is left out."
+)
+
+
+def drive_limits(given: Mapping[str, float]) -> dict[str, float]:
+    """Return the entries of ``[drive_limits]`` of options by their names; empty without any.
+
+    Raises
+    ------
+    ParameterError
+        If some of the three limits are missing.
+    """
+    found = {entry: given[one.name] for entry, one in DRIVE_LIMIT_ENTRIES.items() if one.name in given}
+    names = {entry: DRIVE_LIMIT_ENTRIES[entry].name for entry in Limits.parameters()}
+    missing = [f"--{name}" for entry, name in names.items() if entry not in found]
+    if found and missing:
+        raise ParameterError(
+            f"a compensator needs the drive's limits {', '.join(f'--{name}' for name in names.values())}; "
+            f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
+        )
+    return found
+
+
+def expected_tracking(
+    machine: Machine, recordings: Sequence[Recording], progress: Callable[[float], object]
+) -> dict[str, float | None]:
+    """Return the RMS of commanded minus measured position over the samples that judge, m.
+
+    ``none`` is measured, ``physics`` and ``hybrid`` are estimates with each model; None where a plan diverges.
+    """
+    settings, Np = machine.compensator_predictor, machine.compensator_predictor.Np
+    pairs = [(one.x_d, one.x) for one in recordings]
+    found: dict[str, float | None] = {}
+    for i, model in enumerate(("physics", "hybrid")):
+        compensator = replace(machine.compensator_settings, compensate=model)
+        try:
+            both = list(expected_errors(machine.model, settings, compensator, pairs))
+        except SignalError:
+            found[model] = None
+            continue
+        firsts = [one.first_judged(Np) for one in recordings if len(one.x) > settings.measurement_delay]
+        parts = [np.concatenate([e[k:] for e, k in zip(one, firsts, strict=True)]) for one in zip(*both, strict=True)]
+        without, with_it = (rms(part[~np.isnan(part)]) if len(part) else math.nan for part in parts)
+        found |= {"none": without, model: with_it}
+        progress((i + 1) / 2)
+    return {name: None if value is None or math.isnan(value) else value for name, value in found.items()}
+
+
+def tracking_lines(tracking: Mapping[str, Any], shown: Shown) -> list[str]:
+    """Return the expected tracking errors in words, and how they came about."""
+
+    def figure(name: str) -> str:
+        value = tracking.get(name)
+        return "not known" if value is None else shown.words(value, ".4g")
+
+    return [
+        f"Tracking error (commanded minus measured, RMS): {figure('none')} as recorded; with the compensator about "
+        f"{figure('physics')} by the physics model, with which it starts (compensate = {COMPENSATE}), and about "
+        f"{figure('hybrid')} by the hybrid (compensate = hybrid).",
+        _HOW,
+    ]
+
+
+def write_tracking(report: Report, tracking: Mapping[str, Any], shown: Shown) -> None:
+    """Write the section on compensation, where there are limits."""
+    if tracking:
+        report.heading("Compensation")
+        words, how = tracking_lines(tracking, shown)
+        report.paragraph(words)
+        report.paragraph(how, "dim")

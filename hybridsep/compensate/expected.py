@@ -1,0 +1,61 @@
+"""Tracking error to be expected of a compensator on recorded commands: an estimate before anything is compensated.
+
+The drive is taken for ``x = G_pb x_dm + r``: the identified model, and the residual ``r`` as it was recorded. The
+compensator plans and learns on it in closed loop. That ``r`` would change with the command is left out; friction does
+so where a modified command turns elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ..base.settings import CompensatorSettings, PredictorSettings
+from ..base.signals import Array
+from ..model.physics import ModalModel
+from ..predict.predictor import HybridPredictor
+from .compensator import SepCompensator
+
+__all__ = ["expected_errors"]
+
+
+def expected_errors(
+    model: ModalModel,
+    settings: PredictorSettings,
+    compensator: CompensatorSettings,
+    recordings: Sequence[tuple[Array, Array]],
+) -> Iterator[tuple[Array, Array]]:
+    """Yield commanded minus measured position, ``(n,)``, m, without and with compensation, of one recording each.
+
+    Parameters
+    ----------
+    model : ModalModel
+        ``G_pb``.
+    settings : PredictorSettings
+    compensator : CompensatorSettings
+    recordings : sequence of pairs ``(x_d, x)`` of (n,) arrays, m
+        ``x`` as it arrives, with the ``measurement_delay`` of the settings; NaN where it is missing. The errors of what
+        has not arrived at its end are left out.
+    """
+    planner = SepCompensator(HybridPredictor(model, settings), compensator)
+    discrete, Np, late = model.discretise(settings.T_s, settings.input_hold), settings.Np, settings.measurement_delay
+    for i, (x_d, x) in enumerate(recordings):
+        if i:
+            planner.restart(float(x_d[0]))
+        n, start = len(x_d) - late, float(x_d[0])
+        if n < 1:
+            continue
+        command = np.concatenate((x_d, np.full(planner.preview, x_d[-1])))
+        x_pb = discrete.forced_response(discrete.rest(), x_d - start)[0] + start
+        residual = np.concatenate((x[late:] - x_pb[:n], np.zeros(late + Np)))
+        state, on_the_way, true = discrete.rest(), np.full(late, start), np.empty(0)
+        for k in range(0, n, Np):
+            window = planner.plan(command[k : k + planner.preview])
+            response, state = discrete.forced_response(state, window.x_dm - start)
+            moved = response + start + residual[k : k + Np]
+            true = np.concatenate((true, moved))
+            arrived = np.concatenate((on_the_way, moved))
+            planner.update(arrived[:Np])
+            on_the_way = arrived[Np:]
+        yield x_d[:n] - x[late:], x_d[:n] - true[:n]

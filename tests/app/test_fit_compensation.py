@@ -1,0 +1,82 @@
+"""``hybridsep fit`` with the drive's limits: the compensator FMU, and the tracking error to be expected."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import Run, write_rows
+from identification_cases import T_S
+
+from hybridsep import PAPER_LIMITS, ModalModel, Mode, load_machine, rest_to_rest
+from hybridsep.app.fit_compensation import drive_limits
+from hybridsep.base.errors import ParameterError
+from hybridsep.base.metrics import rms
+from hybridsep.base.signals import Array
+from hybridsep.cosim.importer import read_description
+from hybridsep.cosim.loop import cosimulate
+from hybridsep.plants.encoder import Encoder
+from hybridsep.plants.plant import simulate
+from hybridsep.plants.stage_drive import StageDrive
+
+LIMITS = ("--v_max", 0.3, "--a-max", 30, "--jerk", 2e4)
+
+
+def stage() -> StageDrive:
+    """Return an axis with friction and cable stiffness."""
+    return StageDrive(ModalModel([Mode(35.0, 0.4, (70 * np.pi) ** 2)]), f=8e-6, kappa=0.05, T_s=T_S)
+
+
+def command() -> Array:
+    targets = np.concatenate(([0.0], np.random.default_rng(0).uniform(-0.01, 0.01, 10)))
+    starts = [0.05 + 0.4 * i for i in range(10)]
+    return rest_to_rest(targets, PAPER_LIMITS, T_S, start_times=starts, duration=4.1)
+
+
+def test_the_compensator_is_built_and_its_effect_estimated(hybridsep: Run, tmp_path: Path) -> None:
+    x_d = command()
+    x = simulate(stage(), x_d, T_S) + 5e-7 * np.random.default_rng(1).standard_normal(len(x_d))
+    log, out = write_rows(tmp_path / "axis.csv", x_d, x), tmp_path / "fit"
+    status, said, err = hybridsep("fit", log, "--out", out, "--Np", 50, *LIMITS)
+    assert status == 0, err
+    words = " ".join(said.split())
+    assert "by the physics model, with which it starts (compensate = physics), and about" in words
+    assert "An estimate: the compensator plans in closed loop on the identified model" in words
+    assert "Compensation" in (out / "report.html").read_text(encoding="utf-8")
+    machine = load_machine(out / "machine.toml")
+    assert machine.drive_limits is not None
+    assert (machine.drive_limits.velocity, machine.drive_limits.acceleration, machine.drive_limits.jerk) == (
+        0.3,
+        30,
+        2e4,
+    )
+    assert machine.compensator_settings.compensate == "physics"
+    fmus = sorted(path.stem for path in out.glob("SepCompensator*.fmu"))
+    assert fmus == ["SepCompensatorPy_axis", "SepCompensator_axis"]
+    for name in fmus:
+        starts = {one.name: one.start for one in read_description(out / f"{name}.fmu").modelVariables}
+        assert (float(starts["v_max"]), int(starts["compensate"])) == (0.3, 1)
+    tracking = json.loads((out / "fit.json").read_text())["tracking"]
+    judged = slice(len(x) // 2 // 50 * 50 + 50 * (len(x) // 2 % 50 > 0), None)
+    assert tracking["none"] == pytest.approx(rms((x_d - x)[judged]), rel=1e-9)
+    for model in ("physics", "hybrid"):
+        compensator = machine.new_compensator(replace(machine.compensator_settings, compensate=model))
+        run = cosimulate(compensator, stage(), x_d, encoder=Encoder(5e-7, seed=2))
+        # The same axis, whose friction does change with the command.
+        assert tracking[model] == pytest.approx(rms((run.x_d - run.x_meas)[judged]), rel=0.3)
+        assert tracking[model] < 0.6 * tracking["none"]
+
+
+def test_all_three_limits_are_needed() -> None:
+    assert drive_limits({"period": 0.01}) == {}
+    assert drive_limits({"v_max": 1.0, "a_max": 2.0, "j_max": 3.0, "change_max": 1e-4}) == {
+        "velocity": 1.0,
+        "acceleration": 2.0,
+        "jerk": 3.0,
+        "change_max": 1e-4,
+    }
+    with pytest.raises(ParameterError, match=r"limits --v_max, --a_max, --j_max; --a_max, --j_max are missing"):
+        drive_limits({"v_max": 1.0})
