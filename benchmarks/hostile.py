@@ -44,6 +44,9 @@ MEMORY_MAX = 8 * 2**30
 MESSAGE_MAX = 900
 """Largest length of a message, in characters."""
 
+SAID = ("error: ", "warning: ", "note: ")
+"""Beginnings of the lines that a refusal consists of."""
+
 PASSED = ("read", "refused")
 LOG_OPTIONS: tuple[list[str], ...] = (["--as-is"], ["--fix"], [])
 
@@ -138,6 +141,7 @@ def main(given: Sequence[str] | None = None) -> int:
         for kind in options.kinds:
             n = options.fmus if kind == "fmu" else options.n
             found[kind] = attack(kind, n, options.seed, folder, options.keep)
+            sys.stderr.write(f"{kind}: {dict(found[kind].outcomes)}\n")
     report(found)
     return int(any(set(summary.outcomes) - set(PASSED) for summary in found.values()))
 
@@ -218,9 +222,9 @@ def run(arguments: Sequence[str], folder: Path) -> tuple[str, float, str]:
         return "unexpected", seconds, said
     if status == 0:
         return "read", seconds, said
-    _, mark, message = f"\n{said}".replace(str(folder), "").partition("\nerror: ")  # warnings may come before
-    tidy = status == 2 and mark and len(message.splitlines()) == 1 and len(message) <= MESSAGE_MAX
-    return ("refused", seconds, message) if tidy else ("untidy", seconds, said)
+    lines = said.replace(str(folder), "").splitlines() or [""]  # the last one, below what the intake finds
+    tidy = status == 2 and all(line.startswith(SAID) and len(line) <= MESSAGE_MAX for line in lines)
+    return ("refused", seconds, lines[-1]) if tidy else ("untidy", seconds, said)
 
 
 def _run_and_exit(arguments: Sequence[str], folder: Path, errors: int) -> None:

@@ -48,9 +48,9 @@ _EVIL = ("../evil", "/tmp/evil", "C:/evil", "a\\b", "resources/x/../../../evil",
 
 
 def good_log() -> dict[str, Any]:
-    """Return a short log of the machine: 800 samples at 1 kHz of a move, with some noise."""
+    """Return a short log of the machine: 300 samples at 1 kHz of a move, with some noise."""
     whole = staircase()
-    x_d = np.concatenate((np.full(100, whole[0]), whole[:700]))
+    x_d = np.concatenate((np.full(50, whole[0]), whole[:250]))
     x = np.concatenate((np.full(4, x_d[0]), x_d[:-4])) + np.random.default_rng(0).normal(0.0, 2e-6, len(x_d))
     return {"t": np.arange(len(x_d)) * 1e-3, "x_d": x_d, "x": x}
 
@@ -170,7 +170,7 @@ def _capture_files(_: Path) -> list[tuple[str, bytes]]:
     signals = [{"Name": name, "Axis": axis} for name, axis in zip(names, ("Cycle", "X1", "X1"), strict=True)]
     rows = [[k, 1e3 * float(x_d), 1e3 * float(x)] for k, (x_d, x) in enumerate(zip(log["x_d"], log["x"], strict=True))]
     header = {"CycleTimeMs": 1, "SignalListHFData": signals}
-    content = {"Header": header, "Payload": [{"HFData": rows[:300]}, {"HFBlockEvent": {}}, {"HFData": rows[300:]}]}
+    content = {"Header": header, "Payload": [{"HFData": rows[:100]}, {"HFBlockEvent": {}}, {"HFData": rows[100:]}]}
     return [("capture.json", json.dumps(content).encode())]
 
 
@@ -186,7 +186,7 @@ def _states(_: Path) -> list[tuple[str, bytes]]:
     for trust in (False, True):
         settings = PredictorSettings(trust=trust, Np=20, p=3, q=2, t_init=0.0)
         predictor = HybridPredictor(load_machine(MACHINE).model, settings)
-        for i in range(0, 600, 20):
+        for i in range(0, 300, 20):
             predictor.predict(log["x_d"][i : i + 20])
             predictor.update(log["x"][i : i + 20])
         files.append((f"trust_{trust}.state", predictor.to_bytes()))
