@@ -55,6 +55,8 @@ def backtest(
     Physics model, hold baseline and hybrid are compared.
     """
     with loading():
+        import numpy as np
+
         from ..evaluate.backtest import Batch, backtest_stream
         from ..evaluate.backtest import backtest as backtest_whole
         from ..evaluate.replayed import replayed_run
@@ -68,7 +70,7 @@ def backtest(
         from .log_intake import changed_by, findings_table, open_checked, reading_of
         from .overwrite import BATCH_COLUMNS, BATCHES, BY_ENDING, Output, check_outputs
         from .progress import progress_bar
-        from .tables import console, print_scores, print_written
+        from .tables import console, print_scores, print_without_first, print_written
 
         if figure is not None:
             from ..evaluate.time_plots import prediction_figure
@@ -90,12 +92,15 @@ def backtest(
     shown = shown_of(opened.file_unit, axis_machine.unit)
     n_samples = len(opened.t) if isinstance(opened, Log) else opened.n_samples
     rows: list[tuple[float, ...]] = []
+    first: list[Batch] = []
     title = f"{axis_machine.title}, {log.name}{changed_by(intake.findings)}"
     with progress_bar(as_json) as advance:
 
         def on_batch(batch: Batch) -> None:
             if out is not None:
                 rows.append((round(batch.k * opened.T_s, 9), batch.rms_pb, batch.rms_hold, batch.rms_h))
+            if batch.j == 0:
+                first.append(batch)
             if batch.j % 100 == 0:
                 advance("replay", batch.k / n_samples)
 
@@ -126,7 +131,18 @@ def backtest(
             csv.writer(file).writerows([BATCH_COLUMNS, *rows])
     if isinstance(opened, Log) and not as_json and (line := partly_used(opened)):
         console.print(line, highlight=False)
-    more = {"findings": findings_table(intake.findings)}
+    more: dict[str, Any] = {"findings": findings_table(intake.findings)}
+    in_motion = any(finding.name == "start in motion" and not finding.applied for finding in intake.findings)
+    rest = None
+    if in_motion and scores.n_batches > 1:
+        n = int(np.count_nonzero(~np.isnan(first[0].x)))
+        rest = scores.overall.rms_without(n, (first[0].rms_pb, first[0].rms_hold, first[0].rms_h))
+        unit = f"u{axis_machine.unit}"
+        more["without_first_window"] = {
+            f"rms_{name}_{unit}": 1e6 * value for name, value in zip(("pb", "hold", "h"), rest, strict=True)
+        }
     print_scores(scores.summary(), scores.verdict, as_json, title, unit=axis_machine.unit, shown=shown, more=more)
     if not as_json:
+        if rest is not None:
+            print_without_first(rest, shown)
         print_written(out, figure, *saved)

@@ -58,9 +58,10 @@ def tune(
         from ..tune.grid import TUNED, candidates, default_values
         from ..tune.joint import n_processors, over_windows
         from ..tune.joint import tune as tune_on
+        from ..tune.losses import n_unjudged
         from .arguments import check_ending
         from .extent import partly_used
-        from .log_intake import findings_table, open_checked, reading_of
+        from .log_intake import findings_table, open_checked, reading_of, show
         from .overwrite import BY_ENDING, MACHINE, Output, check_outputs, sealed
         from .progress import progress_bar
         from .tables import console, print_json, print_written
@@ -111,6 +112,11 @@ def tune(
         )
     if figure is not None:
         tuning_figure(tuning, windows, values, given.title, figure)
+    in_motion = [
+        name for name, one in pieces.items() if any(n_unjudged(x_d, changed.predictor_settings.Np) for x_d, _ in one)
+    ]
+    if in_motion and not as_json:
+        show([f"{', '.join(in_motion)}: begins in motion, and is ranked without its first window"], ())
     if as_json:
         print_json({**tuning_summary(tuning, windows, values), "findings": findings})
     else:

@@ -25,6 +25,7 @@ __all__ = [
     "print_predictions",
     "print_run",
     "print_scores",
+    "print_without_first",
     "print_written",
     "shown_figure",
 ]
@@ -164,6 +165,18 @@ def print_scores(
                 table.add_row(label_text, *map(shown_figure, sizes), *ratios)
     console.print(table)
     console.print(str(verdict), highlight=False)
+
+
+def print_without_first(rms: Sequence[float], shown: Shown) -> None:
+    """Print the RMS errors of physics model, hold and hybrid, m or rad, without the first window of a log in motion."""
+    factor, name = shown.error(rms[0])
+    figures = ", ".join(
+        f"{peer} {shown_figure(factor * value)}" for peer, value in zip(("physics", "hold", "hybrid"), rms, strict=True)
+    )
+    console.print(
+        f"Without the first window, of whose start in motion no model knows the state: RMS {figures} {name}.",
+        highlight=False,
+    )
 
 
 def print_run(run: Run, as_json: bool, title: str) -> None:

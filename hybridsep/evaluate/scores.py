@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..base.metrics import RunningErrors, reduction_percent, rms_ratio
@@ -41,6 +43,15 @@ class Score:
     def reduction_percent(self) -> float:
         """By how much the hybrid's RMS is below the physics model's, percent of the latter."""
         return reduction_percent(self.rms_h, self.rms_pb)
+
+    def rms_without(self, n: int, rms: Sequence[float]) -> list[float]:
+        """Return the RMS of physics model, hold and hybrid without ``n`` of the samples, which have ``rms``, m."""
+        left = self.n_samples - n
+        pairs = zip((self.rms_pb, self.rms_hold, self.rms_h), rms, strict=True)
+        return [
+            math.sqrt(max(self.n_samples * own**2 - n * other**2, 0.0) / left) if left > 0 else math.nan
+            for own, other in pairs
+        ]
 
     @classmethod
     def of(cls, errors: RunningErrors) -> Score:

@@ -38,6 +38,10 @@ _FAST, _AROUND = 0.25, 30
 """Speed with which the position meets and leaves its limit, in its largest within that many samples: the same told
 without a line through the motion. The command must move meanwhile."""
 
+_AT_REST = 0.05
+"""Distance beyond the limit, in the travel, of a stretch at the log's beginning or end: half of its play may keep an axis
+at rest from its command."""
+
 _RUNS = 0.6
 """Share of the samples at a limit that must be in such runs."""
 
@@ -129,6 +133,7 @@ def _passes(beyond: Array, begin: int, end: int, least: float) -> bool:
     """Return whether the command's line meets the limit where a run begins, passes it, and meets it where it ends."""
     peak = float(beyond[begin:end].max())
     whole = begin == 0 and end == len(beyond)
+    least = max(least, _AT_REST * float(np.ptp(beyond))) if begin == 0 or end == len(beyond) else least
     meets = (begin == 0 or beyond[begin] < _ENDS * peak) and (end == len(beyond) or beyond[end - 1] < _ENDS * peak)
     return peak > least and meets and not whole
 

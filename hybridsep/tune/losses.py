@@ -18,13 +18,14 @@ from ..base.settings import PredictorSettings, samples_before
 from ..base.signals import PREDICTION_MAX, Array, as_measured, as_samples
 from ..base.threads import one_blas_thread
 from ..evaluate.backtest import Batch, backtest_stream
+from ..intake.motion import starts_in_motion
 from ..model.physics import ModalModel
 from ..predict.features import PastSamples
 from ..predict.predictor import HybridPredictor
 from .free_runs import free_runs
 from .nested import NestedRidge
 
-__all__ = ["Losses", "Piece", "nested_losses", "replayed_losses", "share_a_pass"]
+__all__ = ["Losses", "Piece", "n_unjudged", "nested_losses", "replayed_losses", "share_a_pass"]
 
 Piece = tuple[Array, Array]
 """Commanded and measured positions of a part of a log without a gap, ``(n,)`` each, m."""
@@ -37,7 +38,7 @@ _AT_ONCE = 100_000
 
 @dataclass(frozen=True)
 class Losses:
-    """RMS errors against the measured position over a log, m; those of a backtest.
+    """RMS errors against the measured position over a log, m; those of a backtest without :func:`n_unjudged` samples.
 
     Attributes
     ----------
@@ -57,6 +58,14 @@ def share_a_pass(candidates: Sequence[PredictorSettings]) -> bool:
     common = {replace(one, p=1, q=0, lam=1.0) for one in candidates}
     one = candidates[0]
     return len(common) == 1 and not one.trust and one.v_friction == 0.0 and one.measurement_delay == 0
+
+
+def n_unjudged(x_d: Array, Np: int) -> int:
+    """Return how many leading samples of a piece are not scored: the first window, if the piece begins in motion.
+
+    No model knows the state of the axis there, so that its error says nothing of a candidate and rules the RMS.
+    """
+    return Np if len(x_d) > Np and starts_in_motion(x_d) else 0
 
 
 @one_blas_thread
@@ -97,10 +106,10 @@ def nested_losses(
     discrete = model.discretise(common.T_s, common.input_hold, block=common.Np)
     past = PastSamples(ridge.layout, common.Np)
     squares = _Squares(len(candidates))
-    n_samples = sum(len(x) for _, x in pieces)
+    n_samples, n_before = sum(len(x) for _, x in pieces), 0
     for i, (x_d, x) in enumerate(pieces):
         n_init = 0 if i else samples_before(common.warm_up, common.T_s)
-        state, start, n_before = discrete.rest(), x_d[:1], squares.n
+        state, start, n_unscored = discrete.rest(), x_d[:1], n_unjudged(x_d, common.Np)
         past.restart()
         for k in range(0, len(x), common.Np):
             window = slice(k, k + common.Np)
@@ -110,13 +119,15 @@ def nested_losses(
             past.append(x_pb, measured - start - x_pb)
             rows = past.rows(m, np.zeros((m, 0)))
             warm = min(max(n_init - k, 0), m)
-            squares.add_warm_up(measured[:warm], x_pb[:warm] + start)
-            if warm < m:
+            if k >= n_unscored:
+                squares.add_warm_up(measured[:warm], x_pb[:warm] + start)
+            if warm < m and k >= n_unscored:
                 e_h = free_runs(ridge.layout, rows[:, :-1], ridge.weights(), p)
                 squares.add(measured[warm:], x_pb[warm:] + start, last, e_h[:, warm:])
             ridge.update_stacked(rows)
             past.advance(m)
             progress((n_before + k) / n_samples)
+        n_before += len(x)
     found = squares.losses()
     rms_h = np.empty(len(candidates))
     rms_h[order] = found.rms_h
@@ -174,22 +185,31 @@ def replayed_losses(
     """
     predictor = HybridPredictor(model, candidate)
     _check(pieces, as_measured if candidate.trust else as_samples)
-    n_samples, n_before, scores = sum(len(x) for _, x in pieces), 0, []
+    n_samples, n_before, n_known, squares = sum(len(x) for _, x in pieces), 0, 0, np.zeros(3)
     for i, piece in enumerate(pieces):
         if i:
             predictor.restart()
 
-        def on_batch(batch: Batch, n_before: int = n_before) -> None:
+        n_unscored, first = n_unjudged(piece[0], candidate.Np), [0.0, 0.0, 0.0, 0.0]
+
+        def on_batch(
+            batch: Batch, n_before: int = n_before, n_unscored: int = n_unscored, first: list[float] = first
+        ) -> None:
             progress((n_before + batch.k) / n_samples)
+            n = int(np.count_nonzero(~np.isnan(batch.x)))
+            if batch.k < n_unscored and n:
+                first[:] = [n, *(n * rms**2 for rms in (batch.rms_pb, batch.rms_hold, batch.rms_h))]
 
         try:
-            scores.append(backtest_stream(predictor, _chunks(piece), on_batch=on_batch).overall)
+            score = backtest_stream(predictor, _chunks(piece), on_batch=on_batch).overall
         except SignalError:  # the samples are sound: it diverges
             return Losses(math.nan, math.nan, np.array([math.inf]))
         n_before += len(piece[1])
-    known = [score for score in scores if score.n_samples]
-    squares = [score.n_samples * np.square([score.rms_pb, score.rms_hold, score.rms_h]) for score in known]
-    rms = np.sqrt(sum(squares, np.zeros(3)) / max(sum(score.n_samples for score in known), 1))
+        if score.n_samples > first[0]:
+            whole = score.n_samples * np.square([score.rms_pb, score.rms_hold, score.rms_h])
+            squares += np.maximum(whole - first[1:], 0.0)
+            n_known += score.n_samples - int(first[0])
+    rms = np.sqrt(squares / max(n_known, 1))
     return Losses(float(rms[0]), float(rms[1]), rms[2:])
 
 

@@ -15,7 +15,7 @@ from hybridsep import ModalModel, Mode
 from hybridsep.intake.check import check
 from hybridsep.intake.finding import ERROR, NOTE
 
-SEEDS = range(1000, 1033)
+SEEDS = (*range(1000, 1033), 2105)
 """Of logs on which no threshold was chosen."""
 
 MOVES = {fault: 1000 + 8 * i for i, fault in enumerate(FAULTS)}

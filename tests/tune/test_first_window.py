@@ -1,0 +1,59 @@
+"""First window of a log that begins in motion: it neither ranks candidates nor hides behind the others' figures."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import Run, write_rows
+from staircase_data import commanded, measured
+
+from hybridsep import HybridPredictor, load_machine
+from hybridsep.base.metrics import rms
+from hybridsep.evaluate.backtest import backtest
+from hybridsep.tune.choice import with_window
+from hybridsep.tune.losses import n_unjudged, nested_losses, replayed_losses
+
+NP = 50
+FIRST = 40
+"""Sample in the first move."""
+
+
+def test_losses_are_those_of_a_replay_without_its_first_window() -> None:
+    machine = load_machine("spring_mass_damper")
+    settings = replace(with_window(machine.predictor_settings, NP), trust=False, v_friction=0.0, measurement_delay=0)
+    x_d, x = commanded()[FIRST:2000], measured(0)[FIRST:2000]
+    assert n_unjudged(x_d, NP) == NP
+    assert n_unjudged(commanded()[:2000], NP) == 0
+    assert n_unjudged(x_d[:NP], NP) == 0  # nothing would be left
+    found = backtest(HybridPredictor(machine.model, settings), x_d, x)
+    expected = [rms((x - one)[NP:]) for one in (found.x_pb, found.x_hold, found.x_h)]
+    assert rms(x - found.x_pb) > 1.2 * expected[0]
+    for losses in (
+        nested_losses(machine.model, [(x_d, x)], [settings]),
+        replayed_losses(machine.model, [(x_d, x)], settings),
+    ):
+        np.testing.assert_allclose([losses.rms_pb, losses.rms_hold, *losses.rms_h], expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize("first", [0, FIRST])
+def test_both_figures_are_said(hybridsep: Run, tmp_path: Path, first: int) -> None:
+    log = write_rows(tmp_path / "axis.csv", commanded()[first:2000], measured(0)[first:2000])
+    machine = ("--machine", "spring_mass_damper")
+    status, out, err = hybridsep("backtest", log, *machine, "--json")
+    assert status == 0, err
+    figures = json.loads(out)
+    status, out, err = hybridsep("backtest", log, *machine)
+    assert ("without_first_window" in figures) == (first > 0)
+    assert ("Without the first window, of whose start in motion no model knows the state: RMS physics" in out) == (
+        first > 0
+    )
+    if first:
+        assert figures["without_first_window"]["rms_pb_um"] < 0.7 * figures["rms_pb_um"]
+    few = ("--p", "10", "--q", "1", "--lambda", "1e-10", "--Np", NP, "--jobs", "1")
+    status, _, err = hybridsep("tune", log, *machine, *few)
+    assert status == 0, err
+    assert ("axis.csv: begins in motion, and is ranked without its first window" in err) == (first > 0)
