@@ -39,8 +39,8 @@ _FAST, _AROUND = 0.25, 30
 without a line through the motion. The command must move meanwhile."""
 
 _AT_REST = 0.05
-"""Distance beyond the limit, in the travel, of a stretch at the log's beginning or end: half of its play may keep an axis
-at rest from its command."""
+"""Distance beyond the limit, in the travel, of a stretch at the log's beginning or end: half of its play may keep an
+axis at rest from its command."""
 
 _RUNS = 0.6
 """Share of the samples at a limit that must be in such runs."""
