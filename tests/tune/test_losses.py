@@ -17,7 +17,7 @@ from hybridsep.base.errors import ParameterError, SignalError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.predict.predictor import HybridPredictor
-from hybridsep.tune.losses import Piece, nested_losses, replayed_losses
+from hybridsep.tune.losses import Piece, n_unjudged, nested_losses, replayed_losses
 
 PAPER = PredictorSettings(Np=20, p=5, q=2, lam=1e-9, trust=False, t_init=0.0)
 
@@ -30,7 +30,7 @@ def cut(n: int, *, start: float = 0.0, ends: Sequence[int] = ()) -> list[Piece]:
 
 
 def one_by_one(pieces: Sequence[Piece], candidate: PredictorSettings) -> Array:
-    """RMS of physics model, hold and hybrid over all pieces, by a predictor of its own."""
+    """RMS of physics model, hold and hybrid over what is judged of all pieces, by a predictor of its own."""
     predictor, errors = HybridPredictor(MODEL, candidate), []
     for i, (x_d, x) in enumerate(pieces):
         if i:
@@ -39,7 +39,7 @@ def one_by_one(pieces: Sequence[Piece], candidate: PredictorSettings) -> Array:
             found = backtest(predictor, x_d, x)
         except SignalError:
             return np.array([math.nan, math.nan, math.inf])
-        errors.append(x - np.stack([found.x_pb, found.x_hold, found.x_h]))
+        errors.append((x - np.stack([found.x_pb, found.x_hold, found.x_h]))[:, n_unjudged(x_d, candidate.Np) :])
     return np.asarray(np.sqrt(np.nanmean(np.concatenate(errors, axis=1) ** 2, axis=1)))
 
 
