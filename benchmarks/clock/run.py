@@ -24,7 +24,7 @@ from rich.table import Table
 from hybridsep.fmi.compiler import compile_flags
 
 HERE = Path(__file__).resolve().parent
-CORE = HERE.parents[1] / "fmu_src" / "c" / "core" / "numeric"
+CORE = HERE.parents[1] / "fmu_src" / "c" / "core"
 DEVIATION_MAX = 1e-9
 CASES = (
     (0.0, 1e-3, (1e-3,)),
@@ -49,8 +49,9 @@ def main() -> int:
     missed = 0
     with tempfile.TemporaryDirectory() as folder:
         program = Path(folder) / "clock"
-        sources = [HERE / "main.c", CORE / "hsep_clock.c"]
-        subprocess.run([*command, *compile_flags(command), f"-I{CORE}", *sources, "-lm", "-o", program], check=True)
+        sources = [HERE / "main.c", *CORE.rglob("hsep_clock.c")]
+        includes = [f"-I{path}" for path in sorted({path.parent for path in CORE.rglob("*.h")})]
+        subprocess.run([*command, *compile_flags(command), *includes, *sources, "-lm", "-o", program], check=True)
         for start, T_s, sizes in CASES:
             began = perf_counter()
             done = subprocess.run(
