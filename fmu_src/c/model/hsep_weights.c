@@ -87,9 +87,10 @@ static size_t weights_variable(const hsep_context *context, const char *name)
 }
 
 /* Read the settings of the file and compare them with those of the table: 0 if it is damaged. A setting that the table
- * has not is 0 here; modes that only one side has are told by their number. trust: whether v_friction has no effect. */
+ * has not is 0 here; modes that only one side has are told by their number. has_v_friction: whether v_friction has an effect. */
 static int weights_compare_settings(
-    FILE *file, const hsep_context *context, const double values[], int trust, uint64_t n_settings, char message[])
+    FILE *file, const hsep_context *context, const double values[], int has_v_friction, uint64_t n_settings,
+    char message[])
 {
     uint64_t n_missing = 0;
     for (size_t i = 0; i < context->n_variables; i++) {
@@ -103,7 +104,7 @@ static int weights_compare_settings(
         const size_t place = weights_variable(context, setting.name);
         if (place < context->n_variables) {
             const hsep_variable *variable = &context->variables[place];
-            if (!trust || strcmp(setting.name, "v_friction") != 0) {
+            if (has_v_friction || strcmp(setting.name, "v_friction") != 0) {
                 weights_compare(setting.name, setting.value, values[place], variable->kind, message);
             }
             n_missing -= variable->learned != 0;
@@ -115,18 +116,17 @@ static int weights_compare_settings(
     return n_missing == 0 || message[0] != '\0';
 }
 
-/* Read what has been learned besides the factor: by the residual model that can be trusted, if there is one, and of
- * the errors. 0 if it is damaged. */
-static int weights_take_learned(FILE *file, hsep_trusted *trusted, hsep_uncertainty *uncertainty)
+/* Read what has been learned besides the factor, by the residual model and of the errors. 0 if it is damaged. */
+static int weights_take_learned(FILE *file, hsep_residual_model *model, hsep_uncertainty *uncertainty)
 {
-    for (uint64_t i = 0; trusted != NULL && i < hsep_trusted_n_learned(trusted); i++) {
-        if (fread(hsep_trusted_learned(trusted, i), sizeof(double), 1, file) != 1) {
+    for (uint64_t i = 0; i < hsep_residual_n_learned(model); i++) {
+        if (fread(hsep_residual_learned(model, i), sizeof(double), 1, file) != 1) {
             return 0;
         }
     }
     double *errors = hsep_uncertainty_learned(uncertainty);
     return fread(errors, sizeof(double), HSEP_N_UNCERTAINTY, file) == HSEP_N_UNCERTAINTY &&
-           hsep_uncertainty_sound(uncertainty) && (trusted == NULL || hsep_trusted_sound(trusted));
+           hsep_uncertainty_sound(uncertainty) && hsep_residual_sound(model);
 }
 
 /* Read the file: 0 if it is damaged; with a message, if it was learned with other settings. */
@@ -134,8 +134,8 @@ static int weights_take(
     FILE *file, const hsep_context *context, const double values[], uint64_t n_modes, hsep_predictor *predictor,
     char message[])
 {
-    hsep_regression *regression = hsep_predictor_regression(predictor);
-    hsep_trusted *trusted = hsep_predictor_trusted(predictor);
+    hsep_residual_model *model = hsep_predictor_model(predictor);
+    hsep_regression *regression = hsep_residual_regression(model);
     weights_head head;
     double size = 0.0;
     if (!weights_whole(file, &size) || fread(&head, sizeof head, 1, file) != 1 ||
@@ -143,15 +143,16 @@ static int weights_take(
         return 0;
     }
     weights_compare("the number of modes", (double)head.n_modes, (double)n_modes, HSEP_INTEGER, message);
-    if (!weights_compare_settings(file, context, values, trusted != NULL, head.n_settings, message) ||
+    const int has_v_friction = hsep_residual_has_v_friction(model);
+    if (!weights_compare_settings(file, context, values, has_v_friction, head.n_settings, message) ||
         message[0] != '\0') {
         return 0;
     }
-    const uint64_t n_learned = HSEP_N_UNCERTAINTY + (trusted != NULL ? hsep_trusted_n_learned(trusted) : 0);
+    const uint64_t n_learned = HSEP_N_UNCERTAINTY + hsep_residual_n_learned(model);
     const double n = (double)regression->n, settings = 4.0 * (double)head.n_settings;
     const double words = settings + (double)n_learned + 0.5 * (n + 1.0) * (n + 2.0) + 1.0;
     if (head.n_learned != n_learned || size != (double)sizeof head + words * (double)sizeof(double) ||
-        !weights_take_learned(file, trusted, hsep_predictor_uncertainty(predictor))) {
+        !weights_take_learned(file, model, hsep_predictor_uncertainty(predictor))) {
         return 0;
     }
     for (uint64_t i = 0; i <= regression->n; i++) { /* row after row through the regression's own row */
@@ -162,9 +163,7 @@ static int weights_take(
         }
     }
     regression->n_samples = head.n_samples;
-    if (trusted != NULL) {
-        hsep_trusted_restart(trusted);
-    }
+    hsep_residual_restart(model);
     return 1;
 }
 

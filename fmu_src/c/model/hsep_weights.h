@@ -3,7 +3,7 @@
  * The resource weights.bin, little-endian: "HSEPWGT8"; the numbers of settings, of modes, of learned samples and of
  * what has been learned besides the factor, as uint64; each setting that shapes the features and the factor, its name
  * in 24 bytes and its value as a double; as doubles the numbers of a residual model that can be trusted, as
- * hsep_trusted_learned has them, and those of hsep_uncertainty_learned; the upper triangle of the factor [R z; 0 rho]
+ * hsep_residual_learned has them, and those of hsep_uncertainty_learned; the upper triangle of the factor [R z; 0 rho]
  * by rows, (n + 1)(n + 2)/2 doubles for n features; the CRC-32 of all before as uint64.
  */
 #ifndef HSEP_WEIGHTS_H

@@ -100,7 +100,8 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
 {
     (void)context;
     online_state *self = state;
-    const hsep_predictor *predictor = hsep_online_predictor(&self->online);
+    hsep_predictor *predictor = hsep_online_predictor(&self->online);
+    const hsep_residual_model *model = hsep_predictor_model(predictor);
     const hsep_input x_d_ahead = {values[HSEP_VR_x_d_ahead], values[HSEP_SLOPE_x_d_ahead]};
     const hsep_input x_meas = {values[HSEP_VR_x_meas], values[HSEP_SLOPE_x_meas]};
     int window = 0;
@@ -109,8 +110,8 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
     if (hsep_check_divergence((hsep_divergence)predictor->divergence, message) != HSEP_OK) { /* of an earlier step */
         return HSEP_REFUSED;
     }
-    const int may_miss = predictor->trusted != 0;
-    const hsep_status status = hsep_inputs_count(&self->inputs, x_d_ahead, x_meas, may_miss, t, h, &step, message);
+    const hsep_status status =
+        hsep_inputs_count(&self->inputs, x_d_ahead, x_meas, hsep_residual_may_miss(model), t, h, &step, message);
     if (status == HSEP_REFUSED) {
         return HSEP_REFUSED;
     }

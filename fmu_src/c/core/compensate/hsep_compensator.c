@@ -13,7 +13,7 @@ static hsep_trusted_task compensator_task(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     return (hsep_trusted_task){
-        .model = hsep_predictor_trusted(predictor),
+        .model = hsep_residual_trusted(hsep_predictor_model(predictor)),
         .planner = hsep_compensator_planner(self),
         .spline = hsep_at(self, self->spline_pb),
         .x_d = hsep_at(predictor, predictor->x_d)};
@@ -24,7 +24,6 @@ static void compensator_target(hsep_compensator *self, hsep_sep_state state)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     const hsep_planner *planner = hsep_compensator_planner(self);
-    const hsep_features *f = &predictor->features;
     const uint64_t preview = predictor->preview, Np = predictor->Np;
     const double *x_d = hsep_at(predictor, predictor->x_d);
     double *target = hsep_at(self, self->target);
@@ -37,10 +36,11 @@ static void compensator_target(hsep_compensator *self, hsep_sep_state state)
         target[k] = x_d[k] - predictor->start - x[preview - 1 - k];
     }
     if (state == HSEP_SEP_HYBRID) {
-        const hsep_recursion recursion = hsep_predictor_recursion(predictor, 1);
-        memcpy(x + preview, hsep_at(predictor, predictor->past_x) + Np, (size_t)f->q * sizeof(double));
-        memcpy(e + preview, hsep_at(predictor, predictor->past_e) + Np, (size_t)f->p * sizeof(double));
-        hsep_recursion_run(&recursion, x, hsep_predictor_drive(predictor, preview), e, preview, 0, preview);
+        const hsep_paper *paper = hsep_residual_paper(hsep_predictor_model(predictor));
+        const hsep_recursion recursion = hsep_paper_recursion(paper, 1);
+        memcpy(x + preview, hsep_at(predictor, predictor->past_x) + Np, (size_t)predictor->q * sizeof(double));
+        memcpy(e + preview, hsep_at(predictor, predictor->past_e) + Np, (size_t)predictor->p * sizeof(double));
+        hsep_recursion_run(&recursion, x, hsep_paper_drive(paper, preview), e, preview, 0, preview);
         for (uint64_t k = 0; k < preview; k++) {
             target[k] -= e[preview - 1 - k];
         }
@@ -50,8 +50,8 @@ static void compensator_target(hsep_compensator *self, hsep_sep_state state)
 /* The spline filtered by the hybrid model, G_h = (1 + W_x / (1 - W_e)) G_pb as filters. */
 static void compensator_filter_spline(hsep_compensator *self)
 {
-    const hsep_predictor *predictor = hsep_compensator_predictor(self);
-    const hsep_recursion recursion = hsep_predictor_recursion(predictor, 0);
+    hsep_predictor *predictor = hsep_compensator_predictor(self);
+    const hsep_recursion recursion = hsep_paper_recursion(hsep_residual_paper(hsep_predictor_model(predictor)), 0);
     const uint64_t preview = predictor->preview;
     const double *spline_pb = hsep_at(self, self->spline_pb);
     double *x = hsep_at(self, self->trial_x), *e = hsep_at(self, self->trial_e);
@@ -71,9 +71,9 @@ static void compensator_filter_spline(hsep_compensator *self)
 static int compensator_trusts(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
-    const hsep_recursion recursion = hsep_predictor_recursion(predictor, 0);
+    const hsep_recursion recursion = hsep_paper_recursion(hsep_residual_paper(hsep_predictor_model(predictor)), 0);
     return self->compensate == HSEP_SEP_HYBRID && (double)predictor->k >= predictor->n_init &&
-           hsep_predictor_regression(predictor)->n_samples > 0 && self->monitor.excess <= 0.0 &&
+           hsep_residual_regression(hsep_predictor_model(predictor))->n_samples > 0 && self->monitor.excess <= 0.0 &&
            hsep_recursion_stable(&recursion, hsep_at(self, self->trial_e));
 }
 
@@ -106,9 +106,12 @@ static void compensator_publish(hsep_compensator *self, uint64_t last)
         memcpy(
             hsep_at(predictor, predictor->e_h), hsep_at_const(trusted, trusted->e_h) + (trusted->preview - Np),
             (size_t)predictor->n * sizeof(double));
+    } else {
+        const hsep_residual_window window = hsep_predictor_window(predictor);
+        hsep_residual_predict(hsep_predictor_model(predictor), &window, first, last);
     }
     hsep_predictor_publish(predictor, last);
-    hsep_predictor_doubt(predictor, 0, predictor->n);
+    hsep_predictor_predict_std(predictor, 0, predictor->n);
 }
 
 /* Do parts of a plan with trust, as much work as is due; return whether it is made. */
@@ -219,7 +222,7 @@ static void compensator_next_window(hsep_compensator *self)
     const uint64_t Np = predictor->Np;
     /* Predictions from few rows, before the warm-up is over, are not used: they are not judged. */
     if (hsep_predictor_finish(predictor) && !self->trusted && (double)(predictor->k - Np) >= predictor->n_init) {
-        const hsep_regression *regression = hsep_predictor_regression(predictor);
+        const hsep_regression *regression = hsep_residual_regression(hsep_predictor_model(predictor));
         hsep_plan_monitor_observe(
             &self->monitor, hsep_at(predictor, predictor->past_e), hsep_at(predictor, predictor->e_h), Np,
             regression->residual_sum / (double)regression->n_samples);

@@ -26,7 +26,8 @@ static double compensator_lay_out(hsep_compensator *self, const hsep_compensator
 {
     const hsep_predictor_parameters *predictor = &parameters->predictor;
     const double preview = (double)predictor->preview;
-    const hsep_trusted_parameters trusted = hsep_predictor_trusted_parameters(predictor);
+    const hsep_residual_parameters model = hsep_predictor_model_parameters(predictor);
+    const hsep_trusted_parameters trusted = hsep_residual_trusted_parameters(&model);
     double end = HSEP_WORDS(hsep_compensator);
     self->compensate = (uint64_t)parameters->compensate;
     self->x_dm = hsep_take(&end, (double)predictor->settings.Np);
@@ -56,7 +57,8 @@ HSEP_API void hsep_compensator_init(hsep_compensator *self, const hsep_compensat
     hsep_predictor_init(hsep_compensator_predictor(self), predictor, start);
     hsep_planner_init(hsep_compensator_planner(self), &parameters->planner, start);
     if (self->trusted) {
-        const hsep_trusted_parameters trusted = hsep_predictor_trusted_parameters(predictor);
+        const hsep_residual_parameters model = hsep_predictor_model_parameters(predictor);
+        const hsep_trusted_parameters trusted = hsep_residual_trusted_parameters(&model);
         hsep_trusted_planner_init(hsep_compensator_trusted(self), &trusted, &parameters->planner, start);
     }
     self->state = self->before = self->compensate > HSEP_SEP_PHYSICS ? HSEP_SEP_PHYSICS : self->compensate;
@@ -75,7 +77,8 @@ HSEP_API void hsep_compensator_init(hsep_compensator *self, const hsep_compensat
 HSEP_API int hsep_compensator_valid(const void *block, const hsep_compensator_parameters *parameters, uint64_t k)
 {
     const hsep_predictor_parameters *predictor = &parameters->predictor;
-    const hsep_trusted_parameters trusted = hsep_predictor_trusted_parameters(predictor);
+    const hsep_residual_parameters model = hsep_predictor_model_parameters(predictor);
+    const hsep_trusted_parameters trusted = hsep_residual_trusted_parameters(&model);
     hsep_compensator got;
     hsep_predictor online;
     memcpy(&got, block, sizeof got);

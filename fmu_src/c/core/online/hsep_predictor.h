@@ -26,15 +26,12 @@
 #define HSEP_PREDICTOR_H
 
 #include "hsep_api.h"
-#include "hsep_features.h"
 #include "hsep_layout.h"
 #include "hsep_physics.h"
-#include "hsep_recursion.h"
 #include "hsep_regression.h"
-#include "hsep_sensor.h"
+#include "hsep_residual_model.h"
 #include "hsep_settings.h"
 #include "hsep_start.h"
-#include "hsep_trusted.h"
 #include "hsep_uncertainty.h"
 
 #include <stdint.h>
@@ -53,23 +50,18 @@ typedef struct {
 
 typedef struct {
     uint64_t Np, late, n, preview; /* n = Np + late */
-    hsep_features features;
+    uint64_t p, q;                 /* lags of e_pb and of x_pb */
     double n_init;
-    double sign_step;            /* v_friction T_s, m */
     double start;                /* position of rest, m */
-    double x_d_last;             /* m, the commanded position before the window */
     uint64_t k;                  /* index of the next sample */
     uint64_t n_published;        /* samples of the window that are predicted */
     uint64_t n_physics;          /* leading samples of the window where x_h = x_pb */
-    uint64_t learning;           /* whether the window is learned if it is measured */
-    uint64_t missing;            /* whether a sample of it is missing */
     uint64_t n_measured;         /* samples since t_init */
     double sum_e, sum_pb, sum_h; /* m2, sums of squared servo and prediction errors over them */
     double sum_hold;             /* m2, the same if the last residual measured before each window were held */
     double residual;             /* m, of the last sample measured, as published; 0 before any behind the first fill */
     double held;                 /* m, that before the window */
     uint64_t divergence;         /* hsep_divergence of the first window that diverged; latched */
-    hsep_sensor sensor;
     /* Offsets in doubles from the beginning of the struct */
     uint64_t ahead;    /* (preview,) m, ring of the commands that came last */
     uint64_t x_d;      /* (preview,) m, commands of the window and what follows it */
@@ -81,16 +73,12 @@ typedef struct {
     uint64_t past_x;   /* (n + q,) m, x_pb of this window and of the q samples before it, newest first */
     uint64_t past_e;   /* (n + p,) m, e_pb likewise, as measured */
     uint64_t e_h;      /* (n + p,) m, e_pb as predicted, behind it the measured ones; alone it is past_e */
-    uint64_t weights;  /* (n,) w */
-    uint64_t signs;    /* (preview + 2 HSEP_REFERENCE_REACH,) psi of the reference, if it has features */
-    uint64_t drive;    /* (preview,) m, their part of the residuals, newest first */
-    uint64_t physics, uncertainty, regression;
-    uint64_t trusted; /* the residual model that can be trusted, with a regression of its own; 0: the paper's */
-    uint64_t motion;  /* the motion before the run; with trust, alone */
-    uint64_t saved;   /* the regression as it was before this window; 0: no window is unlearned */
+    uint64_t physics, uncertainty;
+    uint64_t model;  /* the residual model */
+    uint64_t motion; /* the motion before the run; with trust, alone */
 } hsep_predictor;
 
-HSEP_ASSERT_WORDS(hsep_predictor, 51);
+HSEP_ASSERT_WORDS(hsep_predictor, 33);
 
 typedef struct {
     double x_d, x_pb, x_h;                 /* m, now */
@@ -111,14 +99,9 @@ HSEP_API void hsep_predictor_init(hsep_predictor *self, const hsep_predictor_par
  * at sample k: its layout is that of hsep_predictor_init, and every index lies within it. */
 HSEP_API int hsep_predictor_valid(const void *block, const hsep_predictor_parameters *parameters, uint64_t k);
 
-/* The regression, for a warm start by hsep_regression_load before the first sample. */
-HSEP_API hsep_regression *hsep_predictor_regression(hsep_predictor *self);
-
-/* Parameters of the residual model that can be trusted. */
-HSEP_API hsep_trusted_parameters hsep_predictor_trusted_parameters(const hsep_predictor_parameters *parameters);
-
-/* The residual model that can be trusted; NULL for the paper's. */
-HSEP_API hsep_trusted *hsep_predictor_trusted(hsep_predictor *self);
+/* The residual model, and its parameters. */
+HSEP_API hsep_residual_model *hsep_predictor_model(hsep_predictor *self);
+HSEP_API hsep_residual_parameters hsep_predictor_model_parameters(const hsep_predictor_parameters *parameters);
 
 HSEP_API hsep_physics *hsep_predictor_physics(hsep_predictor *self);
 
@@ -144,19 +127,17 @@ HSEP_API int hsep_predictor_finish(hsep_predictor *self);
 /* Begin a window: commands, weights, and the part of the features of the reference. */
 HSEP_API void hsep_predictor_begin(hsep_predictor *self);
 
-/* Predict the samples of the window up to last - 1, whose x_pb are in past_x; eq. (4). */
+/* The signals of the window, as its residual model takes them. */
+HSEP_API hsep_residual_window hsep_predictor_window(hsep_predictor *self);
+
+/* Publish the samples of the window up to last - 1, whose x_pb are in past_x and residuals in e_h; eq. (4). */
 HSEP_API void hsep_predictor_publish(hsep_predictor *self, uint64_t last);
 
-/* Predict the errors of samples first ... last - 1 of the n, which were published, their commands being in command. */
-HSEP_API void hsep_predictor_doubt(hsep_predictor *self, uint64_t first, uint64_t last);
+/* Predict the errors of samples first ... last - 1 of the n, hsep_predictor_std, which were published, their commands
+ * being in command. */
+HSEP_API void hsep_predictor_predict_std(hsep_predictor *self, uint64_t first, uint64_t last);
 
 /* Leading samples of the window in the warm-up. */
 HSEP_API uint64_t hsep_predictor_warm_up(const hsep_predictor *self);
-
-/* The learned recursion, with its bias or without. */
-HSEP_API hsep_recursion hsep_predictor_recursion(const hsep_predictor *self, int with_bias);
-
-/* Part of the features of the reference in the residuals of the next n samples, newest first; NULL for none. */
-HSEP_API const double *hsep_predictor_drive(const hsep_predictor *self, uint64_t n);
 
 #endif

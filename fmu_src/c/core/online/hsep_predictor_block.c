@@ -2,7 +2,6 @@
 #include "hsep_predictor.h"
 
 #include "hsep_range.h"
-#include "hsep_reference_features.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -18,26 +17,22 @@ HSEP_API hsep_uncertainty *hsep_predictor_uncertainty(hsep_predictor *self)
     return (hsep_uncertainty *)hsep_at(self, self->uncertainty);
 }
 
-HSEP_API hsep_trusted *hsep_predictor_trusted(hsep_predictor *self)
+HSEP_API hsep_residual_model *hsep_predictor_model(hsep_predictor *self)
 {
-    return self->trusted ? (hsep_trusted *)hsep_at(self, self->trusted) : NULL;
+    return (hsep_residual_model *)hsep_at(self, self->model);
 }
 
-HSEP_API hsep_regression *hsep_predictor_regression(hsep_predictor *self)
+HSEP_API hsep_residual_parameters hsep_predictor_model_parameters(const hsep_predictor_parameters *parameters)
 {
-    return self->trusted ? hsep_trusted_regression(hsep_predictor_trusted(self))
-                         : (hsep_regression *)hsep_at(self, self->regression);
-}
-
-HSEP_API hsep_trusted_parameters hsep_predictor_trusted_parameters(const hsep_predictor_parameters *parameters)
-{
-    return (hsep_trusted_parameters){
+    return (hsep_residual_parameters){
         .settings = &parameters->settings,
         .trust = &parameters->trust,
         .modes = parameters->modes,
         .n_modes = parameters->n_modes,
-        .n = parameters->preview + parameters->settings.measurement_delay,
-        .planned = parameters->planned};
+        .preview = parameters->preview,
+        .v_friction = parameters->v_friction,
+        .planned = parameters->planned,
+        .unlearns = parameters->unlearns};
 }
 
 static hsep_start_parameters predictor_start_parameters(const hsep_predictor_parameters *parameters)
@@ -53,6 +48,12 @@ static hsep_start_parameters predictor_start_parameters(const hsep_predictor_par
         .input_hold = (hsep_hold)settings->input_hold};
 }
 
+/* Whether the state at the beginning of the run is corrected: with trust, alone. */
+static int predictor_corrects_start(const hsep_predictor_parameters *parameters)
+{
+    return parameters->trust.trust && !parameters->planned;
+}
+
 /* Take a signal of the window, this long, and what is before it; return the offset of the window. */
 static uint64_t predictor_take(double *end, double late, double count)
 {
@@ -65,19 +66,16 @@ static double predictor_lay_out(hsep_predictor *self, const hsep_predictor_param
     const double Np = (double)parameters->settings.Np, preview = (double)parameters->preview;
     const double late = (double)parameters->settings.measurement_delay, n = Np + late;
     const double p = (double)parameters->settings.p, q = (double)parameters->settings.q;
-    const int has_reference = parameters->v_friction > 0.0;
     double end = HSEP_WORDS(hsep_predictor);
-    hsep_features_lay_out(
-        &self->features, parameters->settings.p, parameters->settings.q, has_reference ? HSEP_N_REFERENCE : 0);
-    const hsep_trusted_parameters trusted = hsep_predictor_trusted_parameters(parameters);
+    const hsep_residual_parameters model = hsep_predictor_model_parameters(parameters);
     const hsep_start_parameters start = predictor_start_parameters(parameters);
-    const double regression = parameters->trust.trust ? 0.0 : hsep_regression_size(self->features.n);
     self->Np = parameters->settings.Np;
     self->late = parameters->settings.measurement_delay;
     self->n = self->Np + self->late;
     self->preview = parameters->preview;
+    self->p = parameters->settings.p;
+    self->q = parameters->settings.q;
     self->n_init = parameters->n_init;
-    self->sign_step = parameters->v_friction * parameters->settings.T_s;
     self->ahead = hsep_take(&end, preview);
     self->x_d = predictor_take(&end, late, preview);
     self->x_pb = predictor_take(&end, late, Np);
@@ -88,15 +86,10 @@ static double predictor_lay_out(hsep_predictor *self, const hsep_predictor_param
     self->past_x = hsep_take(&end, n + q);
     self->past_e = hsep_take(&end, n + p);
     self->e_h = parameters->planned ? hsep_take(&end, n + p) : self->past_e;
-    self->weights = hsep_take(&end, (double)self->features.n);
-    self->signs = hsep_take(&end, has_reference ? preview + 2.0 * HSEP_REFERENCE_REACH : 0.0);
-    self->drive = hsep_take(&end, has_reference ? preview : 0.0);
     self->physics = hsep_take_block(&end, hsep_physics_size(parameters->n_modes, parameters->settings.dead_time));
     self->uncertainty = hsep_take_block(&end, hsep_uncertainty_size(self->Np, self->n));
-    self->regression = hsep_take_block(&end, regression);
-    self->trusted = parameters->trust.trust ? hsep_take_block(&end, hsep_trusted_size(&trusted)) : 0;
-    self->motion = self->trusted && !parameters->planned ? hsep_take_block(&end, hsep_start_size(&start)) : 0;
-    self->saved = parameters->unlearns ? hsep_take_block(&end, regression) : 0;
+    self->model = hsep_take_block(&end, hsep_residual_size(&model));
+    self->motion = predictor_corrects_start(parameters) ? hsep_take_block(&end, hsep_start_size(&start)) : 0;
     return end * sizeof(double);
 }
 
@@ -109,9 +102,8 @@ HSEP_API void hsep_predictor_init(hsep_predictor *self, const hsep_predictor_par
 {
     memset(self, 0, (size_t)hsep_predictor_size(parameters));
     (void)predictor_lay_out(self, parameters);
-    self->start = self->x_d_last = start;
-    self->n_published = self->n_physics = self->Np; /* the first fill is not predicted */
-    hsep_sensor_init(&self->sensor);
+    self->start = start;
+    self->n_published = self->n_physics = self->Np;           /* the first fill is not predicted */
     for (uint64_t i = self->ahead; i < self->ahead_pb; i++) { /* commands, and the four signals of the window */
         hsep_at(self, 0)[i] = start;
     }
@@ -121,15 +113,11 @@ HSEP_API void hsep_predictor_init(hsep_predictor *self, const hsep_predictor_par
     hsep_uncertainty_init(
         hsep_predictor_uncertainty(self), self->Np, self->n,
         hsep_uncertainty_first_variance(parameters->settings.lambda, parameters->trust.noise_std));
-    if (self->trusted) {
-        const hsep_trusted_parameters trusted = hsep_predictor_trusted_parameters(parameters);
-        hsep_trusted_init(hsep_predictor_trusted(self), &trusted, start);
-        if (self->motion) {
-            const hsep_start_parameters motion = predictor_start_parameters(parameters);
-            hsep_start_init((hsep_start *)hsep_at(self, self->motion), &motion);
-        }
-    } else {
-        hsep_regression_init(hsep_predictor_regression(self), self->features.n, parameters->settings.lambda);
+    const hsep_residual_parameters model = hsep_predictor_model_parameters(parameters);
+    hsep_residual_init(hsep_predictor_model(self), &model, start);
+    if (self->motion) {
+        const hsep_start_parameters motion = predictor_start_parameters(parameters);
+        hsep_start_init((hsep_start *)hsep_at(self, self->motion), &motion);
     }
 }
 
@@ -138,20 +126,17 @@ HSEP_API int hsep_predictor_valid(const void *block, const hsep_predictor_parame
     hsep_predictor got;
     memcpy(&got, block, sizeof got);
     (void)predictor_lay_out(&got, parameters); /* changes nothing where it is sound */
-    const hsep_trusted_parameters trusted = hsep_predictor_trusted_parameters(parameters);
+    const hsep_residual_parameters model = hsep_predictor_model_parameters(parameters);
     const hsep_start_parameters motion = predictor_start_parameters(parameters);
     const double sums[4] = {got.sum_e, got.sum_pb, got.sum_h, got.sum_hold};
     int sound =
         memcmp(&got, block, sizeof got) == 0 && got.k == k && got.n_published <= got.Np &&
-        k % got.Np < got.n_published && got.n_physics <= got.Np && got.learning <= 1 && got.missing <= 1 &&
-        (!got.missing || got.saved) && got.divergence <= HSEP_DIVERGES_X_DM &&
+        k % got.Np < got.n_published && got.n_physics <= got.Np && got.divergence <= HSEP_DIVERGES_X_DM &&
         (got.divergence || hsep_within(hsep_at_bytes(block, got.ahead), got.past_x - got.ahead, HSEP_PREDICTION_MAX)) &&
         hsep_uncertainty_valid(hsep_at_bytes(block, got.uncertainty), got.Np, got.n) &&
         (!got.motion || hsep_start_valid(hsep_at_bytes(block, got.motion), &motion)) &&
         hsep_physics_valid(hsep_at_bytes(block, got.physics), parameters->n_modes, parameters->settings.dead_time) &&
-        (got.trusted ? hsep_trusted_valid(hsep_at_bytes(block, got.trusted), &trusted)
-                     : hsep_regression_valid(hsep_at_bytes(block, got.regression), got.features.n)) &&
-        (!got.saved || hsep_regression_valid(hsep_at_bytes(block, got.saved), got.features.n));
+        hsep_residual_valid(hsep_at_bytes(block, got.model), &model);
     const double residuals[2] = {got.residual, got.held};
     sound = sound && hsep_within(residuals, 2, HSEP_PREDICTION_MAX);
     for (int i = 0; i < 4; i++) {

@@ -133,7 +133,7 @@ static double trusted_first_variance(const hsep_trusted *self, const double e[])
     return sum / (double)(self->Np - 3) / 20.0;
 }
 
-HSEP_API void hsep_trusted_doubt(hsep_trusted *self, const double past[])
+HSEP_API void hsep_trusted_predict_less(hsep_trusted *self, const double past[])
 {
     hsep_change *change = hsep_trusted_change(self);
     change->doubted = 0;

@@ -133,7 +133,7 @@ HSEP_API void hsep_trusted_vary(hsep_trusted *self, uint64_t first, uint64_t las
 /* In a warm run: predict the window once more, with less weight of earlier runs, for comparison. It is done after the
  * beginning of a window, where it is predicted and planned, to spread the work. past: (p,) m, the residuals before the
  * window. Cost: that of hsep_change_predict. */
-HSEP_API void hsep_trusted_doubt(hsep_trusted *self, const double past[]);
+HSEP_API void hsep_trusted_predict_less(hsep_trusted *self, const double past[]);
 
 /* Take the measured position of sample k of the window that was predicted, m, relative to the start; NaN: missing. */
 HSEP_API void hsep_trusted_measure(hsep_trusted *self, uint64_t k, double x);

@@ -1,0 +1,199 @@
+#include "hsep_residual_model.h"
+
+#include <stddef.h>
+#include <string.h>
+
+/* Parts in which the one that can be trusted predicts a window: its variances are dear. */
+static const uint64_t residual_parts = 5;
+
+static hsep_paper_parameters residual_paper_parameters(const hsep_residual_parameters *parameters)
+{
+    return (hsep_paper_parameters){
+        .settings = parameters->settings,
+        .preview = parameters->preview,
+        .v_friction = parameters->v_friction,
+        .unlearns = parameters->unlearns};
+}
+
+HSEP_API hsep_trusted_parameters hsep_residual_trusted_parameters(const hsep_residual_parameters *parameters)
+{
+    return (hsep_trusted_parameters){
+        .settings = parameters->settings,
+        .trust = parameters->trust,
+        .modes = parameters->modes,
+        .n_modes = parameters->n_modes,
+        .n = parameters->preview + parameters->settings->measurement_delay,
+        .planned = parameters->planned};
+}
+
+HSEP_API hsep_paper *hsep_residual_paper(hsep_residual_model *self)
+{
+    return self->paper ? (hsep_paper *)hsep_at(self, self->paper) : NULL;
+}
+
+HSEP_API hsep_trusted *hsep_residual_trusted(hsep_residual_model *self)
+{
+    return self->trusted ? (hsep_trusted *)hsep_at(self, self->trusted) : NULL;
+}
+
+static const hsep_trusted *residual_trusted(const hsep_residual_model *self)
+{
+    return self->trusted ? (const hsep_trusted *)hsep_at_const(self, self->trusted) : NULL;
+}
+
+/* Set what follows from the parameters; return the bytes of the block. */
+static double residual_lay_out(hsep_residual_model *self, const hsep_residual_parameters *parameters)
+{
+    const hsep_paper_parameters paper = residual_paper_parameters(parameters);
+    const hsep_trusted_parameters trusted = hsep_residual_trusted_parameters(parameters);
+    double end = HSEP_WORDS(hsep_residual_model);
+    self->Np = parameters->settings->Np;
+    self->late = parameters->settings->measurement_delay;
+    self->n = self->Np + self->late;
+    self->planned = parameters->planned != 0;
+    self->paper = parameters->trust->trust ? 0 : hsep_take_block(&end, hsep_paper_size(&paper));
+    self->trusted = parameters->trust->trust ? hsep_take_block(&end, hsep_trusted_size(&trusted)) : 0;
+    return end * sizeof(double);
+}
+
+HSEP_API double hsep_residual_size(const hsep_residual_parameters *parameters)
+{
+    return residual_lay_out(&(hsep_residual_model){0}, parameters);
+}
+
+HSEP_API void hsep_residual_init(hsep_residual_model *self, const hsep_residual_parameters *parameters, double start)
+{
+    const hsep_paper_parameters paper = residual_paper_parameters(parameters);
+    const hsep_trusted_parameters trusted = hsep_residual_trusted_parameters(parameters);
+    (void)residual_lay_out(self, parameters);
+    if (self->trusted) {
+        hsep_trusted_init(hsep_residual_trusted(self), &trusted, start);
+    } else {
+        hsep_paper_init(hsep_residual_paper(self), &paper, start);
+    }
+}
+
+HSEP_API int hsep_residual_valid(const void *block, const hsep_residual_parameters *parameters)
+{
+    const hsep_paper_parameters paper = residual_paper_parameters(parameters);
+    const hsep_trusted_parameters trusted = hsep_residual_trusted_parameters(parameters);
+    hsep_residual_model got;
+    memcpy(&got, block, sizeof got);
+    (void)residual_lay_out(&got, parameters); /* changes nothing where it is sound */
+    return memcmp(&got, block, sizeof got) == 0 && got.learning <= 1 &&
+           (got.trusted ? hsep_trusted_valid(hsep_at_bytes(block, got.trusted), &trusted)
+                        : hsep_paper_valid(hsep_at_bytes(block, got.paper), &paper));
+}
+
+HSEP_API hsep_regression *hsep_residual_regression(hsep_residual_model *self)
+{
+    return self->trusted ? hsep_trusted_regression(hsep_residual_trusted(self))
+                         : hsep_paper_regression(hsep_residual_paper(self));
+}
+
+HSEP_API uint64_t hsep_residual_n_learned(hsep_residual_model *self)
+{
+    return self->trusted ? hsep_trusted_n_learned(hsep_residual_trusted(self)) : 0;
+}
+
+HSEP_API double *hsep_residual_learned(hsep_residual_model *self, uint64_t i)
+{
+    return self->trusted ? hsep_trusted_learned(hsep_residual_trusted(self), i) : NULL;
+}
+
+HSEP_API int hsep_residual_sound(hsep_residual_model *self)
+{
+    return !self->trusted || hsep_trusted_sound(hsep_residual_trusted(self));
+}
+
+HSEP_API void hsep_residual_restart(hsep_residual_model *self)
+{
+    if (self->trusted) {
+        hsep_trusted_restart(hsep_residual_trusted(self));
+    }
+}
+
+HSEP_API int hsep_residual_may_miss(const hsep_residual_model *self) { return self->trusted != 0; }
+
+HSEP_API int hsep_residual_has_v_friction(const hsep_residual_model *self) { return self->paper != 0; }
+
+HSEP_API void hsep_residual_begin(hsep_residual_model *self, const hsep_residual_window *window, int learning)
+{
+    const int measured = self->trusted != 0 || hsep_paper_begin(hsep_residual_paper(self), window);
+    self->learning = learning && measured;
+}
+
+HSEP_API uint64_t hsep_residual_part(const hsep_residual_model *self)
+{
+    const uint64_t part = (self->Np - 1) / residual_parts + 1;
+    /* Two at least, because the spread of errors follows from differences. */
+    return self->trusted ? (part > 2 ? part : 2) : self->Np;
+}
+
+HSEP_API void hsep_residual_predict(
+    hsep_residual_model *self, const hsep_residual_window *window, uint64_t first, uint64_t last)
+{
+    if (!self->trusted) {
+        hsep_paper_predict(hsep_residual_paper(self), window, first, last);
+    } else if (first == 0) {
+        hsep_trusted_forecast(hsep_residual_trusted(self), window->command, window->x_pb, window->e_h, last);
+    } else {
+        hsep_trusted_go_on(hsep_residual_trusted(self), window->e_h, first, last);
+    }
+}
+
+HSEP_API void hsep_residual_signal(hsep_residual_model *self, hsep_uncertainty_signals *signals)
+{
+    hsep_trusted *trusted = hsep_residual_trusted(self);
+    if (trusted != NULL) {
+        signals->disagreement = hsep_at(trusted, trusted->disagreement) + (trusted->n - self->n);
+        signals->doubt = hsep_guard_doubt(&trusted->guard, trusted->scale.largest);
+    }
+}
+
+/* Whether the work for a comparison of the window is done with its sample i: the last one that does not end it, when a
+ * compensator has planned. */
+static int residual_compares(const hsep_residual_model *self, uint64_t i)
+{
+    return i + 2 == (self->Np > 2 ? self->Np : 2);
+}
+
+HSEP_API void hsep_residual_take_in(
+    hsep_residual_model *self, const hsep_residual_window *window, const hsep_residual_sample *sample)
+{
+    hsep_trusted *trusted = hsep_residual_trusted(self);
+    if (trusted == NULL) {
+        hsep_paper_take_in(hsep_residual_paper(self), window, sample, self->learning != 0);
+        return;
+    }
+    hsep_trusted_measure(trusted, sample->i, sample->x_meas - window->start);
+    if (residual_compares(self, sample->i)) {
+        hsep_trusted_predict_less(trusted, window->e + self->n);
+    }
+}
+
+HSEP_API int hsep_residual_finish(hsep_residual_model *self, const hsep_residual_window *window)
+{
+    const uint64_t late = self->late;
+    if (!self->trusted) {
+        return hsep_paper_finish(hsep_residual_paper(self), window) && self->learning;
+    }
+    if (self->learning || self->planned) {
+        hsep_trusted_learn(
+            hsep_residual_trusted(self), window->command + late, window->x_pb + late, window->e + late,
+            self->learning != 0);
+    }
+    return self->learning != 0;
+}
+
+HSEP_API const double *hsep_residual_accepted(const hsep_residual_model *self)
+{
+    const hsep_trusted *trusted = residual_trusted(self);
+    return trusted != NULL ? hsep_at_const(trusted, trusted->accepted) : NULL;
+}
+
+HSEP_API uint64_t hsep_residual_n_rejected(const hsep_residual_model *self)
+{
+    const hsep_trusted *trusted = residual_trusted(self);
+    return trusted != NULL ? trusted->n_rejected : 0;
+}

@@ -1,0 +1,105 @@
+/* Model of the residual e_pb = x - x_pb: the paper's (hsep_paper.h) or the one that can be trusted (hsep_trusted.h).
+ *
+ * What differs between the two is decided here, and nowhere else in a predictor: the block holds one of them, and each
+ * function calls its counterpart. Per window these follow: hsep_residual_begin, _predict until all samples are
+ * predicted, _take_in at each sample, _finish. A compensator plans with what hsep_residual_paper or _trusted gives.
+ *
+ * Memory is one block: the struct, then the model; no pointers. Reentrant; allocates nothing.
+ */
+#ifndef HSEP_RESIDUAL_MODEL_H
+#define HSEP_RESIDUAL_MODEL_H
+
+#include "hsep_api.h"
+#include "hsep_layout.h"
+#include "hsep_paper.h"
+#include "hsep_physics.h"
+#include "hsep_regression.h"
+#include "hsep_residual_window.h"
+#include "hsep_settings.h"
+#include "hsep_trusted.h"
+#include "hsep_uncertainty.h"
+
+#include <stdint.h>
+
+typedef struct {
+    const hsep_predictor_settings *settings;
+    const hsep_trust_settings *trust;
+    const hsep_mode *modes; /* (n_modes,) */
+    uint64_t n_modes;
+    uint64_t preview;  /* samples from the command to the drive, >= Np */
+    double v_friction; /* m/s, of the paper's features of the reference; 0: none */
+    int planned;       /* whether a compensator decides the commands */
+    int unlearns;      /* whether the paper's model unlearns a window with a held measurement */
+} hsep_residual_parameters;
+
+typedef struct {
+    uint64_t Np, late, n; /* samples of a window, those not measured yet before it, both together */
+    uint64_t planned;     /* whether a compensator decides the commands */
+    uint64_t learning;    /* whether the window is learned */
+    /* Offsets in doubles from the beginning of the struct; one of them is 0 */
+    uint64_t paper, trusted;
+} hsep_residual_model;
+
+HSEP_ASSERT_WORDS(hsep_residual_model, 7);
+
+/* Bytes of the block, counted in double so that no size can overflow. */
+HSEP_API double hsep_residual_size(const hsep_residual_parameters *parameters);
+
+/* Fill the block, at rest at start, m, with nothing learned. */
+HSEP_API void hsep_residual_init(hsep_residual_model *self, const hsep_residual_parameters *parameters, double start);
+
+/* Whether a block, in any alignment, is one that hsep_residual_init with these parameters began. */
+HSEP_API int hsep_residual_valid(const void *block, const hsep_residual_parameters *parameters);
+
+/* The implementation; NULL if it is the other one. */
+HSEP_API hsep_paper *hsep_residual_paper(hsep_residual_model *self);
+HSEP_API hsep_trusted *hsep_residual_trusted(hsep_residual_model *self);
+
+/* Parameters of the one that can be trusted. */
+HSEP_API hsep_trusted_parameters hsep_residual_trusted_parameters(const hsep_residual_parameters *parameters);
+
+/* The regression, for a warm start by hsep_regression_load before the first sample. */
+HSEP_API hsep_regression *hsep_residual_regression(hsep_residual_model *self);
+
+/* Numbers learned besides the regression and whether they are in range; those of hsep_trusted_learned, none without. */
+HSEP_API uint64_t hsep_residual_n_learned(hsep_residual_model *self);
+HSEP_API double *hsep_residual_learned(hsep_residual_model *self, uint64_t i);
+HSEP_API int hsep_residual_sound(hsep_residual_model *self);
+
+/* Begin another run with what was learned. */
+HSEP_API void hsep_residual_restart(hsep_residual_model *self);
+
+/* Whether a measurement may be missing, NaN. */
+HSEP_API int hsep_residual_may_miss(const hsep_residual_model *self);
+
+/* Whether the setting v_friction has an effect. */
+HSEP_API int hsep_residual_has_v_friction(const hsep_residual_model *self);
+
+/* Begin a window whose residuals before it are known. learning: whether it is learned, where these were measured. */
+HSEP_API void hsep_residual_begin(hsep_residual_model *self, const hsep_residual_window *window, int learning);
+
+/* Samples that are predicted in one go. Constant cost. */
+HSEP_API uint64_t hsep_residual_part(const hsep_residual_model *self);
+
+/* Predict the residuals of samples first ... last - 1; first is 0, or where the last call ended. */
+HSEP_API void hsep_residual_predict(
+    hsep_residual_model *self, const hsep_residual_window *window, uint64_t first, uint64_t last);
+
+/* Add to the signals of a prediction's errors what the model itself tells. */
+HSEP_API void hsep_residual_signal(hsep_residual_model *self, hsep_uncertainty_signals *signals);
+
+/* Take in a sample. */
+HSEP_API void hsep_residual_take_in(
+    hsep_residual_model *self, const hsep_residual_window *window, const hsep_residual_sample *sample);
+
+/* Finish a window: learn what was not learned sample by sample; window->e becomes its residuals as they are to be
+ * continued from. Return whether it was learned. A first fill that was predicted is not, but is what comes before. */
+HSEP_API int hsep_residual_finish(hsep_residual_model *self, const hsep_residual_window *window);
+
+/* Samples of a finished window that count, (Np,) newest first, 1 or 0; NULL: all. */
+HSEP_API const double *hsep_residual_accepted(const hsep_residual_model *self);
+
+/* Measurements of this run that were missing or not plausible. */
+HSEP_API uint64_t hsep_residual_n_rejected(const hsep_residual_model *self);
+
+#endif
