@@ -87,7 +87,8 @@ static size_t weights_variable(const hsep_context *context, const char *name)
 }
 
 /* Read the settings of the file and compare them with those of the table: 0 if it is damaged. A setting that the table
- * has not is 0 here; modes that only one side has are told by their number. has_v_friction: whether v_friction has an effect. */
+ * has not is 0 here; modes that only one side has are told by their number. has_v_friction: whether v_friction
+ * has an effect. */
 static int weights_compare_settings(
     FILE *file, const hsep_context *context, const double values[], int has_v_friction, uint64_t n_settings,
     char message[])

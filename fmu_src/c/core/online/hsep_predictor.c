@@ -14,7 +14,6 @@ HSEP_API hsep_residual_window hsep_predictor_window(hsep_predictor *self)
         .x_pb = hsep_at(self, self->past_x),
         .e = hsep_at(self, self->past_e),
         .e_h = hsep_at(self, self->e_h),
-        .start = self->start,
         .n_physics = self->n_physics};
 }
 
@@ -26,9 +25,14 @@ HSEP_API int hsep_predictor_take_in(hsep_predictor *self, double x_d_ahead, doub
     const double x_h = hsep_at(self, self->x_h - late)[i], x_hold = hsep_at(self, self->x_hold - late)[i];
     hsep_at(self, self->ahead)[self->k % self->preview] = x_d_ahead;
     hsep_at(self, self->past_e)[j] = x_meas - self->start - hsep_at(self, self->past_x)[j]; /* e_pb = x - x_pb */
-    const hsep_residual_window window = hsep_predictor_window(self);
-    const hsep_residual_sample sample = {i, x_meas, x_pb};
-    hsep_residual_take_in(hsep_predictor_model(self), &window, &sample);
+    const hsep_residual_sample sample = {
+        .i = i,
+        .x_meas = x_meas,
+        .x_pb = x_pb,
+        .relative = x_meas - self->start,
+        .x = hsep_at(self, self->past_x) + j,
+        .e = hsep_at(self, self->past_e) + j};
+    hsep_residual_take_in(hsep_predictor_model(self), &sample);
     if (self->k >= self->preview + late && !isnan(x_meas)) {
         self->residual = x_meas - x_pb;
     }

@@ -158,17 +158,16 @@ static int residual_compares(const hsep_residual_model *self, uint64_t i)
     return i + 2 == (self->Np > 2 ? self->Np : 2);
 }
 
-HSEP_API void hsep_residual_take_in(
-    hsep_residual_model *self, const hsep_residual_window *window, const hsep_residual_sample *sample)
+HSEP_API void hsep_residual_take_in(hsep_residual_model *self, const hsep_residual_sample *sample)
 {
     hsep_trusted *trusted = hsep_residual_trusted(self);
     if (trusted == NULL) {
-        hsep_paper_take_in(hsep_residual_paper(self), window, sample, self->learning != 0);
+        hsep_paper_take_in(hsep_residual_paper(self), sample, self->learning != 0);
         return;
     }
-    hsep_trusted_measure(trusted, sample->i, sample->x_meas - window->start);
+    hsep_trusted_measure(trusted, sample->i, sample->relative);
     if (residual_compares(self, sample->i)) {
-        hsep_trusted_predict_less(trusted, window->e + self->n);
+        hsep_trusted_predict_less(trusted, sample->e + sample->i + 1); /* the residuals before the window */
     }
 }
 

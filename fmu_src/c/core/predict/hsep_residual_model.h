@@ -89,8 +89,7 @@ HSEP_API void hsep_residual_predict(
 HSEP_API void hsep_residual_signal(hsep_residual_model *self, hsep_uncertainty_signals *signals);
 
 /* Take in a sample. */
-HSEP_API void hsep_residual_take_in(
-    hsep_residual_model *self, const hsep_residual_window *window, const hsep_residual_sample *sample);
+HSEP_API void hsep_residual_take_in(hsep_residual_model *self, const hsep_residual_sample *sample);
 
 /* Finish a window: learn what was not learned sample by sample; window->e becomes its residuals as they are to be
  * continued from. Return whether it was learned. A first fill that was predicted is not, but is what comes before. */

@@ -14,7 +14,6 @@ typedef struct {
     const double *x_pb;    /* (n + q,) m, physics-based prediction, relative to the start */
     double *e;             /* (n + p,) m, residuals as measured; alone the predictor keeps e_h at the same place */
     double *e_h;           /* (n + p,) m, residuals as predicted, behind them the measured ones */
-    double start;          /* m, position of rest */
     uint64_t n_physics;    /* leading samples of the window where x_h = x_pb */
 } hsep_residual_window;
 
@@ -22,6 +21,8 @@ typedef struct {
 typedef struct {
     uint64_t i;          /* sample of the window, 0 ... Np - 1 */
     double x_meas, x_pb; /* m, measured position and its physics-based prediction */
+    double relative;     /* m, measured position relative to the start */
+    const double *x, *e; /* the window's x_pb and e from this sample on: it and those before it */
 } hsep_residual_sample;
 
 #endif

@@ -73,31 +73,28 @@ HSEP_API const double *hsep_paper_drive(const hsep_paper *self, uint64_t n)
 }
 
 /* Fold the row of sample i of its window into the regression; eqs. (5) and (6). */
-static void paper_learn(hsep_paper *self, const hsep_residual_window *window, uint64_t i)
+static void paper_learn(hsep_paper *self, const hsep_residual_sample *sample)
 {
     const hsep_features *f = &self->features;
-    const uint64_t j = self->n - 1 - i;
-    const double *x = window->x_pb + j, *e = window->e + j;
     double *row = hsep_regression_row(hsep_paper_regression(self)); /* phi(k), its target e_pb(k) behind it */
     row[HSEP_BIAS] = 1.0;
-    memcpy(row + f->x, x, (size_t)(f->q + 1) * sizeof(double));
-    memcpy(row + f->e, e + 1, (size_t)f->p * sizeof(double));
+    memcpy(row + f->x, sample->x, (size_t)(f->q + 1) * sizeof(double));
+    memcpy(row + f->e, sample->e + 1, (size_t)f->p * sizeof(double));
     if (f->n > f->reference) {
-        hsep_reference_features_at(hsep_at(self, self->signs), i, row + f->reference);
+        hsep_reference_features_at(hsep_at(self, self->signs), sample->i, row + f->reference);
     }
-    row[f->n] = e[0];
+    row[f->n] = sample->e[0];
     hsep_regression_fold(hsep_paper_regression(self));
 }
 
-HSEP_API void hsep_paper_take_in(
-    hsep_paper *self, const hsep_residual_window *window, const hsep_residual_sample *sample, int learning)
+HSEP_API void hsep_paper_take_in(hsep_paper *self, const hsep_residual_sample *sample, int learning)
 {
     /* A measurement held while the drive moves is missing. */
     if (self->saved && hsep_sensor_misses(&self->sensor, sample->x_meas, sample->x_pb, paper_still, paper_first_step)) {
         self->missing = 1;
     }
     if (learning && !self->missing) {
-        paper_learn(self, window, sample->i);
+        paper_learn(self, sample);
     }
 }
 

@@ -54,14 +54,14 @@ HSEP_API int hsep_paper_valid(const void *block, const hsep_paper_parameters *pa
 HSEP_API hsep_regression *hsep_paper_regression(hsep_paper *self);
 
 /* Take in a sample; learning: whether its window is learned. Cost: that of hsep_regression_fold. */
-HSEP_API void hsep_paper_take_in(
-    hsep_paper *self, const hsep_residual_window *window, const hsep_residual_sample *sample, int learning);
+HSEP_API void hsep_paper_take_in(hsep_paper *self, const hsep_residual_sample *sample, int learning);
 
 /* Finish a window; return whether all of it was measured: it is unlearned if not. */
 HSEP_API int hsep_paper_finish(hsep_paper *self, const hsep_residual_window *window);
 
-/* Begin a window: the weights, eq. (6), and the part of the features of the reference. Return whether the window
- * before it was measured: behind one that was unlearned the residuals are predicted ones. Cost: n^2 / 2 multiply-adds, the tanh of hsep_reference_features_signs(preview), and a copy of the regression where windows are unlearned. */
+/* Begin a window: the weights, eq. (6), and the part of the features of the reference. Return whether the window before
+ * it was measured: behind one that was unlearned the residuals are predicted ones. Cost: n^2 / 2 multiply-adds, the tanh
+ * of hsep_reference_features_signs(preview), and a copy of the regression where windows are unlearned. */
 HSEP_API int hsep_paper_begin(hsep_paper *self, const hsep_residual_window *window);
 
 /* Predict the residuals of samples first ... last - 1; eq. (4). */
