@@ -60,8 +60,8 @@ HSEP_API void hsep_paper_take_in(hsep_paper *self, const hsep_residual_sample *s
 HSEP_API int hsep_paper_finish(hsep_paper *self, const hsep_residual_window *window);
 
 /* Begin a window: the weights, eq. (6), and the part of the features of the reference. Return whether the window before
- * it was measured: behind one that was unlearned the residuals are predicted ones. Cost: n^2 / 2 multiply-adds, the tanh
- * of hsep_reference_features_signs(preview), and a copy of the regression where windows are unlearned. */
+ * it was measured: behind one that was unlearned the residuals are predicted ones. Cost: n^2 / 2 multiply-adds, the
+ * tanh of hsep_reference_features_signs(preview), and a copy of the regression where windows are unlearned. */
 HSEP_API int hsep_paper_begin(hsep_paper *self, const hsep_residual_window *window);
 
 /* Predict the residuals of samples first ... last - 1; eq. (4). */
