@@ -77,15 +77,20 @@ class SepCompensator:
         self.preview, self.spacing = settings.preview, settings.spacing
         self.compensate = SepState[settings.compensate.upper()]
         self._basis = SplineBasis(self.preview, self.spacing)
-        n_pinned = _PINNED if predictor.trusted is None else _PINNED_WITH_TRUST
+        n_pinned = _PINNED if self._trusted is None else _PINNED_WITH_TRUST
         self._n_pinned = min(n_pinned, Np // 2) // self.spacing
         self._bounds = DriveBounds(
             self._basis, predictor.T_s, settings.limits, settings.change_max, no_reversal=settings.no_reversal
         )
         self._monitor = PlanMonitor()
-        if predictor.trusted is not None:
-            predictor.trusted.plan_ahead(self.preview)
+        if self._trusted is not None:
+            self._trusted.plan_ahead(self.preview)
         self.restart(predictor.start, t_init=predictor.settings.warm_up)
+
+    @property
+    def _trusted(self) -> TrustedModel | None:
+        residual = self.predictor.residual
+        return residual if isinstance(residual, TrustedModel) else None
 
     def restart(self, start: float | None = None, *, t_init: float = 0.0, lead_in: int = 0) -> None:
         """Begin another run, at rest at ``start``; what was learned is kept (warm start).
@@ -137,7 +142,7 @@ class SepCompensator:
             predictor.start = float(command[0])
         if np.isnan(self._x_d_before[0]):
             self._x_d_before[:] = predictor.start
-        trusted = predictor.trusted
+        trusted = self._trusted
         model = None if trusted is None else self._plan_model(trusted, command - predictor.start)
         state, coefficients = (
             self._best_plan(command) if model is None else self._trusted_plan(command, command - predictor.start, model)
@@ -154,7 +159,7 @@ class SepCompensator:
         The paper's model is published where it planned. With trust it is published wherever it may plan: it vouches for
         itself, and what planned the window is not known before its first samples have acted.
         """
-        Np, prediction, trusted = self.predictor.Np, plan.prediction, self.predictor.trusted is not None
+        Np, prediction, trusted = self.predictor.Np, plan.prediction, self._trusted is not None
         as_published(prediction.x_pb, "x_pb")
         x_h, x_h_std, n_warm_up = prediction.x_pb.copy(), np.zeros(Np), Np
         if trusted and self.compensate is SepState.HYBRID:
@@ -189,7 +194,7 @@ class SepCompensator:
         predictor, Np = self.predictor, self.predictor.Np
         measured = np.asarray(x, dtype=np.float64)
         as_samples(np.nan_to_num(measured, nan=0.0, posinf=np.inf, neginf=-np.inf), "x", Np)
-        if predictor.trusted is None:
+        if self._trusted is None:
             self._update_paper(measured, pending)
         else:
             predictor.update(measured, learn=predictor.k >= self.lead_in)
@@ -249,7 +254,7 @@ class SepCompensator:
         if not (np.isfinite(g).all() and np.isfinite(free).all()):
             return None
         cost = self._basis.cost(g, free, command, rest[:N_DECIDED], self._delta_before, self.settings.jerk_weight)
-        trusted = self.predictor.trusted is not None
+        trusted = self._trusted is not None
         tolerance = TOLERANCE if trusted else EXACT
         found = solve(cost, bounds, rest[N_DECIDED:], self._n_pinned, always=trusted, tolerance=tolerance)
         return None if found is None else np.concatenate((rest[:N_DECIDED], found.x))

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.signals import Array
-from ..predict.forecast import Forecast
 from ..predict.linearised import PlanModel
+from ..predict.trusted import TrustedForecast
 from .constraints import Bounds, solve
 from .interior import Tolerance
 from .splines import N_DECIDED, PlanCost, SplineBasis
@@ -55,7 +55,7 @@ class _Point:
     """Coefficients ``(3 + n_free,)``; prediction, position and third differences, ``(preview,)``, and cost, m²."""
 
     coefficients: Array
-    prediction: Forecast
+    prediction: TrustedForecast
     x_h: Array
     third: Array
     cost: float

@@ -11,17 +11,13 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Mapping
 
 import numpy as np
 
 from ..base.errors import SignalError, StateError
 from ..base.settings import PredictorSettings
 from ..base.signals import Array
-from ..predict.candidates import ResidualScale
-from ..predict.guard import SensorGuard
 from ..predict.predictor import HybridPredictor
-from ..predict.trusted import TrustedModel
 from ..predict.uncertainty import Uncertainty
 
 __all__ = ["WEIGHTS_FILE", "learned_settings", "restore_weights", "weights_file"]
@@ -108,64 +104,19 @@ def restore_weights(predictor: HybridPredictor, content: bytes) -> None:
         name: numbers[first:end].reshape(parts[name].shape).copy()
         for name, first, end in zip(parts, ends, ends[1:], strict=False)
     }
-    if not _are_sound(found):
+    if not (Uncertainty.is_sound(found["errors"]) and predictor.residual.is_sound(found)):
         raise StateError(_DAMAGED)
     try:
         predictor.regression.restore(factor, n_samples)
     except SignalError:
         raise StateError(_DAMAGED) from None
     predictor.uncertainty.restore(found["errors"])
-    if predictor.trusted is not None:
-        _restore_learned(predictor.trusted, found)
+    predictor.residual.restore_learned(found)
 
 
 def _learned(predictor: HybridPredictor) -> dict[str, Array]:
     """Return what has been learned besides the factor, in the order of the file."""
-    errors = {"errors": predictor.uncertainty.learned()}
-    return errors if predictor.trusted is None else _learned_with_trust(predictor.trusted) | errors
-
-
-def _learned_with_trust(trusted: TrustedModel) -> dict[str, Array]:
-    """Return what the residual model has learned."""
-    blend, candidates = trusted.blend, trusted.candidates
-    return {
-        "n_rows": np.array([trusted.n_rows]),
-        "velocity_scale": np.array([trusted.velocity_scale]),
-        "scale": np.array(trusted.scale),
-        "noise_variances": np.array([candidate.noise_variance for candidate in candidates]),
-        "correlations": np.array([candidate.correlation for candidate in candidates]),
-        "weights": blend.weights,
-        "largest": trusted.largest,
-        "gram": blend.gram,
-        "cross": blend.cross,
-        "sensor": trusted.guard.learned(),
-    }
-
-
-def _are_sound(learned: Mapping[str, Array]) -> bool:
-    """Return whether the numbers of :func:`_learned` are finite and in range."""
-    if not Uncertainty.is_sound(learned["errors"]):
-        return False
-    least = {"gram": -np.inf, "cross": -np.inf, "correlations": 1.0}
-    if "sensor" in learned and not SensorGuard.is_sound(learned["sensor"]):
-        return False
-    return all(
-        np.isfinite(part).all() and (part >= least.get(name, 0.0)).all()
-        for name, part in learned.items()
-        if name != "sensor"
-    )
-
-
-def _restore_learned(trusted: TrustedModel, learned: Mapping[str, Array]) -> None:
-    """Restore the numbers of :func:`_learned`, which are sound."""
-    (trusted.n_rows,), (trusted.velocity_scale,) = learned["n_rows"].tolist(), learned["velocity_scale"].tolist()
-    trusted.scale = ResidualScale(*learned["scale"].tolist())
-    variances, correlations = learned["noise_variances"].tolist(), learned["correlations"].tolist()
-    for candidate, variance, correlation in zip(trusted.candidates, variances, correlations, strict=True):
-        candidate.noise_variance, candidate.correlation = variance, correlation
-    trusted.largest, blend = learned["largest"], trusted.blend
-    blend.weights, blend.gram, blend.cross = learned["weights"], learned["gram"], learned["cross"]
-    trusted.guard.restore_learned(learned["sensor"])
+    return predictor.residual.learned() | {"errors": predictor.uncertainty.learned()}
 
 
 def _differences(name: str, then: float, now: float) -> list[str]:

@@ -1,4 +1,4 @@
-"""What the residual model with trust predicts of a window, kept until the window is measured."""
+"""What a residual model predicts of a window, kept until the window is measured."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from ..base.signals import Array
-from .candidates import CandidatePrediction
 
 __all__ = ["FeatureScales", "Forecast"]
 
@@ -31,7 +30,7 @@ class FeatureScales(NamedTuple):
 
 @dataclass(frozen=True)
 class Forecast:
-    """Window predicted before it is measured.
+    """Residual of a window, predicted before it is measured.
 
     Attributes
     ----------
@@ -40,21 +39,10 @@ class Forecast:
     e_h : (n,) array, m
         Predicted residual.
     disagreement : (n,) array, m²
-        Variance of the candidates about their blend.
-    x : (n,) array, m
-        Position that the stiffness acts at.
-    hold : float, m
-        Last residual, bounded: the prediction of the hold candidate.
-    predictions : tuple of CandidatePrediction
-        Of the learned candidates; empty before anything is learned.
-    scales : FeatureScales
+        Variance of the candidates about their blend; 0 where there are none.
     """
 
     x_d: Array
     x_pb: Array
     e_h: Array
     disagreement: Array
-    x: Array
-    hold: float
-    predictions: tuple[CandidatePrediction, ...]
-    scales: FeatureScales

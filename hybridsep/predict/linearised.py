@@ -12,8 +12,7 @@ from scipy.signal import lfilter
 
 from ..base.signals import Array
 from .disturbances import DisturbanceSlopes
-from .forecast import Forecast
-from .trusted import TrustedModel
+from .trusted import TrustedForecast, TrustedModel
 
 __all__ = ["PlanModel"]
 
@@ -51,22 +50,22 @@ class PlanModel:
         """Whether it predicts something else than the physics model."""
         return bool(self._solved)
 
-    def predict(self, x_d: Array) -> Forecast:
+    def predict(self, x_d: Array) -> TrustedForecast:
         """Predict the preview, and what is late before it, under commands ``x_d``, ``(n,)``, m."""
         command = np.concatenate((self._late, x_d))
         x_pb, _ = self._discrete.forced_response(self._state, command)
         return self._model.forecast_by(self._solved, command, x_pb, self.scales, self._held)
 
-    def position(self, at: Forecast) -> Array:
+    def position(self, at: TrustedForecast) -> Array:
         """Return ``x_h`` of :meth:`predict` over the preview, ``(n,)``, m."""
         return (at.x_pb + at.e_h)[len(self._late) :]
 
-    def slope(self, at: Forecast, changes: Array, passed: Array, reach: float) -> Array:
+    def slope(self, at: TrustedForecast, changes: Array, passed: Array, reach: float) -> Array:
         """Return the change of ``x_h`` with changes of the commands, ``(n, m)``, once something is learned.
 
         Parameters
         ----------
-        at : Forecast
+        at : TrustedForecast
             Of :meth:`predict`, where the model is linearised.
         changes : (n, m) array
             Changes of the commands, each a column.

@@ -128,7 +128,7 @@ class LookAhead:
     @property
     def may_miss(self) -> bool:
         """Whether measurements may be NaN, which is missing."""
-        return self.predictor.settings.trust
+        return self.predictor.residual.may_miss
 
     @property
     def batch(self) -> int:

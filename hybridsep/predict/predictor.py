@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.signal import lfilter
 
 from ..base.errors import ParameterError, SignalError
 from ..base.output import written_whole
@@ -23,10 +22,11 @@ from ..base.settings import PredictorSettings, samples_before
 from ..base.signals import Array, as_measured, as_samples
 from ..model.physics import ModalModel
 from .disturbances import Disturbance
-from .features import FeatureLayout, PastSamples
-from .forecast import FeatureScales
+from .forecast import FeatureScales, Forecast
+from .paper_model import PaperModel
 from .reference_features import ReferenceFeatures
 from .regression import RidgeRegression
+from .residual_model import ResidualModel, WindowInputs
 from .saved_predictor import predictor_blob, predictor_from
 from .start_in_motion import motion_before
 from .trusted import TrustedModel
@@ -76,16 +76,15 @@ class HybridPredictor:
         self.model = model
         self.discrete = model.discretise(self.T_s, settings.input_hold, block=self.Np)
         self.reference_features = ReferenceFeatures(settings.v_friction, self.T_s)
-        self.layout = FeatureLayout(settings.p, settings.q, self.reference_features.n)
-        self.past = PastSamples(self.layout, self.Np)
         self.disturbances = tuple(disturbances)
         if self.disturbances and not settings.trust:
             raise ParameterError("disturbances are learned with trust = true only")
         for i, one in enumerate(self.disturbances):
             if not callable(one):
                 raise ParameterError(f"disturbances[{i}] must be a function of x and v, got {one!r}")
-        self.trusted = TrustedModel(settings, self.discrete, self.disturbances) if settings.trust else None
-        self._regression = None if settings.trust else RidgeRegression(self.layout.n, settings.lam)
+        self.residual: ResidualModel[Any] = (
+            TrustedModel(settings, self.discrete, self.disturbances) if settings.trust else PaperModel(settings)
+        )
         self.uncertainty = Uncertainty(first_variance(settings), settings.Np)
         self.restart(start, t_init=settings.warm_up)
 
@@ -96,16 +95,13 @@ class HybridPredictor:
 
     @property
     def regression(self) -> RidgeRegression:
-        """Regression of all learned samples; with trust that of :class:`TrustedModel`."""
-        regression = self._regression if self.trusted is None else self.trusted.regression
-        assert regression is not None
-        return regression
+        """Regression of all learned samples, that of the residual model."""
+        return self.residual.regression
 
     @property
     def residual_weights(self) -> Array:
         """Autoregressive weights of the learned recursion, ``(p,)``."""
-        lags = self.layout.e_pb if self.trusted is None else slice(self.trusted.static.n, None)
-        return self.weights[lags]
+        return self.residual.lag_weights
 
     @property
     def weights(self) -> Array:
@@ -128,9 +124,7 @@ class HybridPredictor:
         self.k = 0
         self.state = self.discrete.rest()
         self.late = np.zeros(self.settings.measurement_delay)
-        self.past.restart()
-        if self.trusted is not None:
-            self.trusted.restart()
+        self.residual.restart()
         self.reference_features.restart()
         self.pending: PredictedWindow | None = None
 
@@ -171,39 +165,27 @@ class HybridPredictor:
         command, path = np.concatenate((self.late, command - start)), np.concatenate((self.late + start, path))
         x_pb, _ = self.discrete.forced_response(self.state, command)  # Eq. (2)
         signs = self.reference_features.signs(path, start)
-        e_h, self.pending = self.predicted(command, x_pb, start, path, signs, scales)
+        inputs = WindowInputs(command, x_pb, start, self.reference_features.features(signs, len(command)))
+        forecast = self.residual.forecast(inputs, scales)
+        self.pending = self.predicted(forecast, start, path, signs)
         std = self.pending.error.std
-        return Prediction(x_pb[delay:] + start, e_h[delay:], std[delay:], self._warm_up(n))
+        return Prediction(x_pb[delay:] + start, forecast.e_h[delay:], std[delay:], self._warm_up(n))
 
-    def predicted(
-        self,
-        x_d: Array,
-        x_pb: Array,
-        start: float,
-        reference: Array,
-        signs: Array,
-        scales: FeatureScales | None = None,
-    ) -> tuple[Array, PredictedWindow]:
-        """Return the residual predicted over a window, ``(n,)``, m, and the window, pending measurement.
+    def predicted(self, forecast: Forecast, start: float, reference: Array, signs: Array) -> PredictedWindow:
+        """Return the window of a forecast with what is known of its error, pending measurement.
 
         With a ``measurement_delay`` the window begins so many samples earlier, with those not measured yet.
         """
-        n, forecast = len(x_d), None
-        if self.trusted is not None:
-            self.trusted.static.origin = start
-            forecast = self.trusted.forecast(x_d, x_pb, scales)
-        features = self.reference_features.features(signs, n)
-        e_h = self._free_run(x_pb, features) if forecast is None else forecast.e_h
-        active = np.arange(n) >= self._warm_up(n, late=len(self.late))
+        active = np.arange(len(forecast.x_d)) >= self._warm_up(len(forecast.x_d), late=len(self.late))
         error = self.uncertainty.predict(
-            x_d,
-            x_pb,
-            np.where(active, e_h, 0.0),
+            forecast.x_d,
+            forecast.x_pb,
+            np.where(active, forecast.e_h, 0.0),
             last=self.last_accepted_residual(),
-            disagreement=0.0 if forecast is None else np.where(active, forecast.disagreement, 0.0),
-            doubted=None if self.trusted is None else self.trusted.guard.doubted(x_pb, self.trusted.scale.largest),
+            disagreement=np.where(active, forecast.disagreement, 0.0),
+            doubted=self.residual.doubted(forecast.x_pb),
         )
-        return e_h, PredictedWindow(x_d, x_pb, start, reference, signs, error, forecast)
+        return PredictedWindow(forecast.x_d, forecast.x_pb, start, reference, signs, error, forecast)
 
     def update(self, x: ArrayLike, *, learn: bool = True) -> None:
         """Learn from the measurement of the predicted window, or of its first samples; eq. (6).
@@ -223,28 +205,20 @@ class HybridPredictor:
         pending = self.pending
         if pending is None:
             raise SignalError("update must follow predict: there is no predicted window to measure")
-        measured = as_samples(x, "x") if self.trusted is None else as_measured(x, "x")
+        measured = as_measured(x, "x") if self.residual.may_miss else as_samples(x, "x")
         if not 1 <= len(measured) <= self.n_pending:
             raise SignalError(f"x must have 1 … {self.n_pending} samples, as predicted, got {len(measured)}")
         m = len(measured)
-        accepted = np.ones(m, dtype=np.bool_)
         e_pb = measured - pending.start - pending.x_pb[:m]
-        if self.trusted is not None and pending.forecast is not None:
-            before = deepcopy((self.trusted, self.state)) if self.disturbances else None
-            try:
-                if self.k == 0 and not self.trusted.plans:
-                    pending, e_pb = self._as_it_began(pending, e_pb)
-                assert pending.forecast is not None
-                accepted = self.trusted.learn(pending.forecast, measured - pending.start, fold=learn)
-            except BaseException:  # of a disturbance of the user's own, at a position that was not predicted
-                if before is not None:
-                    self.trusted, self.state = before
-                raise
-        else:
-            from_reference = self.reference_features.features(pending.signs, m)
-            for i in range(0, m, self.Np):
-                stop = min(i + self.Np, m)
-                self._take_in(pending.x_pb[i:stop], e_pb[i:stop], from_reference[i:stop], learn)
+        before = deepcopy((self.residual, self.state)) if self.disturbances else None
+        try:
+            if self.k == 0 and self.residual.may_begin_in_motion:
+                pending, e_pb = self._as_it_began(pending, e_pb)
+            accepted = self.residual.learn(pending.forecast, measured - pending.start, fold=learn)
+        except BaseException:  # of a disturbance of the user's own, at a position that was not predicted
+            if before is not None:
+                self.residual, self.state = before
+            raise
         if learn:
             self.uncertainty.learn(pending.error, e_pb, accepted)
         self.reference_features.advance(pending.signs, pending.reference, m)
@@ -257,12 +231,11 @@ class HybridPredictor:
         """Correct the state at the beginning of a run, if its first residuals tell that it was in motion."""
         m, late = len(e_pb), len(self.late)
         before = motion_before(self.model, self.discrete, pending.x_d, e_pb - pending.error.e_h[:m], late)
-        if before is None or self.trusted is None or pending.forecast is None:
+        if before is None:
             return pending, e_pb
         self.state = self.state + before.state
         x_d, x_pb = pending.x_d + before.x_d, pending.x_pb + before.x_pb
-        self.trusted.begin_in_motion(x_d, x_pb)
-        forecast = replace(pending.forecast, x_d=x_d, x_pb=x_pb)
+        forecast = self.residual.begin_in_motion(pending.forecast, x_d, x_pb)
         return replace(pending, x_d=x_d, x_pb=x_pb, forecast=forecast), e_pb - before.x_pb[:m]
 
     def operator(self, n: int | None = None, *, reference: ArrayLike | None = None) -> WindowOperator:
@@ -278,7 +251,8 @@ class HybridPredictor:
         SignalError
             If ``n < 1``, or the initial position is neither given nor known from a predicted window.
         """
-        if self.trusted is not None:
+        paper = self.residual
+        if not isinstance(paper, PaperModel):
             raise ParameterError("the operator is that of the paper's model: it needs trust = false")
         length = self.Np if n is None else n
         if length < 1:
@@ -286,16 +260,13 @@ class HybridPredictor:
         start = self.start if self.start is not None or self.pending is None else self.pending.start
         if start is None:
             raise SignalError("the start is not known yet: give start= or predict the first window before")
-        w_x, w_e = self.weights[self.layout.x_pb], self.residual_weights
         g_pb = self.discrete.impulse_response(length)
-        # x_h = x_pb + wᵀφ as filters: G_h = (1 + W_x(z) / (1 − W_e(z))) G_pb
-        denominator = np.concatenate(([1.0], -w_e))
-        g_h = g_pb + lfilter(w_x, denominator, g_pb)
+        g_h = paper.impulse_response(g_pb)
         delay = len(self.late)
         free_pb, _ = self.discrete.forced_response(self.state, np.concatenate((self.late, np.zeros(length))))
         path = np.full(length, start) if reference is None else as_samples(reference, "reference", length)
         signs = self.reference_features.signs(np.concatenate((self.late + start, path)), start)
-        free = (free_pb + self._free_run(free_pb, self.reference_features.features(signs, delay + length)))[delay:]
+        free = (free_pb + paper.free_run(free_pb, self.reference_features.features(signs, delay + length)))[delay:]
         free_pb = free_pb[delay:]
         return WindowOperator(
             g_h=g_h,
@@ -319,11 +290,11 @@ class HybridPredictor:
     @property
     def n_rejected(self) -> int:
         """Measurements of this run that were missing or not plausible; 0 without trust."""
-        return 0 if self.trusted is None else self.trusted.n_rejected
+        return self.residual.n_rejected
 
     def last_accepted_residual(self) -> float:
         """Return the residual ``e_pb``, m, that the next window starts from: with trust the last one accepted."""
-        return float(self.past.e_pb[-1] if self.trusted is None else self.trusted.past[0])
+        return self.residual.last
 
     def to_bytes(self) -> bytes:
         """Return parameters and state, a pending window included, as a versioned blob."""
@@ -364,29 +335,3 @@ class HybridPredictor:
     def _warm_up(self, n: int, *, late: int = 0) -> int:
         """Return how many of ``n`` samples, the next ones or from ``late`` samples before, are within the warm-up."""
         return min(max(self.n_init - self.k + late, 0), n)
-
-    def _free_run(self, x_pb: Array, reference: Array) -> Array:
-        """Return ``wᵀφ`` over a window in free run, ``(n,)``; eq. (4)."""
-        w, layout, past = self.weights, self.layout, self.past
-        # Exogenous part: w₀ + Σ_i w_x,i x_pb(k−i), and the features of the reference
-        drive = w[layout.bias] + np.convolve(np.concatenate((past.x_pb, x_pb)), w[layout.x_pb], "valid")
-        if layout.n_reference:
-            drive += reference @ w[layout.reference]
-        # e(k) = drive(k) + Σ_i w_e,i e(k−i), an all-pole filter started from the measured residuals:
-        # its state is z_j = Σ_m w_e,j+m e(−m)
-        w_e = w[layout.e_pb]
-        state = np.correlate(w_e, past.e_pb[::-1], "full")[layout.p - 1 :]
-        e_h, _ = lfilter([1.0], np.concatenate(([1.0], -w_e)), drive, zi=state)
-        return np.asarray(e_h)
-
-    def _take_in(self, x_pb: Array, e_pb: Array, reference: Array, learn: bool) -> None:
-        """Shift by at most ``Np`` measured samples, learning them if ``learn``."""
-        m = len(e_pb)
-        self.past.append(x_pb, e_pb)
-        if learn:
-            self._learn(self.past.rows(m, reference))
-        self.past.advance(m)
-
-    def _learn(self, rows: Array) -> None:
-        """Update the regression with rows ``[φ(k) | e_pb(k)]``; the place for a guard that weighs or drops rows."""
-        self.regression.update_stacked(rows)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base.signals import Array
 
-__all__ = ["N_REFERENCE", "ReferenceFeatures"]
+__all__ = ["N_REFERENCE", "ReferenceFeatures", "n_reference"]
 
 _SHIFTS = (-40, -30, -20, -15, -10, -5, 0, 5, 10, 15, 20, 30, 40)
 """Shifts of ψ, samples: the drive spreads the effect of a reversal, and ψ leads where a model has too much delay."""
@@ -22,6 +22,11 @@ _SCALE = 1e-3
 """Scale of the features, m: friction errors up to this size are hardly damped by a λ that suits the other features."""
 
 N_REFERENCE = len(_SHIFTS)
+
+
+def n_reference(v_friction: float) -> int:
+    """Return the number of features with a velocity scale, m/s: none with 0."""
+    return N_REFERENCE if v_friction > 0 else 0
 
 
 class ReferenceFeatures:
@@ -37,7 +42,7 @@ class ReferenceFeatures:
 
     def __init__(self, v_friction: float, T_s: float) -> None:
         self.v_friction, self.T_s = v_friction, T_s
-        self.n = N_REFERENCE if v_friction > 0 else 0
+        self.n = n_reference(v_friction)
         self.restart()
 
     def restart(self) -> None:

@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..base.saved import Saved
+from ..base.settings import PredictorSettings
 from ..base.signals import PREDICTION_MAX, Array
 from ..base.state import pack, unpack
 from .blend import Blend
 from .candidates import CORRELATION_MAX, ResidualScale
 from .change import ChangeTest
 from .disturbances import LEAST_VELOCITY, StaticState
+from .forecast import FeatureScales
 from .guard import N_STATE
+from .residual_model import SavedFields
 from .rest import N_REST
-from .trusted import TrustedModel
 
-__all__ = ["restore_trusted", "trusted_blob", "trusted_fields"]
+if TYPE_CHECKING:
+    from .trusted import TrustedModel
+
+__all__ = ["check_sizes", "forecast_fields", "restore_trusted", "saved_scales", "trusted_fields"]
 
 _KIND, _CHANGE = "trusted model", "change test"
 
@@ -36,51 +42,45 @@ _ROUNDING = 1e-6
 """Relative tolerance of what rounding may have changed."""
 
 
-def trusted_blob(model: TrustedModel) -> bytes:
-    """Return the complete state as a versioned blob."""
-    state, blend = model.state, model.blend
-    meta = {
-        "n_samples": model.regression.n_samples,
-        **{name: getattr(model, name) for name in ("n_rows", "velocity_scale", "n_rejected")},
-        "look_ahead": model.preview + model.settings.measurement_delay,
-    }
-    arrays = {
-        "factor": model.regression.factor,
-        "largest": model.largest,
-        "scale": np.array(model.scale),
-        "candidates": np.array([[one.noise_variance, one.correlation] for one in model.candidates]),
-        **{name: getattr(blend, name) for name in ("gram", "cross", "weights")},
-        "filters": state.filters,
-        "filtered": state.filtered,
-        "x_d": np.array([state.x_d]),
-        "x_pb": state.x_pb,
-        "past": model.past,
-        "past_bridged": model.past_bridged.astype(np.float64),
-        "guard": np.array(model.guard.state()),
-        "rest": np.array(model.rest.state()),
-    }
-    change = model.change
-    parts = {} if change is None else {"change": _change_blob(change)}
-    return pack(_KIND, meta, arrays, parts)
+def trusted_fields(model: TrustedModel) -> SavedFields:
+    """Return the complete state; arrays of zeros confirm the numbers of lags before the model is made."""
+    lags = {"x_pb": np.zeros(model.settings.q), "e_pb": np.zeros(model.settings.p)}
+    return SavedFields({}, lags, {"trusted": _blob(model)})
 
 
-def trusted_fields(blob: bytes, p: int) -> Saved:
-    """Return the fields of a :func:`trusted_blob`; StateError if its factor is too small for ``p`` lags."""
-    saved = Saved(_KIND, *unpack(_KIND, blob))
-    size = len(saved.array("factor", None, None))
-    if size <= p:
-        raise saved.error(f"factor must have more than p = {p} rows, got {size}")
-    return saved
+def check_sizes(saved: Saved, settings: PredictorSettings) -> None:
+    """Raise StateError if the arrays of :func:`trusted_fields` do not have the sizes of the settings."""
+    saved.array("x_pb", settings.q), saved.array("e_pb", settings.p)
+    own = _own(saved)
+    size = len(own.array("factor", None, None))
+    if size <= settings.p:
+        raise own.error(f"factor must have more than p = {settings.p} rows, got {size}")
 
 
-def restore_trusted(model: TrustedModel, saved: Saved) -> None:
-    """Restore the state of :func:`trusted_fields` in a model with the same settings.
+def forecast_fields(scales: FeatureScales) -> SavedFields:
+    """Return the fields of the scales of a pending window."""
+    arrays = {"pending_scales": np.array([scales.velocity, *scales.largest])}
+    return SavedFields({"pending_rest": scales.n_rest}, arrays, {})
+
+
+def saved_scales(saved: Saved, n_static: int) -> FeatureScales:
+    """Return the scales of :func:`forecast_fields`, with ``n_static`` features; StateError if one is negative."""
+    velocity, *largest = saved.array("pending_scales", 1 + n_static).tolist()
+    if min(velocity, *largest) < 0.0:
+        raise saved.error("the scales of the pending window must be ≥ 0")
+    n_rest = saved.whole("pending_rest") if "pending_rest" in saved.meta else 0  # earlier builds have none
+    return FeatureScales(velocity, np.array(largest), n_rest)
+
+
+def restore_trusted(model: TrustedModel, predictor: Saved) -> None:
+    """Restore the state of :func:`trusted_fields`, among a predictor's, in a model with the same settings.
 
     Raises
     ------
     StateError
         If a field is missing or inconsistent; the model must not be used then.
     """
+    saved = _own(predictor)
     with saved.consistent():
         model.regression.restore(saved.array("factor", None, None), saved.whole("n_samples"))
     model.plan_ahead(saved.whole("look_ahead") - model.settings.measurement_delay)
@@ -115,6 +115,37 @@ def restore_trusted(model: TrustedModel, saved: Saved) -> None:
     model.change = None
     if "change" in saved.parts:
         model.change = _restored_change(model, Saved(_CHANGE, *unpack(_CHANGE, saved.part("change"))))
+
+
+def _blob(model: TrustedModel) -> bytes:
+    state, blend = model.state, model.blend
+    meta = {
+        "n_samples": model.regression.n_samples,
+        **{name: getattr(model, name) for name in ("n_rows", "velocity_scale", "n_rejected")},
+        "look_ahead": model.preview + model.settings.measurement_delay,
+    }
+    arrays = {
+        "factor": model.regression.factor,
+        "largest": model.largest,
+        "scale": np.array(model.scale),
+        "candidates": np.array([[one.noise_variance, one.correlation] for one in model.candidates]),
+        **{name: getattr(blend, name) for name in ("gram", "cross", "weights")},
+        "filters": state.filters,
+        "filtered": state.filtered,
+        "x_d": np.array([state.x_d]),
+        "x_pb": state.x_pb,
+        "past": model.past,
+        "past_bridged": model.past_bridged.astype(np.float64),
+        "guard": np.array(model.guard.state()),
+        "rest": np.array(model.rest.state()),
+    }
+    change = model.change
+    parts = {} if change is None else {"change": _change_blob(change)}
+    return pack(_KIND, meta, arrays, parts)
+
+
+def _own(saved: Saved) -> Saved:
+    return Saved(_KIND, *unpack(_KIND, saved.part("trusted")))
 
 
 def _change_blob(change: ChangeTest) -> bytes:

@@ -8,11 +8,14 @@ results for positions in another unit are the same in that unit.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.saved import Saved
 from ..base.settings import PredictorSettings
 from ..base.signals import Array
 from ..model.discrete import DiscreteModel
@@ -22,10 +25,13 @@ from .change import DOUBTED, ChangeTest
 from .disturbances import LEAST_VELOCITY, Disturbance, StaticFeatures, StaticState
 from .forecast import FeatureScales, Forecast
 from .guard import SensorGuard
+from .learned_trusted import is_sound, learned_numbers, restore_learned
 from .regression import RidgeRegression
+from .residual_model import ResidualModel, SavedFields, WindowInputs
 from .rest import RestBefore
+from .saved_trusted import check_sizes, forecast_fields, restore_trusted, saved_scales, trusted_fields
 
-__all__ = ["TrustedModel"]
+__all__ = ["TrustedForecast", "TrustedModel"]
 
 _LAST_LAG = 0.005
 """Prior variance of the weight of a lag relative to that of the lag ``p`` before it."""
@@ -64,7 +70,28 @@ _NO_PENALTY = 1e-40
 """λ of the factor itself, m²: penalties come with each solution."""
 
 
-class TrustedModel:
+@dataclass(frozen=True)
+class TrustedForecast(Forecast):
+    """Window predicted by the trusted model.
+
+    Attributes
+    ----------
+    x : (n,) array, m
+        Position that the stiffness acts at.
+    hold : float, m
+        Last residual, bounded: the prediction of the hold candidate.
+    predictions : tuple of CandidatePrediction
+        Of the learned candidates; empty before anything is learned.
+    scales : FeatureScales
+    """
+
+    x: Array
+    hold: float
+    predictions: tuple[CandidatePrediction, ...]
+    scales: FeatureScales
+
+
+class TrustedModel(ResidualModel[TrustedForecast]):
     """Model of the residual ``e_pb``, learned online; it stays the physics model where it does not know better.
 
     Parameters
@@ -74,6 +101,8 @@ class TrustedModel:
     discrete : DiscreteModel
         ``G_pb``.
     """
+
+    may_miss: ClassVar[bool] = True
 
     def __init__(self, settings: PredictorSettings, discrete: DiscreteModel, own: Sequence[Disturbance] = ()) -> None:
         self.settings, self.preview = settings, settings.Np
@@ -109,10 +138,26 @@ class TrustedModel:
             correlations = tuple(candidate.correlation for candidate in self.candidates)
             self.change = ChangeTest(self.regression, self.n_rows, correlations)
 
-    def begin_in_motion(self, x_d: Array, x_pb: Array) -> None:
+    def begin_in_motion(self, forecast: TrustedForecast, x_d: Array, x_pb: Array) -> TrustedForecast:
         """Correct what was before a run in motion: commands and physics-based prediction went on as they begin."""
         before = np.arange(-len(self.state.x_pb), 0)
         self.state = self.state._replace(x_d=float(2.0 * x_d[0] - x_d[1]), x_pb=x_pb[0] + (x_pb[1] - x_pb[0]) * before)
+        return super().begin_in_motion(forecast, x_d, x_pb)
+
+    @property
+    def lag_weights(self) -> Array:
+        """Weights of the lags from all learned samples, ``(p,)``."""
+        return self.regression.weights[self.static.n :]
+
+    @property
+    def last(self) -> float:
+        """Last residual that was accepted or bridged, m."""
+        return float(self.past[0])
+
+    @property
+    def may_begin_in_motion(self) -> bool:
+        """Whether a run may begin in motion: not under a compensator, which begins at rest."""
+        return not self.plans
 
     @property
     def plans(self) -> bool:
@@ -124,18 +169,18 @@ class TrustedModel:
         self.preview = preview
         self.static.damping_of_motion = self.plans
 
-    def forecast(self, x_d: Array, x_pb: Array, scales: FeatureScales | None = None) -> Forecast:
-        """Predict the residual over the next window; nothing is changed.
+    def forecast(self, window: WindowInputs, scales: FeatureScales | None = None) -> TrustedForecast:
+        """Predict the residual over the next window; nothing that is learned is changed.
 
         Parameters
         ----------
-        x_d, x_pb : (n,) array, m
-            Commands and physics-based prediction, relative to the start.
+        window : WindowInputs
         scales : FeatureScales, optional
-            Those of :meth:`scales` for these commands if left out; a compensator's follow from its preview.
+            Those of :meth:`scales` for its commands if left out; a compensator's follow from its preview.
         """
-        scales = self.scales(x_d, x_pb) if scales is None else scales
-        return self.forecast_by(self.solved(scales), x_d, x_pb, scales)
+        self.static.origin = window.start
+        scales = self.scales(window.x_d, window.x_pb) if scales is None else scales
+        return self.forecast_by(self.solved(scales), window.x_d, window.x_pb, scales)
 
     def forecast_by(
         self,
@@ -144,7 +189,7 @@ class TrustedModel:
         x_pb: Array,
         scales: FeatureScales,
         held: tuple[CandidatePrediction, ...] = (),
-    ) -> Forecast:
+    ) -> TrustedForecast:
         """Predict as :meth:`forecast` by the candidates of :meth:`solved`, with the variances ``held`` if there are."""
         predictions: tuple[CandidatePrediction, ...] = ()
         before: Sequence[CandidatePrediction | None] = held or [None] * len(solved)
@@ -161,7 +206,7 @@ class TrustedModel:
         candidates = self._blended(hold, predictions, len(x_d))
         e_h = self.blend.weights @ candidates
         disagreement = np.maximum(self.blend.weights @ candidates**2 - e_h**2, 0.0)
-        return Forecast(x_d, x_pb, e_h, disagreement, x, hold, predictions, scales)
+        return TrustedForecast(x_d, x_pb, e_h, disagreement, x, hold, predictions, scales)
 
     def _rows(self, x_d: Array, x_pb: Array, x: Array, scales: FeatureScales) -> Array:
         """Return the static features to predict with, ``(n, n_static)``; ``x``: position that the stiffness acts at.
@@ -210,7 +255,7 @@ class TrustedModel:
         """Last residual, m, bounded: one that was not learned may be larger."""
         return min(max(float(self.past[0]), -self.bound), self.bound)
 
-    def learn(self, forecast: Forecast, x: Array, *, fold: bool = True) -> NDArray[np.bool_]:
+    def learn(self, forecast: TrustedForecast, x: Array, *, fold: bool = True) -> NDArray[np.bool_]:
         """Learn from the measurement of a window; return which samples are accepted, ``(m,)`` bool.
 
         Parameters
@@ -247,7 +292,47 @@ class TrustedModel:
         self.past_bridged = bridged[-p:]
         return accepted
 
-    def _with_less_of_earlier_runs(self, forecast: Forecast) -> Array | None:
+    def doubted(self, x_pb: Array) -> Array | None:
+        """Return the residual if the rejected measurement before the window is true, ``(n,)``, m; None if none was."""
+        return self.guard.doubted(x_pb, self.scale.largest)
+
+    @staticmethod
+    def check_sizes(saved: Saved, settings: PredictorSettings) -> None:
+        """Raise StateError if arrays do not have the sizes of the settings."""
+        check_sizes(saved, settings)
+
+    def saved(self) -> SavedFields:
+        """Return the complete state."""
+        return trusted_fields(self)
+
+    def restore(self, saved: Saved) -> None:
+        """Restore the state of :meth:`saved`; StateError if it is inconsistent: the model must not be used then."""
+        restore_trusted(self, saved)
+
+    def saved_forecast(self, forecast: TrustedForecast) -> SavedFields:
+        """Return the scales of a forecast, which a compensator has from its preview."""
+        return forecast_fields(forecast.scales)
+
+    def restored_forecast(self, saved: Saved, window: WindowInputs) -> TrustedForecast:
+        """Return the forecast of :meth:`saved_forecast`; StateError if it is inconsistent."""
+        forecast = self.forecast(window, saved_scales(saved, self.static.n))
+        if not np.isfinite(forecast.e_h).all():
+            raise saved.error("the prediction of the pending window must be finite")
+        return forecast
+
+    def learned(self) -> dict[str, Array]:
+        """Return what has been learned besides the regression, in the order of a weights file."""
+        return learned_numbers(self)
+
+    def is_sound(self, learned: Mapping[str, Array]) -> bool:
+        """Return whether the numbers of :meth:`learned` are finite and in range."""
+        return is_sound(self, learned)
+
+    def restore_learned(self, learned: Mapping[str, Array]) -> None:
+        """Restore the numbers of :meth:`learned`, which are sound."""
+        restore_learned(self, learned)
+
+    def _with_less_of_earlier_runs(self, forecast: TrustedForecast) -> Array | None:
         """Return the prediction with lags if earlier runs had less weight, ``(n,)``, m; None if there is no other."""
         change = self.change
         if change is None or change.n_after == 0.0 or not forecast.predictions:
@@ -258,7 +343,7 @@ class TrustedModel:
         return self.predict(solved, rows).e_h
 
     def _is_doubted(
-        self, forecast: Forecast, doubtful: Array | None, measured: Array, accepted: NDArray[np.bool_]
+        self, forecast: TrustedForecast, doubtful: Array | None, measured: Array, accepted: NDArray[np.bool_]
     ) -> bool:
         """Return whether earlier runs had better have less weight, as in the prediction ``doubtful``."""
         m = len(measured)
@@ -293,7 +378,9 @@ class TrustedModel:
         if change is not None and (changed or change.is_over):
             self.change = None
 
-    def _assess(self, forecast: Forecast, measured: Array, accepted: NDArray[np.bool_], *, surprises: bool) -> None:
+    def _assess(
+        self, forecast: TrustedForecast, measured: Array, accepted: NDArray[np.bool_], *, surprises: bool
+    ) -> None:
         """Judge the candidates and their blend by the measurement of their window, which may surprise."""
         m = len(measured)
         self._judge(forecast, measured, accepted, surprises)
@@ -352,7 +439,7 @@ class TrustedModel:
         learned = [prediction.e_h[:m] for prediction in predictions] or [np.zeros(m)] * (len(_FIRST_WEIGHTS) - 1)
         return np.stack((np.full(m, hold), *learned))
 
-    def _judge(self, forecast: Forecast, measured: Array, accepted: NDArray[np.bool_], surprises: bool) -> None:
+    def _judge(self, forecast: TrustedForecast, measured: Array, accepted: NDArray[np.bool_], surprises: bool) -> None:
         """Estimate the errors of the candidates from the measurement of their window."""
         m, given = len(measured), self.settings.noise_std**2
         if not forecast.predictions:

@@ -68,8 +68,8 @@ class PredictedWindow:
         ψ of the reference.
     error : PredictedError
         Published residual, and what is known of its error.
-    forecast : Forecast, optional
-        Prediction of the residual, with trust.
+    forecast : Forecast
+        Prediction of the residual by its model.
     """
 
     x_d: Array
@@ -78,7 +78,7 @@ class PredictedWindow:
     reference: Array
     signs: Array
     error: PredictedError
-    forecast: Forecast | None = None
+    forecast: Forecast
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 from compensator_cases import DRIVE_LIMITS, TS, beyond
+from trusted_cases import trusted_model
 
 from hybridsep import load_machine
 from hybridsep.base.errors import StateError
@@ -56,8 +57,7 @@ def learned(period: float = 0.0) -> bytes:
 
 def plan_model(sep: SepCompensator, x_d: Array, late: int = 0) -> PlanModel:
     """Return the model over commands of which the first ones are late."""
-    assert sep.predictor.trusted is not None
-    return PlanModel(sep.predictor.trusted, sep.predictor.state, x_d[:late], x_d[late:], x_d[late:])
+    return PlanModel(trusted_model(sep.predictor), sep.predictor.state, x_d[:late], x_d[late:], x_d[late:])
 
 
 @pytest.mark.parametrize("period", [0.0, 2e-3])
@@ -86,8 +86,7 @@ def test_late_commands_are_predicted_and_not_changed(late: int) -> None:
     """The preview after them is the end of a longer one, whose first commands stay as they are."""
     sep, n = SepCompensator.from_bytes(learned(2e-3)), 200
     x_d, basis = moves()[: late + n], SplineBasis(n, 2)
-    assert sep.predictor.trusted is not None
-    sep.predictor.trusted.rest.known = late  # the moves begin later
+    trusted_model(sep.predictor).rest.known = late  # the moves begin later
     whole, model = plan_model(sep, x_d), plan_model(sep, x_d, late)
     at, of_whole = model.predict(x_d[late:]), whole.predict(x_d)
     np.testing.assert_array_equal(model.position(at), whole.position(of_whole)[late:])

@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 from c_core import CModel, refusal, write_weights
 from library_models import trained_predictor
+from trusted_cases import trusted_model
 
 from hybridsep.app import cli
 from hybridsep.base.errors import FmuError, StateError
@@ -199,8 +200,7 @@ def test_no_mutation_of_a_file_with_trust_is_accepted(tmp_path: Path) -> None:
     model, file = CModel("predictor", TRUST, tmp_path), tmp_path / WEIGHTS_FILE
     first = 40 + 32 * len(learned_settings(predictor))
     body = content[:-8]
-    trusted = predictor.trusted
-    assert trusted is not None
+    trusted = trusted_model(predictor)
     n_blended, n_candidates = len(trusted.blend.first), len(trusted.candidates)
     n_numbers = 5 + 2 * n_candidates + trusted.static.n + n_blended * (n_blended + 2) + 4 + N_LEARNED
     errors, correlations = first + 8 * (n_numbers - N_LEARNED), first + 8 * (5 + n_candidates)

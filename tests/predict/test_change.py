@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
-from trusted_cases import PERIOD, cycles, friction, physics, run, trusted
+from trusted_cases import PERIOD, cycles, friction, physics, run, trusted, trusted_model
 
 from benchmarks.random_drives.generator import random_drive
 from benchmarks.random_drives.simulation import simulate
@@ -153,8 +153,7 @@ def test_a_change_that_the_likelihood_does_not_tell_is_relearned(index: int, mos
     warm = HybridPredictor(drive.model)
     run(warm, drive.x_d, drive.x_meas)
     warm.restart()
-    assert warm.trusted is not None
-    assert warm.trusted.change is not None
+    assert trusted_model(warm).change is not None
     error, cold = (rms((x_meas - run(one, drive.x_d, x_meas))[2000:]) for one in (warm, HybridPredictor(drive.model)))
     assert error <= most * cold
 
@@ -175,37 +174,33 @@ def test_what_has_changed_is_relearned_as_fast_as_cold(factor: float) -> None:
     found, cold = run(warm, x_d, x), run(trusted(), x_d, x)
     late = slice(2000, None)
     assert rms((x - found)[late]) <= 1.02 * rms((x - cold)[late])
-    assert warm.trusted is not None
-    assert warm.trusted.change is None
-    assert warm.trusted.n_rows <= len(x_d)  # those of earlier runs are gone
+    assert trusted_model(warm).change is None
+    assert trusted_model(warm).n_rows <= len(x_d)  # those of earlier runs are gone
 
 
 def test_what_has_not_changed_keeps_what_was_learned() -> None:
     x_d = cycles(4 * PERIOD)
     x = physics(x_d) + friction(x_d) + NOISE * np.random.default_rng(8).normal(size=len(x_d))
     warm = learned(x_d, friction(x_d))
-    assert warm.trusted is not None
-    carried = warm.trusted.n_rows
+    carried = trusted_model(warm).n_rows
     found, cold = run(warm, x_d, x), run(trusted(), x_d, x)
     assert rms(x - found) < 1.1 * NOISE < 0.5 * rms(x - cold)
-    assert warm.trusted.n_rows == pytest.approx(carried + len(x_d))
+    assert trusted_model(warm).n_rows == pytest.approx(carried + len(x_d))
 
 
 def test_the_comparison_ends_once_this_run_outweighs_the_earlier_ones() -> None:
     x_d = cycles(12 * PERIOD)
     e = friction(x_d)
     warm = learned(x_d[:PERIOD], e[:PERIOD])
-    assert warm.trusted is not None
-    assert warm.trusted.change is not None
+    assert trusted_model(warm).change is not None
     run(warm, x_d[: 9 * PERIOD], (physics(x_d) + e)[: 9 * PERIOD])
-    assert warm.trusted.change is not None
+    assert trusted_model(warm).change is not None
     run(warm, x_d[9 * PERIOD :], (physics(x_d) + e)[9 * PERIOD :])
-    assert warm.trusted.change is None
+    assert trusted_model(warm).change is None
 
 
 def test_a_cold_run_compares_nothing() -> None:
     predictor = trusted()
-    assert predictor.trusted is not None
-    assert predictor.trusted.change is None
+    assert trusted_model(predictor).change is None
     run(predictor, cycles(300), physics(cycles(300)) + friction(cycles(300)))
-    assert predictor.trusted.change is None
+    assert trusted_model(predictor).change is None

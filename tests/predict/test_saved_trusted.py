@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from trusted_cases import cycles, friction, physics, run, trusted
+from trusted_cases import cycles, friction, physics, run, trusted, trusted_model
 
 from hybridsep.base.errors import StateError
 from hybridsep.base.signals import Array
@@ -50,9 +50,8 @@ def test_a_restored_predictor_continues_bit_for_bit(way: str, pending: bool, war
     x_d, x = signals()
     x[[390, 395]], x[435:440] = np.nan, x[435] + 1e-2  # what the guard knows is part of the state, too
     original = in_mid_run(x=x, warm=warm)
-    assert original.trusted is not None
-    assert (original.trusted.change is not None) == warm
-    assert original.trusted.n_rejected >= 2
+    assert (trusted_model(original).change is not None) == warm
+    assert trusted_model(original).n_rejected >= 2
     if not pending:
         original.update(x[400:430])
     twin = WAYS[way](original)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from predictor_cases import MODEL
-from trusted_cases import FRICTION, PERIOD, TS, cycles, friction, physics, run, trusted
+from trusted_cases import FRICTION, PERIOD, TS, cycles, friction, physics, run, trusted, trusted_model
 
 from hybridsep.base.errors import ParameterError
 from hybridsep.base.settings import PredictorSettings
@@ -153,10 +153,9 @@ def test_what_is_held_is_bounded_by_what_was_learned() -> None:
     x = physics(x_d) + 1e-5 + np.cumsum(1e-7 * rng.normal(size=3000))  # an offset that drifts, which a hold predicts
     predictor = trusted()
     run(predictor, x_d[:2900], x[:2900])
-    assert predictor.trusted is not None
-    assert predictor.trusted.blend.weights[0] > 0.3
-    predictor.trusted.past[0] = 1.0
-    largest = predictor.trusted.scale.largest
+    assert trusted_model(predictor).blend.weights[0] > 0.3
+    trusted_model(predictor).past[0] = 1.0
+    largest = trusted_model(predictor).scale.largest
     assert np.abs(predictor.predict(x_d[2900:]).e_h).max() <= 1.2 * largest < 1e-4
 
 
@@ -177,12 +176,10 @@ def test_the_noise_that_is_given_is_that_of_the_candidates() -> None:
     x_d, _, x = with_friction(1000, noise=1e-6)
     predictor = trusted(noise_std=3e-6)
     run(predictor, x_d, x)
-    assert predictor.trusted is not None
-    assert [one.noise_variance for one in predictor.trusted.candidates] == [pytest.approx(9e-12)] * 3
+    assert [one.noise_variance for one in trusted_model(predictor).candidates] == [pytest.approx(9e-12)] * 3
     estimated = trusted()
     run(estimated, x_d, x)
-    assert estimated.trusted is not None
-    for one in estimated.trusted.candidates:
+    for one in trusted_model(estimated).candidates:
         assert math.sqrt(one.noise_variance) == pytest.approx(1e-6, rel=0.3)
 
 

@@ -23,6 +23,7 @@ from hybridsep.plants.plant import Plant, simulate
 from hybridsep.plants.stage_drive import StageDrive
 from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.look_ahead import LookAhead
+from hybridsep.predict.paper_model import PaperModel
 from hybridsep.predict.predictor import HybridPredictor
 
 RUNAWAY = 1e5
@@ -103,7 +104,8 @@ def runaway_predictor() -> HybridPredictor:
     machine = paper_machine("spring_mass_damper")
     predictor = machine.new_predictor(replace(machine.predictor_settings, t_init=0.0))
     weights = np.zeros(predictor.n_features)
-    weights[0], weights[predictor.layout.e_pb.start] = 1e-3, RUNAWAY
+    assert isinstance(predictor.residual, PaperModel)
+    weights[0], weights[predictor.residual.layout.e_pb.start] = 1e-3, RUNAWAY
     factor = 1e6 * np.eye(predictor.n_features + 1)
     factor[:-1, -1] = factor[:-1, :-1] @ weights
     predictor.regression.restore(factor, 1000)

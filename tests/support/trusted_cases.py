@@ -10,8 +10,9 @@ from predictor_cases import MODEL
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.predict.predictor import HybridPredictor
+from hybridsep.predict.trusted import TrustedModel
 
-__all__ = ["FRICTION", "PERIOD", "TS", "cycles", "friction", "physics", "run", "trusted"]
+__all__ = ["FRICTION", "PERIOD", "TS", "cycles", "friction", "physics", "run", "trusted", "trusted_model"]
 
 TS = 1e-3  # s
 PERIOD = 1000
@@ -24,6 +25,12 @@ FRICTION = 2e-5
 def trusted(**changes: Any) -> HybridPredictor:
     """Return a predictor with trust of the default drive."""
     return HybridPredictor(MODEL, PredictorSettings(trust=True, **changes))
+
+
+def trusted_model(predictor: HybridPredictor) -> TrustedModel:
+    """Return the residual model of a predictor with trust."""
+    assert isinstance(predictor.residual, TrustedModel)
+    return predictor.residual
 
 
 def cycles(n: int, amplitude: float = 5e-3) -> Array:
