@@ -40,7 +40,7 @@ from hybridsep.base.settings import PredictorSettings
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.evaluate.canvas import save_figure
 from hybridsep.model.physics import ModalModel
-from hybridsep.predict.look_ahead import LookAhead
+from hybridsep.online.look_ahead import LookAhead
 from hybridsep.predict.predictor import HybridPredictor
 from hybridsep.predict.regression import RidgeRegression
 

@@ -6,7 +6,7 @@ from hybridsep.base.errors import HybridSepError
 from hybridsep.base.settings import CompensatorSettings
 from hybridsep.compensate.compensator import SepCompensator
 from hybridsep.fmi import look_ahead_slave
-from hybridsep.predict.look_ahead import LookAhead
+from hybridsep.online.look_ahead import LookAhead
 
 
 class SepCompensatorPy(look_ahead_slave.LookAheadSlave):

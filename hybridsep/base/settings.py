@@ -152,7 +152,7 @@ class PredictorSettings(Settings):
     input_hold : {"zoh", "foh"}
         Zero-order or first-order hold of ``x_d`` in the physics model.
     trust : bool
-        Whether the residual is predicted by :class:`~hybridsep.predict.trusted.TrustedModel`; else it is the paper's.
+        Whether the residual model is :class:`~hybridsep.predict.trust.model.TrustedModel`; else it is the paper's.
     effect, noise_std : float
         With trust: prior standard deviation of the effect of a feature, and that of the measurement noise, m; 0: from
         the residuals.

@@ -21,13 +21,13 @@ from numpy.typing import ArrayLike
 from ..base.errors import SignalError
 from ..base.settings import CompensatorSettings, PredictorSettings
 from ..base.signals import Array, as_published, as_samples
-from ..predict.disturbances import Disturbance
-from ..predict.linearised import PlanModel
 from ..predict.predictor import HybridPredictor
-from ..predict.trusted import TrustedModel
+from ..predict.trust.disturbances import Disturbance
+from ..predict.trust.model import TrustedModel
 from ..predict.window import PublishedWindow
 from .constraints import Bounds, DriveBounds, solve
 from .interior import EXACT
+from .linearised import PlanModel
 from .plan import PendingPlan, SepState
 from .plan_monitor import PlanMonitor, has_stable_poles
 from .saved_compensator import compensator_blob, compensator_from

@@ -10,8 +10,8 @@ import numpy as np
 from ..base.saved import Saved
 from ..base.settings import CompensatorSettings
 from ..base.state import pack, unpack
-from ..predict.disturbances import Disturbance
 from ..predict.predictor import HybridPredictor
+from ..predict.trust.disturbances import Disturbance
 from ..predict.window import Prediction
 from .plan import PendingPlan, SepState
 

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.signals import Array
-from ..predict.linearised import PlanModel
-from ..predict.trusted import TrustedForecast
+from ..predict.trust.forecast import TrustedForecast
 from .constraints import Bounds, solve
 from .interior import Tolerance
+from .linearised import PlanModel
 from .splines import N_DECIDED, PlanCost, SplineBasis
 
 __all__ = ["TOLERANCE", "TrustedPlanner", "is_better"]

@@ -8,9 +8,9 @@ from __future__ import annotations
 from typing import Any
 
 from ..compensate.compensator import SepCompensator
+from ..online.look_ahead import LookAhead
 from ..plants.encoder import Encoder
 from ..plants.plant import Plant
-from ..predict.look_ahead import LookAhead
 from ..predict.predictor import HybridPredictor
 from .run import COMPENSATOR, PREDICTOR, Kind
 

@@ -17,9 +17,9 @@ from ..base.data_files import DEFAULT_MACHINE
 from ..base.errors import FmuError
 from ..base.output import written_whole
 from ..base.settings import PARAMETERS
+from ..fmi import native_flavour, python_flavour
 from ..machines.machine import Machine
 from ..machines.sections import FeedDriveSection
-from . import native_flavour, python_flavour
 from .flavours import FLAVOURS
 from .warm_start import load_trained
 

@@ -11,8 +11,8 @@ from typing import Any, ClassVar
 from ..base.saved import Saved
 from ..base.settings import PredictorSettings
 from ..model.physics import ModalModel, Mode
-from ..predict.look_ahead import LookAhead, Planner
-from ..predict.look_ahead_inputs import LookAheadInputs
+from ..online.look_ahead import LookAhead, Planner
+from ..online.look_ahead_inputs import LookAheadInputs
 from ..predict.predictor import HybridPredictor
 from .slave import TableSlave
 from .variables import modes_from

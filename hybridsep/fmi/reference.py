@@ -18,9 +18,9 @@ from numpy.typing import ArrayLike
 from ..base.signals import Array, as_samples
 from ..compensate.compensator import SepCompensator
 from ..machines.machine import Machine
+from ..online.look_ahead import LookAhead
 from ..plants.encoder import Encoder
 from ..plants.trajectory import staircase
-from ..predict.look_ahead import LookAhead
 from ..predict.predictor import HybridPredictor
 from .variables import variables_of
 from .weights import restore_weights, weights_file

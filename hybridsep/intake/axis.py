@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.signals import Array
+from ..intake import fixes
 from ..logs.log import Log
-from . import fixes
 from .drives import NO_BETTER, drive_explaining
 from .finding import ERROR, NOTE, WARNING, Finding, Fix
 from .relation import LAG_MAX, fit_dead_time, line, line_at_best_lag, noise_std, shifted

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.signals import Array, Indices
+from ..intake import fixes
 from ..logs.log import Log
-from . import fixes
 from .finding import ERROR, Finding, Fix, Picture
 from .relation import line_at_best_lag, noise_std, shifted
 from .samples import resolution

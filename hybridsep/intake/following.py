@@ -8,8 +8,8 @@ from functools import partial
 import numpy as np
 
 from ..base.signals import Array
+from ..intake import fixes
 from ..logs.log import Log
-from . import fixes
 from .finding import ERROR, Finding, Fix
 from .relation import LAG_MAX, DeadTime, fit_dead_time, line_at_best_lag
 from .stretch import averaged, over_time, stretch

@@ -8,8 +8,8 @@ from dataclasses import replace
 from functools import partial
 
 from ..base.signals import Array
+from ..intake import fixes
 from ..logs.log import Log
-from . import fixes
 from .drives import NO_BETTER, drive_explaining
 from .finding import ERROR, NOTE, Finding, Fix
 from .relation import LAG_MAX, DeadTime, Line, fit_dead_time, line_at_best_lag

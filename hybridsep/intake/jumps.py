@@ -8,8 +8,8 @@ from functools import partial
 import numpy as np
 
 from ..base.signals import Array, Indices
+from ..intake import fixes
 from ..logs.log import Log
-from . import fixes
 from .finding import ERROR, WARNING, Finding, Fix, Picture
 from .relation import noise_std
 

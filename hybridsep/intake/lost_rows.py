@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.signals import Array
+from ..intake import fixes
 from ..logs.log import Log
-from . import fixes
 from .finding import ERROR, Finding, Fix, Picture
 
 __all__ = ["check_lost_rows"]

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.signals import Array
+from ..intake import fixes
 from ..logs.log import Log
-from . import fixes
 from .finding import ERROR, HOPELESS, NOTE, WARNING, Finding, Fix, Picture
 from .relation import noise_std
 

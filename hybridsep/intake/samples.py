@@ -9,8 +9,8 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d, median_filter
 
 from ..base.signals import Array, Indices
+from ..intake import fixes
 from ..logs.log import Log
-from . import fixes
 from .finding import NOTE, WARNING, Finding, Fix, Picture
 
 __all__ = ["check_missing", "check_outliers", "check_repeated", "check_stuck", "resolution"]

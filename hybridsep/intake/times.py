@@ -9,10 +9,10 @@ import numpy as np
 
 from ..base.saved import COUNT_MAX
 from ..base.signals import Indices
+from ..intake import fixes
 from ..logs.gaps import gap_starts
 from ..logs.log import Log
 from ..logs.time_axis import TOLERANCE
-from . import fixes
 from .finding import ERROR, WARNING, Finding, Fix, Picture
 
 __all__ = ["BRIDGED_MAX", "check_gaps", "check_jitter", "check_order"]

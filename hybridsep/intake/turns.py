@@ -9,8 +9,8 @@ from functools import partial
 import numpy as np
 
 from ..base.signals import Array, Indices
+from ..intake import fixes
 from ..logs.log import Log
-from . import fixes
 from .finding import ERROR, Finding, Fix, Picture
 
 __all__ = ["check_turns"]

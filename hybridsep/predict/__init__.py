@@ -1,1 +1,1 @@
-"""Linear hybrid predictor, eqs. (2) to (6): by windows and sample by sample."""
+"""Hybrid predictor by windows, eqs. (2) to (6): what its two models of the residual share."""

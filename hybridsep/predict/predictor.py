@@ -21,15 +21,15 @@ from ..base.output import written_whole
 from ..base.settings import PredictorSettings, samples_before
 from ..base.signals import Array, as_measured, as_samples
 from ..model.physics import ModalModel
-from .disturbances import Disturbance
 from .forecast import FeatureScales, Forecast
-from .paper_model import PaperModel
+from .paper.model import PaperModel
 from .reference_features import ReferenceFeatures
 from .regression import RidgeRegression
 from .residual_model import ResidualModel, WindowInputs
 from .saved_predictor import predictor_blob, predictor_from
 from .start_in_motion import motion_before
-from .trusted import TrustedModel
+from .trust.disturbances import Disturbance
+from .trust.model import TrustedModel
 from .uncertainty import Uncertainty, first_variance
 from .window import PredictedWindow, Prediction, WindowOperator
 

@@ -12,10 +12,10 @@ from ..base.saved import Saved
 from ..base.settings import PredictorSettings
 from ..base.state import pack, unpack
 from ..model.physics import ModalModel, Mode
-from .disturbances import Disturbance
-from .paper_model import PaperModel
+from .paper.model import PaperModel
 from .residual_model import WindowInputs
-from .trusted import TrustedModel
+from .trust.disturbances import Disturbance
+from .trust.model import TrustedModel
 from .uncertainty import N_LEARNED
 from .window import PredictedWindow
 

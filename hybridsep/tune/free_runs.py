@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.signals import Array, Indices
-from ..predict.features import FeatureLayout
+from ..predict.paper.features import FeatureLayout
 
 __all__ = ["free_runs"]
 

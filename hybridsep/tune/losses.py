@@ -20,7 +20,7 @@ from ..base.threads import one_blas_thread
 from ..evaluate.backtest import Batch, backtest_stream
 from ..intake.motion import starts_in_motion
 from ..model.physics import ModalModel
-from ..predict.features import PastSamples
+from ..predict.paper.features import PastSamples
 from ..predict.predictor import HybridPredictor
 from .free_runs import free_runs
 from .nested import NestedRidge

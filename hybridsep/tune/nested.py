@@ -17,7 +17,7 @@ from scipy.linalg import lapack
 
 from ..base.settings import PredictorSettings
 from ..base.signals import Array, Indices
-from ..predict.features import FeatureLayout
+from ..predict.paper.features import FeatureLayout
 from ..predict.regression import RidgeRegression, fold
 
 __all__ = ["NestedRidge"]

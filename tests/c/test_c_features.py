@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.model.physics import ModalModel
-from hybridsep.predict.features import FeatureLayout
+from hybridsep.predict.paper.features import FeatureLayout
 from hybridsep.predict.predictor import HybridPredictor
 from hybridsep.predict.reference_features import N_REFERENCE
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from hybridsep.predict.guard import SensorGuard
+from hybridsep.predict.trust.guard import SensorGuard
 
 Array = NDArray[np.float64]
 

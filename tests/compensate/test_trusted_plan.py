@@ -16,13 +16,13 @@ from hybridsep.base.errors import StateError
 from hybridsep.base.settings import CompensatorSettings, Limits, PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepCompensator, SepState
+from hybridsep.compensate.linearised import PlanModel
 from hybridsep.compensate.splines import SplineBasis
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.cosim.run import Run
 from hybridsep.machines.machine import Machine
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest
-from hybridsep.predict.linearised import PlanModel
 from hybridsep.predict.predictor import HybridPredictor
 
 TRUSTED = PredictorSettings(Np=50, p=20)

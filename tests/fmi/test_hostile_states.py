@@ -20,7 +20,7 @@ from hybridsep.base.settings import CompensatorSettings, Limits, PredictorSettin
 from hybridsep.base.state import VERSION
 from hybridsep.compensate.compensator import SepCompensator
 from hybridsep.model.physics import ModalModel
-from hybridsep.predict.look_ahead import LookAhead
+from hybridsep.online.look_ahead import LookAhead
 from hybridsep.predict.predictor import HybridPredictor
 
 MODEL = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0, dead_time=2)

@@ -191,13 +191,13 @@ def travelling(path: Path) -> dict[str, str]:
 
 def test_each_fmu_carries_what_it_needs(python_fmu: Fmu, tmp_path: Path) -> None:
     mine = travelling(python_fmu("SepCompensatorPy"))
-    assert {"compensate/compensator.py", "predict/look_ahead.py", "base/settings.py", "fmi/slave.py"} < set(mine)
+    assert {"compensate/compensator.py", "online/look_ahead.py", "base/settings.py", "fmi/slave.py"} < set(mine)
     assert {"predict/reference_features.py", "compensate/interior.py", "compensate/__init__.py"} < set(mine)
     assert not {"machines/machine.py", "plants/plant.py", "plants/trajectory.py", "fmi/archive.py"} & set(mine)
     for name in ("HybridPredictorPy", "FeedDrivePy"):
         theirs = travelling(python_fmu(name))
         assert not any(module.startswith("compensate/") for module in theirs)
-        assert "predict/look_ahead.py" in theirs or name == "FeedDrivePy"
+        assert "online/look_ahead.py" in theirs or name == "FeedDrivePy"
     for name in ("SepCompensatorPy", "HybridPredictorPy", "FeedDrivePy"):
         needs_nothing_else(python_fmu(name), tmp_path / name)
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hybridsep.predict.blend import Blend, simplex_minimum
+from hybridsep.predict.trust.blend import Blend, simplex_minimum
 
 FIRST, LATER = (0.0, 0.5, 0.5), (0.5, 0.0, 0.5)
 NP = 50

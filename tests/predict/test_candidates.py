@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from hybridsep.base.signals import Array
-from hybridsep.predict.candidates import CORRELATION_MAX, Candidate, ResidualScale
 from hybridsep.predict.regression import RidgeRegression
+from hybridsep.predict.trust.candidates import CORRELATION_MAX, Candidate, ResidualScale
 
 N_STATIC, N = 3, 40
 EFFECTS = np.array([1.0, 0.5, 0.2])

@@ -13,9 +13,9 @@ from benchmarks.random_drives.generator import random_drive
 from benchmarks.random_drives.simulation import simulate
 from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel
-from hybridsep.predict.change import DOUBTED, ChangeTest
 from hybridsep.predict.predictor import HybridPredictor
 from hybridsep.predict.regression import RidgeRegression
+from hybridsep.predict.trust.change import DOUBTED, ChangeTest
 
 NOISE = 1e-6  # m
 NO_PENALTY = 1e-40

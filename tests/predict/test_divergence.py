@@ -12,7 +12,7 @@ from library_models import library_compensator, numbered, runaway_predictor
 
 from hybridsep.base.errors import SignalError
 from hybridsep.evaluate.backtest import backtest
-from hybridsep.predict.look_ahead import LookAhead
+from hybridsep.online.look_ahead import LookAhead
 from hybridsep.predict.window import Prediction
 
 SAID = "x_h must stay within ±1e+100 m: the learned recursion diverges; raise lambda, lower p or reset"

@@ -25,12 +25,12 @@ from hybridsep.base.settings import PARAMETERS, Limits, PredictorSettings
 from hybridsep.fmi.variables import variables_of
 from hybridsep.machines.machine import load_machine
 from hybridsep.model.physics import ModalModel, Mode
+from hybridsep.online.look_ahead import LookAhead
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.feed_drive import FeedDrive
 from hybridsep.plants.plant import Plant
 from hybridsep.plants.stage_drive import StageDrive
 from hybridsep.plants.trajectory import rest_to_rest
-from hybridsep.predict.look_ahead import LookAhead
 from hybridsep.predict.predictor import HybridPredictor
 
 SAMPLES = 40

@@ -12,8 +12,8 @@ from hybridsep.base.metrics import rms
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.model.physics import ModalModel
 from hybridsep.plants.trajectory import staircase
-from hybridsep.predict.guard import SensorGuard
 from hybridsep.predict.predictor import HybridPredictor
+from hybridsep.predict.trust.guard import SensorGuard
 
 Array = NDArray[np.float64]
 

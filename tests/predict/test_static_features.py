@@ -8,7 +8,7 @@ import pytest
 
 from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel, Mode
-from hybridsep.predict.disturbances import StaticFeatures
+from hybridsep.predict.trust.disturbances import StaticFeatures
 
 TS, N = 1e-3, 800
 MODES = [(25.0, 0.05, 24674.0, 15.7), (90.0, 0.6, -400.0, 3.0)]

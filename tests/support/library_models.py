@@ -17,13 +17,13 @@ from hybridsep.fmi.variables import modes_from
 from hybridsep.fmi.weights import restore_weights, weights_file
 from hybridsep.machines.paper import paper_machine
 from hybridsep.model.physics import ModalModel, Mode
+from hybridsep.online.look_ahead import LookAhead
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.feed_drive import FeedDrive
 from hybridsep.plants.plant import Plant, simulate
 from hybridsep.plants.stage_drive import StageDrive
 from hybridsep.plants.trajectory import staircase
-from hybridsep.predict.look_ahead import LookAhead
-from hybridsep.predict.paper_model import PaperModel
+from hybridsep.predict.paper.model import PaperModel
 from hybridsep.predict.predictor import HybridPredictor
 
 RUNAWAY = 1e5

@@ -12,8 +12,8 @@ from stream import CANNOT, LIBRARY, OUTPUTS, Array, RefusedStreamError, Value, d
 
 from hybridsep import HybridSepError
 from hybridsep.base.state import pack, unpack
+from hybridsep.online.look_ahead_inputs import LookAheadInputs
 from hybridsep.plants.encoder import Encoder
-from hybridsep.predict.look_ahead_inputs import LookAheadInputs
 
 
 @contextmanager

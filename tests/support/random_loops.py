@@ -11,10 +11,10 @@ from library_models import library_compensator, numbered
 from numpy.typing import NDArray
 
 from hybridsep.machines.machine import load_machine
+from hybridsep.online.look_ahead import LookAhead
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.plant import Plant
 from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest
-from hybridsep.predict.look_ahead import LookAhead
 
 Array = NDArray[np.float64]
 

@@ -11,10 +11,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.errors import SignalError
-from ..base.saved import COUNT_MAX
-from ..base.signals import Array
-from .held import HeldValue
+from ...base.errors import SignalError
+from ...base.saved import COUNT_MAX
+from ...base.signals import Array
+from ..held import HeldValue
 
 __all__ = ["N_STATE", "SensorGuard"]
 

@@ -6,7 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
-from ..base.signals import Array
+from ...base.signals import Array
 
 __all__ = ["Blend", "simplex_minimum"]
 

@@ -22,8 +22,8 @@ from ..base.saved import Saved
 from ..base.settings import samples_before
 from ..base.signals import Array, as_measured, check_position
 from ..base.state import pack, unpack
-from .predictor import HybridPredictor
-from .window import PublishedWindow
+from ..predict.predictor import HybridPredictor
+from ..predict.window import PublishedWindow
 
 __all__ = ["LookAhead", "Planner"]
 

@@ -9,29 +9,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.saved import Saved
-from ..base.settings import PredictorSettings
-from ..base.signals import Array
-from ..model.discrete import DiscreteModel
+from ...base.saved import Saved
+from ...base.settings import PredictorSettings
+from ...base.signals import Array
+from ...model.discrete import DiscreteModel
+from ..forecast import FeatureScales
+from ..regression import RidgeRegression
+from ..residual_model import ResidualModel, SavedFields, WindowInputs
 from .blend import Blend
 from .candidates import Candidate, CandidatePrediction, ResidualScale, SolvedCandidate, lags
 from .change import DOUBTED, ChangeTest
 from .disturbances import LEAST_VELOCITY, Disturbance, StaticFeatures, StaticState
-from .forecast import FeatureScales, Forecast
+from .forecast import TrustedForecast
 from .guard import SensorGuard
-from .learned_trusted import is_sound, learned_numbers, restore_learned
-from .regression import RidgeRegression
-from .residual_model import ResidualModel, SavedFields, WindowInputs
+from .learned import is_sound, learned_numbers, restore_learned
 from .rest import RestBefore
-from .saved_trusted import check_sizes, forecast_fields, restore_trusted, saved_scales, trusted_fields
+from .saved import check_sizes, forecast_fields, restore_trusted, saved_scales, trusted_fields
 
-__all__ = ["TrustedForecast", "TrustedModel"]
+__all__ = ["TrustedModel"]
 
 _LAST_LAG = 0.005
 """Prior variance of the weight of a lag relative to that of the lag ``p`` before it."""
@@ -68,27 +68,6 @@ _BRIDGED = 3
 
 _NO_PENALTY = 1e-40
 """λ of the factor itself, m²: penalties come with each solution."""
-
-
-@dataclass(frozen=True)
-class TrustedForecast(Forecast):
-    """Window predicted by the trusted model.
-
-    Attributes
-    ----------
-    x : (n,) array, m
-        Position that the stiffness acts at.
-    hold : float, m
-        Last residual, bounded: the prediction of the hold candidate.
-    predictions : tuple of CandidatePrediction
-        Of the learned candidates; empty before anything is learned.
-    scales : FeatureScales
-    """
-
-    x: Array
-    hold: float
-    predictions: tuple[CandidatePrediction, ...]
-    scales: FeatureScales
 
 
 class TrustedModel(ResidualModel[TrustedForecast]):

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.signals import Array
+from ...base.signals import Array
 from .candidates import ResidualScale
 
 if TYPE_CHECKING:
-    from .trusted import TrustedModel
+    from .model import TrustedModel
 
 __all__ = ["is_sound", "learned_numbers", "restore_learned"]
 

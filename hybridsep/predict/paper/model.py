@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from ..base.saved import Saved
-from ..base.settings import PredictorSettings
-from ..base.signals import Array
+from ...base.saved import Saved
+from ...base.settings import PredictorSettings
+from ...base.signals import Array
+from ..forecast import FeatureScales, Forecast
+from ..reference_features import n_reference
+from ..regression import RidgeRegression
+from ..residual_model import ResidualModel, SavedFields, WindowInputs
 from .features import FeatureLayout, PastSamples
-from .forecast import FeatureScales, Forecast
-from .reference_features import n_reference
-from .regression import RidgeRegression
-from .residual_model import ResidualModel, SavedFields, WindowInputs
 
 __all__ = ["PaperForecast", "PaperModel"]
 

@@ -15,9 +15,9 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.errors import SignalError
-from ..base.signals import Array
-from ..model.discrete import DiscreteModel
+from ...base.errors import SignalError
+from ...base.signals import Array
+from ...model.discrete import DiscreteModel
 
 __all__ = ["LEAST_VELOCITY", "Disturbance", "StaticFeatures", "StaticState"]
 

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.signal import lfilter
 
-from ..base.signals import Array
-from .regression import PenalisedSolution, RidgeRegression
+from ...base.signals import Array
+from ..regression import PenalisedSolution, RidgeRegression
 
 __all__ = ["CORRELATION_MAX", "Candidate", "CandidatePrediction", "ResidualScale", "SolvedCandidate", "lags"]
 

@@ -11,8 +11,9 @@ import numpy as np
 from scipy.signal import lfilter
 
 from ..base.signals import Array
-from .disturbances import DisturbanceSlopes
-from .trusted import TrustedForecast, TrustedModel
+from ..predict.trust.disturbances import DisturbanceSlopes
+from ..predict.trust.forecast import TrustedForecast
+from ..predict.trust.model import TrustedModel
 
 __all__ = ["PlanModel"]
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.errors import SignalError
-from ..base.saved import COUNT_MAX
-from ..base.signals import Array
+from ...base.errors import SignalError
+from ...base.saved import COUNT_MAX
+from ...base.signals import Array
 
 __all__ = ["N_REST", "RestBefore"]
 

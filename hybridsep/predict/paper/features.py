@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
 
-from ..base.signals import Array
+from ...base.signals import Array
 
 __all__ = ["FeatureLayout", "PastSamples"]
 

@@ -7,21 +7,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.saved import Saved
-from ..base.settings import PredictorSettings
-from ..base.signals import PREDICTION_MAX, Array
-from ..base.state import pack, unpack
+from ...base.saved import Saved
+from ...base.settings import PredictorSettings
+from ...base.signals import PREDICTION_MAX, Array
+from ...base.state import pack, unpack
+from ..forecast import FeatureScales
+from ..residual_model import SavedFields
 from .blend import Blend
 from .candidates import CORRELATION_MAX, ResidualScale
 from .change import ChangeTest
 from .disturbances import LEAST_VELOCITY, StaticState
-from .forecast import FeatureScales
 from .guard import N_STATE
-from .residual_model import SavedFields
 from .rest import N_REST
 
 if TYPE_CHECKING:
-    from .trusted import TrustedModel
+    from .model import TrustedModel
 
 __all__ = ["check_sizes", "forecast_fields", "restore_trusted", "saved_scales", "trusted_fields"]
 

@@ -19,8 +19,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.signals import Array
-from .regression import RidgeRegression
+from ...base.signals import Array
+from ..regression import RidgeRegression
 
 __all__ = ["DOUBTED", "ChangeTest"]
 

@@ -1,0 +1,1 @@
+"""Predictor and compensator sample by sample, as in an FMU."""
