@@ -25,12 +25,12 @@ _KIND = "compensator"
 
 def compensator_blob(compensator: SepCompensator) -> bytes:
     """Return parameters and state as a versioned blob."""
-    pending = compensator._pending
+    pending, planning = compensator._pending, compensator._planning
     meta = {
         "settings": compensator.settings.as_table(),
         "lead_in": compensator.lead_in,
-        "excess": compensator._monitor.excess,
-        "measured_before": compensator._measured_before,
+        "excess": planning.monitor.excess,
+        "measured_before": planning.measured_before,
         "state_before": int(compensator._state_before),
         "pending": None if pending is None else [int(pending.state), pending.prediction.n_warm_up],
     }
@@ -38,7 +38,7 @@ def compensator_blob(compensator: SepCompensator) -> bytes:
         "rest": compensator._rest,
         "delta_before": compensator._delta_before,
         "x_d_before": compensator._x_d_before,
-        "sensor": np.array(compensator._sensor.state()),
+        "sensor": np.array(planning.sensor.state()),
     }
     if pending is not None:
         arrays |= {"coefficients": pending.coefficients, "delta": pending.delta, "x_d": pending.x_d}
@@ -63,7 +63,8 @@ def compensator_from(
         compensator = kind(predictor, CompensatorSettings.from_table(saved.table("settings")))
     compensator.predictor = restored  # the constructor has restarted the other one
     compensator.lead_in = saved.whole("lead_in")
-    compensator._monitor.excess, compensator._measured_before = saved.real("excess"), saved.flag("measured_before")
+    planning = compensator._planning
+    planning.monitor.excess, planning.measured_before = saved.real("excess"), saved.flag("measured_before")
     before = saved.whole("state_before")
     if before not in tuple(SepState):
         raise saved.error("state_before must be a state")
@@ -72,7 +73,7 @@ def compensator_from(
     compensator._rest, compensator._delta_before = saved.array("rest", n), saved.array("delta_before", 3)
     compensator._x_d_before = saved.array("x_d_before", 3, finite=False)
     with saved.consistent():
-        compensator._sensor.restore(saved.array("sensor", 5, finite=False))
+        planning.sensor.restore(saved.array("sensor", 5, finite=False))
     if saved.field("pending") is not None:
         state, n_warm_up = saved.numbers("pending", 2)
         if state not in tuple(SepState) or n_warm_up not in range(Np + 1) or restored.n_pending != Np:

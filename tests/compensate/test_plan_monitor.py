@@ -62,7 +62,7 @@ def test_trust_is_not_judged_before_the_warm_up_is_over() -> None:
     for _ in range(8):
         plan = sep.plan(np.zeros(200))
         sep.update(plan.x_pb + 1e-4 * rng.normal(size=50))
-        excess.append(sep._monitor.excess)
+        excess.append(sep._planning.monitor.excess)
     assert excess[:4] == [0.0] * 4
     assert all(excess[4:])
 

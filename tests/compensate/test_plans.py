@@ -122,7 +122,7 @@ def test_a_bounded_plan_costs_what_another_solver_finds(
         bounded.append((value(c[n_pinned:]) - value(other)) / float(cost.v @ free))
         return found
 
-    monkeypatch.setattr("hybridsep.compensate.compensator.solve", compare)
+    monkeypatch.setattr("hybridsep.compensate.planning.solve", compare)
     cosimulate(compensator(limits=limits), plant(), commanded()[:4000], encoder=Encoder(5e-6, 0))
     assert len(bounded) >= n_bounded
     assert np.max(np.abs(bounded)) <= 1e-5
@@ -183,7 +183,7 @@ def test_a_refused_solve_falls_back_to_physics_then_to_the_rest(monkeypatch: pyt
         sep.update(1e-5 + 1e-6 * rng.normal(size=50))
     assert state is SepState.HYBRID
     answers: list[Callable[..., Any]] = [lambda *_, **__: None, solve]
-    monkeypatch.setattr("hybridsep.compensate.compensator.solve", lambda *a, **more: answers.pop(0)(*a, **more))
+    monkeypatch.setattr("hybridsep.compensate.planning.solve", lambda *a, **more: answers.pop(0)(*a, **more))
     assert sep.plan(ahead[:200]).state is SepState.PHYSICS
-    monkeypatch.setattr("hybridsep.compensate.compensator.solve", lambda *_, **__: None)
+    monkeypatch.setattr("hybridsep.compensate.planning.solve", lambda *_, **__: None)
     assert sep.plan(ahead[:200]).state is SepState.OFF

@@ -1,0 +1,139 @@
+"""Interface of a planning: how the plan of a window is chosen and published with a residual model."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from ..base.settings import CompensatorSettings
+from ..base.signals import Array
+from ..predict.forecast import FeatureScales
+from ..predict.predictor import HybridPredictor
+from ..predict.window import Prediction
+from .constraints import Bounds, DriveBounds, solve
+from .interior import Tolerance
+from .plan import PendingPlan, SepState
+from .plan_monitor import PlanMonitor
+from .sensor import SensorWatch
+from .splines import N_DECIDED, SplineBasis
+
+__all__ = ["ChosenPlan", "Planning", "Preview", "PublishedPosition"]
+
+
+@dataclass(frozen=True)
+class Preview:
+    """Commands to plan, and what the plan goes on from.
+
+    Attributes
+    ----------
+    command : (preview,) array, m
+        Commanded positions.
+    x_d_before, delta_before : (3,) array, m
+        Last commanded positions before, and last changes of them.
+    rest : (3 + n_free,) array, m
+        Coefficients of the rest of the last plan, the decided ones first.
+    """
+
+    command: Array
+    x_d_before: Array
+    delta_before: Array
+    rest: Array
+
+
+class ChosenPlan(NamedTuple):
+    """Model of a plan, its coefficients, ``(3 + n_free,)``, m, and the scales of the model's features, if any."""
+
+    state: SepState
+    coefficients: Array
+    scales: FeatureScales | None
+
+
+class PublishedPosition(NamedTuple):
+    """``x_h`` and ``x_h_std``, ``(Np,)``, m; leading samples where ``x_h = x_pb``; those that follow the last plan."""
+
+    x_h: Array
+    x_h_std: Array
+    n_warm_up: int
+    n_followed: int
+
+
+class Planning(ABC):
+    """Plans with a residual model.
+
+    Parameters
+    ----------
+    basis : SplineBasis
+    bounds : DriveBounds
+    settings : CompensatorSettings
+        Of the window: ``preview`` and ``spacing`` are given.
+    Np : int
+
+    Attributes
+    ----------
+    PINNED : int
+        Leading samples of a window in which a plan follows the last one.
+    ALWAYS : bool
+        Whether every plan does; else those that the drive's limits bound.
+    TOLERANCE : Tolerance
+        Of the solver.
+    monitor, sensor, measured_before : PlanMonitor, SensorWatch, bool
+        Watch of the model and of the sensor, and whether the window before was measured completely; as in the beginning
+        where the model watches itself.
+    """
+
+    PINNED: ClassVar[int]
+    ALWAYS: ClassVar[bool]
+    TOLERANCE: ClassVar[Tolerance]
+
+    def __init__(self, basis: SplineBasis, bounds: DriveBounds, settings: CompensatorSettings, Np: int) -> None:
+        assert settings.preview is not None
+        assert settings.spacing is not None
+        self.basis, self.bounds, self.settings = basis, bounds, settings
+        self.preview, self.spacing = settings.preview, settings.spacing
+        self.n_pinned = min(self.PINNED, Np // 2) // self.spacing
+        self.monitor = PlanMonitor()
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin another run."""
+        self.monitor.restart()
+        self.sensor = SensorWatch()
+        self.measured_before = True
+
+    @abstractmethod
+    def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:
+        """Return the best available plan on a model up to ``most``."""
+
+    @abstractmethod
+    def published(self, prediction: Prediction, state: SepState, most: SepState) -> PublishedPosition:
+        """Return what is published of a prediction, the plan being of a model ``state``.
+
+        Raises
+        ------
+        SignalError
+            If it diverges.
+        """
+
+    @abstractmethod
+    def update(self, predictor: HybridPredictor, measured: Array, pending: PendingPlan, *, learn: bool) -> None:
+        """Measure a planned window, ``(Np,)``, m, NaN where missing; ``learn`` whether the run may be learned."""
+
+    def affine_plan(self, g: Array, free: Array, preview: Preview, bounds: Bounds) -> Array | None:
+        """Return the coefficients of the best plan on a model ``g``, ``free`` of eq. (3); None if there is none."""
+        rest = preview.rest
+        if not (np.isfinite(g).all() and np.isfinite(free).all()):
+            return None
+        cost = self.basis.cost(
+            g, free, preview.command, rest[:N_DECIDED], preview.delta_before, self.settings.jerk_weight
+        )
+        found = solve(cost, bounds, rest[N_DECIDED:], self.n_pinned, always=self.ALWAYS, tolerance=self.TOLERANCE)
+        return None if found is None else np.concatenate((rest[:N_DECIDED], found.x))
+
+    def limits(self, preview: Preview, *, may_turn: bool = False) -> Bounds:
+        """Return the drive's limits on the coefficients of a plan."""
+        return self.bounds.bounds(
+            preview.command, preview.x_d_before, preview.delta_before, preview.rest, may_turn=may_turn
+        )

@@ -1,0 +1,74 @@
+"""Plans with the trusted model: the physics model's, or one on the trusted model that it says is better."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from ..base.signals import Array
+from ..predict.predictor import HybridPredictor
+from ..predict.trust.model import TrustedModel
+from ..predict.window import Prediction
+from .interior import Tolerance
+from .linearised import PlanModel
+from .plan import PendingPlan, SepState
+from .planning import ChosenPlan, Planning, Preview, PublishedPosition
+from .trusted_plan import TOLERANCE, TrustedPlanner, is_better
+
+__all__ = ["TrustedPlanning"]
+
+
+class TrustedPlanning(Planning):
+    """Plans with the trusted model, which watches itself."""
+
+    PINNED: ClassVar[int] = 20
+    """Every plan follows the last one there, as it takes more work than the paper's."""
+
+    ALWAYS: ClassVar[bool] = True
+    TOLERANCE: ClassVar[Tolerance] = TOLERANCE
+
+    def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:
+        """Return the physics model's plan, or a better one by Newton steps on the trusted model."""
+        assert predictor.start is not None
+        path = preview.command - predictor.start
+        model = self._model(predictor, path, preview)
+        rest, scales = preview.rest, model.scales
+        if most is SepState.OFF:
+            return ChosenPlan(SepState.OFF, rest, scales)
+        g, free = predictor.physics_operator(self.preview)
+        physics = self.affine_plan(g, free, preview, self.limits(preview))
+        if physics is None:
+            return ChosenPlan(SepState.OFF, rest, scales)
+        if not (most is SepState.HYBRID and predictor.k >= predictor.n_init and model.has_learned):
+            return ChosenPlan(SepState.PHYSICS, physics, scales)
+        with np.errstate(all="ignore"):
+            planner = TrustedPlanner(self.basis, self.settings.jerk_weight, model, path, preview.delta_before)
+            bounds = self.limits(preview, may_turn=True)
+            hybrid, cost = planner.plan(rest, bounds, self.n_pinned, self.basis.filtered(g))
+            better = is_better(cost, planner.cost(physics))
+        return ChosenPlan(SepState.HYBRID, hybrid, scales) if better else ChosenPlan(SepState.PHYSICS, physics, scales)
+
+    def published(self, prediction: Prediction, state: SepState, most: SepState) -> PublishedPosition:
+        """Return the model's position wherever it may plan.
+
+        It vouches for itself, and what planned the window is not known before its first samples have acted.
+        """
+        n_followed, Np = self.n_pinned * self.spacing, len(prediction.x_pb)
+        if most is SepState.HYBRID:
+            return PublishedPosition(prediction.x_h, prediction.x_h_std, prediction.n_warm_up, n_followed)
+        return PublishedPosition(prediction.x_pb.copy(), np.zeros(Np), Np, n_followed)
+
+    def update(self, predictor: HybridPredictor, measured: Array, pending: PendingPlan, *, learn: bool) -> None:
+        """Learn a window; the model leaves out what is missing or not plausible."""
+        predictor.update(measured, learn=learn)
+
+    def _model(self, predictor: HybridPredictor, path: Array, preview: Preview) -> PlanModel:
+        """Return the trusted model over the preview, with the scales of the rest of the last plan."""
+        trusted = predictor.residual
+        assert isinstance(trusted, TrustedModel)
+        assert predictor.start is not None
+        trusted.static.origin = predictor.start
+        with np.errstate(all="ignore"):  # a prediction that is no candidate may overflow
+            x_d = path + self.basis.values @ preview.rest
+            return PlanModel(trusted, predictor.state, predictor.late, x_d, path)
