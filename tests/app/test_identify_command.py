@@ -131,7 +131,8 @@ def test_the_log_is_checked(hybridsep: Run, tmp_path: Path) -> None:
     assert "columns swapped" in " ".join(err.split())
     machine = load_machine(out)
     assert machine.name == "my_axis"  # as the file
-    assert machine.sources == ()  # nothing was done that a controller must do, too
+    assert machine.sources[0] == "identified from swapped.csv"
+    assert machine.sources[1].startswith("swapped.csv: columns swapped: exchange ")
     assert machine.model.modes[0].f_n == pytest.approx(20.0, abs=0.1)
 
 
