@@ -33,6 +33,7 @@ def demo(
         from .builds import default_flavour
         from .demo import demo as run_demo
         from .demo import demo_files, processor_time
+        from .demo_cases import read_recorded
         from .log_intake import show
         from .overwrite import BY_ENDING, Output, check_outputs
         from .progress import progress_bar
@@ -41,6 +42,8 @@ def demo(
     flavour = flavour or default_flavour()
     files = demo_files(out, flavour, emps=emps is not None)
     check_outputs((Output("--out", path, BY_ENDING[path.suffix]) for path in files), {"recording": emps}, force=force)
+    if emps is not None:
+        read_recorded(emps)  # a refusal comes before any announcement
     if not as_json:
         show([f"this takes {processor_time(seeds, flavour)} of processor time"], ())
     with progress_bar(as_json) as advance:

@@ -28,7 +28,7 @@ def spoiled(path: Path, *, n: int = 2500, gain: float = 1.0, offset: float = 0.0
     ("gain", "offset", "words"),
     [
         (-1.0, 0.0, "the measured position runs against the command (gain -0.99"),
-        (1.0, 0.25, "the measured position is +0.249"),
+        (1.0, 0.25, "the measured position is +249.9"),
         (4e-5, 0.0, "times the commanded one: a wrong unit, gear ratio or encoder resolution"),
         (1e3, 0.0, "times the commanded one: measured in mm, commanded in m"),
     ],
@@ -209,7 +209,7 @@ def test_a_rotary_axis(hybridsep: Run, tmp_path: Path) -> None:
     status, out, _ = hybridsep("backtest", log, "-m", rotary, "--json")
     assert status == 0
     assert json.loads(out)["rms_h_urad"] == pytest.approx(expected["rms_h_um"], rel=1e-6)
-    assert "prediction error in µrad" in hybridsep("backtest", log, "-m", rotary)[1]
+    assert "prediction error in mdeg" in hybridsep("backtest", log, "-m", rotary)[1]
     # Where nothing is stated, the positions are in the machine's unit.
     status, out, _ = hybridsep("backtest", tmp_path / "m.csv", "-m", rotary, "--x", "x", "--json")
     assert json.loads(out)["rms_h_urad"] == pytest.approx(expected["rms_h_um"], rel=1e-9)

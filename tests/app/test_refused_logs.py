@@ -69,4 +69,4 @@ def test_exchanged_columns_are_said(hybridsep: Run, tmp_path: Path) -> None:
     np.testing.assert_allclose(used[0].x_d, commanded()[:2500])
     status, out, err = hybridsep("backtest", path, *MACHINE, "--fix")
     assert status == 0, err
-    assert "axis.csv, positions changed (--fix: columns swapped)" in out.replace("\n", " ")
+    assert "axis.csv, positions changed (--fix: columns swapped)" in " ".join(out.split())

@@ -19,13 +19,19 @@ from places import ROOT
 
 from hybridsep.fmi.native_flavour import all_c
 
+SUFFIXES = (".c", ".h", ".cpp")
 SANITISED = ("-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer")
 
 
 def test_the_c_files_are_formatted() -> None:
     command = shutil.which("clang-format", path=str(Path(sys.executable).parent))
     assert command, "clang-format is missing: pip install -e '.[test]'"
-    files = [path for folder in ("fmu_src", "tests", "benchmarks") for path in (ROOT / folder).rglob("*.[ch]*")]
+    files = [
+        path
+        for folder in ("fmu_src", "tests", "benchmarks")
+        for path in (ROOT / folder).rglob("*.*")
+        if path.suffix in SUFFIXES
+    ]
     assert len(files) > 60
     done = subprocess.run([command, "--dry-run", "--Werror", *files], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -283,8 +283,12 @@ def hybridsep(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
 
 
 def test_build_takes_weights_and_targets(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, trained: Path, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    predictor, trained = load_machine(MACHINE.name).new_predictor(), tmp_path / "trained.state"
+    predictor.predict(np.linspace(0, 1e-3, 50))
+    predictor.update(np.linspace(0, 1e-3, 50))
+    predictor.save(trained)
     options = ("--weights", trained, "--target", "host", "--target", "win64", "--out", tmp_path, "--json")
     assert hybridsep(monkeypatch, "build", "HybridPredictor", "FeedDrive", *options) == 0
     paths = json.loads(capsys.readouterr().out)
