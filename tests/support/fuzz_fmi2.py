@@ -144,7 +144,7 @@ class Fuzzer:
         if self._call("ExitInitializationMode", component) == OK:
             self.times[component] = start
 
-    def _reals(self, component: int | None) -> bytes:
+    def _reals(self, component: int) -> bytes:
         """Return all Reals, bit by bit; none where they are refused, as outputs of an invalid start are."""
         try:
             return self.library.reals(component)
