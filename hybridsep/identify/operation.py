@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
@@ -169,6 +170,12 @@ def _require_motion(segments: Sequence[Segment]) -> None:
         )
 
 
+def _as_known(value: float, std: float) -> str:
+    """Return a figure with the decimals of the two leading digits of its standard deviation, seven at most."""
+    decimals = 1 - math.floor(math.log10(std)) if 0.0 < std < math.inf else 7
+    return f"{value:.{min(max(decimals, 0), 7)}f}"
+
+
 def _refusal(reason: str) -> IdentificationError:
     return IdentificationError(f"this log cannot teach a model, because {reason}")
 
@@ -240,7 +247,7 @@ def _findings(
     if not GAIN_RANGE[0] <= gain <= GAIN_RANGE[1]:
         findings.append(f"the static gain is {gain:.4g}: are both positions in the same unit?")
     elif not fit.structure.unit_gain:
-        findings.append(f"the static gain is {gain:.7g} ± {gain_std:.2g}")
+        findings.append(f"the static gain is {_as_known(gain, gain_std)} ± {gain_std:.2g}")
     if fit.structure.order and chosen.rms_held_out > 2 * chosen.fit.rms:
         findings.append(
             f"the error on the part that was held out, {shown.words(chosen.rms_held_out)}, is "

@@ -64,9 +64,10 @@ def check_clipped(log: Log, bridged: int = 1) -> Iterator[Finding]:
     if n < _SHARE * len(log.t):
         return
     where = np.concatenate([np.arange(begin, end) for begin, end in zip(begins, ends, strict=True)])
+    factor, unit = log.shown.position
     words = (
-        f"the measured position is clipped at {' and '.join(f'{limit:.6g}' for limit, *_ in found)} {log.unit} in {n} "
-        f"of {len(log.t)} samples ({100 * n / len(log.t):.2g} %), where the command goes beyond: a limit of the "
+        f"the measured position is clipped at {' and '.join(f'{factor * limit:.6g}' for limit, *_ in found)} {unit} in "
+        f"{n} of {len(log.t)} samples ({100 * n / len(log.t):.2g} %), where the command goes beyond: a limit of the "
         f"sensor, of its signal or of the recorder; the first is sample {begins[0] + 1}, t = {log.t[begins[0]]:.6g} s"
     )
     evidence = {"n": float(n), "share": n / len(log.t), "n_stretches": float(len(begins))}
@@ -77,8 +78,8 @@ def check_clipped(log: Log, bridged: int = 1) -> Iterator[Finding]:
             "cut out what is clipped, and keep what is left apart", partial(fixes.cut_out, begins=begins, ends=ends)
         )
     t = log.t - log.t[0]
-    lines = {"commanded": (t, log.x_d), "measured": (t, log.x_meas)}
-    picture = Picture("Measured position at its limits", "time [s]", f"position [{log.unit}]", lines, t[where])
+    lines = {"commanded": (t, factor * log.x_d), "measured": (t, factor * log.x_meas)}
+    picture = Picture("Measured position at its limits", "time [s]", f"position [{unit}]", lines, t[where])
     yield Finding("clipped", ERROR, words, evidence, picture, fix)
 
 

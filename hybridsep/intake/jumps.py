@@ -37,15 +37,16 @@ def check_jumps(log: Log) -> Iterator[Finding]:
     largest = float(steps[commanded - 1].max())
     others = float(np.delete(steps, commanded - 1).max(initial=0.0))
     n, m = len(commanded), len(both)
+    factor, unit = log.shown.position
     words = (
-        f"the command jumps {n} time{'s' if n > 1 else ''} within one sample, by up to {largest:.4g} {log.unit}, where "
-        f"it otherwise moves by {others:.3g} {log.unit} at most; the first is at sample {commanded[0] + 1}, t = "
-        f"{log.t[commanded[0]]:.6g} s"
+        f"the command jumps {n} time{'s' if n > 1 else ''} within one sample, by up to {factor * largest:.4g} {unit}, "
+        f"where it otherwise moves by {log.shown.words(others)} at most; the first is at sample {commanded[0] + 1}, "
+        f"t = {log.t[commanded[0]]:.6g} s"
     )
     evidence = {"n": float(n), "n_measured": float(m), "largest": largest, "usual": others}
     t = log.t - log.t[0]
-    lines = {"commanded": (t, log.x_d), "measured": (t, log.x_meas)}
-    picture = Picture("Jumps of the command", "time [s]", f"position [{log.unit}]", lines, t[commanded])
+    lines = {"commanded": (t, factor * log.x_d), "measured": (t, factor * log.x_meas)}
+    picture = Picture("Jumps of the command", "time [s]", f"position [{unit}]", lines, t[commanded])
     if m:
         words += f"; the measured position jumps with it{'' if m == n else f' {m} times'}: logs were pasted together"
         fix = Fix("keep the pieces apart", partial(fixes.cut_at, first=both))

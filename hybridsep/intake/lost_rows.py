@@ -79,8 +79,9 @@ def check_lost_rows(log: Log, bridged: int = 1) -> Iterator[Finding]:
     change = partial(fixes.inserted, starts=before, lost=rows, missing=bridged > 0)
     fix = Fix("insert them, the command interpolated, and number the times again", change)
     t = log.t - log.t[0]
-    lines = {"step of the command": (t[1:], np.diff(log.x_d))}
-    picture = Picture("Steps between samples", "time [s]", f"step [{log.unit}]", lines, t[before])
+    factor, unit = log.shown.position
+    lines = {"step of the command": (t[1:], factor * np.diff(log.x_d))}
+    picture = Picture("Steps between samples", "time [s]", f"step [{unit}]", lines, t[before])
     yield Finding("lost rows", ERROR, words, evidence, picture, fix)
 
 

@@ -247,6 +247,10 @@ def test_the_static_gain_may_be_given() -> None:
     x = 0.9 * measured(SECOND, x_d, "foh", 1e-6)
     free = identify_operation([(x_d, x)], T_S, order_max=2)
     assert free.model.dc_gain == pytest.approx(0.9, abs=1e-4)
+    [gain] = [one for one in free.findings if one.startswith("the static gain is ")]
+    figure, _, std = gain.removeprefix("the static gain is ").partition(" ± ")
+    decimals = len(figure.partition(".")[2])
+    assert 10 ** (1 - decimals) <= float(std) < 10 ** (2 - decimals)  # no digit that the deviation does not know
     unit = identify_operation([(x_d, x)], T_S, unit_gain=True, order_max=2)
     assert unit.model.dc_gain == pytest.approx(1.0, abs=1e-12)
     assert unit.rms > 10 * free.rms

@@ -104,7 +104,12 @@ def test_what_is_clipped_is_missing_or_cut_out() -> None:
     spoiled = replace(good, x_meas=np.minimum(good.x_meas, limit))
     (finding,) = [one for one in check(spoiled).findings if one.name == "clipped"]
     assert finding.severity == ERROR
-    assert f"clipped at {limit:.6g} {good.unit} in " in finding.words
+    factor, unit = good.shown.position
+    assert unit == "mm"
+    assert f"clipped at {factor * limit:.6g} {unit} in " in finding.words
+    assert finding.picture is not None
+    assert finding.picture.y_label == "position [mm]"
+    np.testing.assert_array_equal(finding.picture.lines["commanded"][1], factor * good.x_d)
     fixed = check(spoiled).fixed()
     assert np.nanmax(fixed.x_meas) < limit
     known = np.isfinite(fixed.x_meas)
@@ -123,6 +128,9 @@ def test_pasted_logs_are_kept_apart() -> None:
     (finding,) = [one for one in intake.findings if one.severity == ERROR]
     assert finding.name == "jumps"
     assert "logs were pasted together" in finding.words
+    factor, unit = good.shown.position
+    assert unit == "mrad"
+    assert f"by up to {factor * np.abs(np.diff(x_d)).max():.4g} {unit}, where it otherwise moves by " in finding.words
     assert intake.fixed().starts == (0, n)
     command_only = check(replace(good, x_d=x_d))
     (finding,) = [one for one in command_only.findings if one.name == "jumps"]
