@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Mapping
-from pathlib import Path
+import zlib
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -14,13 +14,13 @@ from ..base.signals import Array
 from .chart import BAND_OPACITY, Chart, Line
 from .decimation import drawn_places
 
-__all__ = ["chart_script", "plotly_js"]
+__all__ = ["DIGITS", "chart_script", "packed"]
 
 _HEIGHT, _HEIGHT_OF_SEVERAL = 340, 255
 """Height of the only panel, and of one of several, px."""
 
-_COLUMNS = 1000
-"""Columns of pixels of a chart; the widest has 900."""
+_COLUMNS = 600
+"""Columns of a chart, each with its extremes; the widest has 900 pixels, and the page is to stay below 2 MB."""
 
 _GAP = 0.08
 """Gap between panels, as a share of the height."""
@@ -31,9 +31,24 @@ _FONT_SIZE = 13
 _TEXT, _GRID = "#1d2733", "#e8ecf0"
 
 
-def plotly_js() -> str:
-    """Return the library that draws the charts: plotly.js with the traces of lines, bars and pies."""
-    return (Path(__file__).parent / "plotly_js" / "plotly-basic.min.js").read_text(encoding="utf-8")
+_LESS_THAN = (b"<", b",")
+"""Digit of base 85 that a page must not have in a script, and what stands for it."""
+
+DIGITS = b"".join(base64.b85encode(bytes((0, 0, 0, i)))[-1:] for i in range(85)).replace(*_LESS_THAN).decode("ascii")
+"""Digits of :func:`packed`, in their order."""
+
+
+def packed(scripts: Iterable[str]) -> tuple[str, int]:
+    """Return plotly.js and scripts that use it as a text for a page, and the bytes it stands for.
+
+    They are compressed (zlib), filled up to whole words of four bytes, and written in base 85, five of
+    :data:`DIGITS` a word: plotly.js alone has 4.8 MB.
+    """
+    from plotly.offline import get_plotlyjs
+
+    compressed = zlib.compress("\n".join((get_plotlyjs(), *scripts)).encode("utf-8"), 9)
+    filled = compressed + bytes(-len(compressed) % 4)
+    return base64.b85encode(filled).replace(*_LESS_THAN).decode("ascii"), len(compressed)
 
 
 def chart_script(chart: Chart, name: str) -> str:
@@ -41,7 +56,7 @@ def chart_script(chart: Chart, name: str) -> str:
     data = [trace for line in chart.lines for trace in _traces(line)]
     given = (name, data, _layout(chart), {"responsive": True, "displayModeBar": False})
     arguments = ", ".join(json.dumps(one, separators=(",", ":"), allow_nan=False) for one in given)
-    return f"Plotly.newPlot({arguments});".replace("<", "\\u003c")
+    return f"Plotly.newPlot({arguments});"
 
 
 def _layout(chart: Chart) -> dict[str, Any]:

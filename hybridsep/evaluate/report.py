@@ -11,7 +11,7 @@ from string import Template
 from ..base.output import written_text
 from .chart import Chart
 from .chart_pages import write_pages
-from .chart_script import chart_script, plotly_js
+from .chart_script import DIGITS, chart_script, packed
 
 __all__ = ["Report"]
 
@@ -64,7 +64,7 @@ class Report:
         """Add a chart."""
         self.charts.append(chart)
         name = f"chart{len(self.charts)}"
-        drawn = f'<div id="{name}" class="chart"></div><script>{chart_script(chart, name)}</script>'
+        drawn = f'<div id="{name}" class="chart"></div>'
         caption = f"<figcaption>{html.escape(chart.caption)}</figcaption>" if chart.caption else ""
         self._parts.append(f"<figure>{drawn}{caption}</figure>")
 
@@ -79,7 +79,10 @@ class Report:
         """
         template = (Path(__file__).parent / "templates" / "report.html").read_text(encoding="utf-8")
         values = {"title": html.escape(self.title), "subtitle": html.escape(self.subtitle)}
-        page = Template(template).substitute(values, plotly=plotly_js(), body="\n".join(self._parts))
+        text, n_bytes = packed(chart_script(chart, f"chart{1 + i}") for i, chart in enumerate(self.charts))
+        page = Template(template).substitute(
+            values, body="\n".join(self._parts), packed=text, n_bytes=n_bytes, digits=DIGITS
+        )
         with written_text(path) as file:
             file.write(page)
         if figures is not None:
