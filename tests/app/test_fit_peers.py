@@ -12,6 +12,7 @@ import pytest
 from arx_oracle import arx_by_definition, free_run_by_definition
 from command_line import Run, write_rows
 from places import RECORDINGS
+from report_page import scripts
 from staircase_data import commanded, measured
 
 from hybridsep import read_log
@@ -86,11 +87,12 @@ def test_a_headline_says_share_rate_and_the_logs_own_unit(hybridsep: Run, tmp_pa
     assert f"axis.csv: {head}, travel 60 deg" in words
     assert "Np = 40 (80 ms)" in words
     assert "taught nothing [mdeg]" in words
-    page = unescape((tmp_path / "fit" / "report.html").read_text(encoding="utf-8"))
+    written = (tmp_path / "fit" / "report.html").read_text(encoding="utf-8")
+    page, drawn = unescape(written.partition('id="packed"')[0]), scripts(written)
     assert head in page.partition("<h2>")[0]
     assert not re.search(r"\b[µm]?rad\b", words)
-    assert not re.search(r"\[[µm]?rad\]", page)
-    assert "command [deg]" in page
+    assert not re.search(r"\[[µm]?rad\]", page + drawn.partition('Plotly.newPlot("chart1"')[2])
+    assert "command [deg]" in drawn
     judged = json.loads((tmp_path / "fit" / "fit.json").read_text())["judged"]
     assert judged["rms_h"] < 3e-3  # rad
     assert f"{np.degrees(1e3 * judged['rms_h']):.2f}" in words

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import json
 import re
-import zlib
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from report_page import scripts
 
 from hybridsep.evaluate.chart import Chart, Line
 from hybridsep.evaluate.chart_pages import COLUMN_WIDTH, write_pages
@@ -58,17 +58,6 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> str:
     path = tmp_path_factory.mktemp("report") / "report.html"
     report.write(path)
     return path.read_text(encoding="utf-8")
-
-
-def scripts(page: str) -> str:
-    """Return plotly.js and what draws the charts, digit by digit as a browser unpacks it."""
-    found = re.search(r'<script type="text/plain" id="packed" data-bytes="(\d+)">([^<]*)</script>', page)
-    assert found
-    places = {digit: value for value, digit in enumerate(DIGITS)}
-    assert len(places) == 85
-    digits = np.array([places[digit] for digit in found[2]], dtype=np.uint64).reshape(-1, 5)
-    words = digits @ 85 ** np.arange(4, -1, -1, dtype=np.uint64)
-    return zlib.decompress(words.astype(">u4").tobytes()[: int(found[1])]).decode("utf-8")
 
 
 def charts(page: str) -> list[Any]:
