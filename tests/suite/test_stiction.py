@@ -40,18 +40,18 @@ def stood(x: Array, Np: int) -> Array:
 
 
 @on_all((PREDICTOR,))
-@pytest.mark.parametrize("Np", [20, 100])
+@pytest.mark.parametrize("Np", [20])  # with longer windows none stands beyond the patience for long enough
 @pytest.mark.parametrize("name", ["to and fro", "creep", "creep after motion"])
 def test_an_axis_that_stands_is_learned_after_the_patience(new_stream: StreamMaker, name: str, Np: int) -> None:
     found, x = shown(new_stream(), name, Np)
     hold = held(found["x_pb"], x, Np)
     before, settled = stood(x, Np), np.arange(len(x)) >= 5 * Np
-    learned, meanwhile = settled & (before > 3 * Np), settled & (before > 0) & (before <= 3 * Np)
+    learned, meanwhile = settled & (before > 7 * Np), settled & (before > 0) & (before <= 7 * Np)
     assert learned.sum() > 1000
     assert rms((x - found["x_h"])[learned]) < 1.5 * rms((x - hold)[learned])
     for which in (learned, meanwhile, settled):
         assert coverage((x - found["x_h"])[which], found["x_h_std"][which], 0.95) > 0.85
-    assert found["n_rejected"][-1] < 4 * Np
+    assert found["n_rejected"][-1] < 8 * Np
 
 
 @on_all((PREDICTOR,), needs="agreement")

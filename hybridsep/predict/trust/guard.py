@@ -50,6 +50,10 @@ _RISE, _FALL = 0.5, 0.02
 """Rates at which the mean deviation follows that of a window; the vibration rises at once, and falls as it does."""
 
 
+_STANDING = 3.0
+"""Patience with equal values relative to that with another level: a sensor may stick for half a second."""
+
+
 class SensorGuard:
     """Judges each sample of a window from its residual.
 
@@ -128,7 +132,7 @@ class SensorGuard:
             self.holding = int(self.held.holds(value, position, still=still))
             if self.holding:
                 self.doubtful += 1
-                if self.doubtful <= self.patience:
+                if self.doubtful <= _STANDING * self.patience:
                     accepted[max(k - self.held.repeats + 1, 0) : k + 1] = False
                 else:  # the axis itself stands still
                     self.last, self.gap = e, 0

@@ -18,6 +18,8 @@ static const uint64_t guard_changes = 8;
  * axis itself stood still: a sensor that was held shows the whole motion then. And what is believed from then on,
  * relative to that motion. */
 static const double guard_stood = 0.5, guard_stuck = 2.0;
+/* Patience with equal values relative to that with another level: a sensor may stick for half a second. */
+static const uint64_t guard_standing = 3;
 static const uint64_t guard_doubted = 3; /* doubtful samples in a row from which on they may be true */
 /* Rates at which the mean deviation follows that of a window; the vibration rises at once, and falls as it does. */
 static const double guard_rise = 0.5, guard_fall = 0.02;
@@ -139,7 +141,7 @@ HSEP_API void hsep_guard_accept(
         }
         guard_end_run(self, x[place], x_pb[place]);
         self->holding = (uint64_t)hsep_sensor_misses(&self->held, x[place], x_pb[place], still, HUGE_VAL);
-        if (self->holding && ++self->doubtful > self->patience) { /* the axis itself stands still */
+        if (self->holding && ++self->doubtful > guard_standing * self->patience) { /* the axis itself stands still */
             accepted[place] = 1.0;
             self->last = residual;
             self->gap = 0;
