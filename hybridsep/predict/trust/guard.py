@@ -37,6 +37,9 @@ relative to that motion."""
 _DOUBTED = 3
 """Doubtful samples in a row from which on they may be true; fewer are wrong values."""
 
+_STANDING = 3.0
+"""Patience with equal values relative to that with another level: a sensor may stick for half a second."""
+
 _NEIGHBOURS = 2
 """Samples to either side that an isolated value is compared with."""
 
@@ -50,17 +53,14 @@ _RISE, _FALL = 0.5, 0.02
 """Rates at which the mean deviation follows that of a window; the vibration rises at once, and falls as it does."""
 
 
-_STANDING = 3.0
-"""Patience with equal values relative to that with another level: a sensor may stick for half a second."""
-
-
 class SensorGuard:
     """Judges each sample of a window from its residual.
 
     Parameters
     ----------
     patience : int
-        Doubtful samples in a row after which they are believed: the level is another one, or the axis stands still.
+        Doubtful samples in a row after which another level is believed; an axis that stands still, after three times
+        as many.
 
     Attributes
     ----------
