@@ -15,7 +15,7 @@
 #define HSEP_GUARD_NEIGHBOURS 2 /* samples to either side that an isolated value is compared with */
 
 typedef struct {
-    uint64_t patience; /* doubtful samples in a row after which another level is believed; thrice: an axis that stands */
+    uint64_t patience; /* doubtful samples in a row until another level is believed; thrice: an axis that stands */
     uint64_t gap;      /* samples since the last accepted one */
     uint64_t doubtful; /* held or jumping samples in a row */
     uint64_t holding;  /* whether the last value was held */
