@@ -169,6 +169,8 @@ def attack(kind: str, n: int, seed: int, folder: Path, keep: Path) -> Summary:
         if outcome != "read":
             raise SystemExit(f"the intact {name} was not read: {said}")
     for i in range(n):
+        if i % 250 == 0:
+            sys.stderr.write(f"{kind}: {i} of {n}\n")
         name, content = chance.choice(files)
         target = folder / f"damaged_{name}"
         target.write_bytes(mutated(kind, content, chance))

@@ -42,6 +42,9 @@ TOKENS = (
 )
 """Texts that stand where a number, a word or a sign was."""
 
+_SEARCHED_MAX = 2**20
+"""Bytes of a text in which a token is looked for: a member of 110 MB would have as many."""
+
 _TOKEN = re.compile(rb"[A-Za-z_]\w*|[-+]?[\d.]+(?:[eE][-+]?\d+)?|[^\s\w]")
 _NUMBERS = (0.0, -1.0, 1e-320, 1e9, 1e99, 1e308, float("nan"), float("inf"), float("-inf"))
 _EVIL = ("../evil", "/tmp/evil", "C:/evil", "a\\b", "resources/x/../../../evil", "modelDescription.xml", "x" * 70_000)
@@ -103,7 +106,8 @@ def broken(content: bytes, chance: Random) -> bytes:
 
 def retold(content: bytes, chance: Random) -> bytes:
     """Replace, repeat or leave out a word, a number or a sign of a text."""
-    tokens = [token.span() for token in _TOKEN.finditer(content[:20_000] if chance.random() < 0.7 else content)]
+    end = 20_000 if chance.random() < 0.7 else _SEARCHED_MAX
+    tokens = [token.span() for token in _TOKEN.finditer(content[:end])]
     if not tokens:
         return broken(content, chance)
     (a, b), (c, d) = chance.choice(tokens), chance.choice(tokens)

@@ -52,7 +52,7 @@ def backtest(
 ) -> None:
     """Check a recorded log and replay it causally.
 
-    Physics model, hold baseline and hybrid are compared.
+    Physics model, hold baseline, ARX models and hybrid are compared.
     """
     with loading():
         import numpy as np
@@ -66,8 +66,9 @@ def backtest(
         from ..logs.units import shown_of
         from ..machines.machine import load_machine, machine_path
         from .arguments import check_ending
+        from .backtest_peers import backtest_peers
         from .extent import partly_used
-        from .log_intake import changed_by, findings_table, open_checked, reading_of
+        from .log_intake import CHECKED_MAX, changed_by, findings_table, open_checked, reading_of
         from .overwrite import BATCH_COLUMNS, BATCHES, BY_ENDING, Output, check_outputs
         from .progress import progress_bar
         from .tables import console, print_scores, print_without_first, print_written
@@ -94,6 +95,7 @@ def backtest(
     rows: list[tuple[float, ...]] = []
     first: list[Batch] = []
     title = f"{axis_machine.title}, {log.name}{changed_by(intake.findings)}"
+    peers = None
     with progress_bar(as_json) as advance:
 
         def on_batch(batch: Batch) -> None:
@@ -102,13 +104,16 @@ def backtest(
             if batch.j == 0:
                 first.append(batch)
             if batch.j % 100 == 0:
-                advance("replay", batch.k / n_samples)
+                advance("replay", 0.8 * batch.k / n_samples)
 
         predictions = [path for path in saved if path.suffix.lower() != ".state"]
-        if isinstance(opened, Log) or figure is not None or predictions:
+        if isinstance(opened, Log) or n_samples <= CHECKED_MAX or figure is not None or predictions:
             whole = opened if isinstance(opened, Log) else opened.read()
             found = backtest_whole(predictor, whole.x_d, whole.x_meas, on_batch=on_batch)
             scores: Scores = found
+            peers = backtest_peers(
+                found, whole.x_d, whole.x_meas, predictor, lambda done: advance("ARX models", 0.8 + 0.2 * done)
+            )
             run = replayed_run(
                 found,
                 whole.x_d,
@@ -132,17 +137,22 @@ def backtest(
     if isinstance(opened, Log) and not as_json and (line := partly_used(opened)):
         console.print(line, highlight=False)
     more: dict[str, Any] = {"findings": findings_table(intake.findings)}
+    verdict, summary = scores.verdict, dict[str, Any](scores.summary())
+    if peers is not None:
+        verdict, summary = peers.verdict, {**summary, **peers.summary()}
+    elif not as_json:
+        console.print(f"ARX models are left out: they take at most {CHECKED_MAX} samples.", highlight=False)
     in_motion = any(finding.name == "start in motion" and not finding.applied for finding in intake.findings)
-    rest = None
+    rest: dict[str, float] = {}
     if in_motion and scores.n_batches > 1:
         n = int(np.count_nonzero(~np.isnan(first[0].x)))
-        rest = scores.overall.rms_without(n, (first[0].rms_pb, first[0].rms_hold, first[0].rms_h))
+        without = scores.overall.rms_without(n, (first[0].rms_pb, first[0].rms_hold, first[0].rms_h))
+        rest = dict(zip(("pb", "hold", "h"), without, strict=True))
+        rest |= peers.rms_from(predictor.Np) if peers is not None else {}
         unit = f"u{axis_machine.unit}"
-        more["without_first_window"] = {
-            f"rms_{name}_{unit}": 1e6 * value for name, value in zip(("pb", "hold", "h"), rest, strict=True)
-        }
-    print_scores(scores.summary(), scores.verdict, as_json, title, unit=axis_machine.unit, shown=shown, more=more)
+        more["without_first_window"] = {f"rms_{name}_{unit}": 1e6 * value for name, value in rest.items()}
+    print_scores(summary, verdict, as_json, title, unit=axis_machine.unit, shown=shown, more=more)
     if not as_json:
-        if rest is not None:
+        if rest:
             print_without_first(rest, shown)
         print_written(out, figure, *saved)

@@ -201,10 +201,12 @@ def _write_machine(
 ) -> None:
     """Write the machine file, with the deviations and findings as comments."""
     from ..machines.text import machine_text
+    from .identify_tables import deviation_words
     from .overwrite import sealed
 
     deviations = [
-        f"{e.name} = {e.value:.6g} ± {e.std:.2g}{'' if e.unit == '1' else ' ' + e.unit}" for e in found.parameters
+        f"{e.name} = {e.value:.6g} {deviation_words(e.std, '± ')}{'' if e.unit == '1' else ' ' + e.unit}"
+        for e in found.parameters
     ]
     comments = [f"Identified by hybridsep from {recording}.", *deviations, *found.findings]
     machine = found.machine(name, f"Axis identified from {recording}", **entries)

@@ -61,7 +61,7 @@ def tune(
         from ..tune.losses import n_unjudged
         from .arguments import check_ending
         from .extent import partly_used
-        from .log_intake import findings_table, open_checked, reading_of, show
+        from .log_intake import changes, findings_table, open_checked, reading_of, show
         from .overwrite import BY_ENDING, MACHINE, Output, check_outputs, sealed
         from .progress import progress_bar
         from .tables import console, print_json, print_written
@@ -91,12 +91,12 @@ def tune(
     inputs: dict[str, str | Path | None] = {f"log {path}": path for path in logs}
     check_outputs(outputs, {**inputs, "machine file": machine_path(machine)}, force=force)
     how = reading_of(given, reading, may_miss=settings.trust)
-    pieces, findings, partly = {}, {}, []
+    pieces, findings, changed_logs, partly = {}, {}, {}, []
     for name, path in _named(logs).items():
         opened, intake = open_checked(path, how, given, fix=fix, as_is=as_is, segments=True)
         log = opened if isinstance(opened, Log) else opened.read()
         pieces[name] = [(segment.x_d, segment.x_meas) for segment in log.segments()]
-        findings[name] = findings_table(intake.findings)
+        findings[name], changed_logs[name] = findings_table(intake.findings), intake.findings
         partly += [line] if (line := partly_used(log)) else []
         shown = shown_of(log.file_unit, given.unit)  # that of the last log
     with progress_bar(as_json) as advance:
@@ -125,6 +125,8 @@ def tune(
         print_tuning(tuning, windows, values, given.title, shown)
     if out is not None:
         best = changed.changed("predictor", {"Np": chosen.Np, **entries(chosen, values)})
+        sources = dict.fromkeys((*best.sources, *changes(changed_logs)))
+        best = best.model_copy(update={"sources": tuple(sources)} if sources else {})
         comment = f"Settings of [predictor] from hybridsep tune on {', '.join(path.name for path in logs)}."
         with written_text(out) as file:
             file.write(sealed(machine_text(best, [comment]), "tune"))

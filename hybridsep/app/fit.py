@@ -8,6 +8,8 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..base.errors import IdentificationError, ParameterError
 from ..base.metrics import rms_ratio
 from ..base.output import written_text
@@ -189,7 +191,7 @@ def fit(
         return lambda done: progress(message, begin + (end - begin) * done)
 
     found = stages.result(
-        "identification", lambda: _identified(recordings, default, logs[0], within(0.0, 0.33, "identify"))
+        "identification", lambda: _identified(recordings, default, logs, within(0.0, 0.33, "identify"))
     )
     model = ModalModel([Mode(**mode) for mode in found["modes"]], found["dead_time"])
     default = replace(default, input_hold=found["input_hold"])
@@ -249,9 +251,12 @@ def _window(Np: int | None, T_s: float) -> int:
 
 
 def _identified(
-    recordings: Sequence[Recording], settings: PredictorSettings, log: Log, progress: Callable[[float], object]
+    recordings: Sequence[Recording],
+    settings: PredictorSettings,
+    logs: Sequence[Log],
+    progress: Callable[[float], object],
 ) -> dict[str, Any]:
-    """Return the identification from the samples that teach, as plain values, in the units of a log."""
+    """Return the identification from the samples that teach, as plain values, in the units of the logs."""
     taught = [in_time(*one.taught, settings.measurement_delay) for one in recordings if one.n_taught > 1]
     n, n_all = (sum(lengths) for lengths in zip(*((one.n_taught, len(one.x)) for one in recordings), strict=True))
     try:
@@ -261,12 +266,22 @@ def _identified(
                 "needed"
             )
         found = identify_operation(
-            *(taught, settings.T_s), unit=log.unit, shown=log.shown, progress=lambda _message, done: progress(done)
+            *(taught, settings.T_s),
+            unit=logs[0].unit,
+            shown=logs[0].shown,
+            part=_what_teaches(recordings, logs),
+            progress=lambda _message, done: progress(done),
         )
     except IdentificationError as error:
         found = unit_gain_model(settings.T_s, f"{error}; a gain of 1 without lag is taken")
     summary = dict(found.summary())
     return {name: _known(value) for name, value in summary.items()}
+
+
+def _what_teaches(recordings: Sequence[Recording], logs: Sequence[Log]) -> str:
+    """Return what the samples that teach are, in words: where all of it rests, it is the log that cannot teach."""
+    log = "this log" if len(logs) == 1 else "these logs"
+    return log if all(np.ptp(one.x_d) == 0 for one in recordings) else f"the first half of {log}"
 
 
 def _known(value: Any) -> Any:

@@ -16,7 +16,7 @@ from ..tune.choice import WORTH
 from .extent import extent
 from .fit import Fit
 from .fit_compensation import write_tracking
-from .identify_tables import shown_estimates
+from .identify_tables import deviation_words, shown_estimates
 from .judged import Judged, recommendation
 from .log_intake import changes
 from .report_sections import COLOURS, NAMES, write_changes, write_errors, write_findings
@@ -102,7 +102,7 @@ def _write_identification(report: Report, fit: Fit, judged: Judged) -> None:
     )
     if found["parameters"]:
         rows = [
-            [name, f"{value:.6g}", f"± {std:.2g}", unit]
+            [name, f"{value:.6g}", deviation_words(std, "± "), unit]
             for name, value, std, unit in shown_estimates(found["parameters"], judged.shown)
         ]
         report.table(["parameter", "value", "standard deviation", "unit"], rows)

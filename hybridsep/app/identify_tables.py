@@ -13,7 +13,7 @@ from ..identify.model import IdentifiedModel
 from ..logs.units import Shown
 from .tables import console, print_json
 
-__all__ = ["print_identified", "shown_estimates"]
+__all__ = ["deviation_words", "print_identified", "shown_estimates"]
 
 
 def print_identified(found: IdentifiedModel | IdentifiedResponse, as_json: bool, title: str, shown: Shown) -> None:
@@ -30,6 +30,11 @@ def print_identified(found: IdentifiedModel | IdentifiedResponse, as_json: bool,
         console.print(f"- {finding}", highlight=False)
 
 
+def deviation_words(std: float, sign: str = "") -> str:
+    """Return a standard deviation as text; that of a parameter that was not estimated is no figure."""
+    return f"{sign}{std:.2g}" if std > 0 else "fixed"
+
+
 def shown_estimates(parameters: Iterable[Mapping[str, Any]], shown: Shown) -> Iterator[tuple[str, float, float, str]]:
     """Yield name, value, standard deviation and unit of parameters; positions in the units of their log."""
     for one in parameters:
@@ -41,8 +46,7 @@ def _parameters(found: IdentifiedModel | IdentifiedResponse, title: str, shown: 
     chosen = found.structure if isinstance(found, IdentifiedModel) else f"{len(found.model.modes)} modes"
     table = Table("", "value", "± (1σ)", "unit", title=f"{title}: {chosen}, {found.input_hold}", box=box.SIMPLE)
     for name, value, std, unit in shown_estimates(map(vars, found.parameters), shown):
-        deviation = f"{std:.2g}" if std > 0 else "as chosen"
-        table.add_row(name, f"{value:.7g}", deviation, "" if unit == "1" else unit)
+        table.add_row(name, f"{value:.7g}", deviation_words(std), "" if unit == "1" else unit)
     return table
 
 

@@ -6,8 +6,11 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
 from ..evaluate.peers import ARX_LAGS, LAG_HOLD
 from ..evaluate.verdict import ALIKE, WINDOWS_ENOUGH, WINDOWS_MIN, counted
+from ..identify.operation import LITTLE_MOTION
 from ..logs.units import Shown
 from ..tune.halves import Replay
 
@@ -15,6 +18,9 @@ __all__ = ["Judged", "peers_in_words", "recommendation"]
 
 _IN_WORDS = {"physics model": "the physics model alone", "hold": "holding the last residual"}
 """Names of what a hybrid is compared with, in a sentence; others are as they are."""
+
+_STANDSTILL = 1e-3
+"""Commanded motion of a sample, relative to the largest, below which the axis is at rest."""
 
 
 @dataclass(frozen=True)
@@ -76,12 +82,12 @@ def recommendation(judged: Judged) -> str:
     against = hybrid.rms / plain.rms
     if best.name == plain.name or against >= 1.0 - ALIKE:
         return (
-            f"Do not use the hybrid on what this log shows: {ratio:.2f} × the error of {peer}, which is best, {by}; "
-            "record more motion."
+            f"Do not use the hybrid on what this log shows: {ratio:.2f} × the error of {peer}, which is best, {by}"
+            f"{_more_motion(judged)}."
         )
     return (
         f"Best on what this log shows is {peer}: the hybrid has {ratio:.2f} × its error, and {against:.2f} × that of "
-        f"{_IN_WORDS[plain.name]}, {by}; record more motion."
+        f"{_IN_WORDS[plain.name]}, {by}{_more_motion(judged)}."
     )
 
 
@@ -89,6 +95,16 @@ def _enough(judged: Judged) -> str:
     """Return how long a recording would do, in words: its windows that judge, and one that began before."""
     seconds = (WINDOWS_ENOUGH + 1) * judged.replay.Np * judged.T_s / judged.share
     return f"record at least {math.ceil(round(10 * seconds, 6)) / 10:g} s"
+
+
+def _more_motion(judged: Judged) -> str:
+    """Return that more motion is to be recorded, in words; empty where the axis moves enough to learn from."""
+    steps = [np.abs(np.diff(one.x_d)) for one in judged.replay.recordings]
+    fastest = max(float(one.max(initial=0.0)) for one in steps)
+    moving = sum(int((one > _STANDSTILL * fastest).sum()) for one in steps) / sum(len(one) for one in steps)
+    if moving >= LITTLE_MOTION:
+        return ""
+    return f"; the axis moves in {100 * moving:.2g} % of the samples: record more motion"
 
 
 def peers_in_words(judged: Judged) -> str:

@@ -151,7 +151,7 @@ def take_in(logs: Sequence[Log], *, fix: bool) -> tuple[list[Log], Mapping[str, 
         ]
         if left:
             hint = " (--fix does it)" if all(finding.fix for finding in left) else ""
-            raise LogError(f"{log.path}: " + "; ".join(str(finding) for finding in left) + hint)
+            raise LogError(f"{log.path}: " + "; ".join(finding.plain for finding in left) + hint)
         used.append(apply(log, applied))
         all_findings[log.path.name] = tuple(_applied(one) if one in applied else one for one in findings)
     return used, all_findings

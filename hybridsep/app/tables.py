@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -113,8 +113,12 @@ def shown_figure(value: float | None, unit: str = "") -> str:
     return f"{value:.1f}{unit}" if unit else f"{value:.2f}"
 
 
+PREDICTIONS = {"pb": "physics", "hold": "hold", "arx20": "ARX20", "arx40": "ARX40", "h": "hybrid"}
+"""Names in summaries, and what they are called; ARX models are of replays of logs only."""
+
+
 def print_scores(
-    summary: Mapping[str, float | int],
+    summary: Mapping[str, Any],
     verdict: Verdict,
     as_json: bool,
     title: str,
@@ -149,30 +153,34 @@ def print_scores(
         )
         return
     factor, name = (shown or shown_in(unit)).error(1e-6 * float(summary["rms_pb_um"]))
-    table = Table(title=f"{title}: prediction error in {name} against the measured position")
-    for column in ("", "physics", "hold", "hybrid", "reduction", "× hold"):
-        table.add_column(column, justify="right")
+    keys = [key for key in PREDICTIONS if f"rms_{key}_um" in summary]
+    table = Table(
+        title=f"{title}: prediction error in {name} against the measured position",
+        box=box.SIMPLE,
+        pad_edge=False,
+        collapse_padding=True,
+    )
+    for column in ("", *(PREDICTIONS[key] for key in keys), "reduction", "× hold"):
+        table.add_column(column, justify="right", no_wrap=True)
     warmed_up = summary.get("n_samples_after_warm_up") != summary["n_samples"]
     parts = (("", ""), ("_after_warm_up", " after warm-up"))
     for suffix, label in parts if warmed_up else parts[:1]:
         for quantity in ("rms", "max"):
-            figures = [summary.get(f"{quantity}_{key}_um{suffix}") for key in ("pb", "hold", "h")]
-            if all(figure is not None for figure in figures):
+            if f"{quantity}_pb_um{suffix}" in summary:
+                figures = [summary[f"{quantity}_{key}_um{suffix}"] for key in keys]
                 compared = [summary[f"{key}{suffix}"] for key in ("reduction_percent", "ratio_to_hold")]
                 ratios = [shown_figure(compared[0], " %"), shown_figure(compared[1])] if quantity == "rms" else ["", ""]
                 label_text = f"{quantity.upper() if quantity == 'rms' else quantity}{label}"
-                sizes = [1e-6 * factor * figure for figure in figures if figure is not None]
-                table.add_row(label_text, *map(shown_figure, sizes), *ratios)
+                shown_sizes = [one if isinstance(one, str) else shown_figure(1e-6 * factor * one) for one in figures]
+                table.add_row(label_text, *shown_sizes, *ratios)
     console.print(table)
     console.print(str(verdict), highlight=False)
 
 
-def print_without_first(rms: Sequence[float], shown: Shown) -> None:
-    """Print the RMS errors of physics model, hold and hybrid, m or rad, without the first window of a log in motion."""
-    factor, name = shown.error(rms[0])
-    figures = ", ".join(
-        f"{peer} {shown_figure(factor * value)}" for peer, value in zip(("physics", "hold", "hybrid"), rms, strict=True)
-    )
+def print_without_first(rms: Mapping[str, float], shown: Shown) -> None:
+    """Print RMS errors, m or rad, without the first window of a log in motion, by their names in summaries."""
+    factor, name = shown.error(rms["pb"])
+    figures = ", ".join(f"{peer} {shown_figure(factor * rms[key])}" for key, peer in PREDICTIONS.items() if key in rms)
     console.print(
         f"Without the first window, of whose start in motion no model knows the state: RMS {figures} {name}.",
         highlight=False,

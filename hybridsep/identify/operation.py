@@ -25,7 +25,7 @@ from .selection import HELD_OUT, Candidate, choose, compare_structures, held_out
 from .structure import STRUCTURES, Structure
 from .uncertainty import estimates
 
-__all__ = ["SAMPLES_MIN", "identify_operation", "unit_gain_model"]
+__all__ = ["LITTLE_MOTION", "SAMPLES_MIN", "identify_operation", "unit_gain_model"]
 
 SAMPLES_MIN = 100
 """Samples below which nothing is identified."""
@@ -35,6 +35,9 @@ WEAK = 3.0
 
 OPPOSED = -0.7
 """Correlation of commanded and measured motion below which one of them may have the wrong sign."""
+
+LITTLE_MOTION = 0.25
+"""Share of samples in motion below which more of it is asked for."""
 
 GAIN_RANGE = (0.1, 10.0)
 """Static gains outside of which a unit is probably wrong."""
@@ -51,6 +54,7 @@ def identify_operation(
     order_max: int = 6,
     unit: str = "m",
     shown: Shown | None = None,
+    part: str = "this log",
     progress: Progress = lambda _message, _done: None,
 ) -> IdentifiedModel:
     """Identify the physics model from recordings of one axis in operation.
@@ -75,6 +79,8 @@ def identify_operation(
         Unit of the positions, for estimates.
     shown : Shown, optional
         Units in which findings say errors; those of ``unit`` if left out.
+    part : str
+        What the recordings are, for findings and errors.
     progress : callable, optional
         Called with a message and the fraction done.
 
@@ -90,7 +96,8 @@ def identify_operation(
     T_s, shown = check("T_s", T_s), shown or shown_in(unit)
     given = [(x_d, x) for x_d, x in recordings]
     segments = as_segments(given)
-    _require_motion(segments)
+    if reason := _hindrance(segments):
+        raise IdentificationError(f"{part} cannot teach a model, because {reason}")
     structures = [
         structure
         for structure in STRUCTURES
@@ -105,12 +112,13 @@ def identify_operation(
         fit = _at_rest(segments, T_s)
         spread, rest = shown.words(_spread(segments)), shown.words(fit.rms)
         findings.append(
-            f"too little motion to learn the dynamics from: the commanded position moves by {spread} (standard "
-            f"deviation), and {rest} of the measured one are not explained by it; a gain of 1 without lag is taken"
+            f"too little motion in {part} to learn the dynamics from: the commanded position moves by {spread} "
+            f"(standard deviation), and {rest} of the measured one are not explained by it; a gain of 1 without lag is "
+            "taken"
         )
     parameters, n_effective = estimates(fit, segments, T_s, unit)
     findings += _findings(
-        *(fit, chosen, segments, parameters[0].std, n_effective, shown),
+        *(fit, chosen, segments, parameters[0].std, n_effective, shown, part),
         [np.asarray(x_d, dtype=np.float64) for x_d, _ in given],
     )
     findings += delay_finding(fit, segments, T_s)
@@ -140,21 +148,21 @@ def unit_gain_model(T_s: float, reason: str) -> IdentifiedModel:
     )
 
 
-def _require_motion(segments: Sequence[Segment]) -> None:
-    """Raise IdentificationError if there is nothing to learn from."""
+def _hindrance(segments: Sequence[Segment]) -> str:
+    """Return why there is nothing to learn from; empty if there is something."""
     n = sum(int(segment.known.sum()) for segment in segments)
     if n < SAMPLES_MIN:
-        raise _refusal(f"it has {n} samples, at least {SAMPLES_MIN} are needed")
+        return f"it has {n} samples, at least {SAMPLES_MIN} are needed"
     if all(np.ptp(segment.u) == 0 for segment in segments):
-        raise _refusal("the commanded position does not move; record the axis while it works")
+        return "the commanded position does not move; record the axis while it works"
     measured = [(segment.u[segment.known], segment.y[segment.known]) for segment in segments]
     if all(np.ptp(y) == 0 for _, y in measured):
-        raise _refusal("the measured position does not move")
+        return "the measured position does not move"
     split = motion_split(segments, 1.0 - HELD_OUT)
     n_fitted = sum(int(segment.known[: segment.stop].sum()) for segment in split)
     n_judging = sum(len(held_out(segment)) for segment in split)
     if n < sum(len(segment.u) for segment in segments) and min(n_fitted, n_judging) < SAMPLES_MIN // 4:
-        raise _refusal(
+        return (
             f"too many measured positions are missing: {n_fitted} are left in the part that is fitted to, {n_judging} "
             "in the part that judges"
         )
@@ -164,20 +172,17 @@ def _require_motion(segments: Sequence[Segment]) -> None:
     longest = max(segments, key=lambda segment: float(np.ptp(segment.u)))
     # Beyond its bandwidth, where a swept sine ends, a drive moves against its command with no sign wrong.
     if correlation < OPPOSED and runs_against(longest.u, longest.y) is not None:
-        raise _refusal(
+        return (
             f"the measured position moves against the commanded one (correlation {correlation:.2f}); turn the sign of "
             "one of them"
         )
+    return ""
 
 
 def _as_known(value: float, std: float) -> str:
     """Return a figure with the decimals of the two leading digits of its standard deviation, seven at most."""
     decimals = 1 - math.floor(math.log10(std)) if 0.0 < std < math.inf else 7
     return f"{value:.{min(max(decimals, 0), 7)}f}"
-
-
-def _refusal(reason: str) -> IdentificationError:
-    return IdentificationError(f"this log cannot teach a model, because {reason}")
 
 
 def _is_weak(fit: Fit, segments: Sequence[Segment], T_s: float) -> bool:
@@ -224,14 +229,15 @@ def _findings(
     gain_std: float,
     n_effective: float,
     shown: Shown,
+    part: str,
     commands: Sequence[Array],
 ) -> list[str]:
     """Return what a user should know of the identification, in words."""
     findings = []
     n = sum(int(segment.known.sum()) for segment in segments)
     moving = sum(np.count_nonzero(np.diff(s.u)) for s in segments) / sum(len(s.u) for s in segments)
-    if moving < 0.25:
-        findings.append(f"the command moves in {100 * moving:.0f} % of the samples")
+    if moving < LITTLE_MOTION:
+        findings.append(f"the command moves in {100 * moving:.0f} % of the samples of {part}")
     # Of the recordings, not of the pieces that are fitted to: the liveliest of a long one start in motion always.
     started = [starts_in_motion(x_d) for x_d in commands]
     if started[0]:

@@ -119,5 +119,10 @@ class Finding:
         if self.applied and self.fix is not None:
             how, also = ("fixed", "; your controller must do the same") if self.fix.meaning else ("handled", "")
             return f"{how}: {self.name}: {self.words}. Done: {self.fix.words}{also}."
+        return f"{self.severity}: {self.plain}"
+
+    @property
+    def plain(self) -> str:
+        """What is wrong and what would put it right, without the severity."""
         fix = f" Fix: {self.fix.words}." if self.fix else ""
-        return f"{self.severity}: {self.name}: {self.words}.{fix}"
+        return f"{self.name}: {self.words}.{fix}"

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from arx_oracle import arx_by_definition, free_run_by_definition
 from command_line import Run, write_log
 from staircase_data import commanded, measured
 
@@ -166,6 +167,34 @@ def test_saved_state_and_predictions(hybridsep: Run, tmp_path: Path) -> None:
         assert f"{option} {other} exists and is no" in err
     assert "is the same file as the log" in hybridsep("backtest", log, *MACHINE, "--save", log)[2]
     assert "--save must end in .state or .csv or .npz" in hybridsep("backtest", log, *MACHINE, "--save", "a.bin")[2]
+
+
+def test_arx_models_stand_beside_hold(hybridsep: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    n, Np, warm = 800, 100, 200
+    x_d, x, log = commanded()[:n], measured(0)[:n], write_log(tmp_path / "log.csv", n=n)
+    command = ("backtest", log, *MACHINE, "--Np", Np, "--p", 20, "--t_init", 1e-3 * warm)
+    figures = json.loads(hybridsep(*command, "--json")[1])
+    status, out, err = hybridsep(*command)
+    assert status == 0, err
+    assert "physics hold ARX20 ARX40 hybrid reduction × hold" in " ".join(out.split())
+    for lags in (20, 40):
+        windows = [
+            free_run_by_definition(arx_by_definition(x_d, x, lags, k), x_d, x, lags, k, k + Np)
+            for k in range(Np, n, Np)
+        ]
+        errors = x - np.concatenate([x_d[:Np], *windows])  # nothing is known of the first one
+        for suffix, first in (("", 0), ("_after_warm_up", warm)):
+            rms = 1e6 * np.sqrt(np.mean(errors[first:] ** 2))
+            assert figures[f"rms_arx{lags}_um{suffix}"] == pytest.approx(rms, rel=1e-6)
+            assert figures[f"max_arx{lags}_um{suffix}"] == pytest.approx(1e6 * np.abs(errors[first:]).max(), rel=1e-6)
+            assert f"{rms:.2f}" in out
+        ratio = figures["rms_h_um"] / figures[f"rms_arx{lags}_um"]
+        assert f"than ARX{lags} (refitted): {ratio:.3g} × its RMS error" in figures["verdict"]
+    monkeypatch.setattr("hybridsep.app.log_intake.CHECKED_MAX", n - 1)
+    status, out, err = hybridsep(*command)
+    assert status == 0, err
+    assert "ARX models are left out: they take at most 799 samples." in out
+    assert "ARX20" not in out
 
 
 def test_the_files_that_were_written_are_named(hybridsep: Run, tmp_path: Path) -> None:

@@ -104,6 +104,12 @@ def test_the_report_says_what_to_do_and_shows_the_figures(fitted: Fit, log: Path
     assert all(f"{1e6 * value:.4g}" in page for value in fitted.judged.rms())
     assert "HybridPredictor_axis.fmu" in page
     assert page.count('<div id="chart') == 5
+    estimated = {one["name"]: one["std"] > 0 for one in fitted.identification["parameters"]}
+    assert not estimated["gain"]
+    for name, free in estimated.items():
+        row = page.partition(f"<td>{name}</td>")[2].partition("</tr>")[0]
+        assert ("± " in row) == free
+        assert ("<td>fixed</td>" in row) != free
     slow = dict.fromkeys(fitted.steps, 2e-3)
     fit_report(replace(fitted, steps=slow), used, findings).write(tmp_path / "slow.html")
     assert "would overrun" in (tmp_path / "slow.html").read_text(encoding="utf-8")
@@ -191,6 +197,21 @@ def test_a_log_that_cannot_teach_a_model_is_predicted_by_its_command(tmp_path: P
     assert rms_pb == pytest.approx(1e-6, rel=0.1)
     assert rms_h <= 1.02 * rms_pb
     fit_report(found, used, findings).write(tmp_path / "report.html")
+
+
+def test_a_half_that_rests_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It was the log whose commanded position does not move, where only the half that teaches rests."""
+    monkeypatch.setattr(fitting, "build_for_host", lambda *_arguments, **_options: None)
+    monkeypatch.setattr(fitting, "step_times", lambda *_arguments: {"median": 0.0, "p99_9": 0.0, "largest": 0.0})
+    rest = np.full(300, commanded()[0])
+    noise = np.random.default_rng(0).normal(0, 1e-6, 300)
+    x_d, x = np.concatenate((rest, commanded()[:300])), np.concatenate((rest + noise, measured(0)[:300]))
+    used, _ = take_in([read_log(write_rows(tmp_path / "axis.csv", x_d, x), uniform=False)], fix=False)
+    for logs, name in ((used, "this log"), (2 * used, "these logs")):
+        [reason] = fit(logs, tmp_path, FitOptions(NP, "axis")).identification["findings"]
+        assert reason.startswith(
+            f"the first half of {name} cannot teach a model, because the commanded position does not move"
+        )
 
 
 @pytest.mark.parametrize(

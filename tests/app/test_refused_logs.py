@@ -55,6 +55,21 @@ def test_a_refused_run_leaves_no_folder_and_takes_none_that_was_there(hybridsep:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["axis.csv", "old"]
 
 
+def test_a_refusal_names_its_file_and_itself_once(hybridsep: Run, tmp_path: Path) -> None:
+    """It began with "error: clipped.csv: error: clipped: "."""
+    x = np.clip(measured(0)[:3000], None, 4e-3)
+    clipped, turned = (write_rows(tmp_path / f"{name}.csv", commanded()[:3000], x) for name in ("clipped", "turned"))
+    write_rows(turned, commanded()[:3000], -measured(0)[:3000])
+    for log, finding in ((clipped, "clipped"), (turned, "sign")):
+        status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit")
+        assert (status, out) == (2, "")
+        assert err.startswith(f"error: {log}: {finding}: ")
+        assert err.count("error:") == 1
+        assert err.count(log.name) == 1
+        assert "Fix: " in err
+        assert "(--fix does it)" in err
+
+
 def test_exchanged_columns_are_said(hybridsep: Run, tmp_path: Path) -> None:
     """They were printed as handled, and not among the sources."""
     path = write_log(tmp_path / "axis.csv", header="t,x,x_d")

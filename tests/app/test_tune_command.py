@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import Run, write_log
+from command_line import Run, write_log, write_rows
 
 from hybridsep import load_machine
 from hybridsep.app.tune_table import print_tuning
@@ -88,6 +88,19 @@ def test_a_log_with_a_gap_is_tuned_on_in_pieces(hybridsep: Run, tmp_path: Path) 
     assert status == 0, err
     assert "segments the longest" not in err
     assert "gaps" in [finding["name"] for finding in json.loads(text)["findings"]["log.csv"]]
+
+
+def test_changed_positions_are_among_the_sources(hybridsep: Run, tmp_path: Path) -> None:
+    log, machine, again = write_log(tmp_path / "log.csv", n=600), tmp_path / "machine.toml", tmp_path / "again.toml"
+    columns = np.genfromtxt(log, delimiter=",", skip_header=1)
+    write_rows(log, columns[:, 1], -columns[:, 2])
+    one = ("--Np", "50", "--p", "5", "--q", "1", "--lambda", "1e-12", "--jobs", "1", "--fix")
+    before = load_machine("spring_mass_damper").sources
+    done = "log.csv: sign: turn the measured position's sign; the controller must do the same"
+    for given, out in (("spring_mass_damper", machine), (machine, again)):
+        status, _, err = hybridsep("tune", log, "-m", given, *one, "--out", out)
+        assert status == 0, err
+        assert load_machine(out).sources == (*before, done)
 
 
 @pytest.mark.parametrize(
