@@ -1,4 +1,4 @@
-"""Generated parts of the repository: the settings of the C core and the interface tables of ``README.md``.
+"""Generated files of the repository: the settings of the C core and the pages of reference in ``docs``.
 
 ``python generate.py`` writes them anew after a change of a parameter or a variable; ``tests/test_generated.py`` tells
 when one is out of date.
@@ -9,26 +9,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from hybridsep import load_machine
-from hybridsep.base.data_files import DEFAULT_MACHINE
+from docs.reference_pages import pages
 from hybridsep.base.parameters import Parameter
-from hybridsep.fmi.archive import fmu_description
-from hybridsep.fmi.tables import interface_table
-from hybridsep.fmi.variables import COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS, TRUST_SETTINGS, variables_of
+from hybridsep.fmi.variables import COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS, TRUST_SETTINGS
 
 ROOT = Path(__file__).resolve().parent
 SETTINGS_HEADER = ROOT / "fmu_src" / "c" / "core" / "predict" / "hsep_settings.h"
-README = ROOT / "README.md"
-
-TABLES = ("HybridPredictor", "FeedDrive", "SepCompensator")
-"""FMUs of the default machine, in the order of their tables in the README."""
-
-_HEAD = "| name | causality | type, unit | start | meaning |\n|---|---|---|---|---|\n"
 
 
 def generated() -> dict[Path, str]:
-    """Return the files that are generated, and those with generated parts, as they must be."""
-    return {SETTINGS_HEADER: settings_header(), README: readme(README.read_text(encoding="utf-8"))}
+    """Return the files that are generated, as they must be."""
+    return {SETTINGS_HEADER: settings_header(), **pages()}
 
 
 def settings_header() -> str:
@@ -60,20 +51,6 @@ typedef struct {{
 
 #endif
 """
-
-
-def readme(text: str) -> str:
-    """Return the README with the rows of its interface tables replaced by those of the FMUs."""
-    machine = load_machine(DEFAULT_MACHINE)
-    parts = text.split(_HEAD)
-    for i, model in enumerate(TABLES, start=1):
-        _, behind = parts[i].split("\n\n", 1)
-        table = interface_table(variables_of(fmu_description(machine, model, model)))
-        rows = [
-            f"| `{name}` | " + " | ".join(cell.replace("|", r"\|") for cell in cells) + " |" for name, *cells in table
-        ]
-        parts[i] = "\n".join(rows) + "\n\n" + behind
-    return _HEAD.join(parts)
 
 
 def _list(name: str, settings: Mapping[str, Parameter]) -> str:

@@ -2,20 +2,37 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
+from places import ROOT
 
-from generate import README, SETTINGS_HEADER, generated, readme
+from generate import generated
+from hybridsep.base import errors
+from hybridsep.base.messages import ERRORS, FINDINGS
 
 
-@pytest.mark.parametrize("path", [SETTINGS_HEADER, README], ids=lambda path: path.name)
+@pytest.mark.parametrize("path", generated(), ids=lambda path: path.name)
 def test_generated_files_are_up_to_date(path: Path) -> None:
     assert path.read_text(encoding="utf-8") == generated()[path], "python generate.py writes it anew"
 
 
-def test_rows_of_the_interface_tables_are_written_anew() -> None:
-    text = README.read_text(encoding="utf-8")
-    row = next(line for line in text.splitlines(keepends=True) if line.startswith("| `preview` |"))
-    changed = text.replace(row, "| `old` | parameter, fixed | Real | 0 | a parameter that is no more |\n" * 2)
-    assert readme(changed) == text
+def test_every_exception_and_finding_is_explained() -> None:
+    classes = {name for name in errors.__all__ if isinstance(getattr(errors, name), type)}
+    assert set(ERRORS) == classes
+    for name, one in (*ERRORS.items(), *FINDINGS.items()):
+        assert one.cause.endswith("."), name
+        assert one.remedy.endswith("."), name
+
+
+@pytest.mark.parametrize("words", [words for one in ERRORS.values() for words in one.printed])
+def test_words_of_messages_are_still_printed(words: str) -> None:
+    assert any(
+        words in without_breaks(path) for path in (ROOT / "hybridsep").rglob("*.py") if path.name != "messages.py"
+    )
+
+
+def without_breaks(path: Path) -> str:
+    """Return a file's text with adjacent string literals joined."""
+    return re.sub(r'"\s*\n\s*f?"', "", path.read_text(encoding="utf-8"))

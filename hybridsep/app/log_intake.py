@@ -105,8 +105,8 @@ def open_checked(
         check_interval(path.name, reader.T_s, machine)
     if intake.errors and not (fix or as_is):
         raise LogError(
-            f"{path}: figures from this log would mean nothing: {'; '.join(f.words for f in intake.errors)}. Apply the "
-            "fixes with --fix, correct the log or the options it is read with, or go on with --as-is"
+            f"{path}: errors computed from this log would be invalid: {'; '.join(f.words for f in intake.errors)}. "
+            "Apply the fixes with --fix, correct the log or the options it is read with, or go on with --as-is"
         )
     if fix:
         intake = replace(intake, findings=tuple(_applied(finding) for finding in intake.findings))
@@ -137,7 +137,7 @@ def take_in(logs: Sequence[Log], *, fix: bool) -> tuple[list[Log], Mapping[str, 
     Raises
     ------
     LogError
-        If the figures from a log would mean nothing, with what would put it right.
+        If errors computed from a log would be invalid, with what would put it right.
     """
     used, all_findings = [], {}
     for log in logs:

@@ -68,7 +68,7 @@ class Intake:
 
     @property
     def errors(self) -> tuple[Finding, ...]:
-        """Findings with which figures from the log flatter or mean nothing."""
+        """Findings with which errors computed from the log are invalid."""
         return tuple(finding for finding in self.findings if finding.severity == ERROR)
 
     def fixed(self) -> Log:

@@ -7,42 +7,19 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..base.messages import FINDINGS
 from ..base.signals import Array
 from ..logs.log import Log
 
 __all__ = ["ERROR", "HOPELESS", "NAMES", "NOTE", "WARNING", "Finding", "Fix", "Picture"]
 
 ERROR, WARNING, NOTE = "error", "warning", "note"
-"""Severities: figures from the log flatter or mean nothing; they are worse than they need be; worth knowing."""
+"""Severities: errors computed from the log are invalid; they are larger than they need be; worth knowing."""
 
 HOPELESS = "too little motion"
-"""Finding that no fix helps: the log cannot teach a model."""
+"""Finding that no fix helps: the log does not determine a model."""
 
-NAMES = (
-    "time order",
-    "whole turns",
-    "gaps",
-    "jitter",
-    "lost rows",
-    "missing samples",
-    "jumps",
-    "outliers",
-    "clipped",
-    "stuck samples",
-    "repeated samples",
-    HOPELESS,
-    "same column",
-    "columns swapped",
-    "following error",
-    "velocity for position",
-    "sign",
-    "scale",
-    "offset",
-    "unit",
-    "start in motion",
-    "delay",
-    "sampling rate",
-)
+NAMES = tuple(FINDINGS)
 """Names of findings in the order in which they are looked for, and fixed."""
 
 

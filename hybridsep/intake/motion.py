@@ -102,8 +102,7 @@ def check_start(log: Log) -> Iterator[Finding]:
     factor, unit = log.shown.position
     words = (
         f"the log begins in motion, at {factor * first / log.T_s:.3g} {unit}/s of {factor * largest / log.T_s:.3g} at "
-        "most; the state in which the axis begins is estimated from its first samples, which a log that begins at rest "
-        "needs not"
+        "most; the state in which the axis begins is estimated from its first samples"
     )
     rest = _first_rest(log.x_d, largest)
     fix = None

@@ -41,7 +41,7 @@ def test_a_log_that_would_flatter_is_refused_fixed_or_taken_as_it_is(
     status, out, err = hybridsep("backtest", log, *MACHINE)
     assert (status, out) == (2, "")
     assert len(err.strip().splitlines()) == 1
-    assert "figures from this log would mean nothing: " in err
+    assert "errors computed from this log would be invalid: " in err
     assert words in err
     assert "Apply the fixes with --fix, correct the log or the options it is read with, or go on with --as-is" in err
     good = json.loads(hybridsep("backtest", write_log(tmp_path / "good.csv"), *MACHINE, "--json")[1])

@@ -1,17 +1,18 @@
-"""Links and file names on the pages of the repository."""
+"""Links and file names on the pages of the repository, and its length and tone at the front."""
 
 from __future__ import annotations
 
 import re
+from datetime import date
 from pathlib import Path
 
 import pytest
 from places import ROOT
 
-PAGES = (
-    *("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md"),
-    *("docs/identify.md", "docs/importers.md", "docs/paper.md", "docs/tune.md"),
-)
+DATED = ROOT / "docs" / "experiments"
+"""Pages that tell of the code at their commit: names of files on them may have gone."""
+TOP = tuple(ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md"))
+PAGES = (*TOP, *sorted((ROOT / "docs").rglob("*.md")))
 FOLDERS = (".", "hybridsep", "fmu_src/c", "fmu_src/c/core", "benchmarks", "benchmarks/step_time")
 """Folders below which a page names files."""
 FILE = re.compile(r"(?<![\w*{./-])((?:[\w.-]+/)*[\w.-]+\.(?:py|c|h|toml|md))(?![\w*}])")
@@ -19,7 +20,6 @@ ELSEWHERE = {
     "my_axis.toml",
     "machine.toml",
     "tuned.toml",
-    "example_axis/machine.toml",
     "my_axis/machine.toml",
     "all.c",
     "sources/all.c",
@@ -28,21 +28,51 @@ ELSEWHERE = {
 """Files of the user, of an archive, of another project."""
 
 
-@pytest.mark.parametrize("page", PAGES)
-def test_links_lead_somewhere(page: str) -> None:
-    place = (ROOT / page).parent
-    for target in re.findall(r"\]\((?!http)([^)#]+)\)", (ROOT / page).read_text(encoding="utf-8")):
-        assert (place / target).exists(), target
+def name_of(page: Path) -> str:
+    return page.relative_to(ROOT).as_posix()
 
 
-@pytest.mark.parametrize("page", PAGES)
-def test_files_on_the_page_exist(page: str) -> None:
-    names = set(FILE.findall((ROOT / page).read_text(encoding="utf-8"))) - ELSEWHERE
-    assert names
+def links(page: Path) -> list[tuple[str, str]]:
+    """Return the targets and anchors of a page's links that stay in the repository."""
+    text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    return [(match[1], match[2] or "") for match in re.finditer(r"\]\((?!http|#)([^)#]+)(?:#([^)]+))?\)", text)]
+
+
+def anchors(page: Path) -> set[str]:
+    """Return the anchors of a page's headings, as GitHub and the site make them."""
+    headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_links_lead_somewhere(page: Path) -> None:
+    for target, anchor in links(page):
+        place = page.parent / target
+        assert place.exists(), target
+        assert not anchor or anchor in anchors(place), (target, anchor)
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if page.parent != DATED], ids=name_of)
+def test_files_on_the_page_exist(page: Path) -> None:
+    names = set(FILE.findall(re.sub(r"\]\([^)]*\)", "]", page.read_text(encoding="utf-8")))) - ELSEWHERE
     known = {path.name for folder in ("hybridsep", "fmu_src", "tests", "benchmarks") for path in files_in(folder)}
     for name in names:
         found = any((ROOT / folder / name).is_file() for folder in FOLDERS)
         assert found or ("/" not in name and name in known), name
+
+
+@pytest.mark.parametrize("page", sorted(DATED.glob("2*.md")), ids=lambda page: page.stem)
+def test_an_experiment_says_when_it_was_made(page: Path) -> None:
+    day = date.fromisoformat(page.name[:10])
+    assert re.search(rf"\b{day.day}( and \d+)? {day:%B %Y}", page.read_text(encoding="utf-8"))
+    assert page.stem in (DATED / "index.md").read_text(encoding="utf-8")
+
+
+def test_the_front_is_short() -> None:
+    text = TOP[0].read_text(encoding="utf-8")
+    assert len(text.split()) <= 900
+    assert len(text.splitlines()) <= 140
+    assert len(TOP[1].read_text(encoding="utf-8").splitlines()) <= 250
 
 
 def files_in(folder: str) -> list[Path]:

@@ -1,4 +1,4 @@
-"""Claims of docs/paper.md: readings of the equations, cases where the hybrid is worse, commands."""
+"""Claims of docs/evidence/paper.md: readings of the equations, cases where the hybrid is worse, commands."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from places import ROOT
 
 from hybridsep import PAPER_LIMITS, paper_machine, rest_to_rest, spiral, staircase
 
-PAGE = (ROOT / "docs" / "paper.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "evidence" / "paper.md").read_text(encoding="utf-8")
 
 
 def example(name: str) -> dict[str, Any]:

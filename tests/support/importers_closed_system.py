@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 N_SAMPLES = 6001  # of the staircase
 STEP = 1e-3  # s
-GUIDE = ROOT / "docs" / "importers.md"
+GUIDE = ROOT / "docs" / "evidence" / "importers.md"
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,9 @@ from __future__ import annotations
 import re
 
 SLOW = (
+    # The documentation: its command lines, one page after the other, and its site
+    r"documents/test_commands\.py::test_the_pages",
+    r"documents/test_site\.py",
     # All platforms' compilers, sanitizers and programs that are compiled for one test
     r"fmi/test_native_fmu\.py::test_all_platforms",
     r"fmi/test_native_fmu\.py::test_the_archive_without_binaries_can_be_compiled",

@@ -1,0 +1,299 @@
+"""Pages of reference that are written from declarations: command line, machine file, FMU variables, messages."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from types import UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+import typer
+from pydantic import BaseModel
+
+from hybridsep import load_machine
+from hybridsep.app.cli import app
+from hybridsep.base import errors
+from hybridsep.base.data_files import DEFAULT_MACHINE
+from hybridsep.base.messages import ERRORS, FINDINGS, Explanation
+from hybridsep.base.parameters import Parameter
+from hybridsep.base.settings import PARAMETERS, Limits, PredictorSettings
+from hybridsep.fmi.archive import fmu_description
+from hybridsep.fmi.tables import grouped_table
+from hybridsep.fmi.variables import variables_of
+from hybridsep.machines.machine import Machine
+
+__all__ = ["FMUS", "pages"]
+
+FOLDER = Path(__file__).resolve().parent / "reference"
+
+FMUS = {
+    "HybridPredictor": "Between the interpolator and the drive: it delays the command by `Np` samples and predicts "
+    "the position.",
+    "SepCompensator": "In the predictor's place: it delays the command by `preview` samples and modifies it.",
+    "FeedDrive": "The nonlinear drive of eq. (13), a plant to try the others with.",
+    "ReferenceTrajectory": "Plays the staircase, the spiral or samples of yours, so that a system runs without a "
+    "script.",
+}
+"""FMUs of the default machine, with what each is for."""
+
+_WRITTEN = "<!-- Written by generate.py; a change here is lost. -->"
+
+_SECTIONS = {
+    "": "The head of the file.",
+    "physics": "The linear model `G_pb`: either `[[physics.mode]]` entries, eq. (15), or one "
+    "`[physics.spring_mass_damper]`, eq. (11).",
+    "physics.mode": "One mode, `(beta s + alpha) / (s² + 2 zeta ω s + ω²)` with `ω = 2π f_n`; each has a "
+    "`[[physics.mode]]` of its own.",
+    "physics.spring_mass_damper": "Moving mass, damping and stiffness.",
+    "predictor": "Settings of the predictor.",
+    "compensator": "Settings of the compensator; those of `[predictor]` hold where one is left out.",
+    "plant": "A simulated drive with known disturbances, of kind `feed_drive` or `stage`; it makes the plant FMU.",
+    "limits": "Limits of the test trajectories.",
+    "drive_limits": "What the drive allows the modified command; with it the machine gets a compensator FMU.",
+    "log": "How logs of the axis are read.",
+}
+"""Sections of a machine file in the order of the page, with what each is for."""
+
+_OWN = {
+    "name": "name of the axis: letters, digits and underscores",
+    "title": "one line of text",
+    "sources": "where the data come from",
+    "unit": "`m`, or `rad` for a rotary axis",
+    "kind": "kind of drive",
+    "log.t": "column of the time",
+    "log.x_d": "column of the commanded position",
+    "log.x": "column of the measured position",
+    "log.unit": "unit of the positions in the file",
+    "log.axis": "axis of a file that holds several",
+    "physics.mode": "modes, at least one",
+    "physics.spring_mass_damper": "instead of modes",
+    "limits.velocity": "largest velocity of the trajectory",
+    "limits.acceleration": "largest acceleration of the trajectory",
+    "limits.jerk": "largest jerk of the trajectory",
+}
+"""What an entry means that is no parameter, or means something else in its section."""
+
+
+def pages() -> dict[Path, str]:
+    """Return the text of each page."""
+    return {
+        FOLDER / "command-line.md": command_line(),
+        FOLDER / "machine-file.md": machine_file(),
+        FOLDER / "fmu.md": fmu_variables(),
+        FOLDER / "messages.md": messages(),
+    }
+
+
+def command_line() -> str:
+    """Return the page of the commands with their arguments and options."""
+    parts = [
+        "# Command line",
+        _WRITTEN,
+        "`hybridsep COMMAND --help` prints the same. An error is one line on standard error and exit status 2, Ctrl-C "
+        "130; "
+        "with `HYBRIDSEP_DEBUG=1` in the environment an unexpected error shows its traceback. "
+        "[What messages mean](messages.md).",
+    ]
+    commands = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+    parts.append(
+        _table(
+            ("command", "what"),
+            ((f"[`{name}`](#{name})", one.help.partition("\n")[0]) for name, one in commands.items()),
+        )
+    )
+    for name, command in commands.items():
+        arguments = [one for one in command.params if not one.opts[0].startswith("-")]
+        options = [one for one in command.params if one.opts[0].startswith("-")]
+        usage = [f"{one.name.upper()}{'…' if one.nargs == -1 else ''}" for one in arguments]
+        usage = [text if one.required else f"[{text}]" for text, one in zip(usage, arguments, strict=True)]
+        parts += [
+            f"## {name}",
+            " ".join(command.help.split()),
+            f"`{' '.join(['hybridsep', name, *usage, '[OPTIONS]'])}`",
+        ]
+        rows = [(f"`{one.name.upper()}`", one.help) for one in arguments]
+        rows += [(_option(one), _described(one)) for one in options]
+        parts.append(_table(("argument or option", "what"), rows))
+    return _page(parts)
+
+
+def machine_file() -> str:
+    """Return the page of the sections and entries of a machine file."""
+    parts = [
+        "# Machine file",
+        _WRITTEN,
+        "A TOML file that says what an axis is. Values are SI; of a rotary axis (`unit = 'rad'`) wherever a unit has m "
+        "it is rad. Unknown entries are refused. `hybridsep fit`, `identify` and `init` write one, the library brings "
+        "`spring_mass_damper`, `als25010_x`, `als25010_y` and `emps` by name; an example is in "
+        "[log to FMU](../howto/log-to-fmu.md#machine-file).",
+    ]
+    found = dict(_sections(Machine, ""))
+    for path, purpose in _SECTIONS.items():
+        heading = f"`[{path}]`" if path else "Head"
+        parts += [f"## {heading}", purpose, *found[path]]
+    return _page(parts)
+
+
+def fmu_variables() -> str:
+    """Return the page of the FMUs' variables."""
+    machine = load_machine(DEFAULT_MACHINE)
+    parts = [
+        "# FMU variables",
+        _WRITTEN,
+        "FMI 2.0 for co-simulation, communication step size `T_s`. The tables are of the machine "
+        "`spring_mass_damper`; start values "
+        "follow from the machine file that an FMU is built from, and there are as many `mode[i].*` as modes. "
+        "[How they are wired](../howto/run-fmus.md), [when inputs are read](../explanation/timing.md).",
+    ]
+    for model, purpose in FMUS.items():
+        parts += [f"## {model}", purpose]
+        for heading, rows in grouped_table(variables_of(fmu_description(machine, model, model))).items():
+            cells = ((f"`{name}`", kind, start, meaning) for name, kind, _, start, meaning in rows)
+            parts += [f"**{heading}**", _table(("name", "type, unit", "start", "meaning"), cells)]
+    parts += [
+        "## Other machines",
+        "A plant of kind `stage` has `mode[i].*`, the friction `f`, the velocity `friction_on` that it acts on, the "
+        "cable "
+        "stiffness `kappa` and the sampling interval `T_s` of the command instead of `m`, `c`, `k`, `c_nl`, `k_nl`. "
+        "FMUs are named "
+        "after their machine (`HybridPredictor_als25010_x`), those of `spring_mass_damper` plainly; the Python flavour "
+        "ends in `Py`.",
+    ]
+    return _page(parts)
+
+
+def messages() -> str:
+    """Return the page of exceptions and findings with cause and remedy."""
+    parts = [
+        "# What a message means",
+        _WRITTEN,
+        "On the command line an error is one line, `error: …`; in Python it is one of the [exceptions](#exceptions). "
+        "Where it "
+        "speaks of a log, it usually lists [findings of the log's checks](#findings), which are also printed as "
+        "`warning: …`, "
+        "`note: …`, `handled: …` and `fixed: …`.",
+    ]
+    rows = ((f"`{text}`", f"[{name}](#{name.lower()})") for name, one in ERRORS.items() for text in one.printed)
+    parts += [
+        _table(("a message with", "is a"), rows),
+        "## Findings",
+        "An **error** is refused by `backtest`, `report` and `tune` until `--fix` or `--as-is`, and by `fit` and "
+        "`identify` "
+        "unless they can repair it; a **warning** makes figures worse than they need be; a **note** is worth knowing. "
+        "`handled` and `fixed` say that a fix was applied, `fixed` that positions mean something else afterwards, so "
+        "that your "
+        "controller must do the same.",
+    ]
+    for name, one in FINDINGS.items():
+        parts += [f"### {name}", *_explained(one)]
+    parts += ["## Exceptions", f"```text\n{_hierarchy()}\n```"]
+    for name, one in ERRORS.items():
+        parts += [f"### {name}", *_explained(one)]
+    return _page(parts)
+
+
+def _explained(one: Explanation) -> tuple[str, str]:
+    return f"**Cause.** {one.cause}", f"**Remedy.** {one.remedy}"
+
+
+def _hierarchy() -> str:
+    text = inspect.getdoc(errors) or ""
+    lines = [line[4:] for line in text.splitlines() if re.match(r"    \S", line)]
+    return "\n".join(lines)
+
+
+def _option(one: Any) -> str:
+    names = ", ".join(f"`{name}`" for name in one.opts if name.count("-") <= 2 or "_" not in "".join(one.opts))
+    return names + ("" if one.is_flag or not one.metavar else f" {one.metavar}")
+
+
+def _described(one: Any) -> str:
+    text = " ".join((one.help or "").split())
+    text = text[:1].upper() + text[1:]
+    default = one.default
+    if default is not None and default is not False and not callable(default) and default not in ((), []):
+        text += f" Default: `{default}`."
+    return text + (" Required." if one.required else "")
+
+
+def _sections(model: type[BaseModel], path: str) -> Iterator[tuple[str, list[str]]]:
+    """Yield each section's path and tables, its own before those inside it."""
+    rows, inner = [], []
+    for name, field in model.model_fields.items():
+        entry = field.alias or name
+        below = list(_models(field.annotation))
+        place = f"{path}.{entry}" if path else entry
+        if below:
+            inner.append((place, below))
+            if place in _OWN:
+                rows.append((f"`{entry}`", "table", "", _OWN[place]))
+        else:
+            rows.append(_entry(entry, place, field))
+    yield path, [_table(("entry", "type, unit", "if left out", "meaning"), rows)] if rows else []
+    for place, below in inner:
+        if len(below) == 1:
+            yield from _sections(below[0], place)
+        else:
+            tables = []
+            for one in below:
+                kind = get_args(one.model_fields["kind"].annotation)[0]
+                tables += [f'`kind = "{kind}"`:', *next(_sections(one, place))[1]]
+            yield place, tables
+
+
+def _entry(entry: str, place: str, field: Any) -> tuple[str, str, str, str]:
+    parameter = None if place.startswith("log.") else _parameter(entry, place)
+    default = "required" if field.is_required() else _shown(field.default)
+    if place.startswith("compensator.") and field.default is None:
+        default = "as `[predictor]`" if entry in _PREDICTOR else "automatic"
+    if parameter is None:
+        items = [str(item) for item in get_args(field.annotation)] if get_origin(field.annotation) is Literal else []
+        return (
+            f"`{entry}`",
+            " or ".join(f"`{item}`" for item in items) or "text",
+            default,
+            _OWN.get(place) or _OWN[entry],
+        )
+    unit = "" if parameter.unit == "1" else f", {parameter.unit}"
+    kind = {int: "whole number", float: "number", bool: "true or false", str: ""}[parameter.kind]
+    span = "" if parameter.kind is bool else f" ({parameter.range_text})" if kind else parameter.range_text
+    return f"`{entry}`", f"{kind}{unit}{span}", default, _OWN.get(place) or parameter.description
+
+
+def _parameter(entry: str, place: str) -> Parameter | None:
+    if place.startswith(("predictor.", "compensator.")) and entry in _PREDICTOR:
+        return _PREDICTOR[entry]  # the plant's noise_std has another meaning
+    return _DECLARED.get(entry)
+
+
+def _shown(value: Any) -> str:
+    if value is None:
+        return "none"
+    if value == () or value == "":
+        return "empty"
+    return f"`{str(value).lower() if isinstance(value, bool) else value}`"
+
+
+def _models(annotation: Any) -> list[type[BaseModel]]:
+    """Return the sections that an annotation names, inside tuples and unions too."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    if get_origin(annotation) in (Annotated, Union, UnionType, tuple):
+        return [one for part in get_args(annotation) for one in _models(part)]
+    return []
+
+
+def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    lines += ["| " + " | ".join(cell.replace("|", r"\|") for cell in row) + " |" for row in rows]
+    return "\n".join(lines)
+
+
+def _page(parts: Iterable[str]) -> str:
+    return "\n\n".join(parts) + "\n"
+
+
+_PREDICTOR = PredictorSettings.fmi_parameters()
+_DECLARED = {**PARAMETERS, **Limits.parameters()}
