@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from typing import Annotated
 
 import typer
@@ -44,15 +43,9 @@ def _version(version: Annotated[bool, typer.Option("--version", help="Print the 
         raise typer.Exit
 
 
-def main(leave: Callable[..., object] | None = None) -> None:
-    """Run the command line; an error is one line on stderr and exit status 2, Ctrl-C another and 130.
-
-    Parameters
-    ----------
-    leave : callable, optional
-        Handler of Ctrl-C while a command imports what it works with.
-    """
-    sys.exit(run(app, leave))
+def main() -> None:
+    """Run the command line; an error is one line on stderr and exit status 2, Ctrl-C another and 130."""
+    sys.exit(run(app))
 
 
 if __name__ == "__main__":

@@ -9,7 +9,6 @@ from typing import Annotated, Any
 import typer
 
 from ..base.output import written_text
-from .failures import loading
 from .options import (
     AsIsOption,
     FixOption,
@@ -54,27 +53,26 @@ def backtest(
 
     Physics model, hold baseline, ARX models and hybrid are compared.
     """
-    with loading():
-        import numpy as np
+    import numpy as np
 
-        from ..evaluate.backtest import Batch, backtest_stream
-        from ..evaluate.backtest import backtest as backtest_whole
-        from ..evaluate.replayed import replayed_run
-        from ..evaluate.scores import Scores
-        from ..fmi.warm_start import begun_predictor
-        from ..logs.log import Log
-        from ..logs.units import shown_of
-        from ..machines.machine import load_machine, machine_path
-        from .arguments import check_ending
-        from .backtest_peers import backtest_peers
-        from .extent import partly_used
-        from .log_intake import CHECKED_MAX, changed_by, findings_table, open_checked, reading_of
-        from .overwrite import BATCH_COLUMNS, BATCHES, BY_ENDING, Output, check_outputs
-        from .progress import progress_bar
-        from .tables import console, print_scores, print_without_first, print_written
+    from ..evaluate.backtest import Batch, backtest_stream
+    from ..evaluate.backtest import backtest as backtest_whole
+    from ..evaluate.replayed import replayed_run
+    from ..evaluate.scores import Scores
+    from ..fmi.warm_start import begun_predictor
+    from ..logs.log import Log
+    from ..logs.units import shown_of
+    from ..machines.machine import load_machine, machine_path
+    from .arguments import check_ending
+    from .backtest_peers import backtest_peers
+    from .extent import partly_used
+    from .log_intake import CHECKED_MAX, changed_by, findings_table, open_checked, reading_of
+    from .overwrite import BATCH_COLUMNS, BATCHES, BY_ENDING, Output, check_outputs
+    from .progress import progress_bar
+    from .tables import console, print_scores, print_without_first, print_written
 
-        if figure is not None:
-            from ..evaluate.time_plots import prediction_figure
+    if figure is not None:
+        from ..evaluate.time_plots import prediction_figure
 
     axis_machine = load_machine(machine)
     saved = list(save or [])

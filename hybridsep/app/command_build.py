@@ -9,7 +9,7 @@ import typer
 
 from ..fmi.compiler import TARGET_NAMES, default_targets
 from ..fmi.flavours import FLAVOURS
-from .failures import errors_console, loading
+from .failures import errors_console
 from .options import FlavourOption, ForceOption, JsonOption, TsOption, UnitOption, WeightsOption
 
 __all__ = ["build"]
@@ -46,14 +46,13 @@ def build(
 
     The same machine gives the same bytes.
     """
-    with loading():
-        from ..fmi.archive import build_fmu
-        from ..machines.machine import machine_path
-        from .build_arguments import extras_of, jobs_of
-        from .log_intake import show
-        from .overwrite import FMU, Output, check_outputs
-        from .progress import progress_bar
-        from .tables import console, print_json
+    from ..fmi.archive import build_fmu
+    from ..machines.machine import machine_path
+    from .build_arguments import extras_of, jobs_of
+    from .log_intake import show
+    from .overwrite import FMU, Output, check_outputs
+    from .progress import progress_bar
+    from .tables import console, print_json
 
     jobs = jobs_of(fmus or [], machine or [], flavour, target or [])
     extras = extras_of(jobs, weights, trajectory, unit, T_s)

@@ -12,7 +12,6 @@ import typer
 from ..base.data_files import DEFAULT_MACHINE
 from ..base.settings import PARAMETERS, check
 from ..fmi.flavours import FLAVOURS
-from .failures import loading
 from .options import (
     TRAJECTORIES,
     FlavourOption,
@@ -65,20 +64,19 @@ def cosim(
 
     Over the staircase, a spiral's axis or a trajectory in a file.
     """
-    with loading():
-        from ..cosim.apart import run_apart
-        from ..cosim.loop import cosimulate
-        from ..cosim.run import RESULT_SUFFIXES
-        from ..machines.machine import load_machine, machine_path
-        from .arguments import check_ending
-        from .builds import build_for_host
-        from .cosim_arguments import check_pair, checked_group, fitting, read_command
-        from .overwrite import FIGURE, RUN, Output, check_outputs
-        from .progress import progress_bar
-        from .tables import print_run, print_written
+    from ..cosim.apart import run_apart
+    from ..cosim.loop import cosimulate
+    from ..cosim.run import RESULT_SUFFIXES
+    from ..machines.machine import load_machine, machine_path
+    from .arguments import check_ending
+    from .builds import build_for_host
+    from .cosim_arguments import check_pair, checked_group, fitting, read_command
+    from .overwrite import FIGURE, RUN, Output, check_outputs
+    from .progress import progress_bar
+    from .tables import print_run, print_written
 
-        if figure is not None:
-            from ..evaluate.time_plots import prediction_figure, tracking_figure
+    if figure is not None:
+        from ..evaluate.time_plots import prediction_figure, tracking_figure
 
     axis = load_machine(machine)
     check_ending(out, "--out", RESULT_SUFFIXES)

@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from ..fmi.flavours import FLAVOURS
-from .failures import loading
 from .options import ForceOption, JsonOption
 
 __all__ = ["demo"]
@@ -29,15 +28,14 @@ def demo(
 
     The FMUs of the staircase and the spiral are built first.
     """
-    with loading():
-        from .builds import default_flavour
-        from .demo import demo as run_demo
-        from .demo import demo_files, processor_time
-        from .demo_cases import read_recorded
-        from .log_intake import show
-        from .overwrite import BY_ENDING, Output, check_outputs
-        from .progress import progress_bar
-        from .tables import console, print_compensation, print_json, print_predictions
+    from .builds import default_flavour
+    from .demo import demo as run_demo
+    from .demo import demo_files, processor_time
+    from .demo_cases import read_recorded
+    from .log_intake import show
+    from .overwrite import BY_ENDING, Output, check_outputs
+    from .progress import progress_bar
+    from .tables import console, print_compensation, print_json, print_predictions
 
     flavour = flavour or default_flavour()
     files = demo_files(out, flavour, emps=emps is not None)

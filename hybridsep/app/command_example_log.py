@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from .failures import loading
 from .options import ForceOption
 
 __all__ = ["example_log"]
@@ -21,10 +20,9 @@ def example_log(
 
     20 s of a simulated axis at 1 kHz, in mm.
     """
-    with loading():
-        from ..logs.example import write_example
-        from .arguments import check_ending
-        from .overwrite import EXAMPLE_LOG, Output, check_outputs
+    from ..logs.example import write_example
+    from .arguments import check_ending
+    from .overwrite import EXAMPLE_LOG, Output, check_outputs
 
     check_ending(out, "--out", (".csv", ".gz"))
     check_outputs([Output("--out", out, EXAMPLE_LOG)], {}, force=force)

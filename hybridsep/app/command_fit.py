@@ -7,7 +7,6 @@ from typing import Annotated, Any
 
 import typer
 
-from .failures import loading
 from .options import (
     FigurePagesOption,
     ForceOption,
@@ -46,19 +45,18 @@ def fit(
     as_json: JsonOption = False,
 ) -> None:
     """From the log of an axis to its model, FMUs and a report."""
-    with loading():
-        from ..logs.log import read_log
-        from .arguments import check_ending, checked_name, machine_name
-        from .fit import FitOptions, fit_files
-        from .fit import fit as fit_logs
-        from .fit_compensation import drive_limits
-        from .fit_report import fit_report, judged_by
-        from .fit_table import print_fit
-        from .judged import recommendation
-        from .log_intake import changes, findings_table, show, take_in
-        from .overwrite import BY_ENDING, FIT_FILES, Output, check_outputs
-        from .progress import progress_bar
-        from .tables import console, print_json, print_written
+    from ..logs.log import read_log
+    from .arguments import check_ending, checked_name, machine_name
+    from .fit import FitOptions, fit_files
+    from .fit import fit as fit_logs
+    from .fit_compensation import drive_limits
+    from .fit_report import fit_report, judged_by
+    from .fit_table import print_fit
+    from .judged import recommendation
+    from .log_intake import changes, findings_table, show, take_in
+    from .overwrite import BY_ENDING, FIT_FILES, Output, check_outputs
+    from .progress import progress_bar
+    from .tables import console, print_json, print_written
 
     name = checked_name(name) if name else machine_name(logs[0], reading.axis)
     folder = out or Path(name)

@@ -10,7 +10,6 @@ import typer
 
 from ..base.errors import ParameterError
 from ..base.output import written_text
-from .failures import loading
 from .options import (
     CommandColumnOption,
     ForceOption,
@@ -82,25 +81,24 @@ def identify(
 
     From a log, a frequency response, a swept sine or Klipper's accelerometers.
     """
-    with loading():
-        import numpy as np
+    import numpy as np
 
-        from ..identify.figures import operation_figure, response_figure
-        from ..identify.frequency_response import IdentifiedResponse, identify_frequency_response
-        from ..identify.klipper import identify_resonance, is_klipper, read_klipper
-        from ..identify.operation import identify_operation
-        from ..identify.response_files import has_response, read_response
-        from ..identify.segments import in_time
-        from ..identify.swept_sine import h1
-        from ..logs.log import read_log
-        from ..logs.units import shown_in
-        from .arguments import check_ending, checked_name, machine_name
-        from .extent import partly_used
-        from .identify_tables import print_identified
-        from .log_intake import changes, show, take_in
-        from .overwrite import FIGURE, MACHINE, Output, check_outputs
-        from .progress import progress_bar
-        from .tables import console, print_written
+    from ..identify.figures import operation_figure, response_figure
+    from ..identify.frequency_response import IdentifiedResponse, identify_frequency_response
+    from ..identify.klipper import identify_resonance, is_klipper, read_klipper
+    from ..identify.operation import identify_operation
+    from ..identify.response_files import has_response, read_response
+    from ..identify.segments import in_time
+    from ..identify.swept_sine import h1
+    from ..logs.log import read_log
+    from ..logs.units import shown_in
+    from .arguments import check_ending, checked_name, machine_name
+    from .extent import partly_used
+    from .identify_tables import print_identified
+    from .log_intake import changes, show, take_in
+    from .overwrite import FIGURE, MACHINE, Output, check_outputs
+    from .progress import progress_bar
+    from .tables import console, print_written
 
     if kind not in KINDS:
         raise ParameterError(f"--kind must be one of {', '.join(KINDS)}, got {kind!r}")

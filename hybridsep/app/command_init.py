@@ -10,7 +10,6 @@ import typer
 
 from ..base.errors import ParameterError
 from ..base.output import written_text
-from .failures import loading
 from .options import ForceOption
 
 if TYPE_CHECKING:
@@ -62,12 +61,11 @@ def init(
 
     What no option says is asked.
     """
-    with loading():
-        from ..identify.model import machine_of
-        from ..machines.text import machine_text
-        from ..model.physics import ModalModel
-        from .arguments import check_ending
-        from .overwrite import MACHINE, Output, check_outputs, sealed
+    from ..identify.model import machine_of
+    from ..machines.text import machine_text
+    from ..model.physics import ModalModel
+    from .arguments import check_ending
+    from .overwrite import MACHINE, Output, check_outputs, sealed
 
     check_ending(out, "OUT", (".toml",))
     check_outputs([Output("OUT", out, MACHINE)], {}, force=force)

@@ -7,7 +7,6 @@ from typing import Annotated, Any
 
 import typer
 
-from .failures import loading
 from .options import (
     AsIsOption,
     FigurePagesOption,
@@ -43,26 +42,25 @@ def report(
 
     It is checked and replayed as by backtest. The file needs no network.
     """
-    with loading():
-        from ..cosim.apart import run_apart
-        from ..cosim.fmus import check_controller
-        from ..cosim.run import PREDICTOR
-        from ..evaluate.report import Report
-        from ..fmi.warm_start import begun_predictor
-        from ..logs.log import Log
-        from ..logs.units import shown_of
-        from ..machines.machine import load_machine, machine_path
-        from ..tune.halves import Recording, replay
-        from .arguments import check_ending, machine_name
-        from .extent import extent, partly_used
-        from .judged import Judged, recommendation
-        from .log_intake import changes, open_checked, reading_of
-        from .overwrite import BY_ENDING, REPORT, Output, check_outputs
-        from .progress import progress_bar
-        from .report_sections import write_changes, write_errors, write_findings
-        from .report_use import write_use
-        from .step_times import SAMPLES_MAX, step_times
-        from .tables import console, print_written
+    from ..cosim.apart import run_apart
+    from ..cosim.fmus import check_controller
+    from ..cosim.run import PREDICTOR
+    from ..evaluate.report import Report
+    from ..fmi.warm_start import begun_predictor
+    from ..logs.log import Log
+    from ..logs.units import shown_of
+    from ..machines.machine import load_machine, machine_path
+    from ..tune.halves import Recording, replay
+    from .arguments import check_ending, machine_name
+    from .extent import extent, partly_used
+    from .judged import Judged, recommendation
+    from .log_intake import changes, open_checked, reading_of
+    from .overwrite import BY_ENDING, REPORT, Output, check_outputs
+    from .progress import progress_bar
+    from .report_sections import write_changes, write_errors, write_findings
+    from .report_use import write_use
+    from .step_times import SAMPLES_MAX, step_times
+    from .tables import console, print_written
 
     page = out or Path(f"{machine_name(log)}_report.html")
     check_ending(page, "--out", (".html",))

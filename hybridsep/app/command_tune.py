@@ -11,7 +11,6 @@ import typer
 from ..base.output import written_text
 from ..base.ranges import parse_range
 from ..base.settings import PredictorSettings
-from .failures import loading
 from .options import (
     AsIsOption,
     FixOption,
@@ -49,26 +48,25 @@ def tune(
 
     The look-ahead is the controller's.
     """
-    with loading():
-        from ..logs.log import Log
-        from ..logs.units import shown_of
-        from ..machines.machine import load_machine, machine_path
-        from ..machines.text import machine_text
-        from ..tune.choice import with_window
-        from ..tune.grid import TUNED, candidates, default_values
-        from ..tune.joint import n_processors, over_windows
-        from ..tune.joint import tune as tune_on
-        from ..tune.losses import n_unjudged
-        from .arguments import check_ending
-        from .extent import partly_used
-        from .log_intake import changes, findings_table, open_checked, reading_of, show
-        from .overwrite import BY_ENDING, MACHINE, Output, check_outputs, sealed
-        from .progress import progress_bar
-        from .tables import console, print_json, print_written
-        from .tune_table import entries, print_tuning, tuning_summary
+    from ..logs.log import Log
+    from ..logs.units import shown_of
+    from ..machines.machine import load_machine, machine_path
+    from ..machines.text import machine_text
+    from ..tune.choice import with_window
+    from ..tune.grid import TUNED, candidates, default_values
+    from ..tune.joint import n_processors, over_windows
+    from ..tune.joint import tune as tune_on
+    from ..tune.losses import n_unjudged
+    from .arguments import check_ending
+    from .extent import partly_used
+    from .log_intake import changes, findings_table, open_checked, reading_of, show
+    from .overwrite import BY_ENDING, MACHINE, Output, check_outputs, sealed
+    from .progress import progress_bar
+    from .tables import console, print_json, print_written
+    from .tune_table import entries, print_tuning, tuning_summary
 
-        if figure is not None:
-            from ..tune.figures import tuning_figure
+    if figure is not None:
+        from ..tune.figures import tuning_figure
 
     given = load_machine(machine)
     check_ending(out, "--out", (".toml",))

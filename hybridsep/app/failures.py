@@ -5,12 +5,10 @@ Status 2 for an error, 130 after Ctrl-C, 1 where the reader of standard output h
 
 from __future__ import annotations
 
-import codecs
 import os
-import signal
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import typer
@@ -22,18 +20,12 @@ from ..base.interrupt import interrupts_between_calls
 from ..base.version import __version__
 from .new_folders import remove_empty_folders
 
-__all__ = ["DEBUG_VARIABLE", "Commands", "errors_console", "loading", "run"]
+__all__ = ["DEBUG_VARIABLE", "Commands", "errors_console", "run"]
 
 DEBUG_VARIABLE = "HYBRIDSEP_DEBUG"
 """Environment variable: if it is set, an unexpected error shows its traceback."""
 
 errors_console = Console(stderr=True, emoji=False, markup=False)
-
-_PLAIN = str.maketrans(
-    {"µ": "u", "→": "->", "–": "-", "−": "-", "…": "...", "²": "2", "³": "3", "·": "*", "λ": "lambda"}
-)
-"""Substitutes for characters that a terminal's encoding lacks."""
-
 
 _WANTED = {"int": "must be a whole number", "float": "must be a number"}
 """What an option takes, by the beginning of a type of pydantic's errors."""
@@ -63,41 +55,12 @@ class _Interrupted(BaseException):
     """Ctrl-C; no KeyboardInterrupt, which typer would turn into an exit without a word."""
 
 
-_leave: Callable[..., object] | None = None
-"""Handler of Ctrl-C that ends the process at once; None where the calling program handles Ctrl-C itself."""
-
-
-@contextmanager
-def loading() -> Iterator[None]:
-    """Let Ctrl-C end the process at once while a command imports what it works with.
-
-    Nothing is open then, and an exception that is raised inside another library's import may be lost.
-    """
-    if _leave is None:
-        yield
-        return
-    before = signal.signal(signal.SIGINT, _leave)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
-def run(app: Callable[[], object], leave: Callable[..., object] | None = None) -> int:
-    """Run a command line; return its exit status.
-
-    Parameters
-    ----------
-    app : callable
-    leave : callable, optional
-        Handler of Ctrl-C while a command is :func:`loading`; as at other times if left out.
-    """
-    global _leave
-    _leave = leave
+def run(app: Callable[[], object]) -> int:
+    """Run a command line; return its exit status."""
     _open_closed()
     for stream in (sys.stdout, sys.stderr):
         with suppress(AttributeError):  # a replaced stream, which cannot be reconfigured
-            stream.reconfigure(errors=_PLAIN_ERRORS)  # type: ignore[union-attr]
+            stream.reconfigure(errors="replace")  # type: ignore[union-attr]
     try:
         with interrupts_between_calls(_Interrupted):
             status = _status(app)
@@ -159,15 +122,3 @@ def _abandon_stdout() -> None:
         descriptor = os.open(os.devnull, os.O_WRONLY)
         os.dup2(descriptor, sys.stdout.fileno())
         os.close(descriptor)
-
-
-def _spell_plainly(error: UnicodeError) -> tuple[str, int]:
-    """Replace what a terminal's encoding lacks: µ by u, another character by a question mark."""
-    if not isinstance(error, UnicodeEncodeError):
-        raise error
-    text = error.object[error.start : error.end].translate(_PLAIN)
-    return "".join(character if character.isascii() else "?" for character in text), error.end
-
-
-_PLAIN_ERRORS = "hybridsep-plain"
-codecs.register_error(_PLAIN_ERRORS, _spell_plainly)

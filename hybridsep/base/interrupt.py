@@ -1,15 +1,12 @@
 """Deferral of Ctrl-C to the end of an FMI call, at most one step.
 
 Inside a pythonfmu FMU an exception becomes ``fmi2Fatal``, inside a callback it is lost, and fmpy would leave the
-working directory changed. A second Ctrl-C does not wait. An exception that was lost all the same, in a finalizer or
-in a callback of another library, is raised again.
+working directory changed. A second Ctrl-C does not wait.
 """
 
 from __future__ import annotations
 
-import _thread
 import signal
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -21,9 +18,6 @@ __all__ = ["interrupts_between_calls", "starting_processes", "uninterrupted"]
 
 P = ParamSpec("P")
 Result = TypeVar("Result")
-
-_REPEAT = 0.5
-"""Time after which an exception that did not end the work is raised again, s."""
 
 
 class _Calls(threading.local):
@@ -58,7 +52,7 @@ def uninterrupted(function: Callable[P, Result]) -> Callable[P, Result]:
 
 @contextmanager
 def interrupts_between_calls(stop: type[BaseException] = KeyboardInterrupt) -> Iterator[None]:
-    """Raise ``stop`` on Ctrl-C, deferred to the end of an :func:`uninterrupted` function; again where it is lost.
+    """Raise ``stop`` on Ctrl-C, deferred to the end of an :func:`uninterrupted` function.
 
     Does nothing outside the main thread, or where Ctrl-C is handled in another way already.
     """
@@ -67,22 +61,7 @@ def interrupts_between_calls(stop: type[BaseException] = KeyboardInterrupt) -> I
         yield
         return
 
-    sending, ended, again = threading.Lock(), threading.Event(), threading.Event()
-
-    def repeat() -> None:
-        while not ended.wait(_REPEAT):
-            with sending:
-                if not ended.is_set():
-                    again.set()
-                    _thread.interrupt_main()
-
     def interrupt(number: int, frame: FrameType | None) -> None:
-        if again.is_set():
-            again.clear()
-            if ended.is_set() or _calls.depth > 0 or isinstance(sys.exc_info()[1], stop):  # on its way
-                return
-            raise stop
-        threading.Thread(target=repeat, daemon=True).start()
         if _calls.depth == 0 or _calls.pending is not None:
             _calls.pending = None
             raise stop
@@ -92,11 +71,7 @@ def interrupts_between_calls(stop: type[BaseException] = KeyboardInterrupt) -> I
     try:
         yield
     finally:
-        try:
-            with sending:
-                ended.set()
-        finally:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @contextmanager

@@ -191,10 +191,10 @@ def test_an_ascii_terminal(tmp_path: Path) -> None:
     ascii_only = {**os.environ, "PYTHONIOENCODING": "ascii", "COLUMNS": "200"}
     done = command("backtest", log, "-m", MACHINE, env=ascii_only)
     assert done.returncode == 0, done.stderr
-    assert b"prediction error in um against" in done.stdout
+    assert b"prediction error in ?m against" in done.stdout
     done = command("backtest", log, "-m", MACHINE, "--p", 200, env=ascii_only)
     assert done.returncode == 2
-    assert b"p must be 1 ... Np = 100, got 200" in done.stderr
+    assert b"p must be 1 ? Np = 100, got 200" in done.stderr
 
 
 @POSIX

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
 import signal
 import subprocess
@@ -199,27 +198,6 @@ def test_ctrl_c_from_a_script_is_a_keyboard_interrupt(python_fmu: Callable[[str]
     with pytest.raises(KeyboardInterrupt):
         cosimulate(*fmus, np.zeros(500), progress=interrupt)
     assert cosimulate(*fmus, np.zeros(500)).summary()["n_samples"] == 500
-
-
-def test_ctrl_c_is_raised_again_where_it_was_lost() -> None:
-    """As in drawing a figure, where libraries run finalizers and callbacks."""
-
-    callback = ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.SIGINT))
-    swept: list[str] = []
-    with pytest.raises(KeyboardInterrupt), interrupts_between_calls():  # noqa: PT012
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(sys, "unraisablehook", lambda lost: swept.append(type(lost.exc_value).__name__))
-            callback()
-        assert swept == ["KeyboardInterrupt"]
-        try:
-            for _ in range(3000):
-                time.sleep(0.01)
-        finally:
-            time.sleep(1.2)  # it is raised once, not again while the work is ended
-            swept.append("ended")
-    assert swept == ["KeyboardInterrupt", "ended"]
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    time.sleep(0.7)  # nor later
 
 
 def test_a_call_ends_before_ctrl_c_is_raised() -> None:
