@@ -48,6 +48,10 @@ SAID = ("error: ", "warning: ", "note: ")
 """Beginnings of the lines that a refusal consists of."""
 
 PASSED = ("read", "refused")
+LIBRARIES = (
+    *("fmpy.fmi2", "h5py", "scipy.io", "asammdf", "nptdms", "pyarrow.parquet", "pyarrow.ipc", "openpyxl"),
+    *("hybridsep.cosim.loop", "hybridsep.cosim.fmus"),
+)
 LOG_OPTIONS: tuple[list[str], ...] = (["--as-is"], ["--fix"], [])
 
 
@@ -130,7 +134,7 @@ def main(given: Sequence[str] | None = None) -> int:
     parser.add_argument("--keep", type=Path, default=Path("hostile_findings"), help="folder for findings")
     options = parser.parse_args(given)
     if not options.start:
-        for library in ("fmpy.fmi2", "h5py", "scipy.io", "hybridsep.cosim.loop", "hybridsep.cosim.fmus"):
+        for library in LIBRARIES:
             importlib.import_module(library)
         apart.subprocess = arrays.subprocess = _ForkingSubprocess  # type: ignore[assignment, attr-defined]
     found = {}

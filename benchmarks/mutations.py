@@ -23,6 +23,7 @@ import h5py
 import numpy as np
 from scipy import io as scipy_io
 
+from benchmarks import recorders
 from hybridsep import HybridPredictor, build_fmu, load_machine
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.machines.machine import machine_path
@@ -178,6 +179,57 @@ def _capture_files(_: Path) -> list[tuple[str, bytes]]:
     return [("capture.json", json.dumps(content).encode())]
 
 
+def _mdf_files(folder: Path) -> list[tuple[str, bytes]]:
+    log, files = good_log(), []
+    for name, version in (("4.mf4", "4.10"), ("3.mf4", "3.30")):
+        files.append((name, recorders.write_mdf(folder / "good.mf4", [log], version).read_bytes()))
+    return files
+
+
+def _rated() -> dict[str, tuple[float, Any]]:
+    return {name: (1e-3, values) for name, values in good_log().items() if name != "t"}
+
+
+def _tdms_files(folder: Path) -> list[tuple[str, bytes]]:
+    return [("log.tdms", recorders.write_tdms(folder / "good.tdms", _rated()).read_bytes())]
+
+
+def _parquet_files(folder: Path) -> list[tuple[str, bytes]]:
+    return [("log.parquet", recorders.write_parquet(folder / "good.parquet", good_log(), 100).read_bytes())]
+
+
+def _arrow_files(folder: Path) -> list[tuple[str, bytes]]:
+    path = folder / "good.arrow"
+    return [
+        (f"{name}.arrow", recorders.write_arrow(path, good_log(), stream=stream).read_bytes())
+        for name, stream in (("file", False), ("stream", True))
+    ]
+
+
+def _xlsx_files(folder: Path) -> list[tuple[str, bytes]]:
+    return [("log.xlsx", recorders.write_xlsx(folder / "good.xlsx", good_log()).read_bytes())]
+
+
+def _xlsx(content: bytes, chance: Random) -> bytes:
+    return _resealed(content, chance, lambda _, member: (retold if chance.random() < 0.7 else broken)(member, chance))
+
+
+def _sinumerik_files(_: Path) -> list[tuple[str, bytes]]:
+    log = good_log()
+    signals = {f"{name} [u1, 1]": (0.0, 1e-3, 1e3 * log[key]) for name, key in (("CmdPos", "x_d"), ("ActPos", "x"))}
+    return [("trace.xml", recorders.trace_xml(signals).encode())]
+
+
+def _twincat_files(_: Path) -> list[tuple[str, bytes]]:
+    return [(f"scope{i}.csv", recorders.twincat_csv(_rated(), full=bool(i), shared=bool(i)).encode()) for i in range(2)]
+
+
+def _halscope_files(_: Path) -> list[tuple[str, bytes]]:
+    log = {f"joint.0.motor-pos-{name}": good_log()[key] for name, key in (("cmd", "x_d"), ("fb", "x"))}
+    pairs = recorders.halscope_pairs(log, comma=True)
+    return [("log.csv", recorders.halscope_csv(log).encode()), ("pairs.txt", pairs.encode())]
+
+
 # Machine files and states -------------------------------------------------------------------------------------------
 
 
@@ -284,6 +336,14 @@ KINDS: Mapping[str, tuple[Originals, Damage]] = {
     "mat": (_mat_files, broken),
     "hdf5": (_hdf5_files, broken),
     "capture": (_capture_files, retold),
+    "mdf": (_mdf_files, broken),
+    "tdms": (_tdms_files, broken),
+    "parquet": (_parquet_files, broken),
+    "arrow": (_arrow_files, broken),
+    "xlsx": (_xlsx_files, _xlsx),
+    "sinumerik": (_sinumerik_files, retold),
+    "twincat": (_twincat_files, retold),
+    "halscope": (_halscope_files, retold),
     "machine": (_machine_files, retold),
     "state": (_states, _state),
     "fmu": (_fmus, _fmu),

@@ -69,7 +69,15 @@ def fit(
     outputs += [Output("--figure", figure, BY_ENDING[".pdf"])] if figure is not None else []
     check_outputs(outputs, inputs, force=force)
     found = [
-        read_log(path, columns=reading.columns, unit=reading.unit, T_s=reading.T_s, axis=reading.axis, uniform=False)
+        read_log(
+            path,
+            columns=reading.columns,
+            unit=reading.unit,
+            T_s=reading.T_s,
+            axis=reading.axis,
+            uniform=False,
+            resample=reading.resample,
+        )
         for path in logs
     ]
     for log in found:

@@ -57,6 +57,7 @@ def reading_of(machine: Machine, options: ReadingOptions, *, may_miss: bool) -> 
         "T_s": options.T_s,
         "axis": options.axis or own.axis,
         "may_miss": may_miss,
+        "resample": options.resample,
     }
 
 

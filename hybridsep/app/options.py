@@ -22,9 +22,11 @@ __all__ = [
     "FlavourOption",
     "ForceOption",
     "JsonOption",
+    "ListChannelsOption",
     "LogArgument",
     "MachineOption",
     "MeasuredColumnOption",
+    "ResampleOption",
     "SavedOption",
     "TimeColumnOption",
     "TsOption",
@@ -61,6 +63,16 @@ CommandColumnOption = Annotated[
 ]
 MeasuredColumnOption = Annotated[str | None, typer.Option("--x", help="Name of the measured position's column.")]
 AxisOption = Annotated[str | None, typer.Option(help="Axis of a file that holds several, such as X1.")]
+ResampleOption = Annotated[
+    bool,
+    typer.Option(
+        "--resample", help="Take columns that are sampled at rates of their own at the times of the slower one."
+    ),
+]
+ListChannelsOption = Annotated[
+    bool,
+    typer.Option("--list-channels", help="Print what the log holds, with units and rates, and do nothing else."),
+]
 WeightsOption = Annotated[
     Path | None,
     typer.Option(
@@ -71,7 +83,7 @@ WeightsOption = Annotated[
 LogArgument = Annotated[
     Path,
     typer.Argument(
-        help="Recorded log with the columns t, x_d, x_meas or x: CSV, .npz, .mat, HDF5 or Siemens Capture JSON."
+        help="Recorded log with the columns t, x_d, x_meas or x, in a format of the page on recorders: CSV, .npz, .mat, …"
     ),
 ]
 FixOption = Annotated[bool, typer.Option("--fix", help="Apply the fixes of what the checks of the log find.")]

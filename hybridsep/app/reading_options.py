@@ -11,13 +11,17 @@ from typing import Any
 from .options import (
     AxisOption,
     CommandColumnOption,
+    ListChannelsOption,
     MeasuredColumnOption,
+    ResampleOption,
     TimeColumnOption,
     TsOption,
     UnitOption,
 )
 
 __all__ = ["ReadingOptions", "takes_reading"]
+
+_LIST = "list_channels"
 
 
 @dataclass(frozen=True)
@@ -31,6 +35,7 @@ class ReadingOptions:
     axis : str, optional
     t, x_d, x : str, optional
         Columns of time, commanded and measured position.
+    resample : bool
     """
 
     unit: UnitOption = None
@@ -39,6 +44,7 @@ class ReadingOptions:
     t: TimeColumnOption = None
     x_d: CommandColumnOption = None
     x: MeasuredColumnOption = None
+    resample: ResampleOption = False
 
     @property
     def columns(self) -> dict[str, str]:
@@ -47,18 +53,28 @@ class ReadingOptions:
 
 
 def takes_reading(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command these options in the place of its argument ``reading``, which becomes :class:`ReadingOptions`."""
+    """Give a command these options in the place of its argument ``reading``, which becomes :class:`ReadingOptions`.
+
+    With ``--list-channels`` the channels of its logs are printed in the place of all that it does.
+    """
     names = [field.name for field in fields(ReadingOptions)]
 
     @wraps(command)
     def run(**arguments: Any) -> None:
         reading = ReadingOptions(**{name: arguments.pop(name) for name in names})
+        if arguments.pop(_LIST):
+            from .channel_table import print_channels
+
+            logs = arguments["logs"] if "logs" in arguments else [arguments["log"]]
+            print_channels(logs, as_json=bool(arguments.get("as_json")))
+            return
         command(**arguments, reading=reading)
 
     signature, options = (inspect.signature(one, eval_str=True) for one in (command, ReadingOptions))
     taken: list[inspect.Parameter] = []
+    listing = inspect.Parameter(_LIST, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=ListChannelsOption)
     for name, argument in signature.parameters.items():
-        taken += list(options.parameters.values()) if name == "reading" else [argument]
+        taken += [*options.parameters.values(), listing] if name == "reading" else [argument]
     taken = [argument.replace(kind=inspect.Parameter.KEYWORD_ONLY) for argument in taken]
     run.__signature__ = signature.replace(parameters=taken)  # type: ignore[attr-defined]
     run.__annotations__ = {argument.name: argument.annotation for argument in taken}

@@ -76,15 +76,18 @@ def choose_columns(
     for role in columns or ():
         if role not in ROLES:
             raise LogError(f"{source.path}: columns may name {', '.join(ROLES)}, got {brief(role)}")
-    chosen = {role: _name(source, role, (columns or {}).get(role)) for role in ROLES}
-    if chosen["t"] is None and "t" not in (columns or {}) and time_needed:
+    given = columns or {}
+    chosen = {role: _name(source, role, given.get(role)) for role in ("x_d", "x")}
+    own = source.times.get(chosen["x_d"] or "")
+    chosen = {"t": own if own and "t" not in given else _name(source, "t", given.get("t")), **chosen}
+    if chosen["t"] is None and "t" not in given and time_needed:
         chosen["t"] = _only_clock(source)
-    if chosen["t"] is None and "t" not in (columns or {}) and not time_needed:
+    if chosen["t"] is None and "t" not in given and not time_needed:
         del chosen["t"]
     found: dict[str, Column] = {}
     names = {role: name for role, name in chosen.items() if name is not None}
     if len(names) < len(chosen):
-        raise _missing(source, {role: (columns or {}).get(role, role) for role in chosen if role not in names})
+        raise _missing(source, {role: given.get(role, role) for role in chosen if role not in names})
     for role, name in names.items():
         if source.names.count(name) > 1:
             raise LogError(

@@ -8,16 +8,39 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..base.errors import LogError
+from .arrow import ArrowSource
 from .capture import CaptureSource
+from .halscope import HalscopeCsvSource, HalscopePairsSource
 from .hdf5 import Hdf5Source
 from .mat import MatSource
+from .mdf import MdfSource
 from .npz import NpzSource
-from .source import Source
+from .parquet import ParquetSource
+from .sinumerik import SinumerikSource
+from .source import Channel, Source
+from .tdms import TdmsSource
 from .text import TextSource
+from .twincat import TwinCatSource
+from .xlsx import XlsxSource
 
-__all__ = ["READERS", "open_source"]
+__all__ = ["READERS", "channels", "open_source"]
 
-READERS: tuple[type[Source], ...] = (NpzSource, Hdf5Source, MatSource, CaptureSource, TextSource)
+READERS: tuple[type[Source], ...] = (
+    NpzSource,
+    XlsxSource,
+    Hdf5Source,
+    MdfSource,
+    TdmsSource,
+    ParquetSource,
+    ArrowSource,
+    MatSource,
+    CaptureSource,
+    SinumerikSource,
+    TwinCatSource,
+    HalscopeCsvSource,
+    HalscopePairsSource,
+    TextSource,
+)
 """Readers by precedence; text, which has no mark of its own, is last."""
 
 _HEAD = 4096
@@ -27,13 +50,14 @@ _PANDAS = "pandas.read_{}('{{path}}').to_csv('log.csv', index=False)"
 
 _OTHERS: tuple[tuple[str, tuple[bytes, ...], str], ...] = (
     ("a NumPy .npy array", (b"\x93NUMPY",), "numpy.savez('log.npz', t=a[:, 0], x_d=a[:, 1], x=a[:, 2])"),
-    ("Parquet", (b"PAR1",), _PANDAS.format("parquet")),
-    ("Arrow or Feather", (b"ARROW1", b"FEA1"), _PANDAS.format("feather")),
-    ("ASAM MDF", (b"MDF     ", b"UnFinMF "), "asammdf.MDF('{path}').export('csv')"),
-    ("NI TDMS", (b"TDSm",), "nptdms.TdmsFile.read('{path}').as_dataframe().to_csv('log.csv', index=False)"),
+    ("Feather of version 1", (b"FEA1",), _PANDAS.format("feather")),
     ("a ROS bag", (b"#ROSBAG", b"\x89MCAP0"), "export the joint's topic as CSV, for example by PlotJuggler"),
     ("an old Excel workbook", (b"\xd0\xcf\x11\xe0",), f"{_SAVE} there"),
-    ("XML", (b"<?xml", b"\xef\xbb\xbf<?xml"), f"{_SAVE}; a TwinCAT or TIA scope exports it itself"),
+    (
+        "XML of another kind than a SINUMERIK trace",
+        (b"<?xml", b"\xef\xbb\xbf<?xml"),
+        f"{_SAVE}; a TIA scope exports it itself",
+    ),
     (
         "JSON of another kind than Siemens Capture",
         (b'{"', b"{ ", b"{\n", b"{\r", b"[{", b"[[", b"[\n"),
@@ -44,7 +68,7 @@ _OTHERS: tuple[tuple[str, tuple[bytes, ...], str], ...] = (
     ("a sound file", (b"RIFF", b"fLaC"), _SAVE),
     ("PDF", (b"%PDF",), _SAVE),
     ("compressed", (b"BZh", b"\xfd7zXZ", b"\x28\xb5\x2f\xfd", b"7z\xbc\xaf"), "unpack it, or compress it by gzip"),
-    ("an Excel workbook, or another zip archive", (b"PK\x03\x04",), "pandas.read_excel('{path}').to_csv('log.csv')"),
+    ("a zip archive of another kind than .npz and .xlsx", (b"PK\x03\x04",), "unpack it"),
 )
 """Formats without a reader: what they are, how they begin, how to convert them."""
 
@@ -69,6 +93,11 @@ def open_source(path: Path) -> Source:
         raise LogError(f"{path}: cannot be read: {error.strerror or error}") from error
 
 
+def channels(path: Path) -> list[Channel]:
+    """Return the columns of a file with what it says of them; LogError as for :func:`open_source`."""
+    return open_source(path).channels()
+
+
 def _reader(path: Path, head: bytes) -> type[Source]:
     for reader in READERS[:-1]:
         if reader.recognises(head):
@@ -81,5 +110,5 @@ def _reader(path: Path, head: bytes) -> type[Source]:
     named = [reader for reader in READERS[:-1] if path.name.lower().endswith(reader.endings)]
     if named:
         return named[-1]  # its message says what is damaged
-    known = ", ".join(reader.format for reader in READERS)
+    known = ", ".join(dict.fromkeys(reader.format for reader in READERS))
     raise LogError(f"{path}: is in no format that is read ({known}); {_SAVE}")

@@ -15,6 +15,7 @@ from ..base.signals import POSITION_MAX, Array
 from .columns import COUNT, Column, choose_columns
 from .formats import open_source
 from .gaps import row_interval
+from .rates import on_one_clock
 from .source import NEEDS_TRUST, Block
 from .time_axis import TimeAxis
 from .units import POSITION_UNITS, Shown, position_unit, shown_of, stated_unit
@@ -129,13 +130,15 @@ class LogReader:
         axis: str | None = None,
         uniform: bool = True,
         may_miss: bool | None = None,
+        resample: bool = False,
     ) -> None:
         self.path = Path(path)
         given = check_reading(unit, T_s)
         self._source = open_source(self.path)
         if axis is not None:
             self._source.choose_axis(axis)
-        self._columns = choose_columns(self._source, columns, unit, time_needed=given is None)
+        chosen = choose_columns(self._source, columns, unit, time_needed=given is None)
+        self._source, self._columns = on_one_clock(self._source, chosen, resample=resample)
         self.unit, self.file_unit = self._columns["x_d"].unit.si, self._columns["x_d"].unit.name
         self.remarks = (*self._source.remarks, *self._guessed(columns or {}))
         self._uniform = uniform
@@ -183,7 +186,8 @@ class LogReader:
         for block in self._source.blocks([column.name for column in columns], n):
             for column, values in zip(columns, block.columns, strict=True):
                 self._check_finite(block, column.name, values, measured=column is self._columns["x"])
-            signals = [values * column.unit.factor for column, values in zip(columns, block.columns, strict=True)]
+            with np.errstate(invalid="ignore"):  # a NaN may be a signalling one
+                signals = [values * column.unit.factor for column, values in zip(columns, block.columns, strict=True)]
             x_d = signals[0]
             lowest, highest = min(lowest, float(x_d.min())), max(highest, float(x_d.max()))
             self._check_span(columns[0], highest - lowest)
@@ -297,17 +301,19 @@ def open_log(
     axis: str | None = None,
     uniform: bool = True,
     may_miss: bool | None = None,
+    resample: bool = False,
 ) -> LogReader:
     """Open a log for reading in bounded memory.
 
-    Text is streamed by lines and ``.npz`` files by members; ``.mat``, HDF5 and JSON files are loaded whole, so that
-    their size is limited by the memory. What a file is, its content tells.
+    ``.mat``, HDF5 and JSON files are loaded whole, so that their size is limited by the memory; all others are
+    streamed. What a file is, its content tells.
 
     Parameters
     ----------
     path : str or Path
         Text (CSV, TSV; comma, semicolon, tab or blanks between columns; plain or in gzip), ``.npz``, ``.mat`` (version
-        7.3 with the extra ``hdf5``) or Siemens Capture JSON.
+        7.3 with the extra ``hdf5``), Siemens Capture JSON, SINUMERIK trace XML, TwinCAT Scope's CSV, LinuxCNC halscope;
+        with extras MDF (``mdf``), TDMS (``tdms``), Parquet and Arrow (``parquet``), Excel (``xlsx``).
     columns : mapping, optional
         The file's names of ``"t"``, ``"x_d"`` and ``"x"``, the measured position, where they are others, such as
         ``{"x_d": "qg", "x": "qm"}``; units in them may be left out. Without a name for ``"x"``, ``x_meas`` is read
@@ -327,6 +333,9 @@ def open_log(
     may_miss : bool, optional
         Whether measured positions may be missing: NaN, in text ``nan`` or nothing. With trust a predictor replays them,
         and they are left out of an identification. If left out, where ``uniform`` is false, as the checks find them.
+    resample : bool
+        Whether columns that are sampled at rates of their own are taken at the times of the slower one; otherwise that
+        is refused.
 
     Returns
     -------
@@ -337,7 +346,9 @@ def open_log(
     LogError
         If the file, its columns or its time axis cannot be used.
     """
-    return LogReader(path, columns=columns, unit=unit, T_s=T_s, axis=axis, uniform=uniform, may_miss=may_miss)
+    return LogReader(
+        path, columns=columns, unit=unit, T_s=T_s, axis=axis, uniform=uniform, may_miss=may_miss, resample=resample
+    )
 
 
 def read_log(
@@ -349,6 +360,9 @@ def read_log(
     axis: str | None = None,
     uniform: bool = True,
     may_miss: bool | None = None,
+    resample: bool = False,
 ) -> Log:
     """Return a whole log; parameters and errors as for :func:`open_log`."""
-    return LogReader(path, columns=columns, unit=unit, T_s=T_s, axis=axis, uniform=uniform, may_miss=may_miss).read()
+    return LogReader(
+        path, columns=columns, unit=unit, T_s=T_s, axis=axis, uniform=uniform, may_miss=may_miss, resample=resample
+    ).read()

@@ -13,7 +13,7 @@ import numpy as np
 from ..base.errors import LogError, brief
 from ..base.signals import Array
 
-__all__ = ["NEEDS_TRUST", "Block", "Source", "check_column", "check_lengths", "sample_number"]
+__all__ = ["NEEDS_TRUST", "Block", "Channel", "Source", "check_column", "check_lengths", "sample_number"]
 
 
 NEEDS_TRUST = "; missing measurements are replayed with trust alone: read them with may_miss=True (--trust true)"
@@ -35,6 +35,30 @@ class Block:
 
     columns: list[Array]
     where: Callable[[int], str]
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Column of a file, as it is listed.
+
+    Attributes
+    ----------
+    name : str
+    unit : str
+        As the file states it, or the format's convention; empty if there is none.
+    role : str
+        What the format itself has it for, one of ``"t"``, ``"x_d"`` and ``"x"``; empty otherwise.
+    n_samples : int, optional
+        None where the file would have to be read to count them.
+    interval : float, s, optional
+        Between its samples, where the file states it.
+    """
+
+    name: str
+    unit: str = ""
+    role: str = ""
+    n_samples: int | None = None
+    interval: float | None = None
 
 
 class Source(ABC):
@@ -60,6 +84,9 @@ class Source(ABC):
         ``"t"``, ``"x_d"``, ``"x"`` → the column that the format itself has for it.
     stamps : set of str
         Columns of clock timestamps, which become seconds since the first one.
+    times : mapping
+        Name of a column → column of its times, where columns may be sampled at rates of their own; only those with the
+        same times can be read side by side.
     remarks : list of str
         What was chosen for the reader that the user may want to change.
     advice : str
@@ -81,6 +108,7 @@ class Source(ABC):
         self.assumed_units: Mapping[str, str] = {}
         self.roles: Mapping[str, str] = {}
         self.stamps: Set[str] = frozenset()
+        self.times: Mapping[str, str] = {}
         self.remarks: list[str] = []
         self.advice = ""
         self.measured, self.may_miss = "", False
@@ -93,6 +121,12 @@ class Source(ABC):
     @abstractmethod
     def blocks(self, names: Sequence[str], n: int) -> Iterator[Block]:
         """Iterate over the columns ``names`` in blocks of at most ``n`` samples."""
+
+    def channels(self) -> list[Channel]:
+        """Return the columns with what the file says of them."""
+        roles = {name: role for role, name in self.roles.items()}
+        units = {**self.assumed_units, **self.units}
+        return [Channel(name, units.get(name, ""), roles.get(name, "")) for name in self.names]
 
     def choose_axis(self, axis: str) -> None:
         """Choose one of several axes by its name; LogError if the format holds a single one."""

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence, Set
 from functools import partial
 from itertools import islice
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from .source import NEEDS_TRUST, Block, Source
 from .text_layout import COMMENTS, Layout, decimal_points, find_layout, is_number, split
 from .timestamps import CELL, Clock, cell, stamp_kind
 
-__all__ = ["TextSource"]
+__all__ = ["TextSource", "bounded_lines", "with_own_names"]
 
 _HEAD_LINES = 400
 """Lines, blank ones aside, in which names and numbers must begin."""
@@ -55,7 +55,7 @@ class TextSource(Source):
     """
 
     format = "text"
-    endings = (".csv", ".tsv", ".txt", ".csv.gz", ".tsv.gz")
+    endings: ClassVar[tuple[str, ...]] = (".csv", ".tsv", ".txt", ".csv.gz", ".tsv.gz")
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
@@ -69,14 +69,14 @@ class TextSource(Source):
                     start = packed.read(4)
             self._encoding = "utf-16" if start.startswith(_UTF_16) else "utf-8-sig"
             with self._open() as file:
-                numbered = ((i, line) for i, line in enumerate(self._lines(file), 1) if not line.isspace())
+                numbered = ((i, line) for i, line in enumerate(bounded_lines(self.path, file), 1) if not line.isspace())
                 layout = find_layout(list(islice(numbered, _HEAD_LINES)))
         except _DAMAGE as error:
             raise LogError(f"{path}: is truncated or damaged: {first_line(error)}") from error
         if layout is None:
             raise LogError(f"{path}: the file is empty, a line of column names was expected")
         self._layout: Layout = layout
-        self.names, self.twins = _with_own_names(layout.names)
+        self.names, self.twins = with_own_names(layout.names)
         self.units = layout.units | {
             twin: layout.units[name] for name, twins in self.twins.items() if name in layout.units for twin in twins
         }
@@ -101,7 +101,7 @@ class TextSource(Source):
         line = self._layout.first - 1
         try:
             with self._open() as file:
-                rest = islice(self._lines(file), line, None)
+                rest = islice(bounded_lines(self.path, file), line, None)
                 while lines := list(islice(rest, n)):
                     numbers = [line + 1 + i for i, text in enumerate(lines) if not _is_skipped(text)]
                     line += len(lines)
@@ -121,13 +121,6 @@ class TextSource(Source):
     def _errors(self) -> str:
         return _FALLBACK if self._encoding == "utf-8-sig" else "replace"
 
-    def _lines(self, file: IO[str]) -> Iterator[str]:
-        """Iterate over the lines; LogError for one that is too long."""
-        for i, line in enumerate(iter(partial(file.readline, _LINE_MAX), ""), 1):
-            if len(line) == _LINE_MAX:
-                raise LogError(f"{self.path}, line {i}: has {_LINE_MAX} characters or more; is the file a log?")
-            yield line
-
     def _block(self, lines: list[str], numbers: list[int], use: list[int], clocks: Mapping[int, Clock]) -> Block:
         """Return a block of the columns ``use``, those of timestamps as seconds."""
         dates = {i: self._dates[i] for i in clocks if i in self._dates}
@@ -143,7 +136,7 @@ class TextSource(Source):
 
     def _columns(self, lines: list[str], numbers: list[int], use: list[int], stamps: Set[int]) -> list[NDArray[Any]]:
         """Return the columns ``use``, those of ``stamps`` as text."""
-        mark, expected = self._layout.delimiter, len(self.names)
+        mark, expected = self._layout.delimiter, len(self._layout.names)
         if self._layout.decimal_comma:
             lines = [decimal_points(text) for text in lines]
         widths = [text.count(mark) + 1 for text in lines] if mark else [len(text.split()) for text in lines]
@@ -184,13 +177,21 @@ class TextSource(Source):
                 came = brief(fields[i]) if fields[i] else "nothing"
                 raise LogError(
                     f"{self.path}, line {number}: column {brief(self.names[i])} must be a number, got {came}"
-                    f"{NEEDS_TRUST if missing else _hint(fields[i], divided=len(fields) > len(self.names))}"
+                    f"{NEEDS_TRUST if missing else _hint(fields[i], divided=len(fields) > len(self._layout.names))}"
                 )
             row.append(float(number_there))
         return tuple(row)
 
 
-def _with_own_names(names: Sequence[str]) -> tuple[list[str], dict[str, list[str]]]:
+def bounded_lines(path: Path, file: IO[str]) -> Iterator[str]:
+    """Iterate over the lines of an open file; LogError for one that is too long."""
+    for i, line in enumerate(iter(partial(file.readline, _LINE_MAX), ""), 1):
+        if len(line) == _LINE_MAX:
+            raise LogError(f"{path}, line {i}: has {_LINE_MAX} characters or more; is the file a log?")
+        yield line
+
+
+def with_own_names(names: Sequence[str]) -> tuple[list[str], dict[str, list[str]]]:
     """Return names that occur once, ``Time#2`` for the second ``Time``, and those by the name that they had."""
     own: list[str] = []
     twins: dict[str, list[str]] = {}

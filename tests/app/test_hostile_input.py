@@ -16,7 +16,17 @@ ROOT = Path(__file__).resolve().parents[2]
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX only: runs are forked")
 
 
-@pytest.mark.parametrize("kinds", [["text", "npz", "capture"], ["mat", "hdf5"], ["machine", "state"], ["fmu"]])
+@pytest.mark.parametrize(
+    "kinds",
+    [
+        ["text", "npz", "capture"],
+        ["mat", "hdf5"],
+        ["mdf", "tdms", "parquet", "arrow"],
+        ["xlsx", "sinumerik", "twincat", "halscope"],
+        ["machine", "state"],
+        ["fmu"],
+    ],
+)
 def test_damaged_files_are_read_or_refused(tmp_path: Path, kinds: list[str]) -> None:
     options = ["--n", "25", "--fmus", "12", "--seed", "7", "--keep", str(tmp_path / "findings")]
     command = [sys.executable, "-m", "benchmarks.hostile", *options, "--kinds", *kinds]

@@ -24,6 +24,7 @@ ELSEWHERE = {
     "all.c",
     "sources/all.c",
     "FMI.c",
+    "src/hal/utils/scope_files.c",
 }
 """Files of the user, of an archive, of another project."""
 

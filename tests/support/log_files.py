@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gzip
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,18 @@ import h5py
 import numpy as np
 import pytest
 from scipy import io
+
+from benchmarks.recorders import (
+    halscope_csv,
+    halscope_pairs,
+    trace_xml,
+    twincat_csv,
+    write_arrow,
+    write_mdf,
+    write_parquet,
+    write_tdms,
+    write_xlsx,
+)
 
 __all__ = ["EVERY_FORMAT", "FORMATS", "Columns", "capture", "columns", "write", "write_csv"]
 
@@ -52,6 +64,8 @@ def write(path: Path, data: Columns) -> Path:
                 file[name] = values
     elif path.suffix == ".json":
         path.write_text(json.dumps(capture(data)))
+    elif path.suffix in _RECORDERS:
+        _RECORDERS[path.suffix](path, {name: np.ravel(values) for name, values in data.items()})
     else:
         rows = zip(*data.values(), strict=True)
         text = "\n".join([",".join(data), *(",".join(map(repr, map(float, row))) for row in rows)]) + "\n"
@@ -59,5 +73,30 @@ def write(path: Path, data: Columns) -> Path:
     return path
 
 
+def _rated(data: Columns) -> dict[str, tuple[float, Any]]:
+    return {name: (float(data["t"][1] - data["t"][0]), values) for name, values in data.items() if name != "t"}
+
+
+def _traced(data: Columns) -> dict[str, tuple[float, float, Any]]:
+    return {name: (float(data["t"][0]), *rated) for name, rated in _rated(data).items()}
+
+
+def _positions(data: Columns) -> Columns:
+    return {name: values for name, values in data.items() if name != "t"}
+
+
+_RECORDERS: dict[str, Callable[[Path, Columns], object]] = {
+    ".mf4": lambda path, data: write_mdf(path, [data]),
+    ".tdms": lambda path, data: write_tdms(path, _rated(data)),
+    ".parquet": write_parquet,
+    ".arrow": write_arrow,
+    ".xlsx": write_xlsx,
+    ".xml": lambda path, data: path.write_text(trace_xml(_traced(data), kind="none")),
+    ".scope": lambda path, data: path.write_text(twincat_csv(_rated(data))),
+    ".hal": lambda path, data: path.write_text(halscope_csv(_positions(data))),
+    ".halpairs": lambda path, data: path.write_text(halscope_pairs(_positions(data))),
+}
+"""Writers of recorders' formats."""
+
 FORMATS = pytest.mark.parametrize("suffix", [".csv", ".npz", ".mat"])
-EVERY_FORMAT = pytest.mark.parametrize("suffix", [".csv", ".csv.gz", ".npz", ".mat", ".h5", ".json"])
+EVERY_FORMAT = pytest.mark.parametrize("suffix", [".csv", ".csv.gz", ".npz", ".mat", ".h5", ".json", *_RECORDERS])

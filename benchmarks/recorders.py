@@ -1,0 +1,193 @@
+"""Logs as recorders write them: by the format's library, or after the maker's document where there is none.
+
+Samples of columns may have rates of their own: ``{"x_d": (T_s, values), …}``.
+"""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import nptdms
+import numpy as np
+import openpyxl
+import pyarrow as pa
+import pyarrow.parquet as pq
+from asammdf import MDF, Signal
+
+from hybridsep.base.signals import Array
+
+__all__ = [
+    "halscope_csv",
+    "halscope_pairs",
+    "trace_xml",
+    "twincat_csv",
+    "write_arrow",
+    "write_mdf",
+    "write_parquet",
+    "write_tdms",
+    "write_xlsx",
+]
+
+Rated = Mapping[str, tuple[float, Array]]
+"""Sampling interval, s, and values by column."""
+
+
+def write_mdf(path: Path, groups: Sequence[Mapping[str, Any]], version: str = "4.10", units: str = "m") -> Path:
+    """Write an MDF file; each group has its times as ``t``, whose name in the file is ``time``."""
+    with MDF(version=version) as file:
+        for group in groups:
+            t = np.asarray(group["t"], dtype=np.float64)
+            file.append([Signal(np.asarray(x), t, name=name, unit=units) for name, x in group.items() if name != "t"])
+        saved = file.save(path, overwrite=True, compression=2 if version >= "4" else 0)
+    return Path(saved).replace(path)
+
+
+def write_tdms(path: Path, channels: Rated, unit: str = "m", pieces: int = 2) -> Path:
+    """Write a TDMS file of waveforms in several segments."""
+    with nptdms.TdmsWriter(str(path)) as file:
+        for k in range(pieces):
+            file.write_segment(
+                [
+                    nptdms.ChannelObject(
+                        *("axis", name, np.array_split(values, pieces)[k]),
+                        properties={"wf_increment": T_s, "wf_start_offset": 0.0, "unit_string": unit},
+                    )
+                    for name, (T_s, values) in channels.items()
+                ]
+            )
+    return path
+
+
+def write_parquet(path: Path, data: Mapping[str, Any], rows: int = 20) -> Path:
+    """Write a Parquet file in row groups."""
+    pq.write_table(pa.table(dict(data)), path, row_group_size=rows)
+    return path
+
+
+def write_arrow(path: Path, data: Mapping[str, Any], *, stream: bool = False) -> Path:
+    """Write an Arrow file or stream in batches."""
+    table = pa.table(dict(data))
+    make = pa.ipc.new_stream if stream else pa.ipc.new_file
+    with make(path, table.schema) as writer:
+        writer.write_table(table, max_chunksize=20)
+    return path
+
+
+def write_xlsx(path: Path, data: Mapping[str, Sequence[Any]], *, title: str = "Log", first: str = "") -> Path:
+    """Write a workbook, below a row of text where ``first`` is given."""
+    book = openpyxl.Workbook()
+    sheet = book.active
+    sheet.title = title
+    if first:
+        sheet.append([first])
+    sheet.append(list(data))
+    for row in zip(*data.values(), strict=True):
+        sheet.append([x if isinstance(x, (str, datetime.datetime)) or x is None else float(x) for x in row])
+    book.save(path)
+    return path
+
+
+def halscope_csv(data: Mapping[str, Any], period_ns: int = 1_000_000) -> str:
+    """Return halscope's CSV as ``write_log_file`` of LinuxCNC 2.9 and later writes it, with all digits."""
+    lines = [f"# Sampling period is {period_ns} ns", ";".join(data)]
+    lines += ["# Position: " + ";".join(["0.500000"] * len(data)), "# Scale: " + ";".join(["0"] * len(data))]
+    lines += [";".join(repr(float(x)) for x in row) for row in zip(*data.values(), strict=True)]
+    return "\n".join(lines) + "\n"
+
+
+def halscope_pairs(data: Mapping[str, Any], period_ns: int = 1_000_000, *, comma: bool = False) -> str:
+    """Return halscope's older file, which has one line of what lies behind the samples, in a locale's decimals."""
+    rows = [*zip(*data.values(), strict=True), [0.0] * len(data)]
+
+    def number(x: float) -> str:
+        return f"{float(x):+.17g}".replace(".", "," if comma else ".")
+
+    lines = ["".join(f"{name} {number(x)} " for name, x in zip(data, row, strict=True)) for row in rows]
+    return f"Sampling period is {period_ns} ns \n\n" + "\n".join(lines)
+
+
+def trace_xml(signals: Mapping[str, tuple[float, float, Array]], kind: str = "posn") -> str:
+    """Return a trace of SINUMERIK Operate.
+
+    Signals are first time, interval and samples by name, ``nckServoDataCmdPos2ndEnc64 [u1, 7]``. Values that are as
+    before are left out, and records without any.
+    """
+    declared, changes = [], dict[float, dict[str, float]]()
+    for i, (name, (start, interval, values)) in enumerate(signals.items(), 1):
+        declared.append(
+            f'  <dataSignal domain="NCU_1" interval="{interval:.6f}" id="f{i}" event="255" eventChannel="1" '
+            f'datapointCount="{len(values)}" key="s{i}" name="/Nck/!SD/{name}" unitsType="{kind}" dataType="double"/>'
+        )
+        for k, value in enumerate(values):
+            if k == 0 or value != values[k - 1]:
+                changes.setdefault(round(start + k * interval, 6), {})[f"f{i}"] = float(value)
+    end = max(start + interval * (len(values) - 1) for start, interval, values in signals.values())
+    changes.setdefault(round(end, 6), {})
+    records = [
+        f'  <rec time="{t:.6f}"' + "".join(f' {key}="{value!r}"' for key, value in sorted(values.items())) + "/>"
+        for t, values in sorted(changes.items())
+    ]
+    head = '<?xml version="1.0" encoding="utf-8" ?>\n<traceSession version="01.00.03.02">\n'
+    frame = ' <dataFrame>\n  <frameHeader startTime="2026-04-15T10:00:00" stopInc="0"/>\n'
+    body = "\n".join([*declared, *records])
+    return f"{head}<traceData>\n{frame}{body}\n </dataFrame>\n</traceData>\n</traceSession>\n"
+
+
+def twincat_csv(
+    channels: Rated, *, mark: str = "\t", unit: str = "m (Length)", full: bool = False, shared: bool = False
+) -> str:
+    """Return an export of TwinCAT Scope as Beckhoff's manual describes it.
+
+    Parameters
+    ----------
+    channels : mapping
+    mark : str
+        Between fields; numbers have a decimal comma unless it is one.
+    unit : str
+    full : bool
+        Whether times are Windows file times; otherwise they are milliseconds.
+    shared : bool
+        Whether neighbours that are sampled alike share a column of times.
+    """
+    start = 132_959_733_843_760_000
+
+    def number(x: float) -> str:
+        return repr(float(x)) if mark == "," else repr(float(x)).replace(".", ",")
+
+    def time(k: int, T_s: float) -> str:
+        return str(start + round(k * T_s * 1e7)) if full else number(round(1e3 * k * T_s, 9))
+
+    groups: list[list[str]] = []
+    for name, (T_s, _) in channels.items():
+        if shared and groups and channels[groups[-1][0]][0] == T_s:
+            groups[-1].append(name)
+        else:
+            groups.append([name])
+
+    def row(key: str, values: Mapping[str, str]) -> str:
+        return mark.join(mark.join([key, *(values[name] for name in group)]) for group in groups)
+
+    lines = [f"Name{mark}scope", f"File{mark}scope.csv"]
+    lines += [f"Starttime of export{mark}{start}{mark}Montag, 2. Mai 2022{mark}15:56:24.376"]
+    lines += [f"Endtime of export{mark}{start + 10**7}{mark}Montag, 2. Mai 2022{mark}15:56:25.375", ""]
+    lines += ["", row("Name", {name: name for name in channels})]
+    lines += [
+        row("SampleTime[ms]", {name: number(1e3 * T_s).removesuffix(",0") for name, (T_s, _) in channels.items()})
+    ]
+    lines += [
+        row("SymbolName", {name: f"MAIN.{name}" for name in channels}),
+        row("Unit", dict.fromkeys(channels, unit)),
+        "",
+    ]
+    for k in range(max(len(values) for _, values in channels.values())):
+        cells = []
+        for group in groups:
+            T_s, values = channels[group[0]]
+            inside = k < len(values)
+            cells += [time(k, T_s) if inside else ""]
+            cells += [number(channels[name][1][k]) if inside else "" for name in group]
+        lines.append(mark.join(cells).rstrip(mark))
+    return "\n".join([*lines, "EOF"]) + "\n"
