@@ -83,7 +83,7 @@ WeightsOption = Annotated[
 LogArgument = Annotated[
     Path,
     typer.Argument(
-        help="Recorded log with the columns t, x_d, x_meas or x, in a format of the page on recorders: CSV, .npz, .mat, …"
+        help="Recorded log with the columns t, x_d, x_meas or x, in a format of docs/reference/logs.md: CSV, .mat, …"
     ),
 ]
 FixOption = Annotated[bool, typer.Option("--fix", help="Apply the fixes of what the checks of the log find.")]

@@ -75,11 +75,11 @@ class TwinCatSource(Source):
 
     @staticmethod
     def recognises(head: bytes) -> bool:
-        """Return whether it begins with the scope's name and the file's, or with the row of names and sample times."""
+        """Return whether it begins with the name of the scope, and has a row with the names of channels below."""
         first, _, rest = head.removeprefix(_BOM).partition(b"\n")
         mark = first[len(_NAME) : len(_NAME) + 1]
-        known = (b"File" + mark, _START.encode(), _SAMPLE_TIME.encode())
-        return first.startswith(_NAME.encode()) and mark in _MARKS and any(word in rest for word in known)
+        begin = _NAME.encode() + mark
+        return first.startswith(begin) and mark in _MARKS and b"\n" + begin in b"\n" + rest
 
     def channels(self) -> list[Channel]:
         """Return the columns with what the file says of them."""

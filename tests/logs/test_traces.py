@@ -151,7 +151,7 @@ def test_slow_channels_that_are_filled(tmp_path: Path) -> None:
         ("\n5,0\t", "\n5.5.5\t", r"line 17: column 'time' must be a number, got '5\.5\.5'"),
         ("\n5,0\t", "\nx\t", r"line 17: column 'time' must be a number, got 'x'"),
         (f"\n5,0\t{str(X_D[5]).replace('.', ',')}", "\n5,0\t", "line 17: column 'x_d' must be a number, got nothing"),
-        ("\nName\tx_d", "\nNames\tx_d", "a row of the channels' names was expected below the head, got none"),
+        ("\nName\tx_d", "\n" * 500 + "Name\tx_d", "a row of the channels' names was expected below the head, got none"),
         ("Name\tx_d\tName\tx", "Name\tx_d\tx\ty\tz\tv", r"line 12: a column of times before each channel, .* expected"),
     ],
 )
