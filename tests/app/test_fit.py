@@ -201,7 +201,7 @@ def test_a_log_that_cannot_teach_a_model_is_predicted_by_its_command(tmp_path: P
 
 def test_a_half_that_rests_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It was the log whose commanded position does not move, where only the half that teaches rests."""
-    monkeypatch.setattr(fitting, "build_for_host", lambda *_arguments, **_options: None)
+    monkeypatch.setattr(fitting, "build_here", lambda *_arguments, **_options: None)
     monkeypatch.setattr(fitting, "step_times", lambda *_arguments: {"median": 0.0, "p99_9": 0.0, "largest": 0.0})
     rest = np.full(300, commanded()[0])
     noise = np.random.default_rng(0).normal(0, 1e-6, 300)

@@ -97,6 +97,19 @@ def write_header(name: str, folder: Path) -> None:
     (folder / "hsep_fmu.h").write_text(c_header({"name": name, **DESCRIPTIONS[name]}, "{test}"), encoding="utf-8")
 
 
+class Context(ctypes.Structure):
+    """hsep_context."""
+
+    _fields_ = (
+        ("variables", ctypes.c_void_p),
+        *((name, ctypes.c_size_t) for name in ("n_scalars", "n_modes", "window", "n_variables")),
+        ("starts", ctypes.c_void_p),
+        ("guid", ctypes.c_char_p),
+        ("angular", ctypes.c_int),
+        ("resources", ctypes.c_char_p),
+    )
+
+
 @cache
 def library(name: str) -> ctypes.CDLL:
     """Return the shared library of one of :data:`DESCRIPTIONS`, built when first asked for."""
@@ -119,18 +132,12 @@ def library(name: str) -> ctypes.CDLL:
         ]
     )
     loaded = ctypes.CDLL(str(built))
-    loaded.test_variables.restype = ctypes.c_void_p
+    loaded.test_table.restype = ctypes.POINTER(Context)
     for function in ("physics", "regression", "predictor"):
         getattr(loaded, f"hsep_{function}_size").restype = ctypes.c_double
     loaded.hsep_encoder_measure.restype = ctypes.c_double
     loaded.hsep_regression_row.restype = ctypes.POINTER(ctypes.c_double)
     return loaded
-
-
-class Context(ctypes.Structure):
-    """hsep_context."""
-
-    _fields_ = (("variables", ctypes.c_void_p), ("n_variables", ctypes.c_size_t), ("resources", ctypes.c_char_p))
 
 
 class RefusedError(Exception):
@@ -157,9 +164,8 @@ class CModel:
         slopes = INTERPOLATED[DESCRIPTIONS[name]["model"]]
         self.slope_place = {slope: len(table) + self.place[slope] for slope in slopes}
         self.values: Array = np.array([float(variable.start or 0.0) for variable in table] + [0.0] * len(slopes))
-        self.context = Context(
-            self.library.test_variables(), len(table), f"{resources}/".encode() if resources else None
-        )
+        self.context = Context.from_buffer_copy(self.library.test_table().contents)
+        self.context.resources = f"{resources}/".encode() if resources else None
         for key, value in (start or {}).items():
             self[key] = value
         self.state: Array = np.zeros(0)
