@@ -16,7 +16,6 @@
 
 #include "hsep_encoder.h"
 #include "hsep_fmu.h"
-#include "hsep_table.h"
 #include "hsep_plant.h"
 
 #include <stdint.h>
@@ -110,8 +109,7 @@ int main(int n_arguments, char *arguments[])
 {
     static double values[HSEP_N_VALUES];
     char message[HSEP_MESSAGE_SIZE] = "";
-    char variable[HSEP_NAME_SIZE];
-    hsep_context context = hsep_table;
+    hsep_context context = {hsep_variables, HSEP_N_VARIABLES, NULL};
     if (n_arguments < 4) {
         fail("usage: step_time STEPS LOG TIMES name=value ...");
     }
@@ -122,10 +120,10 @@ int main(int n_arguments, char *arguments[])
         }
     }
     for (size_t i = 0; i < HSEP_N_VARIABLES; i++) {
-        const size_t length = strlen(hsep_table_name(&hsep_table, i, variable));
-        values[i] = hsep_table_start(&hsep_table, i);
+        const size_t length = strlen(hsep_variables[i].name);
+        values[i] = hsep_variables[i].start;
         for (int a = 4; a < n_arguments; a++) {
-            if (strncmp(arguments[a], variable, length) == 0 && arguments[a][length] == '=') {
+            if (strncmp(arguments[a], hsep_variables[i].name, length) == 0 && arguments[a][length] == '=') {
                 values[i] = strtod(arguments[a] + length + 1, NULL);
             }
         }
