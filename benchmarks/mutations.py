@@ -273,9 +273,6 @@ def _state(blob: bytes, chance: Random) -> bytes:
 def _fmus(folder: Path) -> list[tuple[str, bytes]]:
     machine, files = load_machine(MACHINE), []
     for name in FMUS:
-        if (built := folder / f"{name}.fmu").exists():
-            files.append((built.name, built.read_bytes()))
-            continue
         how = {"flavour": "python"} if name.endswith("Py") else {"flavour": "native", "targets": ("host",)}
         files.append((f"{name}.fmu", build_fmu(machine, name, folder, **how).read_bytes()))
     return files

@@ -19,7 +19,7 @@ from hybridsep.base.data_files import DEFAULT_MACHINE
 from hybridsep.base.messages import ERRORS, FINDINGS, Explanation
 from hybridsep.base.parameters import Parameter
 from hybridsep.base.settings import PARAMETERS, Limits, PredictorSettings
-from hybridsep.fmi.archive import fmu_description
+from hybridsep.fmi.description import fmu_description
 from hybridsep.fmi.tables import grouped_table
 from hybridsep.fmi.variables import variables_of
 from hybridsep.machines.machine import Machine

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridsep.fmi.native_flavour import fmi_headers, sources
+from hybridsep.fmi.c_sources import fmi_headers
+from hybridsep.fmi.native_flavour import sources
 from hybridsep.machines.paper import paper_machine
 
 Array = NDArray[np.float64]

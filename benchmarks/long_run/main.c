@@ -99,7 +99,7 @@ static void fold(char *arguments[])
 static void step(unsigned long samples)
 {
     const fmi2ValueReference inputs[2] = {HSEP_VR_x_d_ahead, HSEP_VR_x_meas}, output = HSEP_VR_x_h;
-    const double T_s = hsep_variables[HSEP_VR_T_s].start;
+    const double T_s = hsep_starts[HSEP_VR_T_s];
     double x_h = 0.0;
     fmi2Component fmu = fmi2Instantiate("long run", fmi2CoSimulation, HSEP_GUID, NULL, NULL, fmi2False, fmi2False);
     expect(fmu != NULL && fmi2SetupExperiment(fmu, fmi2False, 0.0, 0.0, fmi2False, 0.0) == fmi2OK, "the instance");

@@ -16,6 +16,7 @@
 
 #include "hsep_encoder.h"
 #include "hsep_fmu.h"
+#include "hsep_table.h"
 #include "hsep_plant.h"
 
 #include <stdint.h>
@@ -109,7 +110,8 @@ int main(int n_arguments, char *arguments[])
 {
     static double values[HSEP_N_VALUES];
     char message[HSEP_MESSAGE_SIZE] = "";
-    hsep_context context = {hsep_variables, HSEP_N_VARIABLES, NULL};
+    char variable[HSEP_NAME_SIZE];
+    hsep_context context = hsep_table;
     if (n_arguments < 4) {
         fail("usage: step_time STEPS LOG TIMES name=value ...");
     }
@@ -120,10 +122,10 @@ int main(int n_arguments, char *arguments[])
         }
     }
     for (size_t i = 0; i < HSEP_N_VARIABLES; i++) {
-        const size_t length = strlen(hsep_variables[i].name);
-        values[i] = hsep_variables[i].start;
+        const size_t length = strlen(hsep_table_name(&hsep_table, i, variable));
+        values[i] = hsep_table_start(&hsep_table, i);
         for (int a = 4; a < n_arguments; a++) {
-            if (strncmp(arguments[a], hsep_variables[i].name, length) == 0 && arguments[a][length] == '=') {
+            if (strncmp(arguments[a], variable, length) == 0 && arguments[a][length] == '=') {
                 values[i] = strtod(arguments[a] + length + 1, NULL);
             }
         }

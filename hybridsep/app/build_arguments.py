@@ -8,7 +8,7 @@ from typing import Any
 
 from ..base.errors import ParameterError
 from ..fmi.archive import fmu_names
-from ..fmi.compiler import compilers
+from ..fmi.libraries import check_available
 from ..fmi.warm_start import load_trained
 from ..logs.log import check_reading
 from ..machines.machine import Machine, load_machine, machine_names
@@ -37,7 +37,7 @@ def jobs_of(fmus: Sequence[str], machines: Sequence[str], flavour: str, targets:
     if targets and flavour != "native":
         raise ParameterError(f"--target is for native FMUs; with --flavour {flavour} leave it out")
     if flavour == "native":
-        compilers(targets or ("host",))
+        check_available(targets or ("host",))
     return [job for job in jobs if not fmus or job[1] in fmus]
 
 

@@ -1,30 +1,32 @@
-"""FMUs built for a command's own use, for this platform alone."""
+"""FMUs built for a command's own use."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from ..fmi.archive import build_fmu, fmu_name
-from ..fmi.compiler import can_compile
+from ..fmi.libraries import has_native, ready_targets
 from ..machines.machine import Machine
 
-__all__ = ["build_for_host", "build_pair", "default_flavour"]
+__all__ = ["build_here", "build_pair", "default_flavour"]
 
 
 def default_flavour() -> str:
-    """Return the flavour of the demo's FMUs: native where there is a C compiler, Python otherwise."""
-    return "native" if can_compile() else "python"
+    """Return the flavour of the demo's FMUs: native where their libraries can be had, Python otherwise."""
+    return "native" if has_native() else "python"
 
 
-def build_for_host(machine: Machine, model: str, out: Path, flavour: str, *, weights: Path | None = None) -> Path:
-    """Build one of a machine's FMUs for this platform."""
+def build_here(machine: Machine, model: str, out: Path, flavour: str, *, weights: Path | None = None) -> Path:
+    """Build one of a machine's FMUs, for all platforms whose libraries are there."""
     name = fmu_name(model, machine.name, flavour)
-    return build_fmu(machine, name, out, flavour, targets=("host",), weights=weights)
+    return build_fmu(
+        machine, name, out, flavour, targets=ready_targets() if flavour == "native" else None, weights=weights
+    )
 
 
 def build_pair(machine: Machine, out: Path, flavour: str) -> tuple[Path, Path]:
     """Build a machine's predictor and plant FMU."""
     return (
-        build_for_host(machine, "HybridPredictor", out, flavour),
-        build_for_host(machine, "FeedDrive", out, flavour),
+        build_here(machine, "HybridPredictor", out, flavour),
+        build_here(machine, "FeedDrive", out, flavour),
     )

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..fmi.compiler import TARGET_NAMES, default_targets
+from ..fmi.compiler import TARGET_NAMES
 from ..fmi.flavours import FLAVOURS
 from .failures import errors_console
 from .options import FlavourOption, ForceOption, JsonOption, TsOption, UnitOption, WeightsOption
@@ -26,10 +26,7 @@ def build(
     flavour: FlavourOption = FLAVOURS[0],
     target: Annotated[
         list[str] | None,
-        typer.Option(
-            help=f"Platform of a native FMU, may be repeated: {', '.join(TARGET_NAMES)}. If left out: all platforms "
-            "where ziglang is installed, this machine (host) otherwise."
-        ),
+        typer.Option(help=f"Platform of a native FMU, may be repeated: {', '.join(TARGET_NAMES)}. All if left out."),
     ] = None,
     weights: WeightsOption = None,
     trajectory: Annotated[
@@ -49,7 +46,6 @@ def build(
     from ..fmi.archive import build_fmu
     from ..machines.machine import machine_path
     from .build_arguments import extras_of, jobs_of
-    from .log_intake import show
     from .overwrite import FMU, Output, check_outputs
     from .progress import progress_bar
     from .tables import console, print_json
@@ -62,14 +58,8 @@ def build(
         {**inputs, "saved predictor": weights, "trajectory": trajectory},
         force=force,
     )
-    platforms = default_targets() if flavour == "native" else ()
     paths = []
     with progress_bar(as_json) as advance:
-        if len(platforms) > 1 and not target and not as_json:
-            show(
-                [f"each FMU gets binaries for {len(platforms)} platforms; with --target host for this machine alone"],
-                (),
-            )
         for i, (axis, name, model) in enumerate(jobs):
             advance(name, i / len(jobs))
 

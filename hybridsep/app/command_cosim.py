@@ -69,7 +69,7 @@ def cosim(
     from ..cosim.run import RESULT_SUFFIXES
     from ..machines.machine import load_machine, machine_path
     from .arguments import check_ending
-    from .builds import build_for_host
+    from .builds import build_here
     from .cosim_arguments import check_pair, checked_group, fitting, read_command
     from .overwrite import FIGURE, RUN, Output, check_outputs
     from .progress import progress_bar
@@ -101,8 +101,8 @@ def cosim(
     title = f"{' and '.join(path.name for path in (predictor, plant) if path is not None) or axis.title}, {trajectory}"
     with tempfile.TemporaryDirectory() as place, progress_bar(as_json) as advance:
         folder = Path(place)
-        ahead = predictor or build_for_host(axis, model, folder, flavour, weights=weights)
-        drive = plant or build_for_host(axis, "FeedDrive", folder, flavour)
+        ahead = predictor or build_here(axis, model, folder, flavour, weights=weights)
+        drive = plant or build_here(axis, "FeedDrive", folder, flavour)
         given = [path.name for path in (predictor, plant) if path is not None]
         call = partial(run_apart, " or ".join(given), cosimulate) if given else cosimulate
         run = call(

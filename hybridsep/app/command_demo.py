@@ -19,7 +19,7 @@ def demo(
     seeds: Annotated[int, typer.Option(min=1, help="Noise seeds the staircase is averaged over.")] = 10,
     flavour: Annotated[
         str | None,
-        typer.Option(help=f"Flavour of the FMUs: {', '.join(FLAVOURS)}; native where there is a C compiler."),
+        typer.Option(help=f"Flavour of the FMUs: {', '.join(FLAVOURS)}; native where their libraries are there."),
     ] = None,
     force: ForceOption = False,
     as_json: JsonOption = False,

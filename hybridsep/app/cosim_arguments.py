@@ -11,7 +11,7 @@ from ..base.signals import Array
 from ..cosim.fmus import check_controller, check_plant
 from ..cosim.run import COMPENSATOR, PREDICTOR
 from ..fmi.archive import fmu_names
-from ..fmi.compiler import compilers
+from ..fmi.libraries import check_available
 from ..fmi.warm_start import load_trained
 from ..logs.log import check_reading
 from ..machines.machine import Machine
@@ -92,4 +92,4 @@ def check_pair(
     if weights is not None:
         load_trained(weights, axis, model)
     if flavour == "native" and None in (predictor, plant):
-        compilers(("host",))
+        check_available(("host",))

@@ -72,7 +72,7 @@ def demo(
     seeds : int
         Noise seeds the staircase is averaged over, ≥ 1.
     flavour : {"native", "python"}, optional
-        Flavour of the FMUs; native where there is a C compiler, if left out.
+        Flavour of the FMUs; native where their libraries are there, if left out.
     progress : callable
         Called with a message and the fraction done.
 

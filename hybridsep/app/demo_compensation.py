@@ -16,7 +16,7 @@ from ..cosim.run import Run
 from ..machines.machine import Machine
 from ..plants.encoder import Encoder
 from ..plants.trajectory import archimedean_spiral
-from .builds import build_for_host
+from .builds import build_here
 
 __all__ = ["COMPENSATED", "Runs", "compensate", "contour_errors", "mean_summary", "train"]
 
@@ -68,10 +68,10 @@ def compensate(
         The same keys → means over the seeds of :meth:`Run.summary`, with the spread
         ``tracking_rms_um_std``.
     """
-    cold = build_for_host(machine, "SepCompensator", out / "fmus", flavour)
+    cold = build_here(machine, "SepCompensator", out / "fmus", flavour)
     weights = out / f"{machine.name}.state"
     train(machine, command, weights)
-    warm = build_for_host(machine, "SepCompensator", out / "fmus" / "warm", flavour, weights=weights)
+    warm = build_here(machine, "SepCompensator", out / "fmus" / "warm", flavour, weights=weights)
     runs: Runs = {}
     summary: dict[str, Any] = {}
     for key, choice in COMPENSATED.items():

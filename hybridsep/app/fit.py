@@ -15,8 +15,8 @@ from ..base.metrics import rms_ratio
 from ..base.output import written_text
 from ..base.settings import PredictorSettings
 from ..fmi.archive import fmu_name
-from ..fmi.compiler import can_compile
 from ..fmi.flavours import FLAVOURS
+from ..fmi.libraries import has_native
 from ..identify.model import machine_of
 from ..identify.operation import SAMPLES_MIN, identify_operation, unit_gain_model
 from ..identify.segments import in_time
@@ -28,7 +28,7 @@ from ..predict.predictor import HybridPredictor
 from ..tune.choice import choose_settings, settings_for, window_scores
 from ..tune.halves import Recording, Replay, halves, replay
 from ..tune.period import period_hint
-from .builds import build_for_host
+from .builds import build_here
 from .fit_compensation import COMPENSATE, expected_tracking
 from .fit_stages import Stages, key_of
 from .overwrite import sealed
@@ -224,7 +224,7 @@ def fit(
     for i, flavour in enumerate(_flavours()):
         progress(f"build the {flavour} FMU", 0.87 + 0.04 * i)
         for built in (_MODEL, _COMPENSATOR) if compensates else (_MODEL,):
-            build_for_host(machine, built, out, flavour, weights=files["trained predictor"])
+            build_here(machine, built, out, flavour, weights=files["trained predictor"])
     progress("time the FMU's steps", 0.95)
     fmu = files[f"{_flavours()[0]} FMU"]
     steps = step_times(fmu, recordings[0].x_d, recordings[0].x)
@@ -347,4 +347,4 @@ def _machine(
 
 def _flavours() -> tuple[str, ...]:
     """Return the flavours that can be built here."""
-    return FLAVOURS if can_compile() else ("python",)
+    return FLAVOURS if has_native() else ("python",)

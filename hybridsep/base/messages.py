@@ -81,7 +81,9 @@ ERRORS: Mapping[str, Explanation] = {
     ),
     "FmuError": Explanation(
         "An FMU cannot be built, read or loaded, or a call came that FMI does not allow in the present state.",
-        "For building, install a C compiler or `ziglang`; other platforms than this one need the latter. An archive "
+        "A native FMU takes its libraries from the installation; "
+        "where they could not be compiled then, `pip install ziglang`, or build with `--flavour python`."
+        " An archive "
         "that is refused "
         "is named with what is wrong with it.",
     ),

@@ -1,6 +1,6 @@
 """FMU archives, reproducible byte for byte from the sources and the machine.
 
-The content follows from the flavour: :mod:`hybridsep.fmi.native_flavour` compiles the C sources,
+The content follows from the flavour: :mod:`hybridsep.fmi.native_flavour` takes libraries of the C sources,
 :mod:`hybridsep.fmi.python_flavour` wraps this library.
 """
 
@@ -16,14 +16,13 @@ from numpy.typing import ArrayLike
 from ..base.data_files import DEFAULT_MACHINE
 from ..base.errors import FmuError
 from ..base.output import written_whole
-from ..base.settings import PARAMETERS
 from ..fmi import native_flavour, python_flavour
 from ..machines.machine import Machine
-from ..machines.sections import FeedDriveSection
+from .description import fmu_description
 from .flavours import FLAVOURS
 from .warm_start import load_trained
 
-__all__ = ["build_fmu", "fmu_description", "fmu_name", "fmu_names"]
+__all__ = ["build_fmu", "fmu_name", "fmu_names"]
 
 _SUFFIX = {"native": "", "python": "Py"}
 _SAMPLES_TRAJECTORY = 3
@@ -85,14 +84,14 @@ def build_fmu(
         Flavour of the FMU.
     targets : sequence of str, optional
         Platforms of a native FMU's binaries: of :data:`hybridsep.fmi.compiler.TARGET_NAMES`, ``"host"`` being this
-        machine. If left out: all platforms where ``ziglang`` is installed, this machine otherwise.
+        machine. If left out: all platforms, or this machine where neither their libraries nor ``ziglang`` is there.
     samples : (n,) array_like, m, optional
         Trajectory 3 of ReferenceTrajectory, at the machine's ``T_s``; played unless another one is chosen.
     weights : str or Path, optional
         File of :meth:`HybridPredictor.save`, trained with the settings of this FMU, for a SepCompensator best in
         closed loop (``compensator.predictor.save(...)``): the FMU starts with these weights, without a warm-up.
     on_target : callable, optional
-        Called with each platform of a native FMU, as ``x86_64-linux``, when its compilation begins.
+        Called with each platform, as ``x86_64-linux``, whose library is not there and has to be compiled.
 
     Returns
     -------
@@ -102,7 +101,7 @@ def build_fmu(
     Raises
     ------
     FmuError
-        If the machine has no such FMU, it cannot be compiled, or it has no use for ``samples`` or ``weights``.
+        If the machine has no such FMU, its library cannot be had, or it has no use for ``samples`` or ``weights``.
     SignalError
         If ``samples`` is not finite or empty.
     StateError
@@ -136,36 +135,11 @@ def build_fmu(
     return path
 
 
-def fmu_description(machine: Machine, model: str, name: str) -> dict[str, Any]:
-    """Return the description from which an FMU is made: model, name, start values, modes, and unit unless it is m."""
-    description = _description(machine, model, name)
-    return description if machine.unit == "m" else {**description, "unit": machine.unit}
-
-
-def _description(machine: Machine, model: str, name: str) -> dict[str, Any]:
-    if model in ("HybridPredictor", "SepCompensator"):
-        physics = [{"f_n": m.f_n, "zeta": m.zeta, "alpha": m.alpha, "beta": m.beta} for m in machine.model.modes]
-        values = machine.fmi_parameters() if model == "HybridPredictor" else machine.fmi_compensator_parameters()
-        return {"model": model, "name": name, "parameters": values, "modes": physics}
-    if model == "ReferenceTrajectory":
-        return {"model": model, "name": name, "parameters": {"trajectory": 0, "T_s": machine.T_s}, "modes": []}
-    assert machine.plant is not None  # by fmu_names
-    modes = [mode.model_dump() for mode in machine.physics.mode]
-    parameters: dict[str, object] = machine.plant.model_dump(exclude={"kind"})
-    if isinstance(machine.plant, FeedDriveSection):
-        assert machine.physics.spring_mass_damper is not None  # by Machine
-        parameters |= machine.physics.spring_mass_damper.model_dump()
-    else:
-        parameters["T_s"] = machine.T_s
-        parameters["friction_on"] = PARAMETERS["friction_on"].to_fmi(machine.plant.friction_on)
-    return {"model": model, "name": name, "parameters": parameters, "modes": modes}
-
-
 def _write_archive(path: Path, files: Mapping[str, bytes]) -> None:
-    """Write a zip whose bytes depend on nothing but its content."""
-    with written_whole(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
+    """Write a zip whose bytes depend on nothing but its content: stored, as compressed ones depend on the zlib."""
+    with written_whole(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
         # modelDescription.xml first, as readers that stream expect
         for arcname in sorted(files, key=lambda key: (key != "modelDescription.xml", key)):
             entry = zipfile.ZipInfo(arcname, _ZIP_TIME)
-            entry.compress_type, entry.external_attr, entry.create_system = zipfile.ZIP_DEFLATED, 0o644 << 16, 3
+            entry.compress_type, entry.external_attr, entry.create_system = zipfile.ZIP_STORED, 0o644 << 16, 3
             archive.writestr(entry, files[arcname])

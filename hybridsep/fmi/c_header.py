@@ -1,23 +1,102 @@
-"""C header ``hsep_fmu.h`` of one FMU: its variable table and value references.
+"""C header ``hsep_fmu.h``: the interface of a kind of FMU, and in source FMUs the table of one of them.
 
-The native FMUs' sources differ in this header alone. It is made from the same table as the
-modelDescription, so the two cannot disagree.
+FMUs of a kind differ in their GUID, the number of modes, the length of the windows and start values. In a source FMU
+the header has them; a library that serves all FMUs of a kind reads them from the resources
+(:mod:`hybridsep.fmi.table_file`). Both follow from the table that modelDescription.xml is made of.
 """
 
 from __future__ import annotations
 
+import hashlib
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
+from .angular_units import angular_unit
 from .variables import INTERPOLATED, Variable, variables_of
 
-__all__ = ["c_header"]
+__all__ = ["KINDS", "Layout", "c_header", "interface_number", "kind_header", "kind_of", "layout_of"]
 
 _C_KINDS = {"Enumeration": "Integer"}
 """FMI 2.0 reads and writes both by the same functions."""
 
+_MODE = {"f_n": 1.0, "zeta": 1.0, "alpha": 1.0, "beta": 0.0}
+_ANY: Mapping[str, object] = {"parameters": defaultdict(lambda: 1), "modes": [_MODE]}
+
+KINDS: Mapping[str, Mapping[str, object]] = {
+    "HybridPredictor": {**_ANY, "model": "HybridPredictor"},
+    "SepCompensator": {**_ANY, "model": "SepCompensator"},
+    "FeedDrive": {**_ANY, "model": "FeedDrive", "modes": []},
+    "StageDrive": {**_ANY, "model": "FeedDrive"},
+    "ReferenceTrajectory": {**_ANY, "model": "ReferenceTrajectory", "modes": []},
+}
+"""Kinds of FMU, each with a description that stands for all FMUs of it."""
+
+_MACROS = {
+    "HybridPredictor": "HYBRID_PREDICTOR",
+    "SepCompensator": "SEP_COMPENSATOR",
+    "FeedDrive": "FEED_DRIVE",
+    "StageDrive": "STAGE_DRIVE",
+    "ReferenceTrajectory": "REFERENCE_TRAJECTORY",
+}
+
+
+def kind_of(description: Mapping[str, object]) -> str:
+    """Return which of :data:`KINDS` an FMU is."""
+    model = str(description["model"])
+    return "StageDrive" if model == "FeedDrive" and description["modes"] else model
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The parts of an FMU's table: single variables, then those of the modes, then windows.
+
+    Attributes
+    ----------
+    scalars, modes : tuple of Variable
+    windows : tuple of tuple of Variable
+        The samples of each window, all windows of one length.
+    """
+
+    scalars: tuple[Variable, ...]
+    modes: tuple[Variable, ...]
+    windows: tuple[tuple[Variable, ...], ...]
+
+    @property
+    def starts(self) -> list[float]:
+        """Start values of single variables and modes, 0 for what is calculated; windows have none."""
+        return [float(variable.start or 0.0) for variable in (*self.scalars, *self.modes)]
+
+
+def layout_of(table: Sequence[Variable]) -> Layout:
+    """Return the parts of a table, which the C core finds by their places."""
+    arrays: dict[str, list[Variable]] = defaultdict(list)
+    for variable in table:
+        array, bracket, _ = variable.name.partition("[")
+        arrays[array if bracket else ""].append(variable)
+    scalars, modes = arrays.pop("", []), arrays.pop("mode", [])
+    windows = tuple(map(tuple, arrays.values()))
+    layout = Layout(tuple(scalars), tuple(modes), windows)
+    flat = [*layout.scalars, *layout.modes, *(sample for window in windows for sample in window)]
+    assert flat == list(table), "single variables come first, then modes, then windows"
+    assert len({len(window) for window in windows}) <= 1, "windows are of one length"
+    return layout
+
+
+def kind_header(kind: str) -> str:
+    """Return the header with which a library serves all FMUs of a kind.
+
+    Parameters
+    ----------
+    kind : str
+        Of :data:`KINDS`.
+    """
+    table = "/* The table of each FMU, its GUID and start values, is in its resources (hsep_table_file.h). */\n"
+    return _header(kind, f"every {kind}", f"{table}#define HSEP_TABLE_IN_RESOURCES 1\n")
+
 
 def c_header(description: Mapping[str, object], guid: str) -> str:
-    """Return the header of one FMU.
+    """Return the header of one FMU, with its table.
 
     Parameters
     ----------
@@ -26,17 +105,48 @@ def c_header(description: Mapping[str, object], guid: str) -> str:
     guid : str
         The modelDescription's.
     """
-    table = variables_of(description)
-    n_modes = sum(variable.name.endswith("].f_n") for variable in table)
-    window = sum(variable.name.startswith("x_h_window[") for variable in table)
-    model, name = _model_macro(str(description["model"]), n_modes), str(description["name"])
-    slopes = INTERPOLATED[str(description["model"])]
-    assert slopes == tuple(variable.name for variable in table[: len(slopes)])  # their places are the inputs' own
-    rows = "\n".join(f"    {_row(variable)}," for variable in table)
-    places = [f"    HSEP_VR_{name} = {place}" for name, place in _references(table).items()]
-    places += [f"    HSEP_SLOPE_{name} = HSEP_N_VARIABLES + HSEP_VR_{name}" for name in slopes]
-    references = ",\n".join(places)
-    return f"""/* The interface of {name}: generated from the table that modelDescription.xml comes from. */
+    name, layout = str(description["name"]), layout_of(variables_of(description))
+    window = len(layout.windows[0]) if layout.windows else 0
+    starts = ",\n".join(
+        f"    {_double(start)} /* {variable.name} */"
+        for start, variable in zip(layout.starts, (*layout.scalars, *layout.modes), strict=True)
+    )
+    table = f"""/* What fmi2Functions.h may put before the names of the FMI functions. */
+#ifndef FMI2_FUNCTION_PREFIX
+#define FMI2_FUNCTION_PREFIX {name}_
+#endif
+
+#define HSEP_GUID {_string(guid)}
+#define HSEP_N_MODES {len(layout.modes) // len(_MODE)}
+#define HSEP_WINDOW {window} /* samples in each window */
+#define HSEP_N_STARTS (HSEP_N_SCALARS + HSEP_MODE_NUMBERS * HSEP_N_MODES)
+#define HSEP_N_VARIABLES (HSEP_N_STARTS + HSEP_N_WINDOWS * HSEP_WINDOW)
+#define HSEP_N_VALUES (HSEP_N_VARIABLES + HSEP_N_INTERPOLATED)
+
+static const double hsep_starts[HSEP_N_STARTS] = {{
+{starts}}};
+
+static const hsep_context hsep_table = {{
+    .variables = hsep_variables,
+    .n_scalars = HSEP_N_SCALARS,
+    .n_modes = HSEP_N_MODES,
+    .window = HSEP_WINDOW,
+    .n_variables = HSEP_N_VARIABLES,
+    .starts = hsep_starts,
+    .guid = HSEP_GUID,
+    .angular = {int(description.get("unit", "m") != "m")}}};
+"""
+    return _header(kind_of(description), name, table)
+
+
+def interface_number(kind: str) -> int:
+    """Return a number of 64 bits that tells the interface of a kind from all others, and from other versions'."""
+    return int.from_bytes(hashlib.sha256(_interface(kind).encode()).digest()[:8], "little")
+
+
+def _header(kind: str, whose: str, table: str) -> str:
+    """Return a header: the interface of a kind, then a table or where it is."""
+    return f"""/* The interface of {whose}: generated from the table that modelDescription.xml comes from. */
 #ifndef HSEP_FMU_H
 #define HSEP_FMU_H
 
@@ -44,61 +154,60 @@ def c_header(description: Mapping[str, object], guid: str) -> str:
 
 #include "hsep_model.h"
 
-/* What fmi2Functions.h may put before the names of the FMI functions. */
-#ifndef FMI2_FUNCTION_PREFIX
-#define FMI2_FUNCTION_PREFIX {name}_
-#endif
-
-#define HSEP_MODEL_IDENTIFIER {_string(name)}
-#define HSEP_GUID {_string(guid)}
-#define HSEP_MODEL_{model} 1
-#define HSEP_N_VARIABLES {len(table)}
-#define HSEP_N_INTERPOLATED {len(slopes)} /* the first variables, inputs with a time derivative */
-#define HSEP_N_VALUES (HSEP_N_VARIABLES + HSEP_N_INTERPOLATED)
-#define HSEP_N_MODES {n_modes}
-#define HSEP_WINDOW {window} /* samples in the window variables, 0 where there are none */
-
-/* Value references; of an array's elements the first one. Behind them the places of the time derivatives. */
-enum {{
-{references}
-}};
-
-static const hsep_variable hsep_variables[HSEP_N_VARIABLES] = {{
-{rows}
-}};
-
+#define HSEP_MODEL_{_MACROS[kind]} 1
+#define HSEP_INTERFACE UINT64_C(0x{interface_number(kind):016X}) /* of all below, up to the table of one FMU */
+{_interface(kind)}
+{table}
 #endif
 """
 
 
-def _model_macro(model: str, n_modes: int) -> str:
-    if model == "FeedDrive":
-        return "STAGE_DRIVE" if n_modes else "FEED_DRIVE"
-    macros = {
-        "HybridPredictor": "HYBRID_PREDICTOR",
-        "SepCompensator": "SEP_COMPENSATOR",
-        "ReferenceTrajectory": "REFERENCE_TRAJECTORY",
-    }
-    return macros[model]
+def _interface(kind: str) -> str:
+    """Return what all FMUs of a kind share: value references and the rows of the table."""
+    description = KINDS[kind]
+    layout, model = layout_of(variables_of(description)), str(description["model"])
+    slopes = INTERPOLATED[model]
+    assert slopes == tuple(variable.name for variable in layout.scalars[: len(slopes)])  # their places are the inputs'
+    places = [f"    HSEP_VR_{variable.name} = {i}" for i, variable in enumerate(layout.scalars)]
+    if layout.modes:
+        places.append(f"    HSEP_VR_mode = {len(layout.scalars)}")
+    windows = [window[0].name.partition("[")[0] for window in layout.windows]
+    first = "HSEP_N_SCALARS + HSEP_MODE_NUMBERS * (context)->n_modes"
+    macros = "".join(
+        f"#define HSEP_VR_{name}(context) ({first} + {i} * (context)->window)\n" for i, name in enumerate(windows)
+    )
+    one = layout.modes[: len(_MODE)]
+    rows = [_row(variable, variable.name) for variable in layout.scalars]
+    rows += [_row(variable, variable.name.partition(".")[2]) for variable in one]
+    rows += [_row(window[0], name) for window, name in zip(layout.windows, windows, strict=True)]
+    references, table = ",\n".join(places), ",\n".join(f"    {row}" for row in rows)
+    return f"""#define HSEP_MODEL_NAME {_string(model)}
+#define HSEP_N_INTERPOLATED {len(slopes)} /* the first variables, inputs with a time derivative */
+#define HSEP_N_SCALARS {len(layout.scalars)}
+#define HSEP_HAS_MODES {int(bool(layout.modes))}
+#define HSEP_N_WINDOWS {len(windows)}
+
+/* Value references; of the modes' numbers the first one. */
+enum {{
+{references}
+}};
+{macros}
+/* Rows of the table: single variables, the numbers of a mode, windows. */
+static const hsep_variable hsep_variables[{len(rows)}] = {{
+{table}
+}};
+"""
 
 
-def _references(table: Sequence[Variable]) -> dict[str, int]:
-    """Return the value reference of each plain variable and of each array's first element."""
-    places: dict[str, int] = {}
-    for place, variable in enumerate(table):
-        places.setdefault(variable.name.partition("[")[0], place)
-    return places
-
-
-def _row(variable: Variable) -> str:
+def _row(variable: Variable, name: str) -> str:
     unit = "" if variable.unit in (None, "1") else str(variable.unit)
     fields = [
-        _string(variable.name),
+        _string(name),
         _string(unit),
+        _string(angular_unit(unit) or ""),
         f"HSEP_{_C_KINDS.get(variable.kind, variable.kind).upper()}",
         f"HSEP_{variable.causality.upper()}",
         str(int(variable.variability == "tunable")),
-        _double(variable.start or 0.0),
         "-HUGE_VAL" if variable.minimum is None else _double(variable.minimum),
         "HUGE_VAL" if variable.maximum is None else _double(variable.maximum),
         _double(variable.nonzero),

@@ -1,8 +1,8 @@
-"""Compilation of an FMU's C file to shared libraries, on this machine for every platform.
+"""Compilation of shared libraries for every platform, on this machine.
 
-Two toolchains: the host's own C compiler for the host, and the ``ziglang`` wheel (``python -m ziglang cc``) for all.
-Both give the same bytes for the same sources: they compile in a folder of their own, by relative names, without build
-ids, dates or debug information.
+Two toolchains: the ``ziglang`` wheel (``python -m ziglang cc``) for all platforms, and the host's own C compiler for
+the host. Both give the same bytes for the same sources: they compile in a folder of their own, by relative names,
+without build ids, dates or debug information.
 
 The folders follow FMI 2.0: ``linux64``, ``win64`` and ``darwin64`` mean x86, and every other platform goes by FMI 3.0's
 tuples. An ARM library is therefore in ``aarch64-linux`` alone, never in ``linux64``, where an importer on x86 would
@@ -20,6 +20,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -31,19 +32,25 @@ from .processes import run_together
 
 __all__ = [
     "ALL_TARGETS",
+    "FLAGS",
     "TARGETS",
     "TARGET_NAMES",
+    "ZIG",
+    "Compiler",
     "Target",
-    "binaries",
-    "can_compile",
     "compile_flags",
-    "compilers",
-    "default_targets",
+    "compiled",
+    "compiler_for",
+    "expanded",
     "host_target",
+    "placed",
 ]
 
-_FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-fvisibility=hidden")
-"""Never ``-ffast-math``: every platform is to give the same numbers."""
+ZIG = "ziglang 0.17.1"
+"""The compiler of the libraries in the wheel, which pyproject.toml pins as a build requirement."""
+
+FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-fvisibility=hidden")
+"""Options of every compiler. Never ``-ffast-math``: every platform is to give the same numbers."""
 
 _STACK_PROTECTOR = "-fstack-protector-strong"
 """An overflow of an array on the stack ends the process before the function returns; gcc 4.9, clang 3.5 and newer."""
@@ -70,7 +77,7 @@ class Target:
     flags: tuple[str, ...] = ()
 
 
-_ELF = ("-fPIC", "-Wl,--build-id=none", "-lm")
+_ELF = ("-fPIC", "-Wl,--build-id=none", "-lm", "-ldl")
 
 TARGETS: Mapping[str, Target] = {
     # glibc 2.17: every Linux distribution since 2014
@@ -86,7 +93,8 @@ TARGETS: Mapping[str, Target] = {
 
 ALL_TARGETS = tuple(TARGETS)
 _MACS = ("x86_64-darwin", "aarch64-darwin")
-_FMI2_PLATFORMS = {
+
+_FMI2_PLATFORMS: Mapping[str, tuple[str, ...]] = {
     "linux64": ("x86_64-linux",),
     "win64": ("x86_64-windows",),
     "win32": ("x86-windows",),
@@ -96,6 +104,14 @@ _FMI2_PLATFORMS = {
 
 TARGET_NAMES = ("host", *TARGETS, *_FMI2_PLATFORMS)
 """Allowed targets."""
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """A C compiler: its command, and what tells it from others whose libraries may differ."""
+
+    command: tuple[str, ...]
+    name: str
 
 
 def host_target() -> str:
@@ -113,51 +129,39 @@ def host_target() -> str:
     return name
 
 
-def default_targets() -> tuple[str, ...]:
-    """Return the targets where none are asked for: all platforms where ``ziglang`` is installed, else this machine."""
-    return ALL_TARGETS if find_spec("ziglang") is not None else ("host",)
-
-
-def binaries(
-    sources: Mapping[str, bytes],
-    name: str,
-    targets: Sequence[str],
-    on_target: Callable[[str], object] = lambda _target: None,
-) -> dict[str, bytes]:
-    """Compile ``all.c`` of the sources.
-
-    Parameters
-    ----------
-    sources : mapping
-        File name → content.
-    name : str
-        Model identifier: the libraries' stem.
-    targets : sequence of str
-        Of :data:`TARGET_NAMES`; for any but ``"host"``, ``ziglang`` must be installed.
-    on_target : callable, optional
-        Called with each platform, a key of :data:`TARGETS`, when its compilation begins.
-
-    Returns
-    -------
-    dict
-        Path below ``binaries/`` → library.
+def expanded(targets: Sequence[str]) -> tuple[str, ...]:
+    """Return the platforms, keys of :data:`TARGETS`, that some of :data:`TARGET_NAMES` mean.
 
     Raises
     ------
     FmuError
-        If a target is unknown, there is no compiler, or it refuses.
+        If a name is unknown.
     """
-    commands = {host_target() if key == "host" else key: command for key, command in compilers(targets).items()}
-    built = _compiled(commands, sources, name, on_target)
-    placed = {
+    if unknown := sorted(set(targets) - set(TARGET_NAMES)):
+        raise FmuError(f"no target {', '.join(unknown)}; there are {', '.join(TARGET_NAMES)}")
+    keys = (key for target in targets for key in _FMI2_PLATFORMS.get(target, (target,)))
+    return tuple(dict.fromkeys(host_target() if key == "host" else key for key in keys))
+
+
+def placed(libraries: Mapping[str, bytes], name: str) -> dict[str, bytes]:
+    """Return where libraries lie in an archive: path below ``binaries/`` → library.
+
+    Parameters
+    ----------
+    libraries : mapping
+        Key of :data:`TARGETS` → library.
+    name : str
+        Model identifier: the libraries' stem.
+    """
+    files = {
         f"{place}/{name}{TARGETS[key].suffix}": library
-        for key, library in built.items()
+        for key, library in libraries.items()
         for place in TARGETS[key].folders
     }
-    macs = [built[key] for key in _MACS if key in built]
+    macs = [libraries[key] for key in _MACS if key in libraries]
     if macs:
-        placed[f"darwin64/{name}.dylib"] = universal(macs) if len(macs) > 1 else macs[0]
-    return placed
+        files[f"darwin64/{name}.dylib"] = universal(macs) if len(macs) > 1 else macs[0]
+    return files
 
 
 def compile_flags(command: Sequence[str]) -> list[str]:
@@ -168,7 +172,7 @@ def compile_flags(command: Sequence[str]) -> list[str]:
     command : sequence of str
         Of a compiler that understands the options of gcc.
     """
-    return [*_FLAGS, *([_STACK_PROTECTOR] if _understands(tuple(command), _STACK_PROTECTOR) else [])]
+    return [*FLAGS, *([_STACK_PROTECTOR] if _understands(tuple(command), _STACK_PROTECTOR) else [])]
 
 
 @cache
@@ -181,72 +185,64 @@ def _understands(command: tuple[str, ...], flag: str) -> bool:
         return subprocess.run(arguments, cwd=place, capture_output=True, check=False).returncode == 0
 
 
-def compilers(targets: Sequence[str]) -> dict[str, list[str]]:
-    """Return the compiler's command for ``"host"`` and each key of :data:`TARGETS` that is asked for.
+def compiler_for(target: str) -> Compiler:
+    """Return the compiler for a key of :data:`TARGETS`: ``ziglang``, or for the host ``$CC``, cc, gcc or clang.
 
     Raises
     ------
     FmuError
-        If one of ``targets`` is not among :data:`TARGET_NAMES`, or there is no compiler for it.
+        If there is none.
     """
-    if unknown := sorted(set(targets) - set(TARGET_NAMES)):
-        raise FmuError(f"no target {', '.join(unknown)}; there are {', '.join(TARGET_NAMES)}")
-    expanded = dict.fromkeys(key for target in targets for key in _FMI2_PLATFORMS.get(target, (target,)))
-    return {target: _host_compiler() if target == "host" else _zig(TARGETS[target].triple) for target in expanded}
-
-
-def can_compile() -> bool:
-    """Return whether a native FMU can be compiled here, for this machine."""
-    try:
-        host_target()
-        return bool(_host_compiler())
-    except FmuError:
-        return False
-
-
-def _host_compiler() -> list[str]:
-    """Return the host's C compiler: ``$CC``, cc, gcc, clang, or zig."""
-    chosen = os.environ.get("CC", "").split()
-    if chosen:
-        return chosen
-    for compiler in ("cc", "gcc", "clang"):
-        if shutil.which(compiler):
-            return [compiler]
     if find_spec("ziglang") is not None:
-        return _zig(TARGETS[host_target()].triple)
-    raise FmuError(
-        "no C compiler: none of $CC, cc, gcc, clang; install one, or pip install ziglang, or build with "
-        "--flavour python"
-    )
-
-
-def _zig(triple: str) -> list[str]:
-    if find_spec("ziglang") is None:
+        zig = (sys.executable, "-m", "ziglang", "cc", "-target", TARGETS[target].triple, "-fno-sanitize=undefined")
+        return Compiler(zig, f"ziglang {version('ziglang')}")
+    if target != host_target():
         raise FmuError("compiling for other platforms needs ziglang: pip install ziglang, or ask for the target host")
-    return [sys.executable, "-m", "ziglang", "cc", "-target", triple, "-fno-sanitize=undefined"]
+    chosen = os.environ.get("CC", "").split()
+    for command in (chosen, ["cc"], ["gcc"], ["clang"]):
+        if command and shutil.which(command[0]):
+            said = subprocess.run([*command, "--version"], capture_output=True, text=True, check=False).stdout
+            return Compiler(tuple(command), f"{' '.join(command)} {said}")
+    raise FmuError("no C compiler: no ziglang and none of $CC, cc, gcc, clang; pip install ziglang")
 
 
-def _compiled(
-    commands: Mapping[str, Sequence[str]],
-    sources: Mapping[str, bytes],
-    name: str,
-    on_target: Callable[[str], object],
-) -> dict[str, bytes]:
-    """Compile and link ``all.c`` into a stripped shared library for each target, by its compiler's command."""
+def compiled(
+    jobs: Mapping[tuple[str, str], tuple[Compiler, Mapping[str, bytes]]],
+    on_job: Callable[[tuple[str, str]], object] = lambda _job: None,
+) -> dict[tuple[str, str], bytes]:
+    """Compile and link ``all.c`` into stripped shared libraries, as many at a time as there are processors.
+
+    Parameters
+    ----------
+    jobs : mapping
+        (name of the library, key of :data:`TARGETS`) → its compiler, and its sources by file name.
+    on_job : callable, optional
+        Called with each key when its compilation begins.
+
+    Raises
+    ------
+    FmuError
+        If a compiler refuses.
+    """
     with TemporaryDirectory() as place:
-        jobs = []
-        for key, command in commands.items():
-            folder, target = Path(place) / key, TARGETS[key]
+        commands = []
+        for (name, target), (compiler, sources) in jobs.items():
+            folder = Path(place) / name / target
             with named_errors(folder):
-                folder.mkdir()
+                folder.mkdir(parents=True)
                 for file, text in sources.items():
                     (folder / file).write_bytes(text)
-            flags = [*compile_flags(command), "-g0", "-s", "-shared", "-I."]
-            jobs.append(([*command, *flags, "all.c", "-o", f"{name}{target.suffix}", *target.flags], folder))
-        keys = list(commands)
-        done = run_together(jobs, lambda i: on_target(keys[i]))
-        for key, (arguments, _), (status, complaint) in zip(keys, jobs, done, strict=False):
+            # dladdr is no part of POSIX
+            flags = [*compile_flags(compiler.command), "-D_GNU_SOURCE", "-g0", "-s", "-shared", "-I."]
+            output = f"{name}{TARGETS[target].suffix}"
+            commands.append(([*compiler.command, *flags, "all.c", "-o", output, *TARGETS[target].flags], folder))
+        keys = list(jobs)
+        done = run_together(commands, lambda i: on_job(keys[i]))
+        for (name, target), (arguments, _), (status, complaint) in zip(keys, commands, done, strict=False):
             if status != 0:
                 said = f"{' '.join(arguments)}\n{complaint.strip()}"
-                raise FmuError(f"{name} cannot be compiled for {TARGETS[key].triple}: {said}")
-        return {key: (Path(place) / key / f"{name}{TARGETS[key].suffix}").read_bytes() for key in commands}
+                raise FmuError(f"{name} cannot be compiled for {TARGETS[target].triple}: {said}")
+        return {
+            (name, target): (folder / f"{name}{TARGETS[target].suffix}").read_bytes()
+            for (name, target), (_, folder) in zip(keys, commands, strict=True)
+        }

@@ -1,9 +1,10 @@
-"""Native flavour of the FMUs: C99 sources compiled for every platform, without dependencies.
+"""Native flavour of the FMUs: libraries for every platform, without dependencies.
 
-The archive holds the sources as well: ``sources/all.c`` includes all the others, and compiles without warnings. As FMI
-2.0, section 2.3, has it, the three FMI headers come from whoever compiles. They decide whether the names of the FMI
-functions begin with the model identifier: the standard's headers put it there, for several FMUs in one program; headers
-for shared libraries (fmpy's) do not.
+A library serves all FMUs of a kind; ``resources/variables.bin`` tells it which one it is. The archive holds the sources
+as well, with a header that has what the file has: ``sources/all.c`` includes all the others, and compiles without
+warnings. As FMI 2.0, section 2.3, has it, the three FMI headers come from whoever compiles. They decide whether the
+names of the FMI functions begin with the model identifier: the standard's headers put it there, for several FMUs in one
+program; headers for shared libraries (fmpy's) do not.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from __future__ import annotations
 import re
 import struct
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
+from contextlib import ExitStack
 
 from numpy.typing import ArrayLike
 
@@ -21,17 +22,21 @@ from ..base.version import __version__
 from ..machines.machine import Machine
 from ..plants.trajectory import spiral, staircase
 from ..predict.predictor import HybridPredictor
-from .c_header import c_header
-from .compiler import binaries, default_targets
+from .c_header import c_header, kind_of
+from .c_sources import c_sources, fmi_headers
+from .compiler import placed
 from .content import content_guid
+from .description import fmu_description
+from .host_fmu import host_fmu
+from .libraries import default_targets, libraries
 from .model_description import build_description, model_description
 from .pages import icon, index_page
-from .reference import reference_files
+from .reference import has_reference, reference_files
+from .table_file import TABLE_FILE, table_file
 from .weights import WEIGHTS_FILE, weights_file
 
-__all__ = ["all_c", "files", "fmi_headers", "sources"]
+__all__ = ["files", "sources"]
 
-_FMI_HEADERS = ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")
 _TRAJECTORY_MAGIC = b"HSEPTRJ1"
 
 
@@ -65,30 +70,55 @@ def files(
     content = {f"sources/{file}": text for file, text in sources(description, guid="").items()}
     del content["sources/hsep_fmu.h"]  # names the GUID
     content |= {f"documentation/licenses/{file}": text for file, text in _licenses().items()}
-    reference = reference_files(machine, description, samples=samples, trained=trained)
     needs = "The FMU needs nothing but its own binary; on Windows before 10 also the Universal C Runtime (KB2999226)."
-    content["documentation/index.html"] = index_page(machine, description, needs, reference=bool(reference))
+    content["documentation/index.html"] = index_page(machine, description, needs, reference=has_reference(description))
     content["model.png"] = icon(model)
     if model == "ReferenceTrajectory":
         content |= {f"resources/{file}": data for file, data in _trajectories(machine.T_s, samples).items()}
     if trained is not None:
         content[f"resources/{WEIGHTS_FILE}"] = weights_file(trained)
     guid = content_guid(content, description)
-    content |= reference  # computed by this machine's LAPACK: it stays out of the GUID, as the binaries do
+    content[f"resources/{TABLE_FILE}"] = table_file(description, guid)
     content["sources/hsep_fmu.h"] = c_header(description, guid).encode()
     content["sources/buildDescription.xml"] = build_description(name)
     tool = f"hybridsep {__version__}"
     content["modelDescription.xml"] = model_description(machine, description, guid, tool, native=True, samples=samples)
-    folder = "sources/"
-    unit = {file.removeprefix(folder): text for file, text in content.items() if file.startswith(folder)}
-    unit |= fmi_headers()
-    for path, binary in binaries(unit, name, targets or default_targets(), on_target).items():
-        content[f"binaries/{path}"] = binary
-    return content
+    if has_reference(description):
+        content |= _reference(machine, description, guid, content, samples, trained)
+    compiled = libraries(kind_of(description), targets or default_targets(), on_target)
+    return content | {f"binaries/{path}": library for path, library in placed(compiled, name).items()}
+
+
+def _reference(
+    machine: Machine,
+    description: Mapping[str, object],
+    guid: str,
+    content: Mapping[str, bytes],
+    samples: ArrayLike | None,
+    trained: HybridPredictor | None,
+) -> dict[str, bytes]:
+    """Return the reference results of the FMU itself, where this machine can run it; else the library's.
+
+    Platforms differ in the last digits, so they stay out of the GUID, as the binaries do.
+    """
+    folder = "resources/"
+    resources = {file.removeprefix(folder): data for file, data in content.items() if file.startswith(folder)}
+    plant = None if machine.plant is None else fmu_description(machine, "FeedDrive", "drive")
+    with ExitStack() as running:
+        fmu = running.enter_context(host_fmu(description, guid, resources, machine.T_s))
+        if fmu is not None:
+            drive = None if plant is None else running.enter_context(host_fmu(plant, "{drive}", {}, machine.T_s))
+            return reference_files(machine, description, fmu, drive)
+    # what the library's models need loads slowly
+    from .reference_models import library_models
+
+    return reference_files(
+        machine, description, *library_models(machine, description, samples=samples, trained=trained)
+    )
 
 
 def sources(description: Mapping[str, object], guid: str) -> dict[str, bytes]:
-    """Return the C sources with the generated ``hsep_fmu.h``, without :func:`fmi_headers`: file name → content.
+    """Return the C sources with the generated ``hsep_fmu.h``, without the FMI headers: file name → content.
 
     Parameters
     ----------
@@ -97,27 +127,7 @@ def sources(description: Mapping[str, object], guid: str) -> dict[str, bytes]:
     guid : str
         The modelDescription's.
     """
-    root = data_folder("fmu_src") / "c"
-    ours = {path.name: path.read_bytes() for path in sorted(root.rglob("*.[ch]"))}
-    unit = all_c([file for file in ours if file.endswith(".c")])
-    return {"all.c": unit.encode(), **ours, "hsep_fmu.h": c_header(description, guid).encode()}
-
-
-def all_c(files: Sequence[str]) -> str:
-    """Return the C file that includes all others, in which the FMI functions alone have external linkage."""
-    includes = "".join(f'#include "{file}"\n' for file in files)
-    return f"""/* The whole FMU as one translation unit: compile this file alone, with your FMI 2.0 headers. */
-#define HSEP_API static inline /* see hsep_api.h */
-
-{includes}"""
-
-
-def fmi_headers() -> dict[str, bytes]:
-    """Return the FMI 2.0 headers for shared libraries, as fmpy carries them, with the line ends of a text file."""
-    import fmpy
-
-    folder = Path(fmpy.__file__).parent / "c-code"
-    return {file: (folder / file).read_bytes().replace(b"\r\n", b"\n") for file in _FMI_HEADERS}
+    return {**c_sources(), "hsep_fmu.h": c_header(description, guid).encode()}
 
 
 def _licenses() -> dict[str, bytes]:

@@ -1,7 +1,8 @@
 """Variable table of each FMU.
 
 The modelDescription, the value references, the Python slave and the interface tables of the documentation follow from
-it. This module is packed into the FMUs: it needs nothing but the standard library.
+it. Single variables come first, then the modes, then the windows, so that the places of all before the windows are the
+same in all FMUs of a kind. This module is packed into the FMUs: it needs nothing but the standard library.
 """
 
 from __future__ import annotations
@@ -316,12 +317,12 @@ def plant_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping[str
         _position(
             "x_meas", "output", "measured position, with encoder noise", initially_from=("x_d", "noise_std", "seed")
         ),
-        *_modes(modes),
         *(
             _parameter(PARAMETERS[name], parameters[name], group=group)
             for group, names in groups.items()
             for name in names
         ),
+        *_modes(modes),
     ]
 
 
@@ -338,8 +339,8 @@ def trajectory_variables(parameters: Mapping[str, Value], modes: Sequence[Mappin
     meaning = "commanded position at t; wire it to x_d_ahead"
     return [
         _position("r", "output", meaning, initially_from=("trajectory",)),
-        *_modes(modes),
         *(_parameter(PARAMETERS[name], parameters[name], group="Trajectory") for name in ("trajectory", "T_s")),
+        *_modes(modes),
     ]
 
 

@@ -22,12 +22,8 @@ TUNED = {name: PredictorSettings.parameters()[name] for name in PredictorSetting
 _CANDIDATES_MAX = 100_000
 """Candidates beyond which a range is a slip of the pen."""
 
-_P_VALUES = 20
-"""Values of p without trust, evenly spaced up to a window."""
-
-_Q_VALUES = (0, 1, 3, 5, 8)
-_LAMBDA_FACTORS = tuple(10.0**i for i in range(-2, 7))
-"""Values without trust. A λ of less than 1e-2 of the default is at the limit of what the numbers tell."""
+_LAMBDA_FACTORS = (1.0, 1e2, 1e4)
+"""Values without trust, relative to the machine's own."""
 
 _FORGETTING = 30
 """Windows after which samples are forgotten in half of the candidates with trust."""
@@ -36,28 +32,20 @@ _FORGETTING = 30
 def default_values(settings: PredictorSettings) -> dict[str, tuple[Any, ...]]:
     """Return the values to try, by the fields of settings.
 
-    Hundreds of combinations for the paper's model, which share a pass; some sixteen with trust, each of which takes a
-    replay.
+    Some sixteen combinations with trust, and two dozen without.
 
     Parameters
     ----------
     settings : PredictorSettings
         The machine's own, whose values are among them.
     """
-    Np = settings.Np
+    tried = settings_to_try(settings)
+    lags = {name: tuple(sorted({getattr(one, name) for one in tried})) for name in ("p", "q")}
     if settings.trust:
-        tried = settings_to_try(settings)
-        forgetting = {settings.forgetting, float(f"{_FORGETTING * Np * settings.T_s:.3g}")}
-        lags = {name: tuple(sorted({getattr(one, name) for one in tried})) for name in ("p", "q")}
+        forgetting = {settings.forgetting, float(f"{_FORGETTING * settings.Np * settings.T_s:.3g}")}
         return {**lags, "forgetting": tuple(sorted(forgetting))}
-    p = {max(1, round((i + 1) * Np / _P_VALUES)) for i in range(_P_VALUES)}
-    allowed = TUNED["lam"].allows
-    lam = {float(f"{settings.lam * factor:.6g}") for factor in _LAMBDA_FACTORS}
-    return {
-        "p": tuple(sorted(p | {settings.p})),
-        "q": tuple(sorted({q for q in _Q_VALUES if q < Np} | {settings.q})),
-        "lam": tuple(sorted(value for value in lam | {settings.lam} if allowed(value))),
-    }
+    lam = {settings.lam, *(float(f"{settings.lam * factor:.6g}") for factor in _LAMBDA_FACTORS)}
+    return {**lags, "lam": tuple(sorted(value for value in lam if TUNED["lam"].allows(value)))}
 
 
 def candidates(settings: PredictorSettings, values: Values) -> list[PredictorSettings]:

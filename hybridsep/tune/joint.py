@@ -17,7 +17,7 @@ from ..base.settings import PredictorSettings
 from ..base.signals import Array
 from ..model.physics import ModalModel
 from .choice import WORTH, window_sizes, with_window
-from .losses import Losses, Piece, nested_losses, replayed_losses, share_a_pass
+from .losses import Losses, Piece, replayed_losses
 
 __all__ = ["Tuning", "joint_ratio", "n_processors", "over_windows", "tune"]
 
@@ -29,8 +29,8 @@ Progress = Callable[[float], object]
 _IDLE = 10
 """Seconds after which a process without work ends; half a minute later where this one was killed."""
 
-_Task = tuple[str, Sequence[Piece], tuple[PredictorSettings, ...]]
-"""Name and pieces of a log, and candidates that are replayed together."""
+_Task = tuple[str, Sequence[Piece], PredictorSettings]
+"""Name and pieces of a log, and a candidate."""
 
 
 @dataclass(frozen=True)
@@ -123,8 +123,7 @@ def tune(
     logs : mapping
         Pieces ``(x_d, x)`` by the log's name; on each log every candidate begins untrained.
     candidates : sequence of PredictorSettings
-        The machine's own first. If they :func:`~hybridsep.tune.losses.share_a_pass`, a log takes one pass; else each
-        candidate takes a replay.
+        The machine's own first; each takes a replay a log.
     jobs : int
         Processes; the result is the same for any number.
     progress : callable, optional
@@ -136,7 +135,7 @@ def tune(
         If a log's samples cannot be used; the message names the log.
     """
     given = tuple(candidates)
-    tasks = [(name, pieces, group) for name, pieces in logs.items() for group in _groups(given)]
+    tasks = [(name, pieces, one) for name, pieces in logs.items() for one in given]
     return _tuning(logs, given, _losses(model, tasks, jobs, progress))
 
 
@@ -159,14 +158,9 @@ def over_windows(
     """
     sizes = window_sizes(settings.Np, min(sum(len(x) for _, x in pieces) for pieces in logs.values()))
     tried = [with_window(settings, Np) for Np in sizes]
-    found = _losses(model, [(name, pieces, (one,)) for one in tried for name, pieces in logs.items()], jobs, progress)
+    found = _losses(model, [(name, pieces, one) for one in tried for name, pieces in logs.items()], jobs, progress)
     n = len(logs)
     return {one.Np: _tuning(logs, (one,), found[i * n : (i + 1) * n]) for i, one in enumerate(tried)}
-
-
-def _groups(candidates: tuple[PredictorSettings, ...]) -> list[tuple[PredictorSettings, ...]]:
-    """Return the candidates that are replayed together."""
-    return [candidates] if share_a_pass(candidates) else [(one,) for one in candidates]
 
 
 def _tuning(logs: Logs, candidates: tuple[PredictorSettings, ...], found: list[Losses]) -> Tuning:
@@ -180,7 +174,7 @@ def _tuning(logs: Logs, candidates: tuple[PredictorSettings, ...], found: list[L
         candidates,
         np.array([one.rms_pb for one in baselines]),
         np.array([one.rms_hold for one in baselines]),
-        np.stack([np.concatenate([one.rms_h for one in losses]) for losses in by_log], axis=1),
+        np.array([[one.rms_h for one in losses] for losses in by_log]).T,
     )
 
 
@@ -206,10 +200,8 @@ def _losses(model: ModalModel, tasks: Sequence[_Task], jobs: int, progress: Prog
 
 
 def _task_losses(model: ModalModel, task: _Task, progress: Progress = lambda _done: None) -> Losses:
-    name, pieces, candidates = task
+    name, pieces, candidate = task
     try:
-        if share_a_pass(candidates):
-            return nested_losses(model, pieces, candidates, progress)
-        return replayed_losses(model, pieces, candidates[0], progress)
+        return replayed_losses(model, pieces, candidate, progress)
     except SignalError as error:
         raise SignalError(f"{name}: {error}") from error

@@ -1,31 +1,22 @@
-"""Losses of many candidates on one log: RMS errors of causal replays, as ``evaluate.backtest`` scores them.
-
-Candidates of the paper's model that differ in p, q and λ share one pass. With trust each has a pass of its own: what it
-learns depends on its own predictions, as a window that surprises lowers the weight of all rows, and its features on the
-velocity and the scales found on the way, so no factor is common to two candidates.
-"""
+"""Losses of candidates on one log: RMS errors of causal replays, as ``evaluate.backtest`` scores them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.errors import ParameterError, SignalError
-from ..base.settings import PredictorSettings, samples_before
-from ..base.signals import PREDICTION_MAX, Array, as_measured, as_samples
-from ..base.threads import one_blas_thread
+from ..base.errors import SignalError
+from ..base.settings import PredictorSettings
+from ..base.signals import Array, as_measured, as_samples
 from ..evaluate.backtest import Batch, backtest_stream
 from ..intake.motion import starts_in_motion
 from ..model.physics import ModalModel
-from ..predict.paper.features import PastSamples
 from ..predict.predictor import HybridPredictor
-from .free_runs import free_runs
-from .nested import NestedRidge
 
-__all__ = ["Losses", "Piece", "n_unjudged", "nested_losses", "replayed_losses", "share_a_pass"]
+__all__ = ["Losses", "Piece", "n_unjudged", "replayed_losses"]
 
 Piece = tuple[Array, Array]
 """Commanded and measured positions of a part of a log without a gap, ``(n,)`` each, m."""
@@ -44,20 +35,13 @@ class Losses:
     ----------
     rms_pb, rms_hold : float
         Physics model, hold baseline.
-    rms_h : (n_candidates,) array
-        Hybrids; infinite where the prediction diverges.
+    rms_h : float
+        Hybrid; infinite where the prediction diverges.
     """
 
     rms_pb: float
     rms_hold: float
-    rms_h: Array
-
-
-def share_a_pass(candidates: Sequence[PredictorSettings]) -> bool:
-    """Return whether candidates are of the paper's model, without a delay, and differ in p, q and λ only."""
-    common = {replace(one, p=1, q=0, lam=1.0) for one in candidates}
-    one = candidates[0]
-    return len(common) == 1 and not one.trust and one.v_friction == 0.0 and one.measurement_delay == 0
+    rms_h: float
 
 
 def n_unjudged(x_d: Array, Np: int) -> int:
@@ -68,115 +52,24 @@ def n_unjudged(x_d: Array, Np: int) -> int:
     return Np if len(x_d) > Np and starts_in_motion(x_d) else 0
 
 
-@one_blas_thread
-def nested_losses(
-    model: ModalModel,
-    pieces: Sequence[Piece],
-    candidates: Sequence[PredictorSettings],
-    progress: Progress = lambda _done: None,
-) -> Losses:
-    """Return the losses of candidates that :func:`share_a_pass`; memory does not grow with the log.
-
-    Parameters
-    ----------
-    model : ModalModel
-        ``G_pb``.
-    pieces : sequence of pairs ``(x_d, x)`` of (n,) arrays, m
-        Each begins at rest; what was learned before is kept, and only the first has a warm-up.
-    candidates : sequence of PredictorSettings
-    progress : callable, optional
-        Called with the fraction done.
-
-    Raises
-    ------
-    ParameterError
-        If the candidates do not share a pass.
-    SignalError
-        If samples cannot be used.
-    """
-    if not share_a_pass(candidates):
-        raise ParameterError(
-            "candidates of one pass must have trust = false and no delay, and differ in p, q and lambda only"
-        )
-    _check(pieces, as_samples)
-    common = candidates[0]
-    order = sorted(range(len(candidates)), key=lambda i: candidates[i].p)
-    ridge = NestedRidge([candidates[i] for i in order])
-    p = np.array([candidates[i].p for i in order])
-    discrete = model.discretise(common.T_s, common.input_hold, block=common.Np)
-    past = PastSamples(ridge.layout, common.Np)
-    squares = _Squares(len(candidates))
-    n_samples, n_before = sum(len(x) for _, x in pieces), 0
-    for i, (x_d, x) in enumerate(pieces):
-        n_init = 0 if i else samples_before(common.warm_up, common.T_s)
-        state, start, n_unscored = discrete.rest(), x_d[:1], n_unjudged(x_d, common.Np)
-        past.restart()
-        for k in range(0, len(x), common.Np):
-            window = slice(k, k + common.Np)
-            x_pb, state = discrete.forced_response(state, x_d[window] - start)  # Eq. (2)
-            measured, last = x[window], float(past.e_pb[-1])
-            m = len(measured)
-            past.append(x_pb, measured - start - x_pb)
-            rows = past.rows(m, np.zeros((m, 0)))
-            warm = min(max(n_init - k, 0), m)
-            if k >= n_unscored:
-                squares.add_warm_up(measured[:warm], x_pb[:warm] + start)
-            if warm < m and k >= n_unscored:
-                e_h = free_runs(ridge.layout, rows[:, :-1], ridge.weights(), p)
-                squares.add(measured[warm:], x_pb[warm:] + start, last, e_h[:, warm:])
-            ridge.update_stacked(rows)
-            past.advance(m)
-            progress((n_before + k) / n_samples)
-        n_before += len(x)
-    found = squares.losses()
-    rms_h = np.empty(len(candidates))
-    rms_h[order] = found.rms_h
-    return replace(found, rms_h=rms_h)
-
-
-class _Squares:
-    """Sums of squared errors of physics model, hold and hybrids."""
-
-    def __init__(self, n_candidates: int) -> None:
-        self.n, self._pb, self._hold, self._h = 0, 0.0, 0.0, np.zeros(n_candidates)
-
-    def add_warm_up(self, x: Array, x_pb: Array) -> None:
-        """Add samples for which all publish the physics model's prediction."""
-        square = float((x - x_pb) @ (x - x_pb))
-        self._pb += square
-        self._hold += square
-        self._h += square
-        self.n += len(x)
-
-    def add(self, x: Array, x_pb: Array, last: float, e_h: Array) -> None:
-        """Add samples with the hold's residual and the hybrids', ``(n_candidates, m)``."""
-        physics, hold = x - x_pb, x - (x_pb + last)
-        hybrid = x - (x_pb + e_h)  # Eq. (4)
-        with np.errstate(over="ignore", invalid="ignore"):
-            fits = np.abs(hybrid).max(axis=1) <= PREDICTION_MAX  # false where it is NaN
-            self._h += np.where(fits, np.einsum("ij,ij->i", hybrid, hybrid), np.inf)
-        self._pb += float(physics @ physics)
-        self._hold += float(hold @ hold)
-        self.n += len(x)
-
-    def losses(self) -> Losses:
-        """Return the RMS errors."""
-        return Losses(math.sqrt(self._pb / self.n), math.sqrt(self._hold / self.n), np.sqrt(self._h / self.n))
-
-
 def replayed_losses(
     model: ModalModel,
     pieces: Sequence[Piece],
     candidate: PredictorSettings,
     progress: Progress = lambda _done: None,
 ) -> Losses:
-    """Return the losses of one candidate, any, by a backtest of its own; NaN for the baselines where it diverges.
+    """Return the losses of a candidate by a backtest of its own; NaN for the baselines where it diverges.
 
     Parameters
     ----------
-    model, pieces, progress
-        As for :func:`nested_losses`; with trust measurements may be NaN, and are not scored there.
+    model : ModalModel
+        ``G_pb``.
+    pieces : sequence of pairs ``(x_d, x)`` of (n,) arrays, m
+        Each begins at rest; what was learned before is kept, and only the first has a warm-up. With trust measurements
+        may be NaN, and are not scored there.
     candidate : PredictorSettings
+    progress : callable, optional
+        Called with the fraction done.
 
     Raises
     ------
@@ -203,14 +96,13 @@ def replayed_losses(
         try:
             score = backtest_stream(predictor, _chunks(piece), on_batch=on_batch).overall
         except SignalError:  # the samples are sound: it diverges
-            return Losses(math.nan, math.nan, np.array([math.inf]))
+            return Losses(math.nan, math.nan, math.inf)
         n_before += len(piece[1])
         if score.n_samples > first[0]:
             whole = score.n_samples * np.square([score.rms_pb, score.rms_hold, score.rms_h])
             squares += np.maximum(whole - first[1:], 0.0)
             n_known += score.n_samples - int(first[0])
-    rms = np.sqrt(squares / max(n_known, 1))
-    return Losses(float(rms[0]), float(rms[1]), rms[2:])
+    return Losses(*np.sqrt(squares / max(n_known, 1)).tolist())
 
 
 def _check(pieces: Sequence[Piece], measured: Callable[[Array, str, int], Array]) -> None:

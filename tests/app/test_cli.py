@@ -17,7 +17,6 @@ from hybridsep.app.parameter_options import PREDICTOR_ENTRIES
 from hybridsep.base.data_files import data_folder
 from hybridsep.base.settings import PARAMETERS
 from hybridsep.evaluate.backtest import backtest
-from hybridsep.fmi.compiler import host_target
 
 
 def test_backtest_of_a_csv(hybridsep: Run, tmp_path: Path) -> None:
@@ -117,15 +116,6 @@ def test_build(hybridsep: Run, tmp_path: Path) -> None:
     assert status == 0
     assert "HybridPredictorPy_emps.fmu" in out
     assert sorted(path.name for path in tmp_path.iterdir()) == ["FeedDrivePy.fmu", "HybridPredictorPy_emps.fmu"]
-
-
-def test_build_names_the_platforms(hybridsep: Run, tmp_path: Path) -> None:
-    build = ("build", "FeedDrive", "--target", "host", "--out", tmp_path)
-    status, out, err = hybridsep(*build)
-    assert status == 0, err
-    assert "FeedDrive.fmu" in out
-    assert err == f"FeedDrive: compile for {host_target()}\n"
-    assert hybridsep(*build, "--json")[2] == ""
 
 
 def test_cosim_over_a_file(hybridsep: Run, tmp_path: Path) -> None:

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from command_line import Run, write_rows
 from identification_cases import T_S
-from quick_fits import without_binaries, without_other_windows
 
 from hybridsep import PAPER_LIMITS, ModalModel, Mode, load_machine, rest_to_rest
 from hybridsep.app.fit_compensation import drive_limits
@@ -37,11 +36,7 @@ def command() -> Array:
     return rest_to_rest(targets, PAPER_LIMITS, T_S, start_times=starts, duration=4.1)
 
 
-def test_the_compensator_is_built_and_its_effect_estimated(
-    hybridsep: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    without_binaries(monkeypatch)
-    without_other_windows(monkeypatch)
+def test_the_compensator_is_built_and_its_effect_estimated(hybridsep: Run, tmp_path: Path) -> None:
     x_d = command()
     x = simulate(stage(), x_d, T_S) + 5e-7 * np.random.default_rng(1).standard_normal(len(x_d))
     log, out = write_rows(tmp_path / "axis.csv", x_d, x), tmp_path / "fit"

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from command_line import Run, write_rows
 from identification_cases import T_S, measured
-from quick_fits import without_compiler, without_other_windows
 
 from hybridsep import PAPER_LIMITS, HybridPredictor, ModalModel, Mode, load_machine, rest_to_rest
 from hybridsep.base.signals import Array
@@ -53,19 +52,14 @@ def test_a_vibration_in_time_is_no_period() -> None:
 def test_a_period_is_hinted_at_and_taken(hybridsep: Run, tmp_path: Path) -> None:
     x_d = long_moves()
     log = write_rows(tmp_path / "axis.csv", x_d, screw(x_d, 8e-6))
-    with pytest.MonkeyPatch.context() as patch:
-        without_compiler(patch)
-        without_other_windows(patch)
-        status, out, err = hybridsep("fit", log, "--out", tmp_path / "without", "--Np", 50)
+    status, out, err = hybridsep("fit", log, "--out", tmp_path / "without", "--Np", 50)
     assert status == 0, err
     words = " ".join(out.split())
     assert "the residual repeats every 10 mm: with --period 0.01 the hybrid's error would go from " in words
     found = json.loads((tmp_path / "without" / "fit.json").read_text())
     assert len(found["period"]) == 1
     assert found["period"][0].split(" m")[0] in (tmp_path / "without" / "report.html").read_text(encoding="utf-8")
-    with pytest.MonkeyPatch.context() as patch:
-        without_other_windows(patch)
-        status, out, err = hybridsep("fit", log, "--out", tmp_path / "with", "--Np", 50, "--period", PITCH)
+    status, out, err = hybridsep("fit", log, "--out", tmp_path / "with", "--Np", 50, "--period", PITCH)
     assert status == 0, err
     assert "the residual repeats" not in out
     taught = json.loads((tmp_path / "with" / "fit.json").read_text())
@@ -90,11 +84,7 @@ def test_a_late_encoder_is_no_dead_time(hybridsep: Run, tmp_path: Path) -> None:
     results = {}
     for n_late, log in logs.items():
         out = tmp_path / f"fit{n_late}"
-        with pytest.MonkeyPatch.context() as patch:
-            without_other_windows(patch)
-            if not n_late:
-                without_compiler(patch)
-            status, said, err = hybridsep("fit", log, "--out", out, "--Np", 50, "--measurement-delay", n_late, "--json")
+        status, said, err = hybridsep("fit", log, "--out", out, "--Np", 50, "--measurement-delay", n_late, "--json")
         assert status == 0, err
         results[n_late] = json.loads(said)
         machine = load_machine(out / "machine.toml")

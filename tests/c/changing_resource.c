@@ -2,6 +2,7 @@
  * exactly that size; to be compiled with the address sanitiser. Arguments: the resources folder with a trailing slash,
  * the file in it, and what takes its place. Prints the message of a refusal, or the last position that is played. */
 #include "hsep_fmu.h"
+#include "hsep_table.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,9 +18,10 @@ int main(int n_arguments, char *arguments[])
     if (n_arguments != 4) {
         return 2;
     }
-    const hsep_context context = {hsep_variables, HSEP_N_VARIABLES, arguments[1]};
+    hsep_context context = hsep_table;
+    context.resources = arguments[1];
     for (size_t i = 0; i < HSEP_N_VARIABLES; i++) {
-        values[i] = hsep_variables[i].start;
+        values[i] = hsep_table_start(&hsep_table, i);
     }
     if (hsep_model_size(&context, values, &size, message) != HSEP_OK || rename(arguments[3], arguments[2]) != 0) {
         fprintf(stderr, "no beginning: %s\n", message);

@@ -8,7 +8,7 @@
 const hsep_variable *test_variables(void);
 void test_fold(hsep_regression *regression, const double rows[], size_t n_rows, size_t repetitions);
 
-const hsep_variable *test_variables(void) { return hsep_variables; }
+const hsep_context *test_table(void) { return &hsep_table; }
 
 /* Fold rows, (n_rows, n + 1), over and over. */
 void test_fold(hsep_regression *regression, const double rows[], size_t n_rows, size_t repetitions)

@@ -1,6 +1,7 @@
 /* Run one model through its whole life, to be compiled with the sanitisers on: exact-size memory, a rollback, foreign
  * and truncated states, inputs that are not finite. Arguments: the resources folder or "-", then name=value pairs. */
 #include "hsep_fmu.h"
+#include "hsep_table.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -25,7 +26,7 @@ static void expect(int held, const char *what)
 static void set_inputs(double k)
 {
     for (size_t i = 0; i < HSEP_N_VARIABLES; i++) {
-        if (hsep_variables[i].causality == HSEP_INPUT) {
+        if (hsep_table_row(&hsep_table, i)->causality == HSEP_INPUT) {
             values[i] = 0.01 * sin(0.01 * k + 0.1 * (double)i);
         }
     }
@@ -41,13 +42,14 @@ static void run(const hsep_context *context, void *state, int from, int to)
 
 int main(int n_arguments, char *arguments[])
 {
-    const hsep_context context = {
-        hsep_variables, HSEP_N_VARIABLES, n_arguments > 1 && arguments[1][0] != '-' ? arguments[1] : NULL};
+    char variable[HSEP_NAME_SIZE];
+    hsep_context context = hsep_table;
+    context.resources = n_arguments > 1 && arguments[1][0] != '-' ? arguments[1] : NULL;
     for (size_t i = 0; i < HSEP_N_VARIABLES; i++) {
-        values[i] = hsep_variables[i].start;
+        values[i] = hsep_table_start(&hsep_table, i);
         for (int a = 2; a < n_arguments; a++) {
-            const size_t length = strlen(hsep_variables[i].name);
-            if (strncmp(arguments[a], hsep_variables[i].name, length) == 0 && arguments[a][length] == '=') {
+            const size_t length = strlen(hsep_table_name(&hsep_table, i, variable));
+            if (strncmp(arguments[a], variable, length) == 0 && arguments[a][length] == '=') {
                 values[i] = strtod(arguments[a] + length + 1, NULL);
             }
         }
@@ -75,9 +77,10 @@ int main(int n_arguments, char *arguments[])
 
     /* What must be refused changes nothing. */
     for (size_t i = 0; i < HSEP_N_VARIABLES; i++) {
-        if (hsep_variables[i].causality == HSEP_INPUT) {
+        if (hsep_table_row(&hsep_table, i)->causality == HSEP_INPUT) {
             const double before = values[i];
-            values[i] = strcmp(hsep_variables[i].name, "x_meas") == 0 ? HUGE_VAL : NAN; /* NaN may be missing */
+            values[i] = strcmp(hsep_table_name(&hsep_table, i, variable), "x_meas") == 0 ? HUGE_VAL
+                                                                                         : NAN; /* NaN may be missing */
             expect(
                 hsep_model_step(&context, state, values, STEPS * STEP_SIZE, STEP_SIZE, message) == HSEP_REFUSED,
                 "not finite");

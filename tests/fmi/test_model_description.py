@@ -14,7 +14,8 @@ from built_once import NATIVE, PYTHON, BuiltFmus
 from fmi2_rules import RULES, variables_of, violations
 
 from hybridsep.base.data_files import data_folder
-from hybridsep.fmi.archive import fmu_description, fmu_names
+from hybridsep.fmi.archive import fmu_names
+from hybridsep.fmi.description import fmu_description
 from hybridsep.fmi.flavours import FLAVOURS
 from hybridsep.fmi.model_description import model_description
 from hybridsep.machines.machine import Machine, load_machine

@@ -122,18 +122,23 @@ def test_the_header_says_what_the_model_description_says(fmus: BuiltFmus) -> Non
         header = archive.read("sources/hsep_fmu.h").decode()
     description = fmpy.read_model_description(str(fmus("HybridPredictor")))
     assert f'#define HSEP_GUID "{description.guid}"' in header
-    rows = re.findall(r'^    \{"([^"]+)", "([^"]*)", HSEP_(\w+), HSEP_(\w+), \d, ([^,]+),', header, re.MULTILINE)
-    assert len(rows) == len(description.modelVariables)
-    for (name, unit, kind, causality, start), variable in zip(rows, description.modelVariables, strict=True):
+    variables = {variable.name: variable for variable in description.modelVariables}
+    starts = re.findall(r"^    (\S+) /\* (\S+) \*/", header, re.MULTILINE)
+    assert [name for _, name in starts] == [name for name in variables if "_window[" not in name]
+    for start, name in starts:
+        expected = variables[name].start or 0
+        assert float(start) == (expected == "true" if variables[name].type == "Boolean" else float(expected))
+    rows = re.findall(r'^    \{"([^"]+)", "([^"]*)", "[^"]*", HSEP_(\w+), HSEP_(\w+), \d,', header, re.MULTILINE)
+    firsts = {name: f"mode[1].{name}" for name in ("f_n", "zeta", "alpha", "beta")}
+    firsts |= {name: f"{name}[1]" for name, *_ in rows if name.endswith("_window")}
+    assert len(rows) == len(starts) + len(firsts) - 4  # its one mode, and a row for each window
+    for name, unit, kind, causality in rows:
+        variable = variables[firsts.get(name, name)]
         c_kind = "Integer" if variable.type == "Enumeration" else variable.type
-        assert (name, unit, kind) == (variable.name, variable.unit or "", c_kind.upper())
-        assert causality == variable.causality.upper()
-        expected = variable.start or 0
-        assert float(start) == (expected == "true" if variable.type == "Boolean" else float(expected))
+        assert (unit, kind, causality) == (variable.unit or "", c_kind.upper(), variable.causality.upper())
     references = dict(re.findall(r"^    HSEP_VR_(\w+) = (\d+)", header, re.MULTILINE))
-    for name in ("x_h", "lambda", "x_h_window[1]", "mode[1].f_n"):
-        place = next(v.valueReference for v in description.modelVariables if v.name == name)
-        assert references[name.partition("[")[0]] == str(place)
+    for name in ("x_h", "lambda", "mode[1].f_n"):
+        assert references[name.partition("[")[0]] == str(variables[name].valueReference)
 
 
 def test_archives_are_reproducible_and_the_guid_does_not_depend_on_the_compiler(
@@ -195,13 +200,9 @@ def test_universal_files() -> None:
         universal([b"MZ"])
 
 
-def test_unknown_targets_and_refusing_compilers_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    machine = load_machine("spring_mass_damper")
+def test_unknown_targets_are_named(tmp_path: Path) -> None:
     with pytest.raises(FmuError, match="no target sparc; there are host, x86_64-linux"):
-        build_fmu(machine, "FeedDrive", tmp_path, targets=("sparc",))
-    monkeypatch.setenv("CC", f"{sys.executable} -c raise(SystemExit('broken'))")
-    with pytest.raises(FmuError, match=r"FeedDrive cannot be compiled for (.|\n)*broken"):
-        build_fmu(machine, "FeedDrive", tmp_path, targets=("host",))
+        build_fmu(load_machine("spring_mass_damper"), "FeedDrive", tmp_path, targets=("sparc",))
 
 
 def drive(

@@ -16,7 +16,9 @@ from built_once import BuiltFmus
 from fmpy.util import read_csv, read_ref_opt_file
 
 from hybridsep.fmi.archive import build_fmu, fmu_names
+from hybridsep.fmi.description import fmu_description
 from hybridsep.fmi.reference import reference_files
+from hybridsep.fmi.reference_models import library_model, library_models
 from hybridsep.machines.machine import load_machine, machine_names
 
 NAMES = [(machine, name) for machine in machine_names() for name in fmu_names(load_machine(machine))]
@@ -61,14 +63,31 @@ def test_fmpy_gets_the_reference_result(
         assert (documentation / link).is_file()
 
 
+@pytest.mark.parametrize(("machine", "name"), NAMES)
+def test_the_library_gives_the_reference_result(machine: str, name: str, folders: Callable[[str], Path]) -> None:
+    """The files hold what the FMU gave when it was built."""
+    axis, base = load_machine(machine), folders(name) / "documentation" / "reference" / name
+    model = fmu_names(axis)[name]
+    reference = library_model(axis, fmu_description(axis, model, name))
+    expected = np.genfromtxt(f"{base}_ref.csv", delimiter=",", skip_header=1)
+    inputs = (
+        np.genfromtxt(f"{base}_in.csv", delimiter=",", skip_header=1) if Path(f"{base}_in.csv").exists() else expected
+    )
+    found = []
+    for row in inputs.tolist():
+        found.append(reference.outputs())
+        reference.sample(*row[1:])
+    np.testing.assert_allclose(found, expected[:, 1:], rtol=0, atol=TOLERANCE[model])
+
+
 def test_the_reference_is_short_and_the_same_every_time() -> None:
     machine = load_machine("spring_mass_damper")
     parameters = machine.fmi_parameters()
     description = {"model": "HybridPredictor", "name": "H", "parameters": parameters, "modes": [{}]}
     mode = machine.model.modes[0]
     description["modes"] = [{"f_n": mode.f_n, "zeta": mode.zeta, "alpha": mode.alpha, "beta": mode.beta}]
-    files = reference_files(machine, description)
-    assert files == reference_files(machine, description)
+    files = reference_files(machine, description, *library_models(machine, description))
+    assert files == reference_files(machine, description, *library_models(machine, description))
     assert sorted(files) == [f"documentation/reference/H_{kind}" for kind in ("in.csv", "ref.csv", "ref.opt")]
     assert b"StopTime, 0.6\n" in files["documentation/reference/H_ref.opt"]
     assert sum(map(len, files.values())) < 120_000
@@ -83,7 +102,7 @@ def test_the_reference_of_a_late_measurement_is_late() -> None:
         modes = [asdict(mode) for mode in changed.model.modes]
         parameters = changed.fmi_compensator_parameters()
         description = {"model": "SepCompensator", "name": "C", "parameters": parameters, "modes": modes}
-        files = reference_files(changed, description)
+        files = reference_files(changed, description, *library_models(changed, description))
         table = np.genfromtxt(BytesIO(files["documentation/reference/C_ref.csv"]), delimiter=",", names=True)
         rms.append(float(table["rms_e"][-1]))
     assert rms[1] == pytest.approx(rms[0], rel=0.2)

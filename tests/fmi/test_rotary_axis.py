@@ -10,7 +10,7 @@ import pytest
 from hybridsep import build_fmu, load_machine
 from hybridsep.base.data_files import data_folder
 from hybridsep.base.errors import MachineError
-from hybridsep.fmi.archive import fmu_description
+from hybridsep.fmi.description import fmu_description
 from hybridsep.fmi.variables import variables_of
 
 

@@ -346,16 +346,3 @@ def test_build_says_what_it_cannot_use(
     given = [str(trained) if argument == "TRAINED" else argument for argument in arguments]
     assert hybridsep(monkeypatch, "build", *given, "--out", tmp_path) == 2
     assert message in capsys.readouterr().err
-
-
-def test_without_a_compiler_build_says_what_to_do(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr("hybridsep.fmi.compiler.find_spec", lambda name: None)
-    monkeypatch.setenv("PATH", str(tmp_path))
-    monkeypatch.delenv("CC", raising=False)
-    assert hybridsep(monkeypatch, "build", "FeedDrive", "--target", "host", "--out", tmp_path) == 2
-    error = capsys.readouterr().err
-    assert "install one, or pip install ziglang, or build with --flavour python" in error
-    assert hybridsep(monkeypatch, "build", "FeedDrive", "--target", "win64", "--out", tmp_path) == 2
-    assert "pip install ziglang, or ask for the target host" in capsys.readouterr().err

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import ctypes
-import hashlib
-import os
 import struct
+import tempfile
 import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
@@ -15,7 +14,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from built_once import SHARED_BUILDS, built_once
 from c_compiler import C_SOURCES, build_folder, include_flags, run_compiler
 from numpy.typing import NDArray
 from places import ROOT
@@ -84,28 +82,32 @@ def model_sources() -> list[str]:
 
 @cache
 def object_files(flags: tuple[str, ...] = ("-O2", "-fPIC"), command: tuple[str, ...] = ()) -> list[str]:
-    """Compile all other C files, once for each set of options, with the host's compiler if no other is asked for.
-
-    All processes of a test session share them.
-    """
-    shared = Path(os.environ.get(SHARED_BUILDS) or build_folder())
-    key = hashlib.sha256(repr((flags, command)).encode()).hexdigest()[:16]
-    compiled = sorted(set(sources()) - set(model_sources()))
-
-    def build(folder: Path) -> None:
-        folder.mkdir()
-        for source in compiled:
-            target = folder / f"{Path(source).stem}.o"
-            run_compiler([*flags, *include_flags(), "-c", source, "-o", target], command=command)
-
-    folder = built_once(shared / f"objects_{key}", build)
-    return [str(folder / f"{Path(source).stem}.o") for source in compiled]
+    """Compile all other C files, once for each set of options, with the host's compiler if no other is asked for."""
+    folder = Path(tempfile.mkdtemp(dir=build_folder()))
+    objects = []
+    for source in sorted(set(sources()) - set(model_sources())):
+        objects.append(str(folder / f"{Path(source).stem}.o"))
+        run_compiler([*flags, *include_flags(), "-c", source, "-o", objects[-1]], command=command)
+    return objects
 
 
 def write_header(name: str, folder: Path) -> None:
     """Write hsep_fmu.h of one of :data:`DESCRIPTIONS`."""
     folder.mkdir(exist_ok=True)
     (folder / "hsep_fmu.h").write_text(c_header({"name": name, **DESCRIPTIONS[name]}, "{test}"), encoding="utf-8")
+
+
+class Context(ctypes.Structure):
+    """hsep_context."""
+
+    _fields_ = (
+        ("variables", ctypes.c_void_p),
+        *((name, ctypes.c_size_t) for name in ("n_scalars", "n_modes", "window", "n_variables")),
+        ("starts", ctypes.c_void_p),
+        ("guid", ctypes.c_char_p),
+        ("angular", ctypes.c_int),
+        ("resources", ctypes.c_char_p),
+    )
 
 
 @cache
@@ -130,18 +132,12 @@ def library(name: str) -> ctypes.CDLL:
         ]
     )
     loaded = ctypes.CDLL(str(built))
-    loaded.test_variables.restype = ctypes.c_void_p
+    loaded.test_table.restype = ctypes.POINTER(Context)
     for function in ("physics", "regression", "predictor"):
         getattr(loaded, f"hsep_{function}_size").restype = ctypes.c_double
     loaded.hsep_encoder_measure.restype = ctypes.c_double
     loaded.hsep_regression_row.restype = ctypes.POINTER(ctypes.c_double)
     return loaded
-
-
-class Context(ctypes.Structure):
-    """hsep_context."""
-
-    _fields_ = (("variables", ctypes.c_void_p), ("n_variables", ctypes.c_size_t), ("resources", ctypes.c_char_p))
 
 
 class RefusedError(Exception):
@@ -168,9 +164,8 @@ class CModel:
         slopes = INTERPOLATED[DESCRIPTIONS[name]["model"]]
         self.slope_place = {slope: len(table) + self.place[slope] for slope in slopes}
         self.values: Array = np.array([float(variable.start or 0.0) for variable in table] + [0.0] * len(slopes))
-        self.context = Context(
-            self.library.test_variables(), len(table), f"{resources}/".encode() if resources else None
-        )
+        self.context = Context.from_buffer_copy(self.library.test_table().contents)
+        self.context.resources = f"{resources}/".encode() if resources else None
         for key, value in (start or {}).items():
             self[key] = value
         self.state: Array = np.zeros(0)

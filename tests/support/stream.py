@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridsep import load_machine, paper_machine
-from hybridsep.fmi.archive import fmu_description
+from hybridsep.fmi.description import fmu_description
 from hybridsep.machines.machine import Machine
 
 Array = NDArray[np.float64]

@@ -10,20 +10,14 @@ from hybridsep.base.errors import ParameterError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.tune.choice import with_window
 from hybridsep.tune.grid import TUNED, candidates, default_values
-from hybridsep.tune.losses import share_a_pass
 
 PAPER = PredictorSettings(Np=100, p=50, q=3, lam=1e-12, trust=False)
 TRUST = replace(PAPER, trust=True)
 
 
-def test_the_defaults_are_hundreds_that_share_a_pass_or_a_few_replays() -> None:
-    tried = candidates(PAPER, default_values(PAPER))
-    assert 500 <= len(tried) <= 1500
-    assert share_a_pass(tried)
-    trusting = candidates(TRUST, default_values(TRUST))
-    assert 10 <= len(trusting) <= 20
-    assert not share_a_pass(trusting)
-    assert not share_a_pass([replace(PAPER, v_friction=1e-3)])
+def test_the_defaults_are_a_few_replays() -> None:
+    assert 20 <= len(candidates(PAPER, default_values(PAPER))) <= 30
+    assert 10 <= len(candidates(TRUST, default_values(TRUST))) <= 20
 
 
 @pytest.mark.parametrize("trust", [False, True])

@@ -1,6 +1,8 @@
 #include "hsep_instance.h"
 
 #include "hsep_check.h"
+#include "hsep_table.h"
+#include "hsep_table_file.h"
 #include "hsep_uri.h"
 
 #include <string.h>
@@ -34,35 +36,74 @@ HSEP_API void hsep_instance_drop_state(hsep_instance *instance)
     instance->state_size = 0;
 }
 
+/* Take the folder of a URI, or NULL. HSEP_WARNED: it is none. */
+static hsep_status instance_folder(hsep_instance *instance, const char *call, const char *uri, char message[])
+{
+    if (uri == NULL) {
+        return HSEP_OK;
+    }
+    instance->resources = hsep_new(instance, HSEP_FOLDER_SIZE(strlen(uri)));
+    if (instance->resources == NULL) {
+        return hsep_message_add(message, "%s: no memory for the path of the resources", call);
+    }
+    if (hsep_uri_folder(uri, INSTANCE_WINDOWS, instance->resources)) {
+        return HSEP_OK;
+    }
+    hsep_message_add(
+        message, "%s: fmuResourceLocation must be a file: URI on this machine, got %.300s; it is not used", call, uri);
+    hsep_delete(instance, instance->resources);
+    instance->resources = NULL;
+    return HSEP_WARNED;
+}
+
+/* Take the table from the resources if the header has none. */
+static hsep_status instance_table(hsep_instance *instance, const char *call, char message[])
+{
+#ifdef HSEP_TABLE_IN_RESOURCES
+    return hsep_table_file_open(instance, call, message);
+#else
+    (void)call, (void)message;
+    instance->context = hsep_table;
+    return HSEP_OK;
+#endif
+}
+
 HSEP_API hsep_status
-hsep_instance_name(hsep_instance *instance, const char *call, const char *name, const char *resources, char message[])
+hsep_instance_open(hsep_instance *instance, const char *call, const char *name, const char *resources, char message[])
 {
     instance->name = hsep_new(instance, strlen(name) + 1);
-    if (resources != NULL) {
-        instance->resources = hsep_new(instance, HSEP_FOLDER_SIZE(strlen(resources)));
-    }
-    if (instance->name == NULL || (resources != NULL && instance->resources == NULL)) {
-        return hsep_message_add(message, "%s: no memory for the instance's name and resources", call);
+    if (instance->name == NULL) {
+        return hsep_message_add(message, "%s: no memory for the instance's name", call);
     }
     (void)strcpy(instance->name, name);
-    if (resources != NULL && !hsep_uri_folder(resources, INSTANCE_WINDOWS, instance->resources)) {
-        hsep_message_add(
-            message, "%s: fmuResourceLocation must be a file: URI on this machine, got %.300s; it is not used", call,
-            resources);
-        hsep_delete(instance, instance->resources);
-        instance->resources = NULL;
-        return HSEP_WARNED;
+    const hsep_status folder = instance_folder(instance, call, resources, message);
+    if (folder == HSEP_REFUSED) {
+        return HSEP_REFUSED;
     }
-    return HSEP_OK;
+    const hsep_status table = instance_table(instance, call, message);
+    if (table == HSEP_REFUSED) {
+        return HSEP_REFUSED;
+    }
+    instance->context.resources = instance->resources;
+    instance->values = hsep_new(instance, hsep_instance_n_values(instance) * sizeof(double));
+    if (instance->values == NULL) {
+        return hsep_message_add(
+            message, "%s: no memory for %lu values", call, (unsigned long)hsep_instance_n_values(instance));
+    }
+    return table == HSEP_WARNED ? table : folder;
+}
+
+HSEP_API size_t hsep_instance_n_values(const hsep_instance *instance)
+{
+    return instance->context.n_variables + HSEP_N_INTERPOLATED;
 }
 
 HSEP_API void hsep_instance_reset(hsep_instance *instance)
 {
     hsep_instance_drop_state(instance);
-    instance->context = (hsep_context){hsep_variables, HSEP_N_VARIABLES, instance->resources};
-    memset(instance->values, 0, sizeof instance->values);
-    for (size_t i = 0; i < HSEP_N_VARIABLES; i++) {
-        instance->values[i] = hsep_variables[i].start;
+    memset(instance->values, 0, hsep_instance_n_values(instance) * sizeof(double));
+    for (size_t i = 0; i < instance->context.n_variables; i++) {
+        instance->values[i] = hsep_table_start(&instance->context, i);
     }
     hsep_model_start_values(&instance->context, instance->values);
     instance->experiment = (hsep_experiment){.phase = HSEP_INSTANTIATED};
@@ -98,7 +139,7 @@ HSEP_API hsep_status hsep_instance_step(hsep_instance *instance, const char *cal
     }
     const hsep_status status = hsep_model_step(&instance->context, instance->state, instance->values, t, h, message);
     if (status != HSEP_REFUSED) {
-        memset(instance->values + HSEP_N_VARIABLES, 0, HSEP_N_INTERPOLATED * sizeof(double));
+        memset(instance->values + instance->context.n_variables, 0, HSEP_N_INTERPOLATED * sizeof(double));
         instance->experiment.time = t + h;
     }
     return status;
@@ -107,6 +148,8 @@ HSEP_API hsep_status hsep_instance_step(hsep_instance *instance, const char *cal
 HSEP_API void hsep_instance_free(hsep_instance *instance)
 {
     hsep_instance_drop_state(instance);
+    hsep_delete(instance, instance->values);
+    hsep_delete(instance, instance->table);
     hsep_delete(instance, instance->resources);
     hsep_delete(instance, instance->name);
     instance->release(instance);

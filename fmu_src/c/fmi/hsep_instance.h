@@ -37,11 +37,12 @@ typedef struct {
     hsep_release release;
     char *name;      /* NULL until it is known */
     char *resources; /* NULL if there is no usable folder */
+    void *table;     /* what the context points to, where it was read from the resources; else NULL */
     hsep_context context;
     hsep_experiment experiment;
     void *state; /* the model's, NULL before the initialization has ended */
     size_t state_size;
-    double values[HSEP_N_VALUES]; /* by value reference, then the time derivatives of inputs */
+    double *values; /* by value reference, then the time derivatives of inputs */
 } hsep_instance;
 
 /* A zeroed block from the importer's memory; NULL if there is none left. */
@@ -53,10 +54,14 @@ HSEP_API void hsep_delete(const hsep_instance *instance, void *block);
 /* Forget the model's state. */
 HSEP_API void hsep_instance_drop_state(hsep_instance *instance);
 
-/* Keep name and resources, a URI or NULL. Fails if there is no memory; HSEP_WARNED: the URI is no folder here, and is
- * not used. */
+/* Keep name and resources, a URI or NULL, and take the table of the FMU's variables: from the header, or from the
+ * resources (hsep_table_file.h), which then are those beside the library where the URI leads to none. Fails if there is
+ * no memory, or no table; HSEP_WARNED: the URI is not used. */
 HSEP_API hsep_status
-hsep_instance_name(hsep_instance *instance, const char *call, const char *name, const char *resources, char message[]);
+hsep_instance_open(hsep_instance *instance, const char *call, const char *name, const char *resources, char message[]);
+
+/* Number of values, the time derivatives of inputs included. */
+HSEP_API size_t hsep_instance_n_values(const hsep_instance *instance);
 
 /* As after the instantiation: start values, no experiment, no state. */
 HSEP_API void hsep_instance_reset(hsep_instance *instance);

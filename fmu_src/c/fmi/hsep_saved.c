@@ -39,16 +39,27 @@ static void saved_replace(hsep_saved **place, hsep_saved *saved)
     *place = saved;
 }
 
+static size_t saved_values_size(const hsep_instance *instance)
+{
+    return hsep_instance_n_values(instance) * sizeof(double);
+}
+
+/* Bytes before the model's state. */
+static size_t saved_fixed_size(const hsep_instance *instance)
+{
+    return sizeof(hsep_header) + saved_values_size(instance);
+}
+
 HSEP_API hsep_status hsep_save(const hsep_instance *instance, hsep_saved **place, char message[])
 {
     hsep_header header = {
         .version = HSEP_SAVED_VERSION,
         .byte_order = HSEP_BYTE_ORDER,
-        .size = HSEP_FIXED_SIZE + instance->state_size,
+        .size = saved_fixed_size(instance) + instance->state_size,
         .experiment = instance->experiment,
         .state_size = instance->state_size};
     memcpy(header.magic, HSEP_SAVED_MAGIC, sizeof header.magic);
-    memcpy(header.guid, HSEP_GUID, sizeof HSEP_GUID);
+    (void)strcpy(header.guid, instance->context.guid);
     const int fits = *place != NULL && (*place)->capacity >= header.size;
     hsep_saved *saved = fits ? *place : saved_new(instance, (size_t)header.size, message);
     if (saved == NULL) {
@@ -56,9 +67,9 @@ HSEP_API hsep_status hsep_save(const hsep_instance *instance, hsep_saved **place
     }
     unsigned char *block = (unsigned char *)saved->block;
     memcpy(block, &header, sizeof header);
-    memcpy(block + sizeof header, instance->values, HSEP_VALUES_SIZE);
+    memcpy(block + sizeof header, instance->values, saved_values_size(instance));
     if (instance->state != NULL) {
-        memcpy(block + HSEP_FIXED_SIZE, instance->state, instance->state_size);
+        memcpy(block + saved_fixed_size(instance), instance->state, instance->state_size);
     }
     saved_replace(place, saved);
     return HSEP_OK;
@@ -69,8 +80,12 @@ HSEP_API hsep_status hsep_restore(hsep_instance *instance, const hsep_saved *sav
     const unsigned char *block = (const unsigned char *)saved->block;
     hsep_header header;
     memcpy(&header, block, sizeof header);
-    if (strcmp(header.guid, HSEP_GUID) != 0) {
-        return hsep_message_add(message, "the state belongs to the FMU %s, not to %s", header.guid, HSEP_GUID);
+    if (strcmp(header.guid, instance->context.guid) != 0) {
+        return hsep_message_add(
+            message, "the state belongs to the FMU %s, not to %s", header.guid, instance->context.guid);
+    }
+    if (header.size != saved_fixed_size(instance) + header.state_size) {
+        return hsep_message_add(message, "the state has another number of variables than this FMU");
     }
     if (header.state_size != instance->state_size) {
         void *state = header.state_size > 0 ? hsep_new(instance, (size_t)header.state_size) : NULL;
@@ -81,9 +96,9 @@ HSEP_API hsep_status hsep_restore(hsep_instance *instance, const hsep_saved *sav
         instance->state = state;
         instance->state_size = (size_t)header.state_size;
     }
-    memcpy(instance->values, block + sizeof header, HSEP_VALUES_SIZE);
+    memcpy(instance->values, block + sizeof header, saved_values_size(instance));
     if (instance->state != NULL) {
-        memcpy(instance->state, block + HSEP_FIXED_SIZE, instance->state_size);
+        memcpy(instance->state, block + saved_fixed_size(instance), instance->state_size);
     }
     instance->experiment = header.experiment;
     return HSEP_OK;
@@ -127,10 +142,10 @@ static const char *saved_fault(const hsep_instance *instance, const hsep_saved *
     if (header.version != HSEP_SAVED_VERSION) {
         return "it is of another version";
     }
-    if (memcmp(header.guid, HSEP_GUID, sizeof HSEP_GUID) != 0) {
+    if (strncmp(header.guid, instance->context.guid, sizeof header.guid) != 0) {
         return "it belongs to another FMU: the GUID differs";
     }
-    if (header.size != size || header.state_size != size - HSEP_FIXED_SIZE) {
+    if (header.size != size || header.state_size != size - saved_fixed_size(instance)) {
         return "it is truncated or too long";
     }
     if (header.checksum != saved_checksum(header, block, size)) {
@@ -148,7 +163,8 @@ static const char *saved_fault(const hsep_instance *instance, const hsep_saved *
     if (state_size != header.state_size) {
         return "its size does not fit its parameters";
     }
-    if (hsep_model_check_state(&instance->context, block + HSEP_FIXED_SIZE, state_size, values, message) != HSEP_OK) {
+    if (hsep_model_check_state(&instance->context, block + saved_fixed_size(instance), state_size, values, message) !=
+        HSEP_OK) {
         return message;
     }
     return NULL;
@@ -158,9 +174,10 @@ HSEP_API hsep_status
 hsep_deserialise(const hsep_instance *instance, const void *bytes, size_t size, hsep_saved **place, char message[])
 {
     char detail[HSEP_MESSAGE_SIZE] = "";
-    if (size < HSEP_FIXED_SIZE) {
+    if (size < saved_fixed_size(instance)) {
         return hsep_message_add(
-            message, "a state has at least %lu bytes, got %lu", (unsigned long)HSEP_FIXED_SIZE, (unsigned long)size);
+            message, "a state has at least %lu bytes, got %lu", (unsigned long)saved_fixed_size(instance),
+            (unsigned long)size);
     }
     hsep_saved *saved = saved_new(instance, size, message);
     if (saved == NULL) {

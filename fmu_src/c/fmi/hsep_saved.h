@@ -1,6 +1,6 @@
 /* Complete state of an instance as one block of bytes, saved, restored and serialised by copying.
  *
- * header | values, HSEP_N_VALUES doubles | the model's state, of hsep_model_size
+ * header | values, hsep_instance_n_values doubles | the model's state, of hsep_model_size
  *
  * Numbers are in the machine's own representation; a serialised block of another byte order is refused, as is one of
  * another FMU (GUID), another version, another length or with a single bit changed (FNV-1a). What fails returns
@@ -11,14 +11,14 @@
 
 #include "hsep_api.h"
 #include "hsep_instance.h"
+#include "hsep_table_file.h"
 #include "hsep_layout.h"
 
 #include <stdint.h>
 
-#define HSEP_SAVED_VERSION 2U
+#define HSEP_SAVED_VERSION 3U
 #define HSEP_BYTE_ORDER 0x01020304U
 #define HSEP_SAVED_MAGIC "HSEPFMI2"
-#define HSEP_GUID_SIZE 48 /* a GUID in braces, padded with zeros */
 
 typedef struct {
     char magic[8];
@@ -40,8 +40,6 @@ typedef struct {
     hsep_release release;
     double block[]; /* header, values, state; aligned for double */
 } hsep_saved;
-
-enum { HSEP_VALUES_SIZE = HSEP_N_VALUES * sizeof(double), HSEP_FIXED_SIZE = sizeof(hsep_header) + HSEP_VALUES_SIZE };
 
 /* Whether a handle points to a saved state. */
 HSEP_API int hsep_is_saved(const hsep_saved *saved);

@@ -9,8 +9,9 @@
 #include <stddef.h>
 
 /* Check that there are n references, all to variables of that kind, and a place for their values. */
-HSEP_API hsep_status
-hsep_values_check(const char *call, hsep_kind kind, const unsigned vr[], size_t n, const void *value, char message[]);
+HSEP_API hsep_status hsep_values_check(
+    const hsep_instance *instance, const char *call, hsep_kind kind, const unsigned vr[], size_t n, const void *value,
+    char message[]);
 
 /* Check beside it that they may be set now: inputs at any time, parameters until the initialization has ended, tunable
  * ones later too. reset: name of the call after which the others may be. */

@@ -1,24 +1,34 @@
 /* Instantiation, reset and release of an instance. */
 #include "hsep_fmi2_instance.h"
 
+#include "hsep_check.h"
+
 #include <stdlib.h>
 #include <string.h>
 
-/* Say why the arguments of fmi2Instantiate cannot be used; 1 if they can. */
-static int hsep_check_arguments(hsep_instance *instance, fmi2String name, fmi2Type type, fmi2String guid)
+/* Check the arguments of fmi2Instantiate and take the table; why not is logged. */
+static hsep_status hsep_open(
+    hsep_instance *instance, fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources)
 {
+    static const char call[] = "fmi2Instantiate";
+    char message[HSEP_MESSAGE_SIZE] = "";
+    hsep_status status = HSEP_REFUSED;
     if (name == NULL || name[0] == '\0') {
-        (void)hsep_refuse(instance, "fmi2Instantiate: instanceName must not be empty");
+        (void)hsep_message_add(message, "%s: instanceName must not be empty", call);
     } else if (type != fmi2CoSimulation) {
-        (void)hsep_refuse(instance, "fmi2Instantiate: fmuType must be fmi2CoSimulation, got %d", (int)type);
-    } else if (guid == NULL || strcmp(guid, HSEP_GUID) != 0) {
-        (void)hsep_refuse(
-            instance, "fmi2Instantiate: fmuGUID must be %s as in modelDescription.xml, got %.100s", HSEP_GUID,
-            (guid == NULL) ? "NULL" : guid);
+        (void)hsep_message_add(message, "%s: fmuType must be fmi2CoSimulation, got %d", call, (int)type);
     } else {
-        return 1;
+        status = hsep_instance_open(instance, call, name, resources, message);
     }
-    return 0;
+    if (status != HSEP_REFUSED && (guid == NULL || strcmp(guid, instance->context.guid) != 0)) {
+        status = hsep_message_add(
+            message, "%s: fmuGUID must be %s as in modelDescription.xml, got %.100s", call, instance->context.guid,
+            (guid == NULL) ? "NULL" : guid);
+    }
+    if (status != HSEP_OK) {
+        hsep_log(instance, status == HSEP_WARNED ? HSEP_LOG_WARNING : HSEP_LOG_ERROR, "%s", message);
+    }
+    return status;
 }
 
 fmi2Component fmi2Instantiate(
@@ -28,13 +38,12 @@ fmi2Component fmi2Instantiate(
     const int own_memory = functions == NULL || functions->allocateMemory == NULL || functions->freeMemory == NULL;
     const hsep_allocate allocate = own_memory ? calloc : functions->allocateMemory;
     const fmi2CallbackLogger logger = (functions == NULL) ? NULL : functions->logger;
-    char message[HSEP_MESSAGE_SIZE] = "";
     hsep_component *component = allocate(1, sizeof *component);
     (void)visible;
     if (component == NULL) {
         if (logger != NULL) {
             logger(
-                functions->componentEnvironment, HSEP_MODEL_IDENTIFIER, fmi2Error, "logStatusError",
+                functions->componentEnvironment, HSEP_MODEL_NAME, fmi2Error, "logStatusError",
                 "fmi2Instantiate: no memory for an instance of %lu bytes", (unsigned long)sizeof *component);
         }
         return NULL;
@@ -49,14 +58,7 @@ fmi2Component fmi2Instantiate(
     hsep_instance *instance = &component->instance;
     instance->allocate = allocate;
     instance->release = own_memory ? free : functions->freeMemory;
-    hsep_status status = HSEP_REFUSED;
-    if (hsep_check_arguments(instance, instanceName, fmuType, fmuGUID)) {
-        status = hsep_instance_name(instance, "fmi2Instantiate", instanceName, fmuResourceLocation, message);
-        if (status != HSEP_OK) {
-            hsep_log(instance, status == HSEP_WARNED ? HSEP_LOG_WARNING : HSEP_LOG_ERROR, "%s", message);
-        }
-    }
-    if (status == HSEP_REFUSED) {
+    if (hsep_open(instance, instanceName, fmuType, fmuGUID, fmuResourceLocation) == HSEP_REFUSED) {
         hsep_instance_free(instance);
         return NULL;
     }

@@ -46,7 +46,7 @@ static void hsep_log_list(const hsep_instance *instance, hsep_category category,
     }
     escaped[n] = '\0';
     component->logger(
-        component->environment, (instance->name == NULL) ? HSEP_MODEL_IDENTIFIER : instance->name,
+        component->environment, (instance->name == NULL) ? HSEP_MODEL_NAME : instance->name,
         hsep_category_status[place], hsep_category_names[place], escaped);
 }
 

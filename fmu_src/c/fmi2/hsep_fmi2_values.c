@@ -1,6 +1,7 @@
 /* Reading and writing variables. A call is checked as a whole first: if one variable is refused, none is touched. */
 #include "hsep_fmi2_instance.h"
 
+#include "hsep_table.h"
 #include "hsep_values.h"
 
 #include <math.h>
@@ -18,7 +19,7 @@ static hsep_instance *hsep_access(
     if (instance == NULL) {
         return NULL;
     }
-    if (hsep_values_check(name, kind, vr, n, value, message) != HSEP_OK ||
+    if (hsep_values_check(instance, name, kind, vr, n, value, message) != HSEP_OK ||
         (sets && hsep_values_check_set(instance, name, "fmi2Reset", vr, n, message) != HSEP_OK) ||
         (gets && hsep_values_prepare(instance, name, vr, n, message) != HSEP_OK)) {
         (void)hsep_refuse(instance, "%s", message);
@@ -97,6 +98,7 @@ fmi2Status fmi2SetRealInputDerivatives(
     fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer order[], const fmi2Real value[])
 {
     static const char name[] = "fmi2SetRealInputDerivatives";
+    char input[HSEP_NAME_SIZE];
     hsep_instance *instance = hsep_access(c, HSEP_CALL_SET_REAL_INPUT_DERIVATIVES, HSEP_REAL, vr, nvr, value);
     if (instance == NULL) {
         return fmi2Error;
@@ -111,20 +113,22 @@ fmi2Status fmi2SetRealInputDerivatives(
     for (size_t i = 0; i < nvr; i++) {
         if (vr[i] + 1 > HSEP_N_INTERPOLATED) {
             return hsep_refuse(
-                instance, "%s: %s takes no derivative, only inputs do", name, hsep_variables[vr[i]].name);
+                instance, "%s: %s takes no derivative, only inputs do", name,
+                hsep_table_name(&instance->context, vr[i], input));
         }
         if (order[i] != 1) {
             return hsep_refuse(
-                instance, "%s: the order of %s must be 1, got %d", name, hsep_variables[vr[i]].name, (int)order[i]);
+                instance, "%s: the order of %s must be 1, got %d", name,
+                hsep_table_name(&instance->context, vr[i], input), (int)order[i]);
         }
         if (!isfinite(value[i])) {
             return hsep_refuse(
-                instance, "%s: the derivative of %s must be finite, got %g", name, hsep_variables[vr[i]].name,
-                value[i]);
+                instance, "%s: the derivative of %s must be finite, got %g", name,
+                hsep_table_name(&instance->context, vr[i], input), value[i]);
         }
     }
     for (size_t i = 0; i < nvr; i++) {
-        instance->values[HSEP_N_VARIABLES + vr[i]] = value[i];
+        instance->values[instance->context.n_variables + vr[i]] = value[i];
     }
     return fmi2OK;
 }

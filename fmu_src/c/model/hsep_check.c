@@ -1,5 +1,7 @@
 #include "hsep_check.h"
 
+#include "hsep_table.h"
+
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -57,10 +59,9 @@ HSEP_API const char *hsep_number(char text[HSEP_NUMBER_SIZE], double value, hsep
 }
 
 /* Write the allowed range of a parameter, with its unit. */
-static void check_range_text(char text[], size_t size, const hsep_variable *v)
+static void check_range_text(char text[], size_t size, const hsep_variable *v, const char *unit)
 {
-    const int has_unit = v->unit[0] != '\0' && strcmp(v->unit, "1") != 0;
-    const char *space = has_unit ? " " : "", *unit = has_unit ? v->unit : "";
+    const char *space = unit[0] != '\0' ? " " : "";
     const char *zero = v->nonzero > 0.0 ? "0 or " : "";
     char automatic[HSEP_NUMBER_SIZE] = "";
     if (isfinite(v->automatic)) {
@@ -80,22 +81,23 @@ static int check_allows(const hsep_variable *v, double value)
 
 HSEP_API int hsep_check_parameters(const hsep_context *context, const double values[], char message[])
 {
-    char number[HSEP_NUMBER_SIZE], range[96];
+    char number[HSEP_NUMBER_SIZE], name[HSEP_NAME_SIZE], range[96];
     int problems = 0;
     for (size_t i = 0; i < context->n_variables; i++) {
-        const hsep_variable *v = &context->variables[i];
+        const hsep_variable *v = hsep_table_row(context, i);
         const double value = values[i];
         if (v->causality != HSEP_PARAMETER) {
             continue;
         }
+        hsep_table_name(context, i, name);
         hsep_number(number, value, v->kind);
         if (!isfinite(value)) {
-            hsep_message_add(message, "%s must be finite, got %s", v->name, number);
+            hsep_message_add(message, "%s must be finite, got %s", name, number);
         } else if (v->kind == HSEP_INTEGER && value != floor(value)) {
-            hsep_message_add(message, "%s must be a whole number, got %s", v->name, number);
+            hsep_message_add(message, "%s must be a whole number, got %s", name, number);
         } else if (!check_allows(v, value)) {
-            check_range_text(range, sizeof range, v);
-            hsep_message_add(message, "%s must be %s, got %s", v->name, range, number);
+            check_range_text(range, sizeof range, v, hsep_table_unit(context, i));
+            hsep_message_add(message, "%s must be %s, got %s", name, range, number);
         } else {
             continue;
         }
@@ -204,12 +206,4 @@ HSEP_API hsep_status hsep_check_step(const hsep_clock *clock, double t, double h
             hsep_number(expected, clock->end, HSEP_REAL), hsep_number(got, t, HSEP_REAL));
     }
     return HSEP_OK;
-}
-
-HSEP_API void hsep_modes_read(const double values[], size_t n, hsep_mode modes[])
-{
-    for (size_t i = 0; i < n; i++) {
-        const double *mode = &values[4 * i];
-        modes[i] = (hsep_mode){.f_n = mode[0], .zeta = mode[1], .alpha = mode[2], .beta = mode[3]};
-    }
 }

@@ -6,7 +6,6 @@
 #include "hsep_api.h"
 #include "hsep_clock.h"
 #include "hsep_model.h"
-#include "hsep_physics.h"
 #include "hsep_range.h"
 
 #define HSEP_NUMBER_SIZE 40 /* bytes of a number as text */
@@ -56,8 +55,5 @@ HSEP_API hsep_status hsep_check_step_size(double h, char message[]);
 /* Check that the step from t by h, s, comes next, and count it. */
 HSEP_API hsep_status
 hsep_check_step(const hsep_clock *clock, double t, double h, hsep_clock_step *step, char message[]);
-
-/* Read n modes from the values of mode[i].f_n, .zeta, .alpha and .beta, which have been checked. */
-HSEP_API void hsep_modes_read(const double values[], size_t n, hsep_mode modes[]);
 
 #endif

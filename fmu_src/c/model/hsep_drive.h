@@ -5,6 +5,7 @@
 
 #include "hsep_api.h"
 #include "hsep_fmu.h"
+#include "hsep_model.h"
 #include "hsep_plant.h"
 
 #include <stddef.h>
@@ -26,10 +27,11 @@ typedef hsep_stage hsep_drive;
 #if defined(HSEP_DRIVE_KIND)
 
 /* Check the parameters of this drive together, after each alone; *bytes: of its block, counted in double. */
-HSEP_API hsep_status hsep_drive_check(const double values[], double *bytes, char message[]);
+HSEP_API hsep_status
+hsep_drive_check(const hsep_context *context, const double values[], double *bytes, char message[]);
 
 /* Reset the drive, of these parameters, to rest at the start value of x_d. */
-HSEP_API void hsep_drive_begin(hsep_drive *self, const double values[]);
+HSEP_API void hsep_drive_begin(const hsep_context *context, hsep_drive *self, const double values[]);
 
 /* Advance by h, s, with the command x_d, m, held. Fails, with the state unchanged, if the state overflows. */
 HSEP_API hsep_status hsep_drive_step(hsep_drive *self, double x_d, double h, char message[]);
@@ -38,7 +40,7 @@ HSEP_API hsep_status hsep_drive_step(hsep_drive *self, double x_d, double h, cha
 HSEP_API double hsep_drive_velocity(const hsep_drive *self);
 
 /* Whether a block, in any alignment and of so many bytes, is a state of the drive for these parameters. */
-HSEP_API int hsep_drive_valid(const void *block, size_t bytes, const double values[]);
+HSEP_API int hsep_drive_valid(const hsep_context *context, const void *block, size_t bytes, const double values[]);
 
 #endif
 

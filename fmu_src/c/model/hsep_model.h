@@ -1,7 +1,7 @@
 /* Interface between a model and an adapter: sizes, initialization, step and values.
  *
- * An adapter (FMI 2.0 now, another one beside it later) owns one array of HSEP_N_VALUES values, one place per variable
- * of the generated table (hsep_fmu.h), then the time derivatives of the first HSEP_N_INTERPOLATED of them, inputs that
+ * An adapter (FMI 2.0 now, another one beside it later) owns one array of values, one place per variable of the table
+ * (hsep_context), then the time derivatives of the first HSEP_N_INTERPOLATED of them (hsep_fmu.h), inputs that
  * may change within a step, which it sets to 0 after each step; and one block of memory, the state, whose size
  * follows from the parameters. The state is plain data without pointers: saving, restoring and serialising it is
  * one copy of its bytes. Outputs change only where their sample does, so what an adapter saves is the state together
@@ -27,14 +27,14 @@ typedef enum {
 typedef enum { HSEP_REAL, HSEP_INTEGER, HSEP_BOOLEAN, HSEP_STRING } hsep_kind;
 typedef enum { HSEP_INPUT, HSEP_OUTPUT, HSEP_PARAMETER, HSEP_LOCAL } hsep_causality;
 
-/* One row of the generated table; its place is the value reference. Numbers of every kind are held as double. */
+/* One row of the generated table (hsep_table.h). Numbers of every kind are held as double. */
 typedef struct {
     const char *name;
-    const char *unit; /* "" if it has none */
+    const char *unit;         /* "" if it has none */
+    const char *angular_unit; /* that of a rotary axis */
     hsep_kind kind;
     hsep_causality causality;
     int tunable;      /* a parameter that may be set while the simulation runs */
-    double start;     /* 0 for what is calculated */
     double minimum;   /* -HUGE_VAL if there is none */
     double maximum;   /* HUGE_VAL if there is none */
     double nonzero;   /* least value that is not 0; 0 if there is none */
@@ -42,10 +42,19 @@ typedef struct {
     int learned;      /* a parameter that what was learned depends on */
 } hsep_variable;
 
-/* What stays the same for one instance: the generated table and where its resources are. */
+#define HSEP_MODE_NUMBERS 4 /* of a mode: f_n, zeta, alpha, beta */
+
+/* What stays the same for one instance: the table, what this FMU has of it, and where its resources are. The variables
+ * are n_scalars single ones, then the numbers of each mode, then the samples of each window. */
 typedef struct {
-    const hsep_variable *variables; /* (n_variables,) */
+    const hsep_variable *variables; /* rows of the table: n_scalars, HSEP_MODE_NUMBERS if it has modes, windows */
+    size_t n_scalars;
+    size_t n_modes;
+    size_t window; /* samples in each window */
     size_t n_variables;
+    const double *starts; /* (n_scalars + HSEP_MODE_NUMBERS n_modes,), 0 for what is calculated; so are the windows */
+    const char *guid;
+    int angular;           /* whether it is a rotary axis */
     const char *resources; /* folder with a trailing slash, decoded; NULL if there is none */
 } hsep_context;
 

@@ -5,6 +5,7 @@
 
 #include "hsep_api.h"
 #include "hsep_fmu.h"
+#include "hsep_model.h"
 
 #if defined(HSEP_MODEL_HYBRID_PREDICTOR)
 
@@ -40,7 +41,7 @@ HSEP_API void hsep_online_begin(hsep_online *self);
 HSEP_API hsep_predictor *hsep_online_predictor(hsep_online *self);
 
 /* Write outputs and locals; window: whether it is a new one. */
-HSEP_API void hsep_online_write(const hsep_online *self, int window, double values[]);
+HSEP_API void hsep_online_write(const hsep_context *context, const hsep_online *self, int window, double values[]);
 
 #endif
 

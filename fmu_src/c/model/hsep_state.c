@@ -1,6 +1,7 @@
 #include "hsep_state.h"
 
 #include "hsep_check.h"
+#include "hsep_table.h"
 
 #include <math.h>
 #include <stdint.h>
@@ -30,7 +31,8 @@ static uint64_t state_hash(const hsep_context *context, const double values[])
 {
     uint64_t hash = HSEP_FNV_BEGIN;
     for (size_t i = 0; i < context->n_variables; i++) {
-        if (context->variables[i].causality == HSEP_PARAMETER && !context->variables[i].tunable) {
+        const hsep_variable *row = hsep_table_row(context, i);
+        if (row->causality == HSEP_PARAMETER && !row->tunable) {
             hash = hsep_fnv(hash, &values[i], sizeof values[i]);
         }
     }

@@ -3,6 +3,7 @@
 #include "hsep_check.h"
 #include "hsep_layout.h"
 #include "hsep_resource.h"
+#include "hsep_table.h"
 
 #include <string.h>
 
@@ -24,21 +25,6 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(weights_setting, 4);
 
-/* CRC-32 as in zlib, 4 bits at a time, of bytes behind those that gave crc. */
-static uint32_t weights_crc(uint32_t crc, const unsigned char bytes[], size_t size)
-{
-    static const uint32_t table[16] = {0x00000000U, 0x1DB71064U, 0x3B6E20C8U, 0x26D930ACU, 0x76DC4190U, 0x6B6B51F4U,
-                                       0x4DB26158U, 0x5005713CU, 0xEDB88320U, 0xF00F9344U, 0xD6D6A3E8U, 0xCB61B38CU,
-                                       0x9B64C2B0U, 0x86D3D2D4U, 0xA00AE278U, 0xBDBDF21CU};
-    crc = ~crc;
-    for (size_t i = 0; i < size; i++) {
-        crc ^= bytes[i];
-        crc = (crc >> 4) ^ table[crc & 15U];
-        crc = (crc >> 4) ^ table[crc & 15U];
-    }
-    return ~crc;
-}
-
 /* Whether the file is whole: its last 8 bytes are the checksum of the others. size: of all of it, bytes. It is put back
  * to its beginning. */
 static int weights_whole(FILE *file, double *size)
@@ -55,7 +41,7 @@ static int weights_whole(FILE *file, double *size)
         if (held < sizeof bytes) {
             break;
         }
-        crc = weights_crc(crc, bytes, WEIGHTS_CHUNK);
+        crc = hsep_crc(crc, bytes, WEIGHTS_CHUNK);
         held -= WEIGHTS_CHUNK;
         memcpy(bytes, bytes + WEIGHTS_CHUNK, held);
     }
@@ -63,7 +49,7 @@ static int weights_whole(FILE *file, double *size)
         return 0;
     }
     memcpy(&sum, bytes + held - sizeof sum, sizeof sum);
-    return sum == weights_crc(crc, bytes, held - sizeof sum);
+    return sum == hsep_crc(crc, bytes, held - sizeof sum);
 }
 
 static void weights_compare(const char *name, double learned, double got, hsep_kind kind, char message[])
@@ -76,16 +62,6 @@ static void weights_compare(const char *name, double learned, double got, hsep_k
     }
 }
 
-/* Index of the variable of a name; n_variables if there is none. */
-static size_t weights_variable(const hsep_context *context, const char *name)
-{
-    size_t i = 0;
-    while (i < context->n_variables && strcmp(context->variables[i].name, name) != 0) {
-        i++;
-    }
-    return i;
-}
-
 /* Read the settings of the file and compare them with those of the table: 0 if it is damaged. A setting that the table
  * has not is 0 here; modes that only one side has are told by their number. has_v_friction: whether v_friction
  * has an effect. */
@@ -95,16 +71,16 @@ static int weights_compare_settings(
 {
     uint64_t n_missing = 0;
     for (size_t i = 0; i < context->n_variables; i++) {
-        n_missing += context->variables[i].learned != 0;
+        n_missing += hsep_table_row(context, i)->learned != 0;
     }
     for (uint64_t i = 0; i < n_settings; i++) {
         weights_setting setting;
         if (fread(&setting, sizeof setting, 1, file) != 1 || setting.name[sizeof setting.name - 1] != '\0') {
             return 0;
         }
-        const size_t place = weights_variable(context, setting.name);
+        const size_t place = hsep_table_place(context, setting.name);
         if (place < context->n_variables) {
-            const hsep_variable *variable = &context->variables[place];
+            const hsep_variable *variable = hsep_table_row(context, place);
             if (has_v_friction || strcmp(setting.name, "v_friction") != 0) {
                 weights_compare(setting.name, setting.value, values[place], variable->kind, message);
             }

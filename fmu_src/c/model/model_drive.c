@@ -27,7 +27,8 @@ HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double v
 {
     double bytes = 0.0;
     message[0] = '\0';
-    if (hsep_check_parameters(context, values, message) > 0 || hsep_drive_check(values, &bytes, message) != HSEP_OK) {
+    if (hsep_check_parameters(context, values, message) > 0 ||
+        hsep_drive_check(context, values, &bytes, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     return hsep_state_size((double)offsetof(drive_state, drive) + bytes, size, message);
@@ -52,7 +53,7 @@ HSEP_API hsep_status hsep_model_initialise(
         return HSEP_REFUSED;
     }
     hsep_encoder_init(&self->encoder, values[HSEP_VR_noise_std], (uint64_t)values[HSEP_VR_seed]);
-    hsep_drive_begin(&self->drive, values);
+    hsep_drive_begin(context, &self->drive, values);
     drive_write_outputs(self, values);
     return HSEP_OK;
 }
@@ -135,7 +136,7 @@ HSEP_API hsep_status hsep_model_check_state(
     memcpy(&encoder, (const char *)state + offsetof(drive_state, encoder), sizeof encoder);
     const size_t before = offsetof(drive_state, drive);
     const int valid = hsep_within(&encoder.noise_std, 1, HSEP_PREDICTION_MAX) &&
-                      hsep_drive_valid((const char *)state + before, size - before, values);
+                      hsep_drive_valid(context, (const char *)state + before, size - before, values);
     return valid ? HSEP_OK : hsep_state_damaged(message);
 }
 

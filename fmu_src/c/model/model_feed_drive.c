@@ -5,8 +5,9 @@
 
 #include "hsep_check.h"
 
-HSEP_API hsep_status hsep_drive_check(const double values[], double *bytes, char message[])
+HSEP_API hsep_status hsep_drive_check(const hsep_context *context, const double values[], double *bytes, char message[])
 {
+    (void)context;
     const double rate = hsep_feed_drive_rate(
         &(hsep_feed_drive){.m = values[HSEP_VR_m], .c = values[HSEP_VR_c], .k = values[HSEP_VR_k]});
     *bytes = sizeof(hsep_feed_drive);
@@ -18,8 +19,9 @@ HSEP_API hsep_status hsep_drive_check(const double values[], double *bytes, char
     return HSEP_OK;
 }
 
-HSEP_API void hsep_drive_begin(hsep_drive *self, const double values[])
+HSEP_API void hsep_drive_begin(const hsep_context *context, hsep_drive *self, const double values[])
 {
+    (void)context;
     self->m = values[HSEP_VR_m];
     self->c = values[HSEP_VR_c];
     self->k = values[HSEP_VR_k];
@@ -41,9 +43,9 @@ HSEP_API hsep_status hsep_drive_step(hsep_drive *self, double x_d, double h, cha
 
 HSEP_API double hsep_drive_velocity(const hsep_drive *self) { return hsep_feed_drive_v(self); }
 
-HSEP_API int hsep_drive_valid(const void *block, size_t bytes, const double values[])
+HSEP_API int hsep_drive_valid(const hsep_context *context, const void *block, size_t bytes, const double values[])
 {
-    (void)values;
+    (void)context, (void)values;
     return hsep_within(block, bytes / sizeof(double), HSEP_PREDICTION_MAX);
 }
 

@@ -26,7 +26,7 @@ HSEP_API void hsep_online_begin(hsep_online *self) { (void)self; }
 
 HSEP_API hsep_predictor *hsep_online_predictor(hsep_online *self) { return self; }
 
-HSEP_API void hsep_online_write(const hsep_online *self, int window, double values[])
+HSEP_API void hsep_online_write(const hsep_context *context, const hsep_online *self, int window, double values[])
 {
     hsep_predictor_outputs outputs;
     hsep_predictor_read(self, &outputs);
@@ -42,29 +42,28 @@ HSEP_API void hsep_online_write(const hsep_online *self, int window, double valu
     values[HSEP_VR_batch] = (double)outputs.batch;
     values[HSEP_VR_n_rejected] = (double)outputs.n_rejected;
     /* Entries past a smaller Np are 0, of a larger Np the first ones are shown. */
-    for (uint64_t i = 0; window && i < HSEP_WINDOW; i++) {
+    for (size_t i = 0; window && i < context->window; i++) {
         const int shown = i < self->Np;
-        values[HSEP_VR_x_d_window + i] = shown ? hsep_at_const(self, self->x_d)[i] : 0.0;
-        values[HSEP_VR_x_pb_window + i] = shown ? hsep_at_const(self, self->x_pb)[i] : 0.0;
-        values[HSEP_VR_x_h_window + i] = shown ? hsep_at_const(self, self->x_h)[i] : 0.0;
-        values[HSEP_VR_x_h_std_window + i] = shown ? hsep_predictor_std(self, i) : 0.0;
+        values[HSEP_VR_x_d_window(context) + i] = shown ? hsep_at_const(self, self->x_d)[i] : 0.0;
+        values[HSEP_VR_x_pb_window(context) + i] = shown ? hsep_at_const(self, self->x_pb)[i] : 0.0;
+        values[HSEP_VR_x_h_window(context) + i] = shown ? hsep_at_const(self, self->x_h)[i] : 0.0;
+        values[HSEP_VR_x_h_std_window(context) + i] = shown ? hsep_predictor_std(self, i) : 0.0;
     }
 }
 
 HSEP_API void hsep_model_start_values(const hsep_context *context, double values[])
 {
-    (void)context;
     const double start = values[HSEP_VR_x_d_ahead]; /* the drive rests there */
     values[HSEP_VR_x_d] = values[HSEP_VR_x_pb] = values[HSEP_VR_x_h] = start;
     values[HSEP_VR_x_h_std] = values[HSEP_VR_e_servo] = 0.0;
     values[HSEP_VR_rms_pb] = values[HSEP_VR_rms_h] = values[HSEP_VR_rms_hold] = 0.0;
     values[HSEP_VR_hybrid_active] = values[HSEP_VR_batch] = values[HSEP_VR_n_rejected] = 0.0;
-    for (size_t i = 0; i < HSEP_WINDOW; i++) {
+    for (size_t i = 0; i < context->window; i++) {
         const double position = (double)i < values[HSEP_VR_Np] ? start : 0.0;
-        values[HSEP_VR_x_d_window + i] = position;
-        values[HSEP_VR_x_pb_window + i] = position;
-        values[HSEP_VR_x_h_window + i] = position;
-        values[HSEP_VR_x_h_std_window + i] = 0.0;
+        values[HSEP_VR_x_d_window(context) + i] = position;
+        values[HSEP_VR_x_pb_window(context) + i] = position;
+        values[HSEP_VR_x_h_window(context) + i] = position;
+        values[HSEP_VR_x_h_std_window(context) + i] = 0.0;
     }
 }
 

@@ -11,6 +11,7 @@
 #include "hsep_inputs.h"
 #include "hsep_model.h"
 #include "hsep_state.h"
+#include "hsep_table.h"
 #include "hsep_weights.h"
 
 #include <string.h>
@@ -24,10 +25,9 @@ typedef struct {
 /* The arrays behind the struct begin at a multiple of 16 bytes, as an importer's memory does. */
 HSEP_ASSERT(alignment_of_online_state, sizeof(online_state) % 16 == 0);
 
-/* Check all parameters and read them. modes: (HSEP_N_MODES,). */
+/* Check all parameters and read them; the modes stay in values. */
 static hsep_status online_checked(
-    const hsep_context *context, const double values[], hsep_online_parameters *parameters, hsep_mode modes[],
-    char message[])
+    const hsep_context *context, const double values[], hsep_online_parameters *parameters, char message[])
 {
     message[0] = '\0';
     if (hsep_check_parameters(context, values, message) > 0) {
@@ -37,9 +37,8 @@ static hsep_status online_checked(
     if (hsep_online_check(values, message) + lags > 0) {
         return HSEP_REFUSED;
     }
-    hsep_modes_read(&values[HSEP_VR_mode], HSEP_N_MODES, modes);
     hsep_predictor_parameters *predictor = (hsep_predictor_parameters *)parameters;
-    *predictor = (hsep_predictor_parameters){.n_modes = HSEP_N_MODES, .modes = modes};
+    *predictor = (hsep_predictor_parameters){.n_modes = context->n_modes, .modes = hsep_table_modes(context, values)};
 #define READ(type, name) predictor->settings.name = (type)values[HSEP_VR_##name];
     HSEP_PREDICTOR_SETTINGS(READ)
 #undef READ
@@ -52,9 +51,8 @@ static hsep_status online_checked(
 
 HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[])
 {
-    hsep_mode modes[HSEP_N_MODES];
     hsep_online_parameters parameters;
-    if (online_checked(context, values, &parameters, modes, message) != HSEP_OK) {
+    if (online_checked(context, values, &parameters, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     const double before = (double)(sizeof(online_state) - sizeof(hsep_online));
@@ -66,10 +64,9 @@ HSEP_API hsep_status hsep_model_initialise(
 {
     size_t needed = 0;
     online_state *self = state;
-    hsep_mode modes[HSEP_N_MODES];
     hsep_online_parameters parameters;
     const double start = values[HSEP_VR_x_d_ahead];
-    if (online_checked(context, values, &parameters, modes, message) != HSEP_OK ||
+    if (online_checked(context, values, &parameters, message) != HSEP_OK ||
         hsep_model_size(context, values, &needed, message) != HSEP_OK ||
         hsep_state_begin(&self->header, context, values, HSEP_ONLINE_KIND, needed, size, message) != HSEP_OK ||
         hsep_model_check_start(values, message) != HSEP_OK ||
@@ -78,14 +75,14 @@ HSEP_API hsep_status hsep_model_initialise(
     }
     HSEP_ONLINE(init)(&self->online, &parameters, start);
     hsep_predictor *predictor = hsep_online_predictor(&self->online);
-    if (hsep_weights_load(context, values, HSEP_N_MODES, predictor, message) != HSEP_OK) {
+    if (hsep_weights_load(context, values, context->n_modes, predictor, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     hsep_online_begin(&self->online);
     if (hsep_check_divergence((hsep_divergence)predictor->divergence, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
-    hsep_online_write(&self->online, 1, values);
+    hsep_online_write(context, &self->online, 1, values);
     return HSEP_OK;
 }
 
@@ -98,12 +95,12 @@ HSEP_API hsep_status hsep_model_check_start(const double values[], char message[
 HSEP_API hsep_status
 hsep_model_step(const hsep_context *context, void *state, double values[], double t, double h, char message[])
 {
-    (void)context;
     online_state *self = state;
+    const double *slopes = values + context->n_variables;
     hsep_predictor *predictor = hsep_online_predictor(&self->online);
     const hsep_residual_model *model = hsep_predictor_model(predictor);
-    const hsep_input x_d_ahead = {values[HSEP_VR_x_d_ahead], values[HSEP_SLOPE_x_d_ahead]};
-    const hsep_input x_meas = {values[HSEP_VR_x_meas], values[HSEP_SLOPE_x_meas]};
+    const hsep_input x_d_ahead = {values[HSEP_VR_x_d_ahead], slopes[HSEP_VR_x_d_ahead]};
+    const hsep_input x_meas = {values[HSEP_VR_x_meas], slopes[HSEP_VR_x_meas]};
     int window = 0;
     hsep_inputs_step step;
     message[0] = '\0';
@@ -121,7 +118,7 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
             return HSEP_REFUSED;
         }
     }
-    hsep_online_write(&self->online, window, values);
+    hsep_online_write(context, &self->online, window, values);
     return status;
 }
 
@@ -129,10 +126,9 @@ HSEP_API hsep_status hsep_model_check_state(
     const hsep_context *context, const void *state, size_t size, const double values[], char message[])
 {
     size_t expected = 0;
-    hsep_mode modes[HSEP_N_MODES];
     hsep_online_parameters parameters;
     online_state head;
-    if (online_checked(context, values, &parameters, modes, message) != HSEP_OK ||
+    if (online_checked(context, values, &parameters, message) != HSEP_OK ||
         hsep_model_size(context, values, &expected, message) != HSEP_OK ||
         hsep_state_check(context, values, state, size, HSEP_ONLINE_KIND, expected, message) != HSEP_OK) {
         return HSEP_REFUSED;

@@ -67,9 +67,9 @@ HSEP_API void hsep_online_begin(hsep_online *self) { hsep_compensator_begin(self
 
 HSEP_API hsep_predictor *hsep_online_predictor(hsep_online *self) { return hsep_compensator_predictor(self); }
 
-HSEP_API void hsep_online_write(const hsep_online *self, int window, double values[])
+HSEP_API void hsep_online_write(const hsep_context *context, const hsep_online *self, int window, double values[])
 {
-    (void)window;
+    (void)context, (void)window;
     hsep_compensator_outputs outputs;
     hsep_compensator_read(self, &outputs);
     const hsep_predictor_outputs *predicted = &outputs.predicted;

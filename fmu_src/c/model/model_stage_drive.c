@@ -4,39 +4,42 @@
 #if defined(HSEP_MODEL_STAGE_DRIVE)
 
 #include "hsep_check.h"
+#include "hsep_table.h"
 
 #include <string.h>
 
-HSEP_API hsep_status hsep_drive_check(const double values[], double *bytes, char message[])
+/* Work space for a step lies behind the stage: zeros between steps. */
+static size_t stage_work_size(uint64_t n_modes) { return (size_t)(HSEP_STAGE_WORK * n_modes) * sizeof(double); }
+
+HSEP_API hsep_status hsep_drive_check(const hsep_context *context, const double values[], double *bytes, char message[])
 {
-    hsep_mode modes[HSEP_N_MODES];
-    hsep_modes_read(&values[HSEP_VR_mode], HSEP_N_MODES, modes);
-    *bytes = hsep_stage_size(HSEP_N_MODES);
-    for (int i = 0; i < HSEP_N_MODES; i++) {
+    const hsep_mode *modes = hsep_table_modes(context, values);
+    *bytes = hsep_stage_size(context->n_modes) + (double)stage_work_size(context->n_modes);
+    for (size_t i = 0; i < context->n_modes; i++) {
         const double rate = hsep_plant_mode_rate(&modes[i]);
         if (rate > HSEP_PLANT_RATE_MAX) {
             return hsep_message_add(
                 message,
-                "2 pi f_n and 4 pi f_n zeta of mode[%d] must be at most %g 1/s in a plant, got %g; lower f_n or zeta",
-                i + 1, HSEP_PLANT_RATE_MAX, rate);
+                "2 pi f_n and 4 pi f_n zeta of mode[%lu] must be at most %g 1/s in a plant, got %g; lower f_n or zeta",
+                (unsigned long)i + 1, HSEP_PLANT_RATE_MAX, rate);
         }
     }
     return HSEP_OK;
 }
 
-HSEP_API void hsep_drive_begin(hsep_drive *self, const double values[])
+HSEP_API void hsep_drive_begin(const hsep_context *context, hsep_drive *self, const double values[])
 {
-    hsep_mode modes[HSEP_N_MODES];
-    hsep_modes_read(&values[HSEP_VR_mode], HSEP_N_MODES, modes);
     hsep_stage_init(
-        self, modes, HSEP_N_MODES, values[HSEP_VR_f], values[HSEP_VR_kappa],
+        self, hsep_table_modes(context, values), context->n_modes, values[HSEP_VR_f], values[HSEP_VR_kappa],
         (hsep_friction_on)values[HSEP_VR_friction_on], values[HSEP_VR_T_s], values[HSEP_VR_x_d]);
 }
 
 HSEP_API hsep_status hsep_drive_step(hsep_drive *self, double x_d, double h, char message[])
 {
-    double work[HSEP_STAGE_WORK * HSEP_N_MODES] = {0.0}; /* zeros, because gcc cannot see that all of it is filled */
-    if (!hsep_stage_step(self, x_d, h, work)) {
+    double *work = hsep_at(self, (uint64_t)hsep_stage_size(self->n_modes) / sizeof(double));
+    const int done = hsep_stage_step(self, x_d, h, work);
+    memset(work, 0, stage_work_size(self->n_modes));
+    if (!done) {
         return hsep_message_add(message, "the stage's state overflowed (command %g m)", x_d);
     }
     return HSEP_OK;
@@ -44,7 +47,7 @@ HSEP_API hsep_status hsep_drive_step(hsep_drive *self, double x_d, double h, cha
 
 HSEP_API double hsep_drive_velocity(const hsep_drive *self) { return self->v; }
 
-HSEP_API int hsep_drive_valid(const void *block, size_t bytes, const double values[])
+HSEP_API int hsep_drive_valid(const hsep_context *context, const void *block, size_t bytes, const double values[])
 {
     hsep_stage stage;
     memcpy(&stage, block, sizeof stage);
@@ -53,7 +56,7 @@ HSEP_API int hsep_drive_valid(const void *block, size_t bytes, const double valu
     return hsep_within(numbers, sizeof numbers / sizeof *numbers, HSEP_PREDICTION_MAX) &&
            hsep_within(
                (const char *)block + sizeof stage, (bytes - sizeof stage) / sizeof(double), HSEP_PREDICTION_MAX) &&
-           hsep_stage_valid(block, HSEP_N_MODES) && stage.friction_on == (uint64_t)values[HSEP_VR_friction_on] &&
+           hsep_stage_valid(block, context->n_modes) && stage.friction_on == (uint64_t)values[HSEP_VR_friction_on] &&
            stage.clock.T_s == values[HSEP_VR_T_s];
 }
 

@@ -1,0 +1,26 @@
+/* The table of one FMU in its resources, where one binary serves all FMUs of a kind (HSEP_TABLE_IN_RESOURCES).
+ *
+ * The resource variables.bin, little-endian: "HSEPVAR1"; as uint64 the size of the file in bytes, HSEP_INTERFACE, the
+ * number of modes, and whether the axis is rotary; the GUID in HSEP_GUID_SIZE bytes, filled with zeros; as doubles the
+ * start values of the single variables and of the numbers of the modes; the CRC-32 of all before as uint64.
+ *
+ * Names, kinds and ranges are the binary's own, so no file can allow what the models do not.
+ */
+#ifndef HSEP_TABLE_FILE_H
+#define HSEP_TABLE_FILE_H
+
+#include "hsep_api.h"
+#include "hsep_instance.h"
+
+#define HSEP_GUID_SIZE 48 /* a GUID in braces, padded with zeros */
+
+#ifdef HSEP_TABLE_IN_RESOURCES
+
+/* Read the file from the instance's resources, or where there is none from those beside the library, which then are the
+ * instance's; fill the context, but its resources. Fails if there is none, or it is not one of this binary, damaged or
+ * out of a range; HSEP_WARNED: the instance's resources had none. */
+HSEP_API hsep_status hsep_table_file_open(hsep_instance *instance, const char *call, char message[]);
+
+#endif
+
+#endif

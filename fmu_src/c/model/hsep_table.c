@@ -1,0 +1,70 @@
+#include "hsep_table.h"
+
+#include "hsep_layout.h"
+
+#include <stdio.h>
+#include <string.h>
+
+/* The numbers of the modes are read in place. */
+HSEP_ASSERT(numbers_of_a_mode, sizeof(hsep_mode) == HSEP_MODE_NUMBERS * sizeof(double));
+
+/* Variables before the windows, which are those with a start value. */
+static size_t table_before_windows(const hsep_context *context)
+{
+    return context->n_scalars + HSEP_MODE_NUMBERS * context->n_modes;
+}
+
+HSEP_API const hsep_variable *hsep_table_row(const hsep_context *context, size_t place)
+{
+    const size_t before = table_before_windows(context);
+    size_t row = place;
+    if (place >= before) {
+        const size_t modes = context->n_modes > 0 ? HSEP_MODE_NUMBERS : 0;
+        row = context->n_scalars + modes + (place - before) / context->window;
+    } else if (place >= context->n_scalars) {
+        row = context->n_scalars + (place - context->n_scalars) % HSEP_MODE_NUMBERS;
+    }
+    return &context->variables[row];
+}
+
+HSEP_API const char *hsep_table_name(const hsep_context *context, size_t place, char text[HSEP_NAME_SIZE])
+{
+    const size_t before = table_before_windows(context);
+    const char *name = hsep_table_row(context, place)->name;
+    if (place >= before) {
+        const size_t sample = (place - before) % context->window + 1;
+        snprintf(text, HSEP_NAME_SIZE, "%.40s[%lu]", name, (unsigned long)sample);
+    } else if (place >= context->n_scalars) {
+        const size_t mode = (place - context->n_scalars) / HSEP_MODE_NUMBERS + 1;
+        snprintf(text, HSEP_NAME_SIZE, "mode[%lu].%.30s", (unsigned long)mode, name);
+    } else {
+        snprintf(text, HSEP_NAME_SIZE, "%.60s", name);
+    }
+    return text;
+}
+
+HSEP_API const char *hsep_table_unit(const hsep_context *context, size_t place)
+{
+    const hsep_variable *row = hsep_table_row(context, place);
+    return context->angular ? row->angular_unit : row->unit;
+}
+
+HSEP_API double hsep_table_start(const hsep_context *context, size_t place)
+{
+    return place < table_before_windows(context) ? context->starts[place] : 0.0;
+}
+
+HSEP_API size_t hsep_table_place(const hsep_context *context, const char *name)
+{
+    char text[HSEP_NAME_SIZE];
+    size_t place = 0;
+    while (place < context->n_variables && strcmp(hsep_table_name(context, place, text), name) != 0) {
+        place++;
+    }
+    return place;
+}
+
+HSEP_API const hsep_mode *hsep_table_modes(const hsep_context *context, const double values[])
+{
+    return (const hsep_mode *)(const void *)&values[context->n_scalars];
+}

@@ -1,0 +1,47 @@
+"""C sources of the native FMUs: ours, one file that includes them all, and the FMI headers they are compiled with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+
+from ..base.data_files import data_folder
+from ..base.errors import FmuError
+
+__all__ = ["all_c", "c_sources", "fmi_headers"]
+
+_FMI_HEADERS = ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")
+
+
+@cache
+def c_sources() -> dict[str, bytes]:
+    """Return our C files by name, with ``all.c`` first; ``hsep_fmu.h`` and the FMI headers are not among them."""
+    root = data_folder("fmu_src") / "c"
+    ours = {path.name: path.read_bytes() for path in sorted(root.rglob("*.[ch]"))}
+    return {"all.c": all_c([file for file in ours if file.endswith(".c")]).encode(), **ours}
+
+
+def all_c(files: Sequence[str]) -> str:
+    """Return the C file that includes all others, in which the FMI functions alone have external linkage."""
+    includes = "".join(f'#include "{file}"\n' for file in files)
+    return f"""/* The whole FMU as one translation unit: compile this file alone, with your FMI 2.0 headers. */
+#define HSEP_API static inline /* see hsep_api.h */
+
+{includes}"""
+
+
+def fmi_headers() -> dict[str, bytes]:
+    """Return the FMI 2.0 headers for shared libraries, as fmpy carries them, with the line ends of a text file.
+
+    Raises
+    ------
+    FmuError
+        If fmpy is not installed.
+    """
+    found = find_spec("fmpy")
+    if found is None or found.origin is None:
+        raise FmuError("the FMI headers come with fmpy, which is not installed: pip install fmpy")
+    folder = Path(found.origin).parent / "c-code"
+    return {file: (folder / file).read_bytes().replace(b"\r\n", b"\n") for file in _FMI_HEADERS}

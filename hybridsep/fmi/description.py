@@ -1,0 +1,36 @@
+"""Description of an FMU by which tables, headers and documents are made: model, name, start values, modes, unit."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..base.settings import PARAMETERS
+from ..machines.machine import Machine
+from ..machines.sections import FeedDriveSection
+
+__all__ = ["fmu_description"]
+
+
+def fmu_description(machine: Machine, model: str, name: str) -> dict[str, Any]:
+    """Return the description from which an FMU is made: model, name, start values, modes, and unit unless it is m."""
+    description = _description(machine, model, name)
+    return description if machine.unit == "m" else {**description, "unit": machine.unit}
+
+
+def _description(machine: Machine, model: str, name: str) -> dict[str, Any]:
+    if model in ("HybridPredictor", "SepCompensator"):
+        physics = [{"f_n": m.f_n, "zeta": m.zeta, "alpha": m.alpha, "beta": m.beta} for m in machine.model.modes]
+        values = machine.fmi_parameters() if model == "HybridPredictor" else machine.fmi_compensator_parameters()
+        return {"model": model, "name": name, "parameters": values, "modes": physics}
+    if model == "ReferenceTrajectory":
+        return {"model": model, "name": name, "parameters": {"trajectory": 0, "T_s": machine.T_s}, "modes": []}
+    assert machine.plant is not None  # by fmu_names
+    modes = [mode.model_dump() for mode in machine.physics.mode]
+    parameters: dict[str, object] = machine.plant.model_dump(exclude={"kind"})
+    if isinstance(machine.plant, FeedDriveSection):
+        assert machine.physics.spring_mass_damper is not None  # by Machine
+        parameters |= machine.physics.spring_mass_damper.model_dump()
+    else:
+        parameters["T_s"] = machine.T_s
+        parameters["friction_on"] = PARAMETERS["friction_on"].to_fmi(machine.plant.friction_on)
+    return {"model": model, "name": name, "parameters": parameters, "modes": modes}

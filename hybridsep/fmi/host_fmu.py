@@ -1,0 +1,132 @@
+"""A native FMU run from its own content, before it is an archive: the model of its reference results."""
+
+from __future__ import annotations
+
+import _ctypes
+import ctypes
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from ..base.errors import FmuError
+from .c_header import kind_of
+from .compiler import TARGETS, host_target
+from .libraries import libraries
+from .table_file import TABLE_FILE, table_file
+from .variables import Variable, variables_of
+
+__all__ = ["HostFmu", "host_fmu"]
+
+_CO_SIMULATION = 1
+_OK = 0
+_NUMBERS = {"Real": ctypes.c_double, "Integer": ctypes.c_int, "Enumeration": ctypes.c_int, "Boolean": ctypes.c_int}
+
+
+class HostFmu:
+    """An instance of a native FMU with its start values, sample by sample.
+
+    Parameters
+    ----------
+    library : ctypes.CDLL
+        Of its kind.
+    description : mapping
+        ``model``, ``name``, ``parameters`` and ``modes``.
+    guid : str
+    resources : Path
+    T_s : float, s
+    """
+
+    def __init__(
+        self, library: ctypes.CDLL, description: Mapping[str, Any], guid: str, resources: Path, T_s: float
+    ) -> None:
+        table = list(enumerate(variables_of(description)))
+        self._inputs = [i for i, variable in table if variable.causality == "input"]
+        self._outputs = [(i, variable) for i, variable in table if variable.causality == "output"]
+        self._library, self._T_s, self._k = library, T_s, 0
+        library.fmi2Instantiate.restype = ctypes.c_void_p
+        text = [description["name"].encode(), guid.encode(), resources.as_uri().encode()]
+        self._component = ctypes.c_void_p(
+            library.fmi2Instantiate(text[0], _CO_SIMULATION, text[1], text[2], None, 0, 0)
+        )
+        if not self._component:
+            raise FmuError(f"{description['name']}: the FMU that is being built cannot be instantiated")
+        self._call("SetupExperiment", 0, ctypes.c_double(0.0), ctypes.c_double(0.0), 0, ctypes.c_double(0.0))
+        self._call("EnterInitializationMode")
+        self._call("ExitInitializationMode")
+
+    def outputs(self) -> list[float]:
+        """Return all outputs, in the order of the table."""
+        return [self._get(place, variable) for place, variable in self._outputs]
+
+    def sample(self, *inputs: float) -> None:
+        """Do one step of T_s, with all inputs in the order of the table."""
+        n = len(self._inputs)
+        self._call("SetReal", (ctypes.c_uint * n)(*self._inputs), ctypes.c_size_t(n), (ctypes.c_double * n)(*inputs))
+        self._call("DoStep", ctypes.c_double(self._k * self._T_s), ctypes.c_double(self._T_s), 1)
+        self._k += 1
+
+    def close(self) -> None:
+        """End the instance."""
+        self._library.fmi2FreeInstance(self._component)
+
+    def _get(self, place: int, variable: Variable) -> float:
+        value: Any = _NUMBERS[variable.kind]()
+        kind = "Integer" if variable.kind == "Enumeration" else variable.kind
+        self._call(f"Get{kind}", ctypes.byref(ctypes.c_uint(place)), ctypes.c_size_t(1), ctypes.byref(value))
+        return float(value.value)
+
+    def _call(self, name: str, *arguments: Any) -> None:
+        if getattr(self._library, f"fmi2{name}")(self._component, *arguments) != _OK:
+            raise FmuError(f"fmi2{name} was refused by the FMU that is being built")
+
+
+@contextmanager
+def host_fmu(
+    description: Mapping[str, Any], guid: str, resources: Mapping[str, bytes], T_s: float
+) -> Iterator[HostFmu | None]:
+    """Run an FMU on this machine; None where no library of its kind can be loaded here.
+
+    Parameters
+    ----------
+    description : mapping
+        ``model``, ``name``, ``parameters`` and ``modes``.
+    guid : str
+    resources : mapping
+        Content of its resources by file name; the table is added.
+    T_s : float, s
+    """
+    with TemporaryDirectory(ignore_cleanup_errors=True) as place:
+        library = _loaded(kind_of(description), Path(place))
+        if library is None:
+            yield None
+            return
+        for file, content in {**resources, TABLE_FILE: table_file(description, guid)}.items():
+            (Path(place) / file).write_bytes(content)
+        try:
+            fmu = HostFmu(library, description, guid, Path(place), T_s)
+            try:
+                yield fmu
+            finally:
+                fmu.close()
+        finally:
+            _unload(library)
+
+
+def _loaded(kind: str, folder: Path) -> ctypes.CDLL | None:
+    """Return a copy of the kind's library for this machine, loaded from a folder."""
+    try:
+        target = host_target()
+        file = folder / f"{kind}{TARGETS[target].suffix}"
+        file.write_bytes(libraries(kind, (target,))[target])
+        return ctypes.CDLL(str(file))
+    except (FmuError, OSError):  # another platform or C library; a folder from which nothing may be loaded
+        return None
+
+
+def _unload(library: ctypes.CDLL) -> None:
+    """Let go of a library, whose file Windows keeps as long as it is loaded."""
+    release = "FreeLibrary" if sys.platform == "win32" else "dlclose"
+    getattr(_ctypes, release)(library._handle)

@@ -1,0 +1,41 @@
+"""Table ``resources/variables.bin`` of a native FMU: what a library that serves all FMUs of a kind reads of one.
+
+Layout, little-endian: ``HSEPVAR1``; as u64 the size of the file in bytes, the number of the kind's interface, the
+number of modes, and whether the axis is rotary; the GUID in 48 bytes, filled with zeros; as float64 the start values of
+single variables and of the modes' numbers; the CRC-32 of all before as u64.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Mapping
+
+from .c_header import interface_number, kind_of, layout_of
+from .variables import variables_of
+
+__all__ = ["TABLE_FILE", "table_file"]
+
+TABLE_FILE = "variables.bin"
+_HEAD = struct.Struct("<8s4Q48s")
+_CHECKSUM = struct.Struct("<Q")
+_MAGIC = b"HSEPVAR1"
+
+
+def table_file(description: Mapping[str, object], guid: str) -> bytes:
+    """Return the content of the file.
+
+    Parameters
+    ----------
+    description : mapping
+        ``model``, ``parameters``, ``modes`` and ``unit`` unless it is m.
+    guid : str
+        The modelDescription's.
+    """
+    layout, kind = layout_of(variables_of(description)), kind_of(description)
+    starts = struct.pack(f"<{len(layout.starts)}d", *layout.starts)
+    size = _HEAD.size + len(starts) + _CHECKSUM.size
+    n_modes = len(layout.modes) // 4
+    angular = int(description.get("unit", "m") != "m")
+    content = _HEAD.pack(_MAGIC, size, interface_number(kind), n_modes, angular, guid.encode()) + starts
+    return content + _CHECKSUM.pack(zlib.crc32(content))

@@ -1,0 +1,97 @@
+"""Where the libraries of native FMUs come from: a wheel, a checkout's own, a compiler."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from command_line import Run
+from places import ROOT
+
+from hybridsep.base.errors import FmuError
+from hybridsep.fmi import libraries as module
+from hybridsep.fmi.c_header import KINDS
+from hybridsep.fmi.c_sources import c_sources
+from hybridsep.fmi.compiler import ALL_TARGETS, TARGETS, ZIG, expanded, host_target
+from hybridsep.fmi.libraries import default_targets, has_native, kept, libraries, ready_targets
+
+ALL = [(kind, target) for kind in KINDS for target in ALL_TARGETS]
+
+
+@pytest.fixture
+def without(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """A machine without compilers and kept libraries; the folder where they would be kept."""
+    monkeypatch.setattr("hybridsep.fmi.compiler.find_spec", lambda name: None)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setenv("HYBRIDSEP_LIBRARIES", str(tmp_path / "kept"))
+    monkeypatch.setattr(module, "_SHIPPED", tmp_path / "shipped")
+    return tmp_path
+
+
+def fill(folder: Path, wanted: list[tuple[str, str]]) -> None:
+    for kind, target in wanted:
+        (folder / kind).mkdir(parents=True, exist_ok=True)
+        (folder / kind / f"{target}{TARGETS[target].suffix}").write_bytes(f"{kind} for {target}".encode())
+
+
+def test_without_compiler_and_libraries_build_says_what_to_do(without: Path, hybridsep: Run) -> None:
+    assert not has_native()
+    assert default_targets() == ("host",)
+    status, _, error = hybridsep("build", "FeedDrive", "--target", "host", "--out", without)
+    assert status == 2
+    assert "no C compiler: no ziglang and none of $CC, cc, gcc, clang; pip install ziglang" in " ".join(error.split())
+    status, _, error = hybridsep("build", "FeedDrive", "--target", "win64", "--out", without)
+    assert status == 2
+    assert "pip install ziglang, or ask for the target host" in " ".join(error.split())
+
+
+def test_the_libraries_of_a_wheel_need_no_compiler(without: Path) -> None:
+    fill(without / "shipped", ALL)
+    assert has_native()
+    assert default_targets() == ready_targets() == ALL_TARGETS
+    found = libraries("FeedDrive", ("host", "darwin64"))
+    assert found == {
+        target: f"FeedDrive for {target}".encode() for target in (host_target(), "x86_64-darwin", "aarch64-darwin")
+    }
+
+
+def test_a_command_of_its_own_does_not_wait_for_other_platforms(without: Path) -> None:
+    fill(without / "shipped", [(kind, host_target()) for kind in KINDS])
+    assert has_native()
+    assert ready_targets() == ("host",)
+    with pytest.raises(FmuError, match="compiling for other platforms needs ziglang"):
+        libraries("FeedDrive", [target for target in ALL_TARGETS if target != host_target()])
+
+
+def test_what_was_compiled_is_kept_by_sources_and_compiler(without: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    place = module._place(ZIG, ("FeedDrive", "x86_64-linux"))
+    assert place.parent.parent.parent == without / "kept"
+    assert module._place("ziglang 0.1", ("FeedDrive", "x86_64-linux")) != place
+    fill(place.parent.parent, [("FeedDrive", "x86_64-linux")])
+    assert kept(("FeedDrive", "x86_64-linux")) == place
+    sources = {**c_sources(), "all.c": b"int other;"}
+    monkeypatch.setattr(module, "c_sources", lambda: sources)
+    module._version.cache_clear()
+    assert kept(("FeedDrive", "x86_64-linux")) is None
+    module._version.cache_clear()
+
+
+def test_only_a_few_versions_are_kept(without: Path) -> None:
+    for i in range(7):
+        fill(without / "kept" / f"version {i}", [("FeedDrive", "x86_64-linux")])
+    module._forget_old_versions()
+    assert len(list((without / "kept").iterdir())) == 4
+
+
+def test_the_build_requirement_is_the_compiler_of_the_libraries() -> None:
+    project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    assert set(re.findall(r'"(ziglang==[\d.]+)', project)) == {ZIG.replace(" ", "==")}
+
+
+def test_names_of_platforms() -> None:
+    assert expanded(("linux64", "host", "x86_64-linux", "win32"))[0] == "x86_64-linux"
+    assert len(expanded(("linux64", "x86_64-linux"))) == 1
+    with pytest.raises(FmuError, match="no target sparc; there are host, x86_64-linux"):
+        expanded(("sparc",))
