@@ -1,4 +1,4 @@
-"""Command line ``hybridsep fit | identify | tune | init | demo | build | cosim | backtest | report | example-log``."""
+"""Command line ``hybridsep``: one function a command."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from .command_cosim import cosim
 from .command_demo import demo
 from .command_example_log import example_log
 from .command_fit import fit
+from .command_fleet import fleet
 from .command_identify import identify
 from .command_init import init
 from .command_report import report
@@ -32,7 +33,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     add_completion=False,
 )
-for _command in (fit, identify, tune, init, demo, build, cosim, backtest, report, example_log):
+for _command in (fit, identify, tune, init, demo, build, cosim, backtest, report, fleet, example_log):
     app.command()(_command)
 
 

@@ -146,6 +146,7 @@ def fit(
     progress: Progress = lambda _message, _done: None,
     *,
     changes: Sequence[str] = (),
+    fmus: bool = True,
 ) -> Fit:
     """Identify an axis from its logs, choose settings, judge them, and build its FMUs.
 
@@ -164,6 +165,8 @@ def fit(
         Called with a message and the fraction done.
     changes : sequence of str
         What was done to the logs' positions before, for the machine file's ``sources``.
+    fmus : bool
+        Whether FMUs are built, and their steps timed.
 
     Raises
     ------
@@ -221,13 +224,16 @@ def fit(
     if compensates:
         estimate = within(0.85, 0.87, "tracking error with compensation")
         tracking = stages.result("tracking", lambda: expected_tracking(machine, recordings, estimate))
-    for i, flavour in enumerate(_flavours()):
+    steps: dict[str, float] = {}
+    for i, flavour in enumerate(_flavours() if fmus else ()):
         progress(f"build the {flavour} FMU", 0.87 + 0.04 * i)
         for built in (_MODEL, _COMPENSATOR) if compensates else (_MODEL,):
             build_here(machine, built, out, flavour, weights=files["trained predictor"])
-    progress("time the FMU's steps", 0.95)
-    fmu = files[f"{_flavours()[0]} FMU"]
-    steps = step_times(fmu, recordings[0].x_d, recordings[0].x)
+    if fmus:
+        progress("time the FMU's steps", 0.95)
+        steps = step_times(files[f"{_flavours()[0]} FMU"], recordings[0].x_d, recordings[0].x)
+    else:
+        files = {what: path for what, path in files.items() if path.suffix != ".fmu"}
     result = Fit(machine, found, choice, windows, steps, options.share, judged, tuple(files.values()), tracking)
     stages.keep("judged", result.summary()["judged"])
     progress("done", 1.0)

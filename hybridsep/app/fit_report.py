@@ -68,8 +68,9 @@ def fit_report(fit: Fit, logs: Sequence[Log], findings: Mapping[str, Sequence[Fi
     _write_settings(report, fit, judged)
     write_tracking(report, fit.tracking, judged.shown)
     fmus = [path.name for path in fit.files if path.suffix == ".fmu"]
-    write_use(report, fmus, fit.steps, T_s, Np)
-    report.paragraph(f"{' and '.join(fmus)} start with what the log has taught.")
+    if fmus:
+        write_use(report, fmus, fit.steps, T_s, Np)
+        report.paragraph(f"{' and '.join(fmus)} start with what the log has taught.")
     return report
 
 

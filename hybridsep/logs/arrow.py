@@ -41,7 +41,7 @@ class ArrowSource(ArrowColumnsSource):
         ipc = import_module("pyarrow.ipc")
         with self.path.open("rb") as file:
             whole = file.read(len(_FILE)) == _FILE
-        with self._arrow.memory_map(str(self.path)) as content:
+        with self._arrow.OSFile(str(self.path)) as content:
             if whole:
                 with ipc.open_file(content) as reader:
                     yield reader, (reader.get_batch(i) for i in range(reader.num_record_batches))

@@ -69,6 +69,7 @@ class CaptureSource(Source):
             for name, axis in axes.items()
             if name.split("|")[0] in (_COMMANDED, _MEASURED)
         }
+        self.axes = list(self._axes)
         self._choose_first()
 
     @staticmethod

@@ -54,6 +54,7 @@ class _HalscopeSource(Source):
                 joint = name.removesuffix(f".{commanded}")
                 if joint != name and f"{joint}.{measured}" in names:
                     self._joints.setdefault(joint, (name, f"{joint}.{measured}"))
+        self.axes = list(self._joints)
         self.roles = {_TIME: _TIME}
         self.remarks = [_UNIT]
         if self._joints:

@@ -6,10 +6,10 @@ import gc
 import sys
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
@@ -37,7 +37,7 @@ class MdfSource(RecordsSource):
         self._places: dict[str, tuple[int, int]] = {}
         self._intervals: dict[int, float] = {}
         units: dict[str, str] = {}
-        with self._opened() as file:
+        with self._opened() as file, self._reading("it"):
             found = [(g, i, channel) for g, group in enumerate(file.groups) for i, channel in enumerate(group.channels)]
             counts = Counter(channel.name for _, _, channel in found)
             for g, i, channel in found:
@@ -87,17 +87,18 @@ class MdfSource(RecordsSource):
 
     @contextmanager
     def _opened(self) -> Iterator[Any]:
-        file = self._open()
-        try:
-            with self._reading("it"):
+        # Of an open file asammdf reads the records that it is asked for; of a path, it may read a column whole
+        with self.path.open("rb") as content:
+            file = self._open(content)
+            try:
                 yield file
-        finally:
-            file.close()
+            finally:
+                file.close()
 
-    def _open(self) -> Any:
+    def _open(self, content: IO[bytes]) -> Any:
         with quiet("asammdf"):
             try:
-                return self._module.MDF(self.path, process_bus_logging=False)
+                return self._module.MDF(content, process_bus_logging=False)
             except MemoryError:
                 raise
             except Exception as error:  # a damaged file makes it fail in nearly every way there is
@@ -111,7 +112,7 @@ class MdfSource(RecordsSource):
     def _reading(self, what: str) -> Iterator[None]:
         """Turn what asammdf raises into LogError."""
         try:
-            with quiet("asammdf"):
+            with quiet("asammdf"), redirect_stdout(None):  # it prints how fast it is
                 yield
         except (MemoryError, LogError):
             raise

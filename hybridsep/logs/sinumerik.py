@@ -68,6 +68,7 @@ class SinumerikSource(Source):
         self.units = dict.fromkeys(self._clocks, "s")
         self.assumed_units = {name: "mm" for name, signal in self._signals.items() if signal.kind == "posn"}
         self._axes = self._positions()
+        self.axes = list(self._axes)
         if self._axes:
             first = next(iter(self._axes))
             self.choose_axis(first)

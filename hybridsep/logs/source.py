@@ -87,6 +87,8 @@ class Source(ABC):
     times : mapping
         Name of a column → column of its times, where columns may be sampled at rates of their own; only those with the
         same times can be read side by side.
+    axes : sequence of str
+        Axes that :meth:`choose_axis` takes, where the format names several.
     remarks : list of str
         What was chosen for the reader that the user may want to change.
     advice : str
@@ -109,6 +111,7 @@ class Source(ABC):
         self.roles: Mapping[str, str] = {}
         self.stamps: Set[str] = frozenset()
         self.times: Mapping[str, str] = {}
+        self.axes: Sequence[str] = ()
         self.remarks: list[str] = []
         self.advice = ""
         self.measured, self.may_miss = "", False

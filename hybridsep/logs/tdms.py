@@ -41,7 +41,7 @@ class TdmsSource(RecordsSource):
         self._kinds: dict[str, np.dtype[Any]] = {}
         self._firsts: dict[str, Any] = {}
         units, times = {}, {}
-        with self._opened() as file:
+        with self._opened() as file, self._reading("it"):
             if file.file_status.incomplete_final_segment:
                 raise LogError(f"{path}: is truncated: its last segment is incomplete")
             found = [channel for group in file.groups() for channel in group.channels()]
@@ -100,8 +100,12 @@ class TdmsSource(RecordsSource):
 
     @contextmanager
     def _opened(self) -> Iterator[Any]:
-        with self._reading("it"), self._module.TdmsFile.open(self.path) as file:
+        with self._reading("it"):
+            file = self._module.TdmsFile.open(self.path)
+        try:
             yield file
+        finally:
+            file.close()
 
     @contextmanager
     def _reading(self, what: str) -> Iterator[None]:

@@ -1,0 +1,137 @@
+"""What a task of a fleet is: a log and an axis, and how they are read and fitted; paths, never data."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from ..base.version import __version__
+from ..fleet.results import key_of
+from ..fleet.sources import LogFile
+from ..logs.log import Log, read_log
+
+__all__ = ["AxisTask", "FleetSettings", "Looked"]
+
+
+@dataclass(frozen=True)
+class FleetSettings:
+    """How every log is read and fitted, or replayed.
+
+    Attributes
+    ----------
+    Np : int, optional
+    unit, T_s, columns : optional
+        As of :func:`~hybridsep.logs.log.read_log`.
+    axes : tuple of str
+        Axes that are read of a log with several; all if empty.
+    resample, fix : bool
+    known : tuple of pairs
+        Entries of ``[predictor]`` that are known.
+    machines : str
+        Folder of machine files, ``MACHINE.toml`` or ``MACHINE_AXIS.toml``, with which logs are replayed; empty to fit.
+    fmus, reports : bool
+        Whether FMUs are built and reports written.
+    """
+
+    Np: int | None = None
+    unit: str | None = None
+    T_s: float | None = None
+    columns: tuple[tuple[str, str], ...] = ()
+    axes: tuple[str, ...] = ()
+    resample: bool = False
+    fix: bool = False
+    known: tuple[tuple[str, Any], ...] = ()
+    machines: str = ""
+    fmus: bool = True
+    reports: bool = True
+
+    def key(self) -> str:
+        """Return a hash of the settings and of the machine files."""
+        found = hashlib.sha256(repr(replace(self, machines="")).encode())
+        for path in sorted(Path(self.machines).glob("*.toml")) if self.machines else ():
+            found.update(path.name.encode() + b"\0" + path.read_bytes())
+        return found.hexdigest()
+
+    def read(self, path: Path, axis: str) -> Log:
+        """Read an axis of a log."""
+        return read_log(
+            path,
+            columns=dict(self.columns),
+            unit=self.unit,
+            T_s=self.T_s,
+            axis=axis or None,
+            uniform=False,
+            resample=self.resample,
+        )
+
+
+@dataclass(frozen=True)
+class Looked:
+    """Log that has been looked at.
+
+    Attributes
+    ----------
+    log : LogFile
+    content : str
+        Hash of its content.
+    axes : tuple of str
+        Those of its axes that are wanted; one without a name where the format names none.
+    """
+
+    log: LogFile
+    content: str
+    axes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class AxisTask:
+    """Axis of a log.
+
+    Attributes
+    ----------
+    looked : Looked
+    axis : str
+    settings : FleetSettings
+    settings_key : str
+    out : str
+        Folder of the results.
+    run : str
+        When the run began, ISO.
+    """
+
+    looked: Looked
+    axis: str
+    settings: FleetSettings
+    settings_key: str
+    out: str
+    run: str
+
+    @property
+    def key(self) -> str:
+        """Key of its row."""
+        return key_of(self.looked.content, self.axis, self.settings_key)
+
+    def row(self) -> dict[str, Any]:
+        """Return what is known of its row before the work."""
+        log = self.looked.log
+        return {
+            "key": self.key,
+            "url": log.url,
+            "size": log.size,
+            "stamp": log.stamp,
+            "log": self.looked.content,
+            "machine": log.machine,
+            "axis": self.axis,
+            "axes": json.dumps(self.looked.axes),
+            "settings": self.settings_key,
+            "recorded": log.recorded,
+            "run": self.run,
+            "version": __version__,
+        }
+
+    def failed(self, message: str) -> dict[str, Any]:
+        """Return its row where there are no figures."""
+        return {**self.row(), "status": "failed", "message": message}

@@ -1,0 +1,181 @@
+"""Work of a fleet on one log and axis: fitted as by ``hybridsep fit``, or replayed with a machine file and judged."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..base.errors import MachineError, brief
+from ..base.metrics import rms_ratio
+from ..base.threads import one_blas_thread
+from ..evaluate.report import Report
+from ..fleet.sources import LogFile, local_copy
+from ..intake.finding import Finding
+from ..logs.formats import open_source
+from ..machines.machine import Machine, load_machine
+from ..predict.predictor import HybridPredictor
+from ..tune.halves import Recording, Replay, replay
+from .arguments import check_interval, check_unit, machine_name
+from .extent import extent
+from .fit import FitOptions, fit
+from .fit_report import fit_report, judged_by
+from .fleet_settings import AxisTask, FleetSettings, Looked
+from .judged import Judged, recommendation
+from .log_intake import changes, findings_table, take_in
+from .report_sections import write_errors, write_findings
+
+__all__ = ["look", "work"]
+
+_FAST = 0.1
+"""Share of the largest velocity from which on an axis counts as moving, for the estimate of friction."""
+
+
+@dataclass
+class _Judged:
+    """What came of an axis."""
+
+    judged: Judged
+    machine: Machine
+    findings: Mapping[str, Sequence[Finding]]
+    modes: list[dict[str, Any]] = field(default_factory=list)
+    folder: str = ""
+
+
+def look(task: tuple[LogFile, FleetSettings]) -> Looked:
+    """Return the hash of a log's content, and its axes.
+
+    Raises
+    ------
+    LogError
+        If it cannot be read.
+    """
+    log, settings = task
+    with local_copy(log.url) as path:
+        content = hashlib.sha256()
+        with path.open("rb") as file:
+            while piece := file.read(1 << 20):
+                content.update(piece)
+        there = tuple(open_source(path).axes)
+    axes = tuple(axis for axis in settings.axes if axis in there) if settings.axes and there else there
+    return Looked(log, content.hexdigest(), axes or settings.axes[:1] or ("",))
+
+
+def work(task: AxisTask) -> dict[str, Any]:
+    """Fit or replay an axis; return its row.
+
+    Raises
+    ------
+    HybridSepError
+        If the log, or the axis, cannot be used.
+    """
+    begin = time.perf_counter()
+    with one_blas_thread, local_copy(task.looked.log.url) as path:
+        found = _replayed(task, path) if task.settings.machines else _fitted(task, path)
+        return {**task.row(), **_figures(found), "seconds": time.perf_counter() - begin}
+
+
+def _fitted(task: AxisTask, path: Path) -> _Judged:
+    used, findings = take_in([task.settings.read(path, task.axis)], fix=task.settings.fix)
+    folder = _folder(task)
+    name = machine_name(path, task.axis)
+    options = FitOptions(task.settings.Np, name, known=dict(task.settings.known))
+    result = fit(used, folder, options, changes=changes(findings), fmus=task.settings.fmus)
+    if task.settings.reports:
+        fit_report(result, used, findings).write(folder / "report.html")
+    judged = judged_by(result, used[0].shown)
+    return _Judged(judged, result.machine, findings, result.identification["modes"], _below(task, folder))
+
+
+def _replayed(task: AxisTask, path: Path) -> _Judged:
+    log = task.settings.read(path, task.axis)
+    machine = _machine(task)
+    check_unit(path.name, log, machine)
+    check_interval(path.name, log.T_s, machine)
+    (used,), findings = take_in([log], fix=task.settings.fix)
+    predictor = HybridPredictor(machine.model, machine.predictor_settings)
+    recordings = [Recording(one.x_d, one.x_meas, 0) for one in used.segments()]
+    judged = Judged(replay(predictor, recordings).with_peers(), used.T_s, used.shown, "the log")
+    folder = _folder(task)
+    if task.settings.reports:
+        report = Report(f"{machine.title}: {path.name}", extent([used]))
+        report.paragraph(recommendation(judged), "verdict")
+        write_errors(report, judged, "Errors of the replay", "The predictor began without any knowledge.")
+        write_findings(report, findings)
+        report.write(folder / "report.html")
+    return _Judged(judged, machine, findings, [], _below(task, folder))
+
+
+def _machine(task: AxisTask) -> Machine:
+    """Return the machine file of a log and axis."""
+    machine = task.looked.log.machine
+    names = [f"{machine}_{task.axis}", machine] if task.axis else [machine]
+    for name in names:
+        path = Path(task.settings.machines) / f"{name}.toml"
+        if path.is_file():
+            return load_machine(path)
+    raise MachineError(f"{task.settings.machines}: there is no machine file for {brief(machine)}: {names[0]}.toml")
+
+
+def _folder(task: AxisTask) -> Path:
+    name = machine_name(Path(task.looked.log.url.rpartition("/")[2]), task.axis)
+    folder = Path(task.out) / "axes" / f"{name}_{task.key[:12]}"
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def _below(task: AxisTask, folder: Path) -> str:
+    return folder.relative_to(task.out).as_posix() if task.settings.reports or not task.settings.machines else ""
+
+
+def _figures(found: _Judged) -> dict[str, Any]:
+    judged, settings = found.judged, found.machine.predictor_settings
+    rms_pb, rms_hold, rms_h = judged.replay.rms()
+    best, verdict = judged.replay.best(), judged.replay.verdict()
+    peers = {one.name: None if one.diverged else _known(one.rms) for one in judged.replay.scored()[2:-1]}
+    findings = [one for listed in found.findings.values() for one in findings_table(listed)]
+    return {
+        "status": "done",
+        "message": "",
+        "unit": found.machine.unit,
+        "T_s": judged.T_s,
+        "n_samples": sum(len(one.x) for one in judged.replay.recordings),
+        "n_windows": verdict.n_windows,
+        "Np": settings.Np,
+        "p": settings.p,
+        "q": settings.q,
+        "dead_time": float(found.machine.model.dead_time),
+        "rms_pb": _known(rms_pb),
+        "rms_hold": _known(rms_hold),
+        "rms_h": _known(rms_h),
+        "best": best.name,
+        "ratio": _known(rms_ratio(rms_h, best.rms)),
+        "verdict": str(verdict),
+        "advice": recommendation(judged),
+        "peers": json.dumps(peers),
+        "modes": json.dumps(found.modes),
+        "findings": json.dumps([[one["name"], one["severity"], one["words"]] for one in findings]),
+        "friction": _known(_friction(judged.replay)),
+        "folder": found.folder,
+    }
+
+
+def _friction(judging: Replay) -> float:
+    """Return half the difference of the physics model's mean residual between forward and backward motion, m."""
+    residual, v = judging.errors()[0], np.gradient(judging.commands()) if len(judging.commands()) > 1 else np.zeros(1)
+    fast = np.abs(v) > _FAST * np.abs(v).max(initial=0.0)
+    sides = [residual[fast & (side * v > 0) & ~np.isnan(residual)] for side in (1, -1)]
+    if not all(len(side) for side in sides):
+        return math.nan
+    return 0.5 * float(sides[0].mean() - sides[1].mean())
+
+
+def _known(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

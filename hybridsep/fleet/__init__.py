@@ -1,0 +1,1 @@
+"""Many logs of many machines: where they are, who works on them, and what came of it."""
