@@ -31,7 +31,8 @@ class FleetSettings:
     known : tuple of pairs
         Entries of ``[predictor]`` that are known.
     machines : str
-        Folder of machine files, ``MACHINE.toml`` or ``MACHINE_AXIS.toml``, with which logs are replayed; empty to fit.
+        Folder of machine files, ``MACHINE.toml`` or ``MACHINE/machine.toml``, or with ``_AXIS``, with which logs are
+        replayed; empty to fit.
     fmus, reports : bool
         Whether FMUs are built and reports written.
     """
@@ -51,8 +52,11 @@ class FleetSettings:
     def key(self) -> str:
         """Return a hash of the settings and of the machine files."""
         found = hashlib.sha256(repr(replace(self, machines="")).encode())
-        for path in sorted(Path(self.machines).glob("*.toml")) if self.machines else ():
-            found.update(path.name.encode() + b"\0" + path.read_bytes())
+        there = (
+            [*Path(self.machines).glob("*.toml"), *Path(self.machines).glob("*/machine.toml")] if self.machines else []
+        )
+        for path in sorted(there):
+            found.update(path.as_posix().encode() + b"\0" + path.read_bytes())
         return found.hexdigest()
 
     def read(self, path: Path, axis: str) -> Log:

@@ -117,11 +117,12 @@ def _machine(task: AxisTask) -> Machine:
     """Return the machine file of a log and axis."""
     machine = task.looked.log.machine
     names = [f"{machine}_{task.axis}", machine] if task.axis else [machine]
+    folder = Path(task.settings.machines)
     for name in names:
-        path = Path(task.settings.machines) / f"{name}.toml"
-        if path.is_file():
-            return load_machine(path)
-    raise MachineError(f"{task.settings.machines}: there is no machine file for {brief(machine)}: {names[0]}.toml")
+        for path in (folder / f"{name}.toml", folder / name / "machine.toml"):
+            if path.is_file():
+                return load_machine(path)
+    raise MachineError(f"{folder}: there is no machine file for {brief(machine)}: {names[0]}.toml")
 
 
 def _folder(task: AxisTask) -> Path:

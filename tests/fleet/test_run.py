@@ -53,7 +53,9 @@ def folder(tmp_path: Path) -> Path:
         path.parent.mkdir(parents=True)
         path.write_bytes(log(i))
         (tmp_path / "machines").mkdir(exist_ok=True)
-        shutil.copy(machine_path("spring_mass_damper"), tmp_path / "machines" / f"{machine}.toml")
+        place = f"{machine}.toml" if machine == "mill" else f"{machine}/machine.toml"
+        (tmp_path / "machines" / place).parent.mkdir(exist_ok=True)
+        shutil.copy(machine_path("spring_mass_damper"), tmp_path / "machines" / place)
     (tmp_path / "logs" / "saw" / "broken.csv").write_text("t,x_d,x\n0,0,0\n0.001,a,0\n")
     return tmp_path
 
@@ -95,7 +97,7 @@ def test_what_is_unchanged_is_left_alone(folder: Path) -> None:
     before = first[str(moved.with_name("X.csv"))]
     assert (later[str(moved)]["key"], later[str(moved)]["seconds"]) == (before["key"], before["seconds"])  # as it was
     assert len(run(folder, unit="m").rows) == 5
-    with (folder / "machines" / "saw.toml").open("a") as file:
+    with (folder / "machines" / "saw" / "machine.toml").open("a") as file:
         file.write("# another\n")
     assert len(run(folder).rows) == 5
 
