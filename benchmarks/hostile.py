@@ -44,8 +44,8 @@ MEMORY_MAX = 8 * 2**30
 MESSAGE_MAX = 900
 """Largest length of a message, in characters."""
 
-SAID = ("error: ", "warning: ", "note: ")
-"""Beginnings of the lines that a refusal consists of."""
+SAID = ("error: ", "warning: ", "note: ", "handled: ", "fixed: ", "Inconsistency detected by ld.so: ")
+"""Beginnings of the lines that a refusal consists of; the last one is of the system's loader, which a library ends."""
 
 PASSED = ("read", "refused")
 LIBRARIES = (
@@ -224,7 +224,7 @@ def run(arguments: Sequence[str], folder: Path) -> tuple[str, float, str]:
         return "hung", seconds, said
     if status < 0:
         return "killed", seconds, f"{signal.Signals(-status).name} {said}"
-    if "unexpected " in said or "fault of hybridsep" in said or "Traceback" in said:
+    if "error: unexpected " in said or "fault of hybridsep" in said or "Traceback" in said:
         return "unexpected", seconds, said
     if status == 0:
         return "read", seconds, said

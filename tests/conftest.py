@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import tempfile
 import zipfile
 
 # Threads make the small factorisations of these tests slower by two orders of magnitude on a busy machine. The
@@ -20,9 +21,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from built_once import BuiltFmus, built_once
+from built_once import SHARED_BUILDS, BuiltFmus, built_once
 from command_line import Run
 from hypothesis import HealthCheck, settings
+from quick_fits import without_other_windows
 from slow_tests import is_slow
 
 # No test fails because something else keeps the cores busy.
@@ -30,11 +32,25 @@ settings.register_profile("patient", deadline=None, suppress_health_check=[Healt
 settings.load_profile("patient")
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Give all processes of the session a folder for what they build; xdist's workers inherit it."""
+    if SHARED_BUILDS not in os.environ:
+        folder = tempfile.TemporaryDirectory(prefix="hsep_builds_")
+        os.environ[SHARED_BUILDS] = folder.name
+        config.add_cleanup(folder.cleanup)
+
+
 @pytest.hookimpl(tryfirst=True)  # before pytest deselects by marker
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if is_slow(item.nodeid):
             item.add_marker("slow")
+
+
+@pytest.fixture
+def quick_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let ``fit`` judge one look-ahead alone."""
+    without_other_windows(monkeypatch)
 
 
 @pytest.fixture(autouse=True)

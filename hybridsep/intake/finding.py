@@ -95,11 +95,16 @@ class Finding:
     def __str__(self) -> str:
         if self.applied and self.fix is not None:
             how, also = ("fixed", "; your controller must do the same") if self.fix.meaning else ("handled", "")
-            return f"{how}: {self.name}: {self.words}. Done: {self.fix.words}{also}."
+            return f"{how}: {self.name}: {_ended(self.words)} Done: {self.fix.words}{also}."
         return f"{self.severity}: {self.plain}"
 
     @property
     def plain(self) -> str:
         """What is wrong and what would put it right, without the severity."""
         fix = f" Fix: {self.fix.words}." if self.fix else ""
-        return f"{self.name}: {self.words}.{fix}"
+        return f"{self.name}: {_ended(self.words)}{fix}"
+
+
+def _ended(words: str) -> str:
+    """Return words as a sentence."""
+    return words if words.endswith("?") else f"{words}."

@@ -78,7 +78,10 @@ def main(kind: str, paths: str, file: str, folder: str) -> dict[str, Any]:
     except MemoryError:
         raise
     except Exception as error:  # a damaged file makes both libraries fail in nearly every way there is
-        return {"damage": f"{type(error).__name__}: {error}"}
+        name = type(error).__name__
+        if name == "error":  # zlib's, struct's
+            name = f"{type(error).__module__}.{name}"
+        return {"damage": f"{name}: {error}"}
     return {"variables": variables}
 
 

@@ -81,6 +81,7 @@ def test_step_times_are_of_the_steps(fitted: Fit) -> None:
     assert 0.0 < fitted.steps["median"] <= fitted.steps["p99_9"] <= fitted.steps["largest"]
 
 
+@pytest.mark.usefixtures("quick_fit")
 def test_a_second_run_goes_on_from_the_first(fitted: Fit, log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def never(*_arguments: object, **_options: object) -> None:
         raise AssertionError("identified again")
@@ -167,6 +168,7 @@ def test_the_command_line(hybridsep: Run, tmp_path: Path) -> None:
     assert machine.read_text(encoding="utf-8") != edited
 
 
+@pytest.mark.usefixtures("quick_fit")
 def test_a_flipped_sign_is_refused_until_it_is_fixed(hybridsep: Run, tmp_path: Path) -> None:
     log = write_rows(tmp_path / "axis.csv", commanded()[:800], -measured(0)[:800])
     status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit")
@@ -185,6 +187,7 @@ def test_a_flipped_sign_is_refused_until_it_is_fixed(hybridsep: Run, tmp_path: P
     np.testing.assert_allclose(used[0].x_meas, measured(0)[:800], atol=1e-15)
 
 
+@pytest.mark.usefixtures("quick_fit")
 def test_a_log_that_cannot_teach_a_model_is_predicted_by_its_command(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     log = write_rows(tmp_path / "still.csv", np.full(600, 0.1), 0.1 + 1e-6 * rng.normal(size=600))
@@ -199,10 +202,9 @@ def test_a_log_that_cannot_teach_a_model_is_predicted_by_its_command(tmp_path: P
     fit_report(found, used, findings).write(tmp_path / "report.html")
 
 
-def test_a_half_that_rests_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.usefixtures("quick_fit")
+def test_a_half_that_rests_is_named(tmp_path: Path) -> None:
     """It was the log whose commanded position does not move, where only the half that teaches rests."""
-    monkeypatch.setattr(fitting, "build_here", lambda *_arguments, **_options: None)
-    monkeypatch.setattr(fitting, "step_times", lambda *_arguments: {"median": 0.0, "p99_9": 0.0, "largest": 0.0})
     rest = np.full(300, commanded()[0])
     noise = np.random.default_rng(0).normal(0, 1e-6, 300)
     x_d, x = np.concatenate((rest, commanded()[:300])), np.concatenate((rest + noise, measured(0)[:300]))
@@ -221,6 +223,7 @@ def test_a_half_that_rests_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         (250, NP, "2 windows of 50 samples; record at least 2.1 s"),
     ],
 )
+@pytest.mark.usefixtures("quick_fit")
 def test_too_short_a_log_judges_nothing(tmp_path: Path, n: int, Np: int | None, words: str) -> None:
     log = write_rows(tmp_path / "short.csv", commanded()[500 : 500 + n], measured(0)[500 : 500 + n])
     used, _ = take_in([read_log(log, uniform=False)], fix=False)
@@ -235,6 +238,7 @@ def test_too_short_a_log_judges_nothing(tmp_path: Path, n: int, Np: int | None, 
     assert found.summary()["judged"]["verdict"].startswith("Nothing is judged: ")
 
 
+@pytest.mark.usefixtures("quick_fit")
 def test_a_gap_in_motion_does_not_decide_the_verdict(tmp_path: Path) -> None:
     x_d, x = commanded()[:N], measured(0)[:N]
     k = np.flatnonzero((np.arange(N) < 2050) | (np.arange(N) >= 2070))  # the axis moves from 2.0 s to 2.14 s
@@ -249,6 +253,7 @@ def test_a_gap_in_motion_does_not_decide_the_verdict(tmp_path: Path) -> None:
     assert "The window after a gap does not judge" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.usefixtures("quick_fit")
 def test_missing_measurements(hybridsep: Run, tmp_path: Path) -> None:
     x_d, x = commanded()[:N], measured(0)[:N]
     x[np.random.default_rng(3).integers(0, N, 25)] = np.nan
@@ -270,6 +275,7 @@ def test_missing_measurements(hybridsep: Run, tmp_path: Path) -> None:
         assert rms_h < 14e-6  # noise is 5 µm
 
 
+@pytest.mark.usefixtures("quick_fit")
 def test_a_gap_is_said_to_be_handled(hybridsep: Run, tmp_path: Path) -> None:
     log = write_rows(tmp_path / "axis.csv", commanded()[:1200], measured(0)[:1200])
     lines = log.read_text().splitlines(keepends=True)
@@ -286,6 +292,7 @@ def test_a_gap_is_said_to_be_handled(hybridsep: Run, tmp_path: Path) -> None:
     assert "changed before" not in page
 
 
+@pytest.mark.usefixtures("quick_fit")
 def test_a_rotary_axis_modulo_one_turn_is_unwrapped(hybridsep: Run, tmp_path: Path) -> None:
     """The staircase as four turns."""
     scale = 8 * np.pi / np.ptp(commanded()[:3000])
@@ -314,6 +321,7 @@ def test_what_is_kept_is_of_the_samples_as_they_are_read(log: Path) -> None:
     assert key_of([replace(recording, x=recording.x.copy())], "m") in keys
 
 
+@pytest.mark.usefixtures("quick_fit")
 def test_a_rotary_axis_stays_one_under_the_default_machines_name(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     log = write_rows(tmp_path / "still.csv", np.full(600, 0.1), 0.1 + 1e-6 * rng.normal(size=600))

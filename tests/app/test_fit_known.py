@@ -49,6 +49,7 @@ def test_a_vibration_in_time_is_no_period() -> None:
     assert residual_period([(np.zeros(50), np.zeros(50))], AXIS, T_S, "zoh") == 0.0
 
 
+@pytest.mark.usefixtures("quick_fit")
 def test_a_period_is_hinted_at_and_taken(hybridsep: Run, tmp_path: Path) -> None:
     x_d = long_moves()
     log = write_rows(tmp_path / "axis.csv", x_d, screw(x_d, 8e-6))
@@ -76,6 +77,7 @@ def start_of(fmu: Path, name: str) -> float:
     return float(variable.start)
 
 
+@pytest.mark.usefixtures("quick_fit")
 def test_a_late_encoder_is_no_dead_time(hybridsep: Run, tmp_path: Path) -> None:
     x_d = long_moves(2)
     x = screw(x_d, 0.0)

@@ -37,6 +37,7 @@ def arx_rms(x_d: Array, x: Array, n: int) -> float:
 
 @pytest.mark.skipif(not RECORDINGS.is_dir(), reason=f"the recordings are not at {RECORDINGS}")
 @pytest.mark.parametrize("name", ["cnc_a_axis2", "xl330_kp100"])
+@pytest.mark.usefixtures("quick_fit")
 def test_the_hybrid_is_not_recommended_where_an_arx_is_better(hybridsep: Run, tmp_path: Path, name: str) -> None:
     log = RECORDINGS / f"{name}.csv"
     [used], _ = take_in([read_log(log, uniform=False)], fix=False)
@@ -75,6 +76,7 @@ def test_the_physics_model_is_judged_with_its_offset(hybridsep: Run, tmp_path: P
     assert "judged with the offset" in (tmp_path / "fit" / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.usefixtures("quick_fit")
 def test_a_headline_says_share_rate_and_the_logs_own_unit(hybridsep: Run, tmp_path: Path) -> None:
     """1 kHz, its times rounded to 2 ms, in degrees."""
     rows = np.column_stack((np.arange(1600) // 2 * 2e-3, 3000 * commanded()[:1600], 3000 * measured(0)[:1600]))

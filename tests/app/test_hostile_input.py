@@ -19,11 +19,8 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX only: run
 @pytest.mark.parametrize(
     "kinds",
     [
-        ["text", "npz", "capture"],
-        ["mat", "hdf5"],
-        ["mdf", "tdms", "parquet", "arrow"],
-        ["xlsx", "sinumerik", "twincat", "halscope"],
-        ["machine", "state"],
+        ["text", "npz", "capture", "mat", "hdf5", "machine", "state"],
+        ["mdf", "tdms", "parquet", "arrow", "xlsx", "sinumerik", "twincat", "halscope"],
         ["fmu"],
     ],
 )
@@ -44,6 +41,9 @@ def test_what_goes_wrong_is_a_finding(tmp_path: Path, monkeypatch: pytest.Monkey
         ("import os; os.kill(os.getpid(), 9)", "killed"),
         ("raise SystemExit(_said('error: short'))", "refused"),
         ("raise SystemExit(_said('warning: one\\nerror: two'))", "refused"),
+        ("raise SystemExit(_said('error: x.fmu: unexpected end of data'))", "refused"),
+        ("raise SystemExit(_said('handled: one\\nfixed: two\\nerror: three'))", "refused"),
+        ("raise SystemExit(_said('Inconsistency detected by ld.so: one\\nerror: two'))", "refused"),
         ("raise SystemExit(_said('error: one\\ntwo'))", "untidy"),
         ("raise SystemExit(_said('error: ' + 'x' * 2000))", "untidy"),
         ("raise SystemExit(_said('error: unexpected KeyError: 3; this is a fault of hybridsep'))", "unexpected"),

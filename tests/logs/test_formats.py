@@ -87,6 +87,16 @@ def test_binary_rubbish_under_a_known_name(tmp_path: Path) -> None:
         open_log(tmp_path / "log.mat")
 
 
+def test_another_librarys_error_is_named(tmp_path: Path) -> None:
+    """It was "error: Error -3", as zlib calls its exception error."""
+    log = tmp_path / "log.mat"
+    io.savemat(log, {"x": np.random.default_rng(0).normal(size=500)}, do_compression=True)
+    content = log.read_bytes()
+    log.write_bytes(content[:300] + bytes(200) + content[500:])
+    with pytest.raises(LogError, match=r"log\.mat: is truncated, damaged or not a MATLAB file: zlib\.error: Error -3"):
+        open_log(log)
+
+
 # Siemens Capture
 
 

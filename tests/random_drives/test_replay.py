@@ -98,5 +98,8 @@ def test_command_line(capsys: pytest.CaptureFixture[str], tmp_path_factory: pyte
     assert "1 random drives, predictor: default" in first
     assert "diverged: " in first
     assert all(fault in first for fault in FAULTS)
+    arguments.remove("--faults")
     main(arguments)  # from the file
-    assert capsys.readouterr().out == first
+    again = capsys.readouterr().out
+    assert "1 random drives, predictor: default" in again
+    assert first.startswith(again)

@@ -24,6 +24,10 @@ PYTHON = [name for name, (_, flavour) in _FMUS.items() if flavour == "python"]
 """Names of all FMUs of all machines."""
 
 
+SHARED_BUILDS = "HYBRIDSEP_TESTS_BUILDS"
+"""Environment variable: folder of what the processes of a test session build once for all of them."""
+
+
 def built_once(path: Path, build: Callable[[Path], object]) -> Path:
     """Return ``path``, which ``build`` makes, given a name beside it; other processes wait meanwhile."""
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import ctypes
+import hashlib
+import os
 import struct
-import tempfile
 import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
@@ -14,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from built_once import SHARED_BUILDS, built_once
 from c_compiler import C_SOURCES, build_folder, include_flags, run_compiler
 from numpy.typing import NDArray
 from places import ROOT
@@ -82,13 +84,22 @@ def model_sources() -> list[str]:
 
 @cache
 def object_files(flags: tuple[str, ...] = ("-O2", "-fPIC"), command: tuple[str, ...] = ()) -> list[str]:
-    """Compile all other C files, once for each set of options, with the host's compiler if no other is asked for."""
-    folder = Path(tempfile.mkdtemp(dir=build_folder()))
-    objects = []
-    for source in sorted(set(sources()) - set(model_sources())):
-        objects.append(str(folder / f"{Path(source).stem}.o"))
-        run_compiler([*flags, *include_flags(), "-c", source, "-o", objects[-1]], command=command)
-    return objects
+    """Compile all other C files, once for each set of options, with the host's compiler if no other is asked for.
+
+    All processes of a test session share them.
+    """
+    shared = Path(os.environ.get(SHARED_BUILDS) or build_folder())
+    key = hashlib.sha256(repr((flags, command)).encode()).hexdigest()[:16]
+    compiled = sorted(set(sources()) - set(model_sources()))
+
+    def build(folder: Path) -> None:
+        folder.mkdir()
+        for source in compiled:
+            target = folder / f"{Path(source).stem}.o"
+            run_compiler([*flags, *include_flags(), "-c", source, "-o", target], command=command)
+
+    folder = built_once(shared / f"objects_{key}", build)
+    return [str(folder / f"{Path(source).stem}.o") for source in compiled]
 
 
 def write_header(name: str, folder: Path) -> None:
