@@ -193,7 +193,7 @@ def cluster(workers: int = 0, scheduler: str = "") -> Iterator[Engine]:
                 yield _Dask(client, distributed, f"Dask at {scheduler}", "")
             return
         started = distributed.LocalCluster(
-            n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=50, host="127.0.0.1"
+            n_workers=workers, threads_per_worker=1, dashboard_address="127.0.0.1:0", silence_logs=50, host="127.0.0.1"
         )
         with started, distributed.Client(started) as client:
             limit = min(one["memory_limit"] for one in client.scheduler_info(n_workers=-1)["workers"].values())

@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 import fsspec
 import numpy as np
 import pytest
 from log_files import capture, columns
+from s3_server import s3_server
 from staircase_data import commanded, measured
 
 from benchmarks.mutations import log_text
@@ -156,17 +157,20 @@ def test_axes_of_a_log(folder: Path) -> None:
     assert [row["axis"] for row in run(folder, source=str(path), unit="mm", axes=("Z1",)).rows] == ["Z1"]
 
 
-def test_an_object_store_gives_the_same(folder: Path) -> None:
-    store = fsspec.filesystem("memory")
-    store.put(str(folder / "logs"), "/fleet-run", recursive=True)
+@pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")
+@pytest.mark.parametrize("kind", ["memory", "s3"])
+def test_an_object_store_gives_the_same(folder: Path, monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
     here = {row["key"]: row for row in run(folder).rows if row["status"] == "done"}
     shutil.rmtree(folder / "out")
-    there = {row["key"]: row for row in run(folder, source="memory://fleet-run").rows if row["status"] == "done"}
-    assert len(there) == 4
+    with nullcontext("memory://runs") if kind == "memory" else s3_server(monkeypatch, "runs") as store:
+        fsspec.core.url_to_fs(store)[0].put(str(folder / "logs"), "runs/fleet", recursive=True)
+        found = run(folder, source=f"{store}/fleet").rows
+        assert run(folder, source=f"{store}/fleet", idle=True).rows == []
+    there = {row["key"]: row for row in found if row["status"] == "done"}
+    assert (len(found), len(there)) == (5, 4)
     for key, row in there.items():
         names = ("machine", "recorded", "rms_pb", "rms_hold", "rms_h", "ratio", "peers", "friction", "findings")
         assert {name: row[name] for name in names} == {name: here[key][name] for name in names}
-    assert run(folder, source="memory://fleet-run", idle=True).rows == []
 
 
 def test_damaged_results(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

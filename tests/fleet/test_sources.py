@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
 from pathlib import Path
 
 import fsspec
 import pytest
-from moto.server import ThreadedMotoServer
+from s3_server import s3_server
 
 from hybridsep.base.errors import LogError
 from hybridsep.fleet.sources import find_logs, local_copy
@@ -83,26 +82,10 @@ def test_memory() -> None:
     store("memory://fleet")
 
 
-@pytest.fixture
-def s3(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
-    server = ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
-    server.start()
-    _, port = server.get_host_and_port()
-    for name, value in (
-        ("AWS_ACCESS_KEY_ID", "testing"),
-        ("AWS_SECRET_ACCESS_KEY", "testing"),
-        ("AWS_DEFAULT_REGION", "us-east-1"),
-        ("AWS_ENDPOINT_URL", f"http://127.0.0.1:{port}"),
-    ):
-        monkeypatch.setenv(name, value)
-    fsspec.filesystem("s3").mkdir("fleet")
-    yield "s3://fleet/logs"
-    server.stop()
-
-
 @pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")
-def test_s3(s3: str) -> None:
-    store(s3)
+def test_s3(monkeypatch: pytest.MonkeyPatch) -> None:
+    with s3_server(monkeypatch, "fleet") as bucket:
+        store(f"{bucket}/logs")
 
 
 def test_an_unknown_store() -> None:
