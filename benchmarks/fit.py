@@ -23,13 +23,13 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # benchmarks are no part of the package
 
 from hybridsep.app.arguments import machine_name
-from hybridsep.app.fit import FitOptions, fit
-from hybridsep.app.fit_report import judged_by
-from hybridsep.app.judged import recommendation
-from hybridsep.app.log_intake import take_in
 from hybridsep.base.errors import HybridSepError
 from hybridsep.evaluate.verdict import ALIKE
+from hybridsep.fit.fit import FitOptions, fit
+from hybridsep.fit.report import judged_by
+from hybridsep.intake.repair import take_in
 from hybridsep.logs.log import Log, read_log
+from hybridsep.reports.judged import recommendation
 
 WINDOWS = (100, 20)
 

@@ -10,16 +10,18 @@ import typer
 
 from ..base.output import written_text
 from .options import (
+    PREDICTOR_ENTRIES,
     AsIsOption,
     FixOption,
     ForceOption,
     JsonOption,
     LogArgument,
     MachineOption,
+    ReadingOptions,
     SavedOption,
+    takes_parameters,
+    takes_reading,
 )
-from .parameter_options import PREDICTOR_ENTRIES, takes_parameters
-from .reading_options import ReadingOptions, takes_reading
 
 __all__ = ["backtest"]
 
@@ -60,13 +62,14 @@ def backtest(
     from ..evaluate.replayed import replayed_run
     from ..evaluate.scores import Scores
     from ..fmi.warm_start import begun_predictor
+    from ..intake.repair import changed_by
     from ..logs.log import Log
     from ..logs.units import shown_of
     from ..machines.machine import load_machine, machine_path
+    from ..reports.backtest_peers import backtest_peers
+    from ..reports.extent import partly_used
     from .arguments import check_ending
-    from .backtest_peers import backtest_peers
-    from .extent import partly_used
-    from .log_intake import CHECKED_MAX, changed_by, findings_table, open_checked, reading_of
+    from .log_intake import CHECKED_MAX, findings_table, open_checked, reading_of
     from .overwrite import BATCH_COLUMNS, BATCHES, BY_ENDING, Output, check_outputs
     from .progress import progress_bar
     from .tables import console, print_scores, print_without_first, print_written

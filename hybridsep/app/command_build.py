@@ -44,8 +44,8 @@ def build(
     The same machine gives the same bytes.
     """
     from ..fmi.archive import build_fmu
+    from ..fmi.jobs import extras_of, jobs_of
     from ..machines.machine import machine_path
-    from .build_arguments import extras_of, jobs_of
     from .overwrite import FMU, Output, check_outputs
     from .progress import progress_bar
     from .tables import console, print_json

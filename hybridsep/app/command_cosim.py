@@ -10,9 +10,12 @@ from typing import Annotated, Any
 import typer
 
 from ..base.data_files import DEFAULT_MACHINE
+from ..base.errors import ParameterError
 from ..base.settings import PARAMETERS, check
 from ..fmi.flavours import FLAVOURS
 from .options import (
+    COMPENSATOR_ENTRIES,
+    PREDICTOR_ENTRIES,
     TRAJECTORIES,
     FlavourOption,
     ForceOption,
@@ -21,8 +24,9 @@ from .options import (
     TsOption,
     UnitOption,
     WeightsOption,
+    parameter_help,
+    takes_parameters,
 )
-from .parameter_options import COMPENSATOR_ENTRIES, PREDICTOR_ENTRIES, parameter_help, takes_parameters
 
 __all__ = ["cosim"]
 
@@ -66,11 +70,11 @@ def cosim(
     """
     from ..cosim.apart import run_apart
     from ..cosim.loop import cosimulate
+    from ..cosim.pairing import check_pair, read_command, values_to_build
     from ..cosim.run import RESULT_SUFFIXES
+    from ..fmi.builds import build_here
     from ..machines.machine import load_machine, machine_path
     from .arguments import check_ending
-    from .builds import build_here
-    from .cosim_arguments import check_pair, checked_group, fitting, read_command
     from .overwrite import FIGURE, RUN, Output, check_outputs
     from .progress import progress_bar
     from .tables import print_run, print_written
@@ -85,9 +89,11 @@ def cosim(
         check("compensate", compensate, label="--compensate")
     model = "HybridPredictor" if compensate is None else "SepCompensator"
     command = read_command(trajectory, axis, unit, T_s)
-    values = checked_group(parameters, model)
+    if compensate is None and (wrong := [f"--{name}" for name in parameters if name in COMPENSATOR_ENTRIES]):
+        raise ParameterError(f"{', '.join(wrong)} must come with --compensate")
+    values = dict(parameters)
     if predictor is None:
-        values = fitting(axis, model, values)
+        values = values_to_build(axis, model, values)
     if seed is not None:
         check("seed", seed)
     if compensate is not None:

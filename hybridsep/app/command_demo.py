@@ -28,10 +28,10 @@ def demo(
 
     The FMUs of the staircase and the spiral are built first.
     """
-    from .builds import default_flavour
-    from .demo import demo as run_demo
-    from .demo import demo_files, processor_time
-    from .demo_cases import read_recorded
+    from ..demo.cases import read_recorded
+    from ..demo.demo import demo as run_demo
+    from ..demo.demo import demo_files, processor_time
+    from ..fmi.builds import default_flavour
     from .log_intake import show
     from .overwrite import BY_ENDING, Output, check_outputs
     from .progress import progress_bar

@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..base.settings import DRIVE_LIMIT_ENTRIES
 from .options import (
+    KNOWN_ENTRIES,
     FigurePagesOption,
     ForceOption,
     JsonOption,
+    ReadingOptions,
+    takes_parameters,
+    takes_reading,
 )
-from .parameter_options import DRIVE_LIMIT_ENTRIES, KNOWN_ENTRIES, takes_parameters
-from .reading_options import ReadingOptions, takes_reading
+
+if TYPE_CHECKING:
+    from ..fit.fit import Fit
+    from ..intake.finding import Finding
+    from ..logs.log import Log
 
 __all__ = ["fit"]
 
@@ -45,15 +54,15 @@ def fit(
     as_json: JsonOption = False,
 ) -> None:
     """From the log of an axis to its model, FMUs and a report."""
+    from ..fit.compensation import drive_limits
+    from ..fit.fit import FitOptions, fit_files
+    from ..fit.fit import fit as fit_logs
+    from ..fit.report import fit_report, judged_by
+    from ..intake.repair import changes, take_in
     from ..logs.log import read_log
+    from ..reports.judged import recommendation
     from .arguments import check_ending, checked_name, machine_name
-    from .fit import FitOptions, fit_files
-    from .fit import fit as fit_logs
-    from .fit_compensation import drive_limits
-    from .fit_report import fit_report, judged_by
-    from .fit_table import print_fit
-    from .judged import recommendation
-    from .log_intake import changes, findings_table, show, take_in
+    from .log_intake import findings_table, show
     from .overwrite import BY_ENDING, FIT_FILES, Output, check_outputs
     from .progress import progress_bar
     from .tables import console, print_json, print_written
@@ -94,7 +103,51 @@ def fit(
         written = {what: str(path) for what, path in files.items()}
         print_json({**result.summary(), "advice": advice, "findings": listed, "files": written})
         return
-    print_fit(result, used, findings)
+    _print_fit(result, used, findings)
     console.print(f"\n{advice}", highlight=False)
     console.print("\n".join(f"{what}: {path}" for what, path in files.items()), highlight=False, soft_wrap=True)
     print_written(figure)
+
+
+def _print_fit(found: Fit, logs: Sequence[Log], findings: Mapping[str, Iterable[Finding]]) -> None:
+    """Print what was read and what the intake found, what was identified and how it was judged."""
+    import numpy as np
+    from rich import box
+    from rich.table import Table
+
+    from ..base.metrics import shown_figure
+    from ..fit.compensation import tracking_lines
+    from ..intake.repair import changed_by
+    from ..reports.extent import extent
+    from .tables import console
+
+    unit, shown = logs[0].unit, logs[0].shown  # of all of them
+    factor, position = shown.position
+    for log in logs:
+        travel = float(np.ptp(log.x_d))
+        stated = "" if log.unit_stated else f", as the file states no unit of positions: taken as {unit} (--unit)"
+        console.print(
+            f"{log.path.name}: {extent([log])}, travel {factor * travel:.4g} {position}{stated}"
+            f"{changed_by(findings.get(log.path.name, ()))}",
+            highlight=False,
+        )
+    for name, of_log in findings.items():
+        for finding in of_log:
+            console.print(f"{name}: {finding}", highlight=False)
+    scale, error = shown.error(found.judged.rms()[0])
+    model, settings = found.identification, found.machine.predictor_settings
+    table = Table(
+        "prediction by", title=f"Error on samples that taught nothing [{error}]", box=box.SIMPLE, pad_edge=False
+    )
+    table.add_column("RMS", justify="right")
+    for one in found.judged.scored():
+        table.add_row(one.name, "diverged" if one.diverged else shown_figure(scale * one.rms))
+    console.print(f"{model['structure']}, dead time {model['dead_time']} samples", highlight=False)
+    for line in model["findings"]:
+        console.print(f"  {line}", highlight=False)
+    window = f"{1e3 * settings.Np * settings.T_s:.4g} ms"
+    console.print(f"Np = {settings.Np} ({window}), p = {settings.p}, q = {settings.q}", highlight=False)
+    console.print(table)
+    console.print(str(found.judged.verdict()), highlight=False)
+    for line in tracking_lines(found.tracking, logs[0].shown) if found.tracking else ():
+        console.print(line, highlight=False)

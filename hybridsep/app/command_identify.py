@@ -21,8 +21,11 @@ from .options import (
 )
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from ..identify.frequency_response import IdentifiedResponse
     from ..identify.model import IdentifiedModel
+    from ..logs.units import Shown
 
 __all__ = ["identify"]
 
@@ -90,12 +93,12 @@ def identify(
     from ..identify.response_files import has_response, read_response
     from ..identify.segments import in_time
     from ..identify.swept_sine import h1
+    from ..intake.repair import changes, take_in
     from ..logs.log import read_log
     from ..logs.units import shown_in
+    from ..reports.extent import partly_used
     from .arguments import check_ending, checked_name, machine_name
-    from .extent import partly_used
-    from .identify_tables import print_identified
-    from .log_intake import changes, show, take_in
+    from .log_intake import show
     from .overwrite import FIGURE, MACHINE, Output, check_outputs
     from .progress import progress_bar
     from .tables import console, print_written
@@ -183,7 +186,7 @@ def identify(
         _write_machine(found, machine, recording.name, entries, out)
     if partly and not as_json:
         console.print(partly, highlight=False)
-    print_identified(found, as_json, recording.name, shown)
+    _print_identified(found, as_json, recording.name, shown)
     if not as_json:
         print_written(out, figure)
 
@@ -198,9 +201,9 @@ def _write_machine(
     found: IdentifiedModel | IdentifiedResponse, name: str, recording: str, entries: Mapping[str, Any], out: Path
 ) -> None:
     """Write the machine file, with the deviations and findings as comments."""
+    from ..identify.shown import deviation_words
+    from ..machines.seal import sealed
     from ..machines.text import machine_text
-    from .identify_tables import deviation_words
-    from .overwrite import sealed
 
     deviations = [
         f"{e.name} = {e.value:.6g} {deviation_words(e.std, '± ')}{'' if e.unit == '1' else ' ' + e.unit}"
@@ -210,3 +213,62 @@ def _write_machine(
     machine = found.machine(name, f"Axis identified from {recording}", **entries)
     with written_text(out) as file:
         file.write(sealed(machine_text(machine, comments), "identify"))
+
+
+def _print_identified(found: IdentifiedModel | IdentifiedResponse, as_json: bool, title: str, shown: Shown) -> None:
+    """Print an identified model, as tables in the units of its log, or as JSON."""
+    from ..identify.model import IdentifiedModel
+    from .tables import console, print_json
+
+    if as_json:
+        print_json(dict(found.summary()))
+        return
+    console.print(_parameters(found, title, shown))
+    if isinstance(found, IdentifiedModel):
+        console.print(_structures(found, shown))
+    elif found.criteria:
+        console.print(_sizes(found))
+    for finding in found.findings:
+        console.print(f"- {finding}", highlight=False)
+
+
+def _parameters(found: IdentifiedModel | IdentifiedResponse, title: str, shown: Shown) -> Table:
+    from rich import box
+    from rich.table import Table
+
+    from ..identify.model import IdentifiedModel
+    from ..identify.shown import deviation_words, shown_estimates
+
+    chosen = found.structure if isinstance(found, IdentifiedModel) else f"{len(found.model.modes)} modes"
+    table = Table("", "value", "± (1σ)", "unit", title=f"{title}: {chosen}, {found.input_hold}", box=box.SIMPLE)
+    for name, value, std, unit in shown_estimates(map(vars, found.parameters), shown):
+        table.add_row(name, f"{value:.7g}", deviation_words(std), "" if unit == "1" else unit)
+    return table
+
+
+def _structures(found: IdentifiedModel, shown: Shown) -> Table:
+    from rich import box
+    from rich.table import Table
+
+    factor, unit = shown.error(found.rms)
+    table = Table(
+        *("structure", "parameters", "fitted", "held out", ""),
+        title=f"RMS error of the simulated position, in {unit}",
+        box=box.SIMPLE,
+    )
+    for other in found.alternatives:
+        remark = "chosen" if other.name == found.structure else other.objection
+        errors = (f"{factor * other.rms_fitted:.4g}", f"{factor * other.rms_held_out:.4g}")
+        table.add_row(other.name, str(other.n_parameters), *errors, remark)
+    return table
+
+
+def _sizes(found: IdentifiedResponse) -> Table:
+    from rich import box
+    from rich.table import Table
+
+    table = Table("modes", "RMS of the relative error", "BIC", "", title="Numbers of modes", box=box.SIMPLE)
+    for n_modes, rms, criterion in found.criteria:
+        chosen = "chosen" if n_modes == len(found.model.modes) else ""
+        table.add_row(str(n_modes), f"{100 * rms:.3g} %", f"{criterion:.1f}", chosen)
+    return table

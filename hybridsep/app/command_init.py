@@ -62,10 +62,11 @@ def init(
     What no option says is asked.
     """
     from ..identify.model import machine_of
+    from ..machines.seal import sealed
     from ..machines.text import machine_text
     from ..model.physics import ModalModel
     from .arguments import check_ending
-    from .overwrite import MACHINE, Output, check_outputs, sealed
+    from .overwrite import MACHINE, Output, check_outputs
 
     check_ending(out, "OUT", (".toml",))
     check_outputs([Output("OUT", out, MACHINE)], {}, force=force)

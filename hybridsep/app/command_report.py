@@ -8,16 +8,18 @@ from typing import Annotated, Any
 import typer
 
 from .options import (
+    PREDICTOR_ENTRIES,
     AsIsOption,
     FigurePagesOption,
     FixOption,
     ForceOption,
     LogArgument,
     MachineOption,
+    ReadingOptions,
     SavedOption,
+    takes_parameters,
+    takes_reading,
 )
-from .parameter_options import PREDICTOR_ENTRIES, takes_parameters
-from .reading_options import ReadingOptions, takes_reading
 
 __all__ = ["report"]
 
@@ -47,19 +49,20 @@ def report(
     from ..cosim.run import PREDICTOR
     from ..evaluate.report import Report
     from ..fmi.warm_start import begun_predictor
+    from ..intake.repair import changes
     from ..logs.log import Log
     from ..logs.units import shown_of
     from ..machines.machine import load_machine, machine_path
+    from ..reports.extent import extent, partly_used
+    from ..reports.judged import Judged, recommendation
+    from ..reports.sections import write_changes, write_errors, write_findings
+    from ..reports.step_times import SAMPLES_MAX, step_times
+    from ..reports.use import write_use
     from ..tune.halves import Recording, replay
     from .arguments import check_ending, machine_name
-    from .extent import extent, partly_used
-    from .judged import Judged, recommendation
-    from .log_intake import changes, open_checked, reading_of
+    from .log_intake import open_checked, reading_of
     from .overwrite import BY_ENDING, REPORT, Output, check_outputs
     from .progress import progress_bar
-    from .report_sections import write_changes, write_errors, write_findings
-    from .report_use import write_use
-    from .step_times import SAMPLES_MAX, step_times
     from .tables import console, print_written
 
     page = out or Path(f"{machine_name(log)}_report.html")

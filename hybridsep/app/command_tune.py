@@ -12,14 +12,16 @@ from ..base.output import written_text
 from ..base.ranges import parse_range
 from ..base.settings import PredictorSettings
 from .options import (
+    PREDICTOR_ENTRIES,
     AsIsOption,
     FixOption,
     ForceOption,
     JsonOption,
     MachineOption,
+    ReadingOptions,
+    takes_parameters,
+    takes_reading,
 )
-from .parameter_options import PREDICTOR_ENTRIES, takes_parameters
-from .reading_options import ReadingOptions, takes_reading
 
 __all__ = ["tune"]
 
@@ -48,19 +50,21 @@ def tune(
 
     The look-ahead is the controller's.
     """
+    from ..intake.repair import changes
     from ..logs.log import Log
     from ..logs.units import shown_of
     from ..machines.machine import load_machine, machine_path
+    from ..machines.seal import sealed
     from ..machines.text import machine_text
+    from ..reports.extent import partly_used
     from ..tune.choice import with_window
     from ..tune.grid import TUNED, candidates, default_values
     from ..tune.joint import n_processors, over_windows
     from ..tune.joint import tune as tune_on
     from ..tune.losses import n_unjudged
     from .arguments import check_ending
-    from .extent import partly_used
-    from .log_intake import changes, findings_table, open_checked, reading_of, show
-    from .overwrite import BY_ENDING, MACHINE, Output, check_outputs, sealed
+    from .log_intake import findings_table, open_checked, reading_of, show
+    from .overwrite import BY_ENDING, MACHINE, Output, check_outputs
     from .progress import progress_bar
     from .tables import console, print_json, print_written
     from .tune_table import entries, print_tuning, tuning_summary

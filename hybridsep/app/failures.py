@@ -17,8 +17,8 @@ from typer.core import TyperGroup
 
 from ..base.errors import HybridSepError, brief
 from ..base.interrupt import interrupts_between_calls
+from ..base.new_folders import remove_empty_folders
 from ..base.version import __version__
-from .new_folders import remove_empty_folders
 
 __all__ = ["DEBUG_VARIABLE", "Commands", "errors_console", "run"]
 

@@ -2,33 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..base.errors import LogError, ParameterError
 from ..intake.check import Intake, apply, check
-from ..intake.finding import ERROR, Finding
+from ..intake.finding import Finding
+from ..intake.repair import MISSING, applied, check_measured
 from ..intake.times import BRIDGED_MAX
 from ..logs.log import Log, LogReader, open_log
+from ..machines.agree import check_interval, check_unit
 from ..machines.machine import Machine
-from .arguments import check_interval, check_unit
 from .failures import errors_console
-from .reading_options import ReadingOptions
+from .options import ReadingOptions
 
-__all__ = ["Reading", "changed_by", "changes", "findings_table", "open_checked", "reading_of", "show", "take_in"]
-
-_REPAIRED = ("time order", "gaps", "jitter", "lost rows", "outliers", "stuck samples", "repeated samples")
-"""Findings about samples, not about what they mean: their fixes lose nothing that could be learned from."""
-
-_MISSING = "missing samples"
-"""Finding whose fix interpolates what a replay with trust takes as missing, and an identification leaves out."""
-
-_HOPELESS = "too little motion"
-"""Finding that no fix helps; the physics model is then a gain of 1."""
+__all__ = ["Reading", "findings_table", "open_checked", "reading_of", "show"]
 
 CHECKED_MAX = 2_000_000
 """Samples that are checked at most; a longer log is replayed in bounded memory all the same."""
@@ -97,7 +87,7 @@ def open_checked(
         raise ParameterError("--fix and --as-is exclude each other")
     reader = open_log(path, **reading, uniform=False)
     checked = reader.read(CHECKED_MAX)
-    _check_measured(checked)
+    check_measured(checked)
     check_unit(path.name, checked, machine)
     trust = bool(reading.get("may_miss"))
     intake = check(replace(checked, unit=machine.unit), machine, bridged=BRIDGED_MAX if trust else 0)
@@ -110,7 +100,7 @@ def open_checked(
             "Apply the fixes with --fix, correct the log or the options it is read with, or go on with --as-is"
         )
     if fix:
-        intake = replace(intake, findings=tuple(_applied(finding) for finding in intake.findings))
+        intake = replace(intake, findings=tuple(applied(finding) for finding in intake.findings))
     show(reader.remarks, intake.findings)
     if fix:
         if reader.n_samples > CHECKED_MAX:
@@ -118,73 +108,11 @@ def open_checked(
         if not trust and any(finding.name == "gaps" for finding in intake.findings):
             bridged = f"with trust (--trust true) those of at most {BRIDGED_MAX} samples are bridged"
             show([f"every gap cuts, as the model has trust = false; {bridged}"], [])
-        fixed = apply(intake.log, (finding for finding in intake.findings if finding.name != _MISSING))
+        fixed = apply(intake.log, (finding for finding in intake.findings if finding.name != MISSING))
         return (fixed if segments else _longest_segment(fixed, path)), intake
     if not (as_is or reader.is_even):  # behind what was checked
         open_log(path, **reading)
     return reader, intake
-
-
-def take_in(logs: Sequence[Log], *, fix: bool) -> tuple[list[Log], Mapping[str, tuple[Finding, ...]]]:
-    """Return the logs to learn from and all findings, by the log's name: what samples suffer from is repaired.
-
-    Parameters
-    ----------
-    logs : sequence of Log
-        Read with ``uniform=False``.
-    fix : bool
-        Whether every fix is applied, also those that change what the columns mean. Missing measurements stay missing.
-
-    Raises
-    ------
-    LogError
-        If errors computed from a log would be invalid, with what would put it right.
-    """
-    used, all_findings = [], {}
-    for log in logs:
-        _check_measured(log)
-        findings = check(log).findings
-        applied = [finding for finding in findings if (fix and finding.name != _MISSING) or finding.name in _REPAIRED]
-        left = [
-            finding
-            for finding in findings
-            if finding.severity == ERROR and finding.name != _HOPELESS and (finding not in applied or not finding.fix)
-        ]
-        if left:
-            hint = " (--fix does it)" if all(finding.fix for finding in left) else ""
-            raise LogError(f"{log.path}: " + "; ".join(finding.plain for finding in left) + hint)
-        used.append(apply(log, applied))
-        all_findings[log.path.name] = tuple(_applied(one) if one in applied else one for one in findings)
-    return used, all_findings
-
-
-def _check_measured(log: Log) -> None:
-    """Raise LogError if no position was measured at all."""
-    if np.isnan(log.x_meas).all():
-        raise LogError(
-            f"{log.path}: the measured position is missing (NaN) in all {len(log.t)} samples; name its column (--x), "
-            "or record it"
-        )
-
-
-def _applied(finding: Finding) -> Finding:
-    return replace(finding, applied=finding.fix is not None)
-
-
-def changes(findings: Mapping[str, Iterable[Finding]]) -> list[str]:
-    """Return the fixes, by log, after which positions mean something else: the controller's must be changed alike."""
-    return [
-        f"{name}: {finding.name}: {finding.fix.words}; the controller must do the same"
-        for name, found in findings.items()
-        for finding in found
-        if finding.applied and finding.fix is not None and finding.fix.meaning
-    ]
-
-
-def changed_by(findings: Iterable[Finding]) -> str:
-    """Return the names of the fixes after which positions mean something else, for a headline; empty without any."""
-    names = [one.name for one in findings if one.applied and one.fix is not None and one.fix.meaning]
-    return f", positions changed (--fix: {', '.join(names)})" if names else ""
 
 
 def findings_table(findings: Iterable[Finding]) -> list[dict[str, Any]]:

@@ -1,18 +1,28 @@
-"""Options of the command line's commands; ranges and units come from the table of parameters.
+"""Options of the command line's commands; ranges and units come from the declarations of parameters.
 
 What a command works with is imported when it runs, so that its help, and that of the others, needs none of it.
 """
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
+from ..base.parameters import Parameter
+from ..base.ranges import GRAMMAR
+from ..base.settings import PARAMETERS, CompensatorSettings, PredictorSettings, Settings
 from ..fmi.flavours import FLAVOURS
 
 __all__ = [
+    "COMPENSATOR_ENTRIES",
+    "KNOWN_ENTRIES",
+    "PREDICTOR_ENTRIES",
     "TRAJECTORIES",
     "AsIsOption",
     "AxisOption",
@@ -26,14 +36,17 @@ __all__ = [
     "LogArgument",
     "MachineOption",
     "MeasuredColumnOption",
+    "ReadingOptions",
     "ResampleOption",
     "SavedOption",
     "TimeColumnOption",
     "TsOption",
     "UnitOption",
     "WeightsOption",
+    "parameter_help",
+    "takes_parameters",
+    "takes_reading",
 ]
-
 
 TRAJECTORIES = ("staircase", "spiral_x", "spiral_y")
 """What ``--trajectory`` takes besides a file."""
@@ -95,3 +108,156 @@ SavedOption = Annotated[
 FigurePagesOption = Annotated[
     Path | None, typer.Option(help="PDF with the report's charts for print, a page each, one column wide.")
 ]
+
+_LIST = "list_channels"
+
+
+def _entries(settings: type[Settings]) -> dict[str, Parameter]:
+    return {name: entry for name, entry in settings.parameters().items() if name not in settings.ELSEWHERE}
+
+
+PREDICTOR_ENTRIES = _entries(PredictorSettings)
+"""Parameters that the section ``[predictor]`` of a machine file may have, by the names of the settings' fields."""
+
+KNOWN_ENTRIES = {name: PREDICTOR_ENTRIES[name] for name in ("period", "measurement_delay")}
+"""Those that are known of an axis, which no log is fitted for."""
+
+COMPENSATOR_ENTRIES = {
+    **{name: entry for name, entry in _entries(CompensatorSettings).items() if name != "compensate"},
+    **{name: PARAMETERS[name] for name in PredictorSettings.NEEDS_PREVIEW},
+}
+"""Parameters that the section ``[compensator]`` may have besides, less the model, which commands choose themselves."""
+
+
+def parameter_help(parameter: Parameter, otherwise: str = "the machine's own") -> str:
+    """Return the help of an option that changes a parameter of the machine."""
+    return f"{parameter.help}; {otherwise} if left out"
+
+
+def takes_parameters(
+    *groups: dict[str, Parameter], ranges: Collection[str] = (), otherwise: str = "the machine's own"
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Return a decorator that gives a command an option for each parameter.
+
+    The command's argument ``parameters`` becomes the mapping of those that are given, by their names in FMUs.
+
+    Parameters
+    ----------
+    *groups : dict
+        Of :data:`PREDICTOR_ENTRIES` and :data:`COMPENSATOR_ENTRIES`.
+    ranges : collection of str
+        Fields of those that take several values; theirs are given as text.
+    otherwise : str
+        What counts where an option is left out.
+    """
+    options = {field: parameter for group in groups for field, parameter in group.items()}
+    taken = []
+    for field, parameter in options.items():
+        kind: Any = str if parameter.kind is bool or field in ranges else parameter.kind
+        annotation = Annotated[kind | None, _option(field, parameter, otherwise, several=field in ranges)]
+        taken.append(inspect.Parameter(field, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=annotation))
+
+    def given(values: dict[str, Any], _others: dict[str, Any]) -> dict[str, Any]:
+        return {options[field].name: value for field, value in values.items() if value is not None}
+
+    return _in_the_place_of("parameters", taken, given)
+
+
+def _option(field: str, parameter: Parameter, otherwise: str, *, several: bool) -> Any:
+    """Return the option, under the FMU's name; with hyphens or by the field's name it is accepted, too."""
+    names = dict.fromkeys(f"--{name}" for name in (parameter.name, parameter.name.replace("_", "-"), field))
+    if several:
+        return typer.Option(
+            *names, help=f"{parameter.help}; several as {GRAMMAR}; a default range if left out", metavar="RANGE"
+        )
+    more: dict[str, Any] = {"parser": _truth_value, "metavar": "true|false"} if parameter.kind is bool else {}
+    return typer.Option(*names, help=parameter_help(parameter, otherwise), **more)
+
+
+def _truth_value(text: str | bool) -> bool:
+    values = {"true": True, "false": False}
+    if str(text).lower() not in values:
+        raise typer.BadParameter(f"{text!r} is neither true nor false")
+    return values[str(text).lower()]
+
+
+@dataclass(frozen=True)
+class ReadingOptions:
+    """Options of how a log is read; None where they are not given.
+
+    Attributes
+    ----------
+    unit : str, optional
+    T_s : float, optional
+    axis : str, optional
+    t, x_d, x : str, optional
+        Columns of time, commanded and measured position.
+    resample : bool
+    """
+
+    unit: UnitOption = None
+    T_s: TsOption = None
+    axis: AxisOption = None
+    t: TimeColumnOption = None
+    x_d: CommandColumnOption = None
+    x: MeasuredColumnOption = None
+    resample: ResampleOption = False
+
+    @property
+    def columns(self) -> dict[str, str]:
+        """Columns that are given, by what they hold."""
+        return {role: column for role in ("t", "x_d", "x") if (column := getattr(self, role))}
+
+
+def takes_reading(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command these options in the place of its argument ``reading``, which becomes :class:`ReadingOptions`.
+
+    With ``--list-channels`` the channels of its logs are printed in the place of all that it does.
+    """
+    listing = inspect.Parameter(_LIST, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=ListChannelsOption)
+
+    def given(values: dict[str, Any], others: dict[str, Any]) -> ReadingOptions:
+        if values.pop(_LIST):
+            from .channel_table import print_channels
+
+            logs = others["logs"] if "logs" in others else [others["log"]]
+            print_channels(logs, as_json=bool(others.get("as_json")))
+            raise typer.Exit
+        return ReadingOptions(**values)
+
+    options = inspect.signature(ReadingOptions, eval_str=True).parameters.values()
+    return _in_the_place_of("reading", [*options, listing], given)(command)
+
+
+def _in_the_place_of(
+    name: str, taken: Sequence[inspect.Parameter], given: Callable[[dict[str, Any], dict[str, Any]], object]
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Return a decorator that gives a command options in the place of one argument.
+
+    Parameters
+    ----------
+    name : str
+        The argument.
+    taken : sequence of inspect.Parameter
+        The options.
+    given : callable
+        Values of the options, the command's other arguments → value of the argument.
+    """
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        @wraps(command)
+        def run(**arguments: Any) -> None:
+            values = {one.name: arguments.pop(one.name) for one in taken}
+            command(**arguments, **{name: given(values, arguments)})
+
+        signature = inspect.signature(command, eval_str=True)
+        mixed = [
+            one.replace(kind=inspect.Parameter.KEYWORD_ONLY)
+            for argument in signature.parameters.values()
+            for one in (taken if argument.name == name else [argument])
+        ]
+        run.__signature__ = signature.replace(parameters=mixed)  # type: ignore[attr-defined]
+        run.__annotations__ = {one.name: one.annotation for one in mixed}
+        return run
+
+    return decorate

@@ -5,9 +5,7 @@ A machine file is overwritten only as it was written: one that was edited since,
 
 from __future__ import annotations
 
-import hashlib
 import os
-import re
 import zipfile
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -15,10 +13,11 @@ from pathlib import Path
 from typing import TypeVar
 
 from ..base.errors import ParameterError
+from ..base.new_folders import make_folder
 from ..base.zip_files import ZIP_DAMAGE
 from ..cosim.run import COMPENSATOR, PREDICTOR
 from ..logs.example import EXAMPLE, HEAD
-from .new_folders import make_folder
+from ..machines.seal import edited_since, is_as_written
 
 __all__ = [
     "BATCHES",
@@ -34,7 +33,6 @@ __all__ = [
     "Kind",
     "Output",
     "check_outputs",
-    "sealed",
 ]
 
 _Answer = TypeVar("_Answer")
@@ -134,43 +132,7 @@ FMU = Kind("FMU of hybridsep", _is_our_fmu)
 EXAMPLE_LOG = Kind("example log of hybridsep", _is_example)
 STATE = Kind("saved predictor", _begins_with(b"HSEP"))
 
-_SEAL = re.compile(r"# Written by (?P<command>hybridsep \w+); checksum (?P<checksum>[0-9a-f]{12})")
-"""First line of a machine file that a command wrote."""
-
-
-def sealed(text: str, command: str) -> str:
-    """Return the text of a machine file under a line with the command that writes it and the text's checksum.
-
-    Parameters
-    ----------
-    text : str
-    command : str
-        Name after ``hybridsep``.
-    """
-    return f"# Written by hybridsep {command}; checksum {_checksum(text)}\n{text}"
-
-
-def _checksum(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()[:12]
-
-
-def _seal_of(path: Path) -> tuple[re.Match[str] | None, str]:
-    """Return the seal of a machine file, if it has one, and the text below its first line."""
-    first, _, rest = path.read_text(encoding="utf-8").partition("\n")
-    return _SEAL.fullmatch(first), rest
-
-
-def _is_as_written(path: Path) -> bool:
-    seal, rest = _seal_of(path)
-    return seal is not None and seal["checksum"] == _checksum(rest)
-
-
-def _edited_since(path: Path) -> str:
-    seal, _ = _seal_of(path)
-    return f"has been edited since `{seal['command']}` wrote it" if seal else ""
-
-
-MACHINE = Kind("machine file that hybridsep wrote", _is_as_written, _edited_since)
+MACHINE = Kind("machine file that hybridsep wrote", is_as_written, edited_since)
 STAGES = Kind("result of hybridsep fit", _begins_with(b'{\n  "hybridsep": "'))
 REPORT = Kind("report of hybridsep", _begins_with(b"<!DOCTYPE html>\n<!-- report of hybridsep -->"))
 SUMMARY = Kind("summary of hybridsep demo", _begins_with(b'{\n  "staircase": {'))

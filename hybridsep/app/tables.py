@@ -13,10 +13,11 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from ..base.metrics import shown_figure
 from ..cosim.run import PREDICTOR, Run
+from ..demo.published import PRINTED
 from ..evaluate.verdict import Verdict, verdict_of
 from ..logs.units import Shown, shown_in
-from .printed import PRINTED
 
 __all__ = [
     "console",
@@ -27,7 +28,6 @@ __all__ = [
     "print_scores",
     "print_without_first",
     "print_written",
-    "shown_figure",
 ]
 
 console = Console(emoji=False, markup=False)
@@ -104,13 +104,6 @@ def _printed(case: Mapping[str, float]) -> str:
     if not case:
         return ""
     return f"{case['rms_pb_um']:g}→{case['rms_h_um']:g}, {case['reduction_percent']:g} %"
-
-
-def shown_figure(value: float | None, unit: str = "") -> str:
-    """Return a figure as text, a dash where there is none."""
-    if value is None or not np.isfinite(value):
-        return "–"
-    return f"{value:.1f}{unit}" if unit else f"{value:.2f}"
 
 
 PREDICTIONS = {"pb": "physics", "hold": "hold", "arx20": "ARX20", "arx40": "ARX40", "h": "hybrid"}

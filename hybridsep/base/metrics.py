@@ -25,6 +25,7 @@ __all__ = [
     "rms",
     "rms_ratio",
     "shares",
+    "shown_figure",
 ]
 
 _NODES = 20_000
@@ -188,3 +189,10 @@ def contour_error(
         along = np.sum((reached - position(u)) * slope, axis=1) / np.sum(slope**2, axis=1)
         u = np.clip(u + along, 0.0, end)
     return np.asarray(np.linalg.norm(reached - position(u), axis=1))
+
+
+def shown_figure(value: float | None, unit: str = "") -> str:
+    """Return a figure as text, a dash where there is none."""
+    if value is None or not np.isfinite(value):
+        return "–"
+    return f"{value:.1f}{unit}" if unit else f"{value:.2f}"

@@ -20,6 +20,7 @@ from .errors import ParameterError, brief
 from .parameters import Parameter, choice, flag, real, whole
 
 __all__ = [
+    "DRIVE_LIMIT_ENTRIES",
     "PARAMETERS",
     "CompensatorSettings",
     "Limits",
@@ -419,6 +420,9 @@ PARAMETERS: Mapping[str, Parameter] = {
     **{parameter.name: parameter for parameter in (field.metadata["parameter"] for field in _OTHERS)},
 }
 """All parameters by their names in FMUs."""
+
+DRIVE_LIMIT_ENTRIES = {**Limits.parameters(), "change_max": PARAMETERS["change_max"]}
+"""Parameters of the section ``[drive_limits]`` of a machine file, by their entries."""
 
 
 def check(name: str, value: Any, *, label: str | None = None) -> Any:

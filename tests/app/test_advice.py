@@ -8,10 +8,10 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from hybridsep.app.judged import Judged, recommendation
 from hybridsep.base.signals import Array
 from hybridsep.evaluate.peers import Peer
 from hybridsep.logs.units import shown_in
+from hybridsep.reports.judged import Judged, recommendation
 from hybridsep.tune.halves import Recording, Replay
 
 NP, N = 20, 1000

@@ -13,7 +13,7 @@ from places import EMPS
 from staircase_data import commanded
 
 from hybridsep import Encoder, __version__, cosimulate, load_machine, staircase
-from hybridsep.app.parameter_options import PREDICTOR_ENTRIES
+from hybridsep.app.options import PREDICTOR_ENTRIES
 from hybridsep.base.data_files import data_folder
 from hybridsep.base.settings import PARAMETERS
 from hybridsep.evaluate.backtest import backtest

@@ -12,9 +12,9 @@ from command_line import Run, write_log
 from log_files import columns, write
 
 from hybridsep import HybridPredictor, load_machine
-from hybridsep.app import demo
 from hybridsep.app.overwrite import BATCHES, FIGURE, FMU, RUN, STATE, SUMMARY
 from hybridsep.cosim.run import COMPENSATOR, PREDICTOR, save_columns
+from hybridsep.demo import demo
 from hybridsep.machines.machine import machine_path
 
 MACHINE = "spring_mass_damper"
@@ -235,7 +235,7 @@ def test_arguments_are_checked_before_any_work(
     folder = tmp_path / "here"
     folder.mkdir()
     monkeypatch.chdir(folder)
-    for module in ("hybridsep.fmi.archive", "hybridsep.app.builds"):
+    for module in ("hybridsep.fmi.archive", "hybridsep.fmi.builds"):
         monkeypatch.setattr(f"{module}.build_fmu", work)
     monkeypatch.setattr("hybridsep.evaluate.backtest.backtest_stream", work)
     names = {"log": log, "folder": folder, "fmu": python_fmu("HybridPredictorPy")}

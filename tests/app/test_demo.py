@@ -16,10 +16,10 @@ from places import EMPS, ROOT
 from rich.console import Console
 
 from hybridsep.app import tables
-from hybridsep.app.builds import default_flavour
-from hybridsep.app.demo import demo, demo_files
-from hybridsep.app.demo_compensation import COMPENSATED
 from hybridsep.app.overwrite import BY_ENDING
+from hybridsep.demo.compensation import COMPENSATED
+from hybridsep.demo.demo import demo, demo_files
+from hybridsep.fmi.builds import default_flavour
 
 PAGE = (ROOT / "docs" / "evidence" / "figures.md").read_text(encoding="utf-8")
 PNG = b"\x89PNG\r\n\x1a\n"

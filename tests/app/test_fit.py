@@ -14,16 +14,16 @@ from command_line import Run, write_rows
 from staircase_data import commanded, measured
 
 from hybridsep import HybridPredictor, load_machine, read_log
-from hybridsep.app import fit as fitting
 from hybridsep.app.arguments import machine_name
-from hybridsep.app.fit import Fit, FitOptions, fit, fit_files
-from hybridsep.app.fit_report import fit_report, judged_by
-from hybridsep.app.fit_stages import key_of
-from hybridsep.app.judged import recommendation
-from hybridsep.app.log_intake import take_in
 from hybridsep.base.errors import LogError, ParameterError
 from hybridsep.cosim.fmus import FmuController
+from hybridsep.fit import fit as fitting
+from hybridsep.fit.fit import Fit, FitOptions, fit, fit_files
+from hybridsep.fit.report import fit_report, judged_by
+from hybridsep.fit.stages import key_of
+from hybridsep.intake.repair import take_in
 from hybridsep.logs.units import shown_in
+from hybridsep.reports.judged import recommendation
 from hybridsep.tune.halves import halves, replay
 
 N = 3000

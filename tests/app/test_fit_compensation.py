@@ -12,12 +12,12 @@ from command_line import Run, write_rows
 from identification_cases import T_S
 
 from hybridsep import PAPER_LIMITS, ModalModel, Mode, load_machine, rest_to_rest
-from hybridsep.app.fit_compensation import drive_limits
 from hybridsep.base.errors import ParameterError
 from hybridsep.base.metrics import rms
 from hybridsep.base.signals import Array
 from hybridsep.cosim.importer import read_description
 from hybridsep.cosim.loop import cosimulate
+from hybridsep.fit.compensation import drive_limits
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.plant import simulate
 from hybridsep.plants.stage_drive import StageDrive

@@ -16,11 +16,11 @@ from report_page import scripts
 from staircase_data import commanded, measured
 
 from hybridsep import read_log
-from hybridsep.app.extent import extent
-from hybridsep.app.log_intake import take_in
 from hybridsep.base.signals import Array
+from hybridsep.intake.repair import take_in
 from hybridsep.logs.log import Log
 from hybridsep.logs.units import shown_in, shown_of
+from hybridsep.reports.extent import extent
 
 NP = 20
 

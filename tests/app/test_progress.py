@@ -11,8 +11,8 @@ from threading import Timer
 import pytest
 
 from hybridsep.app import progress
-from hybridsep.app.demo import processor_time
 from hybridsep.app.progress import progress_bar
+from hybridsep.demo.demo import processor_time
 
 
 class Clock:

@@ -9,7 +9,7 @@ import pytest
 from command_line import Run, write_log, write_rows
 from staircase_data import commanded, measured
 
-from hybridsep.app.log_intake import changed_by, changes, take_in
+from hybridsep.intake.repair import changed_by, changes, take_in
 from hybridsep.logs.log import read_log
 
 MACHINE = ("--machine", "spring_mass_damper")

@@ -9,18 +9,18 @@ import numpy as np
 from ..evaluate.canvas import HYBRID
 from ..evaluate.chart import Chart, Line
 from ..evaluate.report import Report
+from ..identify.shown import deviation_words, shown_estimates
 from ..intake.finding import Finding
+from ..intake.repair import changes
 from ..logs.log import Log
 from ..logs.units import Shown
+from ..reports.extent import extent
+from ..reports.judged import Judged, recommendation
+from ..reports.sections import COLOURS, NAMES, write_changes, write_errors, write_findings
+from ..reports.use import write_use
 from ..tune.choice import WORTH
-from .extent import extent
+from .compensation import write_tracking
 from .fit import Fit
-from .fit_compensation import write_tracking
-from .identify_tables import deviation_words, shown_estimates
-from .judged import Judged, recommendation
-from .log_intake import changes
-from .report_sections import COLOURS, NAMES, write_changes, write_errors, write_findings
-from .report_use import write_use
 
 __all__ = ["fit_report", "judged_by"]
 

@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import IdentificationError, ParameterError
-from ..base.metrics import rms_ratio
+from ..base.metrics import rms_ratio, shown_figure
 from ..base.output import written_text
 from ..base.settings import PredictorSettings
 from ..fmi.archive import fmu_name
+from ..fmi.builds import build_here
 from ..fmi.flavours import FLAVOURS
 from ..fmi.libraries import has_native
 from ..identify.model import machine_of
@@ -22,18 +23,16 @@ from ..identify.operation import SAMPLES_MIN, identify_operation, unit_gain_mode
 from ..identify.segments import in_time
 from ..logs.log import Log
 from ..machines.machine import Machine
+from ..machines.seal import sealed
 from ..machines.text import machine_text
 from ..model.physics import ModalModel, Mode
 from ..predict.predictor import HybridPredictor
+from ..reports.step_times import step_times
 from ..tune.choice import choose_settings, settings_for, window_scores
 from ..tune.halves import Recording, Replay, halves, replay
 from ..tune.period import period_hint
-from .builds import build_here
-from .fit_compensation import COMPENSATE, expected_tracking
-from .fit_stages import Stages, key_of
-from .overwrite import sealed
-from .step_times import step_times
-from .tables import shown_figure
+from .compensation import COMPENSATE, expected_tracking
+from .stages import Stages, key_of
 
 __all__ = ["Fit", "FitOptions", "fit", "fit_files"]
 
@@ -86,7 +85,7 @@ class Fit:
     files : tuple of Path
         Files that were written.
     tracking : dict
-        Tracking errors to be expected, as of :func:`~.fit_compensation.expected_tracking`; empty without drive limits.
+        Tracking errors to be expected, of :func:`~hybridsep.fit.compensation.expected_tracking`; empty without limits.
     """
 
     machine: Machine

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..fmi.archive import build_fmu, fmu_name
-from ..fmi.libraries import has_native, ready_targets
 from ..machines.machine import Machine
+from .archive import build_fmu, fmu_name
+from .libraries import has_native, ready_targets
 
 __all__ = ["build_here", "build_pair", "default_flavour"]
 

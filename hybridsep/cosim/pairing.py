@@ -1,4 +1,4 @@
-"""Checks of the arguments of ``hybridsep cosim`` before any work, and the values for the FMUs."""
+"""A co-simulation's command, FMUs and their parameters, checked before any work."""
 
 from __future__ import annotations
 
@@ -8,19 +8,17 @@ from typing import Any
 
 from ..base.errors import ParameterError
 from ..base.signals import Array
-from ..cosim.fmus import check_controller, check_plant
-from ..cosim.run import COMPENSATOR, PREDICTOR
 from ..fmi.archive import fmu_names
 from ..fmi.libraries import check_available
 from ..fmi.warm_start import load_trained
 from ..logs.log import check_reading
+from ..machines.agree import check_interval
 from ..machines.machine import Machine
 from ..plants.trajectory import PAPER_LIMITS, read_trajectory, spiral, staircase
-from .arguments import check_interval
-from .options import TRAJECTORIES
-from .parameter_options import COMPENSATOR_ENTRIES
+from .fmus import check_controller, check_plant
+from .run import COMPENSATOR, PREDICTOR
 
-__all__ = ["check_pair", "checked_group", "fitting", "read_command"]
+__all__ = ["check_pair", "read_command", "values_to_build"]
 
 
 def read_command(trajectory: str, axis: Machine, unit: str | None, T_s: float | None) -> Array:
@@ -29,22 +27,14 @@ def read_command(trajectory: str, axis: Machine, unit: str | None, T_s: float | 
     limits = PAPER_LIMITS if axis.limits is None else axis.trajectory_limits()
     if trajectory == "staircase":
         return staircase(axis.T_s, limits=limits)
-    if trajectory in TRAJECTORIES:
+    if trajectory in ("spiral_x", "spiral_y"):
         return spiral(axis.T_s, limits=limits)[trajectory == "spiral_y"]
     command, found = read_trajectory(trajectory, unit=unit, T_s=T_s)
     check_interval(trajectory, found, axis)
     return command
 
 
-def checked_group(values: Mapping[str, Any], model: str) -> dict[str, Any]:
-    """Return the values of a look-ahead FMU's parameters, by name; ParameterError if it has none of that name."""
-    wrong = [name for name in values if name in COMPENSATOR_ENTRIES] if model == "HybridPredictor" else []
-    if wrong:
-        raise ParameterError(f"{', '.join(f'--{name}' for name in wrong)} must come with --compensate")
-    return dict(values)
-
-
-def fitting(axis: Machine, model: str, values: Mapping[str, Any]) -> dict[str, Any]:
+def values_to_build(axis: Machine, model: str, values: Mapping[str, Any]) -> dict[str, Any]:
     """Check the FMI values of a look-ahead FMU that will be built; return them with what must change with them."""
     if model == "HybridPredictor":
         axis.changed("predictor", values)

@@ -1,4 +1,4 @@
-"""Checks of the arguments of ``hybridsep build`` before any work, and the list of FMUs to build."""
+"""FMUs to build: which, and what weights and samples are built into them, checked before any work."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from ..base.errors import ParameterError
-from ..fmi.archive import fmu_names
-from ..fmi.libraries import check_available
-from ..fmi.warm_start import load_trained
 from ..logs.log import check_reading
+from ..machines.agree import check_interval
 from ..machines.machine import Machine, load_machine, machine_names
 from ..plants.trajectory import read_trajectory
-from .arguments import check_interval
+from .archive import fmu_names
+from .libraries import check_available
+from .warm_start import load_trained
 
 __all__ = ["Job", "extras_of", "jobs_of"]
 

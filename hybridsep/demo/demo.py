@@ -9,10 +9,10 @@ from pathlib import Path
 from ..base.output import written_text
 from ..fmi.archive import fmu_names
 from ..machines.machine import load_machine
-from .builds import default_flavour
-from .demo_cases import MACHINES, Summary, read_recorded, recorded_case, spiral_case, staircase_case
-from .demo_compensation import COMPENSATED
-from .printed import PRINTED
+from ..fmi.builds import default_flavour
+from .cases import MACHINES, Summary, read_recorded, recorded_case, spiral_case, staircase_case
+from .compensation import COMPENSATED
+from .published import PRINTED
 
 __all__ = ["demo", "demo_files", "processor_time"]
 
@@ -82,7 +82,7 @@ def demo(
         As written to ``summary.json``: for each case ``rms_pb_um``, ``rms_hold_um``, ``rms_h_um``,
         ``reduction_percent``, ``printed`` and more; RMS in µm against the measured position. ``compensation`` says for
         ``off``, ``physics``, ``hybrid_cold`` and ``hybrid_warm`` what
-        :func:`hybridsep.app.demo_compensation.compensate` found, for the spiral's axes with the contour error of both
+        :func:`hybridsep.demo.compensation.compensate` found, for the spiral's axes with the contour error of both
         together, ``contour_rms_um`` and ``contour_max_um``.
 
     Raises

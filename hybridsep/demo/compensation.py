@@ -16,7 +16,7 @@ from ..cosim.run import Run
 from ..machines.machine import Machine
 from ..plants.encoder import Encoder
 from ..plants.trajectory import archimedean_spiral
-from .builds import build_here
+from ..fmi.builds import build_here
 
 __all__ = ["COMPENSATED", "Runs", "compensate", "contour_errors", "mean_summary", "train"]
 

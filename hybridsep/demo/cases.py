@@ -20,8 +20,8 @@ from ..logs.log import Log, read_log
 from ..machines.machine import load_machine
 from ..machines.paper import PAPER_SETTINGS, paper_machine
 from ..plants.trajectory import spiral, staircase
-from .builds import build_pair
-from .demo_compensation import COMPENSATED, Runs, compensate, contour_errors, mean_summary
+from ..fmi.builds import build_pair
+from .compensation import COMPENSATED, Runs, compensate, contour_errors, mean_summary
 
 __all__ = ["MACHINES", "Summary", "read_recorded", "recorded_case", "spiral_case", "staircase_case"]
 

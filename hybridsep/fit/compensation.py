@@ -11,13 +11,12 @@ import numpy as np
 
 from ..base.errors import ParameterError, SignalError
 from ..base.metrics import rms
-from ..base.settings import Limits
+from ..base.settings import DRIVE_LIMIT_ENTRIES, Limits
 from ..compensate.expected import expected_errors
 from ..evaluate.report import Report
 from ..logs.units import Shown
 from ..machines.machine import Machine
 from ..tune.halves import Recording
-from .parameter_options import DRIVE_LIMIT_ENTRIES
 
 __all__ = ["COMPENSATE", "drive_limits", "expected_tracking", "tracking_lines", "write_tracking"]
 

@@ -18,7 +18,7 @@ def write_use(report: Report, fmus: Iterable[str], steps: Mapping[str, float], T
     fmus : iterable of str
         Names of their files.
     steps : mapping
-        As of :func:`~hybridsep.app.step_times.step_times`.
+        As of :func:`~hybridsep.reports.step_times.step_times`.
     T_s : float
         Sampling interval, s.
     Np : int

@@ -1,0 +1,1 @@
+"""From logs of an axis to its model, its FMUs and a report."""

@@ -1,0 +1,1 @@
+"""Reports of a replay: advice, charts by section, use of the FMU, step times."""
