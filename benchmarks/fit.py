@@ -22,13 +22,13 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # benchmarks are no part of the package
 
-from hybridsep.app.arguments import machine_name
 from hybridsep.base.errors import HybridSepError
 from hybridsep.evaluate.verdict import ALIKE
 from hybridsep.fit.fit import FitOptions, fit
 from hybridsep.fit.report import judged_by
 from hybridsep.intake.repair import take_in
 from hybridsep.logs.log import Log, read_log
+from hybridsep.machines.naming import machine_name
 from hybridsep.reports.judged import recommendation
 
 WINDOWS = (100, 20)

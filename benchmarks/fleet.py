@@ -27,12 +27,12 @@ import numpy as np
 import psutil
 
 from benchmarks.mutations import broken, log_text
-from hybridsep.app.fleet_run import FleetRun, run_fleet
-from hybridsep.app.fleet_settings import AxisTask, FleetSettings
-from hybridsep.app.fleet_task import look, work
 from hybridsep.fleet.engine import Engine, cluster
 from hybridsep.fleet.results import Results
+from hybridsep.fleet.run import FleetRun, run_fleet
+from hybridsep.fleet.settings import AxisTask, FleetSettings
 from hybridsep.fleet.sources import find_logs
+from hybridsep.fleet.task import look, work
 from hybridsep.machines.machine import machine_path
 from hybridsep.plants.trajectory import staircase
 
@@ -138,7 +138,7 @@ def scheduler_memory(n: int) -> float:
 
 def imported(_: int) -> None:
     """Import what a task needs."""
-    importlib.import_module("hybridsep.app.fleet_task")
+    importlib.import_module("hybridsep.fleet.task")
 
 
 def start_cost() -> float:

@@ -62,15 +62,15 @@ def backtest(
     from ..evaluate.replayed import replayed_run
     from ..evaluate.scores import Scores
     from ..fmi.warm_start import begun_predictor
+    from ..intake.finding import findings_table
     from ..intake.repair import changed_by
     from ..logs.log import Log
     from ..logs.units import shown_of
     from ..machines.machine import load_machine, machine_path
     from ..reports.backtest_peers import backtest_peers
     from ..reports.extent import partly_used
-    from .arguments import check_ending
-    from .log_intake import CHECKED_MAX, findings_table, open_checked, reading_of
-    from .overwrite import BATCH_COLUMNS, BATCHES, BY_ENDING, Output, check_outputs
+    from .log_intake import CHECKED_MAX, open_checked, reading_of
+    from .overwrite import BATCH_COLUMNS, BATCHES, BY_ENDING, Output, check_ending, check_outputs
     from .progress import progress_bar
     from .tables import console, print_scores, print_without_first, print_written
 

@@ -74,8 +74,7 @@ def cosim(
     from ..cosim.run import RESULT_SUFFIXES
     from ..fmi.builds import build_here
     from ..machines.machine import load_machine, machine_path
-    from .arguments import check_ending
-    from .overwrite import FIGURE, RUN, Output, check_outputs
+    from .overwrite import FIGURE, RUN, Output, check_ending, check_outputs
     from .progress import progress_bar
     from .tables import print_run, print_written
 

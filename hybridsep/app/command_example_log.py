@@ -21,8 +21,7 @@ def example_log(
     20 s of a simulated axis at 1 kHz, in mm.
     """
     from ..logs.example import write_example
-    from .arguments import check_ending
-    from .overwrite import EXAMPLE_LOG, Output, check_outputs
+    from .overwrite import EXAMPLE_LOG, Output, check_ending, check_outputs
 
     check_ending(out, "--out", (".csv", ".gz"))
     check_outputs([Output("--out", out, EXAMPLE_LOG)], {}, force=force)

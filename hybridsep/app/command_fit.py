@@ -58,12 +58,13 @@ def fit(
     from ..fit.fit import FitOptions, fit_files
     from ..fit.fit import fit as fit_logs
     from ..fit.report import fit_report, judged_by
+    from ..intake.finding import findings_table
     from ..intake.repair import changes, take_in
     from ..logs.log import read_log
+    from ..machines.naming import checked_name, machine_name
     from ..reports.judged import recommendation
-    from .arguments import check_ending, checked_name, machine_name
-    from .log_intake import findings_table, show
-    from .overwrite import BY_ENDING, FIT_FILES, Output, check_outputs
+    from .log_intake import show
+    from .overwrite import BY_ENDING, FIT_FILES, Output, check_ending, check_outputs
     from .progress import progress_bar
     from .tables import console, print_json, print_written
 

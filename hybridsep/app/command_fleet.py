@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from .options import (
+    KNOWN_ENTRIES,
     CommandColumnOption,
     JsonOption,
     MeasuredColumnOption,
@@ -15,8 +16,11 @@ from .options import (
     TimeColumnOption,
     TsOption,
     UnitOption,
+    takes_parameters,
 )
-from .parameter_options import KNOWN_ENTRIES, takes_parameters
+
+if TYPE_CHECKING:
+    from ..fleet.run import FleetRun
 
 __all__ = ["fleet"]
 
@@ -71,7 +75,7 @@ def fleet(
     jobs: Annotated[int, typer.Option(min=0, help="Processes without Dask; as many as cores if left out.")] = 0,
     as_json: JsonOption = False,
 ) -> None:
-    """Fit, or replay, every axis of many logs; what is unchanged is left alone.
+    """Fit or replay every axis of many logs.
 
     hybridsep fleet report RESULTS writes one page about the results.
     """
@@ -81,9 +85,8 @@ def fleet(
     from ..fleet.engine import cluster, joblib_engine
     from ..fleet.page import write_page
     from ..fleet.results import Results
-    from .fleet_run import run_fleet
-    from .fleet_settings import FleetSettings
-    from .fleet_table import print_run
+    from ..fleet.run import run_fleet
+    from ..fleet.settings import FleetSettings
     from .progress import progress_bar
     from .tables import console
 
@@ -113,4 +116,22 @@ def fleet(
 
     with progress_bar(as_json) as advance:
         found = run_fleet(sources, out, settings, engine, advance)
-    print_run(found, out, as_json=as_json)
+    _print_run(found, out, as_json=as_json)
+
+
+def _print_run(run: FleetRun, out: Path, *, as_json: bool) -> None:
+    """Print how many logs there were, what was new, and what failed."""
+    from ..base.errors import listed
+    from .tables import console, print_json
+
+    if as_json:
+        print_json({"logs": run.n_logs, "unchanged": run.n_unchanged, "rows": run.rows, "results": str(out)})
+        return
+    done = len(run.rows) - len(run.failed)
+    console.print(
+        f"{run.n_logs} logs, {run.n_unchanged} unchanged; {done} axes done, {len(run.failed)} failed", highlight=False
+    )
+    if run.failed:
+        failures = [f"{row['url'].rpartition('/')[2]} {row['axis']}: {row['message']}" for row in run.failed]
+        console.print(listed(failures, str, "\n"), highlight=False, soft_wrap=True)
+    console.print(f"results: {out}\nnext: hybridsep fleet report {out}", highlight=False, soft_wrap=True)

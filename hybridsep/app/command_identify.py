@@ -96,10 +96,10 @@ def identify(
     from ..intake.repair import changes, take_in
     from ..logs.log import read_log
     from ..logs.units import shown_in
+    from ..machines.naming import checked_name, machine_name
     from ..reports.extent import partly_used
-    from .arguments import check_ending, checked_name, machine_name
     from .log_intake import show
-    from .overwrite import FIGURE, MACHINE, Output, check_outputs
+    from .overwrite import FIGURE, MACHINE, Output, check_ending, check_outputs
     from .progress import progress_bar
     from .tables import console, print_written
 

@@ -65,8 +65,7 @@ def init(
     from ..machines.seal import sealed
     from ..machines.text import machine_text
     from ..model.physics import ModalModel
-    from .arguments import check_ending
-    from .overwrite import MACHINE, Output, check_outputs
+    from .overwrite import MACHINE, Output, check_ending, check_outputs
 
     check_ending(out, "OUT", (".toml",))
     check_outputs([Output("OUT", out, MACHINE)], {}, force=force)

@@ -53,15 +53,15 @@ def report(
     from ..logs.log import Log
     from ..logs.units import shown_of
     from ..machines.machine import load_machine, machine_path
+    from ..machines.naming import machine_name
     from ..reports.extent import extent, partly_used
     from ..reports.judged import Judged, recommendation
     from ..reports.sections import write_changes, write_errors, write_findings
     from ..reports.step_times import SAMPLES_MAX, step_times
     from ..reports.use import write_use
     from ..tune.halves import Recording, replay
-    from .arguments import check_ending, machine_name
     from .log_intake import open_checked, reading_of
-    from .overwrite import BY_ENDING, REPORT, Output, check_outputs
+    from .overwrite import BY_ENDING, REPORT, Output, check_ending, check_outputs
     from .progress import progress_bar
     from .tables import console, print_written
 

@@ -50,6 +50,7 @@ def tune(
 
     The look-ahead is the controller's.
     """
+    from ..intake.finding import findings_table
     from ..intake.repair import changes
     from ..logs.log import Log
     from ..logs.units import shown_of
@@ -62,9 +63,8 @@ def tune(
     from ..tune.joint import n_processors, over_windows
     from ..tune.joint import tune as tune_on
     from ..tune.losses import n_unjudged
-    from .arguments import check_ending
-    from .log_intake import findings_table, open_checked, reading_of, show
-    from .overwrite import BY_ENDING, MACHINE, Output, check_outputs
+    from .log_intake import open_checked, reading_of, show
+    from .overwrite import BY_ENDING, MACHINE, Output, check_ending, check_outputs
     from .progress import progress_bar
     from .tables import console, print_json, print_written
     from .tune_table import entries, print_tuning, tuning_summary

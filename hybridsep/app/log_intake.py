@@ -18,7 +18,7 @@ from ..machines.machine import Machine
 from .failures import errors_console
 from .options import ReadingOptions
 
-__all__ = ["Reading", "findings_table", "open_checked", "reading_of", "show"]
+__all__ = ["Reading", "open_checked", "reading_of", "show"]
 
 CHECKED_MAX = 2_000_000
 """Samples that are checked at most; a longer log is replayed in bounded memory all the same."""
@@ -113,21 +113,6 @@ def open_checked(
     if not (as_is or reader.is_even):  # behind what was checked
         open_log(path, **reading)
     return reader, intake
-
-
-def findings_table(findings: Iterable[Finding]) -> list[dict[str, Any]]:
-    """Return findings as plain data, for JSON."""
-    return [
-        {
-            "name": finding.name,
-            "severity": finding.severity,
-            "words": finding.words,
-            "evidence": dict(finding.evidence),
-            "fix": finding.fix.words if finding.fix else None,
-            "applied": finding.applied,
-        }
-        for finding in findings
-    ]
 
 
 def show(remarks: Iterable[str], findings: Iterable[Finding]) -> None:

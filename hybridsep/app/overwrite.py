@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import zipfile
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
@@ -32,6 +32,7 @@ __all__ = [
     "RUN",
     "Kind",
     "Output",
+    "check_ending",
     "check_outputs",
 ]
 
@@ -212,3 +213,9 @@ def _asked(output: Output, question: Callable[[Path], _Answer], otherwise: _Answ
         return question(output.path)
     except ZIP_DAMAGE:
         return otherwise  # damaged or unreadable: not known to be ours
+
+
+def check_ending(path: Path | None, option: str, endings: Sequence[str]) -> None:
+    """Raise ParameterError if a path, where given, ends in none of the endings."""
+    if path is not None and path.suffix.lower() not in endings:
+        raise ParameterError(f"{option} must end in {' or '.join(endings)}, got {path.name!r}")

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from ..base.messages import FINDINGS
 from ..base.signals import Array
 from ..logs.log import Log
 
-__all__ = ["ERROR", "HOPELESS", "NAMES", "NOTE", "WARNING", "Finding", "Fix", "Picture"]
+__all__ = ["ERROR", "HOPELESS", "NAMES", "NOTE", "WARNING", "Finding", "Fix", "Picture", "findings_table"]
 
 ERROR, WARNING, NOTE = "error", "warning", "note"
 """Severities: errors computed from the log are invalid; they are larger than they need be; worth knowing."""
@@ -108,3 +109,18 @@ class Finding:
 def _ended(words: str) -> str:
     """Return words as a sentence."""
     return words if words.endswith("?") else f"{words}."
+
+
+def findings_table(findings: Iterable[Finding]) -> list[dict[str, Any]]:
+    """Return findings as plain data, for JSON."""
+    return [
+        {
+            "name": finding.name,
+            "severity": finding.severity,
+            "words": finding.words,
+            "evidence": dict(finding.evidence),
+            "fix": finding.fix.words if finding.fix else None,
+            "applied": finding.applied,
+        }
+        for finding in findings
+    ]

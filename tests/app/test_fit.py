@@ -14,7 +14,6 @@ from command_line import Run, write_rows
 from staircase_data import commanded, measured
 
 from hybridsep import HybridPredictor, load_machine, read_log
-from hybridsep.app.arguments import machine_name
 from hybridsep.base.errors import LogError, ParameterError
 from hybridsep.cosim.fmus import FmuController
 from hybridsep.fit import fit as fitting
@@ -23,6 +22,7 @@ from hybridsep.fit.report import fit_report, judged_by
 from hybridsep.fit.stages import key_of
 from hybridsep.intake.repair import take_in
 from hybridsep.logs.units import shown_in
+from hybridsep.machines.naming import machine_name
 from hybridsep.reports.judged import recommendation
 from hybridsep.tune.halves import halves, replay
 

@@ -16,12 +16,12 @@ from s3_server import s3_server
 from staircase_data import commanded, measured
 
 from benchmarks.mutations import log_text
-from hybridsep.app.fit import FitOptions, fit
-from hybridsep.app.fleet_run import FleetRun, run_fleet
-from hybridsep.app.fleet_settings import FleetSettings
 from hybridsep.base.errors import LogError, StateError
+from hybridsep.fit.fit import FitOptions, fit
 from hybridsep.fleet.engine import Engine, joblib_engine
 from hybridsep.fleet.results import Results
+from hybridsep.fleet.run import FleetRun, run_fleet
+from hybridsep.fleet.settings import FleetSettings
 from hybridsep.logs.log import read_log
 from hybridsep.machines.machine import load_machine, machine_path
 from hybridsep.predict.predictor import HybridPredictor
@@ -104,13 +104,13 @@ def test_what_is_unchanged_is_left_alone(folder: Path) -> None:
 
 
 def test_a_run_that_was_killed_goes_on(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("hybridsep.app.fleet_run._EVERY", 0.0)
-    work = "hybridsep.app.fleet_task.work"
+    monkeypatch.setattr("hybridsep.fleet.run._EVERY", 0.0)
+    work = "hybridsep.fleet.task.work"
 
     class _KilledError(BaseException):
         pass
 
-    from hybridsep.app.fleet_task import work as real
+    from hybridsep.fleet.task import work as real
 
     worked: list[str] = []
 

@@ -17,20 +17,21 @@ from ..base.errors import MachineError, brief
 from ..base.metrics import rms_ratio
 from ..base.threads import one_blas_thread
 from ..evaluate.report import Report
-from ..fleet.sources import LogFile, local_copy
-from ..intake.finding import Finding
+from ..fit.fit import FitOptions, fit
+from ..fit.report import fit_report, judged_by
+from ..intake.finding import Finding, findings_table
+from ..intake.repair import changes, take_in
 from ..logs.formats import open_source
+from ..machines.agree import check_interval, check_unit
 from ..machines.machine import Machine, load_machine
+from ..machines.naming import machine_name
 from ..predict.predictor import HybridPredictor
+from ..reports.extent import extent
+from ..reports.judged import Judged, recommendation
+from ..reports.sections import write_errors, write_findings
 from ..tune.halves import Recording, Replay, replay
-from .arguments import check_interval, check_unit, machine_name
-from .extent import extent
-from .fit import FitOptions, fit
-from .fit_report import fit_report, judged_by
-from .fleet_settings import AxisTask, FleetSettings, Looked
-from .judged import Judged, recommendation
-from .log_intake import changes, findings_table, take_in
-from .report_sections import write_errors, write_findings
+from .settings import AxisTask, FleetSettings, Looked
+from .sources import LogFile, local_copy
 
 __all__ = ["look", "work"]
 

@@ -1,21 +1,14 @@
-"""Arguments common to several commands: checks, and names from those of files."""
+"""Names of machines: from a log's, and checked."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from pathlib import Path
 
 from ..base.errors import ParameterError
-from ..machines.machine import NAME_PATTERN
+from .machine import NAME_PATTERN
 
-__all__ = ["check_ending", "checked_name", "machine_name"]
-
-
-def check_ending(path: Path | None, option: str, endings: Sequence[str]) -> None:
-    """Raise ParameterError if a path, where given, ends in none of the endings."""
-    if path is not None and path.suffix.lower() not in endings:
-        raise ParameterError(f"{option} must end in {' or '.join(endings)}, got {path.name!r}")
+__all__ = ["checked_name", "machine_name"]
 
 
 def machine_name(path: Path, axis: str | None = None) -> str:

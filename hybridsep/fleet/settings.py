@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from ..base.version import __version__
-from ..fleet.results import key_of
-from ..fleet.sources import LogFile
 from ..logs.log import Log, read_log
+from .results import key_of
+from .sources import LogFile
 
 __all__ = ["AxisTask", "FleetSettings", "Looked"]
 

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..fleet.engine import Done, Engine
-from ..fleet.results import Results
-from ..fleet.sources import find_logs
-from .fleet_settings import AxisTask, FleetSettings, Looked
+from .engine import Done, Engine
+from .results import Results
+from .settings import AxisTask, FleetSettings, Looked
+from .sources import find_logs
 
 __all__ = ["FleetRun", "run_fleet"]
 
@@ -78,7 +78,7 @@ def run_fleet(
     todo = results.unfinished(logs, key)
     if not todo:
         return FleetRun(len(logs), len(logs), [])
-    from .fleet_task import look, work  # imports all that a fit needs
+    from .task import look, work  # imports all that a fit needs
 
     run = datetime.datetime.now(tz=datetime.timezone.utc).isoformat(timespec="milliseconds")
     before = {row["key"]: row for row in results.rows()}
