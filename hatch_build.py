@@ -8,7 +8,6 @@ Python flavour of the FMUs remains.
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from typing import Any
@@ -24,11 +23,10 @@ class FmuLibraries(BuildHookInterface):
         sys.path.insert(0, self.root)
         try:
             from hybridsep.fmi.c_header import KINDS
-            from hybridsep.fmi.compiler import ALL_TARGETS, TARGETS, expanded
-            from hybridsep.fmi.libraries import library_paths
+            from hybridsep.fmi.compiler import TARGETS
+            from hybridsep.fmi.libraries import chosen_targets, library_paths
 
-            chosen = os.environ.get("HYBRIDSEP_TARGETS", "")
-            targets = ALL_TARGETS if not chosen else () if chosen == "none" else expanded(chosen.split(","))
+            targets = chosen_targets()
             begin = time.monotonic()
             self.app.display_info("libraries of the native FMUs; the first time takes some minutes of processor time")
             paths = library_paths([(kind, target) for kind in KINDS for target in targets])

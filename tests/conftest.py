@@ -12,6 +12,8 @@ import zipfile
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # A process that a test starts says where it crashed, as pytest's own does.
 os.environ.setdefault("PYTHONFAULTHANDLER", "1")
+# Where the checkout has kept no libraries, those for other platforms take a minute.
+os.environ.setdefault("HYBRIDSEP_TARGETS", "host")
 
 # A shell's background jobs ignore Ctrl-C, and so would the processes of the tests about it.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

@@ -18,6 +18,7 @@ from .command_fleet import fleet
 from .command_identify import identify
 from .command_init import init
 from .command_report import report
+from .command_system import system
 from .command_tune import tune
 from .failures import DEBUG_VARIABLE, Commands, run
 
@@ -33,7 +34,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     add_completion=False,
 )
-for _command in (fit, identify, tune, init, demo, build, cosim, backtest, report, fleet, example_log):
+for _command in (fit, identify, tune, init, demo, build, cosim, system, backtest, report, fleet, example_log):
     app.command()(_command)
 
 

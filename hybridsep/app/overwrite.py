@@ -30,6 +30,7 @@ __all__ = [
     "MACHINE",
     "REPORT",
     "RUN",
+    "SYSTEM",
     "Kind",
     "Output",
     "check_ending",
@@ -107,6 +108,13 @@ def _is_our_fmu(path: Path) -> bool:
         return b'generationTool="hybridsep ' in archive.read("modelDescription.xml")
 
 
+def _is_our_system(path: Path) -> bool:
+    if not zipfile.is_zipfile(path) or "SystemStructure.ssd" not in _members(path):
+        return False
+    with zipfile.ZipFile(path) as archive:
+        return b'generationTool="hybridsep ' in archive.read("SystemStructure.ssd")
+
+
 def _is_example(path: Path) -> bool:
     content = path.read_bytes()
     first = HEAD.splitlines()[0].encode()
@@ -130,6 +138,7 @@ RUN = Kind("result of hybridsep cosim", _has_columns(PREDICTOR.columns, COMPENSA
 FIGURE = Kind("PNG", _begins_with(b"\x89PNG\r\n\x1a\n"))
 VECTOR_FIGURE = Kind("figure of hybridsep", _is_our_drawing)
 FMU = Kind("FMU of hybridsep", _is_our_fmu)
+SYSTEM = Kind("system of hybridsep", _is_our_system)
 EXAMPLE_LOG = Kind("example log of hybridsep", _is_example)
 STATE = Kind("saved predictor", _begins_with(b"HSEP"))
 

@@ -6,6 +6,7 @@ The content follows from the flavour: :mod:`hybridsep.fmi.native_flavour` takes 
 
 from __future__ import annotations
 
+import io
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -22,13 +23,11 @@ from .description import fmu_description
 from .flavours import FLAVOURS
 from .warm_start import load_trained
 
-__all__ = ["build_fmu", "fmu_name", "fmu_names"]
+__all__ = ["archived", "build_fmu", "fmu_files", "fmu_name", "fmu_names"]
 
 _SUFFIX = {"native": "", "python": "Py"}
-_SAMPLES_TRAJECTORY = 3
-"""The number under which ReferenceTrajectory plays the samples it was built with."""
-
 _ZIP_TIME = (1980, 1, 1, 0, 0, 0)
+_FIRST = ("modelDescription.xml", "SystemStructure.ssd")
 
 
 def fmu_names(machine: Machine, flavour: str = FLAVOURS[0]) -> dict[str, str]:
@@ -118,28 +117,58 @@ def build_fmu(
     for given, what, models in users:
         if given is not None and model not in models:
             raise FmuError(f"{what} are for a {' or a '.join(models)}, {name} is a {model}")
-    trained = None if weights is None else load_trained(weights, machine, model)
-    description = fmu_description(machine, model, name)
-    if samples is not None:
-        description["parameters"] = {**description["parameters"], "trajectory": _SAMPLES_TRAJECTORY}
-    if trained is not None:
-        description["parameters"] = {**description["parameters"], "t_init": 0.0}
-    if flavour == "native":
-        how: dict[str, Any] = {"targets": targets, "samples": samples, "trained": trained, "on_target": on_target}
-        files = native_flavour.files(machine, description, **how)
-    else:
-        files = python_flavour.files(machine, description, trained=trained)
+    how: dict[str, Any] = (
+        {} if flavour == "python" else {"targets": targets, "samples": samples, "on_target": on_target}
+    )
     path = Path(out) / f"{name}.fmu"
     path.parent.mkdir(parents=True, exist_ok=True)
-    _write_archive(path, files)
+    with written_whole(path) as file:
+        file.write(archived(fmu_files(machine, model, name, flavour, weights=weights, **how)))
     return path
 
 
-def _write_archive(path: Path, files: Mapping[str, bytes]) -> None:
-    """Write a zip whose bytes depend on nothing but its content: stored, as compressed ones depend on the zlib."""
-    with written_whole(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
-        # modelDescription.xml first, as readers that stream expect
-        for arcname in sorted(files, key=lambda key: (key != "modelDescription.xml", key)):
+def fmu_files(
+    machine: Machine, model: str, name: str, flavour: str, *, weights: str | Path | None = None, **how: Any
+) -> dict[str, bytes]:
+    """Return the content of an FMU: archive name → content.
+
+    Parameters
+    ----------
+    machine, flavour, weights
+        As in :func:`build_fmu`.
+    model : str
+        ``HybridPredictor``, ``FeedDrive``, …
+    name : str
+        Model identifier.
+    how
+        Further arguments of the flavour's ``files``.
+
+    Raises
+    ------
+    FmuError, SignalError, StateError
+        As :func:`build_fmu`.
+    """
+    trained = None if weights is None else load_trained(weights, machine, model)
+    description = fmu_description(
+        machine, model, name, samples=how.get("samples") is not None, warm=trained is not None
+    )
+    if flavour == "native":
+        return native_flavour.files(machine, description, trained=trained, **how)
+    return python_flavour.files(machine, description, trained=trained)
+
+
+def archived(files: Mapping[str, bytes]) -> bytes:
+    """Return a zip whose bytes depend on nothing but its content: stored, as compressed ones depend on the zlib.
+
+    Parameters
+    ----------
+    files : mapping
+        Archive name → content; what readers that stream look for comes first.
+    """
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
+        for arcname in sorted(files, key=lambda key: (key not in _FIRST, key)):
             entry = zipfile.ZipInfo(arcname, _ZIP_TIME)
             entry.compress_type, entry.external_attr, entry.create_system = zipfile.ZIP_STORED, 0o644 << 16, 3
             archive.writestr(entry, files[arcname])
+    return file.getvalue()

@@ -11,9 +11,32 @@ from ..machines.sections import FeedDriveSection
 __all__ = ["fmu_description"]
 
 
-def fmu_description(machine: Machine, model: str, name: str) -> dict[str, Any]:
-    """Return the description from which an FMU is made: model, name, start values, modes, and unit unless it is m."""
+_SAMPLES_TRAJECTORY = 3
+"""The number under which ReferenceTrajectory plays the samples it was built with."""
+
+
+def fmu_description(
+    machine: Machine, model: str, name: str, *, samples: bool = False, warm: bool = False
+) -> dict[str, Any]:
+    """Return the description from which an FMU is made: model, name, start values, modes, and unit unless it is m.
+
+    Parameters
+    ----------
+    machine : Machine
+    model : str
+        ``HybridPredictor``, ``FeedDrive``, …
+    name : str
+        Model identifier.
+    samples : bool
+        Whether a ReferenceTrajectory plays samples of its own.
+    warm : bool
+        Whether a look-ahead starts with trained weights, and so without a warm-up.
+    """
     description = _description(machine, model, name)
+    if samples:
+        description["parameters"] = {**description["parameters"], "trajectory": _SAMPLES_TRAJECTORY}
+    if warm:
+        description["parameters"] = {**description["parameters"], "t_init": 0.0}
     return description if machine.unit == "m" else {**description, "unit": machine.unit}
 
 

@@ -24,6 +24,7 @@ from .compiler import ALL_TARGETS, FLAGS, TARGETS, ZIG, compiled, compiler_for, 
 
 __all__ = [
     "check_available",
+    "chosen_targets",
     "default_targets",
     "has_native",
     "kept",
@@ -122,12 +123,25 @@ def has_native() -> bool:
 
 
 def default_targets() -> tuple[str, ...]:
-    """Return the targets where none are asked for: all platforms, or where their libraries cannot be had this one."""
+    """Return the targets where none are asked for: :func:`chosen_targets`, or this one where they cannot be had."""
+    chosen = chosen_targets()
     try:
-        check_available(ALL_TARGETS)
+        check_available(chosen)
     except FmuError:
         return ("host",)
-    return ALL_TARGETS
+    return chosen
+
+
+def chosen_targets() -> tuple[str, ...]:
+    """Return the platforms of ``$HYBRIDSEP_TARGETS``, names with commas or ``none``; all if it is not set.
+
+    Raises
+    ------
+    FmuError
+        If a name is unknown.
+    """
+    chosen = os.environ.get("HYBRIDSEP_TARGETS", "")
+    return expanded(() if chosen == "none" else chosen.split(",")) if chosen else ALL_TARGETS
 
 
 def ready_targets() -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from .content import fmu_title, paper_note
 from .experiment import stop_time
 from .variables import INTERPOLATED, Variable, variables_of
 
-__all__ = ["build_description", "model_description"]
+__all__ = ["build_description", "model_description", "unit_elements"]
 
 _TEMPLATES = Path(__file__).parent / "templates"
 
@@ -89,6 +89,11 @@ def build_description(name: str) -> bytes:
     root = _template("buildDescription.xml")
     root[0].set("modelIdentifier", name)
     return _document(root)
+
+
+def unit_elements() -> list[ET.Element]:
+    """Return the definitions of all units, each with its name and base unit, as FMI 2.0 writes them."""
+    return list(_template("modelDescription.xml").iter("Unit"))
 
 
 def _template(name: str) -> ET.Element:

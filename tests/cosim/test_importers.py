@@ -46,7 +46,9 @@ def moved(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     moved, machine = tmp_path_factory.mktemp("moved"), load_machine("spring_mass_damper")
     for name in ("HybridPredictor", "SepCompensator", "FeedDrive"):
         shutil.copy(folder / f"{name}.fmu", moved)
-    build_fmu(machine, "ReferenceTrajectory", moved, targets=("host",), samples=staircase(machine.T_s) + SHIFT)
+    command = staircase(machine.T_s) + SHIFT
+    np.save(moved / "command.npy", command)
+    build_fmu(machine, "ReferenceTrajectory", moved, targets=("host",), samples=command)
     return moved
 
 
@@ -64,6 +66,8 @@ def run_apart(importer: str, system: ClosedSystem, folder: Path, out: Path) -> A
     """Return what :func:`closed_system.run` does in a process of its own."""
     for model in system.components.values():
         (out / f"{model}.fmu").write_bytes((folder / f"{model}.fmu").read_bytes())
+    if (folder / "command.npy").exists():
+        shutil.copy(folder / "command.npy", out)
     python(out, closed_system.__file__, importer, system.look_ahead, str(out), str(out / "rows.npy"))
     rows: Array = np.load(out / "rows.npy")
     return rows

@@ -14,7 +14,7 @@ from hybridsep.fmi import libraries as module
 from hybridsep.fmi.c_header import KINDS
 from hybridsep.fmi.c_sources import c_sources
 from hybridsep.fmi.compiler import ALL_TARGETS, TARGETS, ZIG, expanded, host_target
-from hybridsep.fmi.libraries import default_targets, has_native, kept, libraries, ready_targets
+from hybridsep.fmi.libraries import chosen_targets, default_targets, has_native, kept, libraries, ready_targets
 
 ALL = [(kind, target) for kind in KINDS for target in ALL_TARGETS]
 
@@ -25,6 +25,7 @@ def without(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     monkeypatch.setattr("hybridsep.fmi.compiler.find_spec", lambda name: None)
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.delenv("CC", raising=False)
+    monkeypatch.delenv("HYBRIDSEP_TARGETS")
     monkeypatch.setenv("HYBRIDSEP_LIBRARIES", str(tmp_path / "kept"))
     monkeypatch.setattr(module, "_SHIPPED", tmp_path / "shipped")
     return tmp_path
@@ -55,6 +56,14 @@ def test_the_libraries_of_a_wheel_need_no_compiler(without: Path) -> None:
     assert found == {
         target: f"FeedDrive for {target}".encode() for target in (host_target(), "x86_64-darwin", "aarch64-darwin")
     }
+
+
+def test_platforms_can_be_left_out(without: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fill(without / "shipped", ALL)
+    monkeypatch.setenv("HYBRIDSEP_TARGETS", "win64,x86_64-linux")
+    assert default_targets() == ("x86_64-windows", "x86_64-linux")
+    monkeypatch.setenv("HYBRIDSEP_TARGETS", "none")
+    assert chosen_targets() == ()
 
 
 def test_a_command_of_its_own_does_not_wait_for_other_platforms(without: Path) -> None:

@@ -12,7 +12,6 @@ import json
 import platform
 import re
 import sys
-import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
@@ -25,7 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 from places import ROOT
 
-from hybridsep import FmuInstance
+from hybridsep import FmuInstance, load_machine, staircase
+from hybridsep.fmi.system import build_system
 
 Array = NDArray[np.float64]
 
@@ -141,30 +141,11 @@ def blocks(language: str) -> list[str]:
 
 
 def system_structure(system: ClosedSystem, folder: Path) -> Path:
-    """Write the SSP that the guide describes, with the FMUs of the folder, and return its path."""
-    description, replacements = blocks("xml")
-    if system.look_ahead == "compensator":
-        description = replaced(description, replacements)
-    path = folder / "staircase.ssp"
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("SystemStructure.ssd", description)
-        for model in system.components.values():
-            archive.write(folder / f"{model}.fmu", f"resources/{model}.fmu")
-    return path
-
-
-def replaced(description: str, replacements: str) -> str:
-    """Put the guide's second block in place of the predictor's component, the connections and the experiment."""
-    for pattern in (
-        r'<ssd:Component name="(?:predictor|compensator)".*?</ssd:Component>',
-        r"<ssd:Connections>.*?</ssd:Connections>",
-        r"<ssd:DefaultExperiment [^>]*/>",
-    ):
-        (old,), (new,) = (re.findall(pattern, text, re.DOTALL) for text in (description, replacements))
-        description, replacements = description.replace(old, new), replacements.replace(new, "")
-    assert not replacements.strip()
-    assert "predictor" not in description
-    return description
+    """Write the system as one file and return its path; ``command.npy`` of the folder is played, or the staircase."""
+    given = folder / "command.npy"
+    command = np.load(given) if given.exists() else staircase()
+    machine, compensate = load_machine("spring_mass_damper"), system.look_ahead == "compensator"
+    return build_system(machine, folder / "staircase.ssp", command, compensate=compensate, targets=("host",))
 
 
 def with_fmpy(system: ClosedSystem, folder: Path) -> Array:

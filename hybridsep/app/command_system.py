@@ -1,0 +1,71 @@
+"""``hybridsep system``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..base.data_files import DEFAULT_MACHINE
+from ..fmi.compiler import TARGET_NAMES
+from .options import TRAJECTORIES, ForceOption, JsonOption, MachineOption, TsOption, UnitOption, WeightsOption
+
+__all__ = ["system"]
+
+
+def system(
+    machine: MachineOption = DEFAULT_MACHINE,
+    compensate: Annotated[
+        bool,
+        typer.Option("--compensate", help="A SepCompensator modifies the command; else a HybridPredictor predicts."),
+    ] = False,
+    trajectory: Annotated[
+        str, typer.Option(help=f"{', '.join(TRAJECTORIES)}, or a CSV, .npz or .mat file with the columns t and x_d.")
+    ] = "staircase",
+    unit: UnitOption = None,
+    T_s: TsOption = None,
+    weights: WeightsOption = None,
+    target: Annotated[
+        list[str] | None,
+        typer.Option(help=f"Platform of the FMUs, may be repeated: {', '.join(TARGET_NAMES)}. All if left out."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="The archive, .ssp; named after the machine in this folder if left out.")
+    ] = None,
+    force: ForceOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Write a whole system as one file, SSP 1.0.
+
+    Trajectory, predictor or compensator and drive, wired, with their parameters, for tools that read SSP.
+    """
+    from ..fmi.libraries import check_available
+    from ..fmi.system import build_system, check_system
+    from ..fmi.warm_start import load_trained
+    from ..machines.machine import load_machine, machine_path
+    from .arguments import check_ending
+    from .cosim_arguments import read_command
+    from .overwrite import SYSTEM, Output, check_outputs
+    from .progress import progress_bar
+    from .tables import console, print_json
+
+    axis = load_machine(machine)
+    out = out or Path(f"{axis.name}.ssp")
+    check_ending(out, "--out", (".ssp",))
+    check_system(axis, compensate=compensate)
+    command = read_command(trajectory, axis, unit, T_s)
+    if weights is not None:
+        load_trained(weights, axis, "SepCompensator" if compensate else "HybridPredictor")
+    check_available(target or ("host",))
+    file = None if trajectory in TRAJECTORIES else trajectory
+    inputs = {"machine file": machine_path(machine), "trajectory": file, "saved predictor": weights}
+    check_outputs([Output("--out", out, SYSTEM)], inputs, force=force)
+    with progress_bar(as_json) as advance:
+        build_system(
+            axis, out, command, compensate=compensate, targets=target or None, weights=weights, progress=advance
+        )
+    if as_json:
+        print_json([str(out)])
+    else:
+        console.print(f"{out}  {out.stat().st_size / 1024:.0f} KiB", highlight=False, soft_wrap=True)

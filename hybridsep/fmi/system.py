@@ -1,0 +1,97 @@
+"""A whole system as one file (SSP 1.0): trajectory, look-ahead and drive of a machine, wired, with their parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from numpy.typing import ArrayLike
+
+from ..base.errors import FmuError
+from ..base.output import written_whole
+from ..base.signals import as_samples
+from ..machines.machine import Machine
+from .archive import archived, fmu_files, fmu_name
+from .description import fmu_description
+from .system_structure import Component, Connection, parameter_set, system_structure
+from .variables import variables_of
+
+__all__ = ["build_system", "check_system"]
+
+
+def check_system(machine: Machine, *, compensate: bool) -> None:
+    """Check that a machine has a plant and, to compensate, drive limits; FmuError if not."""
+    if machine.plant is None:
+        raise FmuError(f"machine {machine.name} has no [plant] section, which a system needs for its drive")
+    if compensate and machine.drive_limits is None:
+        raise FmuError(f"machine {machine.name} has no [drive_limits], which a compensator must keep; add them")
+
+
+def build_system(
+    machine: Machine,
+    path: str | Path,
+    command: ArrayLike,
+    *,
+    compensate: bool = False,
+    targets: Sequence[str] | None = None,
+    weights: str | Path | None = None,
+    progress: Callable[[str, float], object] = lambda _message, _fraction: None,
+) -> Path:
+    """Write a system of three native FMUs as an SSP archive.
+
+    Parameters
+    ----------
+    machine : Machine
+        With a plant.
+    path : str or Path
+        The archive.
+    command : (n,) array_like, m
+        Commanded positions at the machine's ``T_s``, which the system's ReferenceTrajectory plays.
+    compensate : bool
+        Whether a SepCompensator modifies the command; else a HybridPredictor only predicts.
+    targets, weights
+        As in :func:`hybridsep.fmi.archive.build_fmu`, for the look-ahead.
+    progress : callable
+        Called with a message and the fraction done.
+
+    Raises
+    ------
+    FmuError
+        If the machine has no plant or no drive limits, or a library cannot be had.
+    SignalError
+        If ``command`` is not finite or empty.
+    StateError
+        If ``weights`` is no saved predictor, or one of another machine or other settings.
+    """
+    check_system(machine, compensate=compensate)
+    samples = as_samples(command, "command")
+    model, look_ahead, sent = (
+        ("SepCompensator", "compensator", "x_dm") if compensate else ("HybridPredictor", "predictor", "x_d")
+    )
+    parts = {"reference": "ReferenceTrajectory", look_ahead: model, "drive": "FeedDrive"}
+    content: dict[str, bytes] = {}
+    components, sets = [], {}
+    for i, (part, kind) in enumerate(parts.items()):
+        progress(kind, i / len(parts))
+        name = fmu_name(kind, machine.name, "native")
+        how = {"targets": targets, "samples": samples if part == "reference" else None}
+        files = fmu_files(machine, kind, name, "native", weights=weights if part == look_ahead else None, **how)
+        content[f"resources/{name}.fmu"] = archived(files)
+        warm = weights is not None and part == look_ahead
+        description = fmu_description(machine, kind, name, samples=part == "reference", warm=warm)
+        components.append(Component(part, f"{name}.fmu", tuple(variables_of(description))))
+        sets[part] = f"{machine.name}_{part}.ssv"
+        content[f"resources/{sets[part]}"] = parameter_set(components[-1])
+    connections: list[Connection] = [
+        ("reference", "r", look_ahead, "x_d_ahead"),
+        (look_ahead, sent, "drive", "x_d"),
+        ("drive", "x_meas", look_ahead, "x_meas"),
+    ]
+    starts = {variable.name: variable.start for variable in components[1].variables}
+    delay = int(starts["preview" if compensate else "Np"] or 0)
+    stop_time = round((len(samples) - 1 + delay) * machine.T_s, 9)
+    structure = system_structure(machine.name, components, connections, sets, machine.T_s, stop_time)
+    with written_whole(path) as file:
+        file.write(archived({"SystemStructure.ssd": structure, **content}))
+    progress("done", 1.0)
+    return Path(path)

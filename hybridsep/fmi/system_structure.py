@@ -1,0 +1,200 @@
+"""Documents of a system: ``SystemStructure.ssd`` and parameter sets, SSP 1.0.
+
+Enumerations are in neither: libcosim ends the process where it meets one. The FMUs' own start values hold for them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+from xml.etree import ElementTree as ET
+
+from ..base.version import __version__
+from .model_description import unit_elements
+from .variables import Variable
+
+__all__ = ["Component", "Connection", "parameter_set", "system_structure"]
+
+_NAMESPACES = {
+    "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
+    "ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",
+    "ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues",
+    "oms": "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd",
+}
+_HEIGHT, _WIDTH, _GAP = 30.0, 30.0, 20.0
+"""Size of a component in the picture and the space between two, in its own units."""
+
+Connection = tuple[str, str, str, str]
+"""Component and output, component and input."""
+
+
+@dataclass(frozen=True)
+class Component:
+    """An FMU of a system.
+
+    Attributes
+    ----------
+    name : str
+    fmu : str
+        File below ``resources/``.
+    variables : tuple of Variable
+        Its table; the inputs and outputs become connectors, parameters its parameter set.
+    """
+
+    name: str
+    fmu: str
+    variables: tuple[Variable, ...]
+
+    @property
+    def connectors(self) -> list[Variable]:
+        """Inputs and outputs, but enumerations."""
+        return [v for v in self.variables if v.causality in ("input", "output") and not v.items]
+
+    @property
+    def parameters(self) -> list[Variable]:
+        """Parameters, but enumerations."""
+        return [v for v in self.variables if v.causality == "parameter" and not v.items]
+
+
+def system_structure(
+    name: str,
+    components: Sequence[Component],
+    connections: Sequence[Connection],
+    sets: Mapping[str, str],
+    T_s: float,
+    stop_time: float,
+) -> bytes:
+    """Return ``SystemStructure.ssd``.
+
+    Parameters
+    ----------
+    name : str
+        Of the system.
+    components : sequence of Component
+        In the order of the signals.
+    connections : sequence of tuple
+    sets : mapping
+        Component → file of its parameters below ``resources/``.
+    T_s : float, s
+        Communication step size, for OMSimulator's annotation.
+    stop_time : float, s
+    """
+    root = _root("ssd", "SystemStructureDescription", name)
+    root.set("generationTool", f"hybridsep {__version__}")
+    system = _add(root, "ssd:System", name=name)
+    elements, wires = _add(system, "ssd:Elements"), _add(system, "ssd:Connections")
+    for i, component in enumerate(components):
+        _add_component(elements, component, i, sets[component.name])
+    for connection in connections:
+        _add_connection(wires, components, connection)
+    width = len(components) * (_WIDTH + _GAP) + _GAP
+    _add(system, "ssd:SystemGeometry", x1=0.0, y1=0.0, x2=width, y2=_HEIGHT + 2 * _GAP)
+    master = {"description": "oms-ma", "stepSize": T_s, "absoluteTolerance": 1e-4, "relativeTolerance": 1e-4}
+    annotation = _add(_add(system, "ssd:Annotations"), "ssc:Annotation", type="org.openmodelica")
+    _add(_add(_add(annotation, "oms:Annotations"), "oms:SimulationInformation"), "oms:FixedStepMaster", **master)
+    connectors = [variable for component in components for variable in component.connectors]
+    _add_units(_add(root, "ssd:Units"), connectors)
+    _add(root, "ssd:DefaultExperiment", startTime=0.0, stopTime=stop_time)
+    return _document(root)
+
+
+def parameter_set(component: Component) -> bytes:
+    """Return the ``.ssv`` with a component's parameters and their start values."""
+    root = _root("ssv", "ParameterSet", component.name)
+    parameters = _add(root, "ssv:Parameters")
+    for variable in component.parameters:
+        parameter = _add(parameters, "ssv:Parameter", name=variable.name)
+        if variable.kind == "Real":
+            _add(parameter, "ssv:Real", value=float(variable.start or 0.0), **_unit(variable))
+        else:
+            _add(parameter, f"ssv:{variable.kind}", value=variable.start)
+    _add_units(_add(root, "ssv:Units"), component.parameters)
+    return _document(root)
+
+
+def _root(prefix: str, tag: str, name: str) -> ET.Element:
+    for namespace, uri in _NAMESPACES.items():
+        ET.register_namespace(namespace, uri)
+    return ET.Element(_tag(f"{prefix}:{tag}"), version="1.0", name=name)
+
+
+def _tag(name: str) -> str:
+    prefix, _, local = name.partition(":")
+    return f"{{{_NAMESPACES[prefix]}}}{local}"
+
+
+def _add(parent: ET.Element, name: str, /, **attributes: object) -> ET.Element:
+    texts = {key: str(value).lower() if isinstance(value, bool) else str(value) for key, value in attributes.items()}
+    return ET.SubElement(parent, _tag(name), texts)
+
+
+def _document(root: ET.Element) -> bytes:
+    for child in [child for child in root if not len(child) and not child.attrib]:
+        root.remove(child)
+    ET.indent(root)
+    document: bytes = ET.tostring(root, encoding="UTF-8", xml_declaration=True)
+    return document + b"\n"
+
+
+def _unit(variable: Variable) -> dict[str, str]:
+    return {} if variable.unit in (None, "1") else {"unit": str(variable.unit)}
+
+
+def _corner(i: int) -> tuple[float, float]:
+    """Return the lower left corner of the i-th component."""
+    return _GAP + i * (_WIDTH + _GAP), _GAP
+
+
+def _places(component: Component) -> dict[str, tuple[float, float]]:
+    """Return where connectors are on their component, inputs on the left, 0 … 1 from its lower left corner."""
+    places: dict[str, tuple[float, float]] = {}
+    for x, causality in ((0.0, "input"), (1.0, "output")):
+        names = [variable.name for variable in component.connectors if variable.causality == causality]
+        places |= {name: (x, 1.0 - (k + 1) / (len(names) + 1)) for k, name in enumerate(names)}
+    return places
+
+
+def _add_component(parent: ET.Element, component: Component, i: int, parameters: str) -> None:
+    attributes = {"type": "application/x-fmu-sharedlibrary", "source": f"resources/{component.fmu}"}
+    element = _add(parent, "ssd:Component", name=component.name, **attributes, implementation="CoSimulation")
+    connectors, places = _add(element, "ssd:Connectors"), _places(component)
+    for variable in component.connectors:
+        connector = _add(connectors, "ssd:Connector", name=variable.name, kind=variable.causality)
+        _add(connector, f"ssc:{variable.kind}", **_unit(variable))
+        x, y = places[variable.name]
+        _add(connector, "ssd:ConnectorGeometry", x=x, y=round(y, 4))
+    x, y = _corner(i)
+    _add(element, "ssd:ElementGeometry", x1=x, y1=y, x2=x + _WIDTH, y2=y + _HEIGHT)
+    binding = {"type": "application/x-ssp-parameter-set", "source": f"resources/{parameters}"}
+    _add(_add(element, "ssd:ParameterBindings"), "ssd:ParameterBinding", **binding)
+
+
+def _add_connection(parent: ET.Element, components: Sequence[Component], connection: Connection) -> None:
+    """Add a connection, drawn with right angles: from left to right between two components, back below them."""
+    source, output, sink, name = connection
+    index = {component.name: i for i, component in enumerate(components)}
+    (x1, y1), (x2, y2) = (
+        (_corner(i)[0] + px * _WIDTH, _corner(i)[1] + py * _HEIGHT)
+        for i, (px, py) in (
+            (index[source], _places(components[index[source]])[output]),
+            (index[sink], _places(components[index[sink]])[name]),
+        )
+    )
+    if index[sink] > index[source]:
+        middle = (x1 + x2) / 2
+        points = [(middle, y1), (middle, y2)]
+    else:
+        right, left, below = x1 + _GAP / 4, x2 - _GAP / 4, _GAP / 2
+        points = [(right, y1), (right, below), (left, below), (left, y2)]
+    wire = {"startElement": source, "startConnector": output, "endElement": sink, "endConnector": name}
+    xs, ys = (" ".join(str(round(point[axis], 3)) for point in points) for axis in (0, 1))
+    _add(_add(parent, "ssd:Connection", **wire), "ssd:ConnectionGeometry", pointsX=xs, pointsY=ys)
+
+
+def _add_units(parent: ET.Element, variables: Iterable[Variable]) -> None:
+    used = {variable.unit for variable in variables}
+    for unit in unit_elements():
+        if unit.get("name") in used:
+            attributes: dict[str, Any] = dict(unit[0].attrib)
+            _add(_add(parent, "ssc:Unit", name=unit.get("name")), "ssc:BaseUnit", **attributes)

@@ -1,0 +1,156 @@
+"""``hybridsep system``: one file with FMUs, connections and parameters."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import zipfile
+from importlib import import_module
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+import pytest
+from command_line import Run
+from importers_closed_system import exists_here
+
+from hybridsep import load_machine, staircase
+from hybridsep.fmi.archive import build_fmu
+from hybridsep.fmi.system import build_system
+
+etree: Any = import_module("lxml.etree")  # comes with fmpy, has no types
+SSD = "{http://ssp-standard.org/SSP1/SystemStructureDescription}"
+SSV = "{http://ssp-standard.org/SSP1/SystemStructureParameterValues}"
+SCHEMAS = {".ssd": "SystemStructureDescription.xsd", ".ssv": "SystemStructureParameterValues.xsd"}
+
+
+@pytest.fixture(scope="module", params=["spring_mass_damper", "als25010_y compensated"])
+def archive(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    name, _, compensated = request.param.partition(" ")
+    machine, path = load_machine(name), tmp_path_factory.mktemp("system") / "axis.ssp"
+    command = staircase(machine.T_s)[:2000]
+    return build_system(machine, path, command, compensate=bool(compensated), targets=("host",))
+
+
+def content(path: Path) -> dict[str, bytes]:
+    with zipfile.ZipFile(path) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+def test_the_documents_keep_to_the_schemas(archive: Path) -> None:
+    files = content(archive)
+    assert next(iter(files)) == "SystemStructure.ssd"
+    checked = [name for name in files if Path(name).suffix in SCHEMAS]
+    assert len(checked) == 4
+    folder = Path(fmpy.__file__).parent / "ssp" / "schema"
+    for name in checked:
+        etree.XMLSchema(file=str(folder / SCHEMAS[Path(name).suffix])).assertValid(etree.fromstring(files[name]))
+
+
+def test_the_structure_is_that_of_the_fmus(archive: Path, tmp_path: Path) -> None:
+    """Connectors, units and parameters are those of the FMUs, whose start values the sets repeat."""
+    files = content(archive)
+    root = etree.fromstring(files["SystemStructure.ssd"])
+    wired = {(wire.get("endElement"), wire.get("endConnector")) for wire in root.iter(f"{SSD}Connection")}
+    for component in root.iter(f"{SSD}Component"):
+        path = tmp_path / "one.fmu"
+        path.write_bytes(files[component.get("source")])
+        variables = {v.name: v for v in fmpy.read_model_description(str(path)).modelVariables}
+        connectors = {c.get("name"): c for c in component.iter(f"{SSD}Connector")}
+        scalars = {name: v for name, v in variables.items() if v.type != "Enumeration"}
+        assert list(connectors) == [n for n, v in scalars.items() if v.causality in ("input", "output")]
+        for name, connector in connectors.items():
+            assert connector.get("kind") == variables[name].causality
+            assert connector[0].tag.rpartition("}")[2] == variables[name].type
+            assert connector[0].get("unit") == variables[name].unit
+            assert variables[name].causality == "output" or (component.get("name"), name) in wired
+        (binding,) = component.iter(f"{SSD}ParameterBinding")
+        given = etree.fromstring(files[binding.get("source")]).iter(f"{SSV}Parameter")
+        parameters = {parameter.get("name"): parameter[0] for parameter in given}
+        assert list(parameters) == [n for n, v in scalars.items() if v.causality == "parameter"]
+        for name, value in parameters.items():
+            assert value.get("value") == variables[name].start
+            assert value.get("unit") == variables[name].unit
+
+
+def test_the_picture_is_tidy(archive: Path) -> None:
+    """Components stand side by side, within the system, and wires meet no component."""
+    root = etree.fromstring(content(archive)["SystemStructure.ssd"])
+    boxes = [[float(box.get(key)) for key in ("x1", "x2", "y1", "y2")] for box in root.iter(f"{SSD}ElementGeometry")]
+    (whole,) = root.iter(f"{SSD}SystemGeometry")
+    assert all(left[1] < right[0] for left, right in pairwise(boxes))
+    assert boxes[-1][1] < float(whole.get("x2"))
+    wires = list(root.iter(f"{SSD}ConnectionGeometry"))
+    assert len(wires) == 3
+    for wire in wires:
+        for x, y in zip(map(float, wire.get("pointsX").split()), map(float, wire.get("pointsY").split()), strict=True):
+            assert not [box for box in boxes if box[0] < x < box[1] and box[2] < y < box[3]]
+
+
+def test_the_same_system_has_the_same_bytes(tmp_path: Path) -> None:
+    machine, command = load_machine("spring_mass_damper"), staircase()[:100]
+    paths = [build_system(machine, tmp_path / f"{i}.ssp", command, targets=("host",)) for i in range(2)]
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+    fmu = build_fmu(machine, "HybridPredictor", tmp_path, targets=("host",))
+    assert content(paths[0])["resources/HybridPredictor.fmu"] == fmu.read_bytes()
+
+
+@pytest.mark.skipif(not exists_here("libcosim"), reason="libcosim has no library for this machine")
+def test_a_parameter_set_counts_in_libcosim(tmp_path: Path) -> None:
+    """Without the noise that its FMU starts with, what the drive measures is where it is."""
+    path = build_system(load_machine("spring_mass_damper"), tmp_path / "a.ssp", staircase()[:500], targets=("host",))
+    files, changed = content(path), tmp_path / "changed.ssp"
+    noise = rb'(<ssv:Parameter name="noise_std">\s*<ssv:Real value=")5e-06'
+    with zipfile.ZipFile(changed, "w") as archive:
+        for name, text in files.items():
+            archive.writestr(name, re.sub(noise, rb"\g<1>0.0", text) if name.endswith("_drive.ssv") else text)
+    script = """
+import sys
+from libcosimpy.CosimExecution import CosimExecution
+from libcosimpy.CosimObserver import CosimObserver
+execution, observer = CosimExecution.from_ssp_file(sys.argv[1], 1000000), CosimObserver.create_last_value()
+execution.add_observer(observer)
+execution.step(300)
+drive = execution.slave_index_from_instance_name("drive")
+places = {v.name.decode(): v.reference for v in execution.slave_variables(drive)}
+print("ends", *observer.last_real_values(drive, [places["x"], places["x_meas"]]))
+"""
+    ends = []
+    for system in (path, changed):
+        done = subprocess.run([sys.executable, "-c", script, str(system)], capture_output=True, text=True, check=True)
+        (line,) = re.findall(r"^ends (.*)$", done.stdout, re.MULTILINE)  # libcosim prints its log there, too
+        ends.append([float(number) for number in line.split()])
+    assert ends[0][0] != ends[0][1]
+    assert ends[1][0] == ends[1][1] == pytest.approx(ends[0][0], abs=1e-12)
+    assert np.all(np.asarray(ends) > 1e-3)
+
+
+def test_the_command_writes_a_system(hybridsep: Run, tmp_path: Path) -> None:
+    path = tmp_path / "axis.ssp"
+    arguments = ("system", "--machine", "als25010_x", "--compensate", "--target", "host", "--out", path)
+    status, out, err = hybridsep(*arguments)
+    assert (status, out.split()[0]) == (0, str(path)), err
+    structure = content(path)["SystemStructure.ssd"].decode()
+    assert 'startElement="compensator" startConnector="x_dm" endElement="drive" endConnector="x_d"' in structure
+    assert hybridsep(*arguments, "--json")[0] == 0  # its own file is written anew
+    path.write_bytes(b"mine")
+    status, _, err = hybridsep(*arguments)
+    assert status == 2
+    assert "exists and is no system of hybridsep" in " ".join(err.split())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--machine", "emps"), "machine emps has no [plant] section, which a system needs for its drive"),
+        (("--out", "axis.zip"), "--out must end in .ssp"),
+        (("--trajectory", "nothing.csv"), "nothing.csv"),
+    ],
+)
+def test_what_makes_no_system_is_refused(hybridsep: Run, arguments: tuple[str, ...], message: str) -> None:
+    status, _, error = hybridsep("system", *arguments)
+    assert status == 2
+    assert message in " ".join(error.split())
