@@ -40,13 +40,12 @@ def system(
 
     Trajectory, predictor or compensator and drive, wired, with their parameters, for tools that read SSP.
     """
+    from ..cosim.pairing import read_command
     from ..fmi.libraries import check_available
     from ..fmi.system import build_system, check_system
     from ..fmi.warm_start import load_trained
     from ..machines.machine import load_machine, machine_path
-    from .arguments import check_ending
-    from .cosim_arguments import read_command
-    from .overwrite import SYSTEM, Output, check_outputs
+    from .overwrite import SYSTEM, Output, check_ending, check_outputs
     from .progress import progress_bar
     from .tables import console, print_json
 
