@@ -10,6 +10,8 @@ SLOW = (
     r"documents/test_site\.py",
     # All platforms' compilers, sanitizers and programs that are compiled for one test
     r"fmi/test_native_fmu\.py::test_all_platforms",
+    r"fmi/test_tables\.py::test_(mutated_tables|a_table_is_what_the_header_is)",
+    r"cosim/test_systems\.py",
     r"fmi/test_native_fmu\.py::test_the_archive_without_binaries_can_be_compiled",
     r"fmi/test_weights\.py::test_build_takes_weights_and_targets",
     r"fmi/test_weights\.py::test_no_mutation",
