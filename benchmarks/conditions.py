@@ -138,7 +138,7 @@ def delays(emps: Path | None, n: int, *, at_one_horizon: bool) -> Iterator[tuple
 
 
 def _in_turn(case: Case, settings: PredictorSettings, *, earlier: int = 0) -> list[Array]:
-    """Return the errors, m, of runs of a predictor, each going on with what the ones before have taught.
+    """Return the errors, m, of runs of a predictor, each going on with what the ones before have trained.
 
     earlier: samples by which windows begin earlier, at rest.
     """

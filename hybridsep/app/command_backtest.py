@@ -61,7 +61,7 @@ def backtest(
     from ..evaluate.backtest import backtest as backtest_whole
     from ..evaluate.replayed import replayed_run
     from ..evaluate.scores import Scores
-    from ..fmi.warm_start import begun_predictor
+    from ..fmi.warm_start import warm_predictor
     from ..intake.finding import findings_table
     from ..intake.repair import changed_by
     from ..logs.log import Log
@@ -83,7 +83,7 @@ def backtest(
     for path in saved:
         check_ending(path, "--save", (".state", ".csv", ".npz"))
     changed = axis_machine.changed("predictor", parameters)
-    predictor = begun_predictor(changed, weights)
+    predictor = warm_predictor(changed, weights)
     how = reading_of(axis_machine, reading, may_miss=predictor.settings.trust)
     outputs = [] if out is None else [Output("--out", out, BATCHES)]
     outputs += [Output("--figure", figure, BY_ENDING[figure.suffix.lower()])] if figure is not None else []

@@ -48,7 +48,7 @@ def report(
     from ..cosim.fmus import check_controller
     from ..cosim.run import PREDICTOR
     from ..evaluate.report import Report
-    from ..fmi.warm_start import begun_predictor
+    from ..fmi.warm_start import warm_predictor
     from ..intake.repair import changes
     from ..logs.log import Log
     from ..logs.units import shown_of
@@ -59,7 +59,7 @@ def report(
     from ..reports.sections import write_changes, write_errors, write_findings
     from ..reports.step_times import SAMPLES_MAX, step_times
     from ..reports.use import write_use
-    from ..tune.halves import Recording, replay
+    from ..tune.recordings import Recording, replay
     from .log_intake import open_checked, reading_of
     from .overwrite import BY_ENDING, REPORT, Output, check_ending, check_outputs
     from .progress import progress_bar
@@ -75,7 +75,7 @@ def report(
         check_controller(fmu, PREDICTOR)
     axis_machine = load_machine(machine)
     changed = axis_machine.changed("predictor", parameters)
-    predictor = begun_predictor(changed, weights)
+    predictor = warm_predictor(changed, weights)
     how = reading_of(axis_machine, reading, may_miss=predictor.settings.trust)
     opened, intake = open_checked(log, how, axis_machine, fix=fix, as_is=as_is)
     check_outputs(outputs, inputs, force=force)

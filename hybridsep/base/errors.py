@@ -8,7 +8,7 @@
     ├── LogError         a recorded log that cannot be read: columns, time axis, format
     ├── MachineError     a machine file that cannot be read or is inconsistent
     ├── ModelError       a linear model that is unstable, improper or of an unsupported kind
-    ├── IdentificationError  a recording or a frequency response that cannot teach a model
+    ├── IdentificationError  a recording or a frequency response that cannot determine a model
     ├── StateError       a saved state that is foreign, truncated or of another version
     └── FmuError         an FMU that cannot be built, or a call that FMI does not allow now
 
@@ -88,7 +88,7 @@ class ModelError(HybridSepError, ValueError):
 
 
 class IdentificationError(HybridSepError, ValueError):
-    """A recording or a frequency response cannot teach a model."""
+    """A recording or a frequency response cannot determine a model."""
 
 
 class StateError(HybridSepError, ValueError):

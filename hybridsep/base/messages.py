@@ -66,12 +66,12 @@ ERRORS: Mapping[str, Explanation] = {
         "Give a stable, strictly proper single-input single-output system without repeated poles.",
     ),
     "IdentificationError": Explanation(
-        "A recording or a frequency response does not determine a model: too little motion, too few samples or lines, "
+        "A recording or a frequency response cannot determine a model: too little motion, too few samples or lines, "
         "no "
         "resonance, no coherence.",
         "Record more motion, see [how to record a log](../howto/record.md). `hybridsep fit` then goes on with a gain "
         "of 1.",
-        ("cannot teach a model, because",),
+        ("cannot determine a model, because",),
     ),
     "StateError": Explanation(
         "A saved state or trained weights are damaged, of another version, or were learned with other settings, which "

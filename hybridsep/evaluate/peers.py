@@ -23,7 +23,7 @@ ARX_LAGS = (20, 40)
 """Lags of the ARX models."""
 
 LAG_HOLD, FROZEN, REFITTED = "lag + hold", "frozen", "refitted"
-"""Name of the lag whose last residual is held; ARX fitted to what teaches, and again before each window."""
+"""Name of the lag whose last residual is held; ARX fitted to what trains, and again before each window."""
 
 _FAR = 10.0
 """Distance of a prediction from its command, in largest commanded or measured distances from the start, beyond which it
@@ -37,15 +37,15 @@ class Piece(NamedTuple):
     ----------
     x_d, x : (n,) array, m
         Commanded and measured positions, the latter NaN where missing.
-    n_taught : int
-        Leading samples that teach.
+    n_train : int
+        Leading samples that train.
     first : int
         First sample that is predicted, the beginning of a window.
     """
 
     x_d: Array
     x: Array
-    n_taught: int
+    n_train: int
     first: int
 
 
@@ -86,7 +86,7 @@ def predict_peers(
 ) -> tuple[Peer, ...]:
     """Return the peers' predictions of all windows from each piece's ``first`` on.
 
-    The lag and a frozen ARX are fitted to the leading samples that teach; without any there are none of them. A
+    The lag and a frozen ARX are fitted to the leading samples that train; without any there are none of them. A
     refitted ARX is fitted before each window to all samples so far.
 
     Parameters
@@ -100,19 +100,19 @@ def predict_peers(
     progress : callable, optional
         Called with the fraction done.
     """
-    taught = [(one.x_d[: one.n_taught], one.x[: one.n_taught]) for one in pieces if one.n_taught > delay]
-    teaches = any((~np.isnan(x[delay:])).any() for _, x in taught)
-    found = [_lag_hold(pieces, taught, Np, delay)] if teaches else []
-    ways = (FROZEN, REFITTED) if teaches else (REFITTED,)
+    training = [(one.x_d[: one.n_train], one.x[: one.n_train]) for one in pieces if one.n_train > delay]
+    trains = any((~np.isnan(x[delay:])).any() for _, x in training)
+    found = [_lag_hold(pieces, training, Np, delay)] if trains else []
+    ways = (FROZEN, REFITTED) if trains else (REFITTED,)
     for i, n in enumerate(ARX_LAGS):
         found += [_arx(n, way, pieces, Np, delay) for way in ways]
         progress((i + 1) / len(ARX_LAGS))
     return tuple(found)
 
 
-def _lag_hold(pieces: Sequence[Piece], taught: Sequence[tuple[Array, Array]], Np: int, delay: int) -> Peer:
+def _lag_hold(pieces: Sequence[Piece], training: Sequence[tuple[Array, Array]], Np: int, delay: int) -> Peer:
     """Return the fitted lag and its residual at the last sample measured before each window, held over it."""
-    lag = fitted_lag([(x_d[: len(x_d) - delay], x[delay:]) for x_d, x in taught])
+    lag = fitted_lag([(x_d[: len(x_d) - delay], x[delay:]) for x_d, x in training])
     predictions = []
     for piece in pieces:
         x_lag = _late(lag.position(piece.x_d), delay)
@@ -133,7 +133,7 @@ def _arx(n: int, way: str, pieces: Sequence[Piece], Np: int, delay: int) -> Peer
     runs = [ArxRun(one.x_d, one.x, n, delay) for one in pieces]
     if way == FROZEN:
         for run, piece in zip(runs, pieces, strict=True):
-            least_squares.add(run.rows(0, piece.n_taught - delay))
+            least_squares.add(run.rows(0, piece.n_train - delay))
         w = least_squares.solution()
     predictions = [np.full(len(one.x), np.nan) for one in pieces]
     for run, piece, predicted in zip(runs, pieces, predictions, strict=True):

@@ -16,7 +16,7 @@ from ..compensate.expected import expected_errors
 from ..evaluate.report import Report
 from ..logs.units import Shown
 from ..machines.machine import Machine
-from ..tune.halves import Recording
+from ..tune.recordings import Recording
 
 __all__ = ["COMPENSATE", "drive_limits", "expected_tracking", "tracking_lines", "write_tracking"]
 

@@ -1,4 +1,4 @@
-"""From recorded logs to FMUs: identification, choice of settings, judgement on samples that taught nothing."""
+"""From recorded logs to FMUs: identification, choice of settings, judgement on samples that trained nothing."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ from ..model.physics import ModalModel, Mode
 from ..predict.predictor import HybridPredictor
 from ..reports.step_times import step_times
 from ..tune.choice import choose_settings, settings_for, window_scores
-from ..tune.halves import Recording, Replay, halves, replay
 from ..tune.period import period_hint
+from ..tune.recordings import Recording, Replay, replay, split_log
 from .compensation import COMPENSATE, expected_tracking
 from .stages import Stages, key_of
 
@@ -55,7 +55,7 @@ class FitOptions:
     name : str
         The machine's.
     share : float
-        Share of each log's samples that teaches; the rest judges.
+        Share of each log's samples that trains; the rest judges.
     known : mapping
         What is known of the axis: entries of ``[predictor]`` such as ``period`` and ``measurement_delay``.
     drive_limits : mapping
@@ -79,9 +79,9 @@ class Fit:
     identification, choice, windows, steps : plain values
         As in ``fit.json``.
     share : float
-        Share of each log's samples that taught.
+        Share of each log's samples that trained.
     judged : Replay
-        Replay of the logs; what judges taught neither the physics model nor the choice.
+        Replay of the logs; what judges trained neither the physics model nor the choice.
     files : tuple of Path
         Files that were written.
     tracking : dict
@@ -149,7 +149,7 @@ def fit(
 ) -> Fit:
     """Identify an axis from its logs, choose settings, judge them, and build its FMUs.
 
-    The first half of each log teaches: the physics model is identified from it, and settings are chosen by causal
+    The first half of each log trains: the physics model is identified from it, and settings are chosen by causal
     replays of it. Then the whole is replayed, causally; its second half judges. What the predictor has learned at the
     end is the state with which the FMUs start.
 
@@ -177,9 +177,9 @@ def fit(
     T_s = _common(logs)
     Np = _window(options.Np, T_s)
     recordings = [
-        piece for log in logs for piece in halves([(s.x_d, s.x_meas) for s in log.segments()], options.share, Np)
+        piece for log in logs for piece in split_log([(s.x_d, s.x_meas) for s in log.segments()], options.share, Np)
     ]
-    judging = max(len(recording.x) - recording.n_taught for recording in recordings)
+    judging = max(len(recording.x) - recording.n_train for recording in recordings)
     if options.Np is not None and options.Np > judging:
         raise ParameterError(
             f"--Np must be at most {judging}, the longest stretch of samples that judges, got {options.Np}; record more"
@@ -261,20 +261,20 @@ def _identified(
     logs: Sequence[Log],
     progress: Callable[[float], object],
 ) -> dict[str, Any]:
-    """Return the identification from the samples that teach, as plain values, in the units of the logs."""
-    taught = [in_time(*one.taught, settings.measurement_delay) for one in recordings if one.n_taught > 1]
-    n, n_all = (sum(lengths) for lengths in zip(*((one.n_taught, len(one.x)) for one in recordings), strict=True))
+    """Return the identification from the samples that train, as plain values, in the units of the logs."""
+    training = [in_time(*one.training, settings.measurement_delay) for one in recordings if one.n_train > 1]
+    n, n_all = (sum(lengths) for lengths in zip(*((one.n_train, len(one.x)) for one in recordings), strict=True))
     try:
         if n < SAMPLES_MIN:
             raise IdentificationError(
-                f"this log cannot teach a model, because {n} of its {n_all} samples teach, at least {SAMPLES_MIN} are "
-                "needed"
+                f"this log cannot determine a model, because {n} of its {n_all} samples train, at least {SAMPLES_MIN} "
+                "are needed"
             )
         found = identify_operation(
-            *(taught, settings.T_s),
+            *(training, settings.T_s),
             unit=logs[0].unit,
             shown=logs[0].shown,
-            part=_what_teaches(recordings, logs),
+            part=_what_trains(recordings, logs),
             progress=lambda _message, done: progress(done),
         )
     except IdentificationError as error:
@@ -283,8 +283,8 @@ def _identified(
     return {name: _known(value) for name, value in summary.items()}
 
 
-def _what_teaches(recordings: Sequence[Recording], logs: Sequence[Log]) -> str:
-    """Return what the samples that teach are, in words: where all of it rests, it is the log that cannot teach."""
+def _what_trains(recordings: Sequence[Recording], logs: Sequence[Log]) -> str:
+    """Return what the samples that train are, in words: where all of it rests, all of the log."""
     log = "this log" if len(logs) == 1 else "these logs"
     return log if all(np.ptp(one.x_d) == 0 for one in recordings) else f"the first half of {log}"
 
@@ -304,7 +304,7 @@ def _repeats(model: ModalModel, recordings: Sequence[Recording], settings: Predi
     before, after = shown_figure(scale * hint.rms_without), shown_figure(scale * hint.rms_with)
     return [
         f"the residual repeats every {factor * hint.period:.6g} {position}: with --period {hint.period:g} the hybrid's "
-        f"error would go from {before} to {after} {unit}, by replays of the half that teaches"
+        f"error would go from {before} to {after} {unit}, by replays of the half that trains"
     ]
 
 

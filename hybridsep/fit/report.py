@@ -58,9 +58,9 @@ def fit_report(fit: Fit, logs: Sequence[Log], findings: Mapping[str, Sequence[Fi
     write_errors(
         report,
         judged,
-        "Judged on samples that taught nothing",
-        "The first half of each log taught the physics model and chose the settings; these are the errors of the "
-        "second half." + (_SETTLING if any(one.judges_from > one.n_taught for one in fit.judged.recordings) else ""),
+        "Tested on samples that trained nothing",
+        "The first half of each log trained the physics model and chose the settings; these are the errors of the "
+        "second half." + (_SETTLING if any(one.judges_from > one.n_train for one in fit.judged.recordings) else ""),
     )
     _write_other_windows(report, fit, judged)
     write_findings(report, findings)
@@ -70,7 +70,7 @@ def fit_report(fit: Fit, logs: Sequence[Log], findings: Mapping[str, Sequence[Fi
     fmus = [path.name for path in fit.files if path.suffix == ".fmu"]
     if fmus:
         write_use(report, fmus, fit.steps, T_s, Np)
-        report.paragraph(f"{' and '.join(fmus)} start with what the log has taught.")
+        report.paragraph(f"{' and '.join(fmus)} start trained with the log.")
     return report
 
 
@@ -119,7 +119,7 @@ def _write_identification(report: Report, fit: Fit, judged: Judged) -> None:
             for other in found["alternatives"]
         ]
         report.table(["structure", "parameters", f"fitted [{unit}]", f"held out [{unit}]", ""], rows, words=4)
-        report.paragraph("RMS of the simulated position within the half that teaches.", "dim")
+        report.paragraph("RMS of the simulated position within the half that trains.", "dim")
     report.bullets(found["findings"])
 
 
@@ -137,7 +137,7 @@ def _write_settings(report: Report, fit: Fit, judged: Judged) -> None:
     ]
     report.table(["p", "q", f"RMS [{unit}]", ""], rows)
     report.paragraph(
-        "Errors of causal replays over the later half of what teaches. The first row is the default, which stays "
+        "Errors of causal replays over the later half of what trains. The first row is the default, which stays "
         f"unless another is better by {100 * WORTH:g} %.",
         "dim",
     )

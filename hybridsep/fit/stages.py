@@ -10,7 +10,7 @@ from typing import Any
 
 from ..base.output import written_text
 from ..base.version import __version__
-from ..tune.halves import Recording
+from ..tune.recordings import Recording
 
 __all__ = ["Stages", "key_of"]
 
@@ -23,7 +23,7 @@ def key_of(recordings: Iterable[Recording], options: object) -> str:
     """Return what a result depends on as a hash: the samples as they are used, the options, the version."""
     found = hashlib.sha256(f"{_FORMAT} {__version__} {options!r}".encode())
     for recording in recordings:
-        found.update(f"{len(recording.x)} {recording.n_taught}".encode())
+        found.update(f"{len(recording.x)} {recording.n_train}".encode())
         found.update(recording.x_d.tobytes() + recording.x.tobytes())
     return found.hexdigest()
 

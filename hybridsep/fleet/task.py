@@ -29,7 +29,7 @@ from ..predict.predictor import HybridPredictor
 from ..reports.extent import extent
 from ..reports.judged import Judged, recommendation
 from ..reports.sections import write_errors, write_findings
-from ..tune.halves import Recording, Replay, replay
+from ..tune.recordings import Recording, Replay, replay
 from .settings import AxisTask, FleetSettings, Looked
 from .sources import LogFile, local_copy
 

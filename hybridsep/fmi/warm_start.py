@@ -9,10 +9,10 @@ from ..machines.machine import Machine
 from ..predict.predictor import HybridPredictor
 from .weights import learned_settings
 
-__all__ = ["begun_predictor", "load_trained"]
+__all__ = ["load_trained", "warm_predictor"]
 
 
-def begun_predictor(machine: Machine, weights: str | Path | None) -> HybridPredictor:
+def warm_predictor(machine: Machine, weights: str | Path | None) -> HybridPredictor:
     """Return a machine's predictor at the beginning of a run, with what a saved one has learned where it is given.
 
     Raises

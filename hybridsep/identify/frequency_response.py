@@ -180,7 +180,7 @@ def _usable(frequency: ArrayLike, response: ArrayLike, std: ArrayLike | None) ->
     f, G, sigma = f[usable][order], G[usable][order], sigma[usable][order]
     if len(f) < LINES_MIN or f[0] == f[-1]:
         raise IdentificationError(
-            f"this frequency response cannot teach a model, because it has {len(f)} usable lines; at least "
+            f"this frequency response cannot determine a model, because it has {len(f)} usable lines; at least "
             f"{LINES_MIN} at frequencies above 0 are needed"
         )
     return f, G, sigma

@@ -123,7 +123,7 @@ def identify_resonance(
     used = (f >= low) & (f <= high) & (f > 0)
     if np.count_nonzero(used) < 8:
         raise IdentificationError(
-            f"this recording cannot teach a model, because fewer than 8 lines lie between {low:g} and {high:g} Hz"
+            f"this recording cannot determine a model, because fewer than 8 lines lie between {low:g} and {high:g} Hz"
         )
     f = f[used]
     # The commanded acceleration grows as f and dwells equally long at each f
@@ -131,7 +131,8 @@ def identify_resonance(
     scale, f_n, zeta, errors = _one_mode(f, magnitude)
     if not (f[1] < f_n < f[-2] and zeta < ZETA_MAX):
         raise IdentificationError(
-            f"this recording cannot teach a model, because axis {axis} has no resonance between {low:g} and {high:g} Hz"
+            f"this recording cannot determine a model, because axis {axis} has no resonance between {low:g} and "
+            f"{high:g} Hz"
         )
     omega = 2 * np.pi * f_n
     model = ModalModel([Mode(f_n, zeta, omega**2)])

@@ -87,7 +87,7 @@ def identify_operation(
     Raises
     ------
     IdentificationError
-        If the recordings cannot teach a model, with the reason.
+        If the recordings cannot determine a model, with the reason.
     SignalError
         If samples are not finite or of different lengths.
     ParameterError
@@ -97,7 +97,7 @@ def identify_operation(
     given = [(x_d, x) for x_d, x in recordings]
     segments = as_segments(given)
     if reason := _hindrance(segments):
-        raise IdentificationError(f"{part} cannot teach a model, because {reason}")
+        raise IdentificationError(f"{part} cannot determine a model, because {reason}")
     structures = [
         structure
         for structure in STRUCTURES
@@ -141,7 +141,7 @@ def identify_operation(
 
 
 def unit_gain_model(T_s: float, reason: str) -> IdentifiedModel:
-    """Return a model that follows its command, for recordings that cannot teach one; ``reason`` is its finding."""
+    """Return a model that follows its command, for recordings that cannot determine one; ``reason`` is its finding."""
     model = ModalModel(Structure(0).modes(np.empty(0), np.empty(0), T_s))
     return IdentifiedModel(
         *(model, "foh", T_s, "m", Structure(0).name, (), 0.0, np.nan, np.nan, 0, 0.0, (), (reason,)),

@@ -78,7 +78,7 @@ def h1(x_d: ArrayLike, x: ArrayLike, T_s: float, f_min: float = 0.0, f_max: floa
     top = 0.25 / T_s if f_max is None else min(f_max, 0.5 / T_s)
     if len(u) < 10 * SMOOTHED:
         raise IdentificationError(
-            f"this swept sine cannot teach a model, because it has {len(u)} samples; {10 * SMOOTHED} are needed"
+            f"this swept sine cannot determine a model, because it has {len(u)} samples; {10 * SMOOTHED} are needed"
         )
     u, y = u - u[0], y - y[0]
     frequency, power = _spectrum(u, u, T_s)
@@ -93,8 +93,8 @@ def h1(x_d: ArrayLike, x: ArrayLike, T_s: float, f_min: float = 0.0, f_max: floa
     used = band & (power.real > POWER_MIN * np.quantile(power.real[band], 0.9)) & (coherence > COHERENCE_MIN)
     if not used.any():
         raise IdentificationError(
-            "this swept sine cannot teach a model, because the measured signal is not coherent with the commanded one "
-            f"(squared coherence at most {coherence[band].max():.2f})"
+            "this swept sine cannot determine a model, because the measured signal is not coherent with the commanded "
+            f"one (squared coherence at most {coherence[band].max():.2f})"
         )
     noise = smooth[2].real * power.real * (1 - coherence) * _CORRECTION
     floor = median_filter(noise, FLOOR, mode="nearest")

@@ -18,7 +18,7 @@ ERROR, WARNING, NOTE = "error", "warning", "note"
 """Severities: errors computed from the log are invalid; they are larger than they need be; worth knowing."""
 
 HOPELESS = "too little motion"
-"""Finding that no fix helps: the log does not determine a model."""
+"""Finding that no fix helps: the log cannot determine a model."""
 
 NAMES = tuple(FINDINGS)
 """Names of findings in the order in which they are looked for, and fixed."""

@@ -74,7 +74,7 @@ def check_motion(log: Log) -> Iterator[Finding]:
         reasons.append(f"there are {n} samples, fewer than {_SAMPLES_MIN}")
     if not reasons:
         return
-    words = f"{' and '.join(reasons)}: this log cannot teach a model; record moves over the travel that is used"
+    words = f"{' and '.join(reasons)}: this log cannot determine a model; record moves over the travel that is used"
     evidence = {"travel": travel, "noise": noise, "n_moving": float(moving), "n": float(n)}
     yield Finding(HOPELESS, WARNING, words, evidence, _positions(log, "Command and measurement"))
 

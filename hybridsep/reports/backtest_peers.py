@@ -14,7 +14,7 @@ from ..base.signals import Array
 from ..evaluate.backtest import Backtest
 from ..evaluate.verdict import Verdict
 from ..predict.predictor import HybridPredictor
-from ..tune.halves import Recording, Replay
+from ..tune.recordings import Recording, Replay
 
 __all__ = ["BacktestPeers", "backtest_peers"]
 

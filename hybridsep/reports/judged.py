@@ -12,7 +12,7 @@ from ..evaluate.peers import ARX_LAGS, LAG_HOLD
 from ..evaluate.verdict import ALIKE, WINDOWS_ENOUGH, WINDOWS_MIN, counted
 from ..identify.operation import LITTLE_MOTION
 from ..logs.units import Shown
-from ..tune.halves import Replay
+from ..tune.recordings import Replay
 
 __all__ = ["Judged", "peers_in_words", "recommendation"]
 

@@ -24,7 +24,7 @@ __all__ = [
 ]
 
 NAMES = ("physics model", "hold the last residual", "hybrid")
-"""Names of :data:`~hybridsep.tune.halves.PREDICTIONS`."""
+"""Names of :data:`~hybridsep.tune.recordings.PREDICTIONS`."""
 
 COLOURS = (PHYSICS, HOLD, HYBRID)
 """Their colours."""

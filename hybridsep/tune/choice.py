@@ -16,7 +16,7 @@ from ..base.metrics import rms
 from ..base.settings import PARAMETERS, PredictorSettings
 from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
-from .halves import Recording, replay
+from .recordings import Recording, replay
 
 __all__ = [
     "WORTH",
@@ -52,7 +52,7 @@ class Tried:
     ----------
     settings : PredictorSettings
     rms_h : float
-        RMS of the hybrid's error over the later half of the samples that teach, m; infinite if it diverged. The
+        RMS of the hybrid's error over the later half of the samples that train, m; infinite if it diverged. The
         earlier half says who learns fastest, but machines run warm.
     """
 
@@ -118,7 +118,7 @@ def choose_settings(
     settings: PredictorSettings,
     progress: Callable[[float], object] = lambda _done: None,
 ) -> Choice:
-    """Return the settings with the least error of causal replays over the samples that teach.
+    """Return the settings with the least error of causal replays over the samples that train.
 
     Parameters
     ----------
@@ -133,16 +133,16 @@ def choose_settings(
     tried: list[Tried] = []
     candidates = settings_to_try(settings)
     for i, candidate in enumerate(candidates):
-        tried.append(Tried(candidate, _taught_rms(model, candidate, recordings)))
+        tried.append(Tried(candidate, _train_rms(model, candidate, recordings)))
         progress((i + 1) / len(candidates))
     best = min(tried, key=lambda one: one.rms_h)
     chosen = best if best.rms_h < (1.0 - WORTH) * tried[0].rms_h else tried[0]
     return Choice(chosen.settings, tuple(tried))
 
 
-def _taught_rms(model: ModalModel, settings: PredictorSettings, recordings: Sequence[Recording]) -> float:
+def _train_rms(model: ModalModel, settings: PredictorSettings, recordings: Sequence[Recording]) -> float:
     try:
-        errors = replay(HybridPredictor(model, settings), recordings, taught=True).errors(taught=True)[2]
+        errors = replay(HybridPredictor(model, settings), recordings, training=True).errors(training=True)[2]
     except SignalError:  # it diverges
         return float("inf")
     later = errors[len(errors) // 2 :]
@@ -170,7 +170,7 @@ def window_scores(
     model, recordings, settings, progress
         As for :func:`choose_settings`.
     offset : float
-        As of :class:`~hybridsep.tune.halves.Replay`, m.
+        As of :class:`~hybridsep.tune.recordings.Replay`, m.
     """
     sizes = window_sizes(settings.Np, min(len(recording.x) for recording in recordings))
     scores = []

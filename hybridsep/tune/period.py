@@ -13,7 +13,7 @@ from ..identify.periodic import residual_period
 from ..identify.segments import in_time
 from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
-from .halves import Recording, replay
+from .recordings import Recording, replay
 
 __all__ = ["PeriodHint", "period_hint"]
 
@@ -29,7 +29,7 @@ class PeriodHint:
     ----------
     period : float, m
     rms_without, rms_with : float
-        RMS of the hybrid over the later half of the samples that teach, m, by causal replays.
+        RMS of the hybrid over the later half of the samples that train, m, by causal replays.
     """
 
     period: float
@@ -38,7 +38,7 @@ class PeriodHint:
 
 
 def period_hint(model: ModalModel, recordings: Sequence[Recording], settings: PredictorSettings) -> PeriodHint | None:
-    """Return the hint, from the samples that teach; None where nothing repeats, or the predictor gains little.
+    """Return the hint, from the samples that train; None where nothing repeats, or the predictor gains little.
 
     Parameters
     ----------
@@ -49,13 +49,13 @@ def period_hint(model: ModalModel, recordings: Sequence[Recording], settings: Pr
         Without a period.
     """
     late = settings.measurement_delay
-    taught = [in_time(*one.taught, late) for one in recordings if one.n_taught > late + 1]
-    period = residual_period(taught, model, settings.T_s, settings.input_hold) if taught else 0.0
+    training = [in_time(*one.training, late) for one in recordings if one.n_train > late + 1]
+    period = residual_period(training, model, settings.T_s, settings.input_hold) if training else 0.0
     if period == 0.0 or period > PredictorSettings.parameters()["period"].maximum:
         return None
     errors = []
     for tried in (settings, replace(settings, period=period)):
-        found = replay(HybridPredictor(model, tried), recordings, taught=True).errors(taught=True)[2]
+        found = replay(HybridPredictor(model, tried), recordings, training=True).errors(training=True)[2]
         later = found[len(found) // 2 :]
         errors.append(rms(later[~np.isnan(later)]))
     return PeriodHint(period, *errors) if errors[1] < _GAIN * errors[0] else None

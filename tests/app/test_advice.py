@@ -12,7 +12,7 @@ from hybridsep.base.signals import Array
 from hybridsep.evaluate.peers import Peer
 from hybridsep.logs.units import shown_in
 from hybridsep.reports.judged import Judged, recommendation
-from hybridsep.tune.halves import Recording, Replay
+from hybridsep.tune.recordings import Recording, Replay
 
 NP, N = 20, 1000
 

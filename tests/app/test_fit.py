@@ -1,4 +1,4 @@
-"""``hybridsep fit``: from a log to files that work, on samples that taught nothing; what is refused, and going on."""
+"""``hybridsep fit``: from a log to files that work, on samples that trained nothing; what is refused, and going on."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from hybridsep.intake.repair import take_in
 from hybridsep.logs.units import shown_in
 from hybridsep.machines.naming import machine_name
 from hybridsep.reports.judged import recommendation
-from hybridsep.tune.halves import halves, replay
+from hybridsep.tune.recordings import replay, split_log
 
 N = 3000
 NP = 50
@@ -46,7 +46,7 @@ def test_the_figures_are_of_a_causal_replay_with_the_machine_file(fitted: Fit, l
     machine = load_machine(log.parent / "out" / "machine.toml")
     assert machine == fitted.machine
     found = read_log(log)
-    by_hand = replay(machine.new_predictor(), halves([(found.x_d, found.x_meas)], 0.5))
+    by_hand = replay(machine.new_predictor(), split_log([(found.x_d, found.x_meas)], 0.5))
     assert fitted.judged.rms()[1:] == by_hand.rms()[1:]
     assert replace(by_hand, offset=fitted.identification["offset"]).rms() == fitted.judged.rms()
     rms_pb, rms_hold, rms_h = by_hand.rms()
@@ -156,7 +156,7 @@ def test_the_command_line(hybridsep: Run, tmp_path: Path) -> None:
     assert "Judged by 10 windows only." in out
     assert "So far the hybrid is " in out
     assert "judged by 10 windows only: record at least 1.7 s." in " ".join(out.split())
-    assert "taught nothing [µm]" in " ".join(out.split())
+    assert "trained nothing [µm]" in " ".join(out.split())
     machine = tmp_path / "fit" / "machine.toml"
     edited = machine.read_text(encoding="utf-8").replace("dead_time = ", "dead_time = 1")
     machine.write_text(edited, encoding="utf-8")
@@ -183,7 +183,7 @@ def test_a_flipped_sign_is_refused_until_it_is_fixed(hybridsep: Run, tmp_path: P
     done = "axis.csv: sign: turn the measured position's sign; the controller must do the same"
     assert load_machine(tmp_path / "fit" / "machine.toml").sources == ("identified from axis.csv, 800 samples", done)
     page = unescape((tmp_path / "fit" / "report.html").read_text(encoding="utf-8"))
-    assert page.index(done) < page.index("Judged on samples that taught nothing")
+    assert page.index(done) < page.index("Tested on samples that trained nothing")
     np.testing.assert_allclose(used[0].x_meas, measured(0)[:800], atol=1e-15)
 
 
@@ -195,7 +195,7 @@ def test_a_log_that_cannot_teach_a_model_is_predicted_by_its_command(tmp_path: P
     assert [finding.name for finding in findings["still.csv"]] == ["too little motion"]
     found = fit(used, tmp_path, FitOptions(20, "still"))
     [reason] = found.identification["findings"]
-    assert reason.startswith("this log cannot teach a model, because")
+    assert reason.startswith("this log cannot determine a model, because")
     rms_pb, _, rms_h = found.judged.rms()
     assert rms_pb == pytest.approx(1e-6, rel=0.1)
     assert rms_h <= 1.02 * rms_pb
@@ -204,7 +204,7 @@ def test_a_log_that_cannot_teach_a_model_is_predicted_by_its_command(tmp_path: P
 
 @pytest.mark.usefixtures("quick_fit")
 def test_a_half_that_rests_is_named(tmp_path: Path) -> None:
-    """It was the log whose commanded position does not move, where only the half that teaches rests."""
+    """It was the log whose commanded position does not move, where only the half that trains rests."""
     rest = np.full(300, commanded()[0])
     noise = np.random.default_rng(0).normal(0, 1e-6, 300)
     x_d, x = np.concatenate((rest, commanded()[:300])), np.concatenate((rest + noise, measured(0)[:300]))
@@ -212,7 +212,7 @@ def test_a_half_that_rests_is_named(tmp_path: Path) -> None:
     for logs, name in ((used, "this log"), (2 * used, "these logs")):
         [reason] = fit(logs, tmp_path, FitOptions(NP, "axis")).identification["findings"]
         assert reason.startswith(
-            f"the first half of {name} cannot teach a model, because the commanded position does not move"
+            f"the first half of {name} cannot determine a model, because the commanded position does not move"
         )
 
 
@@ -230,7 +230,7 @@ def test_too_short_a_log_judges_nothing(tmp_path: Path, n: int, Np: int | None, 
     found = fit(used, tmp_path, FitOptions(Np, "short"))
     if n == 2:
         [reason] = found.identification["findings"]
-        assert "because 1 of its 2 samples teach, at least 100 are needed; a gain of 1" in reason
+        assert "because 1 of its 2 samples train, at least 100 are needed; a gain of 1" in reason
     assert (
         recommendation(judged_by(found, shown_in("m")))
         == f"Nothing could be judged: the log's second half has {words}."
@@ -247,7 +247,7 @@ def test_a_gap_in_motion_does_not_decide_the_verdict(tmp_path: Path) -> None:
     assert [finding.name for finding in findings["axis.csv"]] == ["gaps"]
     found = fit(used, tmp_path, FitOptions(NP, "axis"))
     pieces = [(one.x_d, one.x_meas) for one in used[0].segments()]
-    all_windows = replay(found.machine.new_predictor(), halves(pieces, 0.5)).rms()
+    all_windows = replay(found.machine.new_predictor(), split_log(pieces, 0.5)).rms()
     assert found.judged.rms()[2] < 0.8 * all_windows[2]
     fit_report(found, used, findings).write(tmp_path / "report.html")
     assert "The window after a gap does not judge" in (tmp_path / "report.html").read_text(encoding="utf-8")
@@ -310,12 +310,12 @@ def test_a_rotary_axis_modulo_one_turn_is_unwrapped(hybridsep: Run, tmp_path: Pa
 
 def test_what_is_kept_is_of_the_samples_as_they_are_read(log: Path) -> None:
     found = read_log(log)
-    [recording] = halves([(found.x_d, found.x_meas)], 0.5)
+    [recording] = split_log([(found.x_d, found.x_meas)], 0.5)
     keys = {
         key_of([recording], "m"),
         key_of([recording], "rad"),
         key_of([replace(recording, x=-recording.x)], "m"),
-        key_of([replace(recording, n_taught=recording.n_taught + 1)], "m"),
+        key_of([replace(recording, n_train=recording.n_train + 1)], "m"),
     }
     assert len(keys) == 4
     assert key_of([replace(recording, x=recording.x.copy())], "m") in keys

@@ -63,8 +63,8 @@ def test_a_period_is_hinted_at_and_taken(hybridsep: Run, tmp_path: Path) -> None
     status, out, err = hybridsep("fit", log, "--out", tmp_path / "with", "--Np", 50, "--period", PITCH)
     assert status == 0, err
     assert "the residual repeats" not in out
-    taught = json.loads((tmp_path / "with" / "fit.json").read_text())
-    assert taught["judged"]["rms_h"] < 0.5 * found["judged"]["rms_h"]
+    training = json.loads((tmp_path / "with" / "fit.json").read_text())
+    assert training["judged"]["rms_h"] < 0.5 * found["judged"]["rms_h"]
     machine = load_machine(tmp_path / "with" / "machine.toml")
     assert machine.predictor_settings.period == PITCH
     assert HybridPredictor.load(tmp_path / "with" / "trained.state").settings.period == PITCH

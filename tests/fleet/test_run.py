@@ -25,7 +25,7 @@ from hybridsep.fleet.settings import FleetSettings
 from hybridsep.logs.log import read_log
 from hybridsep.machines.machine import load_machine, machine_path
 from hybridsep.predict.predictor import HybridPredictor
-from hybridsep.tune.halves import Recording, replay
+from hybridsep.tune.recordings import Recording, replay
 
 DAYS = ("2026-03-05", "2026-03-06")
 

@@ -184,7 +184,7 @@ def test_acceleration_over_acceleration_is_the_same_ratio() -> None:
     assert found == pytest.approx([20.0, 20.0], abs=0.02)
 
 
-def test_what_teaches_nothing_is_refused() -> None:
+def test_what_trains_nothing_is_refused() -> None:
     rng = np.random.default_rng(0)
     u, y = rng.standard_normal((2, 5000)) * 1e-3
     with pytest.raises(IdentificationError, match="not coherent"):

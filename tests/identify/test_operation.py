@@ -1,4 +1,4 @@
-"""Identification from operation: simulated axes are found again, recordings that teach nothing are refused."""
+"""Identification from operation: simulated axes are found again, recordings that train nothing are refused."""
 
 from __future__ import annotations
 
@@ -285,8 +285,8 @@ X_D = moves(1500)
     ],
     ids=["rest", "stuck", "sign", "short"],
 )
-def test_what_teaches_nothing_is_refused(x_d: Array, x: Array, reason: str) -> None:
-    with pytest.raises(IdentificationError, match=f"cannot teach a model, because .*{reason}"):
+def test_what_trains_nothing_is_refused(x_d: Array, x: Array, reason: str) -> None:
+    with pytest.raises(IdentificationError, match=f"cannot determine a model, because .*{reason}"):
         identify_operation([(x_d, x)], T_S)
 
 

@@ -144,7 +144,7 @@ def test_what_no_fix_helps() -> None:
     still = check(FAULTS["no motion"][1](needed("staircase")))
     assert not still.usable
     assert still.errors == ()
-    assert "the command never moves: this log cannot teach a model" in still.findings[0].words
+    assert "the command never moves: this log cannot determine a model" in still.findings[0].words
     log = needed("staircase")
     another = check(replace(log, x_meas=np.cumsum(np.random.default_rng(1).normal(0.0, 1e-4, len(log.t)))))
     assert "hardly follows the command" in another.findings[0].words

@@ -11,7 +11,7 @@ from hybridsep.base.settings import PredictorSettings
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.predictor import HybridPredictor
 from hybridsep.tune.choice import choose_settings, settings_for, settings_to_try, window_scores
-from hybridsep.tune.halves import Recording, halves, replay
+from hybridsep.tune.recordings import Recording, replay, split_log
 
 MODEL = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
 
@@ -26,7 +26,7 @@ def ringing(n: int = 1600) -> list[Recording]:
         state = np.array([2 * 0.995 * np.cos(2 * np.pi / 30) * state[0] - 0.995**2 * state[1], state[0]])
         state[0] += 1e-6 * rng.normal()
         ring[i] = state[0]
-    return halves([(x_d, x_d + ring)], 0.5)
+    return split_log([(x_d, x_d + ring)], 0.5)
 
 
 def test_what_fits_into_a_short_window_is_the_default() -> None:
@@ -45,13 +45,13 @@ def test_all_that_is_tried_has_the_controllers_window(Np: int) -> None:
     assert len(set(tried)) == len(tried)
 
 
-def test_the_best_of_what_was_tried_is_chosen_by_what_teaches() -> None:
+def test_the_best_of_what_was_tried_is_chosen_by_what_trains() -> None:
     recordings = ringing()
     settings = settings_for(40, 1e-3, "zoh")
     choice = choose_settings(MODEL, recordings, settings)
     assert [one.settings for one in choice.tried] == settings_to_try(settings)
     for one in choice.tried:
-        errors = replay(HybridPredictor(MODEL, one.settings), recordings, taught=True).errors(taught=True)[2]
+        errors = replay(HybridPredictor(MODEL, one.settings), recordings, training=True).errors(training=True)[2]
         assert one.rms_h == pytest.approx(np.sqrt(np.mean(errors[400:] ** 2)))
     best = min(choice.tried, key=lambda one: one.rms_h)
     gain = best.rms_h / choice.tried[0].rms_h

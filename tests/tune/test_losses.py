@@ -57,7 +57,7 @@ def test_losses_are_those_of_backtests(pieces: list[Piece], change: dict[str, An
 
 
 def test_a_candidate_that_diverges_has_an_infinite_loss() -> None:
-    # A residual that grows by half in each sample teaches an unstable recursion; a window of 800 samples overflows.
+    # A residual that grows by half in each sample trains an unstable recursion; a window of 800 samples overflows.
     x_d, x = small_signals(800)
     growing = [(x_d[:30], x_d[:30] + 1e-6 * 1.5 ** np.arange(30)), (x_d, x)]
     base = replace(PAPER, Np=800)

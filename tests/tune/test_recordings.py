@@ -1,4 +1,4 @@
-"""Recordings in two parts: what teaches, what judges, and the figures of their replay."""
+"""Recordings in two parts: what trains, what judges, and the figures of their replay."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hybridsep.base.settings import PredictorSettings
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.predictor import HybridPredictor
-from hybridsep.tune.halves import Recording, halves, replay
+from hybridsep.tune.recordings import Recording, replay, split_log
 
 N = 400
 
@@ -32,34 +32,34 @@ def pieces(*lengths: int) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 def test_a_log_is_split_by_its_samples_across_its_gaps() -> None:
-    parts = halves(pieces(100, 300, 200), 0.5)
-    assert [part.n_taught for part in parts] == [100, 200, 0]
-    x_d, x = parts[1].taught
+    parts = split_log(pieces(100, 300, 200), 0.5)
+    assert [part.n_train for part in parts] == [100, 200, 0]
+    x_d, x = parts[1].training
     assert len(x_d) == len(x) == 200
 
 
 @pytest.mark.parametrize("share", [0.0, 1.0, 1e-9])
 def test_a_part_without_samples_is_refused(share: float) -> None:
-    with pytest.raises(SignalError, match="none to teach or none to judge"):
-        halves(pieces(N), share)
+    with pytest.raises(SignalError, match="none to train or none to test"):
+        split_log(pieces(N), share)
 
 
 def test_a_replay_is_the_backtest_of_the_whole_judged_on_its_second_half() -> None:
     (x_d, x), half = pieces(N)[0], N // 2
     whole = backtest(predictor(), x_d, x)
-    found = replay(predictor(), halves([(x_d, x)], 0.5))
+    found = replay(predictor(), split_log([(x_d, x)], 0.5))
     for i, name in enumerate(("x_pb", "x_hold", "x_h")):
         np.testing.assert_array_equal(found.joined(name), getattr(whole, name)[half:])
         np.testing.assert_array_equal(found.errors()[i], (x - getattr(whole, name))[half:])
         assert found.rms()[i] == pytest.approx(np.sqrt(np.mean((x - getattr(whole, name))[half:] ** 2)))
-        assert found.rms(taught=True)[i] == pytest.approx(np.sqrt(np.mean((x - getattr(whole, name))[:half] ** 2)))
+        assert found.rms(training=True)[i] == pytest.approx(np.sqrt(np.mean((x - getattr(whole, name))[:half] ** 2)))
 
 
 def test_one_set_of_samples_judges() -> None:
-    (x_d, x), n, first = pieces(N + 13)[0], N + 13, 220  # 206 samples teach, which end within a window
+    (x_d, x), n, first = pieces(N + 13)[0], N + 13, 220  # 206 samples train, which end within a window
     x[300:305] = np.nan
     whole = backtest(predictor(), x_d, x)
-    found = replace(replay(predictor(), halves([(x_d, x)], 0.5)), offset=2e-6).with_peers()
+    found = replace(replay(predictor(), split_log([(x_d, x)], 0.5)), offset=2e-6).with_peers()
     errors = x[first:] - np.stack((whole.x_pb + 2e-6, whole.x_hold, whole.x_h))[:, first:]
     np.testing.assert_array_equal(found.errors(), errors)
     *others, hybrid = found.scored()
@@ -81,7 +81,7 @@ def test_one_set_of_samples_judges() -> None:
 
 def test_of_two_ways_the_better_is_compared() -> None:
     x_d, x = pieces(N)[0]
-    found = replay(predictor(), halves([(x_d, x)], 0.5)).with_peers()
+    found = replay(predictor(), split_log([(x_d, x)], 0.5)).with_peers()
     rms = {one.name: one.rms for one in found.scored()}
     for peer in found.best_ways()[1:]:
         assert rms[peer.title] == min(rms[f"{peer.name} (frozen)"], rms[f"{peer.name} (refitted)"])
@@ -98,16 +98,16 @@ def test_late_measurements_are_judged_where_they_stand() -> None:
     assert not any(np.isnan(one.errors[7:]).any() for one in found.scored())
 
 
-def test_only_what_teaches_is_seen_where_asked() -> None:
+def test_only_what_trains_is_seen_where_asked() -> None:
     x_d, x = pieces(N)[0]
     spoiled = x.copy()
     spoiled[N // 2 :] = np.nan
-    given, other = (replay(predictor(), halves([(x_d, one)], 0.5), taught=True) for one in (x, spoiled))
-    np.testing.assert_array_equal(given.errors(taught=True), other.errors(taught=True))
+    given, other = (replay(predictor(), split_log([(x_d, one)], 0.5), training=True) for one in (x, spoiled))
+    np.testing.assert_array_equal(given.errors(training=True), other.errors(training=True))
 
 
 def test_the_error_over_the_horizon() -> None:
-    found = replay(predictor(), halves(pieces(N), 0.5))
+    found = replay(predictor(), split_log(pieces(N), 0.5))
     horizon, errors = found.horizon(), found.errors()
     assert horizon.shape == (3, 20)
     np.testing.assert_allclose(horizon[:, 3], np.sqrt(np.mean(errors[:, 3::20] ** 2, axis=1)))
@@ -116,7 +116,7 @@ def test_the_error_over_the_horizon() -> None:
 def test_missing_measurements_are_not_scored() -> None:
     x_d, x = pieces(N)[0]
     x[N // 2 + 5 : N // 2 + 25] = np.nan
-    found = replay(predictor(), halves([(x_d, x)], 0.5))
+    found = replay(predictor(), split_log([(x_d, x)], 0.5))
     assert np.isfinite(found.rms()).all()
     assert np.isfinite(found.horizon()).all()
 
@@ -133,7 +133,7 @@ def test_later_recordings_begin_with_what_the_earlier_ones_taught() -> None:
 def test_the_verdict_is_on_what_judges() -> None:
     x_d, x = pieces(N)[0]
     x[: N // 2] += 1e-2  # would make the hybrid look good
-    verdict = replay(predictor(), halves([(x_d, x)], 0.5)).verdict()
+    verdict = replay(predictor(), split_log([(x_d, x)], 0.5)).verdict()
     assert verdict.n_samples == N // 2
 
 
@@ -142,10 +142,10 @@ def test_the_window_after_a_gap_does_not_judge() -> None:
     drive = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
     x = HybridPredictor(drive, PredictorSettings(Np=900, p=5, q=2)).predict(x_d).x_pb
     parts = [(x_d[:300], x[:300]), (x_d[320:600], x[320:600]), (x_d[640:], x[640:])]
-    judging = halves(parts, 0.5, 20)
+    judging = split_log(parts, 0.5, 20)
     assert [part.n_settling for part in judging] == [0, 20, 20]
     assert [part.judges_from for part in judging] == [300, 120, 20]
-    found, everything = replay(predictor(), judging), replay(predictor(), halves(parts, 0.5))
+    found, everything = replay(predictor(), judging), replay(predictor(), split_log(parts, 0.5))
     assert found.errors().shape[1] == everything.errors().shape[1] - 20
     begins, errors = found.window_errors()
     assert begins[-1] == found.errors().shape[1] - 20
@@ -156,5 +156,5 @@ def test_the_window_after_a_gap_does_not_judge() -> None:
 
 
 def test_the_window_after_a_gap_judges_where_little_else_would() -> None:
-    judging = halves(pieces(40, 10, 12), 0.6, 20)
+    judging = split_log(pieces(40, 10, 12), 0.6, 20)
     assert sum(len(part.x) - part.judges_from for part in judging) == 25

@@ -1,4 +1,4 @@
-"""Recordings of which the first part teaches and the later part judges, and their replay."""
+"""Recordings of which the first part trains and the later part judges, and their replay."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ..evaluate.peers import Peer, Piece, predict_peers
 from ..evaluate.verdict import Tally, Verdict
 from ..predict.predictor import HybridPredictor
 
-__all__ = ["PREDICTIONS", "Recording", "Replay", "Scored", "halves", "replay"]
+__all__ = ["PREDICTIONS", "Recording", "Replay", "Scored", "replay", "split_log"]
 
 PREDICTIONS = ("x_pb", "x_hold", "x_h")
 """What a replay predicts by: physics model, hold baseline, hybrid."""
@@ -31,40 +31,40 @@ class Recording:
     ----------
     x_d, x : (n,) array, m
         Commanded and measured positions.
-    n_taught : int
-        Leading samples that teach; the others judge.
+    n_train : int
+        Leading samples that train; the others judge.
     n_settling : int
         Leading samples that do not judge, as after a gap no model knows the state of the axis.
     """
 
     x_d: Array
     x: Array
-    n_taught: int
+    n_train: int
     n_settling: int = 0
 
     @property
-    def taught(self) -> tuple[Array, Array]:
-        """Commanded and measured positions of the part that teaches."""
-        return self.x_d[: self.n_taught], self.x[: self.n_taught]
+    def training(self) -> tuple[Array, Array]:
+        """Commanded and measured positions of the part that trains."""
+        return self.x_d[: self.n_train], self.x[: self.n_train]
 
     @property
     def judges_from(self) -> int:
         """First sample that judges."""
-        return max(self.n_taught, self.n_settling)
+        return max(self.n_train, self.n_settling)
 
     def first_judged(self, Np: int) -> int:
         """Return the first sample of the first window of ``Np`` that begins among those that judge."""
         return -(-self.judges_from // Np) * Np
 
 
-def halves(pieces: Iterable[tuple[Array, Array]], share: float, n_settling: int = 0) -> list[Recording]:
+def split_log(pieces: Iterable[tuple[Array, Array]], share: float, n_settling: int = 0) -> list[Recording]:
     """Split one log, the pieces ``(x_d, x)`` between its gaps, where a share of its samples is over.
 
     Parameters
     ----------
     pieces : iterable of two (n,) arrays, m
     share : float
-        Share of the samples that teaches.
+        Share of the samples that trains.
     n_settling : int
         Samples after each gap that do not judge, unless fewer than half of those that judge were left.
 
@@ -77,11 +77,11 @@ def halves(pieces: Iterable[tuple[Array, Array]], share: float, n_settling: int 
     n = sum(len(x_d) for x_d, _ in given)
     left = round(share * n)
     if not 0 < left < n:
-        raise SignalError(f"a log of {n} samples has none to teach or none to judge with a share of {share:g}")
+        raise SignalError(f"a log of {n} samples has none to train or none to test with a share of {share:g}")
     found = []
     for x_d, x in given:
         found.append(Recording(x_d, x, min(left, len(x_d))))
-        left -= found[-1].n_taught
+        left -= found[-1].n_train
     settled = [*found[:1], *(replace(one, n_settling=min(n_settling, len(one.x))) for one in found[1:])]
     left, most = (sum(len(one.x) - one.judges_from for one in each) for each in (settled, found))
     return settled if 2 * left >= most else found
@@ -141,28 +141,28 @@ class Replay:
 
     def with_peers(self, progress: Callable[[float], object] = lambda _done: None) -> Replay:
         """Return the replay with the peers' predictions of the samples that judge."""
-        pieces = [Piece(one.x_d, one.x, one.n_taught, one.first_judged(self.Np)) for one in self.recordings]
+        pieces = [Piece(one.x_d, one.x, one.n_train, one.first_judged(self.Np)) for one in self.recordings]
         return replace(self, peers=predict_peers(pieces, self.Np, delay=self.delay, progress=progress))
 
-    def joined(self, name: str, *, taught: bool = False) -> Array:
-        """Return a signal of a :class:`Backtest` over all samples that judge, or over those that teach, ``(n,)``."""
-        return self._parts([getattr(result, name) for result in self.results], taught)
+    def joined(self, name: str, *, training: bool = False) -> Array:
+        """Return a signal of a :class:`Backtest` over all samples that judge, or over those that train, ``(n,)``."""
+        return self._parts([getattr(result, name) for result in self.results], training)
 
     def commands(self) -> Array:
         """Return the commanded position over all samples that judge, ``(n,)``, m."""
         return self._parts([recording.x_d for recording in self.recordings], False)
 
-    def errors(self, *, taught: bool = False) -> Array:
-        """Return ``x`` minus each of :data:`PREDICTIONS` over the samples that judge, or teach, ``(3, n)``, m.
+    def errors(self, *, training: bool = False) -> Array:
+        """Return ``x`` minus each of :data:`PREDICTIONS` over the samples that judge, or train, ``(3, n)``, m.
 
         NaN where a measurement is missing. The physics model is judged with its offset.
         """
-        x = self._measured(taught)
-        return np.stack([x - self._parts(list(rows), taught) for rows in zip(*self._predictions(), strict=True)])
+        x = self._measured(training)
+        return np.stack([x - self._parts(list(rows), training) for rows in zip(*self._predictions(), strict=True)])
 
-    def rms(self, *, taught: bool = False) -> list[float]:
+    def rms(self, *, training: bool = False) -> list[float]:
         """Return the RMS of each of :meth:`errors`, m; NaN without a measurement."""
-        return [_rms(row) for row in self.errors(taught=taught)]
+        return [_rms(row) for row in self.errors(training=training)]
 
     def scored(self) -> list[Scored]:
         """Return the errors of physics model, hold, every peer, and the hybrid, over the samples that judge."""
@@ -242,12 +242,12 @@ class Replay:
         """Return the measured position, ``(n,)``, NaN where it is of before the recording."""
         return np.where(np.arange(len(recording.x)) < self.delay, np.nan, recording.x)
 
-    def _measured(self, taught: bool) -> Array:
-        return self._parts([self._compared(recording) for recording in self.recordings], taught)
+    def _measured(self, training: bool) -> Array:
+        return self._parts([self._compared(recording) for recording in self.recordings], training)
 
-    def _parts(self, signals: Sequence[Array], taught: bool) -> Array:
+    def _parts(self, signals: Sequence[Array], training: bool) -> Array:
         parts = [
-            signal[: recording.n_taught] if taught else signal[recording.first_judged(self.Np) :]
+            signal[: recording.n_train] if training else signal[recording.first_judged(self.Np) :]
             for recording, signal in zip(self.recordings, signals, strict=True)
         ]
         return np.concatenate(parts)
@@ -263,7 +263,7 @@ def replay(
     predictor: HybridPredictor,
     recordings: Sequence[Recording],
     *,
-    taught: bool = False,
+    training: bool = False,
     progress: Callable[[float], object] = lambda _done: None,
 ) -> Replay:
     """Replay recordings with one predictor, which goes on from its state and learns them.
@@ -273,8 +273,8 @@ def replay(
     predictor : HybridPredictor
         It is at the beginning of a run; another begins with each further recording.
     recordings : sequence of Recording
-    taught : bool
-        Whether only the parts that teach are replayed.
+    training : bool
+        Whether only the parts that train are replayed.
     progress : callable, optional
         Called with the fraction done.
 
@@ -284,9 +284,9 @@ def replay(
         If samples cannot be used, or a prediction diverges.
     """
     used = [
-        Recording(*recording.taught, recording.n_taught) if taught else recording
+        Recording(*recording.training, recording.n_train) if training else recording
         for recording in recordings
-        if recording.n_taught or not taught
+        if recording.n_train or not training
     ]
     n, done, results = sum(len(recording.x) for recording in used), 0, []
     for i, recording in enumerate(used):
