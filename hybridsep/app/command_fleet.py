@@ -13,9 +13,11 @@ from .options import (
     JsonOption,
     MeasuredColumnOption,
     ResampleOption,
+    SchedulerOption,
     TimeColumnOption,
     TsOption,
     UnitOption,
+    WorkersOption,
     takes_parameters,
 )
 
@@ -66,12 +68,8 @@ def fleet(
     ] = False,
     fmus: Annotated[bool, typer.Option(help="Build the FMUs of what is fitted.")] = True,
     reports: Annotated[bool, typer.Option(help="Write a report of each axis.")] = True,
-    workers: Annotated[
-        int, typer.Option(min=0, help="Processes of a Dask cluster that is started on this machine.")
-    ] = 0,
-    scheduler: Annotated[
-        str, typer.Option(help="Address of a running Dask scheduler; its workers must reach logs and results.")
-    ] = "",
+    workers: WorkersOption = 0,
+    scheduler: SchedulerOption = "",
     jobs: Annotated[int, typer.Option(min=0, help="Processes without Dask; as many as cores if left out.")] = 0,
     as_json: JsonOption = False,
 ) -> None:
@@ -82,7 +80,7 @@ def fleet(
     from contextlib import nullcontext
 
     from ..base.errors import ParameterError
-    from ..fleet.engine import cluster, joblib_engine
+    from ..fleet.engine import check_engine, cluster, joblib_engine
     from ..fleet.page import write_page
     from ..fleet.results import Results
     from ..fleet.run import run_fleet
@@ -100,8 +98,7 @@ def fleet(
         return
     if out is None:
         raise ParameterError("--out must name the folder of the results")
-    if workers and scheduler:
-        raise ParameterError("--workers and --scheduler exclude each other")
+    check_engine(workers, scheduler)
     named = {role: column for role, column in (("t", t), ("x_d", x_d), ("x", x)) if column}
     settings = FleetSettings(
         *(Np, unit, T_s, tuple(named.items()), tuple(axis or ()), resample, fix),

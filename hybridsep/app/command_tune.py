@@ -19,6 +19,8 @@ from .options import (
     JsonOption,
     MachineOption,
     ReadingOptions,
+    SchedulerOption,
+    WorkersOption,
     takes_parameters,
     takes_reading,
 )
@@ -39,6 +41,8 @@ def tune(
     jobs: Annotated[
         int | None, typer.Option(min=1, help="Processes; as many as there are processors if left out.")
     ] = None,
+    workers: WorkersOption = 0,
+    scheduler: SchedulerOption = "",
     out: Annotated[Path | None, typer.Option(help="Machine file to write, with what was chosen.")] = None,
     figure: Annotated[
         Path | None, typer.Option(help="PNG, PDF or SVG with the error over each parameter and over the look-ahead.")
@@ -50,6 +54,7 @@ def tune(
 
     The look-ahead is the controller's.
     """
+    from ..fleet.engine import cluster_of
     from ..intake.finding import findings_table
     from ..intake.repair import changes
     from ..logs.log import Log
@@ -101,16 +106,20 @@ def tune(
         findings[name], changed_logs[name] = findings_table(intake.findings), intake.findings
         partly += [line] if (line := partly_used(log)) else []
         shown = shown_of(log.file_unit, given.unit)  # that of the last log
-    with progress_bar(as_json) as advance:
+    with cluster_of(workers, scheduler) as engine, progress_bar(as_json) as advance:
         jobs = n_processors() if jobs is None else jobs
         tuning = tune_on(
             *(given.model, pieces, tried),
             jobs=jobs,
+            engine=engine,
             progress=lambda done: advance(f"replay {len(tried)} candidates", 0.9 * done),
         )
         chosen = tuning.candidates[tuning.chosen]
         windows = over_windows(
-            given.model, pieces, chosen, jobs=jobs, progress=lambda done: advance("error over Np", 0.9 + 0.1 * done)
+            *(given.model, pieces, chosen),
+            jobs=jobs,
+            engine=engine,
+            progress=lambda done: advance("error over Np", 0.9 + 0.1 * done),
         )
     if figure is not None:
         tuning_figure(tuning, windows, values, given.title, figure)

@@ -6,19 +6,38 @@ is repeated alone before it is reported: what took the process down twice is the
 
 from __future__ import annotations
 
+import time
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 from ..base.errors import HybridSepError, ParameterError, first_line
+from ..base.interrupt import starting_processes
 from ..logs.extras import library
 
-__all__ = ["Done", "Engine", "cluster", "joblib_engine"]
+__all__ = ["Done", "Engine", "check_engine", "cluster", "cluster_of", "joblib_engine"]
 
 T = TypeVar("T")
+
+_CONFIG: dict[str, Any] = {
+    "distributed.scheduler.allowed-failures": 0,  # a task that is blamed is repeated by its own rule
+    "distributed.admin.log-length": 0,
+    # What watches a worker takes a hundred wake-ups a second, from the thread that works
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "500ms",
+    "distributed.admin.tick.limit": "60s",
+    "distributed.admin.system-monitor.interval": "5s",
+}
+"""Settings of a cluster that is started here."""
+
+_ALONE = 2
+"""Attempts alone of a task that is blamed: it may not even have run, as it waited behind another."""
+
+_COUNTED = 1.0
+"""Time for which a number of workers is taken as it was, s."""
 
 _REACHED = 10.0
 """Time within which a scheduler answers, s."""
@@ -78,8 +97,9 @@ class _Joblib(Engine):
         for i, outcome in self._parallel(work, left):
             yield Done(left.pop(i), *outcome)
         for i, task in left.items():  # a process has ended: one by one, so that it is known on which
-            alone = list(self._parallel(work, {i: task}))
-            yield Done(task, *alone[0][1]) if alone else Done(task, None, _ENDED.format(limit=""))
+            attempts = (list(self._parallel(work, {i: task})) for _ in range(_ALONE))
+            found = next((attempt for attempt in attempts if attempt), None)
+            yield Done(task, *found[0][1]) if found else Done(task, None, _ENDED.format(limit=""))
 
     def _parallel(self, work: Callable[[T], Any], tasks: dict[int, T]) -> Iterator[tuple[int, tuple[Any, str]]]:
         from joblib import Parallel, delayed
@@ -87,7 +107,10 @@ class _Joblib(Engine):
 
         parallel = Parallel(n_jobs=self._jobs if len(tasks) > 1 else 2, return_as="generator_unordered")
         try:
-            yield from parallel(delayed(_numbered)(work, i, task) for i, task in list(tasks.items()))
+            with starting_processes():
+                running = parallel(delayed(_numbered)(work, i, task) for i, task in list(tasks.items()))
+            with closing(running):  # ends the processes where this one is interrupted
+                yield from running
         except (BrokenProcessPool, TerminatedWorkerError):
             return
 
@@ -119,6 +142,7 @@ class _Dask(Engine):
     def __init__(self, client: Any, distributed: Any, words: str, limit: str) -> None:
         self._client, self._distributed = client, distributed
         self.words, self._limit = words, limit
+        self._n, self._counted = 0, -_COUNTED
 
     def run(self, work: Callable[[T], Any], tasks: Iterable[T]) -> Iterator[Done]:
         """Work on all tasks; yield each once, as it is over, in any order."""
@@ -142,13 +166,21 @@ class _Dask(Engine):
                 yield done
             del future
         for task in blamed:
-            future = self._client.submit(_tried, work, task, pure=False, retries=0)
-            self._distributed.wait([future])
-            yield self._done(future, task) or Done(task, None, _ENDED.format(limit=self._limit))
+            attempts = (self._alone(work, task) for _ in range(_ALONE))
+            found = next((attempt for attempt in attempts if attempt), None)
+            yield found or Done(task, None, _ENDED.format(limit=self._limit))
+
+    def _alone(self, work: Callable[[T], Any], task: T) -> Done | None:
+        """Return what came of a task that nothing else runs beside; None if its worker ended."""
+        future = self._client.submit(_tried, work, task, pure=False, retries=0)
+        self._distributed.wait([future])
+        return self._done(future, task)
 
     def _workers(self) -> int:
         """Return the workers there are now; one, which may come, if there are none."""
-        return max(1, len(self._client.scheduler_info(n_workers=-1)["workers"]))
+        if time.monotonic() - self._counted > _COUNTED:
+            self._n, self._counted = len(self._client.scheduler_info(n_workers=-1)["workers"]), time.monotonic()
+        return max(1, self._n)
 
     def _done(self, future: Any, task: T) -> Done | None:
         """Return what came of a task; None if its worker ended."""
@@ -183,7 +215,7 @@ def cluster(workers: int = 0, scheduler: str = "") -> Iterator[Engine]:
     """
     dask = library(Path(scheduler or "--workers"), "dask", "fleet", "an engine")
     distributed = library(Path(scheduler or "--workers"), "distributed", "fleet", "an engine")
-    with dask.config.set({"distributed.scheduler.allowed-failures": 0, "distributed.admin.log-length": 0}):
+    with dask.config.set(_CONFIG):
         if scheduler:
             try:
                 client = distributed.Client(scheduler, timeout=_REACHED)
@@ -192,10 +224,32 @@ def cluster(workers: int = 0, scheduler: str = "") -> Iterator[Engine]:
             with client:
                 yield _Dask(client, distributed, f"Dask at {scheduler}", "")
             return
-        started = distributed.LocalCluster(
-            n_workers=workers, threads_per_worker=1, dashboard_address="127.0.0.1:0", silence_logs=50, host="127.0.0.1"
-        )
+        with starting_processes():
+            started = distributed.LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                host="127.0.0.1",
+                dashboard_address="127.0.0.1:0",  # of its own, so that several may run, and for this machine alone
+                silence_logs=50,
+            )
         with started, distributed.Client(started) as client:
             limit = min(one["memory_limit"] for one in client.scheduler_info(n_workers=-1)["workers"].values())
             words = f"Dask, {workers} worker{'s' if workers > 1 else ''} of {limit / 2**30:.1f} GB"
             yield _Dask(client, distributed, words, f"; its memory limit is {limit / 2**30:.1f} GB")
+
+
+def check_engine(workers: int, scheduler: str) -> None:
+    """Raise ParameterError if both a cluster to be started and a running one are named."""
+    if workers and scheduler:
+        raise ParameterError("--workers and --scheduler exclude each other")
+
+
+@contextmanager
+def cluster_of(workers: int, scheduler: str) -> Iterator[Engine | None]:
+    """Yield the cluster that options name, as of :func:`cluster`; None if they name none."""
+    check_engine(workers, scheduler)
+    if not (workers or scheduler):
+        yield None
+        return
+    with cluster(workers, scheduler) as engine:
+        yield engine

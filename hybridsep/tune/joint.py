@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from ..base.interrupt import starting_processes
 from ..base.metrics import rms_ratio
 from ..base.settings import PredictorSettings
 from ..base.signals import Array
+from ..fleet.engine import Engine
 from ..model.physics import ModalModel
 from .choice import WORTH, window_sizes, with_window
 from .losses import Losses, Piece, replayed_losses
@@ -112,6 +113,7 @@ def tune(
     candidates: Sequence[PredictorSettings],
     *,
     jobs: int = 1,
+    engine: Engine | None = None,
     progress: Progress = lambda _done: None,
 ) -> Tuning:
     """Return the losses of candidates, which have one look-ahead, on each of the logs.
@@ -126,6 +128,8 @@ def tune(
         The machine's own first; each takes a replay a log.
     jobs : int
         Processes; the result is the same for any number.
+    engine : Engine, optional
+        What works in their place, such as a cluster.
     progress : callable, optional
         Called with the fraction done.
 
@@ -136,7 +140,7 @@ def tune(
     """
     given = tuple(candidates)
     tasks = [(name, pieces, one) for name, pieces in logs.items() for one in given]
-    return _tuning(logs, given, _losses(model, tasks, jobs, progress))
+    return _tuning(logs, given, _losses(model, tasks, jobs, engine, progress))
 
 
 def over_windows(
@@ -145,20 +149,22 @@ def over_windows(
     settings: PredictorSettings,
     *,
     jobs: int = 1,
+    engine: Engine | None = None,
     progress: Progress = lambda _done: None,
 ) -> dict[int, Tuning]:
     """Return the losses of settings with shorter and longer windows, as far as the logs reach, by ``Np``.
 
     Parameters
     ----------
-    model, logs, jobs, progress
+    model, logs, jobs, engine, progress
         As for :func:`tune`.
     settings : PredictorSettings
         Of the controller's window; others have as many of the lags as fit into them.
     """
     sizes = window_sizes(settings.Np, min(sum(len(x) for _, x in pieces) for pieces in logs.values()))
     tried = [with_window(settings, Np) for Np in sizes]
-    found = _losses(model, [(name, pieces, one) for one in tried for name, pieces in logs.items()], jobs, progress)
+    tasks = [(name, pieces, one) for one in tried for name, pieces in logs.items()]
+    found = _losses(model, tasks, jobs, engine, progress)
     n = len(logs)
     return {one.Np: _tuning(logs, (one,), found[i * n : (i + 1) * n]) for i, one in enumerate(tried)}
 
@@ -178,9 +184,19 @@ def _tuning(logs: Logs, candidates: tuple[PredictorSettings, ...], found: list[L
     )
 
 
-def _losses(model: ModalModel, tasks: Sequence[_Task], jobs: int, progress: Progress) -> list[Losses]:
+def _losses(
+    model: ModalModel, tasks: Sequence[_Task], jobs: int, engine: Engine | None, progress: Progress
+) -> list[Losses]:
     """Return the losses of each task, in their order."""
     n, n_jobs = len(tasks), min(jobs, len(tasks))
+    if engine is not None:
+        by_number: dict[int, Losses] = {}
+        for done in engine.run(partial(_numbered_losses, model), list(enumerate(tasks))):
+            if done.failure:
+                raise SignalError(done.failure)
+            by_number[done.task[0]] = done.result
+            progress(len(by_number) / n)
+        return [by_number[i] for i in range(n)]
     if n_jobs == 1:
         return [
             _task_losses(model, task, lambda done, i=i: progress((i + done) / n))  # type: ignore[misc]
@@ -197,6 +213,10 @@ def _losses(model: ModalModel, tasks: Sequence[_Task], jobs: int, progress: Prog
             found.append(losses)
             progress(len(found) / n)
     return found
+
+
+def _numbered_losses(model: ModalModel, task: tuple[int, _Task]) -> Losses:
+    return _task_losses(model, task[1])
 
 
 def _task_losses(model: ModalModel, task: _Task, progress: Progress = lambda _done: None) -> Losses:
