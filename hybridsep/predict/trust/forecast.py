@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ...base.signals import Array
 from ..forecast import FeatureScales, Forecast
-from .experts import ExpertPrediction
+from .candidates import CandidatePrediction
 
 __all__ = ["TrustedForecast"]
 
@@ -20,14 +19,14 @@ class TrustedForecast(Forecast):
     ----------
     x : (n,) array, m
         Position that the stiffness acts at.
-    stacked : (n_experts, n) array, m
-        Predictions that are stacked; 0 where an expert knows nothing.
-    predictions : mapping
-        Of the experts that know something, by their places in the stack.
+    hold : float, m
+        Last residual, bounded: the prediction of the hold candidate.
+    predictions : tuple of CandidatePrediction
+        Of the learned candidates; empty before anything is learned.
     scales : FeatureScales
     """
 
     x: Array
-    stacked: Array
-    predictions: Mapping[int, ExpertPrediction]
+    hold: float
+    predictions: tuple[CandidatePrediction, ...]
     scales: FeatureScales
