@@ -11,7 +11,6 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing, contextmanager
-from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 from ..base.errors import HybridSepError, ParameterError, first_line
@@ -213,8 +212,8 @@ def cluster(workers: int = 0, scheduler: str = "") -> Iterator[Engine]:
     ParameterError
         If the scheduler cannot be reached.
     """
-    dask = library(Path(scheduler or "--workers"), "dask", "fleet", "an engine")
-    distributed = library(Path(scheduler or "--workers"), "distributed", "fleet", "an engine")
+    dask = library(scheduler or "--workers", "dask", "fleet", "an engine")
+    distributed = library(scheduler or "--workers", "distributed", "fleet", "an engine")
     with dask.config.set(_CONFIG):
         if scheduler:
             try:

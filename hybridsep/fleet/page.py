@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from statistics import median_high
 from string import Template
 from typing import Any
 
@@ -167,7 +168,7 @@ def _mode(row: Mapping[str, Any]) -> float | None:
 def _change(values: Sequence[float | None]) -> float:
     """Return the latest value relative to the median of those before, less 1; 0 without both."""
     *before, last = [value for value in values if value is not None] or [0.0]
-    middle = sorted(before)[len(before) // 2] if before else 0.0
+    middle = median_high(before) if before else 0.0
     return last / middle - 1.0 if middle else 0.0
 
 
@@ -211,7 +212,7 @@ def _histogram(ratios: Sequence[float]) -> str:
         bars.append(f'<text x="{i * width}" y="142" text-anchor="middle">{_BINS[i]:g}</text>')
     one = _BINS.index(1.0) * width
     better = sum(ratio < 1.0 for ratio in ratios)
-    middle = sorted(ratios)[len(ratios) // 2]
+    middle = median_high(ratios)
     words = (
         f"The hybrid's error relative to that of the best of physics model, hold and ARX models, latest log of each "
         f"axis: {better} of {len(ratios)} below 1, median {middle:.2f}."

@@ -60,9 +60,7 @@ class Results:
         self._rows.mkdir(parents=True, exist_ok=True)
         table = self._arrow.Table.from_pylist([dict(row) for row in rows], schema=self._schema)
         # Names increase with time, so that the last row of an axis is the latest
-        name = (
-            f"{max((row['run'] for row in rows), default='')}-{len(list(self._rows.iterdir())):06}-{uuid.uuid4().hex}"
-        )
+        name = f"{max(row['run'] for row in rows)}-{len(list(self._rows.iterdir())):06}-{uuid.uuid4().hex}"
         with written_whole(self._rows / f"{name.replace(':', '')}.parquet") as file:
             self._parquet.write_table(table, file)
 
@@ -98,7 +96,3 @@ class Results:
             for log in logs
             if (known := (log.url, log.size, log.stamp)) not in done or not wanted[known] <= done[known]
         ]
-
-    def keys(self) -> set[str]:
-        """Return the keys of all rows."""
-        return {row["key"] for row in self.rows()}

@@ -14,7 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from ..base.errors import LogError, brief, first_line
+from ..base.errors import LogError, first_line
 from ..logs.extras import library
 from ..logs.formats import READERS
 
@@ -146,7 +146,4 @@ def _day(below: tuple[str, ...], changed: str) -> str:
 
 
 def _fsspec(url: str) -> Any:
-    try:
-        return library(Path(url), "fsspec", "fleet", "in an object store")
-    except LogError:
-        raise LogError(f"{brief(url)} needs the extra fleet: pip install 'hybridsep[fleet]'") from None
+    return library(url, "fsspec", "fleet", "in an object store")

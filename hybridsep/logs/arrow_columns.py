@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from ..base.errors import LogError, brief
 from ..base.signals import Array
-from .extras import because, library
+from .extras import library, reading
 from .source import Block, Source, sample_number
 
 __all__ = ["ArrowColumnsSource"]
@@ -110,13 +110,7 @@ class ArrowColumnsSource(Source):
         found[np.asarray(values.is_null())] = np.nan
         return found
 
-    @contextmanager
-    def _reading(self) -> Iterator[None]:
+    def _reading(self) -> AbstractContextManager[None]:
         """Turn what pyarrow raises into LogError."""
-        try:
-            yield
-        except (MemoryError, LogError):
-            raise
-        except (self._arrow.ArrowException, OSError, ValueError, KeyError, TypeError) as error:
-            what = because(error)
-            raise LogError(f"{self.path}: is truncated, damaged or not {self.article}: {what}") from error
+        errors = (self._arrow.ArrowException, OSError, ValueError, KeyError, TypeError)
+        return reading(self.path, self.article, errors=errors)

@@ -11,19 +11,19 @@ from typing import Any
 
 from ..base.errors import LogError, first_line
 
-__all__ = ["because", "library", "quiet"]
+__all__ = ["library", "quiet", "reading", "refusal"]
 
 _OWN = (TypeError, AttributeError, LookupError)
 """Errors whose messages tell of the library's own names."""
 
 
-def library(path: Path, module: str, extra: str, format_: str) -> Any:
+def library(asked: Path | str, module: str, extra: str, format_: str) -> Any:
     """Return a module that reads a format.
 
     Parameters
     ----------
-    path : Path
-        The file that needs it, for the message.
+    asked : Path or str
+        What needs it, for the message: a file, an address or an option.
     module : str
     extra : str
         The extra that installs it.
@@ -39,13 +39,31 @@ def library(path: Path, module: str, extra: str, format_: str) -> Any:
         return import_module(module)
     except ModuleNotFoundError as error:
         raise LogError(
-            f"{path}: is {format_}, which needs the extra {extra}: pip install 'hybridsep[{extra}]'"
+            f"{asked}: is {format_}, which needs the extra {extra}: pip install 'hybridsep[{extra}]'"
         ) from error
 
 
-def because(error: Exception) -> str:
-    """Return why a library failed, for a message: the error's type, and its first line where that says something."""
-    return type(error).__name__ if isinstance(error, _OWN) else first_line(f"{type(error).__name__}: {error}")
+def refusal(path: Path, format_: str, error: Exception, what: str = "") -> LogError:
+    """Return that ``what`` of a file, all of it if left out, is damaged or of another format, and why.
+
+    The reason is the type of the library's error, and its first line where that says something.
+    """
+    why = type(error).__name__ if isinstance(error, _OWN) else first_line(f"{type(error).__name__}: {error}")
+    subject = f"{what} is" if what else "is"
+    return LogError(f"{path}: {subject} truncated, damaged or not {format_}: {why}")
+
+
+@contextmanager
+def reading(
+    path: Path, format_: str, what: str = "", errors: tuple[type[Exception], ...] = (Exception,)
+) -> Iterator[None]:
+    """Turn what a library raises into the :func:`refusal` of a file: a damaged one may fail in every way there is."""
+    try:
+        yield
+    except (MemoryError, LogError):
+        raise
+    except errors as error:
+        raise refusal(path, format_, error, what) from error
 
 
 @contextmanager

@@ -6,7 +6,7 @@ Both are written by ``write_log_file`` of LinuxCNC's ``src/hal/utils/scope_files
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -16,7 +16,7 @@ import numpy as np
 
 from ..base.errors import LogError, brief, listed
 from ..base.signals import Array
-from .source import Block, Channel, Source
+from .source import Block, Channel, Source, line_number
 from .text import TextSource, bounded_lines, with_own_names
 from .text_layout import decimal_points, is_number, split
 
@@ -154,7 +154,7 @@ class HalscopePairsSource(_HalscopeSource):
             taken, ahead = [*ahead, *more][:-1], more[-1:]
             found = iter(self._columns(taken, use))
             columns = [self._times(start, len(taken)) if name == _TIME else next(found) for name in names]
-            yield Block(columns, _line_of([number for number, _ in taken]))
+            yield Block(columns, line_number([number for number, _ in taken]))
             start += len(taken)
 
     def _lines(self) -> Iterator[tuple[int, str]]:
@@ -183,7 +183,3 @@ class HalscopePairsSource(_HalscopeSource):
                     f"{brief(fields[i])}"
                 ) from None
         return list(np.array(rows, dtype=np.float64).reshape(len(rows), len(use)).T)
-
-
-def _line_of(numbers: Sequence[int]) -> Callable[[int], str]:
-    return lambda i: f"line {numbers[i]}"

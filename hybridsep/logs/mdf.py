@@ -13,13 +13,15 @@ from typing import IO, Any
 
 import numpy as np
 
-from ..base.errors import LogError, brief
+from ..base.errors import brief
 from ..base.signals import Array
-from .extras import because, library, quiet
+from .extras import library, quiet, reading, refusal
 from .records import RecordsSource
 from .source import Channel, check_column
 
 __all__ = ["MdfSource"]
+
+_FORMAT = "an ASAM MDF file"
 
 
 class MdfSource(RecordsSource):
@@ -33,7 +35,7 @@ class MdfSource(RecordsSource):
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        self._module = library(path, "asammdf", "mdf", "an ASAM MDF file")
+        self._module = library(path, "asammdf", "mdf", _FORMAT)
         self._places: dict[str, tuple[int, int]] = {}
         self._intervals: dict[int, float] = {}
         units: dict[str, str] = {}
@@ -102,23 +104,14 @@ class MdfSource(RecordsSource):
             except MemoryError:
                 raise
             except Exception as error:  # a damaged file makes it fail in nearly every way there is
-                refusal = self._refusal("it", error)
+                refused = refusal(self.path, _FORMAT, error, "it")
             hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
             gc.collect()  # a file that is half open fails again, and says so, as its object ends
             sys.unraisablehook = hook
-        raise refusal
+        raise refused
 
     @contextmanager
     def _reading(self, what: str) -> Iterator[None]:
         """Turn what asammdf raises into LogError."""
-        try:
-            with quiet("asammdf"), redirect_stdout(None):  # it prints how fast it is
-                yield
-        except (MemoryError, LogError):
-            raise
-        except Exception as error:
-            raise self._refusal(what, error) from error
-
-    def _refusal(self, what: str, error: Exception) -> LogError:
-        why = because(error)
-        return LogError(f"{self.path}: {what} is truncated, damaged or not an ASAM MDF file: {why}")
+        with reading(self.path, _FORMAT, what), quiet("asammdf"), redirect_stdout(None):  # it prints how fast it is
+            yield

@@ -13,7 +13,7 @@ import numpy as np
 from ..base.errors import LogError, brief
 from ..base.signals import Array
 
-__all__ = ["NEEDS_TRUST", "Block", "Channel", "Source", "check_column", "check_lengths", "sample_number"]
+__all__ = ["NEEDS_TRUST", "Block", "Channel", "Source", "check_column", "check_lengths", "line_number", "sample_number"]
 
 
 NEEDS_TRUST = "; missing measurements are replayed with trust alone: read them with may_miss=True (--trust true)"
@@ -139,6 +139,11 @@ class Source(ABC):
 def sample_number(offset: int) -> Callable[[int], str]:
     """Return the location, for messages, of samples in a block that begins at ``offset``; counted from 1."""
     return lambda i: f"sample {offset + i + 1} (the first is 1)"
+
+
+def line_number(numbers: Sequence[int]) -> Callable[[int], str]:
+    """Return the location, for messages, of samples in a block whose lines have these numbers."""
+    return lambda i: f"line {numbers[i]}"
 
 
 def check_column(path: Path, name: str, shape: tuple[int, ...], dtype: np.dtype[Any]) -> int:

@@ -13,11 +13,13 @@ import numpy as np
 
 from ..base.errors import LogError, brief
 from ..base.signals import Array
-from .extras import because, library, quiet
+from .extras import library, quiet, reading
 from .records import RecordsSource
 from .source import Channel, check_column
 
 __all__ = ["TdmsSource"]
+
+_FORMAT = "an NI TDMS file"
 
 _UNITS = ("unit_string", "NI_UnitDescription", "Unit", "unit")
 """Properties of a channel that may hold its unit, by precedence."""
@@ -35,7 +37,7 @@ class TdmsSource(RecordsSource):
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        self._module = library(path, "nptdms", "tdms", "an NI TDMS file")
+        self._module = library(path, "nptdms", "tdms", _FORMAT)
         self._keys: dict[str, tuple[str, str]] = {}
         self._grids: dict[str, tuple[float, float]] = {}
         self._kinds: dict[str, np.dtype[Any]] = {}
@@ -110,14 +112,8 @@ class TdmsSource(RecordsSource):
     @contextmanager
     def _reading(self, what: str) -> Iterator[None]:
         """Turn what npTDMS raises into LogError."""
-        try:
-            with quiet("nptdms"):
-                yield
-        except (MemoryError, LogError):
-            raise
-        except Exception as error:  # a damaged file makes it fail in nearly every way there is
-            why = because(error)
-            raise LogError(f"{self.path}: {what} is truncated, damaged or not an NI TDMS file: {why}") from error
+        with reading(self.path, _FORMAT, what), quiet("nptdms"):
+            yield
 
 
 def _start(channel: Any) -> Any:

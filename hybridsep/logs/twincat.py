@@ -8,7 +8,7 @@ of what is known of each channel, each with its key before it, then a column of 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..base.errors import LogError, brief
 from ..base.signals import Array
-from .source import Block, Channel, Source
+from .source import Block, Channel, Source, line_number
 from .text import bounded_lines
 from .text_layout import decimal_points, is_number
 
@@ -162,7 +162,7 @@ class TwinCatSource(Source):
                     keep = np.flatnonzero(np.diff(t, prepend=last) != 0.0)
                     last = float(t[-1])
                 if len(keep):
-                    yield Block([column[keep] for column in columns], _line_of(numbers, keep))
+                    yield Block([column[keep] for column in columns], line_number([numbers[i] for i in keep.tolist()]))
 
     def _columns(self, lines: Sequence[str], numbers: Sequence[int], fields: Sequence[int]) -> tuple[list[Array], bool]:
         """Return fields of the lines as numbers, times in s, and whether they end with these lines."""
@@ -210,7 +210,3 @@ class TwinCatSource(Source):
         if ticks:
             return (values - self._origin) * _TICK
         return values * _MS if self._is_time(field) else values
-
-
-def _line_of(numbers: Sequence[int], keep: NDArray[np.intp]) -> Callable[[int], str]:
-    return lambda i: f"line {numbers[int(keep[i])]}"

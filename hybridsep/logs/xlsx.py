@@ -17,11 +17,13 @@ import numpy as np
 
 from ..base.errors import LogError, brief, first_line, listed
 from ..base.zip_files import ZIP_DAMAGE
-from .extras import because, library
+from .extras import library, reading
 from .source import NEEDS_TRUST, Block, Source
 from .text_layout import find_layout
 
 __all__ = ["XlsxSource"]
+
+_FORMAT = "an Excel workbook"
 
 _HEAD_ROWS = 400
 """Rows in which names and numbers must begin, as in text."""
@@ -61,7 +63,7 @@ class XlsxSource(Source):
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        self._module = library(path, "openpyxl", "xlsx", "an Excel workbook")
+        self._module = library(path, "openpyxl", "xlsx", _FORMAT)
         self._check_members()
         self._places: dict[str, _Place] = {}
         units: dict[str, str] = {}
@@ -145,24 +147,17 @@ class XlsxSource(Source):
                             if b"<!DOCTYPE" in file.read(4096):
                                 raise LogError(f"{self.path}: {brief(member.filename)} has a document type")
         except ZIP_DAMAGE as error:
-            raise LogError(
-                f"{self.path}: is truncated, damaged or not an Excel workbook: {first_line(error)}"
-            ) from error
+            raise LogError(f"{self.path}: is truncated, damaged or not {_FORMAT}: {first_line(error)}") from error
 
     @contextmanager
     def _opened(self) -> Iterator[Any]:
         """Open the workbook; what openpyxl raises becomes LogError."""
         book = None
         try:
-            with self.path.open("rb") as file, warnings.catch_warnings():
+            with reading(self.path, _FORMAT), self.path.open("rb") as file, warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # of styles and extensions that it does not know
                 book = self._module.load_workbook(file, read_only=True, data_only=True)
                 yield book
-        except (MemoryError, LogError, GeneratorExit):
-            raise
-        except Exception as error:  # a damaged file makes it fail in nearly every way there is
-            what = because(error)
-            raise LogError(f"{self.path}: is truncated, damaged or not an Excel workbook: {what}") from error
         finally:
             if book is not None:
                 book.close()
