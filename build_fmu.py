@@ -1,4 +1,4 @@
-"""FMU build script: ``python build_fmu.py [--machine models/X.toml] [--flavour python] [--out dist] [FMU …]``.
+"""FMU build script: ``python build_fmu.py [--machine X.toml] [--flavour python] [--fmi 3] [--out dist] [FMU …]``.
 
 A thin front of ``hybridsep build``; without arguments all FMUs go to ``dist/``.
 """

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ..fmi.compiler import TARGET_NAMES
-from ..fmi.flavours import FLAVOURS
+from ..fmi.flavours import FLAVOURS, FMI_VERSIONS
 from .failures import errors_console
 from .options import FlavourOption, ForceOption, JsonOption, TsOption, UnitOption, WeightsOption
 
@@ -24,6 +24,9 @@ def build(
         typer.Option("--machine", "-m", help="Machine file (.toml) or name; may be repeated; all if left out."),
     ] = None,
     flavour: FlavourOption = FLAVOURS[0],
+    fmi: Annotated[
+        str, typer.Option(help="Version of FMI, 2 or 3, or both; FMUs of FMI 3.0 are native, their names have Fmi3.")
+    ] = FMI_VERSIONS[0],
     target: Annotated[
         list[str] | None,
         typer.Option(help=f"Platform of a native FMU, may be repeated: {', '.join(TARGET_NAMES)}. All if left out."),
@@ -50,17 +53,17 @@ def build(
     from .progress import progress_bar
     from .tables import console, print_json
 
-    jobs = jobs_of(fmus or [], machine or [], flavour, target or [])
+    jobs = jobs_of(fmus or [], machine or [], flavour, target or [], fmi)
     extras = extras_of(jobs, weights, trajectory, unit, T_s)
     inputs = {f"machine file {source}": machine_path(source) for source in machine or []}
     check_outputs(
-        [Output("--out", out / f"{name}.fmu", FMU) for _, name, _ in jobs],
+        [Output("--out", out / f"{name}.fmu", FMU) for _, name, _, _ in jobs],
         {**inputs, "saved predictor": weights, "trajectory": trajectory},
         force=force,
     )
     paths = []
     with progress_bar(as_json) as advance:
-        for i, (axis, name, model) in enumerate(jobs):
+        for i, (axis, name, model, version) in enumerate(jobs):
             advance(name, i / len(jobs))
 
             def on_target(platform: str, name: str = name, done: float = i / len(jobs)) -> None:
@@ -69,8 +72,8 @@ def build(
                 else:
                     errors_console.print(f"{name}: compile for {platform}", highlight=False, soft_wrap=True)
 
-            given = extras.get(model, {})
-            paths.append(build_fmu(axis, name, out, flavour, targets=target or None, on_target=on_target, **given))
+            given = {"targets": target or None, "on_target": on_target, "fmi": version, **extras.get(model, {})}
+            paths.append(build_fmu(axis, name, out, flavour, **given))
         advance("done", 1.0)
     if as_json:
         print_json([str(path) for path in paths])

@@ -1,4 +1,4 @@
-"""Checks of a modelDescription.xml before its FMU is unpacked: well-formed, FMI 2.0 co-simulation, plain names."""
+"""Checks of a modelDescription.xml before its FMU is unpacked: well-formed, version, co-simulation, plain names."""
 
 from __future__ import annotations
 
@@ -12,6 +12,9 @@ __all__ = ["check_description"]
 
 _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,199}")
 """Grammar of a modelIdentifier: that of a name in C (FMI 2.0, section 2.2.1)."""
+
+_VERSION = re.compile(r"2\.0|3\.0(\.[0-9]{1,5})?")
+"""Versions of FMI that are run."""
 
 _DEPTH_MAX = 50
 """Deepest nesting of elements; FMI 2.0's have 5 levels, vendors' annotations some more."""
@@ -30,15 +33,15 @@ def check_description(name: str, text: bytes) -> str:
     Raises
     ------
     FmuError
-        If it is no FMI 2.0 co-simulation FMU, or one that is damaged.
+        If it is no FMI 2.0 or 3.0 co-simulation FMU, or one that is damaged.
     """
     elements = _elements(name, text)
     root, attributes = elements[0]
     if root != "fmiModelDescription":
         raise FmuError(f"{name} is not a readable FMU: its description is an XML file of {brief(root)}")
     version = attributes.get("fmiVersion", "none")
-    if version != "2.0":
-        raise FmuError(f"{name} must be an FMI 2.0 FMU, got FMI {version:.20}")
+    if not _VERSION.fullmatch(version):
+        raise FmuError(f"{name} must be an FMI 2.0 or 3.0 FMU, got FMI {version:.20}")
     slaves = [attributes for element, attributes in elements[1:] if element == "CoSimulation"]
     if not slaves:
         raise FmuError(f"{name} must be a co-simulation FMU, got one for model exchange only")

@@ -1,4 +1,4 @@
-"""Instance of an FMI 2.0 co-simulation FMU with access by variable name, a thin layer over fmpy."""
+"""Instance of an FMI 2.0 or 3.0 co-simulation FMU with access by variable name, a thin layer over fmpy."""
 
 from __future__ import annotations
 
@@ -17,13 +17,6 @@ from typing import Any
 
 import fmpy
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import (
-    FMU2Slave,
-    fmi2CallbackAllocateMemoryTYPE,
-    fmi2CallbackFreeMemoryTYPE,
-    fmi2CallbackFunctions,
-    fmi2CallbackLoggerTYPE,
-)
 
 from ..base.errors import FmuError, first_line, listed
 from ..base.interrupt import uninterrupted
@@ -32,15 +25,13 @@ from ..fmi.pythonfmu_limits import check_unpacked
 from .archive_check import read_description_text
 from .binary_check import check_binary
 from .description_check import check_description
+from .driver import DRIVERS, Driver
 
 __all__ = ["FmuInstance", "read_description"]
 
-_ACCESS = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}
-"""FMI type → the type whose functions get and set it."""
-
 
 def read_description(path: str | Path) -> Any:
-    """Return fmpy's model description of an FMI 2.0 co-simulation FMU.
+    """Return fmpy's model description of an FMI 2.0 or 3.0 co-simulation FMU.
 
     Raises
     ------
@@ -99,16 +90,16 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
     ----------
     description : fmpy's model description
     variables : dict
-        fmpy's scalar variables by name.
+        fmpy's variables by name.
     log : list of (status, message)
         Messages of the FMU's logger; at most the last 1000.
 
     Raises
     ------
     FmuError
-        If the archive cannot be read, must not be unpacked, is no FMI 2.0 co-simulation FMU, has no intact library for
-        this platform, or refuses to be instantiated. A library's code runs in this process, and may still end it; for
-        a process of its own see :func:`~hybridsep.cosim.apart.run_apart`.
+        If the archive cannot be read, must not be unpacked, is no FMI 2.0 or 3.0 co-simulation FMU, has no intact
+        library for this platform, or refuses to be instantiated. A library's code runs in this process, and may still
+        end it; for a process of its own see :func:`~hybridsep.cosim.apart.run_apart`.
     """
 
     def __init__(self, path: str | Path, instance_name: str | None = None) -> None:
@@ -137,32 +128,27 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
             raise
         except Exception as error:  # fmpy raises bare Exceptions here
             raise FmuError(f"{self.path.name} cannot be loaded: {first_line(error)}") from error
-        identifier = self.description.coSimulation.modelIdentifier
+        made = DRIVERS[self.description.fmiVersion[0]]
         try:
-            self._check_library(folder, identifier)
+            self._check_library(folder, f"binaries/{made.platform}")
             check_unpacked(folder, self.description.generationTool or "")
             with _working_directory():
-                slave = FMU2Slave(
-                    guid=self.description.guid,
-                    unzipDirectory=str(folder),
-                    modelIdentifier=identifier,
-                    instanceName=instance_name,
-                )
+                driver = made(folder, self.description, instance_name)
         except Exception as error:  # fmpy raises bare Exceptions here
             reason = error if isinstance(error, FmuError) else first_line(error)
             raise FmuError(f"{self.path.name} cannot be loaded: {reason}") from error
         try:
-            slave.instantiate(callbacks=_callbacks(self.log), loggingOn=True)
+            driver.instantiate(_keeper(self.log))
         except Exception as error:
-            slave.freeLibrary()
+            driver.slave.freeLibrary()
             raise FmuError(f"{self.path.name} cannot be instantiated: {error}{self._last_words()}") from error
-        self._slave = slave
+        self._driver = driver
         # Also for an instance that nobody closes: pythonfmu 0.7 corrupts the heap where the process exits before
-        self._release = weakref.finalize(self, _release, slave, folder)
+        self._release = weakref.finalize(self, _release, driver.slave, folder)
 
-    def _check_library(self, folder: Path, identifier: str) -> None:
+    def _check_library(self, folder: Path, binaries: str) -> None:
         """Raise FmuError if there is no library for this platform, or one that must not be loaded."""
-        place = f"binaries/{fmpy.platform}/{identifier}{fmpy.sharedLibraryExtension}"
+        place = f"{binaries}/{self.description.coSimulation.modelIdentifier}{fmpy.sharedLibraryExtension}"
         if not (folder / place).is_file():
             there = sorted(path.name for path in (folder / "binaries").glob("*") if path.is_dir())
             raise FmuError(f"{place} is missing, there are binaries for {listed(there, str)}")
@@ -172,7 +158,7 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
             raise FmuError(f"{place} {error}") from error
 
     @property
-    def slave(self) -> FMU2Slave:
+    def slave(self) -> Any:
         """The instance as fmpy's slave, for FMI calls that have no method here.
 
         Raises
@@ -180,9 +166,13 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
         FmuError
             If the instance is closed.
         """
+        return self._open.slave
+
+    @property
+    def _open(self) -> Driver:
         if self._release is None or not self._release.alive:
             raise FmuError(f"{self.path.name}: the instance is closed; make a new FmuInstance")
-        return self._slave
+        return self._driver
 
     def __exit__(self, *error: object) -> None:
         self.close()
@@ -201,39 +191,47 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
         FmuError
             If the FMU refuses; its own message is part of the error.
         """
-        self._call(self.slave.setupExperiment, startTime=start_time)
-        self._call(self.slave.enterInitializationMode)
+        self.begin(values, start_time=start_time)
+        self.finish()
+
+    def begin(
+        self, values: Mapping[str, Any] | None = None, *, start_time: float = 0.0, stop_time: float | None = None
+    ) -> None:
+        """Enter Initialization Mode and set parameters and start values; for errors see :meth:`initialise`."""
+        self._call(self._open.begin, start_time, stop_time)
         for name, value in (values or {}).items():
             self.set(name, value)
+
+    def finish(self) -> None:
+        """End the initialization; for errors see :meth:`initialise`."""
         self._call(self.slave.exitInitializationMode)
 
     def set(self, name: str, value: Any) -> None:
         """Set one variable."""
-        variable = self._variable(name)
-        if variable.type in ("Integer", "Enumeration") and not (isinstance(value, int) and abs(value) < 2**31):
+        driver, variable = self._open, self._variable(name)
+        if variable.type in ("Integer", "Int32", "Enumeration") and not (isinstance(value, int) and abs(value) < 2**31):
             raise FmuError(f"{self.path.name}: {name} must be a whole number within ±{2**31 - 1}, got {value!r}")
-        if variable.type == "Real" and not isinstance(value, (int, float)):
+        if variable.type == driver.real and not isinstance(value, (int, float)):
             raise FmuError(f"{self.path.name}: {name} must be a number, got {value!r}")
-        if variable.type not in _ACCESS:
-            raise FmuError(f"{self.path.name}: {name} is a {variable.type}, which is not supported here")
-        self._call(getattr(self.slave, f"set{_ACCESS[variable.type]}"), [variable.valueReference], [value])
+        self._check_type(variable)
+        self._call(driver.set, [variable], [value])
 
     def get(self, name: str) -> Any:
-        """Return one variable."""
-        variable = self._variable(name)
-        if variable.type not in _ACCESS:
-            raise FmuError(f"{self.path.name}: {name} is a {variable.type}, which is not supported here")
-        return self._call(getattr(self.slave, f"get{_ACCESS[variable.type]}"), [variable.valueReference])[0]
+        """Return one variable; of an array a list."""
+        driver, variable = self._open, self._variable(name)
+        self._check_type(variable)
+        values = self._call(driver.get, [variable])
+        return values if variable.shape else values[0]
 
     def real_writer(self, names: Sequence[str]) -> Callable[[Sequence[float]], None]:
-        """Return a function that sets these Reals in one FMI call."""
-        references = [self._variable(name).valueReference for name in names]
-        return lambda values: self._call(self.slave.setReal, references, values)
+        """Return a function that sets these real numbers in one FMI call."""
+        variables = [self._variable(name) for name in names]
+        return lambda values: self._call(self._open.set, variables, values)
 
     def real_reader(self, names: Sequence[str]) -> Callable[[], list[float]]:
-        """Return a function that gets these Reals in one FMI call."""
-        references = [self._variable(name).valueReference for name in names]
-        return lambda: list(self._call(self.slave.getReal, references))
+        """Return a function that gets these real numbers in one FMI call, those of an array one after the other."""
+        variables = [self._variable(name) for name in names]
+        return lambda: list(self._call(self._open.get, variables))
 
     def step(self, t: float, h: float) -> None:
         """Do one communication step from ``t`` by ``h`` seconds."""
@@ -245,19 +243,16 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
 
     def save(self) -> bytes:
         """Return the whole state, serialised."""
-        state = self._call(self.slave.getFMUstate)
-        try:
-            return bytes(self._call(self.slave.serializeFMUstate, state))
-        finally:
-            self._call(self.slave.freeFMUstate, state)
+        return bytes(self._call(self._open.save))
 
     def restore(self, blob: bytes) -> None:
         """Take over a state that :meth:`save` returned, of this or another instance."""
-        state = self._call(self.slave.deSerializeFMUstate, blob)
-        try:
-            self._call(self.slave.setFMUstate, state)
-        finally:
-            self._call(self.slave.freeFMUstate, state)
+        self._call(self._open.restore, blob)
+
+    def _check_type(self, variable: Any) -> None:
+        """Raise FmuError for a variable of a type that is not supported."""
+        if variable.type not in self._open.access:
+            raise FmuError(f"{self.path.name}: {variable.name} is a {variable.type}, which is not supported here")
 
     def _variable(self, name: str) -> Any:
         if name not in self.variables:
@@ -280,21 +275,17 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
         return f": {' '.join((framed[2] if framed else text).split())[:_WORDS_MAX]}"
 
 
-def _callbacks(log: list[tuple[int, str]]) -> fmi2CallbackFunctions:
-    """Return what an FMU may call; its messages go into ``log``."""
+def _keeper(log: list[tuple[int, str]]) -> Callable[[int, str], None]:
+    """Return a function that puts an FMU's messages into ``log``, of which it keeps the last."""
 
-    def keep(environment: Any, instance: bytes, status: int, category: bytes | None, message: bytes | None) -> None:
-        log.append((status, (message or b"").decode("utf-8", "replace")))
+    def keep(status: int, message: str) -> None:
+        log.append((status, message))
         del log[:-1000]
 
-    functions = fmi2CallbackFunctions()
-    functions.logger = fmi2CallbackLoggerTYPE(keep)
-    functions.allocateMemory = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
-    functions.freeMemory = fmi2CallbackFreeMemoryTYPE(fmpy.free)
-    return functions
+    return keep
 
 
-def _release(slave: FMU2Slave, folder: Path) -> None:
+def _release(slave: Any, folder: Path) -> None:
     """Free an instance, its library and its unpacked files."""
     try:
         with suppress(FMICallException):

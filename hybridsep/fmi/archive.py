@@ -20,17 +20,17 @@ from ..base.output import written_whole
 from ..fmi import native_flavour, python_flavour
 from ..machines.machine import Machine
 from .description import fmu_description
-from .flavours import FLAVOURS
+from .flavours import FLAVOURS, FMI_VERSIONS, check_version
 from .warm_start import load_trained
 
 __all__ = ["archived", "build_fmu", "fmu_files", "fmu_name", "fmu_names"]
 
-_SUFFIX = {"native": "", "python": "Py"}
+_SUFFIX = {("native", "2"): "", ("native", "3"): "Fmi3", ("python", "2"): "Py"}
 _ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 _FIRST = ("modelDescription.xml", "SystemStructure.ssd")
 
 
-def fmu_names(machine: Machine, flavour: str = FLAVOURS[0]) -> dict[str, str]:
+def fmu_names(machine: Machine, flavour: str = FLAVOURS[0], fmi: str = FMI_VERSIONS[0]) -> dict[str, str]:
     """Return the FMUs a machine has: archive stem → model (``HybridPredictor``, ``FeedDrive``, …).
 
     A ``SepCompensator`` needs the machine's ``[drive_limits]``, a ``FeedDrive`` its ``[plant]``.
@@ -39,7 +39,7 @@ def fmu_names(machine: Machine, flavour: str = FLAVOURS[0]) -> dict[str, str]:
     Raises
     ------
     FmuError
-        If the flavour is unknown.
+        If the flavour is unknown, or has no FMUs of this version of FMI.
     """
     models = ["HybridPredictor"]
     if machine.drive_limits is not None:
@@ -48,14 +48,15 @@ def fmu_names(machine: Machine, flavour: str = FLAVOURS[0]) -> dict[str, str]:
         models.append("FeedDrive")
     if machine.name == DEFAULT_MACHINE and flavour == "native":
         models.append("ReferenceTrajectory")
-    return {fmu_name(model, machine.name, flavour): model for model in models}
+    return {fmu_name(model, machine.name, flavour, fmi): model for model in models}
 
 
-def fmu_name(model: str, machine: str, flavour: str) -> str:
-    """Return the archive stem of a model of the machine with a name; FmuError if the flavour is unknown."""
+def fmu_name(model: str, machine: str, flavour: str, fmi: str = FMI_VERSIONS[0]) -> str:
+    """Return the archive stem of a model of the machine with a name; FmuError as :func:`fmu_names`."""
     if flavour not in FLAVOURS:
         raise FmuError(f"flavour must be one of {', '.join(FLAVOURS)}, got {flavour!r}")
-    return f"{model}{_SUFFIX[flavour]}{'' if machine == DEFAULT_MACHINE else f'_{machine}'}"
+    check_version(flavour, fmi)
+    return f"{model}{_SUFFIX[flavour, fmi]}{'' if machine == DEFAULT_MACHINE else f'_{machine}'}"
 
 
 def build_fmu(
@@ -68,6 +69,7 @@ def build_fmu(
     samples: ArrayLike | None = None,
     weights: str | Path | None = None,
     on_target: Callable[[str], object] = lambda _target: None,
+    fmi: str = FMI_VERSIONS[0],
 ) -> Path:
     """Build one FMU.
 
@@ -91,6 +93,8 @@ def build_fmu(
         closed loop (``compensator.predictor.save(...)``): the FMU starts with these weights, without a warm-up.
     on_target : callable, optional
         Called with each platform, as ``x86_64-linux``, whose library is not there and has to be compiled.
+    fmi : {"2", "3"}
+        Version of FMI, 2.0 or 3.0; the Python flavour has 2.0 alone.
 
     Returns
     -------
@@ -106,7 +110,7 @@ def build_fmu(
     StateError
         If ``weights`` is no saved predictor, or one of another machine or other settings.
     """
-    names = fmu_names(machine, flavour)
+    names = fmu_names(machine, flavour, fmi)
     if name not in names:
         raise FmuError(f"machine {machine.name} has no FMU {name!r}; it has {', '.join(names)}")
     model = names[name]
@@ -118,7 +122,7 @@ def build_fmu(
         if given is not None and model not in models:
             raise FmuError(f"{what} are for a {' or a '.join(models)}, {name} is a {model}")
     how: dict[str, Any] = (
-        {} if flavour == "python" else {"targets": targets, "samples": samples, "on_target": on_target}
+        {} if flavour == "python" else {"targets": targets, "samples": samples, "on_target": on_target, "fmi": fmi}
     )
     path = Path(out) / f"{name}.fmu"
     path.parent.mkdir(parents=True, exist_ok=True)

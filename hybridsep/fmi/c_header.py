@@ -13,12 +13,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from .angular_units import angular_unit
+from .flavours import FMI_VERSIONS
 from .variables import INTERPOLATED, Variable, variables_of
 
 __all__ = ["KINDS", "Layout", "c_header", "interface_number", "kind_header", "kind_of", "layout_of"]
-
-_C_KINDS = {"Enumeration": "Integer"}
-"""FMI 2.0 reads and writes both by the same functions."""
 
 _MODE = {"f_n": 1.0, "zeta": 1.0, "alpha": 1.0, "beta": 0.0}
 _ANY: Mapping[str, object] = {"parameters": defaultdict(lambda: 1), "modes": [_MODE]}
@@ -95,7 +93,7 @@ def kind_header(kind: str) -> str:
     return _header(kind, f"every {kind}", f"{table}#define HSEP_TABLE_IN_RESOURCES 1\n")
 
 
-def c_header(description: Mapping[str, object], guid: str) -> str:
+def c_header(description: Mapping[str, object], guid: str, fmi: str = FMI_VERSIONS[0]) -> str:
     """Return the header of one FMU, with its table.
 
     Parameters
@@ -104,6 +102,8 @@ def c_header(description: Mapping[str, object], guid: str) -> str:
         ``model``, ``name``, ``parameters`` and ``modes``, as :func:`hybridsep.fmi.variables.variables_of` reads it.
     guid : str
         The modelDescription's.
+    fmi : {"2", "3"}
+        Version of FMI.
     """
     name, layout = str(description["name"]), layout_of(variables_of(description))
     window = len(layout.windows[0]) if layout.windows else 0
@@ -111,9 +111,9 @@ def c_header(description: Mapping[str, object], guid: str) -> str:
         f"    {_double(start)} /* {variable.name} */"
         for start, variable in zip(layout.starts, (*layout.scalars, *layout.modes), strict=True)
     )
-    table = f"""/* What fmi2Functions.h may put before the names of the FMI functions. */
-#ifndef FMI2_FUNCTION_PREFIX
-#define FMI2_FUNCTION_PREFIX {name}_
+    table = f"""/* What fmi{fmi}Functions.h may put before the names of the FMI functions. */
+#ifndef FMI{fmi}_FUNCTION_PREFIX
+#define FMI{fmi}_FUNCTION_PREFIX {name}_
 #endif
 
 #define HSEP_GUID {_string(guid)}
@@ -205,7 +205,7 @@ def _row(variable: Variable, name: str) -> str:
         _string(name),
         _string(unit),
         _string(angular_unit(unit) or ""),
-        f"HSEP_{_C_KINDS.get(variable.kind, variable.kind).upper()}",
+        f"HSEP_{variable.kind.upper()}",
         f"HSEP_{variable.causality.upper()}",
         str(int(variable.variability == "tunable")),
         "-HUGE_VAL" if variable.minimum is None else _double(variable.minimum),

@@ -27,6 +27,7 @@ from tempfile import TemporaryDirectory
 
 from ..base.errors import FmuError
 from ..base.output import named_errors
+from .flavours import FMI_VERSIONS
 from .macho import universal
 from .processes import run_together
 
@@ -143,7 +144,7 @@ def expanded(targets: Sequence[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(host_target() if key == "host" else key for key in keys))
 
 
-def placed(libraries: Mapping[str, bytes], name: str) -> dict[str, bytes]:
+def placed(libraries: Mapping[str, bytes], name: str, fmi: str = FMI_VERSIONS[0]) -> dict[str, bytes]:
     """Return where libraries lie in an archive: path below ``binaries/`` → library.
 
     Parameters
@@ -152,7 +153,11 @@ def placed(libraries: Mapping[str, bytes], name: str) -> dict[str, bytes]:
         Key of :data:`TARGETS` → library.
     name : str
         Model identifier: the libraries' stem.
+    fmi : {"2", "3"}
+        Version of FMI; 3.0 has one folder for each platform, which is called as the platform is.
     """
+    if fmi == "3":
+        return {f"{key}/{name}{TARGETS[key].suffix}": library for key, library in libraries.items()}
     files = {
         f"{place}/{name}{TARGETS[key].suffix}": library
         for key, library in libraries.items()

@@ -12,28 +12,42 @@ from ..machines.agree import check_interval
 from ..machines.machine import Machine, load_machine, machine_names
 from ..plants.trajectory import read_trajectory
 from .archive import fmu_names
+from .flavours import FMI_VERSIONS
 from .libraries import check_available
 from .warm_start import load_trained
 
-__all__ = ["Job", "extras_of", "jobs_of"]
+__all__ = ["VERSIONS", "Job", "extras_of", "jobs_of"]
 
-Job = tuple[Machine, str, str]
-"""An FMU to build: its machine, name and model."""
+Job = tuple[Machine, str, str, str]
+"""An FMU to build: its machine, name and model, and the version of FMI."""
+
+_BOTH = "both"
+VERSIONS = (*FMI_VERSIONS, _BOTH)
+"""What ``--fmi`` takes."""
 
 
-def jobs_of(fmus: Sequence[str], machines: Sequence[str], flavour: str, targets: Sequence[str]) -> list[Job]:
-    """Return the FMUs to build, all of the machines' if none is named."""
+def jobs_of(
+    fmus: Sequence[str], machines: Sequence[str], flavour: str, targets: Sequence[str], fmi: str = FMI_VERSIONS[0]
+) -> list[Job]:
+    """Return the FMUs to build, all of the machines' if none is named; the version may be ``both``."""
+    if fmi not in VERSIONS:
+        raise ParameterError(f"--fmi must be one of {', '.join(VERSIONS)}, got {fmi!r}")
+    if flavour == "python" and fmi != FMI_VERSIONS[0]:
+        raise ParameterError(f"--fmi {fmi} is for native FMUs, pythonfmu's are of FMI 2 alone; leave it out")
     jobs = [
-        (axis, name, model)
+        (axis, name, model, version)
         for axis in map(load_machine, machines or machine_names())
-        for name, model in fmu_names(axis, flavour).items()
+        for version in (FMI_VERSIONS if fmi == _BOTH else (fmi,))
+        for name, model in fmu_names(axis, flavour, version).items()
     ]
-    if unknown := sorted(set(fmus) - {name for _, name, _ in jobs}):
-        without = dict.fromkeys(axis.name for axis, _, _ in jobs if axis.drive_limits is None)
+    if unknown := sorted(set(fmus) - {name for _, name, _, _ in jobs}):
+        without = dict.fromkeys(axis.name for axis, _, _, _ in jobs if axis.drive_limits is None)
         hint = ""
         if without and any(name.startswith("SepCompensator") for name in unknown):
             hint = f"; {', '.join(without)} has no [drive_limits], which a compensator needs"
-        raise ParameterError(f"no FMU {', '.join(unknown)}; there are {', '.join(name for _, name, _ in jobs)}{hint}")
+        raise ParameterError(
+            f"no FMU {', '.join(unknown)}; there are {', '.join(name for _, name, _, _ in jobs)}{hint}"
+        )
     if targets and flavour != "native":
         raise ParameterError(f"--target is for native FMUs; with --flavour {flavour} leave it out")
     if flavour == "native":
@@ -62,8 +76,8 @@ def extras_of(
 def _one_of(jobs: Sequence[Job], models: Sequence[str], option: str) -> tuple[Machine, str]:
     """Return machine and model of the one FMU of these models to which an option applies."""
     found = [job for job in jobs if job[2] in models]
-    if len(found) != 1:
-        names = ", ".join(name for _, name, _ in found) or "none"
+    if len({(axis.name, model) for axis, _, model, _ in found}) != 1:
+        names = ", ".join(name for _, name, _, _ in found) or "none"
         raise ParameterError(
             f"{option} is for one {' or '.join(models)}, this would build {names}; name one, or its --machine"
         )

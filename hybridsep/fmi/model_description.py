@@ -15,7 +15,16 @@ from .content import fmu_title, paper_note
 from .experiment import stop_time
 from .variables import INTERPOLATED, Variable, variables_of
 
-__all__ = ["build_description", "model_description", "unit_elements"]
+__all__ = [
+    "add_items",
+    "build_description",
+    "document",
+    "model_description",
+    "template",
+    "unit_elements",
+    "variable_attributes",
+    "xml_text",
+]
 
 _TEMPLATES = Path(__file__).parent / "templates"
 
@@ -47,7 +56,7 @@ def model_description(
         Trajectory that a ReferenceTrajectory was built with.
     """
     model, name, table = str(description["model"]), str(description["name"]), variables_of(description)
-    root = _template("modelDescription.xml")
+    root = template("modelDescription.xml")
     simulation, units, types, _, experiment, variables, structure = root
     root.attrib |= {
         "modelName": name,
@@ -58,9 +67,9 @@ def model_description(
     }
     simulation.attrib |= {
         "modelIdentifier": name,
-        "needsExecutionTool": _text(not native),
-        "canInterpolateInputs": _text(native and bool(INTERPOLATED[model])),
-        "canNotUseMemoryManagementFunctions": _text(not native),
+        "needsExecutionTool": xml_text(not native),
+        "canInterpolateInputs": xml_text(native and bool(INTERPOLATED[model])),
+        "canNotUseMemoryManagementFunctions": xml_text(not native),
     }
     if native:
         ET.SubElement(ET.SubElement(simulation, "SourceFiles"), "File", name="all.c")
@@ -71,11 +80,11 @@ def model_description(
     if not len(types):
         root.remove(types)
     stop = stop_time(machine, description, samples)
-    experiment.attrib |= {"stopTime": _text(stop), "stepSize": _text(machine.T_s)}
+    experiment.attrib |= {"stopTime": xml_text(stop), "stepSize": xml_text(machine.T_s)}
     for reference, variable in enumerate(table):
         _add_variable(variables, reference, variable)
     _fill_structure(structure, table)
-    return _document(root)
+    return document(root)
 
 
 def build_description(name: str) -> bytes:
@@ -86,27 +95,29 @@ def build_description(name: str) -> bytes:
     name : str
         Model identifier.
     """
-    root = _template("buildDescription.xml")
+    root = template("buildDescription.xml")
     root[0].set("modelIdentifier", name)
-    return _document(root)
+    return document(root)
 
 
 def unit_elements() -> list[ET.Element]:
     """Return the definitions of all units, each with its name and base unit, as FMI 2.0 writes them."""
-    return list(_template("modelDescription.xml").iter("Unit"))
+    return list(template("modelDescription.xml").iter("Unit"))
 
 
-def _template(name: str) -> ET.Element:
+def template(name: str) -> ET.Element:
+    """Return the root of a template."""
     return ET.fromstring((_TEMPLATES / name).read_bytes())
 
 
-def _document(root: ET.Element) -> bytes:
+def document(root: ET.Element) -> bytes:
+    """Return a document, indented."""
     ET.indent(root)
     document: bytes = ET.tostring(root, encoding="UTF-8", xml_declaration=True)
     return document + b"\n"
 
 
-def _text(value: object) -> str:
+def xml_text(value: object) -> str:
     """Write a number so that it reads back the same, and a bool as XML does."""
     return str(value).lower() if isinstance(value, bool) else repr(value)
 
@@ -115,13 +126,34 @@ def _add_types(definitions: ET.Element, table: Sequence[Variable]) -> None:
     """Name the values of the enumerations; each variable has a type of its own."""
     for variable in (variable for variable in table if variable.items):
         attributes = {"name": variable.type_name, "description": variable.description}
-        element = ET.SubElement(ET.SubElement(definitions, "SimpleType", attributes), "Enumeration")
-        for value, (item, meaning) in enumerate(zip(variable.items, variable.item_meanings, strict=True)):
-            ET.SubElement(element, "Item", name=item, value=str(value), description=meaning)
+        add_items(ET.SubElement(ET.SubElement(definitions, "SimpleType", attributes), "Enumeration"), variable)
+
+
+def add_items(parent: ET.Element, variable: Variable) -> None:
+    """Add the items of an enumeration to its type."""
+    for value, (item, meaning) in enumerate(zip(variable.items, variable.item_meanings, strict=True)):
+        ET.SubElement(parent, "Item", name=item, value=str(value), description=meaning)
 
 
 def _add_variable(parent: ET.Element, reference: int, variable: Variable) -> None:
-    attributes = {
+    own, values = variable_attributes(variable, reference, integers=("Integer", "Enumeration"))
+    ET.SubElement(ET.SubElement(parent, "ScalarVariable", own), variable.kind, values)
+
+
+def variable_attributes(
+    variable: Variable, reference: int, *, integers: Sequence[str]
+) -> tuple[dict[str, str], dict[str, str]]:
+    """Return the attributes of a variable, and those of its type.
+
+    Parameters
+    ----------
+    variable : Variable
+    reference : int
+        Value reference.
+    integers : sequence of str
+        Kinds whose numbers are whole.
+    """
+    own = {
         "name": variable.name,
         "valueReference": str(reference),
         "description": variable.description,
@@ -129,21 +161,21 @@ def _add_variable(parent: ET.Element, reference: int, variable: Variable) -> Non
         "variability": variable.variability,
     }
     if variable.causality == "parameter":
-        attributes["initial"] = "exact"
-    elif variable.causality != "input":
-        attributes["initial"] = "calculated"
-    element = ET.SubElement(parent, "ScalarVariable", attributes)
+        own["initial"] = "exact"
+    elif variable.causality not in ("input", "independent"):
+        own["initial"] = "calculated"
     values = {"declaredType": variable.type_name} if variable.items else {}
     if variable.unit not in (None, "1"):
         values["unit"] = str(variable.unit)
         if variable.display_unit:
             values["displayUnit"] = variable.display_unit
-    for key, number in (("min", _least(variable)), ("max", variable.maximum), ("nominal", variable.nominal)):
-        if number is not None and variable.kind != "Boolean":
-            values[key] = _text(float(number) if variable.kind == "Real" else int(number))
+    number = int if variable.kind in integers else float
+    for key, bound in (("min", _least(variable)), ("max", variable.maximum), ("nominal", variable.nominal)):
+        if bound is not None and variable.kind != "Boolean":
+            values[key] = xml_text(number(bound))
     if variable.start is not None:
-        values["start"] = _text(float(variable.start) if variable.kind == "Real" else variable.start)
-    ET.SubElement(element, variable.kind, values)
+        values["start"] = xml_text(variable.start if variable.kind == "Boolean" else number(variable.start))
+    return own, values
 
 
 def _least(variable: Variable) -> float | None:

@@ -4,7 +4,9 @@ A library serves all FMUs of a kind; ``resources/variables.bin`` tells it which 
 as well, with a header that has what the file has: ``sources/all.c`` includes all the others, and compiles without
 warnings. As FMI 2.0, section 2.3, has it, the three FMI headers come from whoever compiles. They decide whether the
 names of the FMI functions begin with the model identifier: the standard's headers put it there, for several FMUs in one
-program; headers for shared libraries (fmpy's) do not.
+program; headers for shared libraries (fmpy's) do not. FMI 3.0's put it there unless
+``FMI3_OVERRIDE_FUNCTION_PREFIX`` is defined. An FMI 3.0 archive holds the same libraries, and the sources of its own
+version.
 """
 
 from __future__ import annotations
@@ -23,16 +25,19 @@ from ..machines.machine import Machine
 from ..plants.trajectory import spiral, staircase
 from ..predict.predictor import HybridPredictor
 from .c_header import c_header, kind_of
-from .c_sources import c_sources, fmi_headers
+from .c_sources import FMI_HEADERS, c_sources, fmi_headers
 from .compiler import placed
 from .content import content_guid
 from .description import fmu_description
+from .flavours import FMI_VERSIONS
+from .fmi3_description import fmi3_description
 from .host_fmu import host_fmu
 from .libraries import default_targets, libraries
 from .model_description import build_description, model_description
 from .pages import icon, index_page
 from .reference import has_reference, reference_files
 from .table_file import TABLE_FILE, table_file
+from .terminals import ICON_FILE, TERMINALS_FILE, terminals_and_icons
 from .weights import WEIGHTS_FILE, weights_file
 
 __all__ = ["files", "sources"]
@@ -48,6 +53,7 @@ def files(
     samples: ArrayLike | None = None,
     trained: HybridPredictor | None = None,
     on_target: Callable[[str], object] = lambda _target: None,
+    fmi: str = FMI_VERSIONS[0],
 ) -> dict[str, bytes]:
     """Return all files of one FMU: archive name → content.
 
@@ -56,7 +62,7 @@ def files(
     machine : Machine
     description : mapping
         ``model``, ``name``, ``parameters`` and ``modes``.
-    targets, samples, on_target
+    targets, samples, on_target, fmi
         As in :func:`hybridsep.fmi.archive.build_fmu`.
     trained : HybridPredictor, optional
         Trained predictor with which a HybridPredictor or SepCompensator starts warm.
@@ -67,26 +73,35 @@ def files(
         If it cannot be compiled.
     """
     model, name = str(description["model"]), str(description["name"])
-    content = {f"sources/{file}": text for file, text in sources(description, guid="").items()}
+    content = {f"sources/{file}": text for file, text in sources(description, "", fmi).items()}
     del content["sources/hsep_fmu.h"]  # names the GUID
     content |= {f"documentation/licenses/{file}": text for file, text in _licenses().items()}
     needs = "The FMU needs nothing but its own binary; on Windows before 10 also the Universal C Runtime (KB2999226)."
-    content["documentation/index.html"] = index_page(machine, description, needs, reference=has_reference(description))
-    content["model.png"] = icon(model)
+    page = index_page(machine, description, needs, reference=has_reference(description), fmi=fmi)
+    content["documentation/index.html"] = page
+    if fmi == "3":
+        content |= {ICON_FILE: icon(model), TERMINALS_FILE: terminals_and_icons(model)}
+    else:
+        content["model.png"] = icon(model)
     if model == "ReferenceTrajectory":
         content |= {f"resources/{file}": data for file, data in _trajectories(machine.T_s, samples).items()}
     if trained is not None:
         content[f"resources/{WEIGHTS_FILE}"] = weights_file(trained)
     guid = content_guid(content, description)
     content[f"resources/{TABLE_FILE}"] = table_file(description, guid)
-    content["sources/hsep_fmu.h"] = c_header(description, guid).encode()
+    content["sources/hsep_fmu.h"] = c_header(description, guid, fmi).encode()
     content["sources/buildDescription.xml"] = build_description(name)
     tool = f"hybridsep {__version__}"
-    content["modelDescription.xml"] = model_description(machine, description, guid, tool, native=True, samples=samples)
+    if fmi == "3":
+        content["modelDescription.xml"] = fmi3_description(machine, description, guid, tool, samples=samples)
+    else:
+        content["modelDescription.xml"] = model_description(
+            machine, description, guid, tool, native=True, samples=samples
+        )
     if has_reference(description):
         content |= _reference(machine, description, guid, content, samples, trained)
     compiled = libraries(kind_of(description), targets or default_targets(), on_target)
-    return content | {f"binaries/{path}": library for path, library in placed(compiled, name).items()}
+    return content | {f"binaries/{path}": library for path, library in placed(compiled, name, fmi).items()}
 
 
 def _reference(
@@ -117,7 +132,7 @@ def _reference(
     )
 
 
-def sources(description: Mapping[str, object], guid: str) -> dict[str, bytes]:
+def sources(description: Mapping[str, object], guid: str, fmi: str = FMI_VERSIONS[0]) -> dict[str, bytes]:
     """Return the C sources with the generated ``hsep_fmu.h``, without the FMI headers: file name → content.
 
     Parameters
@@ -126,20 +141,24 @@ def sources(description: Mapping[str, object], guid: str) -> dict[str, bytes]:
         ``model``, ``name``, ``parameters`` and ``modes``.
     guid : str
         The modelDescription's.
+    fmi : {"2", "3"}
+        Version of FMI.
     """
-    return {**c_sources(), "hsep_fmu.h": c_header(description, guid).encode()}
+    return {**c_sources((fmi,)), "hsep_fmu.h": c_header(description, guid, fmi).encode()}
 
 
 def _licenses() -> dict[str, bytes]:
-    """Return our licence and the one of the FMI headers, which they carry in their own comments."""
-    root = data_folder("fmu_src").parent
-    comment = fmi_headers()["fmi2Functions.h"].decode()
-    notice = re.search(r"^ *Copyright \(C\).*?DAMAGE\.$", comment, re.DOTALL | re.MULTILINE)
-    assert notice is not None  # the headers have been the same since 2019
-    lines = ["fmi2Functions.h, fmi2FunctionTypes.h and fmi2TypesPlatform.h, with which the binaries were compiled:", ""]
-    lines += [line.strip() for line in notice.group().splitlines()]
-    fmi = "\n".join(lines) + "\n"
-    return {"license.txt": (root / "LICENSE").read_bytes(), "fmi-headers.txt": fmi.encode()}
+    """Return our licence and those of the FMI headers, which they carry in their own comments."""
+    root, lines = data_folder("fmu_src").parent, []
+    for version in FMI_VERSIONS:
+        first, second, third = FMI_HEADERS[version]
+        comment = fmi_headers((version,))[first].decode()
+        notice = re.search(r"^ *Copyright \(C\).*?DAMAGE\.$", comment, re.DOTALL | re.MULTILINE)
+        assert notice is not None  # the headers have been the same since 2019 and 2023
+        lines += [f"{first}, {second} and {third}, with which the binaries were compiled:", ""]
+        lines += [*(line.strip() for line in notice.group().splitlines()), ""]
+    text = "\n".join(lines).rstrip("\n") + "\n"
+    return {"license.txt": (root / "LICENSE").read_bytes(), "fmi-headers.txt": text.encode()}
 
 
 def _trajectories(T_s: float, samples: ArrayLike | None) -> dict[str, bytes]:

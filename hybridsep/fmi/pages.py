@@ -9,6 +9,8 @@ from string import Template
 
 from ..machines.machine import Machine
 from .content import fmu_title, paper_note
+from .flavours import FMI_VERSIONS
+from .fmi3_variables import fmi3_variables
 from .tables import grouped_table
 from .variables import variables_of
 
@@ -44,7 +46,13 @@ def filled(template: str, **values: object) -> str:
 
 
 def index_page(
-    machine: Machine, description: Mapping[str, object], needs: str, *, reference: bool = False, limits: str = ""
+    machine: Machine,
+    description: Mapping[str, object],
+    needs: str,
+    *,
+    reference: bool = False,
+    limits: str = "",
+    fmi: str = FMI_VERSIONS[0],
 ) -> bytes:
     """Return the documentation page of an FMU.
 
@@ -60,11 +68,14 @@ def index_page(
         Whether the archive has a reference result.
     limits : str
         Section on the limits of the FMU's flavour, HTML.
+    fmi : {"2", "3"}
+        Version of FMI, whose types are named.
     """
     model, name = str(description["model"]), str(description["name"])
+    table = variables_of(description) if fmi == "2" else [each.shown for each in fmi3_variables(description)]
     rows = "\n".join(
         f'<tbody>\n<tr><th colspan="5" scope="rowgroup">{html.escape(heading)}</th></tr>\n{_rows(group)}\n</tbody>'
-        for heading, group in grouped_table(variables_of(description)).items()
+        for heading, group in grouped_table(table).items()
     )
     has_inputs = model != "ReferenceTrajectory"
     inputs = f', fed with <a href="reference/{name}_in.csv">reference/{name}_in.csv</a>' if has_inputs else ""

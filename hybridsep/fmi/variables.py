@@ -56,7 +56,13 @@ COMPENSATOR_SETTINGS: Mapping[str, Parameter] = {
 _HOLD = "the same for x_pb plus the residual before the window, held"
 _REJECTED = "measurements that were missing or not plausible, with trust; counted window by window"
 _COMPENSATE = CompensatorSettings.parameters()["compensate"]
-_HEADINGS = {"input": "Inputs", "output": "Outputs", "parameter": "Parameters", "local": "Current window"}
+_HEADINGS = {
+    "input": "Inputs",
+    "output": "Outputs",
+    "parameter": "Parameters",
+    "local": "Current window",
+    "independent": "Time",
+}
 _KINDS = {int: "Integer", float: "Real", bool: "Boolean", str: "Enumeration"}
 
 
@@ -69,6 +75,7 @@ class Variable:
     name, description : str
     kind : {"Real", "Integer", "Boolean", "Enumeration"}
     causality : {"input", "output", "parameter", "local"}
+        FMI 3.0 adds ``independent``, the time.
     variability : {"fixed", "tunable", "continuous", "discrete"}
     start : float, int, bool or None
         Start value; None if it is calculated.

@@ -133,8 +133,8 @@ def test_archives_that_are_none(native: Path, tmp_path: Path) -> None:
 
 LAUGHS = "".join(f'<!ENTITY a{i + 1} "{f"&a{i};" * 10}">' for i in range(9))
 BOMB = f'<?xml version="1.0"?><!DOCTYPE x [<!ENTITY a0 "ha">{LAUGHS}]><fmiModelDescription>&a9;</fmiModelDescription>'
-FMI_3 = (
-    '<?xml version="1.0"?><fmiModelDescription fmiVersion="3.0" modelName="m" instantiationToken="{}">'
+FMI_3_1 = (
+    '<?xml version="1.0"?><fmiModelDescription fmiVersion="3.1" modelName="m" instantiationToken="{}">'
     '<CoSimulation modelIdentifier="m"/><ModelVariables><Float64 name="x" valueReference="1"/></ModelVariables>'
     "</fmiModelDescription>"
 )
@@ -143,7 +143,7 @@ FMI_3 = (
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda _: FMI_3.encode(), r"Odd\.fmu must be an FMI 2\.0 FMU, got FMI 3\.0"),
+        (lambda _: FMI_3_1.encode(), r"Odd\.fmu must be an FMI 2\.0 or 3\.0 FMU, got FMI 3\.1"),
         (lambda _: BOMB.encode(), r"Odd\.fmu must not be loaded: its description has a DOCTYPE"),
         (lambda _: BOMB.encode("utf-16"), r"Odd\.fmu must not be loaded: its description has a DOCTYPE"),
         (lambda _: b"<a>" * 100_000, r"its description is an XML file|nested more than 50 deep"),
@@ -151,8 +151,11 @@ FMI_3 = (
         (lambda _: b"", r"Odd\.fmu is not a readable FMU: its description is no XML: no element found"),
         (lambda xml: xml[:-40], r"its description is no XML: "),
         (lambda _: b'<?xml version="1.0" encoding="klingon"?><a/>', r"its description is no XML: unknown encoding"),
-        (lambda xml: xml.replace(b'fmiVersion="2.0"', b'fmiVersion="1.0"'), r"must be an FMI 2\.0 FMU, got FMI 1\.0"),
-        (lambda xml: xml.replace(b"fmiVersion", b"version1"), r"must be an FMI 2\.0 FMU, got FMI none"),
+        (
+            lambda xml: xml.replace(b'fmiVersion="2.0"', b'fmiVersion="1.0"'),
+            r"must be an FMI 2\.0 or 3\.0 FMU, got FMI 1\.0",
+        ),
+        (lambda xml: xml.replace(b"fmiVersion", b"version1"), r"must be an FMI 2\.0 or 3\.0 FMU, got FMI none"),
         (lambda xml: xml.replace(b"CoSimulation", b"ModelExchange"), r"must be a co-simulation FMU"),
         (lambda xml: xml.replace(b"<ModelVariables>", b"<Variables>"), r"is no XML: mismatched tag"),
     ],

@@ -13,15 +13,16 @@ from hybridsep.fmi.flavours import FLAVOURS
 from hybridsep.machines.machine import Machine
 
 _FMUS = {
-    name: (machine, flavour)
+    name: (machine, flavour, fmi)
     for machine in map(load_machine, machine_names())
-    for flavour in FLAVOURS
-    for name in fmu_names(machine, flavour)
+    for flavour, fmi in (*((flavour, "2") for flavour in FLAVOURS), ("native", "3"))
+    for name in fmu_names(machine, flavour, fmi)
 }
 
-NATIVE = [name for name, (_, flavour) in _FMUS.items() if flavour == "native"]
-PYTHON = [name for name, (_, flavour) in _FMUS.items() if flavour == "python"]
-"""Names of all FMUs of all machines."""
+NATIVE = [name for name, (_, flavour, fmi) in _FMUS.items() if (flavour, fmi) == ("native", "2")]
+PYTHON = [name for name, (_, flavour, _) in _FMUS.items() if flavour == "python"]
+FMI3 = [name for name, (_, _, fmi) in _FMUS.items() if fmi == "3"]
+"""Names of all FMUs of all machines, the native ones by their version of FMI."""
 
 
 SHARED_BUILDS = "HYBRIDSEP_TESTS_BUILDS"
@@ -71,14 +72,15 @@ class BuiltFmus:
         weights : Path, optional
             Saved predictor that it starts warm with.
         """
-        own, flavour = _FMUS[name]
+        own, flavour, fmi = _FMUS[name]
         machine = machine or own
         content = machine.model_dump_json().encode() + (weights.read_bytes() if weights else b"")
         folder = self.folder / hashlib.sha256(content).hexdigest()[:16]
         targets = ("host",) if flavour == "native" else None
 
         def build(unfinished: Path) -> None:
-            made = build_fmu(machine, name, unfinished.with_suffix(".d"), flavour, targets=targets, weights=weights)
+            folder = unfinished.with_suffix(".d")
+            made = build_fmu(machine, name, folder, flavour, targets=targets, weights=weights, fmi=fmi)
             os.replace(made, unfinished)  # noqa: PTH105
 
         return built_once(folder / f"{name}.fmu", build)

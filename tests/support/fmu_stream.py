@@ -22,11 +22,11 @@ class FmuStream:
         self._fmu = FmuInstance(archive)
 
     def initialise(self, values: Mapping[str, Value], *, start: float = 0.0, stop: float | None = None) -> None:
-        self._enter(values, start, stop)
-        self._refusing(self._fmu._call, self._fmu.slave.exitInitializationMode)
+        self._refusing(self._fmu.begin, values, start_time=start, stop_time=stop)
+        self._refusing(self._fmu.finish)
 
     def outputs_before(self, values: Mapping[str, Value]) -> list[float]:
-        self._enter(values, 0.0, None)
+        self._refusing(self._fmu.begin, values)
         shown: list[float] = []
         self._refusing(lambda: shown.extend(self.outputs()))
         return shown
@@ -45,7 +45,7 @@ class FmuStream:
         return [float(self._fmu.get(name)) for name in self._outputs]
 
     def window(self, name: str) -> Array:
-        names = [variable for variable in self._fmu.variables if variable.startswith(f"{name}[")]
+        names = [variable for variable in self._fmu.variables if variable.partition("[")[0] == name]
         return np.array(self._fmu.real_reader(names)())
 
     def save(self) -> bytes:
@@ -62,13 +62,6 @@ class FmuStream:
 
     def close(self) -> None:
         self._fmu.close()
-
-    def _enter(self, values: Mapping[str, Value], start: float, stop: float | None) -> None:
-        slave = self._fmu.slave
-        self._refusing(self._fmu._call, slave.setupExperiment, startTime=start, stopTime=stop)
-        slave.enterInitializationMode()
-        for name, value in values.items():
-            self._fmu.set(name, value)
 
     @staticmethod
     def _refusing(function: Callable[..., Any], *arguments: Any, **keywords: Any) -> None:

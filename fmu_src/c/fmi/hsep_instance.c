@@ -36,51 +36,54 @@ HSEP_API void hsep_instance_drop_state(hsep_instance *instance)
     instance->state_size = 0;
 }
 
-/* Take the folder of a URI, or NULL. HSEP_WARNED: it is none. */
-static hsep_status instance_folder(hsep_instance *instance, const char *call, const char *uri, char message[])
+/* Take the folder of a URI or path, or NULL. HSEP_WARNED: it is none. */
+static hsep_status instance_folder(hsep_instance *instance, const char *uri, char message[])
 {
+    const hsep_words *words = instance->words;
     if (uri == NULL) {
         return HSEP_OK;
     }
     instance->resources = hsep_new(instance, HSEP_FOLDER_SIZE(strlen(uri)));
     if (instance->resources == NULL) {
-        return hsep_message_add(message, "%s: no memory for the path of the resources", call);
+        return hsep_message_add(message, "%s: no memory for the path of the resources", words->instantiate);
     }
     if (hsep_uri_folder(uri, INSTANCE_WINDOWS, instance->resources)) {
         return HSEP_OK;
     }
     hsep_message_add(
-        message, "%s: fmuResourceLocation must be a file: URI on this machine, got %.300s; it is not used", call, uri);
+        message, "%s: %s must be %s on this machine, got %.300s; it is not used", words->instantiate, words->location,
+        words->location_form, uri);
     hsep_delete(instance, instance->resources);
     instance->resources = NULL;
     return HSEP_WARNED;
 }
 
 /* Take the table from the resources if the header has none. */
-static hsep_status instance_table(hsep_instance *instance, const char *call, char message[])
+static hsep_status instance_table(hsep_instance *instance, char message[])
 {
 #ifdef HSEP_TABLE_IN_RESOURCES
-    return hsep_table_file_open(instance, call, message);
+    return hsep_table_file_open(instance, message);
 #else
-    (void)call, (void)message;
+    (void)message;
     instance->context = hsep_table;
     return HSEP_OK;
 #endif
 }
 
 HSEP_API hsep_status
-hsep_instance_open(hsep_instance *instance, const char *call, const char *name, const char *resources, char message[])
+hsep_instance_open(hsep_instance *instance, const char *name, const char *resources, char message[])
 {
+    const char *call = instance->words->instantiate;
     instance->name = hsep_new(instance, strlen(name) + 1);
     if (instance->name == NULL) {
         return hsep_message_add(message, "%s: no memory for the instance's name", call);
     }
     (void)strcpy(instance->name, name);
-    const hsep_status folder = instance_folder(instance, call, resources, message);
+    const hsep_status folder = instance_folder(instance, resources, message);
     if (folder == HSEP_REFUSED) {
         return HSEP_REFUSED;
     }
-    const hsep_status table = instance_table(instance, call, message);
+    const hsep_status table = instance_table(instance, message);
     if (table == HSEP_REFUSED) {
         return HSEP_REFUSED;
     }

@@ -116,8 +116,9 @@ static FILE *table_find(const char *folder)
     return hsep_resource_open(&(hsep_context){.resources = folder}, TABLE_FILE);
 }
 
-HSEP_API hsep_status hsep_table_file_open(hsep_instance *instance, const char *call, char message[])
+HSEP_API hsep_status hsep_table_file_open(hsep_instance *instance, char message[])
 {
+    const char *call = instance->words->instantiate, *location = instance->words->location;
     char reason[HSEP_MESSAGE_SIZE] = "";
     hsep_status status = HSEP_OK;
     FILE *file = table_find(instance->resources);
@@ -129,15 +130,14 @@ HSEP_API hsep_status hsep_table_file_open(hsep_instance *instance, const char *c
                 message, "%s: there is no " TABLE_FILE ", which must be in the FMU's resources; beside the library: %s",
                 call, beside != NULL ? beside : "none");
             (void)hsep_message_add(
-                message, "fmuResourceLocation: %s", instance->resources != NULL ? instance->resources : "none");
+                message, "%s: %s", location, instance->resources != NULL ? instance->resources : "none");
             hsep_delete(instance, beside);
             return HSEP_REFUSED;
         }
         if (instance->resources != NULL) {
             (void)hsep_message_add(
-                message,
-                "%s: there is no " TABLE_FILE " in fmuResourceLocation, that beside the library is used; got %s", call,
-                instance->resources);
+                message, "%s: there is no " TABLE_FILE " in %s, that beside the library is used; got %s", call,
+                location, instance->resources);
             status = HSEP_WARNED;
         }
         hsep_delete(instance, instance->resources);

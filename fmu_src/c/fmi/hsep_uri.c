@@ -65,7 +65,7 @@ HSEP_API int hsep_uri_folder(const char *uri, int windows, char *folder)
             uri += 3;
         }
         end = hsep_decode(uri, end);
-    } else if (strstr(uri, "://") == NULL) {
+    } else if (uri[0] == '/' || strstr(uri, "://") == NULL) {
         const size_t length = strlen(uri);
         memcpy(end, uri, length);
         end += length;

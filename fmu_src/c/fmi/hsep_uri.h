@@ -9,7 +9,8 @@
 
 /* Write the folder, percent-decoded (UTF-8 stays as it is) and with a trailing slash; return 1.
  * windows says whether /C:/x means C:/x and //server/share is a place. A text without a scheme is taken as a path, as
- * it is. Return 0, with nothing to be used in folder, if it is another scheme, another host, or names nothing. */
+ * it is: FMI 3.0's importers give one. Return 0, with nothing to be used in folder, if it is another scheme, another
+ * host, or names nothing. */
 HSEP_API int hsep_uri_folder(const char *uri, int windows, char *folder);
 
 #endif

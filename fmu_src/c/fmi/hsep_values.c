@@ -1,64 +1,74 @@
 #include "hsep_values.h"
 
 #include "hsep_check.h"
-#include "hsep_table.h"
 
 #include <limits.h>
 
-static const char *const values_kinds[] = {"Real", "Integer", "Boolean", "String"};
-static const char *const values_causalities[] = {"an input", "an output", "a parameter", "a local variable"};
+static const char *const values_causalities[] = {
+    "an input", "an output", "a parameter", "a local variable", "the independent variable"};
 
-HSEP_API hsep_status hsep_values_check(
-    const hsep_instance *instance, const char *call, hsep_kind kind, const unsigned vr[], size_t n, const void *value,
-    char message[])
+HSEP_API hsep_status hsep_values_check(const hsep_instance *instance, const hsep_access *access, char message[])
 {
     const hsep_context *context = &instance->context;
+    const hsep_words *words = instance->words;
+    const size_t n = access->n_references, n_variables = words->n_variables(context);
     char name[HSEP_NAME_SIZE];
-    if (n > 0 && (vr == NULL || value == NULL)) {
+    size_t n_values = 0;
+    if (n > 0 && (access->references == NULL || access->values == NULL)) {
         return hsep_message_add(
-            message, "%s: %s is NULL, but nvr is %lu", call, vr == NULL ? "vr" : "value", (unsigned long)n);
+            message, "%s: %s is NULL, but %s is %lu", access->call,
+            access->references == NULL ? words->references : words->values, words->n_references, (unsigned long)n);
     }
     for (size_t i = 0; i < n; i++) {
-        if (vr[i] >= context->n_variables) {
+        const unsigned reference = access->references[i];
+        if (reference >= n_variables) {
             return hsep_message_add(
-                message, "%s: value reference must be 0 ... %lu, got %u", call, (unsigned long)context->n_variables - 1,
-                vr[i]);
+                message, "%s: value reference must be 0 ... %lu, got %u", access->call, (unsigned long)n_variables - 1,
+                reference);
         }
-        const hsep_variable *variable = hsep_table_row(context, vr[i]);
-        if (variable->kind != kind) {
+        const hsep_found found = words->find(context, reference);
+        const char *type = words->types[found.row->kind];
+        if (type != access->type) {
             return hsep_message_add(
-                message, "%s: %s (value reference %u) is of type %s, not %s", call,
-                hsep_table_name(context, vr[i], name), vr[i], values_kinds[variable->kind], values_kinds[kind]);
+                message, "%s: %s (value reference %u) is of type %s, not %s", access->call,
+                words->name(context, reference, name), reference, type, access->type);
         }
+        n_values += found.count;
+    }
+    if (n_values != access->n_values) {
+        return hsep_message_add(
+            message, "%s: %s must be %lu, the number of values of all variables, got %lu", access->call,
+            words->n_values, (unsigned long)n_values, (unsigned long)access->n_values);
     }
     return HSEP_OK;
 }
 
-HSEP_API hsep_status hsep_values_check_set(
-    const hsep_instance *instance, const char *call, const char *reset, const unsigned vr[], size_t n, char message[])
+HSEP_API hsep_status hsep_values_check_set(const hsep_instance *instance, const hsep_access *access, char message[])
 {
     const hsep_context *context = &instance->context;
+    const hsep_words *words = instance->words;
     char name[HSEP_NAME_SIZE];
-    for (size_t i = 0; i < n; i++) {
-        const hsep_variable *variable = hsep_table_row(context, vr[i]);
+    for (size_t i = 0; i < access->n_references; i++) {
+        const unsigned reference = access->references[i];
+        const hsep_variable *variable = words->find(context, reference).row;
         if (variable->causality != HSEP_INPUT && variable->causality != HSEP_PARAMETER) {
             return hsep_message_add(
-                message, "%s: %s is %s and cannot be set", call, hsep_table_name(context, vr[i], name),
+                message, "%s: %s is %s and cannot be set", access->call, words->name(context, reference, name),
                 values_causalities[variable->causality]);
         }
         if (variable->causality == HSEP_PARAMETER && !variable->tunable &&
             instance->experiment.phase == HSEP_STEPPING) {
             return hsep_message_add(
-                message, "%s: %s is a fixed parameter and cannot be set after the initialization; call %s first", call,
-                hsep_table_name(context, vr[i], name), reset);
+                message, "%s: %s is a fixed parameter and cannot be set after the initialization; call %s first",
+                access->call, words->name(context, reference, name), words->reset);
         }
     }
     return HSEP_OK;
 }
 
-HSEP_API hsep_status
-hsep_values_prepare(hsep_instance *instance, const char *call, const unsigned vr[], size_t n, char message[])
+HSEP_API hsep_status hsep_values_prepare(hsep_instance *instance, const hsep_access *access, char message[])
 {
+    const hsep_words *words = instance->words;
     char reason[HSEP_MESSAGE_SIZE] = "", name[HSEP_NAME_SIZE];
     if (instance->state != NULL) {
         return HSEP_OK;
@@ -67,11 +77,13 @@ hsep_values_prepare(hsep_instance *instance, const char *call, const unsigned vr
         hsep_model_start_values(&instance->context, instance->values);
         return HSEP_OK;
     }
-    for (size_t i = 0; i < n; i++) {
-        const hsep_variable *variable = hsep_table_row(&instance->context, vr[i]);
+    for (size_t i = 0; i < access->n_references; i++) {
+        const unsigned reference = access->references[i];
+        const hsep_variable *variable = words->find(&instance->context, reference).row;
         if (variable->causality == HSEP_OUTPUT || variable->causality == HSEP_LOCAL) {
             return hsep_message_add(
-                message, "%s: %s is not known yet: %s", call, hsep_table_name(&instance->context, vr[i], name), reason);
+                message, "%s: %s is not known yet: %s", access->call, words->name(&instance->context, reference, name),
+                reason);
         }
     }
     return HSEP_OK;

@@ -8,20 +8,26 @@
 
 #include <stddef.h>
 
-/* Check that there are n references, all to variables of that kind, and a place for their values. */
-HSEP_API hsep_status hsep_values_check(
-    const hsep_instance *instance, const char *call, hsep_kind kind, const unsigned vr[], size_t n, const void *value,
-    char message[]);
+/* What an importer gives to read or write variables. */
+typedef struct {
+    const char *call;
+    const char *type; /* one of the words' types, or of a type that no variable has */
+    const unsigned *references;
+    size_t n_references;
+    const void *values;
+    size_t n_values;
+} hsep_access;
+
+/* Check that all references are to variables of that type, and that there is a place for each of their values. */
+HSEP_API hsep_status hsep_values_check(const hsep_instance *instance, const hsep_access *access, char message[]);
 
 /* Check beside it that they may be set now: inputs at any time, parameters until the initialization has ended, tunable
- * ones later too. reset: name of the call after which the others may be. */
-HSEP_API hsep_status hsep_values_check_set(
-    const hsep_instance *instance, const char *call, const char *reset, const unsigned vr[], size_t n, char message[]);
+ * ones later too. */
+HSEP_API hsep_status hsep_values_check_set(const hsep_instance *instance, const hsep_access *access, char message[]);
 
-/* Calculate what is read before the initialization has ended: it follows from the start values. Refused if one of the n
- * is calculated from a start value that is no position. */
-HSEP_API hsep_status
-hsep_values_prepare(hsep_instance *instance, const char *call, const unsigned vr[], size_t n, char message[]);
+/* Calculate what is read before the initialization has ended: it follows from the start values. Refused if one of the
+ * variables is calculated from a start value that is no position. */
+HSEP_API hsep_status hsep_values_prepare(hsep_instance *instance, const hsep_access *access, char message[]);
 
 /* A value as a whole number of 32 bits. */
 HSEP_API int hsep_values_integer(double number);

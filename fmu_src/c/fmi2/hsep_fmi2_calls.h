@@ -1,22 +1,16 @@
-/* Legal FMI 2.0 calls in each state of an instance: the standard's table of the co-simulation state machine.
- *
- * Steps are done when fmi2DoStep returns, so the standard's stepInProgress and stepCanceled never occur. A call that is
- * refused (fmi2Error) changes nothing, not even the state of the instance: the importer may free, reset or restore it,
- * as the standard asks, and may also correct what was wrong and call again.
- * One thing more than the standard: values may be read before the initialization; they are the start values then.
- */
+/* Legal FMI 2.0 calls in each state of an instance: the standard's table of the co-simulation state machine. */
 #ifndef HSEP_FMI2_CALLS_H
 #define HSEP_FMI2_CALLS_H
 
-#include "hsep_instance.h"
+#include "hsep_calls.h"
+#include "hsep_fmu.h" /* before the importer's header: it names FMI2_FUNCTION_PREFIX */
 
-/* The states, short, for the columns of the table below. */
-enum { HSEP_I = HSEP_INSTANTIATED, HSEP_M = HSEP_INITIALIZATION, HSEP_S = HSEP_STEPPING, HSEP_T = HSEP_TERMINATED };
+#include "fmi2Functions.h"
 
 /* The calls that belong to an instance: CALL(constant, name, states in which it is legal).
  * I: instantiated, M: Initialization Mode, S: stepping, T: terminated */
 /* clang-format off */
-#define HSEP_CALLS(CALL) \
+#define HSEP_FMI2_CALLS(CALL) \
     CALL(SET_DEBUG_LOGGING,           "fmi2SetDebugLogging",          HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
     CALL(SETUP_EXPERIMENT,            "fmi2SetupExperiment",          HSEP_I) \
     CALL(ENTER_INITIALIZATION_MODE,   "fmi2EnterInitializationMode",  HSEP_I) \
@@ -49,16 +43,19 @@ enum { HSEP_I = HSEP_INSTANTIATED, HSEP_M = HSEP_INITIALIZATION, HSEP_S = HSEP_S
     CALL(GET_STRING_STATUS,           "fmi2GetStringStatus",                            HSEP_S | HSEP_T)
 /* clang-format on */
 
-#define HSEP_CALL_CONSTANT(constant, name, legal) HSEP_CALL_##constant,
-#define HSEP_CALL_ROW(constant, name, legal) {name, legal},
+#define HSEP_FMI2_CONSTANT(constant, name, legal) HSEP_FMI2_##constant,
+#define HSEP_FMI2_ROW(constant, name, legal) {name, legal},
 
-typedef enum { HSEP_CALLS(HSEP_CALL_CONSTANT) } hsep_call;
+enum { HSEP_FMI2_CALLS(HSEP_FMI2_CONSTANT) };
 
-typedef struct {
-    const char *name;
-    unsigned legal;
-} hsep_call_row;
+static const hsep_call hsep_fmi2_calls[] = {HSEP_FMI2_CALLS(HSEP_FMI2_ROW)};
 
-static const hsep_call_row hsep_calls[] = {HSEP_CALLS(HSEP_CALL_ROW)};
+#define HSEP_FMI2(constant) (&hsep_fmi2_calls[HSEP_FMI2_##constant])
+
+/* The words of FMI 2.0. */
+HSEP_API const hsep_words *hsep_fmi2_words(void);
+
+/* A status as FMI 2.0 has it. */
+HSEP_API fmi2Status hsep_fmi2_status(hsep_status status);
 
 #endif

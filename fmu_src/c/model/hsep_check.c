@@ -93,7 +93,7 @@ HSEP_API int hsep_check_parameters(const hsep_context *context, const double val
         hsep_number(number, value, v->kind);
         if (!isfinite(value)) {
             hsep_message_add(message, "%s must be finite, got %s", name, number);
-        } else if (v->kind == HSEP_INTEGER && value != floor(value)) {
+        } else if ((v->kind == HSEP_INTEGER || v->kind == HSEP_ENUMERATION) && value != floor(value)) {
             hsep_message_add(message, "%s must be a whole number, got %s", name, number);
         } else if (!check_allows(v, value)) {
             check_range_text(range, sizeof range, v, hsep_table_unit(context, i));

@@ -1,6 +1,6 @@
 /* Interface between a model and an adapter: sizes, initialization, step and values.
  *
- * An adapter (FMI 2.0 now, another one beside it later) owns one array of values, one place per variable of the table
+ * An adapter (one for each version of FMI) owns one array of values, one place per variable of the table
  * (hsep_context), then the time derivatives of the first HSEP_N_INTERPOLATED of them (hsep_fmu.h), inputs that
  * may change within a step, which it sets to 0 after each step; and one block of memory, the state, whose size
  * follows from the parameters. The state is plain data without pointers: saving, restoring and serialising it is
@@ -24,8 +24,8 @@ typedef enum {
     HSEP_WARNED = 2   /* the call is done; the message is a warning */
 } hsep_status;
 
-typedef enum { HSEP_REAL, HSEP_INTEGER, HSEP_BOOLEAN, HSEP_STRING } hsep_kind;
-typedef enum { HSEP_INPUT, HSEP_OUTPUT, HSEP_PARAMETER, HSEP_LOCAL } hsep_causality;
+typedef enum { HSEP_REAL, HSEP_INTEGER, HSEP_ENUMERATION, HSEP_BOOLEAN, HSEP_N_KINDS } hsep_kind;
+typedef enum { HSEP_INPUT, HSEP_OUTPUT, HSEP_PARAMETER, HSEP_LOCAL, HSEP_INDEPENDENT } hsep_causality;
 
 /* One row of the generated table (hsep_table.h). Numbers of every kind are held as double. */
 typedef struct {

@@ -1,0 +1,136 @@
+/* FMI 3.0 for co-simulation: instances, experiments, steps and saved states. Every number comes from the model. */
+#include "hsep_fmi3_calls.h"
+
+#include <stdlib.h>
+
+const char *fmi3GetVersion(void) { return "3.0"; }
+
+static void fmi3_hand(const hsep_component *component, int status, const char *category, const char *text)
+{
+    const fmi3LogMessageCallback logger = (fmi3LogMessageCallback)component->logger;
+    logger(component->environment, (fmi3Status)status, category, text);
+}
+
+fmi3Instance fmi3InstantiateCoSimulation(
+    fmi3String instanceName, fmi3String instantiationToken, fmi3String resourcePath, fmi3Boolean visible,
+    fmi3Boolean loggingOn, fmi3Boolean eventModeUsed, fmi3Boolean earlyReturnAllowed,
+    const fmi3ValueReference requiredIntermediateVariables[], size_t nRequiredIntermediateVariables,
+    fmi3InstanceEnvironment instanceEnvironment, fmi3LogMessageCallback logMessage,
+    fmi3IntermediateUpdateCallback intermediateUpdate)
+{
+    hsep_component filled = {.hand = fmi3_hand, .categories = HSEP_LOG_ERROR};
+    /* An early return is allowed, never needed; without intermediate updates there is nothing to ask for in them. */
+    (void)visible, (void)earlyReturnAllowed, (void)requiredIntermediateVariables, (void)intermediateUpdate;
+    filled.instance.words = hsep_fmi3_words();
+    filled.instance.allocate = calloc;
+    filled.instance.release = free;
+    filled.logger = (void (*)(void))logMessage;
+    filled.environment = instanceEnvironment;
+    if (eventModeUsed) {
+        (void)hsep_refuse(
+            &filled.instance, "fmi3InstantiateCoSimulation: eventModeUsed must be false, as hasEventMode is in "
+                              "modelDescription.xml");
+        return NULL;
+    }
+    if (nRequiredIntermediateVariables > 0) {
+        (void)hsep_refuse(
+            &filled.instance,
+            "fmi3InstantiateCoSimulation: nRequiredIntermediateVariables must be 0, as providesIntermediateUpdate is "
+            "false in modelDescription.xml, got %lu",
+            (unsigned long)nRequiredIntermediateVariables);
+        return NULL;
+    }
+    return hsep_component_new(&filled, instanceName, instantiationToken, resourcePath, loggingOn);
+}
+
+void fmi3FreeInstance(fmi3Instance instance)
+{
+    if (instance != NULL) {
+        hsep_instance_free(instance);
+    }
+}
+
+fmi3Status fmi3SetDebugLogging(
+    fmi3Instance instance, fmi3Boolean loggingOn, size_t nCategories, const fmi3String categories[])
+{
+    return hsep_fmi3_status(
+        hsep_call_logging(instance, HSEP_FMI3(SET_DEBUG_LOGGING), loggingOn, nCategories, categories));
+}
+
+fmi3Status fmi3EnterInitializationMode(
+    fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance, fmi3Float64 startTime,
+    fmi3Boolean stopTimeDefined, fmi3Float64 stopTime)
+{
+    const hsep_call *call = HSEP_FMI3(ENTER_INITIALIZATION_MODE);
+    (void)toleranceDefined, (void)tolerance;
+    if (hsep_call_experiment(instance, call, startTime, stopTimeDefined, stopTime) != HSEP_OK) {
+        return fmi3Error;
+    }
+    return hsep_fmi3_status(hsep_call_phase(instance, call, HSEP_INITIALIZATION));
+}
+
+fmi3Status fmi3ExitInitializationMode(fmi3Instance instance)
+{
+    return hsep_fmi3_status(hsep_call_initialise(instance, HSEP_FMI3(EXIT_INITIALIZATION_MODE)));
+}
+
+fmi3Status fmi3Terminate(fmi3Instance instance)
+{
+    return hsep_fmi3_status(hsep_call_phase(instance, HSEP_FMI3(TERMINATE), HSEP_TERMINATED));
+}
+
+fmi3Status fmi3Reset(fmi3Instance instance) { return hsep_fmi3_status(hsep_call_reset(instance, HSEP_FMI3(RESET))); }
+
+fmi3Status fmi3DoStep(
+    fmi3Instance instance, fmi3Float64 currentCommunicationPoint, fmi3Float64 communicationStepSize,
+    fmi3Boolean noSetFMUStatePriorToCurrentPoint, fmi3Boolean *eventHandlingNeeded, fmi3Boolean *terminateSimulation,
+    fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime)
+{
+    const hsep_call *call = HSEP_FMI3(DO_STEP);
+    hsep_instance *self = hsep_begin(instance, call);
+    (void)noSetFMUStatePriorToCurrentPoint;
+    if (self == NULL) {
+        return fmi3Error;
+    }
+    if (eventHandlingNeeded == NULL || terminateSimulation == NULL || earlyReturn == NULL ||
+        lastSuccessfulTime == NULL) {
+        return hsep_fmi3_status(hsep_refuse(self, "fmi3DoStep: a place for what it returns is NULL"));
+    }
+    const hsep_status status = hsep_call_step(instance, call, currentCommunicationPoint, communicationStepSize);
+    *eventHandlingNeeded = *terminateSimulation = *earlyReturn = fmi3False;
+    *lastSuccessfulTime = self->experiment.time;
+    return hsep_fmi3_status(status);
+}
+
+fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *FMUState)
+{
+    return hsep_fmi3_status(hsep_call_save(instance, HSEP_FMI3(GET_FMU_STATE), FMUState));
+}
+
+fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState FMUState)
+{
+    return hsep_fmi3_status(hsep_call_restore(instance, HSEP_FMI3(SET_FMU_STATE), FMUState));
+}
+
+fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *FMUState)
+{
+    return hsep_fmi3_status(hsep_call_free_state(instance, HSEP_FMI3(FREE_FMU_STATE), FMUState));
+}
+
+fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState FMUState, size_t *size)
+{
+    return hsep_fmi3_status(hsep_call_state_size(instance, HSEP_FMI3(SERIALIZED_FMU_STATE_SIZE), FMUState, size));
+}
+
+fmi3Status fmi3SerializeFMUState(fmi3Instance instance, fmi3FMUState FMUState, fmi3Byte serializedState[], size_t size)
+{
+    return hsep_fmi3_status(
+        hsep_call_serialise(instance, HSEP_FMI3(SERIALIZE_FMU_STATE), FMUState, serializedState, size));
+}
+
+fmi3Status fmi3DeserializeFMUState(
+    fmi3Instance instance, const fmi3Byte serializedState[], size_t size, fmi3FMUState *FMUState)
+{
+    return hsep_fmi3_status(
+        hsep_call_deserialise(instance, HSEP_FMI3(DESERIALIZE_FMU_STATE), serializedState, size, FMUState));
+}

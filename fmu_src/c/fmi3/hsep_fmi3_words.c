@@ -1,0 +1,66 @@
+/* FMI 3.0's words; single variables and modes have a value reference for each value, windows one each, then comes the
+ * time. */
+#include "hsep_fmi3_calls.h"
+
+#include <stdio.h>
+
+/* Value references before the windows, which are the places of the values. */
+static size_t fmi3_before_windows(const hsep_context *context)
+{
+    return context->n_scalars + HSEP_MODE_NUMBERS * context->n_modes;
+}
+
+static size_t fmi3_n_variables(const hsep_context *context)
+{
+    return fmi3_before_windows(context) + HSEP_N_WINDOWS + 1;
+}
+
+/* The time has no place: its value is the experiment's. */
+static const hsep_variable fmi3_time = {
+    .name = "time", .unit = "s", .angular_unit = "s", .kind = HSEP_REAL, .causality = HSEP_INDEPENDENT};
+
+static hsep_found fmi3_find(const hsep_context *context, size_t reference)
+{
+    const size_t before = fmi3_before_windows(context);
+    if (reference < before) {
+        return (hsep_found){.row = hsep_table_row(context, reference), .place = reference, .count = 1};
+    }
+    if (reference == before + HSEP_N_WINDOWS) {
+        return (hsep_found){.row = &fmi3_time, .place = context->n_variables, .count = 1};
+    }
+    const size_t place = before + (reference - before) * context->window;
+    return (hsep_found){.row = hsep_table_row(context, place), .place = place, .count = context->window};
+}
+
+static const char *fmi3_name(const hsep_context *context, size_t reference, char text[HSEP_NAME_SIZE])
+{
+    if (reference < fmi3_before_windows(context)) {
+        return hsep_table_name(context, reference, text);
+    }
+    snprintf(text, HSEP_NAME_SIZE, "%.60s", fmi3_find(context, reference).row->name);
+    return text;
+}
+
+static const hsep_words fmi3_words = {
+    .instantiate = "fmi3InstantiateCoSimulation",
+    .reset = "fmi3Reset",
+    .token = "instantiationToken",
+    .location = "resourcePath",
+    .location_form = "a folder",
+    .references = "valueReferences",
+    .n_references = "nValueReferences",
+    .values = "values",
+    .n_values = "nValues",
+    .phases = {"instantiated", "Initialization Mode", "Step Mode", "terminated"},
+    .types =
+        {[HSEP_REAL] = "Float64",
+         [HSEP_INTEGER] = "Int32",
+         [HSEP_ENUMERATION] = "Int64", /* which the standard reads and writes enumerations by */
+         [HSEP_BOOLEAN] = "Boolean"},
+    .n_variables = fmi3_n_variables,
+    .find = fmi3_find,
+    .name = fmi3_name};
+
+HSEP_API const hsep_words *hsep_fmi3_words(void) { return &fmi3_words; }
+
+HSEP_API fmi3Status hsep_fmi3_status(hsep_status status) { return (status == HSEP_REFUSED) ? fmi3Error : fmi3OK; }
