@@ -22,7 +22,7 @@ from stream import (
     Value,
     kind_of,
 )
-from streams import StreamMaker, on_all
+from streams import StreamMaker, on_adapters
 
 PREDICTION: list[tuple[dict[str, Value], str]] = [
     ({"Np": 0}, "Np must be 1 … 100000, got 0"),
@@ -134,7 +134,7 @@ OF_ONE_MODEL: dict[str, list[tuple[dict[str, Value], str]]] = {
 }
 
 
-@on_all((*LOOK_AHEADS, STAGE_PREDICTOR, *PLANTS, TRAJECTORY))
+@on_adapters((*LOOK_AHEADS, STAGE_PREDICTOR, *PLANTS, TRAJECTORY))
 def test_bad_parameters_are_named_and_others_live_on(new_stream: StreamMaker) -> None:
     good, bad, fresh = new_stream(), new_stream(), new_stream()
     good.initialise({})
@@ -160,7 +160,7 @@ def assert_refused(stream: Stream, t: float, h: float, message: str) -> None:
     assert stream.outputs() == outputs
 
 
-@on_all((*LOOK_AHEADS, TRAJECTORY, *PLANTS))
+@on_adapters((*LOOK_AHEADS, TRAJECTORY, *PLANTS))
 @pytest.mark.parametrize("h", [0.0, -T_S, -1e-320, math.nan, math.inf, 100.5])
 def test_a_step_size_that_cannot_be_changes_nothing(new_stream: StreamMaker, h: float) -> None:
     stream = new_stream()
@@ -170,7 +170,7 @@ def test_a_step_size_that_cannot_be_changes_nothing(new_stream: StreamMaker, h: 
     stream.step(0.05, T_S)
 
 
-@on_all((*LOOK_AHEADS, TRAJECTORY))
+@on_adapters((*LOOK_AHEADS, TRAJECTORY))
 @pytest.mark.parametrize("t", [0.0, 0.0506, 0.0494, 1e9, math.nan, math.inf, -math.inf])
 def test_a_step_from_another_time_changes_nothing(new_stream: StreamMaker, t: float) -> None:
     stream = new_stream()
@@ -181,7 +181,7 @@ def test_a_step_from_another_time_changes_nothing(new_stream: StreamMaker, t: fl
     stream.step(0.05, T_S)
 
 
-@on_all(PLANTS, needs="a plant's time")
+@on_adapters(PLANTS, needs="a plant's time")
 def test_a_plant_starts_no_step_at_infinity(new_stream: StreamMaker) -> None:
     stream = new_stream()
     stream.initialise({})
@@ -191,7 +191,7 @@ def test_a_plant_starts_no_step_at_infinity(new_stream: StreamMaker) -> None:
 BAD_POSITIONS = [(math.nan, "finite"), (math.inf, "finite"), (-math.inf, "finite"), (1e30, "within ±1000 m")]
 
 
-@on_all(LOOK_AHEADS)
+@on_adapters(LOOK_AHEADS)
 @pytest.mark.parametrize("name", ["x_d_ahead", "x_meas"])
 @pytest.mark.parametrize(("value", "expected"), BAD_POSITIONS)
 def test_an_input_that_is_no_position_changes_nothing(
@@ -213,7 +213,7 @@ def test_an_input_that_is_no_position_changes_nothing(
     assert stream.save() == untroubled.save()
 
 
-@on_all(PLANTS)
+@on_adapters(PLANTS)
 @pytest.mark.parametrize(("value", "expected"), BAD_POSITIONS)
 def test_a_plants_command_that_is_no_position_changes_nothing(
     new_stream: StreamMaker, value: float, expected: str
@@ -229,14 +229,14 @@ def test_a_plants_command_that_is_no_position_changes_nothing(
     assert steps(stream, 3, 50) == steps(untroubled, 3, 50)
 
 
-@on_all(PLANTS, needs="a plant's time")
+@on_adapters(PLANTS, needs="a plant's time")
 @pytest.mark.parametrize(("value", "expected"), BAD_POSITIONS)
 def test_a_plants_start_that_is_no_position_is_refused(new_stream: StreamMaker, value: float, expected: str) -> None:
     with pytest.raises(RefusedStreamError, match=f"the start value of x_d must be {expected}, got"):
         new_stream().initialise({"x_d": value})
 
 
-@on_all((DRIVE,))
+@on_adapters((DRIVE,))
 def test_a_step_too_long_for_a_fast_plant_is_refused(new_stream: StreamMaker) -> None:
     stream = new_stream()
     stream.initialise({"k": 9e9})

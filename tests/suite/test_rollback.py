@@ -14,12 +14,12 @@ from built_once import BuiltFmus
 from driving import SHORT, T_S, TIGHT, initialise, position, set_inputs, steps
 from places import SUPPORT
 from stream import CANNOT, COMPENSATOR, LOOK_AHEADS, PLANTS, PREDICTOR, TRAJECTORY, RefusedStreamError, Stream, Value
-from streams import StreamMaker, on_all
+from streams import StreamMaker, on_adapters
 
 ALL = (*LOOK_AHEADS, TRAJECTORY, *PLANTS)
 N_SAMPLES = 420
 
-every = on_all(ALL)
+every = on_adapters(ALL)
 
 
 class Times:
@@ -65,23 +65,23 @@ def test_rollback_is_exact(new_stream: StreamMaker) -> None:
     assert_exact(new_stream, {})
 
 
-@on_all(LOOK_AHEADS)
+@on_adapters(LOOK_AHEADS)
 def test_rollback_is_exact_with_short_windows(new_stream: StreamMaker) -> None:
     assert_exact(new_stream, SHORT[new_stream.model])
 
 
-@on_all((PREDICTOR,))
+@on_adapters((PREDICTOR,))
 def test_rollback_is_exact_with_trust(new_stream: StreamMaker) -> None:
     assert_exact(new_stream, SHORT[PREDICTOR] | {"trust": True, "forgetting": 0.3})
 
 
-@on_all((COMPENSATOR,))
+@on_adapters((COMPENSATOR,))
 def test_rollback_is_exact_while_a_bounded_plan_is_solved(new_stream: StreamMaker) -> None:
     # It is there 8 samples after its window has begun.
     assert_exact(new_stream, SHORT[COMPENSATOR] | TIGHT)
 
 
-@on_all((COMPENSATOR,))
+@on_adapters((COMPENSATOR,))
 @pytest.mark.parametrize("limits", [{}, TIGHT])
 def test_rollback_is_exact_while_a_late_measurement_is_planned_from(
     new_stream: StreamMaker, limits: dict[str, Value]
@@ -102,7 +102,7 @@ def test_a_state_goes_on_in_a_second_instance(new_stream: StreamMaker, cut: int)
     assert second.save() == first.save()
 
 
-@on_all(LOOK_AHEADS)
+@on_adapters(LOOK_AHEADS)
 def test_a_state_of_the_other_model_goes_on_in_a_second_instance(new_stream: StreamMaker) -> None:
     first, second = new_stream(), new_stream()
     initialise(first, trust=new_stream.model == PREDICTOR)  # which the second one has not, by its machine file
@@ -113,7 +113,7 @@ def test_a_state_of_the_other_model_goes_on_in_a_second_instance(new_stream: Str
     assert steps(second, 155, 300) == steps(first, 155, 300)
 
 
-@on_all((PREDICTOR, COMPENSATOR))
+@on_adapters((PREDICTOR, COMPENSATOR))
 def test_what_is_missing_is_part_of_a_state(new_stream: StreamMaker) -> None:
     stream = new_stream()
     initialise(stream, trust=True)
@@ -130,7 +130,7 @@ def test_what_is_missing_is_part_of_a_state(new_stream: StreamMaker) -> None:
     assert steps(stream, 110, 200) == expected
 
 
-@on_all((PREDICTOR,))
+@on_adapters((PREDICTOR,))
 def test_a_reset_ends_trust(new_stream: StreamMaker) -> None:
     stream, fresh = new_stream(), new_stream()
     initialise(stream, trust=True)
@@ -145,7 +145,7 @@ def test_a_reset_ends_trust(new_stream: StreamMaker) -> None:
     assert steps(stream, 0, 150) == with_trust
 
 
-@on_all((PREDICTOR,))
+@on_adapters((PREDICTOR,))
 def test_states_go_on_in_another_process(new_stream: StreamMaker, fmus: BuiltFmus, tmp_path: Path) -> None:
     expected = {}
     for model in ALL:
@@ -177,7 +177,7 @@ print(json.dumps(outputs))
     assert json.loads(done.stdout) == expected
 
 
-@on_all(ALL, needs="bad states")
+@on_adapters(ALL, needs="bad states")
 def test_damaged_and_truncated_states_are_refused(new_stream: StreamMaker) -> None:
     stream = new_stream()
     initialise(stream)
@@ -190,7 +190,7 @@ def test_damaged_and_truncated_states_are_refused(new_stream: StreamMaker) -> No
         assert stream.save() == blob
 
 
-@on_all(LOOK_AHEADS, needs="bad states")
+@on_adapters(LOOK_AHEADS, needs="bad states")
 def test_states_of_other_models_are_refused(new_stream: StreamMaker) -> None:
     stream = new_stream()
     initialise(stream)

@@ -20,12 +20,12 @@ from stream import (
     RefusedStreamError,
     Value,
 )
-from streams import StreamMaker, on_all
+from streams import StreamMaker, on_adapters
 
 ALL = (*LOOK_AHEADS, TRAJECTORY, *PLANTS)
 
 
-@on_all(ALL, needs="stop time")
+@on_adapters(ALL, needs="stop time")
 def test_a_step_begins_before_the_stop_time(new_stream: StreamMaker) -> None:
     stream = new_stream()
     stream.initialise({}, stop=0.0305)
@@ -39,7 +39,7 @@ def test_a_step_begins_before_the_stop_time(new_stream: StreamMaker) -> None:
         stream.step(t, 4e-3)
 
 
-@on_all(ALL, needs="stop time")
+@on_adapters(ALL, needs="stop time")
 def test_the_stop_time_is_reached_in_rounded_sums(new_stream: StreamMaker) -> None:
     stream = new_stream()
     stream.initialise({}, stop=0.1)
@@ -52,7 +52,7 @@ def test_the_stop_time_is_reached_in_rounded_sums(new_stream: StreamMaker) -> No
         stream.step(t, T_S)
 
 
-@on_all(LOOK_AHEADS)
+@on_adapters(LOOK_AHEADS)
 def test_any_start_time_gives_the_same(new_stream: StreamMaker) -> None:
     loop, stream = closed_loop(new_stream.model, 700), new_stream()
     stream.initialise(loop.values, start=1234.5)
@@ -62,7 +62,7 @@ def test_any_start_time_gives_the_same(new_stream: StreamMaker) -> None:
     np.testing.assert_array_equal(replay(other, loop), shown)
 
 
-@on_all((*LOOK_AHEADS, TRAJECTORY))
+@on_adapters((*LOOK_AHEADS, TRAJECTORY))
 @pytest.mark.parametrize(
     ("start", "message"),
     [
@@ -91,7 +91,7 @@ def at_rest(model: str, **others: float) -> list[float]:
     return [shown.get(name, 0.0) for name in OUTPUTS[model]]
 
 
-@on_all((*LOOK_AHEADS, DRIVE))
+@on_adapters((*LOOK_AHEADS, DRIVE))
 def test_outputs_right_after_the_initialization(new_stream: StreamMaker) -> None:
     stream = new_stream()
     stream.initialise(AT_REST[new_stream.model])
@@ -102,13 +102,13 @@ def test_outputs_right_after_the_initialization(new_stream: StreamMaker) -> None
             np.testing.assert_array_equal(stream.window(name), [known] * 60 + [0.0] * 40)
 
 
-@on_all((*LOOK_AHEADS, DRIVE), needs="outputs before")
+@on_adapters((*LOOK_AHEADS, DRIVE), needs="outputs before")
 def test_outputs_before_the_initialization_has_ended(new_stream: StreamMaker) -> None:
     shown = new_stream().outputs_before(AT_REST[new_stream.model])
     assert shown == at_rest(new_stream.model, sep_state=1.0)
 
 
-@on_all((*LOOK_AHEADS, *PLANTS), needs="outputs before")
+@on_adapters((*LOOK_AHEADS, *PLANTS), needs="outputs before")
 @pytest.mark.parametrize(
     ("start", "reason"),
     [
@@ -126,13 +126,13 @@ def test_no_output_follows_from_a_start_value_that_is_no_position(
         new_stream().outputs_before({command: start})
 
 
-@on_all(LOOK_AHEADS, needs="outputs before")
+@on_adapters(LOOK_AHEADS, needs="outputs before")
 def test_a_missing_first_measurement_hides_no_output(new_stream: StreamMaker) -> None:
     shown = new_stream().outputs_before({**AT_REST[new_stream.model], "x_meas": math.nan})
     assert shown == at_rest(new_stream.model, sep_state=1.0)
 
 
-@on_all((COMPENSATOR,))
+@on_adapters((COMPENSATOR,))
 @pytest.mark.parametrize(("compensate", "state"), [(0, 0), (1, 1), (2, 1)])
 def test_the_model_that_plans_first(new_stream: StreamMaker, compensate: int, state: int) -> None:
     stream = new_stream()
@@ -141,7 +141,7 @@ def test_the_model_that_plans_first(new_stream: StreamMaker, compensate: int, st
     assert stream.outputs() == at_rest(COMPENSATOR, sep_state=state, x_h_std=known)
 
 
-@on_all((*LOOK_AHEADS, *PLANTS))
+@on_adapters((*LOOK_AHEADS, *PLANTS))
 def test_a_reset_forgets_everything(new_stream: StreamMaker) -> None:
     stream, fresh = new_stream(), new_stream()
     initialise(fresh)

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from driving import T_S, initialise, position, set_inputs, steps
 from stream import CANNOT, LOOK_AHEADS, PLANTS, PREDICTOR, TRAJECTORY, RefusedStreamError
-from streams import StreamMaker, on_all
+from streams import StreamMaker, on_adapters, on_all
 
 N_SAMPLES = 420
 
@@ -78,7 +78,7 @@ def test_outputs_are_those_of_the_last_instant(new_stream: StreamMaker, pattern:
         assert shown == expected[math.floor(point)], f"{float(point)} samples"
 
 
-@on_all((PREDICTOR, TRAJECTORY))
+@on_adapters((PREDICTOR, TRAJECTORY))
 def test_a_time_that_accumulates_rounding_is_no_error(new_stream: StreamMaker) -> None:
     # At 1e9 s the sum of t += T_s drifts by half a sample in 10 701 steps.
     stream, exact = new_stream(), new_stream()

@@ -14,7 +14,7 @@ from driving import closed_loop, replay, steps
 from library_models import trained_predictor
 from library_stream import LookAheadStream
 from stream import COMPENSATOR, LIBRARY, LOOK_AHEADS, OUTPUTS, PREDICTOR, PYTHON, RefusedStreamError, Value
-from streams import StreamMaker, on_all
+from streams import StreamMaker, on_adapters
 
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.evaluate.backtest import backtest
@@ -40,7 +40,7 @@ def weights(tmp_path_factory: pytest.TempPathFactory) -> Trained:
     return saved
 
 
-@on_all(LOOK_AHEADS)
+@on_adapters(LOOK_AHEADS)
 def test_a_warm_run_is_the_librarys_second_run(new_stream: StreamMaker, weights: Trained) -> None:
     # 1e-11 m at every sample; a pythonfmu FMU is the library.
     tolerance = 0.0 if new_stream.implementation in (LIBRARY, PYTHON) else 1e-11
@@ -59,14 +59,14 @@ def test_a_warm_run_is_the_librarys_second_run(new_stream: StreamMaker, weights:
         assert loop.column(model, "rms_e")[-1] < 5.5e-6  # the encoder's noise is 5 µm
 
 
-@on_all(LOOK_AHEADS, needs="weights before")
+@on_adapters(LOOK_AHEADS, needs="weights before")
 def test_outputs_before_the_initialization_has_ended(new_stream: StreamMaker, weights: Trained) -> None:
     path = weights(new_stream.model)
     expected = closed_loop(new_stream.model, 1500, weights=path).outputs[0]
     assert new_stream(weights=path).outputs_before({}) == expected.tolist()
 
 
-@on_all(LOOK_AHEADS)
+@on_adapters(LOOK_AHEADS)
 def test_a_warm_up_and_the_physics_model_can_be_asked_for(new_stream: StreamMaker, weights: Trained) -> None:
     model = new_stream.model
     choices: dict[str, list[tuple[dict[str, Value], str, int, list[float]]]] = {
@@ -80,7 +80,7 @@ def test_a_warm_up_and_the_physics_model_can_be_asked_for(new_stream: StreamMake
         assert [row[OUTPUTS[model].index(name)] for row in shown[first : first + len(expected)]] == expected
 
 
-@on_all(LOOK_AHEADS)
+@on_adapters(LOOK_AHEADS)
 def test_a_warm_state_is_saved_and_an_instance_reset(new_stream: StreamMaker, weights: Trained) -> None:
     stream, other = (new_stream(weights=weights(new_stream.model)) for _ in range(2))
     runs = []
@@ -113,7 +113,7 @@ OTHERS: list[dict[str, Value]] = [
 ]
 
 
-@on_all(LOOK_AHEADS)
+@on_adapters(LOOK_AHEADS)
 def test_other_settings_than_learned_are_refused(new_stream: StreamMaker, weights: Trained) -> None:
     stream, learned = new_stream(weights=weights(new_stream.model)), LEARNED[new_stream.model]
     for values in OTHERS:
@@ -127,7 +127,7 @@ def test_other_settings_than_learned_are_refused(new_stream: StreamMaker, weight
     stream.initialise({})
 
 
-@on_all(LOOK_AHEADS)
+@on_adapters(LOOK_AHEADS)
 def test_what_does_not_shape_the_features_may_be_another(new_stream: StreamMaker, weights: Trained) -> None:
     stream = new_stream(weights=weights(new_stream.model))
     stream.initialise({"Np": 60, "t_init": 0.1})
@@ -153,7 +153,7 @@ def learned_by_the_papers_model() -> bytes:
     return weights_file(compensator.predictor)
 
 
-@on_all((COMPENSATOR,))
+@on_adapters((COMPENSATOR,))
 def test_the_velocity_of_friction_is_the_learned_one_without_trust(new_stream: StreamMaker) -> None:
     """With trust it has no effect, and a predictor, which has none, may teach a compensator."""
     stream = new_stream.planted(learned_with_trust())
@@ -166,7 +166,7 @@ def test_the_velocity_of_friction_is_the_learned_one_without_trust(new_stream: S
     stream.initialise({"p": 20, "trust": False, "v_friction": 2e-3})
 
 
-@on_all((PREDICTOR,))
+@on_adapters((PREDICTOR,))
 def test_what_was_learned_with_trust_is_all_there_again(new_stream: StreamMaker) -> None:
     learned, values = learned_with_trust(), {"trust": True, "p": 20, "t_init": -1.0}
     cold, warm = LookAheadStream(PREDICTOR), LookAheadStream(PREDICTOR, learned)
@@ -182,7 +182,7 @@ def test_what_was_learned_with_trust_is_all_there_again(new_stream: StreamMaker)
     assert runs[1][-1, rms_h] != runs[0][-1, rms_h]
 
 
-@on_all(LOOK_AHEADS)
+@on_adapters(LOOK_AHEADS)
 def test_what_was_learned_with_trust_is_for_no_other_model(new_stream: StreamMaker) -> None:
     stream = new_stream.planted(learned_with_trust())
     said = "trust must be 1, with which this FMU was trained (weights.bin), got 0"

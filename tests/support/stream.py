@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 Value = float | int | bool
 
 LIBRARY, CORE, PYTHON, NATIVE = IMPLEMENTATIONS = ("library", "C core", "pythonfmu FMU", "native FMU")
+FMI3 = "FMI 3.0 FMU"
+"""Beside them in the tests of what an adapter does; its values are the native FMU's, bit for bit."""
 
 PREDICTOR, COMPENSATOR, TRAJECTORY = "HybridPredictor", "SepCompensator", "ReferenceTrajectory"
 STAGE_PREDICTOR, STAGE_COMPENSATOR = "HybridPredictor_als25010_x", "SepCompensator_als25010_x"
@@ -36,6 +38,8 @@ CANNOT = {
     (LIBRARY, "weights before"): "before its object is made there is nothing to ask",
     (CORE, "weights before"): "the resources are read when the initialization ends",
     (NATIVE, "weights before"): "the resources are read when the initialization ends",
+    (FMI3, "weights before"): "the resources are read when the initialization ends",
+    (FMI3, "slopes"): "FMI 3.0 has no derivatives of inputs",
     (LIBRARY, "agreement"): "it is what the others are compared with; test_windows.py and the oracle are its truth",
     (CORE, "bad states"): "checksum and GUID are the adapter's; what it checks itself: tests/c/test_c_states.py",
     (LIBRARY, "a plant's time"): "its plants are stepped by an interval, and put to rest wherever asked for",

@@ -16,7 +16,7 @@ from core_stream import CoreStream
 from fmu_stream import FmuStream
 from library_models import learned_file
 from library_stream import LookAheadStream, PlantStream
-from stream import CANNOT, CORE, IMPLEMENTATIONS, LIBRARY, NATIVE, TRAJECTORY, Stream, machine_of
+from stream import CANNOT, CORE, FMI3, IMPLEMENTATIONS, LIBRARY, NATIVE, PYTHON, TRAJECTORY, Stream, machine_of
 
 from hybridsep.fmi.weights import WEIGHTS_FILE
 from hybridsep.plants.trajectory import staircase
@@ -73,20 +73,26 @@ class StreamMaker:
         return CoreStream(model, folder, warm=bool(learned))
 
 
+_SUFFIX = {NATIVE: "", PYTHON: "Py", FMI3: "Fmi3"}
+
+
 def fmu_name(model: str, implementation: str) -> str:
     """Return the archive's stem, whose flavour follows the model: ``FeedDrivePy_als25010_x``."""
-    if implementation == NATIVE:
-        return model
     kind, separator, machine = model.partition("_")
-    return f"{kind}Py{separator}{machine}"
+    return f"{kind}{_SUFFIX[implementation]}{separator}{machine}"
 
 
-def cases(models: Sequence[str], *, needs: str = "") -> list[Any]:
-    """Return pytest parameters ``(implementation, model)`` for all that there are, and that can do what is needed."""
+def cases(models: Sequence[str], *, needs: str = "", adapters: bool = False) -> list[Any]:
+    """Return pytest parameters ``(implementation, model)`` for all that there are, and that can do what is needed.
+
+    With ``adapters`` the FMI 3.0 FMU of the first model is among them.
+    """
+    pairs = [(implementation, model) for implementation in IMPLEMENTATIONS for model in models]
+    if adapters:
+        pairs.append((FMI3, models[0]))
     return [
         pytest.param((implementation, model), id=f"{implementation}-{model}")
-        for implementation in IMPLEMENTATIONS
-        for model in models
+        for implementation, model in pairs
         if not {(implementation, model), (implementation, needs)} & CANNOT.keys()
     ]
 
@@ -94,3 +100,8 @@ def cases(models: Sequence[str], *, needs: str = "") -> list[Any]:
 def on_all(models: Sequence[str], *, needs: str = "") -> pytest.MarkDecorator:
     """Return the mark of a test that takes ``new_stream``, on all implementations."""
     return pytest.mark.parametrize("new_stream", cases(models, needs=needs), indirect=True)
+
+
+def on_adapters(models: Sequence[str], *, needs: str = "") -> pytest.MarkDecorator:
+    """Return the same mark for a test of what an adapter does: the FMI 3.0 FMU of the first model takes part."""
+    return pytest.mark.parametrize("new_stream", cases(models, needs=needs, adapters=True), indirect=True)
