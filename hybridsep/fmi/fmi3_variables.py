@@ -32,8 +32,9 @@ class Fmi3Variable:
 
     @property
     def shown(self) -> Variable:
-        """As a table of the interface shows it: an array with its size."""
-        return self.variable if self.size is None else replace(self.variable, name=f"{self.variable.name}[{self.size}]")
+        """As a table of the interface shows it: an array's type with its size."""
+        own = self.variable
+        return own if self.size is None else replace(own, kind=f"{own.kind}[{self.size}]")
 
 
 def fmi3_variables(description: Mapping[str, object]) -> list[Fmi3Variable]:

@@ -12,7 +12,7 @@ import ctypes
 import random
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from ctypes import byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from pathlib import Path
 from typing import Any
@@ -21,9 +21,12 @@ from fmi2_library import DISCARD, ERROR, OK, VALUE_TYPES, Library, repair_checks
 
 
 class Fuzzer:
-    """Calls at random, on up to three instances, of which about half are what an importer would do."""
+    """Calls at random, on up to three instances, of which about half are what an importer would do.
 
-    def __init__(self, library: Library, resources: str, seed: int) -> None:
+    What FMI 3.0 has by other arguments is in methods of its own (fuzz_fmi3.py).
+    """
+
+    def __init__(self, library: Any, resources: str, seed: int) -> None:
         self.library, self.resources = library, resources
         self.random = random.Random(seed)
         self.instances: list[int] = []
@@ -60,9 +63,9 @@ class Fuzzer:
         self.calls += 1
         self.refused += status == ERROR
         if status not in (OK, DISCARD, ERROR):
-            raise AssertionError(f"fmi2{name} returned {status}")
+            raise AssertionError(f"{name} returned {status}")
         if status == ERROR and component is not None and not self.library.messages:
-            raise AssertionError(f"fmi2{name} was refused without a message")
+            raise AssertionError(f"{name} was refused without a message")
         return status
 
     def _component(self) -> int | None:
@@ -91,15 +94,33 @@ class Fuzzer:
         odd = self.random.random() < 0.2
         instance = self.library.instantiate(
             self.random.choice([None, b""]) if odd else b"i%d" % len(self.instances),
-            kind=self.random.choice([0, 1, 7]) if odd else 1,
             guid="{}" if odd and self.random.random() < 0.5 else None,
             resources=self.random.choice([None, "file://%00", "http://x/y", "file:", "%", *7 * [self.resources]]),
             logging_on=self.random.random() < 0.5,
+            **self._odd_kind(odd),
         )
         if instance is not None:
             self.instances.append(instance)
             self.times[instance] = 0.0
         return None
+
+    def _odd_kind(self, odd: bool) -> dict[str, Any]:
+        """Return further arguments of an instantiation."""
+        return {"kind": self.random.choice([0, 1, 7]) if odd else 1}
+
+    def _begin(self, component: int | None, start: float) -> None:
+        """Set an experiment and most often enter Initialization Mode."""
+        self._call("SetupExperiment", component, 0, 0.0, start, self.random.random() < 0.1, self._number())
+        if self.random.random() < 0.9:
+            self._call("EnterInitializationMode", component)
+
+    def _do_step(self, component: int | None, t: float, h: float) -> int:
+        return self._call("DoStep", component, t, h, 1)
+
+    def _reached(self, component: int) -> float | None:
+        """Return the last communication point; None where that is refused."""
+        reached = c_double()
+        return reached.value if self.library.GetRealStatus(component, 2, byref(reached)) == OK else None
 
     def _free(self) -> None:
         if not self.instances:
@@ -116,9 +137,7 @@ class Fuzzer:
         if self.random.random() < 0.7:
             self._call("Reset", component)
         start = self.random.choice([0.0, 0.0, 12.5, self._number()])
-        self._call("SetupExperiment", component, 0, 0.0, start, self.random.random() < 0.1, self._number())
-        if self.random.random() < 0.9:
-            self._call("EnterInitializationMode", component)
+        self._begin(component, start)
         if component is None:
             return
         ranges = {
@@ -147,14 +166,14 @@ class Fuzzer:
     def _reals(self, component: int) -> bytes:
         """Return all Reals, bit by bit; none where they are refused, as outputs of an invalid start are."""
         try:
-            return self.library.reals(component)
+            return bytes(self.library.reals(component))
         except RuntimeError:
             return b""
 
     def _steps(self) -> None:
         component = self._component()
         if component is None:
-            self._call("DoStep", None, 0.0, 1e-3, 1)
+            self._do_step(None, 0.0, 1e-3)
             return
         names = [name for name, causality in self.library.causalities.items() if causality == "input"]
         for _ in range(self.random.randint(1, 100)):
@@ -167,7 +186,7 @@ class Fuzzer:
             if self.random.random() < 0.1:
                 self._slopes(component, names, odd)
             before = self._reals(component)
-            if self._call("DoStep", component, self._number() if self.random.random() < 0.02 else t, h, 1) == OK:
+            if self._do_step(component, self._number() if self.random.random() < 0.02 else t, h) == OK:
                 self.times[component] = t + h
                 self.steps += 1
             elif before != self._reals(component):
@@ -216,10 +235,10 @@ class Fuzzer:
             self._call("GetFMUstate", component, byref(self.random.choice(self.states)) if self.states else None)
         elif action == 2:
             if self._call("SetFMUstate", component, self.random.choice(self.states) if self.states else None) == OK:
-                reached = c_double()
-                if self.library.GetRealStatus(component, 2, byref(reached)) == OK:
-                    assert component is not None
-                    self.times[component] = reached.value
+                assert component is not None
+                reached = self._reached(component)
+                if reached is not None:
+                    self.times[component] = reached
         elif action == 3 and self.states:
             state = self.states.pop()
             if self._call("FreeFMUstate", component, byref(state)) != OK:
@@ -274,8 +293,8 @@ class Fuzzer:
         self._call("GetDirectionalDerivative", self._component(), None, 1, None, 1, None, None)
 
 
-def main() -> None:
-    """Run the fuzzer from the command line."""
+def main(kind: Callable[..., Fuzzer] = Fuzzer, library: Callable[[Path, Path], Any] = Library) -> None:
+    """Run a fuzzer from the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("library", type=Path)
     parser.add_argument("description", type=Path)
@@ -283,7 +302,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=30.0)
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
-    fuzzer = Fuzzer(Library(arguments.library, arguments.description), arguments.resources, arguments.seed)
+    fuzzer = kind(library(arguments.library, arguments.description), arguments.resources, arguments.seed)
     fuzzer.run(arguments.seconds)
     counts = f"{fuzzer.calls} calls, {fuzzer.refused} refused, {fuzzer.steps} steps"
     sys.stdout.write(f"{counts}, no finding (seed {arguments.seed})\n")
