@@ -21,6 +21,7 @@ from hybridsep.base.parameters import Parameter
 from hybridsep.base.settings import PARAMETERS, Limits, PredictorSettings
 from hybridsep.fmi.description import fmu_description
 from hybridsep.fmi.tables import grouped_table
+from hybridsep.fmi.terminals import TERMINALS
 from hybridsep.fmi.variables import variables_of
 from hybridsep.machines.machine import Machine
 
@@ -142,7 +143,8 @@ def fmu_variables() -> str:
     parts = [
         "# FMU variables",
         _WRITTEN,
-        "FMI 2.0 for co-simulation, communication step size `T_s`. The tables are of the machine "
+        "FMI 2.0 for co-simulation, communication step size `T_s`; [FMI 3.0](#fmi-30) below. The tables are of the "
+        "machine "
         "`spring_mass_damper`; start values "
         "follow from the machine file that an FMU is built from, and there are as many `mode[i].*` as modes. "
         "[How they are wired](../howto/run-fmus.md), [when inputs are read](../explanation/timing.md).",
@@ -152,14 +154,43 @@ def fmu_variables() -> str:
         for heading, rows in grouped_table(variables_of(fmu_description(machine, model, model))).items():
             cells = ((f"`{name}`", kind, start, meaning) for name, kind, _, start, meaning in rows)
             parts += [f"**{heading}**", _table(("name", "type, unit", "start", "meaning"), cells)]
+    types = (
+        ("Real", "Float64"),
+        ("Integer", "Int32"),
+        ("Boolean", "Boolean"),
+        ("Enumeration", "Enumeration, read and written as Int64"),
+        ("`name[i]` of a window", "one array `name`, Float64, of fixed size"),
+        ("–", "`time`, Float64, the independent variable"),
+    )
     parts += [
+        "## FMI 3.0",
+        "Native FMUs whose names have `Fmi3` (`HybridPredictorFmi3`) are the twins of those above: the same "
+        "variables, units, ranges, start values and dependencies, with other types.",
+        _table(("FMI 2.0", "FMI 3.0"), types),
+        "`mode[i].*` stay scalars. All parameters are fixed: they may be set until the initialization has ended. There "
+        "is no event mode, no early return, no intermediate update, no clock and no structural parameter, and inputs "
+        "have no derivatives. The state can be saved, restored and serialised. The `instantiationToken` differs "
+        "from the FMI 2.0 twin's GUID, so states are not exchanged between the two.",
+        "Terminals, each a plug whose members belong together by name:",
+        _table(
+            ("model", "terminal", "member: variable"),
+            (
+                (
+                    f"`{model}`",
+                    f"`{name}`",
+                    ", ".join(f"{member}: `{variable}`" for member, variable in members.items()),
+                )
+                for model, terminals in TERMINALS.items()
+                for name, members in terminals.items()
+            ),
+        ),
         "## Other machines",
         "A plant of kind `stage` has `mode[i].*`, the friction `f`, the velocity `friction_on` that it acts on, the "
         "cable "
         "stiffness `kappa` and the sampling interval `T_s` of the command instead of `m`, `c`, `k`, `c_nl`, `k_nl`. "
         "FMUs are named "
         "after their machine (`HybridPredictor_als25010_x`), those of `spring_mass_damper` plainly; the Python flavour "
-        "ends in `Py`.",
+        "ends in `Py`, FMI 3.0 in `Fmi3`, before the machine.",
     ]
     return _page(parts)
 

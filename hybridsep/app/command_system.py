@@ -26,6 +26,9 @@ def system(
     unit: UnitOption = None,
     T_s: TsOption = None,
     weights: WeightsOption = None,
+    ssp: Annotated[
+        str, typer.Option(help="Version of SSP: 1 with FMI 2.0 FMUs, or 2 with FMI 3.0 FMUs, for tools that read it.")
+    ] = "1",
     target: Annotated[
         list[str] | None,
         typer.Option(help=f"Platform of the FMUs, may be repeated: {', '.join(TARGET_NAMES)}. All if left out."),
@@ -36,7 +39,7 @@ def system(
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Write a whole system as one file, SSP 1.0.
+    """Write a whole system as one file, SSP 1.0 or 2.0.
 
     Trajectory, predictor or compensator and drive, wired, with their parameters, for tools that read SSP.
     """
@@ -52,7 +55,7 @@ def system(
     axis = load_machine(machine)
     out = out or Path(f"{axis.name}.ssp")
     check_ending(out, "--out", (".ssp",))
-    check_system(axis, compensate=compensate)
+    check_system(axis, compensate=compensate, ssp=ssp)
     command = read_command(trajectory, axis, unit, T_s)
     if weights is not None:
         load_trained(weights, axis, "SepCompensator" if compensate else "HybridPredictor")
@@ -62,7 +65,14 @@ def system(
     check_outputs([Output("--out", out, SYSTEM)], inputs, force=force)
     with progress_bar(as_json) as advance:
         build_system(
-            axis, out, command, compensate=compensate, targets=target or None, weights=weights, progress=advance
+            axis,
+            out,
+            command,
+            compensate=compensate,
+            targets=target or None,
+            weights=weights,
+            ssp=ssp,
+            progress=advance,
         )
     if as_json:
         print_json([str(out)])

@@ -13,6 +13,7 @@ from ..base.version import __version__
 from ..machines.machine import Machine
 from .content import fmu_title, paper_note
 from .experiment import stop_time
+from .flavours import FMI_VERSIONS
 from .variables import INTERPOLATED, Variable, variables_of
 
 __all__ = [
@@ -87,16 +88,24 @@ def model_description(
     return document(root)
 
 
-def build_description(name: str) -> bytes:
+def build_description(name: str, fmi: str = FMI_VERSIONS[0]) -> bytes:
     """Return ``buildDescription.xml`` (FMI 3.0's, which FMI 2.0 tools read too): how the sources are compiled.
 
     Parameters
     ----------
     name : str
         Model identifier.
+    fmi : {"2", "3"}
+        Version of FMI; 3.0's headers put the identifier before the functions' names unless a definition says not to.
     """
     root = template("buildDescription.xml")
     root[0].set("modelIdentifier", name)
+    if fmi == "3":
+        meaning = (
+            "for a shared library: the FMI functions have their plain names; left out to link FMUs into one program"
+        )
+        attributes = {"name": "FMI3_OVERRIDE_FUNCTION_PREFIX", "value": "1", "optional": "true"}
+        ET.SubElement(root[0][0], "PreprocessorDefinition", attributes, description=meaning)
     return document(root)
 
 

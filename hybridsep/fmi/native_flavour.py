@@ -90,7 +90,7 @@ def files(
     guid = content_guid(content, description)
     content[f"resources/{TABLE_FILE}"] = table_file(description, guid)
     content["sources/hsep_fmu.h"] = c_header(description, guid, fmi).encode()
-    content["sources/buildDescription.xml"] = build_description(name)
+    content["sources/buildDescription.xml"] = build_description(name, fmi)
     tool = f"hybridsep {__version__}"
     if fmi == "3":
         content["modelDescription.xml"] = fmi3_description(machine, description, guid, tool, samples=samples)

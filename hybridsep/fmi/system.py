@@ -1,9 +1,10 @@
-"""A whole system as one file (SSP 1.0): trajectory, look-ahead and drive of a machine, wired, with their parameters."""
+"""A whole system as one file (SSP): trajectory, look-ahead and drive of a machine, wired, with their parameters."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from numpy.typing import ArrayLike
 
@@ -13,14 +14,18 @@ from ..base.signals import as_samples
 from ..machines.machine import Machine
 from .archive import archived, fmu_files, fmu_name
 from .description import fmu_description
-from .system_structure import Component, Connection, parameter_set, system_structure
-from .variables import variables_of
+from .flavours import FMI_VERSIONS
+from .fmi3_variables import fmi3_variables
+from .system_structure import SSP_VERSIONS, Component, Connection, parameter_set, system_structure
+from .variables import Variable, variables_of
 
 __all__ = ["build_system", "check_system"]
 
 
-def check_system(machine: Machine, *, compensate: bool) -> None:
-    """Check that a machine has a plant and, to compensate, drive limits; FmuError if not."""
+def check_system(machine: Machine, *, compensate: bool, ssp: str = SSP_VERSIONS[0]) -> None:
+    """Check the version of SSP, and that a machine has a plant and, to compensate, drive limits; FmuError if not."""
+    if ssp not in SSP_VERSIONS:
+        raise FmuError(f"the version of SSP must be one of {', '.join(SSP_VERSIONS)}, got {ssp!r}")
     if machine.plant is None:
         raise FmuError(f"machine {machine.name} has no [plant] section, which a system needs for its drive")
     if compensate and machine.drive_limits is None:
@@ -35,6 +40,7 @@ def build_system(
     compensate: bool = False,
     targets: Sequence[str] | None = None,
     weights: str | Path | None = None,
+    ssp: str = SSP_VERSIONS[0],
     progress: Callable[[str, float], object] = lambda _message, _fraction: None,
 ) -> Path:
     """Write a system of three native FMUs as an SSP archive.
@@ -51,19 +57,22 @@ def build_system(
         Whether a SepCompensator modifies the command; else a HybridPredictor only predicts.
     targets, weights
         As in :func:`hybridsep.fmi.archive.build_fmu`, for the look-ahead.
+    ssp : {"1", "2"}
+        Version of SSP: 1.0 with FMI 2.0 FMUs, 2.0 with FMI 3.0 FMUs.
     progress : callable
         Called with a message and the fraction done.
 
     Raises
     ------
     FmuError
-        If the machine has no plant or no drive limits, or a library cannot be had.
+        If the machine has no plant or no drive limits, a library cannot be had, or there is no such version of SSP.
     SignalError
         If ``command`` is not finite or empty.
     StateError
         If ``weights`` is no saved predictor, or one of another machine or other settings.
     """
-    check_system(machine, compensate=compensate)
+    check_system(machine, compensate=compensate, ssp=ssp)
+    fmi = FMI_VERSIONS[SSP_VERSIONS.index(ssp)]
     samples = as_samples(command, "command")
     model, look_ahead, sent = (
         ("SepCompensator", "compensator", "x_dm") if compensate else ("HybridPredictor", "predictor", "x_d")
@@ -73,15 +82,15 @@ def build_system(
     components, sets = [], {}
     for i, (part, kind) in enumerate(parts.items()):
         progress(kind, i / len(parts))
-        name = fmu_name(kind, machine.name, "native")
-        how = {"targets": targets, "samples": samples if part == "reference" else None}
+        name = fmu_name(kind, machine.name, "native", fmi)
+        how = {"targets": targets, "samples": samples if part == "reference" else None, "fmi": fmi}
         files = fmu_files(machine, kind, name, "native", weights=weights if part == look_ahead else None, **how)
         content[f"resources/{name}.fmu"] = archived(files)
         warm = weights is not None and part == look_ahead
         description = fmu_description(machine, kind, name, samples=part == "reference", warm=warm)
-        components.append(Component(part, f"{name}.fmu", tuple(variables_of(description))))
+        components.append(Component(part, f"{name}.fmu", _variables(description, fmi)))
         sets[part] = f"{machine.name}_{part}.ssv"
-        content[f"resources/{sets[part]}"] = parameter_set(components[-1])
+        content[f"resources/{sets[part]}"] = parameter_set(components[-1], ssp)
     connections: list[Connection] = [
         ("reference", "r", look_ahead, "x_d_ahead"),
         (look_ahead, sent, "drive", "x_d"),
@@ -90,8 +99,15 @@ def build_system(
     starts = {variable.name: variable.start for variable in components[1].variables}
     delay = int(starts["preview" if compensate else "Np"] or 0)
     stop_time = round((len(samples) - 1 + delay) * machine.T_s, 9)
-    structure = system_structure(machine.name, components, connections, sets, machine.T_s, stop_time)
+    structure = system_structure(machine.name, components, connections, sets, machine.T_s, stop_time, ssp)
     with written_whole(path) as file:
         file.write(archived({"SystemStructure.ssd": structure, **content}))
     progress("done", 1.0)
     return Path(path)
+
+
+def _variables(description: Mapping[str, Any], fmi: str) -> tuple[Variable, ...]:
+    """Return an FMU's variables, of FMI 3.0 the scalar ones."""
+    if fmi == FMI_VERSIONS[0]:
+        return tuple(variables_of(description))
+    return tuple(each.variable for each in fmi3_variables(description) if each.size is None)

@@ -1,4 +1,4 @@
-"""Documents of a system: ``SystemStructure.ssd`` and parameter sets, SSP 1.0.
+"""Documents of a system: ``SystemStructure.ssd`` and parameter sets, SSP 1.0 or 2.0, which has FMI 3.0's types.
 
 Enumerations are in neither: libcosim ends the process where it meets one. The FMUs' own start values hold for them.
 """
@@ -14,7 +14,12 @@ from ..base.version import __version__
 from .model_description import unit_elements
 from .variables import Variable
 
-__all__ = ["Component", "Connection", "parameter_set", "system_structure"]
+__all__ = ["SSP_VERSIONS", "Component", "Connection", "parameter_set", "system_structure"]
+
+SSP_VERSIONS = ("1", "2")
+"""SSP 1.0 with FMI 2.0 FMUs, SSP 2.0 with FMI 3.0 FMUs; the default first."""
+
+_REALS = ("Real", "Float64")
 
 _NAMESPACES = {
     "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
@@ -64,6 +69,7 @@ def system_structure(
     sets: Mapping[str, str],
     T_s: float,
     stop_time: float,
+    ssp: str = SSP_VERSIONS[0],
 ) -> bytes:
     """Return ``SystemStructure.ssd``.
 
@@ -79,8 +85,10 @@ def system_structure(
     T_s : float, s
         Communication step size, for OMSimulator's annotation.
     stop_time : float, s
+    ssp : {"1", "2"}
+        Version of SSP.
     """
-    root = _root("ssd", "SystemStructureDescription", name)
+    root = _root("ssd", "SystemStructureDescription", name, ssp)
     root.set("generationTool", f"hybridsep {__version__}")
     system = _add(root, "ssd:System", name=name)
     elements, wires = _add(system, "ssd:Elements"), _add(system, "ssd:Connections")
@@ -99,24 +107,24 @@ def system_structure(
     return _document(root)
 
 
-def parameter_set(component: Component) -> bytes:
+def parameter_set(component: Component, ssp: str = SSP_VERSIONS[0]) -> bytes:
     """Return the ``.ssv`` with a component's parameters and their start values."""
-    root = _root("ssv", "ParameterSet", component.name)
+    root = _root("ssv", "ParameterSet", component.name, ssp)
     parameters = _add(root, "ssv:Parameters")
     for variable in component.parameters:
         parameter = _add(parameters, "ssv:Parameter", name=variable.name)
-        if variable.kind == "Real":
-            _add(parameter, "ssv:Real", value=float(variable.start or 0.0), **_unit(variable))
+        if variable.kind in _REALS:
+            _add(parameter, f"ssv:{variable.kind}", value=float(variable.start or 0.0), **_unit(variable))
         else:
             _add(parameter, f"ssv:{variable.kind}", value=variable.start)
     _add_units(_add(root, "ssv:Units"), component.parameters)
     return _document(root)
 
 
-def _root(prefix: str, tag: str, name: str) -> ET.Element:
+def _root(prefix: str, tag: str, name: str, ssp: str) -> ET.Element:
     for namespace, uri in _NAMESPACES.items():
         ET.register_namespace(namespace, uri)
-    return ET.Element(_tag(f"{prefix}:{tag}"), version="1.0", name=name)
+    return ET.Element(_tag(f"{prefix}:{tag}"), version=f"{ssp}.0", name=name)
 
 
 def _tag(name: str) -> str:

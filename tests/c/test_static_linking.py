@@ -114,6 +114,19 @@ def test_nothing_but_the_fmi_functions_has_external_linkage(
     assert all(name.startswith(f"{model}_fmi2") for name in shown), shown
 
 
+@pytest.mark.parametrize(("flags", "prefix"), [((), "FeedDriveFmi3_"), (("-DFMI3_OVERRIDE_FUNCTION_PREFIX",), "")])
+def test_fmi_3_has_the_prefix_of_its_own_headers(
+    fmus: BuiltFmus, tmp_path: Path, flags: tuple[str, ...], prefix: str
+) -> None:
+    path = Path(shutil.copy(fmus("FeedDriveFmi3"), tmp_path))
+    with zipfile.ZipFile(path) as archive:
+        archive.extractall(path.with_suffix(""))
+    symbols = elf.symbols(compile_all(path, FMI_HEADERS, tmp_path, *flags))
+    shown = [symbol.name for symbol in symbols if symbol.defined and symbol.exported]
+    assert len(shown) == 75
+    assert all(name.startswith(f"{prefix}fmi3") for name in shown), shown
+
+
 def test_an_importer_may_choose_the_prefix(archives: dict[str, Path], headers: Path, tmp_path: Path) -> None:
     built = compile_all(archives["ReferenceTrajectory"], headers, tmp_path, "-DFMI2_FUNCTION_PREFIX=")
     shown = [symbol.name for symbol in elf.symbols(built) if symbol.defined and symbol.exported]

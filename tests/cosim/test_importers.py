@@ -11,10 +11,11 @@ import zipfile
 from importlib import import_module
 from pathlib import Path
 
+import fmpy
 import importers_closed_system as closed_system
 import numpy as np
 import pytest
-from built_once import NATIVE, BuiltFmus
+from built_once import FMI3, NATIVE, BuiltFmus
 from importers_closed_system import SYSTEMS, Array, ClosedSystem, exists_here
 from places import SUPPORT
 
@@ -33,9 +34,9 @@ SHIFT = 0.1  # m
 
 @pytest.fixture(scope="module")
 def folder(fmus: BuiltFmus, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with all native FMUs of all machines, built for this machine."""
+    """A folder with all native FMUs of all machines and both versions of FMI, built for this machine."""
     folder = tmp_path_factory.mktemp("importers")
-    for name in NATIVE:
+    for name in (*NATIVE, *FMI3):
         shutil.copy(fmus(name), folder)
     return folder
 
@@ -68,7 +69,7 @@ def run_apart(importer: str, system: ClosedSystem, folder: Path, out: Path) -> A
         (out / f"{model}.fmu").write_bytes((folder / f"{model}.fmu").read_bytes())
     if (folder / "command.npy").exists():
         shutil.copy(folder / "command.npy", out)
-    python(out, closed_system.__file__, importer, system.look_ahead, str(out), str(out / "rows.npy"))
+    python(out, closed_system.__file__, importer, system.key, str(out), str(out / "rows.npy"))
     rows: Array = np.load(out / "rows.npy")
     return rows
 
@@ -139,6 +140,35 @@ def test_importers_come_to_the_same_figures(
     np.testing.assert_allclose(rows, expected, rtol=0, atol=1e-8 if judged else TOLERANCE)
 
 
+@pytest.mark.parametrize("system", ["predictor"], indirect=True)
+@pytest.mark.parametrize("importer", [param for param in FOREIGN if param.values[0] in ("ecos", "fmucontainer")])
+def test_fmi_3_fmus_come_to_the_same_figures(
+    folder: Path, system: ClosedSystem, expected: Array, tmp_path: Path, importer: str
+) -> None:
+    """In the importers that read FMI 3.0; fmucontainer is an FMI 2.0 FMU around them."""
+    rows = run_apart(importer, closed_system.FMI3_SYSTEMS["predictor Fmi3"], folder, tmp_path)
+    assert figures(system, rows) == figures(system, expected)
+    np.testing.assert_allclose(rows, expected, rtol=0, atol=TOLERANCE)
+
+
+def test_fmpy_reads_arrays_and_sets_enumerations(folder: Path) -> None:
+    rows = [(k * 1e-3, position, position) for k, position in enumerate(staircase()[:600])]
+    inputs = np.array(rows, dtype=[(name, np.float64) for name in ("time", "x_d_ahead", "x_meas")])
+    how = {"stop_time": 0.5, "step_size": 1e-3, "output_interval": 1e-3, "input": inputs}
+    result = fmpy.simulate_fmu(
+        str(folder / "HybridPredictorFmi3.fmu"),
+        output=["x_d", "x_d_window", "hybrid_active"],
+        start_values={"input_hold": "1", "trust": "true", "mode[1].zeta": "0.06"},
+        **how,
+    )
+    assert result["x_d_window"].shape == (501, 100)
+    np.testing.assert_array_equal(result["x_d_window"][200:301:100].ravel(), staircase()[100:300])
+    result = fmpy.simulate_fmu(
+        str(folder / "SepCompensatorFmi3.fmu"), output=["sep_state"], start_values={"compensate": "1"}, **how
+    )
+    assert set(result["sep_state"]) == {1}
+
+
 @pytest.mark.parametrize("importer", [param for param in FOREIGN if param.values != ("fmpy SSP",)])
 def test_the_start_goes_round_in_initialization_mode(
     moved: Path, system: ClosedSystem, expected: Array, tmp_path: Path, importer: str
@@ -190,7 +220,7 @@ def findings(path: Path, caplog: pytest.LogCaptureFixture) -> list[str]:
     return [record.getMessage() for record in caplog.records if record.levelno > logging.INFO]
 
 
-@pytest.mark.parametrize("name", NATIVE)
+@pytest.mark.parametrize("name", [*NATIVE, *FMI3])
 def test_the_toolbox_has_no_finding(folder: Path, caplog: pytest.LogCaptureFixture, name: str) -> None:
     assert findings(folder / f"{name}.fmu", caplog) == []
 

@@ -90,6 +90,25 @@ def test_the_picture_is_tidy(archive: Path) -> None:
             assert not [box for box in boxes if box[0] < x < box[1] and box[2] < y < box[3]]
 
 
+def test_ssp_2_has_the_twins_of_fmi_3(tmp_path: Path) -> None:
+    """SSP 2.0 has the namespaces of 1.0; without its version and the types of FMI 3.0 it is the same document."""
+    machine, command = load_machine("spring_mass_damper"), staircase()[:100]
+    old, new = (
+        content(build_system(machine, tmp_path / f"{ssp}.ssp", command, targets=("host",), compensate=True, ssp=ssp))
+        for ssp in ("1", "2")
+    )
+    names = {name: name.replace(".fmu", "Fmi3.fmu") for name in old}
+    assert list(new) == list(names.values())
+    for name, twin in names.items():
+        if name.endswith(".fmu"):
+            (tmp_path / "one.fmu").write_bytes(new[twin])
+            assert fmpy.read_model_description(str(tmp_path / "one.fmu")).fmiVersion == "3.0"
+            continue
+        text = new[twin].decode().replace("Fmi3.fmu", ".fmu").replace("Float64", "Real").replace("Int32", "Integer")
+        assert text.replace('version="2.0"', 'version="1.0"') == old[name].decode()
+        assert new[twin] != old[name]
+
+
 def test_the_same_system_has_the_same_bytes(tmp_path: Path) -> None:
     machine, command = load_machine("spring_mass_damper"), staircase()[:100]
     paths = [build_system(machine, tmp_path / f"{i}.ssp", command, targets=("host",)) for i in range(2)]
@@ -147,6 +166,7 @@ def test_the_command_writes_a_system(hybridsep: Run, tmp_path: Path) -> None:
     [
         (("--machine", "emps"), "machine emps has no [plant] section, which a system needs for its drive"),
         (("--out", "axis.zip"), "--out must end in .ssp"),
+        (("--ssp", "3"), "the version of SSP must be one of 1, 2, got '3'"),
         (("--trajectory", "nothing.csv"), "nothing.csv"),
     ],
 )

@@ -141,7 +141,7 @@ def test_a_rotary_axis_keeps_the_rules(tmp_path: Path) -> None:
     for name, model in fmu_names(machine, fmi="3").items():
         xml = ET.fromstring(fmi3_description(machine, fmu_description(machine, model, name), "{1}", "tool"))
         assert xml.find("ModelVariables/Float64[@unit='rad']") is not None
-        build, icons = ET.fromstring(build_description(name)), ET.fromstring(terminals_and_icons(model))
+        build, icons = ET.fromstring(build_description(name, "3")), ET.fromstring(terminals_and_icons(model))
         assert violations(Archive(xml, icons, build, [ICON_FILE, "sources/all.c"])) == []
 
 

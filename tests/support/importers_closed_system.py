@@ -13,7 +13,7 @@ import platform
 import re
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, files
 from pathlib import Path
@@ -56,6 +56,8 @@ class ClosedSystem:
         Those of ``reported`` that the guide states.
     errors : tuple of (str, str)
         Minuend and subtrahend of the errors whose RMS values over the whole trajectory the guide states.
+    suffix : str
+        What the names of the FMUs end in: Fmi3 of those of FMI 3.0.
     """
 
     look_ahead: str
@@ -66,11 +68,18 @@ class ClosedSystem:
     reported: tuple[str, ...]
     figures: tuple[str, ...]
     errors: tuple[tuple[str, str], ...]
+    suffix: str = ""
+
+    @property
+    def key(self) -> str:
+        """Key in :data:`SYSTEMS` or :data:`FMI3_SYSTEMS`."""
+        return f"{self.look_ahead} {self.suffix}".strip()
 
     @property
     def components(self) -> dict[str, str]:
         """Name → FMU, in the order of the signals."""
-        return {"reference": "ReferenceTrajectory", self.look_ahead: self.model, "drive": "FeedDrive"}
+        models = {"reference": "ReferenceTrajectory", self.look_ahead: self.model, "drive": "FeedDrive"}
+        return {name: f"{model}{self.suffix}" for name, model in models.items()}
 
     @property
     def connections(self) -> tuple[tuple[str, str, str, str], ...]:
@@ -132,6 +141,8 @@ SYSTEMS = {
         ),
     )
 }
+
+FMI3_SYSTEMS = {system.key: system for system in (replace(system, suffix="Fmi3") for system in SYSTEMS.values())}
 
 
 def blocks(language: str) -> list[str]:
@@ -199,7 +210,16 @@ def with_libcosim(system: ClosedSystem, folder: Path) -> Array:
 def with_ecos(system: ClosedSystem, folder: Path) -> Array:
     """ecos's fixed-step algorithm."""
     load_tbb()
-    simulation = import_module("ecospy").EcosSimulation(ssp_path=str(system_structure(system, folder)), step_size=STEP)
+    ecospy, how = import_module("ecospy"), dict[str, Any]()
+    if system.suffix:  # it reads SSP 1.0 alone
+        how["structure"] = ecospy.EcosSimulationStructure()
+        for name, model in system.components.items():
+            how["structure"].add_model(name, str(folder / f"{model}.fmu"))
+        for source, output, sink, name in system.connections:
+            how["structure"].make_real_connection(f"{source}::{output}", f"{sink}::{name}")
+    else:
+        how["ssp_path"] = str(system_structure(system, folder))
+    simulation = ecospy.EcosSimulation(**how, step_size=STEP)
     rows = []
     assert simulation.init()
     for _ in range(system.n_steps):
@@ -266,4 +286,4 @@ def run(importer: str, system: ClosedSystem, folder: Path) -> Array:
 
 
 if __name__ == "__main__":
-    np.save(sys.argv[4], run(sys.argv[1], SYSTEMS[sys.argv[2]], Path(sys.argv[3])))
+    np.save(sys.argv[4], run(sys.argv[1], (SYSTEMS | FMI3_SYSTEMS)[sys.argv[2]], Path(sys.argv[3])))
