@@ -17,6 +17,7 @@ from .command_fit import fit
 from .command_fleet import fleet
 from .command_identify import identify
 from .command_init import init
+from .command_live import live
 from .command_report import report
 from .command_system import system
 from .command_tune import tune
@@ -34,7 +35,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     add_completion=False,
 )
-for _command in (fit, identify, tune, init, demo, build, cosim, system, backtest, report, fleet, example_log):
+for _command in (fit, identify, tune, init, demo, build, cosim, system, backtest, report, live, fleet, example_log):
     app.command()(_command)
 
 

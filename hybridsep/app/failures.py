@@ -20,7 +20,7 @@ from ..base.interrupt import interrupts_between_calls
 from ..base.new_folders import remove_empty_folders
 from ..base.version import __version__
 
-__all__ = ["DEBUG_VARIABLE", "Commands", "errors_console", "run"]
+__all__ = ["DEBUG_VARIABLE", "Commands", "Interrupted", "errors_console", "run"]
 
 DEBUG_VARIABLE = "HYBRIDSEP_DEBUG"
 """Environment variable: if it is set, an unexpected error shows its traceback."""
@@ -51,7 +51,7 @@ class Commands(TyperGroup):
             remove_empty_folders()
 
 
-class _Interrupted(BaseException):
+class Interrupted(BaseException):
     """Ctrl-C; no KeyboardInterrupt, which typer would turn into an exit without a word."""
 
 
@@ -62,11 +62,11 @@ def run(app: Callable[[], object]) -> int:
         with suppress(AttributeError):  # a replaced stream, which cannot be reconfigured
             stream.reconfigure(errors="replace")  # type: ignore[union-attr]
     try:
-        with interrupts_between_calls(_Interrupted):
+        with interrupts_between_calls(Interrupted):
             status = _status(app)
             sys.stdout.flush()
             return status
-    except _Interrupted:
+    except Interrupted:
         errors_console.print("interrupted: nothing is half written, files are either as they were or complete")
         return 130
     except BrokenPipeError:

@@ -228,7 +228,7 @@ def takes_reading(command: Callable[..., None]) -> Callable[..., None]:
         if values.pop(_LIST):
             from .channel_table import print_channels
 
-            logs = others["logs"] if "logs" in others else [others["log"]]
+            logs = others.get("logs") or [Path(others.get("log") or others["source"])]
             print_channels(logs, as_json=bool(others.get("as_json")))
             raise typer.Exit
         return ReadingOptions(**values)

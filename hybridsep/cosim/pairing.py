@@ -18,7 +18,9 @@ from ..plants.trajectory import PAPER_LIMITS, read_trajectory, spiral, staircase
 from .fmus import check_controller, check_plant
 from .run import COMPENSATOR, PREDICTOR
 
-__all__ = ["check_pair", "read_command", "values_to_build"]
+__all__ = ["check_pair", "check_predictor", "read_command", "values_to_build"]
+
+_WEIGHTS = "--weights go into an FMU that is built here; leave out --predictor"
 
 
 def read_command(trajectory: str, axis: Machine, unit: str | None, T_s: float | None) -> Array:
@@ -42,6 +44,28 @@ def values_to_build(axis: Machine, model: str, values: Mapping[str, Any]) -> dic
     settings = axis.changed("compensator", values).compensator_settings
     windows = {"preview": settings.preview, "spacing": settings.spacing} if "Np" in values else {}
     return {**values, **windows}
+
+
+def check_predictor(axis: Machine, predictor: Path | None, weights: Path | None) -> None:
+    """Check a predictor FMU that is given, or else that the native one can be built.
+
+    Raises
+    ------
+    FmuError
+        If the given one is no predictor, or there is neither a library nor a compiler for this platform.
+    ParameterError
+        If weights are given for an FMU that is.
+    StateError
+        If they are of another machine.
+    """
+    if predictor is None:
+        check_available(("host",))
+    else:
+        if weights is not None:
+            raise ParameterError(_WEIGHTS)
+        check_controller(predictor, PREDICTOR)
+    if weights is not None:
+        load_trained(weights, axis, "HybridPredictor")
 
 
 def check_pair(
@@ -74,7 +98,7 @@ def check_pair(
             "compensator FMU with --predictor"
         )
     if predictor is not None and weights is not None:
-        raise ParameterError("--weights go into an FMU that is built here; leave out --predictor")
+        raise ParameterError(_WEIGHTS)
     if predictor is not None:
         check_controller(predictor, PREDICTOR if model == "HybridPredictor" else COMPENSATOR)
     if plant is not None:

@@ -10,7 +10,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from ..base.errors import ParameterError
-from ..logs.log import open_log
+from ..logs.log import check_reading, open_log
 from ..machines.agree import check_interval
 from ..machines.machine import Machine
 from .address import check_port
@@ -50,11 +50,14 @@ def open_source(address: str, machine: Machine, how: Mapping[str, Any], speed: f
     LogError
         If the log cannot be read.
     """
+    given = check_reading(how["unit"], how["T_s"])
     reading = Reading(how["columns"], how["unit"], machine.unit)
     udp = _UDP.fullmatch(address)
     stream = address == "-" or udp is not None or "://" in address
     if stream and speed is not None:
         raise ParameterError(f"--speed is for a log; {address} comes at its own")
+    if stream and given is not None:
+        check_interval(address, given, machine)
     if address == "-":
         return LinesSource(sys.stdin.fileno(), reading)
     if udp is not None:

@@ -45,13 +45,22 @@ class LiveRun:
         Counts, RMS errors in m, quantiles of the step time in s, as the sinks got them last.
     n_rows : int
         Rows that went to the sinks.
+    interrupted : bool
+        Whether it was ended before its source was.
     """
 
     status: Mapping[str, Any]
     n_rows: int
+    interrupted: bool = False
 
 
-def run_live(source: LiveSource, controller: FmuController, sinks: Sequence[Sink]) -> LiveRun:
+def run_live(
+    source: LiveSource,
+    controller: FmuController,
+    sinks: Sequence[Sink],
+    *,
+    ends: tuple[type[BaseException], ...] = (),
+) -> LiveRun:
     """Run an FMU on a source until it ends.
 
     Parameters
@@ -61,6 +70,8 @@ def run_live(source: LiveSource, controller: FmuController, sinks: Sequence[Sink
         Of a predictor; it is opened and closed here.
     sinks : sequence of Sink
         They get every row, and are told of the end, by an error too.
+    ends : tuple of type
+        Exceptions, such as that of Ctrl-C, which end a run as its source would.
 
     Raises
     ------
@@ -68,18 +79,20 @@ def run_live(source: LiveSource, controller: FmuController, sinks: Sequence[Sink
         If a sample is refused, or commands are missing.
     """
     with controller:
-        run = _Run(sinks)
+        run, interrupted = _Run(sinks), False
         try:
             for sample in source.samples():
                 if sample is not None:
                     run.take(sample, controller)
                 run.publish(idle=sample is None)
             run.finish()
+        except ends:
+            interrupted = True
         except BaseException as error:
             run.end(str(error) or type(error).__name__)
             raise
         run.end("")
-        return LiveRun(run.status(), run.n_rows)
+        return LiveRun(run.status(), run.n_rows, interrupted)
 
 
 class _Run:

@@ -26,7 +26,7 @@ from hybridsep.live.sample import Sample
 from hybridsep.live.source import LiveSource
 from hybridsep.live.udp import UdpSource
 
-HOW: Mapping[str, Any] = {"columns": {}, "unit": None}
+HOW: Mapping[str, Any] = {"columns": {}, "unit": None, "T_s": None}
 
 
 def come(source: LiveSource, n: int) -> list[Sample]:
@@ -139,6 +139,8 @@ def test_addresses_that_are_none(address: str, error: type[HybridSepError], word
 def test_a_stream_has_its_own_speed_and_paho_is_an_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(ParameterError, match="--speed is for a log; udp:9870 comes at its own"):
         open_source("udp:9870", load_machine("spring_mass_damper"), HOW, speed=2.0)
+    with pytest.raises(ParameterError, match=r"udp:9870 is sampled every 0.002 s, but machine spring_mass_damper has"):
+        open_source("udp:9870", load_machine("spring_mass_damper"), {**HOW, "T_s": 0.002})
     monkeypatch.setitem(sys.modules, "paho.mqtt.client", None)
     with pytest.raises(LogError, match=r"is MQTT, which needs the extra live: pip install 'hybridsep\[live\]'"):
         MqttSource("127.0.0.1", 1883, "x")
