@@ -6,6 +6,7 @@ import json
 import zipfile
 from pathlib import Path
 
+import fmpy
 import numpy as np
 import pytest
 from command_line import Run, write_log
@@ -118,6 +119,16 @@ def test_build(hybridsep: Run, tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["FeedDrivePy.fmu", "HybridPredictorPy_emps.fmu"]
 
 
+def test_build_for_both_versions_of_fmi(hybridsep: Run, tmp_path: Path) -> None:
+    names = ["FeedDrive", "FeedDriveFmi3"]
+    options = ("--fmi", "both", "--target", "host", "--out", tmp_path, "--json")
+    status, out, err = hybridsep("build", *names, *options)
+    assert status == 0, err
+    assert json.loads(out) == [str(tmp_path / f"{name}.fmu") for name in names]
+    versions = [fmpy.read_model_description(str(tmp_path / f"{name}.fmu")).fmiVersion for name in names]
+    assert versions == ["2.0", "3.0"]
+
+
 def test_cosim_over_a_file(hybridsep: Run, tmp_path: Path) -> None:
     path = tmp_path / "command.csv"
     np.savetxt(
@@ -217,6 +228,9 @@ def test_help_shows_units_and_ranges(hybridsep: Run) -> None:
         (["build", "SepCompensatorPy", "-m", "emps", "--flavour", "python"], "; emps has no [drive_limits], which a"),
         (["build", "Robot", "--flavour", "python"], "no FMU Robot; there are HybridPredictorPy_als25010_x"),
         (["build", "--flavour", "cobol"], "flavour must be one of"),
+        (["build", "--fmi", "4"], "--fmi must be one of 2, 3, both, got '4'"),
+        (["build", "--fmi", "both", "--flavour", "python"], "--fmi both is for native FMUs, pythonfmu's are of FMI 2"),
+        (["build", "FeedDriveFmi3", "--target", "host"], "; those of FMI 3.0 need --fmi 3"),
         (["cosim", "-m", "emps", "--flavour", "python"], "machine emps has no plant; name a plant FMU with --plant"),
         (["cosim", "--trajectory", "zigzag"], "zigzag"),
         (["cosim", "--out", "run.xlsx"], "--out must end in .csv or .npz, got 'run.xlsx'"),

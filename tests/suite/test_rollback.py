@@ -14,7 +14,7 @@ from built_once import BuiltFmus
 from driving import SHORT, T_S, TIGHT, initialise, position, set_inputs, steps
 from places import SUPPORT
 from stream import CANNOT, COMPENSATOR, LOOK_AHEADS, PLANTS, PREDICTOR, TRAJECTORY, RefusedStreamError, Stream, Value
-from streams import StreamMaker, on_adapters
+from streams import StreamMaker, on_adapters, on_all
 
 ALL = (*LOOK_AHEADS, TRAJECTORY, *PLANTS)
 N_SAMPLES = 420
@@ -145,7 +145,7 @@ def test_a_reset_ends_trust(new_stream: StreamMaker) -> None:
     assert steps(stream, 0, 150) == with_trust
 
 
-@on_adapters((PREDICTOR,))
+@on_all((PREDICTOR,))
 def test_states_go_on_in_another_process(new_stream: StreamMaker, fmus: BuiltFmus, tmp_path: Path) -> None:
     expected = {}
     for model in ALL:

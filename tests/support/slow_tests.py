@@ -20,7 +20,7 @@ SLOW = (
     r"suite/test_warm_start\.py::\w+\[native",
     r"fmi/test_python_sep_fmu\.py::test_each_fmu_carries_what_it_needs",
     r"fmi/test_fmi2_random\.py",
-    r"fmi/test_fmi3_agreement\.py::\w+\[\w+_(als|emps)",
+    r"fmi/test_fmi3_(agreement|description)\.py::\w+\[\w+_(als|emps)",
     r"fmi/test_foreign\.py",
     r"c/test_c_memory\.py",
     r"c/test_c_sources\.py",
