@@ -44,9 +44,9 @@ class Browser:
     async def call(self, method: str, **parameters: Any) -> Any:
         """Call a method of the protocol."""
         self._n += 1
-        self._waiting[self._n] = asyncio.get_running_loop().create_future()
+        answer = self._waiting[self._n] = asyncio.get_running_loop().create_future()
         await self._connection.write_message(json.dumps({"id": self._n, "method": method, "params": parameters}))
-        return await asyncio.wait_for(self._waiting[self._n], 60.0)
+        return await asyncio.wait_for(answer, 60.0)
 
     async def open(self, address: str) -> None:
         """Go to an address."""
@@ -124,12 +124,21 @@ async def browser(program: str = shutil.which("chromium") or "chromium") -> Asyn
         assert process.stderr is not None
         try:
             found = next(found for line in process.stderr if (found := re.search(r"ws://([\d.:]+)/", line)))
-            pages = json.loads((await AsyncHTTPClient().fetch(f"http://{found[1]}/json/list")).body)
-            address = next(page["webSocketDebuggerUrl"] for page in pages if page["type"] == "page")
-            connection = await websocket_connect(address, max_message_size=1 << 28)
+            connection = await websocket_connect(await _target(found[1]), max_message_size=1 << 28)
             yield Browser(connection)
             connection.close()
         finally:
             process.terminate()
             process.wait()
             process.stderr.close()
+
+
+async def _target(host: str) -> str:
+    """Return the address of the empty page, which the browser opens a moment after it listens."""
+    for _ in range(100):
+        pages = json.loads((await AsyncHTTPClient().fetch(f"http://{host}/json/list")).body)
+        for page in pages:
+            if page["type"] == "page":
+                return str(page["webSocketDebuggerUrl"])
+        await asyncio.sleep(0.1)
+    raise TimeoutError("the browser has opened no page")

@@ -76,11 +76,11 @@ def live(
     check_predictor(axis, predictor, weights)
     values = values_to_build(axis, "HybridPredictor", parameters) if predictor is None else parameters
     how = reading_of(axis, reading, may_miss=axis.changed("predictor", parameters).predictor_settings.trust)
-    shown = shown_of(how["unit"] or "", axis.unit)
     run = LiveRun({}, 0)
     with ExitStack() as stack:
         sinks: list[Sink] = [] if plotjuggler is None else [PlotJuggler(plotjuggler, axis.name)]
         origin = stack.enter_context(open_source(source, axis, how, speed))
+        shown = shown_of(how["unit"] or origin.file_unit, axis.unit)
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         ahead = predictor or build_here(axis, "HybridPredictor", folder, "native", weights=weights)
         served = stack.enter_context(Page(axis.title, shown, port)) if page else None
@@ -90,6 +90,8 @@ def live(
                 errors_console.print(f"page: {served.address}", highlight=False, soft_wrap=True)
             run = run_live(origin, FmuController(ahead, values, 0.0), sinks, ends=(Interrupted, KeyboardInterrupt))
             _print_run(run.status, shown, as_json=as_json)
+            if served is not None and served.n_dropped:
+                errors_console.print(f"note: the page was too slow for {served.n_dropped} samples", highlight=False)
             if served is not None and not run.interrupted:
                 errors_console.print("the source has ended; Ctrl-C ends the page", highlight=False)
                 served.wait()

@@ -64,7 +64,10 @@ class _Session:
             self.range.update(start=start, end=end)
 
     def _painted(self, attribute: str, before: Any, after: Any) -> None:
+        due = 1e3 * (monotonic() - self._unseen) >= FRAME
         self._unseen = -_LOST
+        if due:  # a slow browser gets the next frame at once
+            self.frame()
 
     def _controlled(self, attribute: str, before: Any, after: Any) -> None:
         """Follow what the page asks for: another span, a pause, or more of what it has zoomed in on."""

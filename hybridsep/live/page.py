@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import pickle
 import queue
 import secrets
@@ -26,6 +27,9 @@ __all__ = ["Page"]
 _CHILD = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from hybridsep.live.page_process import serve; serve()"
 )
+
+_FOREIGN = "BOKEH_"
+"""Begin of variables that would let a page load its scripts from elsewhere, or take sessions from other origins."""
 
 _WAITING_MAX = 1000
 """Most batches that wait for the page's process; beyond, the page misses some, and the core none."""
@@ -71,6 +75,7 @@ class Page:
                 [sys.executable, "-I", "-c", _CHILD, json.dumps(sys.path)],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
+                env={name: value for name, value in os.environ.items() if not name.startswith(_FOREIGN)},
             )
         assert self._process.stdin is not None
         assert self._process.stdout is not None

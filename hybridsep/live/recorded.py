@@ -34,7 +34,7 @@ class RecordedSource(LiveSource):
     def __init__(self, log: LogReader, speed: float = 1.0) -> None:
         if not 0.0 <= speed <= 1e6:
             raise ParameterError(f"speed must be 0 … 1e6, 0 for as fast as possible, got {speed:g}")
-        self.name = str(log.path)
+        self.name, self.file_unit = str(log.path), log.file_unit
         self._log, self._speed = log, speed
 
     def samples(self) -> Iterator[Sample | None]:

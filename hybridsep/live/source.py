@@ -23,9 +23,12 @@ class LiveSource(ABC):
     ----------
     name : str
         What it is, for messages.
+    file_unit : str
+        Unit in which positions are shown, empty for that of the machine.
     """
 
     name: str
+    file_unit: str = ""
 
     @abstractmethod
     def samples(self) -> Iterator[Sample | None]:

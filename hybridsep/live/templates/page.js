@@ -4,7 +4,7 @@ window.live = (() => {
   const at = (id) => document.getElementById(id), all = (what) => document.querySelectorAll(what);
   const THEME = "hybridsep-live-theme", QUIET = 2, WAIT = 120; // s; ms, from a zoom to the request of its details
   const HERE = {sync: false}; // a property that the session need not know
-  let plots = [], control, status, seen, range, paused = false, span = 10, timer = 0, waiting = false, told = Date.now();
+  let plots = [], control, status, seen, range, view = null, paused = false, span = 10, timer = 0, waiting = false, told = Date.now();
   const found = {painted: 0, rows: 0, ready: false, running: false};
 
   const digits = (x) => x === 0 ? "0" : Math.abs(x) >= 999.5 ? Math.round(x).toLocaleString("en") : x.toPrecision(3);
@@ -51,22 +51,31 @@ window.live = (() => {
     at("pause").setAttribute("aria-pressed", String(paused));
     at("pause").textContent = paused ? "Go on" : "Pause";
     tell(status);
-    if (paused) return ask(range.start, range.end);
+    if (paused) {
+      view = view ?? [range.start, range.end];
+      return ask(...view);
+    }
+    view = null;
     for (const plot of plots) plot.y_range.reset(); // follows the lines again
     ask();
   }
 
-  function zoomed() { // by a tool of a plot, or a key
+  function zoomed(start = range.start, end = range.end) { // by a tool of a plot, or a key
+    view = [start, end];
+    range.setv({start, end});
     if (!paused) pause(true);
     clearTimeout(timer);
-    timer = setTimeout(() => { if (paused) ask(range.start, range.end); }, WAIT);
+    timer = setTimeout(() => {
+      if (!paused) return;
+      range.setv({start: view[0], end: view[1]}); // once more: a frame may have been on its way
+      ask(...view);
+    }, WAIT);
   }
 
   function zoom(factor, shift = 0) {
-    const width = range.end - range.start, middle = paused ? (range.start + range.end) / 2 : range.end;
-    const left = middle - factor * width * (paused ? 0.5 : 1) + shift * width;
-    zoomed();
-    range.setv({start: left, end: left + factor * width});
+    const [from, to] = paused ? view : [range.start, range.end], width = to - from;
+    const left = (paused ? (from + to) / 2 - factor * width / 2 : to - factor * width) + shift * width;
+    zoomed(left, left + factor * width);
   }
 
   function choose(seconds) {
