@@ -6,6 +6,8 @@ import json
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from ..base.signals import Array
 from ..logs.units import Shown
 from .history import History, drawn
@@ -77,7 +79,8 @@ class State:
     def latest(self, span: float) -> tuple[dict[str, Any], float, float]:
         """Return what is drawn of the last ``span`` s, and from when to when it is."""
         if self._history is None or self.n == 0:
-            return source_data(signals(History(len(COLUMNS), 1).last(0)[0], self.shown), 0), 0.0, span
+            # One row of zeros: of none the browser's console says that there is nothing to scale by
+            return self._drawn(np.zeros((1, len(COLUMNS) + len(self.experts))), 0), 0.0, span
         found = self._history.last(round(span / self.T_s) + 1)
         end = float(found[0][-1, 0])
         return self._drawn(*found), end - span, end

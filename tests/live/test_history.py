@@ -86,8 +86,10 @@ def test_a_state_goes_through_its_phases() -> None:
     state = State("an axis", shown_of("", "m"))
     assert json.loads(state.words())["phase"] == "waiting"
     empty, start, end = state.latest(10.0)
-    assert (len(empty["t"]), start, end) == (0, 0.0, 10.0)
+    assert (empty["t"].tolist(), empty["e_h"].tolist(), start, end) == ([0.0], [0.0], 0.0, 10.0)
+    assert state.between(0.0, 1.0)["t"].tolist() == [0.0]
     state.begin(("hold", "S"), 1e-3, 100)
+    assert state.latest(10.0)[0]["share1"].tolist() == [0.0]
     rows = table([Row(k, 1e-3 * k, 0.0, 1e-6 * k, 0.0, 0.0, 1e-6, 1, 1e-5, (0.5, 0.5)) for k in range(5000)])
     state.take(rows, {"n_samples": 5100})
     words = json.loads(state.words())
