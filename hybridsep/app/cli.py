@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..base.version import __version__
+from ..base.version import version_text
 from .command_backtest import backtest
 from .command_build import build
 from .command_cosim import cosim
@@ -40,9 +40,9 @@ for _command in (fit, identify, tune, init, demo, build, cosim, system, backtest
 
 
 @app.callback(invoke_without_command=True)
-def _version(version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False) -> None:
+def _version(version: Annotated[bool, typer.Option("--version", help="Print version and commit.")] = False) -> None:
     if version:
-        typer.echo(__version__)
+        typer.echo(f"hybridsep {version_text()}")
         raise typer.Exit
 
 

@@ -18,7 +18,7 @@ from typer.core import TyperGroup
 from ..base.errors import HybridSepError, brief
 from ..base.interrupt import interrupts_between_calls
 from ..base.new_folders import remove_empty_folders
-from ..base.version import __version__
+from ..base.version import version_text
 
 __all__ = ["DEBUG_VARIABLE", "Commands", "Interrupted", "errors_console", "run"]
 
@@ -85,8 +85,8 @@ def run(app: Callable[[], object]) -> int:
             raise
         what = " ".join(f"{type(error).__name__}: {error}".split())
         return _fail(
-            f"unexpected {what if len(what) <= 300 else what[:300] + '…'}; this is a fault of hybridsep {__version__}: "
-            f"please report it with the command and its files ({DEBUG_VARIABLE}=1 shows where it is)"
+            f"unexpected {what if len(what) <= 300 else what[:300] + '…'}; this is a fault of hybridsep "
+            f"{version_text()}: please report it with the command and its files ({DEBUG_VARIABLE}=1 shows where it is)"
         )
 
 

@@ -1,7 +1,41 @@
-"""Version of the library."""
+"""Version of the library, and the commit that it was made from."""
 
 from __future__ import annotations
 
-__all__ = ["__version__"]
+import subprocess
+from pathlib import Path
+
+__all__ = ["COMMIT_FILE", "__version__", "commit", "version_text"]
 
 __version__ = "0.1.0"
+
+COMMIT_FILE = "hybridsep/_data/commit.txt"
+"""Where wheel and sdist keep their commit, which ``hatch_build.py`` writes into them."""
+
+_ROOT = Path(__file__).resolve().parents[2]
+
+
+def version_text() -> str:
+    """Return the version with the commit, as ``0.1.0 (1a2b3c4d5e6f)``; without one the version alone."""
+    made_from = commit()
+    return f"{__version__} ({made_from})" if made_from else __version__
+
+
+def commit(root: Path = _ROOT) -> str:
+    """Return the commit of a wheel, an sdist or a checkout, with ``-dirty`` where files differ from it; "" without one.
+
+    Parameters
+    ----------
+    root : Path
+        Folder that the package lies in.
+    """
+    file = root / COMMIT_FILE
+    if file.is_file():
+        return file.read_text(encoding="utf-8").strip()
+    if not (root / ".git").exists():  # a folder inside the checkout of something else has no commit of its own
+        return ""
+    command = ["git", "-C", str(root), "describe", "--always", "--dirty", "--exclude=*", "--abbrev=12"]
+    try:
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):  # no git, or it trusts this folder's owner not
+        return ""
