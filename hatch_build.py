@@ -3,7 +3,8 @@
 ``ziglang``, a build requirement, compiles for all of them; libraries that the checkout has kept are taken as they are.
 The first time takes some minutes of processor time. ``HYBRIDSEP_TARGETS`` (names of ``hybridsep build --target`` with
 commas, or ``none``) leaves platforms out. Where it fails, the installation goes on without them, and says so: the
-Python flavour of the FMUs remains. An editable installation finds them in ``build/binaries``, and asks git for the commit.
+Python flavour of the FMUs remains. An editable installation finds them in ``build/binaries``, and asks git for the
+commit.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 
-class ReleaseHook(BuildHookInterface):
+class ReleaseHook(BuildHookInterface[Any]):
     """Add libraries and commit to a wheel, the commit to an sdist."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:

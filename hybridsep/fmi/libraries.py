@@ -25,6 +25,7 @@ from .compiler import ALL_TARGETS, FLAGS, TARGETS, ZIG, compiled, compiler_for, 
 __all__ = [
     "check_available",
     "chosen_targets",
+    "compilers_of",
     "default_targets",
     "has_native",
     "kept",
@@ -98,6 +99,17 @@ def kept(library: Library) -> Path | None:
     shipped = _SHIPPED / library[0] / f"{library[1]}{TARGETS[library[1]].suffix}"
     places = (shipped, _place(ZIG, library))
     return next((place for place in places if place.is_file()), None)
+
+
+def compilers_of(kind: str, targets: Sequence[str]) -> list[str]:
+    """Return the names of the compilers that the libraries of a kind are from; arguments as of :func:`libraries`.
+
+    Raises
+    ------
+    FmuError
+        As :func:`libraries`.
+    """
+    return [ZIG if kept((kind, target)) else compiler_for(target).name for target in expanded(targets)]
 
 
 def check_available(targets: Sequence[str]) -> None:

@@ -24,6 +24,7 @@ from ..base.version import __version__
 from ..machines.machine import Machine
 from ..plants.trajectory import spiral, staircase
 from ..predict.predictor import HybridPredictor
+from .bill_of_materials import BILL_FILE, bill_of_materials, native_parts
 from .c_header import c_header, kind_of
 from .c_sources import FMI_HEADERS, c_sources, fmi_headers
 from .compiler import placed
@@ -32,7 +33,7 @@ from .description import fmu_description
 from .flavours import FMI_VERSIONS
 from .fmi3_description import fmi3_description
 from .host_fmu import host_fmu
-from .libraries import default_targets, libraries
+from .libraries import compilers_of, default_targets, libraries
 from .model_description import build_description, model_description
 from .pages import icon, index_page
 from .reference import has_reference, reference_files
@@ -100,7 +101,9 @@ def files(
         )
     if has_reference(description):
         content |= _reference(machine, description, guid, content, samples, trained)
-    compiled = libraries(kind_of(description), targets or default_targets(), on_target)
+    kind, targets = kind_of(description), targets or default_targets()
+    compiled = libraries(kind, targets, on_target)
+    content[BILL_FILE] = bill_of_materials(name, guid, native_parts(compilers_of(kind, targets), list(compiled)))
     return content | {f"binaries/{path}": library for path, library in placed(compiled, name, fmi).items()}
 
 

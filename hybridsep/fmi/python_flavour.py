@@ -19,6 +19,7 @@ from ..base.data_files import data_folder
 from ..base.version import __version__
 from ..machines.machine import Machine
 from ..predict.predictor import HybridPredictor
+from .bill_of_materials import BILL_FILE, bill_of_materials, python_parts
 from .content import content_guid
 from .imported import imported_modules
 from .model_description import model_description
@@ -72,6 +73,7 @@ def files(
     content["resources/machine.json"] = json.dumps({**description, "content": guid}, indent=1, sort_keys=True).encode()
     tool = f"hybridsep {__version__} with pythonfmu {version}"
     content["modelDescription.xml"] = model_description(machine, description, guid, tool, native=False)
+    content[BILL_FILE] = bill_of_materials(name, guid, python_parts(version))
     return content
 
 

@@ -14,10 +14,10 @@ from places import EMPS
 from staircase_data import commanded
 
 from hybridsep import Encoder, cosimulate, load_machine, staircase
-from hybridsep.base.version import version_text
 from hybridsep.app.options import PREDICTOR_ENTRIES
 from hybridsep.base.data_files import data_folder
 from hybridsep.base.settings import PARAMETERS
+from hybridsep.base.version import version_text
 from hybridsep.evaluate.backtest import backtest
 
 

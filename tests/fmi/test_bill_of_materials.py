@@ -1,0 +1,74 @@
+"""Bill of materials of an FMU: valid, what is in it, and the same every time."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from built_once import FMI3, NATIVE, PYTHON, BuiltFmus
+from cyclonedx.schema import SchemaVersion
+from cyclonedx.validation.json import JsonStrictValidator
+
+from hybridsep.fmi.bill_of_materials import BILL_FILE, bill_of_materials, native_parts, python_parts
+from hybridsep.fmi.compiler import ALL_TARGETS, ZIG
+
+GUID = "{12345678-1234-1234-1234-123456789abc}"
+valid = JsonStrictValidator(SchemaVersion.V1_6).validate_str
+
+
+def bill_in(path: Path) -> dict[str, Any]:
+    with zipfile.ZipFile(path) as archive:
+        assert [name for name in archive.namelist() if name.startswith("extra/")] == ["extra/org.cyclonedx/bom.json"]
+        text = archive.read(BILL_FILE).decode()
+    assert valid(text) is None
+    return dict(json.loads(text))
+
+
+@pytest.mark.parametrize("name", ["HybridPredictor", "HybridPredictorFmi3"])
+def test_the_bill_of_a_native_fmu(fmus: BuiltFmus, name: str) -> None:
+    assert name in NATIVE + FMI3
+    bill = bill_in(fmus(name))
+    assert bill["metadata"]["component"]["name"] == name
+    parts = {part["name"]: part for part in bill["components"]}
+    assert set(parts) >= {"hybridsep C sources", "FMI 2.0 headers", "FMI 3.0 headers"}
+    assert parts["hybridsep C sources"]["licenses"] == [{"license": {"id": "BSD-3-Clause"}}]
+    compiler = parts["ziglang"]
+    assert (f"ziglang {compiler['version']}", compiler["type"]) == (ZIG, "application")
+
+
+def test_the_bill_of_a_python_fmu(python_fmu: Callable[[str], Path]) -> None:
+    bill = bill_in(python_fmu(PYTHON[0]))
+    with zipfile.ZipFile(python_fmu(PYTHON[0])) as archive:
+        tool = archive.read("modelDescription.xml").decode().partition('generationTool="')[2].partition('"')[0]
+    version = {part["name"]: part["version"] for part in bill["components"]}
+    assert tool == f"hybridsep {version['hybridsep']} with pythonfmu {version['pythonfmu']}"
+
+
+def test_the_same_fmu_has_the_same_bill_and_another_another() -> None:
+    parts = native_parts([ZIG], ALL_TARGETS)
+    bills = [
+        bill_of_materials("Axis", guid, made_of)
+        for guid, made_of in ((GUID, parts), (GUID, parts[::-1]), (GUID, parts[:-1]), (GUID.replace("1", "2"), parts))
+    ]
+    assert bills[0] == bill_of_materials("Axis", GUID, native_parts([ZIG], ALL_TARGETS))
+    assert bills[0] == bills[1]
+    assert len({json.loads(bill)["serialNumber"] for bill in bills}) == 3
+    assert all(valid(bill.decode()) is None and b"timestamp" not in bill for bill in bills)
+
+
+def test_parts_follow_platforms_and_compilers() -> None:
+    def names(compilers: list[str], targets: list[str]) -> list[str]:
+        return [part.name for part in native_parts(compilers, targets)][3:]
+
+    assert names([ZIG, ZIG], ["x86_64-linux"]) == ["ziglang"]
+    assert names([ZIG], ["x86_64-linux", "x86-windows"]) == ["ziglang", "mingw-w64 runtime"]
+    said = "cc cc (Debian 12.2.0) 12.2.0\nCopyright (C) 2022"
+    assert names([said, ZIG], ["x86_64-linux"]) == ["cc", "ziglang"]
+    (own,) = native_parts([said], ["x86_64-windows"])[3:]
+    assert (own.version, own.license) == ("cc (Debian 12.2.0) 12.2.0", "")
+    for parts in (native_parts([said, "clang "], []), python_parts("0.7.0")):
+        assert valid(bill_of_materials("Axis", GUID, parts).decode()) is None
