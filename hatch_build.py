@@ -33,16 +33,17 @@ class ReleaseHook(BuildHookInterface[Any]):
             build_data["force_include"].update(files)
 
     def _commit(self) -> dict[str, str]:
-        """Return the file with the commit: its path → its place; none where an sdist has it, or there is no commit."""
+        """Return the file with the commit: path → place; none where there is no commit."""
         from hybridsep.base.version import COMMIT_FILE, commit
 
-        root = Path(self.root)
-        made_from = commit(root)
-        if not made_from or (root / COMMIT_FILE).is_file():
-            return {}
-        file = root / "build" / "commit.txt"
-        file.parent.mkdir(exist_ok=True)
-        file.write_text(f"{made_from}\n", encoding="utf-8")
+        file = Path(self.root) / COMMIT_FILE
+        if not file.is_file():  # as in a checkout; an sdist has it
+            made_from = commit(Path(self.root))
+            if not made_from:
+                return {}
+            file = Path(self.root) / "build" / "commit.txt"
+            file.parent.mkdir(exist_ok=True)
+            file.write_text(f"{made_from}\n", encoding="utf-8")
         return {str(file): COMMIT_FILE}
 
     def _libraries(self) -> dict[str, str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 from pathlib import Path
 
 __all__ = ["COMMIT_FILE", "__version__", "commit", "version_text"]
@@ -34,8 +33,10 @@ def commit(root: Path = _ROOT) -> str:
         return file.read_text(encoding="utf-8").strip()
     if not (root / ".git").exists():  # a folder inside the checkout of something else has no commit of its own
         return ""
+    import subprocess  # not needed where the library is only used
+
     command = ["git", "-C", str(root), "describe", "--always", "--dirty", "--exclude=*", "--abbrev=12"]
     try:
         return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
-    except (OSError, subprocess.CalledProcessError):  # no git, or it trusts this folder's owner not
+    except (OSError, subprocess.CalledProcessError):  # no git, or it does not trust the folder's owner
         return ""

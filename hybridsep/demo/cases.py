@@ -16,11 +16,11 @@ from ..evaluate.path_plots import contour_figure, spiral_figure
 from ..evaluate.replayed import replayed_run
 from ..evaluate.time_plots import prediction_figure, tracking_figure
 from ..evaluate.verdict import verdict_of
+from ..fmi.builds import build_pair
 from ..logs.log import Log, read_log
 from ..machines.machine import load_machine
 from ..machines.paper import PAPER_SETTINGS, paper_machine
 from ..plants.trajectory import spiral, staircase
-from ..fmi.builds import build_pair
 from .compensation import COMPENSATED, Runs, compensate, contour_errors, mean_summary
 
 __all__ = ["MACHINES", "Summary", "read_recorded", "recorded_case", "spiral_case", "staircase_case"]

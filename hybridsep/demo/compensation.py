@@ -13,10 +13,10 @@ from ..base.settings import PARAMETERS
 from ..base.signals import Array
 from ..cosim.loop import cosimulate
 from ..cosim.run import Run
+from ..fmi.builds import build_here
 from ..machines.machine import Machine
 from ..plants.encoder import Encoder
 from ..plants.trajectory import archimedean_spiral
-from ..fmi.builds import build_here
 
 __all__ = ["COMPENSATED", "Runs", "compensate", "contour_errors", "mean_summary", "train"]
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from ..base.output import written_text
 from ..fmi.archive import fmu_names
-from ..machines.machine import load_machine
 from ..fmi.builds import default_flavour
+from ..machines.machine import load_machine
 from .cases import MACHINES, Summary, read_recorded, recorded_case, spiral_case, staircase_case
 from .compensation import COMPENSATED
 from .published import PRINTED

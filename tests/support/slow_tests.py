@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 
 SLOW = (
-    # The documentation: its command lines, one page after the other, and its site
+    # The documentation: its command lines, one page after the other, and its site; the archives of a release
     r"documents/test_commands\.py::test_the_pages",
     r"documents/test_site\.py",
+    r"release/test_wheel\.py",
     # All platforms' compilers, sanitizers and programs that are compiled for one test
     r"fmi/test_native_fmu\.py::test_all_platforms",
     r"fmi/test_tables\.py::test_(mutated_tables|a_table_is_what_the_header_is)",
