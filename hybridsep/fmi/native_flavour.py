@@ -44,6 +44,13 @@ from .weights import WEIGHTS_FILE, weights_file
 __all__ = ["files", "sources"]
 
 _TRAJECTORY_MAGIC = b"HSEPTRJ1"
+_RUNTIME_LICENSES = """\
+Binaries that Zig compiled (extra/org.cyclonedx/bom.json) have parts of its run-time library:
+
+{}
+Those for Windows have parts of mingw-w64 besides:
+
+{}"""
 
 
 def files(
@@ -151,8 +158,10 @@ def sources(description: Mapping[str, object], guid: str, fmi: str = FMI_VERSION
 
 
 def _licenses() -> dict[str, bytes]:
-    """Return our licence and those of the FMI headers, which they carry in their own comments."""
-    root, lines = data_folder("fmu_src").parent, []
+    """Return our licence, those of the FMI headers, which they carry in their own comments, and the compiler's."""
+    folder = data_folder("fmu_src")
+    runtime = [(folder / "c" / "licenses" / file).read_text(encoding="utf-8") for file in ("zig.txt", "mingw-w64.txt")]
+    lines = []
     for version in FMI_VERSIONS:
         first, second, third = FMI_HEADERS[version]
         comment = fmi_headers((version,))[first].decode()
@@ -160,8 +169,11 @@ def _licenses() -> dict[str, bytes]:
         assert notice is not None  # the headers have been the same since 2019 and 2023
         lines += [f"{first}, {second} and {third}, with which the binaries were compiled:", ""]
         lines += [*(line.strip() for line in notice.group().splitlines()), ""]
-    text = "\n".join(lines).rstrip("\n") + "\n"
-    return {"license.txt": (root / "LICENSE").read_bytes(), "fmi-headers.txt": text.encode()}
+    return {
+        "license.txt": (folder.parent / "LICENSE").read_bytes(),
+        "fmi-headers.txt": ("\n".join(lines).rstrip("\n") + "\n").encode(),
+        "compiler-runtime.txt": _RUNTIME_LICENSES.format(*runtime).encode(),
+    }
 
 
 def _trajectories(T_s: float, samples: ArrayLike | None) -> dict[str, bytes]:

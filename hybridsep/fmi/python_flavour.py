@@ -24,7 +24,7 @@ from .content import content_guid
 from .imported import imported_modules
 from .model_description import model_description
 from .pages import filled, icon, index_page
-from .pythonfmu_limits import checked_version
+from .pythonfmu_limits import checked_version, pythonfmu_license
 from .weights import WEIGHTS_FILE, weights_file
 
 __all__ = ["files"]
@@ -69,6 +69,8 @@ def files(
     for source in ("linux64/libpythonfmu-export.so", "win64/pythonfmu-export.dll"):
         binary = Path(pythonfmu.__file__).parent / "resources" / "binaries" / source
         content[f"binaries/{Path(source).parent}/{name}{binary.suffix}"] = binary.read_bytes()
+    content["documentation/licenses/license.txt"] = (data_folder("fmu_src").parent / "LICENSE").read_bytes()
+    content["documentation/licenses/pythonfmu.txt"] = pythonfmu_license()
     guid = content_guid(content, description)
     content["resources/machine.json"] = json.dumps({**description, "content": guid}, indent=1, sort_keys=True).encode()
     tool = f"hybridsep {__version__} with pythonfmu {version}"

@@ -11,7 +11,7 @@ from urllib.parse import quote
 
 from ..base.errors import FmuError
 
-__all__ = ["check_unpacked", "checked_version"]
+__all__ = ["check_unpacked", "checked_version", "pythonfmu_license"]
 
 SERIES = "0.7."
 """Series whose reference counting ``slave.py`` balances and whose limits are listed in ``templates``."""
@@ -32,6 +32,20 @@ def checked_version() -> str:
             f"pip install 'pythonfmu~={SERIES}0'"
         )
     return version
+
+
+def pythonfmu_license() -> bytes:
+    """Return the licence of the pythonfmu that is installed, which goes with copies of it.
+
+    Raises
+    ------
+    FmuError
+        If the installation has none.
+    """
+    found = [file for file in metadata.files("pythonfmu") or () if file.name == "LICENSE"]
+    if not found:
+        raise FmuError("pythonfmu's LICENSE, which an FMU with a copy of it must carry, is not installed: reinstall it")
+    return found[0].read_binary()
 
 
 def check_unpacked(folder: Path, generation_tool: str) -> None:

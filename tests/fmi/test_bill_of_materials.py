@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import zipfile
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,13 @@ from built_once import FMI3, NATIVE, PYTHON, BuiltFmus
 from cyclonedx.schema import SchemaVersion
 from cyclonedx.validation.json import JsonStrictValidator
 
+from hybridsep.base.data_files import data_folder
+from hybridsep.base.errors import FmuError
 from hybridsep.fmi.bill_of_materials import BILL_FILE, bill_of_materials, native_parts, python_parts
 from hybridsep.fmi.compiler import ALL_TARGETS, ZIG
+from hybridsep.fmi.pythonfmu_limits import pythonfmu_license
 
+LICENSES = data_folder("fmu_src") / "c" / "licenses"
 GUID = "{12345678-1234-1234-1234-123456789abc}"
 valid = JsonStrictValidator(SchemaVersion.V1_6).validate_str
 
@@ -36,6 +41,10 @@ def test_the_bill_of_a_native_fmu(fmus: BuiltFmus, name: str) -> None:
     parts = {part["name"]: part for part in bill["components"]}
     assert set(parts) >= {"hybridsep C sources", "FMI 2.0 headers", "FMI 3.0 headers"}
     assert parts["hybridsep C sources"]["licenses"] == [{"license": {"id": "BSD-3-Clause"}}]
+    with zipfile.ZipFile(fmus(name)) as archive:
+        notices = archive.read("documentation/licenses/compiler-runtime.txt").decode()
+    assert "Copyright (c) Zig contributors" in notices
+    assert "by the mingw-w64 project" in notices
     compiler = parts["ziglang"]
     assert (f"ziglang {compiler['version']}", compiler["type"]) == (ZIG, "application")
 
@@ -43,6 +52,8 @@ def test_the_bill_of_a_native_fmu(fmus: BuiltFmus, name: str) -> None:
 def test_the_bill_of_a_python_fmu(python_fmu: Callable[[str], Path]) -> None:
     bill = bill_in(python_fmu(PYTHON[0]))
     with zipfile.ZipFile(python_fmu(PYTHON[0])) as archive:
+        assert b"BSD 3-Clause" in archive.read("documentation/licenses/license.txt")
+        assert b"MIT License" in archive.read("documentation/licenses/pythonfmu.txt")
         tool = archive.read("modelDescription.xml").decode().partition('generationTool="')[2].partition('"')[0]
     version = {part["name"]: part["version"] for part in bill["components"]}
     assert tool == f"hybridsep {version['hybridsep']} with pythonfmu {version['pythonfmu']}"
@@ -72,3 +83,18 @@ def test_parts_follow_platforms_and_compilers() -> None:
     assert (own.version, own.license) == ("cc (Debian 12.2.0) 12.2.0", "")
     for parts in (native_parts([said, "clang "], []), python_parts("0.7.0")):
         assert valid(bill_of_materials("Axis", GUID, parts).decode()) is None
+
+
+def test_the_notices_are_those_of_the_compiler() -> None:
+    found = find_spec("ziglang")
+    assert found is not None
+    zig = Path(str(found.origin)).parent
+    for own, theirs in (("zig.txt", "LICENSE"), ("mingw-w64.txt", "lib/libc/mingw/COPYING")):
+        lines = [(path / name).read_text(encoding="utf-8").split() for path, name in ((LICENSES, own), (zig, theirs))]
+        assert lines[0] == lines[1]
+
+
+def test_pythonfmu_without_its_licence_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hybridsep.fmi.pythonfmu_limits.metadata.files", lambda name: [])
+    with pytest.raises(FmuError, match=r"pythonfmu's LICENSE, .* is not installed: reinstall it"):
+        pythonfmu_license()
