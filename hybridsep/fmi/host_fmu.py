@@ -8,8 +8,9 @@ from __future__ import annotations
 import _ctypes
 import ctypes
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from itertools import groupby
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -19,13 +20,31 @@ from .c_header import kind_of
 from .compiler import TARGETS, host_target
 from .libraries import libraries
 from .table_file import TABLE_FILE, table_file
-from .variables import Variable, variables_of
+from .variables import variables_of
 
 __all__ = ["HostFmu", "host_fmu"]
 
 _CO_SIMULATION = 1
 _OK = 0
-_NUMBERS = {"Real": ctypes.c_double, "Integer": ctypes.c_int, "Enumeration": ctypes.c_int, "Boolean": ctypes.c_int}
+_KINDS = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}
+"""Kind of a variable → the FMI functions' name of it."""
+
+
+class _Values:
+    """Room for the values of variables of one kind, which one call gets.
+
+    Parameters
+    ----------
+    kind : str
+        Of the values of ``_KINDS``.
+    references : sequence of int
+    """
+
+    def __init__(self, kind: str, references: Sequence[int]) -> None:
+        number = ctypes.c_double if kind == "Real" else ctypes.c_int
+        self.kind, self.n = kind, ctypes.c_size_t(len(references))
+        self.references = (ctypes.c_uint * len(references))(*references)
+        self.values = (number * len(references))()
 
 
 class HostFmu:
@@ -47,7 +66,8 @@ class HostFmu:
     ) -> None:
         table = list(enumerate(variables_of(description)))
         self._inputs = [i for i, variable in table if variable.causality == "input"]
-        self._outputs = [(i, variable) for i, variable in table if variable.causality == "output"]
+        outputs = [(i, _KINDS[variable.kind]) for i, variable in table if variable.causality == "output"]
+        self._outputs = [_Values(kind, [i for i, _ in same]) for kind, same in groupby(outputs, lambda each: each[1])]
         self._library, self._T_s, self._k = library, T_s, 0
         library.fmi2Instantiate.restype = ctypes.c_void_p
         text = [description["name"].encode(), guid.encode(), resources.as_uri().encode()]
@@ -62,7 +82,9 @@ class HostFmu:
 
     def outputs(self) -> list[float]:
         """Return all outputs, in the order of the table."""
-        return [self._get(place, variable) for place, variable in self._outputs]
+        for outputs in self._outputs:
+            self._call(f"Get{outputs.kind}", outputs.references, outputs.n, outputs.values)
+        return [float(value) for outputs in self._outputs for value in outputs.values]
 
     def sample(self, *inputs: float) -> None:
         """Do one step of T_s, with all inputs in the order of the table."""
@@ -74,12 +96,6 @@ class HostFmu:
     def close(self) -> None:
         """End the instance."""
         self._library.fmi2FreeInstance(self._component)
-
-    def _get(self, place: int, variable: Variable) -> float:
-        value: Any = _NUMBERS[variable.kind]()
-        kind = "Integer" if variable.kind == "Enumeration" else variable.kind
-        self._call(f"Get{kind}", ctypes.byref(ctypes.c_uint(place)), ctypes.c_size_t(1), ctypes.byref(value))
-        return float(value.value)
 
     def _call(self, name: str, *arguments: Any) -> None:
         if getattr(self._library, f"fmi2{name}")(self._component, *arguments) != _OK:
