@@ -177,8 +177,12 @@ def _licenses() -> dict[str, bytes]:
 
 
 def _trajectories(T_s: float, samples: ArrayLike | None) -> dict[str, bytes]:
-    """Return ``trajectory_<n>.bin`` of the staircase, the spiral's axes and, if there are some, the user's samples."""
-    played = [staircase(T_s), *spiral(T_s)]
+    """Return ``trajectory_<n>.bin`` of the staircase, the spiral's axes and, if there are some, the user's samples.
+
+    The spiral is rounded to 10 pm: NumPy's sine differs by 0.1 fm from one version or processor to another, and the
+    archive would be another one.
+    """
+    played = [staircase(T_s), *(axis.round(11) for axis in spiral(T_s))]
     if samples is not None:
         played.append(as_samples(samples, "samples"))
         as_samples(played[-1][:1], "samples", 1)
