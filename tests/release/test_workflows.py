@@ -13,6 +13,7 @@ import pytest
 from places import ROOT
 from ruamel.yaml import YAML
 
+from hybridsep.base.version import __version__
 from hybridsep.fmi.compiler import ALL_TARGETS
 
 GITHUB = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
@@ -77,3 +78,10 @@ def test_a_release_has_all_platforms_and_what_workflows_keep() -> None:
     assert [
         step["with"]["path"] for step in content(GITHUB[1])["jobs"]["build"]["steps"] if "path" in step.get("with", {})
     ] == [kept]
+
+
+@pytest.mark.skipif(not shutil.which("bash"), reason="the scripts are bash's")
+def test_a_tag_of_another_version_is_refused() -> None:
+    done = subprocess.run(["bash", ROOT / ".ci" / "release", "v9.9"], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.startswith(f"tag v9.9 is not of {__version__}")
