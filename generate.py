@@ -1,4 +1,4 @@
-"""Generated files of the repository: the settings of the C core and the pages of reference in ``docs``.
+"""Generated files of the repository: settings and constants of the C core, and the pages of reference in ``docs``.
 
 ``python generate.py`` writes them anew after a change of a parameter or a variable; ``tests/test_generated.py`` tells
 when one is out of date.
@@ -6,20 +6,26 @@ when one is out of date.
 
 from __future__ import annotations
 
+import re
+import textwrap
 from collections.abc import Mapping
+from dataclasses import asdict
+from inspect import cleandoc
 from pathlib import Path
 
 from docs.reference_pages import pages
 from hybridsep.base.parameters import Parameter
 from hybridsep.fmi.variables import COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS, TRUST_SETTINGS
+from hybridsep.predict.trust.constants import CONSTANTS
 
 ROOT = Path(__file__).resolve().parent
 SETTINGS_HEADER = ROOT / "fmu_src" / "c" / "core" / "predict" / "hsep_settings.h"
+CONSTANTS_HEADER = ROOT / "fmu_src" / "c" / "core" / "predict" / "trust" / "hsep_trust_constants.h"
 
 
 def generated() -> dict[Path, str]:
     """Return the files that are generated, as they must be."""
-    return {SETTINGS_HEADER: settings_header(), **pages()}
+    return {SETTINGS_HEADER: settings_header(), CONSTANTS_HEADER: constants_header(), **pages()}
 
 
 def settings_header() -> str:
@@ -48,6 +54,32 @@ typedef struct {{
 typedef struct {{
     HSEP_COMPENSATOR_SETTINGS(HSEP_SETTING)
 }} hsep_compensator_settings;
+
+#endif
+"""
+
+
+def constants_header() -> str:
+    """Return the C header of the constants of the residual model with trust, each group behind its description."""
+    values = asdict(CONSTANTS)
+    _, attributes = cleandoc(type(CONSTANTS).__doc__ or "").split("----------\n")
+    groups = re.findall(r"^(\w[\w, ]*) : float\n((?: .*\n?)+)", attributes, re.MULTILINE)
+    found = [name for names, _ in groups for name in names.split(", ")]
+    if found != list(values):
+        raise AssertionError(f"constants must be described in their order, {list(values)}, got {found}")
+    parts = []
+    for names, description in groups:
+        text = " ".join(description.replace("`", "").split())
+        lines = textwrap.wrap(f"{text} */", 114)
+        defines = [f"#define HSEP_TRUST_{name.upper()} {values[name]!r}" for name in names.split(", ")]
+        parts.append("\n".join(["/* " + "\n * ".join(lines), *defines]))
+    body = "\n\n".join(parts)
+    return f"""/* Constants of the residual model with trust as they are declared in hybridsep/predict/trust/constants.py, from
+ * which this file is generated. */
+#ifndef HSEP_TRUST_CONSTANTS_H
+#define HSEP_TRUST_CONSTANTS_H
+
+{body}
 
 #endif
 """

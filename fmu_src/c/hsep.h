@@ -13,8 +13,8 @@
  *   hsep_*_valid                      | constant; the predictor's, its windows          | returns 0 if invalid
  *   hsep_predictor_sample             | hsep_regression_fold; at a window's end         | divergence is set, latched
  *                                     | Np (p + q) + n^2 / 2 on top; with trust, then   |
- *                                     | alone, Np folds, n^3 / 3, Np n^2, 6 Np tanh;    |
- *                                     | n / 3 folds in a warm run;                      |
+ *                                     | alone, for each expert Np n^2, n^3 / 3 and      |
+ *                                     | Np n^2 / 2; 6 Np tanh; one more in a warm run;  |
  *                                     | in a compensator preview for all Np but folds   |
  *   hsep_compensator_begin            | a window's end                                  | divergence is set, latched
  *   hsep_compensator_sample           | as the predictor's; at a window's end a plan,   | divergence is set, latched

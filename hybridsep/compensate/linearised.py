@@ -1,8 +1,12 @@
 """Trusted model over a preview, and its linearisation in the commands.
 
 Disturbances of the commands are no affine functions of them, so a plan follows their slope: at given commands the
-prediction changes with them as an affine map does, friction by ``sech²(v/v_i)``, stiffness by ``2|x|``. Weights, their
-blend and the shrinking by the variance are held.
+prediction changes with them as an affine map does, friction by ``sech²(v/v_i)``, stiffness by ``2|x|``. Weights, the
+stack's and the shrinking by the variance are held:
+
+``∂x_h = (1 − π_A) G_pb + π_L ∂f_L + π_S ∂f_S + π_A ∂x_A``
+
+with the expert of the command alone, A, linear and time-invariant: its increments and lags are those of the command.
 """
 
 from __future__ import annotations
@@ -12,8 +16,9 @@ from scipy.signal import lfilter
 
 from ..base.signals import Array
 from ..predict.trust.disturbances import DisturbanceSlopes
+from ..predict.trust.experts import SolvedExpert
 from ..predict.trust.forecast import TrustedForecast
-from ..predict.trust.model import TrustedModel
+from ..predict.trust.model import COMMAND, STATIC, TrustedModel
 
 __all__ = ["PlanModel"]
 
@@ -48,8 +53,8 @@ class PlanModel:
 
     @property
     def has_learned(self) -> bool:
-        """Whether it predicts something else than the physics model."""
-        return bool(self._solved)
+        """Whether it has learned how the drive's disturbances act."""
+        return STATIC in self._solved
 
     def predict(self, x_d: Array) -> TrustedForecast:
         """Predict the preview, and what is late before it, under commands ``x_d``, ``(n,)``, m."""
@@ -75,28 +80,51 @@ class PlanModel:
         reach : float
             Of the friction's slope, as that of :meth:`StaticFeatures.slopes`.
         """
-        static, discrete, n_late = self._model.static, self._discrete, len(self._late)
-        total: Array = passed.copy()
-        parts = self._model.blend.weights[1:].tolist()
-        over_all = static.slopes(self._model.state, at.x_d, at.x_pb, at.x, self.scales.velocity, reach)
+        static, n_late = self._model.static, len(self._late)
+        weights = self._model.stack.weights.tolist()
+        over_all = static.slopes(self._model.run.static, at.x_d, at.x_pb, at.x, self.scales.velocity, reach)
         slopes = DisturbanceSlopes(*(part[n_late:] for part in over_all))
+        total: Array = passed.copy()
+        for expert, solved in self._solved.items():
+            if weights[expert] == 0.0:
+                continue
+            kept = weights[expert] * at.predictions[expert].shrink[n_late:, None]
+            if expert == COMMAND:
+                acted = self._late_changes(changes)
+                total += kept * self._of_command(solved, acted) + weights[expert] * (acted - passed)
+            else:
+                total += kept * self._of_disturbances(solved, slopes, changes, passed)
+        return total
+
+    def _late_changes(self, changes: Array) -> Array:
+        """Return what changes of the commands are after the dead time, ``(n, m)``, m."""
+        d = min(self._model.command.dead_time, len(changes))
+        return np.concatenate((np.zeros_like(changes[:d]), changes[: len(changes) - d]))
+
+    def _of_command(self, solved: SolvedExpert, acted: Array) -> Array:
+        """Return the change of the command's residual with changes of the commands after the dead time, ``(n, m)``."""
+        increments = np.diff(acted, axis=0, prepend=0.0)
+        drive = lfilter(solved.solution.weights[1 : solved.n_static], [1.0], increments, axis=0)
+        return _recur(solved, drive)
+
+    def _of_disturbances(self, solved: SolvedExpert, slopes: DisturbanceSlopes, changes: Array, passed: Array) -> Array:
+        """Return the change of the physics model's residual by an expert with static features, ``(n, m)``."""
+        discrete = self._discrete
         velocity = np.diff(changes, axis=0, prepend=0.0) / discrete.T_s
         moved = np.diff(passed, axis=0, prepend=0.0) / discrete.T_s
-        for solved, found, part in zip(self._solved, at.predictions, parts, strict=True):
-            if part == 0.0:
-                continue
-            shrink = part * found.shrink[n_late:]
-            linear, own, differences = static.split(solved.solution.weights[: solved.n_static])
-            disturbance = np.zeros_like(changes)
-            for weights, is_difference in ((own, False), (differences, True)):
-                acts = slopes.change(weights, velocity, passed, moved)
-                disturbance += np.diff(acts, axis=0, prepend=0.0) if is_difference else acts
-            drive, _ = discrete.forced_response(discrete.rest(changes.shape[1]), disturbance)
-            difference = passed
-            for weight in linear:
-                drive = drive + weight * difference
-                difference = np.diff(difference, axis=0, prepend=0.0)
-            if len(solved.lag_weights):
-                drive = np.asarray(lfilter([1.0], np.concatenate(([1.0], -solved.lag_weights)), drive, axis=0))
-            total += shrink[:, None] * drive
-        return total
+        linear, own, differences = self._model.static.split(solved.solution.weights[: solved.n_static])
+        disturbance = slopes.change(own, velocity, passed, moved)
+        disturbance += np.diff(slopes.change(differences, velocity, passed, moved), axis=0, prepend=0.0)
+        drive, _ = discrete.forced_response(discrete.rest(changes.shape[1]), disturbance)
+        difference = passed
+        for weight in linear:
+            drive = drive + weight * difference
+            difference = np.diff(difference, axis=0, prepend=0.0)
+        return _recur(solved, drive)
+
+
+def _recur(solved: SolvedExpert, drive: Array) -> Array:
+    """Return the free run ``e(k) = drive(k) + Σ_i w_e,i e(k−i)`` from rest, ``(n, m)``."""
+    if not len(solved.lag_weights):
+        return drive
+    return np.asarray(lfilter([1.0], np.concatenate(([1.0], -solved.lag_weights)), drive, axis=0))

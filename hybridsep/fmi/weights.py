@@ -1,9 +1,10 @@
-"""Weights file ``resources/weights.bin`` of an FMU that starts warm: the factor of a trained predictor.
+"""Weights file ``resources/weights.bin`` of an FMU that starts warm: the factors of a trained predictor.
 
-Layout, little-endian: ``HSEPWGT8``; the numbers of settings, of modes, of learned samples and of what has been learned
-besides the factor, as u64; each setting that shapes the features and the factor (with others the weights mean something
-else), its name in 24 bytes and its value as float64; as float64 the numbers of a residual model that can be trusted and
-those of the errors' variance; the upper triangle of the factor ``[R z; 0 ρ]`` by rows; the CRC-32 of all before as u64.
+Layout, little-endian: ``HSEPWGT9``; the numbers of settings, of modes, of learned samples and of what has been learned
+besides the factors, as u64; each setting that shapes the features and the factors (with others the weights mean
+something else), its name in 24 bytes and its value as float64; as float64 the numbers of a residual model that can be
+trusted and those of the errors' variance; the upper triangle of each factor ``[R z; 0 ρ]`` by rows, of a residual model
+that can be trusted that of the physics model's residual and that of the command's; the CRC-32 of all before as u64.
 This module is packed into the pythonfmu FMUs; the C model reads the same file.
 """
 
@@ -23,7 +24,7 @@ from ..predict.uncertainty import Uncertainty
 __all__ = ["WEIGHTS_FILE", "learned_settings", "restore_weights", "weights_file"]
 
 WEIGHTS_FILE = "weights.bin"
-_MAGIC = b"HSEPWGT8"
+_MAGIC = b"HSEPWGT9"
 _HEAD = struct.Struct("<8s4Q")
 _SETTING = struct.Struct("<24sd")
 _CHECKSUM = struct.Struct("<Q")
@@ -50,13 +51,14 @@ def learned_settings(predictor: HybridPredictor) -> dict[str, float]:
 def weights_file(predictor: HybridPredictor) -> bytes:
     """Return the file's content for a trained predictor."""
     settings = learned_settings(predictor)
-    factor = predictor.regression.factor
+    factors = [regression.factor for regression in predictor.residual.regressions]
     learned = np.concatenate([part.ravel() for part in _learned(predictor).values()])
     content = _HEAD.pack(
         _MAGIC, len(settings), len(predictor.model.modes), predictor.regression.n_samples, len(learned)
     )
     content += b"".join(_SETTING.pack(name.encode(), value) for name, value in settings.items())
-    content += np.concatenate((learned, factor[np.triu_indices(len(factor))])).astype("<f8").tobytes()
+    triangles = [factor[np.triu_indices(len(factor))] for factor in factors]
+    content += np.concatenate((learned, *triangles)).astype("<f8").tobytes()
     return content + _CHECKSUM.pack(zlib.crc32(content))
 
 
@@ -91,15 +93,13 @@ def restore_weights(predictor: HybridPredictor, content: bytes) -> None:
             problems += _differences(name, then, settings.get(name, 0.0))
     if problems:
         raise StateError("; ".join(problems))
-    size, parts = predictor.regression.n_features + 1, _learned(predictor)
-    upper = np.triu_indices(size)
+    parts, regressions = _learned(predictor), predictor.residual.regressions
     ends = np.cumsum([0, *(part.size for part in parts.values())])
-    n_numbers = int(ends[-1]) + len(upper[0])
+    corners = np.cumsum([0, *((one.n_features + 1) * (one.n_features + 2) // 2 for one in regressions)])
+    n_numbers = int(ends[-1] + corners[-1])
     if learned.keys() != settings.keys() or n_learned != ends[-1] or len(body) - start != 8 * n_numbers:
         raise StateError(_DAMAGED)
     numbers = np.frombuffer(body, "<f8", offset=start)
-    factor = np.zeros((size, size))
-    factor[upper] = numbers[n_learned:]
     found = {
         name: numbers[first:end].reshape(parts[name].shape).copy()
         for name, first, end in zip(parts, ends, ends[1:], strict=False)
@@ -107,15 +107,25 @@ def restore_weights(predictor: HybridPredictor, content: bytes) -> None:
     if not (Uncertainty.is_sound(found["errors"]) and predictor.residual.is_sound(found)):
         raise StateError(_DAMAGED)
     try:
-        predictor.regression.restore(factor, n_samples)
+        for regression, first, end in zip(regressions, corners, corners[1:], strict=False):
+            regression.restore(
+                _triangle(numbers[n_learned + first : n_learned + end], regression.n_features), n_samples
+            )
     except SignalError:
         raise StateError(_DAMAGED) from None
     predictor.uncertainty.restore(found["errors"])
     predictor.residual.restore_learned(found)
 
 
+def _triangle(numbers: Array, n_features: int) -> Array:
+    """Return the factor of an upper triangle by rows, ``(n_features + 1, n_features + 1)``."""
+    factor = np.zeros((n_features + 1, n_features + 1))
+    factor[np.triu_indices(n_features + 1)] = numbers
+    return factor
+
+
 def _learned(predictor: HybridPredictor) -> dict[str, Array]:
-    """Return what has been learned besides the factor, in the order of the file."""
+    """Return what has been learned besides the factors, in the order of the file."""
     return predictor.residual.learned() | {"errors": predictor.uncertainty.learned()}
 
 

@@ -19,12 +19,15 @@ class FeatureScales(NamedTuple):
         Velocity scale of the friction features.
     largest : (n_static,) array
         Largest magnitudes of the static features, those ahead included.
+    step : float, m
+        Largest change of the command from sample to sample, those ahead included.
     n_rest : int
         Samples ahead before the first motion of the run.
     """
 
     velocity: float
     largest: Array
+    step: float
     n_rest: int
 
 
@@ -39,7 +42,7 @@ class Forecast:
     e_h : (n,) array, m
         Predicted residual.
     disagreement : (n,) array, m²
-        Variance of the candidates about their blend; 0 where there are none.
+        Variance of the experts about their stack; 0 where there are none.
     """
 
     x_d: Array

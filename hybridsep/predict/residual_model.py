@@ -67,6 +67,11 @@ class ResidualModel(ABC, Generic[AnyForecast]):
     n_rejected: int
 
     @property
+    def regressions(self) -> tuple[RidgeRegression, ...]:
+        """All regressions that another run begins with, in the order of a weights file."""
+        return (self.regression,)
+
+    @property
     @abstractmethod
     def lag_weights(self) -> Array:
         """Weights of the lags of ``e_pb`` from all learned samples, ``(p,)``."""

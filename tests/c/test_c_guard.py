@@ -9,11 +9,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from hybridsep.predict.trust.constants import CONSTANTS
 from hybridsep.predict.trust.guard import SensorGuard
 
 Array = NDArray[np.float64]
 
 NEIGHBOURS = 2
+T_S = 0.02
+"""s; the patience with an axis that stands is 30 samples then, or two windows."""
 
 
 class Doubt(ctypes.Structure):
@@ -26,13 +29,14 @@ class Guard(ctypes.Structure):
     """hsep_guard."""
 
     _fields_ = (
-        *((name, ctypes.c_uint64) for name in ("patience", "gap", "doubtful", "holding")),
+        *((name, ctypes.c_uint64) for name in ("patience", "patience_standing", "gap", "doubtful", "holding", "rests")),
         *(
             (name, ctypes.c_double)
             for name in (
-                "stuck",
                 "vibration",
-                "first",
+                "motion",
+                "motion_pb",
+                "position",
                 "last",
                 "value",
                 "repeats",
@@ -48,13 +52,13 @@ class Guard(ctypes.Structure):
     )
 
     @classmethod
-    def begin(cls, patience: int) -> Guard:
+    def begin(cls, Np: int) -> Guard:
         guard = cls()
-        c_core.library("predictor").hsep_guard_init(ctypes.byref(guard), ctypes.c_uint64(patience))
+        c_core.library("predictor").hsep_guard_init(ctypes.byref(guard), ctypes.c_uint64(Np), ctypes.c_double(T_S))
         return guard
 
     def accepts(self, x: Array, x_pb: Array, largest: float) -> NDArray[np.bool_]:
-        work, accepted = np.empty(len(x)), np.empty(len(x))
+        work, accepted, self.standing = np.empty(len(x)), np.empty(len(x)), np.empty(len(x))
         newest_first = [np.ascontiguousarray(array[::-1]) for array in (x, x_pb)]
         c_core.library("predictor").hsep_guard_accept(
             ctypes.byref(self),
@@ -63,6 +67,7 @@ class Guard(ctypes.Structure):
             ctypes.c_double(largest),
             work.ctypes.data_as(ctypes.c_void_p),
             accepted.ctypes.data_as(ctypes.c_void_p),
+            self.standing.ctypes.data_as(ctypes.c_void_p),
         )
         return accepted[::-1] > 0.0
 
@@ -95,17 +100,21 @@ def test_core_and_library_accept_the_same_samples(seed: int) -> None:
             x[k] = x[k - 1] if abs(x_pb[k] - x[k - 1]) < 2e-3 else x_pb[k] - 2e-3 * np.sign(x_pb[k] - x[k - 1])
     if seed % 5 == 0:  # it rings
         x[28 * n : 36 * n] += 2e-4 * np.sin(np.arange(8 * n) * 17.0 / n)
-    guard, core = SensorGuard(2 * n), Guard.begin(2 * n)
+    guard, core = SensorGuard(n, T_S, CONSTANTS), Guard.begin(n)
     rejected = 0
     for i in range(0, 40 * n, n):
         expected = guard.accepts(x[i : i + n], x_pb[i : i + n], 1e-4)
         assert core.accepts(x[i : i + n], x_pb[i : i + n], 1e-4).tolist() == expected.tolist()
+        assert (core.standing[::-1] > 0.0).tolist() == guard.standing.tolist()
         rejected += n - int(expected.sum())
         doubted = guard.doubted(x_pb[i : i + n], 1e-6)
         assert core.doubted(x_pb[i : i + n], 1e-6) == (None if doubted is None else doubted.tolist())
     assert 0 < rejected < 20 * n
+    assert (core.patience, core.patience_standing) == (guard.patience, guard.patience_standing)
     assert (core.gap, core.doubtful, core.repeats) == (guard.gap, guard.doubtful, guard.held.repeats)
-    assert (core.holding, core.stuck, core.first) == (guard.holding, guard.stuck, guard.first)
+    assert (core.holding, core.rests, core.position) == (guard.holding, guard.rests, guard.position)
+    assert core.motion == pytest.approx(guard.motion, rel=1e-12)
+    assert core.motion_pb == pytest.approx(guard.motion_pb, rel=1e-12)
     assert (core.step, core.pace) == (guard.held.step, guard.pace)
     assert core.spread == pytest.approx(guard.spread, rel=1e-12)
     assert core.vibration == pytest.approx(guard.vibration, rel=1e-12)
@@ -117,7 +126,7 @@ def test_core_and_library_doubt_alike(fault: str) -> None:
     x_pb = 1e-3 * np.sin(0.05 * np.arange(12 * n))
     x = x_pb + np.random.default_rng(1).normal(0.0, 1e-7, 12 * n)
     x[95:] = {"held": np.full(145, x[94]), "another level": x[95:] + 1e-2, "missing": np.full(145, np.nan)}[fault]
-    guard, core, told = SensorGuard(2 * n), Guard.begin(2 * n), []
+    guard, core, told = SensorGuard(n, T_S, CONSTANTS), Guard.begin(n), []
     for i in range(0, 12 * n, n):
         assert core.accepts(x[i : i + n], x_pb[i : i + n], 1e-6).tolist() == (
             guard.accepts(x[i : i + n], x_pb[i : i + n], 1e-6).tolist()

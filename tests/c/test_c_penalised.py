@@ -16,17 +16,20 @@ NO_PENALTY = 1e-40
 
 
 class CSolution:
-    """Weights of the first features of a regression with penalties, as hsep_candidate.c solves for them."""
+    """Weights of the first features of a regression with penalties, as hsep_expert.c solves for them."""
 
     def __init__(self, regression: CRegression, penalties: Array) -> None:
         library, m = regression.library, len(penalties)
         library.hsep_penalised_solve.restype = library.hsep_penalised_leverage.restype = ctypes.c_double
         self.solved, self.weights = CRegression(m, 1.0), np.empty(m)
+        library.hsep_block_fold_size.restype = ctypes.c_double
+        work = np.empty(int(library.hsep_block_fold_size(*2 * [ctypes.c_uint64(regression.n)])))
         self.residual_sum = library.hsep_penalised_solve(
             regression._block,
             penalties.ctypes.data_as(ctypes.c_void_p),
             self.solved._block,
             self.weights.ctypes.data_as(ctypes.c_void_p),
+            work.ctypes.data_as(ctypes.c_void_p),
         )
 
     def leverage(self, rows: Array) -> Array:

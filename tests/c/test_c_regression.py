@@ -53,25 +53,20 @@ def test_rows_that_outweigh_all_before_them_lose_nothing() -> None:
 
 @pytest.mark.parametrize("n", [1, 3, 4, 5, 8, 23])
 @pytest.mark.parametrize("size", [1e-6, 1.0, 100.0])
-def test_the_rows_of_another_regression_are_folded_as_they_are(n: int, size: float) -> None:
+@pytest.mark.parametrize("count", [1, 2, 7, 50])
+def test_rows_folded_at_once_are_those_folded_one_by_one(n: int, size: float, count: int) -> None:
     # 1e-9 relative against long double: rows that weigh as much, next to nothing, and far more than those before.
     rng = np.random.default_rng(n)
-    rows = rng.normal(size=(90, n)) * np.where(np.arange(90) < 40, 1.0, size)[:, None]
-    target = rows @ rng.normal(size=n) + 0.1 * rng.normal(size=90)
-    both, other = CRegression(n, 1e-9), CRegression(n, 1e-9)
-    library, second = RidgeRegression(n, 1e-9), RidgeRegression(n, 1e-9)
-    for ours, peer, part in ((both, library, slice(None, 40)), (other, second, slice(40, None))):
-        ours.fold(rows[part], target[part])
-        peer.update(rows[part], target[part])
-    both.library.hsep_regression_fold_all(both._block, other._block)
-    library.update_from(second)
-    exact = oracle.ridge_extended(rows, target, 2e-9).astype(float)
-    for weights in (both.weights, library.weights):
-        assert np.linalg.norm(weights - exact) <= 1e-9 * np.linalg.norm(exact)
-    left = float(np.sum((target - rows @ exact) ** 2)) + 2e-9 * float(exact @ exact)
-    assert both.residual_sum == pytest.approx(left, rel=1e-9)
-    assert library.residual_sum == pytest.approx(left, rel=1e-9)
-    assert library.n_samples == 90
+    rows = rng.normal(size=(40 + count, n)) * np.where(np.arange(40 + count) < 40, 1.0, size)[:, None]
+    target = rows @ rng.normal(size=n) + 0.1 * rng.normal(size=40 + count)
+    regression, library = CRegression(n, 1e-6), RidgeRegression(n, 1e-6)
+    regression.fold(rows[:40], target[:40])
+    regression.fold_at_once(rows[40:], target[40:])
+    library.update(rows, target)
+    exact = oracle.ridge_extended(rows, target, 1e-6).astype(float)
+    assert np.linalg.norm(regression.weights - exact) <= 1e-9 * np.linalg.norm(exact)
+    assert regression.residual_sum == pytest.approx(library.residual_sum, rel=1e-9)
+    assert regression.n_samples == 40 + count
 
 
 def staircase_rows(p: int, q: int, n: int) -> tuple[Array, Array]:

@@ -32,6 +32,7 @@ from hybridsep.machines.machine import load_machine
 from hybridsep.machines.paper import paper_machine
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
+from hybridsep.predict.trust.learned import learned_numbers
 from hybridsep.predict.uncertainty import N_LEARNED
 
 MACHINE = paper_machine("spring_mass_damper")
@@ -201,17 +202,19 @@ def test_no_mutation_of_a_file_with_trust_is_accepted(tmp_path: Path) -> None:
     first = 40 + 32 * len(learned_settings(predictor))
     body = content[:-8]
     trusted = trusted_model(predictor)
-    n_blended, n_candidates = len(trusted.blend.first), len(trusted.candidates)
-    n_numbers = 5 + 2 * n_candidates + trusted.static.n + n_blended * (n_blended + 2) + 4 + N_LEARNED
-    errors, correlations = first + 8 * (n_numbers - N_LEARNED), first + 8 * (5 + n_candidates)
+    sizes = [one.size for one in learned_numbers(trusted).values()]
+    places = dict(zip(learned_numbers(trusted), first + 8 * (np.cumsum(sizes) - sizes), strict=True))
+    n_numbers = sum(sizes) + N_LEARNED
+    errors = first + 8 * sum(sizes)
     assert struct.unpack_from("<Q", body, 32) == (n_numbers,)
-    spread, step, stuck, vibration = errors - 32, errors - 24, errors - 16, errors - 8
+    spread, step, vibration = (int(places["sensor"]) + 8 * i for i in range(3))
+    rows, noise, correlations = (int(places[name]) for name in ("n_rows", "noise_variances", "correlations"))
     nonsense = [
         *(body[:i] + struct.pack("<d", wrong) + body[i + 8 :] for i in (spread, step) for wrong in (-2.0, np.nan)),
         body[:spread] + struct.pack("<d", np.inf) + body[spread + 8 :],
         body[:step] + struct.pack("<d", 0.0) + body[step + 8 :],
-        *(body[:i] + struct.pack("<d", -1.0) + body[i + 8 :] for i in (stuck, vibration)),
-        *(body[:i] + struct.pack("<d", wrong) + body[i + 8 :] for i in (first, first + 80) for wrong in (-1.0, np.nan)),
+        body[:vibration] + struct.pack("<d", -1.0) + body[vibration + 8 :],
+        *(body[:i] + struct.pack("<d", wrong) + body[i + 8 :] for i in (rows, noise) for wrong in (-1.0, np.nan)),
         *(body[:i] + struct.pack("<d", 0.5) + body[i + 8 :] for i in (correlations, correlations + 8)),
         *(body[:i] + struct.pack("<d", -1.0) + body[i + 8 :] for i in (errors, errors + 8 * (N_LEARNED - 2))),
         *(body[:32] + struct.pack("<Q", n) + body[40:] for n in (0, n_numbers - 1, n_numbers + 1, 2**63)),

@@ -13,6 +13,7 @@ from hybridsep.base.settings import PredictorSettings
 from hybridsep.model.physics import ModalModel
 from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.predictor import HybridPredictor
+from hybridsep.predict.trust.constants import CONSTANTS
 from hybridsep.predict.trust.guard import SensorGuard
 
 Array = NDArray[np.float64]
@@ -29,7 +30,7 @@ def motion(n: int = 3000) -> tuple[Array, Array]:
 
 
 def accepted(x: Array, x_pb: Array, *, scale: float = 1.0) -> NDArray[np.bool_]:
-    guard, largest, found = SensorGuard(2 * NP), 0.0, []
+    guard, largest, found = SensorGuard(NP, 1e-3, CONSTANTS), 0.0, []
     for i in range(0, len(x), NP):
         window = slice(i, i + NP)
         found.append(guard.accepts(scale * x[window], scale * x_pb[window], largest))
@@ -140,7 +141,7 @@ def test_wrong_values_are_rejected_while_a_drive_rings() -> None:
 
 
 def test_a_wrong_value_in_a_short_window_is_no_vibration() -> None:
-    guard = SensorGuard(6)
+    guard = SensorGuard(3, 1e-3, CONSTANTS)
     for x in ([0.0, 1e-7, 0.0], [0.0, 1.0, 0.0], [1e-7, 0.0, 1e-7]):
         found = guard.accepts(np.array(x), np.zeros(3), 1e-6)
     assert guard.vibration == 0.0

@@ -13,6 +13,7 @@ from hybridsep.base.errors import ParameterError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.predict.predictor import HybridPredictor
+from hybridsep.predict.trust.model import COMMAND, LAGGED, STATIC
 
 NOISE = 1e-7  # m
 
@@ -147,14 +148,14 @@ def test_what_is_not_learned_is_where_the_next_window_starts() -> None:
 
 
 def test_what_is_held_is_bounded_by_what_was_learned() -> None:
-    """The last residual may not have been learned; the candidate that holds it predicts 1.2 times the largest one."""
+    """The last residual may not have been learned; the expert that holds it predicts 1.2 times the largest one."""
     x_d = cycles(3000)
     rng = np.random.default_rng(5)
     x = physics(x_d) + 1e-5 + np.cumsum(1e-7 * rng.normal(size=3000))  # an offset that drifts, which a hold predicts
     predictor = trusted()
     run(predictor, x_d[:2900], x[:2900])
-    assert trusted_model(predictor).blend.weights[0] > 0.3
-    trusted_model(predictor).past[0] = 1.0
+    assert trusted_model(predictor).stack.weights[0] > 0.3
+    trusted_model(predictor).run.past[0] = 1.0
     largest = trusted_model(predictor).scale.largest
     assert np.abs(predictor.predict(x_d[2900:]).e_h).max() <= 1.2 * largest < 1e-4
 
@@ -172,15 +173,16 @@ def test_a_changed_drive_is_relearned_where_samples_lose_their_weight() -> None:
     assert rms((true - faded)[late]) < 1e-6
 
 
-def test_the_noise_that_is_given_is_that_of_the_candidates() -> None:
+def test_the_noise_that_is_given_is_that_of_the_experts() -> None:
     x_d, _, x = with_friction(1000, noise=1e-6)
     predictor = trusted(noise_std=3e-6)
     run(predictor, x_d, x)
-    assert [one.noise_variance for one in trusted_model(predictor).candidates] == [pytest.approx(9e-12)] * 3
+    experts = trusted_model(predictor).experts
+    assert [experts[i].noise_variance for i in (LAGGED, STATIC, COMMAND)] == [pytest.approx(9e-12)] * 3
     estimated = trusted()
     run(estimated, x_d, x)
-    for one in trusted_model(estimated).candidates:
-        assert math.sqrt(one.noise_variance) == pytest.approx(1e-6, rel=0.3)
+    for i in (LAGGED, STATIC):
+        assert math.sqrt(trusted_model(estimated).experts[i].noise_variance) == pytest.approx(1e-6, rel=0.3)
 
 
 def test_an_effect_that_is_given_bounds_what_features_explain() -> None:

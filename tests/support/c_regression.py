@@ -29,6 +29,19 @@ class CRegression:
         pointer = stacked.ctypes.data_as(ctypes.c_void_p)
         self.library.test_fold(self._block, pointer, ctypes.c_size_t(len(rows)), ctypes.c_size_t(repetitions))
 
+    def fold_at_once(self, rows: Array, target: Array) -> None:
+        """Fold rows by hsep_block_fold."""
+        stacked, count = np.column_stack((rows, target)), ctypes.c_uint64(len(rows))
+        self.library.hsep_block_fold_size.restype = ctypes.c_double
+        self.library.hsep_block_fold_row.restype = ctypes.POINTER(ctypes.c_double)
+        work = np.full(int(self.library.hsep_block_fold_size(ctypes.c_uint64(self.n), count)), np.nan)
+        pointer = work.ctypes.data_as(ctypes.c_void_p)
+        for b, row in enumerate(stacked.tolist()):
+            place = self.library.hsep_block_fold_row(pointer, ctypes.c_uint64(self.n), ctypes.c_uint64(b))
+            for j, value in enumerate(row):
+                place[j] = value
+        self.library.hsep_block_fold(self._block, pointer, count, 0)
+
     def load(self, i: int, row: Array) -> int:
         place = self.library.hsep_regression_row(self._block)
         for j, value in enumerate(row.tolist()):
@@ -45,3 +58,7 @@ class CRegression:
     @property
     def residual_sum(self) -> float:
         return float(self.block[3])
+
+    @property
+    def n_samples(self) -> int:
+        return int(self.block.view(np.uint64)[2])

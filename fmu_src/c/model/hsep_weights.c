@@ -8,7 +8,7 @@
 #include <string.h>
 
 #define WEIGHTS_FILE "weights.bin"
-#define WEIGHTS_MAGIC "HSEPWGT8"
+#define WEIGHTS_MAGIC "HSEPWGT9"
 #define WEIGHTS_CHUNK 512 /* bytes that are summed up at once, a multiple of 8 */
 
 typedef struct {
@@ -93,7 +93,7 @@ static int weights_compare_settings(
     return n_missing == 0 || message[0] != '\0';
 }
 
-/* Read what has been learned besides the factor, by the residual model and of the errors. 0 if it is damaged. */
+/* Read what has been learned besides the factors, by the residual model and of the errors. 0 if it is damaged. */
 static int weights_take_learned(FILE *file, hsep_residual_model *model, hsep_uncertainty *uncertainty)
 {
     for (uint64_t i = 0; i < hsep_residual_n_learned(model); i++) {
@@ -106,13 +106,37 @@ static int weights_take_learned(FILE *file, hsep_residual_model *model, hsep_unc
            hsep_uncertainty_sound(uncertainty) && hsep_residual_sound(model);
 }
 
+/* Read a factor row after row through the regression's own row: 0 if it is damaged. */
+static int weights_take_factor(FILE *file, hsep_regression *regression, uint64_t n_samples)
+{
+    for (uint64_t i = 0; i <= regression->n; i++) {
+        const size_t left = (size_t)(regression->n + 1 - i);
+        if (fread(hsep_regression_row(regression), sizeof(double), left, file) != left ||
+            !hsep_regression_load(regression, i)) {
+            return 0;
+        }
+    }
+    regression->n_samples = n_samples;
+    return 1;
+}
+
+/* Bytes of a file with this head. */
+static double weights_size(const weights_head *head, hsep_residual_model *model)
+{
+    double words = 4.0 * (double)head->n_settings + (double)head->n_learned + 1.0;
+    for (uint64_t i = 0; i < hsep_residual_n_factors(model); i++) {
+        const double n = (double)hsep_residual_factor(model, i)->n;
+        words += 0.5 * (n + 1.0) * (n + 2.0);
+    }
+    return (double)sizeof *head + words * (double)sizeof(double);
+}
+
 /* Read the file: 0 if it is damaged; with a message, if it was learned with other settings. */
 static int weights_take(
     FILE *file, const hsep_context *context, const double values[], uint64_t n_modes, hsep_predictor *predictor,
     char message[])
 {
     hsep_residual_model *model = hsep_predictor_model(predictor);
-    hsep_regression *regression = hsep_residual_regression(model);
     weights_head head;
     double size = 0.0;
     if (!weights_whole(file, &size) || fread(&head, sizeof head, 1, file) != 1 ||
@@ -125,21 +149,15 @@ static int weights_take(
         message[0] != '\0') {
         return 0;
     }
-    const uint64_t n_learned = HSEP_N_UNCERTAINTY + hsep_residual_n_learned(model);
-    const double n = (double)regression->n, settings = 4.0 * (double)head.n_settings;
-    const double words = settings + (double)n_learned + 0.5 * (n + 1.0) * (n + 2.0) + 1.0;
-    if (head.n_learned != n_learned || size != (double)sizeof head + words * (double)sizeof(double) ||
+    if (head.n_learned != HSEP_N_UNCERTAINTY + hsep_residual_n_learned(model) || size != weights_size(&head, model) ||
         !weights_take_learned(file, model, hsep_predictor_uncertainty(predictor))) {
         return 0;
     }
-    for (uint64_t i = 0; i <= regression->n; i++) { /* row after row through the regression's own row */
-        const size_t left = (size_t)(regression->n + 1 - i);
-        if (fread(hsep_regression_row(regression), sizeof(double), left, file) != left ||
-            !hsep_regression_load(regression, i)) {
+    for (uint64_t i = 0; i < hsep_residual_n_factors(model); i++) {
+        if (!weights_take_factor(file, hsep_residual_factor(model, i), head.n_samples)) {
             return 0;
         }
     }
-    regression->n_samples = head.n_samples;
     hsep_residual_restart(model);
     return 1;
 }

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from ...base.errors import SignalError
 from ...base.signals import Array
 from ...model.discrete import DiscreteModel
+from .constants import CONSTANTS, TrustConstants
 
 __all__ = ["LEAST_VELOCITY", "Disturbance", "StaticFeatures", "StaticState"]
 
@@ -25,10 +26,7 @@ Disturbance: TypeAlias = Callable[[Array, Array], ArrayLike]
 """Disturbance of the user's own, ``d(x, v)``, in any unit: a number for each position ``x``, m, and commanded velocity
 ``v``, m/s, ``(n,)`` each. It knows nothing of other samples."""
 
-_FRICTION_SPREAD = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
-"""Velocities ``v_i`` of the friction's change of sign, relative to the velocity scale."""
-
-_N_FRICTION, _N_LASTING, _N_PERIODIC = len(_FRICTION_SPREAD), len(_FRICTION_SPREAD) + 2, 2
+_N_FRICTION, _N_LASTING, _N_PERIODIC = 6, 8, 2
 """Disturbances by friction, with stiffness and damping, and those that repeat with the position."""
 
 LEAST_VELOCITY = 1e-200
@@ -42,9 +40,6 @@ _OWN_REACH = 1e-3
 
 _DIFFERENCES = 3
 """Largest order of a difference of ``x_pb``: velocity, acceleration and jerk."""
-
-_DIFFERENCE_SHARE = 0.03
-"""Effect of a disturbance's first difference relative to its own: they only correct its timing."""
 
 
 class StaticState(NamedTuple):
@@ -124,6 +119,7 @@ class StaticFeatures:
         Of a disturbance that repeats with the position; 0: none.
     own : sequence of Disturbance
         Those of the user's own.
+    constants : TrustConstants
 
     Attributes
     ----------
@@ -133,19 +129,29 @@ class StaticFeatures:
         The start, which positions are relative to: a disturbance that repeats does not know of it.
     shares : (n,) array
         Effect that a feature may have, relative to the largest.
+    spread : (6,) array
+        Velocities of the friction's change of sign, relative to the velocity scale.
     damping_of_motion : bool
         Whether the damping is that of the position's own velocity; else that of ``x_pb``. Behind a compensator ``x_pb``
         turns with every change of the command, and is far from the motion.
     """
 
-    def __init__(self, discrete: DiscreteModel, q: int, period: float = 0.0, own: Sequence[Disturbance] = ()) -> None:
+    def __init__(
+        self,
+        discrete: DiscreteModel,
+        q: int,
+        period: float = 0.0,
+        own: Sequence[Disturbance] = (),
+        constants: TrustConstants = CONSTANTS,
+    ) -> None:
         self.discrete, self.period, self.own, self.origin = discrete, period, tuple(own), 0.0
+        self.spread = constants.friction_least * constants.friction_ratio ** np.arange(_N_FRICTION)
         self.damping_of_motion = False
         self.n_differences = min(q, _DIFFERENCES)
         self.n_disturbances = _N_LASTING + (_N_PERIODIC if period > 0.0 else 0) + len(self.own)
         self.n = 2 + self.n_differences + 2 * self.n_disturbances
         self.shares = np.ones(self.n)
-        self.shares[-self.n_disturbances :] = _DIFFERENCE_SHARE
+        self.shares[-self.n_disturbances :] = constants.difference_share
 
     def rest(self) -> StaticState:
         """Return the state at rest."""
@@ -183,7 +189,7 @@ class StaticFeatures:
         past = np.concatenate((state.x_pb, x_pb))
         v = self._damped_velocity(state, x_pb, x)
         disturbances = np.empty((len(x_d), self.n_disturbances))
-        disturbances[:, :_N_FRICTION] = np.tanh(v_d[:, None] / _spread(velocity_scale))
+        disturbances[:, :_N_FRICTION] = np.tanh(v_d[:, None] / self._spread(velocity_scale))
         disturbances[:, _N_FRICTION] = x * np.abs(x)
         disturbances[:, _N_FRICTION + 1] = v * np.abs(v)
         if self.period > 0.0:
@@ -214,7 +220,7 @@ class StaticFeatures:
             0: the tangent.
         """
         v_d = np.diff(x_d, prepend=state.x_d) / self.discrete.T_s
-        spread = _spread(velocity_scale)
+        spread = self._spread(velocity_scale)
         v, half = v_d[:, None], reach * velocity_scale
         if half > 0.0:
             friction = (np.tanh((v + half) / spread) - np.tanh((v - half) / spread)) / (2.0 * half)
@@ -268,7 +274,6 @@ class StaticFeatures:
         second = first + self.n_disturbances
         return weights[1:first], weights[first:second], weights[second:]
 
-
-def _spread(velocity_scale: float) -> Array:
-    """Return the velocities of the friction's change of sign, m/s."""
-    return (velocity_scale or 1.0) * np.array(_FRICTION_SPREAD)
+    def _spread(self, velocity_scale: float) -> Array:
+        """Return the velocities of the friction's change of sign, m/s."""
+        return np.asarray((velocity_scale or 1.0) * self.spread)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ...base.signals import Array
 from ..forecast import FeatureScales, Forecast
-from .candidates import CandidatePrediction
+from .experts import ExpertPrediction
 
 __all__ = ["TrustedForecast"]
 
@@ -19,14 +20,14 @@ class TrustedForecast(Forecast):
     ----------
     x : (n,) array, m
         Position that the stiffness acts at.
-    hold : float, m
-        Last residual, bounded: the prediction of the hold candidate.
-    predictions : tuple of CandidatePrediction
-        Of the learned candidates; empty before anything is learned.
+    stacked : (n_experts, n) array, m
+        Predictions that are stacked; 0 where an expert knows nothing.
+    predictions : mapping
+        Of the experts that know something, by their places in the stack.
     scales : FeatureScales
     """
 
     x: Array
-    hold: float
-    predictions: tuple[CandidatePrediction, ...]
+    stacked: Array
+    predictions: Mapping[int, ExpertPrediction]
     scales: FeatureScales

@@ -15,42 +15,27 @@ from ...base.errors import SignalError
 from ...base.saved import COUNT_MAX
 from ...base.signals import Array
 from ..held import HeldValue
+from .constants import TrustConstants
 
 __all__ = ["N_STATE", "SensorGuard"]
-
-_SPREADS, _RESOLUTION, _SMALL, _RIPPLE = 12.0, 3.0, 0.01, 0.1
-"""Plausible deviation: in mean deviations, in resolution steps, and relative to the largest residual and to the
-predicted motion of a sample: a drive at rest does not show the ripple that it has in motion."""
-
-_PACE = 2.0
-"""Plausible change of the residual from sample to sample, relative to the predicted motion or the vibration."""
-
-_NOISE, _CHANGES = 2.0, 8
-"""Median change of the residual from sample to sample that noise may make, in mean deviations: white noise makes 1.4.
-And the changes that a window has to have to tell the vibration: most of fewer could be those of one wrong value."""
-
-_STOOD, _STUCK = 0.5, 2.0
-"""Change at the end of a run of equal values, relative to the motion predicted since its beginning, below which the
-axis itself stood still: a sensor that was held shows the whole motion then. And what is believed from then on,
-relative to that motion."""
 
 _DOUBTED = 3
 """Doubtful samples in a row from which on they may be true; fewer are wrong values."""
 
-_STANDING = 3.0
-"""Patience with equal values relative to that with another level: a sensor may stick for half a second."""
+_WINDOWS = 2
+"""Least patience, in windows: what is believed is learned by windows."""
 
 _NEIGHBOURS = 2
 """Samples to either side that an isolated value is compared with."""
 
-_COUNTS = ("gap", "doubtful", "holding")
-_NUMBERS = ("last", "spread", "pace", "last_x_pb", "first", "stuck", "vibration")
+_COUNTS = ("gap", "doubtful", "holding", "rests")
+_NUMBERS = ("last", "spread", "pace", "last_x_pb", "vibration", "motion", "motion_pb", "position")
 
 N_STATE = len(_COUNTS) + len(_NUMBERS) + HeldValue.N_STATE + _NEIGHBOURS
 """Numbers of a state."""
 
-_RISE, _FALL = 0.5, 0.02
-"""Rates at which the mean deviation follows that of a window; the vibration rises at once, and falls as it does."""
+_CHANGES = 8
+"""Changes that a window has to have to tell the vibration: most of fewer could be those of one wrong value."""
 
 
 class SensorGuard:
@@ -58,23 +43,30 @@ class SensorGuard:
 
     Parameters
     ----------
-    patience : int
-        Doubtful samples in a row after which another level is believed; an axis that stands still, after three times
-        as many.
+    Np : int
+        Samples of a usual window.
+    T_s : float, s
+    constants : TrustConstants
 
     Attributes
     ----------
+    patience, patience_standing : int
+        Doubtful samples in a row after which another level is believed, and an axis that stands still.
     last : float, m
         Last accepted residual.
     gap : int
         Samples since then.
     held : HeldValue
+    standing : (n,) array of bool
+        Samples of the last window in which the axis, or its sensor, stood under a predicted motion: a run of equal
+        values.
     holding : int
         Whether the last value was held, 0 or 1.
-    first : float, m
-        Prediction at the beginning of the run of equal values.
-    stuck : float, m
-        Largest motion that was predicted while the axis itself stood still; 0 if it never did.
+    rests : int
+        Whether the measured motion had faded beside the predicted one when the run of equal values began, 0 or 1: then
+        the axis itself came to rest, and its sensor is not held.
+    motion, motion_pb, position : float, m
+        Measured and predicted motion of a sample, averaged over a few, and the prediction at the last one.
     spread : float, m
         Mean deviation of a residual from the median of its neighbours; −1 before the first window.
     pace : float, m
@@ -90,16 +82,20 @@ class SensorGuard:
         Last residuals, oldest first; NaN where missing.
     """
 
-    def __init__(self, patience: int) -> None:
-        self.patience = patience
-        self.held, self.spread, self.stuck, self.vibration = HeldValue(), -1.0, 0.0, 0.0
+    def __init__(self, Np: int, T_s: float, constants: TrustConstants) -> None:
+        self.constants = constants
+        self.patience = max(_WINDOWS * Np, math.ceil(constants.patience / T_s))
+        self.patience_standing = max(_WINDOWS * Np, math.ceil(constants.patience_standing / T_s))
+        self.held, self.spread, self.vibration = HeldValue(), -1.0, 0.0
         self.restart()
 
     def restart(self) -> None:
         """Begin another run; what is known of the sensor is kept."""
         self.last, self.gap, self.doubtful = 0.0, 0, 0
         self.held.restart()
-        self.holding, self.first = 0, 0.0
+        self.holding = 0
+        self.standing: NDArray[np.bool_] = np.zeros(0, dtype=np.bool_)
+        self.rests, self.motion, self.motion_pb, self.position = 0, 0.0, 0.0, 0.0
         self.pace = 0.0
         self.before = np.zeros(_NEIGHBOURS)
         self.last_x_pb = math.nan
@@ -122,24 +118,27 @@ class SensorGuard:
         pace = float(np.abs(np.diff(x_pb, prepend=first)).max())
         motion = max(pace, self.pace, self.vibration)
         plausible = self._plausible(motion, largest)
-        still = max(plausible, _STUCK * self.stuck)
+        self.standing = np.zeros(len(x), dtype=np.bool_)
         accepted = np.isfinite(x)
         for k, (value, position, e) in enumerate(zip(x.tolist(), x_pb.tolist(), residuals.tolist(), strict=True)):
             self.gap += 1
             if not accepted[k]:
                 continue
-            self._end_run(value, position)
-            self.holding = int(self.held.holds(value, position, still=still))
+            self._follow_motion(value, position)
+            equal = self.held.holds(value, position, still=plausible)
+            run = slice(max(k - self.held.repeats + 1, 0), k + 1)
+            self.standing[run] |= equal
+            self.holding = int(equal and not self.rests)
             if self.holding:
                 self.doubtful += 1
-                if self.doubtful <= _STANDING * self.patience:
-                    accepted[max(k - self.held.repeats + 1, 0) : k + 1] = False
+                if self.doubtful <= self.patience_standing:
+                    accepted[run] = False
                 else:  # the axis itself stands still
                     self.last, self.gap = e, 0
                 continue
             if self.spread >= 0.0:
                 nearest = min(max(e, min(self.last, 0.0)), max(self.last, 0.0))  # towards the prediction is no jump
-                jumping = abs(e - nearest) > plausible + self.gap * _PACE * motion
+                jumping = abs(e - nearest) > plausible + self.gap * self.constants.pace * motion
                 self.doubtful = self.doubtful + 1 if jumping else 0
                 if (jumping and self.doubtful <= self.patience) or deviation[k] > plausible:
                     accepted[k] = False
@@ -175,25 +174,28 @@ class SensorGuard:
 
     def _plausible(self, motion: float, largest: float) -> float:
         """Return the plausible deviation, m, under a predicted motion of a sample, m."""
-        step = 0.0 if math.isinf(self.held.step) else self.held.step
-        return _SPREADS * self.spread + _RESOLUTION * step + _SMALL * largest + _RIPPLE * motion
+        c, step = self.constants, 0.0 if math.isinf(self.held.step) else self.held.step
+        return c.spreads * self.spread + c.resolution * step + c.small * largest + c.ripple * motion
 
-    def _end_run(self, value: float, position: float) -> None:
-        """Judge who stood still where a run of equal values ends, and begin another."""
-        if value == self.held.value:
+    def _follow_motion(self, value: float, position: float) -> None:
+        """Follow the motion of a sample; where it fades beside the predicted one, the axis itself comes to rest."""
+        if math.isnan(self.held.value):
+            self.position = position
             return
-        moved = abs(position - self.first)
-        if self.holding and abs(value - self.held.value) < _STOOD * moved:
-            self.stuck = max(self.stuck, moved)
-        self.first = position
+        rate = self.constants.follow
+        self.motion += rate * (value - self.held.value - self.motion)
+        self.motion_pb += rate * (position - self.position - self.motion_pb)
+        self.position = position
+        if value != self.held.value:
+            self.rests = int(abs(self.motion) < self.constants.stood * abs(self.motion_pb))
 
     def learned(self) -> Array:
         """Return what is known of the sensor, for another run; a spread of −1 and an infinite step are not known."""
-        return np.array([self.spread, self.held.step, self.stuck, self.vibration])
+        return np.array([self.spread, self.held.step, self.vibration])
 
     def restore_learned(self, learned: Array) -> None:
         """Restore :meth:`learned` numbers, which :meth:`is_sound`."""
-        self.spread, self.held.step, self.stuck, self.vibration = learned.tolist()
+        self.spread, self.held.step, self.vibration = learned.tolist()
 
     @staticmethod
     def is_sound(learned: Array) -> bool:
@@ -212,11 +214,15 @@ class SensorGuard:
         ends = np.cumsum((len(_COUNTS), len(_NUMBERS), HeldValue.N_STATE))
         counts, own, held, before = np.split(state, ends)
         values = dict(zip(_NUMBERS, own.tolist(), strict=True))
-        if not all(0 <= count <= COUNT_MAX and count == int(count) for count in counts) or counts[2] > 1:
-            raise SignalError("the guard's gap and doubtful samples must be counts, and holding 0 or 1")
-        if np.isinf(own).any() or np.isinf(before).any() or np.isnan([values["last"], values["first"]]).any():
+        if not all(0 <= count <= COUNT_MAX and count == int(count) for count in counts) or counts[2:].max() > 1:
+            raise SignalError("the guard's gap and doubtful samples must be counts, and holding and rests 0 or 1")
+        if (
+            np.isinf(own).any()
+            or np.isinf(before).any()
+            or np.isnan([values["last"], values["position"], values["motion"], values["motion_pb"]]).any()
+        ):
             raise SignalError("the guard's residuals and positions must be finite")
-        if not all(values[name] >= 0.0 for name in ("pace", "stuck", "vibration")):
+        if not all(values[name] >= 0.0 for name in ("pace", "vibration")):
             raise SignalError("the guard's motions must be ≥ 0")
         if not (values["spread"] >= 0.0 or values["spread"] == -1.0):
             raise SignalError("the guard's spread must be ≥ 0 or −1")
@@ -248,12 +254,12 @@ class SensorGuard:
             self.spread = float(deviations.mean())
             return
         mean = float(np.minimum(deviations, plausible).mean())
-        self.spread += (_RISE if mean > self.spread else _FALL) * (mean - self.spread)
+        self.spread += (self.constants.rise if mean > self.spread else self.constants.fall) * (mean - self.spread)
 
     def _follow_vibration(self, residuals: Array) -> None:
         """Follow the median change of the residual, which no minority of wrong values moves."""
         changes = np.abs(np.diff(residuals, prepend=self.before[-1]))
         changes = changes[np.isfinite(changes)]
         if len(changes) >= _CHANGES:
-            seen = max(float(np.median(changes)) - _NOISE * self.spread, 0.0)
-            self.vibration += (1.0 if seen > self.vibration else _FALL) * (seen - self.vibration)
+            seen = max(float(np.median(changes)) - self.constants.vibration_noise * self.spread, 0.0)
+            self.vibration += (1.0 if seen > self.vibration else self.constants.fall) * (seen - self.vibration)

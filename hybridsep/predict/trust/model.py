@@ -1,15 +1,18 @@
-"""Residual model that can be trusted: features with priors, candidates shrunk by their variance, and their blend.
+"""Residual model that can be trusted: the paper's regression twice, stacked with physics and hold.
 
-Where the paper's regression has one bare penalty λ on every weight, here each weight has a prior from the effect that
-its feature may have, and λ is the variance of the noise, estimated from the residuals. Nothing has a scale of its own:
-results for positions in another unit are the same in that unit.
+``e_pb = x − x_pb`` of a window is predicted by physics (0), hold (the last residual), by static features with lags and
+without, and by eq. (4) with ``G_pb = 1``, on the residual of the command itself, which saves a user whose physics model
+is poor. Their sum is weighted by their errors so far (:mod:`~hybridsep.predict.trust.stack`). Where the paper's
+regression has one bare penalty λ on every weight, here each weight has a prior from the effect that its feature may
+have, and λ is the least variance of the noise. Nothing has a scale of its own: results for positions in another unit
+are the same in that unit.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,53 +24,46 @@ from ...model.discrete import DiscreteModel
 from ..forecast import FeatureScales
 from ..regression import RidgeRegression
 from ..residual_model import ResidualModel, SavedFields, WindowInputs
-from .blend import Blend
-from .candidates import Candidate, CandidatePrediction, ResidualScale, SolvedCandidate, lags
-from .change import DOUBTED, ChangeTest
+from .command import CommandFeatures
+from .constants import CONSTANTS, TrustConstants
 from .disturbances import LEAST_VELOCITY, Disturbance, StaticFeatures, StaticState
+from .experts import Evidence, Expert, ExpertPrediction, ResidualScale, SolvedExpert, lags
 from .forecast import TrustedForecast
 from .guard import SensorGuard
-from .learned import is_sound, learned_numbers, restore_learned
+from .learned import learned_numbers, restore_learned, unsound
 from .rest import RestBefore
 from .saved import check_sizes, forecast_fields, restore_trusted, saved_scales, trusted_fields
+from .stack import Stack
 
-__all__ = ["TrustedModel"]
+__all__ = ["COMMAND", "DOUBTING", "HOLD", "LAGGED", "STATIC", "RunState", "TrustedModel"]
 
-_LAST_LAG = 0.005
-"""Prior variance of the weight of a lag relative to that of the lag ``p`` before it."""
-
-_CAUTIOUS = 100.0
-"""Correlation beyond which the penalty of a cautious candidate does not grow: it would learn nothing at all."""
-
-_FIRST_WEIGHTS, _LATER_WEIGHTS = (0.0, 0.5, 0.5, 0.0), (0.0, 0.0, 0.5, 0.5)
-"""Of the blend without evidence: hold, without lags, with lags, with lags and rows taken as independent. The last one
-learns fastest where G_pb is wrong, but errs by far in the beginning."""
-
-_BOUND = 1.2
-"""Largest prediction relative to the largest residual so far."""
-
-_RECENT = 0.9
-"""Factor by which the mean square of the residual fades from window to window."""
-
-_GROWTH, _GROWTH_LEARNED, _MOTION_LEARNED = 30.0, 1000.0, 15.0
-"""Growth of the commanded velocity by which what was learned at lower ones is forgotten: the first one, as that was a
-creep, and the second one when rows of so many windows are learned."""
-
-_LEAST_NOISE = 1e-4
-"""Bound on λ relative to the largest mean square of the residual: a larger λ would prevent any learning."""
-
-_CARRIED = 30.0
-"""Largest weight of earlier runs when another begins, in windows: a machine may have changed meanwhile."""
-
-_SURPRISE, _SURPRISED = 10.0, 0.1
-"""Mean square error of a window, relative to the expected one, above which the machine has changed; and what then
-remains at least of the weight of all samples before, in windows."""
+HOLD, LAGGED, STATIC, COMMAND, DOUBTING = range(5)
+"""Experts in the order of the stack: the last residual; static features with lags, and without; the command alone; and
+static features with lags and little weight of earlier runs."""
 
 _BRIDGED = 3
 """Lags of a row that may stand for samples without a measurement."""
 
-_NO_PENALTY = 1e-40
-"""λ of the factor itself, m²: penalties come with each solution."""
+
+class RunState(NamedTuple):
+    """What a run has been before the next window; positions relative to the start.
+
+    Attributes
+    ----------
+    static : StaticState
+    commands : (d + p + 1,) array, m
+        Last commands, oldest first.
+    past, past_of_command : (p,) array, m
+        Last residuals of the physics model, and of the command; newest first.
+    bridged : (p,) array of bool
+        Which of these stand for samples without a measurement.
+    """
+
+    static: StaticState
+    commands: Array
+    past: Array
+    past_of_command: Array
+    bridged: NDArray[np.bool_]
 
 
 class TrustedModel(ResidualModel[TrustedForecast]):
@@ -79,49 +75,88 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         ``p`` and ``q`` are the largest lags, ``lam`` the least variance of the noise.
     discrete : DiscreteModel
         ``G_pb``.
+    own : sequence of Disturbance
+        Of the user's own.
+    constants : TrustConstants
     """
 
     may_miss: ClassVar[bool] = True
 
-    def __init__(self, settings: PredictorSettings, discrete: DiscreteModel, own: Sequence[Disturbance] = ()) -> None:
-        self.settings, self.preview = settings, settings.Np
-        self.static = StaticFeatures(discrete, settings.q, settings.period, own)
+    def __init__(
+        self,
+        settings: PredictorSettings,
+        discrete: DiscreteModel,
+        own: Sequence[Disturbance] = (),
+        constants: TrustConstants = CONSTANTS,
+    ) -> None:
+        self.settings, self.constants, self.preview = settings, constants, settings.Np
         p = settings.p
-        self.regression = RidgeRegression(self.static.n + p, _NO_PENALTY)
-        lag_scales = np.sqrt(_LAST_LAG ** (np.arange(p) / p))
-        self.candidates = (
-            Candidate(self.static.n, lag_scales[:0], _CAUTIOUS, settings.Np),
-            Candidate(self.static.n, lag_scales, _CAUTIOUS, settings.Np),
-            Candidate(self.static.n, lag_scales, 1.0, settings.Np),
-        )
-        self.blend = Blend(_FIRST_WEIGHTS, _LATER_WEIGHTS, settings.Np)
-        self.n_rows = 0.0
+        self.static = StaticFeatures(discrete, settings.q, settings.period, own, constants)
+        self.command = CommandFeatures(discrete.dead_time, p)
+        self.experts = {
+            LAGGED: Expert(self.static.shares, p, constants),
+            STATIC: Expert(self.static.shares, 0, constants),
+            COMMAND: Expert(np.ones(self.command.n), p, constants),
+            DOUBTING: Expert(self.static.shares, p, constants),
+        }
+        self.stack = Stack((0.0, constants.first_lagged, constants.first_static, 0.0, 0.0), constants)
+        self.evidence = Evidence.none(self.static.n + p)
+        self.evidence_of_command = Evidence.none(self.command.n + p)
+        self.doubting: Evidence | None = None
         self.largest = np.zeros(self.static.n)
-        self.velocity_scale = 0.0
-        self.scale = ResidualScale()
-        self.guard = SensorGuard(2 * settings.Np)
+        self.velocity_scale = self.largest_step = 0.0
+        self.scale, self.scale_of_command = ResidualScale(), ResidualScale()
+        self.guard = SensorGuard(settings.Np, settings.T_s, constants)
         self.restart()
 
     def restart(self) -> None:
         """Begin another run, at rest; what was learned is kept."""
-        self.state: StaticState = self.static.rest()
-        self.past = np.zeros(self.settings.p)
-        self.past_bridged: NDArray[np.bool_] = np.zeros(self.settings.p, dtype=np.bool_)
+        p = self.settings.p
+        no: NDArray[np.bool_] = np.zeros(p, dtype=np.bool_)
+        self.run = RunState(self.static.rest(), np.zeros(self.command.n_before), np.zeros(p), np.zeros(p), no)
         self.guard.restart()
         self.n_rejected = 0
         self.rest = RestBefore(self.settings.measurement_delay)
-        carried = _CARRIED * self.settings.Np
-        self.change: ChangeTest | None = None
-        self._discount(carried / max(self.n_rows, carried))
-        if self.n_rows > 0.0:
-            correlations = tuple(candidate.correlation for candidate in self.candidates)
-            self.change = ChangeTest(self.regression, self.n_rows, correlations)
+        carried = self.constants.carried * self.settings.Np
+        self.evidence.discount(carried / max(self.evidence.n_rows, carried))
+        self.evidence_of_command.discount(carried / max(self.evidence_of_command.n_rows, carried))
+        self._doubt()
+
+    def _doubt(self) -> None:
+        """Begin to doubt what earlier runs have taught."""
+        self._end_doubt()
+        if self.evidence.n_rows > 0.0:
+            self.doubting = self.evidence.less(self.constants.less)
+            self.experts[DOUBTING].take_over(self.experts[LAGGED])
+            self.stack.copy(LAGGED, DOUBTING)
 
     def begin_in_motion(self, forecast: TrustedForecast, x_d: Array, x_pb: Array) -> TrustedForecast:
         """Correct what was before a run in motion: commands and physics-based prediction went on as they begin."""
-        before = np.arange(-len(self.state.x_pb), 0)
-        self.state = self.state._replace(x_d=float(2.0 * x_d[0] - x_d[1]), x_pb=x_pb[0] + (x_pb[1] - x_pb[0]) * before)
+        static, n, p = self.run.static, self.command.n_before, self.settings.p
+        commands = x_d[0] + (x_d[1] - x_d[0]) * np.arange(-n, 0)
+        positions = x_pb[0] + (x_pb[1] - x_pb[0]) * np.arange(-max(n, len(static.x_pb)), 0)
+        late = commands[-1 - self.command.dead_time :: -1][:p]
+        self.run = self.run._replace(
+            static=static._replace(x_d=float(commands[-1]), x_pb=positions[-len(static.x_pb) :]),
+            commands=commands,
+            past_of_command=positions[: -p - 1 : -1] - late,
+        )
         return super().begin_in_motion(forecast, x_d, x_pb)
+
+    @property
+    def regression(self) -> RidgeRegression:  # type: ignore[override]
+        """Of all learned samples."""
+        return self.evidence.regression
+
+    @property
+    def regressions(self) -> tuple[RidgeRegression, ...]:
+        """Of the physics model's residual, and of the command's."""
+        return self.regression, self.evidence_of_command.regression
+
+    @property
+    def n_rows(self) -> float:
+        """Rows learned so far, weighted."""
+        return self.evidence.n_rows
 
     @property
     def lag_weights(self) -> Array:
@@ -131,7 +166,7 @@ class TrustedModel(ResidualModel[TrustedForecast]):
     @property
     def last(self) -> float:
         """Last residual that was accepted or bridged, m."""
-        return float(self.past[0])
+        return float(self.run.past[0])
 
     @property
     def may_begin_in_motion(self) -> bool:
@@ -163,37 +198,53 @@ class TrustedModel(ResidualModel[TrustedForecast]):
 
     def forecast_by(
         self,
-        solved: tuple[SolvedCandidate, ...],
+        solved: Mapping[int, SolvedExpert],
         x_d: Array,
         x_pb: Array,
         scales: FeatureScales,
-        held: tuple[CandidatePrediction, ...] = (),
+        held: Mapping[int, ExpertPrediction] | None = None,
     ) -> TrustedForecast:
-        """Predict as :meth:`forecast` by the candidates of :meth:`solved`, with the variances ``held`` if there are."""
-        predictions: tuple[CandidatePrediction, ...] = ()
-        before: Sequence[CandidatePrediction | None] = held or [None] * len(solved)
-        x = x_pb
-        if solved:
-            rows = self._rows(x_d, x_pb, x_pb, scales)
+        """Predict as :meth:`forecast` by the experts of :meth:`solved`, with the shrinking of ``held`` if there is."""
+        held = {} if held is None else held
+        x, rows = x_pb, np.empty((len(x_d), 0))
+        if STATIC in solved:
             # The stiffness acts at the position, which the physics model alone does not give well enough.
-            x = x_pb + self.predict(solved[0], rows, before[0]).e_h
+            rows = self._rows(x_d, x_pb, x_pb, scales)
+            x = x_pb + self._predicted(STATIC, solved, rows, held).e_h
             rows = self._rows(x_d, x_pb, x, scales)
-            predictions = tuple(
-                self.predict(candidate, rows, one) for candidate, one in zip(solved, before, strict=True)
-            )
-        hold = self.hold
-        candidates = self._blended(hold, predictions, len(x_d))
-        e_h = self.blend.weights @ candidates
-        disagreement = np.maximum(self.blend.weights @ candidates**2 - e_h**2, 0.0)
-        return TrustedForecast(x_d, x_pb, e_h, disagreement, x, hold, predictions, scales)
+        found: dict[int, ExpertPrediction] = {}
+        stacked = np.zeros((len(self.stack.first), len(x_d)))
+        stacked[HOLD] = min(max(self.last, -self.bound), self.bound)
+        for expert in solved:
+            of_command = expert == COMMAND
+            features = self.command.rows(self.run.commands, x_d) if of_command else rows
+            found[expert] = self._predicted(expert, solved, features, held)
+            stacked[expert] = found[expert].e_h
+            if of_command:
+                follows = self.command.late(self.run.commands, x_d) - x_pb
+                stacked[expert] = np.clip(stacked[expert] + follows, -self.bound, self.bound)
+        e_h = self.stack.weights @ stacked
+        disagreement = np.maximum(self.stack.weights @ stacked**2 - e_h**2, 0.0)
+        return TrustedForecast(x_d, x_pb, e_h, disagreement, x, stacked, found, scales)
+
+    def _predicted(
+        self, expert: int, solved: Mapping[int, SolvedExpert], rows: Array, held: Mapping[int, ExpertPrediction]
+    ) -> ExpertPrediction:
+        """Return what an expert predicts of a window from its features without lags."""
+        if expert == COMMAND:
+            bound, square = self.constants.bound_of_command * self.scale_of_command.largest, self.scale_of_command
+            past = self.run.past_of_command
+        else:
+            bound, square, past = self.bound, self.scale, self.run.past
+        return solved[expert].predict(rows, past, square.largest_square, bound, held.get(expert))
 
     def _rows(self, x_d: Array, x_pb: Array, x: Array, scales: FeatureScales) -> Array:
         """Return the static features to predict with, ``(n, n_static)``; ``x``: position that the stiffness acts at.
 
         The constant that earlier runs have taught is that of motion: before the first one of this run it is 0.
         """
-        rows, _ = self.static.rows(self.state, x_d, x_pb, x, scales.velocity)
-        if self.change is not None:
+        rows, _ = self.static.rows(self.run.static, x_d, x_pb, x, scales.velocity)
+        if self.doubting is not None:
             rows[: scales.n_rest, 0] = 0.0
         return rows
 
@@ -207,32 +258,45 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         path : (m,) array, m, optional
             Commanded positions as far as they are known: a compensator begins to move before them, with a creep.
         """
-        peak = self.static.peak_velocity(self.state, x_d)
-        growth = _GROWTH_LEARNED if self.n_rows >= _MOTION_LEARNED * self.settings.Np else _GROWTH
+        c, static = self.constants, self.run.static
+        peak = self.static.peak_velocity(static, x_d)
+        growth = c.growth_learned if self.n_rows >= c.learned * self.settings.Np else c.growth
         outgrown = peak > max(growth * self.velocity_scale, LEAST_VELOCITY)
+        step = max(self.largest_step, peak * self.settings.T_s)
         if path is not None and self.n_rows == 0.0:
             peak = max(float(np.abs(np.diff(path)).max(initial=0.0)) / self.settings.T_s, self.velocity_scale)
             outgrown = peak > max(self.velocity_scale, LEAST_VELOCITY)
         velocity_scale = peak if outgrown else self.velocity_scale
-        rows, _ = self.static.rows(self.state, x_d, x_pb, x_pb, velocity_scale)
+        rows, _ = self.static.rows(static, x_d, x_pb, x_pb, velocity_scale)
         before = np.zeros(self.static.n) if outgrown else self.largest
         n_rest = self.rest.ahead(x_d if path is None else path, len(x_d))
-        return FeatureScales(velocity_scale, np.maximum(before, np.abs(rows).max(axis=0)), n_rest)
+        return FeatureScales(velocity_scale, np.maximum(before, np.abs(rows).max(axis=0)), step, n_rest)
 
-    def has_learned(self, velocity_scale: float) -> bool:
-        """Return whether there is something to predict with at a velocity scale of :meth:`scales`, m/s."""
-        return self.n_rows > 0.0 and velocity_scale == self.velocity_scale and self.scale.largest_square > 0.0
+    def solved(self, scales: FeatureScales) -> dict[int, SolvedExpert]:
+        """Return the experts that know something, with their weights."""
+        solved = {}
+        if self.n_rows > 0.0 and scales.velocity == self.velocity_scale and self.scale.largest_square > 0.0:
+            for expert in (LAGGED, STATIC):
+                solved[expert] = self._solved(expert, self.evidence, scales.largest, self.scale)
+            if self.doubting is not None:
+                solved[DOUBTING] = self._solved(DOUBTING, self.doubting, scales.largest, self.scale)
+        if self.evidence_of_command.n_rows > 0.0 and self.scale_of_command.largest_square > 0.0:
+            largest = self.command.largest(scales.step)
+            solved[COMMAND] = self._solved(COMMAND, self.evidence_of_command, largest, self.scale_of_command)
+        return solved
 
-    def solved(self, scales: FeatureScales) -> tuple[SolvedCandidate, ...]:
-        """Return the candidates with their weights; none if there is nothing to predict with."""
-        if not self.has_learned(scales.velocity):
-            return ()
-        return tuple(self.solve(candidate, scales.largest) for candidate in self.candidates)
+    def _solved(self, expert: int, evidence: Evidence, largest: Array, scale: ResidualScale) -> SolvedExpert:
+        """Return an expert with the weights that follow from all rows so far."""
+        square, settings = scale.largest_square, self.settings
+        effect = settings.effect or math.sqrt(square)
+        first = settings.noise_std**2 or self.constants.first_noise * square
+        least = min(settings.lam, self.constants.least_noise * square)
+        return self.experts[expert].solve(evidence, largest, effect, first, least)
 
     @property
-    def hold(self) -> float:
-        """Last residual, m, bounded: one that was not learned may be larger."""
-        return min(max(float(self.past[0]), -self.bound), self.bound)
+    def bound(self) -> float:
+        """Bound on what is predicted, m."""
+        return self.constants.bound * self.scale.largest
 
     def learn(self, forecast: TrustedForecast, x: Array, *, fold: bool = True) -> NDArray[np.bool_]:
         """Learn from the measurement of a window; return which samples are accepted, ``(m,)`` bool.
@@ -248,28 +312,76 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         """
         m, p = len(x), self.settings.p
         if forecast.scales.velocity != self.velocity_scale:  # outgrown
-            self.regression = RidgeRegression(self.regression.n_features, _NO_PENALTY)
-            self.n_rows = 0.0
-            self.change = None
-        self.velocity_scale, self.largest, n_rest = forecast.scales
-        x_d, x_pb = forecast.x_d[:m], forecast.x_pb[:m]
-        doubtful = self._with_less_of_earlier_runs(forecast)
+            self.evidence = Evidence.none(self.static.n + p)
+            self._end_doubt()
+            self.stack.forget(DOUBTING)
+        self.velocity_scale, self.largest, self.largest_step, n_rest = forecast.scales
+        run, x_d, x_pb = self.run, forecast.x_d[:m], forecast.x_pb[:m]
         accepted = self.guard.accepts(x, x_pb, self.scale.largest)
-        e = _bridged(float(self.past[0]), x - x_pb, accepted)
-        rows, self.state = self.static.rows(self.state, x_d, x_pb, x_pb + e, self.velocity_scale)
-        bridged: NDArray[np.bool_] = np.concatenate((self.past_bridged, ~accepted))
-        if fold and accepted.any():
+        e = _bridged(self.last, x - x_pb, accepted)
+        e_0 = e + x_pb - self.command.late(run.commands, x_d)
+        rows, static = self.static.rows(run.static, x_d, x_pb, x_pb + e, self.velocity_scale)
+        bridged: NDArray[np.bool_] = np.concatenate((run.bridged, ~accepted))
+        # What stands still, axis or sensor, is followed and not learned: it tells nothing of motion.
+        moving = accepted & ~self.guard.standing
+        if fold and moving.any():
             n_bridged = np.convolve(bridged[:-1].astype(np.float64), np.ones(p), "valid")
-            self._fold(rows, e, accepted & (n_bridged <= _BRIDGED))
-            changed = bool(forecast.predictions) and self._has_changed()
-            doubted = self._is_doubted(forecast, doubtful, e, accepted)
-            self._assess(forecast, e, accepted, surprises=not (changed or doubted))
-            self._conclude(changed, doubted)
+            self._fold(rows, x_d, e, e_0, moving & (n_bridged <= _BRIDGED))
+            self._judge(forecast, e, e_0, moving)
         self.rest.pass_by(m, n_rest)
         self.n_rejected += m - int(accepted.sum())
-        self.past = np.concatenate((e[::-1], self.past))[:p]
-        self.past_bridged = bridged[-p:]
+        self.run = RunState(
+            static,
+            np.concatenate((run.commands, x_d))[m:],
+            np.concatenate((e[::-1], run.past))[:p],
+            np.concatenate((e_0[::-1], run.past_of_command))[:p],
+            bridged[-p:],
+        )
         return accepted
+
+    def _fold(self, rows: Array, x_d: Array, e: Array, e_0: Array, learned: NDArray[np.bool_]) -> None:
+        """Update the experts' evidence with a window's rows of static features."""
+        lagged = lags(self.run.past, e)[learned]
+        of_command = self.command.rows(self.run.commands, x_d)[learned]
+        for evidence in (self.evidence, self.doubting, self.evidence_of_command):
+            if evidence is None:
+                continue
+            if self.settings.forgetting > 0.0:
+                evidence.discount(math.exp(-len(e) * self.settings.T_s / self.settings.forgetting))
+            if evidence is self.evidence_of_command:
+                evidence.learn(of_command, lags(self.run.past_of_command, e_0)[learned], e_0[learned])
+            else:
+                evidence.learn(rows[learned], lagged, e[learned])
+
+    def _judge(self, forecast: TrustedForecast, e: Array, e_0: Array, accepted: NDArray[np.bool_]) -> None:
+        """Judge the experts and their stack by the measurement of their window."""
+        given = self.settings.noise_std**2
+        for expert, prediction in forecast.predictions.items():
+            self.experts[expert].judge(prediction, e_0 if expert == COMMAND else e, accepted, given)
+        self.scale = self.scale.with_window(e[accepted])
+        self.scale_of_command = self.scale_of_command.with_window(e_0[accepted])
+        published = accepted & (np.arange(len(e)) >= min(self.settings.measurement_delay, len(e) - 1))
+        if published.any():
+            self.stack.update(forecast.stacked[:, : len(e)][:, published], e[published], self.settings.lam)
+        if self.doubting is None:
+            return
+        if self.stack.weights[DOUBTING] > self.constants.doubt:
+            self._doubt_earlier_runs(self.doubting)
+        elif self.doubting.n_rows > self.constants.doubt_over * self.n_rows:
+            self._end_doubt()
+
+    def _doubt_earlier_runs(self, doubting: Evidence) -> None:
+        """Let all experts go on with little of earlier runs, as the one that doubts them, and judge them anew."""
+        self.evidence = doubting
+        self.evidence_of_command.discount(self.constants.less)
+        self.experts[LAGGED].take_over(self.experts[DOUBTING])
+        self.experts[STATIC].restart()
+        self.stack.restart()
+        self._end_doubt()
+
+    def _end_doubt(self) -> None:
+        self.doubting = None
+        self.stack.forget(DOUBTING)
 
     def doubted(self, x_pb: Array) -> Array | None:
         """Return the residual if the rejected measurement before the window is true, ``(n,)``, m; None if none was."""
@@ -305,160 +417,11 @@ class TrustedModel(ResidualModel[TrustedForecast]):
 
     def is_sound(self, learned: Mapping[str, Array]) -> bool:
         """Return whether the numbers of :meth:`learned` are finite and in range."""
-        return is_sound(self, learned)
+        return unsound(self, learned) is None
 
     def restore_learned(self, learned: Mapping[str, Array]) -> None:
         """Restore the numbers of :meth:`learned`, which are sound."""
         restore_learned(self, learned)
-
-    def _with_less_of_earlier_runs(self, forecast: TrustedForecast) -> Array | None:
-        """Return the prediction with lags if earlier runs had less weight, ``(n,)``, m; None if there is no other."""
-        change = self.change
-        if change is None or change.n_after == 0.0 or not forecast.predictions:
-            return None
-        rows = self._rows(forecast.x_d, forecast.x_pb, forecast.x, forecast.scales)
-        scales = self._static_scales(forecast.scales.largest)
-        solved = self.candidates[1].solve(change.all_rows(DOUBTED), scales, self._least_variance)
-        return self.predict(solved, rows).e_h
-
-    def _is_doubted(
-        self, forecast: TrustedForecast, doubtful: Array | None, measured: Array, accepted: NDArray[np.bool_]
-    ) -> bool:
-        """Return whether earlier runs had better have less weight, as in the prediction ``doubtful``."""
-        m = len(measured)
-        if self.change is None or doubtful is None or forecast.scales.n_rest >= m:
-            return False
-        predictions = (forecast.predictions[1].e_h[:m], doubtful[:m], np.zeros(m))
-        return self.change.is_doubted(*(float(np.sum((measured - e)[accepted] ** 2)) for e in predictions))
-
-    def _has_changed(self) -> bool:
-        """Return whether the plant of this run is another one than that of earlier runs."""
-        if self.change is None:
-            return False
-        correlation = min(self.change.correlations[0], self.candidates[0].correlation_max)
-        variance = max(self.candidates[0].noise_variance, self._least_variance)
-        return self.change.has_changed(
-            self.regression, self._static_scales(self.largest), variance, self._least_variance, correlation
-        )
-
-    def _conclude(self, changed: bool, doubted: bool) -> None:
-        """Forget what earlier runs have taught if the plant has changed, and end the comparison once it is decided."""
-        change = self.change
-        if change is not None and doubted and not changed:
-            change.doubt()
-            self.regression, self.n_rows = change.all_rows(), change.n_before + change.n_after
-        if change is not None and changed:
-            self.regression, self.n_rows = change.after, change.n_after
-            recent = min(self.scale.recent, change.largest_square)
-            self.scale = ResidualScale(recent, change.largest_square, change.largest)
-            self.blend = Blend(_FIRST_WEIGHTS, _LATER_WEIGHTS, self.settings.Np)
-            for candidate, correlation in zip(self.candidates, change.correlations, strict=True):
-                candidate.correlation = correlation
-        if change is not None and (changed or change.is_over):
-            self.change = None
-
-    def _assess(
-        self, forecast: TrustedForecast, measured: Array, accepted: NDArray[np.bool_], *, surprises: bool
-    ) -> None:
-        """Judge the candidates and their blend by the measurement of their window, which may surprise."""
-        m = len(measured)
-        self._judge(forecast, measured, accepted, surprises)
-        sound = measured[accepted]
-        if self.change is not None:
-            self.change.follow(sound)
-        largest, mean_square = float(np.abs(sound).max()), float(np.mean(sound**2))
-        recent = _RECENT * self.scale.recent + (1.0 - _RECENT) * mean_square if self.scale.recent else mean_square
-        self.scale = ResidualScale(
-            recent, max(self.scale.largest_square, mean_square), max(self.scale.largest, largest)
-        )
-        candidates = self._blended(forecast.hold, forecast.predictions, m)
-        scale, change = self.scale.largest_square, self.change
-        if change is not None and change.n_after > change.n_before:
-            scale = change.largest_square  # what was larger in earlier runs says nothing of the blend any more
-        self.blend.update(candidates[:, accepted], sound, scale, self.n_rows)
-
-    @property
-    def bound(self) -> float:
-        """Bound on what is predicted, m."""
-        return _BOUND * self.scale.largest
-
-    def solve(self, candidate: Candidate, largest: Array) -> SolvedCandidate:
-        """Return a candidate with the weights that follow from all rows so far.
-
-        Parameters
-        ----------
-        candidate : Candidate
-        largest : (n_static,) array
-            Largest magnitudes of the static features, those of the window to predict included.
-        """
-        return candidate.solve(self.regression, self._static_scales(largest), self._least_variance)
-
-    @property
-    def _least_variance(self) -> float:
-        """Least variance of the noise, m²."""
-        return min(self.settings.lam, _LEAST_NOISE * self.scale.largest_square)
-
-    def _static_scales(self, largest: Array) -> Array:
-        """Return the prior standard deviations of the weights of the static features, ``(n_static,)``."""
-        effect = self.settings.effect or math.sqrt(self.scale.largest_square)
-        return effect * self.static.shares / np.maximum(largest, 1e-150)
-
-    def predict(
-        self, solved: SolvedCandidate, rows: Array, held: CandidatePrediction | None = None
-    ) -> CandidatePrediction:
-        """Return the prediction of a candidate over a window, bounded by the residuals so far."""
-        found = solved.predict(rows, self.past[: len(solved.lag_weights)], self.scale, held)
-        return found._replace(
-            e_h=np.clip(found.e_h, -self.bound, self.bound), noise_variance=found.noise_variance / self.n_rows
-        )
-
-    @staticmethod
-    def _blended(hold: float, predictions: tuple[CandidatePrediction, ...], m: int) -> Array:
-        """Return the predictions that are blended, ``(4, m)``, m: hold, and the learned candidates, 0 at first."""
-        learned = [prediction.e_h[:m] for prediction in predictions] or [np.zeros(m)] * (len(_FIRST_WEIGHTS) - 1)
-        return np.stack((np.full(m, hold), *learned))
-
-    def _judge(self, forecast: TrustedForecast, measured: Array, accepted: NDArray[np.bool_], surprises: bool) -> None:
-        """Estimate the errors of the candidates from the measurement of their window."""
-        m, given = len(measured), self.settings.noise_std**2
-        if not forecast.predictions:
-            # Third differences leave white noise, 20 times its variance, and little else.
-            first = float(np.mean(np.diff(measured, 3) ** 2)) / 20.0 if m > 10 else float(np.mean(measured**2))
-            for candidate in self.candidates:
-                candidate.noise_variance = given or first
-            return
-        cautious = forecast.predictions[1]
-        expected = cautious.variance + float(cautious.spread[:m].mean())
-        surprise = float(np.mean((measured - cautious.unshrunk[:m])[accepted] ** 2)) / expected
-        if surprises and surprise > _SURPRISE:
-            self._discount(min(max((_SURPRISE / surprise) ** 2, _SURPRISED * self.settings.Np / self.n_rows), 1.0))
-        for candidate, prediction in zip(self.candidates, forecast.predictions, strict=True):
-            candidate.judge(prediction.unshrunk[:m][accepted], measured[accepted])
-            candidate.noise_variance = given or prediction.noise_variance
-
-    def _discount(self, kept: float) -> None:
-        """Weigh all samples so far by ``kept``."""
-        self.regression.discount(kept)
-        self.n_rows *= kept
-        if self.change is not None:
-            self.change.discount(kept)
-
-    def _fold(self, static: Array, measured: Array, learned: NDArray[np.bool_]) -> None:
-        """Update the regression with a window's rows ``[static features | lags | e_pb]``."""
-        m = len(measured)
-        rows = np.empty((m, self.regression.n_features + 1), order="F")
-        rows[:, : self.static.n] = static
-        rows[:, self.static.n : -1] = lags(self.past, measured)
-        rows[:, -1] = measured
-        if self.settings.forgetting > 0.0:
-            self._discount(math.exp(-m * self.settings.T_s / self.settings.forgetting))
-        stacked = np.asfortranarray(rows[learned])
-        if self.change is None:
-            self.regression.update_stacked(stacked)
-        else:
-            self.change.learn(stacked)
-            self.regression = self.change.all_rows()
-        self.n_rows += int(learned.sum())
 
 
 def _bridged(last: float, measured: Array, accepted: NDArray[np.bool_]) -> Array:

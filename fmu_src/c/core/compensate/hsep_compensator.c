@@ -73,7 +73,7 @@ static int compensator_trusts(hsep_compensator *self)
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     const hsep_recursion recursion = hsep_paper_recursion(hsep_residual_paper(hsep_predictor_model(predictor)), 0);
     return self->compensate == HSEP_SEP_HYBRID && (double)predictor->k >= predictor->n_init &&
-           hsep_residual_regression(hsep_predictor_model(predictor))->n_samples > 0 && self->monitor.excess <= 0.0 &&
+           hsep_residual_factor(hsep_predictor_model(predictor), 0)->n_samples > 0 && self->monitor.excess <= 0.0 &&
            hsep_recursion_stable(&recursion, hsep_at(self, self->trial_e));
 }
 
@@ -222,7 +222,7 @@ static void compensator_next_window(hsep_compensator *self)
     const uint64_t Np = predictor->Np;
     /* Predictions from few rows, before the warm-up is over, are not used: they are not judged. */
     if (hsep_predictor_finish(predictor) && !self->trusted && (double)(predictor->k - Np) >= predictor->n_init) {
-        const hsep_regression *regression = hsep_residual_regression(hsep_predictor_model(predictor));
+        const hsep_regression *regression = hsep_residual_factor(hsep_predictor_model(predictor), 0);
         hsep_plan_monitor_observe(
             &self->monitor, hsep_at(predictor, predictor->past_e), hsep_at(predictor, predictor->e_h), Np,
             regression->residual_sum / (double)regression->n_samples);

@@ -14,7 +14,7 @@
  * spacing > 8) more often, or HSEP_INTERIOR_STEPS times at once. All of it is bounded by the parameters; m = 1000 is
  * far from real time.
  *
- * With trust and a late measurement the plan is as dear, and late^2 / 2 multiply-adds for each candidate come on top in
+ * With trust and a late measurement the plan is as dear, and late^2 / 2 multiply-adds for each expert come on top in
  * two of the samples of a window: nothing to speak of up to 100 samples, 2 ms of a desktop's core for 1000.
  *
  * Memory is one block: the struct, then what its offsets tell; no pointers, so a copy of the block is the state.

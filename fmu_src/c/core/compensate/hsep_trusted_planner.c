@@ -132,7 +132,7 @@ HSEP_API void hsep_trusted_planner_begin(
     const uint64_t pinned = hsep_planner_pinned(task->planner); /* they are published now */
     self->varied = self->late + (pinned > 0 ? pinned : 1);
     (void)trusted_planner_predict(self, task, rest, self->varied);
-    self->follows = best > 1 && task->model->predicted;
+    self->follows = best > 1 && task->model->predicted[HSEP_STATIC];
     if (best == 0) {
         self->stage = HSEP_TRUSTED_PREDICT;
     } else {

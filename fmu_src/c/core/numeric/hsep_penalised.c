@@ -1,5 +1,6 @@
 #include "hsep_penalised.h"
 
+#include "hsep_block_fold.h"
 #include "hsep_tiles.h"
 
 #include <math.h>
@@ -9,35 +10,58 @@
 /* Copy the rows and columns of the first features, as many as to has, with the target beside them. */
 static void penalised_copy_leading(const hsep_regression *self, hsep_regression *to)
 {
-    const uint64_t n = to->n;
+    const uint64_t n = to->n, all = self->n_tiles, kept = to->n_tiles;
+    const double *from = hsep_at_const(self, self->tiles);
+    double *tile = hsep_at(to, to->tiles);
     memcpy(hsep_at(to, to->inverse_d), hsep_at_const(self, self->inverse_d), (size_t)n * sizeof(double));
+    for (uint64_t I = 0; I < kept; I++) { /* a row of tiles has those from the diagonal on */
+        memcpy(tile, from, (size_t)(HSEP_TILE_STRIDE * (kept - I)) * sizeof(double));
+        from += HSEP_TILE_STRIDE * (all - I);
+        tile += HSEP_TILE_STRIDE * (kept - I);
+    }
     for (uint64_t i = 0; i < n; i++) {
-        for (uint64_t j = i + 1; j <= n; j++) {
-            *hsep_tile_entry(to, i, j) = *hsep_tile_entry_const(self, i, j < n ? j : self->n);
+        *hsep_tile_entry(to, i, n) = *hsep_tile_entry_const(self, i, self->n);
+        for (uint64_t j = n + 1; j < HSEP_TILE * kept; j++) {
+            *hsep_tile_entry(to, i, j) = 0.0;
+        }
+    }
+}
+
+/* product := U w, (n,), with w, (4 n_tiles,), 0 behind the features. */
+static void penalised_multiply(const hsep_regression *self, const double w[], double product[])
+{
+    const double *tile = hsep_at_const(self, self->tiles);
+    for (uint64_t first = 0; first < self->n; first += HSEP_TILE) {
+        double sum[HSEP_TILE] = {0.0};
+        for (uint64_t j = first; j < HSEP_TILE * self->n_tiles; j += HSEP_TILE, tile += HSEP_TILE_STRIDE) {
+            for (unsigned r = 0; r < HSEP_TILE; r++) {
+                const double *t = tile + HSEP_TILE * r;
+                sum[r] += (t[0] * w[j] + t[1] * w[j + 1]) + (t[2] * w[j + 2] + t[3] * w[j + 3]);
+            }
+        }
+        for (uint64_t r = 0; r < HSEP_TILE && first + r < self->n; r++) {
+            product[first + r] = sum[r];
         }
     }
 }
 
 HSEP_API double hsep_penalised_solve(
-    const hsep_regression *self, const double penalties[], hsep_regression *solved, double w[])
+    const hsep_regression *self, const double penalties[], hsep_regression *solved, double w[], double work[])
 {
     const uint64_t n = self->n, m = solved->n;
     const double *inverse_d = hsep_at_const(self, self->inverse_d);
-    double *row = hsep_regression_row(solved);
     penalised_copy_leading(self, solved);
     for (uint64_t i = 0; i < m; i++) {
-        const uint64_t first = i / HSEP_TILE;
-        memset(row + HSEP_TILE * first, 0, (size_t)(m + 1 - HSEP_TILE * first) * sizeof(double));
-        row[i] = sqrt(penalties[i]);
-        hsep_regression_fold_once(solved, first);
+        hsep_block_fold_row(work, m, i)[i] = sqrt(penalties[i]);
     }
+    hsep_block_fold(solved, work, m, 1);
     hsep_regression_solve(solved, w);
-    double sum = self->residual_sum;
+    double sum = self->residual_sum, *padded = work, *product = work + HSEP_TILE * self->n_tiles;
+    memset(padded, 0, (size_t)(HSEP_TILE * self->n_tiles) * sizeof(double));
+    memcpy(padded, w, (size_t)m * sizeof(double));
+    penalised_multiply(self, padded, product);
     for (uint64_t i = 0; i < n; i++) { /* [R z; 0 rho] [-w; 1], row after row */
-        double residual = *hsep_tile_entry_const(self, i, n) - (i < m ? w[i] : 0.0);
-        for (uint64_t j = i + 1; j < m; j++) {
-            residual -= *hsep_tile_entry_const(self, i, j) * w[j];
-        }
+        const double residual = *hsep_tile_entry_const(self, i, n) - product[i];
         sum += residual * residual / inverse_d[i];
     }
     return sum;

@@ -14,10 +14,10 @@
 /* Solve for the weights w of the first m features, as many as solved has, each with a penalty of its own:
  *   w = argmin_w sum_k [target(k) - w' phi(k)]^2 + sum_i penalties_i w_i^2 + lambda |w|^2
  * solved: another block, which holds the triangle with these penalties then; what it held before does not matter, and
- * its diagonal is that of hsep_regression_init. Return the first sum, lambda |w|^2 with it.
- * Cost: m^3 / 6 times 2 multiplications and 2 additions. */
+ * its diagonal is that of hsep_regression_init; work: hsep_block_fold_size(n, n) doubles for the n features of self.
+ * Return the first sum, lambda |w|^2 with it. Cost: m^3 / 6 times 2 multiply-adds. */
 HSEP_API double hsep_penalised_solve(
-    const hsep_regression *self, const double penalties[], hsep_regression *solved, double w[]);
+    const hsep_regression *self, const double penalties[], hsep_regression *solved, double w[], double work[]);
 
 /* phi' (R' R)^-1 phi of the row phi, (n,), in hsep_regression_row, which is used up: the variance of w' phi relative to
  * that of the noise. Cost: n^2 / 2 multiply-adds. */

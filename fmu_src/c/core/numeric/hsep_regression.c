@@ -56,38 +56,33 @@ static inline void regression_add(double *restrict u, double *restrict carry, do
 }
 
 /* Rotate 4 entries x of the row with 4 entries u of a row of U:  x := x - pivot u,  u := u + gain x.
- * Written out, as regression_add has it, for compilers to make vectors of it. carries: a constant, whether what
- * rounding takes is kept. */
-static inline void regression_four(double *restrict u, double *restrict x, double pivot, double gain, int carries)
+ * Written out, as regression_add has it, for compilers to make vectors of it. */
+static inline void regression_four(double *restrict u, double *restrict x, double pivot, double gain)
 {
     double *restrict carry = u + HSEP_TILE_ENTRIES;
     const double u0 = u[0], u1 = u[1], u2 = u[2], u3 = u[3];
     const double x0 = x[0] - pivot * u0, x1 = x[1] - pivot * u1, x2 = x[2] - pivot * u2, x3 = x[3] - pivot * u3;
-    if (carries) {
-        const double c0 = gain * x0 + carry[0], c1 = gain * x1 + carry[1];
-        const double c2 = gain * x2 + carry[2], c3 = gain * x3 + carry[3];
-        const double s0 = u0 + c0, s1 = u1 + c1, s2 = u2 + c2, s3 = u3 + c3;
-        const double e0 = c0 - (s0 - u0), e1 = c1 - (s1 - u1), e2 = c2 - (s2 - u2), e3 = c3 - (s3 - u3);
-        u[0] = s0, u[1] = s1, u[2] = s2, u[3] = s3;
-        carry[0] = e0, carry[1] = e1, carry[2] = e2, carry[3] = e3;
-    } else {
-        u[0] = u0 + gain * x0, u[1] = u1 + gain * x1, u[2] = u2 + gain * x2, u[3] = u3 + gain * x3;
-    }
+    const double c0 = gain * x0 + carry[0], c1 = gain * x1 + carry[1];
+    const double c2 = gain * x2 + carry[2], c3 = gain * x3 + carry[3];
+    const double s0 = u0 + c0, s1 = u1 + c1, s2 = u2 + c2, s3 = u3 + c3;
+    const double e0 = c0 - (s0 - u0), e1 = c1 - (s1 - u1), e2 = c2 - (s2 - u2), e3 = c3 - (s3 - u3);
+    u[0] = s0, u[1] = s1, u[2] = s2, u[3] = s3;
+    carry[0] = e0, carry[1] = e1, carry[2] = e2, carry[3] = e3;
     x[0] = x0, x[1] = x1, x[2] = x2, x[3] = x3;
 }
 
 /* Rotate the row x, (4 n,), with 4 rows of U in n tiles. */
 static inline void regression_sweep(
-    double *restrict tile, double *restrict x, uint64_t n, const double pivot[4], const double gain[4], int carries)
+    double *restrict tile, double *restrict x, uint64_t n, const double pivot[4], const double gain[4])
 {
     const double p0 = pivot[0], p1 = pivot[1], p2 = pivot[2], p3 = pivot[3];
     const double g0 = gain[0], g1 = gain[1], g2 = gain[2], g3 = gain[3];
     for (uint64_t t = 0; t < n; t++, tile += HSEP_TILE_STRIDE, x += 4) {
         double y[4] = {x[0], x[1], x[2], x[3]};
-        regression_four(tile, y, p0, g0, carries);
-        regression_four(tile + 4, y, p1, g1, carries);
-        regression_four(tile + 8, y, p2, g2, carries);
-        regression_four(tile + 12, y, p3, g3, carries);
+        regression_four(tile, y, p0, g0);
+        regression_four(tile + 4, y, p1, g1);
+        regression_four(tile + 8, y, p2, g2);
+        regression_four(tile + 12, y, p3, g3);
         x[0] = y[0], x[1] = y[1], x[2] = y[2], x[3] = y[3];
     }
 }
@@ -102,7 +97,7 @@ static void regression_sweep_large(
         for (int r = 0; r < 4; r++) {
             double *restrict u = tile + 4 * r;
             if (!large[r]) {
-                regression_four(u, x, pivot[r], gain[r], 1);
+                regression_four(u, x, pivot[r], gain[r]);
                 continue;
             }
             const double k = keep[r], g = gain[r], p = pivot[r];
@@ -128,11 +123,10 @@ static void regression_rotate(double *tile, int place, double *x, double pivot, 
     }
 }
 
-static inline void regression_fold(hsep_regression *self, uint64_t first, int carries)
+HSEP_API void hsep_regression_fold(hsep_regression *self)
 {
-    double *inverse_d = hsep_at(self, self->inverse_d) + HSEP_TILE * first;
-    double *x = hsep_regression_row(self) + HSEP_TILE * first;
-    double *tile = hsep_tile_entry(self, HSEP_TILE * first, HSEP_TILE * first);
+    double *inverse_d = hsep_at(self, self->inverse_d), *x = hsep_regression_row(self);
+    double *tile = hsep_at(self, self->tiles);
     /* The row still weighs 1/v. With x_j its entry at the pivot, u a row of U and d that row's weight:
      *   v' = v + x_j^2 / d          d' = d v'/v         keep = v / v' = cos^2        gain = x_j / (d v')
      *   x := x - x_j u              u := keep u + gain x = u + gain (x - x_j u)
@@ -140,8 +134,8 @@ static inline void regression_fold(hsep_regression *self, uint64_t first, int ca
      * The last form is the cheapest and its rounding error is that of a Givens rotation divided by the cosine:
      * it is taken where cos^2 >= 1/2, and keep u + gain x, without that factor, elsewhere. */
     double v = 1.0;
-    uint64_t rows = self->n - HSEP_TILE * first;
-    for (uint64_t left = self->n_tiles - first; left > 0; left--, x += 4, inverse_d += 4) {
+    uint64_t rows = self->n;
+    for (uint64_t left = self->n_tiles; left > 0; left--, x += 4, inverse_d += 4) {
         const unsigned height = rows < HSEP_TILE ? (unsigned)rows : HSEP_TILE;
         rows -= height;
         double pivot[4], gain[4], keep[4];
@@ -161,7 +155,7 @@ static inline void regression_fold(hsep_regression *self, uint64_t first, int ca
             }
         }
         if (left > 1 && !any_large) { /* only the last row of tiles has a height below 4 */
-            regression_sweep(tile + HSEP_TILE_STRIDE, x + 4, left - 1, pivot, gain, carries);
+            regression_sweep(tile + HSEP_TILE_STRIDE, x + 4, left - 1, pivot, gain);
         } else if (left > 1) {
             regression_sweep_large(tile + HSEP_TILE_STRIDE, x + 4, left - 1, pivot, gain, keep, large);
         } else {
@@ -169,35 +163,7 @@ static inline void regression_fold(hsep_regression *self, uint64_t first, int ca
         }
         tile += HSEP_TILE_STRIDE * left;
     }
-}
-
-HSEP_API void hsep_regression_fold_from(hsep_regression *self, uint64_t first) { regression_fold(self, first, 1); }
-
-HSEP_API void hsep_regression_fold_once(hsep_regression *self, uint64_t first) { regression_fold(self, first, 0); }
-
-HSEP_API void hsep_regression_fold(hsep_regression *self)
-{
-    hsep_regression_fold_from(self, 0);
     self->n_samples++;
-}
-
-HSEP_API void hsep_regression_fold_all(hsep_regression *self, const hsep_regression *other)
-{
-    const uint64_t n = self->n;
-    const double *inverse_d = hsep_at_const(other, other->inverse_d);
-    double *row = hsep_regression_row(self);
-    for (uint64_t i = 0; i < n; i++) { /* row i of [R z] = D^(1/2) [U z] */
-        const uint64_t first = i / HSEP_TILE;
-        const double root = 1.0 / sqrt(inverse_d[i]);
-        memset(row + HSEP_TILE * first, 0, (size_t)(HSEP_TILE * (self->n_tiles - first)) * sizeof(double));
-        row[i] = root;
-        for (uint64_t j = i + 1; j <= n; j++) {
-            row[j] = root * *hsep_tile_entry_const(other, i, j);
-        }
-        hsep_regression_fold_from(self, first);
-    }
-    self->residual_sum += other->residual_sum;
-    self->n_samples += other->n_samples;
 }
 
 HSEP_API void hsep_regression_discount(hsep_regression *self, double weight)

@@ -49,17 +49,6 @@ HSEP_API double *hsep_regression_row(hsep_regression *self);
  * before; in scalar instead of vector instructions for rows that outweigh all before them, as the first ones do. */
 HSEP_API void hsep_regression_fold(hsep_regression *self);
 
-/* Fold the row, whose entries before 4 * first are 0, into the factor, without counting it. */
-HSEP_API void hsep_regression_fold_from(hsep_regression *self, uint64_t first);
-
-/* The same for one of few rows, of which rounding may take its digits. Cost: 2 multiplications and 2 additions in place
- * of 2 and 5. */
-HSEP_API void hsep_regression_fold_once(hsep_regression *self, uint64_t first);
-
-/* Fold all rows of another regression of as many features, its lambda with them, into the factor. Cost: that of n / 3
- * rows, in scalar instructions where they outweigh those of the factor. */
-HSEP_API void hsep_regression_fold_all(hsep_regression *self, const hsep_regression *other);
-
 /* Solve R w = z for w, (n,). Cost: n^2 / 2 multiply-adds. */
 HSEP_API void hsep_regression_solve(const hsep_regression *self, double w[]);
 

@@ -85,9 +85,14 @@ HSEP_API int hsep_residual_valid(const void *block, const hsep_residual_paramete
                         : hsep_paper_valid(hsep_at_bytes(block, got.paper), &paper));
 }
 
-HSEP_API hsep_regression *hsep_residual_regression(hsep_residual_model *self)
+HSEP_API uint64_t hsep_residual_n_factors(const hsep_residual_model *self)
 {
-    return self->trusted ? hsep_trusted_regression(hsep_residual_trusted(self))
+    return self->trusted ? HSEP_N_FACTORS : 1;
+}
+
+HSEP_API hsep_regression *hsep_residual_factor(hsep_residual_model *self, uint64_t i)
+{
+    return self->trusted ? hsep_trusted_evidence(hsep_residual_trusted(self), (hsep_evidence)i)
                          : hsep_paper_regression(hsep_residual_paper(self));
 }
 
@@ -138,7 +143,7 @@ HSEP_API void hsep_residual_predict(
     } else if (first == 0) {
         hsep_trusted_forecast(hsep_residual_trusted(self), window->command, window->x_pb, window->e_h, last);
     } else {
-        hsep_trusted_go_on(hsep_residual_trusted(self), window->e_h, first, last);
+        hsep_trusted_go_on(hsep_residual_trusted(self), window->x_pb, window->e_h, first, last);
     }
 }
 
@@ -151,23 +156,12 @@ HSEP_API void hsep_residual_signal(hsep_residual_model *self, hsep_uncertainty_s
     }
 }
 
-/* Whether the work for a comparison of the window is done with its sample i: the last one that does not end it, when a
- * compensator has planned. */
-static int residual_compares(const hsep_residual_model *self, uint64_t i)
-{
-    return i + 2 == (self->Np > 2 ? self->Np : 2);
-}
-
 HSEP_API void hsep_residual_take_in(hsep_residual_model *self, const hsep_residual_sample *sample)
 {
-    hsep_trusted *trusted = hsep_residual_trusted(self);
-    if (trusted == NULL) {
+    if (self->trusted) {
+        hsep_trusted_measure(hsep_residual_trusted(self), sample->i, sample->relative);
+    } else {
         hsep_paper_take_in(hsep_residual_paper(self), sample, self->learning != 0);
-        return;
-    }
-    hsep_trusted_measure(trusted, sample->i, sample->relative);
-    if (residual_compares(self, sample->i)) {
-        hsep_trusted_predict_less(trusted, sample->e + sample->i + 1); /* the residuals before the window */
     }
 }
 

@@ -58,10 +58,12 @@ HSEP_API hsep_trusted *hsep_residual_trusted(hsep_residual_model *self);
 /* Parameters of the one that can be trusted. */
 HSEP_API hsep_trusted_parameters hsep_residual_trusted_parameters(const hsep_residual_parameters *parameters);
 
-/* The regression, for a warm start by hsep_regression_load before the first sample. */
-HSEP_API hsep_regression *hsep_residual_regression(hsep_residual_model *self);
+/* Factors that are learned and their number, for a warm start by hsep_regression_load before the first sample. The
+ * first one is that of the physics model's residual. */
+HSEP_API uint64_t hsep_residual_n_factors(const hsep_residual_model *self);
+HSEP_API hsep_regression *hsep_residual_factor(hsep_residual_model *self, uint64_t i);
 
-/* Numbers learned besides the regression and whether they are in range; those of hsep_trusted_learned, none without. */
+/* Numbers learned besides them and whether they are in range; those of hsep_trusted_learned, none without. */
 HSEP_API uint64_t hsep_residual_n_learned(hsep_residual_model *self);
 HSEP_API double *hsep_residual_learned(hsep_residual_model *self, uint64_t i);
 HSEP_API int hsep_residual_sound(hsep_residual_model *self);

@@ -136,14 +136,14 @@ static void uncertainty_at(
     const uint64_t n = self->n;
     /* The difference of the first sample is that of the second. */
     const uint64_t newer = j + 1 == n && j > 0 ? j - 1 : j, older = newer + 1 < n ? newer + 1 : newer;
-    const int blended = signals->disagreement != NULL && n - 1 - j >= signals->n_physics;
+    const int stacked = signals->disagreement != NULL && n - 1 - j >= signals->n_physics;
     f[0] = 1.0;
     f[1] = (double)(n - j) / (double)self->Np;
     f[2] = uncertainty_square(x_pb[newer] - x_pb[older]);
     f[3] = uncertainty_square(published[newer] - published[older]);
     f[4] = uncertainty_square(signals->x_d[j] - x_pb[j]);
     f[5] = uncertainty_square(published[j] - self->last);
-    f[6] = blended ? signals->disagreement[j] : 0.0;
+    f[6] = stacked ? signals->disagreement[j] : 0.0;
 }
 
 HSEP_API void hsep_uncertainty_predict(

@@ -2,7 +2,7 @@
  *
  * The variance of a sample is a sum of components, v = sum_i theta_i f_i, each the square of something that errors
  * come with: measurement noise and its growth over the window, wrong timing (the squared differences of x_pb and e_h),
- * a wrong share of the servo error, a change since the last measured residual, candidates that disagree, slow motion.
+ * a wrong share of the servo error, a change since the last measured residual, experts that disagree, slow motion.
  * What is felt only after it has happened, and for a while, is averaged over the samples before, from the last
  * measured one on. The standard deviation is c sqrt(v). After each window theta takes a step of expectation
  * maximisation for normal errors of that variance, and c, which changes exponentially from the beginning to the end of
@@ -66,7 +66,7 @@ typedef struct {
     const double *x_d, *x_pb;   /* (n,) m, commands and physics-based prediction */
     const double *e_h;          /* (n + 1,) m, predicted residual, behind it the last measured one */
     uint64_t n_physics;         /* leading samples where it is not published */
-    const double *disagreement; /* (n,) m2, variance of the candidates about their blend, or NULL */
+    const double *disagreement; /* (n,) m2, variance of the experts about their stack, or NULL */
     hsep_doubt doubt;           /* what the guard doubts; the same in all calls for a window */
 } hsep_uncertainty_signals;
 

@@ -1,16 +1,21 @@
 #include "hsep_disturbances.h"
 
+#include "hsep_trust_constants.h"
+
 #include <math.h>
 #include <string.h>
 
 #define DISTURBANCES_DIFFERENCES 3
 #define DISTURBANCES_TOGETHER 64 /* samples that are filtered in one go */
 
-/* Velocities v_i of the friction's change of sign, relative to the velocity scale. */
-static const double disturbances_spread[HSEP_DISTURBANCES_FRICTION] = {0.01, 0.03, 0.1, 0.3, 1.0, 3.0};
+#define DISTURBANCES_SPREAD_2 (HSEP_TRUST_FRICTION_LEAST * HSEP_TRUST_FRICTION_RATIO * HSEP_TRUST_FRICTION_RATIO)
+#define DISTURBANCES_SPREAD_4 (DISTURBANCES_SPREAD_2 * HSEP_TRUST_FRICTION_RATIO * HSEP_TRUST_FRICTION_RATIO)
 
-/* Effect of a disturbance's first difference relative to its own: they only correct its timing. */
-static const double disturbances_difference_share = 0.03;
+/* Velocities of the friction's change of sign, relative to the velocity scale. */
+static const double disturbances_spread[HSEP_DISTURBANCES_FRICTION] = {
+    HSEP_TRUST_FRICTION_LEAST, HSEP_TRUST_FRICTION_LEAST * HSEP_TRUST_FRICTION_RATIO,
+    DISTURBANCES_SPREAD_2,     DISTURBANCES_SPREAD_2 * HSEP_TRUST_FRICTION_RATIO,
+    DISTURBANCES_SPREAD_4,     DISTURBANCES_SPREAD_4 * HSEP_TRUST_FRICTION_RATIO};
 
 static const double disturbances_turn = 6.283185307179586; /* rad */
 
@@ -26,7 +31,7 @@ HSEP_API uint64_t hsep_disturbances_n(uint64_t q, double period)
 
 HSEP_API double hsep_disturbances_share(const hsep_disturbances *self, uint64_t feature)
 {
-    return feature + self->count < self->n ? 1.0 : disturbances_difference_share;
+    return feature + self->count < self->n ? 1.0 : HSEP_TRUST_DIFFERENCE_SHARE;
 }
 
 static hsep_physics *disturbances_filter(hsep_disturbances *self, uint64_t i)
@@ -161,7 +166,7 @@ static void disturbances_differences(const hsep_disturbances *self, const double
     }
 }
 
-/* Velocity of the friction's change of sign, m/s. */
+/* Velocity of the change of sign of friction i, m/s. */
 static double disturbances_sign_velocity(double velocity_scale, uint64_t i)
 {
     return (velocity_scale > 0.0 ? velocity_scale : 1.0) * disturbances_spread[i];

@@ -1,32 +1,30 @@
 #include "hsep_guard.h"
 
 #include "hsep_median.h"
+#include "hsep_trust_constants.h"
 
 #include <math.h>
 
 #define GUARD_WINDOW (2 * HSEP_GUARD_NEIGHBOURS + 1)
 
-/* Plausible deviation: in mean deviations, in resolution steps, and relative to the largest residual and to the
- * predicted motion of a sample. */
-static const double guard_spreads = 12.0, guard_resolution = 3.0, guard_small = 0.01, guard_ripple = 0.1;
-static const double guard_pace = 2.0; /* plausible change, relative to the predicted motion or the vibration */
-/* Median change of the residual that noise may make, in mean deviations: white noise makes 1.4. And the changes that a
- * window has to have to tell the vibration: most of fewer could be those of one wrong value. */
-static const double guard_noise = 2.0;
-static const uint64_t guard_changes = 8;
-/* Change at the end of a run of equal values, relative to the motion predicted since its beginning, below which the
- * axis itself stood still: a sensor that was held shows the whole motion then. And what is believed from then on,
- * relative to that motion. */
-static const double guard_stood = 0.5, guard_stuck = 2.0;
-/* Patience with equal values relative to that with another level: a sensor may stick for half a second. */
-static const uint64_t guard_standing = 3;
 static const uint64_t guard_doubted = 3; /* doubtful samples in a row from which on they may be true */
-/* Rates at which the mean deviation follows that of a window; the vibration rises at once, and falls as it does. */
-static const double guard_rise = 0.5, guard_fall = 0.02;
+static const double guard_windows = 2.0; /* least patience, in windows: what is believed is learned by windows */
+/* Changes that a window has to have to tell the vibration: most of fewer could be those of one wrong value. */
+static const uint64_t guard_changes = 8;
 
-HSEP_API void hsep_guard_init(hsep_guard *self, uint64_t patience)
+/* Samples of a time, s; two windows at least. */
+static uint64_t guard_patience(double time, uint64_t Np, double T_s)
 {
-    *self = (hsep_guard){.patience = patience, .spread = -1.0, .x_pb = NAN};
+    return (uint64_t)fmin(fmax(guard_windows * (double)Np, ceil(time / T_s)), 9007199254740992.0);
+}
+
+HSEP_API void hsep_guard_init(hsep_guard *self, uint64_t Np, double T_s)
+{
+    *self = (hsep_guard){
+        .patience = guard_patience(HSEP_TRUST_PATIENCE, Np, T_s),
+        .patience_standing = guard_patience(HSEP_TRUST_PATIENCE_STANDING, Np, T_s),
+        .spread = -1.0,
+        .x_pb = NAN};
     hsep_sensor_init(&self->held);
 }
 
@@ -73,7 +71,7 @@ static void guard_follow(
         }
     }
     if (count > 0.0) {
-        const double mean = sum / count, rate = mean > self->spread ? guard_rise : guard_fall;
+        const double mean = sum / count, rate = mean > self->spread ? HSEP_TRUST_RISE : HSEP_TRUST_FALL;
         self->spread = known ? self->spread + rate * (mean - self->spread) : mean;
     }
 }
@@ -92,8 +90,8 @@ static void guard_follow_vibration(
         last = residual;
     }
     if (count >= guard_changes) {
-        const double seen = fmax(hsep_median(changes, count) - guard_noise * self->spread, 0.0);
-        self->vibration += (seen > self->vibration ? 1.0 : guard_fall) * (seen - self->vibration);
+        const double seen = fmax(hsep_median(changes, count) - HSEP_TRUST_VIBRATION_NOISE * self->spread, 0.0);
+        self->vibration += (seen > self->vibration ? 1.0 : HSEP_TRUST_FALL) * (seen - self->vibration);
     }
 }
 
@@ -101,25 +99,35 @@ static void guard_follow_vibration(
 static double guard_plausible(const hsep_guard *self, double motion, double largest)
 {
     const double step = self->held.step < HUGE_VAL ? self->held.step : 0.0;
-    return guard_spreads * self->spread + guard_resolution * step + guard_small * largest + guard_ripple * motion;
+    return HSEP_TRUST_SPREADS * self->spread + HSEP_TRUST_RESOLUTION * step + HSEP_TRUST_SMALL * largest +
+           HSEP_TRUST_RIPPLE * motion;
 }
 
-/* Judge who stood still where a run of equal values ends, and begin another. */
-static void guard_end_run(hsep_guard *self, double x, double x_pb)
+/* Follow the motion of a sample; where it fades beside the predicted one, the axis itself comes to rest. */
+static void guard_follow_motion(hsep_guard *self, double x, double x_pb)
 {
-    const double moved = fabs(x_pb - self->first);
-    if (x == self->held.value) {
-        return;
+    if (!isnan(self->held.value)) {
+        self->motion += HSEP_TRUST_FOLLOW * (x - self->held.value - self->motion);
+        self->motion_pb += HSEP_TRUST_FOLLOW * (x_pb - self->position - self->motion_pb);
+        if (x != self->held.value) {
+            self->rests = fabs(self->motion) < HSEP_TRUST_STOOD * fabs(self->motion_pb);
+        }
     }
-    if (self->holding && fabs(x - self->held.value) < guard_stood * moved) {
-        self->stuck = fmax(self->stuck, moved);
+    self->position = x_pb;
+}
+
+/* Set the run of equal values that ends with sample k to a value. */
+static void guard_set_run(const hsep_guard *self, uint64_t k, uint64_t n, double value, double of_samples[])
+{
+    const uint64_t repeats = (uint64_t)fmin(self->held.repeats, (double)(k + 1));
+    for (uint64_t j = k + 1 - repeats; j <= k; j++) {
+        of_samples[n - 1 - j] = value;
     }
-    self->first = x_pb;
 }
 
 HSEP_API void hsep_guard_accept(
     hsep_guard *self, const double x[], const double x_pb[], uint64_t n, double largest, double deviation[],
-    double accepted[])
+    double accepted[], double standing[])
 {
     double pace = 0.0, last = isnan(self->x_pb) ? x_pb[n - 1] : self->x_pb;
     for (uint64_t k = 0; k < n; k++) {
@@ -129,35 +137,35 @@ HSEP_API void hsep_guard_accept(
     }
     const double motion = fmax(fmax(pace, self->pace), self->vibration);
     const double plausible = guard_plausible(self, motion, largest);
-    const double still = fmax(plausible, guard_stuck * self->stuck);
     const int known = self->spread >= 0.0;
     for (uint64_t k = 0; k < n; k++) {
         const uint64_t place = n - 1 - k;
         const double residual = x[place] - x_pb[place];
         self->gap++;
-        accepted[place] = 0.0;
+        accepted[place] = standing[place] = 0.0;
         if (!isfinite(x[place])) {
             continue;
         }
-        guard_end_run(self, x[place], x_pb[place]);
-        self->holding = (uint64_t)hsep_sensor_misses(&self->held, x[place], x_pb[place], still, HUGE_VAL);
-        if (self->holding && ++self->doubtful > guard_standing * self->patience) { /* the axis itself stands still */
+        guard_follow_motion(self, x[place], x_pb[place]);
+        const int stands = hsep_sensor_misses(&self->held, x[place], x_pb[place], plausible, HUGE_VAL);
+        if (stands) {
+            guard_set_run(self, k, n, 1.0, standing);
+        }
+        self->holding = stands && !self->rests;
+        if (self->holding && ++self->doubtful > self->patience_standing) { /* the axis itself stands still */
             accepted[place] = 1.0;
             self->last = residual;
             self->gap = 0;
             continue;
         }
         if (self->holding) {
-            const uint64_t repeats = (uint64_t)fmin(self->held.repeats, (double)(k + 1));
-            for (uint64_t j = k + 1 - repeats; j < k; j++) {
-                accepted[n - 1 - j] = 0.0;
-            }
+            guard_set_run(self, k, n, 0.0, accepted);
             continue;
         }
         if (known) {
             /* Towards the prediction is no jump. */
             const double nearest = fmin(fmax(residual, fmin(self->last, 0.0)), fmax(self->last, 0.0));
-            const int jumping = fabs(residual - nearest) > plausible + (double)self->gap * guard_pace * motion;
+            const int jumping = fabs(residual - nearest) > plausible + (double)self->gap * HSEP_TRUST_PACE * motion;
             self->doubtful = jumping ? self->doubtful + 1 : 0;
             if ((jumping && self->doubtful <= self->patience) || deviation[place] > plausible) {
                 continue;

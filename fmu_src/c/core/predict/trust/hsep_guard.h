@@ -15,14 +15,18 @@
 #define HSEP_GUARD_NEIGHBOURS 2 /* samples to either side that an isolated value is compared with */
 
 typedef struct {
-    uint64_t patience; /* doubtful samples in a row until another level is believed; thrice: an axis that stands */
-    uint64_t gap;      /* samples since the last accepted one */
-    uint64_t doubtful; /* held or jumping samples in a row */
-    uint64_t holding;  /* whether the last value was held */
-    double stuck;      /* m, largest motion that was predicted while the axis itself stood still; 0 if it never did */
-    double vibration;  /* m, median change of the residual from sample to sample, beyond that of noise */
-    double first;      /* m, prediction at the beginning of the run of equal values */
-    double last;       /* m, the last accepted residual */
+    uint64_t patience;          /* doubtful samples in a row after which another level is believed, */
+    uint64_t patience_standing; /* and an axis that stands still */
+    uint64_t gap;               /* samples since the last accepted one */
+    uint64_t doubtful;          /* held or jumping samples in a row */
+    uint64_t holding;           /* whether the last value was held */
+    uint64_t
+        rests; /* whether the measured motion had faded beside the predicted one when the run of equal values began:
+                     * then the axis itself came to rest, and its sensor is not held */
+    double vibration;         /* m, median change of the residual from sample to sample, beyond that of noise */
+    double motion, motion_pb; /* m, measured and predicted motion of a sample, averaged over a few, */
+    double position;          /* m, and the prediction at the last one */
+    double last;              /* m, the last accepted residual */
     hsep_sensor held;
     double spread; /* m, mean deviation from the neighbours' median; -1 before the first window */
     double pace;   /* m, largest predicted motion of a sample in the last window */
@@ -30,22 +34,24 @@ typedef struct {
     double before[HSEP_GUARD_NEIGHBOURS]; /* m, the last residuals, oldest first */
 } hsep_guard;
 
-HSEP_ASSERT_WORDS(hsep_guard, 16 + HSEP_GUARD_NEIGHBOURS);
+HSEP_ASSERT_WORDS(hsep_guard, 19 + HSEP_GUARD_NEIGHBOURS);
 
 typedef struct {
     enum { HSEP_NO_DOUBT = 0, HSEP_STANDS, HSEP_OTHER_LEVEL } kind;
     double value; /* m, position where the axis stands, or residual at the other level */
 } hsep_doubt;
 
-HSEP_API void hsep_guard_init(hsep_guard *self, uint64_t patience);
+/* Np: samples of a usual window; T_s: s. */
+HSEP_API void hsep_guard_init(hsep_guard *self, uint64_t Np, double T_s);
 
-/* Judge the samples of a window: accepted, (n,), becomes 1 where a sample is plausible and 0 elsewhere.
+/* Judge the samples of a window: accepted, (n,), becomes 1 where a sample is plausible and 0 elsewhere;
+ * standing, (n,), 1 where the axis, or its sensor, stood under a predicted motion: a run of equal values.
  * x: (n,) m, measured, NaN where missing; x_pb: (n,) m; largest: m, the largest accepted residual so far;
  * deviation: (n,) work. Signals are newest first: sample k is at place n - 1 - k. Cost: about 60 + 2 log2(n) operations
  * a sample, and n more where a run of held values ends. */
 HSEP_API void hsep_guard_accept(
     hsep_guard *self, const double x[], const double x_pb[], uint64_t n, double largest, double deviation[],
-    double accepted[]);
+    double accepted[], double standing[]);
 
 /* What the next window may be otherwise than predicted: the axis stands still, believed or not, until it does not; or
  * the rejected level is the true one. largest: m, the largest accepted residual so far. Constant cost. */

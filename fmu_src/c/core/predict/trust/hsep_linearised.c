@@ -5,7 +5,15 @@
 #include <string.h>
 
 #define LINEARISED_CHANGES 3                      /* signals of a change: v_d, x, v */
-#define LINEARISED_GAINS (2 * LINEARISED_CHANGES) /* of a candidate: of the disturbances, of their differences */
+#define LINEARISED_GAINS (2 * LINEARISED_CHANGES) /* of an expert: of the disturbances, of their differences */
+
+static const hsep_expert_place linearised_experts[HSEP_LINEARISED_EXPERTS] = {HSEP_LAGGED, HSEP_STATIC, HSEP_DOUBTING};
+
+/* Weight of an expert in the stack; 0 where it knows nothing. */
+static double linearised_weight(const hsep_trusted *model, hsep_expert_place expert)
+{
+    return model->predicted[expert] ? model->stack.weights[expert] : 0.0;
+}
 
 /* Set what follows from the parameters; return the bytes of the block. */
 static double linearised_lay_out(hsep_linearised *self, const hsep_trusted_parameters *parameters)
@@ -18,14 +26,17 @@ static double linearised_lay_out(hsep_linearised *self, const hsep_trusted_param
     self->count = hsep_disturbances_count(parameters->trust->period);
     self->slopes = hsep_take(&end, n * (double)self->count);
     self->gains = hsep_take(&end, n * LINEARISED_GAINS * HSEP_PHYSICS_ABREAST);
-    self->shrink = hsep_take(&end, n * HSEP_N_CANDIDATES);
+    self->shrink = hsep_take(&end, n * HSEP_LINEARISED_EXPERTS);
+    self->kept = hsep_take(&end, n);
     self->change = hsep_take(&end, preview * LINEARISED_CHANGES);
-    self->passed = hsep_take(&end, preview * HSEP_N_CANDIDATES);
+    self->base = hsep_take(&end, preview);
+    self->of_command = hsep_take(&end, preview);
+    self->passed = hsep_take(&end, preview * HSEP_LINEARISED_EXPERTS);
     self->run = hsep_take(&end, preview);
     self->disturbance = hsep_take(&end, preview * HSEP_PHYSICS_ABREAST);
     self->drive = hsep_take(&end, preview * HSEP_PHYSICS_ABREAST);
     self->physics = hsep_take_block(&end, filter);
-    self->filters = hsep_take_block(&end, HSEP_N_CANDIDATES * filter);
+    self->filters = hsep_take_block(&end, HSEP_LINEARISED_EXPERTS * filter);
     return end * sizeof(double);
 }
 
@@ -37,7 +48,7 @@ HSEP_API double hsep_linearised_size(const hsep_trusted_parameters *parameters)
 HSEP_API void hsep_linearised_init(hsep_linearised *self, const hsep_trusted_parameters *parameters)
 {
     const hsep_predictor_settings *settings = parameters->settings;
-    memset(self, 0, (size_t)hsep_linearised_size(parameters)); /* gains of no candidate are 0 */
+    memset(self, 0, (size_t)hsep_linearised_size(parameters)); /* gains of no expert are 0 */
     (void)linearised_lay_out(self, parameters);
     hsep_physics_init(
         (hsep_physics *)hsep_at(self, self->physics), parameters->modes, parameters->n_modes, settings->dead_time,
@@ -54,13 +65,13 @@ HSEP_API int hsep_linearised_valid(const void *block, const hsep_trusted_paramet
            hsep_physics_valid(hsep_at_bytes(block, got.physics), n_modes, dead_time);
 }
 
-/* Place of the weights of the disturbances among those of a candidate. */
+/* Place of the weights of the disturbances among those of an expert. */
 static uint64_t linearised_first(const hsep_linearised *self, const hsep_trusted *model)
 {
     return model->n_static - 2 * self->count;
 }
 
-/* What the slopes give of a change, by the weights of a candidate. gain: its first one of those abreast. */
+/* What the slopes give of a change, by the weights of an expert. gain: its first one of those abreast. */
 static void linearised_gains(const hsep_linearised *self, const double weights[], double *gain)
 {
     const double *slopes = hsep_at_const(self, self->slopes);
@@ -100,6 +111,12 @@ static void linearised_pass(const double weights[], uint64_t count, const double
     }
 }
 
+/* A change after the dead time, at sample u. */
+static double linearised_acted(const hsep_linearised_change *change, uint64_t u, uint64_t dead_time)
+{
+    return u >= dead_time && u - dead_time < change->n ? change->commands[u - dead_time] : 0.0;
+}
+
 /* A change as v_d, x and v. */
 static void linearised_signals(hsep_linearised *self, const hsep_linearised_change *change, double T_s)
 {
@@ -113,6 +130,46 @@ static void linearised_signals(hsep_linearised *self, const hsep_linearised_chan
     }
 }
 
+/* Part of an expert in the stack, sample after sample, with what shrinking and bounds leave of it. */
+static void linearised_shrink(
+    const hsep_linearised *self, hsep_trusted *model, hsep_expert_place place, double shrink[])
+{
+    const hsep_expert *expert = hsep_trusted_expert(model, place);
+    const double weight = linearised_weight(model, place);
+    for (uint64_t k = 0; weight > 0.0 && k < self->n; k++) {
+        shrink[k] = weight * hsep_expert_shrink(expert, self->n - 1 - k);
+    }
+}
+
+/* What of a change is neither friction nor stiffness: it behind G_pb and after the dead time, and what the command's
+ * expert makes of its increments, from rest. */
+static void linearised_command(hsep_linearised *self, hsep_trusted *model, const hsep_linearised_change *change)
+{
+    const hsep_expert *expert = hsep_trusted_expert(model, HSEP_COMMAND);
+    const double weight = linearised_weight(model, HSEP_COMMAND), *weights = hsep_at_const(expert, expert->weights);
+    const double *lag_weights = weights + expert->n_static;
+    const uint64_t dead_time = hsep_trusted_command(model)->dead_time, preview = self->preview;
+    double *base = hsep_at(self, self->base), *to = hsep_at(self, self->of_command), *run = hsep_at(self, self->run);
+    memcpy(base, change->passed, (size_t)preview * sizeof(double));
+    if (!(weight > 0.0)) {
+        return;
+    }
+    linearised_shrink(self, model, HSEP_COMMAND, hsep_at(self, self->kept));
+    for (uint64_t u = 0; u < preview; u++) {
+        const double acted = linearised_acted(change, u, dead_time);
+        double drive = 0.0;
+        for (uint64_t i = 1; i < expert->n_static && i <= u + 1; i++) {
+            const uint64_t at = u + 1 - i;
+            const double before = at > 0 ? linearised_acted(change, at - 1, dead_time) : 0.0;
+            drive += weights[i] * (linearised_acted(change, at, dead_time) - before);
+        }
+        double *e = run + (preview - 1 - u);
+        *e = hsep_recur(drive, lag_weights, e + 1, u < expert->p ? u : expert->p);
+        base[u] += weight * (acted - change->passed[u]);
+        to[u] = *e;
+    }
+}
+
 HSEP_API void hsep_linearised_at(
     hsep_linearised *self, hsep_trusted *model, const double x_d[], const double x_pb[],
     const hsep_linearised_change *change, double reach)
@@ -121,21 +178,19 @@ HSEP_API void hsep_linearised_at(
     hsep_disturbances_slopes(
         hsep_trusted_disturbances(model), x_d, x_pb, hsep_at(model, model->x), n, model->forecast_scale, reach,
         hsep_at(self, self->slopes));
-    for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
-        hsep_candidate *candidate = hsep_trusted_candidate(model, i);
-        const double *weights = hsep_at(candidate, candidate->weights), part = model->blend.weights[1 + i];
-        double *shrink = hsep_at(self, self->shrink) + i * n;
-        for (uint64_t k = 0; k < n; k++) {
-            shrink[k] = part * hsep_candidate_shrink(candidate, n - 1 - k);
-        }
+    linearised_signals(self, change, hsep_trusted_disturbances(model)->T_s);
+    linearised_command(self, model, change);
+    for (uint64_t i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
+        const hsep_expert *expert = hsep_trusted_expert(model, linearised_experts[i]);
+        const double *weights = hsep_at_const(expert, expert->weights);
+        linearised_shrink(self, model, linearised_experts[i], hsep_at(self, self->shrink) + i * n);
         linearised_gains(self, weights + first, hsep_at(self, self->gains) + i);
         linearised_pass(
             weights + 1, first - 1, change->passed, self->preview, hsep_at(self, self->passed) + i * self->preview);
     }
-    linearised_signals(self, change, hsep_trusted_disturbances(model)->T_s);
 }
 
-/* The disturbances that a change makes of each candidate, in the last count samples. */
+/* The disturbances that a change makes of each expert, in the last count samples. */
 static void linearised_disturbance(hsep_linearised *self, uint64_t count)
 {
     const uint64_t stride = LINEARISED_GAINS * HSEP_PHYSICS_ABREAST;
@@ -159,28 +214,28 @@ static void linearised_disturbance(hsep_linearised *self, uint64_t count)
 static void linearised_filter(hsep_linearised *self, uint64_t count)
 {
     const uint64_t words = self->filters - self->physics;
-    hsep_physics *filters[HSEP_N_CANDIDATES];
-    for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
+    hsep_physics *filters[HSEP_LINEARISED_EXPERTS];
+    for (uint64_t i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
         double *filter = hsep_at(self, self->filters + i * words);
         memcpy(filter, hsep_at(self, self->physics), (size_t)words * sizeof(double));
         filters[i] = (hsep_physics *)filter;
     }
     hsep_physics_abreast(
-        filters, HSEP_N_CANDIDATES, hsep_at(self, self->disturbance), hsep_at(self, self->drive), (size_t)count);
+        filters, HSEP_LINEARISED_EXPERTS, hsep_at(self, self->disturbance), hsep_at(self, self->drive), (size_t)count);
 }
 
-/* Run of the recursion of candidate i from rest, driven by the filtered disturbance and what the features of x_pb give,
+/* Run of the recursion of expert i from rest, driven by the filtered disturbance and what the features of x_pb give,
  * and its part of the change of x_h. */
 static void linearised_run(
-    hsep_linearised *self, const hsep_candidate *candidate, uint64_t i, uint64_t count, double column[])
+    hsep_linearised *self, const hsep_expert *expert, uint64_t i, uint64_t count, double column[])
 {
-    const double *lag_weights = hsep_at_const(candidate, candidate->weights) + candidate->n_static;
+    const double *lag_weights = hsep_at_const(expert, expert->weights) + expert->n_static;
     const double *own = hsep_at(self, self->passed) + i * self->preview, *drive = hsep_at(self, self->drive) + i;
     const double *shrink = hsep_at(self, self->shrink) + i * self->n + (self->n - count);
     double *run = hsep_at(self, self->run);
     for (uint64_t u = 0; u < count; u++, drive += HSEP_PHYSICS_ABREAST) {
         double *e = run + (count - 1 - u);
-        *e = hsep_recur(*drive + own[u], lag_weights, e + 1, u < candidate->p ? u : candidate->p);
+        *e = hsep_recur(*drive + own[u], lag_weights, e + 1, u < expert->p ? u : expert->p);
         column[u] += shrink[u] * *e;
     }
 }
@@ -188,15 +243,16 @@ static void linearised_run(
 HSEP_API void hsep_linearised_column(hsep_linearised *self, hsep_trusted *model, uint64_t first, double column[])
 {
     const uint64_t count = self->preview - first;
-    const double *change = hsep_at(self, self->change);
-    for (uint64_t u = 0; u < count; u++) {
-        column[u] = change[LINEARISED_CHANGES * u + 1];
+    const double *of_command = hsep_at(self, self->of_command), *kept = hsep_at(self, self->kept) + (self->n - count);
+    memcpy(column, hsep_at(self, self->base), (size_t)count * sizeof(double));
+    for (uint64_t u = 0; linearised_weight(model, HSEP_COMMAND) > 0.0 && u < count; u++) {
+        column[u] += kept[u] * of_command[u];
     }
     linearised_disturbance(self, count);
     linearised_filter(self, count);
-    for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
-        if (model->blend.weights[1 + i] > 0.0) {
-            linearised_run(self, hsep_trusted_candidate(model, i), i, count, column);
+    for (uint64_t i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
+        if (linearised_weight(model, linearised_experts[i]) > 0.0) {
+            linearised_run(self, hsep_trusted_expert(model, linearised_experts[i]), i, count, column);
         }
     }
 }

@@ -1,57 +1,60 @@
 /* Learning of a residual model that can be trusted. */
 #include "hsep_trusted.h"
 
-#include "hsep_vector.h"
+#include "hsep_trust_constants.h"
 
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
 
-/* Factor by which the mean square of the residual fades from window to window. */
-static const double trusted_recent = 0.9;
-
 /* Lags of a row that may stand for samples without a measurement. */
-static const double trusted_bridged_max = 3.0;
+static const double trusted_bridged = 3.0;
 
-/* Largest weight of earlier runs when another begins, in windows. */
-static const double trusted_carried = 30.0;
-
-/* Mean square error of a window, relative to the expected one, above which the machine has changed; and what then
- * remains at least of the weight of all samples before, in windows. */
-static const double trusted_surprise = 10.0, trusted_surprised = 0.1;
-
-/* Bound on the variance of the noise relative to the largest mean square of the residual: a larger one would prevent
- * any learning. */
-static const double trusted_least_noise = 1e-4;
-
-HSEP_API double hsep_trusted_least_variance(const hsep_trusted *self)
-{
-    return fmin(self->least_variance, trusted_least_noise * self->scale.largest_square);
-}
-
-/* Weigh all samples so far by kept. */
-static void trusted_discount(hsep_trusted *self, double kept)
+/* Weigh all rows of some evidence so far by kept. */
+static void trusted_discount(hsep_trusted *self, hsep_evidence evidence, double kept)
 {
     if (kept < 1.0) {
-        hsep_regression_discount(hsep_trusted_regression(self), kept);
-        self->n_rows *= kept;
-        if (hsep_trusted_change(self)->active) {
-            hsep_change_discount(hsep_trusted_change(self), kept);
-        }
+        hsep_regression_discount(hsep_trusted_evidence(self, evidence), kept);
+        self->n_rows[evidence] *= kept;
     }
+}
+
+/* Copy rows: regressions of the same features. */
+static void trusted_copy_rows(hsep_trusted *self, hsep_evidence of, hsep_evidence to)
+{
+    const hsep_regression *from = hsep_trusted_evidence(self, of);
+    memcpy(hsep_trusted_evidence(self, to), from, (size_t)hsep_regression_size(from->n));
+    self->n_rows[to] = self->n_rows[of];
+}
+
+/* Take over what is known of the errors of another expert; NULL: nothing is. */
+static void trusted_set_noise(hsep_trusted *self, hsep_expert_place of, const hsep_expert *other)
+{
+    hsep_expert *expert = hsep_trusted_expert(self, of);
+    expert->noise_variance = other != NULL ? other->noise_variance : 0.0;
+    expert->correlation = other != NULL ? other->correlation : 1.0;
+}
+
+/* End the doubt of what earlier runs have taught. */
+static void trusted_end_doubt(hsep_trusted *self)
+{
+    self->doubts = 0;
+    hsep_stack_forget(&self->stack, HSEP_DOUBTING);
 }
 
 HSEP_API void hsep_trusted_restart(hsep_trusted *self)
 {
-    const double most = trusted_carried * (double)self->Np;
-    hsep_change *change = hsep_trusted_change(self);
-    change->active = 0;
-    trusted_discount(self, most / fmax(self->n_rows, most));
-    for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
-        self->correlations[i] = hsep_trusted_candidate(self, i)->correlation;
+    const double most = HSEP_TRUST_CARRIED * (double)self->Np;
+    for (int i = 0; i < HSEP_N_FACTORS; i++) {
+        trusted_discount(self, (hsep_evidence)i, most / fmax(self->n_rows[i], most));
     }
-    if (self->n_rows > 0.0) {
-        hsep_change_begin(change, hsep_trusted_regression(self), self->n_rows);
+    trusted_end_doubt(self);
+    if (self->n_rows[HSEP_OF_PHYSICS] > 0.0) {
+        self->doubts = 1;
+        trusted_copy_rows(self, HSEP_OF_PHYSICS, HSEP_OF_DOUBT);
+        trusted_discount(self, HSEP_OF_DOUBT, HSEP_TRUST_LESS);
+        trusted_set_noise(self, HSEP_DOUBTING, hsep_trusted_expert(self, HSEP_LAGGED));
+        hsep_stack_copy(&self->stack, HSEP_LAGGED, HSEP_DOUBTING);
     }
 }
 
@@ -84,245 +87,207 @@ static double trusted_bridge(hsep_trusted *self, const double x_pb[], double e[]
     return count;
 }
 
-/* Update the regression with the window's rows [features without lags | lags | e_pb]. */
-static void trusted_fold(hsep_trusted *self, const double e[])
+/* Residual of the command over the window, whose commands and residuals are known. */
+static void trusted_of_command(hsep_trusted *self, const double x_pb[], const double e[])
 {
-    hsep_regression *regression = hsep_trusted_regression(self);
-    hsep_change *change = hsep_trusted_change(self);
-    const uint64_t n_static = self->n_static;
-    const double *rows = hsep_at(self, self->rows), *accepted = hsep_at(self, self->accepted);
-    const double *bridged = hsep_at(self, self->bridged);
+    const double *late = hsep_command_late(hsep_trusted_command(self), self->Np);
+    double *e_0 = hsep_at(self, self->e_0);
+    for (uint64_t j = 0; j < self->Np; j++) {
+        e_0[j] = e[j] + x_pb[j] - late[j];
+    }
+}
+
+/* Which rows of the window are learned, (Np,), by their places, and their number. What stands still is followed and not
+ * learned: it tells nothing of motion. */
+static uint64_t trusted_learned_rows(const hsep_trusted *self, double learned[])
+{
+    const double *moving = hsep_at_const(self, self->moving);
+    const double *bridged = hsep_at_const(self, self->bridged);
     double n_bridged = 0.0; /* among the lags of the row */
+    uint64_t count = 0;
     for (uint64_t i = 0; i < self->p; i++) {
         n_bridged += bridged[self->Np + i];
     }
-    trusted_discount(self, self->kept);
-    for (uint64_t j = self->Np; j-- > 0; rows += n_static) {
-        if (accepted[j] > 0.0 && n_bridged <= trusted_bridged_max) {
-            double *row = change->active ? hsep_change_row(change) : hsep_regression_row(regression);
-            memcpy(row, rows, (size_t)n_static * sizeof(double));
-            memcpy(row + n_static, e + j + 1, (size_t)self->p * sizeof(double));
-            row[n_static + self->p] = e[j];
-            if (change->active) {
-                hsep_change_fold(change);
-            } else {
-                hsep_regression_fold(regression);
-            }
-            self->n_rows += 1.0;
-        }
+    for (uint64_t j = self->Np; j-- > 0;) {
+        learned[j] = moving[j] > 0.0 && n_bridged <= trusted_bridged;
+        count += learned[j] > 0.0;
         n_bridged += bridged[j] - bridged[j + self->p];
     }
-    if (change->active) {
-        hsep_change_join(change, regression);
-    }
+    return count;
 }
 
-/* Variance of the noise from the first window: third differences leave white noise, 20 times its variance, and little
- * else. */
-static double trusted_first_variance(const hsep_trusted *self, const double e[])
+/* Update some evidence with the rows [features without lags | lags | residual] of the window that are learned, count of
+ * them. rows: (Np, n_static); e: (Np + p,), m. */
+static void trusted_fold(
+    hsep_trusted *self, hsep_evidence evidence, const double rows[], const double e[], uint64_t count)
 {
-    double sum = 0.0;
-    if (self->Np <= 10) {
-        return hsep_dot(e, e, self->Np) / (double)self->Np;
-    }
-    for (uint64_t j = 0; j + 3 < self->Np; j++) {
-        const double middle = e[j + 1] - e[j + 2];
-        const double third = ((e[j] - e[j + 1]) - middle) - (middle - (e[j + 2] - e[j + 3]));
-        sum += third * third;
-    }
-    return sum / (double)(self->Np - 3) / 20.0;
-}
-
-HSEP_API void hsep_trusted_predict_less(hsep_trusted *self, const double past[])
-{
-    hsep_change *change = hsep_trusted_change(self);
-    change->doubted = 0;
-    if (change->active && self->predicted && change->n_after > 0.0) {
-        hsep_change_predict(
-            change, hsep_trusted_candidate(self, 1), hsep_at(self, self->scales), hsep_trusted_least_variance(self),
-            hsep_at(self, self->rows), past, &self->scale);
-    }
-}
-
-/* Sum of squared errors of a prediction, of 0 if missing, over the accepted samples. */
-static double trusted_error(const hsep_trusted *self, const double e[], const double predicted[])
-{
-    const double *accepted = hsep_at_const(self, self->accepted);
-    double sum = 0.0;
-    for (uint64_t j = 0; j < self->Np; j++) {
-        const double error = e[j] - (predicted != NULL ? predicted[j] : 0.0);
-        sum += accepted[j] * error * error;
-    }
-    return sum;
-}
-
-/* Whether earlier runs had better have less weight. */
-static int trusted_is_doubted(hsep_trusted *self, const double e[])
-{
-    hsep_change *change = hsep_trusted_change(self);
-    const double *all = hsep_candidate_prediction(hsep_trusted_candidate(self, 1));
-    const double *less = hsep_candidate_prediction(hsep_change_candidate(change));
-    const int compared = change->active && change->doubted && self->n_rest < self->Np;
-    change->doubted = 0;
-    return compared &&
-           hsep_change_is_doubted(
-               change, trusted_error(self, e, all), trusted_error(self, e, less), trusted_error(self, e, NULL));
-}
-
-/* Whether the plant of this run is another one than that of earlier runs. */
-static int trusted_has_changed(hsep_trusted *self)
-{
-    hsep_change *change = hsep_trusted_change(self);
-    const double least = hsep_trusted_least_variance(self);
-    const hsep_candidate *first = hsep_trusted_candidate(self, 0);
-    const double variance = fmax(first->noise_variance, least);
-    const double correlation = fmin(self->correlations[0], first->correlation_max);
-    return change->active && self->predicted &&
-           hsep_change_tells(
-               change, hsep_trusted_regression(self), hsep_at(self, self->scales), variance, least, correlation);
-}
-
-/* Forget what earlier runs have taught if the plant has changed, and end the comparison once it is decided. */
-static void trusted_conclude(hsep_trusted *self, int changed, int doubted)
-{
-    hsep_change *change = hsep_trusted_change(self);
-    if (doubted && !changed) {
-        self->n_rows = hsep_change_doubt(change, hsep_trusted_regression(self));
-    }
-    if (changed) {
-        self->n_rows = hsep_change_keep_after(change, hsep_trusted_regression(self));
-        self->scale = (hsep_residual_scale){
-            fmin(self->scale.recent, change->largest_square), change->largest_square, change->largest};
-        hsep_blend_init(&self->blend);
-        for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
-            hsep_trusted_candidate(self, i)->correlation = self->correlations[i];
+    hsep_regression *regression = hsep_trusted_evidence(self, evidence);
+    const uint64_t n = regression->n, n_static = n - self->p;
+    const double *learned = hsep_at(self, self->x);
+    double *work = hsep_at(self, self->work);
+    uint64_t b = 0;
+    trusted_discount(self, evidence, self->kept);
+    for (uint64_t j = self->Np; j-- > 0; rows += n_static) {
+        if (learned[j] > 0.0) {
+            double *row = hsep_block_fold_row(work, n, b++);
+            memcpy(row, rows, (size_t)n_static * sizeof(double));
+            memcpy(row + n_static, e + j + 1, (size_t)self->p * sizeof(double));
+            row[n] = e[j];
         }
     }
-    if (changed || hsep_change_is_over(change)) {
-        change->active = 0;
+    hsep_block_fold(regression, work, count, 0);
+    self->n_rows[evidence] += (double)count;
+}
+
+/* Update all evidence with the window. */
+static void trusted_fold_window(hsep_trusted *self, const double e[])
+{
+    hsep_command *command = hsep_trusted_command(self);
+    const double *rows = hsep_at(self, self->rows);
+    const uint64_t count = trusted_learned_rows(self, hsep_at(self, self->x)); /* which is not needed any more */
+    trusted_fold(self, HSEP_OF_PHYSICS, rows, e, count);
+    if (self->doubts) {
+        trusted_fold(self, HSEP_OF_DOUBT, rows, e, count);
+    }
+    trusted_fold(self, HSEP_OF_COMMAND, hsep_at(command, command->rows), hsep_at(self, self->e_0), count);
+}
+
+/* Update the weights of the stack with the samples that were published, of those accepted. */
+static void trusted_judge_stack(hsep_trusted *self, const double e[])
+{
+    const double *moving = hsep_at(self, self->moving);
+    const uint64_t first = self->late < self->Np ? self->late : self->Np - 1;
+    double products[HSEP_N_EXPERTS + 1][HSEP_N_EXPERTS + 1] = {{0.0}}, n = 0.0;
+    for (uint64_t j = 0; j < self->Np - first; j++) {
+        double of_sample[HSEP_N_EXPERTS + 1];
+        for (uint64_t i = 0; i < HSEP_N_EXPERTS; i++) {
+            of_sample[i] = hsep_trusted_stacked(self, (hsep_expert_place)i, self->n - self->Np + j);
+        }
+        of_sample[HSEP_N_EXPERTS] = e[j];
+        for (int i = 0; moving[j] > 0.0 && i <= HSEP_N_EXPERTS; i++) {
+            for (int l = 0; l <= HSEP_N_EXPERTS; l++) {
+                products[i][l] += of_sample[i] * of_sample[l];
+            }
+        }
+        n += moving[j];
+    }
+    if (n > 0.0) {
+        hsep_stack_update(&self->stack, products, n, self->least_variance);
     }
 }
 
-/* Estimate the errors of the candidates from the measurement of their window, which may surprise. */
-static void trusted_judge(hsep_trusted *self, double n_rows, const double e[], int surprises)
+/* Let all experts go on with little of earlier runs, as the one that doubts them, and judge them anew. */
+static void trusted_doubt_earlier_runs(hsep_trusted *self)
 {
-    const double *accepted = hsep_at(self, self->accepted);
-    if (self->predicted) {
-        const hsep_candidate *cautious = hsep_trusted_candidate(self, 1);
-        const double surprise = hsep_candidate_surprise(cautious, e, accepted);
-        if (surprises && surprise > trusted_surprise) {
-            const double kept = trusted_surprise / surprise * (trusted_surprise / surprise);
-            trusted_discount(self, fmax(kept, trusted_surprised * (double)self->Np / self->n_rows));
-        }
-    }
-    for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
-        hsep_candidate *candidate = hsep_trusted_candidate(self, i);
-        double variance = 0.0;
-        if (self->predicted) {
-            hsep_candidate_judge(candidate, e, accepted);
-            variance = candidate->residual_sum / n_rows;
-        } else {
-            variance = trusted_first_variance(self, e);
-        }
-        candidate->noise_variance = self->given_variance > 0.0 ? self->given_variance : variance;
-    }
+    trusted_copy_rows(self, HSEP_OF_DOUBT, HSEP_OF_PHYSICS);
+    trusted_discount(self, HSEP_OF_COMMAND, HSEP_TRUST_LESS);
+    trusted_set_noise(self, HSEP_LAGGED, hsep_trusted_expert(self, HSEP_DOUBTING));
+    trusted_set_noise(self, HSEP_STATIC, NULL);
+    hsep_stack_init(&self->stack);
+    trusted_end_doubt(self);
 }
 
-/* Scalar product of two signals over the accepted samples; a missing signal is 0. */
-static double trusted_product(const hsep_trusted *self, const double a[], const double b[])
+/* Judge the experts and their stack by the measurement of their window, of which count samples are moving. */
+static void trusted_judge(hsep_trusted *self, const double e[], double count)
 {
-    const double *accepted = hsep_at_const(self, self->accepted);
-    double sum = 0.0;
-    for (uint64_t j = 0; a != NULL && b != NULL && j < self->Np; j++) {
-        sum += accepted[j] * a[j] * b[j];
-    }
-    return sum;
-}
-
-/* Update the size of the residuals, and the blend of the candidates, with the accepted samples, count of them. */
-static void trusted_assess(hsep_trusted *self, const double e[], double count)
-{
-    hsep_residual_scale *scale = &self->scale;
-    const double *accepted = hsep_at(self, self->accepted);
-    const double *signals[HSEP_N_BLENDED + 1] = {NULL};
-    double products[HSEP_N_BLENDED + 1][HSEP_N_BLENDED + 1] = {{0.0}};
-    const double mean_square = trusted_product(self, e, e) / count;
-    double largest = 0.0;
-    for (uint64_t j = 0; j < self->Np; j++) {
-        largest = fmax(largest, accepted[j] * fabs(e[j]));
-    }
-    hsep_change_follow(hsep_trusted_change(self), mean_square, largest);
-    scale->largest = fmax(scale->largest, largest);
-    scale->recent =
-        scale->recent > 0.0 ? trusted_recent * scale->recent + (1.0 - trusted_recent) * mean_square : mean_square;
-    scale->largest_square = fmax(scale->largest_square, mean_square);
-    signals[HSEP_N_BLENDED] = e;
-    for (uint64_t i = 0; self->predicted && i < HSEP_N_CANDIDATES; i++) {
-        signals[1 + i] = hsep_candidate_prediction(hsep_trusted_candidate(self, i));
-    }
-    for (uint64_t i = 1; i <= HSEP_N_BLENDED; i++) {
-        double sum = 0.0;
-        for (uint64_t j = 0; signals[i] != NULL && j < self->Np; j++) {
-            sum += accepted[j] * signals[i][j];
-        }
-        products[0][i] = products[i][0] = self->hold * sum;
-        for (uint64_t j = 1; j <= HSEP_N_BLENDED; j++) {
-            products[i][j] = trusted_product(self, signals[i], signals[j]);
+    const double *moving = hsep_at(self, self->moving), *e_0 = hsep_at(self, self->e_0);
+    for (uint64_t i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
+        if (self->predicted[i]) {
+            hsep_expert_judge(
+                hsep_trusted_expert(self, (hsep_expert_place)i), i == HSEP_COMMAND ? e_0 : e, moving,
+                self->given_variance);
         }
     }
-    products[0][0] = self->hold * self->hold * count;
-    /* What was larger in earlier runs says nothing of the blend once this one outweighs them. */
-    const hsep_change *change = hsep_trusted_change(self);
-    const int outweighs = change->active && change->n_after > change->n_before;
-    const double largest_square = outweighs ? change->largest_square : scale->largest_square;
-    hsep_blend_update(&self->blend, products, largest_square, self->Np, self->n_rows);
+    trusted_judge_stack(self, e);
+    if (self->doubts && self->stack.weights[HSEP_DOUBTING] > HSEP_TRUST_DOUBT) {
+        trusted_doubt_earlier_runs(self);
+    } else if (self->doubts && self->n_rows[HSEP_OF_DOUBT] > HSEP_TRUST_DOUBT_OVER * self->n_rows[HSEP_OF_PHYSICS]) {
+        trusted_end_doubt(self);
+    }
+    hsep_residual_scale_follow(&self->scale, e, moving, self->Np, count);
+    hsep_residual_scale_follow(&self->scale_of_command, e_0, moving, self->Np, count);
 }
 
 HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const double x_d[], const double x_pb[])
 {
+    const uint64_t Np = self->Np, dead_time = hsep_trusted_command(self)->dead_time;
+    const double step = x_d[Np - 2] - x_d[Np - 1], step_pb = x_pb[Np - 2] - x_pb[Np - 1];
+    double *past = hsep_at(self, self->e_0) + Np;
     hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
-    hsep_disturbances_restart(disturbances, x_d, x_pb, self->Np);
-    hsep_disturbances_command(disturbances, x_d, x_pb, self->Np, self->forecast_scale, hsep_at(self, self->rows));
+    hsep_disturbances_restart(disturbances, x_d, x_pb, Np);
+    hsep_disturbances_command(disturbances, x_d, x_pb, Np, self->forecast_scale, hsep_at(self, self->rows));
+    hsep_command_begin(hsep_trusted_command(self), x_d[Np - 1], x_d[Np - 2]);
+    for (uint64_t i = 0; i < self->p; i++) {
+        past[i] = (x_pb[Np - 1] - step_pb * (double)(i + 1)) - (x_d[Np - 1] - step * (double)(dead_time + i + 1));
+    }
 }
 
-HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_d[], const double x_pb[], double e[], int fold)
+/* Take over the scales of the window; rows at lower velocities are forgotten where it outgrows them. */
+static void trusted_take_scales(hsep_trusted *self)
 {
-    hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
-    double *x = hsep_at(self, self->x), *bridged = hsep_at(self, self->bridged);
-    const double n_rows = self->n_rows;                 /* of the prediction */
-    if (self->forecast_scale != self->velocity_scale) { /* outgrown */
-        hsep_regression_init(hsep_trusted_regression(self), self->n_static + self->p, HSEP_NO_PENALTY);
-        self->n_rows = 0.0;
-        hsep_trusted_change(self)->active = 0;
+    if (self->forecast_scale != self->velocity_scale) {
+        hsep_regression_init(hsep_trusted_evidence(self, HSEP_OF_PHYSICS), self->n_static + self->p, HSEP_NO_PENALTY);
+        self->n_rows[HSEP_OF_PHYSICS] = 0.0;
+        trusted_end_doubt(self);
     }
     self->velocity_scale = self->forecast_scale;
+    self->largest_step = self->forecast_step;
     memcpy(
         hsep_at(self, self->largest), hsep_at(self, self->forecast_largest), (size_t)self->n_static * sizeof(double));
-    hsep_guard_accept(
-        &self->guard, hsep_at(self, self->measured), x_pb, self->Np, self->scale.largest, x,
-        hsep_at(self, self->accepted));
-    const double count = trusted_bridge(self, x_pb, e);
-    self->n_rejected += self->Np - (uint64_t)count;
+}
+
+/* Features of the window as it was measured, and the residual of the command. */
+static void trusted_take_rows(hsep_trusted *self, const double x_d[], const double x_pb[], const double e[])
+{
+    hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
+    double *x = hsep_at(self, self->x), *rows = hsep_at(self, self->rows);
     for (uint64_t j = 0; j < self->Np; j++) {
         x[j] = x_pb[j] + e[j];
     }
     if (self->n > self->Np) { /* what was tried last went beyond the window */
-        hsep_disturbances_command(disturbances, x_d, x_pb, self->Np, self->velocity_scale, hsep_at(self, self->rows));
+        hsep_disturbances_command(disturbances, x_d, x_pb, self->Np, self->velocity_scale, rows);
     }
-    hsep_disturbances_motion(disturbances, x_pb, x, self->Np, hsep_at(self, self->rows));
+    hsep_disturbances_motion(disturbances, x_pb, x, self->Np, rows);
     for (uint64_t k = 0; k < self->n_rest && k < self->Np; k++) { /* learned, but not used, at rest */
-        hsep_at(self, self->rows)[k * self->n_static] = 1.0;
+        rows[k * self->n_static] = 1.0;
     }
     hsep_disturbances_end(disturbances);
-    if (fold && count > 0.0) {
-        trusted_fold(self, e);
-        const int changed = trusted_has_changed(self);
-        const int doubted = trusted_is_doubted(self, e);
-        trusted_judge(self, n_rows, e, !changed && !doubted);
-        trusted_assess(self, e, count);
-        trusted_conclude(self, changed, doubted);
+    hsep_command_take(hsep_trusted_command(self), x_d, self->Np);
+    trusted_of_command(self, x_pb, e);
+}
+
+/* What stands still, axis or sensor, is followed and not learned: it tells nothing of motion. Leave of the standing
+ * samples those that move and are accepted; return how many they are. */
+static double trusted_leave_out_standing(hsep_trusted *self)
+{
+    const double *accepted = hsep_at(self, self->accepted);
+    double *moving = hsep_at(self, self->moving), count = 0.0;
+    for (uint64_t j = 0; j < self->Np; j++) {
+        moving[j] = accepted[j] > 0.0 && !(moving[j] > 0.0) ? 1.0 : 0.0;
+        count += moving[j];
     }
+    return count;
+}
+
+HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_d[], const double x_pb[], double e[], int fold)
+{
+    const size_t lags = (size_t)self->p * sizeof(double);
+    double *bridged = hsep_at(self, self->bridged), *e_0 = hsep_at(self, self->e_0);
+    trusted_take_scales(self);
+    hsep_guard_accept(
+        &self->guard, hsep_at(self, self->measured), x_pb, self->Np, self->scale.largest, hsep_at(self, self->x),
+        hsep_at(self, self->accepted), hsep_at(self, self->moving));
+    const double count = trusted_bridge(self, x_pb, e);
+    self->n_rejected += self->Np - (uint64_t)count;
+    trusted_take_rows(self, x_d, x_pb, e);
+    const double n_moving = trusted_leave_out_standing(self);
+    if (fold && n_moving > 0.0) {
+        trusted_fold_window(self, e);
+        trusted_judge(self, e, n_moving);
+    }
+    hsep_command_end(hsep_trusted_command(self), self->Np);
     self->at_rest = self->n_rest >= self->Np;
     self->known_rest = self->n_rest > self->Np ? self->n_rest - self->Np : 0;
-    memcpy(bridged + self->Np, bridged, (size_t)self->p * sizeof(double)); /* p <= Np: they do not overlap */
+    memcpy(bridged + self->Np, bridged, lags); /* p <= Np: they do not overlap */
+    memcpy(e_0 + self->Np, e_0, lags);
 }

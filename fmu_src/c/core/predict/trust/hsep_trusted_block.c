@@ -1,6 +1,9 @@
 /* Memory of a residual model that can be trusted: its layout, beginning and check, and what it has learned. */
 #include "hsep_trusted.h"
 
+#include "hsep_range.h"
+
+#include <float.h>
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
@@ -10,16 +13,16 @@ HSEP_API hsep_disturbances *hsep_trusted_disturbances(hsep_trusted *self)
     return (hsep_disturbances *)hsep_at(self, self->disturbances);
 }
 
-HSEP_API hsep_regression *hsep_trusted_regression(hsep_trusted *self)
+HSEP_API hsep_command *hsep_trusted_command(hsep_trusted *self) { return (hsep_command *)hsep_at(self, self->command); }
+
+HSEP_API hsep_regression *hsep_trusted_evidence(hsep_trusted *self, hsep_evidence evidence)
 {
-    return (hsep_regression *)hsep_at(self, self->regression);
+    return (hsep_regression *)hsep_at(self, self->evidence[evidence]);
 }
 
-HSEP_API hsep_change *hsep_trusted_change(hsep_trusted *self) { return (hsep_change *)hsep_at(self, self->change); }
-
-HSEP_API hsep_candidate *hsep_trusted_candidate(hsep_trusted *self, uint64_t i)
+HSEP_API hsep_expert *hsep_trusted_expert(hsep_trusted *self, hsep_expert_place expert)
 {
-    return (hsep_candidate *)hsep_at(self, self->candidates[i]);
+    return (hsep_expert *)hsep_at(self, self->experts[expert]);
 }
 
 HSEP_API uint64_t hsep_trusted_n(const hsep_predictor_settings *settings, const hsep_trust_settings *trust)
@@ -27,20 +30,27 @@ HSEP_API uint64_t hsep_trusted_n(const hsep_predictor_settings *settings, const 
     return hsep_disturbances_n(settings->q, trust->period) + settings->p;
 }
 
-/* Correlation beyond which the penalty of a cautious candidate does not grow: it would learn nothing at all. */
-static const double trusted_cautious = 100.0;
-
-/* The last candidate takes the rows as independent: it learns fastest where G_pb is wrong. */
-static hsep_candidate_shape trusted_shape(const hsep_trusted *self, uint64_t candidate)
+/* Features of the rows of some evidence. */
+static uint64_t trusted_n_features(const hsep_trusted *self, uint64_t evidence)
 {
-    return (hsep_candidate_shape){
-        self->Np, self->n, self->n_static, candidate > 0 ? self->p : 0, candidate > 1 ? 1.0 : trusted_cautious};
+    return (evidence == HSEP_OF_COMMAND ? hsep_command_n(self->p) : self->n_static) + self->p;
 }
 
-/* The candidate that predicts windows, no more, with less weight of earlier runs. */
-static hsep_candidate_shape trusted_doubtful_shape(const hsep_trusted *self)
+static hsep_expert_shape trusted_shape(const hsep_trusted *self, uint64_t expert)
 {
-    return (hsep_candidate_shape){self->Np, self->Np, self->n_static, self->p, trusted_cautious};
+    const uint64_t n_static = expert == HSEP_COMMAND ? hsep_command_n(self->p) : self->n_static;
+    return (hsep_expert_shape){self->Np, self->n, n_static, expert == HSEP_STATIC ? 0 : self->p};
+}
+
+/* Doubles of work: for the rows of a window, and for as many as features. */
+static double trusted_work(const hsep_trusted *self)
+{
+    double most = 0.0;
+    for (uint64_t i = 0; i < HSEP_N_EVIDENCE; i++) {
+        const uint64_t n = trusted_n_features(self, i);
+        most = fmax(most, hsep_block_fold_size(n, self->Np > n ? self->Np : n));
+    }
+    return most;
 }
 
 /* Set what follows from the parameters; return the bytes of the block. */
@@ -48,33 +58,41 @@ static double trusted_lay_out(hsep_trusted *self, const hsep_trusted_parameters 
 {
     const hsep_predictor_settings *settings = parameters->settings;
     const hsep_trust_settings *trust = parameters->trust;
-    const double Np = (double)settings->Np, n = (double)parameters->n;
+    const double Np = (double)settings->Np, n = (double)parameters->n, p = (double)settings->p;
     const double n_static = (double)hsep_disturbances_n(settings->q, trust->period);
     double end = HSEP_WORDS(hsep_trusted);
     self->Np = settings->Np;
     self->n = parameters->n;
     self->p = settings->p;
     self->n_static = hsep_disturbances_n(settings->q, trust->period);
+    self->late = settings->measurement_delay;
+    self->T_s = settings->T_s;
     self->least_variance = settings->lambda;
     self->effect = trust->effect;
     self->given_variance = trust->noise_std * trust->noise_std;
     self->kept = trust->forgetting > 0.0 ? exp(-Np * settings->T_s / trust->forgetting) : 1.0;
     self->largest = hsep_take(&end, n_static);
     self->forecast_largest = hsep_take(&end, n_static);
-    self->scales = hsep_take(&end, n_static);
+    self->scales = hsep_take(&end, fmax(n_static, p + 2.0));
     self->x = hsep_take(&end, n);
     self->measured = hsep_take(&end, Np);
     self->accepted = hsep_take(&end, Np);
-    self->bridged = hsep_take(&end, Np + (double)settings->p);
+    self->moving = hsep_take(&end, Np);
+    self->bridged = hsep_take(&end, Np + p);
+    self->e_0 = hsep_take(&end, Np + p);
+    self->stacked = hsep_take(&end, n);
     self->disagreement = hsep_take(&end, n);
     self->rows = hsep_take(&end, n * n_static);
+    self->work = hsep_take(&end, trusted_work(self));
     self->disturbances = hsep_take_block(&end, hsep_disturbances_size(settings, trust->period, parameters->n_modes));
-    self->regression = hsep_take_block(&end, hsep_regression_size(hsep_trusted_n(settings, trust)));
-    const hsep_candidate_shape doubtful = trusted_doubtful_shape(self);
-    self->change = hsep_take_block(&end, hsep_change_size(&doubtful));
-    for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
-        const hsep_candidate_shape shape = trusted_shape(self, i);
-        self->candidates[i] = hsep_take_block(&end, hsep_candidate_size(&shape));
+    self->command = hsep_take_block(&end, hsep_command_size(settings, parameters->n));
+    for (uint64_t i = 0; i < HSEP_N_EVIDENCE; i++) {
+        self->evidence[i] = hsep_take_block(&end, hsep_regression_size(trusted_n_features(self, i)));
+    }
+    self->experts[HSEP_HOLD] = 0;
+    for (uint64_t i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
+        const hsep_expert_shape shape = trusted_shape(self, i);
+        self->experts[i] = hsep_take_block(&end, hsep_expert_size(&shape));
     }
     return end * sizeof(double);
 }
@@ -90,75 +108,108 @@ HSEP_API void hsep_trusted_init(hsep_trusted *self, const hsep_trusted_parameter
     (void)trusted_lay_out(self, parameters);
     self->at_rest = 1;
     self->known_rest = parameters->settings->measurement_delay;
-    hsep_blend_init(&self->blend);
-    hsep_guard_init(&self->guard, 2 * self->Np);
+    hsep_stack_init(&self->stack);
+    hsep_guard_init(&self->guard, self->Np, self->T_s);
     hsep_disturbances_init(
         hsep_trusted_disturbances(self), parameters->settings, parameters->trust->period, parameters->modes,
         parameters->n_modes, parameters->planned, start);
-    hsep_regression_init(hsep_trusted_regression(self), self->n_static + self->p, HSEP_NO_PENALTY);
-    const hsep_candidate_shape doubtful = trusted_doubtful_shape(self);
-    hsep_change_init(hsep_trusted_change(self), &doubtful);
-    for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
-        const hsep_candidate_shape shape = trusted_shape(self, i);
-        hsep_candidate_init(hsep_trusted_candidate(self, i), &shape);
+    hsep_command_init(hsep_trusted_command(self), parameters->settings, parameters->n);
+    for (uint64_t i = 0; i < HSEP_N_EVIDENCE; i++) {
+        hsep_regression_init(
+            hsep_trusted_evidence(self, (hsep_evidence)i), trusted_n_features(self, i), HSEP_NO_PENALTY);
+    }
+    for (uint64_t i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
+        const hsep_expert_shape shape = trusted_shape(self, i);
+        hsep_expert_init(hsep_trusted_expert(self, (hsep_expert_place)i), &shape);
     }
 }
 
 HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters *parameters)
 {
     hsep_trusted got;
+    hsep_guard guard;
     memcpy(&got, block, sizeof got);
     (void)trusted_lay_out(&got, parameters); /* changes nothing where it is sound */
-    const hsep_candidate_shape doubtful = trusted_doubtful_shape(&got);
-    int sound = memcmp(&got, block, sizeof got) == 0 && got.predicted <= 1 && got.at_rest <= 1 &&
-                got.known_rest <= got.n && got.n_rest <= got.n && got.guard.patience == 2 * got.Np &&
+    hsep_guard_init(&guard, got.Np, got.T_s);
+    int sound = memcmp(&got, block, sizeof got) == 0 && got.doubts <= 1 && got.at_rest <= 1 &&
+                got.known_rest <= got.n && got.n_rest <= got.n && got.guard.patience == guard.patience &&
+                got.guard.patience_standing == guard.patience_standing &&
                 hsep_disturbances_valid(
                     hsep_at_bytes(block, got.disturbances), parameters->settings, parameters->trust->period,
                     parameters->n_modes, parameters->planned) &&
-                hsep_regression_valid(hsep_at_bytes(block, got.regression), got.n_static + got.p) &&
-                hsep_change_valid(hsep_at_bytes(block, got.change), &doubtful);
-    for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
-        const void *candidate = hsep_at_bytes(block, got.candidates[i]);
-        const hsep_candidate_shape shape = trusted_shape(&got, i);
-        sound = sound && hsep_candidate_valid(candidate, &shape);
+                hsep_command_valid(hsep_at_bytes(block, got.command), parameters->settings, parameters->n);
+    for (uint64_t i = 0; i < HSEP_N_EVIDENCE; i++) {
+        const void *evidence = hsep_at_bytes(block, got.evidence[i]);
+        sound = sound && hsep_regression_valid(evidence, trusted_n_features(&got, i));
+    }
+    for (uint64_t i = 0; i < HSEP_N_EXPERTS; i++) {
+        const hsep_expert_shape shape = trusted_shape(&got, i);
+        sound = sound && got.predicted[i] <= 1 &&
+                (i == HSEP_HOLD || hsep_expert_valid(hsep_at_bytes(block, got.experts[i]), &shape));
     }
     return sound;
 }
 
-#define TRUSTED_N_SENSOR 4 /* numbers of what is known of the sensor, the last ones */
+/* Some of the numbers that are learned, and their range. */
+typedef struct {
+    double *first;
+    uint64_t n;
+    double least, most;
+} trusted_part;
 
-HSEP_API uint64_t hsep_trusted_n_learned(const hsep_trusted *self)
+#define TRUSTED_PARTS 23
+
+/* What rounding may have added to the sum of the stack's weights. */
+static const double trusted_rounding = 1e-6;
+
+/* All of them, in the order of a weights file. */
+static void trusted_list(hsep_trusted *self, trusted_part parts[TRUSTED_PARTS])
 {
-    return 2 + 3 + 2 * HSEP_N_CANDIDATES + self->n_static + HSEP_N_BLENDED * (HSEP_N_BLENDED + 2) + TRUSTED_N_SENSOR;
+    const double most = HSEP_PREDICTION_MAX;
+    hsep_stack *stack = &self->stack;
+    const trusted_part before[] = {
+        {self->n_rows, HSEP_N_FACTORS, 0.0, most},
+        {&self->velocity_scale, 1, 0.0, most},
+        {&self->largest_step, 1, 0.0, most},
+        {&self->scale.largest_square, 1, 0.0, most},
+        {&self->scale.largest, 1, 0.0, most},
+        {&self->scale_of_command.largest_square, 1, 0.0, most},
+        {&self->scale_of_command.largest, 1, 0.0, most}};
+    const trusted_part behind[] = {
+        {hsep_at(self, self->largest), self->n_static, 0.0, most},
+        {stack->weights, HSEP_N_EXPERTS, 0.0, 1.0},
+        {stack->gram, HSEP_N_EXPERTS * HSEP_N_EXPERTS, -most, most},
+        {stack->cross, HSEP_N_EXPERTS, -most, most},
+        {stack->evidence, 2, 0.0, most},
+        {&self->guard.spread, 1, -1.0, DBL_MAX},
+        {&self->guard.held.step, 1, 0.0, HUGE_VAL},
+        {&self->guard.vibration, 1, 0.0, DBL_MAX}};
+    memcpy(parts, before, sizeof before);
+    parts += sizeof before / sizeof before[0];
+    for (uint64_t i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
+        hsep_expert *expert = hsep_trusted_expert(self, (hsep_expert_place)i);
+        parts[i - HSEP_LAGGED] = (trusted_part){&expert->noise_variance, 1, 0.0, most};
+        parts[i - HSEP_LAGGED + HSEP_N_EXPERTS - 1] = (trusted_part){&expert->correlation, 1, 1.0, most};
+    }
+    memcpy(parts + 2 * (HSEP_N_EXPERTS - 1), behind, sizeof behind);
+}
+
+HSEP_API uint64_t hsep_trusted_n_learned(hsep_trusted *self)
+{
+    trusted_part parts[TRUSTED_PARTS];
+    uint64_t n = 0;
+    trusted_list(self, parts);
+    for (int i = 0; i < TRUSTED_PARTS; i++) {
+        n += parts[i].n;
+    }
+    return n;
 }
 
 HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i)
 {
-    struct {
-        double *first;
-        uint64_t n;
-    } const parts[] = {
-        {&self->n_rows, 1},
-        {&self->velocity_scale, 1},
-        {&self->scale.recent, 1},
-        {&self->scale.largest_square, 1},
-        {&self->scale.largest, 1},
-        {&hsep_trusted_candidate(self, 0)->noise_variance, 1},
-        {&hsep_trusted_candidate(self, 1)->noise_variance, 1},
-        {&hsep_trusted_candidate(self, 2)->noise_variance, 1},
-        {&hsep_trusted_candidate(self, 0)->correlation, 1},
-        {&hsep_trusted_candidate(self, 1)->correlation, 1},
-        {&hsep_trusted_candidate(self, 2)->correlation, 1},
-        {self->blend.weights, HSEP_N_BLENDED},
-        {hsep_at(self, self->largest), self->n_static},
-        {self->blend.gram, HSEP_N_BLENDED * HSEP_N_BLENDED},
-        {self->blend.cross, HSEP_N_BLENDED},
-        {&self->guard.spread, 1},
-        {&self->guard.held.step, 1},
-        {&self->guard.stuck, 1},
-        {&self->guard.vibration, 1},
-    };
+    trusted_part parts[TRUSTED_PARTS];
     size_t part = 0;
+    trusted_list(self, parts);
     for (; i >= parts[part].n; part++) {
         i -= parts[part].n;
     }
@@ -167,17 +218,18 @@ HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i)
 
 HSEP_API int hsep_trusted_sound(hsep_trusted *self)
 {
-    const uint64_t n = hsep_trusted_n_learned(self) - TRUSTED_N_SENSOR;
-    const uint64_t n_signed = HSEP_N_BLENDED * (HSEP_N_BLENDED + 1);
-    const double spread = self->guard.spread, stuck = self->guard.stuck, vibration = self->guard.vibration;
-    int sound = self->guard.held.step > 0.0 && (spread == -1.0 || (spread >= 0.0 && isfinite(spread))) &&
-                stuck >= 0.0 && isfinite(stuck) && vibration >= 0.0 && isfinite(vibration);
-    for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
-        sound = sound && hsep_trusted_candidate(self, i)->correlation >= 1.0;
+    trusted_part parts[TRUSTED_PARTS];
+    const double spread = self->guard.spread;
+    double sum = 0.0;
+    trusted_list(self, parts);
+    int sound = self->guard.held.step > 0.0 && (spread == -1.0 || spread >= 0.0);
+    for (int i = 0; i < TRUSTED_PARTS; i++) {
+        for (uint64_t j = 0; j < parts[i].n; j++) { /* NaN is in no range */
+            sound = sound && parts[i].first[j] >= parts[i].least && parts[i].first[j] <= parts[i].most;
+        }
     }
-    for (uint64_t i = 0; i < n; i++) {
-        const double learned = *hsep_trusted_learned(self, i);
-        sound = sound && isfinite(learned) && (i + n_signed >= n || learned >= 0.0);
+    for (int i = 0; i < HSEP_N_EXPERTS; i++) {
+        sum += self->stack.weights[i];
     }
-    return sound;
+    return sound && sum <= 1.0 + trusted_rounding;
 }

@@ -1,35 +1,35 @@
 /* Prediction by a residual model that can be trusted. */
 #include "hsep_trusted.h"
 
+#include "hsep_trust_constants.h"
+
 #include <math.h>
 #include <stddef.h>
-
-/* Growth of the commanded velocity by which what was learned at lower ones is forgotten: the first one, as that was a
- * creep, and the second one when rows of so many windows are learned. */
-static const double trusted_growth = 30.0, trusted_growth_learned = 1000.0, trusted_motion_learned = 15.0;
 
 /* Velocity, m/s, below which a command is at rest: ratios of smaller ones may underflow. */
 static const double trusted_least_velocity = 1e-200;
 
-/* Bound on the last residual held, relative to the largest one. */
-static const double trusted_hold_max = 1.2;
+static const double trusted_least = 1e-150; /* magnitude of a feature that counts as 0 */
 
-static const double trusted_least_magnitude = 1e-150; /* of a feature */
+/* Experts of the physics model's residual, that without lags first: the stiffness acts at the position, which the
+ * physics model alone does not give well enough. */
+static const hsep_expert_place trusted_of_physics[] = {HSEP_STATIC, HSEP_LAGGED, HSEP_DOUBTING};
 
-/* Whether the commanded velocity outgrows what was learned; the velocity scale with it. A compensator begins to move
- * before the path, with a creep: its first scale is the path's. */
+/* Whether the commanded velocity outgrows what was learned; the scales of velocity and command with it. A compensator
+ * begins to move before the path, with a creep: its first scale is the path's. */
 static int trusted_outgrown(hsep_trusted *self, const double x_d[], const double path[], uint64_t n_path)
 {
     const hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
     double peak = hsep_disturbances_peak_velocity(disturbances, x_d, self->n);
-    const int learned = self->n_rows >= trusted_motion_learned * (double)self->Np;
-    double most = (learned ? trusted_growth_learned : trusted_growth) * self->velocity_scale;
-    if (path != NULL && self->n_rows == 0.0) {
+    const int learned = self->n_rows[HSEP_OF_PHYSICS] >= HSEP_TRUST_LEARNED * (double)self->Np;
+    double most = (learned ? HSEP_TRUST_GROWTH_LEARNED : HSEP_TRUST_GROWTH) * self->velocity_scale;
+    self->forecast_step = fmax(self->largest_step, peak * self->T_s);
+    if (path != NULL && self->n_rows[HSEP_OF_PHYSICS] == 0.0) {
         peak = 0.0;
         for (uint64_t j = 0; j + 1 < n_path; j++) {
             peak = fmax(peak, fabs(path[j] - path[j + 1]));
         }
-        peak = fmax(peak / disturbances->T_s, self->velocity_scale);
+        peak = fmax(peak / self->T_s, self->velocity_scale);
         most = self->velocity_scale;
     }
     const int outgrown = peak > fmax(most, trusted_least_velocity);
@@ -51,20 +51,37 @@ static uint64_t trusted_rest_ahead(const hsep_trusted *self, const double path[]
     return late + k;
 }
 
-/* Solve for the weights of the candidates. */
-static void trusted_solve(hsep_trusted *self)
+/* Largest magnitude of a feature of an expert, that of the window to predict included, and its share. */
+static double trusted_largest(hsep_trusted *self, hsep_expert_place expert, uint64_t feature)
 {
-    const double effect = self->effect > 0.0 ? self->effect : sqrt(self->scale.largest_square);
-    const double least = hsep_trusted_least_variance(self);
-    const double *largest = hsep_at(self, self->forecast_largest);
+    if (expert == HSEP_COMMAND) {
+        return feature > 0 ? self->forecast_step : 1.0;
+    }
+    return hsep_at(self, self->forecast_largest)[feature];
+}
+
+/* Solve for the weights of an expert. */
+static void trusted_solve(hsep_trusted *self, hsep_expert_place place)
+{
+    const int of_command = place == HSEP_COMMAND;
+    const hsep_evidence evidence =
+        of_command ? HSEP_OF_COMMAND : (place == HSEP_DOUBTING ? HSEP_OF_DOUBT : HSEP_OF_PHYSICS);
+    const double square = of_command ? self->scale_of_command.largest_square : self->scale.largest_square;
+    const double effect = self->effect > 0.0 ? self->effect : sqrt(square);
+    hsep_expert *expert = hsep_trusted_expert(self, place);
     double *scales = hsep_at(self, self->scales);
-    for (uint64_t i = 0; i < self->n_static; i++) {
-        const double share = hsep_disturbances_share(hsep_trusted_disturbances(self), i);
-        scales[i] = effect * share / fmax(largest[i], trusted_least_magnitude);
+    for (uint64_t i = 0; i < expert->n_static; i++) {
+        const double share = of_command ? 1.0 : hsep_disturbances_share(hsep_trusted_disturbances(self), i);
+        scales[i] = effect * share / fmax(trusted_largest(self, place, i), trusted_least);
     }
-    for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
-        hsep_candidate_solve(hsep_trusted_candidate(self, i), hsep_trusted_regression(self), scales, least);
-    }
+    const hsep_expert_evidence solved = {
+        .regression = hsep_trusted_evidence(self, evidence),
+        .n_rows = self->n_rows[evidence],
+        .scales = scales,
+        .first = self->given_variance > 0.0 ? self->given_variance : HSEP_TRUST_FIRST_NOISE * square,
+        .least = fmin(self->least_variance, HSEP_TRUST_LEAST_NOISE * square),
+        .work = hsep_at(self, self->work)};
+    hsep_expert_solve(expert, &solved);
 }
 
 HSEP_API void hsep_trusted_scale(
@@ -72,7 +89,6 @@ HSEP_API void hsep_trusted_scale(
     double last_residual)
 {
     hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
-    const double bound = trusted_hold_max * self->scale.largest;
     const int outgrown = trusted_outgrown(self, x_d, path, n_path);
     double *rows = hsep_at(self, self->rows), *largest = hsep_at(self, self->forecast_largest);
     hsep_disturbances_command(disturbances, x_d, x_pb, self->n, self->forecast_scale, rows);
@@ -86,52 +102,103 @@ HSEP_API void hsep_trusted_scale(
         }
     }
     self->n_rest = trusted_rest_ahead(self, path != NULL ? path : x_d, path != NULL ? n_path : self->n);
-    self->hold = fmin(fmax(last_residual, -bound), bound);
-    self->predicted = self->n_rows > 0.0 && !outgrown && self->scale.largest_square > 0.0;
-    if (self->predicted) {
-        trusted_solve(self);
+    self->bound = HSEP_TRUST_BOUND * self->scale.largest;
+    self->hold = fmin(fmax(last_residual, -self->bound), self->bound);
+    const uint64_t known = self->n_rows[HSEP_OF_PHYSICS] > 0.0 && !outgrown && self->scale.largest_square > 0.0;
+    self->predicted[HSEP_HOLD] = 1;
+    self->predicted[HSEP_LAGGED] = self->predicted[HSEP_STATIC] = known;
+    self->predicted[HSEP_DOUBTING] = known && self->doubts;
+    self->predicted[HSEP_COMMAND] = self->n_rows[HSEP_OF_COMMAND] > 0.0 && self->scale_of_command.largest_square > 0.0;
+    for (uint64_t i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
+        if (self->predicted[i]) {
+            trusted_solve(self, (hsep_expert_place)i);
+        }
     }
 }
 
-/* Predict by the candidates, if they have learned, whose rows hold the commands and stiffness and damping at x_pb.
- * past: (p,), m. */
-static void trusted_candidates(hsep_trusted *self, const double x_pb[], const double past[], uint64_t varied)
+/* What the command's expert predicts of the physics model's residual, at places begin ... end - 1. */
+static void trusted_follow_command(hsep_trusted *self, const double x_pb[], uint64_t begin, uint64_t end)
 {
-    if (!self->predicted) {
-        return;
+    const hsep_expert *expert = hsep_trusted_expert(self, HSEP_COMMAND);
+    const double *e_h = hsep_at_const(expert, expert->e_h);
+    const double *late = hsep_command_late(hsep_trusted_command(self), self->n);
+    double *stacked = hsep_at(self, self->stacked);
+    for (uint64_t j = begin; j < end; j++) {
+        stacked[j] = fmax(-self->bound, fmin(e_h[j] + late[j] - x_pb[j], self->bound));
     }
+}
+
+/* Predict by the experts of the physics model's residual, whose rows hold the commands and stiffness and damping at
+ * x_pb. past: (p,), m. */
+static void trusted_by_physics(hsep_trusted *self, const double x_pb[], const double past[], uint64_t varied)
+{
     double *x = hsep_at(self, self->x), *rows = hsep_at(self, self->rows);
-    hsep_candidate *first = hsep_trusted_candidate(self, 0);
-    const uint64_t n_rest = hsep_trusted_change(self)->active ? self->n_rest : 0;
+    hsep_expert *first = hsep_trusted_expert(self, HSEP_STATIC);
+    const uint64_t n_rest = self->doubts ? self->n_rest : 0;
     for (uint64_t k = 0; k < n_rest; k++) { /* the constant that earlier runs have taught is that of motion */
         rows[k * self->n_static] = 0.0;
     }
-    /* The stiffness acts at the position, which the physics model alone does not give well enough. */
-    hsep_candidate_predict(first, rows, past, &self->scale, varied > 0 ? self->n : 0);
+    hsep_expert_predict(first, rows, past, self->scale.largest_square, self->bound, varied > 0 ? self->n : 0);
     for (uint64_t j = 0; j < self->n; j++) {
         x[j] = x_pb[j] + hsep_at(first, first->e_h)[j];
     }
     hsep_disturbances_motion(hsep_trusted_disturbances(self), x_pb, x, self->n, rows);
-    for (uint64_t i = 0; i < HSEP_N_CANDIDATES; i++) {
-        hsep_candidate_predict(hsep_trusted_candidate(self, i), rows, past, &self->scale, varied);
+    for (uint64_t i = 0; i < sizeof trusted_of_physics / sizeof trusted_of_physics[0]; i++) {
+        if (self->predicted[trusted_of_physics[i]]) {
+            hsep_expert_predict(
+                hsep_trusted_expert(self, trusted_of_physics[i]), rows, past, self->scale.largest_square, self->bound,
+                varied);
+        }
     }
 }
 
-/* e: the blend of the candidates, which have predicted samples first ... last - 1. */
-static void trusted_blend(hsep_trusted *self, double e[], uint64_t first, uint64_t last)
+/* Predict by all experts that know something. */
+static void trusted_by_experts(
+    hsep_trusted *self, const double x_d[], const double x_pb[], const double past[], uint64_t varied)
 {
-    const double *weights = self->blend.weights;
+    hsep_command *command = hsep_trusted_command(self);
+    if (self->predicted[HSEP_STATIC]) {
+        trusted_by_physics(self, x_pb, past, varied);
+    }
+    if (self->predicted[HSEP_COMMAND]) {
+        hsep_command_take(command, x_d, self->n);
+        hsep_expert_predict(
+            hsep_trusted_expert(self, HSEP_COMMAND), hsep_at(command, command->rows),
+            hsep_at(self, self->e_0) + self->Np, self->scale_of_command.largest_square,
+            HSEP_TRUST_BOUND_OF_COMMAND * self->scale_of_command.largest, varied);
+        trusted_follow_command(self, x_pb, 0, self->n);
+    }
+}
+
+HSEP_API double hsep_trusted_stacked(const hsep_trusted *self, hsep_expert_place expert, uint64_t place)
+{
+    if (!self->predicted[expert]) {
+        return 0.0;
+    }
+    if (expert == HSEP_HOLD) {
+        return self->hold;
+    }
+    if (expert == HSEP_COMMAND) {
+        return hsep_at_const(self, self->stacked)[place];
+    }
+    const hsep_expert *one = (const hsep_expert *)hsep_at_const(self, self->experts[expert]);
+    return hsep_at_const(one, one->e_h)[place];
+}
+
+/* e: the stack of the experts, which have predicted samples first ... last - 1. */
+static void trusted_stack(hsep_trusted *self, double e[], uint64_t first, uint64_t last)
+{
+    const double *weights = self->stack.weights;
     double *disagreement = hsep_at(self, self->disagreement);
     for (uint64_t j = self->n - last; j < self->n - first; j++) {
-        double square = weights[0] * self->hold * self->hold;
-        e[j] = weights[0] * self->hold;
-        for (uint64_t i = 0; self->predicted && i < HSEP_N_CANDIDATES; i++) {
-            hsep_candidate *one = hsep_trusted_candidate(self, i);
-            const double candidate = hsep_at(one, one->e_h)[j];
-            e[j] += weights[1 + i] * candidate;
-            square += weights[1 + i] * candidate * candidate;
+        double sum = 0.0, square = 0.0;
+        for (uint64_t i = 0; i < HSEP_N_EXPERTS; i++) {
+            const double predicted = hsep_trusted_stacked(self, (hsep_expert_place)i, j);
+            sum += weights[i] * predicted;
+            square += weights[i] * predicted * predicted;
         }
-        disagreement[j] = fmax(square - e[j] * e[j], 0.0);
+        e[j] = sum;
+        disagreement[j] = fmax(square - sum * sum, 0.0);
     }
 }
 
@@ -142,14 +209,18 @@ HSEP_API void hsep_trusted_predict(
     double *rows = hsep_at(self, self->rows);
     hsep_disturbances_command(disturbances, x_d, x_pb, self->n, self->forecast_scale, rows);
     hsep_disturbances_motion(disturbances, x_pb, x_pb, self->n, rows);
-    trusted_candidates(self, x_pb, e + self->n, varied);
-    trusted_blend(self, e, 0, self->n);
+    trusted_by_experts(self, x_d, x_pb, e + self->n, varied);
+    trusted_stack(self, e, 0, self->n);
 }
 
 HSEP_API void hsep_trusted_vary(hsep_trusted *self, uint64_t first, uint64_t last)
 {
-    for (uint64_t i = 0; self->predicted && i < HSEP_N_CANDIDATES; i++) {
-        hsep_candidate_vary(hsep_trusted_candidate(self, i), hsep_at(self, self->rows), &self->scale, first, last);
+    hsep_command *command = hsep_trusted_command(self);
+    for (uint64_t i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
+        const double *rows = i == HSEP_COMMAND ? hsep_at(command, command->rows) : hsep_at(self, self->rows);
+        if (self->predicted[i]) {
+            hsep_expert_vary(hsep_trusted_expert(self, (hsep_expert_place)i), rows, first, last);
+        }
     }
 }
 
@@ -157,14 +228,15 @@ HSEP_API void hsep_trusted_forecast(
     hsep_trusted *self, const double x_d[], const double x_pb[], double e[], uint64_t last)
 {
     hsep_trusted_scale(self, x_d, x_pb, NULL, 0, e[self->n]);
-    trusted_candidates(self, x_pb, e + self->n, last); /* the rows are those of the scales */
-    trusted_blend(self, e, 0, last);
+    trusted_by_experts(self, x_d, x_pb, e + self->n, last); /* the rows are those of the scales */
+    trusted_stack(self, e, 0, last);
 }
 
-HSEP_API void hsep_trusted_go_on(hsep_trusted *self, double e[], uint64_t first, uint64_t last)
+HSEP_API void hsep_trusted_go_on(hsep_trusted *self, const double x_pb[], double e[], uint64_t first, uint64_t last)
 {
-    for (uint64_t i = 0; self->predicted && i < HSEP_N_CANDIDATES; i++) {
-        hsep_candidate_go_on(hsep_trusted_candidate(self, i), hsep_at(self, self->rows), &self->scale, first, last);
+    hsep_trusted_vary(self, first, last);
+    if (self->predicted[HSEP_COMMAND]) {
+        trusted_follow_command(self, x_pb, self->n - last, self->n - first);
     }
-    trusted_blend(self, e, first, last);
+    trusted_stack(self, e, first, last);
 }

@@ -1,10 +1,10 @@
-"""Benchmark of the experts beside the model with trust, with one thing changed at a time.
+"""Ablation of the model with trust: each of its rules switched off, or its constant changed, one at a time.
 
-    python -m benchmarks.experts.run [--emps DATA_EMPS.mat] [--recordings FOLDER] [--n 30] [--seed 7] [--lines]
+    python -m benchmarks.ablation [--emps DATA_EMPS.mat] [--recordings FOLDER] [--n 12] [--seed 7] [--only TEXT]
 
 Cases of ``benchmarks/trust.py`` and random drives of both generators, whole runs, cold and warm; RMS relative to the
-physics model's, geometric means. Constants may be chosen on ``cnc_a_*``, ``xl330_sin_sin_*``, the simulated cases and
-drives of one seed; the others judge.
+physics model's, geometric means and the worst cold one. Constants may be chosen on ``cnc_a_*``, ``xl330_sin_sin_*``, the
+simulated cases and drives of one seed; the others judge. Half an hour for all of it.
 """
 
 from __future__ import annotations
@@ -17,11 +17,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # benchmarks are no part of the package
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # benchmarks are no part of the package
 
 import numpy as np
 
-from benchmarks.experts.model import Constants, Experts
 from benchmarks.random_drives.generators import GENERATORS
 from benchmarks.trust import cases
 from hybridsep.base.metrics import rms
@@ -30,6 +29,8 @@ from hybridsep.base.signals import Array
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.predictor import HybridPredictor
+from hybridsep.predict.trust.constants import CONSTANTS, TrustConstants
+from hybridsep.predict.trust.model import TrustedModel
 
 CHOOSE = ("cnc_a", "xl330_sin_sin")
 """Beginnings of the names of recordings that constants may be chosen on."""
@@ -38,19 +39,21 @@ COPIES = "raw_jitter"
 """Part of the name of a recording that is a copy of another."""
 
 VARIANTS = {
-    "as it is": Constants(),
-    "without S": Constants({"hold": 0.0, "L": 0.5, "A": 0.0}),
-    "without A": Constants({"hold": 0.0, "L": 0.5, "S": 0.5}),
-    "without L": Constants({"hold": 0.0, "S": 0.5, "A": 0.0}),
-    "without hold": Constants({"L": 0.5, "S": 0.5, "A": 0.0}),
-    "A from the first": Constants({"hold": 0.0, "L": 0.4, "S": 0.4, "A": 0.2}),
-    "rows independent": Constants(correlation_max=1.0),
-    "not shrunk": Constants(shrink=0.0),
-    "shrunk twice as much": Constants(shrink=2.0),
-    "kappa 0.3": Constants(kappa=0.3),
-    "kappa 3": Constants(kappa=3.0),
-    "gamma 0.9": Constants(gamma=0.9),
-    "gamma 0.98": Constants(gamma=0.98),
+    "as it is": CONSTANTS,
+    "rows are independent": replace(CONSTANTS, correlation_max=1.0),
+    "predictions hardly bounded": replace(CONSTANTS, bound=100.0, bound_of_command=100.0),
+    "velocities never outgrown": replace(CONSTANTS, growth=1e12, growth_learned=1e12),
+    "earlier runs never doubted": replace(CONSTANTS, doubt=2.0),
+    "earlier runs sooner doubted": replace(CONSTANTS, doubt=0.25),
+    "what stands is believed at once": replace(CONSTANTS, stood=1e12),
+    "what stands never came to rest": replace(CONSTANTS, stood=0.0),
+    "every deviation is plausible": replace(CONSTANTS, spreads=1e12, pace=1e12),
+    "kappa 0.3": replace(CONSTANTS, kappa=0.3),
+    "kappa 3": replace(CONSTANTS, kappa=3.0),
+    "gamma 0.9": replace(CONSTANTS, gamma=0.9),
+    "gamma 0.98": replace(CONSTANTS, gamma=0.98),
+    "L from the first": replace(CONSTANTS, first_lagged=1.0, first_static=0.0),
+    "S from the first": replace(CONSTANTS, first_lagged=0.0, first_static=1.0),
 }
 """What is tried, by name."""
 
@@ -72,20 +75,21 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--emps", type=Path, help="DATA_EMPS.mat")
     parser.add_argument("--recordings", type=Path, help="folder of recordings, *.csv with the columns t, x_d, x")
-    parser.add_argument("--n", type=int, default=30, help="random drives of each generator")
+    parser.add_argument("--n", type=int, default=12, help="random drives of each generator")
     parser.add_argument("--seed", type=int, default=7, help="of the random drives")
+    parser.add_argument("--only", default="", help="rows whose name has this text")
     parser.add_argument("--lines", action="store_true", help="a line for each axis, too")
     given = parser.parse_args(arguments)
     axes = list(axes_of(given.emps, given.recordings, given.n, given.seed))
-    today = [_trusted(axis) for axis in axes]
     groups = sorted({axis.group for axis in axes})
     print("| cold / warm, × physics | " + " | ".join(groups) + " |\n|---|" + "---|" * len(groups))
-    print(_row("model with trust", axes, today, groups), flush=True)
     for name, constants in VARIANTS.items():
-        errors = [_stacked(axis, constants) for axis in axes]
+        if given.only not in name:
+            continue
+        errors = [relative_errors(axis, constants) for axis in axes]
         print(_row(name, axes, errors, groups), flush=True)
-        for axis, one, other in zip(axes, errors, today, strict=True) if given.lines else ():
-            print(f"  {axis.name:40} {one[0]:.3f} {one[1]:.3f}, with trust {other[0]:.3f} {other[1]:.3f}")
+        for axis, (cold, warm) in zip(axes, errors, strict=True) if given.lines else ():
+            print(f"  {axis.name:44} {cold:.3f} {warm:.3f}")
 
 
 def axes_of(emps: Path | None, recordings: Path | None, n: int, seed: int) -> Iterator[Axis]:
@@ -103,26 +107,15 @@ def axes_of(emps: Path | None, recordings: Path | None, n: int, seed: int) -> It
             yield Axis(f"drives, {kind}", f"{kind} {drive.index}", drive.model, drive.settings, drive.x_d, both)
 
 
-def _trusted(axis: Axis) -> tuple[float, float]:
-    """Return the errors of the model with trust, cold and warm, relative to the physics model's in the cold run."""
+def relative_errors(axis: Axis, constants: TrustConstants) -> tuple[float, float]:
+    """Return the errors cold and warm relative to the physics model's in the cold run."""
     predictor = HybridPredictor(axis.model, axis.settings)
+    predictor.residual = TrustedModel(predictor.settings, predictor.discrete, (), constants)
     cold = backtest(predictor, axis.x_d, axis.x_meas[0])
     predictor.restart()
     warm = backtest(predictor, axis.x_d, axis.x_meas[1])
-    return _relative(axis, cold.x_pb, cold.x_h, warm.x_h)
-
-
-def _stacked(axis: Axis, constants: Constants) -> tuple[float, float]:
-    """Return those of the experts."""
-    experts = Experts(axis.model, axis.settings, constants)
-    cold, x_pb, _ = experts.replay(axis.x_d, axis.x_meas[0])
-    warm, _, _ = experts.replay(axis.x_d, axis.x_meas[1])
-    return _relative(axis, x_pb, cold, warm)
-
-
-def _relative(axis: Axis, x_pb: Array, cold: Array, warm: Array) -> tuple[float, float]:
-    physics = rms(axis.x_meas[0] - x_pb)
-    return rms(axis.x_meas[0] - cold) / physics, rms(axis.x_meas[1] - warm) / physics
+    physics = rms(axis.x_meas[0] - cold.x_pb)
+    return rms(axis.x_meas[0] - cold.x_h) / physics, rms(axis.x_meas[1] - warm.x_h) / physics
 
 
 def _row(name: str, axes: Sequence[Axis], errors: Sequence[tuple[float, float]], groups: Sequence[str]) -> str:

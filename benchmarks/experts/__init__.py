@@ -1,1 +1,0 @@
-"""Experiment: the residual as a few experts, stacked by their errors so far; beside the model with trust."""

@@ -1,0 +1,56 @@
+/* Features of the expert without a physics model: eq. (4) with G_pb = 1.
+ *
+ * The residual is that of the command itself, e_0(k) = x(k) - x_d(k - d) with the dead time d; its features are 1 and
+ * the increments x_d(k-d-j) - x_d(k-d-j-1), j = 0 ... p, beside p lags of it.
+ *
+ * Positions are relative to the start. Of m samples that come next, sample k is at place m - 1 - k: newest first.
+ * Memory is one block, without pointers. Reentrant; allocates nothing.
+ */
+#ifndef HSEP_COMMAND_H
+#define HSEP_COMMAND_H
+
+#include "hsep_api.h"
+#include "hsep_layout.h"
+#include "hsep_settings.h"
+
+#include <stdint.h>
+
+typedef struct {
+    uint64_t n;         /* samples of a prediction */
+    uint64_t dead_time; /* samples */
+    uint64_t count;     /* features, p + 2 */
+    uint64_t n_before;  /* commands before a window that its features need */
+    /* Offsets in doubles from the beginning of the struct */
+    uint64_t commands; /* (n + n_before,) m, of a prediction, newest first, and before it: its last m places if it has
+                        * fewer samples */
+    uint64_t rows;     /* (n, count) features, sample after sample */
+} hsep_command;
+
+HSEP_ASSERT_WORDS(hsep_command, 6);
+
+/* Features without lags for p lags. */
+HSEP_API uint64_t hsep_command_n(uint64_t p);
+
+/* Bytes of the block, counted in double so that no size can overflow; n: samples of a prediction. */
+HSEP_API double hsep_command_size(const hsep_predictor_settings *settings, uint64_t n);
+
+/* Fill the block, at rest. */
+HSEP_API void hsep_command_init(hsep_command *self, const hsep_predictor_settings *settings, uint64_t n);
+
+/* Whether a block, in any alignment, is one that hsep_command_init with these parameters began. */
+HSEP_API int hsep_command_valid(const void *block, const hsep_predictor_settings *settings, uint64_t n);
+
+/* Take in the commands of the m samples that come next, (m,), m, m <= n, and fill their rows; may be tried again with
+ * others. */
+HSEP_API void hsep_command_take(hsep_command *self, const double x_d[], uint64_t m);
+
+/* Of these, the commands as many samples ago as the dead time has, (m,), m. */
+HSEP_API const double *hsep_command_late(const hsep_command *self, uint64_t m);
+
+/* End the window, which are the m samples taken in last. */
+HSEP_API void hsep_command_end(hsep_command *self, uint64_t m);
+
+/* Begin with the motion that goes on with the commands first and second, m, before the window. */
+HSEP_API void hsep_command_begin(hsep_command *self, double first, double second);
+
+#endif

@@ -1,0 +1,143 @@
+#include "hsep_stack.h"
+
+#include "hsep_trust_constants.h"
+
+#include <math.h>
+#include <string.h>
+
+static const double stack_least_square = 1e-300; /* m2, mean square that counts as 0 */
+
+static const double stack_first[HSEP_N_EXPERTS] = {0.0, HSEP_TRUST_FIRST_LAGGED, HSEP_TRUST_FIRST_STATIC, 0.0, 0.0};
+
+HSEP_API void hsep_stack_init(hsep_stack *self)
+{
+    memset(self, 0, sizeof *self);
+    memcpy(self->weights, stack_first, sizeof stack_first);
+}
+
+/* Solve A [u v] = [a b] for n unknowns, A positive definite; it is used up. */
+static void stack_solve(
+    double A[HSEP_N_EXPERTS][HSEP_N_EXPERTS], double u[HSEP_N_EXPERTS], double v[HSEP_N_EXPERTS], int n)
+{
+    for (int i = 0; i < n; i++) {
+        for (int r = i + 1; r < n; r++) {
+            const double factor = A[r][i] / A[i][i];
+            for (int c = i; c < n; c++) {
+                A[r][c] -= factor * A[i][c];
+            }
+            u[r] -= factor * u[i];
+            v[r] -= factor * v[i];
+        }
+    }
+    for (int i = n; i-- > 0;) {
+        for (int c = i + 1; c < n; c++) {
+            u[i] -= A[i][c] * u[c];
+            v[i] -= A[i][c] * v[c];
+        }
+        u[i] /= A[i][i];
+        v[i] /= A[i][i];
+    }
+}
+
+/* Minimise 1/2 pi' H pi - l' pi over the pi >= 0, sum pi <= 1 that are 0 outside a support of n experts. Return the
+ * minimum, or infinity if a weight would be negative. */
+static double stack_try(
+    double H[HSEP_N_EXPERTS][HSEP_N_EXPERTS], const double l[HSEP_N_EXPERTS], const int support[], int n,
+    double pi[HSEP_N_EXPERTS])
+{
+    double A[HSEP_N_EXPERTS][HSEP_N_EXPERTS] = {{0.0}}, found[HSEP_N_EXPERTS] = {0.0}, ones[HSEP_N_EXPERTS] = {0.0};
+    double sum = 0.0, of_ones = 0.0, cost = 0.0;
+    for (int i = 0; i < n; i++) {
+        for (int j = 0; j < n; j++) {
+            A[i][j] = H[support[i]][support[j]];
+        }
+        found[i] = l[support[i]];
+        ones[i] = 1.0;
+    }
+    stack_solve(A, found, ones, n);
+    for (int i = 0; i < n; i++) {
+        sum += found[i];
+        of_ones += ones[i];
+    }
+    memset(pi, 0, HSEP_N_EXPERTS * sizeof *pi);
+    for (int i = 0; i < n; i++) {
+        found[i] -= sum > 1.0 ? (sum - 1.0) / of_ones * ones[i] : 0.0; /* then sum pi = 1 is active */
+        if (!(found[i] >= 0.0)) {
+            return HUGE_VAL;
+        }
+        pi[support[i]] = found[i];
+    }
+    for (int i = 0; i < HSEP_N_EXPERTS; i++) {
+        double row = 0.0;
+        for (int j = 0; j < HSEP_N_EXPERTS; j++) {
+            row += H[i][j] * pi[j];
+        }
+        cost += (0.5 * row - l[i]) * pi[i];
+    }
+    return cost;
+}
+
+/* The weights by their active set: all supports are tried. */
+static void stack_minimise(
+    double H[HSEP_N_EXPERTS][HSEP_N_EXPERTS], const double l[HSEP_N_EXPERTS], double weights[HSEP_N_EXPERTS])
+{
+    double least = 0.0, tried[HSEP_N_EXPERTS];
+    memset(weights, 0, HSEP_N_EXPERTS * sizeof *weights);
+    for (unsigned set = 1; set < 1U << HSEP_N_EXPERTS; set++) {
+        int support[HSEP_N_EXPERTS], n = 0;
+        for (int i = 0; i < HSEP_N_EXPERTS; i++) {
+            if ((set >> i & 1U) != 0U) {
+                support[n++] = i;
+            }
+        }
+        const double cost = stack_try(H, l, support, n, tried);
+        if (cost < least) {
+            least = cost;
+            memcpy(weights, tried, sizeof tried);
+        }
+    }
+}
+
+HSEP_API void hsep_stack_update(
+    hsep_stack *self, double products[HSEP_N_EXPERTS + 1][HSEP_N_EXPERTS + 1], double n, double least)
+{
+    double H[HSEP_N_EXPERTS][HSEP_N_EXPERTS], l[HSEP_N_EXPERTS];
+    self->evidence[0] = HSEP_TRUST_GAMMA * self->evidence[0] + products[HSEP_N_EXPERTS][HSEP_N_EXPERTS];
+    self->evidence[1] = HSEP_TRUST_GAMMA * self->evidence[1] + n;
+    double best = self->evidence[0]; /* of the prediction 0, which is always there */
+    for (int i = 0; i < HSEP_N_EXPERTS; i++) {
+        for (int j = 0; j < HSEP_N_EXPERTS; j++) {
+            double *gram = &self->gram[HSEP_N_EXPERTS * i + j];
+            *gram = HSEP_TRUST_GAMMA * *gram + products[i][j];
+            H[i][j] = *gram;
+        }
+        self->cross[i] = HSEP_TRUST_GAMMA * self->cross[i] + products[i][HSEP_N_EXPERTS];
+        best = fmin(best, self->evidence[0] - 2.0 * self->cross[i] + H[i][i]);
+    }
+    const double square = fmax(fmax(best / self->evidence[1], least), stack_least_square);
+    const double ridge = HSEP_TRUST_KAPPA * square * n;
+    for (int i = 0; i < HSEP_N_EXPERTS; i++) {
+        H[i][i] += ridge;
+        l[i] = self->cross[i] + ridge * stack_first[i];
+    }
+    stack_minimise(H, l, self->weights);
+}
+
+HSEP_API void hsep_stack_copy(hsep_stack *self, hsep_expert_place expert, hsep_expert_place to)
+{
+    memcpy(
+        self->gram + HSEP_N_EXPERTS * (int)to, self->gram + HSEP_N_EXPERTS * (int)expert,
+        HSEP_N_EXPERTS * sizeof(double));
+    for (int i = 0; i < HSEP_N_EXPERTS; i++) {
+        self->gram[HSEP_N_EXPERTS * i + (int)to] = self->gram[HSEP_N_EXPERTS * i + (int)expert];
+    }
+    self->cross[to] = self->cross[expert];
+}
+
+HSEP_API void hsep_stack_forget(hsep_stack *self, hsep_expert_place expert)
+{
+    for (int i = 0; i < HSEP_N_EXPERTS; i++) {
+        self->gram[HSEP_N_EXPERTS * i + (int)expert] = self->gram[HSEP_N_EXPERTS * (int)expert + i] = 0.0;
+    }
+    self->cross[expert] = self->weights[expert] = 0.0;
+}

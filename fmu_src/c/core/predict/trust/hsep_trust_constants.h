@@ -1,0 +1,95 @@
+/* Constants of the residual model with trust as they are declared in hybridsep/predict/trust/constants.py, from
+ * which this file is generated. */
+#ifndef HSEP_TRUST_CONSTANTS_H
+#define HSEP_TRUST_CONSTANTS_H
+
+/* Evidence that the first weights of the stack count for, in windows of the best expert's mean square: 0.3 or 3
+ * change errors by 1 to 3 %. */
+#define HSEP_TRUST_KAPPA 1.0
+
+/* Factor by which the stack's evidence fades from window to window: 0.9 or 0.98 change errors by 1 to 3 %. */
+#define HSEP_TRUST_GAMMA 0.95
+
+/* First weights of the experts with and without lags; hold and command begin with none: with 0.2 for the command's
+ * the worst drives are worse. */
+#define HSEP_TRUST_FIRST_LAGGED 0.5
+#define HSEP_TRUST_FIRST_STATIC 0.5
+
+/* Prior variance of the weight of the last lag, relative to that of the first: the residual's memory fades. */
+#define HSEP_TRUST_LAST_LAG 0.005
+
+/* Bound on the least variance of the noise relative to the largest mean square of a window: a larger lambda would
+ * prevent any learning. */
+#define HSEP_TRUST_LEAST_NOISE 1e-06
+
+/* Variance of the noise before it is known, relative to the same: a servo error is repeatable to 10 %. */
+#define HSEP_TRUST_FIRST_NOISE 0.01
+
+/* Bound on the rows that count as one, and how fast their number follows: without, recordings are 1 to 4 % worse. */
+#define HSEP_TRUST_CORRELATION_MAX 100.0
+#define HSEP_TRUST_CORRELATION_RATE 0.1
+
+/* Largest prediction relative to the largest residual so far, of the physics model and of the command: what is
+ * larger was never seen. */
+#define HSEP_TRUST_BOUND 1.2
+#define HSEP_TRUST_BOUND_OF_COMMAND 2.0
+
+/* Growth of the commanded velocity that makes the static features begin anew, as they were learned at a creep: the
+ * first until rows of learned windows are learned, then the second. */
+#define HSEP_TRUST_GROWTH 30.0
+#define HSEP_TRUST_GROWTH_LEARNED 1000.0
+#define HSEP_TRUST_LEARNED 15.0
+
+/* Largest weight of earlier runs when another begins, in windows: a machine may have changed meanwhile. */
+#define HSEP_TRUST_CARRIED 30.0
+
+/* Weight of earlier runs, relative to the one they have, in the expert that doubts them: a prior from a tenth of a
+ * window. With 0.03 changed plants are worse by a tenth, without any by a tenth as well. */
+#define HSEP_TRUST_LESS 0.003
+
+/* Weight of that expert in the stack from which on all go on as it does: 0.25 doubts more plants that have not
+ * changed, and finds no more of those that have. */
+#define HSEP_TRUST_DOUBT 0.5
+
+/* Rows of that expert relative to those of the others from which on there is nothing left to doubt. */
+#define HSEP_TRUST_DOUBT_OVER 0.8
+
+/* Least velocity of the friction's change of sign relative to the velocity scale, and the ratio from one of the six
+ * to the next: half a decade, which neighbours interpolate within. */
+#define HSEP_TRUST_FRICTION_LEAST 0.01
+#define HSEP_TRUST_FRICTION_RATIO 3.1622776601683795
+
+/* Effect of a disturbance's first difference relative to its own: it only corrects the timing. */
+#define HSEP_TRUST_DIFFERENCE_SHARE 0.03
+
+/* Plausible deviation of a measurement: in mean deviations, in steps of the sensor's resolution, and relative to the
+ * largest residual and to the predicted motion of a sample. */
+#define HSEP_TRUST_SPREADS 12.0
+#define HSEP_TRUST_RESOLUTION 3.0
+#define HSEP_TRUST_SMALL 0.01
+#define HSEP_TRUST_RIPPLE 0.1
+
+/* Plausible change of the residual from sample to sample, relative to the predicted motion or the vibration. */
+#define HSEP_TRUST_PACE 2.0
+
+/* Median change of the residual from sample to sample that noise makes, in mean deviations: white noise 1.4. */
+#define HSEP_TRUST_VIBRATION_NOISE 2.0
+
+/* Rate at which the averaged motion of a sample follows: over some four samples, a coarse encoder's step among them.
+ * */
+#define HSEP_TRUST_FOLLOW 0.15
+
+/* Measured motion before a run of equal values relative to the predicted one, below which the axis itself came to
+ * rest: a sensor that is held shows the whole motion. */
+#define HSEP_TRUST_STOOD 0.5
+
+/* Time, s, after which another level is believed, two windows at least, and after which an axis that stands is: an
+ * encoder may be held for half a second. */
+#define HSEP_TRUST_PATIENCE 0.05
+#define HSEP_TRUST_PATIENCE_STANDING 0.6
+
+/* Rates at which the mean deviation follows that of a window; the vibration rises at once, and falls as it does. */
+#define HSEP_TRUST_RISE 0.5
+#define HSEP_TRUST_FALL 0.02
+
+#endif

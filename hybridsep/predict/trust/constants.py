@@ -1,0 +1,115 @@
+"""Constants of the residual model with trust: all of them, each with its reason and the experiment that chose it.
+
+The C core's header is generated from here. ``benchmarks/ablation.py`` switches each rule off; its tables are in
+``docs/experiments``. Constants were chosen on the recordings ``cnc_a_*`` and ``xl330_sin_sin_*``, the simulated cases
+and drives of one seed; other recordings and seeds judge.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["CONSTANTS", "TrustConstants"]
+
+
+@dataclass(frozen=True)
+class TrustConstants:
+    """Constants of the residual model with trust.
+
+    Attributes
+    ----------
+    kappa : float
+        Evidence that the first weights of the stack count for, in windows of the best expert's mean square: 0.3 or 3
+        change errors by 1 to 3 %.
+    gamma : float
+        Factor by which the stack's evidence fades from window to window: 0.9 or 0.98 change errors by 1 to 3 %.
+    first_lagged, first_static : float
+        First weights of the experts with and without lags; hold and command begin with none: with 0.2 for the command's
+        the worst drives are worse.
+    last_lag : float
+        Prior variance of the weight of the last lag, relative to that of the first: the residual's memory fades.
+    least_noise : float
+        Bound on the least variance of the noise relative to the largest mean square of a window: a larger ``lambda``
+        would prevent any learning.
+    first_noise : float
+        Variance of the noise before it is known, relative to the same: a servo error is repeatable to 10 %.
+    correlation_max, correlation_rate : float
+        Bound on the rows that count as one, and how fast their number follows: without, recordings are 1 to 4 % worse.
+    bound, bound_of_command : float
+        Largest prediction relative to the largest residual so far, of the physics model and of the command: what is
+        larger was never seen.
+    growth, growth_learned, learned : float
+        Growth of the commanded velocity that makes the static features begin anew, as they were learned at a creep: the
+        first until rows of ``learned`` windows are learned, then the second.
+    carried : float
+        Largest weight of earlier runs when another begins, in windows: a machine may have changed meanwhile.
+    less : float
+        Weight of earlier runs, relative to the one they have, in the expert that doubts them: a prior from a tenth of a
+        window. With 0.03 changed plants are worse by a tenth, without any by a tenth as well.
+    doubt : float
+        Weight of that expert in the stack from which on all go on as it does: 0.25 doubts more plants that have not
+        changed, and finds no more of those that have.
+    doubt_over : float
+        Rows of that expert relative to those of the others from which on there is nothing left to doubt.
+    friction_least, friction_ratio : float
+        Least velocity of the friction's change of sign relative to the velocity scale, and the ratio from one of the
+        six to the next: half a decade, which neighbours interpolate within.
+    difference_share : float
+        Effect of a disturbance's first difference relative to its own: it only corrects the timing.
+    spreads, resolution, small, ripple : float
+        Plausible deviation of a measurement: in mean deviations, in steps of the sensor's resolution, and relative to
+        the largest residual and to the predicted motion of a sample.
+    pace : float
+        Plausible change of the residual from sample to sample, relative to the predicted motion or the vibration.
+    vibration_noise : float
+        Median change of the residual from sample to sample that noise makes, in mean deviations: white noise 1.4.
+    follow : float
+        Rate at which the averaged motion of a sample follows: over some four samples, a coarse encoder's step among
+        them.
+    stood : float
+        Measured motion before a run of equal values relative to the predicted one, below which the axis itself came to
+        rest: a sensor that is held shows the whole motion.
+    patience, patience_standing : float
+        Time, s, after which another level is believed, two windows at least, and after which an axis that stands is: an
+        encoder may be held for half a second.
+    rise, fall : float
+        Rates at which the mean deviation follows that of a window; the vibration rises at once, and falls as it does.
+    """
+
+    kappa: float = 1.0
+    gamma: float = 0.95
+    first_lagged: float = 0.5
+    first_static: float = 0.5
+    last_lag: float = 0.005
+    least_noise: float = 1e-6
+    first_noise: float = 0.01
+    correlation_max: float = 100.0
+    correlation_rate: float = 0.1
+    bound: float = 1.2
+    bound_of_command: float = 2.0
+    growth: float = 30.0
+    growth_learned: float = 1000.0
+    learned: float = 15.0
+    carried: float = 30.0
+    less: float = 0.003
+    doubt: float = 0.5
+    doubt_over: float = 0.8
+    friction_least: float = 0.01
+    friction_ratio: float = 3.1622776601683795
+    difference_share: float = 0.03
+    spreads: float = 12.0
+    resolution: float = 3.0
+    small: float = 0.01
+    ripple: float = 0.1
+    pace: float = 2.0
+    vibration_noise: float = 2.0
+    follow: float = 0.15
+    stood: float = 0.5
+    patience: float = 0.05
+    patience_standing: float = 0.6
+    rise: float = 0.5
+    fall: float = 0.02
+
+
+CONSTANTS = TrustConstants()
+"""Those of the product."""

@@ -1,0 +1,95 @@
+"""A plant that has changed before a warm run: an expert that doubts earlier runs tells, and it is relearned as cold."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from trusted_cases import PERIOD, cycles, friction, physics, run, trusted, trusted_model
+
+from benchmarks.random_drives.generator import random_drive
+from benchmarks.random_drives.simulation import simulate
+from hybridsep.base.signals import Array
+from hybridsep.model.physics import ModalModel
+from hybridsep.predict.predictor import HybridPredictor
+from hybridsep.predict.trust.constants import CONSTANTS
+from hybridsep.predict.trust.model import COMMAND, DOUBTING, LAGGED
+
+NOISE = 1e-6  # m
+
+
+def rms(error: Array) -> float:
+    return float(np.sqrt(np.mean(error**2)))
+
+
+def learned(x_d: Array, e: Array) -> HybridPredictor:
+    """Return a predictor after a run with residuals ``e``, about to begin another."""
+    predictor = trusted()
+    run(predictor, x_d, physics(x_d) + e + NOISE * np.random.default_rng(7).normal(size=len(x_d)))
+    predictor.restart()
+    return predictor
+
+
+@pytest.mark.parametrize("index", [26, 40])
+def test_a_random_drive_whose_frequencies_fell_by_a_tenth_is_relearned(index: int) -> None:
+    drive = random_drive(index)
+    modes = [replace(mode, f_n=0.9 * mode.f_n, alpha=0.81 * mode.alpha) for mode in drive.true_model.modes]
+    x = simulate([ModalModel(modes)], [drive.disturbances], [drive.x_d])[0]
+    x_meas = x + drive.noise_std * np.random.default_rng(index).standard_normal(len(x))
+    warm = HybridPredictor(drive.model)
+    run(warm, drive.x_d, drive.x_meas)
+    warm.restart()
+    error, cold = (rms((x_meas - run(one, drive.x_d, x_meas))[2000:]) for one in (warm, HybridPredictor(drive.model)))
+    assert error <= 1.06 * cold
+
+
+@pytest.mark.parametrize("factor", [-1.0, 0.2, 3.0])
+def test_what_has_changed_is_relearned_as_fast_as_cold(factor: float) -> None:
+    x_d = cycles(4 * PERIOD)
+    x = physics(x_d) + factor * friction(x_d) + NOISE * np.random.default_rng(8).normal(size=len(x_d))
+    warm = learned(x_d, friction(x_d))
+    found, cold = run(warm, x_d, x), run(trusted(), x_d, x)
+    assert rms((x - found)[2000:]) <= 1.05 * rms((x - cold)[2000:])
+    model = trusted_model(warm)
+    assert model.doubting is None
+    assert model.stack.weights[DOUBTING] == 0.0
+    assert model.n_rows <= len(x_d) + CONSTANTS.less * CONSTANTS.carried * model.settings.Np
+
+
+def test_what_has_not_changed_keeps_what_was_learned() -> None:
+    x_d = cycles(4 * PERIOD)
+    x = physics(x_d) + friction(x_d) + NOISE * np.random.default_rng(8).normal(size=len(x_d))
+    warm = learned(x_d, friction(x_d))
+    carried = trusted_model(warm).n_rows
+    found, cold = run(warm, x_d, x), run(trusted(), x_d, x)
+    assert rms(x - found) < 1.15 * NOISE < 0.5 * rms(x - cold)
+    assert trusted_model(warm).n_rows == pytest.approx(carried + len(x_d))
+
+
+def test_doubt_begins_with_little_of_earlier_runs_and_the_evidence_of_the_expert_it_doubts() -> None:
+    x_d = cycles(2 * PERIOD)
+    model = trusted_model(learned(x_d, friction(x_d)))
+    assert model.doubting is not None
+    assert model.doubting.n_rows == pytest.approx(CONSTANTS.less * model.n_rows)
+    assert model.stack.gram[DOUBTING, DOUBTING] == model.stack.gram[LAGGED, LAGGED] > 0.0
+    assert model.stack.cross[DOUBTING] == model.stack.cross[LAGGED]
+    assert model.experts[DOUBTING].noise_variance == model.experts[LAGGED].noise_variance > 0.0
+
+
+def test_doubt_ends_once_this_run_outweighs_the_earlier_ones() -> None:
+    x_d = cycles(14 * PERIOD)
+    e = friction(x_d)
+    warm = learned(x_d[: 2 * PERIOD], e[: 2 * PERIOD])
+    run(warm, x_d[:PERIOD], (physics(x_d) + e)[:PERIOD])
+    assert trusted_model(warm).doubting is not None
+    run(warm, x_d[PERIOD:], (physics(x_d) + e)[PERIOD:])
+    assert trusted_model(warm).doubting is None
+
+
+def test_a_cold_run_doubts_nothing() -> None:
+    predictor = trusted()
+    assert trusted_model(predictor).doubting is None
+    run(predictor, cycles(300), physics(cycles(300)) + friction(cycles(300)))
+    assert trusted_model(predictor).doubting is None
+    assert trusted_model(predictor).experts[COMMAND].noise_variance > 0.0
