@@ -29,14 +29,14 @@ class Guard(ctypes.Structure):
     """hsep_guard."""
 
     _fields_ = (
-        *((name, ctypes.c_uint64) for name in ("patience", "patience_standing", "gap", "doubtful", "holding", "rests")),
+        *((name, ctypes.c_uint64) for name in ("patience", "patience_standing", "gap", "doubtful", "holding")),
         *(
             (name, ctypes.c_double)
             for name in (
                 "vibration",
-                "motion",
-                "motion_pb",
-                "position",
+                "stood",
+                "measured",
+                "before_run",
                 "last",
                 "value",
                 "repeats",
@@ -58,7 +58,7 @@ class Guard(ctypes.Structure):
         return guard
 
     def accepts(self, x: Array, x_pb: Array, largest: float) -> NDArray[np.bool_]:
-        work, accepted, self.standing = np.empty(len(x)), np.empty(len(x)), np.empty(len(x))
+        work, accepted, self.suspect = np.empty(len(x)), np.empty(len(x)), np.empty(len(x))
         newest_first = [np.ascontiguousarray(array[::-1]) for array in (x, x_pb)]
         c_core.library("predictor").hsep_guard_accept(
             ctypes.byref(self),
@@ -67,7 +67,7 @@ class Guard(ctypes.Structure):
             ctypes.c_double(largest),
             work.ctypes.data_as(ctypes.c_void_p),
             accepted.ctypes.data_as(ctypes.c_void_p),
-            self.standing.ctypes.data_as(ctypes.c_void_p),
+            self.suspect.ctypes.data_as(ctypes.c_void_p),
         )
         return accepted[::-1] > 0.0
 
@@ -105,16 +105,15 @@ def test_core_and_library_accept_the_same_samples(seed: int) -> None:
     for i in range(0, 40 * n, n):
         expected = guard.accepts(x[i : i + n], x_pb[i : i + n], 1e-4)
         assert core.accepts(x[i : i + n], x_pb[i : i + n], 1e-4).tolist() == expected.tolist()
-        assert (core.standing[::-1] > 0.0).tolist() == guard.standing.tolist()
+        assert (core.suspect[::-1] > 0.0).tolist() == guard.suspect.tolist()
         rejected += n - int(expected.sum())
         doubted = guard.doubted(x_pb[i : i + n], 1e-6)
         assert core.doubted(x_pb[i : i + n], 1e-6) == (None if doubted is None else doubted.tolist())
     assert 0 < rejected < 20 * n
     assert (core.patience, core.patience_standing) == (guard.patience, guard.patience_standing)
     assert (core.gap, core.doubtful, core.repeats) == (guard.gap, guard.doubtful, guard.held.repeats)
-    assert (core.holding, core.rests, core.position) == (guard.holding, guard.rests, guard.position)
-    assert core.motion == pytest.approx(guard.motion, rel=1e-12)
-    assert core.motion_pb == pytest.approx(guard.motion_pb, rel=1e-12)
+    assert (core.holding, core.stood) == (guard.holding, guard.stood)
+    assert (core.measured, core.before_run) == (guard.measured, guard.before_run)
     assert (core.step, core.pace) == (guard.held.step, guard.pace)
     assert core.spread == pytest.approx(guard.spread, rel=1e-12)
     assert core.vibration == pytest.approx(guard.vibration, rel=1e-12)

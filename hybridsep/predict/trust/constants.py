@@ -63,15 +63,9 @@ class TrustConstants:
         Plausible change of the residual from sample to sample, relative to the predicted motion or the vibration.
     vibration_noise : float
         Median change of the residual from sample to sample that noise makes, in mean deviations: white noise 1.4.
-    follow : float
-        Rate at which the averaged motion of a sample follows: over some four samples, a coarse encoder's step among
-        them.
-    stood : float
-        Measured motion before a run of equal values relative to the predicted one, below which the axis itself came to
-        rest: a sensor that is held shows the whole motion.
     patience, patience_standing : float
-        Time, s, after which another level is believed, two windows at least, and after which an axis that stands is: an
-        encoder may be held for half a second.
+        Time, s, after which another level is believed, two windows at least, and the first time, after which an axis
+        that stands is: an encoder may be held for half a second.
     rise, fall : float
         Rates at which the mean deviation follows that of a window; the vibration rises at once, and falls as it does.
     """
@@ -103,8 +97,6 @@ class TrustConstants:
     ripple: float = 0.1
     pace: float = 2.0
     vibration_noise: float = 2.0
-    follow: float = 0.15
-    stood: float = 0.5
     patience: float = 0.05
     patience_standing: float = 0.6
     rise: float = 0.5

@@ -28,11 +28,14 @@ _WINDOWS = 2
 _NEIGHBOURS = 2
 """Samples to either side that an isolated value is compared with."""
 
-_COUNTS = ("gap", "doubtful", "holding", "rests")
-_NUMBERS = ("last", "spread", "pace", "last_x_pb", "vibration", "motion", "motion_pb", "position")
+_COUNTS = ("gap", "doubtful", "holding")
+_NUMBERS = ("last", "spread", "pace", "last_x_pb", "vibration", "before_run", "measured", "stood")
 
 N_STATE = len(_COUNTS) + len(_NUMBERS) + HeldValue.N_STATE + _NEIGHBOURS
 """Numbers of a state."""
+
+_MORE = 2.0
+"""Motion under which an axis stands, relative to the largest under which it stood by itself."""
 
 _CHANGES = 8
 """Changes that a window has to have to tell the vibration: most of fewer could be those of one wrong value."""
@@ -57,16 +60,15 @@ class SensorGuard:
     gap : int
         Samples since then.
     held : HeldValue
-    standing : (n,) array of bool
-        Samples of the last window in which the axis, or its sensor, stood under a predicted motion: a run of equal
-        values.
+    suspect : (n,) array of bool
+        Samples of the last window that may be of a held sensor, believed or not: equal under a predicted motion.
     holding : int
-        Whether the last value was held, 0 or 1.
-    rests : int
-        Whether the measured motion had faded beside the predicted one when the run of equal values began, 0 or 1: then
-        the axis itself came to rest, and its sensor is not held.
-    motion, motion_pb, position : float, m
-        Measured and predicted motion of a sample, averaged over a few, and the prediction at the last one.
+        Whether the sensor may be held: the last value was equal under more motion than the axis itself stands, 0 or 1.
+    stood : float, m
+        Largest predicted motion under which the axis itself stood: it went on from there, while a sensor that was held
+        goes on from where the axis has come to meanwhile.
+    measured, before_run : float, m
+        Last measured residual, and that before the run of equal values.
     spread : float, m
         Mean deviation of a residual from the median of its neighbours; −1 before the first window.
     pace : float, m
@@ -86,7 +88,7 @@ class SensorGuard:
         self.constants = constants
         self.patience = max(_WINDOWS * Np, math.ceil(constants.patience / T_s))
         self.patience_standing = max(_WINDOWS * Np, math.ceil(constants.patience_standing / T_s))
-        self.held, self.spread, self.vibration = HeldValue(), -1.0, 0.0
+        self.held, self.spread, self.vibration, self.stood = HeldValue(), -1.0, 0.0, 0.0
         self.restart()
 
     def restart(self) -> None:
@@ -94,9 +96,8 @@ class SensorGuard:
         self.last, self.gap, self.doubtful = 0.0, 0, 0
         self.held.restart()
         self.holding = 0
-        self.standing: NDArray[np.bool_] = np.zeros(0, dtype=np.bool_)
-        self.rests, self.motion, self.motion_pb, self.position = 0, 0.0, 0.0, 0.0
-        self.pace = 0.0
+        self.suspect: NDArray[np.bool_] = np.zeros(0, dtype=np.bool_)
+        self.pace = self.measured = self.before_run = 0.0
         self.before = np.zeros(_NEIGHBOURS)
         self.last_x_pb = math.nan
 
@@ -118,18 +119,19 @@ class SensorGuard:
         pace = float(np.abs(np.diff(x_pb, prepend=first)).max())
         motion = max(pace, self.pace, self.vibration)
         plausible = self._plausible(motion, largest)
-        self.standing = np.zeros(len(x), dtype=np.bool_)
+        self.suspect = np.zeros(len(x), dtype=np.bool_)
         accepted = np.isfinite(x)
         for k, (value, position, e) in enumerate(zip(x.tolist(), x_pb.tolist(), residuals.tolist(), strict=True)):
             self.gap += 1
             if not accepted[k]:
                 continue
-            self._follow_motion(value, position)
-            equal = self.held.holds(value, position, still=plausible)
-            run = slice(max(k - self.held.repeats + 1, 0), k + 1)
-            self.standing[run] |= equal
-            self.holding = int(equal and not self.rests)
+            if value != self.held.value:
+                self._tell_rest(value, e, plausible)
+            self.measured = e
+            self.holding = int(self.held.holds(value, position, still=max(plausible, _MORE * self.stood)))
             if self.holding:
+                run = slice(max(k - self.held.repeats + 1, 0), k + 1)
+                self.suspect[run] = True
                 self.doubtful += 1
                 if self.doubtful <= self.patience_standing:
                     accepted[run] = False
@@ -177,25 +179,24 @@ class SensorGuard:
         c, step = self.constants, 0.0 if math.isinf(self.held.step) else self.held.step
         return c.spreads * self.spread + c.resolution * step + c.small * largest + c.ripple * motion
 
-    def _follow_motion(self, value: float, position: float) -> None:
-        """Follow the motion of a sample; where it fades beside the predicted one, the axis itself comes to rest."""
-        if math.isnan(self.held.value):
-            self.position = position
-            return
-        rate = self.constants.follow
-        self.motion += rate * (value - self.held.value - self.motion)
-        self.motion_pb += rate * (position - self.position - self.motion_pb)
-        self.position = position
-        if value != self.held.value:
-            self.rests = int(abs(self.motion) < self.constants.stood * abs(self.motion_pb))
+    def _tell_rest(self, value: float, e: float, plausible: float) -> None:
+        """Tell, where a run of equal values ends, an axis that stood from a sensor that was held."""
+        held = self.held
+        motion = held.high - held.low
+        if held.stays(motion, still=plausible, first_step=abs(value - held.value)):
+            if abs(e - self.measured) <= abs(e - self.before_run):
+                self.stood = max(self.stood, motion)
+            elif motion <= _MORE * self.stood:
+                self.stood = 0.0
+        self.before_run = self.measured
 
     def learned(self) -> Array:
         """Return what is known of the sensor, for another run; a spread of −1 and an infinite step are not known."""
-        return np.array([self.spread, self.held.step, self.vibration])
+        return np.array([self.spread, self.held.step, self.vibration, self.stood])
 
     def restore_learned(self, learned: Array) -> None:
         """Restore :meth:`learned` numbers, which :meth:`is_sound`."""
-        self.spread, self.held.step, self.vibration = learned.tolist()
+        self.spread, self.held.step, self.vibration, self.stood = learned.tolist()
 
     @staticmethod
     def is_sound(learned: Array) -> bool:
@@ -215,14 +216,14 @@ class SensorGuard:
         counts, own, held, before = np.split(state, ends)
         values = dict(zip(_NUMBERS, own.tolist(), strict=True))
         if not all(0 <= count <= COUNT_MAX and count == int(count) for count in counts) or counts[2:].max() > 1:
-            raise SignalError("the guard's gap and doubtful samples must be counts, and holding and rests 0 or 1")
+            raise SignalError("the guard's gap and doubtful samples must be counts, and holding 0 or 1")
         if (
             np.isinf(own).any()
             or np.isinf(before).any()
-            or np.isnan([values["last"], values["position"], values["motion"], values["motion_pb"]]).any()
+            or np.isnan([values["last"], values["measured"], values["before_run"]]).any()
         ):
             raise SignalError("the guard's residuals and positions must be finite")
-        if not all(values[name] >= 0.0 for name in ("pace", "vibration")):
+        if not all(values[name] >= 0.0 for name in ("pace", "vibration", "stood")):
             raise SignalError("the guard's motions must be ≥ 0")
         if not (values["spread"] >= 0.0 or values["spread"] == -1.0):
             raise SignalError("the guard's spread must be ≥ 0 or −1")

@@ -322,12 +322,12 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         e_0 = e + x_pb - self.command.late(run.commands, x_d)
         rows, static = self.static.rows(run.static, x_d, x_pb, x_pb + e, self.velocity_scale)
         bridged: NDArray[np.bool_] = np.concatenate((run.bridged, ~accepted))
-        # What stands still, axis or sensor, is followed and not learned: it tells nothing of motion.
-        moving = accepted & ~self.guard.standing
-        if fold and moving.any():
+        # What a held sensor may show is followed, once it is believed, and not learned.
+        learnable = accepted & ~self.guard.suspect
+        if fold and learnable.any():
             n_bridged = np.convolve(bridged[:-1].astype(np.float64), np.ones(p), "valid")
-            self._fold(rows, x_d, e, e_0, moving & (n_bridged <= _BRIDGED))
-            self._judge(forecast, e, e_0, moving)
+            self._fold(rows, x_d, e, e_0, learnable & (n_bridged <= _BRIDGED))
+            self._judge(forecast, e, e_0, learnable)
         self.rest.pass_by(m, n_rest)
         self.n_rejected += m - int(accepted.sum())
         self.run = RunState(

@@ -11,6 +11,8 @@ static const uint64_t guard_doubted = 3; /* doubtful samples in a row from which
 static const double guard_windows = 2.0; /* least patience, in windows: what is believed is learned by windows */
 /* Changes that a window has to have to tell the vibration: most of fewer could be those of one wrong value. */
 static const uint64_t guard_changes = 8;
+/* Motion under which an axis stands, relative to the largest under which it stood by itself. */
+static const double guard_more = 2.0;
 
 /* Samples of a time, s; two windows at least. */
 static uint64_t guard_patience(double time, uint64_t Np, double T_s)
@@ -103,17 +105,18 @@ static double guard_plausible(const hsep_guard *self, double motion, double larg
            HSEP_TRUST_RIPPLE * motion;
 }
 
-/* Follow the motion of a sample; where it fades beside the predicted one, the axis itself comes to rest. */
-static void guard_follow_motion(hsep_guard *self, double x, double x_pb)
+/* Tell, where a run of equal values ends, an axis that stood from a sensor that was held; residual: m, of the value. */
+static void guard_tell_rest(hsep_guard *self, double x, double residual, double plausible)
 {
-    if (!isnan(self->held.value)) {
-        self->motion += HSEP_TRUST_FOLLOW * (x - self->held.value - self->motion);
-        self->motion_pb += HSEP_TRUST_FOLLOW * (x_pb - self->position - self->motion_pb);
-        if (x != self->held.value) {
-            self->rests = fabs(self->motion) < HSEP_TRUST_STOOD * fabs(self->motion_pb);
+    const double motion = self->held.high - self->held.low;
+    if (hsep_sensor_stays(&self->held, motion, plausible, fabs(x - self->held.value))) {
+        if (fabs(residual - self->measured) <= fabs(residual - self->before_run)) {
+            self->stood = fmax(self->stood, motion);
+        } else if (motion <= guard_more * self->stood) {
+            self->stood = 0.0;
         }
     }
-    self->position = x_pb;
+    self->before_run = self->measured;
 }
 
 /* Set the run of equal values that ends with sample k to a value. */
@@ -127,7 +130,7 @@ static void guard_set_run(const hsep_guard *self, uint64_t k, uint64_t n, double
 
 HSEP_API void hsep_guard_accept(
     hsep_guard *self, const double x[], const double x_pb[], uint64_t n, double largest, double deviation[],
-    double accepted[], double standing[])
+    double accepted[], double suspect[])
 {
     double pace = 0.0, last = isnan(self->x_pb) ? x_pb[n - 1] : self->x_pb;
     for (uint64_t k = 0; k < n; k++) {
@@ -142,16 +145,19 @@ HSEP_API void hsep_guard_accept(
         const uint64_t place = n - 1 - k;
         const double residual = x[place] - x_pb[place];
         self->gap++;
-        accepted[place] = standing[place] = 0.0;
+        accepted[place] = suspect[place] = 0.0;
         if (!isfinite(x[place])) {
             continue;
         }
-        guard_follow_motion(self, x[place], x_pb[place]);
-        const int stands = hsep_sensor_misses(&self->held, x[place], x_pb[place], plausible, HUGE_VAL);
-        if (stands) {
-            guard_set_run(self, k, n, 1.0, standing);
+        if (x[place] != self->held.value) {
+            guard_tell_rest(self, x[place], residual, plausible);
         }
-        self->holding = stands && !self->rests;
+        self->measured = residual;
+        const double still = fmax(plausible, guard_more * self->stood);
+        self->holding = (uint64_t)hsep_sensor_misses(&self->held, x[place], x_pb[place], still, HUGE_VAL);
+        if (self->holding) {
+            guard_set_run(self, k, n, 1.0, suspect);
+        }
         if (self->holding && ++self->doubtful > self->patience_standing) { /* the axis itself stands still */
             accepted[place] = 1.0;
             self->last = residual;

@@ -75,16 +75,8 @@
 /* Median change of the residual from sample to sample that noise makes, in mean deviations: white noise 1.4. */
 #define HSEP_TRUST_VIBRATION_NOISE 2.0
 
-/* Rate at which the averaged motion of a sample follows: over some four samples, a coarse encoder's step among them.
- * */
-#define HSEP_TRUST_FOLLOW 0.15
-
-/* Measured motion before a run of equal values relative to the predicted one, below which the axis itself came to
- * rest: a sensor that is held shows the whole motion. */
-#define HSEP_TRUST_STOOD 0.5
-
-/* Time, s, after which another level is believed, two windows at least, and after which an axis that stands is: an
- * encoder may be held for half a second. */
+/* Time, s, after which another level is believed, two windows at least, and the first time, after which an axis that
+ * stands is: an encoder may be held for half a second. */
 #define HSEP_TRUST_PATIENCE 0.05
 #define HSEP_TRUST_PATIENCE_STANDING 0.6
 

@@ -101,7 +101,7 @@ static void trusted_of_command(hsep_trusted *self, const double x_pb[], const do
  * learned: it tells nothing of motion. */
 static uint64_t trusted_learned_rows(const hsep_trusted *self, double learned[])
 {
-    const double *moving = hsep_at_const(self, self->moving);
+    const double *learnable = hsep_at_const(self, self->learnable);
     const double *bridged = hsep_at_const(self, self->bridged);
     double n_bridged = 0.0; /* among the lags of the row */
     uint64_t count = 0;
@@ -109,7 +109,7 @@ static uint64_t trusted_learned_rows(const hsep_trusted *self, double learned[])
         n_bridged += bridged[self->Np + i];
     }
     for (uint64_t j = self->Np; j-- > 0;) {
-        learned[j] = moving[j] > 0.0 && n_bridged <= trusted_bridged;
+        learned[j] = learnable[j] > 0.0 && n_bridged <= trusted_bridged;
         count += learned[j] > 0.0;
         n_bridged += bridged[j] - bridged[j + self->p];
     }
@@ -155,7 +155,7 @@ static void trusted_fold_window(hsep_trusted *self, const double e[])
 /* Update the weights of the stack with the samples that were published, of those accepted. */
 static void trusted_judge_stack(hsep_trusted *self, const double e[])
 {
-    const double *moving = hsep_at(self, self->moving);
+    const double *learnable = hsep_at(self, self->learnable);
     const uint64_t first = self->late < self->Np ? self->late : self->Np - 1;
     double products[HSEP_N_EXPERTS + 1][HSEP_N_EXPERTS + 1] = {{0.0}}, n = 0.0;
     for (uint64_t j = 0; j < self->Np - first; j++) {
@@ -164,12 +164,12 @@ static void trusted_judge_stack(hsep_trusted *self, const double e[])
             of_sample[i] = hsep_trusted_stacked(self, (hsep_expert_place)i, self->n - self->Np + j);
         }
         of_sample[HSEP_N_EXPERTS] = e[j];
-        for (int i = 0; moving[j] > 0.0 && i <= HSEP_N_EXPERTS; i++) {
+        for (int i = 0; learnable[j] > 0.0 && i <= HSEP_N_EXPERTS; i++) {
             for (int l = 0; l <= HSEP_N_EXPERTS; l++) {
                 products[i][l] += of_sample[i] * of_sample[l];
             }
         }
-        n += moving[j];
+        n += learnable[j];
     }
     if (n > 0.0) {
         hsep_stack_update(&self->stack, products, n, self->least_variance);
@@ -187,14 +187,14 @@ static void trusted_doubt_earlier_runs(hsep_trusted *self)
     trusted_end_doubt(self);
 }
 
-/* Judge the experts and their stack by the measurement of their window, of which count samples are moving. */
+/* Judge the experts and their stack by the measurement of their window, of which count samples are learned. */
 static void trusted_judge(hsep_trusted *self, const double e[], double count)
 {
-    const double *moving = hsep_at(self, self->moving), *e_0 = hsep_at(self, self->e_0);
+    const double *learnable = hsep_at(self, self->learnable), *e_0 = hsep_at(self, self->e_0);
     for (uint64_t i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
         if (self->predicted[i]) {
             hsep_expert_judge(
-                hsep_trusted_expert(self, (hsep_expert_place)i), i == HSEP_COMMAND ? e_0 : e, moving,
+                hsep_trusted_expert(self, (hsep_expert_place)i), i == HSEP_COMMAND ? e_0 : e, learnable,
                 self->given_variance);
         }
     }
@@ -204,8 +204,8 @@ static void trusted_judge(hsep_trusted *self, const double e[], double count)
     } else if (self->doubts && self->n_rows[HSEP_OF_DOUBT] > HSEP_TRUST_DOUBT_OVER * self->n_rows[HSEP_OF_PHYSICS]) {
         trusted_end_doubt(self);
     }
-    hsep_residual_scale_follow(&self->scale, e, moving, self->Np, count);
-    hsep_residual_scale_follow(&self->scale_of_command, e_0, moving, self->Np, count);
+    hsep_residual_scale_follow(&self->scale, e, learnable, self->Np, count);
+    hsep_residual_scale_follow(&self->scale_of_command, e_0, learnable, self->Np, count);
 }
 
 HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const double x_d[], const double x_pb[])
@@ -256,15 +256,15 @@ static void trusted_take_rows(hsep_trusted *self, const double x_d[], const doub
     trusted_of_command(self, x_pb, e);
 }
 
-/* What stands still, axis or sensor, is followed and not learned: it tells nothing of motion. Leave of the standing
- * samples those that move and are accepted; return how many they are. */
-static double trusted_leave_out_standing(hsep_trusted *self)
+/* What a held sensor may show is followed, once it is believed, and not learned. Set which samples are; return how many.
+ */
+static double trusted_leave_out_suspect(hsep_trusted *self)
 {
     const double *accepted = hsep_at(self, self->accepted);
-    double *moving = hsep_at(self, self->moving), count = 0.0;
+    double *learnable = hsep_at(self, self->learnable), count = 0.0;
     for (uint64_t j = 0; j < self->Np; j++) {
-        moving[j] = accepted[j] > 0.0 && !(moving[j] > 0.0) ? 1.0 : 0.0;
-        count += moving[j];
+        learnable[j] = accepted[j] > 0.0 && !(learnable[j] > 0.0) ? 1.0 : 0.0;
+        count += learnable[j];
     }
     return count;
 }
@@ -276,14 +276,14 @@ HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_d[], const d
     trusted_take_scales(self);
     hsep_guard_accept(
         &self->guard, hsep_at(self, self->measured), x_pb, self->Np, self->scale.largest, hsep_at(self, self->x),
-        hsep_at(self, self->accepted), hsep_at(self, self->moving));
+        hsep_at(self, self->accepted), hsep_at(self, self->learnable));
     const double count = trusted_bridge(self, x_pb, e);
     self->n_rejected += self->Np - (uint64_t)count;
     trusted_take_rows(self, x_d, x_pb, e);
-    const double n_moving = trusted_leave_out_standing(self);
-    if (fold && n_moving > 0.0) {
+    const double n_learnable = trusted_leave_out_suspect(self);
+    if (fold && n_learnable > 0.0) {
         trusted_fold_window(self, e);
-        trusted_judge(self, e, n_moving);
+        trusted_judge(self, e, n_learnable);
     }
     hsep_command_end(hsep_trusted_command(self), self->Np);
     self->at_rest = self->n_rest >= self->Np;

@@ -80,7 +80,7 @@ typedef struct {
     uint64_t x;                /* (n,) m, position */
     uint64_t measured;         /* (Np,) m, measured position, NaN where missing */
     uint64_t accepted;         /* (Np,) whether it is plausible */
-    uint64_t moving;           /* (Np,) whether it is learned: plausible, and neither axis nor sensor stood */
+    uint64_t learnable;        /* (Np,) whether it is learned: plausible, and not of a sensor that may be held */
     uint64_t bridged;          /* (Np + p,) whether a residual stands for one that is not */
     uint64_t e_0;              /* (Np + p,) m, residual of the command */
     uint64_t stacked;          /* (n,) m, what the command's expert predicts of that of the physics model */

@@ -77,7 +77,7 @@ static double trusted_lay_out(hsep_trusted *self, const hsep_trusted_parameters 
     self->x = hsep_take(&end, n);
     self->measured = hsep_take(&end, Np);
     self->accepted = hsep_take(&end, Np);
-    self->moving = hsep_take(&end, Np);
+    self->learnable = hsep_take(&end, Np);
     self->bridged = hsep_take(&end, Np + p);
     self->e_0 = hsep_take(&end, Np + p);
     self->stacked = hsep_take(&end, n);
@@ -157,7 +157,7 @@ typedef struct {
     double least, most;
 } trusted_part;
 
-#define TRUSTED_PARTS 23
+#define TRUSTED_PARTS 24
 
 /* What rounding may have added to the sum of the stack's weights. */
 static const double trusted_rounding = 1e-6;
@@ -183,7 +183,8 @@ static void trusted_list(hsep_trusted *self, trusted_part parts[TRUSTED_PARTS])
         {stack->evidence, 2, 0.0, most},
         {&self->guard.spread, 1, -1.0, DBL_MAX},
         {&self->guard.held.step, 1, 0.0, HUGE_VAL},
-        {&self->guard.vibration, 1, 0.0, DBL_MAX}};
+        {&self->guard.vibration, 1, 0.0, DBL_MAX},
+        {&self->guard.stood, 1, 0.0, DBL_MAX}};
     memcpy(parts, before, sizeof before);
     parts += sizeof before / sizeof before[0];
     for (uint64_t i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
