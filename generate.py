@@ -63,7 +63,7 @@ def constants_header() -> str:
     """Return the C header of the constants of the residual model with trust, each group behind its description."""
     values = asdict(CONSTANTS)
     _, attributes = cleandoc(type(CONSTANTS).__doc__ or "").split("----------\n")
-    groups = re.findall(r"^(\w[\w, ]*) : float\n((?: .*\n?)+)", attributes, re.MULTILINE)
+    groups = re.findall(r"^(\w[\w, ]*) : (?:float|int)\n((?: .*\n?)+)", attributes, re.MULTILINE)
     found = [name for names, _ in groups for name in names.split(", ")]
     if found != list(values):
         raise AssertionError(f"constants must be described in their order, {list(values)}, got {found}")

@@ -13,7 +13,7 @@ from hybridsep.predict.trust.disturbances import StaticFeatures
 TS, N = 1e-3, 800
 MODES = [(25.0, 0.05, 24674.0, 15.7), (90.0, 0.6, -400.0, 3.0)]
 SCALE = 0.05  # m/s
-SPREAD = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
+SPREAD = 0.01 * np.sqrt(10.0) ** np.arange(6)
 PERIOD, ORIGIN = 1.7e-3, 0.0123  # m
 LENGTHS = (100, 1, 7, 2, 300, 3, 387)
 

@@ -26,6 +26,9 @@ class TrustConstants:
     first_lagged, first_static : float
         First weights of the experts with and without lags; hold and command begin with none: with 0.2 for the command's
         the worst drives are worse.
+    lags_of_command : int
+        Most lags of the command's expert, and of its increments: with 50 as well errors are 2 % less on drives of modes, 8 %
+        more on those of two masses, at six times the cost.
     last_lag : float
         Prior variance of the weight of the last lag, relative to that of the first: the residual's memory fades.
     least_noise : float
@@ -74,6 +77,7 @@ class TrustConstants:
     gamma: float = 0.95
     first_lagged: float = 0.5
     first_static: float = 0.5
+    lags_of_command: int = 20
     last_lag: float = 0.005
     least_noise: float = 1e-6
     first_noise: float = 0.01

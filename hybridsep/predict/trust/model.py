@@ -51,9 +51,9 @@ class RunState(NamedTuple):
     Attributes
     ----------
     static : StaticState
-    commands : (d + p + 1,) array, m
-        Last commands, oldest first.
-    past, past_of_command : (p,) array, m
+    commands : (d + p_A + 1,) array, m
+        Last commands, oldest first, for the ``p_A`` lags of the command's expert.
+    past, past_of_command : (p,) and (p_A,) array, m
         Last residuals of the physics model, and of the command; newest first.
     bridged : (p,) array of bool
         Which of these stand for samples without a measurement.
@@ -92,16 +92,16 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         self.settings, self.constants, self.preview = settings, constants, settings.Np
         p = settings.p
         self.static = StaticFeatures(discrete, settings.q, settings.period, own, constants)
-        self.command = CommandFeatures(discrete.dead_time, p)
+        self.command = CommandFeatures(discrete.dead_time, min(p, constants.lags_of_command))
         self.experts = {
             LAGGED: Expert(self.static.shares, p, constants),
             STATIC: Expert(self.static.shares, 0, constants),
-            COMMAND: Expert(np.ones(self.command.n), p, constants),
+            COMMAND: Expert(np.ones(self.command.n), self.command.p, constants),
             DOUBTING: Expert(self.static.shares, p, constants),
         }
         self.stack = Stack((0.0, constants.first_lagged, constants.first_static, 0.0, 0.0), constants)
         self.evidence = Evidence.none(self.static.n + p)
-        self.evidence_of_command = Evidence.none(self.command.n + p)
+        self.evidence_of_command = Evidence.none(self.command.n + self.command.p)
         self.doubting: Evidence | None = None
         self.largest = np.zeros(self.static.n)
         self.velocity_scale = self.largest_step = 0.0
@@ -113,7 +113,8 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         """Begin another run, at rest; what was learned is kept."""
         p = self.settings.p
         no: NDArray[np.bool_] = np.zeros(p, dtype=np.bool_)
-        self.run = RunState(self.static.rest(), np.zeros(self.command.n_before), np.zeros(p), np.zeros(p), no)
+        commands, past_of_command = np.zeros(self.command.n_before), np.zeros(self.command.p)
+        self.run = RunState(self.static.rest(), commands, np.zeros(p), past_of_command, no)
         self.guard.restart()
         self.n_rejected = 0
         self.rest = RestBefore(self.settings.measurement_delay)
@@ -132,7 +133,7 @@ class TrustedModel(ResidualModel[TrustedForecast]):
 
     def begin_in_motion(self, forecast: TrustedForecast, x_d: Array, x_pb: Array) -> TrustedForecast:
         """Correct what was before a run in motion: commands and physics-based prediction went on as they begin."""
-        static, n, p = self.run.static, self.command.n_before, self.settings.p
+        static, n, p = self.run.static, self.command.n_before, self.command.p
         commands = x_d[0] + (x_d[1] - x_d[0]) * np.arange(-n, 0)
         positions = x_pb[0] + (x_pb[1] - x_pb[0]) * np.arange(-max(n, len(static.x_pb)), 0)
         late = commands[-1 - self.command.dead_time :: -1][:p]
@@ -334,7 +335,7 @@ class TrustedModel(ResidualModel[TrustedForecast]):
             static,
             np.concatenate((run.commands, x_d))[m:],
             np.concatenate((e[::-1], run.past))[:p],
-            np.concatenate((e_0[::-1], run.past_of_command))[:p],
+            np.concatenate((e_0[::-1], run.past_of_command))[: self.command.p],
             bridged[-p:],
         )
         return accepted
@@ -360,7 +361,8 @@ class TrustedModel(ResidualModel[TrustedForecast]):
             self.experts[expert].judge(prediction, e_0 if expert == COMMAND else e, accepted, given)
         self.scale = self.scale.with_window(e[accepted])
         self.scale_of_command = self.scale_of_command.with_window(e_0[accepted])
-        published = accepted & (np.arange(len(e)) >= min(self.settings.measurement_delay, len(e) - 1))
+        late = self.settings.measurement_delay
+        published = accepted & (np.arange(len(e)) >= late) if late < len(e) else accepted
         if published.any():
             self.stack.update(forecast.stacked[:, : len(e)][:, published], e[published], self.settings.lam)
         if self.doubting is None:

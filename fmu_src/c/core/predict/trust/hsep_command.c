@@ -1,9 +1,14 @@
 #include "hsep_command.h"
 
+#include "hsep_trust_constants.h"
+
 #include <stddef.h>
 #include <string.h>
 
-HSEP_API uint64_t hsep_command_n(uint64_t p) { return p + 2; }
+HSEP_API uint64_t hsep_command_lags(uint64_t p)
+{
+    return p < HSEP_TRUST_LAGS_OF_COMMAND ? p : HSEP_TRUST_LAGS_OF_COMMAND;
+}
 
 /* Set what follows from the parameters; return the bytes of the block. */
 static double command_lay_out(hsep_command *self, const hsep_predictor_settings *settings, uint64_t n)
@@ -11,9 +16,10 @@ static double command_lay_out(hsep_command *self, const hsep_predictor_settings 
     double end = HSEP_WORDS(hsep_command);
     self->n = n;
     self->dead_time = settings->dead_time;
-    self->count = hsep_command_n(settings->p);
-    self->n_before = settings->dead_time + settings->p + 1;
-    self->commands = hsep_take(&end, (double)n + (double)settings->dead_time + (double)settings->p + 1.0);
+    self->p = hsep_command_lags(settings->p);
+    self->count = self->p + 2;
+    self->n_before = settings->dead_time + self->p + 1;
+    self->commands = hsep_take(&end, (double)n + (double)settings->dead_time + (double)self->p + 1.0);
     self->rows = hsep_take(&end, (double)n * (double)self->count);
     return end * sizeof(double);
 }

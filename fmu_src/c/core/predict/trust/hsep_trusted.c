@@ -117,12 +117,13 @@ static uint64_t trusted_learned_rows(const hsep_trusted *self, double learned[])
 }
 
 /* Update some evidence with the rows [features without lags | lags | residual] of the window that are learned, count of
- * them. rows: (Np, n_static); e: (Np + p,), m. */
+ * them. rows: (Np, n_static); e: (Np + lags,), m. */
 static void trusted_fold(
     hsep_trusted *self, hsep_evidence evidence, const double rows[], const double e[], uint64_t count)
 {
     hsep_regression *regression = hsep_trusted_evidence(self, evidence);
-    const uint64_t n = regression->n, n_static = n - self->p;
+    const uint64_t n = regression->n, p = evidence == HSEP_OF_COMMAND ? hsep_trusted_command(self)->p : self->p;
+    const uint64_t n_static = n - p;
     const double *learned = hsep_at(self, self->x);
     double *work = hsep_at(self, self->work);
     uint64_t b = 0;
@@ -131,7 +132,7 @@ static void trusted_fold(
         if (learned[j] > 0.0) {
             double *row = hsep_block_fold_row(work, n, b++);
             memcpy(row, rows, (size_t)n_static * sizeof(double));
-            memcpy(row + n_static, e + j + 1, (size_t)self->p * sizeof(double));
+            memcpy(row + n_static, e + j + 1, (size_t)p * sizeof(double));
             row[n] = e[j];
         }
     }
@@ -156,7 +157,7 @@ static void trusted_fold_window(hsep_trusted *self, const double e[])
 static void trusted_judge_stack(hsep_trusted *self, const double e[])
 {
     const double *learnable = hsep_at(self, self->learnable);
-    const uint64_t first = self->late < self->Np ? self->late : self->Np - 1;
+    const uint64_t first = self->late < self->Np ? self->late : 0;
     double products[HSEP_N_EXPERTS + 1][HSEP_N_EXPERTS + 1] = {{0.0}}, n = 0.0;
     for (uint64_t j = 0; j < self->Np - first; j++) {
         double of_sample[HSEP_N_EXPERTS + 1];
@@ -217,7 +218,7 @@ HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const double x_d[
     hsep_disturbances_restart(disturbances, x_d, x_pb, Np);
     hsep_disturbances_command(disturbances, x_d, x_pb, Np, self->forecast_scale, hsep_at(self, self->rows));
     hsep_command_begin(hsep_trusted_command(self), x_d[Np - 1], x_d[Np - 2]);
-    for (uint64_t i = 0; i < self->p; i++) {
+    for (uint64_t i = 0; i < hsep_trusted_command(self)->p; i++) {
         past[i] = (x_pb[Np - 1] - step_pb * (double)(i + 1)) - (x_d[Np - 1] - step * (double)(dead_time + i + 1));
     }
 }
@@ -271,7 +272,6 @@ static double trusted_leave_out_suspect(hsep_trusted *self)
 
 HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_d[], const double x_pb[], double e[], int fold)
 {
-    const size_t lags = (size_t)self->p * sizeof(double);
     double *bridged = hsep_at(self, self->bridged), *e_0 = hsep_at(self, self->e_0);
     trusted_take_scales(self);
     hsep_guard_accept(
@@ -288,6 +288,6 @@ HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_d[], const d
     hsep_command_end(hsep_trusted_command(self), self->Np);
     self->at_rest = self->n_rest >= self->Np;
     self->known_rest = self->n_rest > self->Np ? self->n_rest - self->Np : 0;
-    memcpy(bridged + self->Np, bridged, lags); /* p <= Np: they do not overlap */
-    memcpy(e_0 + self->Np, e_0, lags);
+    memcpy(bridged + self->Np, bridged, (size_t)self->p * sizeof(double)); /* p <= Np: they do not overlap */
+    memcpy(e_0 + self->Np, e_0, (size_t)hsep_trusted_command(self)->p * sizeof(double));
 }

@@ -76,13 +76,13 @@ typedef struct {
     /* Offsets in doubles from the beginning of the struct */
     uint64_t largest;          /* (n_static,) largest magnitudes of the features without lags */
     uint64_t forecast_largest; /* (n_static,) those with the window that is predicted */
-    uint64_t scales;           /* (max(n_static, p + 2),) prior standard deviations of weights, work */
+    uint64_t scales;           /* (max(n_static, p of the command + 2),) prior standard deviations of weights, work */
     uint64_t x;                /* (n,) m, position */
     uint64_t measured;         /* (Np,) m, measured position, NaN where missing */
     uint64_t accepted;         /* (Np,) whether it is plausible */
     uint64_t learnable;        /* (Np,) whether it is learned: plausible, and not of a sensor that may be held */
     uint64_t bridged;          /* (Np + p,) whether a residual stands for one that is not */
-    uint64_t e_0;              /* (Np + p,) m, residual of the command */
+    uint64_t e_0;              /* (Np + p of the command,) m, residual of the command */
     uint64_t stacked;          /* (n,) m, what the command's expert predicts of that of the physics model */
     uint64_t disagreement;     /* (n,) m2, variance of the experts about their stack */
     uint64_t rows;             /* (n, n_static) features without lags, sample after sample */

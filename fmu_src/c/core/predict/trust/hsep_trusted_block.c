@@ -33,13 +33,14 @@ HSEP_API uint64_t hsep_trusted_n(const hsep_predictor_settings *settings, const 
 /* Features of the rows of some evidence. */
 static uint64_t trusted_n_features(const hsep_trusted *self, uint64_t evidence)
 {
-    return (evidence == HSEP_OF_COMMAND ? hsep_command_n(self->p) : self->n_static) + self->p;
+    return evidence == HSEP_OF_COMMAND ? 2 * hsep_command_lags(self->p) + 2 : self->n_static + self->p;
 }
 
 static hsep_expert_shape trusted_shape(const hsep_trusted *self, uint64_t expert)
 {
-    const uint64_t n_static = expert == HSEP_COMMAND ? hsep_command_n(self->p) : self->n_static;
-    return (hsep_expert_shape){self->Np, self->n, n_static, expert == HSEP_STATIC ? 0 : self->p};
+    const uint64_t p = expert == HSEP_COMMAND ? hsep_command_lags(self->p) : self->p;
+    const uint64_t n_static = expert == HSEP_COMMAND ? p + 2 : self->n_static;
+    return (hsep_expert_shape){self->Np, self->n, n_static, expert == HSEP_STATIC ? 0 : p};
 }
 
 /* Doubles of work: for the rows of a window, and for as many as features. */
@@ -59,6 +60,7 @@ static double trusted_lay_out(hsep_trusted *self, const hsep_trusted_parameters 
     const hsep_predictor_settings *settings = parameters->settings;
     const hsep_trust_settings *trust = parameters->trust;
     const double Np = (double)settings->Np, n = (double)parameters->n, p = (double)settings->p;
+    const double p_of_command = (double)hsep_command_lags(settings->p);
     const double n_static = (double)hsep_disturbances_n(settings->q, trust->period);
     double end = HSEP_WORDS(hsep_trusted);
     self->Np = settings->Np;
@@ -73,13 +75,13 @@ static double trusted_lay_out(hsep_trusted *self, const hsep_trusted_parameters 
     self->kept = trust->forgetting > 0.0 ? exp(-Np * settings->T_s / trust->forgetting) : 1.0;
     self->largest = hsep_take(&end, n_static);
     self->forecast_largest = hsep_take(&end, n_static);
-    self->scales = hsep_take(&end, fmax(n_static, p + 2.0));
+    self->scales = hsep_take(&end, fmax(n_static, p_of_command + 2.0));
     self->x = hsep_take(&end, n);
     self->measured = hsep_take(&end, Np);
     self->accepted = hsep_take(&end, Np);
     self->learnable = hsep_take(&end, Np);
     self->bridged = hsep_take(&end, Np + p);
-    self->e_0 = hsep_take(&end, Np + p);
+    self->e_0 = hsep_take(&end, Np + p_of_command);
     self->stacked = hsep_take(&end, n);
     self->disagreement = hsep_take(&end, n);
     self->rows = hsep_take(&end, n * n_static);
