@@ -2,6 +2,7 @@
 
 #include "hsep_tiles.h"
 #include "hsep_vector.h"
+#include "hsep_wide.h"
 
 #include <math.h>
 #include <string.h>
@@ -79,7 +80,7 @@ static void block_triangle(block_reflectors *at, const double tau[4])
 
 /* W += V' X for the next 2 rows of X, x and y, with entries v and w of the reflectors; written out for compilers to
  * make vectors of it. */
-static inline void block_add_two(
+HSEP_INLINE void block_add_two(
     double *restrict W, uint64_t width, const double *restrict x, const double *restrict y, const double v[4],
     const double w[4])
 {
@@ -94,7 +95,7 @@ static inline void block_add_two(
 }
 
 /* x := x - V S for 2 rows of X, x and y, with entries v and w of the reflectors. */
-static inline void block_subtract_two(
+HSEP_INLINE void block_subtract_two(
     double *restrict x, double *restrict y, const double *restrict S, uint64_t width, const double v[4],
     const double w[4])
 {
@@ -107,7 +108,7 @@ static inline void block_subtract_two(
 }
 
 /* Entries b of the reflectors. */
-static inline void block_entries(const block_reflectors *at, uint64_t b, double v[4])
+HSEP_INLINE void block_entries(const block_reflectors *at, uint64_t b, double v[4])
 {
     for (unsigned r = 0; r < HSEP_TILE; r++) {
         v[r] = at->v[r * at->m + b];
@@ -115,7 +116,7 @@ static inline void block_entries(const block_reflectors *at, uint64_t b, double 
 }
 
 /* S := T' W of W = R + V' X, and R := R - S. tile: of R, the first one; W: (4, width), V' X, which becomes S. */
-static void block_turn(const block_reflectors *at, double *tile, double *W, uint64_t width)
+HSEP_INLINE void block_turn(const block_reflectors *at, double *tile, double *W, uint64_t width)
 {
     for (uint64_t j = 0; j < width; j += HSEP_TILE, tile += HSEP_TILE_STRIDE) {
         double w[HSEP_TILE][HSEP_TILE];
@@ -140,7 +141,7 @@ static void block_turn(const block_reflectors *at, double *tile, double *W, uint
 }
 
 /* Reflect the columns behind a panel. x: first of these in the first row; W: (4, width), work. */
-static void block_apply(
+HSEP_INLINE void block_apply_as_compiled(
     const block_reflectors *at, double *x, uint64_t stride, double *tiles, double *W, uint64_t width)
 {
     double v[HSEP_TILE], w[HSEP_TILE];
@@ -165,9 +166,23 @@ static void block_apply(
     }
 }
 
+/* The same for any processor, and for one with vectors of four doubles: nearly all of the cost of a fold. */
+static void block_apply(
+    const block_reflectors *at, double *x, uint64_t stride, double *tiles, double *W, uint64_t width)
+{
+    block_apply_as_compiled(at, x, stride, tiles, W, width);
+}
+
+HSEP_WIDE static void block_apply_wide(
+    const block_reflectors *at, double *x, uint64_t stride, double *tiles, double *W, uint64_t width)
+{
+    block_apply_as_compiled(at, x, stride, tiles, W, width);
+}
+
 HSEP_API void hsep_block_fold(hsep_regression *self, double work[], uint64_t count, int is_diagonal)
 {
     const uint64_t n = self->n, stride = block_width(n);
+    const int wide = hsep_is_wide();
     double *inverse_d = hsep_at(self, self->inverse_d), *tile = hsep_at(self, self->tiles);
     double *W = work + stride * count, *V = W + HSEP_TILE * stride;
     for (uint64_t first = 0; first <= n; first += HSEP_TILE) {
@@ -187,7 +202,8 @@ HSEP_API void hsep_block_fold(hsep_regression *self, double work[], uint64_t cou
             self->residual_sum += hsep_dot(target, target, at.m);
         } else {
             block_triangle(&at, tau);
-            block_apply(&at, work + first + HSEP_TILE, stride, tile + HSEP_TILE_STRIDE, W, width);
+            (wide ? block_apply_wide
+                  : block_apply)(&at, work + first + HSEP_TILE, stride, tile + HSEP_TILE_STRIDE, W, width);
         }
         tile += HSEP_TILE_STRIDE * (1 + width / HSEP_TILE);
     }

@@ -257,7 +257,7 @@ static void trusted_take_rows(hsep_trusted *self, const double x_d[], const doub
     trusted_of_command(self, x_pb, e);
 }
 
-/* What a held sensor may show is followed, once it is believed, and not learned. Set which samples are; return how many.
+/* What a held sensor may show is followed, once it is believed, and not learned. Set which are; return how many.
  */
 static double trusted_leave_out_suspect(hsep_trusted *self)
 {
