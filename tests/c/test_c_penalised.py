@@ -32,13 +32,13 @@ class CSolution:
             work.ctypes.data_as(ctypes.c_void_p),
         )
 
-    def leverage(self, rows: Array) -> Array:
+    def leverage(self, rows: Array, *, wide: bool = False) -> Array:
         library, place = self.solved.library, self.solved.library.hsep_regression_row(self.solved._block)
         found = []
         for row in rows.tolist():
             for j, value in enumerate(row):
                 place[j] = value
-            found.append(library.hsep_penalised_leverage(self.solved._block))
+            found.append(library.hsep_penalised_leverage(self.solved._block, int(wide)))
         return np.array(found)
 
 
@@ -63,6 +63,7 @@ def assert_same(regression: CRegression, library: RidgeRegression, penalties: Ar
     assert ours.residual_sum == pytest.approx(expected.residual_sum, rel=1e-11)
     some = rows[:10, :m]
     np.testing.assert_allclose(ours.leverage(some), expected.leverage(some), rtol=1e-11)
+    np.testing.assert_array_equal(ours.leverage(some, wide=bool(regression.library.test_wide())), ours.leverage(some))
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 7, 8, 9, 23])

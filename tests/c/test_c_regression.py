@@ -69,6 +69,19 @@ def test_rows_folded_at_once_are_those_folded_one_by_one(n: int, size: float, co
     assert regression.n_samples == 40 + count
 
 
+@pytest.mark.parametrize("n", [1, 7, 23, 76])
+def test_wide_vectors_change_no_bit(n: int) -> None:
+    rng = np.random.default_rng(n)
+    rows, target = rng.normal(size=(150, n)), rng.normal(size=150)
+    blocks = []
+    for wide in (False, bool(CRegression(n, 1e-6).library.test_wide())):
+        regression = CRegression(n, 1e-6)
+        for i in (0, 50, 99):
+            regression.fold_at_once(rows[i : i + 51], target[i : i + 51], wide=wide)
+        blocks.append(regression.block)
+    np.testing.assert_array_equal(blocks[0], blocks[1])
+
+
 def staircase_rows(p: int, q: int, n: int) -> tuple[Array, Array]:
     """Return rows of features, (n, 2 + q + p), and their targets, (n,), of the measured staircase; eq. (5)."""
     discrete = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0).discretise(TS)

@@ -1,4 +1,4 @@
-"""A plant that has changed before a warm run: an expert that doubts earlier runs tells, and it is relearned as cold."""
+"""A plant that has changed before a warm run: an expert that doubts earlier runs tells, and they are forgotten."""
 
 from __future__ import annotations
 
@@ -45,16 +45,16 @@ def test_a_random_drive_whose_frequencies_fell_by_a_tenth_is_relearned(index: in
 
 
 @pytest.mark.parametrize("factor", [-1.0, 0.2, 3.0])
-def test_what_has_changed_is_relearned_as_fast_as_cold(factor: float) -> None:
+def test_what_has_changed_is_relearned_as_cold(factor: float) -> None:
     x_d = cycles(4 * PERIOD)
     x = physics(x_d) + factor * friction(x_d) + NOISE * np.random.default_rng(8).normal(size=len(x_d))
     warm = learned(x_d, friction(x_d))
     found, cold = run(warm, x_d, x), run(trusted(), x_d, x)
-    assert rms((x - found)[2000:]) <= 1.05 * rms((x - cold)[2000:])
+    assert rms((x - found)[2000:]) <= 1.01 * rms((x - cold)[2000:])
     model = trusted_model(warm)
-    assert model.doubting is None
+    assert not model.doubts
     assert model.stack.weights[DOUBTING] == 0.0
-    assert model.n_rows <= len(x_d) + CONSTANTS.less * CONSTANTS.carried * model.settings.Np
+    assert model.n_rows == len(x_d)
 
 
 def test_what_has_not_changed_keeps_what_was_learned() -> None:
@@ -70,8 +70,8 @@ def test_what_has_not_changed_keeps_what_was_learned() -> None:
 def test_doubt_begins_with_little_of_earlier_runs_and_the_evidence_of_the_expert_it_doubts() -> None:
     x_d = cycles(2 * PERIOD)
     model = trusted_model(learned(x_d, friction(x_d)))
-    assert model.doubting is not None
-    assert model.doubting.n_rows == pytest.approx(CONSTANTS.less * model.n_rows)
+    assert model.doubts
+    assert model.evidence.all(CONSTANTS.less).n_rows == pytest.approx(CONSTANTS.less * model.n_rows)
     assert model.stack.gram[DOUBTING, DOUBTING] == model.stack.gram[LAGGED, LAGGED] > 0.0
     assert model.stack.cross[DOUBTING] == model.stack.cross[LAGGED]
     assert model.experts[DOUBTING].noise_variance == model.experts[LAGGED].noise_variance > 0.0
@@ -82,14 +82,14 @@ def test_doubt_ends_once_this_run_outweighs_the_earlier_ones() -> None:
     e = friction(x_d)
     warm = learned(x_d[: 2 * PERIOD], e[: 2 * PERIOD])
     run(warm, x_d[:PERIOD], (physics(x_d) + e)[:PERIOD])
-    assert trusted_model(warm).doubting is not None
+    assert trusted_model(warm).doubts
     run(warm, x_d[PERIOD:], (physics(x_d) + e)[PERIOD:])
-    assert trusted_model(warm).doubting is None
+    assert not trusted_model(warm).doubts
 
 
 def test_a_cold_run_doubts_nothing() -> None:
     predictor = trusted()
-    assert trusted_model(predictor).doubting is None
+    assert not trusted_model(predictor).doubts
     run(predictor, cycles(300), physics(cycles(300)) + friction(cycles(300)))
-    assert trusted_model(predictor).doubting is None
+    assert not trusted_model(predictor).doubts
     assert trusted_model(predictor).experts[COMMAND].noise_variance > 0.0

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from compensator_cases import DRIVE_LIMITS, TS, beyond
 from predictor_cases import MODEL
-from trusted_cases import cycles, physics
+from trusted_cases import cycles, physics, trusted_model
 
 from hybridsep.base.errors import ParameterError
 from hybridsep.base.settings import CompensatorSettings, PredictorSettings
@@ -51,6 +51,8 @@ def test_windows_are_predicted_from_the_last_measurement_on(delay: int, settings
     """By a predictor without delay that predicts the samples not measured yet as well, and starts so much earlier."""
     x_d, x_meas = drive()[0], late(delay)
     predictor, peer = new(delay, **settings), new(0, **settings)
+    if settings["trust"]:  # only what is published is judged
+        trusted_model(peer).settings = predictor.settings
     commands = np.concatenate((np.full(delay, x_d[0]), x_d))
     for k in range(0, N, NP):
         found = predictor.predict(x_d[k : k + NP])

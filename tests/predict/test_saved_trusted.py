@@ -50,7 +50,7 @@ def test_a_restored_predictor_continues_bit_for_bit(way: str, pending: bool, war
     x_d, x = signals()
     x[[390, 395]], x[435:440] = np.nan, x[435] + 1e-2  # what the guard knows is part of the state, too
     original = in_mid_run(x=x, warm=warm)
-    assert (trusted_model(original).doubting is not None) == warm
+    assert trusted_model(original).doubts == warm
     assert trusted_model(original).n_rejected >= 2
     if not pending:
         original.update(x[400:430])
@@ -162,10 +162,11 @@ def test_an_inconsistent_model(name: str, value: Any) -> None:
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        ("factor_of_doubt", np.eye(26)),
-        ("factor_of_doubt", np.zeros((27, 27))),
-        ("n_doubting", -1.0),
-        ("n_doubting", 1e9),
+        ("earlier", np.eye(26)),
+        ("earlier", np.zeros((27, 27))),
+        ("earlier_of_command", np.eye(3)),
+        ("n_earlier", -1.0),
+        ("n_earlier_of_command", 1e300),
     ],
     ids=str,
 )

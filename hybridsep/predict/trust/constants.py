@@ -48,12 +48,12 @@ class TrustConstants:
         Largest weight of earlier runs when another begins, in windows: a machine may have changed meanwhile.
     less : float
         Weight of earlier runs, relative to the one they have, in the expert that doubts them: a prior from a tenth of a
-        window. With 0.03 changed plants are worse by a tenth, without any by a tenth as well.
+        window. Without any, changed plants are worse by an eighth.
     doubt : float
-        Weight of that expert in the stack from which on all go on as it does: 0.25 doubts more plants that have not
-        changed, and finds no more of those that have.
+        Weight of that expert in the stack from which on earlier runs are forgotten: with 0.5 plants that have not
+        changed are worse by 2 %.
     doubt_over : float
-        Rows of that expert relative to those of the others from which on there is nothing left to doubt.
+        Rows of this run relative to all from which on there is nothing left to doubt.
     friction_least, friction_ratio : float
         Least velocity of the friction's change of sign relative to the velocity scale, and the ratio from one of the
         six to the next: half a decade, which neighbours interpolate within.
@@ -90,7 +90,7 @@ class TrustConstants:
     learned: float = 15.0
     carried: float = 30.0
     less: float = 0.003
-    doubt: float = 0.5
+    doubt: float = 0.7
     doubt_over: float = 0.8
     friction_least: float = 0.01
     friction_ratio: float = 3.1622776601683795

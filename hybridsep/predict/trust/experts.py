@@ -14,7 +14,7 @@ from ...base.signals import Array
 from ..regression import PenalisedSolution, RidgeRegression
 from .constants import TrustConstants
 
-__all__ = ["Evidence", "Expert", "ExpertPrediction", "ResidualScale", "SolvedExpert", "lags"]
+__all__ = ["Evidence", "EvidenceOfRuns", "Expert", "ExpertPrediction", "ResidualScale", "SolvedExpert", "lags"]
 
 _DIVERGED = 1e6
 """Bound on the impulse response of a recursion, on the variance relative to the square of the bound on a prediction,
@@ -74,11 +74,68 @@ class Evidence:
         copy.discount(kept)
         return copy
 
+    def add(self, other: Evidence) -> None:
+        """Add the rows of other evidence on the same weights."""
+        self.regression.update_from(other.regression)
+        self.n_rows += other.n_rows
+
     def learn(self, rows: Array, lagged: Array, target: Array) -> None:
         """Update with rows of features ``(m, n_static)``, lags ``(m, p)`` and targets ``(m,)``."""
         stacked = np.asfortranarray(np.column_stack((rows, lagged, target)))
         self.regression.update_stacked(stacked)
         self.n_rows += len(target)
+
+
+class EvidenceOfRuns:
+    """Rows of this run and, as long as they are doubted, those of earlier ones apart.
+
+    Parameters
+    ----------
+    n_features : int
+
+    Attributes
+    ----------
+    this : Evidence
+    earlier : Evidence, optional
+    """
+
+    def __init__(self, n_features: int) -> None:
+        self.n_features = n_features
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget all rows."""
+        self.this = Evidence.none(self.n_features)
+        self.earlier: Evidence | None = None
+
+    def begin_run(self, most: float) -> None:
+        """Begin another run: all rows so far are of earlier ones, and weigh at most as ``most`` of this one."""
+        everything = self.all()
+        everything.discount(most / max(everything.n_rows, most))
+        self.forget()
+        self.earlier = everything if everything.n_rows > 0.0 else None
+
+    def all(self, kept: float = 1.0) -> Evidence:
+        """Return all rows, those of earlier runs weighed by ``kept``; not to be changed."""
+        if self.earlier is None:
+            return self.this
+        everything = self.this.less(1.0)
+        everything.add(self.earlier.less(kept))
+        return everything
+
+    def believe_earlier(self) -> None:
+        """Go on with all rows as with those of this run."""
+        self.this, self.earlier = self.all(), None
+
+    def forget_earlier(self) -> None:
+        """Go on with the rows of this run alone."""
+        self.earlier = None
+
+    def discount(self, kept: float) -> None:
+        """Weigh all rows so far by ``kept``."""
+        self.this.discount(kept)
+        if self.earlier is not None:
+            self.earlier.discount(kept)
 
 
 class ExpertPrediction(NamedTuple):

@@ -50,7 +50,7 @@ def learned_numbers(model: TrustedModel) -> dict[str, Array]:
     """Return what the model has learned, in the order of :data:`LEARNED`."""
     stack, experts = model.stack, model.experts.values()
     return {
-        "n_rows": np.array([model.evidence.n_rows, model.evidence_of_command.n_rows]),
+        "n_rows": np.array([one.all().n_rows for one in (model.evidence, model.evidence_of_command)]),
         "motion": np.array([model.velocity_scale, model.largest_step]),
         "scale": np.array(model.scale),
         "scale_of_command": np.array(model.scale_of_command),
@@ -83,7 +83,7 @@ _ROUNDING = 1e-6
 
 def restore_learned(model: TrustedModel, learned: Mapping[str, Array]) -> None:
     """Restore the numbers of :func:`learned_numbers`, which are sound."""
-    model.evidence.n_rows, model.evidence_of_command.n_rows = learned["n_rows"].tolist()
+    model.evidence.this.n_rows, model.evidence_of_command.this.n_rows = learned["n_rows"].tolist()
     model.velocity_scale, model.largest_step = learned["motion"].tolist()
     model.scale = ResidualScale(*learned["scale"].tolist())
     model.scale_of_command = ResidualScale(*learned["scale_of_command"].tolist())

@@ -27,7 +27,7 @@ from ..residual_model import ResidualModel, SavedFields, WindowInputs
 from .command import CommandFeatures
 from .constants import CONSTANTS, TrustConstants
 from .disturbances import LEAST_VELOCITY, Disturbance, StaticFeatures, StaticState
-from .experts import Evidence, Expert, ExpertPrediction, ResidualScale, SolvedExpert, lags
+from .experts import Evidence, EvidenceOfRuns, Expert, ExpertPrediction, ResidualScale, SolvedExpert, lags
 from .forecast import TrustedForecast
 from .guard import SensorGuard
 from .learned import learned_numbers, restore_learned, unsound
@@ -100,9 +100,8 @@ class TrustedModel(ResidualModel[TrustedForecast]):
             DOUBTING: Expert(self.static.shares, p, constants),
         }
         self.stack = Stack((0.0, constants.first_lagged, constants.first_static, 0.0, 0.0), constants)
-        self.evidence = Evidence.none(self.static.n + p)
-        self.evidence_of_command = Evidence.none(self.command.n + self.command.p)
-        self.doubting: Evidence | None = None
+        self.evidence = EvidenceOfRuns(self.static.n + p)
+        self.evidence_of_command = EvidenceOfRuns(self.command.n + self.command.p)
         self.largest = np.zeros(self.static.n)
         self.velocity_scale = self.largest_step = 0.0
         self.scale, self.scale_of_command = ResidualScale(), ResidualScale()
@@ -118,16 +117,10 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         self.guard.restart()
         self.n_rejected = 0
         self.rest = RestBefore(self.settings.measurement_delay)
-        carried = self.constants.carried * self.settings.Np
-        self.evidence.discount(carried / max(self.evidence.n_rows, carried))
-        self.evidence_of_command.discount(carried / max(self.evidence_of_command.n_rows, carried))
-        self._doubt()
-
-    def _doubt(self) -> None:
-        """Begin to doubt what earlier runs have taught."""
-        self._end_doubt()
-        if self.evidence.n_rows > 0.0:
-            self.doubting = self.evidence.less(self.constants.less)
+        for evidence in (self.evidence, self.evidence_of_command):
+            evidence.begin_run(self.constants.carried * self.settings.Np)
+        self.stack.forget(DOUBTING)
+        if self.doubts:
             self.experts[DOUBTING].take_over(self.experts[LAGGED])
             self.stack.copy(LAGGED, DOUBTING)
 
@@ -145,19 +138,25 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         return super().begin_in_motion(forecast, x_d, x_pb)
 
     @property
+    def doubts(self) -> bool:
+        """Whether what earlier runs have taught is doubted."""
+        return self.evidence.earlier is not None
+
+    @property
     def regression(self) -> RidgeRegression:  # type: ignore[override]
         """Of all learned samples."""
-        return self.evidence.regression
+        return self.evidence.all().regression
 
     @property
     def regressions(self) -> tuple[RidgeRegression, ...]:
         """Of the physics model's residual, and of the command's."""
-        return self.regression, self.evidence_of_command.regression
+        return self.regression, self.evidence_of_command.all().regression
 
     @property
     def n_rows(self) -> float:
         """Rows learned so far, weighted."""
-        return self.evidence.n_rows
+        earlier = self.evidence.earlier
+        return self.evidence.this.n_rows + (earlier.n_rows if earlier is not None else 0.0)
 
     @property
     def lag_weights(self) -> Array:
@@ -245,7 +244,7 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         The constant that earlier runs have taught is that of motion: before the first one of this run it is 0.
         """
         rows, _ = self.static.rows(self.run.static, x_d, x_pb, x, scales.velocity)
-        if self.doubting is not None:
+        if self.doubts:
             rows[: scales.n_rest, 0] = 0.0
         return rows
 
@@ -277,13 +276,16 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         """Return the experts that know something, with their weights."""
         solved = {}
         if self.n_rows > 0.0 and scales.velocity == self.velocity_scale and self.scale.largest_square > 0.0:
+            evidence = self.evidence.all()
             for expert in (LAGGED, STATIC):
-                solved[expert] = self._solved(expert, self.evidence, scales.largest, self.scale)
-            if self.doubting is not None:
-                solved[DOUBTING] = self._solved(DOUBTING, self.doubting, scales.largest, self.scale)
-        if self.evidence_of_command.n_rows > 0.0 and self.scale_of_command.largest_square > 0.0:
+                solved[expert] = self._solved(expert, evidence, scales.largest, self.scale)
+            if self.doubts:
+                evidence = self.evidence.all(self.constants.less)
+                solved[DOUBTING] = self._solved(DOUBTING, evidence, scales.largest, self.scale)
+        of_command = self.evidence_of_command.all()
+        if of_command.n_rows > 0.0 and self.scale_of_command.largest_square > 0.0:
             largest = self.command.largest(scales.step)
-            solved[COMMAND] = self._solved(COMMAND, self.evidence_of_command, largest, self.scale_of_command)
+            solved[COMMAND] = self._solved(COMMAND, of_command, largest, self.scale_of_command)
         return solved
 
     def _solved(self, expert: int, evidence: Evidence, largest: Array, scale: ResidualScale) -> SolvedExpert:
@@ -313,9 +315,8 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         """
         m, p = len(x), self.settings.p
         if forecast.scales.velocity != self.velocity_scale:  # outgrown
-            self.evidence = Evidence.none(self.static.n + p)
             self._end_doubt()
-            self.stack.forget(DOUBTING)
+            self.evidence.forget()
         self.velocity_scale, self.largest, self.largest_step, n_rest = forecast.scales
         run, x_d, x_pb = self.run, forecast.x_d[:m], forecast.x_pb[:m]
         accepted = self.guard.accepts(x, x_pb, self.scale.largest)
@@ -344,15 +345,12 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         """Update the experts' evidence with a window's rows of static features."""
         lagged = lags(self.run.past, e)[learned]
         of_command = self.command.rows(self.run.commands, x_d)[learned]
-        for evidence in (self.evidence, self.doubting, self.evidence_of_command):
-            if evidence is None:
-                continue
-            if self.settings.forgetting > 0.0:
+        if self.settings.forgetting > 0.0:
+            for evidence in (self.evidence, self.evidence_of_command):
                 evidence.discount(math.exp(-len(e) * self.settings.T_s / self.settings.forgetting))
-            if evidence is self.evidence_of_command:
-                evidence.learn(of_command, lags(self.run.past_of_command, e_0)[learned], e_0[learned])
-            else:
-                evidence.learn(rows[learned], lagged, e[learned])
+        self.evidence.this.learn(rows[learned], lagged, e[learned])
+        lagged = lags(self.run.past_of_command, e_0)[learned]
+        self.evidence_of_command.this.learn(of_command, lagged, e_0[learned])
 
     def _judge(self, forecast: TrustedForecast, e: Array, e_0: Array, accepted: NDArray[np.bool_]) -> None:
         """Judge the experts and their stack by the measurement of their window."""
@@ -365,24 +363,25 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         published = accepted & (np.arange(len(e)) >= late) if late < len(e) else accepted
         if published.any():
             self.stack.update(forecast.stacked[:, : len(e)][:, published], e[published], self.settings.lam)
-        if self.doubting is None:
+        if not self.doubts:
             return
         if self.stack.weights[DOUBTING] > self.constants.doubt:
-            self._doubt_earlier_runs(self.doubting)
-        elif self.doubting.n_rows > self.constants.doubt_over * self.n_rows:
+            self._forget_earlier_runs()
+        elif self.evidence.this.n_rows > self.constants.doubt_over * self.n_rows:
             self._end_doubt()
 
-    def _doubt_earlier_runs(self, doubting: Evidence) -> None:
-        """Let all experts go on with little of earlier runs, as the one that doubts them, and judge them anew."""
-        self.evidence = doubting
-        self.evidence_of_command.discount(self.constants.less)
+    def _forget_earlier_runs(self) -> None:
+        """Let all experts go on with this run alone, and judge them anew."""
+        self.evidence.forget_earlier()
+        self.evidence_of_command.forget_earlier()
         self.experts[LAGGED].take_over(self.experts[DOUBTING])
         self.experts[STATIC].restart()
         self.stack.restart()
-        self._end_doubt()
 
     def _end_doubt(self) -> None:
-        self.doubting = None
+        """Go on with what earlier runs have taught as with what this one has."""
+        self.evidence.believe_earlier()
+        self.evidence_of_command.believe_earlier()
         self.stack.forget(DOUBTING)
 
     def doubted(self, x_pb: Array) -> Array | None:

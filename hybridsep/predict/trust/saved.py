@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...base.saved import Saved
+from ...base.saved import COUNT_MAX, Saved
 from ...base.settings import PredictorSettings
 from ...base.state import pack, unpack
 from ..forecast import FeatureScales
@@ -74,16 +74,10 @@ def restore_trusted(model: TrustedModel, predictor: Saved) -> None:
         raise saved.error("the velocity scale must be a velocity, or 0")
     restore_learned(model, learned)
     with saved.consistent():
-        model.evidence.regression.restore(saved.array("factor", None, None), n_samples)
-        model.evidence_of_command.regression.restore(saved.array("factor_of_command", None, None), n_samples)
-    model.doubting = None
-    if "factor_of_doubt" in saved.arrays:
-        model.doubting = Evidence.none(model.regression.n_features)
-        with saved.consistent():
-            model.doubting.regression.restore(saved.array("factor_of_doubt", None, None), n_samples)
-        model.doubting.n_rows = saved.real("n_doubting")
-        if not 0.0 <= model.doubting.n_rows <= n_samples:
-            raise saved.error("n_doubting must be from 0 to n_samples")
+        model.evidence.this.regression.restore(saved.array("factor", None, None), n_samples)
+        model.evidence_of_command.this.regression.restore(saved.array("factor_of_command", None, None), n_samples)
+    model.evidence.earlier = _earlier(saved, "", model.evidence.n_features)
+    model.evidence_of_command.earlier = _earlier(saved, "_of_command", model.evidence_of_command.n_features)
     run, n = model.run, model.static.n_disturbances
     static = StaticState(
         saved.array("filters", model.static.discrete.n_state, n),
@@ -102,17 +96,32 @@ def restore_trusted(model: TrustedModel, predictor: Saved) -> None:
         model.rest.restore(saved.array("rest", N_REST))
 
 
+def _earlier(saved: Saved, name: str, n_features: int) -> Evidence | None:
+    """Return the evidence of earlier runs, if there is any."""
+    if f"earlier{name}" not in saved.arrays:
+        return None
+    n_rows = saved.real(f"n_earlier{name}")
+    if not 0.0 < n_rows <= COUNT_MAX:
+        raise saved.error(f"n_earlier{name} must be > 0 and at most {COUNT_MAX:g}")
+    evidence = Evidence.none(n_features)
+    with saved.consistent():
+        evidence.regression.restore(saved.array(f"earlier{name}", None, None), 0)
+    evidence.n_rows = n_rows
+    return evidence
+
+
 def _blob(model: TrustedModel) -> bytes:
     run, static = model.run, model.run.static
     meta: dict[str, float] = {
-        "n_samples": model.regression.n_samples,
+        "n_samples": max(model.evidence.this.regression.n_samples, model.evidence_of_command.this.regression.n_samples),
         "n_rejected": model.n_rejected,
         "look_ahead": model.preview + model.settings.measurement_delay,
     }
     arrays = {
         **learned_numbers(model),
-        "factor": model.regression.factor,
-        "factor_of_command": model.evidence_of_command.regression.factor,
+        "n_rows": np.array([model.evidence.this.n_rows, model.evidence_of_command.this.n_rows]),
+        "factor": model.evidence.this.regression.factor,
+        "factor_of_command": model.evidence_of_command.this.regression.factor,
         "filters": static.filters,
         "filtered": static.filtered,
         "x_d": np.array([static.x_d]),
@@ -124,8 +133,10 @@ def _blob(model: TrustedModel) -> bytes:
         "guard": np.array(model.guard.state()),
         "rest": np.array(model.rest.state()),
     }
-    if model.doubting is not None:
-        arrays["factor_of_doubt"], meta["n_doubting"] = model.doubting.regression.factor, model.doubting.n_rows
+    for name, evidence in (("", model.evidence), ("_of_command", model.evidence_of_command)):
+        if evidence.earlier is not None:
+            arrays[f"earlier{name}"] = evidence.earlier.regression.factor
+            meta[f"n_earlier{name}"] = evidence.earlier.n_rows
     return pack(_KIND, meta, arrays)
 
 

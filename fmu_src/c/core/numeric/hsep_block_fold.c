@@ -179,15 +179,14 @@ HSEP_WIDE static void block_apply_wide(
     block_apply_as_compiled(at, x, stride, tiles, W, width);
 }
 
-HSEP_API void hsep_block_fold(hsep_regression *self, double work[], uint64_t count, int is_diagonal)
+HSEP_API void hsep_block_fold(hsep_regression *self, double work[], uint64_t count, int is_triangle, int wide)
 {
     const uint64_t n = self->n, stride = block_width(n);
-    const int wide = hsep_is_wide();
     double *inverse_d = hsep_at(self, self->inverse_d), *tile = hsep_at(self, self->tiles);
     double *W = work + stride * count, *V = W + HSEP_TILE * stride;
     for (uint64_t first = 0; first <= n; first += HSEP_TILE) {
         const uint64_t width = stride - first - HSEP_TILE; /* behind the panel */
-        block_reflectors at = {.v = V, .m = is_diagonal && first + HSEP_TILE < count ? first + HSEP_TILE : count};
+        block_reflectors at = {.v = V, .m = is_triangle && first + HSEP_TILE < count ? first + HSEP_TILE : count};
         double tau[HSEP_TILE] = {0.0};
         for (uint64_t b = 0; b < at.m; b++) {
             for (unsigned c = 0; c < HSEP_TILE; c++) {

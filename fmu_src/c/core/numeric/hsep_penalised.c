@@ -2,6 +2,7 @@
 
 #include "hsep_block_fold.h"
 #include "hsep_tiles.h"
+#include "hsep_wide.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -45,6 +46,21 @@ static void penalised_multiply(const hsep_regression *self, const double w[], do
     }
 }
 
+HSEP_API void hsep_penalised_add(hsep_regression *self, const hsep_regression *other, double weight, double work[])
+{
+    const double *inverse_d = hsep_at_const(other, other->inverse_d);
+    for (uint64_t i = 0; i < other->n; i++) {
+        const double scale = sqrt(weight / inverse_d[i]);
+        double *row = hsep_block_fold_row(work, other->n, i);
+        row[i] = scale;
+        for (uint64_t j = i + 1; j <= other->n; j++) {
+            row[j] = scale * *hsep_tile_entry_const(other, i, j);
+        }
+    }
+    hsep_block_fold(self, work, other->n, 1, hsep_is_wide());
+    self->residual_sum += weight * other->residual_sum;
+}
+
 HSEP_API double hsep_penalised_solve(
     const hsep_regression *self, const double penalties[], hsep_regression *solved, double w[], double work[])
 {
@@ -54,7 +70,7 @@ HSEP_API double hsep_penalised_solve(
     for (uint64_t i = 0; i < m; i++) {
         hsep_block_fold_row(work, m, i)[i] = sqrt(penalties[i]);
     }
-    hsep_block_fold(solved, work, m, 1);
+    hsep_block_fold(solved, work, m, 1, hsep_is_wide());
     hsep_regression_solve(solved, w);
     double sum = self->residual_sum, *padded = work, *product = work + HSEP_TILE * self->n_tiles;
     memset(padded, 0, (size_t)(HSEP_TILE * self->n_tiles) * sizeof(double));
@@ -67,7 +83,7 @@ HSEP_API double hsep_penalised_solve(
     return sum;
 }
 
-HSEP_API double hsep_penalised_leverage(hsep_regression *self)
+HSEP_INLINE double penalised_leverage(hsep_regression *self)
 {
     const double *inverse_d = hsep_at(self, self->inverse_d), *tile = hsep_at(self, self->tiles);
     double *x = hsep_regression_row(self), sum = 0.0;
@@ -93,4 +109,11 @@ HSEP_API double hsep_penalised_leverage(hsep_regression *self)
         tile += HSEP_TILE_STRIDE * left;
     }
     return sum;
+}
+
+HSEP_WIDE static double penalised_leverage_wide(hsep_regression *self) { return penalised_leverage(self); }
+
+HSEP_API double hsep_penalised_leverage(hsep_regression *self, int wide)
+{
+    return wide ? penalised_leverage_wide(self) : penalised_leverage(self);
 }

@@ -87,7 +87,7 @@ HSEP_API int hsep_residual_valid(const void *block, const hsep_residual_paramete
 
 HSEP_API uint64_t hsep_residual_n_factors(const hsep_residual_model *self)
 {
-    return self->trusted ? HSEP_N_FACTORS : 1;
+    return self->trusted ? HSEP_N_EVIDENCE : 1;
 }
 
 HSEP_API hsep_regression *hsep_residual_factor(hsep_residual_model *self, uint64_t i)

@@ -3,6 +3,7 @@
 #include "hsep_penalised.h"
 #include "hsep_trust_constants.h"
 #include "hsep_vector.h"
+#include "hsep_wide.h"
 
 #include <math.h>
 #include <string.h>
@@ -139,15 +140,15 @@ static void expert_respond(hsep_expert *self)
 /* Largest variance that counts, m2. */
 static double expert_most(const hsep_expert *self) { return expert_diverged * self->bound * self->bound; }
 
-/* Variance of sample k of a prediction: that of the rows, carried through the impulse response. */
-static double expert_variance(hsep_expert *self, const double row_of_k[], uint64_t k)
+/* Variance of sample k of a prediction: that of the rows, carried through the impulse response; wide: hsep_is_wide. */
+static double expert_variance(hsep_expert *self, const double row_of_k[], uint64_t k, int wide)
 {
     const uint64_t j = self->n - 1 - k, p = self->p;
     const double *squares = hsep_at(self, self->squares), most = expert_most(self);
     double *variances = hsep_at(self, self->variances), *row = hsep_regression_row(expert_solved(self));
     memcpy(row, row_of_k, (size_t)self->n_static * sizeof(double));
     memcpy(row + self->n_static, hsep_at(self, self->unshrunk) + j + 1, (size_t)p * sizeof(double));
-    variances[j] = self->variance * hsep_penalised_leverage(expert_solved(self));
+    variances[j] = self->variance * hsep_penalised_leverage(expert_solved(self), wide);
     const double carried = p > 0 ? hsep_dot(squares, variances + j, k + 1) : variances[j];
     return isfinite(hsep_at(self, self->run)[j]) ? fmin(carried, most) : most;
 }
@@ -170,12 +171,13 @@ static void expert_shrink(hsep_expert *self, uint64_t begin, uint64_t end)
 
 HSEP_API void hsep_expert_vary(hsep_expert *self, const double rows[], uint64_t first, uint64_t last)
 {
+    const int wide = hsep_is_wide();
     double *kept = hsep_at(self, self->kept);
     if (first == 0 && self->p > 0) {
         expert_respond(self);
     }
     for (uint64_t k = first; k < last; k++) {
-        kept[self->n - 1 - k] = expert_kept(self, expert_variance(self, rows + k * self->n_static, k));
+        kept[self->n - 1 - k] = expert_kept(self, expert_variance(self, rows + k * self->n_static, k, wide));
     }
     expert_shrink(self, self->n - last, self->n - first);
 }

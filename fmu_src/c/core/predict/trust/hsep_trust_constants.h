@@ -48,14 +48,14 @@
 #define HSEP_TRUST_CARRIED 30.0
 
 /* Weight of earlier runs, relative to the one they have, in the expert that doubts them: a prior from a tenth of a
- * window. With 0.03 changed plants are worse by a tenth, without any by a tenth as well. */
+ * window. Without any, changed plants are worse by an eighth. */
 #define HSEP_TRUST_LESS 0.003
 
-/* Weight of that expert in the stack from which on all go on as it does: 0.25 doubts more plants that have not
- * changed, and finds no more of those that have. */
-#define HSEP_TRUST_DOUBT 0.5
+/* Weight of that expert in the stack from which on earlier runs are forgotten: with 0.5 plants that have not changed
+ * are worse by 2 %. */
+#define HSEP_TRUST_DOUBT 0.7
 
-/* Rows of that expert relative to those of the others from which on there is nothing left to doubt. */
+/* Rows of this run relative to all from which on there is nothing left to doubt. */
 #define HSEP_TRUST_DOUBT_OVER 0.8
 
 /* Least velocity of the friction's change of sign relative to the velocity scale, and the ratio from one of the six

@@ -1,7 +1,9 @@
 /* Learning of a residual model that can be trusted. */
 #include "hsep_trusted.h"
 
+#include "hsep_penalised.h"
 #include "hsep_trust_constants.h"
+#include "hsep_wide.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -10,21 +12,47 @@
 /* Lags of a row that may stand for samples without a measurement. */
 static const double trusted_bridged = 3.0;
 
+/* Forget all rows of some evidence. */
+static void trusted_forget(hsep_trusted *self, hsep_evidence evidence)
+{
+    hsep_regression *regression = hsep_trusted_evidence(self, evidence);
+    hsep_regression_init(regression, regression->n, HSEP_NO_PENALTY);
+    self->n_rows[evidence] = self->n_earlier[evidence] = 0.0;
+}
+
+/* Go on with all rows of some evidence as with those of this run. */
+static void trusted_believe_earlier(hsep_trusted *self, hsep_evidence evidence)
+{
+    if (self->n_earlier[evidence] > 0.0) {
+        const hsep_regression *earlier = hsep_trusted_earlier(self, evidence);
+        hsep_penalised_add(hsep_trusted_evidence(self, evidence), earlier, 1.0, hsep_at(self, self->work));
+        self->n_rows[evidence] += self->n_earlier[evidence];
+        self->n_earlier[evidence] = 0.0;
+    }
+}
+
 /* Weigh all rows of some evidence so far by kept. */
 static void trusted_discount(hsep_trusted *self, hsep_evidence evidence, double kept)
 {
     if (kept < 1.0) {
         hsep_regression_discount(hsep_trusted_evidence(self, evidence), kept);
+        hsep_regression_discount(hsep_trusted_earlier(self, evidence), kept);
         self->n_rows[evidence] *= kept;
+        self->n_earlier[evidence] *= kept;
     }
 }
 
-/* Copy rows: regressions of the same features. */
-static void trusted_copy_rows(hsep_trusted *self, hsep_evidence of, hsep_evidence to)
+/* Begin another run: all rows so far are of earlier ones. */
+static void trusted_begin_run(hsep_trusted *self, hsep_evidence evidence)
 {
-    const hsep_regression *from = hsep_trusted_evidence(self, of);
-    memcpy(hsep_trusted_evidence(self, to), from, (size_t)hsep_regression_size(from->n));
-    self->n_rows[to] = self->n_rows[of];
+    const hsep_regression *regression = hsep_trusted_evidence(self, evidence);
+    const double most = HSEP_TRUST_CARRIED * (double)self->Np;
+    trusted_believe_earlier(self, evidence);
+    trusted_discount(self, evidence, most / fmax(self->n_rows[evidence], most));
+    const double n_rows = self->n_rows[evidence];
+    memcpy(hsep_trusted_earlier(self, evidence), regression, (size_t)hsep_regression_size(regression->n));
+    trusted_forget(self, evidence);
+    self->n_earlier[evidence] = n_rows;
 }
 
 /* Take over what is known of the errors of another expert; NULL: nothing is. */
@@ -35,24 +63,22 @@ static void trusted_set_noise(hsep_trusted *self, hsep_expert_place of, const hs
     expert->correlation = other != NULL ? other->correlation : 1.0;
 }
 
-/* End the doubt of what earlier runs have taught. */
+/* Go on with what earlier runs have taught as with what this one has. */
 static void trusted_end_doubt(hsep_trusted *self)
 {
-    self->doubts = 0;
+    trusted_believe_earlier(self, HSEP_OF_PHYSICS);
+    trusted_believe_earlier(self, HSEP_OF_COMMAND);
     hsep_stack_forget(&self->stack, HSEP_DOUBTING);
 }
 
+HSEP_API int hsep_trusted_doubts(const hsep_trusted *self) { return self->n_earlier[HSEP_OF_PHYSICS] > 0.0; }
+
 HSEP_API void hsep_trusted_restart(hsep_trusted *self)
 {
-    const double most = HSEP_TRUST_CARRIED * (double)self->Np;
-    for (int i = 0; i < HSEP_N_FACTORS; i++) {
-        trusted_discount(self, (hsep_evidence)i, most / fmax(self->n_rows[i], most));
-    }
-    trusted_end_doubt(self);
-    if (self->n_rows[HSEP_OF_PHYSICS] > 0.0) {
-        self->doubts = 1;
-        trusted_copy_rows(self, HSEP_OF_PHYSICS, HSEP_OF_DOUBT);
-        trusted_discount(self, HSEP_OF_DOUBT, HSEP_TRUST_LESS);
+    trusted_begin_run(self, HSEP_OF_PHYSICS);
+    trusted_begin_run(self, HSEP_OF_COMMAND);
+    hsep_stack_forget(&self->stack, HSEP_DOUBTING);
+    if (hsep_trusted_doubts(self)) {
         trusted_set_noise(self, HSEP_DOUBTING, hsep_trusted_expert(self, HSEP_LAGGED));
         hsep_stack_copy(&self->stack, HSEP_LAGGED, HSEP_DOUBTING);
     }
@@ -136,7 +162,7 @@ static void trusted_fold(
             row[n] = e[j];
         }
     }
-    hsep_block_fold(regression, work, count, 0);
+    hsep_block_fold(regression, work, count, 0, hsep_is_wide());
     self->n_rows[evidence] += (double)count;
 }
 
@@ -147,9 +173,6 @@ static void trusted_fold_window(hsep_trusted *self, const double e[])
     const double *rows = hsep_at(self, self->rows);
     const uint64_t count = trusted_learned_rows(self, hsep_at(self, self->x)); /* which is not needed any more */
     trusted_fold(self, HSEP_OF_PHYSICS, rows, e, count);
-    if (self->doubts) {
-        trusted_fold(self, HSEP_OF_DOUBT, rows, e, count);
-    }
     trusted_fold(self, HSEP_OF_COMMAND, hsep_at(command, command->rows), hsep_at(self, self->e_0), count);
 }
 
@@ -177,15 +200,13 @@ static void trusted_judge_stack(hsep_trusted *self, const double e[])
     }
 }
 
-/* Let all experts go on with little of earlier runs, as the one that doubts them, and judge them anew. */
-static void trusted_doubt_earlier_runs(hsep_trusted *self)
+/* Let all experts go on with this run alone, and judge them anew. */
+static void trusted_forget_earlier_runs(hsep_trusted *self)
 {
-    trusted_copy_rows(self, HSEP_OF_DOUBT, HSEP_OF_PHYSICS);
-    trusted_discount(self, HSEP_OF_COMMAND, HSEP_TRUST_LESS);
+    self->n_earlier[HSEP_OF_PHYSICS] = self->n_earlier[HSEP_OF_COMMAND] = 0.0;
     trusted_set_noise(self, HSEP_LAGGED, hsep_trusted_expert(self, HSEP_DOUBTING));
     trusted_set_noise(self, HSEP_STATIC, NULL);
     hsep_stack_init(&self->stack);
-    trusted_end_doubt(self);
 }
 
 /* Judge the experts and their stack by the measurement of their window, of which count samples are learned. */
@@ -200,10 +221,13 @@ static void trusted_judge(hsep_trusted *self, const double e[], double count)
         }
     }
     trusted_judge_stack(self, e);
-    if (self->doubts && self->stack.weights[HSEP_DOUBTING] > HSEP_TRUST_DOUBT) {
-        trusted_doubt_earlier_runs(self);
-    } else if (self->doubts && self->n_rows[HSEP_OF_DOUBT] > HSEP_TRUST_DOUBT_OVER * self->n_rows[HSEP_OF_PHYSICS]) {
-        trusted_end_doubt(self);
+    if (hsep_trusted_doubts(self)) {
+        const double n_rows = self->n_rows[HSEP_OF_PHYSICS], n_all = n_rows + self->n_earlier[HSEP_OF_PHYSICS];
+        if (self->stack.weights[HSEP_DOUBTING] > HSEP_TRUST_DOUBT) {
+            trusted_forget_earlier_runs(self);
+        } else if (n_rows > HSEP_TRUST_DOUBT_OVER * n_all) {
+            trusted_end_doubt(self);
+        }
     }
     hsep_residual_scale_follow(&self->scale, e, learnable, self->Np, count);
     hsep_residual_scale_follow(&self->scale_of_command, e_0, learnable, self->Np, count);
@@ -227,9 +251,8 @@ HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const double x_d[
 static void trusted_take_scales(hsep_trusted *self)
 {
     if (self->forecast_scale != self->velocity_scale) {
-        hsep_regression_init(hsep_trusted_evidence(self, HSEP_OF_PHYSICS), self->n_static + self->p, HSEP_NO_PENALTY);
-        self->n_rows[HSEP_OF_PHYSICS] = 0.0;
         trusted_end_doubt(self);
+        trusted_forget(self, HSEP_OF_PHYSICS);
     }
     self->velocity_scale = self->forecast_scale;
     self->largest_step = self->forecast_step;

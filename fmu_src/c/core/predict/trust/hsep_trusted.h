@@ -40,12 +40,10 @@ typedef struct {
     int planned; /* whether a compensator decides the commands */
 } hsep_trusted_parameters;
 
-/* Rows that experts have learned: of the physics model's residual; of the command's; and those of the former in
- * this run alone, while it doubts earlier ones. */
-typedef enum { HSEP_OF_PHYSICS = 0, HSEP_OF_COMMAND, HSEP_OF_DOUBT } hsep_evidence;
+/* Rows that experts have learned: of the physics model's residual, and of the command's. */
+typedef enum { HSEP_OF_PHYSICS = 0, HSEP_OF_COMMAND } hsep_evidence;
 
-#define HSEP_N_EVIDENCE 3
-#define HSEP_N_FACTORS 2 /* of a weights file: those of physics and command */
+#define HSEP_N_EVIDENCE 2
 
 typedef struct {
     uint64_t Np, n, p, n_static; /* samples of a window and of a prediction, lags, features without lags */
@@ -56,12 +54,12 @@ typedef struct {
     double given_variance;       /* m2, of the noise; 0: estimated */
     double kept;                 /* weight of earlier rows, from window to window */
     /* Learned */
-    double n_rows[HSEP_N_EVIDENCE]; /* weighted */
-    double velocity_scale;          /* m/s */
-    double largest_step;            /* m, largest change of the command from sample to sample */
+    double n_rows[HSEP_N_EVIDENCE];    /* of this run, weighted */
+    double n_earlier[HSEP_N_EVIDENCE]; /* of earlier runs, as long as they are doubted */
+    double velocity_scale;             /* m/s */
+    double largest_step;               /* m, largest change of the command from sample to sample */
     hsep_residual_scale scale, scale_of_command;
     hsep_stack stack;
-    uint64_t doubts; /* whether this run doubts earlier ones */
     /* Of the window that is predicted */
     double hold;                        /* m, last residual, bounded */
     double forecast_scale;              /* m/s, velocity scale with it, */
@@ -88,13 +86,15 @@ typedef struct {
     uint64_t rows;             /* (n, n_static) features without lags, sample after sample */
     uint64_t work;             /* rows to be folded, of the window or of penalties */
     uint64_t disturbances, command;
-    uint64_t evidence[HSEP_N_EVIDENCE]; /* regressions */
+    uint64_t evidence[HSEP_N_EVIDENCE]; /* regressions of this run's rows, */
+    uint64_t earlier[HSEP_N_EVIDENCE];  /* of those of earlier runs, */
+    uint64_t all;                       /* and of both, work */
     uint64_t experts[HSEP_N_EXPERTS];   /* hold has none, 0 */
 } hsep_trusted;
 
 HSEP_ASSERT_WORDS(
     hsep_trusted,
-    40 + 2 * HSEP_N_EVIDENCE + 2 * HSEP_N_EXPERTS + (sizeof(hsep_stack) + sizeof(hsep_guard)) / sizeof(double));
+    40 + 4 * HSEP_N_EVIDENCE + 2 * HSEP_N_EXPERTS + (sizeof(hsep_stack) + sizeof(hsep_guard)) / sizeof(double));
 
 /* Features, those without lags first. */
 HSEP_API uint64_t hsep_trusted_n(const hsep_predictor_settings *settings, const hsep_trust_settings *trust);
@@ -109,6 +109,7 @@ HSEP_API void hsep_trusted_init(hsep_trusted *self, const hsep_trusted_parameter
 HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters *parameters);
 
 HSEP_API hsep_regression *hsep_trusted_evidence(hsep_trusted *self, hsep_evidence evidence);
+HSEP_API hsep_regression *hsep_trusted_earlier(hsep_trusted *self, hsep_evidence evidence);
 HSEP_API hsep_disturbances *hsep_trusted_disturbances(hsep_trusted *self);
 HSEP_API hsep_command *hsep_trusted_command(hsep_trusted *self);
 
@@ -160,6 +161,9 @@ HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const double x_d[
  * from it in any case. Cost: that of hsep_block_fold with Np rows of physics, of command, and in a warm run of
  * doubt. */
 HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_d[], const double x_pb[], double e[], int fold);
+
+/* Whether this run doubts earlier ones. */
+HSEP_API int hsep_trusted_doubts(const hsep_trusted *self);
 
 /* Discount what earlier runs have learned, and begin to doubt it: a machine may have changed meanwhile. */
 HSEP_API void hsep_trusted_restart(hsep_trusted *self);

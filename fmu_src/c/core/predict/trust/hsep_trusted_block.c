@@ -20,6 +20,11 @@ HSEP_API hsep_regression *hsep_trusted_evidence(hsep_trusted *self, hsep_evidenc
     return (hsep_regression *)hsep_at(self, self->evidence[evidence]);
 }
 
+HSEP_API hsep_regression *hsep_trusted_earlier(hsep_trusted *self, hsep_evidence evidence)
+{
+    return (hsep_regression *)hsep_at(self, self->earlier[evidence]);
+}
+
 HSEP_API hsep_expert *hsep_trusted_expert(hsep_trusted *self, hsep_expert_place expert)
 {
     return (hsep_expert *)hsep_at(self, self->experts[expert]);
@@ -88,9 +93,14 @@ static double trusted_lay_out(hsep_trusted *self, const hsep_trusted_parameters 
     self->work = hsep_take(&end, trusted_work(self));
     self->disturbances = hsep_take_block(&end, hsep_disturbances_size(settings, trust->period, parameters->n_modes));
     self->command = hsep_take_block(&end, hsep_command_size(settings, parameters->n));
+    double largest = 0.0;
     for (uint64_t i = 0; i < HSEP_N_EVIDENCE; i++) {
-        self->evidence[i] = hsep_take_block(&end, hsep_regression_size(trusted_n_features(self, i)));
+        const double size = hsep_regression_size(trusted_n_features(self, i));
+        self->evidence[i] = hsep_take_block(&end, size);
+        self->earlier[i] = hsep_take_block(&end, size);
+        largest = fmax(largest, size);
     }
+    self->all = hsep_take_block(&end, largest);
     self->experts[HSEP_HOLD] = 0;
     for (uint64_t i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
         const hsep_expert_shape shape = trusted_shape(self, i);
@@ -117,8 +127,9 @@ HSEP_API void hsep_trusted_init(hsep_trusted *self, const hsep_trusted_parameter
         parameters->n_modes, parameters->planned, start);
     hsep_command_init(hsep_trusted_command(self), parameters->settings, parameters->n);
     for (uint64_t i = 0; i < HSEP_N_EVIDENCE; i++) {
-        hsep_regression_init(
-            hsep_trusted_evidence(self, (hsep_evidence)i), trusted_n_features(self, i), HSEP_NO_PENALTY);
+        const uint64_t features = trusted_n_features(self, i);
+        hsep_regression_init(hsep_trusted_evidence(self, (hsep_evidence)i), features, HSEP_NO_PENALTY);
+        hsep_regression_init(hsep_trusted_earlier(self, (hsep_evidence)i), features, HSEP_NO_PENALTY);
     }
     for (uint64_t i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
         const hsep_expert_shape shape = trusted_shape(self, i);
@@ -133,16 +144,18 @@ HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters
     memcpy(&got, block, sizeof got);
     (void)trusted_lay_out(&got, parameters); /* changes nothing where it is sound */
     hsep_guard_init(&guard, got.Np, got.T_s);
-    int sound = memcmp(&got, block, sizeof got) == 0 && got.doubts <= 1 && got.at_rest <= 1 &&
-                got.known_rest <= got.n && got.n_rest <= got.n && got.guard.patience == guard.patience &&
+    int sound = memcmp(&got, block, sizeof got) == 0 && got.at_rest <= 1 && got.known_rest <= got.n &&
+                got.n_rest <= got.n && got.guard.patience == guard.patience &&
                 got.guard.patience_standing == guard.patience_standing &&
                 hsep_disturbances_valid(
                     hsep_at_bytes(block, got.disturbances), parameters->settings, parameters->trust->period,
                     parameters->n_modes, parameters->planned) &&
                 hsep_command_valid(hsep_at_bytes(block, got.command), parameters->settings, parameters->n);
     for (uint64_t i = 0; i < HSEP_N_EVIDENCE; i++) {
-        const void *evidence = hsep_at_bytes(block, got.evidence[i]);
-        sound = sound && hsep_regression_valid(evidence, trusted_n_features(&got, i));
+        const uint64_t features = trusted_n_features(&got, i);
+        sound = sound && hsep_regression_valid(hsep_at_bytes(block, got.evidence[i]), features) &&
+                hsep_regression_valid(hsep_at_bytes(block, got.earlier[i]), features) && got.n_earlier[i] >= 0.0 &&
+                got.n_earlier[i] <= HSEP_PREDICTION_MAX;
     }
     for (uint64_t i = 0; i < HSEP_N_EXPERTS; i++) {
         const hsep_expert_shape shape = trusted_shape(&got, i);
@@ -170,7 +183,7 @@ static void trusted_list(hsep_trusted *self, trusted_part parts[TRUSTED_PARTS])
     const double most = HSEP_PREDICTION_MAX;
     hsep_stack *stack = &self->stack;
     const trusted_part before[] = {
-        {self->n_rows, HSEP_N_FACTORS, 0.0, most},
+        {self->n_rows, HSEP_N_EVIDENCE, 0.0, most},
         {&self->velocity_scale, 1, 0.0, most},
         {&self->largest_step, 1, 0.0, most},
         {&self->scale.largest_square, 1, 0.0, most},

@@ -1,10 +1,12 @@
 /* Prediction by a residual model that can be trusted. */
 #include "hsep_trusted.h"
 
+#include "hsep_penalised.h"
 #include "hsep_trust_constants.h"
 
 #include <math.h>
 #include <stddef.h>
+#include <string.h>
 
 /* Velocity, m/s, below which a command is at rest: ratios of smaller ones may underflow. */
 static const double trusted_least_velocity = 1e-200;
@@ -21,10 +23,11 @@ static int trusted_outgrown(hsep_trusted *self, const double x_d[], const double
 {
     const hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
     double peak = hsep_disturbances_peak_velocity(disturbances, x_d, self->n);
-    const int learned = self->n_rows[HSEP_OF_PHYSICS] >= HSEP_TRUST_LEARNED * (double)self->Np;
+    const double n_rows = self->n_rows[HSEP_OF_PHYSICS] + self->n_earlier[HSEP_OF_PHYSICS];
+    const int learned = n_rows >= HSEP_TRUST_LEARNED * (double)self->Np;
     double most = (learned ? HSEP_TRUST_GROWTH_LEARNED : HSEP_TRUST_GROWTH) * self->velocity_scale;
     self->forecast_step = fmax(self->largest_step, peak * self->T_s);
-    if (path != NULL && self->n_rows[HSEP_OF_PHYSICS] == 0.0) {
+    if (path != NULL && n_rows == 0.0) {
         peak = 0.0;
         for (uint64_t j = 0; j + 1 < n_path; j++) {
             peak = fmax(peak, fabs(path[j] - path[j + 1]));
@@ -60,12 +63,23 @@ static double trusted_largest(hsep_trusted *self, hsep_expert_place expert, uint
     return hsep_at(self, self->forecast_largest)[feature];
 }
 
-/* Solve for the weights of an expert. */
-static void trusted_solve(hsep_trusted *self, hsep_expert_place place)
+/* Rows of this run and of earlier ones, these weighed by weight. */
+static const hsep_regression *trusted_all(hsep_trusted *self, hsep_evidence evidence, double weight)
+{
+    const hsep_regression *of_run = hsep_trusted_evidence(self, evidence);
+    if (!(self->n_earlier[evidence] > 0.0)) {
+        return of_run;
+    }
+    hsep_regression *all = (hsep_regression *)hsep_at(self, self->all);
+    memcpy(all, of_run, (size_t)hsep_regression_size(of_run->n));
+    hsep_penalised_add(all, hsep_trusted_earlier(self, evidence), weight, hsep_at(self, self->work));
+    return all;
+}
+
+/* Solve for the weights of an expert, from its rows. */
+static void trusted_solve(hsep_trusted *self, hsep_expert_place place, const hsep_regression *regression, double n_rows)
 {
     const int of_command = place == HSEP_COMMAND;
-    const hsep_evidence evidence =
-        of_command ? HSEP_OF_COMMAND : (place == HSEP_DOUBTING ? HSEP_OF_DOUBT : HSEP_OF_PHYSICS);
     const double square = of_command ? self->scale_of_command.largest_square : self->scale.largest_square;
     const double effect = self->effect > 0.0 ? self->effect : sqrt(square);
     hsep_expert *expert = hsep_trusted_expert(self, place);
@@ -75,13 +89,33 @@ static void trusted_solve(hsep_trusted *self, hsep_expert_place place)
         scales[i] = effect * share / fmax(trusted_largest(self, place, i), trusted_least);
     }
     const hsep_expert_evidence solved = {
-        .regression = hsep_trusted_evidence(self, evidence),
-        .n_rows = self->n_rows[evidence],
+        .regression = regression,
+        .n_rows = n_rows,
         .scales = scales,
         .first = self->given_variance > 0.0 ? self->given_variance : HSEP_TRUST_FIRST_NOISE * square,
         .least = fmin(self->least_variance, HSEP_TRUST_LEAST_NOISE * square),
         .work = hsep_at(self, self->work)};
     hsep_expert_solve(expert, &solved);
+}
+
+/* Solve for the weights of all experts that know something. */
+static void trusted_solve_all(hsep_trusted *self)
+{
+    const double *n_rows = self->n_rows, *n_earlier = self->n_earlier;
+    if (self->predicted[HSEP_LAGGED]) {
+        const hsep_regression *all = trusted_all(self, HSEP_OF_PHYSICS, 1.0);
+        const double n_all = n_rows[HSEP_OF_PHYSICS] + n_earlier[HSEP_OF_PHYSICS];
+        trusted_solve(self, HSEP_LAGGED, all, n_all);
+        trusted_solve(self, HSEP_STATIC, all, n_all);
+    }
+    if (self->predicted[HSEP_DOUBTING]) {
+        const hsep_regression *all = trusted_all(self, HSEP_OF_PHYSICS, HSEP_TRUST_LESS);
+        trusted_solve(self, HSEP_DOUBTING, all, n_rows[HSEP_OF_PHYSICS] + HSEP_TRUST_LESS * n_earlier[HSEP_OF_PHYSICS]);
+    }
+    if (self->predicted[HSEP_COMMAND]) {
+        const hsep_regression *all = trusted_all(self, HSEP_OF_COMMAND, 1.0);
+        trusted_solve(self, HSEP_COMMAND, all, n_rows[HSEP_OF_COMMAND] + n_earlier[HSEP_OF_COMMAND]);
+    }
 }
 
 HSEP_API void hsep_trusted_scale(
@@ -104,16 +138,14 @@ HSEP_API void hsep_trusted_scale(
     self->n_rest = trusted_rest_ahead(self, path != NULL ? path : x_d, path != NULL ? n_path : self->n);
     self->bound = HSEP_TRUST_BOUND * self->scale.largest;
     self->hold = fmin(fmax(last_residual, -self->bound), self->bound);
-    const uint64_t known = self->n_rows[HSEP_OF_PHYSICS] > 0.0 && !outgrown && self->scale.largest_square > 0.0;
+    const double n_rows = self->n_rows[HSEP_OF_PHYSICS] + self->n_earlier[HSEP_OF_PHYSICS];
+    const double n_of_command = self->n_rows[HSEP_OF_COMMAND] + self->n_earlier[HSEP_OF_COMMAND];
+    const uint64_t known = n_rows > 0.0 && !outgrown && self->scale.largest_square > 0.0;
     self->predicted[HSEP_HOLD] = 1;
     self->predicted[HSEP_LAGGED] = self->predicted[HSEP_STATIC] = known;
-    self->predicted[HSEP_DOUBTING] = known && self->doubts;
-    self->predicted[HSEP_COMMAND] = self->n_rows[HSEP_OF_COMMAND] > 0.0 && self->scale_of_command.largest_square > 0.0;
-    for (uint64_t i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
-        if (self->predicted[i]) {
-            trusted_solve(self, (hsep_expert_place)i);
-        }
-    }
+    self->predicted[HSEP_DOUBTING] = known && hsep_trusted_doubts(self);
+    self->predicted[HSEP_COMMAND] = n_of_command > 0.0 && self->scale_of_command.largest_square > 0.0;
+    trusted_solve_all(self);
 }
 
 /* What the command's expert predicts of the physics model's residual, at places begin ... end - 1. */
@@ -134,7 +166,7 @@ static void trusted_by_physics(hsep_trusted *self, const double x_pb[], const do
 {
     double *x = hsep_at(self, self->x), *rows = hsep_at(self, self->rows);
     hsep_expert *first = hsep_trusted_expert(self, HSEP_STATIC);
-    const uint64_t n_rest = self->doubts ? self->n_rest : 0;
+    const uint64_t n_rest = hsep_trusted_doubts(self) ? self->n_rest : 0;
     for (uint64_t k = 0; k < n_rest; k++) { /* the constant that earlier runs have taught is that of motion */
         rows[k * self->n_static] = 0.0;
     }
