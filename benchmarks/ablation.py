@@ -3,8 +3,8 @@
     python -m benchmarks.ablation [--emps DATA_EMPS.mat] [--recordings FOLDER] [--n 12] [--seed 7] [--only TEXT]
 
 Cases of ``benchmarks/trust.py`` and random drives of both generators, whole runs, cold and warm; RMS relative to the
-physics model's, geometric means and the worst cold one. Constants may be chosen on ``cnc_a_*``, ``xl330_sin_sin_*``, the
-simulated cases and drives of one seed; the others judge. Half an hour for all of it.
+physics model's, geometric means and the worst cold one. Constants may be chosen on ``cnc_a_*``, ``xl330_sin_sin_*``,
+the simulated cases and drives of one seed; the others judge. Half an hour for all of it.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ class TrustConstants:
         First weights of the experts with and without lags; hold and command begin with none: with 0.2 for the command's
         the worst drives are worse.
     lags_of_command : int
-        Most lags of the command's expert, and of its increments: with 50 as well errors are 2 % less on drives of modes, 8 %
+        Most lags of the command's expert, and of its increments: with 50 errors are 2 % less on drives of modes, 8 %
         more on those of two masses, at six times the cost.
     last_lag : float
         Prior variance of the weight of the last lag, relative to that of the first: the residual's memory fades.

@@ -20,8 +20,8 @@ HSEP_API double hsep_block_fold_size(uint64_t n, uint64_t count);
 HSEP_API double *hsep_block_fold_row(double work[], uint64_t n, uint64_t b);
 
 /* Fold these rows into the factor; they are used up. is_triangle: whether row b is 0 before entry b, which saves the
- * work on zeros; wide: hsep_is_wide, the result is the same. Cost: count n^2 / 2 times 2 multiply-adds; n^3 / 6 times as
- * many for a triangle. */
+ * work on zeros; wide: hsep_is_wide, the result is the same. Cost: count n^2 / 2 times 2 multiply-adds; n^3 / 6 times
+ * as many for a triangle. */
 HSEP_API void hsep_block_fold(hsep_regression *self, double work[], uint64_t count, int is_triangle, int wide);
 
 #endif

@@ -1,5 +1,5 @@
-/* Constants of the residual model with trust as they are declared in hybridsep/predict/trust/constants.py, from
- * which this file is generated. */
+/* Constants of the residual model with trust as they are declared in hybridsep/predict/trust/constants.py,
+ * from which this file is generated. */
 #ifndef HSEP_TRUST_CONSTANTS_H
 #define HSEP_TRUST_CONSTANTS_H
 
@@ -15,8 +15,8 @@
 #define HSEP_TRUST_FIRST_LAGGED 0.5
 #define HSEP_TRUST_FIRST_STATIC 0.5
 
-/* Most lags of the command's expert, and of its increments: with 50 as well errors are 2 % less on drives of modes,
- * 8 % more on those of two masses, at six times the cost. */
+/* Most lags of the command's expert, and of its increments: with 50 errors are 2 % less on drives of modes, 8 % more
+ * on those of two masses, at six times the cost. */
 #define HSEP_TRUST_LAGS_OF_COMMAND 20
 
 /* Prior variance of the weight of the last lag, relative to that of the first: the residual's memory fades. */
