@@ -74,8 +74,7 @@ def constants_header() -> str:
         defines = [f"#define HSEP_TRUST_{name.upper()} {values[name]!r}" for name in names.split(", ")]
         parts.append("\n".join(["/* " + "\n * ".join(lines), *defines]))
     body = "\n\n".join(parts)
-    return f"""/* Constants of the residual model with trust as they are declared in hybridsep/predict/trust/constants.py,
- * from which this file is generated. */
+    return f"""/* Constants of the residual model with trust, generated from hybridsep/predict/trust/constants.py. */
 #ifndef HSEP_TRUST_CONSTANTS_H
 #define HSEP_TRUST_CONSTANTS_H
 

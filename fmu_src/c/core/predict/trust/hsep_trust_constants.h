@@ -1,5 +1,4 @@
-/* Constants of the residual model with trust as they are declared in hybridsep/predict/trust/constants.py,
- * from which this file is generated. */
+/* Constants of the residual model with trust, generated from hybridsep/predict/trust/constants.py. */
 #ifndef HSEP_TRUST_CONSTANTS_H
 #define HSEP_TRUST_CONSTANTS_H
 
