@@ -45,7 +45,7 @@ class Guard(ctypes.Structure):
                 "step",
                 "spread",
                 "pace",
-                "x_pb",
+                "last_x_pb",
             )
         ),
         ("before", ctypes.c_double * NEIGHBOURS),

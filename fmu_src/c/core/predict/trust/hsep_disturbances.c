@@ -245,12 +245,12 @@ HSEP_API void hsep_disturbances_motion(
             double *of_sample = disturbances + HSEP_PHYSICS_ABREAST * k;
             j--;
             const double v = disturbances_velocity(self, x_pb, x, n, j);
-            of_sample[0] = x[j] * fabs(x[j]);
-            of_sample[1] = v * fabs(v);
+            *of_sample++ = x[j] * fabs(x[j]);
+            *of_sample++ = v * fabs(v);
             if (self->count > HSEP_DISTURBANCES_PERIODIC) {
                 const double angle = disturbances_angle(self, x[j]);
-                of_sample[2] = sin(angle) - s;
-                of_sample[3] = cos(angle) - c;
+                *of_sample++ = sin(angle) - s;
+                *of_sample = cos(angle) - c;
             }
         }
         disturbances_filter_samples(

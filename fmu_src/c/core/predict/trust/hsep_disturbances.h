@@ -23,11 +23,12 @@
 #define HSEP_DISTURBANCES_DAMPING 7
 #define HSEP_DISTURBANCES_PERIODIC 8 /* sine and cosine, where there is a period */
 #define HSEP_DISTURBANCES_MAX 10
+#define HSEP_DISTURBANCES_PAST 4 /* predictions: differences up to the third need them */
 
 /* What was before a sample. */
 typedef struct {
     double x_d;                             /* m, last command */
-    double x_pb[4];                         /* m, last predictions, newest first */
+    double x_pb[HSEP_DISTURBANCES_PAST];    /* m, last predictions, newest first */
     double filtered[HSEP_DISTURBANCES_MAX]; /* last filtered disturbances */
 } hsep_disturbed;
 

@@ -7,7 +7,8 @@
 
 #define GUARD_WINDOW (2 * HSEP_GUARD_NEIGHBOURS + 1)
 
-static const uint64_t guard_doubted = 3; /* doubtful samples in a row from which on they may be true */
+static const uint64_t guard_doubted = 3;             /* doubtful samples in a row from which on they may be true */
+static const double guard_most = 9007199254740992.0; /* counts that doubles hold exactly */
 static const double guard_windows = 2.0; /* least patience, in windows: what is believed is learned by windows */
 /* Changes that a window has to have to tell the vibration: most of fewer could be those of one wrong value. */
 static const uint64_t guard_changes = 8;
@@ -17,7 +18,7 @@ static const double guard_more = 2.0;
 /* Samples of a time, s; two windows at least. */
 static uint64_t guard_patience(double time, uint64_t Np, double T_s)
 {
-    return (uint64_t)fmin(fmax(guard_windows * (double)Np, ceil(time / T_s)), 9007199254740992.0);
+    return (uint64_t)fmin(fmax(guard_windows * (double)Np, ceil(time / T_s)), guard_most);
 }
 
 HSEP_API void hsep_guard_init(hsep_guard *self, uint64_t Np, double T_s)
@@ -26,7 +27,7 @@ HSEP_API void hsep_guard_init(hsep_guard *self, uint64_t Np, double T_s)
         .patience = guard_patience(HSEP_TRUST_PATIENCE, Np, T_s),
         .patience_standing = guard_patience(HSEP_TRUST_PATIENCE_STANDING, Np, T_s),
         .spread = -1.0,
-        .x_pb = NAN};
+        .last_x_pb = NAN};
     hsep_sensor_init(&self->held);
 }
 
@@ -132,7 +133,7 @@ HSEP_API void hsep_guard_accept(
     hsep_guard *self, const double x[], const double x_pb[], uint64_t n, double largest, double deviation[],
     double accepted[], double suspect[])
 {
-    double pace = 0.0, last = isnan(self->x_pb) ? x_pb[n - 1] : self->x_pb;
+    double pace = 0.0, last = isnan(self->last_x_pb) ? x_pb[n - 1] : self->last_x_pb;
     for (uint64_t k = 0; k < n; k++) {
         pace = fmax(pace, fabs(x_pb[n - 1 - k] - last));
         last = x_pb[n - 1 - k];
@@ -187,7 +188,7 @@ HSEP_API void hsep_guard_accept(
         self->before[j] = guard_residual(self, x, x_pb, n, (int64_t)n - HSEP_GUARD_NEIGHBOURS + (int64_t)j);
     }
     self->pace = pace;
-    self->x_pb = last;
+    self->last_x_pb = last;
 }
 
 HSEP_API hsep_doubt hsep_guard_doubt(const hsep_guard *self, double largest)

@@ -27,9 +27,9 @@ typedef struct {
     double measured, before_run; /* m, the last measured residual, and that before the run of equal values */
     double last;                 /* m, the last accepted residual */
     hsep_sensor held;
-    double spread; /* m, mean deviation from the neighbours' median; -1 before the first window */
-    double pace;   /* m, largest predicted motion of a sample in the last window */
-    double x_pb;   /* m, the last prediction; NaN before the first */
+    double spread;    /* m, mean deviation from the neighbours' median; -1 before the first window */
+    double pace;      /* m, largest predicted motion of a sample in the last window */
+    double last_x_pb; /* m, the last prediction; NaN before the first */
     double before[HSEP_GUARD_NEIGHBOURS]; /* m, the last residuals, oldest first */
 } hsep_guard;
 

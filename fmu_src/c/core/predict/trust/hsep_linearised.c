@@ -5,6 +5,7 @@
 #include <string.h>
 
 #define LINEARISED_CHANGES 3                      /* signals of a change: v_d, x, v */
+#define LINEARISED_DIFFERENCES 8                  /* most orders of differences of x_pb, it among them */
 #define LINEARISED_GAINS (2 * LINEARISED_CHANGES) /* of an expert: of the disturbances, of their differences */
 
 static const hsep_expert_place linearised_experts[HSEP_LINEARISED_EXPERTS] = {HSEP_LAGGED, HSEP_STATIC, HSEP_DOUBTING};
@@ -98,7 +99,7 @@ static void linearised_gains(const hsep_linearised *self, const double weights[]
 /* What the features of x_pb, it and its differences, give of a change behind G_pb. */
 static void linearised_pass(const double weights[], uint64_t count, const double passed[], uint64_t n, double to[])
 {
-    double d[8] = {0.0}; /* differences of the sample before */
+    double d[LINEARISED_DIFFERENCES] = {0.0}; /* of the sample before */
     for (uint64_t k = 0; k < n; k++) {
         double difference = passed[k];
         to[k] = 0.0;
