@@ -66,6 +66,9 @@ class TrustConstants:
         Plausible change of the residual from sample to sample, relative to the predicted motion or the vibration.
     vibration_noise : float
         Median change of the residual from sample to sample that noise makes, in mean deviations: white noise 1.4.
+    stood_more : float
+        Motion under which an axis is believed to stand, relative to the largest under which it has stood by itself:
+        with 2 two servos with stiction have 1.4 and 2 times the error.
     patience, patience_standing : float
         Time, s, after which another level is believed, two windows at least, and the first time, after which an axis
         that stands is: an encoder may be held for half a second.
@@ -101,6 +104,7 @@ class TrustConstants:
     ripple: float = 0.1
     pace: float = 2.0
     vibration_noise: float = 2.0
+    stood_more: float = 5.0
     patience: float = 0.05
     patience_standing: float = 0.6
     rise: float = 0.5

@@ -34,9 +34,6 @@ _NUMBERS = ("last", "spread", "pace", "last_x_pb", "vibration", "before_run", "m
 N_STATE = len(_COUNTS) + len(_NUMBERS) + HeldValue.N_STATE + _NEIGHBOURS
 """Numbers of a state."""
 
-_MORE = 2.0
-"""Motion under which an axis stands, relative to the largest under which it stood by itself."""
-
 _CHANGES = 8
 """Changes that a window has to have to tell the vibration: most of fewer could be those of one wrong value."""
 
@@ -128,7 +125,9 @@ class SensorGuard:
             if value != self.held.value:
                 self._tell_rest(value, e, plausible)
             self.measured = e
-            self.holding = int(self.held.holds(value, position, still=max(plausible, _MORE * self.stood)))
+            self.holding = int(
+                self.held.holds(value, position, still=max(plausible, self.constants.stood_more * self.stood))
+            )
             if self.holding:
                 run = slice(max(k - self.held.repeats + 1, 0), k + 1)
                 self.suspect[run] = True
@@ -186,7 +185,7 @@ class SensorGuard:
         if held.stays(motion, still=plausible, first_step=abs(value - held.value)):
             if abs(e - self.measured) <= abs(e - self.before_run):
                 self.stood = max(self.stood, motion)
-            elif motion <= _MORE * self.stood:
+            elif motion <= self.constants.stood_more * self.stood:
                 self.stood = 0.0
         self.before_run = self.measured
 

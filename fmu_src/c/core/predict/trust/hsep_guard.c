@@ -12,8 +12,6 @@ static const double guard_most = 9007199254740992.0; /* counts that doubles hold
 static const double guard_windows = 2.0; /* least patience, in windows: what is believed is learned by windows */
 /* Changes that a window has to have to tell the vibration: most of fewer could be those of one wrong value. */
 static const uint64_t guard_changes = 8;
-/* Motion under which an axis stands, relative to the largest under which it stood by itself. */
-static const double guard_more = 2.0;
 
 /* Samples of a time, s; two windows at least. */
 static uint64_t guard_patience(double time, uint64_t Np, double T_s)
@@ -113,7 +111,7 @@ static void guard_tell_rest(hsep_guard *self, double x, double residual, double 
     if (hsep_sensor_stays(&self->held, motion, plausible, fabs(x - self->held.value))) {
         if (fabs(residual - self->measured) <= fabs(residual - self->before_run)) {
             self->stood = fmax(self->stood, motion);
-        } else if (motion <= guard_more * self->stood) {
+        } else if (motion <= HSEP_TRUST_STOOD_MORE * self->stood) {
             self->stood = 0.0;
         }
     }
@@ -154,7 +152,7 @@ HSEP_API void hsep_guard_accept(
             guard_tell_rest(self, x[place], residual, plausible);
         }
         self->measured = residual;
-        const double still = fmax(plausible, guard_more * self->stood);
+        const double still = fmax(plausible, HSEP_TRUST_STOOD_MORE * self->stood);
         self->holding = (uint64_t)hsep_sensor_misses(&self->held, x[place], x_pb[place], still, HUGE_VAL);
         if (self->holding) {
             guard_set_run(self, k, n, 1.0, suspect);

@@ -78,6 +78,10 @@
 /* Median change of the residual from sample to sample that noise makes, in mean deviations: white noise 1.4. */
 #define HSEP_TRUST_VIBRATION_NOISE 2.0
 
+/* Motion under which an axis is believed to stand, relative to the largest under which it has stood by itself: with
+ * 2 two servos with stiction have 1.4 and 2 times the error. */
+#define HSEP_TRUST_STOOD_MORE 5.0
+
 /* Time, s, after which another level is believed, two windows at least, and the first time, after which an axis that
  * stands is: an encoder may be held for half a second. */
 #define HSEP_TRUST_PATIENCE 0.05
