@@ -119,6 +119,8 @@ class EvidenceOfRuns:
         """Return all rows, those of earlier runs weighed by ``kept``; not to be changed."""
         if self.earlier is None:
             return self.this
+        if self.this.n_rows == 0.0:
+            return self.earlier.less(kept)
         everything = self.this.less(1.0)
         everything.add(self.earlier.less(kept))
         return everything

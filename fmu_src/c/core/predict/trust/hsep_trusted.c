@@ -20,12 +20,27 @@ static void trusted_forget(hsep_trusted *self, hsep_evidence evidence)
     self->n_rows[evidence] = self->n_earlier[evidence] = 0.0;
 }
 
+HSEP_API void hsep_trusted_gather(hsep_trusted *self, hsep_evidence evidence, double weight, hsep_regression *to)
+{
+    const hsep_regression *of_run = hsep_trusted_evidence(self, evidence);
+    const hsep_regression *earlier = hsep_trusted_earlier(self, evidence);
+    const size_t size = (size_t)hsep_regression_size(of_run->n);
+    if (self->n_rows[evidence] > 0.0) {
+        memmove(to, of_run, size);
+        hsep_penalised_add(to, earlier, weight, hsep_at(self, self->work));
+    } else {
+        memcpy(to, earlier, size);
+        if (weight < 1.0) {
+            hsep_regression_discount(to, weight);
+        }
+    }
+}
+
 /* Go on with all rows of some evidence as with those of this run. */
 static void trusted_believe_earlier(hsep_trusted *self, hsep_evidence evidence)
 {
     if (self->n_earlier[evidence] > 0.0) {
-        const hsep_regression *earlier = hsep_trusted_earlier(self, evidence);
-        hsep_penalised_add(hsep_trusted_evidence(self, evidence), earlier, 1.0, hsep_at(self, self->work));
+        hsep_trusted_gather(self, evidence, 1.0, hsep_trusted_evidence(self, evidence));
         self->n_rows[evidence] += self->n_earlier[evidence];
         self->n_earlier[evidence] = 0.0;
     }

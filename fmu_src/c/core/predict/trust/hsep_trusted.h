@@ -162,6 +162,9 @@ HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const double x_d[
  * doubt. */
 HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_d[], const double x_pb[], double e[], int fold);
 
+/* Rows of this run, and of earlier ones weighed by weight, in to, which may be the regression of this run's. */
+HSEP_API void hsep_trusted_gather(hsep_trusted *self, hsep_evidence evidence, double weight, hsep_regression *to);
+
 /* Whether this run doubts earlier ones. */
 HSEP_API int hsep_trusted_doubts(const hsep_trusted *self);
 

@@ -1,12 +1,10 @@
 /* Prediction by a residual model that can be trusted. */
 #include "hsep_trusted.h"
 
-#include "hsep_penalised.h"
 #include "hsep_trust_constants.h"
 
 #include <math.h>
 #include <stddef.h>
-#include <string.h>
 
 /* Velocity, m/s, below which a command is at rest: ratios of smaller ones may underflow. */
 static const double trusted_least_velocity = 1e-200;
@@ -71,8 +69,7 @@ static const hsep_regression *trusted_all(hsep_trusted *self, hsep_evidence evid
         return of_run;
     }
     hsep_regression *all = (hsep_regression *)hsep_at(self, self->all);
-    memcpy(all, of_run, (size_t)hsep_regression_size(of_run->n));
-    hsep_penalised_add(all, hsep_trusted_earlier(self, evidence), weight, hsep_at(self, self->work));
+    hsep_trusted_gather(self, evidence, weight, all);
     return all;
 }
 
