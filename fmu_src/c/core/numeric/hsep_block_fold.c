@@ -33,7 +33,7 @@ HSEP_API double *hsep_block_fold_row(double work[], uint64_t n, uint64_t b)
 
 /* Reflect column r of a panel of 4, and those behind it; return tau, 0 if there is nothing to reflect. tile: on the
  * diagonal. */
-static double block_reflect(block_reflectors *at, double *tile, double *inverse_d, unsigned r)
+HSEP_INLINE double block_reflect(block_reflectors *at, double *tile, double *inverse_d, unsigned r)
 {
     double *x = at->v + r * at->m;
     const double root = 1.0 / sqrt(*inverse_d), sigma = hsep_dot(x, x, at->m);
@@ -60,7 +60,7 @@ static double block_reflect(block_reflectors *at, double *tile, double *inverse_
 }
 
 /* T of the reflectors' product: its column j is -tau_j T V' v_j above the diagonal. */
-static void block_triangle(block_reflectors *at, const double tau[4])
+HSEP_INLINE void block_triangle(block_reflectors *at, const double tau[4])
 {
     for (unsigned j = 0; j < HSEP_TILE; j++) {
         double products[HSEP_TILE] = {0.0};
@@ -141,7 +141,7 @@ HSEP_INLINE void block_turn(const block_reflectors *at, double *tile, double *W,
 }
 
 /* Reflect the columns behind a panel. x: first of these in the first row; W: (4, width), work. */
-HSEP_INLINE void block_apply_as_compiled(
+HSEP_INLINE void block_apply(
     const block_reflectors *at, double *x, uint64_t stride, double *tiles, double *W, uint64_t width)
 {
     double v[HSEP_TILE], w[HSEP_TILE];
@@ -166,20 +166,7 @@ HSEP_INLINE void block_apply_as_compiled(
     }
 }
 
-/* The same for any processor, and for one with vectors of four doubles: nearly all of the cost of a fold. */
-static void block_apply(
-    const block_reflectors *at, double *x, uint64_t stride, double *tiles, double *W, uint64_t width)
-{
-    block_apply_as_compiled(at, x, stride, tiles, W, width);
-}
-
-HSEP_WIDE static void block_apply_wide(
-    const block_reflectors *at, double *x, uint64_t stride, double *tiles, double *W, uint64_t width)
-{
-    block_apply_as_compiled(at, x, stride, tiles, W, width);
-}
-
-HSEP_API void hsep_block_fold(hsep_regression *self, double work[], uint64_t count, int is_triangle, int wide)
+HSEP_INLINE void block_fold(hsep_regression *self, double work[], uint64_t count, int is_triangle)
 {
     const uint64_t n = self->n, stride = block_width(n);
     double *inverse_d = hsep_at(self, self->inverse_d), *tile = hsep_at(self, self->tiles);
@@ -201,10 +188,23 @@ HSEP_API void hsep_block_fold(hsep_regression *self, double work[], uint64_t cou
             self->residual_sum += hsep_dot(target, target, at.m);
         } else {
             block_triangle(&at, tau);
-            (wide ? block_apply_wide
-                  : block_apply)(&at, work + first + HSEP_TILE, stride, tile + HSEP_TILE_STRIDE, W, width);
+            block_apply(&at, work + first + HSEP_TILE, stride, tile + HSEP_TILE_STRIDE, W, width);
         }
         tile += HSEP_TILE_STRIDE * (1 + width / HSEP_TILE);
     }
     self->n_samples += count;
+}
+
+HSEP_WIDE static void block_fold_wide(hsep_regression *self, double work[], uint64_t count, int is_triangle)
+{
+    block_fold(self, work, count, is_triangle);
+}
+
+HSEP_API void hsep_block_fold(hsep_regression *self, double work[], uint64_t count, int is_triangle, int wide)
+{
+    if (wide) {
+        block_fold_wide(self, work, count, is_triangle);
+    } else {
+        block_fold(self, work, count, is_triangle);
+    }
 }
