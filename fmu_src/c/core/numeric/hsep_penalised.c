@@ -46,6 +46,9 @@ static void penalised_multiply(const hsep_regression *self, const double w[], do
     }
 }
 
+/* Whether wide vectors are worth it for a triangle of n features. */
+static int penalised_is_wide(uint64_t n) { return hsep_is_wide((double)n * (double)n * (double)n / 6.0); }
+
 HSEP_API void hsep_penalised_add(hsep_regression *self, const hsep_regression *other, double weight, double work[])
 {
     const double *inverse_d = hsep_at_const(other, other->inverse_d);
@@ -57,7 +60,7 @@ HSEP_API void hsep_penalised_add(hsep_regression *self, const hsep_regression *o
             row[j] = scale * *hsep_tile_entry_const(other, i, j);
         }
     }
-    hsep_block_fold(self, work, other->n, 1, hsep_is_wide());
+    hsep_block_fold(self, work, other->n, 1, penalised_is_wide(other->n));
     self->residual_sum += weight * other->residual_sum;
 }
 
@@ -70,7 +73,7 @@ HSEP_API double hsep_penalised_solve(
     for (uint64_t i = 0; i < m; i++) {
         hsep_block_fold_row(work, m, i)[i] = sqrt(penalties[i]);
     }
-    hsep_block_fold(solved, work, m, 1, hsep_is_wide());
+    hsep_block_fold(solved, work, m, 1, penalised_is_wide(m));
     hsep_regression_solve(solved, w);
     double sum = self->residual_sum, *padded = work, *product = work + HSEP_TILE * self->n_tiles;
     memset(padded, 0, (size_t)(HSEP_TILE * self->n_tiles) * sizeof(double));

@@ -13,12 +13,14 @@
 #define HSEP_INLINE __attribute__((always_inline)) static inline
 #define HSEP_WIDE __attribute__((target("avx")))
 
-/* Whether the processor has AVX, and its operating system saves the registers. */
-static inline int hsep_is_wide(void)
+/* Whether the processor has AVX, its operating system saves the registers, and so many multiply-adds are worth the
+ * question: it takes up to 10 microseconds in a virtual machine. */
+static inline int hsep_is_wide(double multiply_adds)
 {
+    const double worth = 5e4;
     const unsigned saved = 6; /* registers of SSE and AVX in XCR0 */
     unsigned a = 0, b = 0, c = 0, d = 0;
-    if (!__get_cpuid(1, &a, &b, &c, &d) || !(c & bit_AVX) || !(c & bit_OSXSAVE)) {
+    if (multiply_adds < worth || !__get_cpuid(1, &a, &b, &c, &d) || !(c & bit_AVX) || !(c & bit_OSXSAVE)) {
         return 0;
     }
     __asm__("xgetbv" : "=a"(a), "=d"(d) : "c"(0));
@@ -30,7 +32,11 @@ static inline int hsep_is_wide(void)
 #define HSEP_INLINE static inline
 #define HSEP_WIDE
 
-static inline int hsep_is_wide(void) { return 0; }
+static inline int hsep_is_wide(double multiply_adds)
+{
+    (void)multiply_adds;
+    return 0;
+}
 
 #endif
 

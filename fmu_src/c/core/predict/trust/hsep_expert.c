@@ -171,7 +171,8 @@ static void expert_shrink(hsep_expert *self, uint64_t begin, uint64_t end)
 
 HSEP_API void hsep_expert_vary(hsep_expert *self, const double rows[], uint64_t first, uint64_t last)
 {
-    const int wide = hsep_is_wide();
+    const double n = (double)(self->n_static + self->p);
+    const int wide = hsep_is_wide((double)(last - first) * n * n / 2.0);
     double *kept = hsep_at(self, self->kept);
     if (first == 0 && self->p > 0) {
         expert_respond(self);

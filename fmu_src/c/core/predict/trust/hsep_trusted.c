@@ -138,8 +138,8 @@ static void trusted_of_command(hsep_trusted *self, const double x_pb[], const do
     }
 }
 
-/* Which rows of the window are learned, (Np,), by their places, and their number. What stands still is followed and not
- * learned: it tells nothing of motion. */
+/* Which rows of the window are learned, (Np,), by their places, and their number. Those with many
+ * lags that stand for samples without a measurement are not. */
 static uint64_t trusted_learned_rows(const hsep_trusted *self, double learned[])
 {
     const double *learnable = hsep_at_const(self, self->learnable);
@@ -177,7 +177,7 @@ static void trusted_fold(
             row[n] = e[j];
         }
     }
-    hsep_block_fold(regression, work, count, 0, hsep_is_wide());
+    hsep_block_fold(regression, work, count, 0, hsep_is_wide((double)count * (double)n * (double)n));
     self->n_rows[evidence] += (double)count;
 }
 
