@@ -104,7 +104,7 @@ def test_links_lead_to_a_page_and_a_place_on_it(site: Path, pages: dict[str, Pag
     [
         ("will it fit my axis?", "start/what", "will-it-fit-my-axis"),
         ("what does this refusal mean?", "reference/messages", "sign"),
-        ("how do I load it in Simulink?", "howto/run-fmus", "simulink"),
+        ("how do I load it in Simulink?", "howto/simulink", "by-a-script"),
         ("my log, my FMU", "start/first-fmu", ""),
         ("how good is it?", "evidence/figures", "compensation"),
         ("what did not work?", "experiments/2026-11-22-trusted-model", ""),
