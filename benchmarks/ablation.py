@@ -30,7 +30,7 @@ from hybridsep.evaluate.backtest import backtest
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.predictor import HybridPredictor
 from hybridsep.predict.trust.constants import CONSTANTS, TrustConstants
-from hybridsep.predict.trust.model import TrustedModel
+from hybridsep.predict.trust.saved import SavedTrustedModel
 
 CHOOSE = ("cnc_a", "xl330_sin_sin")
 """Beginnings of the names of recordings that constants may be chosen on."""
@@ -110,7 +110,7 @@ def axes_of(emps: Path | None, recordings: Path | None, n: int, seed: int) -> It
 def relative_errors(axis: Axis, constants: TrustConstants) -> tuple[float, float]:
     """Return the errors cold and warm relative to the physics model's in the cold run."""
     predictor = HybridPredictor(axis.model, axis.settings)
-    predictor.residual = TrustedModel(predictor.settings, predictor.discrete, (), constants)
+    predictor.residual = SavedTrustedModel(predictor.settings, predictor.discrete, (), constants)
     cold = backtest(predictor, axis.x_d, axis.x_meas[0])
     predictor.restart()
     warm = backtest(predictor, axis.x_d, axis.x_meas[1])

@@ -19,17 +19,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.errors import SignalError
+from ..base.saved import Saved
 from ..base.settings import CompensatorSettings, PredictorSettings
 from ..base.signals import Array, as_published, as_samples
+from ..base.state import pack, unpack
 from ..predict.predictor import HybridPredictor
 from ..predict.trust.disturbances import Disturbance
 from ..predict.trust.model import TrustedModel
-from ..predict.window import PublishedWindow
+from ..predict.window import Prediction, PublishedWindow
 from .constraints import DriveBounds
 from .paper_planning import PaperPlanning
 from .plan import PendingPlan, SepState
 from .planning import Planning, Preview
-from .saved_compensator import compensator_blob, compensator_from
 from .splines import N_DECIDED, SplineBasis, direct_samples
 from .trusted_planning import TrustedPlanning
 
@@ -38,6 +39,8 @@ __all__ = ["RECOMMENDED", "SepCompensator", "SepState", "direct_samples"]
 RECOMMENDED = PredictorSettings(trust=False, Np=50, p=50, q=40, lam=1e-8, t_init=0.1, v_friction=2e-3)
 """Predictor settings of the paper's model with the smallest tracking error on the staircase drive, with the
 compensator's defaults."""
+
+_KIND = "compensator"
 
 
 class SepCompensator:
@@ -183,7 +186,25 @@ class SepCompensator:
 
     def to_bytes(self) -> bytes:
         """Return parameters and state, predictor and pending window included, as a versioned blob."""
-        return compensator_blob(self)
+        pending, planning = self._pending, self._planning
+        meta = {
+            "settings": self.settings.as_table(),
+            "lead_in": self.lead_in,
+            "excess": planning.monitor.excess,
+            "measured_before": planning.measured_before,
+            "state_before": int(self._state_before),
+            "pending": None if pending is None else [int(pending.state), pending.prediction.n_warm_up],
+        }
+        arrays = {
+            "rest": self._rest,
+            "delta_before": self._delta_before,
+            "x_d_before": self._x_d_before,
+            "sensor": np.array(planning.sensor.state()),
+        }
+        if pending is not None:
+            arrays |= {"coefficients": pending.coefficients, "delta": pending.delta, "x_d": pending.x_d}
+            arrays |= {name: getattr(pending.prediction, name) for name in ("x_pb", "e_h", "x_h_std")}
+        return pack(_KIND, meta, arrays, {"predictor": self.predictor.to_bytes()})
 
     @classmethod
     def from_bytes(cls, blob: bytes, disturbances: Sequence[Disturbance] = ()) -> SepCompensator:
@@ -194,7 +215,43 @@ class SepCompensator:
         StateError
             If the blob is foreign, truncated or of another version, or the number of disturbances differs.
         """
-        return compensator_from(cls, blob, disturbances)
+        saved = Saved(_KIND, *unpack(_KIND, blob))
+        predictor = HybridPredictor.from_bytes(saved.part("predictor"), disturbances)
+        restored = HybridPredictor.from_bytes(saved.part("predictor"), disturbances)
+        with saved.consistent():
+            compensator = cls(predictor, CompensatorSettings.from_table(saved.table("settings")))
+        compensator.predictor = restored  # the constructor has restarted the other one
+        compensator.lead_in = saved.whole("lead_in")
+        planning = compensator._planning
+        planning.monitor.excess, planning.measured_before = saved.real("excess"), saved.flag("measured_before")
+        before = saved.whole("state_before")
+        if before not in tuple(SepState):
+            raise saved.error("state_before must be a state")
+        compensator._state_before = SepState(before)
+        n, Np = len(compensator._rest), predictor.Np
+        compensator._rest, compensator._delta_before = saved.array("rest", n), saved.array("delta_before", 3)
+        compensator._x_d_before = saved.array("x_d_before", 3, finite=False)
+        with saved.consistent():
+            planning.sensor.restore(saved.array("sensor", 5, finite=False))
+        if saved.field("pending") is not None:
+            state, n_warm_up = saved.numbers("pending", 2)
+            if state not in tuple(SepState) or n_warm_up not in range(Np + 1) or restored.n_pending != Np:
+                raise saved.error("the pending window must be planned and predicted")
+            # A hybrid prediction that is not used may diverge.
+            prediction = Prediction(
+                saved.array("x_pb", Np),
+                saved.array("e_h", Np, finite=False),
+                saved.array("x_h_std", Np),
+                int(n_warm_up),
+            )
+            compensator._pending = PendingPlan(
+                saved.array("coefficients", n),
+                saved.array("delta", Np),
+                saved.array("x_d", Np),
+                prediction,
+                SepState(int(state)),
+            )
+        return compensator
 
 
 def _last_three(before: Array, window: Array) -> Array:

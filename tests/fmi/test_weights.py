@@ -32,7 +32,6 @@ from hybridsep.machines.machine import load_machine
 from hybridsep.machines.paper import paper_machine
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
-from hybridsep.predict.trust.learned import learned_numbers
 from hybridsep.predict.uncertainty import N_LEARNED
 
 MACHINE = paper_machine("spring_mass_damper")
@@ -202,8 +201,8 @@ def test_no_mutation_of_a_file_with_trust_is_accepted(tmp_path: Path) -> None:
     first = 40 + 32 * len(learned_settings(predictor))
     body = content[:-8]
     trusted = trusted_model(predictor)
-    sizes = [one.size for one in learned_numbers(trusted).values()]
-    places = dict(zip(learned_numbers(trusted), first + 8 * (np.cumsum(sizes) - sizes), strict=True))
+    sizes = [one.size for one in trusted.learned().values()]
+    places = dict(zip(trusted.learned(), first + 8 * (np.cumsum(sizes) - sizes), strict=True))
     n_numbers = sum(sizes) + N_LEARNED
     errors = first + 8 * sum(sizes)
     assert struct.unpack_from("<Q", body, 32) == (n_numbers,)

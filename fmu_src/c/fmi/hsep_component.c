@@ -1,6 +1,7 @@
 #include "hsep_component.h"
 
 #include "hsep_check.h"
+#include "hsep_opening.h"
 
 #include <stdarg.h>
 #include <stdio.h>
@@ -79,7 +80,7 @@ static hsep_status component_open(hsep_instance *instance, const char *name, con
     if (name == NULL || name[0] == '\0') {
         (void)hsep_message_add(message, "%s: instanceName must not be empty", words->instantiate);
     } else {
-        status = hsep_instance_open(instance, name, resources, message);
+        status = hsep_open(instance, name, resources, message);
     }
     if (status != HSEP_REFUSED && (token == NULL || strcmp(token, instance->context.guid) != 0)) {
         status = hsep_message_add(

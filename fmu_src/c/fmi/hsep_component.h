@@ -47,7 +47,7 @@ typedef struct {
 enum { HSEP_I = HSEP_INSTANTIATED, HSEP_M = HSEP_INITIALIZATION, HSEP_S = HSEP_STEPPING, HSEP_T = HSEP_TERMINATED };
 
 /* Make an instance of what is filled in of it: words, memory functions, hand, logger and environment. On refusal return
- * NULL and log why. token: what must be that of modelDescription.xml; resources as hsep_instance_open takes them. */
+ * NULL and log why. token: what must be that of modelDescription.xml; resources as hsep_open takes them. */
 HSEP_API hsep_component *hsep_component_new(
     const hsep_component *filled, const char *name, const char *token, const char *resources, int logging_on);
 

@@ -2,16 +2,8 @@
 
 #include "hsep_check.h"
 #include "hsep_table.h"
-#include "hsep_table_file.h"
-#include "hsep_uri.h"
 
 #include <string.h>
-
-#ifdef _WIN32
-enum { INSTANCE_WINDOWS = 1 };
-#else
-enum { INSTANCE_WINDOWS = 0 };
-#endif
 
 /* Share of a step by which rounding may end the last step before the stop time. */
 static const double instance_stop_tolerance = 1e-6;
@@ -34,66 +26,6 @@ HSEP_API void hsep_instance_drop_state(hsep_instance *instance)
     hsep_delete(instance, instance->state);
     instance->state = NULL;
     instance->state_size = 0;
-}
-
-/* Take the folder of a URI or path, or NULL. HSEP_WARNED: it is none. */
-static hsep_status instance_folder(hsep_instance *instance, const char *uri, char message[])
-{
-    const hsep_words *words = instance->words;
-    if (uri == NULL) {
-        return HSEP_OK;
-    }
-    instance->resources = hsep_new(instance, HSEP_FOLDER_SIZE(strlen(uri)));
-    if (instance->resources == NULL) {
-        return hsep_message_add(message, "%s: no memory for the path of the resources", words->instantiate);
-    }
-    if (hsep_uri_folder(uri, INSTANCE_WINDOWS, instance->resources)) {
-        return HSEP_OK;
-    }
-    hsep_message_add(
-        message, "%s: %s must be %s on this machine, got %.300s; it is not used", words->instantiate, words->location,
-        words->location_form, uri);
-    hsep_delete(instance, instance->resources);
-    instance->resources = NULL;
-    return HSEP_WARNED;
-}
-
-/* Take the table from the resources if the header has none. */
-static hsep_status instance_table(hsep_instance *instance, char message[])
-{
-#ifdef HSEP_TABLE_IN_RESOURCES
-    return hsep_table_file_open(instance, message);
-#else
-    (void)message;
-    instance->context = hsep_table;
-    return HSEP_OK;
-#endif
-}
-
-HSEP_API hsep_status
-hsep_instance_open(hsep_instance *instance, const char *name, const char *resources, char message[])
-{
-    const char *call = instance->words->instantiate;
-    instance->name = hsep_new(instance, strlen(name) + 1);
-    if (instance->name == NULL) {
-        return hsep_message_add(message, "%s: no memory for the instance's name", call);
-    }
-    (void)strcpy(instance->name, name);
-    const hsep_status folder = instance_folder(instance, resources, message);
-    if (folder == HSEP_REFUSED) {
-        return HSEP_REFUSED;
-    }
-    const hsep_status table = instance_table(instance, message);
-    if (table == HSEP_REFUSED) {
-        return HSEP_REFUSED;
-    }
-    instance->context.resources = instance->resources;
-    instance->values = hsep_new(instance, hsep_instance_n_values(instance) * sizeof(double));
-    if (instance->values == NULL) {
-        return hsep_message_add(
-            message, "%s: no memory for %lu values", call, (unsigned long)hsep_instance_n_values(instance));
-    }
-    return table == HSEP_WARNED ? table : folder;
 }
 
 HSEP_API size_t hsep_instance_n_values(const hsep_instance *instance)

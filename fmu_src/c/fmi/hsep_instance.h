@@ -56,12 +56,6 @@ HSEP_API void hsep_delete(const hsep_instance *instance, void *block);
 /* Forget the model's state. */
 HSEP_API void hsep_instance_drop_state(hsep_instance *instance);
 
-/* Keep name and resources, a URI, a path or NULL, and take the table of the FMU's variables: from the header, or from
- * the resources (hsep_table_file.h), which then are those beside the library where the location leads to none. Fails if
- * there is no memory, or no table; HSEP_WARNED: the location is not used. */
-HSEP_API hsep_status
-hsep_instance_open(hsep_instance *instance, const char *name, const char *resources, char message[]);
-
 /* Number of values, the time derivatives of inputs included. */
 HSEP_API size_t hsep_instance_n_values(const hsep_instance *instance);
 

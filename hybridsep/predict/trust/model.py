@@ -17,22 +17,19 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.saved import Saved
 from ...base.settings import PredictorSettings
 from ...base.signals import Array
 from ...model.discrete import DiscreteModel
 from ..forecast import FeatureScales
 from ..regression import RidgeRegression
-from ..residual_model import ResidualModel, SavedFields, WindowInputs
+from ..residual_model import ResidualModel, WindowInputs
 from .command import CommandFeatures
 from .constants import CONSTANTS, TrustConstants
 from .disturbances import LEAST_VELOCITY, Disturbance, StaticFeatures, StaticState
 from .experts import Evidence, EvidenceOfRuns, Expert, ExpertPrediction, ResidualScale, SolvedExpert, lags
 from .forecast import TrustedForecast
 from .guard import SensorGuard
-from .learned import learned_numbers, restore_learned, unsound
 from .rest import RestBefore
-from .saved import check_sizes, forecast_fields, restore_trusted, saved_scales, trusted_fields
 from .stack import Stack
 
 __all__ = ["COMMAND", "DOUBTING", "HOLD", "LAGGED", "STATIC", "RunState", "TrustedModel"]
@@ -68,6 +65,8 @@ class RunState(NamedTuple):
 
 class TrustedModel(ResidualModel[TrustedForecast]):
     """Model of the residual ``e_pb``, learned online; it stays the physics model where it does not know better.
+
+    :class:`~hybridsep.predict.trust.saved.SavedTrustedModel` adds its saved state.
 
     Parameters
     ----------
@@ -387,42 +386,6 @@ class TrustedModel(ResidualModel[TrustedForecast]):
     def doubted(self, x_pb: Array) -> Array | None:
         """Return the residual if the rejected measurement before the window is true, ``(n,)``, m; None if none was."""
         return self.guard.doubted(x_pb, self.scale.largest)
-
-    @staticmethod
-    def check_sizes(saved: Saved, settings: PredictorSettings) -> None:
-        """Raise StateError if arrays do not have the sizes of the settings."""
-        check_sizes(saved, settings)
-
-    def saved(self) -> SavedFields:
-        """Return the complete state."""
-        return trusted_fields(self)
-
-    def restore(self, saved: Saved) -> None:
-        """Restore the state of :meth:`saved`; StateError if it is inconsistent: the model must not be used then."""
-        restore_trusted(self, saved)
-
-    def saved_forecast(self, forecast: TrustedForecast) -> SavedFields:
-        """Return the scales of a forecast, which a compensator has from its preview."""
-        return forecast_fields(forecast.scales)
-
-    def restored_forecast(self, saved: Saved, window: WindowInputs) -> TrustedForecast:
-        """Return the forecast of :meth:`saved_forecast`; StateError if it is inconsistent."""
-        forecast = self.forecast(window, saved_scales(saved, self.static.n))
-        if not np.isfinite(forecast.e_h).all():
-            raise saved.error("the prediction of the pending window must be finite")
-        return forecast
-
-    def learned(self) -> dict[str, Array]:
-        """Return what has been learned besides the regression, in the order of a weights file."""
-        return learned_numbers(self)
-
-    def is_sound(self, learned: Mapping[str, Array]) -> bool:
-        """Return whether the numbers of :meth:`learned` are finite and in range."""
-        return unsound(self, learned) is None
-
-    def restore_learned(self, learned: Mapping[str, Array]) -> None:
-        """Restore the numbers of :meth:`learned`, which are sound."""
-        restore_learned(self, learned)
 
 
 def _bridged(last: float, measured: Array, accepted: NDArray[np.bool_]) -> Array:

@@ -1,99 +1,180 @@
-"""Saved state of the residual model with trust: what it has learned, and the state of its run."""
+"""Residual model with trust and its saved state: what it has learned, and the state of its run."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 import numpy as np
 
 from ...base.saved import COUNT_MAX, Saved
 from ...base.settings import PredictorSettings
+from ...base.signals import Array
 from ...base.state import pack, unpack
 from ..forecast import FeatureScales
-from ..residual_model import SavedFields
+from ..residual_model import SavedFields, WindowInputs
 from .disturbances import LEAST_VELOCITY, StaticState
-from .experts import Evidence
+from .experts import Evidence, ResidualScale
+from .forecast import TrustedForecast
 from .guard import N_STATE
-from .learned import learned_numbers, restore_learned, unsound
+from .learned import LEARNED
+from .model import TrustedModel
 from .rest import N_REST
 
-if TYPE_CHECKING:
-    from .model import TrustedModel
-
-__all__ = ["check_sizes", "forecast_fields", "restore_trusted", "saved_scales", "trusted_fields"]
+__all__ = ["SavedTrustedModel"]
 
 _KIND = "trusted model"
 
-
-def trusted_fields(model: TrustedModel) -> SavedFields:
-    """Return the complete state; arrays of zeros confirm the numbers of lags before the model is made."""
-    lags = {"x_pb": np.zeros(model.settings.q), "e_pb": np.zeros(model.settings.p)}
-    return SavedFields({}, lags, {"trusted": _blob(model)})
+_ROUNDING = 1e-6
+"""What rounding may have added to the sum of the weights."""
 
 
-def check_sizes(saved: Saved, settings: PredictorSettings) -> None:
-    """Raise StateError if the arrays of :func:`trusted_fields` do not have the sizes of the settings."""
-    saved.array("x_pb", settings.q), saved.array("e_pb", settings.p)
-    own = _own(saved)
-    size = len(own.array("factor", None, None))
-    if size <= settings.p:
-        raise own.error(f"factor must have more than p = {settings.p} rows, got {size}")
+class SavedTrustedModel(TrustedModel):
+    """:class:`TrustedModel` that can be saved and restored."""
 
+    @staticmethod
+    def check_sizes(saved: Saved, settings: PredictorSettings) -> None:
+        """Raise StateError if arrays do not have the sizes of the settings."""
+        saved.array("x_pb", settings.q), saved.array("e_pb", settings.p)
+        own = _own(saved)
+        size = len(own.array("factor", None, None))
+        if size <= settings.p:
+            raise own.error(f"factor must have more than p = {settings.p} rows, got {size}")
 
-def forecast_fields(scales: FeatureScales) -> SavedFields:
-    """Return the fields of the scales of a pending window."""
-    arrays = {"pending_scales": np.array([scales.velocity, scales.step, *scales.largest])}
-    return SavedFields({"pending_rest": scales.n_rest}, arrays, {})
+    def saved(self) -> SavedFields:
+        """Return the complete state; arrays of zeros confirm the numbers of lags before the model is made."""
+        lags = {"x_pb": np.zeros(self.settings.q), "e_pb": np.zeros(self.settings.p)}
+        return SavedFields({}, lags, {"trusted": self._blob()})
 
+    def _blob(self) -> bytes:
+        run, static = self.run, self.run.static
+        meta: dict[str, float] = {
+            "n_samples": max(
+                self.evidence.this.regression.n_samples, self.evidence_of_command.this.regression.n_samples
+            ),
+            "n_rejected": self.n_rejected,
+            "look_ahead": self.preview + self.settings.measurement_delay,
+        }
+        arrays = {
+            **self.learned(),
+            "n_rows": np.array([self.evidence.this.n_rows, self.evidence_of_command.this.n_rows]),
+            "factor": self.evidence.this.regression.factor,
+            "factor_of_command": self.evidence_of_command.this.regression.factor,
+            "filters": static.filters,
+            "filtered": static.filtered,
+            "x_d": np.array([static.x_d]),
+            "last_x_pb": static.x_pb,
+            "commands": run.commands,
+            "past": run.past,
+            "past_of_command": run.past_of_command,
+            "bridged": run.bridged.astype(np.float64),
+            "guard": np.array(self.guard.state()),
+            "rest": np.array(self.rest.state()),
+        }
+        for name, evidence in (("", self.evidence), ("_of_command", self.evidence_of_command)):
+            if evidence.earlier is not None:
+                arrays[f"earlier{name}"] = evidence.earlier.regression.factor
+                meta[f"n_earlier{name}"] = evidence.earlier.n_rows
+        return pack(_KIND, meta, arrays)
 
-def saved_scales(saved: Saved, n_static: int) -> FeatureScales:
-    """Return the scales of :func:`forecast_fields`, with ``n_static`` features; StateError if one is negative."""
-    velocity, step, *largest = saved.array("pending_scales", 2 + n_static).tolist()
-    if min(velocity, step, *largest) < 0.0:
-        raise saved.error("the scales of the pending window must be ≥ 0")
-    return FeatureScales(velocity, np.array(largest), step, saved.whole("pending_rest"))
+    def restore(self, saved: Saved) -> None:
+        """Restore the state of :meth:`saved`; StateError if it is inconsistent: the model must not be used then."""
+        saved = _own(saved)
+        n_samples = saved.whole("n_samples")
+        self.plan_ahead(saved.whole("look_ahead") - self.settings.measurement_delay)
+        learned = {name: saved.array(name, *one.shape, finite=False) for name, one in self.learned().items()}
+        if (problem := self._unsound(learned)) is not None:
+            raise saved.error(problem)
+        if learned["n_rows"].max() > n_samples:
+            raise saved.error("n_rows must be at most n_samples")
+        if 0.0 < learned["motion"][0] < LEAST_VELOCITY:
+            raise saved.error("the velocity scale must be a velocity, or 0")
+        self.restore_learned(learned)
+        with saved.consistent():
+            self.evidence.this.regression.restore(saved.array("factor", None, None), n_samples)
+            self.evidence_of_command.this.regression.restore(saved.array("factor_of_command", None, None), n_samples)
+        self.evidence.earlier = _earlier(saved, "", self.evidence.n_features)
+        self.evidence_of_command.earlier = _earlier(saved, "_of_command", self.evidence_of_command.n_features)
+        run, n = self.run, self.static.n_disturbances
+        static = StaticState(
+            saved.array("filters", self.static.discrete.n_state, n),
+            saved.array("filtered", n),
+            float(saved.array("x_d", 1)[0]),
+            saved.array("last_x_pb", len(run.static.x_pb)),
+        )
+        self.run = run._replace(
+            static=static,
+            **{name: saved.array(name, len(getattr(run, name))) for name in ("commands", "past", "past_of_command")},
+            bridged=saved.array("bridged", len(run.bridged)) > 0.0,
+        )
+        self.n_rejected = saved.whole("n_rejected")
+        with saved.consistent():
+            self.guard.restore(saved.array("guard", N_STATE, finite=False))
+            self.rest.restore(saved.array("rest", N_REST))
 
+    def saved_forecast(self, forecast: TrustedForecast) -> SavedFields:
+        """Return the scales of a forecast, which a compensator has from its preview."""
+        scales = forecast.scales
+        arrays = {"pending_scales": np.array([scales.velocity, scales.step, *scales.largest])}
+        return SavedFields({"pending_rest": scales.n_rest}, arrays, {})
 
-def restore_trusted(model: TrustedModel, predictor: Saved) -> None:
-    """Restore the state of :func:`trusted_fields`, among a predictor's, in a model with the same settings.
+    def restored_forecast(self, saved: Saved, window: WindowInputs) -> TrustedForecast:
+        """Return the forecast of :meth:`saved_forecast`; StateError if it is inconsistent."""
+        velocity, step, *largest = saved.array("pending_scales", 2 + self.static.n).tolist()
+        if min(velocity, step, *largest) < 0.0:
+            raise saved.error("the scales of the pending window must be ≥ 0")
+        scales = FeatureScales(velocity, np.array(largest), step, saved.whole("pending_rest"))
+        forecast = self.forecast(window, scales)
+        if not np.isfinite(forecast.e_h).all():
+            raise saved.error("the prediction of the pending window must be finite")
+        return forecast
 
-    Raises
-    ------
-    StateError
-        If a field is missing or inconsistent; the model must not be used then.
-    """
-    saved = _own(predictor)
-    n_samples = saved.whole("n_samples")
-    model.plan_ahead(saved.whole("look_ahead") - model.settings.measurement_delay)
-    learned = {name: saved.array(name, *one.shape, finite=False) for name, one in learned_numbers(model).items()}
-    if (problem := unsound(model, learned)) is not None:
-        raise saved.error(problem)
-    if learned["n_rows"].max() > n_samples:
-        raise saved.error("n_rows must be at most n_samples")
-    if 0.0 < learned["motion"][0] < LEAST_VELOCITY:
-        raise saved.error("the velocity scale must be a velocity, or 0")
-    restore_learned(model, learned)
-    with saved.consistent():
-        model.evidence.this.regression.restore(saved.array("factor", None, None), n_samples)
-        model.evidence_of_command.this.regression.restore(saved.array("factor_of_command", None, None), n_samples)
-    model.evidence.earlier = _earlier(saved, "", model.evidence.n_features)
-    model.evidence_of_command.earlier = _earlier(saved, "_of_command", model.evidence_of_command.n_features)
-    run, n = model.run, model.static.n_disturbances
-    static = StaticState(
-        saved.array("filters", model.static.discrete.n_state, n),
-        saved.array("filtered", n),
-        float(saved.array("x_d", 1)[0]),
-        saved.array("last_x_pb", len(run.static.x_pb)),
-    )
-    model.run = run._replace(
-        static=static,
-        **{name: saved.array(name, len(getattr(run, name))) for name in ("commands", "past", "past_of_command")},
-        bridged=saved.array("bridged", len(run.bridged)) > 0.0,
-    )
-    model.n_rejected = saved.whole("n_rejected")
-    with saved.consistent():
-        model.guard.restore(saved.array("guard", N_STATE, finite=False))
-        model.rest.restore(saved.array("rest", N_REST))
+    def learned(self) -> dict[str, Array]:
+        """Return what has been learned besides the regression, in the order of :data:`LEARNED`."""
+        stack, experts = self.stack, self.experts.values()
+        return {
+            "n_rows": np.array([one.all().n_rows for one in (self.evidence, self.evidence_of_command)]),
+            "motion": np.array([self.velocity_scale, self.largest_step]),
+            "scale": np.array(self.scale),
+            "scale_of_command": np.array(self.scale_of_command),
+            "noise_variances": np.array([expert.noise_variance for expert in experts]),
+            "correlations": np.array([expert.correlation for expert in experts]),
+            "largest": self.largest,
+            "weights": stack.weights,
+            "gram": stack.gram,
+            "cross": stack.cross,
+            "evidence": stack.evidence,
+            "sensor": self.guard.learned(),
+        }
+
+    def is_sound(self, learned: Mapping[str, Array]) -> bool:
+        """Return whether the numbers of :meth:`learned` are finite and in range."""
+        return self._unsound(learned) is None
+
+    def _unsound(self, learned: Mapping[str, Array]) -> str | None:
+        """Return what is wrong with numbers of :meth:`learned`; None if they are sound."""
+        for name, (least, most) in LEARNED.items():
+            if not ((learned[name] >= least) & (learned[name] <= most)).all():  # NaN too
+                return f"{name} must be {least:g} … {most:g}"
+        if not self.guard.is_sound(learned["sensor"]):
+            return "sensor must be a spread, a step and motions"
+        if learned["weights"].sum() > 1.0 + _ROUNDING:
+            return "the sum of weights must be at most 1"
+        return None
+
+    def restore_learned(self, learned: Mapping[str, Array]) -> None:
+        """Restore the numbers of :meth:`learned`, which are sound."""
+        self.evidence.this.n_rows, self.evidence_of_command.this.n_rows = learned["n_rows"].tolist()
+        self.velocity_scale, self.largest_step = learned["motion"].tolist()
+        self.scale = ResidualScale(*learned["scale"].tolist())
+        self.scale_of_command = ResidualScale(*learned["scale_of_command"].tolist())
+        for expert, noise, correlation in zip(
+            self.experts.values(), learned["noise_variances"].tolist(), learned["correlations"].tolist(), strict=True
+        ):
+            expert.noise_variance, expert.correlation = noise, correlation
+        self.largest, stack = learned["largest"], self.stack
+        stack.weights, stack.gram, stack.cross = learned["weights"], learned["gram"], learned["cross"]
+        stack.evidence = learned["evidence"]
+        self.guard.restore_learned(learned["sensor"])
 
 
 def _earlier(saved: Saved, name: str, n_features: int) -> Evidence | None:
@@ -108,36 +189,6 @@ def _earlier(saved: Saved, name: str, n_features: int) -> Evidence | None:
         evidence.regression.restore(saved.array(f"earlier{name}", None, None), 0)
     evidence.n_rows = n_rows
     return evidence
-
-
-def _blob(model: TrustedModel) -> bytes:
-    run, static = model.run, model.run.static
-    meta: dict[str, float] = {
-        "n_samples": max(model.evidence.this.regression.n_samples, model.evidence_of_command.this.regression.n_samples),
-        "n_rejected": model.n_rejected,
-        "look_ahead": model.preview + model.settings.measurement_delay,
-    }
-    arrays = {
-        **learned_numbers(model),
-        "n_rows": np.array([model.evidence.this.n_rows, model.evidence_of_command.this.n_rows]),
-        "factor": model.evidence.this.regression.factor,
-        "factor_of_command": model.evidence_of_command.this.regression.factor,
-        "filters": static.filters,
-        "filtered": static.filtered,
-        "x_d": np.array([static.x_d]),
-        "last_x_pb": static.x_pb,
-        "commands": run.commands,
-        "past": run.past,
-        "past_of_command": run.past_of_command,
-        "bridged": run.bridged.astype(np.float64),
-        "guard": np.array(model.guard.state()),
-        "rest": np.array(model.rest.state()),
-    }
-    for name, evidence in (("", model.evidence), ("_of_command", model.evidence_of_command)):
-        if evidence.earlier is not None:
-            arrays[f"earlier{name}"] = evidence.earlier.regression.factor
-            meta[f"n_earlier{name}"] = evidence.earlier.n_rows
-    return pack(_KIND, meta, arrays)
 
 
 def _own(saved: Saved) -> Saved:

@@ -4,7 +4,7 @@
 #define HSEP_CONSTRAINTS_H
 
 #include "hsep_api.h"
-#include "hsep_planner.h"
+#include "hsep_plan.h"
 
 #include <stdint.h>
 

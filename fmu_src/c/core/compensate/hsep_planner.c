@@ -9,11 +9,6 @@
 
 static const double planner_ridge = 1e-12; /* on the diagonal, relative to its largest entry */
 
-HSEP_API const hsep_splines *hsep_planner_splines(const hsep_planner *self)
-{
-    return (const hsep_splines *)hsep_at_const(self, self->splines);
-}
-
 static hsep_interior *planner_interior(hsep_planner *self) { return (hsep_interior *)hsep_at(self, self->interior); }
 
 /* Set what follows from the parameters; return the bytes of the block. */
@@ -71,12 +66,6 @@ HSEP_API uint64_t hsep_planner_pinned(const hsep_planner *self)
 HSEP_API double hsep_planner_decided(const hsep_planner *self, uint64_t k)
 {
     return hsep_splines_sum(hsep_planner_splines(self), hsep_at_const(self, self->c), HSEP_DECIDED, k);
-}
-
-HSEP_API double hsep_planner_delta(const hsep_planner *self, uint64_t k)
-{
-    const hsep_splines *splines = hsep_planner_splines(self);
-    return hsep_splines_sum(splines, hsep_at_const(self, self->c), HSEP_DECIDED + splines->n, k);
 }
 
 /* The third differences of what is decided of delta. */

@@ -13,7 +13,7 @@
 
 #include "hsep_api.h"
 #include "hsep_interior.h"
-#include "hsep_layout.h"
+#include "hsep_plan.h"
 #include "hsep_splines.h"
 
 #include <stdint.h>
@@ -39,24 +39,6 @@ typedef enum {
     HSEP_PLAN_BOUNDED /* hsep_planner_step is to be called until it returns 1 */
 } hsep_plan_status;
 
-typedef struct {
-    uint64_t Np;
-    uint64_t n_pinned; /* splines of a bounded plan that stay as they were */
-    uint64_t no_reversal;
-    double jerk_weight;
-    double delta_before[3], x_d_before[3]; /* m, of the samples before the plan */
-    /* Offsets in doubles from the beginning of the struct */
-    uint64_t c;      /* (3 + n,) m, coefficients */
-    uint64_t total;  /* (4 preview,) rows of x_dm under the rest of the last plan, in shares */
-    uint64_t moves;  /* (preview,) which way x_d moves: -1, 0, 1; 0 where that does not matter */
-    uint64_t third;  /* (preview,) m, third differences of what is decided */
-    uint64_t P;      /* triangle of n rows */
-    uint64_t factor; /* triangle of n rows */
-    uint64_t splines, interior;
-} hsep_planner;
-
-HSEP_ASSERT_WORDS(hsep_planner, 18);
-
 /* Bytes of the block, counted in double so that no size can overflow. */
 HSEP_API double hsep_planner_size(const hsep_planner_parameters *parameters);
 
@@ -65,9 +47,6 @@ HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameter
 
 /* Whether a block, in any alignment, is one that hsep_planner_init with these parameters began. */
 HSEP_API int hsep_planner_valid(const void *block, const hsep_planner_parameters *parameters);
-
-/* The splines of a plan; hsep_splines_shape is to be filtered. */
-HSEP_API const hsep_splines *hsep_planner_splines(const hsep_planner *self);
 
 /* How many samples a bounded plan leaves as they are, the time there is for its steps; and the steps it may need. */
 HSEP_API uint64_t hsep_planner_pinned(const hsep_planner *self);
@@ -105,9 +84,6 @@ HSEP_API int hsep_planner_step(hsep_planner *self);
 
 /* Steps that the last bounded plan took. */
 HSEP_API uint64_t hsep_planner_steps(const hsep_planner *self);
-
-/* delta at sample k of the plan, m; of a bounded one that is not solved yet, at its first hsep_planner_pinned. */
-HSEP_API double hsep_planner_delta(const hsep_planner *self, uint64_t k);
 
 /* Move on by a window with the commanded positions x_d, (Np,), m. */
 HSEP_API void hsep_planner_next(hsep_planner *self, const double x_d[]);

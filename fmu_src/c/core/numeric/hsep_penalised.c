@@ -21,9 +21,9 @@ static void penalised_copy_leading(const hsep_regression *self, hsep_regression 
         tile += HSEP_TILE_STRIDE * (kept - I);
     }
     for (uint64_t i = 0; i < n; i++) {
-        *hsep_tile_entry(to, i, n) = *hsep_tile_entry_const(self, i, self->n);
+        *hsep_regression_entry(to, i, n) = *hsep_regression_entry_const(self, i, self->n);
         for (uint64_t j = n + 1; j < HSEP_TILE * kept; j++) {
-            *hsep_tile_entry(to, i, j) = 0.0;
+            *hsep_regression_entry(to, i, j) = 0.0;
         }
     }
 }
@@ -57,7 +57,7 @@ HSEP_API void hsep_penalised_add(hsep_regression *self, const hsep_regression *o
         double *row = hsep_block_fold_row(work, other->n, i);
         row[i] = scale;
         for (uint64_t j = i + 1; j <= other->n; j++) {
-            row[j] = scale * *hsep_tile_entry_const(other, i, j);
+            row[j] = scale * *hsep_regression_entry_const(other, i, j);
         }
     }
     hsep_block_fold(self, work, other->n, 1, penalised_is_wide(other->n));
@@ -80,7 +80,7 @@ HSEP_API double hsep_penalised_solve(
     memcpy(padded, w, (size_t)m * sizeof(double));
     penalised_multiply(self, padded, product);
     for (uint64_t i = 0; i < n; i++) { /* [R z; 0 rho] [-w; 1], row after row */
-        const double residual = *hsep_tile_entry_const(self, i, n) - product[i];
+        const double residual = *hsep_regression_entry_const(self, i, n) - product[i];
         sum += residual * residual / inverse_d[i];
     }
     return sum;

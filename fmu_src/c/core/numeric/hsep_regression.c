@@ -41,7 +41,7 @@ HSEP_API void hsep_regression_init(hsep_regression *self, uint64_t n, double lam
     (void)regression_lay_out(self, n);
     for (uint64_t i = 0; i < n; i++) {
         hsep_at(self, self->inverse_d)[i] = 1.0 / (lambda < regression_lambda_min ? regression_lambda_min : lambda);
-        *hsep_tile_entry(self, i, i) = 1.0;
+        *hsep_regression_entry(self, i, i) = 1.0;
     }
 }
 
@@ -223,7 +223,7 @@ HSEP_API int hsep_regression_load(hsep_regression *self, uint64_t i)
     }
     hsep_at(self, self->inverse_d)[i] = 1.0 / fmax(row[0] * row[0], regression_lambda_min);
     for (uint64_t j = i + 1; j <= n; j++) {
-        double *entry = hsep_tile_entry(self, i, j);
+        double *entry = hsep_regression_entry(self, i, j);
         entry[0] = row[j - i] / row[0]; /* U = D^(-1/2) R, and z alike */
         entry[HSEP_TILE_ENTRIES] = 0.0;
     }

@@ -15,6 +15,7 @@
 
 #include "hsep_api.h"
 #include "hsep_layout.h"
+#include "hsep_tiles.h"
 
 #include <stdint.h>
 
@@ -59,5 +60,16 @@ HSEP_API void hsep_regression_discount(hsep_regression *self, double weight);
  * hsep_regression_row. All n + 1 rows make a factor. Fails, and returns 0 with the factor unchanged, if an entry
  * is not finite or a diagonal entry of R is 0. Cost: n divisions. */
 HSEP_API int hsep_regression_load(hsep_regression *self, uint64_t i);
+
+/* Entry (i, j), i <= j, of [U z]. */
+static inline const double *hsep_regression_entry_const(const hsep_regression *self, uint64_t i, uint64_t j)
+{
+    return hsep_at_const(self, self->tiles) + hsep_tile_place(self->n_tiles, i, j);
+}
+
+static inline double *hsep_regression_entry(hsep_regression *self, uint64_t i, uint64_t j)
+{
+    return hsep_at(self, self->tiles) + hsep_tile_place(self->n_tiles, i, j);
+}
 
 #endif

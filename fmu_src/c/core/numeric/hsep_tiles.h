@@ -8,31 +8,18 @@
 #ifndef HSEP_TILES_H
 #define HSEP_TILES_H
 
-#include "hsep_layout.h"
-#include "hsep_regression.h"
-
 #include <stdint.h>
 
 #define HSEP_TILE 4
 #define HSEP_TILE_ENTRIES 16 /* of a tile */
 #define HSEP_TILE_STRIDE 32  /* doubles from tile to tile: the entries, then their carries */
 
-/* Place of entry (i, j), i <= j, of [U z] in the tiles. */
-static inline uint64_t hsep_tile_place(const hsep_regression *self, uint64_t i, uint64_t j)
+/* Place of entry (i, j), i <= j, of [U z] in tiles for 4 n_tiles columns. */
+static inline uint64_t hsep_tile_place(uint64_t n_tiles, uint64_t i, uint64_t j)
 {
     const uint64_t I = i / HSEP_TILE, J = j / HSEP_TILE;
-    const uint64_t tile = I * self->n_tiles - I * (I + 1) / 2 + J; /* (n_tiles - I') tiles in each row above */
+    const uint64_t tile = I * n_tiles - I * (I + 1) / 2 + J; /* (n_tiles - I') tiles in each row above */
     return HSEP_TILE_STRIDE * tile + 4 * (i % HSEP_TILE) + j % HSEP_TILE;
-}
-
-static inline const double *hsep_tile_entry_const(const hsep_regression *self, uint64_t i, uint64_t j)
-{
-    return hsep_at_const(self, self->tiles) + hsep_tile_place(self, i, j);
-}
-
-static inline double *hsep_tile_entry(hsep_regression *self, uint64_t i, uint64_t j)
-{
-    return hsep_at(self, self->tiles) + hsep_tile_place(self, i, j);
 }
 
 #endif
