@@ -1,5 +1,7 @@
 #include "hsep_opening.h"
 
+#include "hsep_check.h"
+#include "hsep_table.h"
 #include "hsep_table_file.h"
 #include "hsep_uri.h"
 
