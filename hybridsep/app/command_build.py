@@ -10,7 +10,7 @@ import typer
 from ..fmi.compiler import TARGET_NAMES
 from ..fmi.flavours import FLAVOURS, FMI_VERSIONS
 from .failures import errors_console
-from .options import FlavourOption, ForceOption, JsonOption, TsOption, UnitOption, WeightsOption
+from .options import FlavourOption, FmiOption, ForceOption, JsonOption, TsOption, UnitOption, WeightsOption
 
 __all__ = ["build"]
 
@@ -24,9 +24,7 @@ def build(
         typer.Option("--machine", "-m", help="Machine file (.toml) or name; may be repeated; all if left out."),
     ] = None,
     flavour: FlavourOption = FLAVOURS[0],
-    fmi: Annotated[
-        str, typer.Option(help="Version of FMI, 2 or 3, or both; FMUs of FMI 3.0 are native, their names have Fmi3.")
-    ] = FMI_VERSIONS[0],
+    fmi: FmiOption = FMI_VERSIONS[0],
     target: Annotated[
         list[str] | None,
         typer.Option(help=f"Platform of a native FMU, may be repeated: {', '.join(TARGET_NAMES)}. All if left out."),

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from ..fmi.flavours import FLAVOURS
-from .options import ForceOption, JsonOption
+from ..fmi.flavours import FLAVOURS, FMI_VERSIONS
+from .options import FmiOption, ForceOption, JsonOption
 
 __all__ = ["demo"]
 
@@ -21,6 +21,7 @@ def demo(
         str | None,
         typer.Option(help=f"Flavour of the FMUs: {', '.join(FLAVOURS)}; native where their libraries are there."),
     ] = None,
+    fmi: FmiOption = FMI_VERSIONS[0],
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -38,14 +39,14 @@ def demo(
     from .tables import console, print_compensation, print_json, print_predictions
 
     flavour = flavour or default_flavour()
-    files = demo_files(out, flavour, emps=emps is not None)
+    files = demo_files(out, flavour, emps=emps is not None, fmi=fmi)
     check_outputs((Output("--out", path, BY_ENDING[path.suffix]) for path in files), {"recording": emps}, force=force)
     if emps is not None:
         read_recorded(emps)  # a refusal comes before any announcement
     if not as_json:
         show([f"this takes {processor_time(seeds, flavour)} of processor time"], ())
     with progress_bar(as_json) as advance:
-        summary = run_demo(out, emps=emps, seeds=seeds, flavour=flavour, progress=advance)
+        summary = run_demo(out, emps=emps, seeds=seeds, flavour=flavour, fmi=fmi, progress=advance)
     if as_json:
         print_json(summary)
         return

@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..base.settings import DRIVE_LIMIT_ENTRIES
+from ..fmi.flavours import FMI_VERSIONS
 from .options import (
     KNOWN_ENTRIES,
     FigurePagesOption,
+    FmiOption,
     ForceOption,
     JsonOption,
     ReadingOptions,
@@ -49,13 +51,15 @@ def fit(
     fix: Annotated[
         bool, typer.Option("--fix", help="Apply what puts a finding of the checks right, and go on.")
     ] = False,
+    fmi: FmiOption = FMI_VERSIONS[0],
     figure: FigurePagesOption = None,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """From the log of an axis to its model, FMUs and a report."""
     from ..fit.compensation import drive_limits
-    from ..fit.fit import FitOptions, fit_files
+    from ..fit.files import fit_files
+    from ..fit.fit import FitOptions
     from ..fit.fit import fit as fit_logs
     from ..fit.report import fit_report, judged_by
     from ..intake.finding import findings_table
@@ -71,7 +75,7 @@ def fit(
     name = checked_name(name) if name else machine_name(logs[0], reading.axis)
     folder = out or Path(name)
     limits = drive_limits(parameters)
-    files = fit_files(folder, name, compensator=bool(limits))
+    files = fit_files(folder, name, compensator=bool(limits), fmi=fmi)
     known = {entry: parameters[entry] for entry in KNOWN_ENTRIES if entry in parameters}
     inputs: dict[str, str | Path | None] = {f"log {path.name}": path for path in logs}
     check_ending(figure, "--figure", (".pdf",))
@@ -94,9 +98,8 @@ def fit(
         show((f"{log.path.name}: {remark}" for remark in log.remarks), ())
     used, findings = take_in(found, fix=fix)
     with progress_bar(as_json) as advance:
-        result = fit_logs(
-            used, folder, FitOptions(Np, name, known=known, drive_limits=limits), advance, changes=changes(findings)
-        )
+        options = FitOptions(Np, name, known=known, drive_limits=limits)
+        result = fit_logs(used, folder, options, advance, changes=changes(findings), fmi=fmi)
         fit_report(result, used, findings).write(files["report"], figure)
     advice = recommendation(judged_by(result, used[0].shown))
     if as_json:

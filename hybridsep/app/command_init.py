@@ -10,6 +10,7 @@ import typer
 
 from ..base.errors import ParameterError
 from ..base.output import written_text
+from ..fmi.flavours import FLAVOURS, FMI_CHOICES, versions_of
 from .options import ForceOption
 
 if TYPE_CHECKING:
@@ -55,18 +56,31 @@ def init(
     dead_time: Annotated[int | None, typer.Option(help="Whole samples of dead time.")] = None,
     hold: Annotated[str | None, typer.Option(help="Command between samples: zoh (held) or foh (interpolated).")] = None,
     Np: Annotated[int | None, typer.Option("--Np", help="Samples in a look-ahead window.")] = None,
+    fmi: Annotated[
+        str | None,
+        typer.Option(
+            help=f"Build the native FMUs too, beside the machine file: version of FMI, {', '.join(FMI_CHOICES)}."
+        ),
+    ] = None,
     force: ForceOption = False,
 ) -> None:
     """Write an annotated machine file, by options or questions.
 
     What no option says is asked.
     """
+    from ..fmi.archive import fmu_name
+    from ..fmi.builds import build_here
+    from ..fmi.libraries import check_available
     from ..identify.model import machine_of
+    from ..machines.machine import load_machine
     from ..machines.seal import sealed
     from ..machines.text import machine_text
     from ..model.physics import ModalModel
-    from .overwrite import MACHINE, Output, check_ending, check_outputs
+    from .overwrite import FMU, MACHINE, Output, check_ending, check_outputs
 
+    versions = () if fmi is None else versions_of(fmi, FLAVOURS[0])
+    if versions:
+        check_available(("host",))
     check_ending(out, "OUT", (".toml",))
     check_outputs([Output("OUT", out, MACHINE)], {}, force=force)
     name = str(_asked("--name", name, "name of the machine", out.stem))
@@ -90,6 +104,9 @@ def init(
         *(hold, T_s, name, f"{name}, by hybridsep init"),
         predictor={"Np": window, "p": min(50, window)},
     )
+    names = [fmu_name("HybridPredictor", machine.name, FLAVOURS[0], version) for version in versions]
+    fmus = [out.with_name(f"{fmu}.fmu") for fmu in names]
+    check_outputs([Output("--fmi", path, FMU) for path in fmus], {}, force=force)
     said = ", ".join(f"{key} = {value}" for key, value in given.items())
     comments = [
         f"Physics model: {model}, {said}. hybridsep identify finds it from a log of the axis.",
@@ -98,6 +115,10 @@ def init(
     with written_text(out) as file:
         file.write(sealed(machine_text(machine, comments, annotated=True), "init"))
     typer.echo(f"{out} written: {model}, {said}")
+    if fmi is not None:
+        build_here(load_machine(out), "HybridPredictor", out.parent, FLAVOURS[0], fmi=fmi)
+    for path in fmus:
+        typer.echo(f"{path} written")
 
 
 def _asked(option: str, value: Any, question: str, default: Any) -> Any:

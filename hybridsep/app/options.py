@@ -17,7 +17,7 @@ import typer
 from ..base.parameters import Parameter
 from ..base.ranges import GRAMMAR
 from ..base.settings import PARAMETERS, CompensatorSettings, PredictorSettings, Settings
-from ..fmi.flavours import FLAVOURS
+from ..fmi.flavours import FLAVOURS, FMI_CHOICES
 
 __all__ = [
     "COMPENSATOR_ENTRIES",
@@ -30,6 +30,7 @@ __all__ = [
     "FigurePagesOption",
     "FixOption",
     "FlavourOption",
+    "FmiOption",
     "ForceOption",
     "JsonOption",
     "ListChannelsOption",
@@ -62,6 +63,10 @@ MachineOption = Annotated[
     str, typer.Option("--machine", "-m", help="Machine file (.toml), or the name of one that comes with the library.")
 ]
 FlavourOption = Annotated[str, typer.Option(help=f"Flavour of the FMUs: {', '.join(FLAVOURS)}.")]
+FmiOption = Annotated[
+    str,
+    typer.Option(help=f"Version of FMI: {', '.join(FMI_CHOICES)}; FMUs of FMI 3.0 are native, their names have Fmi3."),
+]
 TsOption = Annotated[
     float | None, typer.Option("--T_s", "--Ts", help="Sampling interval [s], for a file without a time column.")
 ]

@@ -17,6 +17,7 @@ from ..evaluate.replayed import replayed_run
 from ..evaluate.time_plots import prediction_figure, tracking_figure
 from ..evaluate.verdict import verdict_of
 from ..fmi.builds import build_pair
+from ..fmi.flavours import FMI_VERSIONS
 from ..logs.log import Log, read_log
 from ..machines.machine import load_machine
 from ..machines.paper import PAPER_SETTINGS, paper_machine
@@ -31,11 +32,13 @@ MACHINES = {"staircase": "spring_mass_damper", "spiral_x": "als25010_x", "spiral
 """The machine of each case."""
 
 
-def staircase_case(out: Path, seeds: int, flavour: str, advance: Callable[[str], None]) -> dict[str, Any]:
+def staircase_case(
+    out: Path, seeds: int, flavour: str, advance: Callable[[str], None], fmi: str = FMI_VERSIONS[0]
+) -> dict[str, Any]:
     """Predict and compensate on the staircase."""
     machine = load_machine(MACHINES["staircase"])
     command = staircase(machine.T_s)
-    fmus = build_pair(machine, out / "fmus", flavour)
+    fmus = build_pair(machine, out / "fmus", flavour, fmi)
     runs = []
     for seed in range(seeds):
         advance(f"staircase, FMU against FMU, noise seed {seed}")
@@ -45,7 +48,7 @@ def staircase_case(out: Path, seeds: int, flavour: str, advance: Callable[[str],
     title = "Staircase (cf. the paper's Fig. 4), FMU against FMU, noise seed 0"
     prediction_figure(runs[0], title, out / "staircase.png")
     compensated, compensation = compensate(
-        machine, fmus[1], command, out, flavour, seeds=range(seeds), label="staircase", advance=advance
+        machine, fmus[1], command, out, flavour, fmi, seeds=range(seeds), label="staircase", advance=advance
     )
     compensated["hybrid_warm"].save(out / "staircase_compensated.csv")
     title = "Staircase, compensated: FMU against FMU, noise seed 0"
@@ -60,14 +63,14 @@ def staircase_case(out: Path, seeds: int, flavour: str, advance: Callable[[str],
     }
 
 
-def spiral_case(out: Path, flavour: str, advance: Callable[[str], None]) -> Summary:
+def spiral_case(out: Path, flavour: str, advance: Callable[[str], None], fmi: str = FMI_VERSIONS[0]) -> Summary:
     """Predict and compensate on the spiral, both axes."""
     summary: Summary = {}
     axes: dict[str, Run] = {}
     compensated: dict[str, Runs] = {}
     for axis, command in zip(("x", "y"), spiral(), strict=True):
         machine, label = load_machine(MACHINES[f"spiral_{axis}"]), f"spiral, {axis.upper()} axis"
-        fmus = build_pair(machine, out / "fmus", flavour)
+        fmus = build_pair(machine, out / "fmus", flavour, fmi)
         advance(label)
         values = PAPER_SETTINGS[machine.name]
         axes[axis] = run = cosimulate(*fmus, command, controller_values=values)
@@ -81,7 +84,7 @@ def spiral_case(out: Path, flavour: str, advance: Callable[[str], None]) -> Summ
         title = f"Spiral, {axis.upper()} axis (cf. the paper's Fig. 8), FMU against FMU"
         prediction_figure(run, title, out / f"spiral_{axis}.png")
         compensated[axis], case["compensation"] = compensate(
-            machine, fmus[1], command, out, flavour, label=label, advance=advance
+            machine, fmus[1], command, out, flavour, fmi, label=label, advance=advance
         )
         compensated[axis]["hybrid_warm"].save(out / f"spiral_{axis}_compensated.csv")
         title = f"Spiral, {axis.upper()} axis, compensated: FMU against FMU"

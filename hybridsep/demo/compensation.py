@@ -14,6 +14,7 @@ from ..base.signals import Array
 from ..cosim.loop import cosimulate
 from ..cosim.run import Run
 from ..fmi.builds import build_here
+from ..fmi.flavours import FMI_VERSIONS
 from ..machines.machine import Machine
 from ..plants.encoder import Encoder
 from ..plants.trajectory import archimedean_spiral
@@ -35,6 +36,7 @@ def compensate(
     command: Array,
     out: Path,
     flavour: str,
+    fmi: str = FMI_VERSIONS[0],
     *,
     seeds: Sequence[int] = (0,),
     label: str = "",
@@ -53,6 +55,8 @@ def compensate(
         Folder: the FMU goes to ``fmus``, the trained one to ``fmus/warm``, what it learned from to ``<machine>.state``.
     flavour : {"native", "python"}
         Flavour of the FMU.
+    fmi : str
+        Version of FMI, one of :data:`~hybridsep.fmi.flavours.FMI_CHOICES`.
     seeds : sequence of int
         Noise seeds.
     label : str
@@ -68,10 +72,10 @@ def compensate(
         The same keys → means over the seeds of :meth:`Run.summary`, with the spread
         ``tracking_rms_um_std``.
     """
-    cold = build_here(machine, "SepCompensator", out / "fmus", flavour)
+    cold = build_here(machine, "SepCompensator", out / "fmus", flavour, fmi=fmi)
     weights = out / f"{machine.name}.state"
     train(machine, command, weights)
-    warm = build_here(machine, "SepCompensator", out / "fmus" / "warm", flavour, weights=weights)
+    warm = build_here(machine, "SepCompensator", out / "fmus" / "warm", flavour, weights=weights, fmi=fmi)
     runs: Runs = {}
     summary: dict[str, Any] = {}
     for key, choice in COMPENSATED.items():

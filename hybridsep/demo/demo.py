@@ -9,6 +9,7 @@ from pathlib import Path
 from ..base.output import written_text
 from ..fmi.archive import fmu_names
 from ..fmi.builds import default_flavour
+from ..fmi.flavours import FMI_VERSIONS, versions_of
 from ..machines.machine import load_machine
 from .cases import MACHINES, Summary, read_recorded, recorded_case, spiral_case, staircase_case
 from .compensation import COMPENSATED
@@ -27,8 +28,8 @@ Native took 112 s with one seed and 114 s with ten; Python's FMUs take about ten
 Progress = Callable[[str, float], object]
 
 
-def demo_files(out: str | Path, flavour: str, *, emps: bool) -> list[Path]:
-    """Return all files that :func:`demo` writes, with or without the recorded axis."""
+def demo_files(out: str | Path, flavour: str, *, emps: bool, fmi: str = FMI_VERSIONS[0]) -> list[Path]:
+    """Return all files that :func:`demo` writes, with or without the recorded axis; ParameterError as there."""
     out = Path(out)
     files = [
         out / name for name in ("summary.json", "spiral.png", "spiral_contour.png", *(["emps.png"] if emps else []))
@@ -36,7 +37,8 @@ def demo_files(out: str | Path, flavour: str, *, emps: bool) -> list[Path]:
     for case, name in MACHINES.items():
         files += [out / f"{case}{what}{end}" for what in ("", "_compensated") for end in (".csv", ".png")]
         files.append(out / f"{name}.state")
-        for fmu, model in fmu_names(load_machine(name), flavour).items():
+        names = [fmu_names(load_machine(name), flavour, version) for version in versions_of(fmi, flavour)]
+        for fmu, model in (item for of_version in names for item in of_version.items()):
             if model in ("HybridPredictor", "SepCompensator", "FeedDrive"):
                 files.append(out / "fmus" / f"{fmu}.fmu")
             if model == "SepCompensator":
@@ -57,6 +59,7 @@ def demo(
     emps: str | Path | None = None,
     seeds: int = SEEDS,
     flavour: str | None = None,
+    fmi: str = FMI_VERSIONS[0],
     progress: Progress = lambda message, fraction: None,
 ) -> Summary:
     """Build the FMUs, co-simulate the staircase and the spiral, write figures and ``summary.json``.
@@ -73,6 +76,8 @@ def demo(
         Noise seeds the staircase is averaged over, ≥ 1.
     flavour : {"native", "python"}, optional
         Flavour of the FMUs; native where their libraries are there, if left out.
+    fmi : str
+        Version of FMI, one of :data:`~hybridsep.fmi.flavours.FMI_CHOICES`; of both FMUs are written, and 2.0's are run.
     progress : callable
         Called with a message and the fraction done.
 
@@ -89,8 +94,11 @@ def demo(
     ------
     LogError
         If ``emps`` cannot be read; nothing has been done then.
+    ParameterError
+        If ``fmi`` is another word, or a version that the flavour has not.
     """
     flavour = flavour or default_flavour()
+    versions_of(fmi, flavour)
     recorded = None if emps is None else read_recorded(emps)  # first: a refusal must not come after minutes of work
     out = Path(out)
     out.mkdir(parents=True, exist_ok=True)
@@ -104,8 +112,8 @@ def demo(
 
     advance("build the staircase's FMUs")
     summary: Summary = {
-        "staircase": staircase_case(out, seeds, flavour, advance),
-        **spiral_case(out, flavour, advance),
+        "staircase": staircase_case(out, seeds, flavour, advance, fmi),
+        **spiral_case(out, flavour, advance, fmi),
     }
     if recorded is not None:
         advance("EMPS, a recorded axis")

@@ -14,10 +14,7 @@ from ..base.errors import IdentificationError, ParameterError
 from ..base.metrics import rms_ratio, shown_figure
 from ..base.output import written_text
 from ..base.settings import PredictorSettings
-from ..fmi.archive import fmu_name
-from ..fmi.builds import build_here
-from ..fmi.flavours import FLAVOURS
-from ..fmi.libraries import has_native
+from ..fmi.flavours import FMI_VERSIONS
 from ..identify.model import machine_of
 from ..identify.operation import SAMPLES_MIN, identify_operation, unit_gain_model
 from ..identify.segments import in_time
@@ -32,11 +29,10 @@ from ..tune.choice import choose_settings, settings_for, window_scores
 from ..tune.period import period_hint
 from ..tune.recordings import Recording, Replay, replay, split_log
 from .compensation import COMPENSATE, expected_tracking
+from .files import build_fmus, fit_files
 from .stages import Stages, key_of
 
-__all__ = ["Fit", "FitOptions", "fit", "fit_files"]
-
-_MODEL, _COMPENSATOR = "HybridPredictor", "SepCompensator"
+__all__ = ["Fit", "FitOptions", "fit"]
 
 _LOOK_AHEAD = 0.1
 """Look-ahead, s, of a controller of which nothing is known."""
@@ -122,22 +118,6 @@ class Fit:
         return {"judged": judged, "settings": settings, **parts, "step_times": self.steps, "tracking": self.tracking}
 
 
-def fit_files(out: Path, name: str, *, compensator: bool = False) -> dict[str, Path]:
-    """Return the files that :func:`fit` writes and its report, by what they are; a compensator's FMUs if it has one."""
-    models = {"": _MODEL, "compensator ": _COMPENSATOR} if compensator else {"": _MODEL}
-    return {
-        "machine file": out / "machine.toml",
-        "trained predictor": out / "trained.state",
-        "results": out / "fit.json",
-        "report": out / "report.html",
-        **{
-            f"{flavour} {what}FMU": out / f"{fmu_name(model, name, flavour)}.fmu"
-            for what, model in models.items()
-            for flavour in _flavours()
-        },
-    }
-
-
 def fit(
     logs: Sequence[Log],
     out: Path,
@@ -146,6 +126,7 @@ def fit(
     *,
     changes: Sequence[str] = (),
     fmus: bool = True,
+    fmi: str = FMI_VERSIONS[0],
 ) -> Fit:
     """Identify an axis from its logs, choose settings, judge them, and build its FMUs.
 
@@ -158,7 +139,7 @@ def fit(
     logs : sequence of Log
         Of one axis, all sampled alike.
     out : Path
-        Folder of :func:`fit_files`; it exists.
+        Folder of :func:`~hybridsep.fit.files.fit_files`; it exists.
     options : FitOptions
     progress : callable, optional
         Called with a message and the fraction done.
@@ -166,11 +147,14 @@ def fit(
         What was done to the logs' positions before, for the machine file's ``sources``.
     fmus : bool
         Whether FMUs are built, and their steps timed.
+    fmi : str
+        Version of the native FMUs, one of :data:`~hybridsep.fmi.flavours.FMI_CHOICES`.
 
     Raises
     ------
     ParameterError
-        If the logs are sampled differently or in different units, or ``Np`` does not fit into what judges.
+        If ``fmi`` is another word, the logs are sampled differently or in different units, or ``Np`` does not fit into
+        what judges.
     SignalError
         If a log is too short to be split.
     """
@@ -186,7 +170,7 @@ def fit(
         )
     default = replace(settings_for(Np, T_s, "zoh"), **options.known)
     compensates = bool(options.drive_limits)
-    files = fit_files(out, options.name, compensator=compensates)
+    files = fit_files(out, options.name, compensator=compensates, fmi=fmi)
     stages = Stages(files["results"], key_of(recordings, (options, T_s, logs[0].unit, logs[0].shown)))
 
     def within(begin: float, end: float, message: str) -> Callable[[float], object]:
@@ -224,13 +208,10 @@ def fit(
         estimate = within(0.85, 0.87, "tracking error with compensation")
         tracking = stages.result("tracking", lambda: expected_tracking(machine, recordings, estimate))
     steps: dict[str, float] = {}
-    for i, flavour in enumerate(_flavours() if fmus else ()):
-        progress(f"build the {flavour} FMU", 0.87 + 0.04 * i)
-        for built in (_MODEL, _COMPENSATOR) if compensates else (_MODEL,):
-            build_here(machine, built, out, flavour, weights=files["trained predictor"])
     if fmus:
+        built = build_fmus(machine, files, within(0.87, 0.95, "build the FMUs"), fmi)
         progress("time the FMU's steps", 0.95)
-        steps = step_times(files[f"{_flavours()[0]} FMU"], recordings[0].x_d, recordings[0].x)
+        steps = step_times(built, recordings[0].x_d, recordings[0].x)
     else:
         files = {what: path for what, path in files.items() if path.suffix != ".fmu"}
     result = Fit(machine, found, choice, windows, steps, options.share, judged, tuple(files.values()), tracking)
@@ -348,8 +329,3 @@ def _machine(
         predictor={"Np": settings.Np, "p": settings.p, "q": settings.q, **known},
         **sections,
     )
-
-
-def _flavours() -> tuple[str, ...]:
-    """Return the flavours that can be built here."""
-    return FLAVOURS if has_native() else ("python",)

@@ -12,32 +12,25 @@ from ..machines.agree import check_interval
 from ..machines.machine import Machine, load_machine, machine_names
 from ..plants.trajectory import read_trajectory
 from .archive import fmu_names
-from .flavours import FMI_VERSIONS
+from .flavours import FMI_VERSIONS, versions_of
 from .libraries import check_available
 from .warm_start import load_trained
 
-__all__ = ["VERSIONS", "Job", "extras_of", "jobs_of"]
+__all__ = ["Job", "extras_of", "jobs_of"]
 
 Job = tuple[Machine, str, str, str]
 """An FMU to build: its machine, name and model, and the version of FMI."""
-
-_BOTH = "both"
-VERSIONS = (*FMI_VERSIONS, _BOTH)
-"""What ``--fmi`` takes."""
 
 
 def jobs_of(
     fmus: Sequence[str], machines: Sequence[str], flavour: str, targets: Sequence[str], fmi: str = FMI_VERSIONS[0]
 ) -> list[Job]:
-    """Return the FMUs to build, all of the machines' if none is named; the version may be ``both``."""
-    if fmi not in VERSIONS:
-        raise ParameterError(f"--fmi must be one of {', '.join(VERSIONS)}, got {fmi!r}")
-    if flavour == "python" and fmi != FMI_VERSIONS[0]:
-        raise ParameterError(f"--fmi {fmi} is for native FMUs, pythonfmu's are of FMI 2 alone; leave it out")
+    """Return the FMUs to build, all of the machines' if none is named; ``fmi`` is one of ``FMI_CHOICES``."""
+    versions = versions_of(fmi, flavour)
     jobs = [
         (axis, name, model, version)
         for axis in map(load_machine, machines or machine_names())
-        for version in (FMI_VERSIONS if fmi == _BOTH else (fmi,))
+        for version in versions
         for name, model in fmu_names(axis, flavour, version).items()
     ]
     if unknown := sorted(set(fmus) - {name for _, name, _, _ in jobs}):

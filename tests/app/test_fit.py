@@ -17,7 +17,8 @@ from hybridsep import HybridPredictor, load_machine, read_log
 from hybridsep.base.errors import LogError, ParameterError
 from hybridsep.cosim.fmus import FmuController
 from hybridsep.fit import fit as fitting
-from hybridsep.fit.fit import Fit, FitOptions, fit, fit_files
+from hybridsep.fit.files import fit_files
+from hybridsep.fit.fit import Fit, FitOptions, fit
 from hybridsep.fit.report import fit_report, judged_by
 from hybridsep.fit.stages import key_of
 from hybridsep.intake.repair import take_in

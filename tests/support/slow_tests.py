@@ -23,6 +23,7 @@ SLOW = (
     r"fmi/test_fmi2_random\.py",
     r"fmi/test_fmi3_(agreement|description)\.py::\w+\[\w+_(als|emps)",
     r"fmi/test_foreign\.py",
+    r"app/test_fmi_versions\.py::test_(fit_writes|the_demo_runs)",
     r"c/test_c_memory\.py",
     r"c/test_c_sources\.py",
     r"c/test_static_linking\.py",
