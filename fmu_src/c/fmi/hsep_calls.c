@@ -82,32 +82,22 @@ HSEP_API hsep_status hsep_call_reset(void *component, const hsep_call *call)
     return HSEP_OK;
 }
 
-HSEP_API hsep_instance *hsep_call_get(void *component, const hsep_call *call, hsep_access access)
+HSEP_API hsep_instance *hsep_call_access(
+    void *component, const hsep_call *call, int sets, const char *type, const unsigned references[], size_t n,
+    const void *values, size_t n_values)
 {
+    const hsep_access access = {call->name, type, references, n, values, n_values};
     char message[HSEP_MESSAGE_SIZE] = "";
     hsep_instance *instance = hsep_begin(component, call);
-    access.call = call->name;
     if (instance == NULL) {
         return NULL;
     }
-    if (hsep_values_check(instance, &access, message) != HSEP_OK ||
-        hsep_values_prepare(instance, &access, message) != HSEP_OK) {
-        (void)hsep_refuse(instance, "%s", message);
-        return NULL;
+    hsep_status status = hsep_values_check(instance, &access, message);
+    if (status == HSEP_OK) {
+        status =
+            sets ? hsep_values_check_set(instance, &access, message) : hsep_values_prepare(instance, &access, message);
     }
-    return instance;
-}
-
-HSEP_API hsep_instance *hsep_call_set(void *component, const hsep_call *call, hsep_access access)
-{
-    char message[HSEP_MESSAGE_SIZE] = "";
-    hsep_instance *instance = hsep_begin(component, call);
-    access.call = call->name;
-    if (instance == NULL) {
-        return NULL;
-    }
-    if (hsep_values_check(instance, &access, message) != HSEP_OK ||
-        hsep_values_check_set(instance, &access, message) != HSEP_OK) {
+    if (status != HSEP_OK) {
         (void)hsep_refuse(instance, "%s", message);
         return NULL;
     }

@@ -45,18 +45,7 @@ fmi2Component fmi2Instantiate(
     return hsep_component_new(&filled, instanceName, fmuGUID, fmuResourceLocation, loggingOn);
 }
 
-void fmi2FreeInstance(fmi2Component c)
-{
-    if (c != NULL) {
-        hsep_instance_free(c);
-    }
-}
-
-fmi2Status fmi2SetDebugLogging(
-    fmi2Component c, fmi2Boolean loggingOn, size_t nCategories, const fmi2String categories[])
-{
-    return hsep_fmi2_status(hsep_call_logging(c, HSEP_FMI2(SET_DEBUG_LOGGING), loggingOn, nCategories, categories));
-}
+HSEP_COMMON_FUNCTIONS(fmi2, Component, FMUstate, DeSerialize, HSEP_FMI2)
 
 fmi2Status fmi2SetupExperiment(
     fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance, fmi2Real startTime, fmi2Boolean stopTimeDefined,
@@ -72,54 +61,10 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c)
     return hsep_fmi2_status(hsep_call_phase(c, HSEP_FMI2(ENTER_INITIALIZATION_MODE), HSEP_INITIALIZATION));
 }
 
-fmi2Status fmi2ExitInitializationMode(fmi2Component c)
-{
-    return hsep_fmi2_status(hsep_call_initialise(c, HSEP_FMI2(EXIT_INITIALIZATION_MODE)));
-}
-
-fmi2Status fmi2Terminate(fmi2Component c)
-{
-    return hsep_fmi2_status(hsep_call_phase(c, HSEP_FMI2(TERMINATE), HSEP_TERMINATED));
-}
-
-fmi2Status fmi2Reset(fmi2Component c) { return hsep_fmi2_status(hsep_call_reset(c, HSEP_FMI2(RESET))); }
-
 fmi2Status fmi2DoStep(
     fmi2Component c, fmi2Real currentCommunicationPoint, fmi2Real communicationStepSize,
     fmi2Boolean noSetFMUStatePriorToCurrentPoint)
 {
     (void)noSetFMUStatePriorToCurrentPoint;
     return hsep_fmi2_status(hsep_call_step(c, HSEP_FMI2(DO_STEP), currentCommunicationPoint, communicationStepSize));
-}
-
-fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate)
-{
-    return hsep_fmi2_status(hsep_call_save(c, HSEP_FMI2(GET_FMU_STATE), FMUstate));
-}
-
-fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate)
-{
-    return hsep_fmi2_status(hsep_call_restore(c, HSEP_FMI2(SET_FMU_STATE), FMUstate));
-}
-
-fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *FMUstate)
-{
-    return hsep_fmi2_status(hsep_call_free_state(c, HSEP_FMI2(FREE_FMU_STATE), FMUstate));
-}
-
-fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, size_t *size)
-{
-    return hsep_fmi2_status(hsep_call_state_size(c, HSEP_FMI2(SERIALIZED_FMU_STATE_SIZE), FMUstate, size));
-}
-
-fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byte serializedState[], size_t size)
-{
-    return hsep_fmi2_status(hsep_call_serialise(c, HSEP_FMI2(SERIALIZE_FMU_STATE), FMUstate, serializedState, size));
-}
-
-fmi2Status fmi2DeSerializeFMUstate(
-    fmi2Component c, const fmi2Byte serializedState[], size_t size, fmi2FMUstate *FMUstate)
-{
-    return hsep_fmi2_status(
-        hsep_call_deserialise(c, HSEP_FMI2(DESERIALIZE_FMU_STATE), serializedState, size, FMUstate));
 }

@@ -31,63 +31,30 @@ fmi2Status fmi2GetDirectionalDerivative(
     return fmi2_unsupported(c, HSEP_FMI2(GET_DIRECTIONAL_DERIVATIVE), "providesDirectionalDerivative is false");
 }
 
-/* The status of an answer: fmi2OK with the instance if it is known, and there is a place for it. */
-static fmi2Status fmi2_answer(
-    fmi2Component c, const hsep_call *call, const void *value, int known, hsep_instance **instance)
-{
-    *instance = hsep_begin(c, call);
-    if (*instance == NULL) {
-        return fmi2Error;
+/* fmi2Get...Status: whether that status, s, is known, and its value. */
+#define FMI2_STATUS(name, NAME, type, known, answer) \
+    fmi2Status fmi2Get##name(fmi2Component c, const fmi2StatusKind s, type *value) \
+    { \
+        hsep_instance *instance = hsep_begin(c, HSEP_FMI2(GET_##NAME)); \
+        (void)s; \
+        if (instance == NULL) { \
+            return fmi2Error; \
+        } \
+        if (value == NULL) { \
+            return hsep_fmi2_status(hsep_refuse(instance, "fmi2Get" #name ": value is NULL")); \
+        } \
+        if (!(known)) { \
+            hsep_log( \
+                instance, HSEP_LOG_DISCARD, \
+                "fmi2Get" #name ": this status does not exist, because no step is ever pending"); \
+            return fmi2Discard; \
+        } \
+        *value = answer; \
+        return fmi2OK; \
     }
-    if (value == NULL) {
-        (void)hsep_refuse(*instance, "%s: value is NULL", call->name);
-        return fmi2Error;
-    }
-    if (!known) {
-        hsep_log(
-            *instance, HSEP_LOG_DISCARD, "%s: this status does not exist, because no step is ever pending", call->name);
-        return fmi2Discard;
-    }
-    return fmi2OK;
-}
 
-fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *value)
-{
-    hsep_instance *instance;
-    (void)s;
-    return fmi2_answer(c, HSEP_FMI2(GET_STATUS), value, 0, &instance);
-}
-
-fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *value)
-{
-    hsep_instance *instance;
-    const fmi2Status status = fmi2_answer(c, HSEP_FMI2(GET_REAL_STATUS), value, s == fmi2LastSuccessfulTime, &instance);
-    if (status == fmi2OK) {
-        *value = instance->experiment.time;
-    }
-    return status;
-}
-
-fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind s, fmi2Integer *value)
-{
-    hsep_instance *instance;
-    (void)s;
-    return fmi2_answer(c, HSEP_FMI2(GET_INTEGER_STATUS), value, 0, &instance);
-}
-
-fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean *value)
-{
-    hsep_instance *instance;
-    const fmi2Status status = fmi2_answer(c, HSEP_FMI2(GET_BOOLEAN_STATUS), value, s == fmi2Terminated, &instance);
-    if (status == fmi2OK) {
-        *value = fmi2False;
-    }
-    return status;
-}
-
-fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2String *value)
-{
-    hsep_instance *instance;
-    (void)s;
-    return fmi2_answer(c, HSEP_FMI2(GET_STRING_STATUS), value, 0, &instance);
-}
+FMI2_STATUS(Status, STATUS, fmi2Status, 0, fmi2OK)
+FMI2_STATUS(RealStatus, REAL_STATUS, fmi2Real, s == fmi2LastSuccessfulTime, instance->experiment.time)
+FMI2_STATUS(IntegerStatus, INTEGER_STATUS, fmi2Integer, 0, 0)
+FMI2_STATUS(BooleanStatus, BOOLEAN_STATUS, fmi2Boolean, s == fmi2Terminated, fmi2False)
+FMI2_STATUS(StringStatus, STRING_STATUS, fmi2String, 0, NULL)

@@ -3,83 +3,40 @@
 
 #include <math.h>
 
-/* What is read or written, of a kind's type. */
-static hsep_access fmi2_access(hsep_kind kind, const fmi2ValueReference vr[], size_t n, const void *value)
-{
-    return (hsep_access){
-        .type = hsep_fmi2_words()->types[kind], .references = vr, .n_references = n, .values = value, .n_values = n};
-}
+/* fmi2Get... and fmi2Set... of a type. */
+#define FMI2_ACCESS(name, NAME, type, get, set) \
+    fmi2Status fmi2Get##name(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2##name value[]) \
+    { \
+        const hsep_instance *self = hsep_call_access(c, HSEP_FMI2(GET_##NAME), 0, type, vr, nvr, value, nvr); \
+        for (size_t i = 0; self != NULL && i < nvr; i++) { \
+            const double number = self->values[vr[i]]; \
+            value[i] = get; \
+        } \
+        return (self == NULL) ? fmi2Error : fmi2OK; \
+    } \
+    fmi2Status fmi2Set##name(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2##name value[]) \
+    { \
+        hsep_instance *self = hsep_call_access(c, HSEP_FMI2(SET_##NAME), 1, type, vr, nvr, value, nvr); \
+        for (size_t i = 0; self != NULL && i < nvr; i++) { \
+            const fmi2##name number = value[i]; \
+            self->values[vr[i]] = set; \
+        } \
+        return (self == NULL) ? fmi2Error : fmi2OK; \
+    }
+
+FMI2_ACCESS(Real, REAL, hsep_fmi2_words()->types[HSEP_REAL], number, number)
+FMI2_ACCESS(Integer, INTEGER, hsep_fmi2_words()->types[HSEP_INTEGER], hsep_values_integer(number), (double)number)
+FMI2_ACCESS(Boolean, BOOLEAN, hsep_fmi2_words()->types[HSEP_BOOLEAN], number != 0.0, number ? 1.0 : 0.0)
 
 /* There are no variables of type String: with references, the access is refused by name. */
-static hsep_access fmi2_strings(const fmi2ValueReference vr[], size_t n, const void *value)
-{
-    hsep_access access = fmi2_access(HSEP_REAL, vr, n, value);
-    access.type = "String";
-    return access;
-}
-
-fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Real value[])
-{
-    const hsep_instance *instance = hsep_call_get(c, HSEP_FMI2(GET_REAL), fmi2_access(HSEP_REAL, vr, nvr, value));
-    for (size_t i = 0; instance != NULL && i < nvr; i++) {
-        value[i] = instance->values[vr[i]];
-    }
-    return (instance == NULL) ? fmi2Error : fmi2OK;
-}
-
-fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Integer value[])
-{
-    const hsep_instance *instance = hsep_call_get(c, HSEP_FMI2(GET_INTEGER), fmi2_access(HSEP_INTEGER, vr, nvr, value));
-    for (size_t i = 0; instance != NULL && i < nvr; i++) {
-        value[i] = hsep_values_integer(instance->values[vr[i]]);
-    }
-    return (instance == NULL) ? fmi2Error : fmi2OK;
-}
-
-fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Boolean value[])
-{
-    const hsep_instance *instance = hsep_call_get(c, HSEP_FMI2(GET_BOOLEAN), fmi2_access(HSEP_BOOLEAN, vr, nvr, value));
-    for (size_t i = 0; instance != NULL && i < nvr; i++) {
-        value[i] = (instance->values[vr[i]] != 0.0) ? fmi2True : fmi2False;
-    }
-    return (instance == NULL) ? fmi2Error : fmi2OK;
-}
-
 fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2String value[])
 {
-    return (hsep_call_get(c, HSEP_FMI2(GET_STRING), fmi2_strings(vr, nvr, value)) == NULL) ? fmi2Error : fmi2OK;
-}
-
-fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[])
-{
-    hsep_instance *instance = hsep_call_set(c, HSEP_FMI2(SET_REAL), fmi2_access(HSEP_REAL, vr, nvr, value));
-    for (size_t i = 0; instance != NULL && i < nvr; i++) {
-        instance->values[vr[i]] = value[i];
-    }
-    return (instance == NULL) ? fmi2Error : fmi2OK;
-}
-
-fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer value[])
-{
-    hsep_instance *instance = hsep_call_set(c, HSEP_FMI2(SET_INTEGER), fmi2_access(HSEP_INTEGER, vr, nvr, value));
-    for (size_t i = 0; instance != NULL && i < nvr; i++) {
-        instance->values[vr[i]] = (double)value[i];
-    }
-    return (instance == NULL) ? fmi2Error : fmi2OK;
-}
-
-fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Boolean value[])
-{
-    hsep_instance *instance = hsep_call_set(c, HSEP_FMI2(SET_BOOLEAN), fmi2_access(HSEP_BOOLEAN, vr, nvr, value));
-    for (size_t i = 0; instance != NULL && i < nvr; i++) {
-        instance->values[vr[i]] = value[i] ? 1.0 : 0.0;
-    }
-    return (instance == NULL) ? fmi2Error : fmi2OK;
+    return hsep_call_access(c, HSEP_FMI2(GET_STRING), 0, "String", vr, nvr, value, nvr) == NULL ? fmi2Error : fmi2OK;
 }
 
 fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2String value[])
 {
-    return (hsep_call_set(c, HSEP_FMI2(SET_STRING), fmi2_strings(vr, nvr, value)) == NULL) ? fmi2Error : fmi2OK;
+    return hsep_call_access(c, HSEP_FMI2(SET_STRING), 1, "String", vr, nvr, value, nvr) == NULL ? fmi2Error : fmi2OK;
 }
 
 /* Why one of the derivatives cannot be taken; HSEP_OK if all can. */
@@ -121,13 +78,12 @@ fmi2Status fmi2SetRealInputDerivatives(
     fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer order[], const fmi2Real value[])
 {
     const hsep_call *call = HSEP_FMI2(SET_REAL_INPUT_DERIVATIVES);
-    hsep_access access = fmi2_access(HSEP_REAL, vr, nvr, value);
+    const hsep_access access = {call->name, hsep_fmi2_words()->types[HSEP_REAL], vr, nvr, value, nvr};
     hsep_instance *instance = hsep_begin(c, call);
     char message[HSEP_MESSAGE_SIZE] = "";
     if (instance == NULL) {
         return fmi2Error;
     }
-    access.call = call->name;
     if (hsep_values_check(instance, &access, message) != HSEP_OK) {
         (void)hsep_refuse(instance, "%s", message);
         return fmi2Error;

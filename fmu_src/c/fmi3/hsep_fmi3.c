@@ -43,19 +43,7 @@ fmi3Instance fmi3InstantiateCoSimulation(
     return hsep_component_new(&filled, instanceName, instantiationToken, resourcePath, loggingOn);
 }
 
-void fmi3FreeInstance(fmi3Instance instance)
-{
-    if (instance != NULL) {
-        hsep_instance_free(instance);
-    }
-}
-
-fmi3Status fmi3SetDebugLogging(
-    fmi3Instance instance, fmi3Boolean loggingOn, size_t nCategories, const fmi3String categories[])
-{
-    return hsep_fmi3_status(
-        hsep_call_logging(instance, HSEP_FMI3(SET_DEBUG_LOGGING), loggingOn, nCategories, categories));
-}
+HSEP_COMMON_FUNCTIONS(fmi3, Instance, FMUState, Deserialize, HSEP_FMI3)
 
 fmi3Status fmi3EnterInitializationMode(
     fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance, fmi3Float64 startTime,
@@ -68,18 +56,6 @@ fmi3Status fmi3EnterInitializationMode(
     }
     return hsep_fmi3_status(hsep_call_phase(instance, call, HSEP_INITIALIZATION));
 }
-
-fmi3Status fmi3ExitInitializationMode(fmi3Instance instance)
-{
-    return hsep_fmi3_status(hsep_call_initialise(instance, HSEP_FMI3(EXIT_INITIALIZATION_MODE)));
-}
-
-fmi3Status fmi3Terminate(fmi3Instance instance)
-{
-    return hsep_fmi3_status(hsep_call_phase(instance, HSEP_FMI3(TERMINATE), HSEP_TERMINATED));
-}
-
-fmi3Status fmi3Reset(fmi3Instance instance) { return hsep_fmi3_status(hsep_call_reset(instance, HSEP_FMI3(RESET))); }
 
 fmi3Status fmi3DoStep(
     fmi3Instance instance, fmi3Float64 currentCommunicationPoint, fmi3Float64 communicationStepSize,
@@ -100,37 +76,4 @@ fmi3Status fmi3DoStep(
     *eventHandlingNeeded = *terminateSimulation = *earlyReturn = fmi3False;
     *lastSuccessfulTime = self->experiment.time;
     return hsep_fmi3_status(status);
-}
-
-fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *FMUState)
-{
-    return hsep_fmi3_status(hsep_call_save(instance, HSEP_FMI3(GET_FMU_STATE), FMUState));
-}
-
-fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState FMUState)
-{
-    return hsep_fmi3_status(hsep_call_restore(instance, HSEP_FMI3(SET_FMU_STATE), FMUState));
-}
-
-fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *FMUState)
-{
-    return hsep_fmi3_status(hsep_call_free_state(instance, HSEP_FMI3(FREE_FMU_STATE), FMUState));
-}
-
-fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState FMUState, size_t *size)
-{
-    return hsep_fmi3_status(hsep_call_state_size(instance, HSEP_FMI3(SERIALIZED_FMU_STATE_SIZE), FMUState, size));
-}
-
-fmi3Status fmi3SerializeFMUState(fmi3Instance instance, fmi3FMUState FMUState, fmi3Byte serializedState[], size_t size)
-{
-    return hsep_fmi3_status(
-        hsep_call_serialise(instance, HSEP_FMI3(SERIALIZE_FMU_STATE), FMUState, serializedState, size));
-}
-
-fmi3Status fmi3DeserializeFMUState(
-    fmi3Instance instance, const fmi3Byte serializedState[], size_t size, fmi3FMUState *FMUState)
-{
-    return hsep_fmi3_status(
-        hsep_call_deserialise(instance, HSEP_FMI3(DESERIALIZE_FMU_STATE), serializedState, size, FMUState));
 }
