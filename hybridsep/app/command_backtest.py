@@ -70,7 +70,7 @@ def backtest(
     from ..reports.backtest_peers import backtest_peers
     from ..reports.extent import partly_used
     from .log_intake import CHECKED_MAX, open_checked, reading_of
-    from .overwrite import BATCH_COLUMNS, BATCHES, BY_ENDING, Output, check_ending, check_outputs
+    from .overwrite import BATCH_COLUMNS, BATCHES, FIGURES, RUNS, STATE, Output, check_outputs
     from .progress import progress_bar
     from .tables import console, print_scores, print_without_first, print_written
 
@@ -79,15 +79,11 @@ def backtest(
 
     axis_machine = load_machine(machine)
     saved = list(save or [])
-    check_ending(figure, "--figure", (".png", ".pdf", ".svg"))
-    for path in saved:
-        check_ending(path, "--save", (".state", ".csv", ".npz"))
     changed = axis_machine.changed("predictor", parameters)
     predictor = warm_predictor(changed, weights)
     how = reading_of(axis_machine, reading, may_miss=predictor.settings.trust)
-    outputs = [] if out is None else [Output("--out", out, BATCHES)]
-    outputs += [Output("--figure", figure, BY_ENDING[figure.suffix.lower()])] if figure is not None else []
-    outputs += [Output("--save", path, BY_ENDING[path.suffix.lower()]) for path in saved]
+    outputs = [Output("--out", out, BATCHES), Output("--figure", figure, FIGURES)]
+    outputs += [Output("--save", path, {".state": STATE, **RUNS}) for path in saved]
     inputs = {"log": log, "machine file": machine_path(machine), "saved predictor": weights}
     opened, intake = open_checked(log, how, axis_machine, fix=fix, as_is=as_is)
     check_outputs(outputs, inputs, force=force)

@@ -71,10 +71,9 @@ def cosim(
     from ..cosim.apart import run_apart
     from ..cosim.loop import cosimulate
     from ..cosim.pairing import check_pair, read_command, values_to_build
-    from ..cosim.run import RESULT_SUFFIXES
     from ..fmi.builds import build_here
     from ..machines.machine import load_machine, machine_path
-    from .overwrite import FIGURE, RUN, Output, check_ending, check_outputs
+    from .overwrite import PNG, RUNS, Output, check_outputs
     from .progress import progress_bar
     from .tables import print_run, print_written
 
@@ -82,8 +81,7 @@ def cosim(
         from ..evaluate.time_plots import prediction_figure, tracking_figure
 
     axis = load_machine(machine)
-    check_ending(out, "--out", RESULT_SUFFIXES)
-    check_ending(figure, "--figure", (".png",))
+    outputs = (Output("--out", out, RUNS), Output("--figure", figure, PNG))
     if compensate is not None:
         check("compensate", compensate, label="--compensate")
     model = "HybridPredictor" if compensate is None else "SepCompensator"
@@ -98,8 +96,6 @@ def cosim(
     if compensate is not None:
         values["compensate"] = PARAMETERS["compensate"].to_fmi(compensate)
     check_pair(axis, model, predictor, plant, weights, flavour)
-    results = (("--out", out, RUN), ("--figure", figure, FIGURE))
-    outputs = [Output(option, path, kind) for option, path, kind in results if path is not None]
     file = None if trajectory in TRAJECTORIES else trajectory
     inputs = {"trajectory": file, "predictor": predictor, "plant": plant, "saved predictor": weights}
     check_outputs(outputs, {"machine file": machine_path(machine), **inputs}, force=force)

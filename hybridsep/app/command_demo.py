@@ -40,7 +40,7 @@ def demo(
 
     flavour = flavour or default_flavour()
     files = demo_files(out, flavour, emps=emps is not None, fmi=fmi)
-    check_outputs((Output("--out", path, BY_ENDING[path.suffix]) for path in files), {"recording": emps}, force=force)
+    check_outputs((Output("--out", path, BY_ENDING) for path in files), {"recording": emps}, force=force)
     if emps is not None:
         read_recorded(emps)  # a refusal comes before any announcement
     if not as_json:

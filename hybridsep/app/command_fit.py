@@ -68,7 +68,7 @@ def fit(
     from ..machines.naming import checked_name, machine_name
     from ..reports.judged import recommendation
     from .log_intake import show
-    from .overwrite import BY_ENDING, FIT_FILES, Output, check_ending, check_outputs
+    from .overwrite import FIT_FILES, PDF, Output, check_outputs
     from .progress import progress_bar
     from .tables import console, print_json, print_written
 
@@ -78,10 +78,8 @@ def fit(
     files = fit_files(folder, name, compensator=bool(limits), fmi=fmi)
     known = {entry: parameters[entry] for entry in KNOWN_ENTRIES if entry in parameters}
     inputs: dict[str, str | Path | None] = {f"log {path.name}": path for path in logs}
-    check_ending(figure, "--figure", (".pdf",))
-    outputs = [Output("--out", path, FIT_FILES[path.suffix]) for path in files.values()]
-    outputs += [Output("--figure", figure, BY_ENDING[".pdf"])] if figure is not None else []
-    check_outputs(outputs, inputs, force=force)
+    outputs = [Output("--out", path, FIT_FILES) for path in files.values()]
+    check_outputs([*outputs, Output("--figure", figure, PDF)], inputs, force=force)
     found = [
         read_log(
             path,

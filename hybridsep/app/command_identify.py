@@ -99,16 +99,13 @@ def identify(
     from ..machines.naming import checked_name, machine_name
     from ..reports.extent import partly_used
     from .log_intake import show
-    from .overwrite import FIGURE, MACHINE, Output, check_ending, check_outputs
+    from .overwrite import MACHINE, PNG, Output, check_outputs
     from .progress import progress_bar
     from .tables import console, print_written
 
     if kind not in KINDS:
         raise ParameterError(f"--kind must be one of {', '.join(KINDS)}, got {kind!r}")
-    check_ending(out, "--out", (".toml",))
-    check_ending(figure, "--figure", (".png",))
-    given = [("--out", out, MACHINE), ("--figure", figure, FIGURE)]
-    outputs = [Output(option, path, what) for option, path, what in given if path is not None]
+    outputs = (Output("--out", out, {".toml": MACHINE}), Output("--figure", figure, PNG))
     machine = checked_name(name) if name else machine_name(out or recording)
     check_outputs(outputs, {"recording": recording}, force=force)
     columns = {role: column for role, column in (("t", t), ("x_d", x_d), ("x", x)) if column}

@@ -76,13 +76,12 @@ def init(
     from ..machines.seal import sealed
     from ..machines.text import machine_text
     from ..model.physics import ModalModel
-    from .overwrite import FMU, MACHINE, Output, check_ending, check_outputs
+    from .overwrite import FMU, MACHINE, Output, check_outputs
 
     versions = () if fmi is None else versions_of(fmi, FLAVOURS[0])
     if versions:
         check_available(("host",))
-    check_ending(out, "OUT", (".toml",))
-    check_outputs([Output("OUT", out, MACHINE)], {}, force=force)
+    check_outputs([Output("OUT", out, {".toml": MACHINE})], {}, force=force)
     name = str(_asked("--name", name, "name of the machine", out.stem))
     T_s = float(_asked("--T_s", T_s, "sampling interval [s]", 1e-3))
     if from_tf is not None:

@@ -61,15 +61,12 @@ def report(
     from ..reports.use import write_use
     from ..tune.recordings import Recording, replay
     from .log_intake import open_checked, reading_of
-    from .overwrite import BY_ENDING, REPORT, Output, check_ending, check_outputs
+    from .overwrite import PDF, REPORT, Output, check_outputs
     from .progress import progress_bar
     from .tables import console, print_written
 
     page = out or Path(f"{machine_name(log)}_report.html")
-    check_ending(page, "--out", (".html",))
-    check_ending(figure, "--figure", (".pdf",))
-    outputs = [Output("--out", page, REPORT)]
-    outputs += [Output("--figure", figure, BY_ENDING[".pdf"])] if figure is not None else []
+    outputs = (Output("--out", page, {".html": REPORT}), Output("--figure", figure, PDF))
     inputs = {"log": log, "machine file": machine_path(machine), "saved predictor": weights, "FMU": fmu}
     if fmu is not None:
         check_controller(fmu, PREDICTOR)

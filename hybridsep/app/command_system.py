@@ -46,23 +46,19 @@ def system(
     from ..cosim.pairing import read_command
     from ..fmi.libraries import check_available
     from ..fmi.system import build_system, check_system
-    from ..fmi.warm_start import load_trained
     from ..machines.machine import load_machine, machine_path
-    from .overwrite import SYSTEM, Output, check_ending, check_outputs
+    from .overwrite import SYSTEM, Output, check_outputs
     from .progress import progress_bar
     from .tables import console, print_json
 
     axis = load_machine(machine)
     out = out or Path(f"{axis.name}.ssp")
-    check_ending(out, "--out", (".ssp",))
     check_system(axis, compensate=compensate, ssp=ssp)
     command = read_command(trajectory, axis, unit, T_s)
-    if weights is not None:
-        load_trained(weights, axis, "SepCompensator" if compensate else "HybridPredictor")
     check_available(target or ("host",))
     file = None if trajectory in TRAJECTORIES else trajectory
     inputs = {"machine file": machine_path(machine), "trajectory": file, "saved predictor": weights}
-    check_outputs([Output("--out", out, SYSTEM)], inputs, force=force)
+    check_outputs([Output("--out", out, {".ssp": SYSTEM})], inputs, force=force)
     with progress_bar(as_json) as advance:
         build_system(
             axis,

@@ -69,7 +69,7 @@ def tune(
     from ..tune.joint import tune as tune_on
     from ..tune.losses import n_unjudged
     from .log_intake import open_checked, reading_of, show
-    from .overwrite import BY_ENDING, MACHINE, Output, check_ending, check_outputs
+    from .overwrite import FIGURES, MACHINE, Output, check_outputs
     from .progress import progress_bar
     from .tables import console, print_json, print_written
     from .tune_table import entries, print_tuning, tuning_summary
@@ -78,8 +78,7 @@ def tune(
         from ..tune.figures import tuning_figure
 
     given = load_machine(machine)
-    check_ending(out, "--out", (".toml",))
-    check_ending(figure, "--figure", (".png", ".pdf", ".svg"))
+    outputs = (Output("--out", out, {".toml": MACHINE}), Output("--figure", figure, FIGURES))
     ranges = {
         field: parse_range(parameters[parameter.name], parameter)
         for field, parameter in TUNED.items()
@@ -93,8 +92,6 @@ def tune(
     tried = candidates(settings, values)
     if out is not None:  # a [compensator] that takes over p and q may not allow the largest
         changed.changed("predictor", {"p": max(one.p for one in tried), "q": max(one.q for one in tried)})
-    outputs = [Output("--out", out, MACHINE)] if out is not None else []
-    outputs += [Output("--figure", figure, BY_ENDING[figure.suffix.lower()])] if figure is not None else []
     inputs: dict[str, str | Path | None] = {f"log {path}": path for path in logs}
     check_outputs(outputs, {**inputs, "machine file": machine_path(machine)}, force=force)
     how = reading_of(given, reading, may_miss=settings.trust)

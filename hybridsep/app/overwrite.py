@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import zipfile
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
@@ -25,15 +25,19 @@ __all__ = [
     "BY_ENDING",
     "EXAMPLE_LOG",
     "FIGURE",
+    "FIGURES",
     "FIT_FILES",
     "FMU",
     "MACHINE",
+    "PDF",
+    "PNG",
     "REPORT",
     "RUN",
+    "RUNS",
+    "STATE",
     "SYSTEM",
     "Kind",
     "Output",
-    "check_ending",
     "check_outputs",
 ]
 
@@ -70,13 +74,28 @@ class Output:
     ----------
     option : str
         Option that named it.
-    path : Path
-    kind : Kind
+    path : Path or None
+        None where the option is not given.
+    kind : Kind or mapping
+        Or kinds by the endings that the file may have.
+
+    Raises
+    ------
+    ParameterError
+        If it has another ending.
     """
 
     option: str
-    path: Path
-    kind: Kind
+    path: Path | None
+    kind: Kind | Mapping[str, Kind]
+
+    def __post_init__(self) -> None:
+        if self.path is not None and not isinstance(self.kind, Kind) and self.path.suffix.lower() not in self.kind:
+            raise ParameterError(f"{self.option} must end in {' or '.join(self.kind)}, got {self.path.name!r}")
+
+    def chosen(self, path: Path) -> Kind:
+        """Return the kind of the file."""
+        return self.kind if isinstance(self.kind, Kind) else self.kind[path.suffix.lower()]
 
 
 def _begins_with(start: bytes) -> Callable[[Path], bool]:
@@ -147,16 +166,12 @@ STAGES = Kind("result of hybridsep fit", _begins_with(b'{\n  "hybridsep": "'))
 REPORT = Kind("report of hybridsep", _begins_with(b"<!DOCTYPE html>\n<!-- report of hybridsep -->"))
 SUMMARY = Kind("summary of hybridsep demo", _begins_with(b'{\n  "staircase": {'))
 
-BY_ENDING = {
-    ".csv": RUN,
-    ".npz": RUN,
-    ".png": FIGURE,
-    ".pdf": VECTOR_FIGURE,
-    ".svg": VECTOR_FIGURE,
-    ".fmu": FMU,
-    ".state": STATE,
-    ".json": SUMMARY,
-}
+PNG = {".png": FIGURE}
+PDF = {".pdf": VECTOR_FIGURE}
+FIGURES = PNG | PDF | {".svg": VECTOR_FIGURE}
+RUNS = {".csv": RUN, ".npz": RUN}
+
+BY_ENDING = RUNS | FIGURES | {".fmu": FMU, ".state": STATE, ".json": SUMMARY}
 """Kinds of the files that the library names itself."""
 
 FIT_FILES = {".toml": MACHINE, ".json": STAGES, ".html": REPORT, ".fmu": FMU, ".state": STATE}
@@ -181,31 +196,30 @@ def check_outputs(outputs: Iterable[Output], inputs: Mapping[str, str | Path | N
         a folder that cannot be made or written to.
     """
     taken = [(f"the {what} {path}", Path(path)) for what, path in inputs.items() if path is not None]
-    known = list(outputs)
-    for output in known:
-        path = output.path
+    known = [(output.option, output.path, output.chosen(output.path)) for output in outputs if output.path is not None]
+    for option, path, kind in known:
         for what, other in taken:
             if _same_file(path, other):
-                raise ParameterError(f"{output.option} {path} is the same file as {what}; choose another name")
-        taken.append((f"{output.option} {path}", path))
+                raise ParameterError(f"{option} {path} is the same file as {what}; choose another name")
+        taken.append((f"{option} {path}", path))
         if path.is_dir():
-            raise ParameterError(f"{output.option} must be a file, got the folder {path}")
-        if path.is_file() and path.stat().st_size and not force and not _asked(output, output.kind.recognises, False):
-            changed = _asked(output, output.kind.changed, "")
+            raise ParameterError(f"{option} must be a file, got the folder {path}")
+        if path.is_file() and path.stat().st_size and not force and not _asked(path, kind.recognises, False):
+            changed = _asked(path, kind.changed, "")
             raise ParameterError(
-                f"{output.option} {path} exists and {changed or f'is no {output.kind.name}'}; choose another name, or "
+                f"{option} {path} exists and {changed or f'is no {kind.name}'}; choose another name, or "
                 f"overwrite it{' and lose the edits' if changed else ''} with --force"
             )
-    for output in known:
+    for option, path, _ in known:
         try:
-            make_folder(output.path.parent)
+            make_folder(path.parent)
         except (FileExistsError, NotADirectoryError) as error:
             raise ParameterError(
-                f"{output.option} {output.path}: a file has the name of the folder {output.path.parent}; choose another"
+                f"{option} {path}: a file has the name of the folder {path.parent}; choose another"
             ) from error
-        folder = Path(os.path.realpath(output.path)).parent
+        folder = Path(os.path.realpath(path)).parent
         if not os.access(folder, os.W_OK):
-            raise ParameterError(f"{output.option} {output.path}: no file can be written in {folder}")
+            raise ParameterError(f"{option} {path}: no file can be written in {folder}")
 
 
 def _same_file(one: Path, other: Path) -> bool:
@@ -216,15 +230,9 @@ def _same_file(one: Path, other: Path) -> bool:
         return os.path.realpath(one) == os.path.realpath(other)
 
 
-def _asked(output: Output, question: Callable[[Path], _Answer], otherwise: _Answer) -> _Answer:
+def _asked(path: Path, question: Callable[[Path], _Answer], otherwise: _Answer) -> _Answer:
     """Return what a kind says of the existing file."""
     try:
-        return question(output.path)
+        return question(path)
     except ZIP_DAMAGE:
         return otherwise  # damaged or unreadable: not known to be ours
-
-
-def check_ending(path: Path | None, option: str, endings: Sequence[str]) -> None:
-    """Raise ParameterError if a path, where given, ends in none of the endings."""
-    if path is not None and path.suffix.lower() not in endings:
-        raise ParameterError(f"{option} must end in {' or '.join(endings)}, got {path.name!r}")

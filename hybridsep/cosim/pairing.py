@@ -10,7 +10,6 @@ from ..base.errors import ParameterError
 from ..base.signals import Array
 from ..fmi.archive import fmu_names
 from ..fmi.libraries import check_available
-from ..fmi.warm_start import load_trained
 from ..logs.log import check_reading
 from ..machines.agree import check_interval
 from ..machines.machine import Machine
@@ -55,8 +54,6 @@ def check_predictor(axis: Machine, predictor: Path | None, weights: Path | None)
         If the given one is no predictor, or there is neither a library nor a compiler for this platform.
     ParameterError
         If weights are given for an FMU that is.
-    StateError
-        If they are of another machine.
     """
     if predictor is None:
         check_available(("host",))
@@ -64,8 +61,6 @@ def check_predictor(axis: Machine, predictor: Path | None, weights: Path | None)
         if weights is not None:
             raise ParameterError(_WEIGHTS)
         check_controller(predictor, PREDICTOR)
-    if weights is not None:
-        load_trained(weights, axis, "HybridPredictor")
 
 
 def check_pair(
@@ -103,7 +98,5 @@ def check_pair(
         check_controller(predictor, PREDICTOR if model == "HybridPredictor" else COMPENSATOR)
     if plant is not None:
         check_plant(plant)
-    if weights is not None:
-        load_trained(weights, axis, model)
     if flavour == "native" and None in (predictor, plant):
         check_available(("host",))
