@@ -1,111 +1,81 @@
-"""Mutated tables of an FMU whose library serves all FMUs of its kind.
+"""Mutated tables of FMUs whose libraries serve all FMUs of their kind, under the sanitizers.
 
-Run as a program: ``python tests/support/fuzz_tables.py LIBRARY MODEL_DESCRIPTION TABLE FOLDER --n 100000``, where
-FOLDER is for the mutated files. A finding is a crash, a sanitizer's report, a refusal without a message, a memory block
-that was not given back, or a table that was changed without its checksum and not refused.
+Run as a program, ``python tests/support/fuzz_tables.py --n 100000``, it tries so many of each kind;
+``tests/c/fuzz_tables.c`` says what a finding is.
 """
 
 from __future__ import annotations
 
 import argparse
-import random
-import struct
-import zlib
+import os
+import subprocess
+import sys
+import tempfile
+import time
+import zipfile
+from collections.abc import Sequence
 from pathlib import Path
 
-from fmi2_library import ERROR, OK, Library
+from c_compiler import run_compiler, sanitising_compiler
+from places import ROOT
 
-NUMBERS = (0.0, -0.0, 1.0, -1.0, 2.0, 0.5, 1e-300, 1e300, -1e300, 1e5, 1e9, float("nan"), float("inf"), -float("inf"))
-STEPS = 12
+from hybridsep import build_fmu, load_machine
+from hybridsep.fmi.c_header import KINDS, kind_header
+from hybridsep.fmi.c_sources import c_sources, fmi_headers
 
+__all__ = ["MACHINES", "fuzz"]
 
-class Fuzzer:
-    """Instances of one library, each with a table of its own."""
+MACHINES = dict.fromkeys(KINDS, "spring_mass_damper") | {"StageDrive": "als25010_x"}
+"""The machine whose FMU a kind is tried with."""
 
-    def __init__(self, library: Library, table: bytes, folder: Path, seed: int) -> None:
-        self.library, self.table, self.folder = library, table, folder
-        self.random = random.Random(seed)
-        self.refused = self.run = 0
-
-    def once(self) -> None:
-        """Instantiate with a mutated table; where it is taken, initialise and step."""
-        whole = self.random.random() < 0.7
-        table = self._repaired(self._mutated()) if whole else self._mutated()
-        (self.folder / "variables.bin").write_bytes(table)
-        self.library.messages.clear()
-        component = self.library.instantiate(resources=self.folder.as_uri())
-        if component is None:
-            self.refused += 1
-            assert any(status == ERROR for status, _, _ in self.library.messages), "refused without a message"
-        else:
-            assert whole or table == self.table, "a damaged table was taken"
-            self._simulate(component)
-            self.library.FreeInstance(component)
-        assert not self.library.blocks, f"{len(self.library.blocks)} blocks of memory were not given back"
-
-    def _simulate(self, component: int) -> None:
-        if (
-            self.library.EnterInitializationMode(component) != OK
-            or self.library.ExitInitializationMode(component) != OK
-        ):
-            return
-        self.run += 1
-        for k in range(STEPS):
-            for name, causality in self.library.causalities.items():
-                if causality == "input":
-                    self.library.set(component, name, self.random.gauss(0, 1e-2))
-            if self.library.DoStep(component, k * 1e-3, 1e-3, 1) != OK:
-                return
-        for name, causality in self.library.causalities.items():
-            if causality == "output":
-                self.library.get(component, name)
-
-    def _mutated(self) -> bytes:
-        table = bytearray(self.table)
-        for _ in range(self.random.choice([1, 1, 1, 2, 5])):
-            what = self.random.random()
-            if what < 0.3:
-                table[self.random.randrange(len(table))] ^= 1 << self.random.randrange(8)
-            elif what < 0.6:
-                struct.pack_into("<d", table, 8 * self.random.randrange(len(table) // 8), self.random.choice(NUMBERS))
-            elif what < 0.8:
-                number = self.random.choice([0, 1, 2, 7, 2**31, 2**61, 2**64 - 1, self.random.getrandbits(64)])
-                struct.pack_into("<Q", table, 8 * self.random.randrange(5), number)
-            elif what < 0.9:
-                del table[self.random.randrange(len(table)) :]
-                table += bytes(max(0, 48 - len(table)))
-            else:
-                table += self.random.randbytes(8 * self.random.choice([1, 4, 4, 8, 400]))
-        return bytes(table)
-
-    def _repaired(self, table: bytes) -> bytes:
-        """Return a table whose size and checksum fit, and mostly its number of modes."""
-        body = bytearray(table[:-8])
-        if len(body) < 16:
-            return table
-        struct.pack_into("<Q", body, 8, len(table))
-        if len(body) > 32 and self.random.random() < 0.7:
-            (modes,) = struct.unpack_from("<Q", self.table, 24)
-            more = (len(table) - len(self.table)) // 32
-            struct.pack_into("<Q", body, 24, max(0, modes + more))
-        return bytes(body) + struct.pack("<Q", zlib.crc32(bytes(body)))
+_FLAGS = ["-O0", "-g", "-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all", "-D_GNU_SOURCE"]
 
 
-def main() -> None:
+def fuzz(kind: str, folder: Path, n: int, seed: int = 1) -> tuple[bool, str]:
+    """Try mutated tables of a kind; return whether there was no finding, and what the program said.
+
+    Parameters
+    ----------
+    kind : str
+        Of :data:`hybridsep.fmi.c_header.KINDS`.
+    folder : Path
+        For what is built; empty.
+    n : int
+        Number of tables.
+    seed : int
+        Of the mutations.
+    """
+    machine = load_machine(MACHINES[kind])
+    name = "FeedDrive_als25010_x" if kind == "StageDrive" else kind
+    with zipfile.ZipFile(build_fmu(machine, name, folder, targets=("host",))) as archive:
+        archive.extractall(folder, [member for member in archive.namelist() if member.startswith("resources/")])
+    for file, content in {**c_sources(), **fmi_headers(), "hsep_fmu.h": kind_header(kind).encode()}.items():
+        (folder / file).write_bytes(content)
+    program, resources = folder / "fuzz", folder / "resources"
+    own = (resources / "variables.bin").rename(folder / "variables.bin")
+    sources: list[str | Path] = [f"-I{folder}", ROOT / "tests" / "c" / "fuzz_tables.c", "-lm", "-ldl", "-o", program]
+    run_compiler([*_FLAGS, *sources], command=sanitising_compiler())
+    options = {"ASAN_OPTIONS": "detect_leaks=0:allocator_may_return_null=1"}  # blocks are counted
+    command: Sequence[str | Path] = [program, own, resources, str(n), str(seed)]
+    done = subprocess.run(command, env=os.environ | options, capture_output=True, text=True, check=False)
+    return done.returncode == 0 and "no finding" in done.stdout, done.stdout + done.stderr
+
+
+def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("library", type=Path)
-    parser.add_argument("description", type=Path)
-    parser.add_argument("table", type=Path)
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--n", type=int, default=100_000)
+    parser.add_argument("--kind", choices=list(KINDS), nargs="+", default=list(KINDS))
+    parser.add_argument("--n", type=int, default=100_000, help="tables of each kind")
     parser.add_argument("--seed", type=int, default=1)
-    arguments = parser.parse_args()
-    library = Library(arguments.library, arguments.description, largest=1 << 22)
-    fuzzer = Fuzzer(library, arguments.table.read_bytes(), arguments.folder, arguments.seed)
-    for _ in range(arguments.n):
-        fuzzer.once()
-    print(f"no finding: {arguments.n} tables, {fuzzer.refused} refused, {fuzzer.run} simulated")
+    given = parser.parse_args()
+    held = True
+    for kind in given.kind:
+        begin = time.perf_counter()
+        with tempfile.TemporaryDirectory() as folder:
+            one, said = fuzz(kind, Path(folder), given.n, given.seed)
+        held &= one
+        print(f"{kind}: {said.strip()} ({time.perf_counter() - begin:.0f} s)", flush=True)
+    return int(not held)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

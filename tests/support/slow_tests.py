@@ -11,7 +11,7 @@ SLOW = (
     r"release/test_wheel\.py",
     # All platforms' compilers, sanitizers and programs that are compiled for one test
     r"fmi/test_native_fmu\.py::test_all_platforms",
-    r"fmi/test_tables\.py::test_(mutated_tables|a_table_is_what_the_header_is)",
+    r"fmi/test_tables\.py::test_(mutated_tables|the_fuzzer|a_table_is_what_the_header_is)",
     r"cosim/test_systems\.py",
     r"fmi/test_native_fmu\.py::test_the_archive_without_binaries_can_be_compiled",
     r"fmi/test_weights\.py::test_build_takes_weights_and_targets",
