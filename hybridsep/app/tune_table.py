@@ -1,4 +1,4 @@
-"""What ``hybridsep tune`` prints: ranked candidates, the choice, the error over other windows; or plain values."""
+"""Output of ``hybridsep tune``: ranked candidates, the choice, the error over other windows; or plain values."""
 
 from __future__ import annotations
 

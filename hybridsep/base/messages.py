@@ -31,8 +31,8 @@ ERRORS: Mapping[str, Explanation] = {
         "On the command line an error is one line and exit status 2.",
     ),
     "ParameterError": Explanation(
-        "A parameter is out of its range, or several do not fit together. The message has the range and the value. "
-        "It is a `ValueError` too.",
+        "A parameter is out of its range, or several do not fit together. The message has the range and the value. It "
+        "is a `ValueError` too.",
         "Change the value; ranges are in the reference of [machine files](machine-file.md) and [FMUs](fmu.md).",
         ("lower p or raise Np", "spacing must be ≥ 1 and divide Np"),
     ),
@@ -44,10 +44,8 @@ ERRORS: Mapping[str, Explanation] = {
     "LogError": Explanation(
         "A recorded log cannot be read, or the errors computed from it would be invalid.",
         "The message names file, line and column. Names of columns are given by `--t`, `--x_d`, `--x`, the unit by "
-        "`--unit`, the "
-        "interval of a log without times by `--T_s`. Where it lists findings of the checks, look them up below; "
-        "`--fix` "
-        "applies their fixes, `--as-is` (of `backtest`, `report` and `tune`) goes on without.",
+        "`--unit`, the interval of a log without times by `--T_s`. Where it lists findings of the checks, look them up "
+        "below; `--fix` applies their fixes, `--as-is` (of `backtest`, `report` and `tune`) goes on without.",
         (
             "must increase",
             "counts samples: it is an index",
@@ -66,8 +64,7 @@ ERRORS: Mapping[str, Explanation] = {
         "Give a stable, strictly proper single-input single-output system without repeated poles.",
     ),
     "IdentificationError": Explanation(
-        "A recording or a frequency response cannot determine a model: too little motion, too few samples or lines, "
-        "no "
+        "A recording or a frequency response cannot determine a model: too little motion, too few samples or lines, no "
         "resonance, no coherence.",
         "Record more motion, see [how to record a log](../howto/record.md). `hybridsep fit` then goes on with a gain "
         "of 1.",
@@ -75,17 +72,13 @@ ERRORS: Mapping[str, Explanation] = {
     ),
     "StateError": Explanation(
         "A saved state or trained weights are damaged, of another version, or were learned with other settings, which "
-        "the "
-        "message names.",
+        "the message names.",
         "Train again (`hybridsep fit`, or `backtest --save`), or use the settings that the message names.",
     ),
     "FmuError": Explanation(
         "An FMU cannot be built, read or loaded, or a call came that FMI does not allow in the present state.",
-        "A native FMU takes its libraries from the installation; "
-        "where they could not be compiled then, `pip install ziglang`, or build with `--flavour python`."
-        " An archive "
-        "that is refused "
-        "is named with what is wrong with it.",
+        "A native FMU takes its libraries from the installation; where they could not be compiled then, `pip install "
+        "ziglang`, or build with `--flavour python`. A refused archive is named, with the reason.",
     ),
 }
 """By class of exception; in the order of the hierarchy in :mod:`hybridsep.base.errors`."""
@@ -93,13 +86,12 @@ ERRORS: Mapping[str, Explanation] = {
 FINDINGS: Mapping[str, Explanation] = {
     "time order": Explanation(
         "Times repeat or run backwards: rows written twice, a clock that was set back, or times rounded more coarsely "
-        "than "
-        "the sampling interval.",
-        "`--fix` sorts and keeps one row of each time. If times are rounded, take the column out and give `--T_s`.",
+        "than the sampling interval.",
+        "`--fix` sorts and keeps one row of each time. If times are rounded, remove the column and give `--T_s`.",
     ),
     "whole turns": Explanation(
         "A rotary axis was recorded modulo one turn: it jumps by whole turns.",
-        "`--fix` unwraps both positions; your controller must count alike.",
+        "`--fix` unwraps both positions; your controller must count turns the same way.",
     ),
     "gaps": Explanation(
         "Stretches of time without samples: the recorder lost data, or was stopped.",
@@ -107,34 +99,33 @@ FINDINGS: Mapping[str, Explanation] = {
         "interruption.",
     ),
     "jitter": Explanation(
-        "Sampling intervals differ; the model takes them as equal.",
-        "`--fix` resamples. Better record with the controller's own cycle than with a PC's clock.",
+        "Sampling intervals differ; the model assumes equal ones.",
+        "`--fix` resamples. Record in the controller's own cycle rather than by a PC's clock.",
     ),
     "lost rows": Explanation(
-        "Rows are missing although the times are even: both positions make a step that is a multiple of their "
-        "neighbours.",
-        "`--fix` inserts the rows as missing. Look for the recorder's buffer overflow.",
+        "Rows are missing although the times are even: both positions make a step that is a multiple of the "
+        "neighbouring ones.",
+        "`--fix` inserts the rows as missing. Check the recorder for a buffer overflow.",
     ),
     "missing samples": Explanation(
         "The measured position is empty or `nan` in some rows.",
-        "Nothing with `trust = true`, which takes them as missing. Without, `--fix` interpolates.",
+        "None is needed with `trust = true`, which treats them as missing. Without trust, `--fix` interpolates.",
     ),
     "jumps": Explanation(
-        "Both positions jump in one sample: two logs were pasted together; or the command alone does.",
-        "`--fix` keeps the pieces apart. A step command needs nothing.",
+        "Both positions jump within one sample, as where two logs were joined, or the command alone jumps.",
+        "`--fix` splits the log at the jump. A step in the command alone needs no remedy.",
     ),
     "outliers": Explanation(
         "Single samples are far from their neighbours: glitches of the encoder or of the transmission.",
         "Repaired by `fit` and `--fix`, which interpolate. With `trust = true` the guard rejects them online.",
     ),
     "clipped": Explanation(
-        "The measured position stops at a limit at speed and leaves it at speed, while the command goes on: the "
-        "recorder's "
-        "range ends there.",
-        "`--fix` takes the samples as missing. Record with a larger range or another scaling.",
+        "The measured position stops dead at a limit and leaves it at speed, while the command moves on: the "
+        "recorder's range ends there.",
+        "`--fix` treats the samples as missing. Record with a larger range or another scaling.",
     ),
     "stuck samples": Explanation(
-        "The measured position stands still and then jumps: the sensor or its transmission hung.",
+        "The measured position stands still and then jumps: the sensor or its transmission froze.",
         "Repaired by `fit` and `--fix`, which cut the stretch out.",
     ),
     "repeated samples": Explanation(
@@ -146,35 +137,34 @@ FINDINGS: Mapping[str, Explanation] = {
         "No fix helps: record the axis at work. `hybridsep fit` goes on with a gain of 1.",
     ),
     "same column": Explanation(
-        "The measured position equals the commanded one in every sample: one column was read for both, or the axis "
-        "was simulated.",
+        "The measured position equals the commanded one in every sample: one column was read for both, or the axis was "
+        "simulated.",
         "Name the columns with `--x_d` and `--x`.",
     ),
     "columns swapped": Explanation(
-        "The column of the commanded position is later and noisier than that of the measured one.",
+        "The column of the commanded position lags behind that of the measured one and is noisier.",
         "Exchange `--x_d` and `--x`, or let `--fix` do it.",
     ),
     "following error": Explanation(
         "The measured position's column holds the following error, which controllers call *lag* or *contouring "
         "deviation*.",
-        "`--fix` computes the position from it; better record the actual position.",
+        "`--fix` computes the position from it; recording the actual position is better.",
     ),
     "velocity for position": Explanation(
         "One of the columns holds a velocity.",
         "Name the column of the position. `--fix` integrates, which drifts.",
     ),
     "sign": Explanation(
-        "The measured position runs against its command: its static gain is negative.",
-        "`--fix` turns the sign; your controller must do the same.",
+        "The measured position moves opposite to its command: its static gain is negative.",
+        "`--fix` reverses the sign; your controller must do the same.",
     ),
     "scale": Explanation(
         "The measured position moves by a multiple of the command: a wrong unit, resolution or gear ratio.",
-        "`--fix` multiplies where the factor is plain; give `--unit`, or correct the scaling. A gain between 0.15 and "
-        "1 "
-        "is a note: a weak servo has one.",
+        "`--fix` multiplies where the factor is unambiguous; give `--unit`, or correct the scaling. A gain between "
+        "0.15 and 1 is only a note: a soft servo has one.",
     ),
     "offset": Explanation(
-        "The zeros of both positions differ by far.",
+        "The zeros of the two positions are far apart.",
         "`--fix` subtracts the difference; your controller must do the same.",
     ),
     "unit": Explanation(
@@ -187,12 +177,12 @@ FINDINGS: Mapping[str, Explanation] = {
     ),
     "delay": Explanation(
         "The measured position is late by more than the model explains, or early.",
-        "If you know that the encoder is late by whole samples, give `--measurement_delay`; what it counts, "
-        "`dead_time` must not.",
+        "If you know that the encoder is late by whole samples, give `--measurement_delay`; `dead_time` must not count "
+        "those samples again.",
     ),
     "sampling rate": Explanation(
         "The log is sampled too slowly for the model's fastest mode, or at another interval than the machine's.",
-        "Record at the controller's rate. `--fix` resamples where the interval alone differs.",
+        "Record at the controller's rate. `--fix` resamples where only the interval differs.",
     ),
 }
 """By name of a finding, in the order in which they are looked for, and fixed."""

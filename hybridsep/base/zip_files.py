@@ -1,4 +1,4 @@
-"""What Python's zipfile raises for damaged archives."""
+"""Exceptions of Python's zipfile for damaged archives."""
 
 from __future__ import annotations
 

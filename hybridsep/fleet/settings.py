@@ -1,4 +1,4 @@
-"""What a task of a fleet is: a log and an axis, and how they are read and fitted; paths, never data."""
+"""Task of a fleet: a log and an axis, and how they are read and fitted; paths, never data."""
 
 from __future__ import annotations
 

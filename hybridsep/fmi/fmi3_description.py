@@ -8,12 +8,9 @@ from xml.etree import ElementTree as ET
 
 from numpy.typing import ArrayLike
 
-from ..base.version import __version__
 from ..machines.machine import Machine
-from .content import fmu_title, paper_note
-from .experiment import stop_time
 from .fmi3_variables import Fmi3Variable, fmi3_variables
-from .model_description import add_items, document, template, unit_elements, variable_attributes, xml_text
+from .model_description import add_items, begun, document, types_of, variable_attributes
 
 __all__ = ["fmi3_description"]
 
@@ -40,26 +37,15 @@ def fmi3_description(
     samples : (n,) array_like, m, optional
         Trajectory that a ReferenceTrajectory was built with.
     """
-    model, name, table = str(description["model"]), str(description["name"]), fmi3_variables(description)
-    root = template("modelDescription3.xml")
-    simulation, units, types, _, experiment, variables, structure = root
-    root.attrib |= {
-        "modelName": name,
-        "instantiationToken": token,
-        "description": fmu_title(machine, model) + paper_note(machine, model),
-        "version": __version__,
-        "generationTool": generation_tool,
-    }
-    simulation.set("modelIdentifier", name)
-    used = {each.variable.unit for each in table}
-    units.extend(unit for unit in unit_elements() if unit.get("name") in used)
-    for variable in (each.variable for each in table if each.variable.items):
-        attributes = {"name": variable.type_name, "description": variable.description}
+    table = fmi3_variables(description)
+    own_table = [each.variable for each in table]
+    named = {"instantiationToken": token}
+    root = begun("modelDescription3.xml", machine, description, own_table, named, generation_tool, samples)
+    _, _, types, _, _, variables, structure = root
+    for variable, attributes in types_of(own_table):
         add_items(ET.SubElement(types, "EnumerationType", attributes), variable)
     if not len(types):
         root.remove(types)
-    stop = stop_time(machine, description, samples)
-    experiment.attrib |= {"stopTime": xml_text(stop), "stepSize": xml_text(machine.T_s)}
     for reference, each in enumerate(table):
         own, values = variable_attributes(each.variable, reference, integers=("Int32", "Enumeration"))
         element = ET.SubElement(variables, each.variable.kind, own | values)

@@ -18,10 +18,12 @@ from .variables import INTERPOLATED, Variable, variables_of
 
 __all__ = [
     "add_items",
+    "begun",
     "build_description",
     "document",
     "model_description",
     "template",
+    "types_of",
     "unit_elements",
     "variable_attributes",
     "xml_text",
@@ -56,36 +58,63 @@ def model_description(
     samples : (n,) array_like, m, optional
         Trajectory that a ReferenceTrajectory was built with.
     """
-    model, name, table = str(description["model"]), str(description["name"]), variables_of(description)
-    root = template("modelDescription.xml")
-    simulation, units, types, _, experiment, variables, structure = root
-    root.attrib |= {
-        "modelName": name,
-        "guid": guid,
-        "description": fmu_title(machine, model) + paper_note(machine, model),
-        "version": __version__,
-        "generationTool": generation_tool,
-    }
+    table = variables_of(description)
+    root = begun("modelDescription.xml", machine, description, table, {"guid": guid}, generation_tool, samples)
+    simulation, _, types, _, _, variables, structure = root
     simulation.attrib |= {
-        "modelIdentifier": name,
         "needsExecutionTool": xml_text(not native),
-        "canInterpolateInputs": xml_text(native and bool(INTERPOLATED[model])),
+        "canInterpolateInputs": xml_text(native and bool(INTERPOLATED[str(description["model"])])),
         "canNotUseMemoryManagementFunctions": xml_text(not native),
     }
     if native:
         ET.SubElement(ET.SubElement(simulation, "SourceFiles"), "File", name="all.c")
-    used = {variable.unit for variable in table}
-    for unit in [unit for unit in units if unit.get("name") not in used]:
-        units.remove(unit)
-    _add_types(types, table)
+    for variable, attributes in types_of(table):
+        add_items(ET.SubElement(ET.SubElement(types, "SimpleType", attributes), "Enumeration"), variable)
     if not len(types):
         root.remove(types)
-    stop = stop_time(machine, description, samples)
-    experiment.attrib |= {"stopTime": xml_text(stop), "stepSize": xml_text(machine.T_s)}
     for reference, variable in enumerate(table):
-        _add_variable(variables, reference, variable)
+        own, values = variable_attributes(variable, reference, integers=("Integer", "Enumeration"))
+        ET.SubElement(ET.SubElement(variables, "ScalarVariable", own), variable.kind, values)
     _fill_structure(structure, table)
     return document(root)
+
+
+def begun(
+    file: str,
+    machine: Machine,
+    description: Mapping[str, Any],
+    table: Sequence[Variable],
+    token: Mapping[str, str],
+    generation_tool: str,
+    samples: ArrayLike | None,
+) -> ET.Element:
+    """Return a template with what all versions of FMI say alike: names, units and the default experiment.
+
+    Parameters
+    ----------
+    file : str
+        The template.
+    machine, description, generation_tool, samples
+        As :func:`model_description` has them.
+    table : sequence of Variable
+    token : mapping
+        What the version calls the GUID → the GUID.
+    """
+    model, name, root = str(description["model"]), str(description["name"]), template(file)
+    simulation, units, _, _, experiment, _, _ = root
+    root.attrib |= {
+        "modelName": name,
+        **token,
+        "description": fmu_title(machine, model) + paper_note(machine, model),
+        "version": __version__,
+        "generationTool": generation_tool,
+    }
+    simulation.set("modelIdentifier", name)
+    used = {variable.unit for variable in table}
+    units[:] = [unit for unit in unit_elements() if unit.get("name") in used]
+    stop = stop_time(machine, description, samples)
+    experiment.attrib |= {"stopTime": xml_text(stop), "stepSize": xml_text(machine.T_s)}
+    return root
 
 
 def build_description(name: str, fmi: str = FMI_VERSIONS[0]) -> bytes:
@@ -131,22 +160,16 @@ def xml_text(value: object) -> str:
     return str(value).lower() if isinstance(value, bool) else repr(value)
 
 
-def _add_types(definitions: ET.Element, table: Sequence[Variable]) -> None:
-    """Name the values of the enumerations; each variable has a type of its own."""
-    for variable in (variable for variable in table if variable.items):
-        attributes = {"name": variable.type_name, "description": variable.description}
-        add_items(ET.SubElement(ET.SubElement(definitions, "SimpleType", attributes), "Enumeration"), variable)
+def types_of(table: Sequence[Variable]) -> list[tuple[Variable, dict[str, str]]]:
+    """Return the enumerations, each of which has a type of its own, with the attributes of that type."""
+    items = [variable for variable in table if variable.items]
+    return [(variable, {"name": variable.type_name, "description": variable.description}) for variable in items]
 
 
 def add_items(parent: ET.Element, variable: Variable) -> None:
     """Add the items of an enumeration to its type."""
     for value, (item, meaning) in enumerate(zip(variable.items, variable.item_meanings, strict=True)):
         ET.SubElement(parent, "Item", name=item, value=str(value), description=meaning)
-
-
-def _add_variable(parent: ET.Element, reference: int, variable: Variable) -> None:
-    own, values = variable_attributes(variable, reference, integers=("Integer", "Enumeration"))
-    ET.SubElement(ET.SubElement(parent, "ScalarVariable", own), variable.kind, values)
 
 
 def variable_attributes(

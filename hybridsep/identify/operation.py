@@ -173,8 +173,8 @@ def _hindrance(segments: Sequence[Segment]) -> str:
     # Beyond its bandwidth, where a swept sine ends, a drive moves against its command with no sign wrong.
     if correlation < OPPOSED and runs_against(longest.u, longest.y) is not None:
         return (
-            f"the measured position moves against the commanded one (correlation {correlation:.2f}); turn the sign of "
-            "one of them"
+            f"the measured position moves against the commanded one (correlation {correlation:.2f}); reverse the sign "
+            "of one of them"
         )
     return ""
 

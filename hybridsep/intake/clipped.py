@@ -72,10 +72,11 @@ def check_clipped(log: Log, bridged: int = 1) -> Iterator[Finding]:
     )
     evidence = {"n": float(n), "share": n / len(log.t), "n_stretches": float(len(begins))}
     if bridged:
-        fix = Fix("take what is clipped as missing", partial(fixes.missing_at, where=where))
+        fix = Fix("treat the clipped samples as missing", partial(fixes.missing_at, where=where))
     else:
         fix = Fix(
-            "cut out what is clipped, and keep what is left apart", partial(fixes.cut_out, begins=begins, ends=ends)
+            "cut out the clipped samples and treat the rest as separate segments",
+            partial(fixes.cut_out, begins=begins, ends=ends),
         )
     t = log.t - log.t[0]
     lines = {"commanded": (t, factor * log.x_d), "measured": (t, factor * log.x_meas)}

@@ -49,7 +49,7 @@ def check_following_error(log: Log) -> Iterator[Finding]:
     )
     evidence = {"sign": sign, "unexplained": left[sign], "lag": lag}
     formula = "x = x_d − x" if sign > 0 else "x = x_d + x"
-    fix = Fix(f"reckon the measured position from it, {formula}", partial(fixes.from_error, sign=sign), meaning=True)
+    fix = Fix(f"compute the measured position from it, {formula}", partial(fixes.from_error, sign=sign), meaning=True)
     picture = over_time(log, part, log.x_d[part], log.x_meas[part])
     yield Finding("following error", ERROR, words, evidence, picture, fix)
 

@@ -91,7 +91,7 @@ def _modes(x_d: Array, x: Array) -> tuple[DeadTime, DeadTime]:
 
 
 def check_sign(log: Log) -> Iterator[Finding]:
-    """Find a measured position that runs against the command."""
+    """Find a measured position that moves opposite to the command."""
     x_d, x, width = averaged(log)
     mode = runs_against(x_d, x)
     if mode is None:
@@ -101,11 +101,11 @@ def check_sign(log: Log) -> Iterator[Finding]:
     fit = at_lag if at_lag.gain < 0.0 and not _mode_counts(mode, at_lag) else _as_line(mode, x_d, x)
     fit = replace(fit, lag=width * fit.lag)
     words = (
-        f"the measured position runs against the command (gain {fit.gain:.4g}): its sign is flipped, or the axis "
+        f"the measured position moves opposite to the command (gain {fit.gain:.4g}): its sign is flipped, or the axis "
         "counts the other way"
     )
     change = partial(fixes.scaled, factor=-1.0, column="x_meas")
-    fix = Fix("turn the measured position's sign", change, meaning=True)
+    fix = Fix("reverse the measured position's sign", change, meaning=True)
     yield Finding("sign", ERROR, words, _numbers(fit), against_command(log, stretch(log), fit), fix)
 
 

@@ -49,7 +49,7 @@ def check_jumps(log: Log) -> Iterator[Finding]:
     picture = Picture("Jumps of the command", "time [s]", f"position [{unit}]", lines, t[commanded])
     if m:
         words += f"; the measured position jumps with it{'' if m == n else f' {m} times'}: logs were pasted together"
-        fix = Fix("keep the pieces apart", partial(fixes.cut_at, first=both))
+        fix = Fix("split the log there", partial(fixes.cut_at, first=both))
         yield Finding("jumps", ERROR, words, evidence, picture, fix)
         return
     words += "; the measured position does not: it is a target, or commands of two logs, and no motion of the axis"

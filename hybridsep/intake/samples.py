@@ -134,7 +134,10 @@ def check_stuck(log: Log) -> Iterator[Finding]:
         f"{log.t[held[0][0]]:.6g} s"
     )
     evidence = {"n": float(len(held)), "n_samples": float(lengths.sum()), "longest": float(lengths.max())}
-    fix = Fix("cut them out and keep what is left apart", partial(fixes.cut_out, begins=first[:, 0], ends=first[:, 1]))
+    fix = Fix(
+        "cut them out and treat the rest as separate segments",
+        partial(fixes.cut_out, begins=first[:, 0], ends=first[:, 1]),
+    )
     marks = np.concatenate([np.arange(begin, end) for begin, end in held])
     yield Finding("stuck samples", WARNING, words, evidence, _signals(log, _COLUMNS["x_meas"], marks), fix)
 

@@ -37,7 +37,7 @@ def check_order(log: Log) -> Iterator[Finding]:
         f"{wrong[0] + 1}, t = {log.t[wrong[0]]:.6g} s"
     )
     if len(wrong) - back > _ROUNDED * len(log.t):
-        words += "; if they are rounded too coarsely, take the column out and give T_s"
+        words += "; if they are rounded too coarsely, remove the column and give T_s"
     evidence = {"n": float(len(wrong)), "n_backwards": float(back), "first": float(wrong[0])}
     fix = Fix("sort the samples by time and keep one of each time", fixes.in_order)
     yield Finding("time order", ERROR, words, evidence, _intervals(log, wrong), fix)
@@ -83,8 +83,8 @@ def check_jitter(log: Log) -> Iterator[Finding]:
         return
     words = (
         f"{len(uneven)} of {len(steps)} intervals differ{'' if len(uneven) > 1 else 's'} by more than "
-        f"{100 * TOLERANCE:g} % from {log.T_s:.6g} s, by up to {100 * deviations.max():.3g} %; the model takes them as "
-        "equal"
+        f"{100 * TOLERANCE:g} % from {log.T_s:.6g} s, by up to {100 * deviations.max():.3g} %; the model assumes "
+        "equal ones"
     )
     evidence = {"n": float(len(uneven)), "largest": float(deviations.max()), "std": float(np.std(deviations))}
     fix = Fix(f"resample at {log.T_s:.6g} s, linearly between samples", fixes.resampled)

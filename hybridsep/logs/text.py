@@ -213,7 +213,7 @@ def _hint(field: str, *, divided: bool) -> str:
         return "; a column of times has timestamps with the time of day in all lines, or in none; --t names another"
     if ":" in field and is_number(decimal_points(field.rsplit(":", 1)[1])):
         return (
-            "; write times of day as hh:mm:ss with up to 9 decimals or as seconds, or take the column out and give T_s "
+            "; write times of day as hh:mm:ss with up to 9 decimals or as seconds, or remove the column and give T_s "
             "(--T_s)"
         )
     return ""

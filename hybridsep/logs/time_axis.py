@@ -123,7 +123,7 @@ class TimeAxis:
             now = float(block.columns[0][i + shift])
             what, hint = "runs backwards", ""
             if steps[i] == 0.0:
-                what, hint = "repeats", "; if times are rounded too coarsely, take the column out and give T_s (--T_s)"
+                what, hint = "repeats", "; if times are rounded too coarsely, remove the column and give T_s (--T_s)"
             raise LogError(
                 f"{self._path}, {block.where(i + shift)}: time {brief(self._name)} {what}: a value above "
                 f"{now - float(steps[i]):.9g} s was expected, got {now:.9g} s{hint}"

@@ -1,4 +1,4 @@
-"""What a residual model predicts of a window, kept until the window is measured."""
+"""Forecast of a residual model over a window, kept until the window is measured."""
 
 from __future__ import annotations
 

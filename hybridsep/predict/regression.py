@@ -172,24 +172,6 @@ class RidgeRegression:
         diagonal[np.abs(diagonal) < _LEAST_DIAGONAL] = _LEAST_DIAGONAL
         self._weights = None
 
-    def factor_with(self, lam: float) -> Array:
-        """Return the factor ``[R z; 0 ρ]`` that another penalty would have given, ``(n+1, n+1)``, column-major.
-
-        Below its diagonal are arbitrary values.
-
-        Parameters
-        ----------
-        lam : float
-            At least :attr:`lam`, of a regression that was not discounted.
-        """
-        n = self.n_features
-        factor = np.array(self._factor, order="F")
-        if lam > self.lam:
-            rows = np.zeros((n, n + 1), order="F")
-            np.fill_diagonal(rows, math.sqrt(lam - self.lam))
-            fold(factor, rows, n_triangular=n)
-        return factor
-
     def penalised(self, penalties: Array) -> PenalisedSolution:
         """Solve for the weights of the first ``m`` features, each with a penalty of its own.
 

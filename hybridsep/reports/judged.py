@@ -1,4 +1,4 @@
-"""Replay as it is reported, and what it advises."""
+"""Replay of a report, and the advice that follows from it."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ def spoiled(path: Path, *, n: int = 2500, gain: float = 1.0, offset: float = 0.0
 @pytest.mark.parametrize(
     ("gain", "offset", "words"),
     [
-        (-1.0, 0.0, "the measured position runs against the command (gain -0.99"),
+        (-1.0, 0.0, "the measured position moves opposite to the command (gain -0.99"),
         (1.0, 0.25, "the measured position is +249.9"),
         (4e-5, 0.0, "times the commanded one: a wrong unit, gear ratio or encoder resolution"),
         (1e3, 0.0, "times the commanded one: measured in mm, commanded in m"),
@@ -73,7 +73,7 @@ def test_gaps_and_jitter(hybridsep: Run, tmp_path: Path) -> None:
     status, _, err = hybridsep("backtest", tmp_path / "jitter.csv", *MACHINE)
     assert status == 0
     assert "intervals differ by more than 5 % from 0.001 s" in err
-    assert "the model takes them as equal" in err
+    assert "the model assumes equal ones" in err
     status, _, err = hybridsep("backtest", tmp_path / "log.csv", *MACHINE, "--as-is")
     assert status == 0
     status, out, err = hybridsep("backtest", tmp_path / "log.csv", *MACHINE, "--fix", "--json")
@@ -264,4 +264,4 @@ def test_clock_timestamps(hybridsep: Run, tmp_path: Path) -> None:
     status, _, err = hybridsep("backtest", tmp_path / "stamps1.csv", *MACHINE)
     assert status == 2
     assert "2475 times are not above the one before, 0 of them run backwards" in err
-    assert "if they are rounded too coarsely, take the column out and give T_s" in err
+    assert "if they are rounded too coarsely, remove the column and give T_s" in err

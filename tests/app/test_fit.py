@@ -55,7 +55,7 @@ def test_the_figures_are_of_a_causal_replay_with_the_machine_file(fitted: Fit, l
     assert rms_h < 12e-6  # noise is 5 µm
 
 
-def test_the_fmus_begin_with_what_the_log_taught(fitted: Fit, log: Path) -> None:
+def test_the_fmus_begin_with_what_was_learned_from_the_log(fitted: Fit, log: Path) -> None:
     found, trained = read_log(log), HybridPredictor.load(log.parent / "out" / "trained.state")
     trained.restart()
     x_d, x = found.x_d[: 6 * NP], found.x_meas[: 6 * NP]
@@ -181,7 +181,7 @@ def test_a_flipped_sign_is_refused_until_it_is_fixed(hybridsep: Run, tmp_path: P
     status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", 40, "--fix")
     assert status == 0, err
     assert "axis.csv: fixed: sign: " in " ".join(out.split())
-    done = "axis.csv: sign: turn the measured position's sign; the controller must do the same"
+    done = "axis.csv: sign: reverse the measured position's sign; the controller must do the same"
     assert load_machine(tmp_path / "fit" / "machine.toml").sources == ("identified from axis.csv, 800 samples", done)
     page = unescape((tmp_path / "fit" / "report.html").read_text(encoding="utf-8"))
     assert page.index(done) < page.index("Tested on samples that trained nothing")

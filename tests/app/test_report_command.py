@@ -73,12 +73,12 @@ def test_findings_are_shown_and_faults_refused(hybridsep: Run, tmp_path: Path) -
     page = tmp_path / "page.html"
     status, _, err = hybridsep("report", log, *MACHINE, "--out", page)
     assert status == 2
-    assert "runs against the command" in err
+    assert "moves opposite to the command" in err
     assert not page.exists()
     status, _, err = hybridsep("report", log, *MACHINE, "--out", page, "--fix")
     assert status == 0, err
     text = page.read_text(encoding="utf-8")
-    assert "runs against the command" in text
+    assert "moves opposite to the command" in text
     assert text.count('<div id="chart') == 5
     for option, name in (("--out", "page.pdf"), ("--figure", "charts.png")):
         status, _, err = hybridsep("report", log, *MACHINE, option, tmp_path / name)

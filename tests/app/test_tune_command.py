@@ -96,7 +96,7 @@ def test_changed_positions_are_among_the_sources(hybridsep: Run, tmp_path: Path)
     write_rows(log, columns[:, 1], -columns[:, 2])
     one = ("--Np", "50", "--p", "5", "--q", "1", "--lambda", "1e-12", "--jobs", "1", "--fix")
     before = load_machine("spring_mass_damper").sources
-    done = "log.csv: sign: turn the measured position's sign; the controller must do the same"
+    done = "log.csv: sign: reverse the measured position's sign; the controller must do the same"
     for given, out in (("spring_mass_damper", machine), (machine, again)):
         status, _, err = hybridsep("tune", log, "-m", given, *one, "--out", out)
         assert status == 0, err

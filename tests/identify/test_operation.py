@@ -280,7 +280,7 @@ X_D = moves(1500)
     [
         (np.full(500, 0.1), X_D[:500], "commanded position does not move"),
         (X_D, np.zeros(len(X_D)), "measured position does not move"),
-        (X_D, -X_D, "turn the sign"),
+        (X_D, -X_D, "reverse the sign"),
         (X_D[:60], X_D[:60], "it has 60 samples"),
     ],
     ids=["rest", "stuck", "sign", "short"],

@@ -212,7 +212,7 @@ def test_words() -> None:
     def words(fault: str) -> str:
         return str(check(FAULTS[fault][1](log)).findings[0])
 
-    assert "the measured position runs against the command (gain -0.999" in words("flipped")
+    assert "the measured position moves opposite to the command (gain -0.999" in words("flipped")
     assert "999.143 times the commanded one: measured in mm, commanded in m. Fix: multiply" in words("mm for m")
     assert "is +249.989 mm away from the commanded one throughout, 8.3 of the travel" in words("offset of 0.25 m")
     assert "47 samples are missing in 2 gaps, the longest of 0.041 s; the first is before sample 201" in words(

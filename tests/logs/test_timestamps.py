@@ -352,13 +352,13 @@ def test_milliseconds_at_4_khz(tmp_path: Path) -> None:
     text = spelling.log([1_772_706_030 * SECOND + k // 4 * 1_000_000 for k in range(400)])
     path = write_csv(tmp_path / "log.csv", text)
     with pytest.raises(
-        LogError, match=r"line 3: time 't' repeats: .* rounded too coarsely, take .* give T_s \(--T_s\)"
+        LogError, match=r"line 3: time 't' repeats: .* rounded too coarsely, remove .* give T_s \(--T_s\)"
     ):
         open_log(path)
     finding = next(one for one in check(read_log(path, uniform=False)).findings if one.name == "time order")
     assert finding.evidence["n"] == 300
     assert "300 times are not above the one before, 0 of them run backwards" in finding.words
-    assert finding.words.endswith("; if they are rounded too coarsely, take the column out and give T_s")
+    assert finding.words.endswith("; if they are rounded too coarsely, remove the column and give T_s")
 
 
 def test_datetimes_of_numpy(tmp_path: Path) -> None:

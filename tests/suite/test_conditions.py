@@ -192,7 +192,7 @@ def test_a_run_in_motion_is_no_worse_than_physics(new_stream: StreamMaker) -> No
 def test_a_changed_plant_is_relearned_as_by_the_library(
     new_stream: StreamMaker, name: str, factor: float, saved_at: int
 ) -> None:
-    """The state that is saved has what earlier runs and this one have taught, or what is left of it."""
+    """The state that is saved has what was learned in earlier runs and in this one, or what is left of it."""
     model = new_stream.model
     name = {"k": "kappa", "c_nl": "f"}.get(name, "f") if model == STAGE_PREDICTOR else name
     inputs, weights = changed(model, name, factor), learned(model)

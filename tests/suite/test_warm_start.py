@@ -155,7 +155,7 @@ def learned_by_the_papers_model() -> bytes:
 
 @on_adapters((COMPENSATOR,))
 def test_the_velocity_of_friction_is_the_learned_one_without_trust(new_stream: StreamMaker) -> None:
-    """With trust it has no effect, and a predictor, which has none, may teach a compensator."""
+    """With trust it has no effect, and a predictor, which has none, may train a compensator."""
     stream = new_stream.planted(learned_with_trust())
     stream.initialise({"p": 20, "trust": True, "v_friction": 1e-3})
     stream = new_stream.planted(learned_by_the_papers_model())

@@ -121,7 +121,7 @@ def test_missing_measurements_are_not_scored() -> None:
     assert np.isfinite(found.horizon()).all()
 
 
-def test_later_recordings_begin_with_what_the_earlier_ones_taught() -> None:
+def test_later_recordings_begin_with_what_the_earlier_ones_learned() -> None:
     first, second = pieces(N, N)
     found = replay(predictor(), [Recording(*first, N), Recording(*second, 0)])
     by_hand = predictor()

@@ -1,4 +1,4 @@
-"""What the trusted model predicts of a window, kept until the window is measured."""
+"""Forecast of the trusted model over a window, kept until the window is measured."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the trusted model has learned besides its factors, declared once.
+"""Learned numbers of the trusted model besides its factors, and their ranges.
 
 Saved states and weights files hold these numbers in this order, and the C core has them in the same.
 """
