@@ -17,15 +17,22 @@ from docs.reference_pages import pages
 from hybridsep.base.parameters import Parameter
 from hybridsep.fmi.variables import COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS, TRUST_SETTINGS
 from hybridsep.predict.trust.constants import CONSTANTS
+from hybridsep.predict.trust.learned import LEARNED
 
 ROOT = Path(__file__).resolve().parent
 SETTINGS_HEADER = ROOT / "fmu_src" / "c" / "core" / "predict" / "hsep_settings.h"
 CONSTANTS_HEADER = ROOT / "fmu_src" / "c" / "core" / "predict" / "trust" / "hsep_trust_constants.h"
+LEARNED_HEADER = CONSTANTS_HEADER.with_name("hsep_trust_learned.h")
 
 
 def generated() -> dict[Path, str]:
     """Return the files that are generated, as they must be."""
-    return {SETTINGS_HEADER: settings_header(), CONSTANTS_HEADER: constants_header(), **pages()}
+    headers = {
+        SETTINGS_HEADER: settings_header(),
+        CONSTANTS_HEADER: constants_header(),
+        LEARNED_HEADER: learned_header(),
+    }
+    return headers | pages()
 
 
 def settings_header() -> str:
@@ -79,6 +86,20 @@ def constants_header() -> str:
 #define HSEP_TRUST_CONSTANTS_H
 
 {body}
+
+#endif
+"""
+
+
+def learned_header() -> str:
+    """Return the C header of the ranges of what the residual model with trust has learned."""
+    ranges = "\n".join(f"#define HSEP_LEARNED_{name.upper()} {one.least}, {one.most}" for name, one in LEARNED.items())
+    return f"""/* Least and most of what the residual model with trust has learned, generated from
+ * hybridsep/predict/trust/learned.py; the sensor's are those of its guard. */
+#ifndef HSEP_TRUST_LEARNED_H
+#define HSEP_TRUST_LEARNED_H
+
+{ranges}
 
 #endif
 """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from math import prod
 from pathlib import Path
@@ -24,7 +25,7 @@ Log = Callable[[int, str], object]
 """Called with the status and the text of each message of an FMU's logger."""
 
 
-class Driver:
+class Driver(ABC):
     """An fmpy slave of one version of FMI.
 
     Parameters
@@ -38,31 +39,44 @@ class Driver:
     Attributes
     ----------
     slave
-        fmpy's.
+        fmpy's, of ``fmpy_class``.
     platform : str
         Folder of this machine's library below ``binaries/``.
     real : str
         Type of real numbers.
     access : mapping
         Type of a variable → type whose functions get and set it.
+    state, deserialise : str
+        What the version's functions call a state, and its deserialisation.
     """
 
+    fmpy_class: ClassVar[Any]
     platform: ClassVar[str]
     real: ClassVar[str]
     access: ClassVar[Mapping[str, str]]
-    slave: Any
+    state: ClassVar[str]
+    deserialise: ClassVar[str]
 
+    def __init__(self, folder: Path, description: Any, instance_name: str) -> None:
+        self.slave = self.fmpy_class(
+            guid=description.guid,
+            unzipDirectory=str(folder),
+            modelIdentifier=description.coSimulation.modelIdentifier,
+            instanceName=instance_name,
+        )
+
+    @abstractmethod
     def instantiate(self, log: Log) -> None:
         """Make the instance, with logging on."""
-        raise NotImplementedError
 
+    @abstractmethod
     def begin(self, start_time: float, stop_time: float | None = None) -> None:
         """Set the experiment, s, and enter Initialization Mode."""
-        raise NotImplementedError
 
     def get(self, variables: Sequence[Any]) -> list[Any]:
         """Return the values of variables of one type, those of an array one after the other."""
-        raise NotImplementedError
+        references = [variable.valueReference for variable in variables]
+        return list(getattr(self.slave, f"get{self.access[variables[0].type]}")(references))
 
     def set(self, variables: Sequence[Any], values: Sequence[Any]) -> None:
         """Set variables of one type."""
@@ -71,14 +85,26 @@ class Driver:
 
     def save(self) -> bytes:
         """Return the state, serialised."""
-        raise NotImplementedError
+        state = self._call_state("get")
+        try:
+            return bytes(self._call_state("serialize", state))
+        finally:
+            self._call_state("free", state)
 
     def restore(self, blob: bytes) -> None:
         """Take over a serialised state."""
-        raise NotImplementedError
+        state = self._call_state(self.deserialise, blob)
+        try:
+            self._call_state("set", state)
+        finally:
+            self._call_state("free", state)
+
+    def _call_state(self, verb: str, *arguments: Any) -> Any:
+        return getattr(self.slave, f"{verb}{self.state}")(*arguments)
 
 
 class _Fmi2Driver(Driver):
+    fmpy_class = FMU2Slave
     platform = fmpy.platform
     real = "Real"
     access: ClassVar[Mapping[str, str]] = {
@@ -87,9 +113,7 @@ class _Fmi2Driver(Driver):
         "Enumeration": "Integer",
         "Boolean": "Boolean",
     }
-
-    def __init__(self, folder: Path, description: Any, instance_name: str) -> None:
-        self.slave = _slave(FMU2Slave, folder, description, instance_name)
+    state, deserialise = "FMUstate", "deSerialize"
 
     def instantiate(self, log: Log) -> None:
         def keep(environment: Any, instance: bytes, status: int, category: bytes | None, message: bytes | None) -> None:
@@ -105,26 +129,9 @@ class _Fmi2Driver(Driver):
         self.slave.setupExperiment(startTime=start_time, stopTime=stop_time)
         self.slave.enterInitializationMode()
 
-    def get(self, variables: Sequence[Any]) -> list[Any]:
-        references = [variable.valueReference for variable in variables]
-        return list(getattr(self.slave, f"get{self.access[variables[0].type]}")(references))
-
-    def save(self) -> bytes:
-        state = self.slave.getFMUstate()
-        try:
-            return bytes(self.slave.serializeFMUstate(state))
-        finally:
-            self.slave.freeFMUstate(state)
-
-    def restore(self, blob: bytes) -> None:
-        state = self.slave.deSerializeFMUstate(blob)
-        try:
-            self.slave.setFMUstate(state)
-        finally:
-            self.slave.freeFMUstate(state)
-
 
 class _Fmi3Driver(Driver):
+    fmpy_class = FMU3Slave
     platform = fmpy.platform_tuple
     real = "Float64"
     access: ClassVar[Mapping[str, str]] = {
@@ -133,9 +140,7 @@ class _Fmi3Driver(Driver):
         "Enumeration": "Int64",
         "Boolean": "Boolean",
     }
-
-    def __init__(self, folder: Path, description: Any, instance_name: str) -> None:
-        self.slave = _slave(FMU3Slave, folder, description, instance_name)
+    state, deserialise = "FMUState", "deserialize"
 
     def instantiate(self, log: Log) -> None:
         def keep(environment: Any, status: int, category: bytes | None, message: bytes | None) -> None:
@@ -151,32 +156,9 @@ class _Fmi3Driver(Driver):
         n = sum(prod(variable.shape or ()) for variable in variables)
         return list(getattr(self.slave, f"get{self.access[variables[0].type]}")(references, n))
 
-    def save(self) -> bytes:
-        state = self.slave.getFMUState()
-        try:
-            return bytes(self.slave.serializeFMUState(state))
-        finally:
-            self.slave.freeFMUState(state)
-
-    def restore(self, blob: bytes) -> None:
-        state = self.slave.deserializeFMUState(blob)
-        try:
-            self.slave.setFMUState(state)
-        finally:
-            self.slave.freeFMUState(state)
-
 
 DRIVERS: Mapping[str, type[_Fmi2Driver | _Fmi3Driver]] = {"2": _Fmi2Driver, "3": _Fmi3Driver}
 """By the first digit of the version of FMI."""
-
-
-def _slave(kind: Any, folder: Path, description: Any, instance_name: str) -> Any:
-    return kind(
-        guid=description.guid,
-        unzipDirectory=str(folder),
-        modelIdentifier=description.coSimulation.modelIdentifier,
-        instanceName=instance_name,
-    )
 
 
 def _text(message: bytes | None) -> str:

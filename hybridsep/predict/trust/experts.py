@@ -108,6 +108,11 @@ class EvidenceOfRuns:
         self.this = Evidence.none(self.n_features)
         self.earlier: Evidence | None = None
 
+    @property
+    def n_rows(self) -> float:
+        """Number of all rows, weighted."""
+        return self.this.n_rows + (0.0 if self.earlier is None else self.earlier.n_rows)
+
     def begin_run(self, most: float) -> None:
         """Begin another run: all rows so far are of earlier ones, and weigh at most as ``most`` of this one."""
         everything = self.all()

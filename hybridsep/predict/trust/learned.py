@@ -1,11 +1,11 @@
 """Learned numbers of the trusted model besides its factors, and their ranges.
 
-Saved states and weights files hold these numbers in this order, and the C core has them in the same.
+Saved states and weights files hold these numbers in this order. The C core has them in the same; its ranges are
+generated from these.
 """
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 from ...base.signals import PREDICTION_MAX
@@ -32,8 +32,7 @@ LEARNED: dict[str, Range] = {
     "gram": Range(-PREDICTION_MAX),
     "cross": Range(-PREDICTION_MAX),
     "evidence": Range(),
-    "sensor": Range(-1.0, math.inf),
 }
 """Ranges by name: rows of the factors; scales of velocity, m/s, and of the command's steps, m; sizes of the residuals
-of the physics model and of the command; of each expert noise, m², and correlation; largest features; the stack; and the
-sensor, whose spread of −1 and infinite step are not known."""
+of the physics model and of the command; of each expert noise, m², and correlation; largest features; and the stack. The
+sensor's numbers follow them, with ranges that its guard knows."""

@@ -154,8 +154,7 @@ class TrustedModel(ResidualModel[TrustedForecast]):
     @property
     def n_rows(self) -> float:
         """Rows learned so far, weighted."""
-        earlier = self.evidence.earlier
-        return self.evidence.this.n_rows + (earlier.n_rows if earlier is not None else 0.0)
+        return self.evidence.n_rows
 
     @property
     def lag_weights(self) -> Array:

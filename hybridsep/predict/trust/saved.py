@@ -129,10 +129,10 @@ class SavedTrustedModel(TrustedModel):
         return forecast
 
     def learned(self) -> dict[str, Array]:
-        """Return what has been learned besides the regression, in the order of :data:`LEARNED`."""
+        """Return what has been learned besides the regression, in the order of :data:`LEARNED`, then the sensor."""
         stack, experts = self.stack, self.experts.values()
         return {
-            "n_rows": np.array([one.all().n_rows for one in (self.evidence, self.evidence_of_command)]),
+            "n_rows": np.array([self.evidence.n_rows, self.evidence_of_command.n_rows]),
             "motion": np.array([self.velocity_scale, self.largest_step]),
             "scale": np.array(self.scale),
             "scale_of_command": np.array(self.scale_of_command),

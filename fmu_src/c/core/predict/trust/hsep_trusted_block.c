@@ -2,6 +2,7 @@
 #include "hsep_trusted.h"
 
 #include "hsep_range.h"
+#include "hsep_trust_learned.h"
 
 #include <float.h>
 #include <math.h>
@@ -180,22 +181,21 @@ static const double trusted_rounding = 1e-6;
 /* All of them, in the order of a weights file. */
 static void trusted_list(hsep_trusted *self, trusted_part parts[TRUSTED_PARTS])
 {
-    const double most = HSEP_PREDICTION_MAX;
     hsep_stack *stack = &self->stack;
     const trusted_part before[] = {
-        {self->n_rows, HSEP_N_EVIDENCE, 0.0, most},
-        {&self->velocity_scale, 1, 0.0, most},
-        {&self->largest_step, 1, 0.0, most},
-        {&self->scale.largest_square, 1, 0.0, most},
-        {&self->scale.largest, 1, 0.0, most},
-        {&self->scale_of_command.largest_square, 1, 0.0, most},
-        {&self->scale_of_command.largest, 1, 0.0, most}};
+        {self->n_rows, HSEP_N_EVIDENCE, HSEP_LEARNED_N_ROWS},
+        {&self->velocity_scale, 1, HSEP_LEARNED_MOTION},
+        {&self->largest_step, 1, HSEP_LEARNED_MOTION},
+        {&self->scale.largest_square, 1, HSEP_LEARNED_SCALE},
+        {&self->scale.largest, 1, HSEP_LEARNED_SCALE},
+        {&self->scale_of_command.largest_square, 1, HSEP_LEARNED_SCALE_OF_COMMAND},
+        {&self->scale_of_command.largest, 1, HSEP_LEARNED_SCALE_OF_COMMAND}};
     const trusted_part behind[] = {
-        {hsep_at(self, self->largest), self->n_static, 0.0, most},
-        {stack->weights, HSEP_N_EXPERTS, 0.0, 1.0},
-        {stack->gram, HSEP_N_EXPERTS * HSEP_N_EXPERTS, -most, most},
-        {stack->cross, HSEP_N_EXPERTS, -most, most},
-        {stack->evidence, 2, 0.0, most},
+        {hsep_at(self, self->largest), self->n_static, HSEP_LEARNED_LARGEST},
+        {stack->weights, HSEP_N_EXPERTS, HSEP_LEARNED_WEIGHTS},
+        {stack->gram, HSEP_N_EXPERTS * HSEP_N_EXPERTS, HSEP_LEARNED_GRAM},
+        {stack->cross, HSEP_N_EXPERTS, HSEP_LEARNED_CROSS},
+        {stack->evidence, 2, HSEP_LEARNED_EVIDENCE},
         {&self->guard.spread, 1, -1.0, DBL_MAX},
         {&self->guard.held.step, 1, 0.0, HUGE_VAL},
         {&self->guard.vibration, 1, 0.0, DBL_MAX},
@@ -204,8 +204,9 @@ static void trusted_list(hsep_trusted *self, trusted_part parts[TRUSTED_PARTS])
     parts += sizeof before / sizeof before[0];
     for (uint64_t i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
         hsep_expert *expert = hsep_trusted_expert(self, (hsep_expert_place)i);
-        parts[i - HSEP_LAGGED] = (trusted_part){&expert->noise_variance, 1, 0.0, most};
-        parts[i - HSEP_LAGGED + HSEP_N_EXPERTS - 1] = (trusted_part){&expert->correlation, 1, 1.0, most};
+        parts[i - HSEP_LAGGED] = (trusted_part){&expert->noise_variance, 1, HSEP_LEARNED_NOISE_VARIANCES};
+        parts[i - HSEP_LAGGED + HSEP_N_EXPERTS - 1] =
+            (trusted_part){&expert->correlation, 1, HSEP_LEARNED_CORRELATIONS};
     }
     memcpy(parts + 2 * (HSEP_N_EXPERTS - 1), behind, sizeof behind);
 }
