@@ -132,13 +132,13 @@ def backtest(
         with written_text(out) as file:
             csv.writer(file).writerows([BATCH_COLUMNS, *rows])
     if isinstance(opened, Log) and not as_json and (line := partly_used(opened)):
-        console.print(line, highlight=False)
+        console.print(line)
     more: dict[str, Any] = {"findings": findings_table(intake.findings)}
     verdict, summary = scores.verdict, dict[str, Any](scores.summary())
     if peers is not None:
         verdict, summary = peers.verdict, {**summary, **peers.summary()}
     elif not as_json:
-        console.print(f"ARX models are left out: they take at most {CHECKED_MAX} samples.", highlight=False)
+        console.print(f"ARX models are left out: they take at most {CHECKED_MAX} samples.")
     in_motion = any(finding.name == "start in motion" and not finding.applied for finding in intake.findings)
     rest: dict[str, float] = {}
     if in_motion and scores.n_batches > 1:

@@ -68,7 +68,7 @@ def build(
                 if as_json or errors_console.is_terminal:
                     advance(f"{name}, {platform}", done)
                 else:
-                    errors_console.print(f"{name}: compile for {platform}", highlight=False, soft_wrap=True)
+                    errors_console.print(f"{name}: compile for {platform}", soft_wrap=True)
 
             given = {"targets": target or None, "on_target": on_target, "fmi": version, **extras.get(model, {})}
             paths.append(build_fmu(axis, name, out, flavour, **given))
@@ -77,4 +77,4 @@ def build(
         print_json([str(path) for path in paths])
     else:
         for path in paths:
-            console.print(f"{path}  {path.stat().st_size / 1024:.0f} KiB", highlight=False, soft_wrap=True)
+            console.print(f"{path}  {path.stat().st_size / 1024:.0f} KiB", soft_wrap=True)

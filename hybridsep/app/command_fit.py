@@ -106,8 +106,8 @@ def fit(
         print_json({**result.summary(), "advice": advice, "findings": listed, "files": written})
         return
     _print_fit(result, used, findings)
-    console.print(f"\n{advice}", highlight=False)
-    console.print("\n".join(f"{what}: {path}" for what, path in files.items()), highlight=False, soft_wrap=True)
+    console.print(f"\n{advice}")
+    console.print("\n".join(f"{what}: {path}" for what, path in files.items()), soft_wrap=True)
     print_written(figure)
 
 
@@ -130,12 +130,11 @@ def _print_fit(found: Fit, logs: Sequence[Log], findings: Mapping[str, Iterable[
         stated = "" if log.unit_stated else f", as the file states no unit of positions: taken as {unit} (--unit)"
         console.print(
             f"{log.path.name}: {extent([log])}, travel {factor * travel:.4g} {position}{stated}"
-            f"{changed_by(findings.get(log.path.name, ()))}",
-            highlight=False,
+            f"{changed_by(findings.get(log.path.name, ()))}"
         )
     for name, of_log in findings.items():
         for finding in of_log:
-            console.print(f"{name}: {finding}", highlight=False)
+            console.print(f"{name}: {finding}")
     scale, error = shown.error(found.judged.rms()[0])
     model, settings = found.identification, found.machine.predictor_settings
     table = Table(
@@ -144,12 +143,12 @@ def _print_fit(found: Fit, logs: Sequence[Log], findings: Mapping[str, Iterable[
     table.add_column("RMS", justify="right")
     for one in found.judged.scored():
         table.add_row(one.name, "diverged" if one.diverged else shown_figure(scale * one.rms))
-    console.print(f"{model['structure']}, dead time {model['dead_time']} samples", highlight=False)
+    console.print(f"{model['structure']}, dead time {model['dead_time']} samples")
     for line in model["findings"]:
-        console.print(f"  {line}", highlight=False)
+        console.print(f"  {line}")
     window = f"{1e3 * settings.Np * settings.T_s:.4g} ms"
-    console.print(f"Np = {settings.Np} ({window}), p = {settings.p}, q = {settings.q}", highlight=False)
+    console.print(f"Np = {settings.Np} ({window}), p = {settings.p}, q = {settings.q}")
     console.print(table)
-    console.print(str(found.judged.verdict()), highlight=False)
+    console.print(str(found.judged.verdict()))
     for line in tracking_lines(found.tracking, logs[0].shown) if found.tracking else ():
-        console.print(line, highlight=False)
+        console.print(line)

@@ -94,7 +94,7 @@ def fleet(
         folder = Path(sources[1])
         page = out or folder / "report.html"
         write_page(Results(folder).rows(), page, folder)
-        console.print(f"report: {page}", highlight=False, soft_wrap=True)
+        console.print(f"report: {page}", soft_wrap=True)
         return
     if out is None:
         raise ParameterError("--out must name the folder of the results")
@@ -125,10 +125,8 @@ def _print_run(run: FleetRun, out: Path, *, as_json: bool) -> None:
         print_json({"logs": run.n_logs, "unchanged": run.n_unchanged, "rows": run.rows, "results": str(out)})
         return
     done = len(run.rows) - len(run.failed)
-    console.print(
-        f"{run.n_logs} logs, {run.n_unchanged} unchanged; {done} axes done, {len(run.failed)} failed", highlight=False
-    )
+    console.print(f"{run.n_logs} logs, {run.n_unchanged} unchanged; {done} axes done, {len(run.failed)} failed")
     if run.failed:
         failures = [f"{row['url'].rpartition('/')[2]} {row['axis']}: {row['message']}" for row in run.failed]
-        console.print(listed(failures, str, "\n"), highlight=False, soft_wrap=True)
-    console.print(f"results: {out}\nnext: hybridsep fleet report {out}", highlight=False, soft_wrap=True)
+        console.print(listed(failures, str, "\n"), soft_wrap=True)
+    console.print(f"results: {out}\nnext: hybridsep fleet report {out}", soft_wrap=True)

@@ -182,7 +182,7 @@ def identify(
         entries |= {"sources": [f"identified from {recording.name}", *changed]} if changed else {}
         _write_machine(found, machine, recording.name, entries, out)
     if partly and not as_json:
-        console.print(partly, highlight=False)
+        console.print(partly)
     _print_identified(found, as_json, recording.name, shown)
     if not as_json:
         print_written(out, figure)
@@ -226,7 +226,7 @@ def _print_identified(found: IdentifiedModel | IdentifiedResponse, as_json: bool
     elif found.criteria:
         console.print(_sizes(found))
     for finding in found.findings:
-        console.print(f"- {finding}", highlight=False)
+        console.print(f"- {finding}")
 
 
 def _parameters(found: IdentifiedModel | IdentifiedResponse, title: str, shown: Shown) -> Table:

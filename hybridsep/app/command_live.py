@@ -87,13 +87,13 @@ def live(
         try:
             if served is not None:
                 sinks.append(served)
-                errors_console.print(f"page: {served.address}", highlight=False, soft_wrap=True)
+                errors_console.print(f"page: {served.address}", soft_wrap=True)
             run = run_live(origin, FmuController(ahead, values, 0.0), sinks, ends=(Interrupted, KeyboardInterrupt))
             _print_run(run.status, shown, as_json=as_json)
             if served is not None and served.n_dropped:
-                errors_console.print(f"note: the page was too slow for {served.n_dropped} samples", highlight=False)
+                errors_console.print(f"note: the page was too slow for {served.n_dropped} samples")
             if served is not None and not run.interrupted:
-                errors_console.print("the source has ended; Ctrl-C ends the page", highlight=False)
+                errors_console.print("the source has ended; Ctrl-C ends the page")
                 served.wait()
         except (Interrupted, KeyboardInterrupt):  # before the first sample, or while the page is looked at
             if not run.status:
@@ -119,4 +119,4 @@ def _print_run(status: Mapping[str, Any], shown: Shown, *, as_json: bool) -> Non
     times = {"step_p50": "median", "step_p99": "99 %", "step_max": "longest"}
     steps = [f"{words} {float(f'{1e6 * status[name]:.3g}'):g} µs" for name, words in times.items()]
     lines.append(f"step: {', '.join(steps)}")
-    console.print("\n".join(lines), highlight=False)
+    console.print("\n".join(lines))

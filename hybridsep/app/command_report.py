@@ -102,6 +102,6 @@ def report(
     written.write(page, figure)
     for line in (partly_used(whole), recommendation(judged)):
         if line:
-            console.print(line, highlight=False)
-    console.print(f"report: {page}", highlight=False, soft_wrap=True)
+            console.print(line)
+    console.print(f"report: {page}", soft_wrap=True)
     print_written(figure)

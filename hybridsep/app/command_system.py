@@ -73,4 +73,4 @@ def system(
     if as_json:
         print_json([str(out)])
     else:
-        console.print(f"{out}  {out.stat().st_size / 1024:.0f} KiB", highlight=False, soft_wrap=True)
+        console.print(f"{out}  {out.stat().st_size / 1024:.0f} KiB", soft_wrap=True)

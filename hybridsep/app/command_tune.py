@@ -129,7 +129,7 @@ def tune(
         print_json({**tuning_summary(tuning, windows, values), "findings": findings})
     else:
         for line in partly:
-            console.print(line, highlight=False)
+            console.print(line)
         print_tuning(tuning, windows, values, given.title, shown)
     if out is not None:
         best = changed.changed("predictor", {"Np": chosen.Np, **entries(chosen, values)})

@@ -25,7 +25,7 @@ __all__ = ["DEBUG_VARIABLE", "Commands", "Interrupted", "errors_console", "run"]
 DEBUG_VARIABLE = "HYBRIDSEP_DEBUG"
 """Environment variable: if it is set, an unexpected error shows its traceback."""
 
-errors_console = Console(stderr=True, emoji=False, markup=False)
+errors_console = Console(stderr=True, emoji=False, markup=False, highlight=False)
 
 _WANTED = {"int": "must be a whole number", "float": "must be a number"}
 """What an option takes, by the beginning of a type of pydantic's errors."""
@@ -112,7 +112,7 @@ def _status(app: Callable[[], object]) -> int:
 
 def _fail(message: str) -> int:
     errors_console.print("error: ", style="bold red", end="")
-    errors_console.print(message, highlight=False, soft_wrap=True)
+    errors_console.print(message, soft_wrap=True)
     return 2
 
 

@@ -118,7 +118,7 @@ def open_checked(
 def show(remarks: Iterable[str], findings: Iterable[Finding]) -> None:
     """Print remarks and findings on standard error."""
     for line in [f"note: {remark}" for remark in remarks] + [str(finding) for finding in findings]:
-        errors_console.print(line, highlight=False, soft_wrap=True)
+        errors_console.print(line, soft_wrap=True)
 
 
 def _longest_segment(log: Log, path: Path) -> Log:

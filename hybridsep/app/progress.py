@@ -48,4 +48,4 @@ class _Lines:
             return
         if message != self._stage or now - self._printed >= _PAUSE:
             self._stage, self._printed = message, now
-            errors_console.print(f"[{fraction:4.0%}] {message}", highlight=False, soft_wrap=True)
+            errors_console.print(f"[{fraction:4.0%}] {message}", soft_wrap=True)

@@ -30,7 +30,7 @@ __all__ = [
     "print_written",
 ]
 
-console = Console(emoji=False, markup=False)
+console = Console(emoji=False, markup=False, highlight=False)
 """Standard output. Units and names of files may have brackets, which are text there, as in the tables."""
 
 PAPER_COLUMN = "× hold: RMS relative to holding the last residual; paper: physics → hybrid, reduction, as printed there"
@@ -55,11 +55,10 @@ def print_predictions(summary: Mapping[str, Mapping[str, Any]]) -> None:
         text = f"{name}: of {n} windows the hybrid is worse than physics in {len(worse)}"
         times = ", ".join(f"{batch['t_s']:g}" for batch in worse)
         console.print(
-            f"{text}{f' (from {times} s on)' if worse else ''}, worse than hold in {case['n_batches_worse_than_hold']}",
-            highlight=False,
+            f"{text}{f' (from {times} s on)' if worse else ''}, worse than hold in {case['n_batches_worse_than_hold']}"
         )
     for name, case in summary.items():
-        console.print(f"\n{name}\n{case['verdict']}", highlight=False)
+        console.print(f"\n{name}\n{case['verdict']}")
 
 
 def print_compensation(summary: Mapping[str, Mapping[str, Any]]) -> None:
@@ -167,17 +166,14 @@ def print_scores(
                 shown_sizes = [one if isinstance(one, str) else shown_figure(1e-6 * factor * one) for one in figures]
                 table.add_row(label_text, *shown_sizes, *ratios)
     console.print(table)
-    console.print(str(verdict), highlight=False)
+    console.print(str(verdict))
 
 
 def print_without_first(rms: Mapping[str, float], shown: Shown) -> None:
     """Print RMS errors, m or rad, without the first window of a log in motion, by their names in summaries."""
     factor, name = shown.error(rms["pb"])
     figures = ", ".join(f"{peer} {shown_figure(factor * rms[key])}" for key, peer in PREDICTIONS.items() if key in rms)
-    console.print(
-        f"Without the first window, of whose start in motion no model knows the state: RMS {figures} {name}.",
-        highlight=False,
-    )
+    console.print(f"Without the first window, of whose start in motion no model knows the state: RMS {figures} {name}.")
 
 
 def print_run(run: Run, as_json: bool, title: str) -> None:
@@ -207,8 +203,7 @@ def _print_tracking(summary: Mapping[str, float | int], as_json: bool, title: st
     console.print(
         f"command to the drive: at most {1e3 * peaks[0]:.1f} mm/s, {peaks[1]:.2f} m/s², {peaks[2]:.0f} m/s³\n"
         f"planned by the hybrid {summary['share_hybrid']:.1%}, by the physics model {summary['share_physics']:.1%}, "
-        f"not compensated {summary['share_off']:.1%} of the samples",
-        highlight=False,
+        f"not compensated {summary['share_off']:.1%} of the samples"
     )
 
 
@@ -216,7 +211,7 @@ def print_written(*paths: Path | None) -> None:
     """Print the names of files that were written, None being none."""
     for path in paths:
         if path is not None:
-            console.print(f"wrote {path}", highlight=False, soft_wrap=True)
+            console.print(f"wrote {path}", soft_wrap=True)
 
 
 def print_json(result: Any) -> None:

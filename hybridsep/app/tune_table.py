@@ -80,21 +80,20 @@ def print_tuning(tuning: Tuning, windows: Mapping[int, Tuning], values: Values, 
     chosen = tuning.candidates[tuning.chosen]
     factor, unit = shown.error(float(np.max(tuning.rms_pb)))
     heading = f"{title}: RMS in {unit} against the measured position, Np = {chosen.Np}"
-    console.print(heading, highlight=False)
+    console.print(heading)
     console.print(_ranked(tuning, values, factor))
     for line in _words(tuning, values):
-        console.print(line, highlight=False)
+        console.print(line)
     console.print(
         f"\nThe same settings over other look-aheads, RMS in {unit}; no choice: the look-ahead is the controller's, "
-        "and a shorter one is always predicted better",
-        highlight=False,
+        "and a shorter one is always predicted better"
     )
     console.print(_over_windows(windows, factor))
-    console.print("For the machine file:\n", highlight=False)
+    console.print("For the machine file:\n")
     lines = {"Np": chosen.Np, **entries(chosen, values), "trust": str(chosen.trust).lower()}
-    console.print("[predictor]", highlight=False)
+    console.print("[predictor]")
     for name, value in lines.items():
-        console.print(f"{name} = {value}", highlight=False)
+        console.print(f"{name} = {value}")
 
 
 def _ranked(tuning: Tuning, values: Values, factor: float) -> Table:
