@@ -15,7 +15,6 @@ from typing import TypeVar
 from ..base.errors import ParameterError
 from ..base.new_folders import make_folder
 from ..base.zip_files import ZIP_DAMAGE
-from ..cosim.run import COMPENSATOR, PREDICTOR
 from ..logs.example import EXAMPLE, HEAD
 from ..machines.seal import edited_since, is_as_written
 
@@ -120,6 +119,12 @@ def _has_columns(*tables: tuple[str, ...]) -> Callable[[Path], bool]:
     return recognises
 
 
+def _is_run(path: Path) -> bool:
+    from ..cosim.run import COMPENSATOR, PREDICTOR
+
+    return _has_columns(PREDICTOR.columns, COMPENSATOR.columns)(path)
+
+
 def _is_our_fmu(path: Path) -> bool:
     if not zipfile.is_zipfile(path) or "modelDescription.xml" not in _members(path):
         return False
@@ -153,7 +158,7 @@ def _members(path: Path) -> list[str]:
 
 
 BATCHES = Kind("CSV of hybridsep backtest", _has_columns(BATCH_COLUMNS))
-RUN = Kind("result of hybridsep cosim", _has_columns(PREDICTOR.columns, COMPENSATOR.columns))
+RUN = Kind("result of hybridsep cosim", _is_run)
 FIGURE = Kind("PNG", _begins_with(b"\x89PNG\r\n\x1a\n"))
 VECTOR_FIGURE = Kind("figure of hybridsep", _is_our_drawing)
 FMU = Kind("FMU of hybridsep", _is_our_fmu)

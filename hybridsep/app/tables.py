@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import typer
@@ -14,10 +14,12 @@ from rich.console import Console
 from rich.table import Table
 
 from ..base.metrics import shown_figure
-from ..cosim.run import PREDICTOR, Run
 from ..demo.published import PRINTED
-from ..evaluate.verdict import Verdict, verdict_of
 from ..logs.units import Shown, shown_in
+
+if TYPE_CHECKING:
+    from ..cosim.run import Run
+    from ..evaluate.verdict import Verdict
 
 __all__ = [
     "console",
@@ -178,6 +180,9 @@ def print_without_first(rms: Mapping[str, float], shown: Shown) -> None:
 
 def print_run(run: Run, as_json: bool, title: str) -> None:
     """Print the figures of a run: its prediction errors, or its tracking errors."""
+    from ..cosim.run import PREDICTOR
+    from ..evaluate.verdict import verdict_of
+
     if run.kind == PREDICTOR:
         print_scores(run.summary(), verdict_of(run), as_json, title)
     else:

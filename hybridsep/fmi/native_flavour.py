@@ -15,6 +15,7 @@ import re
 import struct
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
+from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
@@ -23,7 +24,6 @@ from ..base.signals import as_samples
 from ..base.version import __version__
 from ..machines.machine import Machine
 from ..plants.trajectory import spiral, staircase
-from ..predict.predictor import HybridPredictor
 from .bill_of_materials import BILL_FILE, bill_of_materials, native_parts
 from .c_header import c_header, kind_of
 from .c_sources import FMI_HEADERS, c_sources, fmi_headers
@@ -39,7 +39,9 @@ from .pages import icon, index_page
 from .reference import has_reference, reference_files
 from .table_file import TABLE_FILE, table_file
 from .terminals import ICON_FILE, TERMINALS_FILE, terminals_and_icons
-from .weights import WEIGHTS_FILE, weights_file
+
+if TYPE_CHECKING:
+    from ..predict.predictor import HybridPredictor
 
 __all__ = ["files", "sources"]
 
@@ -94,6 +96,8 @@ def files(
     if model == "ReferenceTrajectory":
         content |= {f"resources/{file}": data for file, data in _trajectories(machine.T_s, samples).items()}
     if trained is not None:
+        from .weights import WEIGHTS_FILE, weights_file
+
         content[f"resources/{WEIGHTS_FILE}"] = weights_file(trained)
     guid = content_guid(content, description)
     content[f"resources/{TABLE_FILE}"] = table_file(description, guid)

@@ -12,20 +12,22 @@ import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pythonfmu
 
 from ..base.data_files import data_folder
 from ..base.version import __version__
 from ..machines.machine import Machine
-from ..predict.predictor import HybridPredictor
 from .bill_of_materials import BILL_FILE, bill_of_materials, python_parts
 from .content import content_guid
 from .imported import imported_modules
 from .model_description import model_description
 from .pages import filled, icon, index_page
 from .pythonfmu_limits import checked_version, pythonfmu_license
-from .weights import WEIGHTS_FILE, weights_file
+
+if TYPE_CHECKING:
+    from ..predict.predictor import HybridPredictor
 
 __all__ = ["files"]
 
@@ -61,6 +63,8 @@ def files(
     version = checked_version()
     content = _resources(model)
     if trained is not None:
+        from .weights import WEIGHTS_FILE, weights_file
+
         content[f"resources/{WEIGHTS_FILE}"] = weights_file(trained)
     needs = "The FMU needs a Python 3 with NumPy and SciPy in the importing tool's process."
     limits = filled("pythonfmu_limits", version=version)

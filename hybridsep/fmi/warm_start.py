@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..base.errors import StateError
 from ..machines.machine import Machine
-from ..predict.predictor import HybridPredictor
-from .weights import learned_settings
+
+if TYPE_CHECKING:
+    from ..predict.predictor import HybridPredictor
 
 __all__ = ["load_trained", "warm_predictor"]
 
@@ -44,6 +46,8 @@ def load_trained(path: str | Path, machine: Machine, model: str) -> HybridPredic
     StateError
         If the file is not a saved predictor, one of another machine, naming all that differs, or has learned nothing.
     """
+    from ..predict.predictor import HybridPredictor
+
     path = Path(path)
     try:
         trained = HybridPredictor.load(path)
@@ -70,4 +74,6 @@ def load_trained(path: str | Path, machine: Machine, model: str) -> HybridPredic
 
 def _parameters(predictor: HybridPredictor) -> dict[str, object]:
     """Return the settings that must agree, by their names in the machine file."""
+    from .weights import learned_settings
+
     return {"Np": predictor.Np, **learned_settings(predictor), "input_hold": predictor.settings.input_hold}

@@ -7,19 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, ValidationError, model_validator
 
 from ..base.data_files import data_folder
 from ..base.errors import MachineError, ParameterError, brief, first_line, listed
 from ..base.settings import PARAMETERS, CompensatorSettings, Limits, PredictorSettings, Settings
-from ..compensate.compensator import SepCompensator
 from ..model.physics import ModalModel, Mode
 from ..plants.feed_drive import FeedDrive
 from ..plants.plant import Plant
 from ..plants.stage_drive import StageDrive
-from ..predict.predictor import HybridPredictor
 from .sections import (
     CompensatorSection,
     DriveLimitsSection,
@@ -34,6 +32,10 @@ from .sections import (
     StageSection,
 )
 from .toml import read_toml
+
+if TYPE_CHECKING:  # they load slowly, and whoever builds an FMU needs neither
+    from ..compensate.compensator import SepCompensator
+    from ..predict.predictor import HybridPredictor
 
 __all__ = ["NAME_PATTERN", "Machine", "load_machine", "machine_from_table", "machine_names", "machine_path"]
 
@@ -138,6 +140,8 @@ class Machine(Section):
 
     def new_predictor(self, settings: PredictorSettings | None = None) -> HybridPredictor:
         """Return a predictor for this machine, with its :attr:`predictor_settings` unless others are given."""
+        from ..predict.predictor import HybridPredictor
+
         return HybridPredictor(self.model, self.predictor_settings if settings is None else settings)
 
     def new_compensator(
@@ -152,6 +156,8 @@ class Machine(Section):
         predictor : PredictorSettings, optional
             :attr:`compensator_predictor` if left out.
         """
+        from ..compensate.compensator import SepCompensator
+
         own = self.new_predictor(self.compensator_predictor if predictor is None else predictor)
         return SepCompensator(own, self._compensation() if settings is None else settings)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import expm, toeplitz
 
 from ..base.settings import check
 from ..base.signals import Array
@@ -104,6 +103,8 @@ class DiscreteModel:
 
     def _tabulate(self) -> None:
         """Tabulate the lifted matrices for windows of up to ``block`` samples."""
+        from scipy.linalg import toeplitz  # loads slowly, and a machine file is read without it
+
         m, n = self._block, self._n
         self._powers = np.empty((m + 1, n, n))  # A⁰ … Aᵐ
         self._powers[0] = np.eye(n)
@@ -136,6 +137,8 @@ def discretised_block(A: Array, b: Array, T_s: float, input_hold: str) -> tuple[
     T_s : float, s
     input_hold : {"zoh", "foh"}
     """
+    from scipy.linalg import expm
+
     m = len(b)
     augmented = np.zeros((m + 2, m + 2))
     augmented[:m, :m] = A * T_s

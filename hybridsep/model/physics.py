@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import block_diag
 
 from ..base.errors import ModelError, ParameterError
 from ..base.settings import check
@@ -155,6 +154,8 @@ class ModalModel:
         b : (2m,) array, 1/s
         c : (2m,) array, 1
         """
+        from scipy.linalg import block_diag
+
         blocks, b, c = [], [], []
         for mode in self.modes:
             w = mode.omega
