@@ -15,6 +15,7 @@ from pythonfmu import Fmi2Slave
 ctypes.pythonapi.Py_IncRef(ctypes.py_object(globals()))
 
 try:
+    import scipy.linalg  # noqa: F401 - the library loads it where it computes: too late to refuse
     from slave_module import *  # type: ignore[import-not-found]  # noqa: F403 - its class is found by its bases
 except Exception as error:  # whatever a library that does not fit this Python raises
     REASON = f"{error}; the FMU needs a Python with NumPy and SciPy in the importing tool's process, and all its files"
