@@ -3,8 +3,8 @@
 ``ziglang``, a build requirement, compiles for all of them; libraries that the checkout has kept are taken as they are.
 The first time takes some minutes of processor time. ``HYBRIDSEP_TARGETS`` (names of ``hybridsep build --target`` with
 commas, or ``none``) leaves platforms out. Where it fails, the installation goes on without them, and says so: the
-Python flavour of the FMUs remains. An editable installation finds them in ``build/binaries``, and asks git for the
-commit.
+Python flavour of the FMUs remains. An editable installation finds them in ``build/binaries``, where those of other
+platforms come when they are first asked for: it compiles this machine's alone. It asks git for the commit.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class ReleaseHook(BuildHookInterface[Any]):
         try:
             files = self._commit()
             if self.target_name == "wheel":
-                files |= self._libraries()
+                files |= self._libraries(this_machine_alone=version == "editable")
         finally:
             sys.path.remove(self.root)
         if version != "editable":
@@ -46,14 +46,16 @@ class ReleaseHook(BuildHookInterface[Any]):
             file.write_text(f"{made_from}\n", encoding="utf-8")
         return {str(file): COMMIT_FILE}
 
-    def _libraries(self) -> dict[str, str]:
+    def _libraries(self, this_machine_alone: bool) -> dict[str, str]:
         """Return the libraries: path → place; none where they cannot be compiled."""
         try:
             from hybridsep.fmi.c_header import KINDS
-            from hybridsep.fmi.compiler import TARGETS
+            from hybridsep.fmi.compiler import TARGETS, host_target
             from hybridsep.fmi.libraries import chosen_targets, library_paths
 
             targets = chosen_targets()
+            if this_machine_alone:
+                targets = tuple(target for target in targets if target == host_target())
             begin = time.monotonic()
             self.app.display_info("libraries of the native FMUs; the first time takes some minutes of processor time")
             paths = library_paths([(kind, target) for kind in KINDS for target in targets])

@@ -123,7 +123,7 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
         """Unpack the archive, load its library and make the instance."""
         try:
             with named_errors(gettempdir()):
-                fmpy.extract(str(archive), folder)
+                fmpy.extract(str(archive), folder, include=_serves_a_run)
         except OSError:  # the disk's, with a name
             raise
         except Exception as error:  # fmpy raises bare Exceptions here
@@ -273,6 +273,11 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
         text = self.log[-1][1]
         framed = re.search(r"\w+Error\(([\"'])(.*)\1\)", text, re.DOTALL)
         return f": {' '.join((framed[2] if framed else text).split())[:_WORDS_MAX]}"
+
+
+def _serves_a_run(name: str) -> bool:
+    """Return whether a file of an archive can serve a run; sources and documentation are most files and never do."""
+    return not name.startswith(("sources/", "documentation/"))
 
 
 def _keeper(log: list[tuple[int, str]]) -> Callable[[int, str], None]:

@@ -146,7 +146,7 @@ def test_cosim_over_a_file(hybridsep: Run, tmp_path: Path) -> None:
 
 
 def test_cosim_with_compensation(hybridsep: Run, tmp_path: Path) -> None:
-    options = ("--flavour", "python", "--out", tmp_path / "run.csv", "--figure", tmp_path / "run.png")
+    options = ("--out", tmp_path / "run.csv", "--figure", tmp_path / "run.png")
     figures = {}
     for kind in ("off", "physics", "hybrid"):
         status, out, _ = hybridsep("cosim", "--compensate", kind, *options, "--json")
@@ -174,7 +174,7 @@ def test_weights_for_a_compensator(hybridsep: Run, tmp_path: Path) -> None:
     compensator = machine.new_compensator()
     cosimulate(compensator, machine.new_plant(), staircase(), encoder=Encoder(5e-6, 1))
     compensator.predictor.save(weights)
-    options = ("--flavour", "python", "--weights", weights)
+    options = ("--weights", weights)
     status, out, _ = hybridsep("cosim", "--compensate", "hybrid", *options, "--json")
     assert status == 0
     assert json.loads(out)["tracking_rms_um"] < 2.5
@@ -182,13 +182,13 @@ def test_weights_for_a_compensator(hybridsep: Run, tmp_path: Path) -> None:
     status, _, err = hybridsep("cosim", *options)
     assert status == 2
     assert "trained.state was not trained for machine spring_mass_damper: it has Np = 50 instead of 100" in err
-    assert hybridsep("build", "SepCompensatorPy", "FeedDrivePy", *options, "--out", tmp_path)[0] == 0
-    with zipfile.ZipFile(tmp_path / "SepCompensatorPy.fmu") as archive:
+    assert hybridsep("build", "SepCompensator", "FeedDrive", *options, "--out", tmp_path)[0] == 0
+    with zipfile.ZipFile(tmp_path / "SepCompensator.fmu") as archive:
         assert "resources/weights.bin" in archive.namelist()
     status, _, err = hybridsep("build", "-m", "spring_mass_damper", *options, "--out", tmp_path)
     assert status == 2
     assert (
-        "--weights is for one HybridPredictor or SepCompensator, this would build HybridPredictorPy, SepCompensatorPy; "
+        "--weights is for one HybridPredictor or SepCompensator, this would build HybridPredictor, SepCompensator; "
         "name one" in " ".join(err.split())
     )
 

@@ -25,7 +25,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX only: run
     ],
 )
 def test_damaged_files_are_read_or_refused(tmp_path: Path, kinds: list[str]) -> None:
-    options = ["--n", "25", "--fmus", "12", "--seed", "7", "--keep", str(tmp_path / "findings")]
+    options = ["--n", "12", "--fmus", "6", "--seed", "7", "--keep", str(tmp_path / "findings")]
     command = [sys.executable, "-m", "benchmarks.hostile", *options, "--kinds", *kinds]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     findings = tmp_path / "findings" / "findings.txt"

@@ -63,6 +63,14 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
+def test_what_no_run_needs_is_not_unpacked(temporary: Path, native: Path) -> None:
+    with FmuInstance(native):
+        (unpacked,) = temporary.iterdir()
+        there = {path.name for path in unpacked.iterdir()}
+        assert {"binaries", "modelDescription.xml", "resources"} <= there
+        assert not {"sources", "documentation"} & there
+
+
 @pytest.fixture
 def eager_threads() -> Iterator[None]:
     """Let threads give way as often as possible."""

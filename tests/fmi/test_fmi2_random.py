@@ -20,12 +20,12 @@ from hybridsep.fmi.native_flavour import sources
 from hybridsep.machines.machine import load_machine
 
 FUZZED = {
-    "HybridPredictor": 8,
-    "SepCompensator": 8,
-    "FeedDrive": 3,
-    "FeedDrive_als25010_x": 3,
-    "ReferenceTrajectory": 3,
-    "HybridPredictorFmi3": 6,
+    "HybridPredictor": 5,
+    "SepCompensator": 5,
+    "FeedDrive": 2,
+    "FeedDrive_als25010_x": 2,
+    "ReferenceTrajectory": 2,
+    "HybridPredictorFmi3": 4,
 }
 """Duration of the random calls of each model, s; of FMI 3.0's that with arrays, as what they compute is the same."""
 
@@ -90,9 +90,12 @@ def test_each_source_compiles_alone_without_warnings(tmp_path: Path, compiler: l
         files = [path for path in files if path.name in adapter]
         assert len(files) >= 4
 
+    # What gcc warns of it finds while it optimises; clang finds it before, and would take twice the time
+    optimised = "-O1" if compiler == ["gcc"] else "-O0"
+
     def compile_alone(path: Path) -> None:
         # FMI 3.0's own header has two declarations that clang warns of
-        run_compiler(["-O2", "-isystem", FMI_HEADERS, "-c", path, "-o", path.with_suffix(".o")], command=compiler)
+        run_compiler([optimised, "-isystem", FMI_HEADERS, "-c", path, "-o", path.with_suffix(".o")], command=compiler)
 
     with ThreadPoolExecutor() as pool:
         list(pool.map(compile_alone, files))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -13,7 +15,7 @@ from hybridsep.base.errors import FmuError
 from hybridsep.fmi import libraries as module
 from hybridsep.fmi.c_header import KINDS
 from hybridsep.fmi.c_sources import c_sources
-from hybridsep.fmi.compiler import ALL_TARGETS, TARGETS, ZIG, expanded, host_target
+from hybridsep.fmi.compiler import ALL_TARGETS, TARGETS, ZIG, compiler_for, expanded, host_target
 from hybridsep.fmi.libraries import chosen_targets, default_targets, has_native, kept, libraries, ready_targets
 
 ALL = [(kind, target) for kind in KINDS for target in ALL_TARGETS]
@@ -104,3 +106,16 @@ def test_names_of_platforms() -> None:
     assert len(expanded(("linux64", "x86_64-linux"))) == 1
     with pytest.raises(FmuError, match="no target sparc; there are host, x86_64-linux"):
         expanded(("sparc",))
+
+
+@pytest.mark.skipif(find_spec("ziglang") is None, reason="needs ziglang")
+@pytest.mark.parametrize("target", ALL_TARGETS)
+def test_the_look_ahead_fmus_compile_for_every_platform(tmp_path: Path, target: str) -> None:
+    """Without optimisation; ``test_all_platforms`` links a drive's library, and libm is all that these need besides."""
+    for kind in ("HybridPredictor", "SepCompensator"):
+        for file, content in module._sources(kind).items():
+            (tmp_path / file).write_bytes(content)
+        flags = ["-std=c99", "-O0", "-Wall", "-Wextra", "-Werror", "-D_GNU_SOURCE", "-I."]
+        command = [*compiler_for(target).command, *flags, "-c", "all.c", "-o", "all.o"]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+        assert done.returncode == 0, f"{kind}: {done.stderr}"
