@@ -12,7 +12,6 @@ import argparse
 import contextlib
 import importlib
 import io
-import json
 import os
 import resource
 import signal
@@ -32,8 +31,7 @@ from rich.table import Table
 
 from benchmarks.mutations import KINDS, MACHINE, good_log, log_text, mutated, originals
 from hybridsep.app import cli
-from hybridsep.cosim import apart
-from hybridsep.logs import _arrays_child, arrays
+from hybridsep.base import apart
 
 TIME_MAX = 120
 """Time after which a run counts as hung, s."""
@@ -65,12 +63,14 @@ class Summary:
 
 
 class Forked:
-    """Stand-in for subprocess.Popen, with as much of it as :mod:`hybridsep.cosim.apart` uses."""
+    """Stand-in for subprocess.Popen, with as much of it as :mod:`hybridsep.base.apart` uses."""
 
-    def __init__(self, *_: Any, **__: Any) -> None:
+    def __init__(self, *_: Any, stderr: int | None = None, **__: Any) -> None:
         (job, self_in), (self_out, answers) = os.pipe(), os.pipe()
         self.pid = os.fork()
         if not self.pid:
+            if stderr is not None:
+                os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
             _become(job, answers, apart.serve)
         os.close(job)
         os.close(answers)
@@ -88,23 +88,6 @@ class Forked:
         """End it, if it has not ended."""
         if self.status is None:
             os.kill(self.pid, signal.SIGKILL)
-
-
-def forked_run(command: Sequence[str], **_: Any) -> subprocess.CompletedProcess[str]:
-    """Stand-in for subprocess.run, for the child that reads arrays."""
-    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
-        pid = os.fork()
-        if not pid:
-            os.dup2(err.fileno(), 2)
-            _become(os.open(os.devnull, os.O_RDONLY), out.fileno(), lambda: _read_arrays(command[3:]))
-        status = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
-        out.seek(0)
-        err.seek(0)
-        return subprocess.CompletedProcess(command, status, out.read().decode(), err.read().decode())
-
-
-def _read_arrays(arguments: Sequence[str]) -> None:
-    print(json.dumps(_arrays_child.main(*arguments)))
 
 
 def _become(standard_input: int, standard_output: int, work: Callable[[], object]) -> None:
@@ -136,7 +119,7 @@ def main(given: Sequence[str] | None = None) -> int:
     if not options.start:
         for library in LIBRARIES:
             importlib.import_module(library)
-        apart.subprocess = arrays.subprocess = _ForkingSubprocess  # type: ignore[assignment, attr-defined]
+        apart.subprocess = _ForkingSubprocess  # type: ignore[assignment, attr-defined]
     found = {}
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
@@ -161,7 +144,7 @@ class _ForkingSubprocess:
     """Stand-in for the module subprocess."""
 
     PIPE, DEVNULL = subprocess.PIPE, subprocess.DEVNULL
-    Popen, run = Forked, staticmethod(forked_run)
+    Popen = Forked
 
 
 def attack(kind: str, n: int, seed: int, folder: Path, keep: Path) -> Summary:

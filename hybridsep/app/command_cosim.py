@@ -68,7 +68,8 @@ def cosim(
 
     Over the staircase, a spiral's axis or a trajectory in a file.
     """
-    from ..cosim.apart import run_apart
+    from ..base.apart import run_apart
+    from ..cosim.importer import faulty
     from ..cosim.loop import cosimulate
     from ..cosim.pairing import check_pair, read_command, values_to_build
     from ..fmi.builds import build_here
@@ -105,7 +106,7 @@ def cosim(
         ahead = predictor or build_here(axis, model, folder, flavour, weights=weights)
         drive = plant or build_here(axis, "FeedDrive", folder, flavour)
         given = [path.name for path in (predictor, plant) if path is not None]
-        call = partial(run_apart, " or ".join(given), cosimulate) if given else cosimulate
+        call = partial(run_apart, faulty(" or ".join(given)), cosimulate) if given else cosimulate
         run = call(
             ahead,
             drive,

@@ -44,8 +44,9 @@ def report(
 
     It is checked and replayed as by backtest. The file needs no network.
     """
-    from ..cosim.apart import run_apart
+    from ..base.apart import run_apart
     from ..cosim.fmus import check_controller
+    from ..cosim.importer import faulty
     from ..cosim.run import PREDICTOR
     from ..evaluate.report import Report
     from ..fmi.warm_start import warm_predictor
@@ -84,7 +85,7 @@ def report(
         advance("time the FMU's steps", 0.95)
         steps = {}
         if fmu is not None:
-            steps = run_apart(fmu.name, step_times, fmu, whole.x_d[:SAMPLES_MAX], whole.x_meas[:SAMPLES_MAX])
+            steps = run_apart(faulty(fmu.name), step_times, fmu, whole.x_d[:SAMPLES_MAX], whole.x_meas[:SAMPLES_MAX])
     judged = Judged(replayed, whole.T_s, shown_of(whole.file_unit, axis_machine.unit), "the log")
     settings = predictor.settings
     written = Report(

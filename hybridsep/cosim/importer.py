@@ -27,7 +27,7 @@ from .binary_check import check_binary
 from .description_check import check_description
 from .driver import DRIVERS, Driver
 
-__all__ = ["FmuInstance", "read_description"]
+__all__ = ["FmuInstance", "faulty", "read_description"]
 
 
 def read_description(path: str | Path) -> Any:
@@ -73,6 +73,11 @@ def _working_directory() -> Iterator[Path]:
             os.chdir(folder)
 
 
+def faulty(name: str) -> Callable[[str], FmuError]:
+    """Return the error of an FMU that ends the process it runs in, by how that ends (:mod:`hybridsep.base.apart`)."""
+    return lambda how: FmuError(f"{name} ended its process {how}: its library is faulty")
+
+
 class FmuInstance(AbstractContextManager["FmuInstance"]):
     """An instance of a co-simulation FMU; use it as a context manager, or close it.
 
@@ -99,7 +104,7 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
     FmuError
         If the archive cannot be read, must not be unpacked, is no FMI 2.0 or 3.0 co-simulation FMU, has no intact
         library for this platform, or refuses to be instantiated. A library's code runs in this process, and may still
-        end it; for a process of its own see :func:`~hybridsep.cosim.apart.run_apart`.
+        end it; for a process of its own see :func:`~hybridsep.base.apart.run_apart`.
     """
 
     def __init__(self, path: str | Path, instance_name: str | None = None) -> None:

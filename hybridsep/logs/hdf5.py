@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import Any
+
 from .arrays import ArraysSource
 
 __all__ = ["Hdf5Source"]
@@ -14,8 +17,26 @@ class Hdf5Source(ArraysSource):
 
     format = "MATLAB v7.3 (HDF5)"
     endings = (".mat", ".h5", ".hdf5")
-    kind = "hdf5"
     library = "h5py"
+
+    @staticmethod
+    def items(file: str) -> Iterator[tuple[str, Any]]:
+        """Yield data sets, groups by dots; MATLAB's own bookkeeping aside."""
+        import h5py
+        import numpy as np
+
+        found: list[tuple[str, Any]] = []
+
+        def visit(name: str, item: Any) -> None:
+            if isinstance(item, h5py.Dataset) and not name.startswith("#"):
+                # MATLAB stores the shape of what is empty, and text as numbers.
+                empty, text = item.attrs.get("MATLAB_empty", 0), item.attrs.get("MATLAB_class") in (b"char", "char")
+                value = np.empty((0, 0)) if empty else "" if text else item[()]
+                found.append((name.replace("/", "."), value))
+
+        with h5py.File(file, "r") as content:
+            content.visititems(visit)
+        yield from found
 
     @staticmethod
     def recognises(head: bytes) -> bool:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterator
+from typing import Any
 
 from .arrays import ArraysSource
 
@@ -17,8 +19,16 @@ class MatSource(ArraysSource):
 
     format = "MATLAB"
     endings = (".mat",)
-    kind = "mat"
     library = "SciPy"
+
+    @staticmethod
+    def items(file: str) -> Iterator[tuple[str, Any]]:
+        """Yield variables, the fields of structs and the parts of complex arrays."""
+        from scipy import io
+
+        for name, value in io.loadmat(file).items():
+            if not name.startswith("__"):
+                yield from _fields(name, value)
 
     @staticmethod
     def recognises(head: bytes) -> bool:
@@ -31,3 +41,16 @@ class MatSource(ArraysSource):
             if plausible and head[19 + length : 20 + length] == b"\0":
                 return True
         return False
+
+
+def _fields(name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """Yield a variable, or what is in it if it is a scalar struct."""
+    names = getattr(getattr(value, "dtype", None), "names", None)
+    if names and value.size == 1:
+        for field in names:
+            yield from _fields(f"{name}.{field}", value[field].reshape(-1)[0])
+    else:
+        yield name, value
+        if getattr(getattr(value, "dtype", None), "kind", "") == "c":
+            yield f"{name}.real", value.real
+            yield f"{name}.imag", value.imag

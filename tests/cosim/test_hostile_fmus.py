@@ -19,9 +19,10 @@ from built_once import BuiltFmus
 from command_line import Run
 
 from hybridsep import FmuInstance
+from hybridsep.base.apart import run_apart
 from hybridsep.base.errors import FmuError, LogError
-from hybridsep.cosim.apart import run_apart
 from hybridsep.cosim.binary_check import check_binary
+from hybridsep.cosim.importer import faulty
 
 Change = Callable[[bytes], bytes]
 
@@ -278,14 +279,14 @@ def count(n: int, progress: Callable[[int, int], object]) -> list[int]:
 
 def test_a_run_apart(nothing_left: Path) -> None:
     seen: list[tuple[int, int]] = []
-    assert run_apart("x.fmu", count, 3, progress=lambda *done: seen.append(done)) == [0, 1, 2]
+    assert run_apart(faulty("x.fmu"), count, 3, progress=lambda *done: seen.append(done)) == [0, 1, 2]
     assert seen == [(0, 3), (1, 3), (2, 3)]
     with pytest.raises(LogError, match=rf"a log: {nothing_left}/tmp"):
-        run_apart("x.fmu", fail, "a log")
+        run_apart(faulty("x.fmu"), fail, "a log")
     with pytest.raises(FmuError, match=r"x\.fmu ended its process with SIGSEGV: its library is faulty"):
-        run_apart("x.fmu", die)
+        run_apart(faulty("x.fmu"), die)
     with pytest.raises(FmuError, match=r"x\.fmu ended its process with status 7"):
-        run_apart("x.fmu", os._exit, 7)
+        run_apart(faulty("x.fmu"), os._exit, 7)
     assert not list(nothing_left.iterdir())
 
 

@@ -1,6 +1,6 @@
-"""Run of a function in a process of its own, which a foreign FMU may end.
+"""Run of a function in a process of its own, which foreign machine code may end.
 
-An FMU's library is machine code: a damaged one, or a faulty one, ends the process that has loaded it.
+A damaged or faulty FMU ends the process that has loaded it, and a damaged file can crash the library that reads it.
 """
 
 from __future__ import annotations
@@ -17,39 +17,36 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import IO, Any, TypeVar
 
-from ..base.errors import FmuError
-from ..base.interrupt import starting_processes
+from .interrupt import starting_processes
 
 __all__ = ["run_apart", "serve"]
 
 Result = TypeVar("Result")
 
-_CHILD = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from hybridsep.cosim.apart import serve; serve()"
+_CHILD = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from hybridsep.base.apart import serve; serve()"
 
 
 def run_apart(
-    what: str,
+    ended: Callable[[str], Exception],
     function: Callable[..., Result],
     *arguments: Any,
     progress: Callable[..., object] | None = None,
+    quiet: bool = False,
     **keywords: Any,
 ) -> Result:
     """Call a function in a new process; return its result, or raise its exception.
 
     Parameters
     ----------
-    what : str
-        Whose code runs there, for the message.
+    ended : callable
+        How the process ended before the function did → what is raised then.
     function : callable
         It, its arguments and its result can be pickled.
     *arguments, **keywords
     progress : callable, optional
         Called here with what the function gives its own argument ``progress``.
-
-    Raises
-    ------
-    FmuError
-        If the process ends before the function does.
+    quiet : bool
+        Whether what the process prints is dropped; otherwise it goes to standard error.
     """
     # The folder is here, so that what a killed process had unpacked is removed
     with tempfile.TemporaryDirectory() as folder:
@@ -58,6 +55,7 @@ def run_apart(
                 [sys.executable, "-I", "-c", _CHILD, json.dumps(sys.path)],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL if quiet else None,
             )
         assert process.stdin is not None
         assert process.stdout is not None
@@ -74,7 +72,7 @@ def run_apart(
                 if progress is not None:
                     progress(*content)
         except (EOFError, pickle.UnpicklingError) as error:
-            raise FmuError(f"{what} ended its process {_ending(process.wait())}: its library is faulty") from error
+            raise ended(_ending(process.wait())) from error
         finally:
             process.kill()
             process.wait()
@@ -82,7 +80,7 @@ def run_apart(
 
 
 def serve() -> None:
-    """Do in the new process what its standard input says; what an FMU prints goes to standard error."""
+    """Do in the new process what its standard input says; what else is printed goes to standard error."""
     with os.fdopen(os.dup(sys.stdout.fileno()), "wb") as answers:
         os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
         folder, function, arguments, keywords, reports = pickle.load(sys.stdin.buffer)
