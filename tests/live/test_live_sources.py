@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import socket
+import ssl
 import sys
 from collections.abc import Mapping
 from contextlib import closing
@@ -13,13 +15,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from certificates import Authority
 from command_line import write_log
 from mqtt_broker import Broker
 
 from hybridsep import load_machine
 from hybridsep.base.errors import HybridSepError, LogError, ParameterError, SignalError
 from hybridsep.live.lines import LinesSource
-from hybridsep.live.mqtt import PASSWORD, USER, MqttSource
+from hybridsep.live.mqtt import CA, CERTIFICATE, KEY, KEY_PASSWORD, PASSWORD, USER, MqttSource
 from hybridsep.live.open_source import open_source
 from hybridsep.live.recorded import RecordedSource
 from hybridsep.live.sample import Sample
@@ -98,12 +101,93 @@ def test_mqtt(monkeypatch: pytest.MonkeyPatch) -> None:
         ({"grant": 128}, "the broker refuses the topic"),
     ],
 )
-def test_brokers_that_refuse(broker: dict[str, int], words: str) -> None:
+def test_brokers_that_refuse(broker: dict[str, Any], words: str) -> None:
     with (
         MqttSource("127.0.0.1", Broker([], **broker).port, "x") as source,
         pytest.raises(ParameterError, match=words),
     ):
         come(source, 1)
+
+
+@pytest.fixture(scope="module")
+def authority(tmp_path_factory: pytest.TempPathFactory) -> Authority:
+    return Authority(tmp_path_factory.mktemp("certificates"))
+
+
+def server(authority: Authority, name: str = "broker", asks: bool = False) -> ssl.SSLContext:
+    """Return what a broker encrypts with; ``asks`` for a certificate of its client, too."""
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.load_cert_chain(*authority.issue(name))
+    if asks:
+        context.load_verify_locations(authority.path)
+        context.verify_mode = ssl.CERT_REQUIRED
+    return context
+
+
+def encrypted(broker: Broker) -> LiveSource:
+    return open_source(f"mqtts://127.0.0.1:{broker.port}/x", load_machine("spring_mass_damper"), HOW)
+
+
+MESSAGES = [json.dumps({"k": k, "x_d": 0.0, "x_meas": 1.0}).encode() for k in range(50)]
+
+
+def test_mqtt_by_tls(monkeypatch: pytest.MonkeyPatch, authority: Authority) -> None:
+    monkeypatch.setenv(CA, str(authority.path))
+    monkeypatch.setenv(USER, "ann")
+    broker = Broker(MESSAGES, tls=server(authority))
+    with encrypted(broker) as source:
+        assert [sample.k for sample in come(source, 50)] == list(range(50))
+        assert b"ann" in broker.connect
+
+
+def test_mqtt_by_tls_with_a_certificate_of_the_client(monkeypatch: pytest.MonkeyPatch, authority: Authority) -> None:
+    certificate, key = authority.issue("client", "a secret")
+    for name, value in ((CA, authority.path), (CERTIFICATE, certificate), (KEY, key), (KEY_PASSWORD, "a secret")):
+        monkeypatch.setenv(name, str(value))
+    with encrypted(Broker(MESSAGES, tls=server(authority, asks=True))) as source:
+        assert len(come(source, 50)) == 50
+    monkeypatch.setenv(KEY_PASSWORD, "another")
+    with pytest.raises(
+        ParameterError, match=f"the certificate and its key cannot be used: .*; {CERTIFICATE}, {KEY} and"
+    ):
+        encrypted(Broker(MESSAGES))
+    for name in (CERTIFICATE, KEY, KEY_PASSWORD):
+        monkeypatch.delenv(name)
+    with (
+        pytest.raises(ParameterError, match=r"the broker cannot be reached|the connection is lost"),
+        encrypted(Broker(MESSAGES, tls=server(authority, asks=True))) as source,
+    ):
+        come(source, 1)
+
+
+@pytest.mark.filterwarnings("ignore:unclosed:ResourceWarning")  # paho's, of the connection that it did not make
+def test_a_broker_that_is_not_trusted(monkeypatch: pytest.MonkeyPatch, authority: Authority, tmp_path: Path) -> None:
+    """Signed by nobody whom the system knows, or by another than the one that is named."""
+    monkeypatch.delenv(CA, raising=False)
+    words = f"the broker's certificate is not trusted: .*; {CA} names the file of who signed it"
+    with pytest.raises(ParameterError, match=words):
+        encrypted(Broker([], tls=server(authority)))
+    monkeypatch.setenv(CA, str(Authority(tmp_path).path))
+    with pytest.raises(ParameterError, match=words):
+        encrypted(Broker([], tls=server(authority)))
+    with pytest.raises(ParameterError, match="the broker cannot be reached"):  # which speaks no TLS
+        encrypted(Broker([], refusal=5))
+    gc.collect()
+
+
+@pytest.mark.parametrize(
+    ("files", "words"),
+    [
+        ({CA: "none.pem"}, f"{CA} must name a PEM file, there is none at none.pem"),
+        ({KEY: __file__}, f"{KEY} is the key of a certificate, which {CERTIFICATE} must name"),
+        ({CA: __file__}, f"{CA} names no file of certificates: "),
+    ],
+)
+def test_files_of_tls_that_are_none(monkeypatch: pytest.MonkeyPatch, files: dict[str, str], words: str) -> None:
+    for name, path in files.items():
+        monkeypatch.setenv(name, path)
+    with pytest.raises(ParameterError, match=words):
+        MqttSource("127.0.0.1", 9, "x", tls=True)
 
 
 def test_logs(tmp_path: Path) -> None:

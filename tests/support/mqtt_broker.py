@@ -6,6 +6,7 @@ Packets are those of the OASIS standard MQTT 3.1.1, sections 3.1 to 3.9.
 from __future__ import annotations
 
 import socket
+import ssl
 import threading
 from collections.abc import Sequence
 
@@ -24,11 +25,15 @@ class Broker(threading.Thread):
         Return code of the connection; 0 accepts it, 5 is "not authorised".
     grant : int
         Return code of the subscription; 128 is a failure.
+    tls : ssl.SSLContext, optional
+        Of the server, where connections are encrypted.
     """
 
-    def __init__(self, messages: Sequence[bytes], *, refusal: int = 0, grant: int = 0) -> None:
+    def __init__(
+        self, messages: Sequence[bytes], *, refusal: int = 0, grant: int = 0, tls: ssl.SSLContext | None = None
+    ) -> None:
         super().__init__(daemon=True)
-        self._messages, self._refusal, self._grant = messages, refusal, grant
+        self._messages, self._refusal, self._grant, self._tls = messages, refusal, grant, tls
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.port = int(self._listener.getsockname()[1])
         self.connect = b""
@@ -36,7 +41,15 @@ class Broker(threading.Thread):
         self.start()
 
     def run(self) -> None:
-        with self._listener, self._listener.accept()[0] as client, client.makefile("rb") as packets:
+        with self._listener, self._listener.accept()[0] as plain:
+            try:
+                client = self._tls.wrap_socket(plain, server_side=True) if self._tls else plain
+            except (ssl.SSLError, OSError):  # the client goes, or has no certificate
+                return
+            self._serve(client)
+
+    def _serve(self, client: socket.socket) -> None:
+        with client, client.makefile("rb") as packets:
             kind, self.connect = self._packet(packets)
             assert kind == CONNECT
             client.sendall(bytes([0x20, 2, 0, self._refusal]))
