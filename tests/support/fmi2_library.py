@@ -7,7 +7,7 @@ import struct
 from collections.abc import Callable
 from ctypes import CFUNCTYPE, POINTER, byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 from xml.etree import ElementTree as ET
 
 HEADER_SIZE, CHECKSUM_PLACE = 120, 72
@@ -61,7 +61,37 @@ for _kind, _type in VALUE_TYPES.items():
     _SIGNATURES[f"Get{_kind}"] = _SIGNATURES[f"Set{_kind}"] = [c_void_p, POINTER(c_uint), c_size_t, POINTER(_type)]
 
 
-class Library:
+class Functions:
+    """FMI functions of one shared library, the prefix left out of their names, and its states."""
+
+    prefix: ClassVar[str]
+    _dll: ctypes.CDLL
+
+    def __getattr__(self, name: str) -> Callable[..., int]:
+        function: Callable[..., int] = getattr(self._dll, f"{self.prefix}{name}")
+        return function
+
+    def save(self, component: int | None) -> bytes:
+        """Return the serialised state."""
+        state, size = c_void_p(), c_size_t()
+        assert self.GetFMUstate(component, byref(state)) == OK
+        assert self.SerializedFMUstateSize(component, state, byref(size)) == OK
+        block = ctypes.create_string_buffer(size.value)
+        assert self.SerializeFMUstate(component, state, block, size.value) == OK
+        assert self.FreeFMUstate(component, byref(state)) == OK
+        return block.raw
+
+    def restore(self, component: int | None, block: bytes) -> int:
+        """Take over a serialised state and return the first status that is not OK."""
+        state = c_void_p()
+        status = self.DeSerializeFMUstate(component, block, len(block), byref(state))
+        if status == OK:
+            status = self.SetFMUstate(component, state)
+            assert self.FreeFMUstate(component, byref(state)) == OK
+        return status
+
+
+class Library(Functions):
     """The FMI functions of one shared library, ``fmi2`` left out of their names, and what passed its callbacks.
 
     Parameters
@@ -73,6 +103,8 @@ class Library:
     largest : int
         Bytes beyond which the importer has no memory for a block.
     """
+
+    prefix = "fmi2"
 
     def __init__(self, path: Path, description: Path, largest: int = 1 << 26) -> None:
         self._dll = ctypes.CDLL(str(path.resolve()))
@@ -113,10 +145,6 @@ class Library:
             libc.free(block)
 
         self.callbacks = Callbacks(Logger(log), Allocate(allocate), Free(free), None, None)
-
-    def __getattr__(self, name: str) -> Callable[..., int]:
-        function: Callable[..., int] = getattr(self._dll, f"fmi2{name}")
-        return function
 
     def instantiate(
         self,
@@ -170,25 +198,6 @@ class Library:
         if status != OK:
             raise RuntimeError(self.messages[-1][2])
         return bytes(values)
-
-    def save(self, component: int | None) -> bytes:
-        """Return the serialised state."""
-        state, size = c_void_p(), c_size_t()
-        assert self.GetFMUstate(component, byref(state)) == OK
-        assert self.SerializedFMUstateSize(component, state, byref(size)) == OK
-        block = ctypes.create_string_buffer(size.value)
-        assert self.SerializeFMUstate(component, state, block, size.value) == OK
-        assert self.FreeFMUstate(component, byref(state)) == OK
-        return block.raw
-
-    def restore(self, component: int | None, block: bytes) -> int:
-        """Take over a serialised state and return the first status that is not OK."""
-        state = c_void_p()
-        status = self.DeSerializeFMUstate(component, block, len(block), byref(state))
-        if status == OK:
-            status = self.SetFMUstate(component, state)
-            assert self.FreeFMUstate(component, byref(state)) == OK
-        return status
 
 
 def repair_checksum(block: bytearray) -> None:

@@ -29,7 +29,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
-from fmi2_library import OK
+from fmi2_library import OK, Functions
 
 Logger = CFUNCTYPE(None, c_void_p, c_int, c_char_p, c_char_p)
 
@@ -110,7 +110,7 @@ _SIGNATURES: dict[str, list[Any]] = {
 }
 
 
-class Library3:
+class Library3(Functions):
     """The FMI 3.0 functions of one shared library, ``fmi3`` left out of their names.
 
     The functions for states can be called by FMI 2.0's names as well, so that one fuzzer serves both.
@@ -150,9 +150,7 @@ class Library3:
         self.logger = Logger(log)
 
     def __getattr__(self, name: str) -> Callable[..., int]:
-        name = name.replace("FMUstate", "FMUState").replace("DeSerialize", "Deserialize")
-        function: Callable[..., int] = getattr(self._dll, f"fmi3{name}")
-        return function
+        return super().__getattr__(name.replace("FMUstate", "FMUState").replace("DeSerialize", "Deserialize"))
 
     @property
     def blocks(self) -> list[int]:
@@ -224,22 +222,3 @@ class Library3:
         if self.GetFloat64(instance, places, len(names), values, n) != OK:
             raise RuntimeError(self.messages[-1][2])
         return bytes(values)
-
-    def save(self, instance: int | None) -> bytes:
-        """Return the serialised state."""
-        state, size = c_void_p(), c_size_t()
-        assert self.GetFMUState(instance, byref(state)) == OK
-        assert self.SerializedFMUStateSize(instance, state, byref(size)) == OK
-        block = ctypes.create_string_buffer(size.value)
-        assert self.SerializeFMUState(instance, state, block, size.value) == OK
-        assert self.FreeFMUState(instance, byref(state)) == OK
-        return block.raw
-
-    def restore(self, instance: int | None, block: bytes) -> int:
-        """Take over a serialised state and return the first status that is not OK."""
-        state = c_void_p()
-        status = self.DeserializeFMUState(instance, block, len(block), byref(state))
-        if status == OK:
-            status = self.SetFMUState(instance, state)
-            assert self.FreeFMUState(instance, byref(state)) == OK
-        return status
