@@ -1,4 +1,4 @@
-"""Interface tables of an FMU for the README and the FMU's documentation page."""
+"""Table of an FMU's interface for its documentation page."""
 
 from __future__ import annotations
 
@@ -7,24 +7,7 @@ from collections.abc import Iterable
 
 from .variables import Variable
 
-__all__ = ["grouped_table", "interface_table"]
-
-
-def interface_table(table: Iterable[Variable]) -> list[tuple[str, str, str, str, str]]:
-    """Return ``(name, causality, type and unit, start, meaning)`` of each variable, arrays in one row.
-
-    Parameters
-    ----------
-    table : iterable of Variable
-        As :func:`hybridsep.fmi.variables.variables_of` returns it.
-    """
-    rows = []
-    for name, variable in _in_one_row(table).items():
-        causality = "parameter, fixed" if variable.causality == "parameter" else variable.causality
-        items = ", ".join(f"{number} {item}" for number, item in enumerate(variable.items))
-        meaning = f"{variable.description}: {items}" if items else variable.description
-        rows.append((name, causality, _kind(variable), _start(variable), meaning))
-    return rows
+__all__ = ["grouped_table"]
 
 
 def grouped_table(table: Iterable[Variable]) -> dict[str, list[tuple[str, str, str, str, str]]]:
