@@ -23,8 +23,6 @@ from .options import (
     takes_reading,
 )
 
-__all__ = ["backtest"]
-
 
 @takes_reading
 @takes_parameters(PREDICTOR_ENTRIES)

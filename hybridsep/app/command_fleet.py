@@ -24,7 +24,6 @@ from .options import (
 if TYPE_CHECKING:
     from ..fleet.run import FleetRun
 
-__all__ = ["fleet"]
 
 _REPORT = "report"
 

@@ -21,8 +21,6 @@ from .options import (
     takes_reading,
 )
 
-__all__ = ["report"]
-
 
 @takes_reading
 @takes_parameters(PREDICTOR_ENTRIES)

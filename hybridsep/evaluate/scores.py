@@ -9,8 +9,6 @@ from dataclasses import dataclass
 from ..base.metrics import RunningErrors, reduction_percent, rms_ratio
 from .verdict import Verdict
 
-__all__ = ["Score", "Scores"]
-
 
 @dataclass(frozen=True)
 class Score:

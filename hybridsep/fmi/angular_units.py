@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["angular_unit"]
-
 _ANGULAR = {
     "m": "rad",
     "m2": "rad2",

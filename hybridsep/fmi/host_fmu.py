@@ -22,8 +22,6 @@ from .libraries import libraries
 from .table_file import TABLE_FILE, table_file
 from .variables import variables_of
 
-__all__ = ["HostFmu", "host_fmu"]
-
 _CO_SIMULATION = 1
 _OK = 0
 _KINDS = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}

@@ -16,8 +16,6 @@ from jinja2 import Template
 
 from .state import State
 
-__all__ = ["fill"]
-
 FRAME = 50
 """Time between two frames, ms."""
 

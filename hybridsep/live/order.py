@@ -9,8 +9,6 @@ from time import monotonic
 from ..base.errors import SignalError
 from .sample import Sample
 
-__all__ = ["HELD_MAX", "Order"]
-
 HELD_MAX = 64
 """Most samples that wait for one that is late; a network that reorders more would be slower than any window."""
 

@@ -12,8 +12,6 @@ from typing import IO, Any
 
 from .state import State
 
-__all__ = ["serve"]
-
 
 def serve() -> None:
     """Serve the page of a run that standard input tells, until it ends; what it was bound to is printed."""

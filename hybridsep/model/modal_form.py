@@ -14,7 +14,6 @@ from ..base.errors import ModelError
 if TYPE_CHECKING:
     import control
 
-__all__ = ["modes_of"]
 
 Array = NDArray[np.float64]
 

@@ -25,8 +25,6 @@ from ..base.state import pack, unpack
 from ..predict.predictor import HybridPredictor
 from ..predict.window import PublishedWindow
 
-__all__ = ["LookAhead", "Planner"]
-
 _KIND = "look-ahead"
 
 

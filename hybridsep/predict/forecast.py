@@ -7,8 +7,6 @@ from typing import NamedTuple
 
 from ..base.signals import Array
 
-__all__ = ["FeatureScales", "Forecast"]
-
 
 class FeatureScales(NamedTuple):
     """Scales that the features and their priors are relative to, from the commands ahead.

@@ -10,8 +10,6 @@ import numpy as np
 from ..base.signals import Array
 from ..cosim.fmus import FmuController
 
-__all__ = ["SAMPLES_MAX", "step_times"]
-
 SAMPLES_MAX = 5000
 """Samples that are timed, at most."""
 
