@@ -220,17 +220,6 @@ def test_every_parameter_compensates_with_trust_as_in_the_library(
     assert_agreement(new_stream, 550 if values.get("Np") == 2 else 1100, values, 1e-9)
 
 
-def late(delay: int, start: float = 0.0, sensor: Sensor | None = None) -> Sensor:
-    """Return a sensor whose values arrive so many samples late; at rest at ``start`` before."""
-    measured = [start] * delay
-
-    def late_sensor(k: int, x_meas: float, last: float) -> float:
-        measured.append(x_meas if sensor is None else sensor(k, x_meas, last))
-        return measured[k]
-
-    return late_sensor
-
-
 @on_all((COMPENSATOR,), needs="agreement")
 @pytest.mark.parametrize(
     "values",
@@ -249,13 +238,13 @@ def late(delay: int, start: float = 0.0, sensor: Sensor | None = None) -> Sensor
 def test_a_late_measurement_is_compensated_as_by_the_library(new_stream: StreamMaker, values: dict[str, Value]) -> None:
     delay = int(values["measurement_delay"])
     start = 0.1 if "spacing" in values else 0.0
-    assert_agreement(new_stream, 1400, values, 1e-9, start=start, sensor=late(delay, start))
+    assert_agreement(new_stream, 1400, values, 1e-9, start=start, delay=delay)
 
 
 @on_all((COMPENSATOR,), needs="agreement")
 def test_late_and_faulty_measurements_are_compensated_as_by_the_library(new_stream: StreamMaker) -> None:
     values: dict[str, Value] = {"p": 20, "measurement_delay": 5}
-    loop = assert_agreement(new_stream, 2450, values, 1e-9, sensor=late(5, sensor=faulty))
+    loop = assert_agreement(new_stream, 2450, values, 1e-9, sensor=faulty, delay=5)
     assert np.isfinite(loop.outputs).all()
     assert loop.column(COMPENSATOR, "n_rejected")[-1] > 100
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from driving import T_S
@@ -54,10 +56,15 @@ def test_an_axis_that_stands_is_learned_after_the_patience(new_stream: StreamMak
     assert found["n_rejected"][-1] < 8 * Np
 
 
+@cache
+def of_library(Np: int) -> dict[str, Array]:
+    return shown(LookAheadStream(PREDICTOR), "to and fro", Np)[0]
+
+
 @on_all((PREDICTOR,), needs="agreement")
 @pytest.mark.parametrize("Np", [20, 100])
 def test_a_servo_with_stiction_is_predicted_as_by_the_library(new_stream: StreamMaker, Np: int) -> None:
-    expected, _ = shown(LookAheadStream(PREDICTOR), "to and fro", Np)
+    expected = of_library(Np)
     found, _ = shown(new_stream(), "to and fro", Np)
     exact = new_stream.implementation == PYTHON
     for name in OUTPUTS[PREDICTOR]:

@@ -104,6 +104,7 @@ def closed_loop(
     weights: Path | None = None,
     size: float = 1.0,
     sensor: Sensor = _faithful,
+    delay: int = 0,
     path: str = "staircase",
 ) -> Loop:
     """Return a closed loop over a path; the same is run once.
@@ -123,11 +124,13 @@ def closed_loop(
     size : float
         Of the path, as a fraction.
     sensor : function
+    delay : int
+        Samples by which its output arrives late; at rest before.
     path : {"staircase", "spiral"}
         The spiral is the X axis' part of it.
     """
     given = {**(values or {}), "x_d_ahead": start, "x_meas": start}
-    return _closed_loop(model, n, tuple(given.items()), weights, size, sensor, path)
+    return _closed_loop(model, n, tuple(given.items()), weights, size, sensor, delay, path)
 
 
 @cache
@@ -138,6 +141,7 @@ def _closed_loop(
     weights: Path | None,
     size: float,
     sensor: Sensor,
+    delay: int,
     path: str,
 ) -> Loop:
     machine, values = machine_of(model), dict(given)
@@ -148,9 +152,10 @@ def _closed_loop(
     stream.initialise(values)
     plant.reset(start)
     r, x = size * (commanded() if path == "staircase" else spiral()[0])[:n] + start, np.empty(n)
-    outputs = [stream.outputs()]
+    outputs, arrive = [stream.outputs()], [start] * delay
     for k in range(n):
-        x[k] = sensor(k, encoder.measure(plant.x), float(x[k - 1]) if k else start)
+        arrive.append(sensor(k, encoder.measure(plant.x), float(x[k - 1]) if k else start))
+        x[k] = arrive[k]
         plant.step(outputs[-1][0], T_s)  # x_d of a predictor, x_dm of a compensator
         stream.set("x_d_ahead", float(r[k]))
         stream.set("x_meas", float(x[k]))
