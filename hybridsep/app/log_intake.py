@@ -1,4 +1,4 @@
-"""Intake of a log on the command line: findings are shown, and put right or refused."""
+"""Intake of a log on the command line: findings are shown, and fixed or refused."""
 
 from __future__ import annotations
 

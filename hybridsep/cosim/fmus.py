@@ -46,14 +46,14 @@ class _OpenedFmu(AbstractContextManager["_OpenedFmu"]):
         self.fmu.initialise({**self._values, **inputs}, start_time=self._start_time)
 
     def _samples(self, name: str) -> int:
-        """Return a number of samples that the FMU tells, checked."""
+        """Return a number of samples reported by the FMU, checked."""
         value = self.fmu.get(name)
         if not 0 <= value <= _SAMPLES_MAX:  # NaN too
             raise FmuError(f"{self.name}: {name} must be 0 … {_SAMPLES_MAX} samples, got {brief(value)}")
         return int(value)
 
     def _interval(self) -> float:
-        """Return the sampling interval that the FMU tells, s, checked."""
+        """Return the sampling interval reported by the FMU, s, checked."""
         return float(check("T_s", self.fmu.get("T_s"), label=f"{self.name}: T_s"))
 
     def _step(self, k: int, h: float) -> None:

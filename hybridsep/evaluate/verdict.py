@@ -226,9 +226,9 @@ class Tally:
             causes.append(f"too little motion to learn from, {100 * moving:.2g} % of the samples")
         peers = [peer for peer, value in enumerate(ratios) if value > 1.0 + ALIKE]
         if all(self._worse_early(peer) for peer in peers):
-            causes.append(f"only the first {_N_EARLY} windows are worse, where next to nothing is learned yet")
+            causes.append(f"only the first {_N_EARLY} windows are worse, where hardly anything has been learned yet")
         elif ratios[0] <= 1.0 + ALIKE and not causes:
-            causes.append("the residual changes so slowly that its last value says more than the motion does")
+            causes.append("the residual changes so slowly that its last value predicts it better than the motion does")
         elif not causes:
             causes.append("the residual does not repeat with the motion")
         return causes

@@ -1,4 +1,4 @@
-"""Delay of a model as a whole: what a recording tells of lag and dead time together, where it does not of each."""
+"""Delay of a model as a whole: the sum of lag and dead time, where a recording determines neither alone."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from .state import State
 
 
 def serve() -> None:
-    """Serve the page of a run that standard input tells, until it ends; what it was bound to is printed."""
+    """Serve the page of a run, which arrives on standard input, until it ends; what it was bound to is printed."""
     with os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8") as answer:
         os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
         title, shown, port, token = pickle.load(sys.stdin.buffer)
@@ -33,7 +33,7 @@ def serve() -> None:
 
 
 def _follow(told: IO[bytes], state: State, server: Any) -> None:
-    """Hand on what the run's process tells."""
+    """Hand on what the run's process sends."""
     handlers = {"begin": state.begin, "take": state.take, "end": state.end}
     try:
         while True:

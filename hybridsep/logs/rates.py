@@ -73,8 +73,8 @@ def on_one_clock(source: Source, columns: Mapping[str, Column], *, resample: boo
     rates = f"{brief(x_d)} {_words(clocks[t_d], unit)}, {brief(x)} {_words(clocks[t], unit)}"
     if not resample:
         raise LogError(
-            f"{source.path}: columns are sampled at different times: {rates}; record them alike, or resample=True "
-            "(--resample) takes both at the times of the slower one"
+            f"{source.path}: columns are sampled at different times: {rates}; record them at one rate, or "
+            "resample=True (--resample) takes both at the times of the slower one"
         )
     slow = max((t, t_d), key=lambda name: clocks[name].interval)
     chosen["t"] = Column(slow, chosen["t"].unit, True)
@@ -137,7 +137,7 @@ class _Resampled(Source):
                     i = int(np.argmax(distances > self._gap))
                     raise LogError(
                         f"{self.path}, {where(i)}: column {brief(name)} has a gap of {distances[i]:.6g} s there and "
-                        "cannot be resampled; record it without, or both columns alike"
+                        "cannot be resampled; record it without, or both columns at one rate"
                     )
             yield Block([found[name] for name in names], where)
 

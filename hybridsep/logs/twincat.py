@@ -92,7 +92,7 @@ class TwinCatSource(Source):
         if sum(1 for cell in first[1] if cell) < len(row) or len(times) == len(row):
             raise LogError(
                 f"{self.path}, line {first[0]}: a column of times before each channel, or before those that are "
-                "sampled alike, was expected; export with timelines (All, or For each sampletime)"
+                "sampled at one rate, was expected; export with timelines (All, or For each sampletime)"
             )
         counts = Counter(row)
         symbols = self._known.get("SymbolName", [])

@@ -1,4 +1,4 @@
-"""Hint at a residual that repeats with the position, with what the predictor gains where it is told the period."""
+"""Hint at a residual that repeats with the position, with the predictor's gain if it is given the period."""
 
 from __future__ import annotations
 

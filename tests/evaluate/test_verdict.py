@@ -79,7 +79,7 @@ def test_alike_is_neither_better_nor_worse() -> None:
             "Why: the prediction is unstable: it leaves the physics model by 5 × the largest residual.",
         ),
         ((10, 10, 12), np.where(np.arange(NP) < 1, 1e-3, 0.0), "Why: too little motion to learn from, 3.2 % of the"),
-        ((10, 3, 5), 1e-3, "Why: the residual changes so slowly that its last value says more than the motion does."),
+        ((10, 3, 5), 1e-3, "Why: the residual changes so slowly that its last value predicts it better than"),
         ((10, 10, 15), 1e-3, "Why: the residual does not repeat with the motion."),
     ],
 )
@@ -94,7 +94,7 @@ def test_a_bad_beginning_is_told_from_a_bad_model() -> None:
         tally.add(x_d + k * NP * 1e-3, np.zeros(NP), errors(10, 10, 28 if k < 10 else 2))
     found = tally.verdict()
     assert found.ratio_pb > 1.1
-    assert found.causes == ("only the first 10 windows are worse, where next to nothing is learned yet",)
+    assert found.causes == ("only the first 10 windows are worse, where hardly anything has been learned yet",)
 
 
 def test_rejected_measurements_are_told() -> None:
