@@ -66,7 +66,7 @@ def feature_rows(x_pb: Array, e_pb: Array, p: int, q: int) -> Array:
     """Return the rows ``[φ(k) | e_pb(k)]`` of eq. (5), (n, 3 + q + p); all before the first sample is zero."""
     n = len(x_pb)
     x_past, e_past = np.concatenate((np.zeros(q), x_pb)), np.concatenate((np.zeros(p), e_pb))
-    columns = [np.ones(n)]
+    columns: list[Array] = [np.ones(n)]
     columns += [x_past[q - i : q - i + n] for i in range(q + 1)]
     columns += [e_past[p - i : p - i + n] for i in range(1, p + 1)]
     return np.column_stack([*columns, e_pb])

@@ -194,6 +194,20 @@ def test_kinds_are_recognised_and_others_are_not(tmp_path: Path, python_fmu: Cal
 # All arguments before any work -------------------------------------------------------------------------------------
 
 
+def test_weights_that_are_none_are_refused_before_a_loop_is_run(
+    hybridsep: Run, tmp_path: Path, log: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They are loaded once, where the FMU is built."""
+
+    def run(*_: object, **__: object) -> None:
+        raise AssertionError("a loop is run")
+
+    monkeypatch.setattr("hybridsep.cosim.loop.cosimulate", run)
+    said = refusal(hybridsep, "cosim", "--weights", str(log), "--out", str(tmp_path / "run.csv"))
+    assert "a saved state of kind 'predictor' was expected" in said
+    assert not (tmp_path / "run.csv").exists()
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -211,7 +225,6 @@ def test_kinds_are_recognised_and_others_are_not(tmp_path: Path, python_fmu: Cal
         (["cosim", "--plant", "none.fmu"], "no FMU at none.fmu; build it first"),
         (["cosim", "--plant", "{fmu}"], "HybridPredictorPy.fmu is no plant: it has no input x_d"),
         (["cosim", "--compensate", "physics", "--predictor", "{fmu}"], "is no compensator: it has no output x_dm"),
-        (["cosim", "--weights", "{log}"], "a saved state of kind 'predictor' was expected"),
         (
             ["cosim", "--unit", "furlong"],
             "unit must be one of m, mm, um, nm, in, rad, mrad, urad, deg, rev, got 'furlong'",
