@@ -21,7 +21,9 @@ T = TypeVar("T")
 
 _CONFIG: dict[str, Any] = {
     "distributed.scheduler.allowed-failures": 0,  # a task that is blamed is repeated by its own rule
+    # What is kept of tasks that are over: messages and transitions, some megabytes
     "distributed.admin.log-length": 0,
+    "distributed.admin.low-level-log-length": 0,
     # What watches a worker takes a hundred wake-ups a second, from the thread that works
     "distributed.worker.profile.enabled": False,
     "distributed.admin.tick.interval": "500ms",
