@@ -39,11 +39,11 @@ class Forecast:
         Commands and physics-based prediction, relative to the start.
     e_h : (n,) array, m
         Predicted residual.
-    disagreement : (n,) array, m²
-        Variance of the experts about their stack; 0 where there are none.
+    variance : (n,) array, m²
+        What the model knows of the error of ``e_h``: the variance of the mixture of its experts; 0 where there are none.
     """
 
     x_d: Array
     x_pb: Array
     e_h: Array
-    disagreement: Array
+    variance: Array

@@ -1,12 +1,11 @@
 """Uncertainty of a prediction: the variance of its error against the measured position, learned from earlier windows.
 
-The variance at sample ``k`` of a window is a sum of components, ``v(k) = Σ_i θ_i f_i(k)``, each the square of something
-that errors come with: measurement noise and its growth over the window, wrong timing (the squared differences of
-``x_pb`` and ``e_h``), a wrong share of the servo error, a change since the last measured residual, candidates that
-disagree, slow motion, where friction on the actual velocity is least certain. What errors come with is known before the
-window is measured, so that the variance is small at standstill and large at a reversal. What is felt only after it has
-happened, and for a while, is averaged over the samples before, from the last measured one on. The published standard
-deviation is ``c(k)·√v``.
+The variance at sample ``k`` of a window is a sum of four components, ``v(k) = Σ_i θ_i f_i(k)``, of what errors come
+with: measurement noise; timing, the squared difference of ``x_pb`` from sample to sample; a change since the last
+measured residual, ``(e_h − e)²``; and what the residual model knows of itself, the variance of the mixture of its
+experts. All are known before the window is measured, so that the variance is small at standstill and large at a
+reversal. Timing and that variance are felt after they have happened, and for a while: they are averaged over the
+samples before, from the last measured one on. The published standard deviation is ``c(k)·√v``.
 
 After each window every ``θ_i`` takes a step of expectation maximisation for normal errors of that variance (variance
 components: Dempster, Laird, Rubin, J. R. Stat. Soc. B 39 (1977)). The factor ``c(k)``, which changes exponentially from
@@ -29,29 +28,22 @@ from ..base.signals import PREDICTION_MAX, Array
 
 __all__ = ["N_COMPONENTS", "N_LEARNED", "PredictedError", "Uncertainty", "first_variance"]
 
-_SHARES = (4.0, 9.0, 0.01, 0.3, 2.0, 0.05)
-"""First variance of the error relative to that of its causes: differences of ``x_pb`` and of ``e_h`` from sample to
-sample, servo error, change since the last residual, disagreement, slow motion."""
+_SHARES = (4.0, 0.3, 2.0)
+"""First variance of the error relative to that of its causes: timing, change, variance of the experts."""
 
-N_COMPONENTS = 2 + len(_SHARES)
+N_COMPONENTS = 1 + len(_SHARES)
 
-N_LEARNED = 2 * N_COMPONENTS + 4
+N_LEARNED = 2 * N_COMPONENTS + 3
 """Numbers that :meth:`Uncertainty.learned` returns."""
 
 _UNKNOWN_NOISE = 25.0
 """First variance of a noise that is not known, relative to λ."""
 
-_GROWTH = 0.3
-"""First variance of the error's growth over a window, relative to the mean square error of the first window."""
-
-_FELT = (2, 3, 6, 7)
-"""Components that are felt for a while: differences, disagreement, slow motion."""
+_FELT = (1, 3)
+"""Components that are felt for a while: timing, variance of the experts."""
 
 _FELT_FOR = 0.2
 """Time constant of their averaging, in windows."""
-
-_SLOW = 0.04
-"""Velocity relative to the largest one so far, below which motion is slow."""
 
 _SHARE_LEAST, _SHARE_MOST = 1e-9 * np.array(_SHARES), 1e4 * np.array(_SHARES)
 """Bounds on the variance relative to its cause."""
@@ -95,11 +87,9 @@ class PredictedError(NamedTuple):
     e_h : (n,) array, m
         Published residual.
     components : (n, N_COMPONENTS) array
-        ``f_i(k)``; m² but for the first two, which are relative.
+        ``f_i(k)``; m² but for the first, which is 1.
     std : (n,) array, m
         Standard deviation of the error.
-    fastest : float, m
-        Largest change of ``x_pb`` from sample to sample, of earlier windows too.
     in_doubt : bool
         Whether the measurement before it is doubted: what is wrong then tells nothing of the errors of other windows.
     """
@@ -107,7 +97,6 @@ class PredictedError(NamedTuple):
     e_h: Array
     components: Array
     std: Array
-    fastest: float
     in_doubt: bool = False
 
 
@@ -124,7 +113,7 @@ class Uncertainty:
     Attributes
     ----------
     theta : (N_COMPONENTS,) array
-        ``θ``: variances, m², of noise and growth, and those relative to their causes.
+        ``θ``: variance of the noise, m², and those relative to their causes.
     evidence : (N_COMPONENTS,) array
         Windows that each stands on, faded.
     factor : float
@@ -133,55 +122,46 @@ class Uncertainty:
         ``c`` at its end relative to that at its beginning.
     recent : float, m²
         Recent mean square of the residual; 0 before the first window.
-    fastest : float, m
-        Largest change of ``x_pb`` from sample to sample in a measured window.
     """
 
     def __init__(self, variance: float, Np: int) -> None:
         self.Np = Np
-        self.theta = np.array([variance, 0.0, *_SHARES])
+        self.theta = np.array([variance, *_SHARES])
         self.evidence = np.zeros(N_COMPONENTS)
-        self.factor, self.ratio, self.recent, self.fastest = 1.0, 1.0, 0.0, 0.0
+        self.factor, self.ratio, self.recent = 1.0, 1.0, 0.0
 
     def predict(
         self,
-        x_d: Array,
         x_pb: Array,
         e_h: Array,
         *,
         last: float,
-        disagreement: Array | float,
+        variance: Array | float,
         doubted: Array | None = None,
     ) -> PredictedError:
         """Return what is known of the error of the next window; nothing is changed.
 
         Parameters
         ----------
-        x_d, x_pb, e_h : (n,) array, m
-            Commands, physics-based prediction and published residual, relative to the start.
+        x_pb, e_h : (n,) array, m
+            Physics-based prediction and published residual, relative to the start.
         last : float, m
             Last measured residual.
-        disagreement : (n,) array or float, m²
-            Variance of the candidates about their blend.
+        variance : (n,) array or float, m²
+            What the residual model knows of its error.
         doubted : (n,) array, m, optional
             Residual if the rejected measurement before the window is true.
         """
-        n = len(x_d)
+        n = len(x_pb)
         bounded = e_h
         if not np.abs(e_h).max() <= PREDICTION_MAX:  # a prediction that diverges is refused when it is published
             bounded = np.clip(np.nan_to_num(e_h), -PREDICTION_MAX, PREDICTION_MAX)
         components = np.empty((n, N_COMPONENTS))
         components[:, 0] = 1.0
-        components[:, 1] = np.arange(1, n + 1) / self.Np
-        _set_differences(components[:, 2], x_pb)
-        _set_differences(components[:, 3], bounded)
-        components[:, 4] = x_d - x_pb
-        components[:, 5] = bounded - last
-        components[:, 2:6] = np.minimum(np.abs(components[:, 2:6]), PREDICTION_MAX) ** 2
-        components[:, 6] = disagreement
-        fastest = np.maximum(np.maximum.accumulate(components[:, 2]), self.fastest**2)
-        slow = _SLOW**2 * fastest  # of the samples so far: a compensator still plans those after
-        components[:, 7] = self.recent * slow / (slow + components[:, 2] + _LEAST_VARIANCE)
+        _set_differences(components[:, 1], x_pb)
+        components[:, 2] = bounded - last
+        components[:, 1:3] = np.minimum(np.abs(components[:, 1:3]), PREDICTION_MAX) ** 2
+        components[:, 3] = variance
         gain = 1.0 / (1.0 + _FELT_FOR * self.Np)
         components[:, _FELT] = lfilter([gain], [1.0, gain - 1.0], components[:, _FELT], axis=0)
         c = self.factor * self.ratio ** self._from_middle(n)
@@ -189,7 +169,7 @@ class Uncertainty:
         if doubted is not None:
             std = np.sqrt(std**2 + np.minimum(np.abs(doubted - bounded), PREDICTION_MAX) ** 2)
         std = np.minimum(std, PREDICTION_MAX)
-        return PredictedError(bounded, components, std, math.sqrt(fastest[-1]), doubted is not None)
+        return PredictedError(bounded, components, std, doubted is not None)
 
     def learn(self, predicted: PredictedError, residuals: Array, accepted: NDArray[np.bool_]) -> None:
         """Learn from the measurement of a window.
@@ -215,13 +195,12 @@ class Uncertainty:
             return
         error = measured - e_h
         mean_square = _mean_square(measured)
-        self.fastest = predicted.fastest
         if self.recent > 0.0:
             self._calibrate(np.abs(error) / std, place)
             self.recent = _RECENT * self.recent + (1.0 - _RECENT) * mean_square
         else:
             self.recent, self.ratio = mean_square, _RATIO
-            self.theta[:2] = _mean_square(error) * np.array([1.0, _GROWTH])
+            self.theta[0] = _mean_square(error)
         variance = self._variance(components)
         share = components * self.theta / variance[:, None]  # of the variance, that is due to each component
         total = share.sum(axis=0)
@@ -230,28 +209,27 @@ class Uncertainty:
         change = np.maximum(np.divide(seen, total, out=np.ones(N_COMPONENTS), where=total > 0.0), _VANISHING)
         step = np.minimum(_STEP * total / self.Np / (self.evidence + _FIRST_EVIDENCE), 1.0)
         theta = self.theta * change**step
-        self.theta[:2] = np.minimum(np.maximum(theta[:2], _FLOOR * self.recent), PREDICTION_MAX)
-        self.theta[2:] = np.minimum(np.maximum(theta[2:], _SHARE_LEAST), _SHARE_MOST)
+        self.theta[0] = min(max(float(theta[0]), _FLOOR * self.recent), PREDICTION_MAX)
+        self.theta[1:] = np.minimum(np.maximum(theta[1:], _SHARE_LEAST), _SHARE_MOST)
 
     def learned(self) -> Array:
         """Return what has been learned, ``(N_LEARNED,)``: all numbers are ≥ 0."""
-        others = [self.factor, self.ratio, self.recent, self.fastest]
-        return np.concatenate((self.theta, self.evidence, others))
+        return np.concatenate((self.theta, self.evidence, [self.factor, self.ratio, self.recent]))
 
     def restore(self, learned: Array) -> None:
         """Restore what :meth:`learned` returned and :meth:`is_sound` accepts."""
-        self.theta, self.evidence = learned[:N_COMPONENTS].copy(), learned[N_COMPONENTS:-4].copy()
-        self.factor, self.ratio, self.recent, self.fastest = learned[-4:].tolist()
+        self.theta, self.evidence = learned[:N_COMPONENTS].copy(), learned[N_COMPONENTS:-3].copy()
+        self.factor, self.ratio, self.recent = learned[-3:].tolist()
 
     @staticmethod
     def is_sound(learned: Array) -> bool:
         """Return whether the numbers of :meth:`learned` are in range."""
-        shares, others = learned[2:N_COMPONENTS], np.delete(learned, range(2, N_COMPONENTS))
+        shares, others = learned[1:N_COMPONENTS], np.delete(learned, range(1, N_COMPONENTS))
         return bool(
             ((shares >= _SHARE_LEAST) & (shares <= _SHARE_MOST)).all()
             and ((others >= 0.0) & (others <= PREDICTION_MAX)).all()
-            and 1.0 / _FACTOR_MAX <= learned[-4] <= _FACTOR_MAX
-            and 1.0 / _RATIO_MAX <= learned[-3] <= _RATIO_MAX
+            and 1.0 / _FACTOR_MAX <= learned[-3] <= _FACTOR_MAX
+            and 1.0 / _RATIO_MAX <= learned[-2] <= _RATIO_MAX
         )
 
     def _calibrate(self, relative: Array, place: Array) -> None:

@@ -149,11 +149,10 @@ class WindowPredictor:
         """
         active = np.arange(len(forecast.x_d)) >= self._warm_up(len(forecast.x_d), late=len(self.late))
         error = self.uncertainty.predict(
-            forecast.x_d,
             forecast.x_pb,
             np.where(active, forecast.e_h, 0.0),
             last=self.last_accepted_residual(),
-            disagreement=np.where(active, forecast.disagreement, 0.0),
+            variance=np.where(active, forecast.variance, 0.0),
             doubted=self.residual.doubted(forecast.x_pb),
         )
         return PredictedWindow(forecast.x_d, forecast.x_pb, start, reference, signs, error, forecast)

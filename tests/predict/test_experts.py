@@ -109,7 +109,7 @@ def test_a_recursion_that_diverges_predicts_nothing() -> None:
 
 def judged(one: Expert, errors: Array, noise_variance: float) -> None:
     nothing = np.zeros(len(errors))
-    prediction = ExpertPrediction(nothing, nothing, nothing + 1.0, noise_variance)
+    prediction = ExpertPrediction(nothing, nothing, nothing + 1.0, nothing, noise_variance)
     one.judge(prediction, errors, np.ones(len(errors), dtype=np.bool_), 0.0)
 
 
@@ -128,5 +128,5 @@ def test_correlation_follows_errors_that_are_alike() -> None:
 
 def test_a_given_noise_is_kept() -> None:
     one, nothing = expert(2, 0.0), np.zeros(10)
-    one.judge(ExpertPrediction(nothing, nothing, nothing, 0.3), nothing, np.ones(10, dtype=np.bool_), 0.04)
+    one.judge(ExpertPrediction(nothing, nothing, nothing, nothing, 0.3), nothing, np.ones(10, dtype=np.bool_), 0.04)
     assert one.noise_variance == 0.04

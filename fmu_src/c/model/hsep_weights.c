@@ -8,7 +8,7 @@
 #include <string.h>
 
 #define WEIGHTS_FILE "weights.bin"
-#define WEIGHTS_MAGIC "HSEPWGT9"
+#define WEIGHTS_MAGIC "HSEPWG10"
 #define WEIGHTS_CHUNK 512 /* bytes that are summed up at once, a multiple of 8 */
 
 typedef struct {

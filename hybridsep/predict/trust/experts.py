@@ -155,6 +155,8 @@ class ExpertPrediction(NamedTuple):
     unshrunk : (n,) array, m
     kept : (n,) array
         What the variance leaves of it.
+    variance : (n,) array, m²
+        What is left of the variance of the residual, ``v·τ²/(v + τ²)``.
     noise_variance : float, m²
         Mean square of the rows so far about this expert.
     """
@@ -162,6 +164,7 @@ class ExpertPrediction(NamedTuple):
     e_h: Array
     unshrunk: Array
     kept: Array
+    variance: Array
     noise_variance: float
 
     @property
@@ -232,7 +235,9 @@ class SolvedExpert(NamedTuple):
             most = _DIVERGED * bound**2
             variance = np.where(finite, np.minimum(variance, most), most)
             kept = largest_square / (largest_square + variance)
-        return ExpertPrediction(np.clip(e, -bound, bound) * kept, e, kept, self.noise_variance)
+        return ExpertPrediction(
+            np.clip(e, -bound, bound) * kept, e, kept, largest_square * (1.0 - kept), self.noise_variance
+        )
 
 
 class Expert:

@@ -222,8 +222,11 @@ class TrustedModel(ResidualModel[TrustedForecast]):
                 follows = self.command.late(self.run.commands, x_d) - x_pb
                 stacked[expert] = np.clip(stacked[expert] + follows, -self.bound, self.bound)
         e_h = self.stack.weights @ stacked
-        disagreement = np.maximum(self.stack.weights @ stacked**2 - e_h**2, 0.0)
-        return TrustedForecast(x_d, x_pb, e_h, disagreement, x, stacked, found, scales)
+        second = stacked**2  # moments of the experts' errors about 0, physics being one without a variance of its own
+        for expert, prediction in found.items():
+            second[expert] += prediction.variance
+        variance = np.maximum(self.stack.weights @ second - e_h**2, 0.0)
+        return TrustedForecast(x_d, x_pb, e_h, variance, x, stacked, found, scales)
 
     def _predicted(
         self, expert: int, solved: Mapping[int, SolvedExpert], rows: Array, held: Mapping[int, ExpertPrediction]

@@ -160,7 +160,6 @@ HSEP_API uint64_t hsep_predictor_warm_up(const hsep_predictor *self) { return pr
 HSEP_API void hsep_predictor_predict_std(hsep_predictor *self, uint64_t first, uint64_t last)
 {
     hsep_uncertainty_signals signals = {
-        .x_d = hsep_at(self, self->command),
         .x_pb = hsep_at(self, self->past_x),
         .e_h = hsep_at(self, self->e_h),
         .n_physics = predictor_warm_up(self, self->late)};

@@ -6,24 +6,17 @@
 #include <math.h>
 #include <string.h>
 
-/* First variance of the error relative to that of its causes: differences of x_pb and of e_h, servo error, change since
- * the last residual, disagreement, slow motion; bounds relative to it. */
-static const double uncertainty_shares[HSEP_N_COMPONENTS] = {0.0, 0.0, 4.0, 9.0, 0.01, 0.3, 2.0, 0.05};
+/* First variance of the error relative to that of its causes: timing, change since the last residual, variance of the
+ * experts; bounds relative to it. */
+static const double uncertainty_shares[HSEP_N_COMPONENTS] = {0.0, 4.0, 0.3, 2.0};
 static const double uncertainty_share_least = 1e-9, uncertainty_share_most = 1e4;
 
-/* Components that are felt for a while: differences, disagreement, slow motion; time constant of their averaging, in
- * windows. */
-static const int uncertainty_felt[] = {2, 3, 6, 7};
+/* Components that are felt for a while: timing, variance of the experts; time constant of their averaging, windows. */
+static const int uncertainty_felt[] = {1, 3};
 static const double uncertainty_felt_for = 0.2;
-
-/* Velocity relative to the largest one so far, below which motion is slow. */
-static const double uncertainty_slow = 0.04;
 
 /* First variance of a noise that is not known, relative to lambda. */
 static const double uncertainty_unknown_noise = 25.0;
-
-/* First variance of the growth, relative to the mean square error of the first window. */
-static const double uncertainty_growth = 0.3;
 
 /* Least variance relative to the recent mean square of the residual; and in m2, so that no divisor is 0. */
 static const double uncertainty_floor = 1e-6, uncertainty_least = 1e-100;
@@ -88,8 +81,7 @@ HSEP_API int hsep_uncertainty_valid(const void *block, uint64_t Np, uint64_t n)
     hsep_uncertainty got;
     memcpy(&got, block, sizeof got);
     (void)uncertainty_lay_out(&got, Np, n); /* changes nothing where it is sound */
-    return memcmp(&got, block, sizeof got) == 0 && hsep_uncertainty_sound(&got) && got.fastest_ahead >= 0.0 &&
-           got.fastest_ahead <= HSEP_PREDICTION_MAX && got.in_doubt <= 1;
+    return memcmp(&got, block, sizeof got) == 0 && hsep_uncertainty_sound(&got) && got.in_doubt <= 1;
 }
 
 HSEP_API double *hsep_uncertainty_learned(hsep_uncertainty *self) { return self->theta; }
@@ -132,18 +124,15 @@ static double uncertainty_from_middle(const hsep_uncertainty *self, uint64_t k)
 static void uncertainty_at(
     const hsep_uncertainty *self, const hsep_uncertainty_signals *signals, uint64_t j, double f[HSEP_N_COMPONENTS])
 {
-    const double *x_pb = signals->x_pb, *published = hsep_at_const(self, self->e_h);
+    const double *x_pb = signals->x_pb;
     const uint64_t n = self->n;
     /* The difference of the first sample is that of the second. */
     const uint64_t newer = j + 1 == n && j > 0 ? j - 1 : j, older = newer + 1 < n ? newer + 1 : newer;
-    const int stacked = signals->disagreement != NULL && n - 1 - j >= signals->n_physics;
+    const int stacked = signals->variance != NULL && n - 1 - j >= signals->n_physics;
     f[0] = 1.0;
-    f[1] = (double)(n - j) / (double)self->Np;
-    f[2] = uncertainty_square(x_pb[newer] - x_pb[older]);
-    f[3] = uncertainty_square(published[newer] - published[older]);
-    f[4] = uncertainty_square(signals->x_d[j] - x_pb[j]);
-    f[5] = uncertainty_square(published[j] - self->last);
-    f[6] = stacked ? signals->disagreement[j] : 0.0;
+    f[1] = uncertainty_square(x_pb[newer] - x_pb[older]);
+    f[2] = uncertainty_square(hsep_at_const(self, self->e_h)[j] - self->last);
+    f[3] = stacked ? signals->variance[j] : 0.0;
 }
 
 HSEP_API void hsep_uncertainty_predict(
@@ -154,20 +143,15 @@ HSEP_API void hsep_uncertainty_predict(
     double *published = hsep_at(self, self->e_h), *std = hsep_at(self, self->std), *felt = self->felt;
     if (first == 0) {
         memset(felt, 0, sizeof self->felt);
-        self->fastest_ahead = self->fastest;
         self->last = signals->e_h[n];
         self->in_doubt = signals->doubt.kind != HSEP_NO_DOUBT;
     }
-    double fastest = uncertainty_square(self->fastest_ahead);
     for (uint64_t k = first; k < last; k++) {
         published[n - 1 - k] = k < signals->n_physics ? 0.0 : signals->e_h[n - 1 - k];
     }
     for (uint64_t k = first; k < last; k++) { /* in time, from the last measured sample on */
         double *f = hsep_at(self, self->components) + (n - 1 - k) * HSEP_N_COMPONENTS;
         uncertainty_at(self, signals, n - 1 - k, f);
-        fastest = fmax(fastest, f[2]); /* of the samples so far: a compensator still plans those after */
-        const double slow = uncertainty_slow * uncertainty_slow * fastest;
-        f[7] = self->recent * slow / (slow + f[2] + uncertainty_least);
         for (size_t i = 0; i < sizeof uncertainty_felt / sizeof *uncertainty_felt; i++) {
             const int place = uncertainty_felt[i];
             felt[place] += gain * (f[place] - felt[place]);
@@ -182,7 +166,6 @@ HSEP_API void hsep_uncertainty_predict(
         }
         std[n - 1 - k] = fmin(deviation, HSEP_PREDICTION_MAX);
     }
-    self->fastest_ahead = sqrt(fastest);
 }
 
 /* What is summed over the samples that count. */
@@ -211,7 +194,6 @@ static void uncertainty_add(uncertainty_sums *sums, double e, double error, doub
 static void uncertainty_follow(hsep_uncertainty *self, const uncertainty_sums *sums)
 {
     const double count = sums->count, mean_square = fmin(sums->squares / count, HSEP_PREDICTION_MAX);
-    self->fastest = self->fastest_ahead;
     if (self->recent > 0.0) {
         for (int i = 0; i < HSEP_N_COMPONENTS && sums->far / count > uncertainty_far_share; i++) {
             self->theta[i] *= uncertainty_far * uncertainty_far;
@@ -225,7 +207,6 @@ static void uncertainty_follow(hsep_uncertainty *self, const uncertainty_sums *s
         self->recent = mean_square;
         self->ratio = uncertainty_ratio;
         self->theta[0] = fmin(sums->errors / count, HSEP_PREDICTION_MAX);
-        self->theta[1] = self->theta[0] * uncertainty_growth;
     }
 }
 

@@ -1,15 +1,15 @@
 /* Uncertainty of a prediction: the variance of its error against the measured position, learned from earlier windows.
  *
- * The variance of a sample is a sum of components, v = sum_i theta_i f_i, each the square of something that errors
- * come with: measurement noise and its growth over the window, wrong timing (the squared differences of x_pb and e_h),
- * a wrong share of the servo error, a change since the last measured residual, experts that disagree, slow motion.
- * What is felt only after it has happened, and for a while, is averaged over the samples before, from the last
- * measured one on. The standard deviation is c sqrt(v). After each window theta takes a step of expectation
- * maximisation for normal errors of that variance, and c, which changes exponentially from the beginning to the end of
+ * The variance of a sample is a sum of four components, v = sum_i theta_i f_i, of what errors come with: measurement
+ * noise; timing, the squared difference of x_pb; a change since the last measured residual; and what the residual model
+ * knows of itself, the variance of the mixture of its experts. Timing and that variance are felt after they have
+ * happened, and for a while: they are averaged over the samples before, from the last measured one on. The standard
+ * deviation is c sqrt(v). After each window theta takes a step of expectation maximisation for normal errors of that
+ * variance, and c, which changes exponentially from the beginning to the end of
  * a window, moves until intervals of 50, 90 and 95 % miss as many errors as they may, together.
  *
  * Signals are kept newest first: sample k of the n that are predicted is at place n - 1 - k. The first Np of them are
- * learned. Memory is one block, without pointers. Reentrant; allocates nothing. Cost of a window: 70 n operations each.
+ * learned. Memory is one block, without pointers. Reentrant; allocates nothing. Cost of a window: 50 n operations each.
  */
 #ifndef HSEP_UNCERTAINTY_H
 #define HSEP_UNCERTAINTY_H
@@ -20,29 +20,27 @@
 
 #include <stdint.h>
 
-#define HSEP_N_COMPONENTS 8
-#define HSEP_N_UNCERTAINTY (2 * HSEP_N_COMPONENTS + 4) /* numbers that are learned, each >= 0 */
+#define HSEP_N_COMPONENTS 4
+#define HSEP_N_UNCERTAINTY (2 * HSEP_N_COMPONENTS + 3) /* numbers that are learned, each >= 0 */
 
 typedef struct {
     uint64_t Np;
-    double theta[HSEP_N_COMPONENTS];    /* variances, m2, of noise and growth; those relative to their causes */
+    double theta[HSEP_N_COMPONENTS];    /* variance of the noise, m2; those relative to their causes */
     double evidence[HSEP_N_COMPONENTS]; /* windows that each stands on, faded */
     double factor;                      /* c in the middle of a window */
     double ratio;                       /* c at its end relative to that at its beginning */
     double recent;                      /* m2, recent mean square of the residual; 0 before the first window */
-    double fastest;                     /* m, largest change of x_pb from sample to sample in a measured window */
     uint64_t n;                         /* samples that are predicted */
     uint64_t in_doubt;                  /* whether the guard doubted them */
-    double fastest_ahead;               /* m, fastest with those of the predicted samples */
     double last;                        /* m, last measured residual before them */
     double felt[HSEP_N_COMPONENTS];     /* m2, averages of what is felt for a while, up to the last one of them */
     /* Offsets in doubles from the beginning of the struct */
     uint64_t e_h;        /* (n,) m, residual of the window as published */
-    uint64_t components; /* (n, HSEP_N_COMPONENTS) m2 but for the first two */
+    uint64_t components; /* (n, HSEP_N_COMPONENTS) m2 but for the first, which is 1 */
     uint64_t std;        /* (n,) m, standard deviation of the error */
 } hsep_uncertainty;
 
-HSEP_ASSERT_WORDS(hsep_uncertainty, 8 + HSEP_N_COMPONENTS + HSEP_N_UNCERTAINTY);
+HSEP_ASSERT_WORDS(hsep_uncertainty, 7 + HSEP_N_COMPONENTS + HSEP_N_UNCERTAINTY);
 
 /* Bytes of the block, counted in double so that no size can overflow. */
 HSEP_API double hsep_uncertainty_size(uint64_t Np, uint64_t n);
@@ -63,11 +61,11 @@ HSEP_API int hsep_uncertainty_sound(const hsep_uncertainty *self);
 
 /* Signals that tell of a prediction's error. */
 typedef struct {
-    const double *x_d, *x_pb;   /* (n,) m, commands and physics-based prediction */
-    const double *e_h;          /* (n + 1,) m, predicted residual, behind it the last measured one */
-    uint64_t n_physics;         /* leading samples where it is not published */
-    const double *disagreement; /* (n,) m2, variance of the experts about their stack, or NULL */
-    hsep_doubt doubt;           /* what the guard doubts; the same in all calls for a window */
+    const double *x_pb;     /* (n,) m, physics-based prediction */
+    const double *e_h;      /* (n + 1,) m, predicted residual, behind it the last measured one */
+    uint64_t n_physics;     /* leading samples where it is not published */
+    const double *variance; /* (n,) m2, what the residual model knows of its error, or NULL */
+    hsep_doubt doubt;       /* what the guard doubts; the same in all calls for a window */
 } hsep_uncertainty_signals;
 
 /* Predict the errors of samples first ... last - 1; first is 0, or where the last call ended. The first samples are at

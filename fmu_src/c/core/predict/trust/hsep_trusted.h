@@ -82,7 +82,7 @@ typedef struct {
     uint64_t bridged;          /* (Np + p,) whether a residual stands for one that is not */
     uint64_t e_0;              /* (Np + p of the command,) m, residual of the command */
     uint64_t stacked;          /* (n,) m, what the command's expert predicts of that of the physics model */
-    uint64_t disagreement;     /* (n,) m2, variance of the experts about their stack */
+    uint64_t variance;         /* (n,) m2, of the mixture of the experts */
     uint64_t rows;             /* (n, n_static) features without lags, sample after sample */
     uint64_t work;             /* rows to be folded, of the window or of penalties */
     uint64_t disturbances, command;

@@ -89,7 +89,7 @@ static double trusted_lay_out(hsep_trusted *self, const hsep_trusted_parameters 
     self->bridged = hsep_take(&end, Np + p);
     self->e_0 = hsep_take(&end, Np + p_of_command);
     self->stacked = hsep_take(&end, n);
-    self->disagreement = hsep_take(&end, n);
+    self->variance = hsep_take(&end, n);
     self->rows = hsep_take(&end, n * n_static);
     self->work = hsep_take(&end, trusted_work(self));
     self->disturbances = hsep_take_block(&end, hsep_disturbances_size(settings, trust->period, parameters->n_modes));

@@ -214,20 +214,30 @@ HSEP_API double hsep_trusted_stacked(const hsep_trusted *self, hsep_expert_place
     return hsep_at_const(one, one->e_h)[place];
 }
 
+/* What is left of the variance of the residual where an expert predicts place j, m2. */
+static double trusted_variance(const hsep_trusted *self, hsep_expert_place expert, uint64_t place)
+{
+    if (!self->predicted[expert] || expert == HSEP_HOLD) {
+        return 0.0;
+    }
+    const hsep_expert *one = (const hsep_expert *)hsep_at_const(self, self->experts[expert]);
+    return one->largest_square * (1.0 - hsep_at_const(one, one->kept)[place]);
+}
+
 /* e: the stack of the experts, which have predicted samples first ... last - 1. */
 static void trusted_stack(hsep_trusted *self, double e[], uint64_t first, uint64_t last)
 {
     const double *weights = self->stack.weights;
-    double *disagreement = hsep_at(self, self->disagreement);
+    double *variance = hsep_at(self, self->variance);
     for (uint64_t j = self->n - last; j < self->n - first; j++) {
         double sum = 0.0, square = 0.0;
         for (uint64_t i = 0; i < HSEP_N_EXPERTS; i++) {
             const double predicted = hsep_trusted_stacked(self, (hsep_expert_place)i, j);
             sum += weights[i] * predicted;
-            square += weights[i] * predicted * predicted;
+            square += weights[i] * (predicted * predicted + trusted_variance(self, (hsep_expert_place)i, j));
         }
         e[j] = sum;
-        disagreement[j] = fmax(square - sum * sum, 0.0);
+        variance[j] = fmax(square - sum * sum, 0.0);
     }
 }
 
