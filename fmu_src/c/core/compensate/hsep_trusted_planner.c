@@ -126,12 +126,11 @@ HSEP_API void hsep_trusted_planner_begin(
         path[self->preview - 1 - k] = task->x_d[k] - self->start;
     }
     trusted_planner_command(self, task, rest, HSEP_DECIDED + self->n);
-    hsep_trusted_scale(
-        task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb), path, self->preview,
-        before->residuals[0]);
     const uint64_t pinned = hsep_planner_pinned(task->planner); /* they are published now */
     self->varied = self->late + (pinned > 0 ? pinned : 1);
-    (void)trusted_planner_predict(self, task, rest, self->varied);
+    hsep_trusted_forecast(
+        task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb), path, self->preview,
+        hsep_at(self, self->e_h), self->varied);
     self->follows = best > 1 && task->model->predicted[HSEP_STATIC];
     if (best == 0) {
         self->stage = HSEP_TRUSTED_PREDICT;

@@ -114,7 +114,7 @@ typedef struct {
 
 /* Begin a window: predict it under the rest of the last plan. best: best model allowed, 0 none, 1 physics, 2 trusted.
  * Only the samples that the plan leaves as they are, and the late ones before them, have their variance then. Cost:
- * that of hsep_trusted_scale and a prediction; with a late measurement its variances, late^2 / 2 multiply-adds for each
+ * that of hsep_trusted_forecast; with a late measurement its variances, late^2 / 2 multiply-adds for each
  * expert, here and in the last part. */
 HSEP_API void hsep_trusted_planner_begin(
     hsep_trusted_planner *self, const hsep_trusted_task *task, const hsep_trusted_before *before, uint64_t best);

@@ -7,10 +7,10 @@
  * variance of the noise.
  *
  * A window is predicted by hsep_trusted_forecast, and learned by hsep_trusted_learn once it is measured. A compensator,
- * which decides the commands of a window, calls hsep_trusted_scale and, for commands that it tries over its preview,
- * hsep_trusted_predict; the last ones count. Signals are kept newest first: of n samples, sample k is at place
- * n - 1 - k, and what was before them is behind them. Positions are relative to the start. Memory is one block, without
- * pointers; a window predicted and not measured yet is part of it. Reentrant; allocates nothing.
+ * which decides the commands of a window, begins with the rest of its last plan, and calls hsep_trusted_predict for
+ * other commands that it tries over its preview; the last ones count. Signals are kept newest first: of n samples,
+ * sample k is at place n - 1 - k, and what was before them is behind them. Positions are relative to the start. Memory
+ * is one block, without pointers; a window predicted and not measured yet is part of it. Reentrant; allocates nothing.
  */
 #ifndef HSEP_TRUSTED_H
 #define HSEP_TRUSTED_H
@@ -128,22 +128,19 @@ HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i);
 HSEP_API int hsep_trusted_sound(hsep_trusted *self);
 
 /* Predict the residual e, (n + p,), m, in samples 0 ... last - 1 of those that come next; behind it the last ones, as
- * measured. x_d: commands, x_pb: physics-based prediction, (n,), m. Cost: m^3 / 6 multiply-adds for each expert's m
+ * measured. x_d: commands, x_pb: physics-based prediction, (n,), m; path: unmodified commands of the last n_path of
+ * them, m, of a compensator; or NULL. Cost: m^3 / 6 multiply-adds for each expert's m
  * features, last m^2 / 2, last n / 2, and 6 n tanh. */
 HSEP_API void hsep_trusted_forecast(
-    hsep_trusted *self, const double x_d[], const double x_pb[], double e[], uint64_t last);
+    hsep_trusted *self, const double x_d[], const double x_pb[], const double path[], uint64_t n_path, double e[],
+    uint64_t last);
 
 /* Predict samples first ... last - 1, too: their variances are dear, and nobody asks for them before. */
 HSEP_API void hsep_trusted_go_on(hsep_trusted *self, const double x_pb[], double e[], uint64_t first, uint64_t last);
 
-/* What a compensator needs of it, over n samples. Take the scales of the features from the samples that come next, and
- * solve for the weights; path: unmodified commands of the last n_path of these, m, of a compensator; or NULL. */
-HSEP_API void hsep_trusted_scale(
-    hsep_trusted *self, const double x_d[], const double x_pb[], const double path[], uint64_t n_path,
-    double last_residual);
-
-/* Predict with them. e: (n + p,), m; varied: samples whose variance is computed, the first ones, while the prediction
- * of those behind them means nothing yet; 0: shrinking stays that of the last prediction. */
+/* Predict other commands with the same scales and weights. e: (n + p,), m; varied: samples whose variance is computed,
+ * the first ones, while the prediction of those behind them means nothing yet; 0: shrinking stays that of the last
+ * prediction. */
 HSEP_API void hsep_trusted_predict(
     hsep_trusted *self, const double x_d[], const double x_pb[], double e[], uint64_t varied);
 

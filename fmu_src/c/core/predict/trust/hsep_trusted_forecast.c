@@ -115,7 +115,8 @@ static void trusted_solve_all(hsep_trusted *self)
     }
 }
 
-HSEP_API void hsep_trusted_scale(
+/* Take the scales of the features from the samples that come next, and solve for the weights. */
+static void trusted_scale(
     hsep_trusted *self, const double x_d[], const double x_pb[], const double path[], uint64_t n_path,
     double last_residual)
 {
@@ -264,9 +265,10 @@ HSEP_API void hsep_trusted_vary(hsep_trusted *self, uint64_t first, uint64_t las
 }
 
 HSEP_API void hsep_trusted_forecast(
-    hsep_trusted *self, const double x_d[], const double x_pb[], double e[], uint64_t last)
+    hsep_trusted *self, const double x_d[], const double x_pb[], const double path[], uint64_t n_path, double e[],
+    uint64_t last)
 {
-    hsep_trusted_scale(self, x_d, x_pb, NULL, 0, e[self->n]);
+    trusted_scale(self, x_d, x_pb, path, n_path, e[self->n]);
     trusted_by_experts(self, x_d, x_pb, e + self->n, last); /* the rows are those of the scales */
     trusted_stack(self, e, 0, last);
 }
