@@ -13,6 +13,8 @@ from ..logs.formats import channels
 from ..logs.source import Channel
 from .tables import console, print_json
 
+__all__ = ["print_channels"]
+
 _ROLES = {"t": "time", "x_d": "commanded", "x": "measured"}
 
 

@@ -23,6 +23,8 @@ from .command_system import system
 from .command_tune import tune
 from .failures import DEBUG_VARIABLE, Commands, run
 
+__all__ = ["app", "main"]
+
 app = typer.Typer(
     cls=Commands,
     help="Predict a CNC feed drive's servo error one look-ahead window early, with a linear hybrid model.",

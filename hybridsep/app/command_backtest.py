@@ -23,6 +23,8 @@ from .options import (
     takes_reading,
 )
 
+__all__ = ["backtest"]
+
 
 @takes_reading
 @takes_parameters(PREDICTOR_ENTRIES)

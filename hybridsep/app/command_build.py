@@ -12,6 +12,8 @@ from ..fmi.flavours import FLAVOURS, FMI_VERSIONS
 from .failures import errors_console
 from .options import FlavourOption, FmiOption, ForceOption, JsonOption, TsOption, UnitOption, WeightsOption
 
+__all__ = ["build"]
+
 
 def build(
     fmus: Annotated[

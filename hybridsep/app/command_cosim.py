@@ -28,6 +28,8 @@ from .options import (
     takes_parameters,
 )
 
+__all__ = ["cosim"]
+
 
 @takes_parameters(PREDICTOR_ENTRIES, COMPENSATOR_ENTRIES)
 def cosim(

@@ -10,6 +10,8 @@ import typer
 from ..fmi.flavours import FLAVOURS, FMI_VERSIONS
 from .options import FmiOption, ForceOption, JsonOption
 
+__all__ = ["demo"]
+
 
 def demo(
     out: Annotated[Path, typer.Option(help="Folder for FMUs, figures, results and summary.json.")] = Path("demo"),

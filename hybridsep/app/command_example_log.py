@@ -9,6 +9,8 @@ import typer
 
 from .options import ForceOption
 
+__all__ = ["example_log"]
+
 
 def example_log(
     out: Annotated[Path, typer.Option(help="File for the log, .csv or .csv.gz.")] = Path("example_axis.csv"),

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from ..intake.finding import Finding
     from ..logs.log import Log
 
+__all__ = ["fit"]
+
 
 @takes_reading
 @takes_parameters(KNOWN_ENTRIES, DRIVE_LIMIT_ENTRIES, otherwise="none, or the usual one")

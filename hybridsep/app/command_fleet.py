@@ -24,6 +24,7 @@ from .options import (
 if TYPE_CHECKING:
     from ..fleet.run import FleetRun
 
+__all__ = ["fleet"]
 
 _REPORT = "report"
 

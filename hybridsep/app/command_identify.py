@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from ..identify.model import IdentifiedModel
     from ..logs.units import Shown
 
+__all__ = ["identify"]
 
 KINDS = ("auto", "operation", "response", "sweep", "klipper")
 """What ``--kind`` takes."""

@@ -16,6 +16,7 @@ from .options import ForceOption
 if TYPE_CHECKING:
     from ..model.physics import ModalModel
 
+__all__ = ["init"]
 
 MODELS = {
     "lag": ("tau",),

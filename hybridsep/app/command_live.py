@@ -22,6 +22,8 @@ from .options import (
 if TYPE_CHECKING:
     from ..logs.units import Shown
 
+__all__ = ["live"]
+
 
 @takes_reading
 @takes_parameters(PREDICTOR_ENTRIES)

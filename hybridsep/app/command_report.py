@@ -21,6 +21,8 @@ from .options import (
     takes_reading,
 )
 
+__all__ = ["report"]
+
 
 @takes_reading
 @takes_parameters(PREDICTOR_ENTRIES)

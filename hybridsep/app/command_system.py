@@ -11,6 +11,8 @@ from ..base.data_files import DEFAULT_MACHINE
 from ..fmi.compiler import TARGET_NAMES
 from .options import TRAJECTORIES, ForceOption, JsonOption, MachineOption, TsOption, UnitOption, WeightsOption
 
+__all__ = ["system"]
+
 
 def system(
     machine: MachineOption = DEFAULT_MACHINE,

@@ -25,6 +25,8 @@ from .options import (
     takes_reading,
 )
 
+__all__ = ["tune"]
+
 
 @takes_reading
 @takes_parameters(PREDICTOR_ENTRIES, ranges=PredictorSettings.TUNED)

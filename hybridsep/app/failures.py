@@ -20,6 +20,8 @@ from ..base.interrupt import interrupts_between_calls
 from ..base.new_folders import remove_empty_folders
 from ..base.version import version_text
 
+__all__ = ["DEBUG_VARIABLE", "Commands", "Interrupted", "errors_console", "run"]
+
 DEBUG_VARIABLE = "HYBRIDSEP_DEBUG"
 """Environment variable: if it is set, an unexpected error shows its traceback."""
 

@@ -18,6 +18,8 @@ from ..machines.machine import Machine
 from .failures import errors_console
 from .options import ReadingOptions
 
+__all__ = ["Reading", "open_checked", "reading_of", "show"]
+
 CHECKED_MAX = 2_000_000
 """Samples that are checked at most; a longer log is replayed in bounded memory all the same."""
 

@@ -19,6 +19,38 @@ from ..base.ranges import GRAMMAR
 from ..base.settings import PARAMETERS, CompensatorSettings, PredictorSettings, Settings
 from ..fmi.flavours import FLAVOURS, FMI_CHOICES
 
+__all__ = [
+    "COMPENSATOR_ENTRIES",
+    "KNOWN_ENTRIES",
+    "PREDICTOR_ENTRIES",
+    "TRAJECTORIES",
+    "AsIsOption",
+    "AxisOption",
+    "CommandColumnOption",
+    "FigurePagesOption",
+    "FixOption",
+    "FlavourOption",
+    "FmiOption",
+    "ForceOption",
+    "JsonOption",
+    "ListChannelsOption",
+    "LogArgument",
+    "MachineOption",
+    "MeasuredColumnOption",
+    "ReadingOptions",
+    "ResampleOption",
+    "SavedOption",
+    "SchedulerOption",
+    "TimeColumnOption",
+    "TsOption",
+    "UnitOption",
+    "WeightsOption",
+    "WorkersOption",
+    "parameter_help",
+    "takes_parameters",
+    "takes_reading",
+]
+
 TRAJECTORIES = ("staircase", "spiral_x", "spiral_y")
 """What ``--trajectory`` takes besides a file."""
 

@@ -18,6 +18,28 @@ from ..base.zip_files import ZIP_DAMAGE
 from ..logs.example import EXAMPLE, HEAD
 from ..machines.seal import edited_since, is_as_written
 
+__all__ = [
+    "BATCHES",
+    "BATCH_COLUMNS",
+    "BY_ENDING",
+    "EXAMPLE_LOG",
+    "FIGURE",
+    "FIGURES",
+    "FIT_FILES",
+    "FMU",
+    "MACHINE",
+    "PDF",
+    "PNG",
+    "REPORT",
+    "RUN",
+    "RUNS",
+    "STATE",
+    "SYSTEM",
+    "Kind",
+    "Output",
+    "check_outputs",
+]
+
 _Answer = TypeVar("_Answer")
 
 BATCH_COLUMNS = ("t", "rms_pb", "rms_hold", "rms_h")

@@ -10,6 +10,8 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 
 from .failures import errors_console
 
+__all__ = ["progress_bar"]
+
 _SILENT = 2.0
 """Time for which no line is printed, s: what is done by then needs no progress."""
 

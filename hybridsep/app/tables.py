@@ -21,6 +21,16 @@ if TYPE_CHECKING:
     from ..cosim.run import Run
     from ..evaluate.verdict import Verdict
 
+__all__ = [
+    "console",
+    "print_compensation",
+    "print_json",
+    "print_predictions",
+    "print_run",
+    "print_scores",
+    "print_without_first",
+    "print_written",
+]
 
 console = Console(emoji=False, markup=False, highlight=False)
 """Standard output. Units and names of files may have brackets, which are text there, as in the tables."""

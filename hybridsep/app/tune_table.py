@@ -19,6 +19,8 @@ from ..tune.grid import TUNED
 from ..tune.joint import Tuning, joint_ratio
 from .tables import console
 
+__all__ = ["entries", "print_tuning", "tuning_summary"]
+
 _ROWS = 10
 """Candidates that are printed, besides the machine's own settings."""
 

@@ -19,6 +19,8 @@ from typing import IO, Any, TypeVar
 
 from .interrupt import starting_processes
 
+__all__ = ["run_apart", "serve"]
+
 Result = TypeVar("Result")
 
 _CHILD = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from hybridsep.base.apart import serve; serve()"

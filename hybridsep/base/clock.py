@@ -14,6 +14,8 @@ from typing import NamedTuple
 
 from .errors import FmuError, ParameterError, StateError
 
+__all__ = ["STEP_MAX", "ClockStep", "SampleClock", "check_step_size"]
+
 STEP_MAX = 100.0
 """Longest communication step, s, which bounds the cost of one step: 10⁷ samples at the shortest ``T_s``."""
 

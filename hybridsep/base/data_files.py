@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+__all__ = ["DEFAULT_MACHINE", "data_folder"]
+
 DEFAULT_MACHINE = "spring_mass_damper"
 """Machine file of the paper's staircase; its FMUs have no suffix."""
 

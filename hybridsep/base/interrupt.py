@@ -14,6 +14,8 @@ from functools import wraps
 from types import FrameType
 from typing import ParamSpec, TypeVar
 
+__all__ = ["interrupts_between_calls", "starting_processes", "uninterrupted"]
+
 P = ParamSpec("P")
 Result = TypeVar("Result")
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+__all__ = ["ERRORS", "FINDINGS", "Explanation"]
+
 
 @dataclass(frozen=True)
 class Explanation:

@@ -12,6 +12,22 @@ from numpy.typing import ArrayLike, NDArray
 
 from .signals import Array
 
+__all__ = [
+    "RunningErrors",
+    "batch_rms",
+    "contour_error",
+    "coverage",
+    "hold",
+    "largest",
+    "last_residual",
+    "peak_derivatives",
+    "reduction_percent",
+    "rms",
+    "rms_ratio",
+    "shares",
+    "shown_figure",
+]
+
 _NODES = 20_000
 """Points of a path for the search of the nearest one, before refinement; 24 µm apart on the paper's spiral."""
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from contextlib import suppress
 from pathlib import Path
 
+__all__ = ["make_folder", "remove_empty_folders"]
+
 _made: list[Path] = []
 """Folders that were made, those within others first."""
 

@@ -23,6 +23,7 @@ from typing import IO
 if sys.platform != "win32":
     import fcntl
 
+__all__ = ["named_errors", "written_text", "written_whole"]
 
 _PART = re.compile(r"\.hybridsep-[0-9a-f]{32}\.tmp")
 

@@ -9,6 +9,8 @@ from typing import Any
 
 from .errors import ParameterError, brief
 
+__all__ = ["Parameter", "choice", "flag", "real", "whole"]
+
 
 @dataclass(frozen=True)
 class Parameter:

@@ -8,6 +8,8 @@ from typing import Any
 from .errors import ParameterError, brief
 from .parameters import Parameter
 
+__all__ = ["GRAMMAR", "parse_range"]
+
 GRAMMAR = "5,10,50 or 5:100:5 (steps) or 1e-14:1e-6:x10 (factors)"
 """How ranges are written, by examples."""
 

@@ -12,6 +12,8 @@ import numpy as np
 from .errors import ParameterError, SignalError, StateError
 from .signals import PREDICTION_MAX, Array
 
+__all__ = ["COUNT_MAX", "Saved"]
+
 Value = TypeVar("Value")
 
 COUNT_MAX = 2**53

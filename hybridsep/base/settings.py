@@ -19,6 +19,17 @@ from typing import Any, ClassVar, TypeVar
 from .errors import ParameterError, brief
 from .parameters import Parameter, choice, flag, real, whole
 
+__all__ = [
+    "DRIVE_LIMIT_ENTRIES",
+    "PARAMETERS",
+    "CompensatorSettings",
+    "Limits",
+    "PredictorSettings",
+    "Settings",
+    "check",
+    "samples_before",
+]
+
 _SettingsType = TypeVar("_SettingsType", bound="Settings")
 
 

@@ -10,6 +10,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import SignalError
 
+__all__ = [
+    "POSITION_MAX",
+    "PREDICTION_MAX",
+    "Array",
+    "Indices",
+    "as_measured",
+    "as_published",
+    "as_samples",
+    "check_position",
+]
+
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 

@@ -19,6 +19,8 @@ import numpy as np
 from .errors import StateError
 from .signals import Array
 
+__all__ = ["VERSION", "pack", "unpack"]
+
 MAGIC = b"HSEP"
 VERSION = 1
 _PREFIX = struct.Struct("<4sII")

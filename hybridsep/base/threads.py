@@ -14,6 +14,8 @@ from typing import Any
 import scipy.linalg  # noqa: F401  # loads the libraries that are limited
 from threadpoolctl import ThreadpoolController
 
+__all__ = ["one_blas_thread"]
+
 
 @cache
 def _libraries() -> ThreadpoolController:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+__all__ = ["COMMIT_FILE", "__version__", "commit", "version_text"]
+
 __version__ = "0.1.0"
 
 COMMIT_FILE = "hybridsep/_data/commit.txt"

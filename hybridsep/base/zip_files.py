@@ -7,6 +7,8 @@ import struct
 import zipfile
 import zlib
 
+__all__ = ["ZIP_DAMAGE"]
+
 ZIP_DAMAGE = (
     *(zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, EOFError, OSError),
     *(RuntimeError, ValueError, LookupError, OverflowError, MemoryError),

@@ -10,6 +10,8 @@ from pathlib import Path, PurePosixPath
 from ..base.errors import FmuError, brief, first_line
 from ..base.zip_files import ZIP_DAMAGE
 
+__all__ = ["DESCRIPTION", "read_description_text"]
+
 DESCRIPTION = "modelDescription.xml"
 
 _MEMBERS_MAX = 20_000

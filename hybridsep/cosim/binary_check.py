@@ -10,6 +10,8 @@ import struct
 from collections.abc import Callable
 from pathlib import Path
 
+__all__ = ["check_binary"]
+
 _X86_64, _ARM64 = "x86-64", "ARM64"
 _PROCESSORS = {"x86_64": _X86_64, "amd64": _X86_64, "aarch64": _ARM64, "arm64": _ARM64}
 """Processors by :func:`platform.machine`, in small letters."""

@@ -8,6 +8,8 @@ from xml.parsers import expat
 
 from ..base.errors import FmuError, brief, first_line
 
+__all__ = ["check_description"]
+
 _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,199}")
 """Grammar of a modelIdentifier: that of a name in C (FMI 2.0, section 2.2.1)."""
 

@@ -18,6 +18,9 @@ from fmpy.fmi2 import (
 )
 from fmpy.fmi3 import FMU3Slave
 
+__all__ = ["DRIVERS", "Driver"]
+
+
 Log = Callable[[int, str], object]
 """Called with the status and the text of each message of an FMU's logger."""
 

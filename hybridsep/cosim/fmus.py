@@ -12,6 +12,8 @@ from ..base.settings import check
 from .importer import FmuInstance, read_description
 from .run import COMPENSATOR, PREDICTOR, Kind
 
+__all__ = ["FmuController", "FmuDrive", "check_controller", "check_plant"]
+
 _SAMPLES_MAX = 1_000_000
 """Most samples of an FMU's window or delay; a hybridsep FMU's have at most a tenth."""
 

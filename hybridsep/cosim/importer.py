@@ -27,6 +27,8 @@ from .binary_check import check_binary
 from .description_check import check_description
 from .driver import DRIVERS, Driver
 
+__all__ = ["FmuInstance", "faulty", "read_description"]
+
 
 def read_description(path: str | Path) -> Any:
     """Return fmpy's model description of an FMI 2.0 or 3.0 co-simulation FMU.

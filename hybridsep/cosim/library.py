@@ -14,6 +14,8 @@ from ..plants.plant import Plant
 from ..predict.predictor import HybridPredictor
 from .run import COMPENSATOR, PREDICTOR, Kind
 
+__all__ = ["LibraryController", "LibraryDrive"]
+
 
 class LibraryController:
     """A predictor or compensator behind its look-ahead, with the FMU's timing.

@@ -31,6 +31,7 @@ from .run import Run
 if TYPE_CHECKING:
     from .fmus import FmuController, FmuDrive
 
+__all__ = ["Disturb", "Progress", "Sensor", "cosimulate"]
 
 Sensor = Callable[[int, float], float]
 """Called as ``sensor(k, x_meas)``, ``k`` counted from the end of the fill; returns what is measured in its place."""

@@ -17,6 +17,8 @@ from ..plants.trajectory import PAPER_LIMITS, read_trajectory, spiral, staircase
 from .fmus import check_controller, check_plant
 from .run import COMPENSATOR, PREDICTOR
 
+__all__ = ["check_pair", "check_predictor", "read_command", "values_to_build"]
+
 _WEIGHTS = "--weights go into an FMU that is built here; leave out --predictor"
 
 

@@ -16,6 +16,8 @@ from ..base.output import written_text, written_whole
 from ..base.signals import Array
 from ..compensate.plan import SepState
 
+__all__ = ["COMPENSATOR", "PREDICTOR", "RESULT_SUFFIXES", "Kind", "Run", "save_columns"]
+
 RESULT_SUFFIXES = (".csv", ".npz")
 """Endings of files that :func:`save_columns` can write."""
 

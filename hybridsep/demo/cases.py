@@ -24,6 +24,8 @@ from ..machines.paper import PAPER_SETTINGS, paper_machine
 from ..plants.trajectory import spiral, staircase
 from .compensation import COMPENSATED, Runs, compensate, contour_errors, mean_summary
 
+__all__ = ["MACHINES", "Summary", "read_recorded", "recorded_case", "spiral_case", "staircase_case"]
+
 Summary = dict[str, dict[str, Any]]
 
 MACHINES = {"staircase": "spring_mass_damper", "spiral_x": "als25010_x", "spiral_y": "als25010_y"}

@@ -19,6 +19,8 @@ from ..machines.machine import Machine
 from ..plants.encoder import Encoder
 from ..plants.trajectory import archimedean_spiral
 
+__all__ = ["COMPENSATED", "Runs", "compensate", "contour_errors", "mean_summary", "train"]
+
 TRAINING_SEED = 1000
 """Noise seed of the training run of a warm compensator; no case uses it."""
 

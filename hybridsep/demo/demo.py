@@ -15,6 +15,8 @@ from .cases import MACHINES, Summary, read_recorded, recorded_case, spiral_case,
 from .compensation import COMPENSATED
 from .published import PRINTED
 
+__all__ = ["demo", "demo_files", "processor_time"]
+
 SEEDS = 10
 
 _PROCESSOR_TIME = {"native": (100.0, 2.0), "python": (1000.0, 20.0)}

@@ -14,6 +14,8 @@ from scipy.signal import lfilter, lfiltic
 
 from ..base.signals import Array
 
+__all__ = ["ArxRun", "MinimumNorm"]
+
 _BLOCK = 4096
 """Rows that are factorised at once."""
 

@@ -23,6 +23,8 @@ from ..predict.predictor import HybridPredictor
 from .scores import Score, Scores
 from .verdict import Tally
 
+__all__ = ["Backtest", "Batch", "backtest", "backtest_stream"]
+
 
 class Batch(NamedTuple):
     """Window of a replay, after it was revealed.

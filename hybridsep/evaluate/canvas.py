@@ -17,6 +17,8 @@ from numpy.typing import ArrayLike
 from ..base.output import written_whole
 from .decimation import drawn_places
 
+__all__ = ["CASES", "CREATOR", "HOLD", "HYBRID", "PHYSICS", "draw_line", "finish_panels", "legend_above", "save_figure"]
+
 CREATOR = "hybridsep"
 """Creator that a PDF or SVG names, by which it is known as ours."""
 

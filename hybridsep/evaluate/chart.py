@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
+__all__ = ["BAND_OPACITY", "Chart", "Line"]
+
 BAND_OPACITY = 0.18
 """Opacity of a band's area."""
 

@@ -16,6 +16,8 @@ from .canvas import CREATOR, finish_panels
 from .chart import BAND_OPACITY, Chart, Line
 from .decimation import drawn_places
 
+__all__ = ["COLUMN_WIDTH", "write_pages"]
+
 COLUMN_WIDTH = 88.0
 """Width of one column, mm."""
 

@@ -14,6 +14,8 @@ from ..base.signals import Array
 from .chart import BAND_OPACITY, Chart, Line
 from .decimation import drawn_places
 
+__all__ = ["DIGITS", "chart_script", "packed"]
+
 _HEIGHT, _HEIGHT_OF_SEVERAL = 340, 255
 """Height of the only panel, and of one of several, px."""
 

@@ -9,6 +9,8 @@ from numpy.typing import ArrayLike
 
 from ..base.signals import Indices
 
+__all__ = ["drawn_places"]
+
 
 def drawn_places(columns: int, *rows: ArrayLike) -> Indices:
     """Return the indices at which lines are drawn: the extremes in each of so many columns of pixels.

@@ -12,6 +12,8 @@ from scipy.signal import lfilter
 
 from ..base.signals import Array
 
+__all__ = ["FirstOrderLag", "fitted_lag"]
+
 DEAD_TIME_MAX = 20
 """Largest dead time, samples, that is tried."""
 

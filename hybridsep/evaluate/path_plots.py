@@ -16,6 +16,8 @@ from ..base.signals import Array
 from ..cosim.run import Run
 from .canvas import CASES, save_figure
 
+__all__ = ["contour_figure", "spiral_figure"]
+
 
 def spiral_figure(x: Run, y: Run, path: str | Path) -> None:
     """Draw each model's prediction error along the spiral, both axes together, to a PNG."""

@@ -17,6 +17,8 @@ from ..base.threads import one_blas_thread
 from .arx import ArxRun, MinimumNorm
 from .lag import fitted_lag
 
+__all__ = ["ARX_LAGS", "FROZEN", "LAG_HOLD", "REFITTED", "Peer", "Piece", "predict_peers"]
+
 ARX_LAGS = (20, 40)
 """Lags of the ARX models."""
 

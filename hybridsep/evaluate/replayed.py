@@ -9,6 +9,8 @@ from ..compensate.plan import SepState
 from ..cosim.run import PREDICTOR, Run
 from .backtest import Backtest
 
+__all__ = ["replayed_run"]
+
 
 def replayed_run(found: Backtest, x_d: Array, x_meas: Array, T_s: float, Np: int, *, measurement_delay: int = 0) -> Run:
     """Return the run of a replay, each measurement at the instant that it is of.

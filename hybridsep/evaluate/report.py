@@ -13,6 +13,8 @@ from .chart import Chart
 from .chart_pages import write_pages
 from .chart_script import DIGITS, chart_script, packed
 
+__all__ = ["Report"]
+
 
 @dataclass
 class Report:

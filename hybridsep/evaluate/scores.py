@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from ..base.metrics import RunningErrors, reduction_percent, rms_ratio
 from .verdict import Verdict
 
+__all__ = ["Score", "Scores"]
+
 
 @dataclass(frozen=True)
 class Score:

@@ -17,6 +17,8 @@ from ..cosim.run import Run
 from ..logs.units import Shown, shown_in
 from .canvas import CASES, HOLD, HYBRID, PHYSICS, draw_line, finish_panels, legend_above, save_figure
 
+__all__ = ["prediction_figure", "tracking_figure"]
+
 _SPANS = {SepState.OFF: ("not compensated", HOLD), SepState.PHYSICS: ("planned by the physics model", PHYSICS)}
 """Shading of spans that a lesser model planned than others of the run."""
 

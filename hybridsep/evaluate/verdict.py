@@ -16,6 +16,8 @@ from ..base.metrics import rms_ratio
 from ..base.signals import Array
 from ..cosim.run import Run
 
+__all__ = ["ALIKE", "PEERS", "WINDOWS_ENOUGH", "WINDOWS_MIN", "Tally", "Verdict", "counted", "verdict_of"]
+
 ALIKE = 0.02
 """Relative difference of two RMS errors below which they count as equal."""
 

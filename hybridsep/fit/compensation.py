@@ -18,6 +18,8 @@ from ..logs.units import Shown
 from ..machines.machine import Machine
 from ..tune.recordings import Recording
 
+__all__ = ["COMPENSATE", "drive_limits", "expected_tracking", "tracking_lines", "write_tracking"]
+
 COMPENSATE = "physics"
 """Model that a new compensator starts with: that of the hybrid is chosen when it has been seen to be the better one."""
 

@@ -11,6 +11,8 @@ from ..fmi.flavours import FLAVOURS, FMI_VERSIONS, versions_of
 from ..fmi.libraries import check_available, has_native
 from ..machines.machine import Machine
 
+__all__ = ["build_fmus", "fit_files"]
+
 _MODELS = {"": "HybridPredictor", "compensator ": "SepCompensator"}
 """Models of the FMUs, by how a compensator's are called."""
 

@@ -32,6 +32,8 @@ from .compensation import COMPENSATE, expected_tracking
 from .files import build_fmus, fit_files
 from .stages import Stages, key_of
 
+__all__ = ["Fit", "FitOptions", "fit"]
+
 _LOOK_AHEAD = 0.1
 """Look-ahead, s, of a controller of which nothing is known."""
 

@@ -22,6 +22,9 @@ from ..tune.choice import WORTH
 from .compensation import write_tracking
 from .fit import Fit
 
+__all__ = ["fit_report", "judged_by"]
+
+
 _SETTLING = (
     " The window after a gap does not judge: there no model knows the state of the axis, and a controller has no gaps."
 )

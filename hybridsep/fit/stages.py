@@ -12,6 +12,9 @@ from ..base.output import written_text
 from ..base.version import __version__
 from ..tune.recordings import Recording
 
+__all__ = ["Stages", "key_of"]
+
+
 _FORMAT = 2
 """Number of what the stages hold; it is counted up where that changes."""
 

@@ -17,6 +17,8 @@ from ..base.errors import HybridSepError, ParameterError, first_line
 from ..base.interrupt import starting_processes
 from ..logs.extras import library
 
+__all__ = ["Done", "Engine", "check_engine", "cluster", "cluster_of", "joblib_engine"]
+
 T = TypeVar("T")
 
 _CONFIG: dict[str, Any] = {

@@ -17,6 +17,8 @@ from typing import Any
 from ..base.errors import LogError
 from ..base.output import written_text
 
+__all__ = ["Course", "courses", "write_page"]
+
 _WORSE, _SHIFT, _FRICTION, _RESIDUAL = 1.03, 0.05, 0.3, 0.5
 """From which on an axis is looked at: error relative to the best baseline; relative changes of the first mode's
 frequency, of friction and of the error since the logs before. Two fits of one axis on recordings of different motions

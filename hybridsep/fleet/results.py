@@ -14,6 +14,8 @@ from ..base.output import written_whole
 from ..logs.extras import library
 from .sources import LogFile
 
+__all__ = ["COLUMNS", "Results", "key_of"]
+
 _FOLDER = "rows"
 
 COLUMNS: Mapping[str, str] = {

@@ -15,6 +15,8 @@ from .results import Results
 from .settings import AxisTask, FleetSettings, Looked
 from .sources import find_logs
 
+__all__ = ["FleetRun", "run_fleet"]
+
 _EVERY = 5.0
 """Time after which the rows that are there are written, s: as much work as is lost if the run is killed."""
 

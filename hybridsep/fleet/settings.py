@@ -13,6 +13,8 @@ from ..logs.log import Log, read_log
 from .results import key_of
 from .sources import LogFile
 
+__all__ = ["AxisTask", "FleetSettings", "Looked"]
+
 
 @dataclass(frozen=True)
 class FleetSettings:

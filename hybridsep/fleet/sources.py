@@ -18,6 +18,8 @@ from ..base.errors import LogError, first_line
 from ..logs.extras import library
 from ..logs.formats import READERS
 
+__all__ = ["LogFile", "find_logs", "local_copy"]
+
 _ENDINGS = tuple(sorted({ending for reader in READERS for ending in reader.endings}))
 """Endings of the names by which logs in a folder are told from other files; a pattern takes any."""
 

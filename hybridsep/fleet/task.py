@@ -33,6 +33,8 @@ from ..tune.recordings import Recording, Replay, replay
 from .settings import AxisTask, FleetSettings, Looked
 from .sources import LogFile, local_copy
 
+__all__ = ["look", "work"]
+
 _FAST = 0.1
 """Share of the largest velocity from which on an axis counts as moving, for the estimate of friction."""
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+__all__ = ["angular_unit"]
+
 _ANGULAR = {
     "m": "rad",
     "m2": "rad2",

@@ -23,6 +23,8 @@ from .description import fmu_description
 from .flavours import FLAVOURS, FMI_VERSIONS, check_version
 from .warm_start import load_trained
 
+__all__ = ["archived", "build_fmu", "fmu_files", "fmu_name", "fmu_names"]
+
 _SUFFIX = {("native", "2"): "", ("native", "3"): "Fmi3", ("python", "2"): "Py"}
 _ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 _FIRST = ("modelDescription.xml", "SystemStructure.ssd")

@@ -17,6 +17,7 @@ from ..base.version import __version__
 if TYPE_CHECKING:
     from cyclonedx.model.component import Component
 
+__all__ = ["BILL_FILE", "Part", "bill_of_materials", "native_parts", "python_parts"]
 
 BILL_FILE = "extra/org.cyclonedx/bom.json"
 

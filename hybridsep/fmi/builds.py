@@ -9,6 +9,8 @@ from .archive import build_fmu, fmu_name
 from .flavours import FMI_VERSIONS, versions_of
 from .libraries import has_native, ready_targets
 
+__all__ = ["build_here", "build_pair", "default_flavour"]
+
 
 def default_flavour() -> str:
     """Return the flavour of the demo's FMUs: native where their libraries can be had, Python otherwise."""

@@ -16,6 +16,8 @@ from .angular_units import angular_unit
 from .flavours import FMI_VERSIONS
 from .variables import INTERPOLATED, Variable, variables_of
 
+__all__ = ["KINDS", "Layout", "c_header", "interface_number", "kind_header", "kind_of", "layout_of"]
+
 _MODE = {"f_n": 1.0, "zeta": 1.0, "alpha": 1.0, "beta": 0.0}
 _ANY: Mapping[str, object] = {"parameters": defaultdict(lambda: 1), "modes": [_MODE]}
 

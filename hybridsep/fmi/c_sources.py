@@ -11,6 +11,8 @@ from ..base.data_files import data_folder
 from ..base.errors import FmuError
 from .flavours import FMI_VERSIONS
 
+__all__ = ["FMI_HEADERS", "all_c", "c_sources", "fmi_headers"]
+
 FMI_HEADERS = {
     "2": ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
     "3": ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),

@@ -31,6 +31,22 @@ from .flavours import FMI_VERSIONS
 from .macho import universal
 from .processes import run_together
 
+__all__ = [
+    "ALL_TARGETS",
+    "FLAGS",
+    "TARGETS",
+    "TARGET_NAMES",
+    "ZIG",
+    "Compiler",
+    "Target",
+    "compile_flags",
+    "compiled",
+    "compiler_for",
+    "expanded",
+    "host_target",
+    "placed",
+]
+
 ZIG = "ziglang 0.17.1"
 """The compiler of the libraries in the wheel, which pyproject.toml pins as a build requirement."""
 

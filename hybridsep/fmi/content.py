@@ -10,6 +10,8 @@ from collections.abc import Mapping
 from ..machines.machine import Machine
 from ..machines.paper import PAPER_SETTINGS
 
+__all__ = ["content_guid", "fmu_title", "paper_note"]
+
 _TITLES = {
     "HybridPredictor": "linear hybrid model: predicts the drive's position one look-ahead window early",
     "SepCompensator": "servo error pre-compensation: modifies the command so that the drive follows it",

@@ -8,6 +8,9 @@ from ..base.settings import PARAMETERS
 from ..machines.machine import Machine
 from ..machines.sections import FeedDriveSection
 
+__all__ = ["fmu_description"]
+
+
 _SAMPLES_TRAJECTORY = 3
 """The number under which ReferenceTrajectory plays the samples it was built with."""
 

@@ -11,6 +11,8 @@ from ..base.signals import as_samples
 from ..machines.machine import Machine
 from ..plants.trajectory import staircase
 
+__all__ = ["stop_time"]
+
 _WITHOUT_TRAJECTORY = 10.0  # s
 
 

@@ -12,6 +12,8 @@ from ..machines.machine import Machine
 from .fmi3_variables import Fmi3Variable, fmi3_variables
 from .model_description import add_items, begun, document, types_of, variable_attributes
 
+__all__ = ["fmi3_description"]
+
 
 def fmi3_description(
     machine: Machine,

@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 from .c_header import layout_of
 from .variables import Variable, variables_of
 
+__all__ = ["Fmi3Variable", "fmi3_variables"]
+
 _TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Enumeration": "Enumeration"}
 
 _TIME = Variable("time", "Real", "independent", "continuous", "simulation time", unit="s")

@@ -22,6 +22,8 @@ from .libraries import libraries
 from .table_file import TABLE_FILE, table_file
 from .variables import variables_of
 
+__all__ = ["HostFmu", "host_fmu"]
+
 _CO_SIMULATION = 1
 _OK = 0
 _KINDS = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}

@@ -6,6 +6,8 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 
+__all__ = ["imported_modules"]
+
 _PACKAGE = Path(__file__).resolve().parents[1]
 
 

@@ -16,6 +16,8 @@ from .flavours import FMI_VERSIONS, versions_of
 from .libraries import check_available
 from .warm_start import load_trained
 
+__all__ = ["Job", "extras_of", "jobs_of"]
+
 Job = tuple[Machine, str, str, str]
 """An FMU to build: its machine, name and model, and the version of FMI."""
 

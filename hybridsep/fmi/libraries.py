@@ -22,6 +22,18 @@ from .c_header import KINDS, kind_header
 from .c_sources import c_sources, fmi_headers
 from .compiler import ALL_TARGETS, FLAGS, TARGETS, ZIG, compiled, compiler_for, expanded
 
+__all__ = [
+    "check_available",
+    "chosen_targets",
+    "compilers_of",
+    "default_targets",
+    "has_native",
+    "kept",
+    "libraries",
+    "library_paths",
+    "ready_targets",
+]
+
 _SHIPPED = Path(__file__).resolve().parents[1] / "_data" / "binaries"
 _KEPT_VERSIONS = 4
 """Versions of the sources whose libraries are kept in a checkout: a few branches, at 8 MB each."""

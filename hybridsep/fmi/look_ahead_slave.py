@@ -18,6 +18,8 @@ from .slave import TableSlave
 from .variables import modes_from
 from .weights import WEIGHTS_FILE, restore_weights
 
+__all__ = ["LookAheadSlave"]
+
 
 class LookAheadSlave(TableSlave):
     """A slave whose core is a look-ahead.

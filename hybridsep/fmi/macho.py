@@ -12,6 +12,8 @@ from collections.abc import Sequence
 
 from ..base.errors import FmuError
 
+__all__ = ["universal"]
+
 _UNIVERSAL = 0xCAFEBABE
 _MACHO_64 = 0xFEEDFACF
 _ALIGNMENT = 14  # 16 KiB, the page of Apple's ARM processors; x86 has 4 KiB

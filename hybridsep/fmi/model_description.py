@@ -16,6 +16,19 @@ from .experiment import stop_time
 from .flavours import FMI_VERSIONS
 from .variables import INTERPOLATED, Variable, variables_of
 
+__all__ = [
+    "add_items",
+    "begun",
+    "build_description",
+    "document",
+    "model_description",
+    "template",
+    "types_of",
+    "unit_elements",
+    "variable_attributes",
+    "xml_text",
+]
+
 _TEMPLATES = Path(__file__).parent / "templates"
 
 

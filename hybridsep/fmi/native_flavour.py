@@ -43,6 +43,7 @@ from .terminals import ICON_FILE, TERMINALS_FILE, terminals_and_icons
 if TYPE_CHECKING:
     from ..predict.predictor import HybridPredictor
 
+__all__ = ["files", "sources"]
 
 _TRAJECTORY_MAGIC = b"HSEPTRJ1"
 _RUNTIME_LICENSES = """\

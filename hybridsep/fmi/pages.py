@@ -14,6 +14,8 @@ from .fmi3_variables import fmi3_variables
 from .tables import grouped_table
 from .variables import variables_of
 
+__all__ = ["filled", "icon", "index_page"]
+
 _HERE = Path(__file__).parent
 
 _PARTNERS = {"SepCompensator": ("SepCompensator", "x_dm")}

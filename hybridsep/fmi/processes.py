@@ -12,6 +12,8 @@ from pathlib import Path
 
 from ..base.interrupt import uninterrupted
 
+__all__ = ["run_together"]
+
 
 def run_together(
     commands: Sequence[tuple[Sequence[str], Path]], on_start: Callable[[int], object] = lambda _i: None

@@ -29,6 +29,7 @@ from .pythonfmu_limits import checked_version, pythonfmu_license
 if TYPE_CHECKING:
     from ..predict.predictor import HybridPredictor
 
+__all__ = ["files"]
 
 _SLAVES = {
     "HybridPredictor": "hybrid_predictor.py",

@@ -11,6 +11,8 @@ from urllib.parse import quote
 
 from ..base.errors import FmuError
 
+__all__ = ["check_unpacked", "checked_version", "pythonfmu_license"]
+
 SERIES = "0.7."
 """Series whose reference counting ``slave.py`` balances and whose limits are listed in ``templates``."""
 

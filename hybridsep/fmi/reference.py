@@ -23,6 +23,8 @@ from ..plants.encoder import Encoder
 from ..plants.trajectory import staircase
 from .variables import variables_of
 
+__all__ = ["REFERENCE_FOLDER", "ReferenceModel", "has_reference", "reference_files"]
+
 REFERENCE_FOLDER = "documentation/reference"
 
 _SAMPLES = 600

@@ -19,6 +19,8 @@ from .reference import ReferenceModel
 from .variables import variables_of
 from .weights import restore_weights, weights_file
 
+__all__ = ["library_model", "library_models"]
+
 
 class _LookAheadModel:
     """A predictor or a compensator, sample by sample."""

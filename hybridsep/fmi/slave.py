@@ -27,6 +27,8 @@ from ..base.signals import check_position
 from ..base.state import pack, unpack
 from .variables import Variable, variables_of
 
+__all__ = ["DESCRIPTION_FILE", "TableSlave"]
+
 DESCRIPTION_FILE = "machine.json"
 """In the resources: model, start values of the parameters, modes and GUID of the FMU's content."""
 

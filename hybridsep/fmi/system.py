@@ -19,6 +19,8 @@ from .fmi3_variables import fmi3_variables
 from .system_structure import SSP_VERSIONS, Component, Connection, parameter_set, system_structure
 from .variables import Variable, variables_of
 
+__all__ = ["build_system", "check_system"]
+
 
 def check_system(machine: Machine, *, compensate: bool, ssp: str = SSP_VERSIONS[0]) -> None:
     """Check the version of SSP, and that a machine has a plant and, to compensate, drive limits; FmuError if not."""

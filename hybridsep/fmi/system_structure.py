@@ -14,6 +14,8 @@ from ..base.version import __version__
 from .model_description import unit_elements
 from .variables import Variable
 
+__all__ = ["SSP_VERSIONS", "Component", "Connection", "parameter_set", "system_structure"]
+
 SSP_VERSIONS = ("1", "2")
 """SSP 1.0 with FMI 2.0 FMUs, SSP 2.0 with FMI 3.0 FMUs; the default first."""
 

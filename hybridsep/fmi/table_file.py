@@ -14,6 +14,8 @@ from collections.abc import Mapping
 from .c_header import interface_number, kind_of, layout_of
 from .variables import variables_of
 
+__all__ = ["TABLE_FILE", "table_file"]
+
 TABLE_FILE = "variables.bin"
 _HEAD = struct.Struct("<8s4Q48s")
 _CHECKSUM = struct.Struct("<Q")

@@ -7,6 +7,8 @@ from collections.abc import Iterable
 
 from .variables import Variable
 
+__all__ = ["grouped_table"]
+
 
 def grouped_table(table: Iterable[Variable]) -> dict[str, list[tuple[str, str, str, str, str]]]:
     """Return ``(name, type and unit, display unit, start, meaning)`` by heading; enumerations with what items mean."""

@@ -11,6 +11,8 @@ from xml.etree import ElementTree as ET
 
 from .model_description import document
 
+__all__ = ["ICON_FILE", "TERMINALS", "TERMINALS_FILE", "terminals_and_icons"]
+
 TERMINALS_FILE = "terminalsAndIcons/terminalsAndIcons.xml"
 ICON_FILE = "terminalsAndIcons/icon.png"
 

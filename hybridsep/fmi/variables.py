@@ -15,6 +15,21 @@ from ..base.parameters import Parameter
 from ..base.settings import PARAMETERS, CompensatorSettings, PredictorSettings, check
 from .angular_units import angular_unit
 
+__all__ = [
+    "COMPENSATOR_SETTINGS",
+    "INTERPOLATED",
+    "MODELS",
+    "PREDICTOR_SETTINGS",
+    "TRUST_SETTINGS",
+    "Variable",
+    "compensator_variables",
+    "modes_from",
+    "plant_variables",
+    "predictor_variables",
+    "trajectory_variables",
+    "variables_of",
+]
+
 Value = float | int | bool
 
 _PREDICTOR = PredictorSettings.fmi_parameters()

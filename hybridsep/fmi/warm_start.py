@@ -11,6 +11,8 @@ from ..machines.machine import Machine
 if TYPE_CHECKING:
     from ..predict.predictor import HybridPredictor
 
+__all__ = ["load_trained", "warm_predictor"]
+
 
 def warm_predictor(machine: Machine, weights: str | Path | None) -> HybridPredictor:
     """Return a machine's predictor at the beginning of a run, with what a saved one has learned where it is given.

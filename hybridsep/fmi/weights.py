@@ -21,6 +21,8 @@ from ..base.signals import Array
 from ..predict.predictor import HybridPredictor
 from ..predict.uncertainty import Uncertainty
 
+__all__ = ["WEIGHTS_FILE", "learned_settings", "restore_weights", "weights_file"]
+
 WEIGHTS_FILE = "weights.bin"
 _MAGIC = b"HSEPWG10"
 _HEAD = struct.Struct("<8s4Q")

@@ -8,6 +8,8 @@ import numpy as np
 
 from ..model.physics import Mode
 
+__all__ = ["slow_parts"]
+
 APART = 2.5
 """Least ratio of frequencies between slow parts and the others: a 14 Hz part of an axis of 35 Hz is one of its own."""
 

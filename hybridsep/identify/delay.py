@@ -11,6 +11,8 @@ from .output_error import Fit
 from .segments import Segment
 from .uncertainty import Estimate, full_covariance
 
+__all__ = ["delay_finding", "total_delay"]
+
 APART = 0.5
 """Deviation of the whole delay in multiples of the dead time's, below which these cannot be told apart."""
 

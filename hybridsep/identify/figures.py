@@ -17,6 +17,8 @@ from ..logs.units import Shown, shown_in
 from .frequency_response import IdentifiedResponse
 from .model import IdentifiedModel
 
+__all__ = ["operation_figure", "response_figure"]
+
 
 def operation_figure(
     found: IdentifiedModel,

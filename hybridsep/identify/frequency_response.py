@@ -25,6 +25,8 @@ from .model import machine_of
 from .response_fit import MODES_MAX, Lines, fits_by_size
 from .uncertainty import Estimate
 
+__all__ = ["IdentifiedResponse", "identify_frequency_response"]
+
 Complex = NDArray[np.complex128]
 
 LINES_MIN = 8

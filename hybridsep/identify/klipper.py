@@ -21,6 +21,8 @@ from ..model.physics import ModalModel, Mode
 from .frequency_response import IdentifiedResponse
 from .uncertainty import Estimate
 
+__all__ = ["Acceleration", "identify_resonance", "is_klipper", "read_klipper"]
+
 HEADER = "time,accel_x,accel_y,accel_z"
 
 BAND = (5.0, 135.0)

@@ -14,6 +14,8 @@ from scipy.optimize import least_squares
 from ..base.signals import Array
 from ..model.physics import Mode
 
+__all__ = ["ModalFit", "polish", "quadratics_of"]
+
 Complex = NDArray[np.complex128]
 
 _MARGIN = 3.0

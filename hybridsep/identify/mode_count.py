@@ -14,6 +14,8 @@ from .cancelling import slow_parts
 from .modal_fit import ModalFit
 from .response_fit import Complex, Lines
 
+__all__ = ["best_fit", "doubtful_modes"]
+
 WORTH = 10.0
 """Decrease of the criterion from which more modes are taken, very strong evidence by Kass and Raftery, J. Am. Stat.
 Assoc. 90 (1995) 773."""

@@ -25,6 +25,8 @@ from .selection import HELD_OUT, Candidate, choose, compare_structures, held_out
 from .structure import STRUCTURES, Structure
 from .uncertainty import estimates
 
+__all__ = ["LITTLE_MOTION", "SAMPLES_MIN", "identify_operation", "unit_gain_model"]
+
 SAMPLES_MIN = 100
 """Samples below which nothing is identified."""
 

@@ -17,6 +17,8 @@ from .responses import free_responses, responses, sections_of
 from .segments import Segment, delayed
 from .structure import Structure
 
+__all__ = ["Delay", "Fit", "affine", "fit_structure", "simulated", "without"]
+
 EVALUATIONS_MAX = 20
 """Largest number of iterations of one start; a good one converges within 15."""
 

@@ -16,6 +16,8 @@ from scipy.signal import lombscargle
 from ..base.signals import Array
 from ..model.physics import ModalModel
 
+__all__ = ["residual_period"]
+
 PREDICTED = 0.35
 """Share of the variance in one half that the other predicts, both ways, from which a period is believed: at most 0.18
 on recorded axes, 0.03 on simulated ones without a period, 0.5 and more with one of 2 µm beside 5 µm of friction."""

@@ -15,6 +15,9 @@ from ..base.errors import ParameterError
 from ..base.settings import check
 from ..base.signals import Array, as_samples
 
+__all__ = ["PositionObserver", "observe_position"]
+
+
 CROSSOVER = 0.5
 """Default crossover, Hz: a twentieth of a first mode of 10 Hz, whose deflection is then observed within 15 %."""
 

@@ -15,6 +15,8 @@ from ..base.signals import Array
 from ..logs.formats import open_source
 from ..logs.source import Source
 
+__all__ = ["ResponseFile", "has_response", "read_response"]
+
 ROLES: Mapping[str, tuple[str, ...]] = {
     "frequency": ("frequency", "freq", "f", "hz", "omega", "w"),
     "real": ("real", "re"),

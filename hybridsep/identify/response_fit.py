@@ -13,6 +13,8 @@ from ..model.physics import ModalModel
 from .modal_fit import ModalFit, polish, quadratics_of
 from .vector_fitting import starting_poles, vector_fit
 
+__all__ = ["MODES_MAX", "Complex", "Lines", "fits_by_size"]
+
 Complex = NDArray[np.complex128]
 
 MODES_MAX = 10

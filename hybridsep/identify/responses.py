@@ -12,6 +12,8 @@ from ..base.signals import Array
 from ..model.discrete import discretised_block
 from .structure import Structure
 
+__all__ = ["Section", "free_responses", "responses", "sections_of"]
+
 
 class Section(NamedTuple):
     """Discrete mode or lag: ``s(k+1) = A s(k) + b u(k)``, its states being ``s + d u``.

@@ -11,6 +11,8 @@ from .output_error import Delay, Fit, fit_structure
 from .segments import Segment
 from .structure import DECAY_MIN, SLOWEST, Structure
 
+__all__ = ["fit_delay", "fit_near"]
+
 DEAD_TIME_MAX = 0.25
 """Longest dead time that is tried, s, and at most a quarter of the recording."""
 

@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base.signals import Array, as_measured, as_samples
 
+__all__ = ["Segment", "as_segments", "delayed", "in_time", "motion_split"]
+
 SAMPLES_MAX = 60_000
 """Samples that are used of long recordings: the parts in which the axis moves most."""
 

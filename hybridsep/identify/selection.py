@@ -15,6 +15,8 @@ from .segments import Segment, motion_split
 from .structure import DECAY_MIN, STRUCTURES, Structure
 from .uncertainty import estimates
 
+__all__ = ["HELD_OUT", "Candidate", "choose", "compare_structures", "held_out"]
+
 HELD_OUT = 0.35
 """Part of the commanded motion that is held out."""
 

@@ -7,6 +7,8 @@ from typing import Any
 
 from ..logs.units import Shown
 
+__all__ = ["deviation_words", "shown_estimates"]
+
 
 def deviation_words(std: float, sign: str = "") -> str:
     """Return a standard deviation as text; that of a parameter that was not estimated is no figure."""

@@ -10,6 +10,8 @@ import numpy as np
 from ..base.signals import Array
 from ..model.physics import Mode
 
+__all__ = ["DECAY_MIN", "SLOWEST", "STRUCTURES", "Structure", "lag_mode"]
+
 ZETA_RANGE = (0.003, 5.0)
 """Damping ratios that are tried; Table 1 has 0.007, and at 5 the two poles are a factor of 98 apart."""
 

@@ -17,6 +17,8 @@ from ..base.errors import IdentificationError
 from ..base.settings import check
 from ..base.signals import Array, as_samples
 
+__all__ = ["Response", "h1"]
+
 COHERENCE_MIN = 0.8
 """Squared coherence below which a line is left out: it would tell little, and its deviation is not well known."""
 

@@ -17,6 +17,8 @@ from .output_error import Fit, affine, without
 from .responses import free_responses, responses, sections_of
 from .segments import Segment, delayed
 
+__all__ = ["Estimate", "estimates", "full_covariance"]
+
 BATCHES = 30
 """Batches of the residual: enough for a variance, and each long beside a servo's memory."""
 

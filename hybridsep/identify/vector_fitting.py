@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from ..base.signals import Array
 
+__all__ = ["starting_poles", "vector_fit"]
+
 Complex = NDArray[np.complex128]
 
 ITERATIONS_MAX = 25

@@ -20,6 +20,13 @@ from .stretch import against_command, averaged, over_time, stretch
 if TYPE_CHECKING:
     from ..machines.machine import Machine
 
+__all__ = [
+    "check_delay",
+    "check_offset",
+    "check_same",
+    "check_swapped",
+    "check_velocity",
+]
 
 _NOISIER = 3.0
 """Ratio of the columns' noise from which the noisier one is the measured one."""

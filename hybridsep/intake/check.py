@@ -24,6 +24,7 @@ from .turns import check_turns
 if TYPE_CHECKING:
     from ..machines.machine import Machine
 
+__all__ = ["Intake", "apply", "check"]
 
 _Check = Callable[[Log], Iterator[Finding]]
 

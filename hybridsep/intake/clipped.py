@@ -16,6 +16,8 @@ from .finding import ERROR, Finding, Fix, Picture
 from .relation import line_at_best_lag, noise_std, shifted
 from .samples import resolution
 
+__all__ = ["check_clipped", "filled_by_command"]
+
 _RUN = 5
 """Samples at a limit in a row: fewer are a turning point."""
 

@@ -12,6 +12,8 @@ from scipy.signal import lfilter
 from ..base.signals import Array
 from .relation import DeadTime, poles_of, shifted
 
+__all__ = ["DRIVE_GAINS", "NO_BETTER", "drive_explaining"]
+
 DRIVE_GAINS = (0.15, 1.05)
 """Static gains that a position loop may have: a small servo under load was recorded at 0.25, none reaches more than
 its command."""

@@ -12,6 +12,8 @@ from ..base.messages import FINDINGS
 from ..base.signals import Array
 from ..logs.log import Log
 
+__all__ = ["ERROR", "HOPELESS", "NAMES", "NOTE", "WARNING", "Finding", "Fix", "Picture", "findings_table"]
+
 ERROR, WARNING, NOTE = "error", "warning", "note"
 """Severities: errors computed from the log are invalid; they are larger than they need be; worth knowing."""
 

@@ -10,6 +10,27 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from ..base.signals import Array, Indices
 from ..logs.log import Log
 
+__all__ = [
+    "begin_at",
+    "bridge",
+    "cut_at",
+    "cut_out",
+    "filled",
+    "from_error",
+    "in_order",
+    "inserted",
+    "integrated",
+    "missing_at",
+    "offset_removed",
+    "resampled",
+    "scaled",
+    "shifted_back",
+    "swapped",
+    "thinned",
+    "unwrapped",
+    "without_missing",
+]
+
 
 def in_order(log: Log) -> Log:
     """Sort by time and drop samples whose time repeats."""

@@ -14,6 +14,8 @@ from .finding import ERROR, Finding, Fix
 from .relation import LAG_MAX, DeadTime, fit_dead_time, line_at_best_lag
 from .stretch import averaged, over_time, stretch
 
+__all__ = ["check_following_error"]
+
 _TRAVEL, _POSITION_LEFT = 0.5, 0.3
 """Range of the column, in travels, from which it is no following error, and share of its variance that the command may
 leave: less is left of a position in another unit."""

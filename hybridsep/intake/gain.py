@@ -15,6 +15,8 @@ from .finding import ERROR, NOTE, Finding, Fix
 from .relation import LAG_MAX, DeadTime, Line, fit_dead_time, line_at_best_lag
 from .stretch import against_command, averaged, stretch
 
+__all__ = ["check_scale", "check_sign", "runs_against"]
+
 _EXPLAINED, _OPPOSITE = 0.15, 4.0
 """Share of the variance that a mode may leave if its gain's sign is to count, and what one of the opposite sign must
 leave at least, in that: over swept sines of drives of 10 to 60 Hz the wrong sign leaves five times as much and more

@@ -13,6 +13,8 @@ from ..logs.log import Log
 from .finding import ERROR, WARNING, Finding, Fix, Picture
 from .relation import noise_std
 
+__all__ = ["check_jumps"]
+
 _USUAL, _TIMES = 0.98, 8.0
 """Quantile of what steps differ by from the median of the four around them, and how many of it a jump has: where the
 command consists of steps, they are usual."""

@@ -13,6 +13,8 @@ from ..intake import fixes
 from ..logs.log import Log
 from .finding import ERROR, Finding, Fix, Picture
 
+__all__ = ["check_lost_rows"]
+
 _ALIKE = 0.35
 """Relative distance from the local step of the steps beside it, at most."""
 

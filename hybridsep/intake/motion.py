@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from ..machines.machine import Machine
     from ..model.physics import Mode
 
+__all__ = ["check_motion", "check_rate", "check_start", "check_unit", "moves", "starts_in_motion"]
 
 _SAMPLES_MIN = 200
 """Samples below which nothing can be learned and judged: two windows of the default length."""

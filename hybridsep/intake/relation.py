@@ -12,6 +12,18 @@ from scipy.signal import lfilter
 
 from ..base.signals import Array
 
+__all__ = [
+    "LAG_MAX",
+    "DeadTime",
+    "Line",
+    "fit_dead_time",
+    "line",
+    "line_at_best_lag",
+    "noise_std",
+    "poles_of",
+    "shifted",
+]
+
 LAG_MAX = 300
 """Largest lag that is looked for, in samples: 0.3 s at 1 kHz is beyond any drive and any bus."""
 

@@ -12,6 +12,8 @@ from ..logs.log import Log
 from .check import apply, check
 from .finding import ERROR, HOPELESS, Finding
 
+__all__ = ["MISSING", "applied", "changed_by", "changes", "check_measured", "take_in"]
+
 _REPAIRED = ("time order", "gaps", "jitter", "lost rows", "outliers", "stuck samples", "repeated samples")
 """Findings about samples, not about what they mean: their fixes lose nothing that could be learned from."""
 

@@ -13,6 +13,8 @@ from ..intake import fixes
 from ..logs.log import Log
 from .finding import NOTE, WARNING, Finding, Fix, Picture
 
+__all__ = ["check_missing", "check_outliers", "check_repeated", "check_stuck", "resolution"]
+
 _COLUMNS = {"x_d": "commanded position", "x_meas": "measured position"}
 
 _OUTLIER = 5.0

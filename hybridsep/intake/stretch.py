@@ -12,6 +12,8 @@ from .finding import Picture
 from .motion import moves
 from .relation import Line, shifted
 
+__all__ = ["against_command", "averaged", "over_time", "stretch"]
+
 _STRETCH = 8000
 """Samples that relations are fitted to: those with most motion."""
 

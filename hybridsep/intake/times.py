@@ -15,6 +15,8 @@ from ..logs.log import Log
 from ..logs.time_axis import TOLERANCE
 from .finding import ERROR, WARNING, Finding, Fix, Picture
 
+__all__ = ["BRIDGED_MAX", "check_gaps", "check_jitter", "check_order"]
+
 BRIDGED_MAX = 10
 """Samples missing in a row that are bridged, a tenth of the default window: a command of 2 m/s² at 1 kHz is
 interpolated within 0.2 µm over one of them, 11 µm over ten."""

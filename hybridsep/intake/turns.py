@@ -13,6 +13,8 @@ from ..intake import fixes
 from ..logs.log import Log
 from .finding import ERROR, Finding, Fix, Picture
 
+__all__ = ["check_turns"]
+
 _TURN = 2 * math.pi
 
 _STEPS = 3.0

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from ..base.errors import ParameterError
 
+__all__ = ["check_port"]
+
 _PORT_MAX = 65535
 
 

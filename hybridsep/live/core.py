@@ -18,6 +18,8 @@ from ..cosim.fmus import FmuController
 from .sample import Sample
 from .step_times import StepTimes
 
+__all__ = ["LiveCore", "Row"]
+
 _SHARE = re.compile(r"share_(\w+)")
 """Names of an FMU's variables with the share of an expert in the prediction."""
 

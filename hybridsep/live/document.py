@@ -16,6 +16,8 @@ from jinja2 import Template
 
 from .state import State
 
+__all__ = ["fill"]
+
 FRAME = 50
 """Time between two frames, ms."""
 

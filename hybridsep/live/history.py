@@ -6,6 +6,8 @@ import numpy as np
 
 from ..base.signals import Array
 
+__all__ = ["History", "drawn"]
+
 CAPACITY = 200_000
 """Rows that are kept: three minutes at 1 kHz, in some 30 MB."""
 

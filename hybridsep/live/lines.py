@@ -10,6 +10,8 @@ from .sample import AS_NAMED, Reading, RowReader, Sample
 from .source import LiveSource
 from .waiting import Waiting
 
+__all__ = ["LinesSource"]
+
 
 class LinesSource(LiveSource):
     """CSV lines of a descriptor, the first of which are the names; it ends where the writer closes it.

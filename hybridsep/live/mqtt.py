@@ -14,6 +14,8 @@ from .sample import AS_NAMED, MessageReader, Reading, Sample
 from .source import LiveSource
 from .waiting import Waiting
 
+__all__ = ["CA", "CERTIFICATE", "KEY", "KEY_PASSWORD", "PASSWORD", "USER", "MqttSource"]
+
 USER, PASSWORD = "HYBRIDSEP_MQTT_USER", "HYBRIDSEP_MQTT_PASSWORD"
 """Environment variables of the broker's credentials."""
 

@@ -21,6 +21,8 @@ from .sample import Reading
 from .source import LiveSource
 from .udp import LOCAL, UdpSource
 
+__all__ = ["FORMS", "open_source"]
+
 FORMS = "a log, udp:[HOST:]PORT, - (CSV on standard input), or mqtt://HOST[:PORT]/TOPIC (mqtts:// with TLS)"
 
 _UDP = re.compile(r"udp:(?:(?P<host>[^:\s]+|\[[^\]\s]+\]):)?(?P<port>\d+)", re.ASCII)

@@ -22,6 +22,8 @@ from ..logs.units import Shown
 from .core import Row
 from .view import table
 
+__all__ = ["Page"]
+
 _CHILD = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from hybridsep.live.page_process import serve; serve()"
 )

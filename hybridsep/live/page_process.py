@@ -12,6 +12,8 @@ from typing import IO, Any
 
 from .state import State
 
+__all__ = ["serve"]
+
 
 def serve() -> None:
     """Serve the page of a run, which arrives on standard input, until it ends; what it was bound to is printed."""

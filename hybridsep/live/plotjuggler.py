@@ -14,6 +14,8 @@ from ..base.errors import ParameterError
 from .address import check_port
 from .core import Row
 
+__all__ = ["PlotJuggler"]
+
 _ADDRESS = re.compile(r"(?P<host>[^:\s]+|\[[^\]\s]+\]):(?P<port>\d+)", re.ASCII)
 
 

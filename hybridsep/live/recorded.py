@@ -10,6 +10,8 @@ from ..logs.log import LogReader
 from .sample import Sample
 from .source import IDLE, LiveSource
 
+__all__ = ["RecordedSource"]
+
 _PAUSE = 1e-3
 """Time for which a replay sleeps at least, s; samples due meanwhile come together."""
 

@@ -13,6 +13,8 @@ from .order import Order
 from .sample import Sample
 from .source import LiveSource
 
+__all__ = ["LiveRun", "Sink", "run_live"]
+
 _PUBLISHED = 0.03
 """Time between two batches of rows, s: shorter than a frame of the page."""
 

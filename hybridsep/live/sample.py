@@ -14,6 +14,8 @@ from ..logs.source import Block, Source
 from ..logs.text_layout import is_number, split
 from ..logs.units import stated_unit
 
+__all__ = ["AHEAD", "AS_NAMED", "NUMBER", "MessageReader", "Reading", "RowReader", "Sample"]
+
 NUMBER, AHEAD = "k", "x_d_ahead"
 """Names of the sample number, and of a command that the drive gets a look-ahead later."""
 

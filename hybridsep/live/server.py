@@ -20,6 +20,8 @@ from tornado.httpserver import HTTPServer
 from tornado.ioloop import IOLoop
 from tornado.web import HTTPError
 
+__all__ = ["HOST", "PageServer"]
+
 HOST = "127.0.0.1"
 
 _FAREWELL = 0.3

@@ -8,6 +8,8 @@ from typing import TypeVar
 
 from .sample import Sample
 
+__all__ = ["IDLE", "LiveSource"]
+
 IDLE = 0.05
 """Longest time for which a source waits before it says that nothing came, s."""
 

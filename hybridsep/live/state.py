@@ -13,6 +13,8 @@ from ..logs.units import Shown
 from .history import History, drawn
 from .view import COLUMNS, signals, source_data
 
+__all__ = ["State"]
+
 _PIXELS, _PAUSED_PIXELS = 400, 2000
 """Columns of pixels that lines are drawn for, two values each: while they move, with few, as a browser without a
 graphics processor must draw them ten times a second; while they rest, with as many as a screen has."""

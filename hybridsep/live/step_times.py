@@ -6,6 +6,8 @@ import math
 
 import numpy as np
 
+__all__ = ["StepTimes"]
+
 _SHORTEST, _WIDTH, _BINS = 1e-7, math.log(1.02), 1000
 """Shortest time that is resolved, s, logarithmic width of a bin and number of bins, which reach 40 s."""
 

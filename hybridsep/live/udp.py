@@ -10,6 +10,8 @@ from ..base.errors import ParameterError
 from .sample import AS_NAMED, MessageReader, Reading, Sample
 from .source import IDLE, LiveSource
 
+__all__ = ["LOCAL", "UdpSource"]
+
 LOCAL = "127.0.0.1"
 
 _BUFFER = 4 << 20

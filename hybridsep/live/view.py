@@ -10,6 +10,8 @@ from ..base.signals import Array
 from ..logs.units import Shown
 from .core import Row
 
+__all__ = ["COLUMNS", "names", "signals", "source_data", "table"]
+
 COLUMNS = ("t", "x_d", "x_meas", "x_pb", "x_h", "x_h_std", "active", "step", "k")
 """Columns of a row as the page gets it; the shares of the experts follow."""
 

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 
 from .source import IDLE
 
+__all__ = ["Waiting"]
+
 _MOST = 10_000
 """Most pieces that wait; their thread waits then, or what it serves does."""
 

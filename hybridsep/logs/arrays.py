@@ -18,6 +18,8 @@ from ..base.errors import LogError, brief, first_line
 from ..base.signals import Array
 from .source import Block, Source, check_column, check_lengths, sample_number
 
+__all__ = ["ArraysSource"]
+
 
 class _Variable(NamedTuple):
     """Variable of a file.

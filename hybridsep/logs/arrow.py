@@ -9,6 +9,8 @@ from typing import Any
 
 from .arrow_columns import ArrowColumnsSource
 
+__all__ = ["ArrowSource"]
+
 _FILE, _STREAM = b"ARROW1", b"\xff\xff\xff\xff"
 """Beginnings of a file, and of a stream: the latter's is the mark of its first message."""
 

@@ -15,6 +15,8 @@ from ..base.signals import Array
 from .extras import library, reading
 from .source import Block, Source, sample_number
 
+__all__ = ["ArrowColumnsSource"]
+
 _UNIT_KEYS = (b"unit", b"units")
 """Keys of a field's metadata under which its unit may stand."""
 

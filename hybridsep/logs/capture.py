@@ -14,6 +14,8 @@ from ..base.errors import LogError, brief, first_line, listed
 from ..base.signals import Array
 from .source import Block, Source, sample_number
 
+__all__ = ["CaptureSource"]
+
 _SIGNALS = b'"SignalListHFData"'
 _COUNTER, _COMMANDED, _MEASURED = "CYCLE", "DES_POS", "ENC_POS"
 _TIME = "t"

@@ -9,6 +9,8 @@ from ..base.errors import LogError, brief, listed
 from .source import Source
 from .units import POSITION_UNITS, TIME_UNITS, Unit, plain_name, position_unit, stated_unit, time_unit
 
+__all__ = ["COUNT", "ROLES", "Column", "choose_columns"]
+
 COUNT = "such as unit='0.1um' (--unit 0.1um)"
 """Example of the unit of a log in encoder counts, for messages."""
 

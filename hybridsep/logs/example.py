@@ -7,6 +7,8 @@ from pathlib import Path
 
 from ..base.output import written_whole
 
+__all__ = ["EXAMPLE", "HEAD", "write_example"]
+
 EXAMPLE = Path(__file__).with_name("example_axis.csv.gz")
 """The log, 20 s of a simulated axis at 1 kHz."""
 

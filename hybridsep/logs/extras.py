@@ -11,6 +11,8 @@ from typing import Any
 
 from ..base.errors import LogError, first_line
 
+__all__ = ["library", "quiet", "reading", "refusal"]
+
 _OWN = (TypeError, AttributeError, LookupError)
 """Errors whose messages tell of the library's own names."""
 

@@ -23,6 +23,8 @@ from .text import TextSource
 from .twincat import TwinCatSource
 from .xlsx import XlsxSource
 
+__all__ = ["READERS", "channels", "open_source"]
+
 READERS: tuple[type[Source], ...] = (
     NpzSource,
     XlsxSource,

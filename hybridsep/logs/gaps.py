@@ -9,6 +9,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from ..base.signals import Array, Indices
 
+__all__ = ["gap_starts", "mean_interval", "rounded_interval", "row_interval", "standard_error"]
+
 _GAP = 1.5
 """Intervals, in sampling intervals, from which at least one sample is missing."""
 

@@ -20,6 +20,8 @@ from .source import Block, Channel, Source, line_number
 from .text import TextSource, bounded_lines, with_own_names
 from .text_layout import decimal_points, is_number, split
 
+__all__ = ["HalscopeCsvSource", "HalscopePairsSource"]
+
 _PERIOD = re.compile(rb"(#?)\s*Sampling period is\s+(-?\d{1,18})\s+ns\s")
 """First line, with a number sign in the CSV."""
 

@@ -7,6 +7,8 @@ from typing import Any
 
 from .arrays import ArraysSource
 
+__all__ = ["Hdf5Source"]
+
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 

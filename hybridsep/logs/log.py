@@ -20,6 +20,8 @@ from .source import NEEDS_TRUST, Block
 from .time_axis import TimeAxis
 from .units import POSITION_UNITS, Shown, position_unit, shown_of, stated_unit
 
+__all__ = ["Log", "LogReader", "check_reading", "open_log", "read_log"]
+
 SPAN_MAX: Mapping[str, float] = {"m": 100.0, "rad": POSITION_MAX}
 """Largest plausible travel of an axis, m or rad; a larger one indicates a log in a smaller unit."""
 

@@ -8,6 +8,8 @@ from typing import Any
 
 from .arrays import ArraysSource
 
+__all__ = ["MatSource"]
+
 _TYPE_MAX = 4052
 """Largest type of a matrix in a version 4 file, ``1000·machine + 10·precision + kind``."""
 

@@ -19,6 +19,8 @@ from .extras import library, quiet, reading, refusal
 from .records import RecordsSource
 from .source import Channel, check_column
 
+__all__ = ["MdfSource"]
+
 _FORMAT = "an ASAM MDF file"
 
 

@@ -10,6 +10,8 @@ from typing import IO, Any, NamedTuple
 
 import numpy as np
 
+__all__ = ["NpyHeader", "read_npy_header"]
+
 _MAGIC = b"\x93NUMPY"
 _LENGTH_BYTES = {1: 2, 2: 4, 3: 4}
 """Bytes of the header's length, by the format's major version."""

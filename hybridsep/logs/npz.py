@@ -16,6 +16,8 @@ from ..base.zip_files import ZIP_DAMAGE
 from .npy_header import NpyHeader, read_npy_header
 from .source import Block, Source, check_column, check_lengths, sample_number
 
+__all__ = ["NpzSource"]
+
 
 class NpzSource(Source):
     """The arrays of an ``.npz`` file, compressed or not."""

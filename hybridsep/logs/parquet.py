@@ -8,6 +8,8 @@ from typing import Any
 
 from .arrow_columns import ArrowColumnsSource
 
+__all__ = ["ParquetSource"]
+
 
 class ParquetSource(ArrowColumnsSource):
     """The columns of a Parquet file, streamed row group by row group."""

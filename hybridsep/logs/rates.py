@@ -13,6 +13,8 @@ from ..base.signals import Array
 from .columns import Column
 from .source import Block, Source
 
+__all__ = ["on_one_clock"]
+
 _BLOCK = 10_000
 
 _GAP = 1.5

@@ -12,6 +12,8 @@ from ..base.errors import LogError, brief
 from ..base.signals import Array
 from .source import Block, Source, check_lengths, sample_number
 
+__all__ = ["RecordsSource"]
+
 _READ = 50_000
 """Samples that are read of a column at once: few calls of a library, and half a megabyte."""
 

@@ -22,6 +22,8 @@ from ..base.signals import Array
 from .sinumerik_xml import Record, Signal, TraceXml
 from .source import Block, Channel, Source, sample_number
 
+__all__ = ["SinumerikSource"]
+
 _ROOT = b"<traceSession"
 
 _COMMANDED = re.compile(r"cmdpos|despos", re.IGNORECASE)

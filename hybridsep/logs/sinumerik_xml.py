@@ -12,6 +12,8 @@ from xml.parsers import expat
 from ..base.errors import LogError, brief, first_line
 from .text_layout import is_number
 
+__all__ = ["POINTS_MAX", "Record", "Signal", "TraceXml"]
+
 POINTS_MAX = 100_000_000
 """Most samples of a signal: a day at 1 kHz. A damaged number must not be filled up with held values."""
 

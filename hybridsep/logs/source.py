@@ -13,6 +13,9 @@ import numpy as np
 from ..base.errors import LogError, brief
 from ..base.signals import Array
 
+__all__ = ["NEEDS_TRUST", "Block", "Channel", "Source", "check_column", "check_lengths", "line_number", "sample_number"]
+
+
 NEEDS_TRUST = "; missing measurements are replayed with trust alone: read them with may_miss=True (--trust true)"
 """End of the message about a measured position that is missing."""
 

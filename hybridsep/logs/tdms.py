@@ -17,6 +17,8 @@ from .extras import library, quiet, reading
 from .records import RecordsSource
 from .source import Channel, check_column
 
+__all__ = ["TdmsSource"]
+
 _FORMAT = "an NI TDMS file"
 
 _UNITS = ("unit_string", "NI_UnitDescription", "Unit", "unit")

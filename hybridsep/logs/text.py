@@ -20,6 +20,8 @@ from .source import NEEDS_TRUST, Block, Source
 from .text_layout import COMMENTS, Layout, decimal_points, find_layout, is_number, split
 from .timestamps import CELL, Clock, cell, stamp_kind
 
+__all__ = ["TextSource", "bounded_lines", "with_own_names"]
+
 _HEAD_LINES = 400
 """Lines, blank ones aside, in which names and numbers must begin."""
 

@@ -11,6 +11,8 @@ from itertools import pairwise
 from .timestamps import stamp_kind
 from .units import plain_name, position_unit, time_unit
 
+__all__ = ["COMMENTS", "Layout", "decimal_points", "find_layout", "is_number", "split"]
+
 COMMENTS = ("#", "%", "//", "!")
 """Beginnings of a comment line."""
 

@@ -13,6 +13,8 @@ from ..base.signals import Array
 from .gaps import gap_starts, mean_interval, rounded_interval, standard_error
 from .source import Block
 
+__all__ = ["COUNTED", "TOLERANCE", "TimeAxis"]
+
 TOLERANCE = 0.05
 """Largest relative deviation of an interval from the median one.
 

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from ..base.errors import LogError, brief
 from ..base.signals import Array
 
+__all__ = ["CELL", "Cells", "Clock", "cell", "stamp_kind"]
+
 Cells = NDArray[np.bytes_]
 Integers = NDArray[np.int64]
 

@@ -23,6 +23,8 @@ from .source import Block, Channel, Source, line_number
 from .text import bounded_lines
 from .text_layout import decimal_points, is_number
 
+__all__ = ["TwinCatSource"]
+
 _BOM = b"\xef\xbb\xbf"
 _MARKS = (b"\t", b";", b",")
 _NAME, _UNIT, _SAMPLE_TIME, _START = "Name", "Unit", "SampleTime[ms]", "Starttime of export"

@@ -7,6 +7,19 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+__all__ = [
+    "POSITION_UNITS",
+    "TIME_UNITS",
+    "Shown",
+    "Unit",
+    "plain_name",
+    "position_unit",
+    "shown_in",
+    "shown_of",
+    "stated_unit",
+    "time_unit",
+]
+
 
 @dataclass(frozen=True)
 class Unit:

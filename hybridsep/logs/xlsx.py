@@ -21,6 +21,8 @@ from .extras import library, reading
 from .source import NEEDS_TRUST, Block, Source
 from .text_layout import find_layout
 
+__all__ = ["XlsxSource"]
+
 _FORMAT = "an Excel workbook"
 
 _HEAD_ROWS = 400

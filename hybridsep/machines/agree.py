@@ -6,6 +6,8 @@ from ..base.errors import ParameterError
 from ..logs.log import Log
 from .machine import Machine
 
+__all__ = ["check_interval", "check_unit"]
+
 
 def check_interval(name: str, T_s: float, axis: Machine) -> None:
     """Raise ParameterError if a file's sampling interval is not the machine's."""

@@ -37,6 +37,7 @@ if TYPE_CHECKING:  # they load slowly, and whoever builds an FMU needs neither
     from ..compensate.compensator import SepCompensator
     from ..predict.predictor import HybridPredictor
 
+__all__ = ["NAME_PATTERN", "Machine", "load_machine", "machine_from_table", "machine_names", "machine_path"]
 
 NAME_PATTERN = r"^[A-Za-z][A-Za-z0-9_]*$"
 """Names of machines; they become parts of FMUs' names."""

@@ -8,6 +8,8 @@ from pathlib import Path
 from ..base.errors import ParameterError
 from .machine import NAME_PATTERN
 
+__all__ = ["checked_name", "machine_name"]
+
 
 def machine_name(path: Path, axis: str | None = None) -> str:
     """Return a machine's name from that of a log, and of the axis that is read of it."""

@@ -10,6 +10,8 @@ from collections.abc import Mapping
 from ..base.errors import MachineError
 from .machine import Machine, load_machine
 
+__all__ = ["PAPER_SETTINGS", "paper_machine"]
+
 PAPER_SETTINGS: Mapping[str, Mapping[str, bool | float]] = {
     "spring_mass_damper": {"trust": False, "t_init": 0.3},
     "als25010_x": {"trust": False, "t_init": 0.297},

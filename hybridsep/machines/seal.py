@@ -6,6 +6,8 @@ import hashlib
 import re
 from pathlib import Path
 
+__all__ = ["edited_since", "is_as_written", "sealed"]
+
 _SEAL = re.compile(r"# Written by (?P<command>hybridsep \w+); checksum (?P<checksum>[0-9a-f]{12})")
 """First line of a machine file that a command wrote."""
 

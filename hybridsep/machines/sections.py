@@ -10,6 +10,23 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationIn
 from ..base.parameters import Parameter
 from ..base.settings import PARAMETERS, CompensatorSettings, Limits, PredictorSettings, Settings
 
+__all__ = [
+    "CompensatorSection",
+    "DriveLimitsSection",
+    "Entries",
+    "FeedDriveSection",
+    "LimitsSection",
+    "Line",
+    "LogSection",
+    "Number",
+    "Physics",
+    "PredictorSection",
+    "Section",
+    "SpringMassDamper",
+    "StageSection",
+]
+
+
 _DECLARED = {**PARAMETERS, **Limits.parameters()}
 """Parameters by the names of their entries; a drive's and a trajectory's limits have the range of the compensator's."""
 

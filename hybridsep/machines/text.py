@@ -8,6 +8,8 @@ from typing import Any
 from ..base.settings import PARAMETERS
 from .machine import Machine
 
+__all__ = ["machine_text"]
+
 _COLUMN = 32
 """Column of the comments, for alignment."""
 

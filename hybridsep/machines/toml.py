@@ -12,6 +12,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
+__all__ = ["read_toml"]
 
 _KEY_DOTS_MAX = 100
 """Most dots in a key: the time to read one grows with their square, 8 s for 100 000; a machine file's have two."""

@@ -14,6 +14,7 @@ from ..base.errors import ModelError
 if TYPE_CHECKING:
     import control
 
+__all__ = ["modes_of"]
 
 Array = NDArray[np.float64]
 

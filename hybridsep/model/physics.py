@@ -20,6 +20,7 @@ from .discrete import BLOCK_MAX, DiscreteModel
 if TYPE_CHECKING:
     import control
 
+__all__ = ["ModalModel", "Mode"]
 
 MODES_MAX = 100
 """Largest number of modes; the discrete model's tables grow with its square."""

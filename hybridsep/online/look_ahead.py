@@ -25,6 +25,8 @@ from ..base.state import pack, unpack
 from ..predict.predictor import HybridPredictor
 from ..predict.window import PublishedWindow
 
+__all__ = ["LookAhead", "Planner"]
+
 _KIND = "look-ahead"
 
 

@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike
 from ..base.settings import check
 from ..base.signals import Array, as_samples
 
+__all__ = ["Encoder"]
+
 _MASK: int = 0xFFFF_FFFF_FFFF_FFFF
 
 

@@ -8,6 +8,8 @@ from ..base.errors import ParameterError, SignalError
 from ..base.settings import check
 from .plant import RATE_MAX, STATE_MAX, check_command, check_step, internal_steps
 
+__all__ = ["FeedDrive"]
+
 
 class FeedDrive:
     """Spring-mass-damper drive with quadratic damping and stiffness, eq. (13).

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import math
 
+__all__ = ["velocity_under_friction"]
+
 _STEPS_MAX = 60
 """Largest number of Newton steps: 4 to 8 usually, one for each bit where the solution is about to end."""
 

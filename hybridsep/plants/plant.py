@@ -17,6 +17,17 @@ from ..base.clock import check_step_size
 from ..base.errors import ParameterError, SignalError
 from ..base.signals import POSITION_MAX, Array, as_samples
 
+__all__ = [
+    "INTERNAL_STEP",
+    "RATE_MAX",
+    "STATE_MAX",
+    "Plant",
+    "check_command",
+    "check_step",
+    "internal_steps",
+    "simulate",
+]
+
 INTERNAL_STEP = 1e-4
 """Longest internal integration step, s: 0.1 ms, a tenth of the usual sampling interval."""
 

@@ -11,6 +11,8 @@ from ..model.physics import ModalModel, Mode
 from .motion_friction import velocity_under_friction
 from .plant import RATE_MAX, STATE_MAX, check_command, check_step, internal_steps
 
+__all__ = ["FRICTION_VELOCITY", "StageDrive"]
+
 FRICTION_VELOCITY = 2e-3
 """Velocity scale of the friction's change of sign, m/s, a choice of the stand-in: the paper gives none."""
 

@@ -22,6 +22,15 @@ from ..logs.log import read_log
 if TYPE_CHECKING:
     import ruckig
 
+__all__ = [
+    "PAPER_LIMITS",
+    "along_path",
+    "archimedean_spiral",
+    "read_trajectory",
+    "rest_to_rest",
+    "spiral",
+    "staircase",
+]
 
 Curve = Callable[[Array], Array]
 

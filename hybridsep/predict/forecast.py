@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 from ..base.signals import Array
 
+__all__ = ["FeatureScales", "Forecast"]
+
 
 class FeatureScales(NamedTuple):
     """Scales that the features and their priors are relative to, from the commands ahead.
@@ -40,7 +42,7 @@ class Forecast:
     e_h : (n,) array, m
         Predicted residual.
     variance : (n,) array, m²
-        What the model knows of the error of ``e_h``: the variance of the mixture of its experts; 0 where there are none.
+        What the model knows of the error of ``e_h``: the variance of the mixture of its experts; 0 without experts.
     """
 
     x_d: Array

@@ -10,6 +10,8 @@ from ..base.errors import SignalError
 from ..base.saved import COUNT_MAX
 from ..base.signals import Array
 
+__all__ = ["HeldValue"]
+
 _REPEATS = 3
 """Equal consecutive values from which a measurement may be held: two may occur by chance at slow motion."""
 

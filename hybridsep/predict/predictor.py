@@ -22,6 +22,8 @@ from .uncertainty import N_LEARNED
 from .window import PredictedWindow
 from .window_predictor import WindowPredictor
 
+__all__ = ["HybridPredictor"]
+
 _KIND = "predictor"
 
 

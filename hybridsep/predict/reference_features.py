@@ -11,6 +11,8 @@ import numpy as np
 
 from ..base.signals import Array
 
+__all__ = ["N_REFERENCE", "ReferenceFeatures", "n_reference"]
+
 _SHIFTS = (-40, -30, -20, -15, -10, -5, 0, 5, 10, 15, 20, 30, 40)
 """Shifts of ψ, samples: the drive spreads the effect of a reversal, and ψ leads where a model has too much delay."""
 

@@ -21,6 +21,8 @@ from ..base.errors import ParameterError, SignalError
 from ..base.settings import check
 from ..base.signals import Array, as_samples
 
+__all__ = ["PenalisedSolution", "RidgeRegression", "fold"]
+
 _COLUMNS_AT_ONCE = 8
 """Block size of dtpqrt, the fastest one measured for 50 to 200 features."""
 

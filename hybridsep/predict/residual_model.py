@@ -16,6 +16,8 @@ from ..base.signals import Array
 from .forecast import FeatureScales, Forecast
 from .regression import RidgeRegression
 
+__all__ = ["ResidualModel", "SavedFields", "WindowInputs"]
+
 AnyForecast = TypeVar("AnyForecast", bound=Forecast)
 
 

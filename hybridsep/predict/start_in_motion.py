@@ -16,6 +16,8 @@ from ..model.discrete import DiscreteModel
 from ..model.physics import ModalModel
 from .regression import RidgeRegression
 
+__all__ = ["MotionBefore", "motion_before"]
+
 _MOVING = 0.05
 """Commanded velocity of the first sample relative to the largest of the window, from which on an axis may have been in
 motion: from rest a jerk-limited command needs time."""

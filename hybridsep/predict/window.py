@@ -14,6 +14,8 @@ from ..base.signals import Array, as_published, as_samples
 from .forecast import Forecast
 from .uncertainty import PredictedError
 
+__all__ = ["PredictedWindow", "Prediction", "PublishedWindow", "WindowOperator"]
+
 
 @dataclass(frozen=True)
 class Prediction:

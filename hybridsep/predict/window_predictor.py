@@ -30,6 +30,8 @@ from .trust.saved import SavedTrustedModel
 from .uncertainty import Uncertainty, first_variance
 from .window import PredictedWindow, Prediction, WindowOperator
 
+__all__ = ["WindowPredictor"]
+
 
 class WindowPredictor:
     """Prediction and learning; :class:`~hybridsep.predict.predictor.HybridPredictor` adds its saved state."""

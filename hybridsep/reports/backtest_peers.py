@@ -16,6 +16,8 @@ from ..evaluate.verdict import Verdict
 from ..predict.predictor import HybridPredictor
 from ..tune.recordings import Recording, Replay
 
+__all__ = ["BacktestPeers", "backtest_peers"]
+
 
 @dataclass(frozen=True)
 class BacktestPeers:

@@ -8,6 +8,8 @@ import numpy as np
 
 from ..logs.log import Log
 
+__all__ = ["extent", "partly_used"]
+
 _ALL = 0.995
 """Share of a file's samples from which on it counts as used, all of it."""
 

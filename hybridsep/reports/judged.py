@@ -14,6 +14,8 @@ from ..identify.operation import LITTLE_MOTION
 from ..logs.units import Shown
 from ..tune.recordings import Replay
 
+__all__ = ["Judged", "peers_in_words", "recommendation"]
+
 _IN_WORDS = {"physics model": "the physics model alone", "hold": "holding the last residual"}
 """Names of what a hybrid is compared with, in a sentence; others are as they are."""
 

@@ -15,6 +15,14 @@ from ..evaluate.report import Report
 from ..intake.finding import Finding
 from .judged import Judged, peers_in_words
 
+__all__ = [
+    "COLOURS",
+    "NAMES",
+    "write_changes",
+    "write_errors",
+    "write_findings",
+]
+
 NAMES = ("physics model", "hold the last residual", "hybrid")
 """Names of :data:`~hybridsep.tune.recordings.PREDICTIONS`."""
 

@@ -10,6 +10,8 @@ import numpy as np
 from ..base.signals import Array
 from ..cosim.fmus import FmuController
 
+__all__ = ["SAMPLES_MAX", "step_times"]
+
 SAMPLES_MAX = 5000
 """Samples that are timed, at most."""
 

@@ -6,6 +6,8 @@ from collections.abc import Iterable, Mapping
 
 from ..evaluate.report import Report
 
+__all__ = ["write_use"]
+
 
 def write_use(report: Report, fmus: Iterable[str], steps: Mapping[str, float], T_s: float, Np: int) -> None:
     """Write how FMUs are used, and how long a step of the first takes.

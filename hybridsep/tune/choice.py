@@ -18,6 +18,19 @@ from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
 from .recordings import Recording, replay
 
+__all__ = [
+    "WORTH",
+    "Choice",
+    "Tried",
+    "WindowScore",
+    "choose_settings",
+    "settings_for",
+    "settings_to_try",
+    "window_scores",
+    "window_sizes",
+    "with_window",
+]
+
 WORTH = 0.05
 """Relative gain below which the default settings stay: less may be chance."""
 

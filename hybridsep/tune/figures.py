@@ -14,6 +14,8 @@ from ..evaluate.canvas import HOLD, HYBRID, PHYSICS, finish_panels, save_figure
 from .grid import TUNED
 from .joint import Tuning
 
+__all__ = ["tuning_figure"]
+
 _COLUMNS = 2
 
 _VALUES_NAMED = 10

@@ -12,6 +12,8 @@ from ..base.errors import ParameterError
 from ..base.settings import PredictorSettings
 from .choice import settings_to_try
 
+__all__ = ["TUNED", "candidates", "default_values"]
+
 Values = Mapping[str, Sequence[Any]]
 
 TUNED = {name: PredictorSettings.parameters()[name] for name in PredictorSettings.TUNED}

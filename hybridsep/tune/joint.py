@@ -20,6 +20,8 @@ from ..model.physics import ModalModel
 from .choice import WORTH, window_sizes, with_window
 from .losses import Losses, Piece, replayed_losses
 
+__all__ = ["Tuning", "joint_ratio", "n_processors", "over_windows", "tune"]
+
 Logs = Mapping[str, Sequence[Piece]]
 """Logs by name, each in pieces without a gap."""
 

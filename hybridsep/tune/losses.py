@@ -16,6 +16,8 @@ from ..intake.motion import starts_in_motion
 from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
 
+__all__ = ["Losses", "Piece", "n_unjudged", "replayed_losses"]
+
 Piece = tuple[Array, Array]
 """Commanded and measured positions of a part of a log without a gap, ``(n,)`` each, m."""
 

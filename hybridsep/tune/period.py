@@ -15,6 +15,8 @@ from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
 from .recordings import Recording, replay
 
+__all__ = ["PeriodHint", "period_hint"]
+
 _GAIN = 0.9
 """Ratio of the errors with and without the period below which it is worth a hint."""
 

@@ -17,6 +17,8 @@ from ..evaluate.peers import Peer, Piece, predict_peers
 from ..evaluate.verdict import Tally, Verdict
 from ..predict.predictor import HybridPredictor
 
+__all__ = ["PREDICTIONS", "Recording", "Replay", "Scored", "replay", "split_log"]
+
 PREDICTIONS = ("x_pb", "x_hold", "x_h")
 """What a replay predicts by: physics model, hold baseline, hybrid."""
 

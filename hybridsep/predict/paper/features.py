@@ -9,6 +9,8 @@ from numpy.lib.stride_tricks import as_strided
 
 from ...base.signals import Array
 
+__all__ = ["FeatureLayout", "PastSamples"]
+
 
 @dataclass(frozen=True)
 class FeatureLayout:

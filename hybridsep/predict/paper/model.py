@@ -19,6 +19,8 @@ from ..regression import RidgeRegression
 from ..residual_model import ResidualModel, SavedFields, WindowInputs
 from .features import FeatureLayout, PastSamples
 
+__all__ = ["PaperForecast", "PaperModel"]
+
 
 @dataclass(frozen=True)
 class PaperForecast(Forecast):
