@@ -189,7 +189,7 @@ def test_a_flipped_sign_is_refused_until_it_is_fixed(hybridsep: Run, tmp_path: P
 
 
 @pytest.mark.usefixtures("quick_fit")
-def test_a_log_that_cannot_teach_a_model_is_predicted_by_its_command(tmp_path: Path) -> None:
+def test_a_log_that_cannot_train_a_model_is_predicted_by_its_command(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     log = write_rows(tmp_path / "still.csv", np.full(600, 0.1), 0.1 + 1e-6 * rng.normal(size=600))
     used, findings = take_in([read_log(log, uniform=False)], fix=False)

@@ -107,7 +107,7 @@ def test_late_measurements_are_those_of_earlier_positions(delay: int) -> None:
     assert not np.isnan(found[300:]).any()
 
 
-def test_without_samples_that_teach_there_are_refitted_models_alone() -> None:
+def test_without_samples_that_train_there_are_refitted_models_alone() -> None:
     x_d, x = axis()
     found = predict_peers([Piece(x_d, x, 0, 0)], NP)
     assert [one.title for one in found] == ["ARX20 (refitted)", "ARX40 (refitted)"]

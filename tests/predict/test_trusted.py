@@ -205,7 +205,7 @@ def test_warm_up(t_init: float, n_init: int) -> None:
     assert predictor.predict(x_d[:100]).active.all()
 
 
-def test_a_rest_teaches_nothing_of_a_motion() -> None:
+def test_a_rest_trains_nothing_of_a_motion() -> None:
     """Long at rest with an offset, then the first motion: it starts again, from the physics model."""
     x_d = np.concatenate((np.zeros(2000), cycles(3000)))
     rng = np.random.default_rng(4)

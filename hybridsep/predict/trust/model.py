@@ -138,7 +138,7 @@ class TrustedModel(ResidualModel[TrustedForecast]):
 
     @property
     def doubts(self) -> bool:
-        """Whether what earlier runs have taught is doubted."""
+        """Whether what earlier runs have trained is doubted."""
         return self.evidence.earlier is not None
 
     @property
@@ -242,7 +242,7 @@ class TrustedModel(ResidualModel[TrustedForecast]):
     def _rows(self, x_d: Array, x_pb: Array, x: Array, scales: FeatureScales) -> Array:
         """Return the static features to predict with, ``(n, n_static)``; ``x``: position that the stiffness acts at.
 
-        The constant that earlier runs have taught is that of motion: before the first one of this run it is 0.
+        The constant that earlier runs have trained is that of motion: before the first one of this run it is 0.
         """
         rows, _ = self.static.rows(self.run.static, x_d, x_pb, x, scales.velocity)
         if self.doubts:
@@ -380,7 +380,7 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         self.stack.restart()
 
     def _end_doubt(self) -> None:
-        """Go on with what earlier runs have taught as with what this one has."""
+        """Go on with what earlier runs have trained as with what this one has."""
         self.evidence.believe_earlier()
         self.evidence_of_command.believe_earlier()
         self.stack.forget(DOUBTING)

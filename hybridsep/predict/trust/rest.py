@@ -1,4 +1,4 @@
-"""Rest before the first motion of a run: the offset that earlier runs have taught in motion is not there yet."""
+"""Rest before the first motion of a run: the offset that earlier runs have trained in motion is not there yet."""
 
 from __future__ import annotations
 

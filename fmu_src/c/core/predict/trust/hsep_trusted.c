@@ -78,7 +78,7 @@ static void trusted_set_noise(hsep_trusted *self, hsep_expert_place of, const hs
     expert->correlation = other != NULL ? other->correlation : 1.0;
 }
 
-/* Go on with what earlier runs have taught as with what this one has. */
+/* Go on with what earlier runs have trained as with what this one has. */
 static void trusted_end_doubt(hsep_trusted *self)
 {
     trusted_believe_earlier(self, HSEP_OF_PHYSICS);

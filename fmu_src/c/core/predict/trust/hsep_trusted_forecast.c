@@ -165,7 +165,7 @@ static void trusted_by_physics(hsep_trusted *self, const double x_pb[], const do
     double *x = hsep_at(self, self->x), *rows = hsep_at(self, self->rows);
     hsep_expert *first = hsep_trusted_expert(self, HSEP_STATIC);
     const uint64_t n_rest = hsep_trusted_doubts(self) ? self->n_rest : 0;
-    for (uint64_t k = 0; k < n_rest; k++) { /* the constant that earlier runs have taught is that of motion */
+    for (uint64_t k = 0; k < n_rest; k++) { /* the constant that earlier runs have trained is that of motion */
         rows[k * self->n_static] = 0.0;
     }
     hsep_expert_predict(first, rows, past, self->scale.largest_square, self->bound, varied > 0 ? self->n : 0);
