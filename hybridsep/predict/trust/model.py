@@ -222,7 +222,7 @@ class TrustedModel(ResidualModel[TrustedForecast]):
                 follows = self.command.late(self.run.commands, x_d) - x_pb
                 stacked[expert] = np.clip(stacked[expert] + follows, -self.bound, self.bound)
         e_h = self.stack.weights @ stacked
-        second = stacked**2  # moments of the experts' errors about 0, physics being one without a variance of its own
+        second = stacked**2  # second moments of the residual by each expert; hold and physics have no variance
         for expert, prediction in found.items():
             second[expert] += prediction.variance
         variance = np.maximum(self.stack.weights @ second - e_h**2, 0.0)

@@ -146,10 +146,8 @@ HSEP_API void hsep_uncertainty_predict(
         self->last = signals->e_h[n];
         self->in_doubt = signals->doubt.kind != HSEP_NO_DOUBT;
     }
-    for (uint64_t k = first; k < last; k++) {
-        published[n - 1 - k] = k < signals->n_physics ? 0.0 : signals->e_h[n - 1 - k];
-    }
     for (uint64_t k = first; k < last; k++) { /* in time, from the last measured sample on */
+        published[n - 1 - k] = k < signals->n_physics ? 0.0 : signals->e_h[n - 1 - k];
         double *f = hsep_at(self, self->components) + (n - 1 - k) * HSEP_N_COMPONENTS;
         uncertainty_at(self, signals, n - 1 - k, f);
         for (size_t i = 0; i < sizeof uncertainty_felt / sizeof *uncertainty_felt; i++) {
