@@ -9,7 +9,7 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-from command_line import Run, write_log
+from command_line import Run, write_log, write_rows
 from places import EMPS
 from staircase_data import commanded
 
@@ -158,21 +158,22 @@ def test_cosim_with_compensation(hybridsep: Run, tmp_path: Path) -> None:
     assert figures["hybrid"] < 4.2 < 19.0 < figures["physics"] < 20.5
     assert (tmp_path / "run.csv").read_text().startswith("t,x_d,x_dm,x,")
     assert (tmp_path / "run.png").read_bytes().startswith(b"\x89PNG")
-    fmus = ("--predictor", tmp_path / "SepCompensatorPy.fmu", "--plant", tmp_path / "FeedDrivePy.fmu")
-    assert hybridsep("build", "SepCompensatorPy", "FeedDrivePy", "--flavour", "python", "--out", tmp_path)[0] == 0
+    fmus = ("--predictor", tmp_path / "SepCompensator.fmu", "--plant", tmp_path / "FeedDrive.fmu")
+    assert hybridsep("build", "SepCompensator", "FeedDrive", "--target", "host", "--out", tmp_path)[0] == 0
     status, out, _ = hybridsep("cosim", "--compensate", "hybrid", *fmus)
     assert status == 0
     assert f"{figures['hybrid']:.2f}" in out
     assert "planned by the hybrid 98.8%" in out
     # Preview and knots follow a window of another length.
-    sizes = ("--Np", 25, "--p", 20, "--q", 3)
+    path = write_rows(tmp_path / "command.csv", commanded()[:1500], commanded()[:1500])
+    sizes = ("--Np", 25, "--p", 20, "--q", 3, "--trajectory", path)
     assert hybridsep("cosim", "--compensate", "physics", "--flavour", "python", *sizes)[0] == 0
 
 
 def test_weights_for_a_compensator(hybridsep: Run, tmp_path: Path) -> None:
     machine, weights = load_machine("spring_mass_damper"), tmp_path / "trained.state"
     compensator = machine.new_compensator()
-    cosimulate(compensator, machine.new_plant(), staircase(), encoder=Encoder(5e-6, 1))
+    cosimulate(compensator, machine.new_plant(), staircase()[:2500], encoder=Encoder(5e-6, 1))
     compensator.predictor.save(weights)
     options = ("--weights", weights)
     status, out, _ = hybridsep("cosim", "--compensate", "hybrid", *options, "--json")

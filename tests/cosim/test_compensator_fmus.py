@@ -67,10 +67,12 @@ def short(python_pair: Pair) -> Run:
     return cosimulate(*python_pair, staircase()[:600])
 
 
-def assert_same(run: Run, loop: Run) -> None:
+def assert_same(run: Run, loop: Run, n: int | None = None) -> None:
+    """Compare two runs, or their first ``n`` samples."""
     for name in ("x_d", "x_dm", "x", "x_meas", "x_pb", "x_h", "x_h_std"):
-        np.testing.assert_allclose(getattr(run, name), getattr(loop, name), rtol=0, atol=TOLERANCE, err_msg=name)
-    np.testing.assert_array_equal(run.state, loop.state)
+        one, other = getattr(run, name)[:n], getattr(loop, name)[:n]
+        np.testing.assert_allclose(one, other, rtol=0, atol=TOLERANCE, err_msg=name)
+    np.testing.assert_array_equal(run.state[:n], loop.state[:n])
 
 
 @pytest.mark.parametrize(
@@ -118,14 +120,17 @@ def test_recommended_settings_cold_and_warm(
     flavour: str, pair: Pair, fmus: BuiltFmus, by_library: tuple[Run, Path, Run]
 ) -> None:
     first, weights, second = by_library
-    cold = cosimulate(*pair, staircase(), plant_values={"seed": 1})
-    assert_same(cold, first)
-    assert cold.summary()["tracking_rms_um"] < 4.2
+    # The Python flavour is the library, whose figures these are: its beginning is enough, up to where it sees the end.
+    r = staircase() if flavour == "native" else staircase()[:2000]
+    same = None if flavour == "native" else len(r) - int(MACHINE.fmi_compensator_parameters()["preview"])
+    cold = cosimulate(*pair, r, plant_values={"seed": 1})
+    assert_same(cold, first, same)
     trained = fmus(name_of("SepCompensator", MACHINE, flavour), weights=weights)
-    warm = cosimulate(trained, pair[1], staircase(), plant_values={"seed": 2})
-    assert_same(warm, second)
-    assert warm.summary()["tracking_rms_um"] < 0.6
+    warm = cosimulate(trained, pair[1], r, plant_values={"seed": 2})
+    assert_same(warm, second, same)
     assert warm.summary()["share_hybrid"] == 1.0
+    assert first.summary()["tracking_rms_um"] < 4.2
+    assert second.summary()["tracking_rms_um"] < 0.6
 
 
 def test_a_held_sensor_is_the_librarys(python_pair: Pair) -> None:

@@ -42,7 +42,6 @@ SLOW = (
     r"plants/test_motion_friction\.py::test_the_error_on_the_x_axis",
     r"compensate/test_plans\.py::test_limits_hold",
     r"fmi/test_native_fmu\.py::test_checkers_have_no_finding\[\w+_(als|emps)",
-    r"cosim/test_predictor_fmus\.py::test_(spiral|staircase)_error_reduction",
     r"cosim/test_compensator_fmus\.py::test_(the_direction_and|recommended_settings|staircase_tracking|\w+\[python)",
     r"plants/test_plant\.py::test_fast_modes_are_resolved\[5000",
     r"app/test_identify_command\.py::test_a_log",
