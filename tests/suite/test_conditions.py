@@ -151,7 +151,7 @@ def test_a_start_in_motion_is_predicted_as_by_the_library(new_stream: StreamMake
     assert_agreement(new_stream, inputs, TRUST | values)
 
 
-@on_all((PREDICTOR,))
+@on_all((PREDICTOR,), needs="figures")
 @pytest.mark.parametrize("trust", [True, False])
 def test_a_known_delay_costs_little(new_stream: StreamMaker, trust: bool) -> None:
     """At most 5 % more than without delay at the same horizon, but many times as much where the delay is not known."""
@@ -182,7 +182,7 @@ def test_growing_and_ringing_are_predicted_as_by_the_library(new_stream: StreamM
     assert_agreement(new_stream, growing(new_stream.model), TRUST | {"Np": Np, "p": 20})
 
 
-@on_all((PREDICTOR, STAGE_PREDICTOR))
+@on_all((PREDICTOR, STAGE_PREDICTOR), needs="figures")
 def test_a_run_in_motion_is_no_worse_than_physics(new_stream: StreamMaker) -> None:
     inputs = cut(new_stream.model, 100, 0, 2000)
     trusted, paper = (run(new_stream(), inputs, {**TRUST, "trust": trust}) for trust in (True, False))
@@ -211,7 +211,7 @@ def test_a_changed_plant_is_relearned_as_by_the_library(
     assert_same(run(new_stream.planted(weights), inputs, TRUST, saved_at=saved_at), expected, new_stream.implementation)
 
 
-@on_all((PREDICTOR, STAGE_PREDICTOR))
+@on_all((PREDICTOR, STAGE_PREDICTOR), needs="figures")
 @pytest.mark.parametrize(("factor", "most"), [(2.0, 1.06), (0.3, 1.06), (1.0, 0.999)])
 def test_a_plant_that_has_changed_is_relearned_as_fast_as_cold(
     new_stream: StreamMaker, factor: float, most: float

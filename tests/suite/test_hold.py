@@ -34,7 +34,7 @@ def disturbed(model: str, delay: int, *, missing: bool) -> tuple[Array, Array]:
     return x_d, x
 
 
-@on_all((PREDICTOR, COMPENSATOR))
+@on_all((PREDICTOR, COMPENSATOR), needs="figures")
 @pytest.mark.parametrize(
     "more",
     [
