@@ -27,7 +27,7 @@ from built_once import SHARED_BUILDS, BuiltFmus, built_once
 from command_line import Run
 from hypothesis import HealthCheck, settings
 from quick_fits import without_other_windows
-from slow_tests import is_slow
+from slow_tests import is_slow, runs_before
 
 # No test fails because something else keeps the cores busy.
 settings.register_profile("patient", deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -47,6 +47,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if is_slow(item.nodeid):
             item.add_marker("slow")
+    items.sort(key=lambda item: runs_before(item.nodeid))
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""The tests that ``pytest -m "not slow"`` leaves out, as each takes seconds on an idle machine."""
+"""The tests that ``pytest -m "not slow"`` leaves out, as each takes seconds on an idle machine; the longest files."""
 
 from __future__ import annotations
 
@@ -106,6 +106,36 @@ SLOW = (
     r"documents/",
 )
 """Beginnings of their names below tests/, as regular expressions."""
+
+
+LONGEST = (
+    "suite/test_agreement.py",
+    "app/test_demo.py",
+    "documents/test_commands.py",
+    "random_drives/test_trusted_drives.py",
+    "suite/test_conditions.py",
+    "suite/test_rollback.py",
+    "suite/test_timing.py",
+    "cosim/test_importers.py",
+    "fmi/test_fmi2_random.py",
+    "release/test_wheel.py",
+    "cosim/test_compensator_fmus.py",
+    "compensate/test_trusted_plan.py",
+    "fmi/test_hostile_states.py",
+    "app/test_fit.py",
+    "app/test_hostile_input.py",
+    "documents/test_site.py",
+    "documents/test_readme.py",
+    "c/test_c_memory.py",
+    "c/test_c_agreement.py",
+)
+"""Files below tests/ that run first: with one of them last, all workers but one would wait for it."""
+
+
+def runs_before(nodeid: str) -> int:
+    """Return where a test's file stands among those that run first; the others come after them, as they are."""
+    file = nodeid.removeprefix("tests/").partition("::")[0]
+    return LONGEST.index(file) if file in LONGEST else len(LONGEST)
 
 
 def is_slow(nodeid: str) -> bool:
