@@ -37,6 +37,7 @@ def test_every_block_is_run_or_shown() -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="the lines are those of a POSIX shell")
+@pytest.mark.usefixtures("quick_fit")
 def test_the_pages_run_from_first_to_last(
     hybridsep: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -20,12 +20,12 @@ from hybridsep.fmi.native_flavour import sources
 from hybridsep.machines.machine import load_machine
 
 FUZZED = {
-    "HybridPredictor": 5,
-    "SepCompensator": 5,
-    "FeedDrive": 2,
-    "FeedDrive_als25010_x": 2,
-    "ReferenceTrajectory": 2,
-    "HybridPredictorFmi3": 4,
+    "HybridPredictor": 3,
+    "SepCompensator": 3,
+    "FeedDrive": 1,
+    "FeedDrive_als25010_x": 1,
+    "ReferenceTrajectory": 1,
+    "HybridPredictorFmi3": 2,
 }
 """Duration of the random calls of each model, s; of FMI 3.0's that with arrays, as what they compute is the same."""
 
