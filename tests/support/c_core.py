@@ -82,13 +82,17 @@ def model_sources() -> list[str]:
     return [source for source in sources() if Path(source).name.startswith("model_")]
 
 
+def _shared() -> Path:
+    """Return the folder of what the processes of a test session build once for all of them."""
+    return Path(os.environ.get(SHARED_BUILDS) or build_folder())
+
+
 @cache
 def object_files(flags: tuple[str, ...] = ("-O2", "-fPIC"), command: tuple[str, ...] = ()) -> list[str]:
     """Compile all other C files, once for each set of options, with the host's compiler if no other is asked for.
 
     All processes of a test session share them.
     """
-    shared = Path(os.environ.get(SHARED_BUILDS) or build_folder())
     key = hashlib.sha256(repr((flags, command)).encode()).hexdigest()[:16]
     compiled = sorted(set(sources()) - set(model_sources()))
 
@@ -98,7 +102,7 @@ def object_files(flags: tuple[str, ...] = ("-O2", "-fPIC"), command: tuple[str, 
             target = folder / f"{Path(source).stem}.o"
             run_compiler([*flags, *include_flags(), "-c", source, "-o", target], command=command)
 
-    folder = built_once(shared / f"objects_{key}", build)
+    folder = built_once(_shared() / f"objects_{key}", build)
     return [str(folder / f"{Path(source).stem}.o") for source in compiled]
 
 
@@ -123,26 +127,19 @@ class Context(ctypes.Structure):
 
 @cache
 def library(name: str) -> ctypes.CDLL:
-    """Return the shared library of one of :data:`DESCRIPTIONS`, built when first asked for."""
+    """Return the shared library of one of :data:`DESCRIPTIONS`, built when first asked for.
+
+    All processes of a test session share it.
+    """
     folder = build_folder() / name
     write_header(name, folder)
-    built = folder / "model.so"
-    run_compiler(
-        [
-            "-O2",
-            "-fPIC",
-            "-shared",
-            f"-I{folder}",
-            *include_flags(),
-            *model_sources(),
-            EXPOSE,
-            *object_files(),
-            "-lm",
-            "-o",
-            built,
-        ]
-    )
-    loaded = ctypes.CDLL(str(built))
+    key = hashlib.sha256((folder / "hsep_fmu.h").read_bytes()).hexdigest()[:16]
+    flags = ["-O2", "-fPIC", "-shared", f"-I{folder}", *include_flags()]
+
+    def build(built: Path) -> None:
+        run_compiler([*flags, *model_sources(), EXPOSE, *object_files(), "-lm", "-o", built])
+
+    loaded = ctypes.CDLL(str(built_once(_shared() / f"{name}_{key}.so", build)))
     loaded.test_table.restype = ctypes.POINTER(Context)
     for function in ("physics", "regression", "predictor"):
         getattr(loaded, f"hsep_{function}_size").restype = ctypes.c_double
