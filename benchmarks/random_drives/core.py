@@ -33,8 +33,7 @@ def core_replay(predictor: str, model: ModalModel, settings: PredictorSettings, 
     any_modes = DESCRIPTIONS["predictor"]["modes"] * len(modes)
     DESCRIPTIONS.setdefault(name, {**DESCRIPTIONS["predictor"], "modes": any_modes})
     start = {f"mode[{i}].{key}": value for i, mode in enumerate(modes, 1) for key, value in asdict(mode).items()}
-    alone = {key: value for key, value in used.to_fmi().items() if key not in used.NEEDS_PREVIEW}
-    start |= {**alone, "dead_time": model.dead_time, "x_d_ahead": x_d[0], "x_meas": x_d[0]}
+    start |= {**used.to_fmi(), "dead_time": model.dead_time, "x_d_ahead": x_d[0], "x_meas": x_d[0]}
     core = CModel(name, start).initialise()
     x_h = np.empty(n)
     x_d_ahead, measured, predicted = (core.place[key] for key in ("x_d_ahead", "x_meas", "x_h"))

@@ -16,7 +16,7 @@ import typer
 
 from ..base.parameters import Parameter
 from ..base.ranges import GRAMMAR
-from ..base.settings import PARAMETERS, CompensatorSettings, PredictorSettings, Settings
+from ..base.settings import CompensatorSettings, PredictorSettings, Settings
 from ..fmi.flavours import FLAVOURS, FMI_CHOICES
 
 __all__ = [
@@ -135,10 +135,7 @@ PREDICTOR_ENTRIES = _entries(PredictorSettings)
 KNOWN_ENTRIES = {name: PREDICTOR_ENTRIES[name] for name in ("period", "measurement_delay")}
 """Those that are known of an axis, which no log is fitted for."""
 
-COMPENSATOR_ENTRIES = {
-    **{name: entry for name, entry in _entries(CompensatorSettings).items() if name != "compensate"},
-    **{name: PARAMETERS[name] for name in PredictorSettings.NEEDS_PREVIEW},
-}
+COMPENSATOR_ENTRIES = {name: entry for name, entry in _entries(CompensatorSettings).items() if name != "compensate"}
 """Parameters that the section ``[compensator]`` may have besides, less the model, which commands choose themselves."""
 
 

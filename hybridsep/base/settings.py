@@ -165,13 +165,7 @@ class PredictorSettings(Settings):
     measurement_delay : int
         Samples by which the measurement is late: the position that arrives at ``k`` is ``x(k − measurement_delay)``.
         A compensator's predictor needs trust for it.
-    v_friction : float
-        Velocity scale of the friction's change of sign, m/s, for additional features of the reference
-        (:mod:`~hybridsep.predict.reference_features`); 0, as in the paper: none.
     """
-
-    NEEDS_PREVIEW: ClassVar[tuple[str, ...]] = ("v_friction",)
-    """Fields of a predictor that a compensator holds: alone it has no reference beyond its window."""
 
     TRUST: ClassVar[tuple[str, ...]] = ("trust", "effect", "noise_std", "forgetting", "period")
     """Fields of the residual model with trust."""
@@ -179,7 +173,7 @@ class PredictorSettings(Settings):
     TUNED: ClassVar[tuple[str, ...]] = ("p", "q", "lam", "effect", "noise_std", "forgetting")
     """Fields that can be tuned on a log: ``Np`` is the controller's, and a warm-up hides errors."""
 
-    ELSEWHERE: ClassVar[tuple[str, ...]] = ("T_s", "input_hold", *NEEDS_PREVIEW)
+    ELSEWHERE: ClassVar[tuple[str, ...]] = ("T_s", "input_hold")
 
     Np: int = whole(100, 1, 100_000, "samples in a look-ahead window")
     p: int = whole(50, 1, 5000, "past residuals e_pb in the features", learned=True)
@@ -222,14 +216,6 @@ class PredictorSettings(Settings):
         learned=True,
     )
     measurement_delay: int = whole(0, 0, 10_000, "whole samples by which the measured position is late")
-    v_friction: float = real(
-        *(2e-3, 0.0, 1e4, "m/s"),
-        "velocity over which friction changes its sign, for features of the reference; 0: none of them",
-        display_unit="mm/s",
-        nonzero=1e-9,
-        learned=True,
-        unless_given=0.0,
-    )
 
     @property
     def warm_up(self) -> float:
@@ -300,8 +286,7 @@ class CompensatorSettings(Settings):
         Bound on the magnitude of the change, m; none if None.
     no_reversal : bool
         Whether the velocity of ``x_dm`` keeps the sign of that of ``x_d``: otherwise friction changes its sign too. It
-        has no effect without ``limits``, and a predictor with ``v_friction > 0`` may then be worse than without. Plans
-        of a model with ``trust`` follow the friction and may turn.
+        has no effect without ``limits``. Plans of a model with ``trust`` follow the friction and may turn.
     compensate : {"off", "physics", "hybrid"}
         Best model allowed; ``"off"`` leaves the command unmodified.
     """

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from ..base.errors import SignalError
 from ..base.saved import Saved
 from ..base.settings import CompensatorSettings, PredictorSettings
-from ..base.signals import Array, as_published, as_samples
+from ..base.signals import Array, as_measured, as_published, as_samples
 from ..base.state import pack, unpack
 from ..predict.predictor import HybridPredictor
 from ..predict.trust.disturbances import Disturbance
@@ -36,7 +36,7 @@ from .trusted_planning import TrustedPlanning
 
 __all__ = ["RECOMMENDED", "SepCompensator", "SepState", "direct_samples"]
 
-RECOMMENDED = PredictorSettings(trust=False, Np=50, p=50, q=40, lam=1e-8, t_init=0.1, v_friction=2e-3)
+RECOMMENDED = PredictorSettings(trust=False, Np=50, p=50, q=40, lam=1e-8, t_init=0.1)
 """Predictor settings of the paper's model with the smallest tracking error on the staircase drive, with the
 compensator's defaults."""
 
@@ -53,7 +53,7 @@ class SepCompensator:
     ----------
     predictor : HybridPredictor
         At the beginning of a run; it learns from the modified commands. With ``trust`` plans follow the slope of its
-        model (:mod:`~hybridsep.compensate.trusted_plan`); else they use the paper's, where :class:`PlanMonitor` allows.
+        model (:mod:`~hybridsep.compensate.trusted_plan`); else they use the paper's.
     settings : CompensatorSettings, optional
         The defaults if left out.
 
@@ -100,7 +100,6 @@ class SepCompensator:
         predictor = self.predictor
         predictor.restart(start, t_init=t_init + lead_in * predictor.T_s if t_init > 0 else 0.0)
         self.lead_in = int(lead_in)
-        self._planning.restart()
         self._state_before = min(self.compensate, SepState.PHYSICS)
         # Coefficients of the remainder of the last plan; last three values of δ and of x_d
         self._rest = np.zeros(N_DECIDED + self._basis.n_free)
@@ -137,7 +136,7 @@ class SepCompensator:
         chosen = self._planning.choose(predictor, preview, self.compensate)
         delta = (self._basis.values @ chosen.coefficients)[:Np]
         x_dm = command[:Np] + delta
-        prediction = predictor.predict(x_dm, reference=command, scales=chosen.scales)
+        prediction = predictor.predict(x_dm, scales=chosen.scales)
         self._pending = PendingPlan(chosen.coefficients, delta, command[:Np].copy(), prediction, chosen.state)
         as_published(prediction.x_pb, "x_pb")
         x_h, x_h_std, n_warm_up, n_followed = self._planning.published(prediction, chosen.state, self.compensate)
@@ -149,27 +148,21 @@ class SepCompensator:
     def update(self, x: ArrayLike) -> None:
         """Learn from the measurement of the planned window.
 
-        A window with missing samples (NaN, or a value held while the drive moves) is not learned: its residuals are
-        replaced by their predictions, and learning resumes after a completely measured window. With ``trust`` the
-        predictor itself leaves out what is missing or not plausible.
-
         Parameters
         ----------
         x : (Np,) array_like, m
-            Measured positions; NaN where missing.
+            Measured positions; with ``trust`` NaN where missing.
 
         Raises
         ------
         SignalError
-            If nothing is planned, the length is another one or a value is infinite. Nothing is changed.
+            If nothing is planned, the length is another one or a value is not finite. Nothing is changed.
         """
         pending = self._pending
         if pending is None:
             raise SignalError("update must follow plan: there is no planned window to measure")
         predictor, Np = self.predictor, self.predictor.Np
-        measured = np.asarray(x, dtype=np.float64)
-        as_samples(np.nan_to_num(measured, nan=0.0, posinf=np.inf, neginf=-np.inf), "x", Np)
-        self._planning.update(predictor, measured, pending, learn=predictor.k >= self.lead_in)
+        predictor.update(as_measured(x, "x", Np), learn=predictor.k >= self.lead_in)
         kept = Np // self.spacing
         self._rest = np.concatenate((pending.coefficients[kept:], np.zeros(kept)))
         self._delta_before, self._x_d_before = (
@@ -186,12 +179,10 @@ class SepCompensator:
 
     def to_bytes(self) -> bytes:
         """Return parameters and state, predictor and pending window included, as a versioned blob."""
-        pending, planning = self._pending, self._planning
+        pending = self._pending
         meta = {
             "settings": self.settings.as_table(),
             "lead_in": self.lead_in,
-            "excess": planning.monitor.excess,
-            "measured_before": planning.measured_before,
             "state_before": int(self._state_before),
             "pending": None if pending is None else [int(pending.state), pending.prediction.n_warm_up],
         }
@@ -199,7 +190,6 @@ class SepCompensator:
             "rest": self._rest,
             "delta_before": self._delta_before,
             "x_d_before": self._x_d_before,
-            "sensor": np.array(planning.sensor.state()),
         }
         if pending is not None:
             arrays |= {"coefficients": pending.coefficients, "delta": pending.delta, "x_d": pending.x_d}
@@ -222,8 +212,6 @@ class SepCompensator:
             compensator = cls(predictor, CompensatorSettings.from_table(saved.table("settings")))
         compensator.predictor = restored  # the constructor has restarted the other one
         compensator.lead_in = saved.whole("lead_in")
-        planning = compensator._planning
-        planning.monitor.excess, planning.measured_before = saved.real("excess"), saved.flag("measured_before")
         before = saved.whole("state_before")
         if before not in tuple(SepState):
             raise saved.error("state_before must be a state")
@@ -231,8 +219,6 @@ class SepCompensator:
         n, Np = len(compensator._rest), predictor.Np
         compensator._rest, compensator._delta_before = saved.array("rest", n), saved.array("delta_before", 3)
         compensator._x_d_before = saved.array("x_d_before", 3, finite=False)
-        with saved.consistent():
-            planning.sensor.restore(saved.array("sensor", 5, finite=False))
         if saved.field("pending") is not None:
             state, n_warm_up = saved.numbers("pending", 2)
             if state not in tuple(SepState) or n_warm_up not in range(Np + 1) or restored.n_pending != Np:

@@ -15,9 +15,7 @@ from ..predict.predictor import HybridPredictor
 from ..predict.window import Prediction
 from .constraints import Bounds, DriveBounds, solve
 from .interior import Tolerance
-from .plan import PendingPlan, SepState
-from .plan_monitor import PlanMonitor
-from .sensor import SensorWatch
+from .plan import SepState
 from .splines import N_DECIDED, SplineBasis
 
 __all__ = ["ChosenPlan", "Planning", "Preview", "PublishedPosition"]
@@ -79,9 +77,6 @@ class Planning(ABC):
         Whether every plan does; else those that the drive's limits bound.
     TOLERANCE : Tolerance
         Of the solver.
-    monitor, sensor, measured_before : PlanMonitor, SensorWatch, bool
-        Watch of the model and of the sensor, and whether the window before was measured completely; as in the beginning
-        where the model watches itself.
     """
 
     PINNED: ClassVar[int]
@@ -94,14 +89,6 @@ class Planning(ABC):
         self.basis, self.bounds, self.settings = basis, bounds, settings
         self.preview, self.spacing = settings.preview, settings.spacing
         self.n_pinned = min(self.PINNED, Np // 2) // self.spacing
-        self.monitor = PlanMonitor()
-        self.restart()
-
-    def restart(self) -> None:
-        """Begin another run."""
-        self.monitor.restart()
-        self.sensor = SensorWatch()
-        self.measured_before = True
 
     @abstractmethod
     def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:
@@ -116,10 +103,6 @@ class Planning(ABC):
         SignalError
             If it diverges.
         """
-
-    @abstractmethod
-    def update(self, predictor: HybridPredictor, measured: Array, pending: PendingPlan, *, learn: bool) -> None:
-        """Measure a planned window, ``(Np,)``, m, NaN where missing; ``learn`` whether the run may be learned."""
 
     def affine_plan(self, g: Array, free: Array, preview: Preview, bounds: Bounds) -> Array | None:
         """Return the coefficients of the best plan on a model ``g``, ``free`` of eq. (3); None if there is none."""

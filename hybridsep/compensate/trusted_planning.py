@@ -12,7 +12,7 @@ from ..predict.trust.model import TrustedModel
 from ..predict.window import Prediction
 from .interior import Tolerance
 from .linearised import PlanModel
-from .plan import PendingPlan, SepState
+from .plan import SepState
 from .planning import ChosenPlan, Planning, Preview, PublishedPosition
 from .trusted_plan import TOLERANCE, TrustedPlanner, is_better
 
@@ -58,10 +58,6 @@ class TrustedPlanning(Planning):
         if most is SepState.HYBRID:
             return PublishedPosition(prediction.x_h, prediction.x_h_std, prediction.n_warm_up, n_followed)
         return PublishedPosition(prediction.x_pb.copy(), np.zeros(Np), Np, n_followed)
-
-    def update(self, predictor: HybridPredictor, measured: Array, pending: PendingPlan, *, learn: bool) -> None:
-        """Learn a window; the model leaves out what is missing or not plausible."""
-        predictor.update(measured, learn=learn)
 
     def _model(self, predictor: HybridPredictor, path: Array, preview: Preview) -> PlanModel:
         """Return the trusted model over the preview, with the scales of the rest of the last plan."""

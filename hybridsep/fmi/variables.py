@@ -35,11 +35,7 @@ Value = float | int | bool
 _PREDICTOR = PredictorSettings.fmi_parameters()
 
 PREDICTOR_SETTINGS: Mapping[str, Parameter] = {
-    **{
-        name: parameter
-        for name, parameter in _PREDICTOR.items()
-        if name not in (*PredictorSettings.NEEDS_PREVIEW, *PredictorSettings.TRUST)
-    },
+    **{name: parameter for name, parameter in _PREDICTOR.items() if name not in PredictorSettings.TRUST},
     "dead_time": PARAMETERS["dead_time"],
 }
 """Further parameters of a HybridPredictor and of the predictor that a SepCompensator holds."""
@@ -47,10 +43,7 @@ PREDICTOR_SETTINGS: Mapping[str, Parameter] = {
 TRUST_SETTINGS: Mapping[str, Parameter] = {name: _PREDICTOR[name] for name in PredictorSettings.TRUST}
 """Parameters of the residual model with trust, of both."""
 
-COMPENSATOR_SETTINGS: Mapping[str, Parameter] = {
-    **{name: _PREDICTOR[name] for name in PredictorSettings.NEEDS_PREVIEW},
-    **CompensatorSettings.fmi_parameters(),
-}
+COMPENSATOR_SETTINGS: Mapping[str, Parameter] = CompensatorSettings.fmi_parameters()
 """Parameters of a SepCompensator besides those of its predictor."""
 
 _HOLD = "the same for x_pb plus the residual before the window, held"

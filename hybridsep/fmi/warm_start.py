@@ -37,7 +37,7 @@ def load_trained(path: str | Path, machine: Machine, model: str) -> HybridPredic
     path : str or Path
     machine : Machine
         Machine that it must have been trained for: ``Np``, ``p``, ``q``, ``lambda``, ``T_s``, ``input_hold``,
-        ``dead_time``, modes and, without trust, ``v_friction``.
+        ``dead_time`` and modes.
     model : {"HybridPredictor", "SepCompensator"}
         Which of the machine's two sets of ``Np``, ``p``, ``q`` and ``lambda`` is meant.
 

@@ -181,8 +181,7 @@ class Machine(Section):
 
     def fmi_parameters(self) -> dict[str, float | int | bool]:
         """Return the start values of the predictor FMU's scalar parameters, under their FMI names."""
-        values = {**self.predictor_settings.to_fmi(), "dead_time": self.physics.dead_time}
-        return _without(PredictorSettings.NEEDS_PREVIEW, values)
+        return {**self.predictor_settings.to_fmi(), "dead_time": self.physics.dead_time}
 
     def fmi_compensator_parameters(self) -> dict[str, float | int | bool]:
         """Return the start values of the compensator FMU's scalar parameters, under their FMI names.
@@ -294,10 +293,6 @@ def load_machine(machine: str | Path) -> Machine:
         return machine_from_table(content)
     except ParameterError as error:
         raise MachineError(f"{path.name}: {error}") from error
-
-
-def _without(names: tuple[str, ...], values: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in values.items() if name not in names}
 
 
 def machine_from_table(content: Mapping[str, Any]) -> Machine:

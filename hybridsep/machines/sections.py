@@ -143,11 +143,7 @@ else:
         "CompensatorSection",
         __base__=Entries,
         __doc__="Parameters of the compensator; the predictor's count where they are left out.",
-        **{
-            **_settings_section(PredictorSettings, inherits=True),
-            **_settings_section(CompensatorSettings),
-            **{name: (Number, PARAMETERS[name].default) for name in PredictorSettings.NEEDS_PREVIEW},
-        },
+        **{**_settings_section(PredictorSettings, inherits=True), **_settings_section(CompensatorSettings)},
     )
 
 

@@ -49,7 +49,7 @@ class HeldValue:
         """Begin another run; the resolution step is kept."""
         self.value, self.repeats, self.low, self.high = math.nan, 0, 0.0, 0.0
 
-    def holds(self, value: float, position: float, *, still: float, first_step: float = math.inf) -> bool:
+    def holds(self, value: float, position: float, *, still: float) -> bool:
         """Take in a measured value and return whether it is held.
 
         Parameters
@@ -58,8 +58,6 @@ class HeldValue:
             Measurement, and its physics-based prediction.
         still : float, m
             Predicted motion within which equal values are plausible whatever the resolution.
-        first_step : float, m
-            Resolution step assumed before the first change.
         """
         if value != self.value:
             if not math.isnan(self.value):
@@ -67,10 +65,13 @@ class HeldValue:
             self.value, self.repeats, self.low, self.high = value, 0, position, position
         self.repeats += 1
         self.low, self.high = min(self.low, position), max(self.high, position)
-        return self.stays(self.high - self.low, still=still, first_step=first_step)
+        return self.stays(self.high - self.low, still=still)
 
     def stays(self, motion: float, *, still: float, first_step: float = math.inf) -> bool:
-        """Return whether the last value has been equal under a predicted motion, m; the rest as for :meth:`holds`."""
+        """Return whether the last value has been equal under a predicted motion, m.
+
+        ``first_step`` is the resolution step assumed before the first change, m; the rest as for :meth:`holds`.
+        """
         step = first_step if math.isinf(self.step) else self.step
         return self.repeats >= _REPEATS and motion > max(_STEPS * step, still)
 

@@ -56,7 +56,7 @@ class HybridPredictor(WindowPredictor):
 
     def to_bytes(self) -> bytes:
         """Return parameters and state, a pending window included, as a versioned blob."""
-        pending, reference, residual = self.pending, self.reference_features, self.residual.saved()
+        pending, residual = self.pending, self.residual.saved()
         meta = {
             "settings": self.settings.as_table(),
             **{name: getattr(self, name) for name in ("k", "n_init", "start")},
@@ -71,12 +71,10 @@ class HybridPredictor(WindowPredictor):
             "state": self.state,
             "late": self.late,
             **residual.arrays,
-            "signs": reference.before,
-            "reference": np.array([reference.last]),
             "uncertainty": self.uncertainty.learned(),
         }
         if pending is not None:
-            arrays |= {f"pending_{name}": getattr(pending, name) for name in ("x_d", "x_pb", "reference", "signs")}
+            arrays |= {f"pending_{name}": getattr(pending, name) for name in ("x_d", "x_pb")}
             forecast = self.residual.saved_forecast(pending.forecast)
             arrays |= forecast.arrays
             meta |= forecast.meta
@@ -105,9 +103,6 @@ class HybridPredictor(WindowPredictor):
         predictor.k, predictor.n_init = saved.whole("k"), saved.whole("n_init")
         predictor.state[:] = saved.array("state", predictor.discrete.n_state)
         predictor.late = saved.array("late", settings.measurement_delay)
-        features = predictor.reference_features
-        features.before = saved.array("signs", len(features.before))
-        features.last = float(saved.array("reference", 1, finite=False)[0])
         predictor.residual.restore(saved)
         learned = saved.array("uncertainty", N_LEARNED, finite=False)
         if not predictor.uncertainty.is_sound(learned):
@@ -142,12 +137,10 @@ class HybridPredictor(WindowPredictor):
 def _pending(predictor: HybridPredictor, saved: Saved) -> PredictedWindow:
     """Return the predicted window; StateError if it is inconsistent."""
     start = saved.real("pending_start")
-    x_d, reference = saved.array("pending_x_d", None), saved.array("pending_reference", None)
-    if not len(predictor.late) < len(x_d) <= len(reference):
-        raise saved.error("the pending window must have samples, and a reference at least as long")
+    x_d = saved.array("pending_x_d", None)
+    if not len(predictor.late) < len(x_d):
+        raise saved.error("the pending window must have samples")
     x_pb = saved.array("pending_x_pb", len(x_d))
-    signs = saved.array("pending_signs", len(predictor.reference_features.signs(reference, start)))
-    inputs = WindowInputs(x_d, x_pb, start, predictor.reference_features.features(signs, len(x_d)))
     with np.errstate(all="ignore"):
-        forecast = predictor.residual.restored_forecast(saved, inputs)  # follows from the state
-        return predictor.predicted(forecast, start, reference, signs)
+        forecast = predictor.residual.restored_forecast(saved, WindowInputs(x_d, x_pb, start))  # follows from the state
+        return predictor.predicted(forecast, start)

@@ -30,14 +30,11 @@ class WindowInputs(NamedTuple):
         Commands and physics-based prediction, relative to ``start``.
     start : float, m
         Initial position.
-    features : (n, n_reference) array, m
-        Features of the reference.
     """
 
     x_d: Array
     x_pb: Array
     start: float
-    features: Array
 
 
 @dataclass(frozen=True)

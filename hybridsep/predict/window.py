@@ -62,10 +62,6 @@ class PredictedWindow:
         Commands and response of the physics model, relative to ``start``.
     start : float
         Initial position, m.
-    reference : (≥ n,) array, m
-        Unmodified commanded positions.
-    signs : array
-        ψ of the reference.
     error : PredictedError
         Published residual, and what is known of its error.
     forecast : Forecast
@@ -75,8 +71,6 @@ class PredictedWindow:
     x_d: Array
     x_pb: Array
     start: float
-    reference: Array
-    signs: Array
     error: PredictedError
     forecast: Forecast
 

@@ -21,7 +21,6 @@ from ..base.signals import Array, as_measured, as_samples
 from ..model.physics import ModalModel
 from .forecast import FeatureScales, Forecast
 from .paper.model import PaperModel
-from .reference_features import ReferenceFeatures
 from .regression import RidgeRegression
 from .residual_model import ResidualModel, WindowInputs
 from .start_in_motion import motion_before
@@ -48,7 +47,6 @@ class WindowPredictor:
         self.Np, self.T_s = settings.Np, settings.T_s
         self.model = model
         self.discrete = model.discretise(self.T_s, settings.input_hold, block=self.Np)
-        self.reference_features = ReferenceFeatures(settings.v_friction, self.T_s)
         self.disturbances = tuple(disturbances)
         if self.disturbances and not settings.trust:
             raise ParameterError("disturbances are learned with trust = true only")
@@ -98,12 +96,9 @@ class WindowPredictor:
         self.state = self.discrete.rest()
         self.late = np.zeros(self.settings.measurement_delay)
         self.residual.restart()
-        self.reference_features.restart()
         self.pending: PredictedWindow | None = None
 
-    def predict(
-        self, x_d: ArrayLike, *, reference: ArrayLike | None = None, scales: FeatureScales | None = None
-    ) -> Prediction:
+    def predict(self, x_d: ArrayLike, *, scales: FeatureScales | None = None) -> Prediction:
         """Predict the next window from its commands and all earlier measurements; eqs. (2), (4).
 
         May be called again, with other commands or another length, before :meth:`update`; the last call counts.
@@ -112,8 +107,6 @@ class WindowPredictor:
         ----------
         x_d : (n,) array_like, m
             Commanded positions of the next ``n ≥ 1`` samples; usually ``n = Np``.
-        reference : (m,) array_like, m, optional
-            Unmodified commanded positions, ``m ≥ n``, beyond the window as far as known; ``x_d`` if left out.
         scales : FeatureScales, optional
             With trust: scales of the features, in a compensator; those of ``x_d`` if left out.
 
@@ -124,27 +117,22 @@ class WindowPredictor:
         Raises
         ------
         SignalError
-            If ``x_d`` is empty, not one-dimensional or not finite, or ``reference`` is shorter.
+            If ``x_d`` is empty, not one-dimensional or not finite.
         """
         command = as_samples(x_d, "x_d")
         n = len(command)
         if n == 0:
             raise SignalError("x_d must have at least one sample, got none")
         start = float(command[0]) if self.start is None else self.start
-        path = command if reference is None else as_samples(reference, "reference")
-        if len(path) < n:
-            raise SignalError(f"reference must have at least the {n} samples of x_d, got {len(path)}")
         delay = len(self.late)
-        command, path = np.concatenate((self.late, command - start)), np.concatenate((self.late + start, path))
+        command = np.concatenate((self.late, command - start))
         x_pb, _ = self.discrete.forced_response(self.state, command)  # Eq. (2)
-        signs = self.reference_features.signs(path, start)
-        inputs = WindowInputs(command, x_pb, start, self.reference_features.features(signs, len(command)))
-        forecast = self.residual.forecast(inputs, scales)
-        self.pending = self.predicted(forecast, start, path, signs)
+        forecast = self.residual.forecast(WindowInputs(command, x_pb, start), scales)
+        self.pending = self.predicted(forecast, start)
         std = self.pending.error.std
         return Prediction(x_pb[delay:] + start, forecast.e_h[delay:], std[delay:], self._warm_up(n))
 
-    def predicted(self, forecast: Forecast, start: float, reference: Array, signs: Array) -> PredictedWindow:
+    def predicted(self, forecast: Forecast, start: float) -> PredictedWindow:
         """Return the window of a forecast with what is known of its error, pending measurement.
 
         With a ``measurement_delay`` the window begins so many samples earlier, with those not measured yet.
@@ -157,7 +145,7 @@ class WindowPredictor:
             variance=np.where(active, forecast.variance, 0.0),
             doubted=self.residual.doubted(forecast.x_pb),
         )
-        return PredictedWindow(forecast.x_d, forecast.x_pb, start, reference, signs, error, forecast)
+        return PredictedWindow(forecast.x_d, forecast.x_pb, start, error, forecast)
 
     def update(self, x: ArrayLike, *, learn: bool = True) -> None:
         """Learn from the measurement of the predicted window, or of its first samples; eq. (6).
@@ -193,7 +181,6 @@ class WindowPredictor:
             raise
         if learn:
             self.uncertainty.learn(pending.error, e_pb, accepted)
-        self.reference_features.advance(pending.signs, pending.reference, m)
         _, self.state = self.discrete.forced_response(self.state, pending.x_d[:m])
         self.start, self.late = pending.start, pending.x_d[m : m + len(self.late)].copy()
         self.k += m
@@ -210,11 +197,10 @@ class WindowPredictor:
         forecast = self.residual.begin_in_motion(pending.forecast, x_d, x_pb)
         return replace(pending, x_d=x_d, x_pb=x_pb, forecast=forecast), e_pb - before.x_pb[:m]
 
-    def operator(self, n: int | None = None, *, reference: ArrayLike | None = None) -> WindowOperator:
+    def operator(self, n: int | None = None) -> WindowOperator:
         """Return the lifted prediction of the next ``n`` (default ``Np``) samples, affine in their commands; eq. (3).
 
-        It is the hybrid model, during the warm-up too. ``reference``, ``(n,)``, m, is the unmodified command, for the
-        features of the reference; at rest if left out.
+        It is the hybrid model, during the warm-up too.
 
         Raises
         ------
@@ -236,9 +222,7 @@ class WindowPredictor:
         g_h = paper.impulse_response(g_pb)
         delay = len(self.late)
         free_pb, _ = self.discrete.forced_response(self.state, np.concatenate((self.late, np.zeros(length))))
-        path = np.full(length, start) if reference is None else as_samples(reference, "reference", length)
-        signs = self.reference_features.signs(np.concatenate((self.late + start, path)), start)
-        free = (free_pb + paper.free_run(free_pb, self.reference_features.features(signs, delay + length)))[delay:]
+        free = (free_pb + paper.free_run(free_pb))[delay:]
         free_pb = free_pb[delay:]
         return WindowOperator(
             g_h=g_h,

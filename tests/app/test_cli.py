@@ -334,8 +334,6 @@ def test_the_compensators_parameters_are_options_and_need_a_compensator(hybridse
         4,
         "--no-reversal",
         "false",
-        "--v_friction",
-        0,
     )
     run = ("cosim", "--trajectory", command, "--flavour", "python", "--json")
     status, out, _ = hybridsep(*run, "--compensate", "physics", *given)

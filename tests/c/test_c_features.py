@@ -13,38 +13,31 @@ from hybridsep.base.settings import PredictorSettings
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.paper.features import FeatureLayout
 from hybridsep.predict.predictor import HybridPredictor
-from hybridsep.predict.reference_features import N_REFERENCE
 
 Array = NDArray[np.float64]
 
-NP, V_S = 8, 2e-3
+NP = 8
 
 
 class Features(ctypes.Structure):
     """hsep_features."""
 
-    _fields_ = tuple((name, ctypes.c_uint64) for name in ("p", "q", "x", "e", "reference", "n"))
+    _fields_ = tuple((name, ctypes.c_uint64) for name in ("p", "q", "x", "e", "n"))
 
 
-def layout(p: int, q: int, n_reference: int) -> Features:
+def layout(p: int, q: int) -> Features:
     features = Features()
-    c_core.library("predictor").hsep_features_lay_out(
-        ctypes.byref(features), *map(ctypes.c_uint64, (p, q, n_reference))
-    )
+    c_core.library("predictor").hsep_features_lay_out(ctypes.byref(features), ctypes.c_uint64(p), ctypes.c_uint64(q))
     return features
 
 
-@pytest.mark.parametrize(("p", "q", "v_friction"), [(1, 0, 0.0), (3, 2, 0.0), (8, 7, 0.0), (3, 2, V_S), (8, 0, V_S)])
-def test_a_row_of_the_library_has_the_slices_of_the_core(
-    p: int, q: int, v_friction: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.parametrize(("p", "q"), [(1, 0), (3, 2), (8, 7), (8, 0)])
+def test_a_row_of_the_library_has_the_slices_of_the_core(p: int, q: int, monkeypatch: pytest.MonkeyPatch) -> None:
     model = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
-    predictor = HybridPredictor(
-        model, PredictorSettings(trust=False, Np=NP, p=p, q=q, lam=1e-8, t_init=0.0, v_friction=v_friction), start=0.0
-    )
+    predictor = HybridPredictor(model, PredictorSettings(trust=False, Np=NP, p=p, q=q, lam=1e-8, t_init=0.0), start=0.0)
     learned: list[Array] = []
     monkeypatch.setattr(predictor.regression, "update_stacked", lambda rows: learned.append(rows.copy()))
-    features = layout(p, q, N_REFERENCE if v_friction else 0)
+    features = layout(p, q)
     chance = np.random.default_rng(0)
     x_pb, e_pb = np.zeros(0), np.zeros(0)
     for window in range(3):
@@ -58,16 +51,12 @@ def test_a_row_of_the_library_has_the_slices_of_the_core(
     for k, row in enumerate(learned[-1], start=2 * NP):
         assert row[0] == 1.0
         assert row[features.x : features.e] == pytest.approx(x_pb[k - q : k + 1][::-1], abs=1e-15)
-        assert row[features.e : features.reference] == pytest.approx(e_pb[k - p : k][::-1], abs=1e-15)
-        assert np.all(np.abs(row[features.reference : features.n]) <= 1e-3)
+        assert row[features.e : features.n] == pytest.approx(e_pb[k - p : k][::-1], abs=1e-15)
         assert row[features.n] == pytest.approx(e_pb[k], abs=1e-15)
-    assert features.n - features.reference == (N_REFERENCE if v_friction else 0)
-    assert np.any(learned[-1][:, features.reference : features.n]) == bool(v_friction)
 
 
-@pytest.mark.parametrize(("p", "q", "n_reference"), [(1, 0, 0), (50, 3, 0), (50, 40, N_REFERENCE)])
-def test_both_layouts_are_the_same(p: int, q: int, n_reference: int) -> None:
-    core, library = layout(p, q, n_reference), FeatureLayout(p, q, n_reference)
+@pytest.mark.parametrize(("p", "q"), [(1, 0), (50, 3), (50, 40)])
+def test_both_layouts_are_the_same(p: int, q: int) -> None:
+    core, library = layout(p, q), FeatureLayout(p, q)
     assert (core.p, core.q, core.n) == (library.p, library.q, library.n)
-    assert (slice(core.x, core.e), slice(core.e, core.reference)) == (library.x_pb, library.e_pb)
-    assert slice(core.reference, core.n) == library.reference
+    assert (slice(core.x, core.e), slice(core.e, core.n)) == (library.x_pb, library.e_pb)

@@ -23,16 +23,6 @@ def test_many_problems_are_cut_off_within_the_message() -> None:
     assert 450 < len(message.encode()) < c_core.MESSAGE_SIZE
 
 
-@pytest.mark.parametrize(("learned", "now"), [(2e-3, 0.0), (0.0, 2e-3), (2e-3, 1e-3)])
-def test_weights_of_other_features_are_refused(learned: float, now: float, tmp_path: Path) -> None:
-    n = 2 + 3 + 50 + (13 if learned else 0)
-    write_weights(tmp_path, "compensator", np.eye(n + 1), 100, v_friction=learned)
-    assert refusal(CModel("compensator", {"v_friction": now}, tmp_path).initialise) == (
-        f"v_friction must be {learned!r}, with which this FMU was trained (weights.bin), got {now!r}"
-    )
-    CModel("compensator", {"v_friction": learned}, tmp_path).initialise()
-
-
 def test_resources_that_do_not_fit_are_refused(tmp_path: Path) -> None:
     file = tmp_path / "trajectory_3.bin"
     assert refusal(CModel("trajectory").size) == "trajectory_3.bin must be in the resources (none) and readable"

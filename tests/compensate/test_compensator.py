@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -33,37 +33,22 @@ def test_figures_with_the_papers_settings() -> None:
 def test_figures_with_the_recommended_settings() -> None:
     sep = compensator(**asdict(RECOMMENDED))
     cold, warm = closed(sep), closed(sep, 1000, t_init=0.0)
-    assert 1e6 * cold.tracking_rms == pytest.approx(4.4, abs=0.3)
-    assert 1e6 * warm.tracking_rms == pytest.approx(1.46, abs=0.15)
+    assert 1e6 * cold.tracking_rms == pytest.approx(4.75, abs=0.3)
+    assert 1e6 * warm.tracking_rms == pytest.approx(1.95, abs=0.2)
     for loop in (cold, warm):
         assert beyond(loop.x_dm, DRIVE_LIMITS) <= 1.0
         assert turned(loop.x_dm, loop.x_d) == 0
 
 
-def test_what_the_features_of_the_reference_bring() -> None:
-    """Without them the recommended settings are those of before: 4.7 and 1.95 µm."""
-    sep = compensator(**asdict(replace(RECOMMENDED, v_friction=0.0)))
-    assert 1e6 * closed(sep).tracking_rms == pytest.approx(4.75, abs=0.3)
-    assert 1e6 * closed(sep, 1000, t_init=0.0).tracking_rms == pytest.approx(1.95, abs=0.2)
-
-
 @pytest.mark.parametrize("settings_", [{}, asdict(RECOMMENDED)], ids=["paper", "recommended"])
-@pytest.mark.parametrize("trouble", ["changed", "held", "noise", "limits"])
+@pytest.mark.parametrize("trouble", ["changed", "noise", "limits"])
 def test_trouble_never_makes_it_worse_than_physics(settings_: dict[str, Any], trouble: str) -> None:
-    held = [0.0]
-
-    def hold(k: int, x_meas: float) -> float:
-        if not 1050 <= k < 1550:
-            held[0] = x_meas
-        return held[0]
-
     def change(k: int, drive: Plant) -> None:
         if k == 3050 and isinstance(drive, FeedDrive):
             drive.k, drive.c_nl, drive.k_nl = 1.1 * drive.k, 2 * drive.c_nl, 2 * drive.k_nl
 
     troubles: dict[str, dict[str, Any]] = {
         "changed": {"disturb": change},
-        "held": {"sensor": hold},
         "noise": {"noise": 5e-5},
         "limits": {},
     }
@@ -77,12 +62,12 @@ def test_trouble_never_makes_it_worse_than_physics(settings_: dict[str, Any], tr
     assert np.max(np.abs(hybrid.x_dm - hybrid.x_d)) <= 1e-3
 
 
-@pytest.mark.parametrize("v_friction", [0.0, 2e-3])
+@pytest.mark.parametrize("no_reversal", [False, True])
 @pytest.mark.parametrize("planned", [False, True])
-def test_a_saved_state_goes_on_bit_for_bit(planned: bool, v_friction: float) -> None:
+def test_a_saved_state_goes_on_bit_for_bit(planned: bool, no_reversal: bool) -> None:
     r = np.concatenate((commanded()[900:2600], np.zeros(200)))
     rng = np.random.default_rng(0)
-    sep = compensator(Np=50, p=20, q=3, t_init=0.1, v_friction=v_friction, no_reversal=v_friction > 0)
+    sep = compensator(Np=50, p=20, q=3, t_init=0.1, no_reversal=no_reversal)
 
     def window(one: SepCompensator, k: int, noise: Array) -> Array:
         plan = one.plan(r[k : k + 200])
@@ -96,7 +81,7 @@ def test_a_saved_state_goes_on_bit_for_bit(planned: bool, v_friction: float) -> 
     other = SepCompensator.from_bytes(sep.to_bytes())
     assert other.to_bytes() == sep.to_bytes()
     assert other.settings == sep.settings
-    assert sep.settings.no_reversal is (v_friction > 0)
+    assert sep.settings.no_reversal is no_reversal
     for k in range(600, 1200, 50):
         noise = 5e-6 * rng.normal(size=50)
         np.testing.assert_array_equal(window(other, k, noise), window(sep, k, noise))

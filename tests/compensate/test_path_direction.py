@@ -25,17 +25,14 @@ from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest, spiral
     st.integers(0, 2**31),
     st.sampled_from([1e-6, 1e-4, 1e-2]),
     st.sampled_from([PAPER_LIMITS, DRIVE_LIMITS]),
-    st.sampled_from([0.0, 2e-3]),
 )
-def test_a_command_never_turns_where_the_path_moves(
-    seed: int, spread: float, limits: Limits, v_friction: float
-) -> None:
+def test_a_command_never_turns_where_the_path_moves(seed: int, spread: float, limits: Limits) -> None:
     """Whatever is measured, from window to window, and within the limits."""
     rng = np.random.default_rng(seed)
     stops = np.cumsum(np.concatenate(([0.0], rng.uniform(-0.004, 0.004, 5))))
     r = rest_to_rest(stops, PAPER_LIMITS, TS, dwell=float(rng.uniform(0.0, 0.03)))
     x_d, commands = np.concatenate((r, np.full(300, r[-1]))), []
-    sep = compensator(limits=limits, Np=50, p=10, q=3, t_init=0.0, v_friction=v_friction)
+    sep = compensator(limits=limits, Np=50, p=10, q=3, t_init=0.0)
     for k in range(0, len(r), 50):
         plan = sep.plan(x_d[k : k + 200])
         commands.append(plan.x_dm)

@@ -25,7 +25,7 @@ from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.trajectory import spiral, staircase
 
 MACHINE = load_machine("spring_mass_damper")
-PAPER = {"trust": False, "Np": 100, "p": 50, "q": 3, "lambda": 1e-12, "t_init": 0.3, "v_friction": 0.0}
+PAPER = {"trust": False, "Np": 100, "p": 50, "q": 3, "lambda": 1e-12, "t_init": 0.3}
 COMPENSATE = PARAMETERS["compensate"]
 TOLERANCE = 1e-9  # m, between library and FMU
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -224,19 +224,13 @@ def test_figures(short: Run, tmp_path: Path) -> None:
         assert path.read_bytes().startswith(PNG)
 
 
-def test_the_direction_and_the_features_of_the_reference_can_be_turned_off(flavour: str, fmus: BuiltFmus) -> None:
-    """Fixed parameters of the FMU, without a rebuild; the library with the same settings commands the same."""
+def test_the_direction_can_be_turned_off(flavour: str, fmus: BuiltFmus) -> None:
+    """A fixed parameter of the FMU, without a rebuild; the library with the same settings commands the same."""
     machine, r = load_machine("als25010_y"), spiral()[1][:1500]
     pair = fmus(name_of("SepCompensator", machine, flavour)), fmus(name_of("FeedDrive", machine, flavour))
-    settings: tuple[dict[str, Any], ...] = (
-        {},
-        {"v_friction": 0.0},
-        {"no_reversal": False},
-        {"v_friction": 0.0, "no_reversal": False},
-    )
     commands = []
-    for values in settings:
-        values = {"trust": False, "q": 40, "lambda": 1e-8, "t_init": 0.1, **values}
+    for change in ({}, {"no_reversal": False}):
+        values: dict[str, Any] = {"trust": False, "q": 40, "lambda": 1e-8, "t_init": 0.1, **change}
         run = cosimulate(*pair, r, controller_values=values)
         fmi = {**machine.fmi_compensator_parameters(), **values}
         compensator = machine.new_compensator(
@@ -247,6 +241,4 @@ def test_the_direction_and_the_features_of_the_reference_can_be_turned_off(flavo
         against = np.diff(run.x_dm) * np.sign(np.diff(run.x_d))
         assert (np.min(against) < -1e-6) == ("no_reversal" in values)
         commands.append(run.x_dm)
-    for i in range(4):
-        for j in range(i):
-            assert np.max(np.abs(commands[i] - commands[j])) > 1e-6
+    assert np.max(np.abs(commands[0] - commands[1])) > 1e-6

@@ -47,7 +47,7 @@ def small_predictor(**more: Any) -> HybridPredictor:
 
 def small_compensator(**more: Any) -> SepCompensator:
     settings = CompensatorSettings(preview=24, limits=Limits(0.1, 16.0, 5000.0))
-    return SepCompensator(small_predictor(v_friction=2e-3, **more), settings)
+    return SepCompensator(small_predictor(**more), settings)
 
 
 def use_predictor(predictor: HybridPredictor) -> None:
@@ -75,7 +75,7 @@ def use_compensator(compensator: SepCompensator) -> None:
 
 
 def predictor_state() -> bytes:
-    predictor = small_predictor(v_friction=2e-3)
+    predictor = small_predictor()
     use_predictor(predictor)
     predictor.predict(np.linspace(0, 1e-3, 8))
     return predictor.to_bytes()

@@ -69,7 +69,6 @@ def test_the_interface_is_the_contract(compensator: FmuInstance) -> None:
         ("noise_std", "parameter", "Real", "m", "0.0"),
         ("forgetting", "parameter", "Real", "s", "0.0"),
         ("period", "parameter", "Real", "m", "0.0"),
-        ("v_friction", "parameter", "Real", "m/s", "0.002"),
         ("preview", "parameter", "Integer", None, "200"),
         ("spacing", "parameter", "Integer", None, "2"),
         ("jerk_weight", "parameter", "Real", None, "1.0"),
@@ -101,7 +100,7 @@ def test_both_flavours_have_the_table_and_the_page_shows_the_wiring(python_fmu: 
         description = json.loads(archive.read("resources/machine.json"))
         page = archive.read("documentation/index.html").decode()
     header = c_header(description, "{0}")
-    for line in ("HSEP_MODEL_SEP_COMPENSATOR 1", "HSEP_VR_x_dm = 2,", "HSEP_VR_preview = 30,", "HSEP_VR_mode = 39"):
+    for line in ("HSEP_MODEL_SEP_COMPENSATOR 1", "HSEP_VR_x_dm = 2,", "HSEP_VR_preview = 29,", "HSEP_VR_mode = 38"):
         assert line in header
     assert "SepCompensator</text>" in page
     assert "x_dm → x_d" in page
@@ -193,7 +192,7 @@ def travelling(path: Path) -> dict[str, str]:
 def test_each_fmu_carries_what_it_needs(python_fmu: Fmu, tmp_path: Path) -> None:
     mine = travelling(python_fmu("SepCompensatorPy"))
     assert {"compensate/compensator.py", "online/look_ahead.py", "base/settings.py", "fmi/slave.py"} < set(mine)
-    assert {"predict/reference_features.py", "compensate/interior.py", "compensate/__init__.py"} < set(mine)
+    assert {"predict/window_predictor.py", "compensate/interior.py", "compensate/__init__.py"} < set(mine)
     assert not {"machines/machine.py", "plants/plant.py", "plants/trajectory.py", "fmi/archive.py"} & set(mine)
     for name in ("HybridPredictorPy", "FeedDrivePy"):
         theirs = travelling(python_fmu(name))

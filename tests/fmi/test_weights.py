@@ -244,7 +244,7 @@ def test_both_flavours_say_the_same_of_other_settings(tmp_path: Path) -> None:
         learned, now = (
             HybridPredictor(
                 ModalModel([Mode(**mode) for mode in modes], int(values.pop("dead_time"))),
-                PredictorSettings.from_fmi({name: value for name, value in values.items() if name != "v_friction"}),
+                PredictorSettings.from_fmi(values),
             )
             for values, modes in (
                 ({**c_core.PREDICTOR, **changes}, description["modes"][::-1]),

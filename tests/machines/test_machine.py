@@ -165,7 +165,7 @@ def test_the_compensators_settings_are_the_recommended_ones() -> None:
     for name in ("spring_mass_damper", "als25010_x", "als25010_y"):
         machine = load_machine(name)
         compensator = machine.new_compensator()
-        assert compensator.predictor.settings == PredictorSettings(Np=50, v_friction=2e-3)
+        assert compensator.predictor.settings == PredictorSettings(Np=50)
         paper = {"trust": False, "p": 50, "q": 40, "lambda": 1e-8, "t_init": 0.1}  # as the comment there says
         assert machine.changed("compensator", paper).compensator_predictor == RECOMMENDED
         limits = Limits(0.1, 16.0, 5000.0)
@@ -199,26 +199,24 @@ def test_what_the_compensator_section_leaves_out_is_the_predictors(tmp_path: Pat
         "a_max": 8.0,
         "j_max": 900.0,
         "change_max": 1e-3,
-        "v_friction": 2e-3,
         "no_reversal": True,
         "compensate": 2,
     }
     entries = "Np = 30\nq = 9\nlambda = 1e-9\nt_init = 0.1\npreview = 180\nspacing = 3\njerk_weight = 0\n"
-    entries += "v_friction = 1e-3\nno_reversal = false\n"
+    entries += "no_reversal = false\n"
     machine = load_machine(write(tmp_path, COMPENSATED + entries))
     given = {"Np": 30, "p": 20, "q": 9, "lambda": 1e-9, "t_init": 0.1, "preview": 180, "spacing": 3, "jerk_weight": 0.0}
-    given |= {"v_friction": 1e-3, "no_reversal": False}
+    given |= {"no_reversal": False}
     found = machine.fmi_compensator_parameters()
     assert {name: found[name] for name in given} == given
     changes = replace(machine.compensator_settings, preview=90, change_max=None, compensate="physics")
     compensator = machine.new_compensator(changes, predictor=replace(machine.compensator_predictor, p=10))
-    settings = PredictorSettings(Np=30, p=10, q=9, lam=1e-9, T_s=0.002, t_init=0.1, v_friction=1e-3)
+    settings = PredictorSettings(Np=30, p=10, q=9, lam=1e-9, T_s=0.002, t_init=0.1)
     assert compensator.predictor.settings == settings
     assert compensator.settings == changes
     assert (changes.spacing, changes.no_reversal, changes.jerk_weight) == (3, False, 0.0)
-    without = machine.new_compensator(predictor=replace(machine.compensator_predictor, trust=False, v_friction=0.0))
+    without = machine.new_compensator(predictor=replace(machine.compensator_predictor, trust=False))
     assert without.predictor.n_features == 2 + 9 + 20
-    assert machine.predictor_settings.v_friction == 0.0  # it predicts with the paper's features
     assert machine.fmi_parameters()["Np"] == 50
 
 
@@ -264,8 +262,7 @@ def test_a_predictors_section_alone_gives_a_compensator(tmp_path: Path, Np: int,
         ("Np = 2.5", r"compensator.Np: Np must be a whole number, got 2.5"),
         ('p = "many"', r"compensator.p: p must be a number, got 'many'"),
         ("change_max = 1e-3", r"compensator.change_max is not an entry"),
-        ("v_friction = -1e-3", r"compensator.v_friction: v_friction must be 0 or 1e-09 … 10000 m/s, got -0.001"),
-        ("v_friction = inf", r"compensator.v_friction: v_friction must be finite, got inf"),
+        ("v_friction = 2e-3", r"compensator.v_friction is not an entry"),
         ("no_reversal = 2", r"compensator.no_reversal: no_reversal must be true or false, got 2"),
         ('no_reversal = "no"', r"compensator.no_reversal: no_reversal must be true or false, got 'no'"),
         ("spacing = 3", r"compensator: spacing must be ≥ 1 and divide Np = 50, got 3 \(Np, p, q of \[predictor\]\)"),

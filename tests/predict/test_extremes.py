@@ -39,7 +39,7 @@ SMALL = {"Np": 8, "p": 4, "q": 2, "dead_time": 0, "preview": 24, "spacing": 2}
 
 LEARNING = ("lambda", "T_s", "t_init")
 TRUST = ("effect", "noise_std", "forgetting")
-PLANNING = ("jerk_weight", "v_max", "a_max", "j_max", "change_max", "v_friction")
+PLANNING = ("jerk_weight", "v_max", "a_max", "j_max", "change_max")
 MODE = ("f_n", "zeta", "alpha", "beta")
 FEED_DRIVE = ("m", "c", "k", "c_nl", "k_nl", "noise_std")
 STAGE = ("f", "kappa", "T_s", "noise_std")

@@ -36,9 +36,9 @@ def numbered(modes: Sequence[Mapping[str, float]]) -> dict[str, float]:
 
 
 def library_predictor(values: Mapping[str, Any]) -> HybridPredictor:
-    """Return the predictor; ``v_friction`` may be among the values, ``dead_time`` and ``mode[i].*`` must."""
+    """Return the predictor; ``dead_time`` and ``mode[i].*`` must be among the values."""
     model = ModalModel([Mode(**mode) for mode in modes_from(values)], values["dead_time"])
-    return HybridPredictor(model, PredictorSettings.from_fmi({"v_friction": 0.0, **values}))
+    return HybridPredictor(model, PredictorSettings.from_fmi(values))
 
 
 def library_compensator(values: Mapping[str, Any]) -> SepCompensator:

@@ -102,7 +102,6 @@ def random_loop(seed: int, n: int = 2500, machine: str | None = None, **fixed: f
     values |= {
         "change_max": float(rng.choice([1e-4, 2e-4, 5e-4, 1e-3, 5e-3])),
         "jerk_weight": float(10 ** rng.uniform(-2, 2.5)),
-        "v_friction": float(rng.choice([0.0, 1e-3, 2e-3, 5e-3])),
         "no_reversal": int(rng.integers(2)),
         "t_init": float(rng.choice([0.0, 0.05, 0.1, 0.3])),
     }

@@ -8,7 +8,7 @@
 #include <string.h>
 
 #define WEIGHTS_FILE "weights.bin"
-#define WEIGHTS_MAGIC "HSEPWG10"
+#define WEIGHTS_MAGIC "HSEPWG11"
 #define WEIGHTS_CHUNK 512 /* bytes that are summed up at once, a multiple of 8 */
 
 typedef struct {
@@ -63,11 +63,9 @@ static void weights_compare(const char *name, double learned, double got, hsep_k
 }
 
 /* Read the settings of the file and compare them with those of the table: 0 if it is damaged. A setting that the table
- * has not is 0 here; modes that only one side has are told by their number. has_v_friction: whether v_friction
- * has an effect. */
+ * has not is 0 here; modes that only one side has are told by their number. */
 static int weights_compare_settings(
-    FILE *file, const hsep_context *context, const double values[], int has_v_friction, uint64_t n_settings,
-    char message[])
+    FILE *file, const hsep_context *context, const double values[], uint64_t n_settings, char message[])
 {
     uint64_t n_missing = 0;
     for (size_t i = 0; i < context->n_variables; i++) {
@@ -81,9 +79,7 @@ static int weights_compare_settings(
         const size_t place = hsep_table_place(context, setting.name);
         if (place < context->n_variables) {
             const hsep_variable *variable = hsep_table_row(context, place);
-            if (has_v_friction || strcmp(setting.name, "v_friction") != 0) {
-                weights_compare(setting.name, setting.value, values[place], variable->kind, message);
-            }
+            weights_compare(setting.name, setting.value, values[place], variable->kind, message);
             n_missing -= variable->learned != 0;
         } else if (strncmp(setting.name, "mode[", 5) != 0) {
             const hsep_kind kind = strcmp(setting.name, "trust") == 0 ? HSEP_BOOLEAN : HSEP_REAL;
@@ -144,9 +140,7 @@ static int weights_take(
         return 0;
     }
     weights_compare("the number of modes", (double)head.n_modes, (double)n_modes, HSEP_INTEGER, message);
-    const int has_v_friction = hsep_residual_has_v_friction(model);
-    if (!weights_compare_settings(file, context, values, has_v_friction, head.n_settings, message) ||
-        message[0] != '\0') {
+    if (!weights_compare_settings(file, context, values, head.n_settings, message) || message[0] != '\0') {
         return 0;
     }
     if (head.n_learned != HSEP_N_UNCERTAINTY + hsep_residual_n_learned(model) || size != weights_size(&head, model) ||

@@ -44,12 +44,10 @@ HSEP_API void hsep_online_read(const double values[], hsep_online_parameters *pa
     const int trust = predictor->trust.trust != 0;
     const double T_s = predictor->settings.T_s, t_init = hsep_warm_up(predictor->settings.t_init, trust);
     predictor->preview = settings.preview;
-    predictor->v_friction = trust ? 0.0 : settings.v_friction;
     /* The warm-up counts from the end of the first fill; without one, the first window is planned with what is
      * known. */
     predictor->n_init = hsep_warm_up_samples(t_init > 0.0 ? t_init + (double)settings.preview * T_s : 0.0, T_s);
     predictor->planned = 1;
-    predictor->unlearns = !trust;
     parameters->planner = (hsep_planner_parameters){
         .Np = predictor->settings.Np,
         .preview = settings.preview,

@@ -16,20 +16,16 @@ __all__ = ["FeatureLayout", "PastSamples"]
 class FeatureLayout:
     """Slices of φ and w by groups of features.
 
-    ``φ(k) = [1, x_pb(k) … x_pb(k−q), e_pb(k−1) … e_pb(k−p), those of the reference]``; eq. (5). In C:
-    ``hsep_features.h``.
+    ``φ(k) = [1, x_pb(k) … x_pb(k−q), e_pb(k−1) … e_pb(k−p)]``; eq. (5). In C: ``hsep_features.h``.
 
     Parameters
     ----------
     p, q : int
         Lags of ``e_pb`` and of ``x_pb``.
-    n_reference : int
-        Features of the reference; none in the paper.
     """
 
     p: int
     q: int
-    n_reference: int = 0
 
     @property
     def bias(self) -> int:
@@ -47,14 +43,9 @@ class FeatureLayout:
         return slice(self.x_pb.stop, self.x_pb.stop + self.p)
 
     @property
-    def reference(self) -> slice:
-        """Features of the reference."""
-        return slice(self.e_pb.stop, self.n)
-
-    @property
     def n(self) -> int:
         """Number of features."""
-        return int(self.e_pb.stop) + self.n_reference
+        return int(self.e_pb.stop)
 
 
 class PastSamples:
@@ -93,21 +84,13 @@ class PastSamples:
         p, q, m = self.layout.p, self.layout.q, len(e_pb)
         self._x[q : q + m], self._e[p : p + m] = x_pb, e_pb
 
-    def rows(self, m: int, reference: Array) -> Array:
-        """Return the rows ``[φ(k) | e_pb(k)]`` of the ``m`` appended samples, ``(m, n + 1)``; eq. (5).
-
-        Parameters
-        ----------
-        m : int
-        reference : (m, n_reference) array, m
-            Features of the reference.
-        """
+    def rows(self, m: int) -> Array:
+        """Return the rows ``[φ(k) | e_pb(k)]`` of the ``m`` appended samples, ``(m, n + 1)``; eq. (5)."""
         layout, p = self.layout, self.layout.p
         rows = self._rows if m == self.Np else np.empty((m, layout.n + 1), order="F")
         rows[:, layout.bias] = 1.0
         rows[:, layout.x_pb] = self._x_lags[:m]
         rows[:, layout.e_pb] = self._e_lags[:m]
-        rows[:, layout.reference] = reference
         rows[:, -1] = self._e[p : p + m]
         return rows
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -14,28 +13,14 @@ from ...base.saved import Saved
 from ...base.settings import PredictorSettings
 from ...base.signals import Array
 from ..forecast import FeatureScales, Forecast
-from ..reference_features import n_reference
 from ..regression import RidgeRegression
 from ..residual_model import ResidualModel, SavedFields, WindowInputs
 from .features import FeatureLayout, PastSamples
 
-__all__ = ["PaperForecast", "PaperModel"]
+__all__ = ["PaperModel"]
 
 
-@dataclass(frozen=True)
-class PaperForecast(Forecast):
-    """Window predicted by the paper's model.
-
-    Attributes
-    ----------
-    features : (n, n_reference) array, m
-        Features of the reference.
-    """
-
-    features: Array
-
-
-class PaperModel(ResidualModel[PaperForecast]):
+class PaperModel(ResidualModel[Forecast]):
     """Linear model of the residual by its lags and those of ``x_pb``, every weight with the penalty λ.
 
     Parameters
@@ -52,7 +37,7 @@ class PaperModel(ResidualModel[PaperForecast]):
 
     def __init__(self, settings: PredictorSettings) -> None:
         self.Np = settings.Np
-        self.layout = _layout(settings)
+        self.layout = FeatureLayout(settings.p, settings.q)
         self.past = PastSamples(self.layout, settings.Np)
         self.regression = RidgeRegression(self.layout.n, settings.lam)
         self.n_rejected = 0
@@ -76,27 +61,22 @@ class PaperModel(ResidualModel[PaperForecast]):
         """Begin another run, at rest; what was learned is kept."""
         self.past.restart()
 
-    def forecast(self, window: WindowInputs, scales: FeatureScales | None = None) -> PaperForecast:
+    def forecast(self, window: WindowInputs, scales: FeatureScales | None = None) -> Forecast:
         """Predict the residual over the next window; its features have no scales."""
         n = len(window.x_pb)
-        e_h = self.free_run(window.x_pb, window.features)
-        return PaperForecast(window.x_d, window.x_pb, e_h, np.zeros(n), window.features)
+        return Forecast(window.x_d, window.x_pb, self.free_run(window.x_pb), np.zeros(n))
 
-    def free_run(self, x_pb: Array, features: Array) -> Array:
+    def free_run(self, x_pb: Array) -> Array:
         """Return ``wᵀφ`` over a window in free run, ``(n,)``, m; eq. (4).
 
         Parameters
         ----------
         x_pb : (n,) array, m
             Physics-based prediction, relative to the start.
-        features : (n, n_reference) array, m
-            Features of the reference.
         """
         w, layout, past = self.regression.weights, self.layout, self.past
-        # Exogenous part: w₀ + Σ_i w_x,i x_pb(k−i), and the features of the reference
+        # Exogenous part: w₀ + Σ_i w_x,i x_pb(k−i)
         drive = w[layout.bias] + np.convolve(np.concatenate((past.x_pb, x_pb)), w[layout.x_pb], "valid")
-        if layout.n_reference:
-            drive += features @ w[layout.reference]
         # e(k) = drive(k) + Σ_i w_e,i e(k−i), an all-pole filter started from the measured residuals:
         # its state is z_j = Σ_m w_e,j+m e(−m)
         w_e = w[layout.e_pb]
@@ -110,7 +90,7 @@ class PaperModel(ResidualModel[PaperForecast]):
         w_x, denominator = self.regression.weights[self.layout.x_pb], np.concatenate(([1.0], -self.lag_weights))
         return np.asarray(g_pb + lfilter(w_x, denominator, g_pb))
 
-    def learn(self, forecast: PaperForecast, x: Array, *, fold: bool = True) -> NDArray[np.bool_]:
+    def learn(self, forecast: Forecast, x: Array, *, fold: bool = True) -> NDArray[np.bool_]:
         """Learn from the measurement of a window; every sample is accepted."""
         m = len(x)
         x_pb = forecast.x_pb[:m]
@@ -119,7 +99,7 @@ class PaperModel(ResidualModel[PaperForecast]):
             stop = min(i + self.Np, m)
             self.past.append(x_pb[i:stop], e_pb[i:stop])
             if fold:
-                self.regression.update_stacked(self.past.rows(stop - i, forecast.features[i:stop]))
+                self.regression.update_stacked(self.past.rows(stop - i))
             self.past.advance(stop - i)
         return np.ones(m, dtype=np.bool_)
 
@@ -130,7 +110,7 @@ class PaperModel(ResidualModel[PaperForecast]):
     @staticmethod
     def check_sizes(saved: Saved, settings: PredictorSettings) -> None:
         """Raise StateError if arrays do not have the sizes of the settings."""
-        n = _layout(settings).n
+        n = FeatureLayout(settings.p, settings.q).n
         saved.array("x_pb", settings.q), saved.array("e_pb", settings.p), saved.array("factor", n + 1, n + 1)
 
     def saved(self) -> SavedFields:
@@ -146,11 +126,11 @@ class PaperModel(ResidualModel[PaperForecast]):
         self.past.x_pb[:] = saved.array("x_pb", self.layout.q)
         self.past.e_pb[:] = saved.array("e_pb", self.layout.p)
 
-    def saved_forecast(self, forecast: PaperForecast) -> SavedFields:
+    def saved_forecast(self, forecast: Forecast) -> SavedFields:
         """Return no fields: a forecast follows from the state and its window."""
         return SavedFields({}, {}, {})
 
-    def restored_forecast(self, saved: Saved, window: WindowInputs) -> PaperForecast:
+    def restored_forecast(self, saved: Saved, window: WindowInputs) -> Forecast:
         """Return the forecast, which may have diverged."""
         return self.forecast(window)
 
@@ -164,7 +144,3 @@ class PaperModel(ResidualModel[PaperForecast]):
 
     def restore_learned(self, learned: Mapping[str, Array]) -> None:
         """Restore nothing: all is in the regression."""
-
-
-def _layout(settings: PredictorSettings) -> FeatureLayout:
-    return FeatureLayout(settings.p, settings.q, n_reference(settings.v_friction))

@@ -36,35 +36,34 @@ static void compensator_target(hsep_compensator *self, hsep_sep_state state)
         target[k] = x_d[k] - predictor->start - x[preview - 1 - k];
     }
     if (state == HSEP_SEP_HYBRID) {
-        const hsep_paper *paper = hsep_residual_paper(hsep_predictor_model(predictor));
-        const hsep_recursion recursion = hsep_paper_recursion(paper, 1);
+        const hsep_recursion recursion = hsep_paper_recursion(hsep_residual_paper(hsep_predictor_model(predictor)), 1);
         memcpy(x + preview, hsep_at(predictor, predictor->past_x) + Np, (size_t)predictor->q * sizeof(double));
         memcpy(e + preview, hsep_at(predictor, predictor->past_e) + Np, (size_t)predictor->p * sizeof(double));
-        hsep_recursion_run(&recursion, x, hsep_paper_drive(paper, preview), e, preview, 0, preview);
+        hsep_recursion_run(&recursion, x, e, preview, 0, preview);
         for (uint64_t k = 0; k < preview; k++) {
             target[k] -= e[preview - 1 - k];
         }
     }
 }
 
-/* The spline filtered by the hybrid model, G_h = (1 + W_x / (1 - W_e)) G_pb as filters. */
-static void compensator_filter_spline(hsep_compensator *self)
+/* The spline filtered by the hybrid model, G_h = (1 + W_x / (1 - W_e)) G_pb as filters, (preview,), in place of a trial. */
+static const double *compensator_filter_spline(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     const hsep_recursion recursion = hsep_paper_recursion(hsep_residual_paper(hsep_predictor_model(predictor)), 0);
     const uint64_t preview = predictor->preview;
     const double *spline_pb = hsep_at(self, self->spline_pb);
     double *x = hsep_at(self, self->trial_x), *e = hsep_at(self, self->trial_e);
-    double *spline_h = hsep_at(self, self->spline_h);
     for (uint64_t k = 0; k < preview; k++) {
         x[preview - 1 - k] = spline_pb[k];
     }
     memset(x + preview, 0, (size_t)recursion.q * sizeof(double));
     memset(e + preview, 0, (size_t)recursion.p * sizeof(double));
-    hsep_recursion_run(&recursion, x, NULL, e, preview, 0, preview);
+    hsep_recursion_run(&recursion, x, e, preview, 0, preview);
     for (uint64_t k = 0; k < preview; k++) {
-        spline_h[k] = spline_pb[k] + e[preview - 1 - k];
+        x[k] = spline_pb[k] + e[preview - 1 - k];
     }
+    return x;
 }
 
 /* Whether the hybrid model may plan the window that begins. */
@@ -73,7 +72,7 @@ static int compensator_trusts(hsep_compensator *self)
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     const hsep_recursion recursion = hsep_paper_recursion(hsep_residual_paper(hsep_predictor_model(predictor)), 0);
     return self->compensate == HSEP_SEP_HYBRID && (double)predictor->k >= predictor->n_init &&
-           hsep_residual_factor(hsep_predictor_model(predictor), 0)->n_samples > 0 && self->monitor.excess <= 0.0 &&
+           hsep_residual_factor(hsep_predictor_model(predictor), 0)->n_samples > 0 &&
            hsep_recursion_stable(&recursion, hsep_at(self, self->trial_e));
 }
 
@@ -156,10 +155,10 @@ static void compensator_solve(hsep_compensator *self)
 static hsep_plan_status compensator_try(hsep_compensator *self, hsep_sep_state state)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
-    const uint64_t spline = state == HSEP_SEP_HYBRID ? self->spline_h : self->spline_pb;
     compensator_target(self, state);
+    const double *spline = state == HSEP_SEP_HYBRID ? compensator_filter_spline(self) : hsep_at(self, self->spline_pb);
     hsep_planner_open(hsep_compensator_planner(self), hsep_at(predictor, predictor->x_d));
-    hsep_planner_aim(hsep_compensator_planner(self), hsep_at(self, spline), hsep_at(self, self->target));
+    hsep_planner_aim(hsep_compensator_planner(self), spline, hsep_at(self, self->target));
     const hsep_plan_status status = hsep_planner_solve(hsep_compensator_planner(self), 0, &compensator_tolerance);
     self->state = (uint64_t)(status == HSEP_PLAN_FAILED ? HSEP_SEP_OFF : state);
     return status;
@@ -172,7 +171,6 @@ static void compensator_plan(hsep_compensator *self)
     hsep_plan_status status = HSEP_PLAN_FAILED;
     self->state = HSEP_SEP_OFF;
     if (compensator_trusts(self)) {
-        compensator_filter_spline(self);
         status = compensator_try(self, HSEP_SEP_HYBRID);
     }
     if (status == HSEP_PLAN_FAILED && self->compensate != HSEP_SEP_OFF) {
@@ -215,18 +213,11 @@ HSEP_API void hsep_compensator_begin(hsep_compensator *self)
     }
 }
 
-/* Finish a window, update the excess prediction error, and begin the next window. */
+/* Finish a window and begin the next one. */
 static void compensator_next_window(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
-    const uint64_t Np = predictor->Np;
-    /* Predictions from few rows, before the warm-up is over, are not used: they are not judged. */
-    if (hsep_predictor_finish(predictor) && !self->trusted && (double)(predictor->k - Np) >= predictor->n_init) {
-        const hsep_regression *regression = hsep_residual_factor(hsep_predictor_model(predictor), 0);
-        hsep_plan_monitor_observe(
-            &self->monitor, hsep_at(predictor, predictor->past_e), hsep_at(predictor, predictor->e_h), Np,
-            regression->residual_sum / (double)regression->n_samples);
-    }
+    hsep_predictor_finish(predictor);
     hsep_planner_next(hsep_compensator_planner(self), hsep_at(predictor, predictor->x_d));
     hsep_compensator_begin(self);
 }

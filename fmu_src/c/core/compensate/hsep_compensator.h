@@ -9,10 +9,9 @@
  *
  * Cost of a sample, with n features and m splines in a plan: that of hsep_regression_fold(n). At the end of a window on
  * top n^2 / 2 + p^2 / 2 + (2 preview + Np) (p + q) + m^3 / 6 + m preview multiply-adds, the last two twice if the
- * hybrid plan fails, and copies of the regression and of the dead time. While a plan is being solved that of
- * hsep_interior_step, three times in each of the 8 samples that follow; where so many are not pinned (Np < 16, or
- * spacing > 8) more often, or HSEP_INTERIOR_STEPS times at once. All of it is bounded by the parameters; m = 1000 is
- * far from real time.
+ * hybrid plan fails, and a copy of the dead time. While a plan is being solved that of hsep_interior_step, three times
+ * in each of the 8 samples that follow; where so many are not pinned (Np < 16, or spacing > 8) more often, or
+ * HSEP_INTERIOR_STEPS times at once. All of it is bounded by the parameters; m = 1000 is far from real time.
  *
  * With trust and a late measurement the plan is as dear, and late^2 / 2 multiply-adds for each expert come on top in
  * two of the samples of a window: nothing to speak of up to 100 samples, 2 ms of a desktop's core for 1000.
@@ -28,7 +27,6 @@
 #include "hsep_layout.h"
 #include "hsep_planner.h"
 #include "hsep_predictor.h"
-#include "hsep_plan_monitor.h"
 #include "hsep_trusted_planner.h"
 
 #include <stdint.h>
@@ -47,20 +45,19 @@ typedef struct {
     uint64_t state;      /* hsep_sep_state of the window, */
     uint64_t before;     /* and of the window before, whose plan the first samples follow with trust */
     uint64_t solving;    /* whether its plan is being solved */
-    hsep_plan_monitor monitor;
     /* Offsets in doubles from the beginning of the struct */
-    uint64_t x_dm;      /* (Np,) m, the window: modified commands */
-    uint64_t trial_x;   /* (preview + q,) m, x_pb of a trial, newest first */
+    uint64_t x_dm; /* (Np,) m, the window: modified commands */
+    uint64_t
+        trial_x; /* (preview + q,) m, x_pb of a trial, newest first; then the spline filtered by the hybrid model */
     uint64_t trial_e;   /* (preview + p,) m, its residuals */
     uint64_t target;    /* (preview,) m */
-    uint64_t spline_pb; /* (preview,) m/m, a spline filtered by the physics model, */
-    uint64_t spline_h;  /* (preview,) m/m, and by the hybrid one */
+    uint64_t spline_pb; /* (preview,) m/m, a spline filtered by the physics model */
     uint64_t trial;     /* the physics model of a trial */
     uint64_t planner, predictor;
     uint64_t trusted; /* the planner on the residual model that can be trusted; 0: the paper's */
 } hsep_compensator;
 
-HSEP_ASSERT_WORDS(hsep_compensator, 15);
+HSEP_ASSERT_WORDS(hsep_compensator, 13);
 
 typedef struct {
     hsep_predictor_outputs predicted; /* x_h: of the model that planned the window; with trust that of its model */

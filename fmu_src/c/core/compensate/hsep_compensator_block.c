@@ -35,7 +35,6 @@ static double compensator_lay_out(hsep_compensator *self, const hsep_compensator
     self->trial_e = hsep_take(&end, preview + (double)predictor->settings.p);
     self->target = hsep_take(&end, preview);
     self->spline_pb = hsep_take(&end, preview);
-    self->spline_h = hsep_take(&end, preview);
     self->trial = hsep_take_block(&end, hsep_physics_size(predictor->n_modes, predictor->settings.dead_time));
     self->planner = hsep_take_block(&end, hsep_planner_size(&parameters->planner));
     self->predictor = hsep_take_block(&end, hsep_predictor_size(predictor));

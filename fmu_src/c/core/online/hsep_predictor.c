@@ -9,12 +9,10 @@
 HSEP_API hsep_residual_window hsep_predictor_window(hsep_predictor *self)
 {
     return (hsep_residual_window){
-        .x_d = hsep_at(self, self->x_d),
         .command = hsep_at(self, self->command),
         .x_pb = hsep_at(self, self->past_x),
         .e = hsep_at(self, self->past_e),
-        .e_h = hsep_at(self, self->e_h),
-        .n_physics = self->n_physics};
+        .e_h = hsep_at(self, self->e_h)};
 }
 
 HSEP_API int hsep_predictor_take_in(hsep_predictor *self, double x_d_ahead, double x_meas)
@@ -27,8 +25,6 @@ HSEP_API int hsep_predictor_take_in(hsep_predictor *self, double x_d_ahead, doub
     hsep_at(self, self->past_e)[j] = x_meas - self->start - hsep_at(self, self->past_x)[j]; /* e_pb = x - x_pb */
     const hsep_residual_sample sample = {
         .i = i,
-        .x_meas = x_meas,
-        .x_pb = x_pb,
         .relative = x_meas - self->start,
         .x = hsep_at(self, self->past_x) + j,
         .e = hsep_at(self, self->past_e) + j};
@@ -72,7 +68,7 @@ static void predictor_start(hsep_predictor *self)
     }
 }
 
-HSEP_API int hsep_predictor_finish(hsep_predictor *self)
+HSEP_API void hsep_predictor_finish(hsep_predictor *self)
 {
     const uint64_t n = self->n, late = self->late;
     const hsep_residual_window window = hsep_predictor_window(self);
@@ -81,13 +77,11 @@ HSEP_API int hsep_predictor_finish(hsep_predictor *self)
     if (self->motion && self->k == self->preview + self->Np) {
         predictor_start(self);
     }
-    const int learned = hsep_residual_finish(model, &window);
-    if (learned) {
+    if (hsep_residual_finish(model, &window)) {
         hsep_uncertainty_learn(hsep_predictor_uncertainty(self), past_e + late, hsep_residual_accepted(model));
     }
     memcpy(past_x + n, past_x + late, (size_t)self->q * sizeof(double)); /* q < Np, p <= Np: they do not overlap */
     memcpy(past_e + n, past_e + late, (size_t)self->p * sizeof(double));
-    return learned;
 }
 
 /* Keep the samples of the window that are not measured yet, before the next one. */
@@ -114,9 +108,7 @@ HSEP_API void hsep_predictor_begin(hsep_predictor *self)
     if (e_h != past_e) {
         memcpy(e_h + n, past_e + n, (size_t)self->p * sizeof(double));
     }
-    const hsep_residual_window window = hsep_predictor_window(self);
-    hsep_residual_begin(
-        hsep_predictor_model(self), &window, self->k >= self->preview); /* the first fill is not learned */
+    hsep_residual_begin(hsep_predictor_model(self), self->k >= self->preview); /* the first fill is not learned */
     self->n_published = 0;
     self->held = self->residual;
 }
@@ -209,7 +201,7 @@ HSEP_API int hsep_predictor_sample(hsep_predictor *self, double x_d_ahead, doubl
         }
         return 0;
     }
-    (void)hsep_predictor_finish(self);
+    hsep_predictor_finish(self);
     if (self->k == self->preview) { /* the first fill was not predicted */
         memset(hsep_at(self, self->past_e), 0, (size_t)(self->n + self->p) * sizeof(double));
     }

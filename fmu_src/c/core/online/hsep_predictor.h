@@ -13,10 +13,9 @@
  * window hsep_predictor_finish and _begin; once commands are decided, hsep_predictor_publish.
  *
  * Cost of a sample, with n features: that of hsep_regression_fold(n), and alone 9 multiply-adds a mode; at the end of a
- * window (Np (p + q + 2) + n^2 / 2) multiply-adds on top, the tanh of hsep_reference_features_signs(preview) and,
- * where windows are unlearned, a copy of the regression. Never more, at no sample number. With trust nothing is folded
- * but at the end of a window: hsep_trusted_learn and hsep_trusted_forecast, which leaves four fifths of the window that
- * begins to the next four samples.
+ * window (Np (p + q + 2) + n^2 / 2) multiply-adds on top. Never more, at no sample number. With trust nothing is folded but at
+ * the end of a window: hsep_trusted_learn and hsep_trusted_forecast, which leaves four fifths of the window that begins
+ * to the next four samples.
  *
  * Memory is one block: the struct, then what its offsets tell; no pointers, so a copy of the block is the state.
  * Reentrant; allocates nothing. Once the parameters are in range nothing here fails but the prediction of a window:
@@ -39,11 +38,9 @@
 typedef struct {
     hsep_predictor_settings settings;
     hsep_trust_settings trust;
-    double v_friction;      /* m/s, scale of friction's change of sign; 0: no features of the reference */
     uint64_t preview;       /* samples from r(k) to the drive, >= Np; Np alone */
     double n_init;          /* samples of warm-up from the beginning; whole, >= 0 */
     int planned;            /* whether a compensator decides the commands of a window when it begins */
-    int unlearns;           /* whether a window with a missing sample is unlearned */
     uint64_t n_modes;       /* >= 1 */
     const hsep_mode *modes; /* (n_modes,) */
 } hsep_predictor_parameters;
@@ -120,11 +117,10 @@ HSEP_API double hsep_predictor_std(const hsep_predictor *self, uint64_t i);
 /* Process sample k: learn it, update the error sums, advance to k + 1; return whether the window has ended. */
 HSEP_API int hsep_predictor_take_in(hsep_predictor *self, double x_d_ahead, double x_meas);
 
-/* Finish a window: learn it with trust, and its errors; its residuals, as measured, or as predicted where missing,
- * become the past of the next one. Return whether it was learned. */
-HSEP_API int hsep_predictor_finish(hsep_predictor *self);
+/* Finish a window: learn it with trust, and its errors; its residuals become the past of the next one. */
+HSEP_API void hsep_predictor_finish(hsep_predictor *self);
 
-/* Begin a window: commands, weights, and the part of the features of the reference. */
+/* Begin a window: commands and weights. */
 HSEP_API void hsep_predictor_begin(hsep_predictor *self);
 
 /* The signals of the window, as its residual model takes them. */

@@ -30,9 +30,7 @@ HSEP_API hsep_residual_parameters hsep_predictor_model_parameters(const hsep_pre
         .modes = parameters->modes,
         .n_modes = parameters->n_modes,
         .preview = parameters->preview,
-        .v_friction = parameters->v_friction,
-        .planned = parameters->planned,
-        .unlearns = parameters->unlearns};
+        .planned = parameters->planned};
 }
 
 static hsep_start_parameters predictor_start_parameters(const hsep_predictor_parameters *parameters)

@@ -6,15 +6,6 @@
 /* Parts in which the one that can be trusted predicts a window: its variances are dear. */
 static const uint64_t residual_parts = 5;
 
-static hsep_paper_parameters residual_paper_parameters(const hsep_residual_parameters *parameters)
-{
-    return (hsep_paper_parameters){
-        .settings = parameters->settings,
-        .preview = parameters->preview,
-        .v_friction = parameters->v_friction,
-        .unlearns = parameters->unlearns};
-}
-
 HSEP_API hsep_trusted_parameters hsep_residual_trusted_parameters(const hsep_residual_parameters *parameters)
 {
     return (hsep_trusted_parameters){
@@ -44,14 +35,13 @@ static const hsep_trusted *residual_trusted(const hsep_residual_model *self)
 /* Set what follows from the parameters; return the bytes of the block. */
 static double residual_lay_out(hsep_residual_model *self, const hsep_residual_parameters *parameters)
 {
-    const hsep_paper_parameters paper = residual_paper_parameters(parameters);
     const hsep_trusted_parameters trusted = hsep_residual_trusted_parameters(parameters);
     double end = HSEP_WORDS(hsep_residual_model);
     self->Np = parameters->settings->Np;
     self->late = parameters->settings->measurement_delay;
     self->n = self->Np + self->late;
     self->planned = parameters->planned != 0;
-    self->paper = parameters->trust->trust ? 0 : hsep_take_block(&end, hsep_paper_size(&paper));
+    self->paper = parameters->trust->trust ? 0 : hsep_take_block(&end, hsep_paper_size(parameters->settings));
     self->trusted = parameters->trust->trust ? hsep_take_block(&end, hsep_trusted_size(&trusted)) : 0;
     return end * sizeof(double);
 }
@@ -63,26 +53,24 @@ HSEP_API double hsep_residual_size(const hsep_residual_parameters *parameters)
 
 HSEP_API void hsep_residual_init(hsep_residual_model *self, const hsep_residual_parameters *parameters, double start)
 {
-    const hsep_paper_parameters paper = residual_paper_parameters(parameters);
     const hsep_trusted_parameters trusted = hsep_residual_trusted_parameters(parameters);
     (void)residual_lay_out(self, parameters);
     if (self->trusted) {
         hsep_trusted_init(hsep_residual_trusted(self), &trusted, start);
     } else {
-        hsep_paper_init(hsep_residual_paper(self), &paper, start);
+        hsep_paper_init(hsep_residual_paper(self), parameters->settings);
     }
 }
 
 HSEP_API int hsep_residual_valid(const void *block, const hsep_residual_parameters *parameters)
 {
-    const hsep_paper_parameters paper = residual_paper_parameters(parameters);
     const hsep_trusted_parameters trusted = hsep_residual_trusted_parameters(parameters);
     hsep_residual_model got;
     memcpy(&got, block, sizeof got);
     (void)residual_lay_out(&got, parameters); /* changes nothing where it is sound */
     return memcmp(&got, block, sizeof got) == 0 && got.learning <= 1 &&
            (got.trusted ? hsep_trusted_valid(hsep_at_bytes(block, got.trusted), &trusted)
-                        : hsep_paper_valid(hsep_at_bytes(block, got.paper), &paper));
+                        : hsep_paper_valid(hsep_at_bytes(block, got.paper), parameters->settings));
 }
 
 HSEP_API uint64_t hsep_residual_n_factors(const hsep_residual_model *self)
@@ -120,12 +108,12 @@ HSEP_API void hsep_residual_restart(hsep_residual_model *self)
 
 HSEP_API int hsep_residual_may_miss(const hsep_residual_model *self) { return self->trusted != 0; }
 
-HSEP_API int hsep_residual_has_v_friction(const hsep_residual_model *self) { return self->paper != 0; }
-
-HSEP_API void hsep_residual_begin(hsep_residual_model *self, const hsep_residual_window *window, int learning)
+HSEP_API void hsep_residual_begin(hsep_residual_model *self, int learning)
 {
-    const int measured = self->trusted != 0 || hsep_paper_begin(hsep_residual_paper(self), window);
-    self->learning = learning && measured;
+    self->learning = learning != 0;
+    if (!self->trusted) {
+        hsep_paper_begin(hsep_residual_paper(self));
+    }
 }
 
 HSEP_API uint64_t hsep_residual_part(const hsep_residual_model *self)
@@ -160,18 +148,15 @@ HSEP_API void hsep_residual_take_in(hsep_residual_model *self, const hsep_residu
 {
     if (self->trusted) {
         hsep_trusted_measure(hsep_residual_trusted(self), sample->i, sample->relative);
-    } else {
-        hsep_paper_take_in(hsep_residual_paper(self), sample, self->learning != 0);
+    } else if (self->learning) {
+        hsep_paper_learn(hsep_residual_paper(self), sample);
     }
 }
 
 HSEP_API int hsep_residual_finish(hsep_residual_model *self, const hsep_residual_window *window)
 {
     const uint64_t late = self->late;
-    if (!self->trusted) {
-        return hsep_paper_finish(hsep_residual_paper(self), window) && self->learning;
-    }
-    if (self->learning || self->planned) {
+    if (self->trusted && (self->learning || self->planned)) {
         hsep_trusted_learn(
             hsep_residual_trusted(self), window->command + late, window->x_pb + late, window->e + late,
             self->learning != 0);

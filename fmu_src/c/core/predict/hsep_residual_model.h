@@ -26,10 +26,8 @@ typedef struct {
     const hsep_trust_settings *trust;
     const hsep_mode *modes; /* (n_modes,) */
     uint64_t n_modes;
-    uint64_t preview;  /* samples from the command to the drive, >= Np */
-    double v_friction; /* m/s, of the paper's features of the reference; 0: none */
-    int planned;       /* whether a compensator decides the commands */
-    int unlearns;      /* whether the paper's model unlearns a window with a held measurement */
+    uint64_t preview; /* samples from the command to the drive, >= Np */
+    int planned;      /* whether a compensator decides the commands */
 } hsep_residual_parameters;
 
 typedef struct {
@@ -74,11 +72,8 @@ HSEP_API void hsep_residual_restart(hsep_residual_model *self);
 /* Whether a measurement may be missing, NaN. */
 HSEP_API int hsep_residual_may_miss(const hsep_residual_model *self);
 
-/* Whether the setting v_friction has an effect. */
-HSEP_API int hsep_residual_has_v_friction(const hsep_residual_model *self);
-
-/* Begin a window whose residuals before it are known. learning: whether it is learned, where these were measured. */
-HSEP_API void hsep_residual_begin(hsep_residual_model *self, const hsep_residual_window *window, int learning);
+/* Begin a window whose residuals before it are known. learning: whether it is learned. */
+HSEP_API void hsep_residual_begin(hsep_residual_model *self, int learning);
 
 /* Samples that are predicted in one go. Constant cost. */
 HSEP_API uint64_t hsep_residual_part(const hsep_residual_model *self);

@@ -1,7 +1,7 @@
 /* Signals of a window that a residual model learns from and predicts.
  *
  * They are kept newest first: of the n = Np + late samples that are predicted, sample k is at place n - 1 - k, and what
- * was before them is behind them; the first Np are measured when the window ends. x_d alone is oldest first.
+ * was before them is behind them; the first Np are measured when the window ends.
  */
 #ifndef HSEP_RESIDUAL_WINDOW_H
 #define HSEP_RESIDUAL_WINDOW_H
@@ -9,18 +9,15 @@
 #include <stdint.h>
 
 typedef struct {
-    const double *x_d;     /* (preview,) m, commands of the window and what follows it, oldest first */
     const double *command; /* (n,) m, commands relative to the start */
     const double *x_pb;    /* (n + q,) m, physics-based prediction, relative to the start */
     double *e;             /* (n + p,) m, residuals as measured; alone the predictor keeps e_h at the same place */
     double *e_h;           /* (n + p,) m, residuals as predicted, behind them the measured ones */
-    uint64_t n_physics;    /* leading samples of the window where x_h = x_pb */
 } hsep_residual_window;
 
 /* A sample of it whose measurement came. */
 typedef struct {
     uint64_t i;          /* sample of the window, 0 ... Np - 1 */
-    double x_meas, x_pb; /* m, measured position and its physics-based prediction */
     double relative;     /* m, measured position relative to the start */
     const double *x, *e; /* the window's x_pb and e from this sample on: it and those before it */
 } hsep_residual_sample;

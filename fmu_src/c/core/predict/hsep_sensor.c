@@ -12,7 +12,7 @@ HSEP_API void hsep_sensor_init(hsep_sensor *self)
     self->step = HUGE_VAL;
 }
 
-HSEP_API int hsep_sensor_misses(hsep_sensor *self, double x_meas, double x_pb, double still, double first_step)
+HSEP_API int hsep_sensor_misses(hsep_sensor *self, double x_meas, double x_pb, double still)
 {
     if (!(x_meas == self->value)) {
         if (!isnan(self->value)) {
@@ -25,7 +25,7 @@ HSEP_API int hsep_sensor_misses(hsep_sensor *self, double x_meas, double x_pb, d
     self->repeats += 1.0;
     self->low = fmin(self->low, x_pb);
     self->high = fmax(self->high, x_pb);
-    return hsep_sensor_stays(self, self->high - self->low, still, first_step);
+    return hsep_sensor_stays(self, self->high - self->low, still, HUGE_VAL);
 }
 
 HSEP_API int hsep_sensor_stays(const hsep_sensor *self, double motion, double still, double first_step)

@@ -22,10 +22,11 @@ HSEP_ASSERT_WORDS(hsep_sensor, 5);
 HSEP_API void hsep_sensor_init(hsep_sensor *self);
 
 /* Process a measurement and its prediction, m; return whether it is held. still: m, predicted motion within which equal
- * values are plausible whatever the resolution; first_step: m, resolution assumed before the first change. */
-HSEP_API int hsep_sensor_misses(hsep_sensor *self, double x_meas, double x_pb, double still, double first_step);
+ * values are plausible whatever the resolution. */
+HSEP_API int hsep_sensor_misses(hsep_sensor *self, double x_meas, double x_pb, double still);
 
-/* Whether the last value has been equal under a predicted motion, m; the rest as above. */
+/* Whether the last value has been equal under a predicted motion, m; first_step: m, resolution assumed before the first
+ * change; the rest as above. */
 HSEP_API int hsep_sensor_stays(const hsep_sensor *self, double motion, double still, double first_step);
 
 #endif

@@ -39,8 +39,6 @@
     SETTING(double, period)
 
 #define HSEP_COMPENSATOR_SETTINGS(SETTING) \
-    /* velocity over which friction changes its sign, for features of the reference; 0: none of them, m/s */ \
-    SETTING(double, v_friction) \
     /* samples planned ahead, at least Np + 4 spacing + 3 */ \
     SETTING(uint64_t, preview) \
     /* samples between the knots of the change, a divisor of Np */ \

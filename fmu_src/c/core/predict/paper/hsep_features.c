@@ -1,11 +1,10 @@
 #include "hsep_features.h"
 
-HSEP_API void hsep_features_lay_out(hsep_features *self, uint64_t p, uint64_t q, uint64_t n_reference)
+HSEP_API void hsep_features_lay_out(hsep_features *self, uint64_t p, uint64_t q)
 {
     self->p = p;
     self->q = q;
     self->x = HSEP_BIAS + 1;
     self->e = self->x + q + 1;
-    self->reference = self->e + p;
-    self->n = self->reference + n_reference;
+    self->n = self->e + p;
 }

@@ -1,8 +1,6 @@
 /* Layout of the features phi and of the weights w, eq. (5), as slices of both:
  *
- *   phi(k) = [1 | x_pb(k) ... x_pb(k-q) | e_pb(k-1) ... e_pb(k-p) | features of the reference]
- *
- * Those of the reference: hsep_reference_features.h.
+ *   phi(k) = [1 | x_pb(k) ... x_pb(k-q) | e_pb(k-1) ... e_pb(k-p)]
  */
 #ifndef HSEP_FEATURES_H
 #define HSEP_FEATURES_H
@@ -15,16 +13,15 @@
 #define HSEP_BIAS 0 /* place of the constant feature */
 
 typedef struct {
-    uint64_t p, q;      /* lags of e_pb and of x_pb */
-    uint64_t x;         /* place of x_pb(k), the first of q + 1 */
-    uint64_t e;         /* of e_pb(k-1), the first of p */
-    uint64_t reference; /* of the first feature of the reference */
-    uint64_t n;         /* features; in a row their target's place */
+    uint64_t p, q; /* lags of e_pb and of x_pb */
+    uint64_t x;    /* place of x_pb(k), the first of q + 1 */
+    uint64_t e;    /* of e_pb(k-1), the first of p */
+    uint64_t n;    /* features; in a row their target's place */
 } hsep_features;
 
-HSEP_ASSERT_WORDS(hsep_features, 6);
+HSEP_ASSERT_WORDS(hsep_features, 5);
 
-/* Lay out p lags of e_pb, q of x_pb and n_reference features of the reference. */
-HSEP_API void hsep_features_lay_out(hsep_features *self, uint64_t p, uint64_t q, uint64_t n_reference);
+/* Lay out p lags of e_pb and q of x_pb. */
+HSEP_API void hsep_features_lay_out(hsep_features *self, uint64_t p, uint64_t q);
 
 #endif

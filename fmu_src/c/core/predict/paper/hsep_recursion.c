@@ -6,13 +6,11 @@
 #include <stddef.h>
 
 HSEP_API void hsep_recursion_run(
-    const hsep_recursion *self, const double x[], const double drive[], double e[], uint64_t n, uint64_t first,
-    uint64_t last)
+    const hsep_recursion *self, const double x[], double e[], uint64_t n, uint64_t first, uint64_t last)
 {
     for (uint64_t k = first; k < last; k++) {
         const uint64_t j = n - 1 - k;
-        const double bias = drive != NULL ? self->bias + drive[j] : self->bias;
-        e[j] = bias + hsep_dot(self->w_x, x + j, self->q + 1) + hsep_dot(self->w_e, e + j + 1, self->p);
+        e[j] = self->bias + hsep_dot(self->w_x, x + j, self->q + 1) + hsep_dot(self->w_e, e + j + 1, self->p);
     }
 }
 

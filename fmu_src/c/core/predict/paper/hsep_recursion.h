@@ -1,5 +1,5 @@
 /* Free run of the learned ARX recursion, sample by sample; eq. (4):
- *   e(k) = bias + drive(k) + sum_i w_x,i x(k-i) + sum_i w_e,i e(k-i)
+ *   e(k) = bias + sum_i w_x,i x(k-i) + sum_i w_e,i e(k-i)
  *
  * Signals are kept newest first: sample k of n is at place n - 1 - k, its lag i at i places further. Reentrant.
  */
@@ -18,11 +18,9 @@ typedef struct {
 } hsep_recursion;
 
 /* Run over the samples first ... last - 1 of n. x: (n + q,), e: (n + p,), m; both hold the past behind the window.
- * drive: (n,), m, further exogenous part; NULL for none.
  * Cost: p + q + 1 multiply-adds a sample. */
 HSEP_API void hsep_recursion_run(
-    const hsep_recursion *self, const double x[], const double drive[], double e[], uint64_t n, uint64_t first,
-    uint64_t last);
+    const hsep_recursion *self, const double x[], double e[], uint64_t n, uint64_t first, uint64_t last);
 
 /* Whether all roots of z^p - w_e,1 z^(p-1) - ... - w_e,p are inside the unit circle: the Schur-Cohn test by step-down
  * recursion (Jury 1964). work: (2 p,). Cost: p^2 / 2 multiply-adds and p divisions. */

@@ -153,7 +153,7 @@ HSEP_API void hsep_guard_accept(
         }
         self->measured = residual;
         const double still = fmax(plausible, HSEP_TRUST_STOOD_MORE * self->stood);
-        self->holding = (uint64_t)hsep_sensor_misses(&self->held, x[place], x_pb[place], still, HUGE_VAL);
+        self->holding = (uint64_t)hsep_sensor_misses(&self->held, x[place], x_pb[place], still);
         if (self->holding) {
             guard_set_run(self, k, n, 1.0, suspect);
         }
