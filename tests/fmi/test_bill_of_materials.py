@@ -12,7 +12,6 @@ from typing import Any
 import pytest
 from built_once import FMI3, NATIVE, PYTHON, BuiltFmus
 from cyclonedx.schema import SchemaVersion
-from cyclonedx.validation.json import JsonStrictValidator
 
 from hybridsep.base.data_files import data_folder
 from hybridsep.base.errors import FmuError
@@ -22,7 +21,13 @@ from hybridsep.fmi.pythonfmu_limits import pythonfmu_license
 
 LICENSES = data_folder("fmu_src") / "c" / "licenses"
 GUID = "{12345678-1234-1234-1234-123456789abc}"
-valid = JsonStrictValidator(SchemaVersion.V1_6).validate_str
+
+
+def valid(bill: str) -> object:
+    """Return what the schema of CycloneDX 1.6 has against a bill; its library takes seconds to load."""
+    from cyclonedx.validation.json import JsonStrictValidator
+
+    return JsonStrictValidator(SchemaVersion.V1_6).validate_str(bill)
 
 
 def bill_in(path: Path) -> dict[str, Any]:
