@@ -1,4 +1,4 @@
-"""Hold baseline of every command and FMU, recomputed by three lines from the columns ``x_pb`` and ``x_meas``.
+"""Hold baseline of every command and FMU, recomputed by a few lines from the columns ``x_pb`` and ``x_meas``.
 
     python -m benchmarks.hold [--emps DATA_EMPS.mat] [--recordings FOLDER] [--Np 20]      (twenty minutes)
 
@@ -57,9 +57,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def hold(x_pb: Column, x_meas: Column, Np: int) -> Column:
     """Return the hold baseline, (n,), m: ``x_pb`` and the last residual measured before the window."""
-    e = [[x - y for x, y in zip(x_meas[:k], x_pb[:k], strict=True) if x == x] for k in range(0, len(x_pb), Np)]
-    last = [(before or [0.0])[-1] for before in e]
-    return [y + last[k // Np] for k, y in enumerate(x_pb)]
+    held, last = [], 0.0
+    for k in range(0, len(x_pb), Np):
+        held += [y + last for y in x_pb[k : k + Np]]
+        last = ([x - y for x, y in zip(x_meas[k : k + Np], x_pb[k : k + Np], strict=True) if x == x] or [last])[-1]
+    return held
 
 
 def rms_of(x_meas: Column, predicted: Column) -> float:

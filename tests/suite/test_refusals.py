@@ -197,16 +197,16 @@ def test_an_input_that_is_no_position_changes_nothing(
     stream, untroubled = new_stream(), new_stream()
     for each in (stream, untroubled):
         initialise(each, trust=not math.isnan(value))  # with trust a measurement may be missing
-        steps(each, 0, 245)
-        each.step(0.245, 0.4 * T_S)
-        set_inputs(each, 0.246)
+        steps(each, 0, 145)
+        each.step(0.145, 0.4 * T_S)
+        set_inputs(each, 0.146)
     stream.set(name, value)
     # The step's later instants are checked before its first one is executed.
-    assert_refused(stream, 0.2454, 8 * T_S, f"{name} must be {expected}, got {value:g} at sample 246")
+    assert_refused(stream, 0.1454, 8 * T_S, f"{name} must be {expected}, got {value:g} at sample 146")
     for each in (stream, untroubled):
-        set_inputs(each, 0.246)
-        each.step(0.2454, 0.6 * T_S)
-    assert steps(stream, 246, 330) == steps(untroubled, 246, 330)
+        set_inputs(each, 0.146)
+        each.step(0.1454, 0.6 * T_S)
+    assert steps(stream, 146, 230) == steps(untroubled, 146, 230)
     assert stream.save() == untroubled.save()
 
 

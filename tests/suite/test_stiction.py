@@ -41,7 +41,7 @@ def stood(x: Array, Np: int) -> Array:
     return np.where(begin > 0, run[begin - 1], 0.0)
 
 
-@on_all((PREDICTOR,))
+@on_all((PREDICTOR,), needs="figures")
 @pytest.mark.parametrize("Np", [20])  # with longer windows none stands beyond the patience for long enough
 @pytest.mark.parametrize("name", ["to and fro", "creep", "creep after motion"])
 def test_an_axis_that_stands_is_learned_after_the_patience(new_stream: StreamMaker, name: str, Np: int) -> None:
