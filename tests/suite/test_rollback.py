@@ -17,7 +17,7 @@ from stream import CANNOT, COMPENSATOR, LOOK_AHEADS, PLANTS, PREDICTOR, TRAJECTO
 from streams import StreamMaker, on_adapters, on_all
 
 ALL = (*LOOK_AHEADS, TRAJECTORY, *PLANTS)
-N_SAMPLES = 420
+N_SAMPLES = 280
 
 every = on_adapters(ALL)
 

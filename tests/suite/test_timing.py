@@ -16,7 +16,7 @@ from driving import T_S, initialise, position, set_inputs, steps
 from stream import CANNOT, LOOK_AHEADS, PLANTS, PREDICTOR, TRAJECTORY, RefusedStreamError
 from streams import StreamMaker, on_adapters, on_all
 
-N_SAMPLES = 420
+N_SAMPLES = 260
 
 Clock = list[Fraction]
 
@@ -67,7 +67,7 @@ def in_samples(new_stream: StreamMaker, points: Clock, start: float) -> list[lis
 @pytest.mark.parametrize(
     ("pattern", "start"),
     [
-        *((pattern, 0.0) for pattern in ("0.3", "0.4", "0.5", "1", "2", "3.7", "8", "12.2", "370", "mixture")),
+        *((pattern, 0.0) for pattern in ("0.3", "0.4", "0.5", "1", "2", "3.7", "8", "12.2", "230", "mixture")),
         *((pattern, 1e9) for pattern in ("12.2", "mixture")),
     ],
 )
