@@ -125,18 +125,14 @@ def _is_run(path: Path) -> bool:
     return _has_columns(PREDICTOR.columns, COMPENSATOR.columns)(path)
 
 
-def _is_our_fmu(path: Path) -> bool:
-    if not zipfile.is_zipfile(path) or "modelDescription.xml" not in _members(path):
-        return False
-    with zipfile.ZipFile(path) as archive:
-        return b'generationTool="hybridsep ' in archive.read("modelDescription.xml")
+def _is_our_archive(description: str) -> Callable[[Path], bool]:
+    def recognises(path: Path) -> bool:
+        if not zipfile.is_zipfile(path) or description not in _members(path):
+            return False
+        with zipfile.ZipFile(path) as archive:
+            return b'generationTool="hybridsep ' in archive.read(description)
 
-
-def _is_our_system(path: Path) -> bool:
-    if not zipfile.is_zipfile(path) or "SystemStructure.ssd" not in _members(path):
-        return False
-    with zipfile.ZipFile(path) as archive:
-        return b'generationTool="hybridsep ' in archive.read("SystemStructure.ssd")
+    return recognises
 
 
 def _is_example(path: Path) -> bool:
@@ -161,8 +157,8 @@ BATCHES = Kind("CSV of hybridsep backtest", _has_columns(BATCH_COLUMNS))
 RUN = Kind("result of hybridsep cosim", _is_run)
 FIGURE = Kind("PNG", _begins_with(b"\x89PNG\r\n\x1a\n"))
 VECTOR_FIGURE = Kind("figure of hybridsep", _is_our_drawing)
-FMU = Kind("FMU of hybridsep", _is_our_fmu)
-SYSTEM = Kind("system of hybridsep", _is_our_system)
+FMU = Kind("FMU of hybridsep", _is_our_archive("modelDescription.xml"))
+SYSTEM = Kind("system of hybridsep", _is_our_archive("SystemStructure.ssd"))
 EXAMPLE_LOG = Kind("example log of hybridsep", _is_example)
 STATE = Kind("saved predictor", _begins_with(b"HSEP"))
 

@@ -74,7 +74,7 @@ class HybridPredictor(WindowPredictor):
             "uncertainty": self.uncertainty.learned(),
         }
         if pending is not None:
-            arrays |= {f"pending_{name}": getattr(pending, name) for name in ("x_d", "x_pb")}
+            arrays |= {"pending_x_d": pending.forecast.x_d, "pending_x_pb": pending.forecast.x_pb}
             forecast = self.residual.saved_forecast(pending.forecast)
             arrays |= forecast.arrays
             meta |= forecast.meta

@@ -79,9 +79,9 @@ class ResidualModel(ABC, Generic[AnyForecast]):
         """Last residual that was accepted, m: that which the next window starts from."""
 
     @property
-    @abstractmethod
     def may_begin_in_motion(self) -> bool:
         """Whether the state of ``G_pb`` that a run begins with follows from its first residuals; else it is rest."""
+        return False
 
     @abstractmethod
     def restart(self) -> None:
@@ -116,9 +116,9 @@ class ResidualModel(ABC, Generic[AnyForecast]):
         """Return the forecast of a run that began in motion, with the commands and ``x_pb`` of that motion."""
         return replace(forecast, x_d=x_d, x_pb=x_pb)
 
-    @abstractmethod
     def doubted(self, x_pb: Array) -> Array | None:
         """Return the residual if a rejected measurement before the window is true, ``(n,)``, m; None if none was."""
+        return None
 
     @staticmethod
     @abstractmethod
@@ -133,21 +133,21 @@ class ResidualModel(ABC, Generic[AnyForecast]):
     def restore(self, saved: Saved) -> None:
         """Restore the state of :meth:`saved`; StateError if it is inconsistent: the model must not be used then."""
 
-    @abstractmethod
     def saved_forecast(self, forecast: AnyForecast) -> SavedFields:
         """Return what a forecast does not have from the state and its window."""
+        return SavedFields({}, {}, {})
 
-    @abstractmethod
     def restored_forecast(self, saved: Saved, window: WindowInputs) -> AnyForecast:
         """Return the forecast of :meth:`saved_forecast`; StateError if it is inconsistent."""
+        return self.forecast(window)
 
-    @abstractmethod
     def learned(self) -> dict[str, Array]:
         """Return what has been learned besides the regression, in the order of a weights file."""
+        return {}
 
-    @abstractmethod
     def is_sound(self, learned: Mapping[str, Array]) -> bool:
         """Return whether the numbers of :meth:`learned` are finite and in range."""
+        return True
 
     @abstractmethod
     def restore_learned(self, learned: Mapping[str, Array]) -> None:

@@ -58,18 +58,14 @@ class PredictedWindow:
 
     Attributes
     ----------
-    x_d, x_pb : (n,) arrays, m
-        Commands and response of the physics model, relative to ``start``.
     start : float
         Initial position, m.
     error : PredictedError
         Published residual, and what is known of its error.
     forecast : Forecast
-        Prediction of the residual by its model.
+        Commands, response of the physics model, and prediction of the residual by its model, relative to ``start``.
     """
 
-    x_d: Array
-    x_pb: Array
     start: float
     error: PredictedError
     forecast: Forecast

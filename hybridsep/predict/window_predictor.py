@@ -145,7 +145,7 @@ class WindowPredictor:
             variance=np.where(active, forecast.variance, 0.0),
             doubted=self.residual.doubted(forecast.x_pb),
         )
-        return PredictedWindow(forecast.x_d, forecast.x_pb, start, error, forecast)
+        return PredictedWindow(start, error, forecast)
 
     def update(self, x: ArrayLike, *, learn: bool = True) -> None:
         """Learn from the measurement of the predicted window, or of its first samples; eq. (6).
@@ -169,7 +169,7 @@ class WindowPredictor:
         if not 1 <= len(measured) <= self.n_pending:
             raise SignalError(f"x must have 1 … {self.n_pending} samples, as predicted, got {len(measured)}")
         m = len(measured)
-        e_pb = measured - pending.start - pending.x_pb[:m]
+        e_pb = measured - pending.start - pending.forecast.x_pb[:m]
         before = deepcopy((self.residual, self.state)) if self.disturbances else None
         try:
             if self.k == 0 and self.residual.may_begin_in_motion:
@@ -181,21 +181,22 @@ class WindowPredictor:
             raise
         if learn:
             self.uncertainty.learn(pending.error, e_pb, accepted)
-        _, self.state = self.discrete.forced_response(self.state, pending.x_d[:m])
-        self.start, self.late = pending.start, pending.x_d[m : m + len(self.late)].copy()
+        x_d = pending.forecast.x_d
+        _, self.state = self.discrete.forced_response(self.state, x_d[:m])
+        self.start, self.late = pending.start, x_d[m : m + len(self.late)].copy()
         self.k += m
         self.pending = None
 
     def _as_it_began(self, pending: PredictedWindow, e_pb: Array) -> tuple[PredictedWindow, Array]:
         """Correct the state at the beginning of a run, if its first residuals tell that it was in motion."""
         m, late = len(e_pb), len(self.late)
-        before = motion_before(self.model, self.discrete, pending.x_d, e_pb - pending.error.e_h[:m], late)
+        forecast = pending.forecast
+        before = motion_before(self.model, self.discrete, forecast.x_d, e_pb - pending.error.e_h[:m], late)
         if before is None:
             return pending, e_pb
         self.state = self.state + before.state
-        x_d, x_pb = pending.x_d + before.x_d, pending.x_pb + before.x_pb
-        forecast = self.residual.begin_in_motion(pending.forecast, x_d, x_pb)
-        return replace(pending, x_d=x_d, x_pb=x_pb, forecast=forecast), e_pb - before.x_pb[:m]
+        moved = self.residual.begin_in_motion(forecast, forecast.x_d + before.x_d, forecast.x_pb + before.x_pb)
+        return replace(pending, forecast=moved), e_pb - before.x_pb[:m]
 
     def operator(self, n: int | None = None) -> WindowOperator:
         """Return the lifted prediction of the next ``n`` (default ``Np``) samples, affine in their commands; eq. (3).
@@ -241,7 +242,7 @@ class WindowPredictor:
     @property
     def n_pending(self) -> int:
         """Samples of the predicted window pending measurement; 0 if there is none."""
-        return 0 if self.pending is None else len(self.pending.x_d) - len(self.late)
+        return 0 if self.pending is None else len(self.pending.forecast.x_d) - len(self.late)
 
     @property
     def n_rejected(self) -> int:

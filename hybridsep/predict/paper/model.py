@@ -52,11 +52,6 @@ class PaperModel(ResidualModel[Forecast]):
         """Last measured residual, m."""
         return float(self.past.e_pb[-1])
 
-    @property
-    def may_begin_in_motion(self) -> bool:
-        """False: a run begins at rest."""
-        return False
-
     def restart(self) -> None:
         """Begin another run, at rest; what was learned is kept."""
         self.past.restart()
@@ -103,10 +98,6 @@ class PaperModel(ResidualModel[Forecast]):
             self.past.advance(stop - i)
         return np.ones(m, dtype=np.bool_)
 
-    def doubted(self, x_pb: Array) -> Array | None:
-        """Return None: no measurement is rejected."""
-        return None
-
     @staticmethod
     def check_sizes(saved: Saved, settings: PredictorSettings) -> None:
         """Raise StateError if arrays do not have the sizes of the settings."""
@@ -125,22 +116,6 @@ class PaperModel(ResidualModel[Forecast]):
             self.regression.restore(saved.array("factor", n + 1, n + 1), saved.whole("n_samples"))
         self.past.x_pb[:] = saved.array("x_pb", self.layout.q)
         self.past.e_pb[:] = saved.array("e_pb", self.layout.p)
-
-    def saved_forecast(self, forecast: Forecast) -> SavedFields:
-        """Return no fields: a forecast follows from the state and its window."""
-        return SavedFields({}, {}, {})
-
-    def restored_forecast(self, saved: Saved, window: WindowInputs) -> Forecast:
-        """Return the forecast, which may have diverged."""
-        return self.forecast(window)
-
-    def learned(self) -> dict[str, Array]:
-        """Return nothing: all is in the regression."""
-        return {}
-
-    def is_sound(self, learned: Mapping[str, Array]) -> bool:
-        """Return True: all is in the regression."""
-        return True
 
     def restore_learned(self, learned: Mapping[str, Array]) -> None:
         """Restore nothing: all is in the regression."""
