@@ -44,7 +44,7 @@ MODE = ("f_n", "zeta", "alpha", "beta")
 FEED_DRIVE = ("m", "c", "k", "c_nl", "k_nl", "noise_std")
 STAGE = ("f", "kappa", "T_s", "noise_std")
 
-bounded = settings(max_examples=150, deadline=timedelta(seconds=20), suppress_health_check=list(HealthCheck))
+bounded = settings(max_examples=100, deadline=timedelta(seconds=20), suppress_health_check=list(HealthCheck))
 
 
 @pytest.fixture(scope="module", autouse=True)
