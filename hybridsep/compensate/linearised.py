@@ -6,7 +6,8 @@ stack's and the shrinking by the variance are held:
 
 ``∂x_h = (1 − π_A) G_pb + π_L ∂f_L + π_S ∂f_S + π_A ∂x_A``
 
-with the expert of the command alone, A, linear and time-invariant: its increments and lags are those of the command.
+with the expert of the command alone, A, linear and time-invariant: its increments and lags are those of the command. An
+expert that doubts earlier runs, D, counts as the one of these whose counterpart it is.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from ..base.signals import Array
 from ..predict.trust.disturbances import DisturbanceSlopes
 from ..predict.trust.experts import SolvedExpert
 from ..predict.trust.forecast import TrustedForecast
-from ..predict.trust.model import COMMAND, STATIC, TrustedModel
+from ..predict.trust.model import STATIC, TrustedModel
 
 __all__ = ["PlanModel"]
 
@@ -89,7 +90,7 @@ class PlanModel:
             if weights[expert] == 0.0:
                 continue
             kept = weights[expert] * at.predictions[expert].shrink[n_late:, None]
-            if expert == COMMAND:
+            if self._model.is_of_command(expert):
                 acted = self._late_changes(changes)
                 total += kept * self._of_command(solved, acted) + weights[expert] * (acted - passed)
             else:

@@ -36,7 +36,7 @@ __all__ = ["COMMAND", "DOUBTING", "HOLD", "LAGGED", "STATIC", "RunState", "Trust
 
 HOLD, LAGGED, STATIC, COMMAND, DOUBTING = range(5)
 """Experts in the order of the stack: the last residual; static features with lags, and without; the command alone; and
-static features with lags and little weight of earlier runs."""
+the one of these with lags that led, with little weight of earlier runs."""
 
 _BRIDGED = 3
 """Lags of a row that may stand for samples without a measurement."""
@@ -77,6 +77,11 @@ class TrustedModel(ResidualModel[TrustedForecast]):
     own : sequence of Disturbance
         Of the user's own.
     constants : TrustConstants
+
+    Attributes
+    ----------
+    leading : int
+        Expert that led when earlier runs ended, LAGGED or COMMAND: DOUBTING is its counterpart.
     """
 
     may_miss: ClassVar[bool] = True
@@ -92,12 +97,9 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         p = settings.p
         self.static = StaticFeatures(discrete, settings.q, settings.period, own, constants)
         self.command = CommandFeatures(discrete.dead_time, min(p, constants.lags_of_command))
-        self.experts = {
-            LAGGED: Expert(self.static.shares, p, constants),
-            STATIC: Expert(self.static.shares, 0, constants),
-            COMMAND: Expert(np.ones(self.command.n), self.command.p, constants),
-            DOUBTING: Expert(self.static.shares, p, constants),
-        }
+        self.experts = {LAGGED: self._expert(LAGGED), STATIC: Expert(self.static.shares, 0, constants)}
+        self.experts |= {COMMAND: self._expert(COMMAND), DOUBTING: self._expert(LAGGED)}
+        self.leading = LAGGED
         self.stack = Stack((0.0, constants.first_lagged, constants.first_static, 0.0, 0.0), constants)
         self.evidence = EvidenceOfRuns(self.static.n + p)
         self.evidence_of_command = EvidenceOfRuns(self.command.n + self.command.p)
@@ -118,10 +120,26 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         self.rest = RestBefore(self.settings.measurement_delay)
         for evidence in (self.evidence, self.evidence_of_command):
             evidence.begin_run(self.constants.carried * self.settings.Np)
+        weights = self.stack.weights
+        self.lead(COMMAND if weights[COMMAND] > weights[LAGGED] + weights[STATIC] else LAGGED)
         self.stack.forget(DOUBTING)
         if self.doubts:
-            self.experts[DOUBTING].take_over(self.experts[LAGGED])
-            self.stack.copy(LAGGED, DOUBTING)
+            self.experts[DOUBTING].take_over(self.experts[self.leading])
+            self.stack.copy(self.leading, DOUBTING)
+
+    def lead(self, expert: int) -> None:
+        """Let the doubting expert be the counterpart of LAGGED or COMMAND."""
+        self.leading, self.experts[DOUBTING] = expert, self._expert(expert)
+
+    def _expert(self, expert: int) -> Expert:
+        """Return a new expert with lags, of the kind of LAGGED or COMMAND."""
+        if expert == COMMAND:
+            return Expert(np.ones(self.command.n), self.command.p, self.constants)
+        return Expert(self.static.shares, self.settings.p, self.constants)
+
+    def is_of_command(self, expert: int) -> bool:
+        """Return whether an expert predicts the residual of the command."""
+        return COMMAND in (expert, self.leading if expert == DOUBTING else expert)
 
     def begin_in_motion(self, forecast: TrustedForecast, x_d: Array, x_pb: Array) -> TrustedForecast:
         """Correct what was before a run in motion: commands and physics-based prediction went on as they begin."""
@@ -214,7 +232,7 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         stacked = np.zeros((len(self.stack.first), len(x_d)))
         stacked[HOLD] = min(max(self.last, -self.bound), self.bound)
         for expert in solved:
-            of_command = expert == COMMAND
+            of_command = self.is_of_command(expert)
             features = self.command.rows(self.run.commands, x_d) if of_command else rows
             found[expert] = self._predicted(expert, solved, features, held)
             stacked[expert] = found[expert].e_h
@@ -232,7 +250,7 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         self, expert: int, solved: Mapping[int, SolvedExpert], rows: Array, held: Mapping[int, ExpertPrediction]
     ) -> ExpertPrediction:
         """Return what an expert predicts of a window from its features without lags."""
-        if expert == COMMAND:
+        if self.is_of_command(expert):
             bound, square = self.constants.bound_of_command * self.scale_of_command.largest, self.scale_of_command
             past = self.run.past_of_command
         else:
@@ -277,16 +295,21 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         """Return the experts that know something, with their weights."""
         solved = {}
         if self.n_rows > 0.0 and scales.velocity == self.velocity_scale and self.scale.largest_square > 0.0:
-            evidence = self.evidence.all()
-            for expert in (LAGGED, STATIC):
-                solved[expert] = self._solved(expert, evidence, scales.largest, self.scale)
-            if self.doubts:
-                evidence = self.evidence.all(self.constants.less)
-                solved[DOUBTING] = self._solved(DOUBTING, evidence, scales.largest, self.scale)
-        of_command = self.evidence_of_command.all()
-        if of_command.n_rows > 0.0 and self.scale_of_command.largest_square > 0.0:
+            solved |= self._solved_of(LAGGED, self.evidence, scales.largest, self.scale)
+        if self.evidence_of_command.n_rows > 0.0 and self.scale_of_command.largest_square > 0.0:
             largest = self.command.largest(scales.step)
-            solved[COMMAND] = self._solved(COMMAND, of_command, largest, self.scale_of_command)
+            solved |= self._solved_of(COMMAND, self.evidence_of_command, largest, self.scale_of_command)
+        return solved
+
+    def _solved_of(
+        self, expert: int, of_runs: EvidenceOfRuns, largest: Array, scale: ResidualScale
+    ) -> dict[int, SolvedExpert]:
+        """Return the experts of one kind of rows, that of LAGGED or COMMAND, with their weights."""
+        evidence = of_runs.all()
+        experts = (LAGGED, STATIC) if expert == LAGGED else (COMMAND,)
+        solved = {one: self._solved(one, evidence, largest, scale) for one in experts}
+        if self.doubts and expert == self.leading:
+            solved[DOUBTING] = self._solved(DOUBTING, of_runs.all(self.constants.less), largest, scale)
         return solved
 
     def _solved(self, expert: int, evidence: Evidence, largest: Array, scale: ResidualScale) -> SolvedExpert:
@@ -357,7 +380,7 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         """Judge the experts and their stack by the measurement of their window."""
         given = self.settings.noise_std**2
         for expert, prediction in forecast.predictions.items():
-            self.experts[expert].judge(prediction, e_0 if expert == COMMAND else e, accepted, given)
+            self.experts[expert].judge(prediction, e_0 if self.is_of_command(expert) else e, accepted, given)
         self.scale = self.scale.with_window(e[accepted])
         self.scale_of_command = self.scale_of_command.with_window(e_0[accepted])
         late = self.settings.measurement_delay
@@ -375,8 +398,9 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         """Let all experts go on with this run alone, and judge them anew."""
         self.evidence.forget_earlier()
         self.evidence_of_command.forget_earlier()
-        self.experts[LAGGED].take_over(self.experts[DOUBTING])
-        self.experts[STATIC].restart()
+        for expert in (LAGGED, STATIC) if self.leading == COMMAND else (STATIC,):
+            self.experts[expert].restart()
+        self.experts[self.leading].take_over(self.experts[DOUBTING])
         self.stack.restart()
 
     def _end_doubt(self) -> None:

@@ -17,7 +17,7 @@ from .experts import Evidence, ResidualScale
 from .forecast import TrustedForecast
 from .guard import N_STATE
 from .learned import LEARNED
-from .model import TrustedModel
+from .model import COMMAND, LAGGED, TrustedModel
 from .rest import N_REST
 
 __all__ = ["SavedTrustedModel"]
@@ -52,6 +52,7 @@ class SavedTrustedModel(TrustedModel):
                 self.evidence.this.regression.n_samples, self.evidence_of_command.this.regression.n_samples
             ),
             "n_rejected": self.n_rejected,
+            "leading": self.leading,
             "look_ahead": self.preview + self.settings.measurement_delay,
         }
         arrays = {
@@ -81,6 +82,10 @@ class SavedTrustedModel(TrustedModel):
         saved = _own(saved)
         n_samples = saved.whole("n_samples")
         self.plan_ahead(saved.whole("look_ahead") - self.settings.measurement_delay)
+        leading = saved.whole("leading")
+        if leading not in (LAGGED, COMMAND):
+            raise saved.error("leading must be the place of an expert with lags")
+        self.lead(leading)
         learned = {name: saved.array(name, *one.shape, finite=False) for name, one in self.learned().items()}
         if (problem := self._unsound(learned)) is not None:
             raise saved.error(problem)

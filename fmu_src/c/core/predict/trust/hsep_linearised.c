@@ -10,10 +10,14 @@
 
 static const hsep_expert_place linearised_experts[HSEP_LINEARISED_EXPERTS] = {HSEP_LAGGED, HSEP_STATIC, HSEP_DOUBTING};
 
-/* Weight of an expert in the stack; 0 where it knows nothing. */
-static double linearised_weight(const hsep_trusted *model, hsep_expert_place expert)
+#define LINEARISED_OF_COMMAND 2
+static const hsep_expert_place linearised_of_command[LINEARISED_OF_COMMAND] = {HSEP_COMMAND, HSEP_DOUBTING};
+
+/* Weight of an expert in the stack; 0 where it knows nothing, or is not of the command, or is. */
+static double linearised_weight(const hsep_trusted *model, hsep_expert_place expert, int of_command)
 {
-    return model->predicted[expert] ? model->stack.weights[expert] : 0.0;
+    const int of_kind = hsep_trusted_is_of_command(model, expert) == of_command;
+    return model->predicted[expert] && of_kind ? model->stack.weights[expert] : 0.0;
 }
 
 /* Set what follows from the parameters; return the bytes of the block. */
@@ -28,10 +32,10 @@ static double linearised_lay_out(hsep_linearised *self, const hsep_trusted_param
     self->slopes = hsep_take(&end, n * (double)self->count);
     self->gains = hsep_take(&end, n * LINEARISED_GAINS * HSEP_PHYSICS_ABREAST);
     self->shrink = hsep_take(&end, n * HSEP_LINEARISED_EXPERTS);
-    self->kept = hsep_take(&end, n);
+    self->kept = hsep_take(&end, n * LINEARISED_OF_COMMAND);
     self->change = hsep_take(&end, preview * LINEARISED_CHANGES);
     self->base = hsep_take(&end, preview);
-    self->of_command = hsep_take(&end, preview);
+    self->of_command = hsep_take(&end, preview * LINEARISED_OF_COMMAND);
     self->passed = hsep_take(&end, preview * HSEP_LINEARISED_EXPERTS);
     self->run = hsep_take(&end, preview);
     self->disturbance = hsep_take(&end, preview * HSEP_PHYSICS_ABREAST);
@@ -133,41 +137,53 @@ static void linearised_signals(hsep_linearised *self, const hsep_linearised_chan
 
 /* Part of an expert in the stack, sample after sample, with what shrinking and bounds leave of it. */
 static void linearised_shrink(
-    const hsep_linearised *self, hsep_trusted *model, hsep_expert_place place, double shrink[])
+    const hsep_linearised *self, hsep_trusted *model, hsep_expert_place place, double weight, double shrink[])
 {
     const hsep_expert *expert = hsep_trusted_expert(model, place);
-    const double weight = linearised_weight(model, place);
     for (uint64_t k = 0; weight > 0.0 && k < self->n; k++) {
         shrink[k] = weight * hsep_expert_shrink(expert, self->n - 1 - k);
     }
 }
 
-/* What of a change is neither friction nor stiffness: it behind G_pb and after the dead time, and what the command's
- * expert makes of its increments, from rest. */
-static void linearised_command(hsep_linearised *self, hsep_trusted *model, const hsep_linearised_change *change)
+/* What an expert of the command makes of the increments of a change, from rest, (preview,). */
+static void linearised_of_increments(
+    hsep_linearised *self, const hsep_expert *expert, const hsep_linearised_change *change, uint64_t dead_time,
+    double to[])
 {
-    const hsep_expert *expert = hsep_trusted_expert(model, HSEP_COMMAND);
-    const double weight = linearised_weight(model, HSEP_COMMAND), *weights = hsep_at_const(expert, expert->weights);
-    const double *lag_weights = weights + expert->n_static;
-    const uint64_t dead_time = hsep_trusted_command(model)->dead_time, preview = self->preview;
-    double *base = hsep_at(self, self->base), *to = hsep_at(self, self->of_command), *run = hsep_at(self, self->run);
-    memcpy(base, change->passed, (size_t)preview * sizeof(double));
-    if (!(weight > 0.0)) {
-        return;
-    }
-    linearised_shrink(self, model, HSEP_COMMAND, hsep_at(self, self->kept));
-    for (uint64_t u = 0; u < preview; u++) {
-        const double acted = linearised_acted(change, u, dead_time);
+    const double *weights = hsep_at_const(expert, expert->weights), *lag_weights = weights + expert->n_static;
+    double *run = hsep_at(self, self->run);
+    for (uint64_t u = 0; u < self->preview; u++) {
         double drive = 0.0;
         for (uint64_t i = 1; i < expert->n_static && i <= u + 1; i++) {
             const uint64_t at = u + 1 - i;
             const double before = at > 0 ? linearised_acted(change, at - 1, dead_time) : 0.0;
             drive += weights[i] * (linearised_acted(change, at, dead_time) - before);
         }
-        double *e = run + (preview - 1 - u);
+        double *e = run + (self->preview - 1 - u);
         *e = hsep_recur(drive, lag_weights, e + 1, u < expert->p ? u : expert->p);
-        base[u] += weight * (acted - change->passed[u]);
         to[u] = *e;
+    }
+}
+
+/* What of a change is neither friction nor stiffness: it behind G_pb and after the dead time, and what the experts of
+ * the command make of it. */
+static void linearised_command(hsep_linearised *self, hsep_trusted *model, const hsep_linearised_change *change)
+{
+    const uint64_t dead_time = hsep_trusted_command(model)->dead_time;
+    double *base = hsep_at(self, self->base);
+    memcpy(base, change->passed, (size_t)self->preview * sizeof(double));
+    for (uint64_t i = 0; i < LINEARISED_OF_COMMAND; i++) {
+        const hsep_expert_place place = linearised_of_command[i];
+        const double weight = linearised_weight(model, place, 1);
+        if (weight > 0.0) {
+            linearised_shrink(self, model, place, weight, hsep_at(self, self->kept) + i * self->n);
+            linearised_of_increments(
+                self, hsep_trusted_expert(model, place), change, dead_time,
+                hsep_at(self, self->of_command) + i * self->preview);
+            for (uint64_t u = 0; u < self->preview; u++) {
+                base[u] += weight * (linearised_acted(change, u, dead_time) - change->passed[u]);
+            }
+        }
     }
 }
 
@@ -184,7 +200,11 @@ HSEP_API void hsep_linearised_at(
     for (uint64_t i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
         const hsep_expert *expert = hsep_trusted_expert(model, linearised_experts[i]);
         const double *weights = hsep_at_const(expert, expert->weights);
-        linearised_shrink(self, model, linearised_experts[i], hsep_at(self, self->shrink) + i * n);
+        const double weight = linearised_weight(model, linearised_experts[i], 0);
+        if (hsep_trusted_is_of_command(model, linearised_experts[i])) {
+            continue;
+        }
+        linearised_shrink(self, model, linearised_experts[i], weight, hsep_at(self, self->shrink) + i * n);
         linearised_gains(self, weights + first, hsep_at(self, self->gains) + i);
         linearised_pass(
             weights + 1, first - 1, change->passed, self->preview, hsep_at(self, self->passed) + i * self->preview);
@@ -246,13 +266,15 @@ HSEP_API void hsep_linearised_column(hsep_linearised *self, hsep_trusted *model,
     const uint64_t count = self->preview - first;
     const double *of_command = hsep_at(self, self->of_command), *kept = hsep_at(self, self->kept) + (self->n - count);
     memcpy(column, hsep_at(self, self->base), (size_t)count * sizeof(double));
-    for (uint64_t u = 0; linearised_weight(model, HSEP_COMMAND) > 0.0 && u < count; u++) {
-        column[u] += kept[u] * of_command[u];
+    for (uint64_t i = 0; i < LINEARISED_OF_COMMAND; i++, kept += self->n, of_command += self->preview) {
+        for (uint64_t u = 0; linearised_weight(model, linearised_of_command[i], 1) > 0.0 && u < count; u++) {
+            column[u] += kept[u] * of_command[u];
+        }
     }
     linearised_disturbance(self, count);
     linearised_filter(self, count);
     for (uint64_t i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
-        if (linearised_weight(model, linearised_experts[i]) > 0.0) {
+        if (linearised_weight(model, linearised_experts[i], 0) > 0.0) {
             linearised_run(self, hsep_trusted_expert(model, linearised_experts[i]), i, count, column);
         }
     }

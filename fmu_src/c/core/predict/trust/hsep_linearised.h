@@ -7,6 +7,7 @@
  *   dx_h = (1 - pi_A) G_pb + pi_L df_L + pi_S df_S + pi_A dx_A
  *
  * with the expert of the command alone, A, linear and time-invariant: its increments and lags are those of the command.
+ * An expert that doubts earlier runs, D, counts as the one of these whose counterpart it is.
  * Memory is one block, without pointers. Reentrant; allocates nothing.
  */
 #ifndef HSEP_LINEARISED_H
@@ -30,10 +31,10 @@ typedef struct {
     uint64_t gains;       /* (n, 6) of experts abreast: what friction, position and damping give of changes of v_d, x
                            * and v, the disturbances themselves and then their differences */
     uint64_t shrink;      /* (n,) of experts: part of each one in the stack, */
-    uint64_t kept;        /* (n,) and of that of the command */
+    uint64_t kept;        /* (2, n) and of those of the command */
     uint64_t change;      /* (preview, 3) of a change: v_d, x and v, the latter two behind G_pb */
     uint64_t base;        /* (preview,) of a change: (1 - pi_A) G_pb + pi_A after the dead time, */
-    uint64_t of_command;  /* (preview,) and what the command's expert makes of it */
+    uint64_t of_command;  /* (2, preview) and what the experts of the command make of it */
     uint64_t passed;      /* (preview,) of experts: what the features of x_pb give of it */
     uint64_t run;         /* (preview,) work of a recursion, newest first */
     uint64_t disturbance; /* (preview,) of experts abreast: disturbances that a change makes, */

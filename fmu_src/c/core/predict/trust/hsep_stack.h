@@ -13,7 +13,7 @@
 #include <stdint.h>
 
 /* Experts in the order of the stack: the last residual; static features with lags, and without; the command alone; and
- * static features with lags and little weight of earlier runs. */
+ * the one of these with lags that led, with little weight of earlier runs. */
 typedef enum { HSEP_HOLD = 0, HSEP_LAGGED, HSEP_STATIC, HSEP_COMMAND, HSEP_DOUBTING } hsep_expert_place;
 
 #define HSEP_N_EXPERTS 5

@@ -92,10 +92,14 @@ HSEP_API void hsep_trusted_restart(hsep_trusted *self)
 {
     trusted_begin_run(self, HSEP_OF_PHYSICS);
     trusted_begin_run(self, HSEP_OF_COMMAND);
+    const double *weights = self->stack.weights;
+    const int of_command = weights[HSEP_COMMAND] > weights[HSEP_LAGGED] + weights[HSEP_STATIC];
+    const hsep_expert_place leading = of_command ? HSEP_COMMAND : HSEP_LAGGED;
+    hsep_trusted_lead(self, leading);
     hsep_stack_forget(&self->stack, HSEP_DOUBTING);
     if (hsep_trusted_doubts(self)) {
-        trusted_set_noise(self, HSEP_DOUBTING, hsep_trusted_expert(self, HSEP_LAGGED));
-        hsep_stack_copy(&self->stack, HSEP_LAGGED, HSEP_DOUBTING);
+        trusted_set_noise(self, HSEP_DOUBTING, hsep_trusted_expert(self, leading));
+        hsep_stack_copy(&self->stack, leading, HSEP_DOUBTING);
     }
 }
 
@@ -219,8 +223,9 @@ static void trusted_judge_stack(hsep_trusted *self, const double e[])
 static void trusted_forget_earlier_runs(hsep_trusted *self)
 {
     self->n_earlier[HSEP_OF_PHYSICS] = self->n_earlier[HSEP_OF_COMMAND] = 0.0;
-    trusted_set_noise(self, HSEP_LAGGED, hsep_trusted_expert(self, HSEP_DOUBTING));
     trusted_set_noise(self, HSEP_STATIC, NULL);
+    trusted_set_noise(self, HSEP_LAGGED, NULL);
+    trusted_set_noise(self, (hsep_expert_place)self->leading, hsep_trusted_expert(self, HSEP_DOUBTING));
     hsep_stack_init(&self->stack);
 }
 
@@ -231,8 +236,8 @@ static void trusted_judge(hsep_trusted *self, const double e[], double count)
     for (uint64_t i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
         if (self->predicted[i]) {
             hsep_expert_judge(
-                hsep_trusted_expert(self, (hsep_expert_place)i), i == HSEP_COMMAND ? e_0 : e, learnable,
-                self->given_variance);
+                hsep_trusted_expert(self, (hsep_expert_place)i), hsep_trusted_is_of_command(self, i) ? e_0 : e,
+                learnable, self->given_variance);
         }
     }
     trusted_judge_stack(self, e);

@@ -66,6 +66,7 @@ typedef struct {
     double forecast_step;               /* m, and largest change of the command */
     double bound;                       /* m, on what is predicted */
     uint64_t predicted[HSEP_N_EXPERTS]; /* whether an expert knows something */
+    uint64_t leading; /* expert that led when earlier runs ended, HSEP_LAGGED or HSEP_COMMAND: its counterpart doubts */
     hsep_guard guard;
     uint64_t n_rejected; /* samples of this run that were not accepted */
     uint64_t at_rest;    /* whether the command has not moved in this run yet, in what was learned, */
@@ -81,7 +82,8 @@ typedef struct {
     uint64_t learnable;        /* (Np,) whether it is learned: plausible, and not of a sensor that may be held */
     uint64_t bridged;          /* (Np + p,) whether a residual stands for one that is not */
     uint64_t e_0;              /* (Np + p of the command,) m, residual of the command */
-    uint64_t stacked;          /* (n,) m, what the command's expert predicts of that of the physics model */
+    uint64_t stacked;          /* (2, n) m, what the command's expert and the doubting one, where it is of the command,
+                                * predict of that of the physics model */
     uint64_t variance;         /* (n,) m2, of the mixture of the experts */
     uint64_t rows;             /* (n, n_static) features without lags, sample after sample */
     uint64_t work;             /* rows to be folded, of the window or of penalties */
@@ -94,7 +96,7 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(
     hsep_trusted,
-    40 + 4 * HSEP_N_EVIDENCE + 2 * HSEP_N_EXPERTS + (sizeof(hsep_stack) + sizeof(hsep_guard)) / sizeof(double));
+    41 + 4 * HSEP_N_EVIDENCE + 2 * HSEP_N_EXPERTS + (sizeof(hsep_stack) + sizeof(hsep_guard)) / sizeof(double));
 
 /* Features, those without lags first. */
 HSEP_API uint64_t hsep_trusted_n(const hsep_predictor_settings *settings, const hsep_trust_settings *trust);
@@ -115,6 +117,12 @@ HSEP_API hsep_command *hsep_trusted_command(hsep_trusted *self);
 
 /* An expert; not hold. */
 HSEP_API hsep_expert *hsep_trusted_expert(hsep_trusted *self, hsep_expert_place expert);
+
+/* Whether an expert predicts the residual of the command. */
+HSEP_API int hsep_trusted_is_of_command(const hsep_trusted *self, uint64_t expert);
+
+/* Let the doubting expert be the counterpart of HSEP_LAGGED or HSEP_COMMAND, with nothing learned. */
+HSEP_API void hsep_trusted_lead(hsep_trusted *self, hsep_expert_place expert);
 
 /* What an expert predicts of the sample at a place, m; 0 where it knows nothing. */
 HSEP_API double hsep_trusted_stacked(const hsep_trusted *self, hsep_expert_place expert, uint64_t place);

@@ -42,11 +42,25 @@ static uint64_t trusted_n_features(const hsep_trusted *self, uint64_t evidence)
     return evidence == HSEP_OF_COMMAND ? 2 * hsep_command_lags(self->p) + 2 : self->n_static + self->p;
 }
 
+HSEP_API int hsep_trusted_is_of_command(const hsep_trusted *self, uint64_t expert)
+{
+    return expert == HSEP_COMMAND || (expert == HSEP_DOUBTING && self->leading == HSEP_COMMAND);
+}
+
 static hsep_expert_shape trusted_shape(const hsep_trusted *self, uint64_t expert)
 {
-    const uint64_t p = expert == HSEP_COMMAND ? hsep_command_lags(self->p) : self->p;
-    const uint64_t n_static = expert == HSEP_COMMAND ? p + 2 : self->n_static;
+    const int of_command = hsep_trusted_is_of_command(self, expert);
+    const uint64_t p = of_command ? hsep_command_lags(self->p) : self->p;
+    const uint64_t n_static = of_command ? p + 2 : self->n_static;
     return (hsep_expert_shape){self->Np, self->n, n_static, expert == HSEP_STATIC ? 0 : p};
+}
+
+/* Bytes of the block of an expert, whichever it is the counterpart of. */
+static double trusted_expert_size(const hsep_trusted *self, uint64_t expert)
+{
+    const hsep_expert_shape shape = trusted_shape(self, expert), other = trusted_shape(self, HSEP_COMMAND);
+    const double size = hsep_expert_size(&shape);
+    return expert == HSEP_DOUBTING ? fmax(size, hsep_expert_size(&other)) : size;
 }
 
 /* Doubles of work: for the rows of a window, and for as many as features. */
@@ -88,7 +102,7 @@ static double trusted_lay_out(hsep_trusted *self, const hsep_trusted_parameters 
     self->learnable = hsep_take(&end, Np);
     self->bridged = hsep_take(&end, Np + p);
     self->e_0 = hsep_take(&end, Np + p_of_command);
-    self->stacked = hsep_take(&end, n);
+    self->stacked = hsep_take(&end, 2.0 * n);
     self->variance = hsep_take(&end, n);
     self->rows = hsep_take(&end, n * n_static);
     self->work = hsep_take(&end, trusted_work(self));
@@ -104,8 +118,7 @@ static double trusted_lay_out(hsep_trusted *self, const hsep_trusted_parameters 
     self->all = hsep_take_block(&end, largest);
     self->experts[HSEP_HOLD] = 0;
     for (uint64_t i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
-        const hsep_expert_shape shape = trusted_shape(self, i);
-        self->experts[i] = hsep_take_block(&end, hsep_expert_size(&shape));
+        self->experts[i] = hsep_take_block(&end, trusted_expert_size(self, i));
     }
     return end * sizeof(double);
 }
@@ -119,6 +132,7 @@ HSEP_API void hsep_trusted_init(hsep_trusted *self, const hsep_trusted_parameter
 {
     memset(self, 0, (size_t)hsep_trusted_size(parameters));
     (void)trusted_lay_out(self, parameters);
+    self->leading = HSEP_LAGGED;
     self->at_rest = 1;
     self->known_rest = parameters->settings->measurement_delay;
     hsep_stack_init(&self->stack);
@@ -138,6 +152,13 @@ HSEP_API void hsep_trusted_init(hsep_trusted *self, const hsep_trusted_parameter
     }
 }
 
+HSEP_API void hsep_trusted_lead(hsep_trusted *self, hsep_expert_place expert)
+{
+    self->leading = expert;
+    const hsep_expert_shape shape = trusted_shape(self, HSEP_DOUBTING);
+    hsep_expert_init(hsep_trusted_expert(self, HSEP_DOUBTING), &shape);
+}
+
 HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters *parameters)
 {
     hsep_trusted got;
@@ -145,9 +166,9 @@ HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters
     memcpy(&got, block, sizeof got);
     (void)trusted_lay_out(&got, parameters); /* changes nothing where it is sound */
     hsep_guard_init(&guard, got.Np, got.T_s);
-    int sound = memcmp(&got, block, sizeof got) == 0 && got.at_rest <= 1 && got.known_rest <= got.n &&
-                got.n_rest <= got.n && got.guard.patience == guard.patience &&
-                got.guard.patience_standing == guard.patience_standing &&
+    int sound = memcmp(&got, block, sizeof got) == 0 && (got.leading == HSEP_LAGGED || got.leading == HSEP_COMMAND) &&
+                got.at_rest <= 1 && got.known_rest <= got.n && got.n_rest <= got.n &&
+                got.guard.patience == guard.patience && got.guard.patience_standing == guard.patience_standing &&
                 hsep_disturbances_valid(
                     hsep_at_bytes(block, got.disturbances), parameters->settings, parameters->trust->period,
                     parameters->n_modes, parameters->planned) &&

@@ -13,7 +13,17 @@ static const double trusted_least = 1e-150; /* magnitude of a feature that count
 
 /* Experts of the physics model's residual, that without lags first: the stiffness acts at the position, which the
  * physics model alone does not give well enough. */
-static const hsep_expert_place trusted_of_physics[] = {HSEP_STATIC, HSEP_LAGGED, HSEP_DOUBTING};
+static const hsep_expert_place trusted_experts_of_physics[] = {HSEP_STATIC, HSEP_LAGGED, HSEP_DOUBTING};
+
+/* Those of the command's. */
+#define TRUSTED_OF_COMMAND 2
+static const hsep_expert_place trusted_experts_of_command[TRUSTED_OF_COMMAND] = {HSEP_COMMAND, HSEP_DOUBTING};
+
+/* Whether an expert predicts the residual of the command from what it knows. */
+static int trusted_predicts_command(const hsep_trusted *self, hsep_expert_place expert)
+{
+    return self->predicted[expert] && hsep_trusted_is_of_command(self, expert);
+}
 
 /* Whether the commanded velocity outgrows what was learned; the scales of velocity and command with it. A compensator
  * begins to move before the path, with a creep: its first scale is the path's. */
@@ -55,7 +65,7 @@ static uint64_t trusted_rest_ahead(const hsep_trusted *self, const double path[]
 /* Largest magnitude of a feature of an expert, that of the window to predict included, and its share. */
 static double trusted_largest(hsep_trusted *self, hsep_expert_place expert, uint64_t feature)
 {
-    if (expert == HSEP_COMMAND) {
+    if (hsep_trusted_is_of_command(self, expert)) {
         return feature > 0 ? self->forecast_step : 1.0;
     }
     return hsep_at(self, self->forecast_largest)[feature];
@@ -76,7 +86,7 @@ static const hsep_regression *trusted_all(hsep_trusted *self, hsep_evidence evid
 /* Solve for the weights of an expert, from its rows. */
 static void trusted_solve(hsep_trusted *self, hsep_expert_place place, const hsep_regression *regression, double n_rows)
 {
-    const int of_command = place == HSEP_COMMAND;
+    const int of_command = hsep_trusted_is_of_command(self, place);
     const double square = of_command ? self->scale_of_command.largest_square : self->scale.largest_square;
     const double effect = self->effect > 0.0 ? self->effect : sqrt(square);
     hsep_expert *expert = hsep_trusted_expert(self, place);
@@ -95,23 +105,21 @@ static void trusted_solve(hsep_trusted *self, hsep_expert_place place, const hse
     hsep_expert_solve(expert, &solved);
 }
 
-/* Solve for the weights of all experts that know something. */
-static void trusted_solve_all(hsep_trusted *self)
+/* Solve for the weights of the experts of some evidence, the first one with lags, that know something. */
+static void trusted_solve_of(
+    hsep_trusted *self, hsep_evidence evidence, const hsep_expert_place experts[], uint64_t count)
 {
-    const double *n_rows = self->n_rows, *n_earlier = self->n_earlier;
-    if (self->predicted[HSEP_LAGGED]) {
-        const hsep_regression *all = trusted_all(self, HSEP_OF_PHYSICS, 1.0);
-        const double n_all = n_rows[HSEP_OF_PHYSICS] + n_earlier[HSEP_OF_PHYSICS];
-        trusted_solve(self, HSEP_LAGGED, all, n_all);
-        trusted_solve(self, HSEP_STATIC, all, n_all);
+    const double n_rows = self->n_rows[evidence], n_earlier = self->n_earlier[evidence];
+    if (!self->predicted[experts[0]]) {
+        return;
     }
-    if (self->predicted[HSEP_DOUBTING]) {
-        const hsep_regression *all = trusted_all(self, HSEP_OF_PHYSICS, HSEP_TRUST_LESS);
-        trusted_solve(self, HSEP_DOUBTING, all, n_rows[HSEP_OF_PHYSICS] + HSEP_TRUST_LESS * n_earlier[HSEP_OF_PHYSICS]);
+    const hsep_regression *all = trusted_all(self, evidence, 1.0);
+    for (uint64_t i = 0; i < count; i++) {
+        trusted_solve(self, experts[i], all, n_rows + n_earlier);
     }
-    if (self->predicted[HSEP_COMMAND]) {
-        const hsep_regression *all = trusted_all(self, HSEP_OF_COMMAND, 1.0);
-        trusted_solve(self, HSEP_COMMAND, all, n_rows[HSEP_OF_COMMAND] + n_earlier[HSEP_OF_COMMAND]);
+    if (self->leading == experts[0] && self->predicted[HSEP_DOUBTING]) {
+        all = trusted_all(self, evidence, HSEP_TRUST_LESS);
+        trusted_solve(self, HSEP_DOUBTING, all, n_rows + HSEP_TRUST_LESS * n_earlier);
     }
 }
 
@@ -141,20 +149,23 @@ static void trusted_scale(
     const uint64_t known = n_rows > 0.0 && !outgrown && self->scale.largest_square > 0.0;
     self->predicted[HSEP_HOLD] = 1;
     self->predicted[HSEP_LAGGED] = self->predicted[HSEP_STATIC] = known;
-    self->predicted[HSEP_DOUBTING] = known && hsep_trusted_doubts(self);
     self->predicted[HSEP_COMMAND] = n_of_command > 0.0 && self->scale_of_command.largest_square > 0.0;
-    trusted_solve_all(self);
+    self->predicted[HSEP_DOUBTING] = self->predicted[self->leading] && hsep_trusted_doubts(self);
+    trusted_solve_of(self, HSEP_OF_PHYSICS, (const hsep_expert_place[]){HSEP_LAGGED, HSEP_STATIC}, 2);
+    trusted_solve_of(self, HSEP_OF_COMMAND, (const hsep_expert_place[]){HSEP_COMMAND}, 1);
 }
 
-/* What the command's expert predicts of the physics model's residual, at places begin ... end - 1. */
+/* What the experts of the command predict of the physics model's residual, at places begin ... end - 1. */
 static void trusted_follow_command(hsep_trusted *self, const double x_pb[], uint64_t begin, uint64_t end)
 {
-    const hsep_expert *expert = hsep_trusted_expert(self, HSEP_COMMAND);
-    const double *e_h = hsep_at_const(expert, expert->e_h);
     const double *late = hsep_command_late(hsep_trusted_command(self), self->n);
     double *stacked = hsep_at(self, self->stacked);
-    for (uint64_t j = begin; j < end; j++) {
-        stacked[j] = fmax(-self->bound, fmin(e_h[j] + late[j] - x_pb[j], self->bound));
+    for (uint64_t i = 0; i < TRUSTED_OF_COMMAND; i++, stacked += self->n) {
+        const hsep_expert *expert = hsep_trusted_expert(self, trusted_experts_of_command[i]);
+        const double *e_h = hsep_at_const(expert, expert->e_h);
+        for (uint64_t j = begin; trusted_predicts_command(self, trusted_experts_of_command[i]) && j < end; j++) {
+            stacked[j] = fmax(-self->bound, fmin(e_h[j] + late[j] - x_pb[j], self->bound));
+        }
     }
 }
 
@@ -173,11 +184,12 @@ static void trusted_by_physics(hsep_trusted *self, const double x_pb[], const do
         x[j] = x_pb[j] + hsep_at(first, first->e_h)[j];
     }
     hsep_disturbances_motion(hsep_trusted_disturbances(self), x_pb, x, self->n, rows);
-    for (uint64_t i = 0; i < sizeof trusted_of_physics / sizeof trusted_of_physics[0]; i++) {
-        if (self->predicted[trusted_of_physics[i]]) {
+    for (uint64_t i = 0; i < sizeof trusted_experts_of_physics / sizeof trusted_experts_of_physics[0]; i++) {
+        if (self->predicted[trusted_experts_of_physics[i]] &&
+            !hsep_trusted_is_of_command(self, trusted_experts_of_physics[i])) {
             hsep_expert_predict(
-                hsep_trusted_expert(self, trusted_of_physics[i]), rows, past, self->scale.largest_square, self->bound,
-                varied);
+                hsep_trusted_expert(self, trusted_experts_of_physics[i]), rows, past, self->scale.largest_square,
+                self->bound, varied);
         }
     }
 }
@@ -190,14 +202,19 @@ static void trusted_by_experts(
     if (self->predicted[HSEP_STATIC]) {
         trusted_by_physics(self, x_pb, past, varied);
     }
-    if (self->predicted[HSEP_COMMAND]) {
-        hsep_command_take(command, x_d, self->n);
-        hsep_expert_predict(
-            hsep_trusted_expert(self, HSEP_COMMAND), hsep_at(command, command->rows),
-            hsep_at(self, self->e_0) + self->Np, self->scale_of_command.largest_square,
-            HSEP_TRUST_BOUND_OF_COMMAND * self->scale_of_command.largest, varied);
-        trusted_follow_command(self, x_pb, 0, self->n);
+    if (!self->predicted[HSEP_COMMAND]) {
+        return;
     }
+    hsep_command_take(command, x_d, self->n);
+    for (uint64_t i = 0; i < TRUSTED_OF_COMMAND; i++) {
+        if (trusted_predicts_command(self, trusted_experts_of_command[i])) {
+            hsep_expert_predict(
+                hsep_trusted_expert(self, trusted_experts_of_command[i]), hsep_at(command, command->rows),
+                hsep_at(self, self->e_0) + self->Np, self->scale_of_command.largest_square,
+                HSEP_TRUST_BOUND_OF_COMMAND * self->scale_of_command.largest, varied);
+        }
+    }
+    trusted_follow_command(self, x_pb, 0, self->n);
 }
 
 HSEP_API double hsep_trusted_stacked(const hsep_trusted *self, hsep_expert_place expert, uint64_t place)
@@ -208,8 +225,8 @@ HSEP_API double hsep_trusted_stacked(const hsep_trusted *self, hsep_expert_place
     if (expert == HSEP_HOLD) {
         return self->hold;
     }
-    if (expert == HSEP_COMMAND) {
-        return hsep_at_const(self, self->stacked)[place];
+    if (hsep_trusted_is_of_command(self, expert)) {
+        return hsep_at_const(self, self->stacked)[(expert == HSEP_COMMAND ? 0 : self->n) + place];
     }
     const hsep_expert *one = (const hsep_expert *)hsep_at_const(self, self->experts[expert]);
     return hsep_at_const(one, one->e_h)[place];
@@ -257,7 +274,8 @@ HSEP_API void hsep_trusted_vary(hsep_trusted *self, uint64_t first, uint64_t las
 {
     hsep_command *command = hsep_trusted_command(self);
     for (uint64_t i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
-        const double *rows = i == HSEP_COMMAND ? hsep_at(command, command->rows) : hsep_at(self, self->rows);
+        const int of_command = hsep_trusted_is_of_command(self, i);
+        const double *rows = of_command ? hsep_at(command, command->rows) : hsep_at(self, self->rows);
         if (self->predicted[i]) {
             hsep_expert_vary(hsep_trusted_expert(self, (hsep_expert_place)i), rows, first, last);
         }
