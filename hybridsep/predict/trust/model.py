@@ -230,15 +230,17 @@ class TrustedModel(ResidualModel[TrustedForecast]):
             rows = self._rows(x_d, x_pb, x, scales)
         found: dict[int, ExpertPrediction] = {}
         stacked = np.zeros((len(self.stack.first), len(x_d)))
+        growth = self._growth(scales)
         stacked[HOLD] = min(max(self.last, -self.bound), self.bound)
         for expert in solved:
             of_command = self.is_of_command(expert)
             features = self.command.rows(self.run.commands, x_d) if of_command else rows
-            found[expert] = self._predicted(expert, solved, features, held)
+            found[expert] = self._predicted(expert, solved, features, held, growth)
             stacked[expert] = found[expert].e_h
             if of_command:
                 follows = self.command.late(self.run.commands, x_d) - x_pb
-                stacked[expert] = np.clip(stacked[expert] + follows, -self.bound, self.bound)
+                most = growth * self.bound
+                stacked[expert] = np.clip(stacked[expert] + follows, -most, most)
         e_h = self.stack.weights @ stacked
         second = stacked**2  # second moments of the residual by each expert; hold and physics have no variance
         for expert, prediction in found.items():
@@ -247,15 +249,27 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         return TrustedForecast(x_d, x_pb, e_h, variance, x, stacked, found, scales)
 
     def _predicted(
-        self, expert: int, solved: Mapping[int, SolvedExpert], rows: Array, held: Mapping[int, ExpertPrediction]
+        self,
+        expert: int,
+        solved: Mapping[int, SolvedExpert],
+        rows: Array,
+        held: Mapping[int, ExpertPrediction],
+        growth: float = 1.0,
     ) -> ExpertPrediction:
-        """Return what an expert predicts of a window from its features without lags."""
+        """Return what an expert predicts of a window from its features without lags; ``growth`` of the command."""
         if self.is_of_command(expert):
-            bound, square = self.constants.bound_of_command * self.scale_of_command.largest, self.scale_of_command
-            past = self.run.past_of_command
+            square, past = self.scale_of_command, self.run.past_of_command
+            bound = growth * self.constants.bound_of_command * square.largest
         else:
-            bound, square, past = self.bound, self.scale, self.run.past
+            square, past, bound = self.scale, self.run.past, self.bound
         return solved[expert].predict(rows, past, square.largest_square, bound, held.get(expert))
+
+    def _growth(self, scales: FeatureScales) -> float:
+        """Return the largest step of the command relative to that before the window, ≥ 1.
+
+        What follows the command alone is linear in it: it may be larger than anything so far by as much.
+        """
+        return min(scales.step / self.largest_step, self.constants.growth) if self.largest_step > 0.0 else 1.0
 
     def _rows(self, x_d: Array, x_pb: Array, x: Array, scales: FeatureScales) -> Array:
         """Return the static features to predict with, ``(n, n_static)``; ``x``: position that the stiffness acts at.

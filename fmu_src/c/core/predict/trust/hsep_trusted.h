@@ -64,7 +64,8 @@ typedef struct {
     double hold;                        /* m, last residual, bounded */
     double forecast_scale;              /* m/s, velocity scale with it, */
     double forecast_step;               /* m, and largest change of the command */
-    double bound;                       /* m, on what is predicted */
+    double bound;                       /* m, on what is predicted, */
+    double growth;                      /* and by how much that of the command may be larger: as its largest step is */
     uint64_t predicted[HSEP_N_EXPERTS]; /* whether an expert knows something */
     uint64_t leading; /* expert that led when earlier runs ended, HSEP_LAGGED or HSEP_COMMAND: its counterpart doubts */
     hsep_guard guard;
@@ -96,7 +97,7 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(
     hsep_trusted,
-    41 + 4 * HSEP_N_EVIDENCE + 2 * HSEP_N_EXPERTS + (sizeof(hsep_stack) + sizeof(hsep_guard)) / sizeof(double));
+    42 + 4 * HSEP_N_EVIDENCE + 2 * HSEP_N_EXPERTS + (sizeof(hsep_stack) + sizeof(hsep_guard)) / sizeof(double));
 
 /* Features, those without lags first. */
 HSEP_API uint64_t hsep_trusted_n(const hsep_predictor_settings *settings, const hsep_trust_settings *trust);

@@ -143,6 +143,7 @@ static void trusted_scale(
     }
     self->n_rest = trusted_rest_ahead(self, path != NULL ? path : x_d, path != NULL ? n_path : self->n);
     self->bound = HSEP_TRUST_BOUND * self->scale.largest;
+    self->growth = self->largest_step > 0.0 ? fmin(self->forecast_step / self->largest_step, HSEP_TRUST_GROWTH) : 1.0;
     self->hold = fmin(fmax(last_residual, -self->bound), self->bound);
     const double n_rows = self->n_rows[HSEP_OF_PHYSICS] + self->n_earlier[HSEP_OF_PHYSICS];
     const double n_of_command = self->n_rows[HSEP_OF_COMMAND] + self->n_earlier[HSEP_OF_COMMAND];
@@ -159,12 +160,12 @@ static void trusted_scale(
 static void trusted_follow_command(hsep_trusted *self, const double x_pb[], uint64_t begin, uint64_t end)
 {
     const double *late = hsep_command_late(hsep_trusted_command(self), self->n);
-    double *stacked = hsep_at(self, self->stacked);
+    double *stacked = hsep_at(self, self->stacked), most = self->growth * self->bound;
     for (uint64_t i = 0; i < TRUSTED_OF_COMMAND; i++, stacked += self->n) {
         const hsep_expert *expert = hsep_trusted_expert(self, trusted_experts_of_command[i]);
         const double *e_h = hsep_at_const(expert, expert->e_h);
         for (uint64_t j = begin; trusted_predicts_command(self, trusted_experts_of_command[i]) && j < end; j++) {
-            stacked[j] = fmax(-self->bound, fmin(e_h[j] + late[j] - x_pb[j], self->bound));
+            stacked[j] = fmax(-most, fmin(e_h[j] + late[j] - x_pb[j], most));
         }
     }
 }
@@ -211,7 +212,7 @@ static void trusted_by_experts(
             hsep_expert_predict(
                 hsep_trusted_expert(self, trusted_experts_of_command[i]), hsep_at(command, command->rows),
                 hsep_at(self, self->e_0) + self->Np, self->scale_of_command.largest_square,
-                HSEP_TRUST_BOUND_OF_COMMAND * self->scale_of_command.largest, varied);
+                self->growth * HSEP_TRUST_BOUND_OF_COMMAND * self->scale_of_command.largest, varied);
         }
     }
     trusted_follow_command(self, x_pb, 0, self->n);
