@@ -44,6 +44,10 @@ class ResidualScale(NamedTuple):
     largest_square: float = 0.0
     largest: float = 0.0
 
+    def grown(self, growth: float) -> ResidualScale:
+        """Return the scale of residuals that are larger by a factor."""
+        return ResidualScale(growth**2 * self.largest_square, growth * self.largest)
+
     def with_window(self, residuals: Array) -> ResidualScale:
         """Return the scale with another window of residuals, ``(n,)``, m, n ≥ 1."""
         mean_square, largest = float(np.mean(residuals**2)), float(np.abs(residuals).max())

@@ -258,11 +258,11 @@ class TrustedModel(ResidualModel[TrustedForecast]):
     ) -> ExpertPrediction:
         """Return what an expert predicts of a window from its features without lags; ``growth`` of the command."""
         if self.is_of_command(expert):
-            square, past = self.scale_of_command, self.run.past_of_command
-            bound = growth * self.constants.bound_of_command * square.largest
+            scale, past = self.scale_of_command.grown(growth), self.run.past_of_command
+            bound = self.constants.bound_of_command * scale.largest
         else:
-            square, past, bound = self.scale, self.run.past, self.bound
-        return solved[expert].predict(rows, past, square.largest_square, bound, held.get(expert))
+            scale, past, bound = self.scale, self.run.past, self.bound
+        return solved[expert].predict(rows, past, scale.largest_square, bound, held.get(expert))
 
     def _growth(self, scales: FeatureScales) -> float:
         """Return the largest step of the command relative to that before the window, ≥ 1.

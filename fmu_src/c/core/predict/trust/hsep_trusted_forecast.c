@@ -211,8 +211,9 @@ static void trusted_by_experts(
         if (trusted_predicts_command(self, trusted_experts_of_command[i])) {
             hsep_expert_predict(
                 hsep_trusted_expert(self, trusted_experts_of_command[i]), hsep_at(command, command->rows),
-                hsep_at(self, self->e_0) + self->Np, self->scale_of_command.largest_square,
-                self->growth * HSEP_TRUST_BOUND_OF_COMMAND * self->scale_of_command.largest, varied);
+                hsep_at(self, self->e_0) + self->Np,
+                self->growth * self->growth * self->scale_of_command.largest_square,
+                HSEP_TRUST_BOUND_OF_COMMAND * (self->growth * self->scale_of_command.largest), varied);
         }
     }
     trusted_follow_command(self, x_pb, 0, self->n);
