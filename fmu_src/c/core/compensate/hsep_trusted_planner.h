@@ -25,7 +25,7 @@
 #define HSEP_TRUSTED_TOGETHER 8  /* tries of all, */
 #define HSEP_TRUSTED_SOLVER 34   /* solver steps after which no bounded try is begun, */
 #define HSEP_TRUSTED_SOLVED 10   /* and those of one programme at most */
-#define HSEP_TRUSTED_COLUMNS 5   /* parts in which the changes of x_h by the splines are computed */
+#define HSEP_TRUSTED_COLUMNS 7   /* parts in which the changes of x_h by the splines are computed */
 #define HSEP_TRUSTED_VARIANCES 5 /* parts in which the variances over the preview are computed */
 
 /* Work of a plan at most, in steps of the interior-point solver: the physics model's programme, Newton steps, tries

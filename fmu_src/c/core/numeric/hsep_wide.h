@@ -17,7 +17,7 @@
  * question: it takes up to 10 microseconds in a virtual machine. */
 static inline int hsep_is_wide(double multiply_adds)
 {
-    const double worth = 5e4;
+    const double worth = 4e4;
     const unsigned saved = 6; /* registers of SSE and AVX in XCR0 */
     unsigned a = 0, b = 0, c = 0, d = 0;
     if (multiply_adds < worth || !__get_cpuid(1, &a, &b, &c, &d) || !(c & bit_AVX) || !(c & bit_OSXSAVE)) {

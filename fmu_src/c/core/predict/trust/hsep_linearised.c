@@ -267,7 +267,8 @@ HSEP_API void hsep_linearised_column(hsep_linearised *self, hsep_trusted *model,
     const double *of_command = hsep_at(self, self->of_command), *kept = hsep_at(self, self->kept) + (self->n - count);
     memcpy(column, hsep_at(self, self->base), (size_t)count * sizeof(double));
     for (uint64_t i = 0; i < LINEARISED_OF_COMMAND; i++, kept += self->n, of_command += self->preview) {
-        for (uint64_t u = 0; linearised_weight(model, linearised_of_command[i], 1) > 0.0 && u < count; u++) {
+        const int counts = linearised_weight(model, linearised_of_command[i], 1) > 0.0;
+        for (uint64_t u = 0; counts && u < count; u++) {
             column[u] += kept[u] * of_command[u];
         }
     }

@@ -164,7 +164,8 @@ static void trusted_follow_command(hsep_trusted *self, const double x_pb[], uint
     for (uint64_t i = 0; i < TRUSTED_OF_COMMAND; i++, stacked += self->n) {
         const hsep_expert *expert = hsep_trusted_expert(self, trusted_experts_of_command[i]);
         const double *e_h = hsep_at_const(expert, expert->e_h);
-        for (uint64_t j = begin; trusted_predicts_command(self, trusted_experts_of_command[i]) && j < end; j++) {
+        const int predicts = trusted_predicts_command(self, trusted_experts_of_command[i]);
+        for (uint64_t j = begin; predicts && j < end; j++) {
             stacked[j] = fmax(-most, fmin(e_h[j] + late[j] - x_pb[j], most));
         }
     }
