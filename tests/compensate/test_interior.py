@@ -33,7 +33,7 @@ def problems_of(monkeypatch: pytest.MonkeyPatch, seed: int, n: int, **fixed: flo
 
 @pytest.mark.parametrize(
     ("seed", "n", "fixed"),
-    [(34, 1100, {}), (38, 800, {}), (233, 800, {"change_max": 1e-4})],
+    [(34, 1100, {}), (38, 1000, {}), (233, 800, {"change_max": 1e-4})],
     ids=["jerk bounds side by side", "limits of the trajectory", "change of 0.1 mm"],
 )
 def test_the_minimum_is_that_of_another_solver(

@@ -307,7 +307,7 @@ class TrustedModel(ResidualModel[TrustedForecast]):
 
     def solved(self, scales: FeatureScales) -> dict[int, SolvedExpert]:
         """Return the experts that know something, with their weights."""
-        solved = {}
+        solved: dict[int, SolvedExpert] = {}
         if self.n_rows > 0.0 and scales.velocity == self.velocity_scale and self.scale.largest_square > 0.0:
             solved |= self._solved_of(LAGGED, self.evidence, scales.largest, self.scale)
         if self.evidence_of_command.n_rows > 0.0 and self.scale_of_command.largest_square > 0.0:
