@@ -120,12 +120,17 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         self.rest = RestBefore(self.settings.measurement_delay)
         for evidence in (self.evidence, self.evidence_of_command):
             evidence.begin_run(self.constants.carried * self.settings.Np)
-        weights = self.stack.weights
-        self.lead(COMMAND if weights[COMMAND] > weights[LAGGED] + weights[STATIC] else LAGGED)
+        self.lead(self._leader)
         self.stack.forget(DOUBTING)
         if self.doubts:
             self.experts[DOUBTING].take_over(self.experts[self.leading])
             self.stack.copy(self.leading, DOUBTING)
+
+    @property
+    def _leader(self) -> int:
+        """COMMAND, if it has more of the stack than LAGGED and STATIC together, else LAGGED."""
+        weights = self.stack.weights
+        return COMMAND if weights[COMMAND] > weights[LAGGED] + weights[STATIC] else LAGGED
 
     def lead(self, expert: int) -> None:
         """Let the doubting expert be the counterpart of LAGGED or COMMAND."""
@@ -265,11 +270,13 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         return solved[expert].predict(rows, past, scale.largest_square, bound, held.get(expert))
 
     def _growth(self, scales: FeatureScales) -> float:
-        """Return the largest step of the command relative to that before the window, ≥ 1.
+        """Return the largest step of the command relative to that before the window, ≥ 1, where its expert leads.
 
         What follows the command alone is linear in it: it may be larger than anything so far by as much.
         """
-        return min(scales.step / self.largest_step, self.constants.growth) if self.largest_step > 0.0 else 1.0
+        if not (self.largest_step > 0.0 and self._leader == COMMAND):
+            return 1.0
+        return min(scales.step / self.largest_step, self.constants.growth)
 
     def _rows(self, x_d: Array, x_pb: Array, x: Array, scales: FeatureScales) -> Array:
         """Return the static features to predict with, ``(n, n_static)``; ``x``: position that the stiffness acts at.

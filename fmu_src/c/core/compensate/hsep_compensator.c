@@ -46,7 +46,8 @@ static void compensator_target(hsep_compensator *self, hsep_sep_state state)
     }
 }
 
-/* The spline filtered by the hybrid model, G_h = (1 + W_x / (1 - W_e)) G_pb as filters, (preview,), in place of a trial. */
+/* The spline filtered by the hybrid model, G_h = (1 + W_x / (1 - W_e)) G_pb as filters, (preview,), in place of a
+ * trial. */
 static const double *compensator_filter_spline(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);

@@ -123,6 +123,12 @@ HSEP_API void hsep_stack_update(
     stack_minimise(H, l, self->weights);
 }
 
+HSEP_API hsep_expert_place hsep_stack_leader(const hsep_stack *self)
+{
+    const double *weights = self->weights;
+    return weights[HSEP_COMMAND] > weights[HSEP_LAGGED] + weights[HSEP_STATIC] ? HSEP_COMMAND : HSEP_LAGGED;
+}
+
 HSEP_API void hsep_stack_copy(hsep_stack *self, hsep_expert_place expert, hsep_expert_place to)
 {
     memcpy(

@@ -35,6 +35,9 @@ HSEP_API void hsep_stack_init(hsep_stack *self);
 HSEP_API void hsep_stack_update(
     hsep_stack *self, double products[HSEP_N_EXPERTS + 1][HSEP_N_EXPERTS + 1], double n, double least);
 
+/* HSEP_COMMAND, if it has more of the weights than HSEP_LAGGED and HSEP_STATIC together, else HSEP_LAGGED. */
+HSEP_API hsep_expert_place hsep_stack_leader(const hsep_stack *self);
+
 /* Give an expert the evidence of another, as if it had predicted the same so far. */
 HSEP_API void hsep_stack_copy(hsep_stack *self, hsep_expert_place expert, hsep_expert_place to);
 

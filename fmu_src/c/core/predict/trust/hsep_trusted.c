@@ -92,9 +92,7 @@ HSEP_API void hsep_trusted_restart(hsep_trusted *self)
 {
     trusted_begin_run(self, HSEP_OF_PHYSICS);
     trusted_begin_run(self, HSEP_OF_COMMAND);
-    const double *weights = self->stack.weights;
-    const int of_command = weights[HSEP_COMMAND] > weights[HSEP_LAGGED] + weights[HSEP_STATIC];
-    const hsep_expert_place leading = of_command ? HSEP_COMMAND : HSEP_LAGGED;
+    const hsep_expert_place leading = hsep_stack_leader(&self->stack);
     hsep_trusted_lead(self, leading);
     hsep_stack_forget(&self->stack, HSEP_DOUBTING);
     if (hsep_trusted_doubts(self)) {

@@ -123,6 +123,16 @@ static void trusted_solve_of(
     }
 }
 
+/* Largest step of the command relative to that before the window, >= 1, where its expert leads: it is linear in the
+ * command, and may predict as much more than anything so far. */
+static double trusted_growth(const hsep_trusted *self)
+{
+    if (!(self->largest_step > 0.0 && hsep_stack_leader(&self->stack) == HSEP_COMMAND)) {
+        return 1.0;
+    }
+    return fmin(self->forecast_step / self->largest_step, HSEP_TRUST_GROWTH);
+}
+
 /* Take the scales of the features from the samples that come next, and solve for the weights. */
 static void trusted_scale(
     hsep_trusted *self, const double x_d[], const double x_pb[], const double path[], uint64_t n_path,
@@ -143,7 +153,7 @@ static void trusted_scale(
     }
     self->n_rest = trusted_rest_ahead(self, path != NULL ? path : x_d, path != NULL ? n_path : self->n);
     self->bound = HSEP_TRUST_BOUND * self->scale.largest;
-    self->growth = self->largest_step > 0.0 ? fmin(self->forecast_step / self->largest_step, HSEP_TRUST_GROWTH) : 1.0;
+    self->growth = trusted_growth(self);
     self->hold = fmin(fmax(last_residual, -self->bound), self->bound);
     const double n_rows = self->n_rows[HSEP_OF_PHYSICS] + self->n_earlier[HSEP_OF_PHYSICS];
     const double n_of_command = self->n_rows[HSEP_OF_COMMAND] + self->n_earlier[HSEP_OF_COMMAND];
