@@ -18,11 +18,13 @@ from library_stream import LookAheadStream
 from staircase_data import commanded
 from stream import OUTPUTS, PREDICTOR, PYTHON, STAGE_PREDICTOR, Array, Stream, Value, machine_of
 from streams import StreamMaker, on_all
+from trusted_cases import trusted_model
 
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.fmi.weights import weights_file
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.plant import simulate
+from hybridsep.predict.trust.model import COMMAND, LAGGED
 
 TRUST: dict[str, Value] = {"trust": True, "t_init": 0.0}
 DELAY = 5
@@ -54,11 +56,12 @@ def cut(model: str, Np: int, delay: int, n: int = 1500) -> tuple[Array, Array]:
 
 
 @cache
-def learned(model: str) -> bytes:
-    """Return the ``weights.bin`` of the model's predictor with trust after the staircase."""
+def learned(model: str, leading: int = LAGGED) -> bytes:
+    """Return the ``weights.bin`` of the model's predictor with trust after the staircase, in which an expert led."""
     machine = machine_of(model)
     predictor = machine.new_predictor(replace(machine.predictor_settings, trust=True))
     backtest(predictor, *moved(model))
+    trusted_model(predictor).stack.weights = np.eye(5)[leading]
     return weights_file(predictor)
 
 
@@ -200,13 +203,14 @@ def test_a_run_in_motion_is_no_worse_than_physics(new_stream: StreamMaker) -> No
         ("k_nl", 0.7, 2499),  # of the drive, told by errors alone in the window that ends then, predicted once more
     ],
 )
+@pytest.mark.parametrize("leading", [LAGGED, COMMAND])
 def test_a_changed_plant_is_relearned_as_by_the_library(
-    new_stream: StreamMaker, name: str, factor: float, saved_at: int
+    new_stream: StreamMaker, name: str, factor: float, saved_at: int, leading: int
 ) -> None:
     """The state that is saved has what was learned in earlier runs and in this one, or what is left of it."""
     model = new_stream.model
     name = {"k": "kappa", "c_nl": "f"}.get(name, "f") if model == STAGE_PREDICTOR else name
-    inputs, weights = changed(model, name, factor), learned(model)
+    inputs, weights = changed(model, name, factor), learned(model, leading)
     expected = of_library(model, inputs, TRUST, weights)
     assert_same(run(new_stream.planted(weights), inputs, TRUST, saved_at=saved_at), expected, new_stream.implementation)
 

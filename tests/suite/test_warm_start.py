@@ -15,12 +15,14 @@ from library_models import trained_predictor
 from library_stream import LookAheadStream
 from stream import COMPENSATOR, LIBRARY, LOOK_AHEADS, OUTPUTS, PREDICTOR, PYTHON, RefusedStreamError, Value
 from streams import StreamMaker, on_adapters
+from trusted_cases import trusted_model
 
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.fmi.weights import weights_file
 from hybridsep.machines.machine import load_machine
 from hybridsep.plants.plant import simulate
 from hybridsep.plants.trajectory import staircase
+from hybridsep.predict.trust.model import COMMAND
 
 Trained = Callable[[str], Path]
 
@@ -56,6 +58,21 @@ def test_a_warm_run_is_the_librarys_second_run(new_stream: StreamMaker, weights:
         # The first plan, at rest, has nothing to gain, and the first samples of the second one follow it.
         assert (loop.column(model, "sep_state")[70:] == 2.0).all()
         assert loop.column(model, "rms_e")[-1] < 5.5e-6  # the encoder's noise is 5 µm
+
+
+@on_adapters((COMPENSATOR,))
+def test_a_warm_run_in_which_the_commands_expert_led(new_stream: StreamMaker, tmp_path: Path) -> None:
+    """Its counterpart doubts it, and has a part in the plans."""
+    tolerance = 0.0 if new_stream.implementation in (LIBRARY, PYTHON) else 1e-10
+    path, predictor = tmp_path / "command.state", trained_predictor(COMPENSATOR)
+    model = trusted_model(predictor)
+    model.stack.weights, model.stack.gram = np.eye(5)[COMMAND], 1e-3 * model.stack.gram
+    model.stack.cross, model.stack.evidence = 1e-3 * model.stack.cross, 1e-3 * model.stack.evidence
+    predictor.save(path)
+    loop = closed_loop(COMPENSATOR, 1200, weights=path)
+    stream = new_stream(weights=path)
+    stream.initialise(loop.values)
+    np.testing.assert_allclose(replay(stream, loop), loop.outputs, rtol=0, atol=tolerance)
 
 
 @on_adapters(LOOK_AHEADS, needs="weights before")
