@@ -140,10 +140,14 @@ def test_a_forgotten_instance_is_closed(drive: Path, temporary: Path) -> None:
 
 
 def test_an_instance_may_be_open_when_python_exits(drive: Path, temporary: Path) -> None:
-    """pythonfmu 0.7 releases its interpreter twice where its library is loaded at that time: the heap was corrupt."""
+    """pythonfmu 0.7 releases its interpreter twice where its library is loaded at that time: the heap was corrupt.
+
+    Of several of its FMUs the library that came first stays loaded, whoever closes it (docs/evidence/limits.md).
+    """
+    n = 1 if drive.stem.endswith("Py") else 3
     script = f"""
 from hybridsep import FmuInstance
-instances = [FmuInstance({str(drive)!r}) for _ in range(3)]
+instances = [FmuInstance({str(drive)!r}) for _ in range({n})]
 for instance in instances:
     instance.initialise()
 """
