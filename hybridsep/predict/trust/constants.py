@@ -41,7 +41,7 @@ class TrustConstants:
         Bound on the rows that count as one, and how fast their number follows: without, recordings are 1 to 4 % worse.
     bound, bound_of_command : float
         Largest prediction relative to the largest residual so far, of the physics model and of the command: what is
-        larger was never seen. Where the command's expert leads, its grows with the command's steps, up to ``growth``:
+        larger was never seen. Where the command's expert leads, its bound grows with its steps, by up to ``growth``:
         without, CNC axes that creep before a motion have 3 and 4 times the error.
     growth, growth_learned, learned : float
         Growth of the commanded velocity that makes the static features begin anew, as they were learned at a creep: the

@@ -144,7 +144,7 @@ class TrustedModel(ResidualModel[TrustedForecast]):
 
     def is_of_command(self, expert: int) -> bool:
         """Return whether an expert predicts the residual of the command."""
-        return COMMAND in (expert, self.leading if expert == DOUBTING else expert)
+        return expert == COMMAND or (expert == DOUBTING and self.leading == COMMAND)
 
     def begin_in_motion(self, forecast: TrustedForecast, x_d: Array, x_pb: Array) -> TrustedForecast:
         """Correct what was before a run in motion: commands and physics-based prediction went on as they begin."""

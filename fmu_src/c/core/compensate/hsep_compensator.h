@@ -46,9 +46,8 @@ typedef struct {
     uint64_t before;     /* and of the window before, whose plan the first samples follow with trust */
     uint64_t solving;    /* whether its plan is being solved */
     /* Offsets in doubles from the beginning of the struct */
-    uint64_t x_dm; /* (Np,) m, the window: modified commands */
-    uint64_t
-        trial_x; /* (preview + q,) m, x_pb of a trial, newest first; then the spline filtered by the hybrid model */
+    uint64_t x_dm;      /* (Np,) m, the window: modified commands */
+    uint64_t trial_x;   /* (preview + q,) m, x_pb of a trial, newest first; then the hybrid model's filtered spline */
     uint64_t trial_e;   /* (preview + p,) m, its residuals */
     uint64_t target;    /* (preview,) m */
     uint64_t spline_pb; /* (preview,) m/m, a spline filtered by the physics model */

@@ -3,9 +3,8 @@
 #include <stddef.h>
 #include <string.h>
 
-/* Parts, about, in which the one that can be trusted predicts a window: its variances are dear; and samples whose
- * variances are computed abreast. */
-static const uint64_t residual_parts = 7, residual_abreast = 4;
+/* Parts in which the one that can be trusted predicts a window: its variances are dear. */
+static const uint64_t residual_parts = 6;
 
 HSEP_API hsep_trusted_parameters hsep_residual_trusted_parameters(const hsep_residual_parameters *parameters)
 {
@@ -119,7 +118,9 @@ HSEP_API void hsep_residual_begin(hsep_residual_model *self, int learning)
 
 HSEP_API uint64_t hsep_residual_part(const hsep_residual_model *self)
 {
-    return self->trusted ? (self->Np / (residual_parts * residual_abreast) + 1) * residual_abreast : self->Np;
+    const uint64_t part = (self->Np - 1) / residual_parts + 1;
+    /* Two at least, because the spread of errors follows from differences. */
+    return self->trusted ? (part > 2 ? part : 2) : self->Np;
 }
 
 HSEP_API void hsep_residual_predict(

@@ -13,7 +13,7 @@ static const hsep_expert_place linearised_experts[HSEP_LINEARISED_EXPERTS] = {HS
 #define LINEARISED_OF_COMMAND 2
 static const hsep_expert_place linearised_of_command[LINEARISED_OF_COMMAND] = {HSEP_COMMAND, HSEP_DOUBTING};
 
-/* Weight of an expert in the stack; 0 where it knows nothing, or is not of the command, or is. */
+/* Weight of an expert in the stack; 0 where it knows nothing, or predicts the other residual. of_command: which one. */
 static double linearised_weight(const hsep_trusted *model, hsep_expert_place expert, int of_command)
 {
     const int of_kind = hsep_trusted_is_of_command(model, expert) == of_command;
@@ -200,10 +200,10 @@ HSEP_API void hsep_linearised_at(
     for (uint64_t i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
         const hsep_expert *expert = hsep_trusted_expert(model, linearised_experts[i]);
         const double *weights = hsep_at_const(expert, expert->weights);
-        const double weight = linearised_weight(model, linearised_experts[i], 0);
         if (hsep_trusted_is_of_command(model, linearised_experts[i])) {
             continue;
         }
+        const double weight = linearised_weight(model, linearised_experts[i], 0);
         linearised_shrink(self, model, linearised_experts[i], weight, hsep_at(self, self->shrink) + i * n);
         linearised_gains(self, weights + first, hsep_at(self, self->gains) + i);
         linearised_pass(

@@ -34,8 +34,8 @@
 #define HSEP_TRUST_CORRELATION_RATE 0.1
 
 /* Largest prediction relative to the largest residual so far, of the physics model and of the command: what is
- * larger was never seen. Where the command's expert leads, its grows with the command's steps, up to growth:
- * without, CNC axes that creep before a motion have 3 and 4 times the error. */
+ * larger was never seen. Where the command's expert leads, its bound grows with its steps, by up to growth: without,
+ * CNC axes that creep before a motion have 3 and 4 times the error. */
 #define HSEP_TRUST_BOUND 1.2
 #define HSEP_TRUST_BOUND_OF_COMMAND 2.0
 
