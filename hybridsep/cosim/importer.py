@@ -11,6 +11,7 @@ import threading
 import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
+from functools import lru_cache
 from pathlib import Path
 from tempfile import gettempdir, mkdtemp
 from typing import Any
@@ -31,7 +32,7 @@ __all__ = ["FmuInstance", "faulty", "read_description"]
 
 
 def read_description(path: str | Path) -> Any:
-    """Return fmpy's model description of an FMI 2.0 or 3.0 co-simulation FMU.
+    """Return fmpy's model description of an FMI 2.0 or 3.0 co-simulation FMU, which callers share: change none.
 
     Raises
     ------
@@ -41,6 +42,13 @@ def read_description(path: str | Path) -> Any:
     path = Path(path)
     if not path.is_file():
         raise FmuError(f"no FMU at {path}; build it first (hybridsep build)")
+    status = path.stat()
+    return _description(path.absolute(), status.st_ino, status.st_size, status.st_mtime_ns)
+
+
+@lru_cache(maxsize=16)
+def _description(path: Path, *_file: int) -> Any:
+    """Return the same; a file is read again when it is another one or has changed."""
     check_description(path.name, read_description_text(path))
     try:
         return fmpy.read_model_description(str(path), validate=False)
