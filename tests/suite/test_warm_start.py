@@ -41,6 +41,17 @@ def weights(tmp_path_factory: pytest.TempPathFactory) -> Trained:
     return saved
 
 
+@pytest.fixture(scope="module")
+def led(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a compensator's predictor, saved, in which the command's expert led."""
+    path, predictor = tmp_path_factory.mktemp("led") / "command.state", trained_predictor(COMPENSATOR)
+    model = trusted_model(predictor)
+    model.stack.weights, model.stack.gram = np.eye(5)[COMMAND], 1e-3 * model.stack.gram
+    model.stack.cross, model.stack.evidence = 1e-3 * model.stack.cross, 1e-3 * model.stack.evidence
+    predictor.save(path)
+    return path
+
+
 @on_adapters(LOOK_AHEADS)
 def test_a_warm_run_is_the_librarys_second_run(new_stream: StreamMaker, weights: Trained) -> None:
     # 1e-11 m at every sample; a pythonfmu FMU is the library.
@@ -61,16 +72,11 @@ def test_a_warm_run_is_the_librarys_second_run(new_stream: StreamMaker, weights:
 
 
 @on_adapters((COMPENSATOR,))
-def test_a_warm_run_in_which_the_commands_expert_led(new_stream: StreamMaker, tmp_path: Path) -> None:
+def test_a_warm_run_in_which_the_commands_expert_led(new_stream: StreamMaker, led: Path) -> None:
     """Its counterpart doubts it, and has a part in the plans."""
     tolerance = 0.0 if new_stream.implementation in (LIBRARY, PYTHON) else 1e-10
-    path, predictor = tmp_path / "command.state", trained_predictor(COMPENSATOR)
-    model = trusted_model(predictor)
-    model.stack.weights, model.stack.gram = np.eye(5)[COMMAND], 1e-3 * model.stack.gram
-    model.stack.cross, model.stack.evidence = 1e-3 * model.stack.cross, 1e-3 * model.stack.evidence
-    predictor.save(path)
-    loop = closed_loop(COMPENSATOR, 1200, weights=path)
-    stream = new_stream(weights=path)
+    loop = closed_loop(COMPENSATOR, 1200, weights=led)
+    stream = new_stream(weights=led)
     stream.initialise(loop.values)
     np.testing.assert_allclose(replay(stream, loop), loop.outputs, rtol=0, atol=tolerance)
 
