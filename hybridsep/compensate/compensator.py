@@ -101,6 +101,7 @@ class SepCompensator:
         predictor.restart(start, t_init=t_init + lead_in * predictor.T_s if t_init > 0 else 0.0)
         self.lead_in = int(lead_in)
         self._state_before = min(self.compensate, SepState.PHYSICS)
+        self._hybrid_ended = False
         # Coefficients of the remainder of the last plan; last three values of δ and of x_d
         self._rest = np.zeros(N_DECIDED + self._basis.n_free)
         self._delta_before = np.zeros(3)
@@ -133,11 +134,14 @@ class SepCompensator:
         if np.isnan(self._x_d_before[0]):
             self._x_d_before[:] = predictor.start
         preview = Preview(command, self._x_d_before, self._delta_before, self._rest)
-        chosen = self._planning.choose(predictor, preview, self.compensate)
+        most = min(self.compensate, SepState.PHYSICS) if self._hybrid_ended else self.compensate
+        chosen = self._planning.choose(predictor, preview, most)
         delta = (self._basis.values @ chosen.coefficients)[:Np]
         x_dm = command[:Np] + delta
         prediction = predictor.predict(x_dm, scales=chosen.scales)
-        self._pending = PendingPlan(chosen.coefficients, delta, command[:Np].copy(), prediction, chosen.state)
+        self._pending = PendingPlan(
+            chosen.coefficients, delta, command[:Np].copy(), prediction, chosen.state, chosen.ends_hybrid
+        )
         as_published(prediction.x_pb, "x_pb")
         x_h, x_h_std, n_warm_up, n_followed = self._planning.published(prediction, chosen.state, self.compensate)
         x_d = self._pending.x_d
@@ -170,6 +174,7 @@ class SepCompensator:
             _last_three(self._x_d_before, pending.x_d),
         )
         self._state_before = pending.state
+        self._hybrid_ended |= pending.ends_hybrid
         self._pending = None
 
     @property
@@ -184,7 +189,8 @@ class SepCompensator:
             "settings": self.settings.as_table(),
             "lead_in": self.lead_in,
             "state_before": int(self._state_before),
-            "pending": None if pending is None else [int(pending.state), pending.prediction.n_warm_up],
+            "hybrid_ended": self._hybrid_ended,
+            "pending": pending and [int(pending.state), int(pending.ends_hybrid), pending.prediction.n_warm_up],
         }
         arrays = {
             "rest": self._rest,
@@ -212,16 +218,19 @@ class SepCompensator:
             compensator = cls(predictor, CompensatorSettings.from_table(saved.table("settings")))
         compensator.predictor = restored  # the constructor has restarted the other one
         compensator.lead_in = saved.whole("lead_in")
-        before = saved.whole("state_before")
-        if before not in tuple(SepState):
-            raise saved.error("state_before must be a state")
-        compensator._state_before = SepState(before)
+        compensator._state_before = SepState(saved.whole("state_before", max(SepState)))
+        compensator._hybrid_ended = saved.flag("hybrid_ended")
         n, Np = len(compensator._rest), predictor.Np
         compensator._rest, compensator._delta_before = saved.array("rest", n), saved.array("delta_before", 3)
         compensator._x_d_before = saved.array("x_d_before", 3, finite=False)
         if saved.field("pending") is not None:
-            state, n_warm_up = saved.numbers("pending", 2)
-            if state not in tuple(SepState) or n_warm_up not in range(Np + 1) or restored.n_pending != Np:
+            state, ends_hybrid, n_warm_up = saved.numbers("pending", 3)
+            if (
+                state not in tuple(SepState)
+                or ends_hybrid not in (0, 1)
+                or n_warm_up not in range(Np + 1)
+                or restored.n_pending != Np
+            ):
                 raise saved.error("the pending window must be planned and predicted")
             # A hybrid prediction that is not used may diverge.
             prediction = Prediction(
@@ -236,6 +245,7 @@ class SepCompensator:
                 saved.array("x_d", Np),
                 prediction,
                 SepState(int(state)),
+                ends_hybrid == 1,
             )
         return compensator
 

@@ -33,6 +33,8 @@ class PendingPlan:
         Under the modified command.
     state : SepState
         Model of the plan.
+    ends_hybrid : bool
+        Whether the residual model may plan no further window of the run.
     """
 
     coefficients: Array
@@ -40,3 +42,4 @@ class PendingPlan:
     x_d: Array
     prediction: Prediction
     state: SepState
+    ends_hybrid: bool

@@ -42,11 +42,23 @@ class Preview:
 
 
 class ChosenPlan(NamedTuple):
-    """Model of a plan, its coefficients, ``(3 + n_free,)``, m, and the scales of the model's features, if any."""
+    """Plan of a window.
+
+    Attributes
+    ----------
+    state : SepState
+        Model that planned it.
+    coefficients : (3 + n_free,) array, m
+    scales : FeatureScales, optional
+        Of the residual model's features.
+    ends_hybrid : bool
+        Whether the residual model may plan no further window of the run.
+    """
 
     state: SepState
     coefficients: Array
     scales: FeatureScales | None
+    ends_hybrid: bool = False
 
 
 class PublishedPosition(NamedTuple):
@@ -88,6 +100,7 @@ class Planning(ABC):
         assert settings.spacing is not None
         self.basis, self.bounds, self.settings = basis, bounds, settings
         self.preview, self.spacing = settings.preview, settings.spacing
+        self.Np = Np
         self.n_pinned = min(self.PINNED, Np // 2) // self.spacing
 
     @abstractmethod

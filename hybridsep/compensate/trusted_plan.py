@@ -21,7 +21,7 @@ from .interior import Tolerance
 from .linearised import PlanModel
 from .splines import N_DECIDED, PlanCost, SplineBasis
 
-__all__ = ["TOLERANCE", "TrustedPlanner", "is_better"]
+__all__ = ["TOLERANCE", "TrustedPlanner", "is_better", "runs_away"]
 
 TOLERANCE = Tolerance(1e-4, 1e-2, 10)
 """Of the solver: a plan is judged by the model itself, and taken if it is better than the others."""
@@ -43,6 +43,30 @@ _FIRST_PENALTY, _RAISE, _LOWER = 1.0, 8.0, 0.25
 _GAIN, _LEAST_GAIN = 1e-3, 1e-9
 """Relative gain of a step below which it is the last one, and below which a plan is no better than another: costs that
 rounding tells apart are equal."""
+
+
+_AT_BOUND, _BOUND_SHARE, _LEFT = 0.97, 0.2, 0.3
+"""Change of a plan, relative to the largest one, that is at its bound; share of a window in which a plan may be there
+longer than the physics model's; and RMS error that it may leave then, relative to the largest change."""
+
+
+def runs_away(delta: Array, of_physics: Array, error: float, change_max: float) -> bool:
+    """Return whether a plan asks for more than compensation is made for, which shows that its model is wrong.
+
+    A motor at its limit does not follow, so that the next plan asks for more; and a position loop that is driven so far
+    has a second state, with an error many times larger, in which it stays when compensation ends.
+
+    Parameters
+    ----------
+    delta, of_physics : (Np,) arrays, m
+        Changes of the command by the plan, and by that of the physics model.
+    error : float, m
+        RMS error that the plan leaves, by its own model.
+    change_max : float, m
+        Largest change of the command.
+    """
+    shares = [float(np.mean(np.abs(change) > _AT_BOUND * change_max)) for change in (delta, of_physics)]
+    return error > _LEFT * change_max and shares[0] - shares[1] > _BOUND_SHARE
 
 
 def is_better(cost: float, other: float) -> bool:

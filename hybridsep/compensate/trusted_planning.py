@@ -1,7 +1,11 @@
-"""Plans with the trusted model: the physics model's, or one on the trusted model that it says is better."""
+"""Plans with the trusted model: the physics model's, or one on the trusted model that it says is better.
+
+Where a plan runs away, the physics model plans the rest of the run.
+"""
 
 from __future__ import annotations
 
+import math
 from typing import ClassVar
 
 import numpy as np
@@ -14,7 +18,7 @@ from .interior import Tolerance
 from .linearised import PlanModel
 from .plan import SepState
 from .planning import ChosenPlan, Planning, Preview, PublishedPosition
-from .trusted_plan import TOLERANCE, TrustedPlanner, is_better
+from .trusted_plan import TOLERANCE, TrustedPlanner, is_better, runs_away
 
 __all__ = ["TrustedPlanning"]
 
@@ -47,7 +51,11 @@ class TrustedPlanning(Planning):
             bounds = self.limits(preview, may_turn=True)
             hybrid, cost = planner.plan(rest, bounds, self.n_pinned, self.basis.filtered(g))
             better = is_better(cost, planner.cost(physics))
-        return ChosenPlan(SepState.HYBRID, hybrid, scales) if better else ChosenPlan(SepState.PHYSICS, physics, scales)
+        if not better:
+            return ChosenPlan(SepState.PHYSICS, physics, scales)
+        if self._runs_away(hybrid, physics, cost):
+            return ChosenPlan(SepState.PHYSICS, physics, scales, ends_hybrid=True)
+        return ChosenPlan(SepState.HYBRID, hybrid, scales)
 
     def published(self, prediction: Prediction, state: SepState, most: SepState) -> PublishedPosition:
         """Return the model's position wherever it may plan.
@@ -58,6 +66,12 @@ class TrustedPlanning(Planning):
         if most is SepState.HYBRID:
             return PublishedPosition(prediction.x_h, prediction.x_h_std, prediction.n_warm_up, n_followed)
         return PublishedPosition(prediction.x_pb.copy(), np.zeros(Np), Np, n_followed)
+
+    def _runs_away(self, hybrid: Array, physics: Array, cost: float) -> bool:
+        change_max, values = self.settings.change_max, self.basis.values[: self.Np]
+        if change_max is None:
+            return False
+        return runs_away(values @ hybrid, values @ physics, math.sqrt(cost / self.preview), change_max)
 
     def _model(self, predictor: HybridPredictor, path: Array, preview: Preview) -> PlanModel:
         """Return the trusted model over the preview, with the scales of the rest of the last plan."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
@@ -18,6 +19,7 @@ from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepCompensator, SepState
 from hybridsep.compensate.linearised import PlanModel
 from hybridsep.compensate.splines import SplineBasis
+from hybridsep.compensate.trusted_plan import runs_away
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.cosim.run import Run
 from hybridsep.machines.machine import Machine
@@ -156,6 +158,56 @@ def test_a_plan_that_is_predicted_to_be_worse_is_rejected(monkeypatch: pytest.Mo
         plan = sep.plan(x_d)
         assert plan.state is SepState.PHYSICS
         np.testing.assert_array_equal(plan.x_dm, expected.plan(x_d).x_dm)
+
+
+def no_faster(velocity: float) -> Callable[[int, float], float]:
+    """Return the sensor of a drive whose motor does not go beyond a velocity, m/s."""
+    last = 0.0
+
+    def sensed(k: int, x_meas: float) -> float:
+        nonlocal last
+        last += min(max(x_meas - last, -velocity * TS), velocity * TS)
+        return last
+
+    return sensed
+
+
+def test_a_plan_that_runs_away_ends_the_hybrids_plans_for_the_run() -> None:
+    sep = compensator(change_max=2e-4)
+    run(sep)
+    away = run(sep, sensor=no_faster(0.06), t_init=0.0)
+    first = int(np.argmax(away.state == SepState.PHYSICS))
+    assert 50 < first < 250
+    assert (away.state[:first] == SepState.HYBRID).all()
+    assert (away.state[first:] == SepState.PHYSICS).all()
+    restored = SepCompensator.from_bytes(sep.to_bytes())
+    for one in (sep, restored):
+        assert one.plan(np.full(200, 0.007)).state is SepState.PHYSICS
+    assert run(sep, t_init=0.0).state.max() == SepState.HYBRID  # another run
+
+
+def test_without_a_largest_change_no_plan_runs_away() -> None:
+    sep = compensator(change_max=None)
+    run(sep)
+    state = run(sep, sensor=no_faster(0.02), t_init=0.0).state
+    first = int(np.argmax(state == SepState.PHYSICS))  # its plan is better there
+    assert (state[first:] == SepState.HYBRID).any()
+
+
+@pytest.mark.parametrize(
+    ("at_bound", "of_physics", "error", "expected"),
+    [
+        (30, 0, 4e-5, True),
+        (20, 0, 4e-5, False),  # a fifth of the window
+        (60, 45, 4e-5, False),  # as long as the physics model's
+        (30, 0, 2e-5, False),  # it pays
+        (100, 0, math.nan, False),
+    ],
+)
+def test_a_plan_runs_away_at_its_bound(at_bound: int, of_physics: int, error: float, expected: bool) -> None:
+    delta, other = np.zeros(100), np.zeros(100)
+    delta[:at_bound], other[:of_physics] = -1e-4, 0.98e-4
+    assert runs_away(delta, other, error, 1e-4) is expected
 
 
 def test_an_outlier_of_a_millimetre_hardly_moves_the_command() -> None:

@@ -21,6 +21,10 @@ static const hsep_tolerance trusted_planner_tolerance = {1e-4, 1e-2, HSEP_TRUSTE
  * rounding tells apart are equal. */
 static const double trusted_planner_gain = 1e-3, trusted_planner_least_gain = 1e-9;
 
+/* Change of a plan, relative to the largest one, that is at its bound; share of a window in which a plan may be there
+ * longer than the physics model's; and RMS error that it may leave then, relative to the largest change. */
+static const double trusted_planner_at_bound = 0.97, trusted_planner_bound_share = 0.2, trusted_planner_left = 0.3;
+
 /* Whether a plan costs less than another; not if it is NaN. */
 static int trusted_planner_better(double cost, double other)
 {
@@ -131,7 +135,7 @@ HSEP_API void hsep_trusted_planner_begin(
     hsep_trusted_forecast(
         task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb), path, self->preview,
         hsep_at(self, self->e_h), self->varied);
-    self->follows = best > 1 && task->model->predicted[HSEP_STATIC];
+    self->follows = best > 1 && !self->ended && task->model->predicted[HSEP_STATIC];
     if (best == 0) {
         self->stage = HSEP_TRUSTED_PREDICT;
     } else {
@@ -254,11 +258,38 @@ static void trusted_planner_judge(hsep_trusted_planner *self, const hsep_trusted
     trusted_planner_copy(self, c, hsep_at(self, self->rest));
 }
 
+/* Share of a window in which a plan is at the bound of the change. */
+static double trusted_planner_bounded(const hsep_trusted_planner *self, const hsep_splines *splines, const double c[])
+{
+    const uint64_t count = HSEP_DECIDED + self->n;
+    double bounded = 0.0;
+    for (uint64_t k = 0; k < self->Np; k++) {
+        bounded += fabs(hsep_splines_sum(splines, c, count, k)) * splines->share[0] > trusted_planner_at_bound;
+    }
+    return bounded / (double)self->Np;
+}
+
+/* Whether the best plan asks for more than compensation is made for. A motor at its limit does not follow, so that the
+ * next plan asks for more; and a position loop that is driven so far has a second state, with an error many times
+ * larger, in which it stays when compensation ends. */
+static int trusted_planner_runs_away(const hsep_trusted_planner *self, const hsep_trusted_task *task)
+{
+    const hsep_splines *splines = hsep_planner_splines(task->planner);
+    const double error = sqrt(self->cost / (double)self->preview) * splines->share[0];
+    const double longer = trusted_planner_bounded(self, splines, hsep_at_const(self, self->best)) -
+                          trusted_planner_bounded(self, splines, hsep_at_const(self, self->of_physics));
+    return error > trusted_planner_left && longer > trusted_planner_bound_share;
+}
+
 /* Take the plan whose cost is lower. */
 static void trusted_planner_compare(hsep_trusted_planner *self, const hsep_trusted_task *task)
 {
     const double cost = trusted_planner_at(self, task, hsep_at(self, self->of_physics), 0);
-    const int is_better = trusted_planner_better(self->cost, cost);
+    int is_better = trusted_planner_better(self->cost, cost);
+    if (is_better && trusted_planner_runs_away(self, task)) {
+        self->ended = 1;
+        is_better = 0;
+    }
     self->planned = is_better ? 2 : 1;
     self->stage = HSEP_TRUSTED_PREDICT;
     trusted_planner_copy(

@@ -3,7 +3,8 @@
  * min |x_d - x_h(x_d + delta)|^2 + jerk_weight |D^3 delta|^2 within the drive's limits, where x_h is not affine in
  * delta. Each step solves the quadratic programme of the linearised model (Gauss-Newton); a step that does not lower
  * the cost is repeated with a penalty on the change of velocity (Levenberg-Marquardt). The plan is compared with that
- * of the physics model, and the better one is taken.
+ * of the physics model, and the better one is taken. Where a plan asks for more than compensation is made for,
+ * which shows that the trusted model is wrong, the physics model plans the rest of the run.
  *
  * Nothing of it is long: hsep_trusted_planner_advance does a part of it, hsep_trusted_planner_next tells how much work
  * that is. All of it is at most HSEP_TRUSTED_WORK. Memory is one block, without pointers. Reentrant; allocates nothing.
@@ -63,6 +64,7 @@ typedef struct {
     uint64_t tries_in_all; /* of all */
     uint64_t solver_steps; /* of all bounded tries */
     uint64_t planned;      /* model of the plan: 0 none, 1 physics, 2 trusted */
+    uint64_t ended;        /* whether the trusted model plans no more in this run */
     double cost;           /* m2, of the best plan so far */
     double penalty;        /* on the change of velocity, in the unit of the jerk's weight */
     double start;          /* m, position of rest */
@@ -82,7 +84,7 @@ typedef struct {
     uint64_t trial;   /* and for a trial */
 } hsep_trusted_planner;
 
-HSEP_ASSERT_WORDS(hsep_trusted_planner, 30);
+HSEP_ASSERT_WORDS(hsep_trusted_planner, 31);
 
 /* What it plans with: other blocks, and the window's data. */
 typedef struct {

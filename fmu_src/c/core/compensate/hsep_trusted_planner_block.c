@@ -68,7 +68,7 @@ HSEP_API int hsep_trusted_planner_valid(
     return memcmp(&got, block, sizeof got) == 0 && got.stage <= HSEP_TRUSTED_PREDICT && got.follows <= 1 &&
            got.varied <= got.preview + got.late && got.steps <= HSEP_TRUSTED_STEPS && got.columns <= got.n &&
            got.tries <= HSEP_TRUSTED_TRIES && got.tries_in_all <= HSEP_TRUSTED_TOGETHER &&
-           got.solver_steps < HSEP_TRUSTED_SOLVER + HSEP_TRUSTED_SOLVED && got.planned <= 2 &&
+           got.solver_steps < HSEP_TRUSTED_SOLVER + HSEP_TRUSTED_SOLVED && got.planned <= 2 && got.ended <= 1 &&
            hsep_linearised_valid(hsep_at_bytes(block, got.linearised), parameters) &&
            hsep_physics_valid(hsep_at_bytes(block, got.physics), n_modes, dead_time) &&
            hsep_physics_valid(hsep_at_bytes(block, got.trial), n_modes, dead_time);
