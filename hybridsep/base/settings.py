@@ -283,7 +283,8 @@ class CompensatorSettings(Settings):
     limits : Limits, optional
         The drive's limits, which the differences of ``x_dm`` keep; none if left out.
     change_max : float, optional
-        Bound on the magnitude of the change, m; none if None.
+        Bound on the magnitude of the change, m; none if None. About twice the servo error without compensation: hybrid
+        plans that ask for far more end for the run (:func:`~hybridsep.compensate.trusted_plan.runs_away`).
     no_reversal : bool
         Whether the velocity of ``x_dm`` keeps the sign of that of ``x_d``: otherwise friction changes its sign too. It
         has no effect without ``limits``. Plans of a model with ``trust`` follow the friction and may turn.
