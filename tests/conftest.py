@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import tempfile
 import zipfile
 
@@ -12,6 +13,9 @@ import zipfile
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # A process that a test starts says where it crashed, as pytest's own does.
 os.environ.setdefault("PYTHONFAULTHANDLER", "1")
+# Without byte code each of the hundreds of processes that tests start would compile all that it imports, for seconds.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 # Where the checkout has kept no libraries, those for other platforms take a minute.
 os.environ.setdefault("HYBRIDSEP_TARGETS", "host")
 
