@@ -15,7 +15,6 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("PYTHONFAULTHANDLER", "1")
 # Without byte code each of the hundreds of processes that tests start would compile all that it imports, for seconds.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-sys.dont_write_bytecode = False
 # Where the checkout has kept no libraries, those for other platforms take a minute.
 os.environ.setdefault("HYBRIDSEP_TARGETS", "host")
 
@@ -32,6 +31,8 @@ from command_line import Run
 from hypothesis import HealthCheck, settings
 from quick_fits import without_other_windows
 from slow_tests import is_slow, runs_before
+
+sys.dont_write_bytecode = False  # of this process too
 
 # No test fails because something else keeps the cores busy.
 settings.register_profile("patient", deadline=None, suppress_health_check=[HealthCheck.too_slow])
