@@ -9,6 +9,8 @@ SLOW = (
     r"documents/test_commands\.py::test_the_pages",
     r"documents/test_site\.py",
     r"release/test_wheel\.py",
+    # The types of all files
+    r"test_types\.py",
     # All platforms' compilers, sanitizers and programs that are compiled for one test
     r"fmi/test_native_fmu\.py::test_all_platforms",
     r"fmi/test_tables\.py::test_(mutated_tables|the_fuzzer|a_table_is_what_the_header_is)",
@@ -113,6 +115,7 @@ LONGEST = (
     "fmi/test_native_fmu.py",  # where no compiler has run yet, two minutes for Windows' C library alone
     "suite/test_agreement.py",
     "app/test_demo.py",
+    "test_types.py",
     "documents/test_commands.py",
     "random_drives/test_trusted_drives.py",
     "suite/test_conditions.py",
