@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from ...base.errors import SignalError
 from ...base.saved import COUNT_MAX
 from ...base.signals import Array
-from ..held import HeldValue
 from .constants import TrustConstants
+from .held import HeldValue
 
 __all__ = ["N_STATE", "SensorGuard"]
 

@@ -26,7 +26,7 @@ HSEP_API void hsep_guard_init(hsep_guard *self, uint64_t Np, double T_s)
         .patience_standing = guard_patience(HSEP_TRUST_PATIENCE_STANDING, Np, T_s),
         .spread = -1.0,
         .last_x_pb = NAN};
-    hsep_sensor_init(&self->held);
+    hsep_held_init(&self->held);
 }
 
 /* Residual i of the window, or one before it; NaN behind it. */
@@ -108,7 +108,7 @@ static double guard_plausible(const hsep_guard *self, double motion, double larg
 static void guard_tell_rest(hsep_guard *self, double x, double residual, double plausible)
 {
     const double motion = self->held.high - self->held.low;
-    if (hsep_sensor_stays(&self->held, motion, plausible, fabs(x - self->held.value))) {
+    if (hsep_held_stays(&self->held, motion, plausible, fabs(x - self->held.value))) {
         if (fabs(residual - self->measured) <= fabs(residual - self->before_run)) {
             self->stood = fmax(self->stood, motion);
         } else if (motion <= HSEP_TRUST_STOOD_MORE * self->stood) {
@@ -153,7 +153,7 @@ HSEP_API void hsep_guard_accept(
         }
         self->measured = residual;
         const double still = fmax(plausible, HSEP_TRUST_STOOD_MORE * self->stood);
-        self->holding = (uint64_t)hsep_sensor_misses(&self->held, x[place], x_pb[place], still);
+        self->holding = (uint64_t)hsep_held_holds(&self->held, x[place], x_pb[place], still);
         if (self->holding) {
             guard_set_run(self, k, n, 1.0, suspect);
         }
@@ -195,7 +195,7 @@ HSEP_API hsep_doubt hsep_guard_doubt(const hsep_guard *self, double largest)
     const double range = self->held.high - self->held.low;
     const double motion = fmin(range, self->pace * fmin(self->held.repeats, (double)self->patience));
     const double plausible = guard_plausible(self, fmax(self->pace, self->vibration), largest);
-    if (self->holding || hsep_sensor_stays(&self->held, motion, plausible, HUGE_VAL)) {
+    if (self->holding || hsep_held_stays(&self->held, motion, plausible, HUGE_VAL)) {
         return (hsep_doubt){isfinite(self->held.value) ? HSEP_STANDS : HSEP_NO_DOUBT, self->held.value};
     }
     if (self->doubtful >= guard_doubted && self->doubtful <= self->patience && isfinite(last)) {

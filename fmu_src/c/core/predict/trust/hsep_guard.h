@@ -7,8 +7,8 @@
 #define HSEP_GUARD_H
 
 #include "hsep_api.h"
+#include "hsep_held.h"
 #include "hsep_layout.h"
-#include "hsep_sensor.h"
 
 #include <stdint.h>
 
@@ -26,7 +26,7 @@ typedef struct {
                                * a sensor that was held goes on from where the axis has come to meanwhile */
     double measured, before_run; /* m, the last measured residual, and that before the run of equal values */
     double last;                 /* m, the last accepted residual */
-    hsep_sensor held;
+    hsep_held held;
     double spread;    /* m, mean deviation from the neighbours' median; -1 before the first window */
     double pace;      /* m, largest predicted motion of a sample in the last window */
     double last_x_pb; /* m, the last prediction; NaN before the first */

@@ -4,8 +4,8 @@
  * the range of predicted positions are kept, so a value held over many windows is detected in each of them, also at
  * rest once the drive has moved. Plain data; reentrant; constant cost.
  */
-#ifndef HSEP_SENSOR_H
-#define HSEP_SENSOR_H
+#ifndef HSEP_HELD_H
+#define HSEP_HELD_H
 
 #include "hsep_api.h"
 #include "hsep_layout.h"
@@ -15,18 +15,18 @@ typedef struct {
     double repeats;   /* length of the run of equal values */
     double low, high; /* m, range of predicted positions over the run */
     double step;      /* m, the smallest change so far; infinite before the first */
-} hsep_sensor;
+} hsep_held;
 
-HSEP_ASSERT_WORDS(hsep_sensor, 5);
+HSEP_ASSERT_WORDS(hsep_held, 5);
 
-HSEP_API void hsep_sensor_init(hsep_sensor *self);
+HSEP_API void hsep_held_init(hsep_held *self);
 
 /* Process a measurement and its prediction, m; return whether it is held. still: m, predicted motion within which equal
  * values are plausible whatever the resolution. */
-HSEP_API int hsep_sensor_misses(hsep_sensor *self, double x_meas, double x_pb, double still);
+HSEP_API int hsep_held_holds(hsep_held *self, double x_meas, double x_pb, double still);
 
 /* Whether the last value has been equal under a predicted motion, m; first_step: m, resolution assumed before the first
  * change; the rest as above. */
-HSEP_API int hsep_sensor_stays(const hsep_sensor *self, double motion, double still, double first_step);
+HSEP_API int hsep_held_stays(const hsep_held *self, double motion, double still, double first_step);
 
 #endif

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from ..base.errors import SignalError
-from ..base.saved import COUNT_MAX
-from ..base.signals import Array
+from ...base.errors import SignalError
+from ...base.saved import COUNT_MAX
+from ...base.signals import Array
 
 __all__ = ["HeldValue"]
 
