@@ -71,6 +71,9 @@ class TrustConstants:
     stood_more : float
         Motion under which an axis is believed to stand, relative to the largest under which it has stood by itself:
         with 2 two servos with stiction have 1.4 and 2 times the error.
+    stood_residual : float
+        The same, at most, relative to the largest residual so far: without, a stuck sensor was learned as an axis that
+        stands, where one had stood at a reversal, with 2.9 times the physics model's error after it.
     patience, patience_standing : float
         Time, s, after which another level is believed, two windows at least, and the first time, after which an axis
         that stands is: an encoder may be held for half a second.
@@ -107,6 +110,7 @@ class TrustConstants:
     pace: float = 2.0
     vibration_noise: float = 2.0
     stood_more: float = 5.0
+    stood_residual: float = 4.0
     patience: float = 0.05
     patience_standing: float = 0.6
     rise: float = 0.5

@@ -125,9 +125,8 @@ class SensorGuard:
             if value != self.held.value:
                 self._tell_rest(value, e, plausible)
             self.measured = e
-            self.holding = int(
-                self.held.holds(value, position, still=max(plausible, self.constants.stood_more * self.stood))
-            )
+            standing = min(self.constants.stood_more * self.stood, self.constants.stood_residual * largest)
+            self.holding = int(self.held.holds(value, position, still=max(plausible, standing)))
             if self.holding:
                 run = slice(max(k - self.held.repeats + 1, 0), k + 1)
                 self.suspect[run] = True

@@ -152,8 +152,8 @@ HSEP_API void hsep_guard_accept(
             guard_tell_rest(self, x[place], residual, plausible);
         }
         self->measured = residual;
-        const double still = fmax(plausible, HSEP_TRUST_STOOD_MORE * self->stood);
-        self->holding = (uint64_t)hsep_held_holds(&self->held, x[place], x_pb[place], still);
+        const double standing = fmin(HSEP_TRUST_STOOD_MORE * self->stood, HSEP_TRUST_STOOD_RESIDUAL * largest);
+        self->holding = (uint64_t)hsep_held_holds(&self->held, x[place], x_pb[place], fmax(plausible, standing));
         if (self->holding) {
             guard_set_run(self, k, n, 1.0, suspect);
         }
