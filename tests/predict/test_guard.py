@@ -91,6 +91,19 @@ def test_an_axis_that_stands_still_by_itself_is_believed() -> None:
     assert set(range(3260, 3300)) <= set(rejected.tolist())
 
 
+@pytest.mark.parametrize(("largest", "believed"), [(8e-5, False), (1e-3, True)])
+def test_an_axis_stands_no_further_than_its_residuals_allow(largest: float, believed: bool) -> None:
+    x_pb, x = motion(2 * NP)
+    guard = SensorGuard(NP, 1e-3, CONSTANTS)
+    guard.accepts(x[:NP], x_pb[:NP], largest)
+    guard.stood = 1e-4
+    predicted = x_pb[NP - 1] + 4.5e-6 * np.arange(1, NP + 1)
+    held = np.full(NP, x[NP - 1])
+    last = guard.accepts(held, predicted, largest)[-1]  # under a motion of 450 µm
+    assert bool(last) is believed
+    assert guard.holding == int(not believed)
+
+
 def test_zeros_for_a_while_are_rejected() -> None:
     x_pb, x = motion()
     x[1330:1380] = 0.0
