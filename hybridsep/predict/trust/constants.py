@@ -72,8 +72,8 @@ class TrustConstants:
         Motion under which an axis is believed to stand, relative to the largest under which it has stood by itself:
         with 2 two servos with stiction have 1.4 and 2 times the error.
     stood_residual : float
-        The same, at most, relative to the largest residual so far: without, a stuck sensor was learned as an axis that
-        stands, where one had stood at a reversal, with 2.9 times the physics model's error after it.
+        Bound on that motion, relative to the largest residual so far: without, the stuck sensor of a drive that had
+        stood at a reversal was believed, with 2.9 times the physics model's error after it.
     patience, patience_standing : float
         Time, s, after which another level is believed, two windows at least, and the first time, after which an axis
         that stands is: an encoder may be held for half a second.

@@ -184,7 +184,7 @@ class SensorGuard:
         if held.stays(motion, still=plausible, first_step=abs(value - held.value)):
             if abs(e - self.measured) <= abs(e - self.before_run):
                 self.stood = max(self.stood, motion)
-            elif motion <= self.constants.stood_more * self.stood:  # whatever the residual: it was no axis at rest
+            elif motion <= self.constants.stood_more * self.stood:  # without that bound: the belief was wrong
                 self.stood = 0.0
         self.before_run = self.measured
 

@@ -111,7 +111,7 @@ static void guard_tell_rest(hsep_guard *self, double x, double residual, double 
     if (hsep_held_stays(&self->held, motion, plausible, fabs(x - self->held.value))) {
         if (fabs(residual - self->measured) <= fabs(residual - self->before_run)) {
             self->stood = fmax(self->stood, motion);
-        } else if (motion <= HSEP_TRUST_STOOD_MORE * self->stood) { /* whatever the residual: it was no axis at rest */
+        } else if (motion <= HSEP_TRUST_STOOD_MORE * self->stood) { /* without that bound: the belief was wrong */
             self->stood = 0.0;
         }
     }

@@ -84,8 +84,8 @@
  * 2 two servos with stiction have 1.4 and 2 times the error. */
 #define HSEP_TRUST_STOOD_MORE 5.0
 
-/* The same, at most, relative to the largest residual so far: without, a stuck sensor was learned as an axis that
- * stands, where one had stood at a reversal, with 2.9 times the physics model's error after it. */
+/* Bound on that motion, relative to the largest residual so far: without, the stuck sensor of a drive that had stood
+ * at a reversal was believed, with 2.9 times the physics model's error after it. */
 #define HSEP_TRUST_STOOD_RESIDUAL 4.0
 
 /* Time, s, after which another level is believed, two windows at least, and the first time, after which an axis that
