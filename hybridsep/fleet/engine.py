@@ -6,6 +6,7 @@ is repeated alone before it is reported: what took the process down twice is the
 
 from __future__ import annotations
 
+import multiprocessing
 import time
 from abc import ABC, abstractmethod
 from collections import deque
@@ -42,6 +43,9 @@ _COUNTED = 1.0
 
 _REACHED = 10.0
 """Time within which a scheduler answers, s."""
+
+_CLOSED = 30.0
+"""Time within which a cluster closes, s: a worker that dies as it is restarted may be waited for in vain."""
 
 _ENDED = "the process that worked on it ended, twice: out of memory, or a fault of a library{limit}"
 
@@ -197,6 +201,20 @@ _NONE: Any = object()
 
 
 @contextmanager
+def _ending(started: Any) -> Iterator[None]:
+    """Close a cluster of this machine at the end; kill its workers if it does not close in time."""
+    try:
+        yield
+    finally:
+        workers = [one for one in multiprocessing.active_children() if one.name.startswith("Dask Worker process")]
+        try:
+            started.close(timeout=_CLOSED)
+        except TimeoutError:
+            for one in workers:
+                one.kill()
+
+
+@contextmanager
 def cluster(workers: int = 0, scheduler: str = "") -> Iterator[Engine]:
     """Start a cluster of this machine, or use a running one, and end what was started.
 
@@ -233,7 +251,7 @@ def cluster(workers: int = 0, scheduler: str = "") -> Iterator[Engine]:
                 dashboard_address="127.0.0.1:0",  # of its own, so that several may run, and for this machine alone
                 silence_logs=50,
             )
-        with started, distributed.Client(started) as client:
+        with _ending(started), distributed.Client(started) as client:
             limit = min(one["memory_limit"] for one in client.scheduler_info(n_workers=-1)["workers"].values())
             words = f"Dask, {workers} worker{'s' if workers > 1 else ''} of {limit / 2**30:.1f} GB"
             yield _Dask(client, distributed, words, f"; its memory limit is {limit / 2**30:.1f} GB")

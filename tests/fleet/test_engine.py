@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import psutil
 import pytest
 from fleet_stubs import squared
 
@@ -57,6 +60,20 @@ def test_one_process_is_this_one() -> None:
     done = list(joblib_engine(1).run(squared, [(2, ""), (3, "raise")]))
     assert done[0].result == (4, os.getpid())
     assert done[1].failure == "no log"
+
+
+def test_a_cluster_that_does_not_close(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def waits_in_vain(_: object) -> None:
+        await asyncio.sleep(3600)
+
+    monkeypatch.setattr("hybridsep.fleet.engine._CLOSED", 0.5)
+    with cluster(1) as engine:
+        (done,) = engine.run(squared, [(2, "")])
+        monkeypatch.setattr("distributed.LocalCluster._close", waits_in_vain)
+    started = time.monotonic()
+    while psutil.pid_exists(done.result[1]):
+        assert time.monotonic() - started < 10
+        time.sleep(0.05)
 
 
 def test_engines_that_are_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
