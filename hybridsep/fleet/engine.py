@@ -6,6 +6,7 @@ is repeated alone before it is reported: what took the process down twice is the
 
 from __future__ import annotations
 
+import asyncio
 import multiprocessing
 import time
 from abc import ABC, abstractmethod
@@ -45,7 +46,7 @@ _REACHED = 10.0
 """Time within which a scheduler answers, s."""
 
 _CLOSED = 30.0
-"""Time within which a cluster closes, s: a worker that dies as it is restarted may be waited for in vain."""
+"""Time within which a cluster closes, s: rarely, Dask has waited for a worker without end."""
 
 _ENDED = "the process that worked on it ended, twice: out of memory, or a fault of a library{limit}"
 
@@ -206,12 +207,12 @@ def _ending(started: Any) -> Iterator[None]:
     try:
         yield
     finally:
-        workers = [one for one in multiprocessing.active_children() if one.name.startswith("Dask Worker process")]
         try:
             started.close(timeout=_CLOSED)
-        except TimeoutError:
-            for one in workers:
-                one.kill()
+        except asyncio.TimeoutError:  # in Python 3.10 not the built-in one
+            for child in multiprocessing.active_children():
+                if child.name.startswith("Dask Worker process"):
+                    child.kill()
 
 
 @contextmanager

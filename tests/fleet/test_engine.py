@@ -5,13 +5,13 @@ from __future__ import annotations
 import asyncio
 import os
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import psutil
 import pytest
 from fleet_stubs import squared
+from live_runs import until
 
 from hybridsep.base.errors import LogError, ParameterError
 from hybridsep.fleet.engine import Done, Engine, cluster, joblib_engine
@@ -70,10 +70,7 @@ def test_a_cluster_that_does_not_close(monkeypatch: pytest.MonkeyPatch) -> None:
     with cluster(1) as engine:
         (done,) = engine.run(squared, [(2, "")])
         monkeypatch.setattr("distributed.LocalCluster._close", waits_in_vain)
-    started = time.monotonic()
-    while psutil.pid_exists(done.result[1]):
-        assert time.monotonic() - started < 10
-        time.sleep(0.05)
+    until(lambda: not psutil.pid_exists(done.result[1]), 10)
 
 
 def test_engines_that_are_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
