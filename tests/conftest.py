@@ -29,9 +29,8 @@ import pytest
 from built_once import SHARED_BUILDS, BuiltFmus, built_once
 from c_coverage import count_in, table
 from command_line import Run
+from properties import LEFT_OUT, take_profile
 from quick_fits import without_other_windows
-
-from examples import LEFT_OUT, take_profile
 
 sys.dont_write_bytecode = False  # of this process too
 

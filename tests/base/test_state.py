@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
+from properties import examples
 
-from examples import examples
 from hybridsep.base.errors import HybridSepError, StateError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.state import VERSION, pack, unpack

@@ -9,8 +9,8 @@ import pytest
 from compensator_cases import compensator
 from hypothesis import given
 from hypothesis import strategies as st
+from properties import examples
 
-from examples import examples
 from hybridsep.base.errors import SignalError
 from hybridsep.compensate.compensator import SepState
 from hybridsep.compensate.paper_planning import has_stable_poles

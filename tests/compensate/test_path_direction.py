@@ -9,8 +9,8 @@ import pytest
 from compensator_cases import DRIVE_LIMITS, TS, beyond, compensator, move, turned
 from hypothesis import given
 from hypothesis import strategies as st
+from properties import examples
 
-from examples import examples
 from hybridsep.base.settings import Limits
 from hybridsep.base.signals import Array
 from hybridsep.compensate.constraints import DriveBounds

@@ -11,11 +11,11 @@ from bounded_oracle import clarabel_minimum
 from compensator_cases import DRIVE_LIMITS, MODEL, TS, beyond, compensator, move, plant
 from hypothesis import example, given
 from hypothesis import strategies as st
+from properties import examples
 from scipy.linalg import toeplitz
 from scipy.optimize import nnls
 from staircase_data import commanded
 
-from examples import examples
 from hybridsep.base.settings import Limits, PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.compensate.compensator import SepState, direct_samples

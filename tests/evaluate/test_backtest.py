@@ -13,8 +13,8 @@ from hold_oracle import held
 from hypothesis import given
 from hypothesis import strategies as st
 from places import EMPS
+from properties import examples
 
-from examples import examples
 from hybridsep.base.errors import SignalError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array

@@ -1,4 +1,4 @@
-"""Binaries for other platforms against x86-64 Linux, under Wine and qemu where installed."""
+"""Binaries for other platforms against x86-64 Linux, under Wine and qemu where installed; of nights and releases."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 from foreign import compare
+
+pytestmark = [pytest.mark.nightly, pytest.mark.release]
 
 TOLERANCE = 1e-12  # m
 

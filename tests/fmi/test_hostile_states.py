@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from properties import share
 
 from hybridsep.base.errors import HybridSepError, StateError
 from hybridsep.base.settings import CompensatorSettings, Limits, PredictorSettings
@@ -29,7 +30,7 @@ HOSTILE: list[Any] = [
     *(-0.5, 0.0, 1e-320, 1e-3, 1e99, 1e101, 1e308, float("nan"), float("inf"), float("-inf")),
 ]
 NUMBERS = [0.0, -1.0, 1e-320, 1e9, 1e99, 1e101, 1e308, np.nan, np.inf, -np.inf]
-EXAMPLES = 200
+EXAMPLES = share(200)
 MEMORY_MAX = 300e6  # bytes, for a state of a few kilobytes
 TIME_MAX = 20.0  # s
 

@@ -159,6 +159,7 @@ def test_another_machine_has_another_guid(fmus: BuiltFmus) -> None:
     assert len(guids) == len(NATIVE)
 
 
+@pytest.mark.release
 def test_all_platforms(tmp_path: Path) -> None:
     machine = load_machine("spring_mass_damper")
     path = build_fmu(machine, "FeedDrive", tmp_path / "1", targets=ALL_TARGETS)

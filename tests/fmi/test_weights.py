@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 from c_core import CModel, refusal, write_weights
 from library_models import trained_predictor
+from properties import share
 from trusted_cases import trusted_model
 
 from hybridsep.app import cli
@@ -50,6 +51,7 @@ def build(flavour: str, out: Path, weights: Path | None = None, model: str = "Hy
     return build_fmu(MACHINE, name, out, flavour, targets=("host",), weights=weights)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_the_weights_are_in_the_resources_and_in_the_guid(flavour: str, tmp_path: Path, trained: Path) -> None:
     paths = [build(flavour, tmp_path / str(i), weights) for i, weights in enumerate((trained, trained, None))]
@@ -158,7 +160,7 @@ def mutations(content: bytes, count: int) -> Iterator[bytes]:
 def test_no_mutation_of_the_file_is_accepted(trained: Path) -> None:
     content = weights_file(HybridPredictor.load(trained))
     predictor = MACHINE.new_predictor()
-    for changed in mutations(content, 20_000):
+    for changed in mutations(content, share(20_000)):
         with pytest.raises(StateError):
             restore_weights(predictor, changed)
     assert not predictor.weights.any()
@@ -171,7 +173,7 @@ def test_no_mutation_of_the_file_is_accepted_in_c(tmp_path: Path) -> None:
     file, model = tmp_path / WEIGHTS_FILE, CModel("predictor_2", {"p": 4, "q": 2, "Np": 8}, tmp_path)
     content = file.read_bytes()
     model.initialise()
-    for changed in mutations(content, 5000):
+    for changed in mutations(content, share(5000)):
         file.write_bytes(changed)
         assert refusal(model.initialise)
     file.write_bytes(content)
@@ -220,7 +222,7 @@ def test_no_mutation_of_a_file_with_trust_is_accepted(tmp_path: Path) -> None:
         body[:first] + body[first + 8 :],
         body[:first] + bytes(8) + body[first:],
     ]
-    for changed in (*mutations(content, 2000), *map(sealed, nonsense)):
+    for changed in (*mutations(content, share(2000)), *map(sealed, nonsense)):
         with pytest.raises(StateError):
             restore_weights(predictor, changed)
         file.write_bytes(changed)
@@ -284,6 +286,7 @@ def hybridsep(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
     return 0
 
 
+@pytest.mark.release
 def test_build_takes_weights_and_targets(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

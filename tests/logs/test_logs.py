@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from log_files import EVERY_FORMAT, FORMATS, columns, write, write_csv
 from places import EMPS
+from properties import examples
 
-from examples import examples
 from hybridsep.logs.log import LogReader, open_log, read_log
 
 

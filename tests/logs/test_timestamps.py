@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from log_files import write_csv
+from properties import examples
 
-from examples import examples
 from hybridsep.base.errors import LogError
 from hybridsep.intake.check import check
 from hybridsep.logs.formats import open_source

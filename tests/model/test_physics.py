@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from modal_cases import CASES, HOLDS, LIGHT, OVER, TS, UNDER, Array, command, transfer_function
+from properties import examples
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from examples import examples
 from hybridsep.model.discrete import BLOCK_MAX
 from hybridsep.model.physics import ModalModel
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from properties import examples
 
-from examples import examples
 from hybridsep.base.errors import LogError, ParameterError, SignalError
 from hybridsep.base.settings import Limits
 from hybridsep.plants.trajectory import (

@@ -18,8 +18,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from library_models import library_compensator
 from places import ROOT
+from properties import share
 
-from examples import share
 from hybridsep.app import cli
 from hybridsep.base.errors import HybridSepError, MachineError, ParameterError
 from hybridsep.base.settings import PARAMETERS, Limits, PredictorSettings

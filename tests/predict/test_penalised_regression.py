@@ -7,8 +7,8 @@ import oracle
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from properties import examples
 
-from examples import examples
 from hybridsep.base.signals import Array
 from hybridsep.predict.regression import RidgeRegression
 

@@ -12,8 +12,8 @@ import staircase_data as staircase
 from hypothesis import given
 from hypothesis import strategies as st
 from predictor_cases import MODEL, Array, replay, small_signals, trained
+from properties import examples
 
-from examples import examples
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor

@@ -12,8 +12,8 @@ import staircase_data as staircase
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from properties import examples
 
-from examples import examples
 from hybridsep.base.errors import ParameterError, SignalError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.model.physics import ModalModel

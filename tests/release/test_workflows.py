@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 from places import ROOT
+from properties import LEFT_OUT
 from ruamel.yaml import YAML
 
-from examples import LEFT_OUT
 from hybridsep.base.version import __version__
 from hybridsep.fmi.compiler import ALL_TARGETS
 
