@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from compensator_cases import DRIVE_LIMITS, TS, beyond, compensator, move, turned
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
+from examples import examples
 from hybridsep.base.settings import Limits
 from hybridsep.base.signals import Array
 from hybridsep.compensate.constraints import DriveBounds
@@ -20,7 +21,7 @@ from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest, spiral
 
 
-@settings(max_examples=12)
+@examples(12)
 @given(
     st.integers(0, 2**31),
     st.sampled_from([1e-6, 1e-4, 1e-2]),
@@ -59,7 +60,7 @@ def test_only_the_velocity_where_the_path_moves_is_bounded_by_the_direction() ->
     np.testing.assert_array_equal(kept.rows, free.rows)
 
 
-@settings(max_examples=30)
+@examples(30)
 @given(st.integers(0, 2**31))
 def test_the_rest_of_a_plan_that_turned_is_still_a_plan(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 from library_models import library_compensator
 from places import ROOT
 
+from examples import share
 from hybridsep.app import cli
 from hybridsep.base.errors import HybridSepError, MachineError, ParameterError
 from hybridsep.base.settings import PARAMETERS, Limits, PredictorSettings
@@ -44,7 +45,7 @@ MODE = ("f_n", "zeta", "alpha", "beta")
 FEED_DRIVE = ("m", "c", "k", "c_nl", "k_nl", "noise_std")
 STAGE = ("f", "kappa", "T_s", "noise_std")
 
-bounded = settings(max_examples=100, deadline=timedelta(seconds=20), suppress_health_check=list(HealthCheck))
+bounded = settings(max_examples=share(100), deadline=timedelta(seconds=20), suppress_health_check=list(HealthCheck))
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -7,7 +7,22 @@ from pathlib import Path
 
 import pytest
 from built_once import BuiltFmus
+from stream import PYTHON
 from streams import StreamMaker
+
+
+@pytest.hookimpl(tryfirst=True)  # before tests/conftest.py leaves out what runs at night
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Let a pythonfmu FMU, which is the library itself, run one set of a test's parameters for each model."""
+    seen = set()
+    for item in items:
+        call = getattr(item, "callspec", None)
+        implementation, model = call.params.get("new_stream", ("", "")) if call else ("", "")
+        if implementation == PYTHON:
+            test = (item.nodeid.partition("[")[0], model)
+            if test in seen:
+                item.add_marker("nightly")
+            seen.add(test)
 
 
 @pytest.fixture
