@@ -31,7 +31,7 @@ from c_coverage import count_in, table
 from command_line import Run
 from quick_fits import without_other_windows
 
-from examples import take_profile
+from examples import LEFT_OUT, take_profile
 
 sys.dont_write_bytecode = False  # of this process too
 
@@ -66,7 +66,7 @@ def _asked_for(config: pytest.Config, mark: str) -> bool:
 @pytest.hookimpl(tryfirst=True)  # before pytest deselects by marker
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out what runs at night or at a release only, where it is not asked for."""
-    others = [mark for mark in ("nightly", "release") if not _asked_for(config, mark)]
+    others = [mark for mark in LEFT_OUT if not _asked_for(config, mark)]
     left_out = [item for item in items if any(item.get_closest_marker(mark) for mark in others)]
     if left_out:
         config.hook.pytest_deselected(items=left_out)

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import pytest
 from places import ROOT
-from slow_tests import LONGEST
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
@@ -38,10 +37,6 @@ def test_ci_prints_and_keeps_the_stacks_of_a_crash(tmp_path: Path) -> None:
     assert done.returncode != 0
     assert "Fatal Python error: Aborted" in done.stdout
     assert (tmp_path / ".ci" / "run.log").read_text() == done.stdout
-
-
-def test_the_files_that_run_first_are_there() -> None:
-    assert [file for file in LONGEST if not (ROOT / "tests" / file).is_file()] == []
 
 
 def test_processes_of_tests_tell_where_they_crash() -> None:

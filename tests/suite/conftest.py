@@ -7,19 +7,16 @@ from pathlib import Path
 
 import pytest
 from built_once import BuiltFmus
-from stream import PYTHON
 from streams import StreamMaker
 
 
 @pytest.hookimpl(tryfirst=True)  # before tests/conftest.py leaves out what runs at night
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Let a pythonfmu FMU, which is the library itself, run one set of a test's parameters for each model."""
+def pytest_collection_modifyitems(items: list[pytest.Function]) -> None:
+    """Leave all but one set of parameters to the night where one will do."""
     seen = set()
     for item in items:
-        call = getattr(item, "callspec", None)
-        implementation, model = call.params.get("new_stream", ("", "")) if call else ("", "")
-        if implementation == PYTHON:
-            test = (item.nodeid.partition("[")[0], model)
+        if item.get_closest_marker("one_set"):
+            test = (item.nodeid.partition("[")[0], item.callspec.params["new_stream"])
             if test in seen:
                 item.add_marker("nightly")
             seen.add(test)

@@ -1,10 +1,13 @@
-"""How many examples a property is tried on: all of them at night, a sixth in a contributor's run, others each time."""
+"""What a contributor's run leaves out, and how many examples a property is tried on: a sixth, all of them at night."""
 
 from __future__ import annotations
 
 from hypothesis import HealthCheck, settings
 
-__all__ = ["examples", "share", "take_profile"]
+__all__ = ["LEFT_OUT", "examples", "share", "take_profile"]
+
+LEFT_OUT = ("nightly", "release")
+"""Marks of tests that run where they are named in ``-m``, or by their own names."""
 
 _SHARE = 6
 _all = False

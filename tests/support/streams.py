@@ -85,13 +85,20 @@ def fmu_name(model: str, implementation: str) -> str:
 def cases(models: Sequence[str], *, needs: str = "", adapters: bool = False) -> list[Any]:
     """Return pytest parameters ``(implementation, model)`` for all that there are, and that can do what is needed.
 
-    With ``adapters`` the FMI 3.0 FMU of the first model is among them.
+    With ``adapters`` the FMI 3.0 FMU of the first model is among them. What a pythonfmu FMU computes is the library's,
+    and what a native FMU computes the C core's: the former runs one set of a test's other parameters, and the latter
+    where a test is of agreement (``one_set``); the other sets run at night.
     """
+    once = (PYTHON, NATIVE) if needs == "agreement" else (PYTHON,)
     pairs = [(implementation, model) for implementation in IMPLEMENTATIONS for model in models]
     if adapters:
         pairs.append((FMI3, models[0]))
     return [
-        pytest.param((implementation, model), id=f"{implementation}-{model}")
+        pytest.param(
+            (implementation, model),
+            id=f"{implementation}-{model}",
+            marks=[pytest.mark.one_set] if implementation in once else [],
+        )
         for implementation, model in pairs
         if not {(implementation, model), (implementation, needs)} & CANNOT.keys()
     ]
