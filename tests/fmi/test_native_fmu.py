@@ -24,7 +24,7 @@ from fmpy.validation import validate_fmu
 from hybridsep.base.errors import FmuError
 from hybridsep.cosim.importer import FmuInstance
 from hybridsep.fmi.archive import archived, build_fmu, fmu_names
-from hybridsep.fmi.compiler import ALL_TARGETS, TARGETS, compile_flags, host_target
+from hybridsep.fmi.compiler import ALL_TARGETS, compile_flags, host_target
 from hybridsep.fmi.flavours import FLAVOURS
 from hybridsep.fmi.macho import universal
 from hybridsep.fmi.variables import Variable, variables_of
