@@ -118,4 +118,5 @@ def _list(name: str, settings: Mapping[str, Parameter]) -> str:
 
 if __name__ == "__main__":
     for path, content in generated().items():
+        path.parent.mkdir(exist_ok=True)
         path.write_text(content, encoding="utf-8")

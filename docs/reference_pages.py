@@ -80,15 +80,16 @@ _OWN = {
 def pages() -> dict[Path, str]:
     """Return the text of each page."""
     return {
-        FOLDER / "command-line.md": command_line(),
+        **command_pages(),
         FOLDER / "machine-file.md": machine_file(),
         FOLDER / "fmu.md": fmu_variables(),
         FOLDER / "messages.md": messages(),
     }
 
 
-def command_line() -> str:
-    """Return the page of the commands with their arguments and options."""
+def command_pages() -> dict[Path, str]:
+    """Return the page that lists the commands, and one for each with its arguments and options."""
+    commands = typer.main.get_command(app).commands  # type: ignore[attr-defined]
     parts = [
         "# Command line",
         _WRITTEN,
@@ -96,27 +97,36 @@ def command_line() -> str:
         "130; "
         "with `HYBRIDSEP_DEBUG=1` in the environment an unexpected error shows its traceback. "
         "[What messages mean](messages.md).",
-    ]
-    commands = typer.main.get_command(app).commands  # type: ignore[attr-defined]
-    parts.append(
         _table(
             ("command", "what"),
-            ((f"[`{name}`](#{name})", one.help.partition("\n")[0]) for name, one in commands.items()),
-        )
-    )
-    for name, command in commands.items():
-        arguments = [one for one in command.params if not one.opts[0].startswith("-")]
-        options = [one for one in command.params if one.opts[0].startswith("-")]
-        usage = [f"{one.name.upper()}{'…' if one.nargs == -1 else ''}" for one in arguments]
-        usage = [text if one.required else f"[{text}]" for text, one in zip(usage, arguments, strict=True)]
-        parts += [
-            f"## {name}",
-            " ".join(command.help.split()),
-            f"`{' '.join(['hybridsep', name, *usage, '[OPTIONS]'])}`",
-        ]
-        rows = [(f"`{one.name.upper()}`", one.help) for one in arguments]
-        rows += [(_option(one), _described(one)) for one in options]
-        parts.append(_table(("argument or option", "what"), rows))
+            ((f"[`{name}`](command-line/{name}.md)", one.help.partition("\n")[0]) for name, one in commands.items()),
+        ),
+        "```{toctree}\n:hidden:\n\n" + "\n".join(f"command-line/{name}" for name in commands) + "\n```",
+    ]
+    pages = {FOLDER / "command-line.md": _page(parts)}
+    return pages | {FOLDER / "command-line" / f"{name}.md": _command(name, one) for name, one in commands.items()}
+
+
+def _command(name: str, command: Any) -> str:
+    """Return the page of a command: what it does, how it is called, its arguments, then its options panel by panel."""
+    arguments = [one for one in command.params if not one.opts[0].startswith("-")]
+    options = [one for one in command.params if one.opts[0].startswith("-")]
+    usage = [f"{one.name.upper()}{'…' if one.nargs == -1 else ''}" for one in arguments]
+    usage = [text if one.required else f"[{text}]" for text, one in zip(usage, arguments, strict=True)]
+    parts = [
+        f"# {name}",
+        _WRITTEN,
+        " ".join(command.help.split()),
+        f"```text\n{' '.join(['hybridsep', name, *usage, '[OPTIONS]'])}\n```",
+    ]
+    if arguments:
+        parts.append(_table(("argument", "what"), ((f"`{one.name.upper()}`", one.help) for one in arguments)))
+    panels: dict[str, list[Any]] = {}
+    for one in options:
+        panels.setdefault(getattr(one, "rich_help_panel", None) or "Options", []).append(one)
+    for panel, members in panels.items():
+        rows = ((_option(one), _described(one)) for one in members)
+        parts += [f"## {panel}", _table(("option", "what"), rows)]
     return _page(parts)
 
 

@@ -23,6 +23,7 @@ from ..base.saved import Saved
 from ..base.settings import CompensatorSettings, PredictorSettings
 from ..base.signals import Array, as_measured, as_published, as_samples
 from ..base.state import pack, unpack
+from ..base.threads import one_blas_thread
 from ..predict.predictor import HybridPredictor
 from ..predict.trust.disturbances import Disturbance
 from ..predict.trust.model import TrustedModel
@@ -108,6 +109,7 @@ class SepCompensator:
         self._x_d_before = np.full(3, np.nan)
         self._pending: PendingPlan | None = None
 
+    @one_blas_thread
     def plan(self, x_d: ArrayLike) -> PublishedWindow:
         """Plan the next window.
 
@@ -149,6 +151,7 @@ class SepCompensator:
             x_d, x_dm, prediction.x_pb, x_h, x_h_std, chosen.state, n_warm_up, n_followed, self._state_before
         )
 
+    @one_blas_thread
     def update(self, x: ArrayLike) -> None:
         """Learn from the measurement of the planned window.
 

@@ -14,6 +14,7 @@ from ..base.errors import IdentificationError, ParameterError
 from ..base.metrics import rms_ratio, shown_figure
 from ..base.output import written_text
 from ..base.settings import PredictorSettings
+from ..base.threads import one_blas_thread
 from ..fmi.flavours import FMI_VERSIONS
 from ..identify.model import machine_of
 from ..identify.operation import SAMPLES_MIN, identify_operation, unit_gain_model
@@ -118,6 +119,7 @@ class Fit:
         return {"judged": judged, "settings": settings, **parts, "step_times": self.steps, "tracking": self.tracking}
 
 
+@one_blas_thread
 def fit(
     logs: Sequence[Log],
     out: Path,

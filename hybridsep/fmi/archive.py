@@ -29,6 +29,12 @@ _SUFFIX = {("native", "2"): "", ("native", "3"): "Fmi3", ("python", "2"): "Py"}
 _ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 _FIRST = ("modelDescription.xml", "SystemStructure.ssd")
 
+_LEVEL = 9
+"""Of zlib's deflate; fixed, as another level, like another implementation, gives other bytes for the same content."""
+
+_COMPRESSED = ".fmu"
+"""Suffix of what is stored as it is."""
+
 
 def fmu_names(machine: Machine, flavour: str = FLAVOURS[0], fmi: str = FMI_VERSIONS[0]) -> dict[str, str]:
     """Return the FMUs a machine has: archive stem → model (``HybridPredictor``, ``FeedDrive``, …).
@@ -162,7 +168,7 @@ def fmu_files(
 
 
 def archived(files: Mapping[str, bytes]) -> bytes:
-    """Return a zip whose bytes depend on nothing but its content: stored, as compressed ones depend on the zlib.
+    """Return a zip whose bytes depend on its content, and on the zlib of this Python, alone.
 
     Parameters
     ----------
@@ -170,9 +176,10 @@ def archived(files: Mapping[str, bytes]) -> bytes:
         Archive name → content; what readers that stream look for comes first.
     """
     file = io.BytesIO()
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
+    with zipfile.ZipFile(file, "w") as archive:
         for arcname in sorted(files, key=lambda key: (key not in _FIRST, key)):
             entry = zipfile.ZipInfo(arcname, _ZIP_TIME)
-            entry.compress_type, entry.external_attr, entry.create_system = zipfile.ZIP_STORED, 0o644 << 16, 3
-            archive.writestr(entry, files[arcname])
+            entry.external_attr, entry.create_system = 0o644 << 16, 3
+            how = zipfile.ZIP_STORED if arcname.endswith(_COMPRESSED) else zipfile.ZIP_DEFLATED
+            archive.writestr(entry, files[arcname], how, _LEVEL)
     return file.getvalue()

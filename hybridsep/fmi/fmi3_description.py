@@ -43,6 +43,8 @@ def fmi3_description(
     root = begun("modelDescription3.xml", machine, description, own_table, named, generation_tool, samples)
     _, _, types, _, _, variables, structure = root
     for variable, attributes in types_of(own_table):
+        # fmpy up to 0.3.23 reads no EnumerationType that has a description; the variable and the items have theirs
+        del attributes["description"]
         add_items(ET.SubElement(types, "EnumerationType", attributes), variable)
     if not len(types):
         root.remove(types)

@@ -60,9 +60,7 @@ class LookAheadSlave(TableSlave):
 
     def advance(self, t: float, h: float) -> None:
         """Execute the samples that the step reaches."""
-        warning = self.inputs.advance(self.look_ahead, self.values["x_d_ahead"], self.values["x_meas"], t, h)
-        if warning:
-            self.warn_once(warning)
+        self.warn_once(self.inputs.advance(self.look_ahead, self.values["x_d_ahead"], self.values["x_meas"], t, h))
 
     def core_state(self) -> tuple[dict[str, Any], bytes]:
         """Return the clock with the inputs of the sample in progress, and the look-ahead."""

@@ -97,7 +97,8 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
         self.modelName = self.table_description["name"]
         self.table = variables_of(self.table_description)
         self.values: dict[str, Any] = {v.name: v.start for v in self.table if v.causality in ("input", "parameter")}
-        self.running = self.terminated = self.warned = False
+        self.running = self.terminated = False
+        self.warned: set[str] = set()
         self.start_time = 0.0
         self.stop_time: float | None = None
         for variable in self.table:
@@ -168,11 +169,12 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
         """Allow no more steps; values can still be read."""
         self.terminated = True
 
-    def warn_once(self, message: str) -> None:
-        """Log a warning, the first one of this instance alone."""
-        if not self.warned:
-            self.warned = True
-            self.log(f"{self.instance_name}: {message}", Fmi2Status.warning)
+    def warn_once(self, warnings: Mapping[str, str]) -> None:
+        """Log warnings, of each kind the first one of this instance alone."""
+        for kind, message in warnings.items():
+            if kind not in self.warned:
+                self.warned.add(kind)
+                self.log(f"{self.instance_name}: {message}", Fmi2Status.warning)
 
     # The whole state, not only the registered variables --------------------------------------------------------
 

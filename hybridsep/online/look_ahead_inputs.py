@@ -37,7 +37,7 @@ class LookAheadInputs:
         self.clock = SampleClock.begin(t_start, T_s)
         self._latched = (start, start)
 
-    def advance(self, look_ahead: LookAhead, x_d_ahead: float, x_meas: float, t: float, h: float) -> str:
+    def advance(self, look_ahead: LookAhead, x_d_ahead: float, x_meas: float, t: float, h: float) -> dict[str, str]:
         """Execute the samples that the communication step from ``t`` by ``h``, s, reaches.
 
         Parameters
@@ -48,8 +48,8 @@ class LookAheadInputs:
 
         Returns
         -------
-        warning : str
-            Empty unless a sampling instant is no communication point.
+        warnings : dict of str
+            ``late`` where a sampling instant is no communication point, ``moved`` where it was taken at one beside it.
 
         Raises
         ------
@@ -72,13 +72,14 @@ class LookAheadInputs:
             self._latched = (x_d_ahead, x_meas)
         inside = step.n_latched > 1 - self.clock.latched  # t_k, where it is not read yet, is the step's start
         self.clock = step.after
-        if not inside:
-            return ""
-        late = min(step.first + (step.n_latched - 1) * self.clock.T_s, h)
-        return (
-            f"the step from {t:.9g} s by {h:.9g} s contains sampling instants of T_s = {self.clock.T_s:g} s between "
-            f"its ends: x_meas is read up to {late:g} s late, so a closed loop needs steps of T_s"
-        )
+        warnings = {"moved": step.warning} if step.warning else {}
+        if inside:
+            late = min(step.first + (step.n_latched - 1) * self.clock.T_s, h)
+            warnings["late"] = (
+                f"the step from {t:.9g} s by {h:.9g} s contains sampling instants of T_s = {self.clock.T_s:g} s "
+                f"between its ends: x_meas is read up to {late:g} s late, so a closed loop needs steps of T_s"
+            )
+        return warnings
 
     def state(self) -> list[float]:
         """Return the fields of the clock, then the inputs."""

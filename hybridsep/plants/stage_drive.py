@@ -96,14 +96,14 @@ class StageDrive:
         self._last_x_d, self._v_d, self._clock = last_x_d, v_d, step.after
 
     def state(self) -> list[float]:
-        """Return ``[start, last x_d, v_d, v, 7 numbers of the clock, z …]``."""
+        """Return ``[start, last x_d, v_d, v, 5 numbers of the clock, z …]``."""
         return [self._start, self._last_x_d, self._v_d, self._v, *self._clock.state(), *self._z]
 
     def restore(self, state: list[float]) -> None:
         """Restore a :meth:`state`."""
         self._start, self._last_x_d, self._v_d, self._v = state[:4]
-        self._clock = SampleClock.from_state(state[4:11])
-        self._z = list(state[11:])
+        self._clock = SampleClock.from_state(state[4:9])
+        self._z = list(state[9:])
 
     def _disturbed(self, r: float, v_d: float) -> float:
         """Return the command disturbed by friction, if it is one of the commanded velocity."""

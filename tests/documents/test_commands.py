@@ -36,6 +36,17 @@ def test_every_block_is_run_or_shown() -> None:
             assert language == "sh" or not re.search(r"^(hybridsep|python) ", text, re.MULTILINE), page.name
 
 
+def test_fmpy_gets_the_communication_step_size() -> None:
+    """``step_size`` is nothing to a co-simulation, whose steps fmpy doubles until at most 1000 are left."""
+    calls = [
+        call
+        for page in PAGES
+        for call in re.findall(r"simulate_fmu\((.*?)\n\)", page.read_text(encoding="utf-8"), re.DOTALL)
+    ]
+    assert calls
+    assert all("output_interval=1e-3" in call and "step_size" not in call for call in calls)
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="the lines are those of a POSIX shell")
 @pytest.mark.usefixtures("quick_fit")
 def test_the_pages_run_from_first_to_last(

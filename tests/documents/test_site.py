@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
@@ -149,3 +150,22 @@ def inside(name: str, page: Page) -> Iterator[tuple[str, str]]:
         target, anchor = urldefrag(link)
         place = os.path.normpath(Path(name).parent / unquote(target)) if target else name
         yield Path(place).as_posix().removesuffix(".html"), unquote(anchor)
+
+
+def test_a_search_finds_what_holds_today_not_dated_pages(site: Path) -> None:
+    index = json.loads((site / "searchindex.js").read_text(encoding="utf-8").removeprefix("Search.setIndex(")[:-1])
+    dated = {i for i, name in enumerate(index["docnames"]) if name.startswith("experiments/2")}
+    found = {i for places in index["terms"].values() for i in ([places] if isinstance(places, int) else places)}
+    assert dated
+    assert not dated & found
+
+
+def test_the_way_from_log_to_fmu_leads_the_how_to_pages(site: Path) -> None:
+    links = re.findall(r'href="(howto/[\w-]+)\.html"', (site / "index.html").read_text(encoding="utf-8"))
+    in_menu = links[links.index("howto/log-to-fmu") :]
+    assert in_menu[:2] == ["howto/log-to-fmu", "howto/read-the-report"]
+
+
+def test_each_command_has_a_page_of_its_own() -> None:
+    listed = set(re.findall(r"\(command-line/([\w-]+)\.md\)", (DOCS / "reference" / "command-line.md").read_text()))
+    assert listed == {path.stem for path in (DOCS / "reference" / "command-line").iterdir()}

@@ -66,6 +66,14 @@ def test_the_archive_is_complete(fmus: BuiltFmus, name: str) -> None:
         assert f"<td>{variable.name}</td><td>{variable.type}{size}" in page
 
 
+@pytest.mark.parametrize("name", FMI3)
+def test_types_are_described_by_their_items_alone(fmus: BuiltFmus, name: str) -> None:
+    """fmpy up to 0.3.23 raises a TypeError where an EnumerationType has a description."""
+    for found in opened(fmus(name)).model.iter("EnumerationType"):
+        assert list(found.attrib) == ["name"]
+        assert all(item.get("description") for item in found)
+
+
 def test_binaries_lie_where_fmi_3_has_them() -> None:
     found = placed(dict.fromkeys(ALL_TARGETS, b""), "Axis", "3")
     assert sorted(found) == sorted(f"{key}/Axis{TARGETS[key].suffix}" for key in ALL_TARGETS)

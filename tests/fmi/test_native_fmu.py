@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 import shutil
 import struct
@@ -22,8 +23,8 @@ from fmpy.validation import validate_fmu
 
 from hybridsep.base.errors import FmuError
 from hybridsep.cosim.importer import FmuInstance
-from hybridsep.fmi.archive import build_fmu, fmu_names
-from hybridsep.fmi.compiler import ALL_TARGETS, TARGETS, compile_flags, host_target
+from hybridsep.fmi.archive import archived, build_fmu, fmu_names
+from hybridsep.fmi.compiler import ALL_TARGETS, compile_flags, host_target
 from hybridsep.fmi.flavours import FLAVOURS
 from hybridsep.fmi.macho import universal
 from hybridsep.fmi.variables import Variable, variables_of
@@ -83,6 +84,20 @@ def test_the_archive_is_complete(fmus: BuiltFmus, name: str) -> None:
     variables = fmpy.read_model_description(str(fmus(name))).modelVariables
     for variable in variables:
         assert re.sub(r"(_window)\[\d+\]", r"\1[i]", variable.name) in page
+
+
+def test_archives_are_deflated_and_the_same_every_time(fmus: BuiltFmus) -> None:
+    """At one level of zlib; the figures are those of HybridPredictor for this machine: 1.2 MB stored, with a double."""
+    path = fmus("HybridPredictor")
+    with zipfile.ZipFile(path) as archive:
+        entries = archive.infolist()
+        files = {entry.filename: archive.read(entry) for entry in entries}
+    assert {entry.compress_type for entry in entries} == {zipfile.ZIP_DEFLATED}
+    assert archived(files) == path.read_bytes()
+    assert len(path.read_bytes()) < 0.4 * sum(map(len, files.values()))
+    assert len(set(files.values())) == len(files)  # nothing lies there twice
+    with zipfile.ZipFile(io.BytesIO(archived({"a.fmu": path.read_bytes()}))) as system:
+        assert system.infolist()[0].compress_type == zipfile.ZIP_STORED
 
 
 def test_only_fmi_functions_are_exported(fmus: BuiltFmus, tmp_path: Path) -> None:
@@ -168,14 +183,13 @@ def test_all_platforms(tmp_path: Path) -> None:
         binaries = {
             n.removeprefix("binaries/"): archive.read(n) for n in archive.namelist() if n.startswith("binaries/")
         }
-    assert {name.partition("/")[0] for name in binaries} == {
-        "darwin64",
-        *(folder for target in TARGETS.values() for folder in target.folders),
-    }
+    assert list(binaries) == [  # FMI 2.0's names, and FMI 3.0's of the one platform that has none; nothing twice
+        *("aarch64-linux/FeedDrive.so", "darwin64/FeedDrive.dylib", "linux64/FeedDrive.so"),
+        *("win32/FeedDrive.dll", "win64/FeedDrive.dll"),
+    ]
     elf = {name.partition("/")[0]: content for name, content in binaries.items() if name.endswith(".so")}
     assert {name: struct.unpack_from("<H", content, 18)[0] for name, content in elf.items()} == {
         "linux64": 62,
-        "x86_64-linux": 62,
         "aarch64-linux": 183,
     }
     versions = {tuple(map(int, v.split(b"."))) for v in re.findall(rb"GLIBC_([\d.]+)", elf["linux64"])}

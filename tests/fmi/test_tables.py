@@ -39,7 +39,7 @@ def test_a_kind_has_one_library(fmus: BuiltFmus) -> None:
         "FeedDrive_als25010_y",
     ):
         with zipfile.ZipFile(fmus(name)) as archive:
-            libraries[name] = archive.read(f"binaries/{TARGETS[host_target()].folders[0]}/{name}.so")
+            libraries[name] = archive.read(f"binaries/{TARGETS[host_target()].folder}/{name}.so")
     assert libraries["HybridPredictor"] == libraries["HybridPredictor_emps"]
     assert libraries["FeedDrive_als25010_x"] == libraries["FeedDrive_als25010_y"]
     assert len(set(libraries.values())) == 3

@@ -85,8 +85,7 @@ class LookAheadStream(LibraryStream):
     def step(self, t: float, h: float) -> None:
         with refusing():
             inputs = float(self._values["x_d_ahead"]), float(self._values["x_meas"])
-            if warning := self._clock.advance(self._look_ahead, *inputs, t, h):
-                self._warnings.append(warning)
+            self._warnings += self._clock.advance(self._look_ahead, *inputs, t, h).values()
 
     def outputs(self) -> list[float]:
         return [float(getattr(self._look_ahead, name)) for name in OUTPUTS[self._kind]]

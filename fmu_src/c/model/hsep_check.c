@@ -194,16 +194,38 @@ HSEP_API hsep_status hsep_check_step_size(double h, char message[])
         hsep_number(number, h, HSEP_REAL));
 }
 
-HSEP_API hsep_status hsep_check_step(const hsep_clock *clock, double t, double h, hsep_clock_step *step, char message[])
+HSEP_API hsep_status hsep_check_point(double end, double t, double tolerance, char message[])
 {
     char expected[HSEP_NUMBER_SIZE], got[HSEP_NUMBER_SIZE];
+    if (hsep_clock_follows(end, t, tolerance)) {
+        return HSEP_OK;
+    }
+    return hsep_message_add(
+        message, "the communication point must be %s s, where the last step ended, got %s s",
+        hsep_number(expected, end, HSEP_REAL), hsep_number(got, t, HSEP_REAL));
+}
+
+HSEP_API hsep_status hsep_check_step(const hsep_clock *clock, double t, double h, hsep_clock_step *step, char message[])
+{
     if (hsep_check_step_size(h, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     if (!hsep_clock_count(clock, t, h, step)) {
-        return hsep_message_add(
-            message, "the communication point must be %s s, where the last step ended, got %s s",
-            hsep_number(expected, clock->end, HSEP_REAL), hsep_number(got, t, HSEP_REAL));
+        return hsep_check_point(clock->end, t, 0.5 * clock->T_s, message);
     }
     return HSEP_OK;
+}
+
+HSEP_API hsep_status hsep_check_moved(const hsep_clock_step *step, char message[])
+{
+    const hsep_clock *clock = &step->after;
+    if (!step->noticed) {
+        return HSEP_OK;
+    }
+    hsep_message_add(
+        message,
+        "the communication point %.9g s is %.2g samples of T_s = %g s %s a sampling instant, which is taken there: "
+        "samples follow the importer's points; a model of T_s needs steps of T_s",
+        clock->end, fabs(step->moved) / clock->T_s, clock->T_s, step->moved > 0.0 ? "behind" : "before");
+    return HSEP_WARNED_MOVED;
 }

@@ -52,8 +52,14 @@ HSEP_API hsep_status hsep_check_clock(hsep_clock *clock, double t_start, double 
 /* Check the size of a communication step, s. */
 HSEP_API hsep_status hsep_check_step_size(double h, char message[]);
 
+/* Check that a step begins at t where the last one ended, at end, s; tolerance as that of hsep_clock_follows. */
+HSEP_API hsep_status hsep_check_point(double end, double t, double tolerance, char message[]);
+
 /* Check that the step from t by h, s, comes next, and count it. */
 HSEP_API hsep_status
 hsep_check_step(const hsep_clock *clock, double t, double h, hsep_clock_step *step, char message[]);
+
+/* HSEP_WARNED_MOVED, with a message, where a step has taken an instant at its end that lies beside it; else HSEP_OK. */
+HSEP_API hsep_status hsep_check_moved(const hsep_clock_step *step, char message[]);
 
 #endif

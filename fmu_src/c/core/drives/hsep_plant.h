@@ -69,7 +69,7 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_feed_drive, 9);
 HSEP_ASSERT_WORDS(hsep_stage_mode, 4);
-HSEP_ASSERT_WORDS(hsep_stage, 18);
+HSEP_ASSERT_WORDS(hsep_stage, 16);
 
 #define HSEP_STAGE_WORK 8 /* doubles of work space for each mode */
 

@@ -14,7 +14,7 @@ from fleet_stubs import squared
 from live_runs import until
 
 from hybridsep.base.errors import LogError, ParameterError
-from hybridsep.fleet.engine import Done, Engine, cluster, joblib_engine
+from hybridsep.parallel.engine import Done, Engine, cluster, joblib_engine
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="processes are ended by SIGKILL")
 
@@ -66,7 +66,7 @@ def test_a_cluster_that_does_not_close(monkeypatch: pytest.MonkeyPatch) -> None:
     async def waits_in_vain(_: object) -> None:
         await asyncio.sleep(3600)
 
-    monkeypatch.setattr("hybridsep.fleet.engine._CLOSED", 0.5)
+    monkeypatch.setattr("hybridsep.parallel.engine._CLOSED", 0.5)
     with cluster(1) as engine:
         (done,) = engine.run(squared, [(2, "")])
         monkeypatch.setattr("distributed.LocalCluster._close", waits_in_vain)
@@ -74,7 +74,7 @@ def test_a_cluster_that_does_not_close(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_engines_that_are_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("hybridsep.fleet.engine._REACHED", 0.5)
+    monkeypatch.setattr("hybridsep.parallel.engine._REACHED", 0.5)
     with (
         pytest.raises(ParameterError, match=r"--scheduler tcp://127\.0\.0\.1:9 cannot be reached"),
         cluster(scheduler="tcp://127.0.0.1:9"),

@@ -207,11 +207,12 @@ def _ending(started: Any) -> Iterator[None]:
     try:
         yield
     finally:
+        own = {nanny.pid for nanny in started.workers.values()}
         try:
             started.close(timeout=_CLOSED)
         except asyncio.TimeoutError:  # in Python 3.10 not the built-in one
             for child in multiprocessing.active_children():
-                if child.name.startswith("Dask Worker process"):
+                if child.pid in own:
                     child.kill()
 
 
