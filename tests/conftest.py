@@ -30,7 +30,7 @@ from built_once import SHARED_BUILDS, BuiltFmus, built_once
 from c_coverage import count_in, table
 from command_line import Run
 from properties import LEFT_OUT, take_profile
-from quick_fits import without_other_windows
+from quick_fits import without_other_settings, without_other_windows
 
 sys.dont_write_bytecode = False  # of this process too
 
@@ -74,8 +74,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.fixture
 def quick_fit(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let ``fit`` judge one look-ahead alone."""
+    """Let ``fit`` judge one look-ahead, with the default settings alone."""
     without_other_windows(monkeypatch)
+    without_other_settings(monkeypatch)
 
 
 @pytest.fixture(autouse=True)

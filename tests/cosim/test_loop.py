@@ -15,7 +15,7 @@ from hybridsep.base.errors import ParameterError
 from hybridsep.cosim.run import COMPENSATOR, PREDICTOR
 
 MACHINE = load_machine("spring_mass_damper")
-R = staircase()[:1500]
+R = staircase()[:1200]
 
 Fmu = Callable[[str], Path]
 

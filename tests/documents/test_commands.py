@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 from command_line import Run
 from places import ROOT
+from quick_fits import without_other_windows
 
 PAGES = [
     ROOT / "README.md",
@@ -48,10 +49,10 @@ def test_fmpy_gets_the_communication_step_size() -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="the lines are those of a POSIX shell")
-@pytest.mark.usefixtures("quick_fit")
 def test_the_pages_run_from_first_to_last(
     hybridsep: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    without_other_windows(monkeypatch)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     done: set[str] = set()
