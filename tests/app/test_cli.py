@@ -130,6 +130,7 @@ def test_build_for_both_versions_of_fmi(hybridsep: Run, tmp_path: Path) -> None:
     assert versions == ["2.0", "3.0"]
 
 
+@pytest.mark.slow
 def test_cosim_over_a_file(hybridsep: Run, tmp_path: Path) -> None:
     path = tmp_path / "command.csv"
     np.savetxt(
@@ -145,6 +146,7 @@ def test_cosim_over_a_file(hybridsep: Run, tmp_path: Path) -> None:
     assert json.loads(again)["rms_h_um"] != json.loads(out)["rms_h_um"]
 
 
+@pytest.mark.slow
 def test_cosim_with_compensation(hybridsep: Run, tmp_path: Path) -> None:
     options = ("--out", tmp_path / "run.csv", "--figure", tmp_path / "run.png")
     figures = {}
@@ -170,6 +172,7 @@ def test_cosim_with_compensation(hybridsep: Run, tmp_path: Path) -> None:
     assert hybridsep("cosim", "--compensate", "physics", "--flavour", "python", *sizes)[0] == 0
 
 
+@pytest.mark.slow
 def test_weights_for_a_compensator(hybridsep: Run, tmp_path: Path) -> None:
     machine, weights = load_machine("spring_mass_damper"), tmp_path / "trained.state"
     compensator = machine.new_compensator()
@@ -194,6 +197,7 @@ def test_weights_for_a_compensator(hybridsep: Run, tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_figure_of_a_prediction(hybridsep: Run, tmp_path: Path) -> None:
     figure = tmp_path / "made" / "run.png"
     assert hybridsep("cosim", "--flavour", "python", "--figure", figure)[0] == 0

@@ -74,6 +74,7 @@ def test_ctrl_c_during_the_demo(tmp_path: Path) -> None:
     assert len(lines) == 6002
 
 
+@pytest.mark.slow
 @POSIX
 @pytest.mark.skipif(find_spec("ziglang") is None, reason="needs ziglang")
 def test_ctrl_c_during_a_build_ends_the_compilers(tmp_path: Path) -> None:
@@ -91,6 +92,7 @@ def test_ctrl_c_during_a_build_ends_the_compilers(tmp_path: Path) -> None:
     assert list(temporary.rglob("all.c")) == []
 
 
+@pytest.mark.slow
 @POSIX
 def test_ctrl_c_in_a_terminal_ends_the_processes_of_tune(tmp_path: Path) -> None:
     """A terminal sends it to all of them; half a minute of replays, two at a time."""

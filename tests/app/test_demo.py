@@ -47,6 +47,7 @@ def shown(tmp_path_factory: pytest.TempPathFactory) -> Demonstration:
     return Demonstration(out, summary, fractions)
 
 
+@pytest.mark.slow
 def test_demo_writes_all_it_promises(shown: Demonstration) -> None:
     assert json.loads((shown.out / "summary.json").read_text()) == shown.summary
     assert set(shown.summary) - {"emps"} == set(CASES)
@@ -70,6 +71,7 @@ def test_demo_writes_all_it_promises(shown: Demonstration) -> None:
     assert len(set(shown.fractions)) == len(shown.fractions)
 
 
+@pytest.mark.slow
 def test_staircase_error_reduction(shown: Demonstration) -> None:
     """Printed: physics 33.7 µm, hybrid 14.7 µm, reduction 56.4 %."""
     mean = shown.summary["staircase"]
@@ -84,6 +86,7 @@ def test_staircase_error_reduction(shown: Demonstration) -> None:
     assert mean["servo_error_rms_um"] == pytest.approx(88.5, abs=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("axis", "printed", "tolerance", "most"), [("x", 22.0, 0.1, 13.3), ("y", 130.2, 0.5, 98.5)])
 def test_spiral_error_reduction(shown: Demonstration, axis: str, printed: float, tolerance: float, most: float) -> None:
     """Printed: X 22 → 13.7 µm, 38 %; Y 130.2 → 94.5 µm, 27 %; with Table 1 and friction scaled to the first figures."""
@@ -95,6 +98,7 @@ def test_spiral_error_reduction(shown: Demonstration, axis: str, printed: float,
     assert stiffness["reduction_percent"] > 70.0 > both["reduction_percent"] > friction["reduction_percent"] > 15.0
 
 
+@pytest.mark.slow
 def test_demo_compensates(shown: Demonstration) -> None:
     """Tracking RMS of the true position, µm: less from kind to kind."""
     for case in CASES:
@@ -113,6 +117,7 @@ def test_demo_compensates(shown: Demonstration) -> None:
     assert max(shown.compensation("staircase", "peak_jerk_m_s3")) <= 5000 * (1 + 1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not EMPS.exists(), reason="needs ../shared/data/emps beside the repository")
 def test_demo_with_the_recorded_axis(shown: Demonstration) -> None:
     assert shown.summary["emps"]["rms_h_um"] <= 5.55
@@ -125,6 +130,7 @@ def row_of(label: str, page: str = PAGE) -> list[float]:
     return [float(figure) for figure in re.findall(r"(?<=\| )[\d.]+(?= (?:% )?\|)", f"|{row}|")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("case", "label"),
     [("staircase", "staircase, FMU"), ("spiral_x", "spiral, stage X"), ("spiral_y", "spiral, stage Y")],
@@ -134,6 +140,7 @@ def test_predictions_on_the_page(shown: Demonstration, case: str, label: str) ->
     assert row_of(label)[:5] == pytest.approx([shown.summary[case][key] for key in keys], abs=0.06)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("case", "figure", "label"),
     [
@@ -148,6 +155,7 @@ def test_compensation_on_the_page(shown: Demonstration, case: str, figure: str, 
     assert row_of(label) == pytest.approx(shown.compensation(case, figure), rel=0.02, abs=0.06)
 
 
+@pytest.mark.slow
 def test_compensation_in_the_readme(shown: Demonstration) -> None:
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     (row,) = re.findall(r"^\| compensation: `hybridsep demo --out demo` \|(.*)\|$", readme, re.MULTILINE)
@@ -155,6 +163,7 @@ def test_compensation_in_the_readme(shown: Demonstration) -> None:
     assert figures == pytest.approx(shown.compensation("staircase", "tracking_rms_um"), rel=0.02, abs=0.06)
 
 
+@pytest.mark.slow
 def test_build_fmu_is_a_front_of_the_command_line(tmp_path: Path) -> None:
     command = [sys.executable, str(ROOT / "build_fmu.py"), "--machine", str(ROOT / "models" / "als25010_x.toml")]
     subprocess.run([*command, "--flavour", "python", "--out", str(tmp_path)], check=True, stdout=subprocess.DEVNULL)
@@ -165,6 +174,7 @@ def test_build_fmu_is_a_front_of_the_command_line(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_the_tables_fit_into_80_columns(shown: Demonstration, monkeypatch: pytest.MonkeyPatch) -> None:
     narrow = Console(width=80, record=True, file=io.StringIO())
     monkeypatch.setattr(tables, "console", narrow)

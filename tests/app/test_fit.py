@@ -43,6 +43,7 @@ def fitted(log: Path) -> Fit:
     return fit([read_log(log)], out, FitOptions(NP, "axis"))
 
 
+@pytest.mark.slow
 def test_the_figures_are_of_a_causal_replay_with_the_machine_file(fitted: Fit, log: Path) -> None:
     machine = load_machine(log.parent / "out" / "machine.toml")
     assert machine == fitted.machine
@@ -82,6 +83,7 @@ def test_step_times_are_of_the_steps(fitted: Fit) -> None:
     assert 0.0 < fitted.steps["median"] <= fitted.steps["p99_9"] <= fitted.steps["largest"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick_fit")
 def test_a_second_run_goes_on_from_the_first(fitted: Fit, log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def never(*_arguments: object, **_options: object) -> None:
@@ -134,6 +136,7 @@ def test_the_reports_script_replays_a_log(
     assert np.sqrt(np.mean(error**2)) < 1.2 * fitted.judged.rms()[2]
 
 
+@pytest.mark.slow
 def test_the_command_line(hybridsep: Run, tmp_path: Path) -> None:
     log = write_rows(tmp_path / "my axis.csv", commanded()[:800], measured(0)[:800])
     pages = tmp_path / "charts.pdf"
@@ -239,6 +242,7 @@ def test_too_short_a_log_judges_nothing(tmp_path: Path, n: int, Np: int | None, 
     assert found.summary()["judged"]["verdict"].startswith("Nothing is judged: ")
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick_fit")
 def test_a_gap_in_motion_does_not_decide_the_verdict(tmp_path: Path) -> None:
     x_d, x = commanded()[:N], measured(0)[:N]
@@ -276,6 +280,7 @@ def test_missing_measurements(hybridsep: Run, tmp_path: Path) -> None:
         assert rms_h < 14e-6  # noise is 5 µm
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick_fit")
 def test_a_gap_is_said_to_be_handled(hybridsep: Run, tmp_path: Path) -> None:
     log = write_rows(tmp_path / "axis.csv", commanded()[:1200], measured(0)[:1200])
@@ -293,6 +298,7 @@ def test_a_gap_is_said_to_be_handled(hybridsep: Run, tmp_path: Path) -> None:
     assert "changed before" not in page
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick_fit")
 def test_a_rotary_axis_modulo_one_turn_is_unwrapped(hybridsep: Run, tmp_path: Path) -> None:
     """The staircase as four turns."""
@@ -322,6 +328,7 @@ def test_what_is_kept_is_of_the_samples_as_they_are_read(log: Path) -> None:
     assert key_of([replace(recording, x=recording.x.copy())], "m") in keys
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick_fit")
 def test_a_rotary_axis_stays_one_under_the_default_machines_name(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)

@@ -63,6 +63,7 @@ def results() -> dict[str, str]:
     return {name: hashlib.sha256(signal.tobytes()).hexdigest() for name, signal in signals.items()}
 
 
+@pytest.mark.slow
 def test_results_do_not_depend_on_the_number_of_threads() -> None:
     script = f"import sys; sys.path[:0] = {[str(Path(__file__).parent), str(SUPPORT)]!r}\n"
     script += "import json, test_threads; print(json.dumps(test_threads.results()))"

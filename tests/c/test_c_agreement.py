@@ -23,6 +23,7 @@ LOOPS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "machine", "fixed"), LOOPS, ids=lambda value: str(value))
 def test_random_loops_command_the_same(seed: int, machine: str, fixed: dict[str, float]) -> None:
     loop = random_loop(seed, 1500, machine, **fixed)

@@ -61,6 +61,7 @@ def test_a_state_of_other_parameters_is_refused() -> None:
         CModel("predictor").initialise().check_state(blob)
 
 
+@pytest.mark.slow
 def test_damaged_states_with_trust_are_refused_or_can_be_used() -> None:
     values = {"trust": 1.0, "Np": 5, "p": 2, "q": 1, "dead_time": 2}
     model = CModel("predictor", values).initialise()

@@ -40,6 +40,7 @@ def test_figures_with_the_recommended_settings() -> None:
         assert turned(loop.x_dm, loop.x_d) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings_", [{}, asdict(RECOMMENDED)], ids=["paper", "recommended"])
 @pytest.mark.parametrize("trouble", ["changed", "noise", "limits"])
 def test_trouble_never_makes_it_worse_than_physics(settings_: dict[str, Any], trouble: str) -> None:

@@ -21,6 +21,7 @@ from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest, spiral
 
 
+@pytest.mark.slow
 @examples(12)
 @given(
     st.integers(0, 2**31),
@@ -44,6 +45,7 @@ def test_a_command_never_turns_where_the_path_moves(seed: int, spread: float, li
     assert np.max(np.abs(x_dm[3:] - x_d[: len(x_dm) - 3])) <= 1e-3
 
 
+@pytest.mark.slow
 def test_only_the_velocity_where_the_path_moves_is_bounded_by_the_direction() -> None:
     basis, n, step = SplineBasis(80, 4), 80, 1e-5
     steps = np.concatenate((np.full(30, step), np.zeros(30), np.full(20, -step)))  # it moves from the first sample on
@@ -60,6 +62,7 @@ def test_only_the_velocity_where_the_path_moves_is_bounded_by_the_direction() ->
     np.testing.assert_array_equal(kept.rows, free.rows)
 
 
+@pytest.mark.slow
 @examples(30)
 @given(st.integers(0, 2**31))
 def test_the_rest_of_a_plan_that_turned_is_still_a_plan(seed: int) -> None:
@@ -72,6 +75,7 @@ def test_the_rest_of_a_plan_that_turned_is_still_a_plan(seed: int) -> None:
     assert np.min(np.diff(move(80) + basis.values @ rest)) < -1e-6  # it does turn
 
 
+@pytest.mark.slow
 def test_friction_that_follows_the_command_makes_turning_dear() -> None:
     """The stage's Y axis, physics model: 126.7 µm where the command keeps its direction, 128.4 where it need not."""
     machine, r = load_machine("als25010_y"), spiral()[1]

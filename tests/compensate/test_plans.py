@@ -129,6 +129,7 @@ def test_a_bounded_plan_costs_what_another_solver_finds(
     assert np.max(np.abs(bounded)) <= 1e-5
 
 
+@pytest.mark.slow
 @examples(12)
 @given(st.integers(0, 2**31), st.sampled_from([1e-6, 1e-4, 1e-2]), st.sampled_from([PAPER_LIMITS, DRIVE_LIMITS]))
 def test_limits_hold_whatever_is_measured(seed: int, spread: float, limits: Limits) -> None:

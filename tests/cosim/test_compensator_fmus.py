@@ -98,6 +98,7 @@ def assert_same(run: Run, loop: Run, n: int | None = None) -> None:
     np.testing.assert_array_equal(run.state[:n], loop.state[:n])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("choice", "least", "most"), [("off", 87.0, 90.0), ("physics", 0.0, 20.5), ("hybrid", 0.0, 6.6)]
 )
@@ -118,6 +119,7 @@ def test_the_drives_limits_are_kept(runs: Callable[[str, str], Run], choice: str
     assert run.summary()["change_max_um"] > 100.0 or choice == "off"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("choice", COMPENSATE.choices)
 def test_fmus_equal_the_library(runs: Callable[[str, str], Run], flavour: str, choice: str) -> None:
     run = runs(flavour, choice)
@@ -136,6 +138,7 @@ def by_library(tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Path, Run
     return cold, trained, warm
 
 
+@pytest.mark.slow
 def test_recommended_settings_cold_and_warm(
     flavour: str, pair: Pair, fmus: BuiltFmus, by_library: tuple[Run, Path, Run]
 ) -> None:
@@ -244,6 +247,7 @@ def test_figures(short: Run, tmp_path: Path) -> None:
         assert path.read_bytes().startswith(PNG)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flavour", ["native", pytest.param("python", marks=pytest.mark.nightly)])
 def test_the_direction_can_be_turned_off(flavour: str, fmus: BuiltFmus) -> None:
     """A fixed parameter of the FMU, without a rebuild; the library with the same settings commands the same."""

@@ -125,6 +125,7 @@ def figures(system: ClosedSystem, rows: Array) -> list[str]:
     return [f"{1e6 * figure:#.4g}" for figure in (*reported, *overall)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("system", ["predictor"], indirect=True)
 def test_the_loop_without_an_importer_is_cosimulate(folder: Path, system: ClosedSystem, expected: Array) -> None:
     run = cosimulate(folder / "HybridPredictor.fmu", folder / "FeedDrive.fmu", staircase())
@@ -134,6 +135,7 @@ def test_the_loop_without_an_importer_is_cosimulate(folder: Path, system: Closed
     assert summary["reduction_percent"] > 50
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("system", ["compensator"], indirect=True)
 def test_the_compensated_loop_without_an_importer_is_the_same(
     folder: Path, system: ClosedSystem, expected: Array
@@ -153,6 +155,7 @@ def assert_bit_for_bit(run: Run, system: ClosedSystem, rows: Array) -> None:
         np.testing.assert_array_equal(of[name], getattr(run, name), err_msg=name)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("importer", FOREIGN)
 def test_importers_come_to_the_same_figures(system: ClosedSystem, expected: Array, apart: Apart, importer: str) -> None:
     rows = apart(importer)[system.key]
@@ -165,6 +168,7 @@ def test_importers_come_to_the_same_figures(system: ClosedSystem, expected: Arra
     np.testing.assert_allclose(rows, expected, rtol=0, atol=1e-8 if judged else TOLERANCE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("system", ["predictor"], indirect=True)
 @pytest.mark.parametrize("importer", [param for param in FOREIGN if param.values[0] in READ_FMI3])
 def test_fmi_3_fmus_come_to_the_same_figures(
@@ -176,6 +180,7 @@ def test_fmi_3_fmus_come_to_the_same_figures(
     np.testing.assert_allclose(rows, expected, rtol=0, atol=TOLERANCE)
 
 
+@pytest.mark.slow
 def test_fmpy_reads_arrays_and_sets_enumerations(folder: Path) -> None:
     rows = [(k * 1e-3, position, position) for k, position in enumerate(staircase()[:600])]
     inputs = np.array(rows, dtype=[(name, np.float64) for name in ("time", "x_d_ahead", "x_meas")])
@@ -194,6 +199,7 @@ def test_fmpy_reads_arrays_and_sets_enumerations(folder: Path) -> None:
     assert set(result["sep_state"]) == {1}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("importer", [param for param in FOREIGN if param.values != ("fmpy SSP",)])
 def test_the_start_goes_round_in_initialization_mode(
     system: ClosedSystem, expected: Array, apart: Apart, importer: str
@@ -205,6 +211,7 @@ def test_the_start_goes_round_in_initialization_mode(
     np.testing.assert_allclose(rows, expected[: N_MOVED - 2], rtol=0, atol=1e-11)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not exists_here("ecos"), reason="ecos has no library for this machine")
 def test_the_script_of_the_guide(folder: Path, system: ClosedSystem, expected: Array) -> None:
     (script,) = closed_system.blocks("python")
@@ -217,6 +224,7 @@ def test_the_script_of_the_guide(folder: Path, system: ClosedSystem, expected: A
     assert [f"{1e6 * float(number):#.4g}" for number in printed.split()] == figures(system, expected)[:2]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not all(map(exists_here, closed_system.IMPORTERS)), reason="not all importers run here")
 def test_the_figures_of_the_guide(system: ClosedSystem, expected: Array) -> None:
     guide, row = closed_system.GUIDE.read_text("utf-8"), " | ".join(figures(system, expected))
@@ -245,11 +253,13 @@ def findings(path: Path, caplog: pytest.LogCaptureFixture) -> list[str]:
     return [record.getMessage() for record in caplog.records if record.levelno > logging.INFO]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*NATIVE, *FMI3])
 def test_the_toolbox_has_no_finding(folder: Path, caplog: pytest.LogCaptureFixture, name: str) -> None:
     assert findings(folder / f"{name}.fmu", caplog) == []
 
 
+@pytest.mark.slow
 def test_the_toolbox_would_find_something(folder: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     broken = tmp_path / "broken.fmu"
     with zipfile.ZipFile(folder / "FeedDrive.fmu") as archive, zipfile.ZipFile(broken, "w") as copy:

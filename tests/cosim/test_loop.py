@@ -61,6 +61,7 @@ def test_what_the_controller_takes_for_late_arrives_late(python_fmu: Fmu) -> Non
     assert fmu.measurement_delay == late
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["HybridPredictor", "SepCompensator"])
 def test_library_and_fmu_take_each_others_place(python_fmu: Fmu, model: str) -> None:
     def new_controller() -> Any:

@@ -88,6 +88,7 @@ def test_the_picture_is_tidy(archive: Path) -> None:
             assert not [box for box in boxes if box[0] < x < box[1] and box[2] < y < box[3]]
 
 
+@pytest.mark.slow
 def test_every_tag_is_one_that_omsimulator_takes(archive: Path) -> None:
     """It refuses a file for one tag that it does not know, as ``ssd:SystemGeometry``, however legal."""
     (system,) = etree.fromstring(content(archive)["SystemStructure.ssd"]).iter(f"{SSD}System")

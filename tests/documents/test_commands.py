@@ -37,6 +37,7 @@ def test_every_block_is_run_or_shown() -> None:
             assert language == "sh" or not re.search(r"^(hybridsep|python) ", text, re.MULTILINE), page.name
 
 
+@pytest.mark.slow
 def test_fmpy_gets_the_communication_step_size() -> None:
     """``step_size`` is nothing to a co-simulation, whose steps fmpy doubles until at most 1000 are left."""
     calls = [
@@ -48,6 +49,7 @@ def test_fmpy_gets_the_communication_step_size() -> None:
     assert all("output_interval=1e-3" in call and "step_size" not in call for call in calls)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="the lines are those of a POSIX shell")
 def test_the_pages_run_from_first_to_last(
     hybridsep: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

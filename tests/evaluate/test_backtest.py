@@ -209,6 +209,7 @@ def test_second_run_starts_warm() -> None:
     assert warm.overall.rms_h < cold.overall.rms_h
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_stream() -> None:
     x_d, x = log(1000)
 

@@ -43,6 +43,7 @@ def drive(fmu: FmuInstance, steps: Sequence[int], h: float = 1e-3) -> list[bytes
     return rows
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("twins", FMI3, indirect=True)
 def test_all_values_are_the_same_bit_for_bit(twins: tuple[FmuInstance, FmuInstance]) -> None:
     new, old = twins

@@ -40,6 +40,7 @@ def opened(path: Path) -> Archive:
         return Archive(model, terminals, build, archive.namelist())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FMI3)
 def test_schemas_checkers_and_rules_have_no_finding(fmus: BuiltFmus, name: str) -> None:
     path = fmus(name)
@@ -52,6 +53,7 @@ def test_schemas_checkers_and_rules_have_no_finding(fmus: BuiltFmus, name: str) 
     assert violations(opened(path)) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FMI3)
 def test_the_archive_is_complete(fmus: BuiltFmus, name: str) -> None:
     with zipfile.ZipFile(fmus(name)) as archive:
@@ -66,6 +68,7 @@ def test_the_archive_is_complete(fmus: BuiltFmus, name: str) -> None:
         assert f"<td>{variable.name}</td><td>{variable.type}{size}" in page
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FMI3)
 def test_types_are_described_by_their_items_alone(fmus: BuiltFmus, name: str) -> None:
     """fmpy up to 0.3.23 raises a TypeError where an EnumerationType has a description."""
@@ -79,6 +82,7 @@ def test_binaries_lie_where_fmi_3_has_them() -> None:
     assert sorted(found) == sorted(f"{key}/Axis{TARGETS[key].suffix}" for key in ALL_TARGETS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("new", "old"), list(zip(FMI3, NATIVE, strict=True)))
 def test_the_twins_have_the_same_interface(fmus: BuiltFmus, new: str, old: str) -> None:
     """Names, causalities, units, ranges and starts; windows are arrays, and there is the time beside them."""

@@ -23,6 +23,7 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     compare.end_wine(folder)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(
     (platform.system(), platform.machine()) != ("Linux", "x86_64"), reason="the comparison starts from x86-64 Linux"
 )

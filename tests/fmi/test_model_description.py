@@ -26,6 +26,7 @@ def description_of(path: Path) -> ET.Element:
         return ET.fromstring(archive.read("modelDescription.xml"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*NATIVE, *PYTHON])
 def test_archives_keep_the_rules_of_the_standard(fmus: BuiltFmus, name: str) -> None:
     path = fmus(name)

@@ -57,6 +57,7 @@ def assert_equal(run: Run, expected: dict[str, Array]) -> None:
         np.testing.assert_allclose(getattr(run, name), samples, rtol=0, atol=TOLERANCE, err_msg=name)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plant", FLAVOURS)
 @pytest.mark.parametrize("predictor", FLAVOURS)
 def test_every_pairing_agrees_with_the_library_on_the_staircase(fmus: BuiltFmus, predictor: str, plant: str) -> None:
@@ -68,6 +69,7 @@ def test_every_pairing_agrees_with_the_library_on_the_staircase(fmus: BuiltFmus,
     assert run.summary()["reduction_percent"] > 50
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plant", FLAVOURS)
 @pytest.mark.parametrize("predictor", FLAVOURS)
 @pytest.mark.parametrize("axis", [0, 1])
@@ -92,6 +94,7 @@ TIGHT = {"v_max": 0.08, "a_max": 8.0, "j_max": 1000.0}
 """Limits of the trajectory itself: most plans are bounded by them."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("machine", "values"),
     [("", {}), ("", PAPER), ("", TIGHT), ("_als25010_x", {}), ("_als25010_x", TIGHT), ("_als25010_y", {})],
@@ -113,6 +116,7 @@ def test_both_flavours_of_the_compensator_command_the_same(
     assert np.max(np.abs(native.change)) > 1e-5
 
 
+@pytest.mark.slow
 def test_another_start_and_start_time(fmus: BuiltFmus) -> None:
     command = 0.1 + staircase()[:2001]
     machine = load_machine("spring_mass_damper")
@@ -122,6 +126,7 @@ def test_another_start_and_start_time(fmus: BuiltFmus) -> None:
     assert run.t[0] == pytest.approx(1234.6)
 
 
+@pytest.mark.slow
 def test_the_whole_system_without_a_script(fmus: BuiltFmus) -> None:
     """ReferenceTrajectory → HybridPredictor → FeedDrive give what the same system gives with commands from outside."""
     expected = reference(load_machine("spring_mass_damper"), staircase())
@@ -146,12 +151,14 @@ def test_the_whole_system_without_a_script(fmus: BuiltFmus) -> None:
         np.testing.assert_allclose(samples, expected[name][:1900], rtol=0, atol=TOLERANCE, err_msg=name)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [0, 1, 2])
 def test_the_trajectories(fmus: BuiltFmus, n: int) -> None:
     command = (staircase(), *spiral())[n]
     assert_played(fmus("ReferenceTrajectory"), n, command if n == 0 else command.round(11))
 
 
+@pytest.mark.slow
 def test_given_samples_are_trajectory_3(tmp_path: Path) -> None:
     machine = load_machine("spring_mass_damper")
     samples = 0.2 + np.cumsum(np.random.default_rng(1).normal(0, 1e-4, 40))
@@ -172,11 +179,13 @@ def assert_played(path: Path, n: int, command: Array) -> None:
     assert set(played[len(command) :]) == {command[-1]}
 
 
+@pytest.mark.slow
 def test_a_trajectory_that_is_not_there_is_named(fmus: BuiltFmus) -> None:
     with FmuInstance(fmus("ReferenceTrajectory")) as source, pytest.raises(FmuError, match="trajectory"):
         source.initialise({"trajectory": 3})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*NATIVE, *PYTHON])
 def test_a_run_with_the_importers_defaults_reaches_the_end(fmus: BuiltFmus, name: str) -> None:
     stop = float(fmpy.read_model_description(str(fmus(name))).defaultExperiment.stopTime)
@@ -189,6 +198,7 @@ def test_a_run_with_the_importers_defaults_reaches_the_end(fmus: BuiltFmus, name
         assert all(np.isfinite(result[column].astype(float)).all() for column in result.dtype.names)
 
 
+@pytest.mark.slow
 def test_the_default_step_of_an_importer_does_no_harm(fmus: BuiltFmus) -> None:
     """fmpy's step for a run of 4 s is 4 ms; the paper's model goes to 20 mm then, on a sine of 10 mm."""
     t = np.arange(0.0, 4.1, 1e-3)
@@ -204,6 +214,7 @@ def test_the_default_step_of_an_importer_does_no_harm(fmus: BuiltFmus) -> None:
     assert paper > 15e-3
 
 
+@pytest.mark.slow
 def test_the_description_names_the_papers_settings(fmus: BuiltFmus) -> None:
     for name, settings in (
         ("HybridPredictor", "; the paper's settings are trust = false, t_init = 0.3"),

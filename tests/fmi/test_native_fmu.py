@@ -48,6 +48,7 @@ def test_native_is_the_default_and_names_follow_the_machine() -> None:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NATIVE)
 def test_checkers_have_no_finding(fmus: BuiltFmus, name: str) -> None:
     assert validate_fmu(str(fmus(name))) == []
@@ -64,6 +65,7 @@ def test_checkers_have_no_finding(fmus: BuiltFmus, name: str) -> None:
     assert configuration.sourceFileSets[0].sourceFiles == ["all.c"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NATIVE)
 def test_the_archive_is_complete(fmus: BuiltFmus, name: str) -> None:
     with zipfile.ZipFile(fmus(name)) as archive:
@@ -124,6 +126,7 @@ def test_a_compiler_without_a_stack_protector_will_do() -> None:
     assert compile_flags(accepting) == [*compile_flags(refusing), "-fstack-protector-strong"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*NATIVE, "HybridPredictorPy"])
 def test_a_description_names_the_machine_where_the_fmu_depends_on_it(fmus: BuiltFmus, name: str) -> None:
     description = fmpy.read_model_description(str(fmus(name))).description
@@ -159,6 +162,7 @@ def test_the_header_says_what_the_model_description_says(fmus: BuiltFmus) -> Non
         assert references[name.partition("[")[0]] == str(variables[name].valueReference)
 
 
+@pytest.mark.slow
 def test_archives_are_reproducible_and_the_guid_does_not_depend_on_the_compiler(
     tmp_path: Path, fmus: BuiltFmus
 ) -> None:
@@ -169,6 +173,7 @@ def test_archives_are_reproducible_and_the_guid_does_not_depend_on_the_compiler(
     assert fmpy.read_model_description(str(other)).guid == fmpy.read_model_description(str(again)).guid
 
 
+@pytest.mark.slow
 def test_another_machine_has_another_guid(fmus: BuiltFmus) -> None:
     guids = {fmpy.read_model_description(str(fmus(name))).guid for name in NATIVE}
     assert len(guids) == len(NATIVE)
@@ -243,6 +248,7 @@ def drive(
     return outputs
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["HybridPredictor", "FeedDrive_als25010_x", "ReferenceTrajectory", "FeedDriveFmi3"])
 def test_the_archive_without_binaries_can_be_compiled(
     fmus: BuiltFmus, tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch

@@ -40,6 +40,7 @@ def test_all_fmus_are_there() -> None:
     assert sorted(name for m in machine_names() for name in fmu_names(load_machine(m), "python")) == sorted(NAMES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_fmpy_finds_nothing_to_object_to(python_fmu: Fmu, name: str) -> None:
     assert validate_fmu(str(python_fmu(name))) == []
@@ -124,6 +125,7 @@ def test_interface_of_the_predictor(predictor: FmuInstance) -> None:
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "parameters"), [
     ("FeedDrivePy", {"m", "c", "k", "c_nl", "k_nl", "noise_std", "seed"}),
     ("FeedDrivePy_als25010_y", {"f", "kappa", "friction_on", "T_s", "noise_std", "seed"}

@@ -189,6 +189,7 @@ def travelling(path: Path) -> dict[str, str]:
         return {match[1]: archive.read(name).decode() for name, match in found if match}
 
 
+@pytest.mark.slow
 def test_each_fmu_carries_what_it_needs(python_fmu: Fmu, tmp_path: Path) -> None:
     mine = travelling(python_fmu("SepCompensatorPy"))
     assert {"compensate/compensator.py", "online/look_ahead.py", "base/settings.py", "fmi/slave.py"} < set(mine)

@@ -26,6 +26,7 @@ TOLERANCE = {"HybridPredictor": 1e-11, "SepCompensator": 1e-9, "FeedDrive": 1e-1
 """m and m/s, as each FMU's page says."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("machine", "name"), NAMES)
 def test_fmpy_gets_the_reference_result(
     machine: str, name: str, fmus: BuiltFmus, folders: Callable[[str], Path]
@@ -63,6 +64,7 @@ def test_fmpy_gets_the_reference_result(
         assert (documentation / link).is_file()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("machine", "name"), NAMES)
 def test_the_library_gives_the_reference_result(machine: str, name: str, folders: Callable[[str], Path]) -> None:
     """The files hold what the FMU gave when it was built."""
@@ -80,6 +82,7 @@ def test_the_library_gives_the_reference_result(machine: str, name: str, folders
     np.testing.assert_allclose(found, expected[:, 1:], rtol=0, atol=TOLERANCE[model])
 
 
+@pytest.mark.slow
 def test_the_reference_is_short_and_the_same_every_time() -> None:
     machine = load_machine("spring_mass_damper")
     parameters = machine.fmi_parameters()
@@ -93,6 +96,7 @@ def test_the_reference_is_short_and_the_same_every_time() -> None:
     assert sum(map(len, files.values())) < 120_000
 
 
+@pytest.mark.slow
 def test_the_reference_of_a_late_measurement_is_late() -> None:
     """Its compensator does as well as without delay: it is told what it gets."""
     machine = load_machine("spring_mass_damper")
@@ -108,6 +112,7 @@ def test_the_reference_of_a_late_measurement_is_late() -> None:
     assert rms[1] == pytest.approx(rms[0], rel=0.2)
 
 
+@pytest.mark.slow
 def test_given_samples_are_the_reference_of_their_trajectory(tmp_path: Path) -> None:
     machine = load_machine("spring_mass_damper")
     samples = [0.1, 0.2, 0.3]
@@ -119,6 +124,7 @@ def test_given_samples_are_the_reference_of_their_trajectory(tmp_path: Path) -> 
     np.testing.assert_array_equal(result["r"][:4], [0.1, 0.2, 0.3, 0.3])
 
 
+@pytest.mark.slow
 def test_windows_that_no_short_run_can_show_have_no_reference(tmp_path: Path) -> None:
     machine = load_machine("spring_mass_damper")
     large = machine.model_copy(update={"predictor": machine.predictor.model_copy(update={"Np": 1001})})

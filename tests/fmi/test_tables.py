@@ -65,6 +65,7 @@ def trace(library: Library, resources: Path) -> list[bytes]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["HybridPredictor", "FeedDrive_als25010_x"])
 def test_a_table_is_what_the_header_is(folders: Folders, tmp_path: Path, name: str) -> None:
     """The library with a compiled-in table has the same outputs and states, bit for bit."""
@@ -178,6 +179,7 @@ def test_a_table_of_another_fmu_has_another_guid(folders: Folders) -> None:
     assert "it is of another kind of FMU" in library.messages[-1][2]
 
 
+@pytest.mark.slow
 @needs_sanitisers
 def test_mutated_tables_under_sanitizers(tmp_path: Path) -> None:
     """``python tests/support/fuzz_tables.py`` has all kinds, and goes on for longer."""
@@ -192,6 +194,7 @@ def test_mutated_tables_under_sanitizers(tmp_path: Path) -> None:
         assert not "".join(pool.map(findings, ("HybridPredictor", "StageDrive")))
 
 
+@pytest.mark.slow
 @needs_sanitisers
 def test_the_fuzzer_finds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A table that is taken without its checksum is a finding."""

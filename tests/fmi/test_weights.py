@@ -157,6 +157,7 @@ def mutations(content: bytes, count: int) -> Iterator[bytes]:
             yield bytes(changed)
 
 
+@pytest.mark.slow
 def test_no_mutation_of_the_file_is_accepted(trained: Path) -> None:
     content = weights_file(HybridPredictor.load(trained))
     predictor = MACHINE.new_predictor()
@@ -166,6 +167,7 @@ def test_no_mutation_of_the_file_is_accepted(trained: Path) -> None:
     assert not predictor.weights.any()
 
 
+@pytest.mark.slow
 def test_no_mutation_of_the_file_is_accepted_in_c(tmp_path: Path) -> None:
     # A small factor, so that the head is hit as often as the triangle.
     rows = np.random.default_rng(1).normal(size=(40, 9))
@@ -194,6 +196,7 @@ def trained_with_trust() -> HybridPredictor:
     return predictor
 
 
+@pytest.mark.slow
 def test_no_mutation_of_a_file_with_trust_is_accepted(tmp_path: Path) -> None:
     # Neither what fails the checksum nor, with another checksum, what has wrong numbers.
     content = weights_file(trained_with_trust())

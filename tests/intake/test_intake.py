@@ -35,6 +35,7 @@ def names(findings: tuple[Finding, ...]) -> list[str]:
     return [finding.name for finding in findings]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", GOOD)
 def test_a_good_log_is_not_accused(name: str) -> None:
     log = needed(name)
@@ -308,6 +309,7 @@ def test_what_is_no_wrapping_is_not_unwrapped() -> None:
     assert names(check(spiky).findings) == ["outliers"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["staircase", "random drive 3", "random drive 15", "random drive 33"])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_following_error_is_no_velocity(name: str, sign: float) -> None:

@@ -168,6 +168,7 @@ def test_a_median_between_two_intervals_that_differ_much(tmp_path: Path) -> None
     assert read_log(path, uniform=False).T_s == 5.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".csv", ".npz"])
 def test_memory_does_not_grow_with_the_log(tmp_path: Path, suffix: str) -> None:
     peaks = []

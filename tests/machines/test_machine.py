@@ -77,6 +77,7 @@ def test_the_stage_is_table_1(axis: str, gain: float) -> None:
     assert machine.plant.kappa == pytest.approx(1.5e3 * machine.plant.f, rel=1e-12)  # 1.5e-3 mm⁻²
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("axis", "printed"), [("x", 22.0), ("y", 130.2)])
 def test_the_stages_friction_is_calibrated(axis: str, printed: float) -> None:
     machine, x_d = load_machine(f"als25010_{axis}"), dict(zip("xy", spiral(), strict=True))[axis]

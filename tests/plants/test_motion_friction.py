@@ -64,6 +64,7 @@ def test_the_motion_is_integrated_to_a_nanometre() -> None:
     assert np.max(np.abs(x - truth)) < 1e-9
 
 
+@pytest.mark.slow
 def test_the_error_on_the_x_axis_hardly_depends_on_the_internal_step(monkeypatch: pytest.MonkeyPatch) -> None:
     # Where β < 0 the friction's change of sign is a jump, so that a motion is resolved to micrometres only.
     machine, x_d = load_machine("als25010_x"), spiral()[0][:700]

@@ -42,6 +42,7 @@ def replays() -> Replays:
     return found
 
 
+@pytest.mark.slow
 def test_no_drive_is_worse_than_by_physics(replays: Replays) -> None:
     ratios = np.array([result.ratio for result in replays.results])
     assert len(ratios) == N
@@ -50,6 +51,7 @@ def test_no_drive_is_worse_than_by_physics(replays: Replays) -> None:
     assert np.median(ratios) <= 0.265
 
 
+@pytest.mark.slow
 def test_intervals_cover_what_they_say(replays: Replays) -> None:
     """Pooled over 300 drives they do within 2 points (``benchmarks/intervals.py``); these are few."""
     errors, deviations = np.concatenate(replays.errors), np.concatenate(replays.deviations)

@@ -53,6 +53,7 @@ def named(values: object) -> str:
     return ",".join(f"{key}={value:g}" for key, value in values.items()) if isinstance(values, dict) else str(values)
 
 
+@pytest.mark.slow
 @on_all((PREDICTOR,), needs="agreement")
 @pytest.mark.parametrize("start", [0.0, 0.1])
 @pytest.mark.parametrize(("p", "q"), [(50, 3), (100, 99)])
@@ -61,6 +62,7 @@ def test_the_staircase_is_predicted_as_by_the_library(new_stream: StreamMaker, p
     assert 5e-6 < loop.column(PREDICTOR, "rms_h")[-1] < 1.5e-5
 
 
+@pytest.mark.slow
 @on_all((STAGE_PREDICTOR,), needs="agreement")
 @pytest.mark.parametrize(
     "values",
@@ -88,6 +90,7 @@ def test_the_staircase_is_predicted_with_trust_as_by_the_library(new_stream: Str
     assert loop.column(PREDICTOR, "rms_h")[-1] < 0.5 * loop.column(PREDICTOR, "rms_pb")[-1]
 
 
+@pytest.mark.slow
 @on_all((STAGE_PREDICTOR,), needs="agreement")
 @pytest.mark.parametrize("path", ["staircase", "spiral"])
 @pytest.mark.parametrize(
@@ -148,6 +151,7 @@ def test_the_staircase_is_compensated_as_by_the_library(new_stream: StreamMaker,
     assert 4e-6 < loop.column(COMPENSATOR, "rms_e")[-1] < 1.5e-5
 
 
+@pytest.mark.slow
 @on_all((COMPENSATOR,), needs="agreement")
 @pytest.mark.parametrize(
     "values",
@@ -176,6 +180,7 @@ def test_every_parameter_compensates_as_in_the_library(new_stream: StreamMaker, 
     assert_agreement(new_stream, 300 if values.get("Np") == 1 else 1250, values, 1e-9)
 
 
+@pytest.mark.slow
 @on_all((STAGE_COMPENSATOR,), needs="agreement")
 @pytest.mark.parametrize(
     "values",
@@ -195,6 +200,7 @@ def test_the_staircase_is_compensated_with_trust_as_by_the_library(new_stream: S
     assert (loop.column(COMPENSATOR, "x_h_std") > 0.0).all()
 
 
+@pytest.mark.slow
 @on_all((COMPENSATOR,), needs="agreement")
 @pytest.mark.parametrize(
     "values",

@@ -206,6 +206,7 @@ def test_a_plant_goes_back_by_a_saved_state_alone(new_stream: StreamMaker) -> No
 BAD_POSITIONS = [(math.nan, "finite"), (math.inf, "finite"), (-math.inf, "finite"), (1e30, "within ±1000 m")]
 
 
+@pytest.mark.slow
 @on_adapters(LOOK_AHEADS)
 @pytest.mark.parametrize("name", ["x_d_ahead", "x_meas"])
 @pytest.mark.parametrize(("value", "expected"), BAD_POSITIONS)

@@ -86,6 +86,7 @@ def in_samples(new_stream: StreamMaker, points: Clock, start: float) -> list[lis
     return [outputs[bisect_right(instants, point) - 1] for point in points]
 
 
+@pytest.mark.slow
 @every
 @pytest.mark.parametrize(
     ("pattern", "start"),
@@ -187,6 +188,7 @@ def test_a_restored_state_has_the_grid_that_it_was_saved_with(new_stream: Stream
     assert tails[0] == tails[1]
 
 
+@pytest.mark.slow
 @on_adapters((PREDICTOR, TRAJECTORY))
 def test_a_time_that_accumulates_rounding_is_no_error(new_stream: StreamMaker) -> None:
     # At 1e9 s the sum of t += T_s drifts by half a sample in 10 701 steps.
@@ -270,6 +272,7 @@ def test_a_ramp_with_derivatives_is_that_of_single_samples(new_stream: StreamMak
     assert expected[0] == expected[1]
 
 
+@pytest.mark.slow
 @on_all(PLANTS)
 @pytest.mark.parametrize("step", ["0.3", "0.4", "0.5", "2", "3.7", "8", "12.2", "37"])
 def test_plants_move_the_same_in_any_steps(new_stream: StreamMaker, step: str) -> None:

@@ -39,6 +39,7 @@ def test_predictions_are_those_of_the_delayed_log(new_stream: StreamMaker, start
     np.testing.assert_array_equal(shown["hybrid_active"][100 : 100 + n] == 1.0, active)
 
 
+@pytest.mark.slow
 @on_all((PREDICTOR,))
 def test_the_staircase_is_predicted_as_by_the_directly_solved_problem(new_stream: StreamMaker) -> None:
     # The oracle shares no code with the library and solves each batch from all its rows.
@@ -98,6 +99,7 @@ def test_windows_show_the_batch(new_stream: StreamMaker, Np: int, n: int) -> Non
     np.testing.assert_array_equal(stream.window("x_d_window")[:length], loop.r[n - Np : n - Np + length])
 
 
+@pytest.mark.slow
 @on_all((PREDICTOR,))
 def test_an_offset_changes_no_prediction(new_stream: StreamMaker) -> None:
     shown, moved = (shown_by(new_stream, 2500, {}, start) for start in (0.0, 0.1))

@@ -16,10 +16,27 @@ from core_stream import CoreStream
 from fmu_stream import FmuStream
 from library_models import learned_file
 from library_stream import LookAheadStream, PlantStream
-from stream import CANNOT, CORE, FMI3, IMPLEMENTATIONS, LIBRARY, NATIVE, PYTHON, TRAJECTORY, Stream, machine_of
+from stream import (
+    CANNOT,
+    CORE,
+    FMI3,
+    IMPLEMENTATIONS,
+    LIBRARY,
+    NATIVE,
+    PYTHON,
+    STAGE,
+    STAGE_COMPENSATOR,
+    STAGE_PREDICTOR,
+    TRAJECTORY,
+    Stream,
+    machine_of,
+)
 
 from hybridsep.fmi.weights import WEIGHTS_FILE
 from hybridsep.plants.trajectory import staircase
+
+STAGES = (STAGE, STAGE_PREDICTOR, STAGE_COMPENSATOR)
+"""Models of the stage's X drive, which differ from the default machine's in modes and settings."""
 
 
 class StreamMaker:
@@ -97,7 +114,10 @@ def cases(models: Sequence[str], *, needs: str = "", adapters: bool = False) -> 
         pytest.param(
             (implementation, model),
             id=f"{implementation}-{model}",
-            marks=[pytest.mark.one_set] if implementation in once else [],
+            marks=[
+                *([pytest.mark.one_set] if implementation in once else []),
+                *([pytest.mark.slow] if implementation == PYTHON or model in STAGES else []),
+            ],
         )
         for implementation, model in pairs
         if not {(implementation, model), (implementation, needs)} & CANNOT.keys()
