@@ -17,7 +17,7 @@ import fmpy
 import importers_closed_system as closed_system
 import numpy as np
 import pytest
-from built_once import FMI3, NATIVE, BuiltFmus
+from built_once import FMI3, NATIVE, BuiltFmus, each_kind
 from importers_closed_system import SYSTEMS, Array, ClosedSystem, exists_here
 from places import SUPPORT
 
@@ -254,7 +254,7 @@ def findings(path: Path, caplog: pytest.LogCaptureFixture) -> list[str]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [*NATIVE, *FMI3])
+@pytest.mark.parametrize("name", each_kind([*NATIVE, *FMI3]))
 def test_the_toolbox_has_no_finding(folder: Path, caplog: pytest.LogCaptureFixture, name: str) -> None:
     assert findings(folder / f"{name}.fmu", caplog) == []
 

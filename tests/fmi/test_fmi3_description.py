@@ -11,7 +11,7 @@ from xml.etree import ElementTree as ET
 
 import fmpy
 import pytest
-from built_once import FMI3, NATIVE, BuiltFmus
+from built_once import FMI3, NATIVE, BuiltFmus, each_kind
 from fmi3_rules import RULES, Archive, violations
 from fmpy.validation import validate_fmu
 
@@ -41,7 +41,7 @@ def opened(path: Path) -> Archive:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", FMI3)
+@pytest.mark.parametrize("name", each_kind(FMI3))
 def test_schemas_checkers_and_rules_have_no_finding(fmus: BuiltFmus, name: str) -> None:
     path = fmus(name)
     assert validate_fmu(str(path)) == []
@@ -54,7 +54,7 @@ def test_schemas_checkers_and_rules_have_no_finding(fmus: BuiltFmus, name: str) 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", FMI3)
+@pytest.mark.parametrize("name", each_kind(FMI3))
 def test_the_archive_is_complete(fmus: BuiltFmus, name: str) -> None:
     with zipfile.ZipFile(fmus(name)) as archive:
         files = set(archive.namelist())
@@ -69,7 +69,7 @@ def test_the_archive_is_complete(fmus: BuiltFmus, name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", FMI3)
+@pytest.mark.parametrize("name", each_kind(FMI3))
 def test_types_are_described_by_their_items_alone(fmus: BuiltFmus, name: str) -> None:
     """fmpy up to 0.3.23 raises a TypeError where an EnumerationType has a description."""
     for found in opened(fmus(name)).model.iter("EnumerationType"):
@@ -83,7 +83,7 @@ def test_binaries_lie_where_fmi_3_has_them() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("new", "old"), list(zip(FMI3, NATIVE, strict=True)))
+@pytest.mark.parametrize(("new", "old"), each_kind(list(zip(FMI3, NATIVE, strict=True))))
 def test_the_twins_have_the_same_interface(fmus: BuiltFmus, new: str, old: str) -> None:
     """Names, causalities, units, ranges and starts; windows are arrays, and there is the time beside them."""
     described, before = (fmpy.read_model_description(str(fmus(name))) for name in (new, old))

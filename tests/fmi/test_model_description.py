@@ -10,7 +10,7 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 import pytest
-from built_once import NATIVE, PYTHON, BuiltFmus
+from built_once import NATIVE, PYTHON, BuiltFmus, each_kind
 from fmi2_rules import RULES, variables_of, violations
 
 from hybridsep.base.data_files import data_folder
@@ -27,7 +27,7 @@ def description_of(path: Path) -> ET.Element:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [*NATIVE, *PYTHON])
+@pytest.mark.parametrize("name", each_kind([*NATIVE, *PYTHON]))
 def test_archives_keep_the_rules_of_the_standard(fmus: BuiltFmus, name: str) -> None:
     path = fmus(name)
     root = description_of(path)

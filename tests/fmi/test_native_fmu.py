@@ -15,7 +15,7 @@ from typing import Any
 import fmpy
 import numpy as np
 import pytest
-from built_once import NATIVE, BuiltFmus
+from built_once import NATIVE, BuiltFmus, each_kind
 from elf import symbols
 from fmpy.build import build_platform_binary
 from fmpy.model_description import read_build_description
@@ -49,7 +49,7 @@ def test_native_is_the_default_and_names_follow_the_machine() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", NATIVE)
+@pytest.mark.parametrize("name", each_kind(NATIVE))
 def test_checkers_have_no_finding(fmus: BuiltFmus, name: str) -> None:
     assert validate_fmu(str(fmus(name))) == []
     with zipfile.ZipFile(fmus(name)) as archive:
@@ -66,7 +66,7 @@ def test_checkers_have_no_finding(fmus: BuiltFmus, name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", NATIVE)
+@pytest.mark.parametrize("name", each_kind(NATIVE))
 def test_the_archive_is_complete(fmus: BuiltFmus, name: str) -> None:
     with zipfile.ZipFile(fmus(name)) as archive:
         files = set(archive.namelist())
@@ -127,7 +127,7 @@ def test_a_compiler_without_a_stack_protector_will_do() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [*NATIVE, "HybridPredictorPy"])
+@pytest.mark.parametrize("name", each_kind([*NATIVE, "HybridPredictorPy"]))
 def test_a_description_names_the_machine_where_the_fmu_depends_on_it(fmus: BuiltFmus, name: str) -> None:
     description = fmpy.read_model_description(str(fmus(name))).description
     with zipfile.ZipFile(fmus(name)) as archive:

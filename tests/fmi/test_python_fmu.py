@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from built_once import each_kind
 from driving import steps
 from fmpy.validation import validate_fmu
 from fmu_stream import FmuStream
@@ -41,7 +42,7 @@ def test_all_fmus_are_there() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", each_kind(NAMES))
 def test_fmpy_finds_nothing_to_object_to(python_fmu: Fmu, name: str) -> None:
     assert validate_fmu(str(python_fmu(name))) == []
 
