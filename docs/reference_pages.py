@@ -158,6 +158,8 @@ def fmu_variables() -> str:
         "`spring_mass_damper`; start values "
         "follow from the machine file that an FMU is built from, and there are as many `mode[i].*` as modes. "
         "[How they are wired](../howto/run-fmus.md), [when inputs are read](../explanation/timing.md).",
+        "Parameters are fixed, set before the initialization has ended, but for two of SepCompensator that are "
+        "tunable: `compensate` and `change_max` [may change in a run](../howto/close-the-loop.md#in-a-run).",
     ]
     for model, purpose in FMUS.items():
         parts += [f"## {model}", purpose]
@@ -177,10 +179,9 @@ def fmu_variables() -> str:
         "Native FMUs whose names have `Fmi3` (`HybridPredictorFmi3`) are the twins of those above: the same "
         "variables, units, ranges, start values and dependencies, with other types.",
         _table(("FMI 2.0", "FMI 3.0"), types),
-        "`mode[i].*` stay scalars. All parameters are fixed: they may be set until the initialization has ended. There "
-        "is no event mode, no early return, no intermediate update, no clock and no structural parameter, and inputs "
-        "have no derivatives. The state can be saved, restored and serialised. The `instantiationToken` differs "
-        "from the FMI 2.0 twin's GUID, so states are not exchanged between the two.",
+        "`mode[i].*` stay scalars. There is no event mode, no early return, no intermediate update, no clock and no "
+        "structural parameter, and inputs have no derivatives. The state can be saved, restored and serialised. The "
+        "`instantiationToken` differs from the FMI 2.0 twin's GUID, so states are not exchanged between the two.",
         "Terminals, each a plug whose members belong together by name:",
         _table(
             ("model", "terminal", "member: variable"),

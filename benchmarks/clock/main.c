@@ -2,8 +2,8 @@
  *
  * Arguments: number of steps, start s, T_s s, whether the importer's times are in single precision and a step is their
  * difference, then the step sizes s that take turns. Prints the largest deviation of the clock's time since the last
- * instant from the exact one, in T_s; how often the number of instants reached was another one than the rule's; that number; the
- * drift of the importer's time against the sum of samples, in T_s.
+ * instant from the exact one, in T_s; how often the number of instants reached was another one than the rule's; that
+ * number; the drift of the importer's time against the sum of samples, in T_s.
  */
 #include "hsep_clock.h"
 

@@ -289,7 +289,7 @@ class CompensatorSettings(Settings):
         Whether the velocity of ``x_dm`` keeps the sign of that of ``x_d``: otherwise friction changes its sign too. It
         has no effect without ``limits``. Plans of a model with ``trust`` follow the friction and may turn.
     compensate : {"off", "physics", "hybrid"}
-        Best model allowed; ``"off"`` leaves the command unmodified.
+        Best model allowed; ``"off"`` leaves the command unmodified, and in a run lets the change fade.
     """
 
     OPTIONAL: ClassVar[tuple[str, ...]] = ("preview", "spacing", "change_max")
@@ -303,7 +303,9 @@ class CompensatorSettings(Settings):
     )
     jerk_weight: float = real(1.0, 0.0, 1e12, "1", "weight of the change's jerk against the tracking error")
     limits: Limits | None = None
-    change_max: float | None = real(1e-3, 1e-12, 10.0, "m", "largest change of the command", display_unit="mm")
+    change_max: float | None = real(
+        1e-3, 1e-12, 10.0, "m", "largest change of the command", display_unit="mm", tunable=True
+    )
     no_reversal: bool = flag(True, "whether x_dm never turns while the commanded position moves")
     compensate: str = choice(
         "hybrid",
@@ -313,6 +315,7 @@ class CompensatorSettings(Settings):
             "hybrid": "the hybrid model",
         },
         "best model to compensate with",
+        tunable=True,
     )
 
     def for_window(self, Np: int) -> CompensatorSettings:

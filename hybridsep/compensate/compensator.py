@@ -14,11 +14,13 @@ from that remainder: there is always a feasible plan, and where no other can be 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.errors import SignalError
+from ..base.errors import ParameterError, SignalError
 from ..base.saved import Saved
 from ..base.settings import CompensatorSettings, PredictorSettings
 from ..base.signals import Array, as_measured, as_published, as_samples
@@ -42,6 +44,7 @@ RECOMMENDED = PredictorSettings(trust=False, Np=50, p=50, q=40, lam=1e-8, t_init
 compensator's defaults."""
 
 _KIND = "compensator"
+_TUNABLE = tuple(name for name, parameter in CompensatorSettings.parameters().items() if parameter.tunable)
 
 
 class SepCompensator:
@@ -73,11 +76,8 @@ class SepCompensator:
         assert settings.preview is not None
         assert settings.spacing is not None
         self.preview, self.spacing = settings.preview, settings.spacing
-        self.compensate = SepState[settings.compensate.upper()]
         self._basis = SplineBasis(self.preview, self.spacing)
-        bounds = DriveBounds(
-            self._basis, predictor.T_s, settings.limits, settings.change_max, no_reversal=settings.no_reversal
-        )
+        bounds = self._bounds(settings)
         self._planning: Planning
         if isinstance(predictor.residual, TrustedModel):
             predictor.residual.plan_ahead(self.preview)
@@ -108,6 +108,36 @@ class SepCompensator:
         self._delta_before = np.zeros(3)
         self._x_d_before = np.full(3, np.nan)
         self._pending: PendingPlan | None = None
+
+    @property
+    def compensate(self) -> SepState:
+        """Best model allowed."""
+        return SepState[self.settings.compensate.upper()]
+
+    def change(self, **settings: Any) -> None:
+        """Change settings in a run, from the next window on; no command jumps.
+
+        Every plan goes on from the rest of the last one, which keeps the drive's limits and ends at ``x_d``: with
+        ``compensate="off"`` that rest is followed, so the change of the command fades within the preview. Where it is
+        larger than a new ``change_max``, it is bounded by that rest.
+
+        Parameters
+        ----------
+        **settings
+            ``compensate`` or ``change_max``, as those of :class:`~hybridsep.base.settings.CompensatorSettings`.
+
+        Raises
+        ------
+        ParameterError
+            If one is out of its range, or fixed. Nothing is changed.
+        """
+        fixed = [name for name in settings if name not in _TUNABLE]
+        if fixed:
+            raise ParameterError(f"{', '.join(fixed)} cannot change in a run, {' and '.join(_TUNABLE)} can")
+        changed = replace(self.settings, **settings)
+        if changed != self.settings:
+            self.settings = changed
+            self._planning.adopt(self._bounds(changed), changed)
 
     @one_blas_thread
     def plan(self, x_d: ArrayLike) -> PublishedWindow:
@@ -179,6 +209,11 @@ class SepCompensator:
         self._state_before = pending.state
         self._hybrid_ended |= pending.ends_hybrid
         self._pending = None
+
+    def _bounds(self, settings: CompensatorSettings) -> DriveBounds:
+        return DriveBounds(
+            self._basis, self.predictor.T_s, settings.limits, settings.change_max, no_reversal=settings.no_reversal
+        )
 
     @property
     def is_planned(self) -> bool:

@@ -254,7 +254,7 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
         def assign(value: Any) -> None:
             if causality not in ("input", "parameter"):
                 raise FmuError(f"{name} is an {causality} variable and cannot be set")
-            if causality == "parameter" and self.running:
+            if causality == "parameter" and variable.variability == "fixed" and self.running:
                 raise FmuError(f"{name} is a fixed parameter and cannot be set after initialization, got {value!r}")
             self.values[name] = value
 

@@ -135,7 +135,7 @@ def _parameter(parameter: Parameter, start: Value, *, group: str, label: str | N
         label or parameter.name,
         _KINDS[parameter.kind],
         "parameter",
-        "fixed",
+        "tunable" if parameter.tunable else "fixed",
         parameter.description,
         start=start,
         unit=parameter.unit if parameter.kind is float else None,

@@ -6,7 +6,7 @@ outputs change at sampling instants only and stay causal. ``hsep_inputs.c`` is t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from ..base.clock import SampleClock
 from ..base.errors import SignalError
@@ -37,7 +37,15 @@ class LookAheadInputs:
         self.clock = SampleClock.begin(t_start, T_s)
         self._latched = (start, start)
 
-    def advance(self, look_ahead: LookAhead, x_d_ahead: float, x_meas: float, t: float, h: float) -> dict[str, str]:
+    def advance(
+        self,
+        look_ahead: LookAhead,
+        x_d_ahead: float,
+        x_meas: float,
+        t: float,
+        h: float,
+        begin: Callable[[], None] | None = None,
+    ) -> dict[str, str]:
         """Execute the samples that the communication step from ``t`` by ``h``, s, reaches.
 
         Parameters
@@ -45,6 +53,10 @@ class LookAheadInputs:
         look_ahead : LookAhead
         x_d_ahead, x_meas : float
             Inputs, m, constant over the step.
+        t, h : float
+            The step's start and size, s.
+        begin : function, optional
+            Called when the step is known to be valid, before its first sample; may refuse it.
 
         Returns
         -------
@@ -61,6 +73,8 @@ class LookAheadInputs:
         step = self.clock.stepped(t, h)
         if step.n_latched:
             look_ahead.check(x_d_ahead, x_meas, self.clock.k + self.clock.latched)
+        if begin is not None:
+            begin()
         pending = self.clock.latched
         for _ in range(step.n_samples):
             if pending:  # the sample that an earlier step latched

@@ -79,29 +79,34 @@ static int check_allows(const hsep_variable *v, double value)
            (value >= v->minimum && value <= v->maximum && (value == 0.0 || fabs(value) >= v->nonzero));
 }
 
-HSEP_API int hsep_check_parameters(const hsep_context *context, const double values[], char message[])
+HSEP_API int hsep_check_parameter(const hsep_context *context, size_t i, const double values[], char message[])
 {
     char number[HSEP_NUMBER_SIZE], name[HSEP_NAME_SIZE], range[96];
+    const hsep_variable *v = hsep_table_row(context, i);
+    const double value = values[i];
+    const int whole = v->kind == HSEP_INTEGER || v->kind == HSEP_ENUMERATION;
+    if (isfinite(value) && !(whole && value != floor(value)) && check_allows(v, value)) {
+        return 1;
+    }
+    hsep_table_name(context, i, name);
+    hsep_number(number, value, v->kind);
+    if (!isfinite(value)) {
+        hsep_message_add(message, "%s must be finite, got %s", name, number);
+    } else if (whole && value != floor(value)) {
+        hsep_message_add(message, "%s must be a whole number, got %s", name, number);
+    } else {
+        check_range_text(range, sizeof range, v, hsep_table_unit(context, i));
+        hsep_message_add(message, "%s must be %s, got %s", name, range, number);
+    }
+    return 0;
+}
+
+HSEP_API int hsep_check_parameters(const hsep_context *context, const double values[], char message[])
+{
     int problems = 0;
     for (size_t i = 0; i < context->n_variables; i++) {
-        const hsep_variable *v = hsep_table_row(context, i);
-        const double value = values[i];
-        if (v->causality != HSEP_PARAMETER) {
-            continue;
-        }
-        hsep_table_name(context, i, name);
-        hsep_number(number, value, v->kind);
-        if (!isfinite(value)) {
-            hsep_message_add(message, "%s must be finite, got %s", name, number);
-        } else if ((v->kind == HSEP_INTEGER || v->kind == HSEP_ENUMERATION) && value != floor(value)) {
-            hsep_message_add(message, "%s must be a whole number, got %s", name, number);
-        } else if (!check_allows(v, value)) {
-            check_range_text(range, sizeof range, v, hsep_table_unit(context, i));
-            hsep_message_add(message, "%s must be %s, got %s", name, range, number);
-        } else {
-            continue;
-        }
-        problems++;
+        const int is_parameter = hsep_table_row(context, i)->causality == HSEP_PARAMETER;
+        problems += is_parameter && !hsep_check_parameter(context, i, values, message);
     }
     return problems;
 }

@@ -2,8 +2,8 @@
  *
  * The samples are those of the resource trajectory_<n>.bin, n being the parameter trajectory:
  *   "HSEPTRJ1", their number as uint64, T_s as double, s, then the samples as doubles, m, all little-endian.
- * Sample k is the output from instant k on (hsep_clock.h); after the last one it stays. The samples are part of the state,
- * so a state's size follows from the file.
+ * Sample k is the output from instant k on (hsep_clock.h); after the last one it stays. The samples are part of the
+ * state, so a state's size follows from the file.
  */
 #include "hsep_fmu.h"
 
