@@ -62,6 +62,7 @@ def fit(
     from ..fit.fit import FitOptions
     from ..fit.fit import fit as fit_logs
     from ..fit.report import fit_report, judged_by
+    from ..fmi.builds import other_platforms
     from ..intake.finding import findings_table
     from ..intake.repair import changes, take_in
     from ..logs.log import read_log
@@ -109,6 +110,9 @@ def fit(
     console.print(f"\n{advice}")
     console.print("\n".join(f"{what}: {path}" for what, path in files.items()), soft_wrap=True)
     print_written(figure)
+    native = [path for what, path in files.items() if what.startswith("native FMU")]
+    if native and (note := other_platforms(native[0], files["machine file"], files["trained predictor"], fmi)):
+        console.print(note, soft_wrap=True)
 
 
 def _print_fit(found: Fit, logs: Sequence[Log], findings: Mapping[str, Iterable[Finding]]) -> None:

@@ -8,8 +8,16 @@ from typing import Annotated
 import typer
 
 from ..base.data_files import DEFAULT_MACHINE
-from ..fmi.compiler import TARGET_NAMES
-from .options import TRAJECTORIES, ForceOption, JsonOption, MachineOption, TsOption, UnitOption, WeightsOption
+from .options import (
+    TRAJECTORIES,
+    ForceOption,
+    JsonOption,
+    MachineOption,
+    TargetOption,
+    TsOption,
+    UnitOption,
+    WeightsOption,
+)
 
 __all__ = ["system"]
 
@@ -29,10 +37,7 @@ def system(
     ssp: Annotated[
         str, typer.Option(help="Version of SSP: 1 with FMI 2.0 FMUs, or 2 with FMI 3.0 FMUs, for tools that read it.")
     ] = "1",
-    target: Annotated[
-        list[str] | None,
-        typer.Option(help=f"Platform of the FMUs, may be repeated: {', '.join(TARGET_NAMES)}. All if left out."),
-    ] = None,
+    target: TargetOption = None,
     out: Annotated[
         Path | None, typer.Option(help="The archive, .ssp; named after the machine in this folder if left out.")
     ] = None,

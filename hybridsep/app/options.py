@@ -17,6 +17,7 @@ import typer
 from ..base.parameters import Parameter
 from ..base.ranges import GRAMMAR
 from ..base.settings import CompensatorSettings, PredictorSettings, Settings
+from ..fmi.compiler import TARGET_NAMES
 from ..fmi.flavours import FLAVOURS, FMI_CHOICES
 
 __all__ = [
@@ -66,6 +67,13 @@ FlavourOption = Annotated[str, typer.Option(help=f"Flavour of the FMUs: {', '.jo
 FmiOption = Annotated[
     str,
     typer.Option(help=f"Version of FMI: {', '.join(FMI_CHOICES)}; FMUs of FMI 3.0 are native, their names have Fmi3."),
+]
+TargetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        help=f"Platform of native FMUs, may be repeated: {', '.join(TARGET_NAMES)}. If left out this machine's, or all "
+        "where their libraries are there."
+    ),
 ]
 TsOption = Annotated[
     float | None, typer.Option("--T_s", "--Ts", help="Sampling interval [s], for a file without a time column.")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 import zipfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -74,7 +74,6 @@ def build_fmu(
     targets: Sequence[str] | None = None,
     samples: ArrayLike | None = None,
     weights: str | Path | None = None,
-    on_target: Callable[[str], object] = lambda _target: None,
     fmi: str = FMI_VERSIONS[0],
 ) -> Path:
     """Build one FMU.
@@ -91,14 +90,12 @@ def build_fmu(
         Flavour of the FMU.
     targets : sequence of str, optional
         Platforms of a native FMU's binaries: of :data:`hybridsep.fmi.compiler.TARGET_NAMES`, ``"host"`` being this
-        machine. If left out: all platforms, or this machine where neither their libraries nor ``ziglang`` is there.
+        machine. If left out: all platforms where their libraries are there, else this machine.
     samples : (n,) array_like, m, optional
         Trajectory 3 of ReferenceTrajectory, at the machine's ``T_s``; played unless another one is chosen.
     weights : str or Path, optional
         File of :meth:`HybridPredictor.save`, trained with the settings of this FMU, for a SepCompensator best in
         closed loop (``compensator.predictor.save(...)``): the FMU starts with these weights, without a warm-up.
-    on_target : callable, optional
-        Called with each platform, as ``x86_64-linux``, whose library is not there and has to be compiled.
     fmi : {"2", "3"}
         Version of FMI, 2.0 or 3.0; the Python flavour has 2.0 alone.
 
@@ -127,9 +124,7 @@ def build_fmu(
     for given, what, models in users:
         if given is not None and model not in models:
             raise FmuError(f"{what} are for a {' or a '.join(models)}, {name} is a {model}")
-    how: dict[str, Any] = (
-        {} if flavour == "python" else {"targets": targets, "samples": samples, "on_target": on_target, "fmi": fmi}
-    )
+    how: dict[str, Any] = {} if flavour == "python" else {"targets": targets, "samples": samples, "fmi": fmi}
     path = Path(out) / f"{name}.fmu"
     path.parent.mkdir(parents=True, exist_ok=True)
     with written_whole(path) as file:

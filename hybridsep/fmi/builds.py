@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
 from ..machines.machine import Machine
 from .archive import build_fmu, fmu_name
+from .compiler import ALL_TARGETS, expanded
 from .flavours import FMI_VERSIONS, versions_of
-from .libraries import has_native, ready_targets
+from .libraries import default_targets, has_native
 
-__all__ = ["build_here", "build_pair", "default_flavour"]
+__all__ = ["build_here", "build_pair", "default_flavour", "other_platforms"]
 
 
 def default_flavour() -> str:
@@ -26,7 +28,7 @@ def build_here(
     weights: Path | None = None,
     fmi: str = FMI_VERSIONS[0],
 ) -> Path:
-    """Build one of a machine's FMUs, for all platforms whose libraries are there.
+    """Build one of a machine's FMUs, for this machine, or for all platforms where their libraries are there.
 
     Parameters
     ----------
@@ -37,14 +39,8 @@ def build_here(
     fmi : str
         Of :data:`~hybridsep.fmi.flavours.FMI_CHOICES`; of both versions the first one's path is returned.
     """
-    targets = ready_targets() if flavour == "native" else None
     paths = [
-        build_fmu(
-            *(machine, fmu_name(model, machine.name, flavour, version), out, flavour),
-            targets=targets,
-            weights=weights,
-            fmi=version,
-        )
+        build_fmu(machine, fmu_name(model, machine.name, flavour, version), out, flavour, weights=weights, fmi=version)
         for version in versions_of(fmi, flavour)
     ]
     return paths[0]
@@ -56,3 +52,23 @@ def build_pair(machine: Machine, out: Path, flavour: str, fmi: str = FMI_VERSION
         build_here(machine, "HybridPredictor", out, flavour, fmi=fmi),
         build_here(machine, "FeedDrive", out, flavour, fmi=fmi),
     )
+
+
+def other_platforms(fmu: Path, machine: Path, weights: Path | None = None, fmi: str = FMI_VERSIONS[0]) -> str:
+    """Return which platforms a native FMU was built for here and the line that builds it for all; empty if it was.
+
+    Parameters
+    ----------
+    fmu, machine, weights : Path
+        The archive, its machine file, and what it has learned.
+    fmi : str
+        As in :func:`build_here`.
+    """
+    targets = expanded(default_targets())
+    if set(targets) == set(ALL_TARGETS):
+        return ""
+    line: list[object] = ["hybridsep", "build", fmu.stem, "--target", "all", "-m", machine]
+    line += [] if weights is None else ["--weights", weights]
+    line += ["--fmi", fmi] if fmi in FMI_VERSIONS[1:] else []
+    line += ["--out", fmu.parent]
+    return f"native FMUs are for {', '.join(targets)}; for all platforms: {shlex.join(map(str, line))}"

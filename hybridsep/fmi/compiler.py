@@ -104,7 +104,7 @@ _FMI2_PLATFORMS: Mapping[str, tuple[str, ...]] = {
 }
 """FMI 2.0's names of platforms, which users know."""
 
-TARGET_NAMES = ("host", *TARGETS, *_FMI2_PLATFORMS)
+TARGET_NAMES = ("host", "all", *TARGETS, *_FMI2_PLATFORMS)
 """Allowed targets."""
 
 
@@ -141,7 +141,8 @@ def expanded(targets: Sequence[str]) -> tuple[str, ...]:
     """
     if unknown := sorted(set(targets) - set(TARGET_NAMES)):
         raise FmuError(f"no target {', '.join(unknown)}; there are {', '.join(TARGET_NAMES)}")
-    keys = (key for target in targets for key in _FMI2_PLATFORMS.get(target, (target,)))
+    several = {**_FMI2_PLATFORMS, "all": ALL_TARGETS}
+    keys = (key for target in targets for key in several.get(target, (target,)))
     return tuple(dict.fromkeys(host_target() if key == "host" else key for key in keys))
 
 
@@ -203,7 +204,9 @@ def compiler_for(target: str) -> Compiler:
         zig = (sys.executable, "-m", "ziglang", "cc", "-target", TARGETS[target].triple, "-fno-sanitize=undefined")
         return Compiler(zig, f"ziglang {version('ziglang')}")
     if target != host_target():
-        raise FmuError("compiling for other platforms needs ziglang: pip install ziglang, or ask for the target host")
+        raise FmuError(
+            f"compiling for {target} needs ziglang: pip install {ZIG.replace(' ', '==')}, or ask for the target host"
+        )
     chosen = os.environ.get("CC", "").split()
     for command in (chosen, ["cc"], ["gcc"], ["clang"]):
         if command and shutil.which(command[0]):
@@ -216,7 +219,7 @@ def compiled(
     jobs: Mapping[tuple[str, str], tuple[Compiler, Mapping[str, bytes]]],
     on_job: Callable[[tuple[str, str]], object] = lambda _job: None,
 ) -> dict[tuple[str, str], bytes]:
-    """Compile and link ``all.c`` into stripped shared libraries, as many at a time as there are processors.
+    """Compile and link ``all.c`` into stripped shared libraries, always as many as there are processors.
 
     Parameters
     ----------
@@ -243,9 +246,9 @@ def compiled(
             output = f"{name}{TARGETS[target].suffix}"
             commands.append(([*compiler.command, *flags, "all.c", "-o", output, *TARGETS[target].flags], folder))
         keys = list(jobs)
-        done = run_together(commands, lambda i: on_job(keys[i]))
-        for (name, target), (arguments, _), (status, complaint) in zip(keys, commands, done, strict=False):
+        for i, (status, complaint) in run_together(commands, lambda i: on_job(keys[i])).items():
             if status != 0:
+                (name, target), (arguments, _) = keys[i], commands[i]
                 said = f"{' '.join(arguments)}\n{complaint.strip()}"
                 raise FmuError(f"{name} cannot be compiled for {TARGETS[target].triple}: {said}")
         return {

@@ -12,11 +12,14 @@ from ..machines.agree import check_interval
 from ..machines.machine import Machine, load_machine, machine_names
 from ..plants.trajectory import read_trajectory
 from .archive import fmu_names
+from .c_header import kind_of
+from .compiler import expanded
+from .description import fmu_description
 from .flavours import FMI_VERSIONS, versions_of
-from .libraries import check_available
+from .libraries import Library, check_available, default_targets
 from .warm_start import load_trained
 
-__all__ = ["Job", "extras_of", "jobs_of"]
+__all__ = ["Job", "extras_of", "jobs_of", "libraries_of"]
 
 Job = tuple[Machine, str, str, str]
 """An FMU to build: its machine, name and model, and the version of FMI."""
@@ -48,6 +51,12 @@ def jobs_of(
     if flavour == "native":
         check_available(targets or ("host",))
     return [job for job in jobs if not fmus or job[1] in fmus]
+
+
+def libraries_of(jobs: Sequence[Job], targets: Sequence[str]) -> list[Library]:
+    """Return the libraries of native FMUs for some platforms, the default ones if none is named."""
+    kinds = dict.fromkeys(kind_of(fmu_description(axis, model, name)) for axis, name, model, _ in jobs)
+    return [(kind, target) for target in expanded(targets or default_targets()) for kind in kinds]
 
 
 def extras_of(

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
@@ -62,7 +62,6 @@ def files(
     targets: Sequence[str] | None = None,
     samples: ArrayLike | None = None,
     trained: HybridPredictor | None = None,
-    on_target: Callable[[str], object] = lambda _target: None,
     fmi: str = FMI_VERSIONS[0],
 ) -> dict[str, bytes]:
     """Return all files of one FMU: archive name → content.
@@ -72,7 +71,7 @@ def files(
     machine : Machine
     description : mapping
         ``model``, ``name``, ``parameters`` and ``modes``.
-    targets, samples, on_target, fmi
+    targets, samples, fmi
         As in :func:`hybridsep.fmi.archive.build_fmu`.
     trained : HybridPredictor, optional
         Trained predictor with which a HybridPredictor or SepCompensator starts warm.
@@ -113,7 +112,7 @@ def files(
     if has_reference(description):
         content |= _reference(machine, description, guid, content, samples, trained)
     kind, targets = kind_of(description), targets or default_targets()
-    compiled = libraries(kind, targets, on_target)
+    compiled = libraries(kind, targets)
     content[BILL_FILE] = bill_of_materials(name, guid, native_parts(compilers_of(kind, targets), list(compiled)))
     return content | {f"binaries/{path}": library for path, library in placed(compiled, name, fmi).items()}
 
