@@ -162,8 +162,8 @@ def fmu_variables() -> str:
     for model, purpose in FMUS.items():
         parts += [f"## {model}", purpose]
         for heading, rows in grouped_table(variables_of(fmu_description(machine, model, model))).items():
-            cells = ((f"`{name}`", kind, start, meaning) for name, kind, _, start, meaning in rows)
-            parts += [f"**{heading}**", _table(("name", "type, unit", "start", "meaning"), cells)]
+            cells = ((f"`{name}`", kind, start, allowed, meaning) for name, kind, _, start, allowed, meaning in rows)
+            parts += [f"**{heading}**", _table(("name", "type, unit", "start", "range", "meaning"), cells)]
     types = (
         ("Real", "Float64"),
         ("Integer", "Int32"),

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..base.version import __version__
 from ..machines.machine import Machine
-from .content import fmu_title, paper_note
+from .content import author, copyright_notice, fmu_title, generation_time, paper_note
 from .experiment import stop_time
 from .flavours import FMI_VERSIONS
 from .variables import INTERPOLATED, Variable, variables_of
@@ -107,7 +107,10 @@ def begun(
         **token,
         "description": fmu_title(machine, model) + paper_note(machine, model),
         "version": __version__,
+        "author": author(),
+        "copyright": copyright_notice(),
         "generationTool": generation_tool,
+        "generationDateAndTime": generation_time(),
     }
     simulation.set("modelIdentifier", name)
     used = {variable.unit for variable in table}
