@@ -14,7 +14,7 @@ from ..machines.machine import Machine
 from .content import author, copyright_notice, fmu_title, generation_time, paper_note
 from .experiment import stop_time
 from .flavours import FMI_VERSIONS
-from .variables import INTERPOLATED, Variable, variables_of
+from .variables import INTERPOLATED, Variable, shown_variables
 
 __all__ = [
     "add_items",
@@ -58,7 +58,7 @@ def model_description(
     samples : (n,) array_like, m, optional
         Trajectory that a ReferenceTrajectory was built with.
     """
-    table = variables_of(description)
+    table = shown_variables(description)
     root = begun("modelDescription.xml", machine, description, table, {"guid": guid}, generation_tool, samples)
     simulation, _, types, _, _, variables, structure = root
     simulation.attrib |= {

@@ -13,7 +13,7 @@ from .flavours import FMI_VERSIONS
 from .fmi3_variables import fmi3_variables
 from .related_files import AGREEMENT, RELATED_FOLDER
 from .tables import grouped_table
-from .variables import variables_of
+from .variables import shown_variables
 
 __all__ = ["compile_note", "dependencies_note", "filled", "icon", "index_page", "reference_note"]
 
@@ -87,7 +87,7 @@ def index_page(
         Version of FMI, whose types are named.
     """
     model, name = str(description["model"]), str(description["name"])
-    table = variables_of(description) if fmi == "2" else [each.shown for each in fmi3_variables(description)]
+    table = shown_variables(description) if fmi == "2" else [each.shown for each in fmi3_variables(description)]
     rows = "\n".join(
         f'<tbody>\n<tr><th colspan="6" scope="rowgroup">{html.escape(heading)}</th></tr>\n{_rows(group)}\n</tbody>'
         for heading, group in grouped_table(table).items()
