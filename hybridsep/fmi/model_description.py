@@ -191,7 +191,8 @@ def variable_attributes(
     own = {
         "name": variable.name,
         "valueReference": str(reference),
-        "description": variable.description,
+        # in a tool's flat list a description stands alone
+        "description": f"{variable.group}: {variable.description}" if variable.group else variable.description,
         "causality": variable.causality,
         "variability": variable.variability,
     }
