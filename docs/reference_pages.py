@@ -22,7 +22,7 @@ from hybridsep.base.settings import PARAMETERS, Limits, PredictorSettings
 from hybridsep.fmi.description import fmu_description
 from hybridsep.fmi.tables import grouped_table
 from hybridsep.fmi.terminals import TERMINALS
-from hybridsep.fmi.variables import variables_of
+from hybridsep.fmi.variables import shown_variables
 from hybridsep.machines.machine import Machine
 
 __all__ = ["FMUS", "pages"]
@@ -163,9 +163,9 @@ def fmu_variables() -> str:
     ]
     for model, purpose in FMUS.items():
         parts += [f"## {model}", purpose]
-        for heading, rows in grouped_table(variables_of(fmu_description(machine, model, model))).items():
-            cells = ((f"`{name}`", kind, start, meaning) for name, kind, _, start, meaning in rows)
-            parts += [f"**{heading}**", _table(("name", "type, unit", "start", "meaning"), cells)]
+        for heading, rows in grouped_table(shown_variables(fmu_description(machine, model, model))).items():
+            cells = ((f"`{name}`", kind, start, allowed, meaning) for name, kind, _, start, allowed, meaning in rows)
+            parts += [f"**{heading}**", _table(("name", "type, unit", "start", "range", "meaning"), cells)]
     types = (
         ("Real", "Float64"),
         ("Integer", "Int32"),

@@ -75,6 +75,7 @@ def build_fmu(
     samples: ArrayLike | None = None,
     weights: str | Path | None = None,
     fmi: str = FMI_VERSIONS[0],
+    origin: Mapping[str, Any] | None = None,
 ) -> Path:
     """Build one FMU.
 
@@ -98,6 +99,8 @@ def build_fmu(
         closed loop (``compensator.predictor.save(...)``): the FMU starts with these weights, without a warm-up.
     fmi : {"2", "3"}
         Version of FMI, 2.0 or 3.0; the Python flavour has 2.0 alone.
+    origin : mapping, optional
+        What the FMU was made from, plain values: the FMU carries it as meta data (SRMD, SSP Traceability).
 
     Returns
     -------
@@ -128,18 +131,25 @@ def build_fmu(
     path = Path(out) / f"{name}.fmu"
     path.parent.mkdir(parents=True, exist_ok=True)
     with written_whole(path) as file:
-        file.write(archived(fmu_files(machine, model, name, flavour, weights=weights, **how)))
+        file.write(archived(fmu_files(machine, model, name, flavour, weights=weights, origin=origin, **how)))
     return path
 
 
 def fmu_files(
-    machine: Machine, model: str, name: str, flavour: str, *, weights: str | Path | None = None, **how: Any
+    machine: Machine,
+    model: str,
+    name: str,
+    flavour: str,
+    *,
+    weights: str | Path | None = None,
+    origin: Mapping[str, Any] | None = None,
+    **how: Any,
 ) -> dict[str, bytes]:
     """Return the content of an FMU: archive name → content.
 
     Parameters
     ----------
-    machine, flavour, weights
+    machine, flavour, weights, origin
         As in :func:`build_fmu`.
     model : str
         ``HybridPredictor``, ``FeedDrive``, …
@@ -158,8 +168,8 @@ def fmu_files(
         machine, model, name, samples=how.get("samples") is not None, warm=trained is not None
     )
     if flavour == "native":
-        return native_flavour.files(machine, description, trained=trained, **how)
-    return python_flavour.files(machine, description, trained=trained)
+        return native_flavour.files(machine, description, trained=trained, origin=origin, **how)
+    return python_flavour.files(machine, description, trained=trained, origin=origin)
 
 
 def archived(files: Mapping[str, bytes]) -> bytes:

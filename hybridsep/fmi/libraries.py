@@ -20,7 +20,7 @@ from ..base.errors import FmuError
 from ..base.output import written_whole
 from .c_header import KINDS, kind_header
 from .c_sources import c_sources, fmi_headers
-from .compiler import ALL_TARGETS, FLAGS, TARGETS, ZIG, compiled, compiler_for, expanded
+from .compiler import ALL_TARGETS, FLAGS, TARGETS, ZIG, compiled, compiler_for, expanded, host_target
 
 __all__ = [
     "Library",
@@ -29,6 +29,7 @@ __all__ = [
     "compilers_of",
     "default_targets",
     "has_native",
+    "is_kept_here",
     "kept",
     "libraries",
     "library_paths",
@@ -103,6 +104,14 @@ def kept(library: Library) -> Path | None:
     shipped = _SHIPPED / library[0] / f"{library[1]}{TARGETS[library[1]].suffix}"
     places = (shipped, _place(ZIG, library))
     return next((place for place in places if place.is_file()), None)
+
+
+def is_kept_here(kind: str) -> bool:
+    """Return whether a kind's library for this machine is there, and need not be compiled."""
+    try:
+        return kept((kind, host_target())) is not None
+    except FmuError:  # a platform that no library is for
+        return False
 
 
 def compilers_of(kind: str, targets: Sequence[str]) -> list[str]:

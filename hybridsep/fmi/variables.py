@@ -26,6 +26,7 @@ __all__ = [
     "modes_from",
     "plant_variables",
     "predictor_variables",
+    "shown_variables",
     "trajectory_variables",
     "variables_of",
 ]
@@ -365,6 +366,33 @@ def variables_of(description: Mapping[str, object]) -> list[Variable]:
     """Return the table that an FMU's ``machine.json`` describes: its model, parameters, modes and unit."""
     table = MODELS[str(description["model"])](description["parameters"], description["modes"])  # type: ignore[arg-type]
     return table if description.get("unit", "m") == "m" else [_angular(variable) for variable in table]
+
+
+def shown_variables(description: Mapping[str, object]) -> list[Variable]:
+    """Return :func:`variables_of` with the ranges that hold in one FMU, where its kind has wider ones.
+
+    A ReferenceTrajectory plays what lies in its archive: at the interval of its samples, and samples of the user's only
+    where it was built with some, which it then starts with.
+    """
+    table = variables_of(description)
+    if description["model"] != "ReferenceTrajectory":
+        return table
+    starts: Any = description["parameters"]
+    n = len(PARAMETERS["trajectory"].choices)
+    played = n if starts["trajectory"] == n - 1 else n - 1
+    own: dict[str, dict[str, Any]] = {
+        "T_s": {"minimum": starts["T_s"], "maximum": starts["T_s"]},
+        "trajectory": {"maximum": played - 1},
+    }
+    return [
+        replace(
+            variable,
+            items=variable.items[:played],
+            item_meanings=variable.item_meanings[:played],
+            **own.get(variable.name, {}),
+        )
+        for variable in table
+    ]
 
 
 def _angular(variable: Variable) -> Variable:

@@ -42,6 +42,38 @@ def test_archives_keep_the_rules_of_the_standard(fmus: BuiltFmus, name: str) -> 
     assert {"modelDescription.xml", "documentation/index.html", "model.png"} <= set(files)
 
 
+GROUPS = {
+    "Predictor": ["Look-ahead and residual model", "Residual model with trust", "Physics model"],
+    "Compensator": ["Look-ahead and residual model", "Residual model with trust", "Compensation", "Physics model"],
+    "Drive": ["Drive", "Encoder"],
+    "Drive_als25010_x": ["Disturbance", "Encoder", "Physics model"],
+    "Trajectory": ["Trajectory"],
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "groups"),
+    [
+        ("HybridPredictor", "Predictor"),
+        ("HybridPredictorPy", "Predictor"),
+        ("SepCompensatorFmi3", "Compensator"),
+        ("FeedDrive", "Drive"),
+        ("FeedDrive_als25010_x", "Drive_als25010_x"),
+        ("ReferenceTrajectory", "Trajectory"),
+    ],
+)
+def test_parameters_are_grouped_and_described_alone(fmus: BuiltFmus, name: str, groups: str) -> None:
+    """A tool's flat list shows the paper's names, m or p; group and meaning stand in each description."""
+    variables = description_of(fmus(name)).findall("ModelVariables/*")
+    described = {v.get("name"): str(v.get("description")) for v in variables if v.get("causality") == "parameter"}
+    parts = [text.partition(": ") for text in described.values()]
+    found = [group for group, _, _ in parts]
+    assert [group for i, group in enumerate(found) if group not in found[:i]] == GROUPS[groups]
+    assert sorted(found, key=GROUPS[groups].index) == found
+    assert all(len(meaning.split()) > 2 for _, _, meaning in parts)
+    assert {"FeedDrive": {"m", "c", "k"}, "HybridPredictor": {"p", "q", "lambda"}}.get(name, set()) <= described.keys()
+
+
 def test_a_rotary_axis_keeps_the_rules(rotary: Machine) -> None:
     for flavour in FLAVOURS:
         names = fmu_names(rotary, flavour)

@@ -297,3 +297,36 @@ def test_the_tables_hold_together() -> None:
     assert [variable.name for variable in table] == ["r", "trajectory", "T_s"]
     assert all(isinstance(variable, Variable) and variable.description for variable in table)
     assert (table[2].minimum, table[2].maximum) == (1e-5, 1.0)
+
+
+@pytest.mark.parametrize(("samples", "fmi", "played"), [(None, "2", 3), ([0.0, 1e-3], "2", 4), ([0.0, 1e-3], "3", 4)])
+def test_a_trajectory_declares_what_it_plays(
+    tmp_path: Path, samples: list[float] | None, fmi: str, played: int
+) -> None:
+    """At the interval of its samples alone, and samples of the user's where it was built with some."""
+    machine, name = load_machine("spring_mass_damper"), "ReferenceTrajectory" + "Fmi3" * (fmi == "3")
+    path = build_fmu(machine, name, tmp_path, targets=("host",), samples=samples, fmi=fmi)
+    description = fmpy.read_model_description(str(path))
+    variables = {variable.name: variable for variable in description.modelVariables}
+    T_s, trajectory = variables["T_s"], variables["trajectory"]
+    assert T_s.start == T_s.min == T_s.max == "0.001"
+    assert [item.name for item in trajectory.declaredType.items] == ["staircase", "spiral_x", "spiral_y", "samples"][
+        :played
+    ]
+    assert (trajectory.min, trajectory.max) == ("0", str(played - 1))
+    with zipfile.ZipFile(path) as archive:
+        page = archive.read("documentation/index.html").decode()
+    assert f"<td>0 … {played - 1}</td>" in page
+    assert ("samples with which" in page) == (samples is not None)
+    for number in range(5):
+        with FmuInstance(path) as instance:
+            instance.set("trajectory", number)
+            if number < played:
+                instance.initialise()
+            else:
+                with pytest.raises(FmuError, match="trajectory"):
+                    instance.initialise()
+    with FmuInstance(path) as instance:
+        instance.set("T_s", 0.002)
+        with pytest.raises(FmuError, match=r"T_s must be 0\.001 s"):
+            instance.initialise()
