@@ -48,7 +48,7 @@ def test_foreign_truncated_and_damaged_states_are_refused(name: str, tmp_path: P
         middle = {
             "predictor": 32 + 56 + 16,
             "compensator": 32 + 56 + 16,
-            "stage_drive": 32 + 24 + 40 + 56 + 24,
+            "stage_drive": 32 + 24 + 64 + 56 + 32,
             "trajectory": 32 + 56,
         }[name]
         with pytest.raises(RefusedError, match="the state is inconsistent: it is damaged"):
