@@ -70,6 +70,7 @@ _OWN = {
     "log.axis": "axis of a file that holds several",
     "physics.mode": "modes, at least one",
     "physics.spring_mass_damper": "instead of modes",
+    "drive_limits.estimated": "whether they are estimates from the motion of a log: your drive's own are better",
     "limits.velocity": "largest velocity of the trajectory",
     "limits.acceleration": "largest acceleration of the trajectory",
     "limits.jerk": "largest jerk of the trajectory",
@@ -196,9 +197,10 @@ def fmu_variables() -> str:
             ),
         ),
         "## Other machines",
-        "A plant of kind `stage` has `mode[i].*`, the friction `f`, the velocity `friction_on` that it acts on, the "
-        "cable "
-        "stiffness `kappa` and the sampling interval `T_s` of the command instead of `m`, `c`, `k`, `c_nl`, `k_nl`. "
+        "A plant of kind `stage` or `identified` has `mode[i].*`, the friction `f`, the velocity `friction_on` that it "
+        "acts on, the velocity `v_friction` over which it changes sign, the cable stiffness `kappa`, and sampling "
+        "interval `T_s`, `dead_time` and `input_hold` of the command instead of `m`, `c`, `k`, `c_nl`, `k_nl`. "
+        "An identified one is the model that a log gave, for trying: no measurement. "
         "FMUs are named "
         "after their machine (`HybridPredictor_als25010_x`), those of `spring_mass_damper` plainly; the Python flavour "
         "ends in `Py`, FMI 3.0 in `Fmi3`, before the machine.",
@@ -294,7 +296,7 @@ def _entry(entry: str, place: str, field: Any) -> tuple[str, str, str, str]:
         items = [str(item) for item in get_args(field.annotation)] if get_origin(field.annotation) is Literal else []
         return (
             f"`{entry}`",
-            " or ".join(f"`{item}`" for item in items) or "text",
+            " or ".join(f"`{item}`" for item in items) or ("true or false" if field.annotation is bool else "text"),
             default,
             _OWN.get(place) or _OWN[entry],
         )

@@ -71,7 +71,7 @@ class FeedDrivePy(slave.TableSlave):
         values = self.values
         modes = modes_from(values)
         if modes:
-            friction_on = PARAMETERS["friction_on"].from_fmi(values["friction_on"])
-            model = ModalModel([Mode(**mode) for mode in modes])
-            return StageDrive(model, values["f"], values["kappa"], values["T_s"], friction_on)
+            chosen = {name: PARAMETERS[name].from_fmi(values[name]) for name in ("friction_on", "input_hold")}
+            numbers = {name: values[name] for name in ("f", "kappa", "T_s", "v_friction")}
+            return StageDrive(ModalModel([Mode(**mode) for mode in modes], values["dead_time"]), **numbers, **chosen)
         return FeedDrive(*(values[name] for name in ("m", "c", "k", "c_nl", "k_nl")))

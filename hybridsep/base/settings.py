@@ -414,6 +414,11 @@ _OTHERS = (
         "velocity that the friction opposes: commanded or actual",
         name="friction_on",
     ),
+    real(
+        *(2e-3, 1e-12, 1e4, "m/s", "velocity over which the friction changes sign"),
+        name="v_friction",
+        display_unit="mm/s",
+    ),
     real(0.0, 0.0, 1.0, "m", "standard deviation of the encoder noise", name="noise_std", display_unit="um"),
     whole(0, 0, 2**31 - 1, "seed of the encoder noise", name="seed"),
     # The source of commands.

@@ -301,16 +301,20 @@ def plant_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping[str
     Parameters
     ----------
     parameters : mapping
-        Start values of ``m``, ``c``, ``k``, ``c_nl``, ``k_nl`` or of ``f``, ``kappa``, ``friction_on``, ``T_s``;
-        and of ``noise_std`` and ``seed``.
+        Start values of ``m``, ``c``, ``k``, ``c_nl``, ``k_nl`` or of ``f``, ``kappa``, ``friction_on``,
+        ``v_friction``, ``T_s``, ``dead_time``, ``input_hold``; and of ``noise_std`` and ``seed``.
     modes : sequence of mappings
         ``f_n``, ``zeta``, ``alpha``, ``beta`` of each mode.
     """
     velocity = Variable(
         "v", "Real", "output", "continuous", "true velocity", unit="m/s", display_unit="mm/s", nominal=1e-2
     )
-    own = ("f", "kappa", "friction_on", "T_s") if modes else ("m", "c", "k", "c_nl", "k_nl")
-    groups = {"Disturbance" if modes else "Drive": own, "Encoder": ("noise_std", "seed")}
+    drive: dict[str, tuple[str, ...]] = {"Drive": ("m", "c", "k", "c_nl", "k_nl")}
+    stage = {
+        "Disturbance": ("f", "kappa", "friction_on", "v_friction"),
+        "Command": ("T_s", "dead_time", "input_hold"),
+    }
+    groups = {**(stage if modes else drive), "Encoder": ("noise_std", "seed")}
     return [
         _position("x_d", "input", "commanded position, constant over a step", start=0.0),
         _position("x", "output", "true position", variability="continuous", initially_from=("x_d",)),

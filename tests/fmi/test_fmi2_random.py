@@ -14,6 +14,7 @@ import fuzz_fmi2
 import fuzz_fmi3
 import pytest
 from c_compiler import C_SOURCES, FMI_HEADERS, address_sanitizer, needs_sanitisers, run_compiler, sanitising_compiler
+from c_core import STAGE_DRIVE
 from places import ROOT
 
 from hybridsep.fmi.native_flavour import sources
@@ -77,7 +78,7 @@ CLANG = pytest.param([sys.executable, "-m", "ziglang", "cc"], id="clang")
     ("model", "fmi"), [("HybridPredictor", "2"), ("SepCompensator", "2"), ("FeedDrive", "2"), ("HybridPredictor", "3")]
 )
 def test_each_source_compiles_alone_without_warnings(tmp_path: Path, compiler: list[str], model: str, fmi: str) -> None:
-    parameters: dict[str, object] = dict.fromkeys(("f", "kappa", "friction_on", "noise_std", "seed"), 0) | {"T_s": 1e-3}
+    parameters: dict[str, object] = dict(STAGE_DRIVE)
     mode = {"f_n": 25.0, "zeta": 0.05, "alpha": 1.0, "beta": 0.0}
     description = {"model": "FeedDrive", "name": "Stage", "parameters": parameters, "modes": [mode]}
     if model != "FeedDrive":

@@ -129,8 +129,8 @@ def test_interface_of_the_predictor(predictor: FmuInstance) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "parameters"), [
     ("FeedDrivePy", {"m", "c", "k", "c_nl", "k_nl", "noise_std", "seed"}),
-    ("FeedDrivePy_als25010_y", {"f", "kappa", "friction_on", "T_s", "noise_std", "seed"}
-     | {f"mode[{i}].{key}" for i in (1, 2, 3, 4) for key in ("f_n", "zeta", "alpha", "beta")}),
+    ("FeedDrivePy_als25010_y", {"f", "kappa", "friction_on", "v_friction", "T_s", "dead_time", "input_hold"}
+     | {"noise_std", "seed"} | {f"mode[{i}].{key}" for i in (1, 2, 3, 4) for key in ("f_n", "zeta", "alpha", "beta")}),
 ])  # fmt: skip
 def test_interface_of_the_plants(python_fmu: Fmu, name: str, parameters: set[str]) -> None:
     with FmuInstance(python_fmu(name)) as instance:

@@ -56,7 +56,17 @@ STAGE_MODES = [asdict(mode) for mode in load_machine("als25010_x").model.modes]
 """The stage's X axis, Table 1."""
 PREDICTOR = {**defaults({**PREDICTOR_SETTINGS, **TRUST_SETTINGS}), "trust": 0}  # the paper's model
 FEED_DRIVE = {"m": 1.0, "c": 15.7, "k": 24674.0, "c_nl": 100.0, "k_nl": 1000.0, "noise_std": 5e-6, "seed": 0}
-STAGE_DRIVE = {"f": 1.4211e-5, "kappa": 0.0213165, "friction_on": 0, "T_s": 1e-3, "noise_std": 1e-6, "seed": 7}
+STAGE_DRIVE = {
+    "f": 1.4211e-5,
+    "kappa": 0.0213165,
+    "friction_on": 0,
+    "v_friction": 2e-3,
+    "T_s": 1e-3,
+    "dead_time": 0,
+    "input_hold": 0,
+    "noise_std": 1e-6,
+    "seed": 7,
+}
 
 COMPENSATOR = {**defaults({**PREDICTOR_SETTINGS, **TRUST_SETTINGS, **COMPENSATOR_SETTINGS}), "trust": 0}
 
