@@ -183,11 +183,12 @@ static void axis_write(axis_data *self, double command, double feedback)
     pins->rejected = (hal_u32_t)*axis_value(self, HSEP_VR_n_rejected);
 }
 
-/* Hand the command on as it is, while the axis does not follow it. */
+/* What stands on the pins while nothing is predicted: the command as it came, or, while the axis is switched off, the
+ * position where it is: LinuxCNC's command goes there, too, one period later. */
 static void axis_pass(axis_data *self, int state)
 {
     axis_pins *pins = self->pins;
-    *pins->out = *pins->delayed = *pins->predicted = *pins->cmd;
+    *pins->out = *pins->delayed = *pins->predicted = state == AXIS_INACTIVE ? *pins->fb : *pins->cmd;
     *pins->fb_joint = *pins->fb;
     *pins->error = *pins->std_dev = 0.0;
     *pins->state = state;

@@ -1,8 +1,9 @@
 #!/usr/bin/python3
 """Display of the simulated machine: homes it, does what HSEP_PROGRAM says, and samples all periods.
 
-HSEP_PROGRAM is a G-code file, or a Python file whose function ``drive(machine)`` uses :class:`Machine`. The samples go to
-HSEP_SAMPLES, as halsampler writes them, a number of the sample first. It runs under LinuxCNC's own Python.
+HSEP_PROGRAM is a G-code file, or a Python file whose function ``drive(machine)`` uses :class:`Machine`. The samples go
+to HSEP_SAMPLES, as halsampler writes them, below a line with their names, so that hybridsep reads the file as it is.
+LinuxCNC's own Python runs it.
 """
 
 from __future__ import annotations
@@ -12,8 +13,14 @@ import runpy
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import linuxcnc
+
+COLUMNS = ["n"] + [
+    axis + "_" + name for name in ("out", "delayed", "fb", "pos", "predicted", "state") for axis in ("x", "y")
+]
+"""Names of what axes.hal samples, mm."""
 
 WAIT = 60.0
 """Time after which what is waited for will not come, s."""
@@ -46,6 +53,10 @@ class Machine:
         self.command.state(linuxcnc.STATE_ON)
         self.command.wait_complete()
         self.until(lambda status: status.enabled)
+        self.command.mode(linuxcnc.MODE_MANUAL)
+        self.command.wait_complete()
+        self.command.teleop_enable(0)
+        self.command.wait_complete()
         self.command.home(-1)
         self.until(lambda status: all(status.homed[: status.joints]))
 
@@ -59,7 +70,7 @@ class Machine:
         """Start a G-code file."""
         self.command.mode(linuxcnc.MODE_AUTO)
         self.command.wait_complete()
-        self.command.program_open(os.path.abspath(program))
+        self.command.program_open(str(Path(program).resolve()))
         self.command.auto(linuxcnc.AUTO_RUN, 0)
         self.until(lambda status: status.interp_state != linuxcnc.INTERP_IDLE)
 
@@ -78,7 +89,9 @@ class Machine:
 def main() -> None:
     """Run the program, and stop LinuxCNC by ending."""
     program = os.environ["HSEP_PROGRAM"]
-    with open(os.environ["HSEP_SAMPLES"], "w") as samples:
+    with Path(os.environ["HSEP_SAMPLES"]).open("w") as samples:
+        samples.write(" ".join(COLUMNS) + "\n")
+        samples.flush()
         sampler = subprocess.Popen(["halsampler", "-t"], stdout=samples)
         try:
             machine = Machine()
@@ -89,6 +102,7 @@ def main() -> None:
                 machine.start(program)
                 machine.finish()
             time.sleep(0.3)
+            subprocess.run(["halcmd", "show", "param", "hsep.*.tmax"], check=True)
         finally:
             sampler.terminate()
             sampler.wait()
