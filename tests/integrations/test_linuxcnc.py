@@ -9,11 +9,11 @@ from __future__ import annotations
 import os
 import pwd
 import shutil
-import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+import contour
 import numpy as np
 import pytest
 from command_line import Run
@@ -24,10 +24,6 @@ from hybridsep.base.metrics import rms
 from hybridsep.predict.predictor import HybridPredictor
 
 SIMULATION = ROOT / "integrations" / "linuxcnc" / "simulation"
-sys.path.insert(0, str(SIMULATION))
-
-import contour  # noqa: E402
-
 AXES = tuple(str(SIMULATION / f"{axis}.toml") for axis in contour.AXES)
 USER = "nobody"
 
