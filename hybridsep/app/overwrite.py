@@ -27,6 +27,7 @@ __all__ = [
     "FIGURES",
     "FIT_FILES",
     "FMU",
+    "HAL_FILES",
     "MACHINE",
     "PDF",
     "PNG",
@@ -177,6 +178,12 @@ BY_ENDING = RUNS | FIGURES | {".fmu": FMU, ".state": STATE, ".json": SUMMARY}
 
 FIT_FILES = {".toml": MACHINE, ".json": STAGES, ".html": REPORT, ".fmu": FMU, ".state": STATE}
 """Kinds of the files of ``hybridsep fit``."""
+
+HAL_FILES = {
+    ".bin": Kind("file of hybridsep hal", _begins_with(b"HSEP")),
+    ".c": Kind("HAL component of hybridsep", _begins_with(b"/* HAL component for LinuxCNC")),
+}
+"""Kinds of the files of ``hybridsep hal``."""
 
 
 def check_outputs(outputs: Iterable[Output], inputs: Mapping[str, str | Path | None], *, force: bool = False) -> None:

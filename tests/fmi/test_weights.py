@@ -182,6 +182,20 @@ def test_no_mutation_of_the_file_is_accepted_in_c(tmp_path: Path) -> None:
     model.initialise()
 
 
+def test_weights_in_memory_are_those_of_the_file(tmp_path: Path) -> None:
+    write_weights(tmp_path, "predictor_2", np.linalg.qr(np.eye(40, 9))[1], 40, p=4, q=2)
+    content = (tmp_path / WEIGHTS_FILE).read_bytes()
+    settings = {"p": 4, "q": 2, "Np": 8}
+    from_file = CModel("predictor_2", settings, tmp_path).initialise()
+    in_memory = CModel("predictor_2", settings)
+    for damaged in (content[:-8], content + b"\0", b"X" + content[1:]):
+        in_memory.context.weights, in_memory.context.weights_size = damaged, len(damaged)
+        assert "weights.bin must be a factor of learned rows" in refusal(in_memory.initialise)
+    in_memory.context.weights, in_memory.context.weights_size = content, len(content)
+    assert in_memory.initialise().state.tobytes() == from_file.state.tobytes()
+    assert from_file.state.tobytes() != CModel("predictor_2", settings).initialise().state.tobytes()
+
+
 TRUST = {"p": 4, "q": 2, "Np": 20, "trust": 1}
 
 

@@ -132,6 +132,8 @@ class Context(ctypes.Structure):
         ("guid", ctypes.c_char_p),
         ("angular", ctypes.c_int),
         ("resources", ctypes.c_char_p),
+        ("weights", ctypes.c_char_p),
+        ("weights_size", ctypes.c_size_t),
     )
 
 

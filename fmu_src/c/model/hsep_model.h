@@ -60,6 +60,8 @@ typedef struct {
     const char *guid;
     int angular;           /* whether it is a rotary axis */
     const char *resources; /* folder with a trailing slash, decoded; NULL if there is none */
+    const void *weights;   /* content of weights.bin in memory, taken instead of the resources' file; NULL: the file */
+    size_t weights_size;   /* bytes */
 } hsep_context;
 
 /* Check the parameters in values, alone and together, and return the size of the state, bytes.
