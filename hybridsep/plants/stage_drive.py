@@ -128,7 +128,7 @@ class StageDrive:
         self._start, self._acting, self._last_x_d, self._v_d, self._v = state[:5]
         self._clock = SampleClock.from_state(state[5:10])
         end = 10 + 2 * len(self._modes)
-        self._z, self._line = list(state[12:end]), list(state[end:])
+        self._z, self._line = list(state[10:end]), list(state[end:])
 
     def _disturbed(self, r: float, v_d: float) -> float:
         """Return the command disturbed by friction, if it is one of the commanded velocity."""

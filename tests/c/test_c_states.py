@@ -48,7 +48,7 @@ def test_foreign_truncated_and_damaged_states_are_refused(name: str, tmp_path: P
         middle = {
             "predictor": 32 + 40 + 16,
             "compensator": 32 + 40 + 16,
-            "stage_drive": 32 + 24 + 64 + 40 + 32,
+            "stage_drive": 32 + 8 + 24 + 64 + 40 + 32,
             "trajectory": 32 + 40,
         }[name]
         with pytest.raises(RefusedError, match="the state is inconsistent: it is damaged"):

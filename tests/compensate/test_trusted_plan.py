@@ -151,7 +151,7 @@ def test_plans_follow_friction_that_follows_the_command() -> None:
 def test_a_plan_that_is_predicted_to_be_worse_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
     x_d = moves()[:200]
     expected = SepCompensator.from_bytes(learned())
-    expected.compensate = SepState.PHYSICS
+    expected.change(compensate="physics")
     sep = SepCompensator.from_bytes(learned())
     assert sep.plan(x_d).state is SepState.HYBRID
     worse = np.full(3 + sep._basis.n_free, 1e-3)

@@ -58,9 +58,9 @@ def runs(fmus: BuiltFmus) -> Callable[[str, str], Run]:
 
     @cache
     def run(flavour: str, choice: str) -> Run:
-        pair = (fmus(name_of(model, MACHINE, flavour)) for model in ("SepCompensator", "FeedDrive"))
+        controller, plant = (fmus(name_of(model, MACHINE, flavour)) for model in ("SepCompensator", "FeedDrive"))
         r = staircase() if flavour == "native" else staircase()[:1500]
-        return cosimulate(*pair, r, controller_values={**PAPER, "compensate": COMPENSATE.to_fmi(choice)})
+        return cosimulate(controller, plant, r, controller_values={**PAPER, "compensate": COMPENSATE.to_fmi(choice)})
 
     return run
 
