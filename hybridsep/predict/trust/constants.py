@@ -27,9 +27,9 @@ class TrustConstants:
         First weights of the experts with and without lags; hold and command begin with none: with 0.2 for the command's
         the worst drives are worse.
     lags_of_command : int
-        Most lags of the command's expert, and of its increments: with 50 instead of 20 errors are 2 % less on drives of
-        modes, 8 % more on those of two masses, and a third less where the physics model is bad; more than 36 cost more
-        than four million instructions in the dearest sample.
+        Lags of the command's expert, and of its increments, which may reach beyond the window before: with 50 instead
+        of 20 errors are 2 % less on drives of modes, 8 % more on those of two masses, and a third less where the
+        physics model is bad; more than 36 cost more than four million instructions in the dearest sample.
     last_lag : float
         Prior variance of the weight of the last lag, relative to that of the first: the residual's memory fades.
     least_noise : float

@@ -96,7 +96,7 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         self.settings, self.constants, self.preview = settings, constants, settings.Np
         p = settings.p
         self.static = StaticFeatures(discrete, settings.q, settings.period, own, constants)
-        self.command = CommandFeatures(discrete.dead_time, min(p, constants.lags_of_command))
+        self.command = CommandFeatures(discrete.dead_time, constants.lags_of_command)
         self.experts = {LAGGED: self._expert(LAGGED), STATIC: Expert(self.static.shares, 0, constants)}
         self.experts |= {COMMAND: self._expert(COMMAND), DOUBTING: self._expert(LAGGED)}
         self.leading = LAGGED

@@ -14,9 +14,9 @@
 #define HSEP_TRUST_FIRST_LAGGED 0.5
 #define HSEP_TRUST_FIRST_STATIC 0.5
 
-/* Most lags of the command's expert, and of its increments: with 50 instead of 20 errors are 2 % less on drives of
- * modes, 8 % more on those of two masses, and a third less where the physics model is bad; more than 36 cost more
- * than four million instructions in the dearest sample. */
+/* Lags of the command's expert, and of its increments, which may reach beyond the window before: with 50 instead of
+ * 20 errors are 2 % less on drives of modes, 8 % more on those of two masses, and a third less where the physics
+ * model is bad; more than 36 cost more than four million instructions in the dearest sample. */
 #define HSEP_TRUST_LAGS_OF_COMMAND 36
 
 /* Prior variance of the weight of the last lag, relative to that of the first: the residual's memory fades. */

@@ -317,5 +317,5 @@ HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_d[], const d
     self->at_rest = self->n_rest >= self->Np;
     self->known_rest = self->n_rest > self->Np ? self->n_rest - self->Np : 0;
     memcpy(bridged + self->Np, bridged, (size_t)self->p * sizeof(double)); /* p <= Np: they do not overlap */
-    memcpy(e_0 + self->Np, e_0, (size_t)hsep_trusted_command(self)->p * sizeof(double));
+    memmove(e_0 + self->Np, e_0, (size_t)hsep_trusted_command(self)->p * sizeof(double));
 }

@@ -2,6 +2,7 @@
 #include "hsep_trusted.h"
 
 #include "hsep_range.h"
+#include "hsep_trust_constants.h"
 #include "hsep_trust_learned.h"
 
 #include <math.h>
@@ -38,7 +39,7 @@ HSEP_API uint64_t hsep_trusted_n(const hsep_predictor_settings *settings, const 
 /* Features of the rows of some evidence. */
 static uint64_t trusted_n_features(const hsep_trusted *self, uint64_t evidence)
 {
-    return evidence == HSEP_OF_COMMAND ? 2 * hsep_command_lags(self->p) + 2 : self->n_static + self->p;
+    return evidence == HSEP_OF_COMMAND ? 2 * HSEP_TRUST_LAGS_OF_COMMAND + 2 : self->n_static + self->p;
 }
 
 HSEP_API int hsep_trusted_is_of_command(const hsep_trusted *self, uint64_t expert)
@@ -49,7 +50,7 @@ HSEP_API int hsep_trusted_is_of_command(const hsep_trusted *self, uint64_t exper
 static hsep_expert_shape trusted_shape(const hsep_trusted *self, uint64_t expert)
 {
     const int of_command = hsep_trusted_is_of_command(self, expert);
-    const uint64_t p = of_command ? hsep_command_lags(self->p) : self->p;
+    const uint64_t p = of_command ? HSEP_TRUST_LAGS_OF_COMMAND : self->p;
     const uint64_t n_static = of_command ? p + 2 : self->n_static;
     return (hsep_expert_shape){self->Np, self->n, n_static, expert == HSEP_STATIC ? 0 : p};
 }
@@ -79,7 +80,7 @@ static double trusted_lay_out(hsep_trusted *self, const hsep_trusted_parameters 
     const hsep_predictor_settings *settings = parameters->settings;
     const hsep_trust_settings *trust = parameters->trust;
     const double Np = (double)settings->Np, n = (double)parameters->n, p = (double)settings->p;
-    const double p_of_command = (double)hsep_command_lags(settings->p);
+    const double p_of_command = (double)HSEP_TRUST_LAGS_OF_COMMAND;
     const double n_static = (double)hsep_disturbances_n(settings->q, trust->period);
     double end = HSEP_WORDS(hsep_trusted);
     self->Np = settings->Np;
