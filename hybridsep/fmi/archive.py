@@ -76,6 +76,7 @@ def build_fmu(
     weights: str | Path | None = None,
     on_target: Callable[[str], object] = lambda _target: None,
     fmi: str = FMI_VERSIONS[0],
+    windows: bool = True,
 ) -> Path:
     """Build one FMU.
 
@@ -101,6 +102,8 @@ def build_fmu(
         Called with each platform, as ``x86_64-linux``, whose library is not there and has to be compiled.
     fmi : {"2", "3"}
         Version of FMI, 2.0 or 3.0; the Python flavour has 2.0 alone.
+    windows : bool
+        Whether a HybridPredictor shows the samples of its window, ``4·Np`` scalars or four arrays.
 
     Returns
     -------
@@ -133,18 +136,25 @@ def build_fmu(
     path = Path(out) / f"{name}.fmu"
     path.parent.mkdir(parents=True, exist_ok=True)
     with written_whole(path) as file:
-        file.write(archived(fmu_files(machine, model, name, flavour, weights=weights, **how)))
+        file.write(archived(fmu_files(machine, model, name, flavour, weights=weights, windows=windows, **how)))
     return path
 
 
 def fmu_files(
-    machine: Machine, model: str, name: str, flavour: str, *, weights: str | Path | None = None, **how: Any
+    machine: Machine,
+    model: str,
+    name: str,
+    flavour: str,
+    *,
+    weights: str | Path | None = None,
+    windows: bool = True,
+    **how: Any,
 ) -> dict[str, bytes]:
     """Return the content of an FMU: archive name → content.
 
     Parameters
     ----------
-    machine, flavour, weights
+    machine, flavour, weights, windows
         As in :func:`build_fmu`.
     model : str
         ``HybridPredictor``, ``FeedDrive``, …
@@ -160,7 +170,7 @@ def fmu_files(
     """
     trained = None if weights is None else load_trained(weights, machine, model)
     description = fmu_description(
-        machine, model, name, samples=how.get("samples") is not None, warm=trained is not None
+        machine, model, name, samples=how.get("samples") is not None, warm=trained is not None, windows=windows
     )
     if flavour == "native":
         return native_flavour.files(machine, description, trained=trained, **how)
