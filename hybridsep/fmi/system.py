@@ -83,7 +83,7 @@ def build_system(
     for i, (part, kind) in enumerate(parts.items()):
         progress(kind, i / len(parts))
         name = fmu_name(kind, machine.name, "native", fmi)
-        how = {"targets": targets, "samples": samples if part == "reference" else None, "fmi": fmi}
+        how: dict[str, Any] = {"targets": targets, "samples": samples if part == "reference" else None, "fmi": fmi}
         files = fmu_files(machine, kind, name, "native", weights=weights if part == look_ahead else None, **how)
         content[f"resources/{name}.fmu"] = archived(files)
         warm = weights is not None and part == look_ahead
