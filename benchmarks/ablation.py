@@ -45,7 +45,7 @@ VARIANTS = {
     "velocities never outgrown": replace(CONSTANTS, growth=1e12, growth_learned=1e12),
     "earlier runs never doubted": replace(CONSTANTS, doubt=2.0),
     "earlier runs sooner doubted": replace(CONSTANTS, doubt=0.25),
-    "what stands is believed at once": replace(CONSTANTS, patience_standing=0.0),
+    "every measurement is believed": replace(CONSTANTS, reach_steps=1e12),
     "5 lags of the command": replace(CONSTANTS, lags_of_command=5),
     "50 lags of the command": replace(CONSTANTS, lags_of_command=50),
     "kappa 0.3": replace(CONSTANTS, kappa=0.3),

@@ -41,6 +41,13 @@ def build(
     ] = None,
     unit: UnitOption = None,
     T_s: TsOption = None,
+    windows: Annotated[
+        bool,
+        typer.Option(
+            "--windows/--no-windows",
+            help="Whether a HybridPredictor shows its whole window, 4·Np scalars or four arrays.",
+        ),
+    ] = True,
     out: Annotated[Path, typer.Option(help="Folder for the archives.")] = Path("dist"),
     force: ForceOption = False,
     as_json: JsonOption = False,
@@ -58,7 +65,7 @@ def build(
     from .tables import console, print_json
 
     jobs = jobs_of(fmus or [], machine or [], flavour, target or [], fmi)
-    extras = extras_of(jobs, weights, trajectory, unit, T_s)
+    extras = extras_of(jobs, weights, trajectory, unit, T_s, windows=windows)
     inputs = {f"machine file {source}": machine_path(source) for source in machine or []}
     check_outputs(
         [Output("--out", out / f"{name}.fmu", FMU) for _, name, _, _ in jobs],

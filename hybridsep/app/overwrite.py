@@ -173,7 +173,7 @@ PDF = {".pdf": VECTOR_FIGURE}
 FIGURES = PNG | PDF | {".svg": VECTOR_FIGURE}
 RUNS = {".csv": RUN, ".npz": RUN}
 
-BY_ENDING = RUNS | FIGURES | {".fmu": FMU, ".state": STATE, ".json": SUMMARY}
+BY_ENDING = RUNS | FIGURES | {".fmu": FMU, ".state": STATE, ".json": SUMMARY, ".html": REPORT}
 """Kinds of the files that the library names itself."""
 
 FIT_FILES = {".toml": MACHINE, ".json": STAGES, ".html": REPORT, ".fmu": FMU, ".state": STATE}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 from ..fmi.archive import fmu_name
 from ..fmi.builds import build_here
@@ -52,15 +53,30 @@ def fit_files(out: Path, name: str, *, compensator: bool = False, fmi: str = FMI
 
 
 def build_fmus(
-    machine: Machine, files: Mapping[str, Path], progress: Callable[[float], object], fmi: str = FMI_VERSIONS[0]
+    machine: Machine,
+    files: Mapping[str, Path],
+    progress: Callable[[float], object],
+    fmi: str = FMI_VERSIONS[0],
+    origin: Mapping[str, Any] | None = None,
 ) -> Path:
-    """Build the FMUs among :func:`fit_files`, trained, and return the first predictor's."""
+    """Build the FMUs among :func:`fit_files`, trained, and return the first predictor's.
+
+    Parameters
+    ----------
+    machine, files, fmi
+        As :func:`fit_files` has them.
+    progress : callable
+        Called with the fraction done.
+    origin : mapping, optional
+        What the FMUs say of their origin, of :func:`~hybridsep.fit.origin.fit_origin`.
+    """
     variants = _variants(fmi)
     for i, (flavour, version) in enumerate(variants):
         progress(i / len(variants))
         for what, model in _MODELS.items():
             if path := files.get(_called(what, flavour, version)):
-                build_here(machine, model, path.parent, flavour, weights=files["trained predictor"], fmi=version)
+                given: dict[str, Any] = {"weights": files["trained predictor"], "fmi": version, "origin": origin}
+                build_here(machine, model, path.parent, flavour, **given)
     return files[_called("", *variants[0])]
 
 

@@ -31,6 +31,7 @@ from ..tune.period import period_hint
 from ..tune.recordings import Recording, Replay, replay, split_log
 from .compensation import COMPENSATE, expected_tracking
 from .files import build_fmus, fit_files
+from .origin import fit_origin
 from .stages import Stages, key_of
 
 __all__ = ["Fit", "FitOptions", "fit"]
@@ -209,14 +210,14 @@ def fit(
     if compensates:
         estimate = within(0.85, 0.87, "tracking error with compensation")
         tracking = stages.result("tracking", lambda: expected_tracking(machine, recordings, estimate))
-    steps: dict[str, float] = {}
-    if fmus:
-        built = build_fmus(machine, files, within(0.87, 0.95, "build the FMUs"), fmi)
-        progress("time the FMU's steps", 0.95)
-        steps = step_times(built, recordings[0].x_d, recordings[0].x)
-    else:
+    if not fmus:
         files = {what: path for what, path in files.items() if path.suffix != ".fmu"}
-    result = Fit(machine, found, choice, windows, steps, options.share, judged, tuple(files.values()), tracking)
+    result = Fit(machine, found, choice, windows, {}, options.share, judged, tuple(files.values()), tracking)
+    if fmus:
+        origin = fit_origin(machine, logs, found, result.summary()["judged"], share=options.share, changes=changes)
+        built = build_fmus(machine, files, within(0.87, 0.95, "build the FMUs"), fmi, origin)
+        progress("time the FMU's steps", 0.95)
+        result = replace(result, steps=step_times(built, recordings[0].x_d, recordings[0].x))
     stages.keep("judged", result.summary()["judged"])
     progress("done", 1.0)
     return result

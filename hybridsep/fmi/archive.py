@@ -76,6 +76,7 @@ def build_fmu(
     weights: str | Path | None = None,
     fmi: str = FMI_VERSIONS[0],
     origin: Mapping[str, Any] | None = None,
+    windows: bool = True,
 ) -> Path:
     """Build one FMU.
 
@@ -101,6 +102,8 @@ def build_fmu(
         Version of FMI, 2.0 or 3.0; the Python flavour has 2.0 alone.
     origin : mapping, optional
         What the FMU was made from, plain values: the FMU carries it as meta data (SRMD, SSP Traceability).
+    windows : bool
+        Whether a HybridPredictor shows the samples of its window, ``4·Np`` scalars or four arrays.
 
     Returns
     -------
@@ -131,7 +134,8 @@ def build_fmu(
     path = Path(out) / f"{name}.fmu"
     path.parent.mkdir(parents=True, exist_ok=True)
     with written_whole(path) as file:
-        file.write(archived(fmu_files(machine, model, name, flavour, weights=weights, origin=origin, **how)))
+        files = fmu_files(machine, model, name, flavour, weights=weights, origin=origin, windows=windows, **how)
+        file.write(archived(files))
     return path
 
 
@@ -143,13 +147,14 @@ def fmu_files(
     *,
     weights: str | Path | None = None,
     origin: Mapping[str, Any] | None = None,
+    windows: bool = True,
     **how: Any,
 ) -> dict[str, bytes]:
     """Return the content of an FMU: archive name → content.
 
     Parameters
     ----------
-    machine, flavour, weights, origin
+    machine, flavour, weights, origin, windows
         As in :func:`build_fmu`.
     model : str
         ``HybridPredictor``, ``FeedDrive``, …
@@ -165,7 +170,7 @@ def fmu_files(
     """
     trained = None if weights is None else load_trained(weights, machine, model)
     description = fmu_description(
-        machine, model, name, samples=how.get("samples") is not None, warm=trained is not None
+        machine, model, name, samples=how.get("samples") is not None, warm=trained is not None, windows=windows
     )
     if flavour == "native":
         return native_flavour.files(machine, description, trained=trained, origin=origin, **how)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from ..machines.machine import Machine
 from .archive import build_fmu, fmu_name
@@ -27,12 +29,13 @@ def build_here(
     *,
     weights: Path | None = None,
     fmi: str = FMI_VERSIONS[0],
+    origin: Mapping[str, Any] | None = None,
 ) -> Path:
     """Build one of a machine's FMUs, for this machine, or for all platforms where their libraries are there.
 
     Parameters
     ----------
-    machine, out, flavour, weights
+    machine, out, flavour, weights, origin
         As in :func:`~hybridsep.fmi.archive.build_fmu`.
     model : str
         ``HybridPredictor``, ``FeedDrive``, …
@@ -40,7 +43,12 @@ def build_here(
         Of :data:`~hybridsep.fmi.flavours.FMI_CHOICES`; of both versions the first one's path is returned.
     """
     paths = [
-        build_fmu(machine, fmu_name(model, machine.name, flavour, version), out, flavour, weights=weights, fmi=version)
+        build_fmu(
+            *(machine, fmu_name(model, machine.name, flavour, version), out, flavour),
+            weights=weights,
+            fmi=version,
+            origin=origin,
+        )
         for version in versions_of(fmi, flavour)
     ]
     return paths[0]

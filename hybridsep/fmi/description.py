@@ -17,7 +17,7 @@ _SAMPLES_TRAJECTORY = 3
 
 
 def fmu_description(
-    machine: Machine, model: str, name: str, *, samples: bool = False, warm: bool = False
+    machine: Machine, model: str, name: str, *, samples: bool = False, warm: bool = False, windows: bool = True
 ) -> dict[str, Any]:
     """Return the description from which an FMU is made: model, name, start values, modes, and unit unless it is m.
 
@@ -32,12 +32,16 @@ def fmu_description(
         Whether a ReferenceTrajectory plays samples of its own.
     warm : bool
         Whether a look-ahead starts with trained weights, and so without a warm-up.
+    windows : bool
+        Whether a HybridPredictor shows the samples of its window.
     """
     description = _description(machine, model, name)
     if samples:
         description["parameters"] = {**description["parameters"], "trajectory": _SAMPLES_TRAJECTORY}
     if warm:
         description["parameters"] = {**description["parameters"], "t_init": 0.0}
+    if model == "HybridPredictor" and not windows:
+        description["windows"] = False
     return description if machine.unit == "m" else {**description, "unit": machine.unit}
 
 

@@ -60,9 +60,18 @@ def libraries_of(jobs: Sequence[Job], targets: Sequence[str]) -> list[Library]:
 
 
 def extras_of(
-    jobs: Sequence[Job], weights: Path | None, trajectory: Path | None, unit: str | None, T_s: float | None
+    jobs: Sequence[Job],
+    weights: Path | None,
+    trajectory: Path | None,
+    unit: str | None,
+    T_s: float | None,
+    *,
+    windows: bool = True,
 ) -> dict[str, dict[str, Any]]:
-    """Return weights or samples of a trajectory for one of the FMUs: model → keywords of ``build_fmu``."""
+    """Return what is special about some of the FMUs: model → keywords of ``build_fmu``.
+
+    Weights and the samples of a trajectory are for one of them; ``windows=False`` for all that have windows.
+    """
     extras: dict[str, dict[str, Any]] = {}
     check_reading(unit, T_s)
     if weights is not None:
@@ -74,6 +83,11 @@ def extras_of(
         samples, found = read_trajectory(trajectory, unit=unit, T_s=T_s)
         check_interval(trajectory.name, found, axis)
         extras[model] = {"samples": samples}
+    if not windows:
+        if not any(model == "HybridPredictor" for _, _, model, _ in jobs):
+            names = ", ".join(name for _, name, _, _ in jobs)
+            raise ParameterError(f"--no-windows is for a HybridPredictor, this would build {names}; leave it out")
+        extras["HybridPredictor"] = {**extras.get("HybridPredictor", {}), "windows": False}
     return extras
 
 

@@ -80,7 +80,8 @@ def reference_files(
         The machine's plant, behind a look-ahead; a linear drive 2 % off if left out.
     """
     table, T_s = variables_of(description), machine.T_s
-    names = [variable.name for variable in table if variable.causality == "output"]
+    outputs = {variable.name: variable.kind for variable in table if variable.causality == "output"}
+    names = list(outputs)
     given = [variable.name for variable in table if variable.causality == "input"]
     if description["model"] in ("HybridPredictor", "SepCompensator"):
         measure = _measurement(machine, drive)
@@ -93,11 +94,11 @@ def reference_files(
     base = f"{RELATED_FOLDER}/{description['name']}"
     options = {"StartTime": 0.0, "StopTime": times[-1], "StepSize": T_s, "RelTol": _REL_TOL}
     files = {
-        f"{base}_ref.csv": _csv(times, names, [row[0] for row in rows], _RESULT_RESOLUTION),
+        f"{base}_ref.csv": _csv(times, outputs, [row[0] for row in rows], _RESULT_RESOLUTION),
         f"{base}_ref.opt": "".join(f"{name}, {number!r}\n" for name, number in options.items()).encode(),
     }
     if given:
-        files[f"{base}_in.csv"] = _csv(times, given, [row[1] for row in rows], _RESOLUTION)
+        files[f"{base}_in.csv"] = _csv(times, dict.fromkeys(given, "Real"), [row[1] for row in rows], _RESOLUTION)
     name, model_name = str(description["name"]), str(description["model"])
     files[EXPERIMENT_FILE] = experiment(name, model_name, options, inputs=bool(given))
     return files
@@ -169,11 +170,20 @@ def _command(machine: Machine, n: int) -> Array:
     return np.asarray(np.pad(command, (0, n - len(command)), mode="edge"))
 
 
-def _csv(times: Sequence[float], names: Sequence[str], rows: Sequence[Sequence[float]], decimals: int) -> bytes:
-    """Write columns over time, numbers so that they read back the same."""
-    head = ",".join(f'"{name}"' for name in ("time", *names))
+def _csv(times: Sequence[float], kinds: Mapping[str, str], rows: Sequence[Sequence[float]], decimals: int) -> bytes:
+    """Write columns over time, numbers so that they read back the same, whole ones and flags without a point.
+
+    ``kinds`` are those of the columns by name.
+    """
+    head = ",".join(f'"{name}"' for name in ("time", *kinds))
+    real = [kind == "Real" for kind in kinds.values()]
     lines = (
-        ",".join([repr(t), *(repr(round(float(number), decimals)) for number in row)])
+        ",".join(
+            [
+                repr(t),
+                *(repr(round(float(n), decimals) if is_real else int(n)) for n, is_real in zip(row, real, strict=True)),
+            ]
+        )
         for t, row in zip(times, rows, strict=True)
     )
     return "\n".join((head, *lines, "")).encode()

@@ -77,6 +77,13 @@ def _read_description(resources: str) -> dict[str, Any]:
     return _LAST_READ[resources]
 
 
+class _References(dict[int, Any]):
+    """Variables by value reference; a reference to none is refused by its number and the range."""
+
+    def __missing__(self, reference: int) -> Any:
+        raise FmuError(f"value reference must be 0 … {len(self) - 1}, got {reference}")
+
+
 class TableSlave(Fmi2Slave):  # type: ignore[misc]
     """Slave whose variables come from its table and whose arithmetic is in the library.
 
@@ -93,6 +100,7 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
+        self.vars = _References()
         self.table_description = _read_description(self.resources)
         self.modelName = self.table_description["name"]
         self.table = variables_of(self.table_description)

@@ -367,8 +367,10 @@ INTERPOLATED: dict[str, tuple[str, ...]] = {
 
 
 def variables_of(description: Mapping[str, object]) -> list[Variable]:
-    """Return the table that an FMU's ``machine.json`` describes: its model, parameters, modes and unit."""
+    """Return the table that an FMU's ``machine.json`` describes: its model, parameters, modes, unit and windows."""
     table = MODELS[str(description["model"])](description["parameters"], description["modes"])  # type: ignore[arg-type]
+    if not description.get("windows", True):
+        table = [variable for variable in table if variable.causality != "local"]
     return table if description.get("unit", "m") == "m" else [_angular(variable) for variable in table]
 
 

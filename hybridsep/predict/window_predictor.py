@@ -145,7 +145,6 @@ class WindowPredictor:
             np.where(active, forecast.e_h, 0.0),
             last=self.last_accepted_residual(),
             variance=np.where(active, forecast.variance, 0.0),
-            doubted=self.residual.doubted(forecast.x_pb),
         )
         return PredictedWindow(start, error, forecast)
 

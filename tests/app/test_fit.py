@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+import zipfile
 from dataclasses import replace
 from html import unescape
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -19,8 +22,10 @@ from hybridsep.cosim.fmus import FmuController
 from hybridsep.fit import fit as fitting
 from hybridsep.fit.files import fit_files
 from hybridsep.fit.fit import Fit, FitOptions, fit
+from hybridsep.fit.origin import sha256_of
 from hybridsep.fit.report import fit_report, judged_by
 from hybridsep.fit.stages import key_of
+from hybridsep.fmi.resource_data import RESOURCE_DATA_FILE
 from hybridsep.intake.repair import take_in
 from hybridsep.logs.units import shown_in
 from hybridsep.machines.naming import machine_name
@@ -77,6 +82,23 @@ def test_the_fmus_begin_with_what_was_learned_from_the_log(fitted: Fit, log: Pat
                 ahead = float(x_d[min(k, len(x_d) - 1)])
                 controller.step(k, ahead, float(x[k - NP]) if k >= NP else float(x_d[0]))
         np.testing.assert_allclose(x_h[NP:], np.concatenate(expected), rtol=0, atol=1e-9)
+
+
+def test_the_fmus_name_the_log_the_settings_and_the_figures(fitted: Fit, log: Path, tmp_path: Path) -> None:
+    """By SRMD of SSP Traceability, so that whoever gets an FMU alone can find the log that it is from."""
+    results = json.loads((log.parent / "out" / "fit.json").read_text(encoding="utf-8"))
+    for path in (path for path in fitted.files if path.suffix == ".fmu"):
+        with zipfile.ZipFile(path) as archive:
+            root = ElementTree.fromstring(archive.read(RESOURCE_DATA_FILE))
+        entries = {entry.get("keyword"): entry.text for entry in root.iter() if entry.get("keyword")}
+        assert entries["log.1.file"] == "axis.csv"
+        assert entries["log.1.sha256"] == hashlib.sha256(log.read_bytes()).hexdigest()
+        assert entries["log.1.samples"] == str(N)
+        settings = fitted.machine.predictor_settings
+        assert [entries[f"settings.{name}"] for name in ("Np", "p", "q")] == [str(NP), str(settings.p), str(settings.q)]
+        assert float(entries["judged.rms_h"] or "nan") == results["judged"]["rms_h"]
+        assert entries["judged.best"] == results["judged"]["best"]
+    assert sha256_of(tmp_path / "gone.csv") == "unknown"
 
 
 def test_step_times_are_of_the_steps(fitted: Fit) -> None:

@@ -67,6 +67,7 @@ def test_the_page_names_the_version(folder: Path) -> None:
     assert "an exit while the library is loaded" in page
     assert "the GUID and the type" in page
     assert "whether a state has been freed already" in page
+    assert "the bytes that <code>fmi2DeSerializeFMUstate</code> gets" in page
 
 
 def test_only_the_pythonfmu_that_the_slave_was_made_for_is_packed(

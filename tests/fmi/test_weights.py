@@ -225,14 +225,14 @@ def test_no_mutation_of_a_file_with_trust_is_accepted(tmp_path: Path) -> None:
     n_numbers = sum(sizes) + N_LEARNED
     errors = first + 8 * sum(sizes)
     assert struct.unpack_from("<Q", body, 32) == (n_numbers,)
-    spread, step, vibration = (int(places["sensor"]) + 8 * i for i in range(3))
     rows, noise, correlations = (int(places[name]) for name in ("n_rows", "noise_variances", "correlations"))
+    fastest = int(places["motion"]) + 16
     nonsense = [
-        *(body[:i] + struct.pack("<d", wrong) + body[i + 8 :] for i in (spread, step) for wrong in (-2.0, np.nan)),
-        body[:spread] + struct.pack("<d", np.inf) + body[spread + 8 :],
-        body[:step] + struct.pack("<d", 0.0) + body[step + 8 :],
-        body[:vibration] + struct.pack("<d", -1.0) + body[vibration + 8 :],
-        *(body[:i] + struct.pack("<d", wrong) + body[i + 8 :] for i in (rows, noise) for wrong in (-1.0, np.nan)),
+        *(
+            body[:i] + struct.pack("<d", wrong) + body[i + 8 :]
+            for i in (rows, noise, fastest)
+            for wrong in (-1.0, np.nan)
+        ),
         *(body[:i] + struct.pack("<d", 0.5) + body[i + 8 :] for i in (correlations, correlations + 8)),
         *(body[:i] + struct.pack("<d", -1.0) + body[i + 8 :] for i in (errors, errors + 8 * (N_LEARNED - 2))),
         *(body[:32] + struct.pack("<Q", n) + body[40:] for n in (0, n_numbers - 1, n_numbers + 1, 2**63)),

@@ -54,7 +54,7 @@ typedef struct {
     const hsep_variable *variables; /* rows of the table: n_scalars, HSEP_MODE_NUMBERS if it has modes, windows */
     size_t n_scalars;
     size_t n_modes;
-    size_t window; /* samples in each window */
+    size_t window; /* samples in each window, 0 where they are left out */
     size_t n_variables;
     const double *starts; /* (n_scalars + HSEP_MODE_NUMBERS n_modes,), 0 for what is calculated; so are the windows */
     const char *guid;

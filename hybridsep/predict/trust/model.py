@@ -28,7 +28,7 @@ from .constants import CONSTANTS, TrustConstants
 from .disturbances import LEAST_VELOCITY, Disturbance, StaticFeatures, StaticState
 from .experts import Evidence, EvidenceOfRuns, Expert, ExpertPrediction, ResidualScale, SolvedExpert, lags
 from .forecast import TrustedForecast
-from .guard import SensorGuard
+from .reach import Reach, reached
 from .rest import RestBefore
 from .stack import Stack
 
@@ -96,7 +96,7 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         self.settings, self.constants, self.preview = settings, constants, settings.Np
         p = settings.p
         self.static = StaticFeatures(discrete, settings.q, settings.period, own, constants)
-        self.command = CommandFeatures(discrete.dead_time, min(p, constants.lags_of_command))
+        self.command = CommandFeatures(discrete.dead_time, constants.lags_of_command)
         self.experts = {LAGGED: self._expert(LAGGED), STATIC: Expert(self.static.shares, 0, constants)}
         self.experts |= {COMMAND: self._expert(COMMAND), DOUBTING: self._expert(LAGGED)}
         self.leading = LAGGED
@@ -106,7 +106,7 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         self.largest = np.zeros(self.static.n)
         self.velocity_scale = self.largest_step = 0.0
         self.scale, self.scale_of_command = ResidualScale(), ResidualScale()
-        self.guard = SensorGuard(settings.Np, settings.T_s, constants)
+        self.reach = Reach()
         self.restart()
 
     def restart(self) -> None:
@@ -115,7 +115,7 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         no: NDArray[np.bool_] = np.zeros(p, dtype=np.bool_)
         commands, past_of_command = np.zeros(self.command.n_before), np.zeros(self.command.p)
         self.run = RunState(self.static.rest(), commands, np.zeros(p), past_of_command, no)
-        self.guard.restart()
+        self.reach = Reach(self.reach.fastest)
         self.n_rejected = 0
         self.rest = RestBefore(self.settings.measurement_delay)
         for evidence in (self.evidence, self.evidence_of_command):
@@ -364,17 +364,16 @@ class TrustedModel(ResidualModel[TrustedForecast]):
             self.evidence.forget()
         self.velocity_scale, self.largest, self.largest_step, n_rest = forecast.scales
         run, x_d, x_pb = self.run, forecast.x_d[:m], forecast.x_pb[:m]
-        accepted = self.guard.accepts(x, x_pb, self.scale.largest)
+        before, largest, T_s = float(run.static.x_pb[-1]), self.scale.largest, self.settings.T_s
+        accepted, self.reach = reached(self.reach, x, x_pb, before, largest, T_s, self.constants)
         e = _bridged(self.last, x - x_pb, accepted)
         e_0 = e + x_pb - self.command.late(run.commands, x_d)
         rows, static = self.static.rows(run.static, x_d, x_pb, x_pb + e, self.velocity_scale)
         bridged: NDArray[np.bool_] = np.concatenate((run.bridged, ~accepted))
-        # What a held sensor may show is followed, once it is believed, and not learned.
-        learnable = accepted & ~self.guard.suspect
-        if fold and learnable.any():
+        if fold and accepted.any():
             n_bridged = np.convolve(bridged[:-1].astype(np.float64), np.ones(p), "valid")
-            self._fold(rows, x_d, e, e_0, learnable & (n_bridged <= _BRIDGED))
-            self._judge(forecast, e, e_0, learnable)
+            self._fold(rows, x_d, e, e_0, accepted & (n_bridged <= _BRIDGED))
+            self._judge(forecast, e, e_0, accepted)
         self.rest.pass_by(m, n_rest)
         self.n_rejected += m - int(accepted.sum())
         self.run = RunState(
@@ -429,10 +428,6 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         self.evidence.believe_earlier()
         self.evidence_of_command.believe_earlier()
         self.stack.forget(DOUBTING)
-
-    def doubted(self, x_pb: Array) -> Array | None:
-        """Return the residual if the rejected measurement before the window is true, ``(n,)``, m; None if none was."""
-        return self.guard.doubted(x_pb, self.scale.largest)
 
 
 def _bridged(last: float, measured: Array, accepted: NDArray[np.bool_]) -> Array:

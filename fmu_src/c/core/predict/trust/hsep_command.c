@@ -5,18 +5,13 @@
 #include <stddef.h>
 #include <string.h>
 
-HSEP_API uint64_t hsep_command_lags(uint64_t p)
-{
-    return p < HSEP_TRUST_LAGS_OF_COMMAND ? p : HSEP_TRUST_LAGS_OF_COMMAND;
-}
-
 /* Set what follows from the parameters; return the bytes of the block. */
 static double command_lay_out(hsep_command *self, const hsep_predictor_settings *settings, uint64_t n)
 {
     double end = HSEP_WORDS(hsep_command);
     self->n = n;
     self->dead_time = settings->dead_time;
-    self->p = hsep_command_lags(settings->p);
+    self->p = HSEP_TRUST_LAGS_OF_COMMAND;
     self->count = self->p + 2;
     self->n_before = settings->dead_time + self->p + 1;
     self->commands = hsep_take(&end, (double)n + (double)settings->dead_time + (double)self->p + 1.0);
