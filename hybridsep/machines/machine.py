@@ -114,6 +114,13 @@ class Machine(Section):
         return ModalModel([Mode(**mode.model_dump()) for mode in self.physics.mode], self.physics.dead_time)
 
     @property
+    def plant_model(self) -> ModalModel:
+        """Linear part of the plant: ``G_pb``, or an identified plant's own modes."""
+        if isinstance(self.plant, IdentifiedSection) and self.plant.mode:
+            return ModalModel([Mode(**mode.model_dump()) for mode in self.plant.mode], self.physics.dead_time)
+        return self.model
+
+    @property
     def predictor_settings(self) -> PredictorSettings:
         """Settings of the predictor."""
         return PredictorSettings(**self.predictor.given(), **self._sampling)
@@ -176,13 +183,13 @@ class Machine(Section):
             raise MachineError(
                 f"machine {self.name} has no [plant] section: it cannot be simulated, only its log replayed"
             )
-        values = {**self.plant.model_dump(exclude={"kind", "noise_std", "seed"}), **changes}
+        values = {**self.plant.model_dump(exclude={"kind", "noise_std", "seed", "mode"}), **changes}
         if isinstance(self.plant, FeedDriveSection):
             assert self.physics.spring_mass_damper is not None  # by _plant_fits_physics
             return FeedDrive(**self.physics.spring_mass_damper.model_dump(), **values)
         if isinstance(self.plant, IdentifiedSection):
             values = {"input_hold": self.physics.input_hold, **values}
-        return StageDrive(self.model, **values, T_s=self.T_s)
+        return StageDrive(self.plant_model, **values, T_s=self.T_s)
 
     def fmi_parameters(self) -> dict[str, float | int | bool]:
         """Return the start values of the predictor FMU's scalar parameters, under their FMI names."""
