@@ -16,7 +16,7 @@ from ..base.errors import MachineError, ParameterError, brief, first_line, liste
 from ..base.settings import PARAMETERS, CompensatorSettings, Limits, PredictorSettings, Settings
 from ..model.physics import ModalModel, Mode
 from ..plants.feed_drive import FeedDrive
-from ..plants.plant import Plant
+from ..plants.plant import Drive
 from ..plants.stage_drive import StageDrive
 from .sections import (
     CompensatorSection,
@@ -171,7 +171,7 @@ class Machine(Section):
         own = self.new_predictor(self.compensator_predictor if predictor is None else predictor)
         return SepCompensator(own, self._compensation() if settings is None else settings)
 
-    def new_plant(self, **changes: float | str) -> Plant:
+    def new_plant(self, **changes: float | str) -> Drive:
         """Return the plant; ``changes`` are values of its own section, such as ``c_nl`` or ``kappa``.
 
         Raises
