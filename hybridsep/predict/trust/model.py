@@ -96,7 +96,7 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         self.settings, self.constants, self.preview = settings, constants, settings.Np
         p = settings.p
         self.static = StaticFeatures(discrete, settings.q, settings.period, own, constants)
-        self.command = CommandFeatures(discrete.dead_time, constants.lags_of_command)
+        self.command = CommandFeatures(discrete.dead_time, constants.lags_of_command, constants.last_lag)
         self.experts = {LAGGED: self._expert(LAGGED), STATIC: Expert(self.static.shares, 0, constants)}
         self.experts |= {COMMAND: self._expert(COMMAND), DOUBTING: self._expert(LAGGED)}
         self.leading = LAGGED
@@ -139,7 +139,7 @@ class TrustedModel(ResidualModel[TrustedForecast]):
     def _expert(self, expert: int) -> Expert:
         """Return a new expert with lags, of the kind of LAGGED or COMMAND."""
         if expert == COMMAND:
-            return Expert(np.ones(self.command.n), self.command.p, self.constants)
+            return Expert(self.command.shares, self.command.p, self.constants)
         return Expert(self.static.shares, self.settings.p, self.constants)
 
     def is_of_command(self, expert: int) -> bool:

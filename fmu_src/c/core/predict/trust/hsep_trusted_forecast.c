@@ -92,7 +92,8 @@ static void trusted_solve(hsep_trusted *self, hsep_expert_place place, const hse
     hsep_expert *expert = hsep_trusted_expert(self, place);
     double *scales = hsep_at(self, self->scales);
     for (uint64_t i = 0; i < expert->n_static; i++) {
-        const double share = of_command ? 1.0 : hsep_disturbances_share(hsep_trusted_disturbances(self), i);
+        const double share = of_command ? hsep_command_share(hsep_trusted_command(self), i)
+                                        : hsep_disturbances_share(hsep_trusted_disturbances(self), i);
         scales[i] = effect * share / fmax(trusted_largest(self, place, i), trusted_least);
     }
     const hsep_expert_evidence solved = {
