@@ -33,13 +33,13 @@ FLAVOURS = {"2.0": ("", "native", "2"), "3.0": ("Fmi3", "native", "3"), "Python"
 
 
 def exact(n: int, T_s: float) -> tuple[Array, Array]:
-    return np.arange(n) * T_s, np.full(n, T_s)
+    return T_s * np.arange(n, dtype=np.float64), np.full(n, T_s, dtype=np.float64)
 
 
 def whole_nanoseconds(n: int, T_s: float) -> tuple[Array, Array]:
     """Return steps of a whole number of them, as libcosim's."""
     step = round(T_s * 1e9) * 1e-9
-    return np.arange(n) * step, np.full(n, step)
+    return step * np.arange(n, dtype=np.float64), np.full(n, step, dtype=np.float64)
 
 
 def rounded_to_nanoseconds(n: int, T_s: float) -> tuple[Array, Array]:
