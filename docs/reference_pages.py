@@ -70,6 +70,7 @@ _OWN = {
     "log.axis": "axis of a file that holds several",
     "physics.mode": "modes, at least one",
     "physics.spring_mass_damper": "instead of modes",
+    "plant.mode": "modes of an identified plant, as those of the physics model; the same if left out",
     "drive_limits.estimated": "whether they are estimates from the motion of a log: your drive's own are better",
     "limits.velocity": "largest velocity of the trajectory",
     "limits.acceleration": "largest acceleration of the trajectory",

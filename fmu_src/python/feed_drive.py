@@ -14,7 +14,7 @@ from hybridsep.fmi.variables import modes_from
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.feed_drive import FeedDrive
-from hybridsep.plants.plant import Plant
+from hybridsep.plants.plant import Drive
 from hybridsep.plants.stage_drive import StageDrive
 
 _TIME_TOLERANCE = 0.5  # of a step: rounding of the importer's times
@@ -67,7 +67,7 @@ class FeedDrivePy(slave.TableSlave):
         encoder.n_draws, x_meas = saved.whole("n_draws"), saved.real("x_meas")
         self.plant, self.encoder, self.x_meas, self.end = plant, encoder, x_meas, saved.real("end")
 
-    def _new_plant(self) -> Plant:
+    def _new_plant(self) -> Drive:
         values = self.values
         modes = modes_from(values)
         if modes:

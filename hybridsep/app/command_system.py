@@ -14,6 +14,7 @@ from .options import (
     JsonOption,
     MachineOption,
     TargetOption,
+    TrajectoryOption,
     TsOption,
     UnitOption,
     WeightsOption,
@@ -28,9 +29,7 @@ def system(
         bool,
         typer.Option("--compensate", help="A SepCompensator modifies the command; else a HybridPredictor predicts."),
     ] = False,
-    trajectory: Annotated[
-        str, typer.Option(help=f"{', '.join(TRAJECTORIES)}, or a CSV, .npz or .mat file with the columns t and x_d.")
-    ] = "staircase",
+    trajectory: TrajectoryOption = None,
     unit: UnitOption = None,
     T_s: TsOption = None,
     weights: WeightsOption = None,
@@ -48,7 +47,7 @@ def system(
 
     Trajectory, predictor or compensator and drive, wired, with their parameters, for tools that read SSP.
     """
-    from ..cosim.pairing import read_command
+    from ..cosim.pairing import default_trajectory, read_command
     from ..fmi.libraries import check_available
     from ..fmi.system import build_system, check_system
     from ..machines.machine import load_machine, machine_path
@@ -57,6 +56,7 @@ def system(
     from .tables import console, print_json
 
     axis = load_machine(machine)
+    trajectory = trajectory or default_trajectory(machine)
     out = out or Path(f"{axis.name}.ssp")
     check_system(axis, compensate=compensate, ssp=ssp)
     command = read_command(trajectory, axis, unit, T_s)

@@ -14,6 +14,7 @@ from typing import Annotated, Any
 
 import typer
 
+from ..base.data_files import COMMANDS
 from ..base.parameters import Parameter
 from ..base.ranges import GRAMMAR
 from ..base.settings import CompensatorSettings, PredictorSettings, Settings
@@ -43,6 +44,7 @@ __all__ = [
     "SavedOption",
     "SchedulerOption",
     "TimeColumnOption",
+    "TrajectoryOption",
     "TsOption",
     "UnitOption",
     "WeightsOption",
@@ -128,6 +130,14 @@ SavedOption = Annotated[
 ]
 FigurePagesOption = Annotated[
     Path | None, typer.Option(help="PDF with the report's charts for print, a page each, one column wide.")
+]
+
+TrajectoryOption = Annotated[
+    str | None,
+    typer.Option(
+        help=f"{', '.join(TRAJECTORIES)}, or a CSV, .npz or .mat file with the columns t and x_d; if left out, "
+        f"{COMMANDS} beside the machine file, which fit writes, or else the staircase."
+    ),
 ]
 
 _LIST = "list_channels"

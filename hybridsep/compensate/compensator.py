@@ -26,6 +26,7 @@ from ..base.settings import CompensatorSettings, PredictorSettings
 from ..base.signals import Array, as_measured, as_published, as_samples
 from ..base.state import pack, unpack
 from ..base.threads import one_blas_thread
+from ..online.look_ahead import LookAhead
 from ..predict.predictor import HybridPredictor
 from ..predict.trust.disturbances import Disturbance
 from ..predict.trust.model import TrustedModel
@@ -50,8 +51,8 @@ _TUNABLE = tuple(name for name, parameter in CompensatorSettings.parameters().it
 class SepCompensator:
     """Receding-horizon compensator that keeps learning in closed loop.
 
-    For each window, call :meth:`plan` with the commanded positions ahead, send its ``x_dm`` to the drive, then call
-    :meth:`update` with the measured positions.
+    Sample by sample, call :meth:`step`. Or for each window, call :meth:`plan` with the commanded positions ahead, send
+    its ``x_dm`` to the drive, then call :meth:`update` with the measured positions.
 
     Parameters
     ----------
@@ -98,6 +99,7 @@ class SepCompensator:
         lead_in : int
             Samples at rest before the trajectory, not learned.
         """
+        self._online: LookAhead | None = None
         predictor = self.predictor
         predictor.restart(start, t_init=t_init + lead_in * predictor.T_s if t_init > 0 else 0.0)
         self.lead_in = int(lead_in)
@@ -138,6 +140,42 @@ class SepCompensator:
         if changed != self.settings:
             self.settings = changed
             self._planning.adopt(self._bounds(changed), changed)
+
+    @property
+    def T_s(self) -> float:
+        """Sampling interval, s."""
+        return self.predictor.T_s
+
+    @property
+    def delay(self) -> int:
+        """Samples by which :meth:`step` delays the command: ``preview``."""
+        return self.preview
+
+    def step(self, x_d_ahead: float, x_meas: float) -> float:
+        """Process one sample and return the modified command of the next one, m: an online loop in one call.
+
+        It is a :class:`~hybridsep.online.look_ahead.LookAhead` over this compensator, which begins at the first call
+        after :meth:`restart`: there are predictions, errors and a state to save in it.
+
+        Parameters
+        ----------
+        x_d_ahead : float, m
+            Commanded position for ``preview`` samples later.
+        x_meas : float, m
+            Position measured now.
+
+        Raises
+        ------
+        SignalError
+            As :meth:`LookAhead.sample <hybridsep.online.look_ahead.LookAhead.sample>`.
+        """
+        online = self._online
+        if online is None:
+            start = self.predictor.start
+            online = LookAhead(self, float(x_d_ahead if start is None else start))
+            self._online = online  # making it restarts the compensator
+        online.sample(x_d_ahead, x_meas)
+        return online.x_dm
 
     @one_blas_thread
     def plan(self, x_d: ArrayLike) -> PublishedWindow:

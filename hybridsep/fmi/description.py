@@ -8,6 +8,7 @@ from typing import Any
 from ..base.settings import PARAMETERS
 from ..machines.machine import Machine
 from ..machines.sections import FeedDriveSection, IdentifiedSection
+from ..model.physics import ModalModel
 
 __all__ = ["fmu_description"]
 
@@ -48,11 +49,11 @@ def fmu_description(
 def _description(machine: Machine, model: str, name: str) -> dict[str, Any]:
     if model in ("HybridPredictor", "SepCompensator"):
         values = machine.fmi_parameters() if model == "HybridPredictor" else machine.fmi_compensator_parameters()
-        return {"model": model, "name": name, "parameters": values, "modes": _modes(machine)}
+        return {"model": model, "name": name, "parameters": values, "modes": _modes(machine.model)}
     if model == "ReferenceTrajectory":
         return {"model": model, "name": name, "parameters": {"trajectory": 0, "T_s": machine.T_s}, "modes": []}
     assert machine.plant is not None  # by fmu_names
-    parameters: dict[str, object] = machine.plant.model_dump(exclude={"kind"})
+    parameters: dict[str, object] = machine.plant.model_dump(exclude={"kind", "mode"})
     if isinstance(machine.plant, FeedDriveSection):
         assert machine.physics.spring_mass_damper is not None  # by Machine
         parameters |= machine.physics.spring_mass_damper.model_dump()
@@ -65,8 +66,8 @@ def _description(machine: Machine, model: str, name: str) -> dict[str, Any]:
     parameters = {"v_friction": PARAMETERS["v_friction"].default, **parameters}
     parameters |= {key: PARAMETERS[key].to_fmi(value) for key, value in chosen.items()}
     parameters |= {"T_s": machine.T_s, "dead_time": machine.physics.dead_time}
-    return {"model": model, "name": name, "parameters": parameters, "modes": _modes(machine)}
+    return {"model": model, "name": name, "parameters": parameters, "modes": _modes(machine.plant_model)}
 
 
-def _modes(machine: Machine) -> list[dict[str, float]]:
-    return [asdict(mode) for mode in machine.model.modes]
+def _modes(model: ModalModel) -> list[dict[str, float]]:
+    return [asdict(mode) for mode in model.modes]

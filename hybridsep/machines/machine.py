@@ -16,7 +16,7 @@ from ..base.errors import MachineError, ParameterError, brief, first_line, liste
 from ..base.settings import PARAMETERS, CompensatorSettings, Limits, PredictorSettings, Settings
 from ..model.physics import ModalModel, Mode
 from ..plants.feed_drive import FeedDrive
-from ..plants.plant import Plant
+from ..plants.plant import Drive
 from ..plants.stage_drive import StageDrive
 from .sections import (
     CompensatorSection,
@@ -114,6 +114,13 @@ class Machine(Section):
         return ModalModel([Mode(**mode.model_dump()) for mode in self.physics.mode], self.physics.dead_time)
 
     @property
+    def plant_model(self) -> ModalModel:
+        """Linear part of the plant: ``G_pb``, or an identified plant's own modes."""
+        if isinstance(self.plant, IdentifiedSection) and self.plant.mode:
+            return ModalModel([Mode(**mode.model_dump()) for mode in self.plant.mode], self.physics.dead_time)
+        return self.model
+
+    @property
     def predictor_settings(self) -> PredictorSettings:
         """Settings of the predictor."""
         return PredictorSettings(**self.predictor.given(), **self._sampling)
@@ -164,7 +171,7 @@ class Machine(Section):
         own = self.new_predictor(self.compensator_predictor if predictor is None else predictor)
         return SepCompensator(own, self._compensation() if settings is None else settings)
 
-    def new_plant(self, **changes: float | str) -> Plant:
+    def new_plant(self, **changes: float | str) -> Drive:
         """Return the plant; ``changes`` are values of its own section, such as ``c_nl`` or ``kappa``.
 
         Raises
@@ -176,13 +183,13 @@ class Machine(Section):
             raise MachineError(
                 f"machine {self.name} has no [plant] section: it cannot be simulated, only its log replayed"
             )
-        values = {**self.plant.model_dump(exclude={"kind", "noise_std", "seed"}), **changes}
+        values = {**self.plant.model_dump(exclude={"kind", "noise_std", "seed", "mode"}), **changes}
         if isinstance(self.plant, FeedDriveSection):
             assert self.physics.spring_mass_damper is not None  # by _plant_fits_physics
             return FeedDrive(**self.physics.spring_mass_damper.model_dump(), **values)
         if isinstance(self.plant, IdentifiedSection):
             values = {"input_hold": self.physics.input_hold, **values}
-        return StageDrive(self.model, **values, T_s=self.T_s)
+        return StageDrive(self.plant_model, **values, T_s=self.T_s)
 
     def fmi_parameters(self) -> dict[str, float | int | bool]:
         """Return the start values of the predictor FMU's scalar parameters, under their FMI names."""

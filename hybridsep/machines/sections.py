@@ -170,7 +170,7 @@ class StageSection(Section):
 
 
 class IdentifiedSection(Section):
-    """A plant to try with, not a measurement: ``[physics]`` as identified, and the disturbances that a log showed."""
+    """A plant to try with, no measurement: modes, those of ``[physics]`` if left out, and disturbances of a log."""
 
     kind: Literal["identified"]
     f: Number = PARAMETERS["f"].default
@@ -178,6 +178,7 @@ class IdentifiedSection(Section):
     v_friction: Number = PARAMETERS["v_friction"].default
     noise_std: Number = PARAMETERS["noise_std"].default
     seed: Whole = PARAMETERS["seed"].default
+    mode: tuple[ModeSection, ...] = ()
 
 
 class LimitsSection(Section):

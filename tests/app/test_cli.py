@@ -237,7 +237,10 @@ def test_help_shows_units_and_ranges(hybridsep: Run) -> None:
         (["build", "--fmi", "4"], "--fmi must be one of 2, 3, both, got '4'"),
         (["build", "--fmi", "both", "--flavour", "python"], "--fmi both is for native FMUs, pythonfmu's are of FMI 2"),
         (["build", "FeedDriveFmi3", "--target", "host"], "; those of FMI 3.0 need --fmi 3"),
-        (["cosim", "-m", "emps", "--flavour", "python"], "machine emps has no plant; name a plant FMU with --plant"),
+        (
+            ["cosim", "-m", "emps", "--flavour", "python"],
+            "machine emps has no plant: `hybridsep fit` writes one from a log of the axis; or name a plant",
+        ),
         (["cosim", "--trajectory", "zigzag"], "zigzag"),
         (["cosim", "--out", "run.xlsx"], "--out must end in .csv or .npz, got 'run.xlsx'"),
         (["cosim", "--Np", "10"], "p must be 1 … Np = 10, got 50"),

@@ -29,7 +29,7 @@ from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.online.look_ahead import LookAhead
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.feed_drive import FeedDrive
-from hybridsep.plants.plant import Plant
+from hybridsep.plants.plant import Drive
 from hybridsep.plants.stage_drive import StageDrive
 from hybridsep.plants.trajectory import rest_to_rest
 from hybridsep.predict.predictor import HybridPredictor
@@ -192,7 +192,7 @@ def test_the_compensator_in_c(values: dict[str, float], modes: dict[str, float],
     refused({**values, **modes}, lambda: check_c_model(model, samples, values["T_s"]))
 
 
-def check_plant(plant: Plant, noise_std: float, samples: Any, h: float) -> None:
+def check_plant(plant: Drive, noise_std: float, samples: Any, h: float) -> None:
     encoder = Encoder(noise_std)
     for x_d, _ in samples.tolist():
         plant.step(x_d, h)
