@@ -13,7 +13,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from ..base.errors import StateError, first_line
+from ..base.errors import LogError, StateError, first_line
 from ..base.output import written_whole
 from ..logs.extras import library
 from .sources import LogFile
@@ -81,6 +81,8 @@ class Results:
         for path in sorted(path for path in paths if path.suffix in (_PARQUET, _JSON)):
             try:
                 found += _read(path)
+            except LogError:  # pyarrow is not installed
+                raise
             except (OSError, LookupError, TypeError, ValueError) as error:  # pyarrow's are of these
                 raise StateError(
                     f"{path}: is damaged: {first_line(error)}; remove it, its logs are fitted again"
