@@ -24,7 +24,8 @@ __all__ = ["core_outputs", "core_replay"]
 
 def core_replay(predictor: str, model: ModalModel, settings: PredictorSettings, x_d: Array, x_meas: Array) -> Array:
     """Return ``x_h`` of the C core's predictor, ``(n,)``, m; with trust ``x_meas`` is NaN where missing."""
-    return core_outputs(predictor, model, settings, x_d, x_meas, ("x_h",))[0]
+    outputs = core_outputs(predictor, model, settings, x_d, x_meas, ("x_h",))
+    return np.asarray(outputs[0])
 
 
 def core_outputs(
@@ -43,7 +44,7 @@ def core_outputs(
     start = {f"mode[{i}].{key}": value for i, mode in enumerate(modes, 1) for key, value in asdict(mode).items()}
     start |= {**used.to_fmi(), "dead_time": model.dead_time, "x_d_ahead": x_d[0], "x_meas": x_d[0]}
     core = CModel(name, start).initialise()
-    outputs = np.empty((n, len(names)))
+    outputs: Array = np.empty((n, len(names)))
     x_d_ahead, measured = (core.place[key] for key in ("x_d_ahead", "x_meas"))
     shown = [core.place[name] for name in names]
     try:
@@ -55,4 +56,4 @@ def core_outputs(
                 outputs[k + 1 - Np] = core.values[shown]
     except RefusedError as error:
         raise SignalError(str(error)) from error
-    return outputs.T
+    return np.asarray(outputs.T)

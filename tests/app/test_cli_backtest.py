@@ -18,7 +18,7 @@ from hybridsep.evaluate.backtest import backtest
 MACHINE = ("-m", "spring_mass_damper")
 
 
-def spoiled(path: Path, *, n: int = 1500, gain: float = 1.0, offset: float = 0.0, names: str = "t,x_d,x") -> Path:
+def spoiled(path: Path, *, n: int = 2500, gain: float = 1.0, offset: float = 0.0, names: str = "t,x_d,x") -> Path:
     t = np.arange(n) * 1e-3
     columns = np.column_stack((t, commanded()[:n], gain * measured(0)[:n] + offset))
     np.savetxt(path, columns, delimiter=",", header=names, comments="", fmt="%.17g")

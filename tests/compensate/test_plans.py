@@ -156,7 +156,7 @@ def test_what_is_left_of_a_plan_is_followed_when_there_is_no_other() -> None:
     ahead = np.concatenate((commanded()[950:], np.zeros(200)))
     plans = []
     for k in range(0, 500, 100):
-        sep.compensate = SepState.PHYSICS if k < 200 else SepState.OFF
+        sep.change(compensate="physics" if k < 200 else "off")
         plans.append(sep.plan(ahead[k : k + 200]))
         sep.update(plans[-1].x_pb)
     states = [plan.state for plan in plans]

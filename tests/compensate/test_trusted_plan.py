@@ -90,7 +90,6 @@ def test_late_commands_are_predicted_and_not_changed(late: int) -> None:
     """The preview after them is the end of a longer one, whose first commands stay as they are."""
     sep, n = SepCompensator.from_bytes(learned(2e-3)), 200
     x_d, basis = moves()[: late + n], SplineBasis(n, 2)
-    trusted_model(sep.predictor).rest.known = late  # the moves begin later
     whole, model = plan_model(sep, x_d), plan_model(sep, x_d, late)
     at, of_whole = model.predict(x_d[late:]), whole.predict(x_d)
     np.testing.assert_array_equal(model.position(at), whole.position(of_whole)[late:])

@@ -60,7 +60,13 @@ def test_the_example_of_a_machine_file_is_valid(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "example", sorted(path.name for path in (ROOT / "examples").glob("*.py") if "__main__" in path.read_text("utf-8"))
+    "example",
+    [
+        # machines/test_machine.py has it calibrate the stage
+        pytest.param(path.name, marks=[pytest.mark.nightly] if path.stem == "calibrate_stage" else [])
+        for path in sorted((ROOT / "examples").glob("*.py"))
+        if "__main__" in path.read_text("utf-8")
+    ],
 )
 def test_examples_run(example: str, tmp_path: Path) -> None:
     command = [sys.executable, "-W", "error", str(ROOT / "examples" / example)]

@@ -168,7 +168,10 @@ def test_names_of_platforms() -> None:
 
 
 @pytest.mark.skipif(find_spec("ziglang") is None, reason="needs ziglang")
-@pytest.mark.parametrize("target", ALL_TARGETS)
+@pytest.mark.parametrize(
+    "target",
+    [pytest.param(target, marks=[] if target == "x86-windows" else [pytest.mark.release]) for target in ALL_TARGETS],
+)
 def test_the_look_ahead_fmus_compile_for_every_platform(tmp_path: Path, target: str) -> None:
     """Without optimisation; ``test_all_platforms`` links a drive's library, and libm is all that these need besides."""
     for kind in ("HybridPredictor", "SepCompensator"):

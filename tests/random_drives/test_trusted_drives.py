@@ -32,7 +32,7 @@ class Replays:
         if len(self.errors) < N_INTERVALS:
             self.errors.append(x_meas - x_h)
             self.deviations.append(x_h_std)
-        return x_h
+        return np.asarray(x_h)
 
 
 @pytest.fixture(scope="module")

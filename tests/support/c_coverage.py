@@ -15,6 +15,7 @@ import subprocess
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from c_compiler import C_SOURCES
 
@@ -95,7 +96,7 @@ def table(folder: Path) -> str:
     return "\n".join(rows)
 
 
-def _reports(folder: Path) -> Iterator[dict[str, list[dict[str, object]]]]:
+def _reports(folder: Path) -> Iterator[dict[str, Any]]:
     for counts in folder.glob("*/*.gcda"):
         done = subprocess.run(
             ["gcov", "--json-format", "--stdout", "--branch-probabilities", counts],

@@ -34,7 +34,7 @@ class Run:
         return status, out, err
 
 
-def write_log(path: Path, *, n: int = 1500, header: str = "t,x_d,x", scale: float = 1.0) -> Path:
+def write_log(path: Path, *, n: int = 2500, header: str = "t,x_d,x", scale: float = 1.0) -> Path:
     return write_rows(path, commanded()[:n] * scale, measured(0)[:n] * scale, header=header)
 
 

@@ -31,7 +31,8 @@ class TrustConstants:
         of 20 errors are 2 % less on drives of modes, 8 % more on those of two masses, and a third less where the
         physics model is bad; more than 36 cost more than four million instructions in the dearest sample.
     last_lag : float
-        Prior variance of the weight of the last lag, relative to that of the first: the residual's memory fades.
+        Prior variance of the weight of the last lag, and of the command's last increment, relative to that of the
+        first: memory fades. Without it for the increments a CNC axis that outgrows them has three times the error.
     least_noise : float
         Bound on the least variance of the noise relative to the largest mean square of a window: a larger ``lambda``
         would prevent any learning.

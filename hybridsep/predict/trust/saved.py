@@ -18,7 +18,6 @@ from .forecast import TrustedForecast
 from .learned import LEARNED
 from .model import COMMAND, LAGGED, TrustedModel
 from .reach import Reach
-from .rest import N_REST
 
 __all__ = ["SavedTrustedModel"]
 
@@ -70,7 +69,6 @@ class SavedTrustedModel(TrustedModel):
             "past": run.past,
             "past_of_command": run.past_of_command,
             "bridged": run.bridged.astype(np.float64),
-            "rest": np.array(self.rest.state()),
         }
         for name, evidence in (("", self.evidence), ("_of_command", self.evidence_of_command)):
             if evidence.earlier is not None:
@@ -114,21 +112,19 @@ class SavedTrustedModel(TrustedModel):
         )
         self.n_rejected = saved.whole("n_rejected")
         self.reach = self.reach._replace(n_missing=saved.whole("n_missing"), n_beyond=saved.whole("n_beyond"))
-        with saved.consistent():
-            self.rest.restore(saved.array("rest", N_REST))
 
     def saved_forecast(self, forecast: TrustedForecast) -> SavedFields:
         """Return the scales of a forecast, which a compensator has from its preview."""
         scales = forecast.scales
         arrays = {"pending_scales": np.array([scales.velocity, scales.step, *scales.largest])}
-        return SavedFields({"pending_rest": scales.n_rest}, arrays, {})
+        return SavedFields({}, arrays, {})
 
     def restored_forecast(self, saved: Saved, window: WindowInputs) -> TrustedForecast:
         """Return the forecast of :meth:`saved_forecast`; StateError if it is inconsistent."""
         velocity, step, *largest = saved.array("pending_scales", 2 + self.static.n).tolist()
         if min(velocity, step, *largest) < 0.0:
             raise saved.error("the scales of the pending window must be ≥ 0")
-        scales = FeatureScales(velocity, np.array(largest), step, saved.whole("pending_rest"))
+        scales = FeatureScales(velocity, np.array(largest), step)
         forecast = self.forecast(window, scales)
         if not np.isfinite(forecast.e_h).all():
             raise saved.error("the prediction of the pending window must be finite")

@@ -2,6 +2,7 @@
 
 #include "hsep_trust_constants.h"
 
+#include <math.h>
 #include <stddef.h>
 #include <string.h>
 
@@ -36,6 +37,11 @@ HSEP_API int hsep_command_valid(const void *block, const hsep_predictor_settings
     memcpy(&got, block, sizeof got);
     (void)command_lay_out(&got, settings, n); /* changes nothing where it is sound */
     return memcmp(&got, block, sizeof got) == 0;
+}
+
+HSEP_API double hsep_command_share(const hsep_command *self, uint64_t feature)
+{
+    return feature > 0 ? sqrt(pow(HSEP_TRUST_LAST_LAG, (double)(feature - 1) / (double)self->p)) : 1.0;
 }
 
 HSEP_API void hsep_command_take(hsep_command *self, const double x_d[], uint64_t m)

@@ -38,6 +38,9 @@ HSEP_API void hsep_command_init(hsep_command *self, const hsep_predictor_setting
 /* Whether a block, in any alignment, is one that hsep_command_init with these parameters began. */
 HSEP_API int hsep_command_valid(const void *block, const hsep_predictor_settings *settings, uint64_t n);
 
+/* Effect that a feature may have, relative to the largest: an old increment explains less than a recent one. */
+HSEP_API double hsep_command_share(const hsep_command *self, uint64_t feature);
+
 /* Take in the commands of the m samples that come next, (m,), m, m <= n, and fill their rows; may be tried again with
  * others. */
 HSEP_API void hsep_command_take(hsep_command *self, const double x_d[], uint64_t m);

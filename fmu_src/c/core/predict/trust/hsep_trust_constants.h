@@ -19,7 +19,8 @@
  * model is bad; more than 36 cost more than four million instructions in the dearest sample. */
 #define HSEP_TRUST_LAGS_OF_COMMAND 36
 
-/* Prior variance of the weight of the last lag, relative to that of the first: the residual's memory fades. */
+/* Prior variance of the weight of the last lag, and of the command's last increment, relative to that of the first:
+ * memory fades. Without it for the increments a CNC axis that outgrows them has three times the error. */
 #define HSEP_TRUST_LAST_LAG 0.005
 
 /* Bound on the least variance of the noise relative to the largest mean square of a window: a larger lambda would

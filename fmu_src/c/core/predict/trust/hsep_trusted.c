@@ -291,9 +291,6 @@ static void trusted_take_rows(hsep_trusted *self, const double x_d[], const doub
         hsep_disturbances_command(disturbances, x_d, x_pb, self->Np, self->velocity_scale, rows);
     }
     hsep_disturbances_motion(disturbances, x_pb, x, self->Np, rows);
-    for (uint64_t k = 0; k < self->n_rest && k < self->Np; k++) { /* learned, but not used, at rest */
-        rows[k * self->n_static] = 1.0;
-    }
     hsep_disturbances_end(disturbances);
     hsep_command_take(hsep_trusted_command(self), x_d, self->Np);
     trusted_of_command(self, x_pb, e);
@@ -314,8 +311,6 @@ HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_d[], const d
         trusted_judge(self, e, count);
     }
     hsep_command_end(hsep_trusted_command(self), self->Np);
-    self->at_rest = self->n_rest >= self->Np;
-    self->known_rest = self->n_rest > self->Np ? self->n_rest - self->Np : 0;
     memcpy(bridged + self->Np, bridged, (size_t)self->p * sizeof(double)); /* p <= Np: they do not overlap */
     memmove(e_0 + self->Np, e_0, (size_t)hsep_trusted_command(self)->p * sizeof(double));
 }

@@ -70,9 +70,6 @@ typedef struct {
     uint64_t leading; /* expert that led when earlier runs ended, HSEP_LAGGED or HSEP_COMMAND: its counterpart doubts */
     hsep_reach reach;
     uint64_t n_rejected; /* samples of this run that were not accepted */
-    uint64_t at_rest;    /* whether the command has not moved in this run yet, in what was learned, */
-    uint64_t known_rest; /* how many samples behind these are at rest as well (0 if it has), */
-    uint64_t n_rest;     /* and how many of those predicted, the first ones */
     /* Offsets in doubles from the beginning of the struct */
     uint64_t largest;          /* (n_static,) largest magnitudes of the features without lags */
     uint64_t forecast_largest; /* (n_static,) those with the window that is predicted */
@@ -96,7 +93,7 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(
     hsep_trusted,
-    41 + 4 * HSEP_N_EVIDENCE + 2 * HSEP_N_EXPERTS + (sizeof(hsep_stack) + sizeof(hsep_reach)) / sizeof(double));
+    38 + 4 * HSEP_N_EVIDENCE + 2 * HSEP_N_EXPERTS + (sizeof(hsep_stack) + sizeof(hsep_reach)) / sizeof(double));
 
 /* Features, those without lags first. */
 HSEP_API uint64_t hsep_trusted_n(const hsep_predictor_settings *settings, const hsep_trust_settings *trust);

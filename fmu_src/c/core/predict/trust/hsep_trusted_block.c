@@ -132,8 +132,6 @@ HSEP_API void hsep_trusted_init(hsep_trusted *self, const hsep_trusted_parameter
     memset(self, 0, (size_t)hsep_trusted_size(parameters));
     (void)trusted_lay_out(self, parameters);
     self->leading = HSEP_LAGGED;
-    self->at_rest = 1;
-    self->known_rest = parameters->settings->measurement_delay;
     hsep_stack_init(&self->stack);
     hsep_disturbances_init(
         hsep_trusted_disturbances(self), parameters->settings, parameters->trust->period, parameters->modes,
@@ -163,7 +161,6 @@ HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters
     memcpy(&got, block, sizeof got);
     (void)trusted_lay_out(&got, parameters); /* changes nothing where it is sound */
     int sound = memcmp(&got, block, sizeof got) == 0 && (got.leading == HSEP_LAGGED || got.leading == HSEP_COMMAND) &&
-                got.at_rest <= 1 && got.known_rest <= got.n && got.n_rest <= got.n &&
                 hsep_disturbances_valid(
                     hsep_at_bytes(block, got.disturbances), parameters->settings, parameters->trust->period,
                     parameters->n_modes, parameters->planned) &&
