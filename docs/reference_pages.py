@@ -14,6 +14,7 @@ from pydantic import BaseModel
 
 from hybridsep import load_machine
 from hybridsep.app.cli import app
+from hybridsep.app.panels import EXAMPLES
 from hybridsep.base import errors
 from hybridsep.base.data_files import DEFAULT_MACHINE
 from hybridsep.base.messages import ERRORS, FINDINGS, Explanation
@@ -124,6 +125,7 @@ def _command(name: str, command: Any) -> str:
     ]
     if arguments:
         parts.append(_table(("argument", "what"), ((f"`{one.name.upper()}`", one.help) for one in arguments)))
+    parts.append("```text\n" + "\n".join(EXAMPLES[name]) + "\n```")
     panels: dict[str, list[Any]] = {}
     for one in options:
         panels.setdefault(getattr(one, "rich_help_panel", None) or "Options", []).append(one)

@@ -23,6 +23,7 @@ from .command_report import report
 from .command_system import system
 from .command_tune import tune
 from .failures import DEBUG_VARIABLE, Commands, run
+from .panels import EXAMPLES, PanelledCommand
 
 __all__ = ["app", "main"]
 
@@ -52,7 +53,10 @@ for _command in (
     fleet,
     example_log,
 ):
-    app.command()(_command)
+    _name = _command.__name__.replace("_", "-")
+    app.command(cls=PanelledCommand, epilog="\b\nExamples:\n" + "\n".join(f"  {line}" for line in EXAMPLES[_name]))(
+        _command
+    )
 
 
 @app.callback(invoke_without_command=True)

@@ -69,6 +69,7 @@ def backtest(
     from ..machines.machine import load_machine, machine_path
     from ..reports.backtest_peers import backtest_peers
     from ..reports.extent import partly_used
+    from ..reports.judged import whole_log_words
     from .log_intake import CHECKED_MAX, open_checked, reading_of
     from .overwrite import BATCH_COLUMNS, BATCHES, FIGURES, RUNS, STATE, Output, check_outputs
     from .progress import progress_bar
@@ -150,6 +151,7 @@ def backtest(
         more["without_first_window"] = {f"rms_{name}_{unit}": 1e6 * value for name, value in rest.items()}
     print_scores(summary, verdict, as_json, title, unit=axis_machine.unit, shown=shown, more=more)
     if not as_json:
+        console.print(whole_log_words(warm=weights is not None))
         if rest:
             print_without_first(rest, shown)
         print_written(out, figure, *saved)

@@ -56,7 +56,7 @@ def report(
     from ..machines.machine import load_machine, machine_path
     from ..machines.naming import machine_name
     from ..reports.extent import extent, partly_used
-    from ..reports.judged import Judged, recommendation
+    from ..reports.judged import Judged, recommendation, whole_log_words
     from ..reports.sections import write_changes, write_errors, write_findings
     from ..reports.step_times import SAMPLES_MAX, step_times
     from ..reports.use import write_use
@@ -86,7 +86,7 @@ def report(
         steps = {}
         if fmu is not None:
             steps = run_apart(faulty(fmu.name), step_times, fmu, whole.x_d[:SAMPLES_MAX], whole.x_meas[:SAMPLES_MAX])
-    judged = Judged(replayed, whole.T_s, shown_of(whole.file_unit, axis_machine.unit), "the log")
+    judged = Judged(replayed, whole.T_s, shown_of(whole.file_unit, axis_machine.unit), "the whole log")
     settings = predictor.settings
     written = Report(
         f"{axis_machine.title}: {log.name}",
@@ -95,13 +95,13 @@ def report(
     )
     written.paragraph(recommendation(judged), "verdict")
     write_changes(written, changes({log.name: intake.findings}))
-    learned = "began with what an earlier run had learned" if weights is not None else "began without any knowledge"
-    write_errors(written, judged, "Errors of the replay", f"The predictor {learned}.")
+    words = whole_log_words(warm=weights is not None)
+    write_errors(written, judged, "Errors of the replay", words)
     write_findings(written, {log.name: intake.findings})
     if fmu is not None:
         write_use(written, [fmu.name], steps, whole.T_s, settings.Np)
     written.write(page, figure)
-    for line in (partly_used(whole), recommendation(judged)):
+    for line in (partly_used(whole), recommendation(judged), words):
         if line:
             console.print(line)
     console.print(f"report: {page}", soft_wrap=True)

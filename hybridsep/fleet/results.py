@@ -1,4 +1,7 @@
-"""Results of a fleet: a Parquet dataset that only grows, one row an axis of a log as it was then."""
+"""Results of a fleet: a dataset that only grows, one row an axis of a log as it was then.
+
+Its files are Parquet where pyarrow (extra ``fleet``) is installed, else JSON; both are read.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +9,18 @@ import hashlib
 import json
 import uuid
 from collections.abc import Iterable, Mapping, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from ..base.errors import StateError, first_line
+from ..base.errors import LogError, StateError, first_line
 from ..base.output import written_whole
 from ..logs.extras import library
 from .sources import LogFile
 
 __all__ = ["COLUMNS", "Results", "key_of"]
 
-_FOLDER = "rows"
+_FOLDER, _PARQUET, _JSON = "rows", ".parquet", ".json"
 
 COLUMNS: Mapping[str, str] = {
     **dict.fromkeys(("key", "url", "stamp", "log", "machine", "axis", "settings", "recorded", "run"), "string"),
@@ -39,30 +43,28 @@ class Results:
     Parameters
     ----------
     folder : Path
-
-    Raises
-    ------
-    LogError
-        If pyarrow is not installed.
     """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._rows = folder / _FOLDER
-        self._arrow = library(folder, "pyarrow", "fleet", "a folder of results")
-        self._parquet = library(folder, "pyarrow.parquet", "fleet", "a folder of results")
-        self._schema = self._arrow.schema([(name, getattr(self._arrow, kind)()) for name, kind in COLUMNS.items()])
+        self._parquet = find_spec("pyarrow") is not None
 
     def add(self, rows: Sequence[Mapping[str, Any]]) -> None:
         """Write rows; a column that a row leaves out is null."""
         if not rows:
             return
         self._rows.mkdir(parents=True, exist_ok=True)
-        table = self._arrow.Table.from_pylist([dict(row) for row in rows], schema=self._schema)
         # Names increase with time, so that the last row of an axis is the latest
         name = f"{max(row['run'] for row in rows)}-{len(list(self._rows.iterdir())):06}-{uuid.uuid4().hex}"
-        with written_whole(self._rows / f"{name.replace(':', '')}.parquet") as file:
-            self._parquet.write_table(table, file)
+        path = self._rows / f"{name.replace(':', '')}{_PARQUET if self._parquet else _JSON}"
+        whole = [{column: row.get(column) for column in COLUMNS} for row in rows]
+        with written_whole(path) as file:
+            if self._parquet:
+                arrow, parquet = _arrow(path)
+                parquet.write_table(arrow.Table.from_pylist(whole, schema=_schema(arrow)), file)
+            else:
+                file.write(json.dumps(whole).encode())
 
     def rows(self) -> list[dict[str, Any]]:
         """Return all rows, the oldest first.
@@ -71,12 +73,17 @@ class Results:
         ------
         StateError
             If a file is damaged.
+        LogError
+            If one is Parquet and pyarrow is not installed.
         """
         found: list[dict[str, Any]] = []
-        for path in sorted(self._rows.glob("*.parquet")) if self._rows.is_dir() else ():
+        paths = self._rows.iterdir() if self._rows.is_dir() else ()
+        for path in sorted(path for path in paths if path.suffix in (_PARQUET, _JSON)):
             try:
-                found += self._parquet.read_table(path, schema=self._schema).to_pylist()
-            except (self._arrow.ArrowException, OSError, ValueError) as error:
+                found += _read(path)
+            except LogError:  # pyarrow is not installed
+                raise
+            except (OSError, LookupError, TypeError, ValueError) as error:  # pyarrow's are of these
                 raise StateError(
                     f"{path}: is damaged: {first_line(error)}; remove it, its logs are fitted again"
                 ) from error
@@ -96,3 +103,21 @@ class Results:
             for log in logs
             if (known := (log.url, log.size, log.stamp)) not in done or not wanted[known] <= done[known]
         ]
+
+
+def _arrow(path: Path) -> tuple[Any, Any]:
+    """Return pyarrow and its Parquet; LogError if they are not installed."""
+    return tuple(library(path, name, "fleet", "Parquet") for name in ("pyarrow", "pyarrow.parquet"))
+
+
+def _schema(arrow: Any) -> Any:
+    return arrow.schema([(name, getattr(arrow, kind)()) for name, kind in COLUMNS.items()])
+
+
+def _read(path: Path) -> list[dict[str, Any]]:
+    """Return the rows of a file."""
+    if path.suffix == _PARQUET:
+        arrow, parquet = _arrow(path)
+        rows: list[dict[str, Any]] = parquet.read_table(path, schema=_schema(arrow)).to_pylist()
+        return rows
+    return [{column: row[column] for column in COLUMNS} for row in json.loads(path.read_text(encoding="utf-8"))]

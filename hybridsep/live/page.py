@@ -68,7 +68,7 @@ class Page:
     """
 
     def __init__(self, title: str, shown: Shown, port: int = 0) -> None:
-        library("the page", "bokeh", "live", "a Bokeh server")
+        library("the page (--no-page runs without it)", "bokeh", "live", "a Bokeh server")
         token = secrets.token_urlsafe(24)
         with starting_processes():
             self._process = subprocess.Popen(

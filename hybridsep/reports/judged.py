@@ -14,7 +14,7 @@ from ..identify.operation import LITTLE_MOTION
 from ..logs.units import Shown
 from ..tune.recordings import Replay
 
-__all__ = ["Judged", "peers_in_words", "recommendation"]
+__all__ = ["Judged", "peers_in_words", "recommendation", "whole_log_words"]
 
 _IN_WORDS = {"physics model": "the physics model alone", "hold": "holding the last residual"}
 """Names of what a hybrid is compared with, in a sentence; others are as they are."""
@@ -58,6 +58,15 @@ class Judged:
     def unit(self) -> tuple[float, str]:
         """Factor and name of the unit in which errors are shown."""
         return self.shown.error(self.replay.rms()[0])
+
+
+def whole_log_words(*, warm: bool) -> str:
+    """Return what a replay of a whole log is judged by, in words: other samples than those that judge a fit."""
+    began = "began with what an earlier run had learned" if warm else "began without any knowledge"
+    return (
+        f"The predictor {began}, and the whole log judges; hybridsep fit judges its second half alone, when "
+        "the first has been learned."
+    )
 
 
 def recommendation(judged: Judged) -> str:

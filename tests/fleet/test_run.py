@@ -180,5 +180,21 @@ def test_damaged_results(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(StateError, match=r"\.parquet: is damaged: .*; remove it, its logs are fitted again"):
         run(folder)
     monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
-    with pytest.raises(LogError, match=r"is a folder of results, which needs the extra fleet: pip install"):
-        Results(folder / "out")
+    with pytest.raises(LogError, match=r"\.parquet: is Parquet, which needs the extra fleet: pip install"):
+        Results(folder / "out").rows()
+
+
+def test_without_its_extra_results_are_json(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    row = {"key": "k", "run": "2026-01-01T00:00:00", "n_samples": 3, "rms_h": 1e-6}
+    monkeypatch.setattr("hybridsep.fleet.results.find_spec", lambda _name: None)
+    Results(tmp_path).add([row])
+    monkeypatch.undo()
+    Results(tmp_path).add([{**row, "run": "2026-01-02T00:00:00"}])
+    assert sorted(path.suffix for path in (tmp_path / "rows").iterdir()) == [".json", ".parquet"]
+    first, second = Results(tmp_path).rows()
+    assert {name: first[name] for name in row} == row
+    assert {**first, "run": second["run"]} == second
+    damaged = next((tmp_path / "rows").glob("*.json"))
+    damaged.write_text("[{")
+    with pytest.raises(StateError, match=r"\.json: is damaged: .*; remove it"):
+        Results(tmp_path).rows()

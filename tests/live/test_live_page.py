@@ -157,7 +157,10 @@ def test_the_end_is_told_and_the_process_ends() -> None:
 
 def test_bokeh_is_an_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "bokeh", None)
-    with pytest.raises(LogError, match=r"the page: is a Bokeh server, which needs the extra live: pip install"):
+    with pytest.raises(
+        LogError,
+        match=r"the page \(--no-page runs without it\): is a Bokeh server, which needs the extra",
+    ):
         Page(TITLE, SHOWN)
 
 
