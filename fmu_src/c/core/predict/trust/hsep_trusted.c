@@ -78,14 +78,6 @@ static void trusted_set_noise(hsep_trusted *self, hsep_expert_place of, const hs
     expert->correlation = other != NULL ? other->correlation : 1.0;
 }
 
-/* Go on with what earlier runs have trained as with what this one has. */
-static void trusted_end_doubt(hsep_trusted *self)
-{
-    trusted_believe_earlier(self, HSEP_OF_PHYSICS);
-    trusted_believe_earlier(self, HSEP_OF_COMMAND);
-    hsep_stack_forget(&self->stack, HSEP_DOUBTING);
-}
-
 HSEP_API int hsep_trusted_doubts(const hsep_trusted *self) { return self->n_earlier[HSEP_OF_PHYSICS] > 0.0; }
 
 HSEP_API void hsep_trusted_restart(hsep_trusted *self)
@@ -240,13 +232,8 @@ static void trusted_judge(hsep_trusted *self, const double e[], double count)
         }
     }
     trusted_judge_stack(self, e);
-    if (hsep_trusted_doubts(self)) {
-        const double n_rows = self->n_rows[HSEP_OF_PHYSICS], n_all = n_rows + self->n_earlier[HSEP_OF_PHYSICS];
-        if (self->stack.weights[HSEP_DOUBTING] > HSEP_TRUST_DOUBT) {
-            trusted_forget_earlier_runs(self);
-        } else if (n_rows > HSEP_TRUST_DOUBT_OVER * n_all) {
-            trusted_end_doubt(self);
-        }
+    if (hsep_trusted_doubts(self) && self->stack.weights[HSEP_DOUBTING] > HSEP_TRUST_DOUBT) {
+        trusted_forget_earlier_runs(self);
     }
     hsep_residual_scale_follow(&self->scale, e, accepted, self->Np, count);
     hsep_residual_scale_follow(&self->scale_of_command, e_0, accepted, self->Np, count);
@@ -270,8 +257,9 @@ HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const double x_d[
 static void trusted_take_scales(hsep_trusted *self)
 {
     if (self->forecast_scale != self->velocity_scale) {
-        trusted_end_doubt(self);
         trusted_forget(self, HSEP_OF_PHYSICS);
+        trusted_believe_earlier(self, HSEP_OF_COMMAND);
+        hsep_stack_forget(&self->stack, HSEP_DOUBTING);
     }
     self->velocity_scale = self->forecast_scale;
     self->largest_step = self->forecast_step;
