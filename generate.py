@@ -95,7 +95,7 @@ def learned_header() -> str:
     """Return the C header of the ranges of what the residual model with trust has learned."""
     ranges = "\n".join(f"#define HSEP_LEARNED_{name.upper()} {one.least}, {one.most}" for name, one in LEARNED.items())
     return f"""/* Least and most of what the residual model with trust has learned, generated from
- * hybridsep/predict/trust/learned.py; the sensor's are those of its guard. */
+ * hybridsep/predict/trust/learned.py. */
 #ifndef HSEP_TRUST_LEARNED_H
 #define HSEP_TRUST_LEARNED_H
 
@@ -118,4 +118,5 @@ def _list(name: str, settings: Mapping[str, Parameter]) -> str:
 
 if __name__ == "__main__":
     for path, content in generated().items():
+        path.parent.mkdir(exist_ok=True)
         path.write_text(content, encoding="utf-8")

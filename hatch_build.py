@@ -1,20 +1,27 @@
-"""Build hook: compiles the libraries of the native FMUs, which a wheel carries for all platforms, and notes the commit.
+"""Build hook: compiles the libraries of the native FMUs that an installation finds, and notes the commit.
 
-``ziglang``, a build requirement, compiles for all of them; libraries that the checkout has kept are taken as they are.
-The first time takes some minutes of processor time. ``HYBRIDSEP_TARGETS`` (names of ``hybridsep build --target`` with
-commas, or ``none``) leaves platforms out. Where it fails, the installation goes on without them, and says so: the
-Python flavour of the FMUs remains. An editable installation finds them in ``build/binaries``, where those of other
-platforms come when they are first asked for: it compiles this machine's alone. It asks git for the commit.
+They are this machine's, half a minute of processor time at most: whoever installs from a checkout asked for no others,
+which are compiled when they are. ``HYBRIDSEP_TARGETS`` (names of ``hybridsep build --target`` with commas, or ``none``)
+says which ones else; a release sets ``all``, since its wheel goes to other machines, and no hook can tell one from the
+other. ``ziglang``, a build requirement, compiles for all of them; libraries that the checkout has kept are taken as
+they are. Where it fails, the installation goes on without them, and says so: the Python flavour of the FMUs remains. It
+asks git for the commit.
 """
 
 from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from threading import Event, Thread
 from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+_PAUSE = 2.0
+"""Time after which compilation says again that it goes on, s: pip's progress moves with the lines of a build."""
 
 
 class ReleaseHook(BuildHookInterface[Any]):
@@ -26,7 +33,7 @@ class ReleaseHook(BuildHookInterface[Any]):
         try:
             files = self._commit()
             if self.target_name == "wheel":
-                files |= self._libraries(this_machine_alone=version == "editable")
+                files |= self._libraries()
         finally:
             sys.path.remove(self.root)
         if version != "editable":
@@ -46,20 +53,19 @@ class ReleaseHook(BuildHookInterface[Any]):
             file.write_text(f"{made_from}\n", encoding="utf-8")
         return {str(file): COMMIT_FILE}
 
-    def _libraries(self, this_machine_alone: bool) -> dict[str, str]:
+    def _libraries(self) -> dict[str, str]:
         """Return the libraries: path → place; none where they cannot be compiled."""
         try:
             from hybridsep.fmi.c_header import KINDS
-            from hybridsep.fmi.compiler import TARGETS, host_target
+            from hybridsep.fmi.compiler import TARGETS
             from hybridsep.fmi.libraries import chosen_targets, library_paths
 
             targets = chosen_targets()
-            if this_machine_alone:
-                targets = tuple(target for target in targets if target == host_target())
-            begin = time.monotonic()
-            self.app.display_info("libraries of the native FMUs; the first time takes some minutes of processor time")
-            paths = library_paths([(kind, target) for kind in KINDS for target in targets])
-            self.app.display_info(f"{len(paths)} libraries after {time.monotonic() - begin:.0f} s")
+            with self._lively(f"libraries of the native FMUs for {', '.join(targets) or 'no platform'}"):
+                paths = library_paths(
+                    [(kind, target) for target in targets for kind in KINDS],
+                    lambda library: self.app.display_info(f"compile {library[0]} for {library[1]}"),
+                )
         except Exception as error:  # whatever it is, the library without them is better than none
             self.app.display_warning(f"no libraries of the native FMUs, whose Python flavour remains: {error}")
             return {}
@@ -67,3 +73,22 @@ class ReleaseHook(BuildHookInterface[Any]):
             str(path): f"hybridsep/_data/binaries/{kind}/{target}{TARGETS[target].suffix}"
             for (kind, target), path in paths.items()
         }
+
+    @contextmanager
+    def _lively(self, what: str) -> Iterator[None]:
+        """Say what goes on, how long it has taken after each pause, and how long in all."""
+        begin, ended = time.monotonic(), Event()
+
+        def speak() -> None:
+            while not ended.wait(_PAUSE):
+                self.app.display_info(f"{what}: {time.monotonic() - begin:.0f} s")
+
+        self.app.display_info(what)
+        speaker = Thread(target=speak, daemon=True)
+        speaker.start()
+        try:
+            yield
+        finally:
+            ended.set()
+            speaker.join()
+            self.app.display_info(f"{what}: {time.monotonic() - begin:.0f} s")

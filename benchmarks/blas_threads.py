@@ -1,8 +1,8 @@
 """Benchmark of one BLAS thread against two, in the regression and in a closed loop.
 
 Run with ``python benchmarks/blas_threads.py``, or with ``--busy`` while as many processes as the machine has cores
-compete. The package itself uses one thread inside replays and loops, whatever is set; here the same window by window
-calls are made without that.
+compete. The package itself uses one thread around every window, whatever is set; here its limit counts as begun
+before the number of threads is set, so that it changes nothing.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from rich.table import Table
 from threadpoolctl import threadpool_limits
 
 from benchmarks.common import Array, staircase_log, staircase_predictor
+from hybridsep.base.threads import one_blas_thread
 from hybridsep.compensate.compensator import SepCompensator
 from hybridsep.machines.machine import load_machine
 
@@ -54,7 +55,7 @@ def plans(x_d: Array, x: Array) -> tuple[int, Array]:
 
 def seconds(run: Callable[[], tuple[int, Array]], n_threads: int) -> tuple[float, bytes]:
     """Return the seconds a sample takes with so many threads, and the bits of what came out."""
-    with threadpool_limits(n_threads, user_api="blas"):
+    with one_blas_thread, threadpool_limits(n_threads, user_api="blas"):
         begin = perf_counter()
         n, result = run()
         return (perf_counter() - begin) / n, np.ascontiguousarray(result).tobytes()

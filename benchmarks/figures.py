@@ -51,9 +51,16 @@ def main() -> int:
 
 
 def demo(emps: Path | None) -> Any:
-    """Return the demo's summary, rounded."""
+    """Return the full demo's summary, rounded."""
     with TemporaryDirectory() as out:
-        arguments = ["demo", "--json", "--out", out, *([] if emps is None else ["--emps", str(emps.resolve())])]
+        arguments = [
+            "demo",
+            "--full",
+            "--json",
+            "--out",
+            out,
+            *([] if emps is None else ["--emps", str(emps.resolve())]),
+        ]
         command = [sys.executable, "-c", "from hybridsep.app.cli import main; main()", *arguments]
         return rounded(json.loads(run(command)))
 

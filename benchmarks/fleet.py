@@ -28,13 +28,13 @@ import numpy as np
 import psutil
 
 from benchmarks.mutations import broken, log_text
-from hybridsep.fleet.engine import Engine, cluster
 from hybridsep.fleet.results import Results
 from hybridsep.fleet.run import FleetRun, run_fleet
 from hybridsep.fleet.settings import AxisTask, FleetSettings
 from hybridsep.fleet.sources import find_logs
 from hybridsep.fleet.task import look, work
 from hybridsep.machines.machine import machine_path
+from hybridsep.parallel.engine import Engine, cluster
 from hybridsep.plants.trajectory import staircase
 
 MACHINES, BROKEN = 10, 20

@@ -2,7 +2,9 @@
 
 ``python -m benchmarks.intake --drives 150`` takes some minutes. The faults are those of tests/support/spoiled_logs.py.
 The thresholds of the checks were chosen on the logs named here, on the random drives 0 to 399 and on the generated logs
-0 to 159 (tests/support/generated_logs.py): ``--first 1000 --spoil 20 --generated 200`` judges them on others.
+0 to 159 (tests/support/generated_logs.py): ``--first 1000 --spoil 20 --generated 200`` judges them on others. Those of
+clipped positions were chosen on the axes 0 to 299 that stand by friction and load (tests/support/standing_axes.py), and
+on the recorded arm: ``--only-standing --first 1000 --standing 120`` judges them on others in a minute.
 """
 
 from __future__ import annotations
@@ -18,12 +20,14 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
 
 from generated_logs import generated_log
+from places import SO101
 from spoiled_logs import FAULTS, GOOD, good, log_of
+from standing_axes import clipped_axis, standing_axis
 
 from benchmarks.random_drives.commands import T_S
 from benchmarks.random_drives.generator import random_drives
 from hybridsep.intake.check import check
-from hybridsep.logs.log import Log
+from hybridsep.logs.log import Log, read_log
 
 SPOILED = ("staircase", "stage x", "EMPS", "cnc_a_axis1.csv", "cnc_a_axis2.csv", "random drive 3", "random drive 26")
 
@@ -35,8 +39,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--first", type=int, default=0, help="index of the first of them")
     parser.add_argument("--spoil", type=int, default=0, help="how many of them are spoiled, besides the named logs")
     parser.add_argument("--generated", type=int, default=0, help="generated logs, and as many that are spoiled")
+    parser.add_argument("--standing", type=int, default=30, help="axes that stand by friction, good and clipped")
+    parser.add_argument("--only-standing", action="store_true", help="nothing but these, and the recorded arm")
     options = parser.parse_args(arguments)
     first = options.first
+    report_standing(range(first, first + options.standing))
+    if options.only_standing:
+        return
     report_faults("named logs", ((name, good(name)) for name in SPOILED))
     report_faults("random drives", ((name, log) for name, log, _ in random_logs(first, options.spoil)))
     report_generated(range(first, first + options.generated))
@@ -80,6 +89,29 @@ def report_generated(seeds: Iterable[int]) -> None:
             print(f"{seed}: {generated}: {fault} is {expected}, found: {', '.join(names) or 'nothing'}", flush=True)
     print(f"generated logs: {refused} of {n} good ones refused; found of those spoiled, by fault:")
     print(", ".join(f"{fault} {right} of {all_}" for fault, (right, all_) in found.items() if all_), flush=True)
+
+
+def report_standing(seeds: Iterable[int]) -> None:
+    """Print how many axes that stand by friction and load are refused, and of how many that are clipped it is found."""
+    recorded = [(path.stem, read_log(path, uniform=False)) for path in sorted(SO101.glob("*.csv"))]
+    refused, noted, n = 0, 0, 0
+    for name, log in (*recorded, *((str(seed), standing_axis(seed)) for seed in seeds)):
+        intake = check(log)
+        errors = [finding.name for finding in intake.errors] + ([] if intake.usable else ["not usable"])
+        n, refused = n + 1, refused + bool(errors)
+        noted += any(finding.name == "clipped" for finding in intake.findings)
+        if errors:
+            print(f"standing axis {name}: refused: {', '.join(errors)}", flush=True)
+    found = n_clipped = 0
+    for seed in seeds:
+        errors = [finding.name for finding in check(clipped_axis(seed)).errors]
+        n_clipped, found = n_clipped + 1, found + ("clipped" in errors)
+        if errors != ["clipped"]:
+            print(f"clipped axis {seed}: found: {', '.join(errors) or 'nothing'}", flush=True)
+    print(
+        f"axes that stand by friction and load, {len(recorded)} of them recorded: {refused} of {n} good ones refused, "
+        f"{noted} with a note that they stand at a limit; {found} of {n_clipped} clipped ones found"
+    )
 
 
 def report(title: str, logs: Iterator[tuple[str, Log, Any]]) -> None:

@@ -28,7 +28,7 @@ from rich.table import Table
 from hybridsep.plants.trajectory import staircase
 
 COMMANDS = {
-    "demo": ["demo", "--seeds", "1", "--out", "."],
+    "demo": ["demo", "--out", "."],
     "build": ["build", "-m", "spring_mass_damper", "--target", "host", "--out", "."],
     "backtest": ["backtest", "../log.csv", "-m", "spring_mass_damper", "--out", "batches.csv"],
     "cosim": ["cosim", "--flavour", "python", "--out", "run.csv", "--figure", "run.png"],

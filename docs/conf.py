@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))  # mathml
 
@@ -34,3 +35,14 @@ html_math_renderer = "mathml"
 smartquotes = False  # -- begins options
 html_copy_source = False
 html_show_copyright = False
+
+
+def setup(app: Any) -> None:
+    """Leave dated pages out of the search: who looks for a word wants what holds today."""
+    app.connect("env-updated", _not_searched)
+
+
+def _not_searched(_app: Any, env: Any) -> None:
+    for name in env.found_docs:
+        if name.startswith("experiments/2"):
+            env.metadata[name]["nosearch"] = ""

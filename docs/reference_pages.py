@@ -22,7 +22,7 @@ from hybridsep.base.settings import PARAMETERS, Limits, PredictorSettings
 from hybridsep.fmi.description import fmu_description
 from hybridsep.fmi.tables import grouped_table
 from hybridsep.fmi.terminals import TERMINALS
-from hybridsep.fmi.variables import variables_of
+from hybridsep.fmi.variables import shown_variables
 from hybridsep.machines.machine import Machine
 
 __all__ = ["FMUS", "pages"]
@@ -70,6 +70,8 @@ _OWN = {
     "log.axis": "axis of a file that holds several",
     "physics.mode": "modes, at least one",
     "physics.spring_mass_damper": "instead of modes",
+    "plant.mode": "modes of an identified plant, as those of the physics model; the same if left out",
+    "drive_limits.estimated": "whether they are estimates from the motion of a log: your drive's own are better",
     "limits.velocity": "largest velocity of the trajectory",
     "limits.acceleration": "largest acceleration of the trajectory",
     "limits.jerk": "largest jerk of the trajectory",
@@ -80,15 +82,16 @@ _OWN = {
 def pages() -> dict[Path, str]:
     """Return the text of each page."""
     return {
-        FOLDER / "command-line.md": command_line(),
+        **command_pages(),
         FOLDER / "machine-file.md": machine_file(),
         FOLDER / "fmu.md": fmu_variables(),
         FOLDER / "messages.md": messages(),
     }
 
 
-def command_line() -> str:
-    """Return the page of the commands with their arguments and options."""
+def command_pages() -> dict[Path, str]:
+    """Return the page that lists the commands, and one for each with its arguments and options."""
+    commands = typer.main.get_command(app).commands  # type: ignore[attr-defined]
     parts = [
         "# Command line",
         _WRITTEN,
@@ -96,27 +99,36 @@ def command_line() -> str:
         "130; "
         "with `HYBRIDSEP_DEBUG=1` in the environment an unexpected error shows its traceback. "
         "[What messages mean](messages.md).",
-    ]
-    commands = typer.main.get_command(app).commands  # type: ignore[attr-defined]
-    parts.append(
         _table(
             ("command", "what"),
-            ((f"[`{name}`](#{name})", one.help.partition("\n")[0]) for name, one in commands.items()),
-        )
-    )
-    for name, command in commands.items():
-        arguments = [one for one in command.params if not one.opts[0].startswith("-")]
-        options = [one for one in command.params if one.opts[0].startswith("-")]
-        usage = [f"{one.name.upper()}{'…' if one.nargs == -1 else ''}" for one in arguments]
-        usage = [text if one.required else f"[{text}]" for text, one in zip(usage, arguments, strict=True)]
-        parts += [
-            f"## {name}",
-            " ".join(command.help.split()),
-            f"`{' '.join(['hybridsep', name, *usage, '[OPTIONS]'])}`",
-        ]
-        rows = [(f"`{one.name.upper()}`", one.help) for one in arguments]
-        rows += [(_option(one), _described(one)) for one in options]
-        parts.append(_table(("argument or option", "what"), rows))
+            ((f"[`{name}`](command-line/{name}.md)", one.help.partition("\n")[0]) for name, one in commands.items()),
+        ),
+        "```{toctree}\n:hidden:\n\n" + "\n".join(f"command-line/{name}" for name in commands) + "\n```",
+    ]
+    pages = {FOLDER / "command-line.md": _page(parts)}
+    return pages | {FOLDER / "command-line" / f"{name}.md": _command(name, one) for name, one in commands.items()}
+
+
+def _command(name: str, command: Any) -> str:
+    """Return the page of a command: what it does, how it is called, its arguments, then its options panel by panel."""
+    arguments = [one for one in command.params if not one.opts[0].startswith("-")]
+    options = [one for one in command.params if one.opts[0].startswith("-")]
+    usage = [f"{one.name.upper()}{'…' if one.nargs == -1 else ''}" for one in arguments]
+    usage = [text if one.required else f"[{text}]" for text, one in zip(usage, arguments, strict=True)]
+    parts = [
+        f"# {name}",
+        _WRITTEN,
+        " ".join(command.help.split()),
+        f"```text\n{' '.join(['hybridsep', name, *usage, '[OPTIONS]'])}\n```",
+    ]
+    if arguments:
+        parts.append(_table(("argument", "what"), ((f"`{one.name.upper()}`", one.help) for one in arguments)))
+    panels: dict[str, list[Any]] = {}
+    for one in options:
+        panels.setdefault(getattr(one, "rich_help_panel", None) or "Options", []).append(one)
+    for panel, members in panels.items():
+        rows = ((_option(one), _described(one)) for one in members)
+        parts += [f"## {panel}", _table(("option", "what"), rows)]
     return _page(parts)
 
 
@@ -148,12 +160,14 @@ def fmu_variables() -> str:
         "`spring_mass_damper`; start values "
         "follow from the machine file that an FMU is built from, and there are as many `mode[i].*` as modes. "
         "[How they are wired](../howto/run-fmus.md), [when inputs are read](../explanation/timing.md).",
+        "Parameters are fixed, set before the initialization has ended, but for two of SepCompensator that are "
+        "tunable: `compensate` and `change_max` [may change in a run](../howto/close-the-loop.md#in-a-run).",
     ]
     for model, purpose in FMUS.items():
         parts += [f"## {model}", purpose]
-        for heading, rows in grouped_table(variables_of(fmu_description(machine, model, model))).items():
-            cells = ((f"`{name}`", kind, start, meaning) for name, kind, _, start, meaning in rows)
-            parts += [f"**{heading}**", _table(("name", "type, unit", "start", "meaning"), cells)]
+        for heading, rows in grouped_table(shown_variables(fmu_description(machine, model, model))).items():
+            cells = ((f"`{name}`", kind, start, allowed, meaning) for name, kind, _, start, allowed, meaning in rows)
+            parts += [f"**{heading}**", _table(("name", "type, unit", "start", "range", "meaning"), cells)]
     types = (
         ("Real", "Float64"),
         ("Integer", "Int32"),
@@ -167,10 +181,9 @@ def fmu_variables() -> str:
         "Native FMUs whose names have `Fmi3` (`HybridPredictorFmi3`) are the twins of those above: the same "
         "variables, units, ranges, start values and dependencies, with other types.",
         _table(("FMI 2.0", "FMI 3.0"), types),
-        "`mode[i].*` stay scalars. All parameters are fixed: they may be set until the initialization has ended. There "
-        "is no event mode, no early return, no intermediate update, no clock and no structural parameter, and inputs "
-        "have no derivatives. The state can be saved, restored and serialised. The `instantiationToken` differs "
-        "from the FMI 2.0 twin's GUID, so states are not exchanged between the two.",
+        "`mode[i].*` stay scalars. There is no event mode, no early return, no intermediate update, no clock and no "
+        "structural parameter, and inputs have no derivatives. The state can be saved, restored and serialised. The "
+        "`instantiationToken` differs from the FMI 2.0 twin's GUID, so states are not exchanged between the two.",
         "Terminals, each a plug whose members belong together by name:",
         _table(
             ("model", "terminal", "member: variable"),
@@ -185,9 +198,10 @@ def fmu_variables() -> str:
             ),
         ),
         "## Other machines",
-        "A plant of kind `stage` has `mode[i].*`, the friction `f`, the velocity `friction_on` that it acts on, the "
-        "cable "
-        "stiffness `kappa` and the sampling interval `T_s` of the command instead of `m`, `c`, `k`, `c_nl`, `k_nl`. "
+        "A plant of kind `stage` or `identified` has `mode[i].*`, the friction `f`, the velocity `friction_on` that it "
+        "acts on, the velocity `v_friction` over which it changes sign, the cable stiffness `kappa`, and sampling "
+        "interval `T_s`, `dead_time` and `input_hold` of the command instead of `m`, `c`, `k`, `c_nl`, `k_nl`. "
+        "An identified one is the model that a log gave, for trying: no measurement. "
         "FMUs are named "
         "after their machine (`HybridPredictor_als25010_x`), those of `spring_mass_damper` plainly; the Python flavour "
         "ends in `Py`, FMI 3.0 in `Fmi3`, before the machine.",
@@ -283,7 +297,7 @@ def _entry(entry: str, place: str, field: Any) -> tuple[str, str, str, str]:
         items = [str(item) for item in get_args(field.annotation)] if get_origin(field.annotation) is Literal else []
         return (
             f"`{entry}`",
-            " or ".join(f"`{item}`" for item in items) or "text",
+            " or ".join(f"`{item}`" for item in items) or ("true or false" if field.annotation is bool else "text"),
             default,
             _OWN.get(place) or _OWN[entry],
         )

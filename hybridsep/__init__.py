@@ -16,10 +16,11 @@ from .base.version import __version__
 
 if TYPE_CHECKING:
     from .base.errors import HybridSepError
-    from .base.settings import Limits
+    from .base.settings import CompensatorSettings, Limits, PredictorSettings
     from .compensate.compensator import SepCompensator
     from .compensate.plan import SepState
     from .cosim.importer import FmuInstance
+    from .cosim.library import Compensator
     from .cosim.loop import cosimulate
     from .cosim.run import Run
     from .evaluate.backtest import backtest, backtest_stream
@@ -28,21 +29,27 @@ if TYPE_CHECKING:
     from .machines.machine import Machine, load_machine, machine_names
     from .machines.paper import paper_machine
     from .model.physics import ModalModel, Mode
+    from .online.look_ahead import LookAhead
     from .plants.encoder import Encoder
-    from .plants.plant import simulate
+    from .plants.plant import Plant, simulate
     from .plants.trajectory import PAPER_LIMITS, rest_to_rest, spiral, staircase
     from .predict.predictor import HybridPredictor
 
 __all__ = [
     "PAPER_LIMITS",
+    "Compensator",
+    "CompensatorSettings",
     "Encoder",
     "FmuInstance",
     "HybridPredictor",
     "HybridSepError",
     "Limits",
+    "LookAhead",
     "Machine",
     "ModalModel",
     "Mode",
+    "Plant",
+    "PredictorSettings",
     "Run",
     "SepCompensator",
     "SepState",
@@ -65,14 +72,19 @@ __all__ = [
 
 _MODULES = {
     "PAPER_LIMITS": "plants.trajectory",
+    "Compensator": "cosim.library",
+    "CompensatorSettings": "base.settings",
     "Encoder": "plants.encoder",
     "FmuInstance": "cosim.importer",
     "HybridPredictor": "predict.predictor",
     "HybridSepError": "base.errors",
     "Limits": "base.settings",
+    "LookAhead": "online.look_ahead",
     "Machine": "machines.machine",
     "ModalModel": "model.physics",
     "Mode": "model.physics",
+    "Plant": "plants.plant",
+    "PredictorSettings": "base.settings",
     "Run": "cosim.run",
     "SepCompensator": "compensate.compensator",
     "SepState": "compensate.plan",

@@ -27,38 +27,56 @@ from pathlib import Path
 
 import pytest
 from built_once import SHARED_BUILDS, BuiltFmus, built_once
+from c_coverage import count_in, table
 from command_line import Run
-from hypothesis import HealthCheck, settings
-from quick_fits import without_other_windows
-from slow_tests import is_slow, runs_before
+from properties import LEFT_OUT, take_profile
+from quick_fits import without_other_settings, without_other_windows
 
 sys.dont_write_bytecode = False  # of this process too
 
-# No test fails because something else keeps the cores busy.
-settings.register_profile("patient", deadline=None, suppress_health_check=[HealthCheck.too_slow])
-settings.load_profile("patient")
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--c-coverage", type=Path, metavar="FOLDER", help="count what is reached of the C sources")
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    if folder := config.getoption("--c-coverage"):
+        terminalreporter.section("coverage of the C sources")
+        terminalreporter.write_line(table(folder))
 
 
 def pytest_configure(config: pytest.Config) -> None:
     """Give all processes of the session a folder for what they build; xdist's workers inherit it."""
+    take_profile(all_of_them=_asked_for(config, "nightly"))
+    folder = config.getoption("--c-coverage")
+    if folder and "PYTEST_XDIST_WORKER" not in os.environ:
+        count_in(folder)
     if SHARED_BUILDS not in os.environ:
         folder = tempfile.TemporaryDirectory(prefix="hsep_builds_")
         os.environ[SHARED_BUILDS] = folder.name
         config.add_cleanup(folder.cleanup)
 
 
+def _asked_for(config: pytest.Config, mark: str) -> bool:
+    """Return whether a mark is named in ``-m``, or tests are named one by one."""
+    return mark in config.getoption("markexpr") or any("::" in argument for argument in config.args)
+
+
 @pytest.hookimpl(tryfirst=True)  # before pytest deselects by marker
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    for item in items:
-        if is_slow(item.nodeid):
-            item.add_marker("slow")
-    items.sort(key=lambda item: runs_before(item.nodeid))
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out what runs at night or at a release only, where it is not asked for."""
+    others = [mark for mark in LEFT_OUT if not _asked_for(config, mark)]
+    left_out = [item for item in items if any(item.get_closest_marker(mark) for mark in others)]
+    if left_out:
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if item not in set(left_out)]
 
 
 @pytest.fixture
 def quick_fit(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let ``fit`` judge one look-ahead alone."""
+    """Let ``fit`` judge one look-ahead, with the default settings alone."""
     without_other_windows(monkeypatch)
+    without_other_settings(monkeypatch)
 
 
 @pytest.fixture(autouse=True)

@@ -68,3 +68,22 @@ def test_imports_are_found_wherever_they_are() -> None:
         "hybridsep.b.c",
         "hybridsep.d",
     }
+
+
+def test_packages_import_those_below_them_alone() -> None:
+    """Hold the order that ARCHITECTURE.md states against what the packages import."""
+    text = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
+    (stated,) = re.findall(r"^Imports point one way: (.*?);", text, re.MULTILINE | re.DOTALL)
+    floor = {name: number for number, one in enumerate(stated.split("<")) for name in re.findall(r"`(\w+)`", one)}
+    packages = {path.parent.name for path in (ROOT / "hybridsep").glob("*/__init__.py")}
+    assert packages == set(floor)
+    upwards = [
+        f"{name} → {one}"
+        for name, imports in library().items()
+        for one in imports
+        if len(name.split(".")) > 2
+        and len(one.split(".")) > 2
+        and (own := name.split(".")[1]) != (other := one.split(".")[1])
+        and floor[other] >= floor[own]
+    ]
+    assert upwards == []

@@ -1,8 +1,8 @@
-"""Accumulation test of the C core's clock over 10⁹ communication steps.
+"""Accumulation test of the C core's clock over 10⁹ communication steps, and importers' rounded times over 10⁶.
 
 The clock's time is compared after each step with the exact sum of the step sizes, in 128-bit integers, and the number
 of instants reached with the rule's. The importer's time is its own rounded sum, which drifts. Ends with 1 if the clock
-is ever off by more than 1e-9 of T_s or a count is another one.
+is ever off by more than 1e-9 of T_s, a count is another one, or a sample was lost or doubled.
 """
 
 from __future__ import annotations
@@ -36,6 +36,16 @@ CASES = (
 )
 """Start s, T_s s, and the step sizes s that take turns."""
 
+ROUNDED = (
+    ("whole nanoseconds", 1_000_000, 1 / 3000, 333_333e-9, False),
+    ("whole nanoseconds", 1_000_000, 1 / 7000, 142_857e-9, False),
+    ("single precision", 100_000, 1e-3, 1e-3, True),
+    ("single precision", 300_000, 1 / 3000, 1 / 3000, True),
+    ("single precision", 800_000, 1.25e-4, 1.25e-4, True),
+)
+"""Importers' times from 0 to 100 s or for 10⁶ samples: steps, T_s s, step size s, and whether their times are float32.
+Each step brings one sample."""
+
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -54,22 +64,35 @@ def main() -> int:
         subprocess.run([*command, *compile_flags(command), *includes, *sources, "-lm", "-o", program], check=True)
         for start, T_s, sizes in CASES:
             began = perf_counter()
-            done = subprocess.run(
-                [program, str(options.steps), repr(start), repr(T_s), *map(repr, sizes)],
-                capture_output=True,
-                text=True,
-                check=False,
-            )
-            if done.returncode:
-                print(done.stderr, file=sys.stderr)
+            if not (found := run(program, options.steps, start, T_s, False, *sizes)):
                 return 1
-            worst, wrong, drift = done.stdout.split()
+            worst, wrong, _, drift = found
             missed += float(worst) > DEVIATION_MAX or int(wrong) > 0
             time = 1e9 * (perf_counter() - began) / options.steps
             row = (f"{start:g}", f"{T_s:g}", " ".join(map(str, sizes)), worst, wrong, drift, f"{time:.0f}")
             table.add_row(*row)
+        rounded = Table(title="rounded times, one sample a step")
+        for heading in ("times", "steps", "T_s s", "off by, T_s", "other counts", "samples lost or doubled"):
+            rounded.add_column(heading, justify="right")
+        for name, n_steps, T_s, size, single in ROUNDED:
+            if not (found := run(program, n_steps, 0.0, T_s, single, size)):
+                return 1
+            worst, wrong, counted, _ = found
+            lost = n_steps - int(counted)
+            missed += float(worst) > DEVIATION_MAX or int(wrong) > 0 or lost != 0
+            rounded.add_row(name, str(n_steps), f"{T_s:g}", worst, wrong, str(lost))
+    Console().print(rounded)
     Console().print(table)
     return int(missed > 0)
+
+
+def run(program: Path, n_steps: int, start: float, T_s: float, single: bool, *sizes: float) -> list[str]:
+    """Return what the program prints; nothing, with its message shown, if it fails."""
+    arguments = [str(n_steps), repr(start), repr(T_s), str(int(single)), *map(repr, sizes)]
+    done = subprocess.run([program, *arguments], capture_output=True, text=True, check=False)
+    if done.returncode:
+        print(done.stderr, file=sys.stderr)
+    return done.stdout.split()
 
 
 if __name__ == "__main__":

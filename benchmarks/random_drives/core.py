@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -18,11 +19,19 @@ from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel
 
-__all__ = ["core_replay"]
+__all__ = ["core_outputs", "core_replay"]
 
 
 def core_replay(predictor: str, model: ModalModel, settings: PredictorSettings, x_d: Array, x_meas: Array) -> Array:
-    """Return ``x_h`` of the C core's predictor, ``(n,)``, m; with trust ``x_meas`` is NaN where missing.
+    """Return ``x_h`` of the C core's predictor, ``(n,)``, m; with trust ``x_meas`` is NaN where missing."""
+    outputs = core_outputs(predictor, model, settings, x_d, x_meas, ("x_h",))
+    return np.asarray(outputs[0])
+
+
+def core_outputs(
+    predictor: str, model: ModalModel, settings: PredictorSettings, x_d: Array, x_meas: Array, names: Sequence[str]
+) -> Array:
+    """Return outputs of the C core's predictor, ``(len(names), n)``, m.
 
     A last window that is cut off is predicted as part of a whole one, beyond whose end the command rests; the library
     predicts it alone.
@@ -35,15 +44,16 @@ def core_replay(predictor: str, model: ModalModel, settings: PredictorSettings, 
     start = {f"mode[{i}].{key}": value for i, mode in enumerate(modes, 1) for key, value in asdict(mode).items()}
     start |= {**used.to_fmi(), "dead_time": model.dead_time, "x_d_ahead": x_d[0], "x_meas": x_d[0]}
     core = CModel(name, start).initialise()
-    x_h = np.empty(n)
-    x_d_ahead, measured, predicted = (core.place[key] for key in ("x_d_ahead", "x_meas", "x_h"))
+    outputs: Array = np.empty((n, len(names)))
+    x_d_ahead, measured = (core.place[key] for key in ("x_d_ahead", "x_meas"))
+    shown = [core.place[name] for name in names]
     try:
         for k in range(n + Np - 1):
             core.values[x_d_ahead] = x_d[min(k, n - 1)]
             core.values[measured] = x_meas[k - Np] if k >= Np else x_d[0]
             core.step(k * used.T_s, used.T_s)
             if k + 1 >= Np:
-                x_h[k + 1 - Np] = core.values[predicted]
+                outputs[k + 1 - Np] = core.values[shown]
     except RefusedError as error:
         raise SignalError(str(error)) from error
-    return x_h
+    return np.asarray(outputs.T)

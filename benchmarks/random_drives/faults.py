@@ -23,27 +23,27 @@ def outliers(x_meas: Array, T_s: float, rng: np.random.Generator) -> tuple[Array
     return faulty, int(at.max())
 
 
-def held(x_meas: Array, T_s: float, rng: np.random.Generator) -> tuple[Array, int]:
-    """Return a measurement that repeats its value for 50 ms while the drive moves."""
-    n = round(0.05 / T_s)
-    first, end = _span(len(x_meas))
-    distance = np.abs(x_meas[first + n : end + n] - x_meas[first:end])
-    fast = first + np.flatnonzero(distance >= distance.max() / 2)
-    return _repeated(x_meas, int(rng.choice(fast)), n)
-
-
 def zeros(x_meas: Array, T_s: float, rng: np.random.Generator) -> tuple[Array, int]:
     """Return a measurement that reads 0 for 50 ms."""
-    n = round(0.05 / T_s)
-    k = int(rng.integers(*_span(len(x_meas))))
-    faulty = x_meas.copy()
-    faulty[k : k + n] = 0.0
-    return faulty, k + n - 1
+    return _reads(x_meas, 0.0, round(0.05 / T_s), rng)
+
+
+def zeros_for_long(x_meas: Array, T_s: float, rng: np.random.Generator) -> tuple[Array, int]:
+    """Return a measurement that reads 0 for 0.5 s."""
+    return _reads(x_meas, 0.0, round(0.5 / T_s), rng)
+
+
+def missing_for_long(x_meas: Array, T_s: float, rng: np.random.Generator) -> tuple[Array, int]:
+    """Return a measurement that is missing (NaN) for 0.1 s."""
+    return _reads(x_meas, np.nan, round(0.1 / T_s), rng)
 
 
 def stuck(x_meas: Array, T_s: float, rng: np.random.Generator) -> tuple[Array, int]:
     """Return a measurement that repeats its value for 0.5 s."""
-    return _repeated(x_meas, int(rng.integers(*_span(len(x_meas)))), round(0.5 / T_s))
+    k, n = int(rng.integers(*_span(len(x_meas)))), round(0.5 / T_s)
+    faulty = x_meas.copy()
+    faulty[k + 1 : k + 1 + n] = x_meas[k]
+    return faulty, k + n
 
 
 def offset_step(x_meas: Array, T_s: float, rng: np.random.Generator) -> tuple[Array, int]:
@@ -74,8 +74,9 @@ OFFSET_STEP, JITTER = "offset step", "5 % jitter"
 
 FAULTS: dict[str, Fault] = {
     "outliers of 10 µm to 1 m": outliers,
-    "held 50 ms in motion": held,
     "reads 0 for 50 ms": zeros,
+    "reads 0 for 0.5 s": zeros_for_long,
+    "missing for 0.1 s": missing_for_long,
     "stuck for 0.5 s": stuck,
     OFFSET_STEP: offset_step,
     "1 % missing": missing,
@@ -88,8 +89,9 @@ def _span(n: int) -> tuple[int, int]:
     return n // 10, n // 2
 
 
-def _repeated(x_meas: Array, k: int, n: int) -> tuple[Array, int]:
-    """Return the value of sample ``k`` repeated over the ``n`` after it."""
+def _reads(x_meas: Array, reading: float, n: int, rng: np.random.Generator) -> tuple[Array, int]:
+    """Return a measurement that is something else over ``n`` samples."""
+    k = int(rng.integers(*_span(len(x_meas))))
     faulty = x_meas.copy()
-    faulty[k + 1 : k + 1 + n] = x_meas[k]
-    return faulty, k + n
+    faulty[k : k + n] = reading
+    return faulty, k + n - 1

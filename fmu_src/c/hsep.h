@@ -20,6 +20,7 @@
  *   hsep_compensator_sample           | as the predictor's; at a window's end a plan,   | divergence is set, latched
  *                                     | m^3 / 6; hsep_interior_step after a bounded one |
  *                                     | or, with trust, hsep_trusted_planner_advance    |
+ *   hsep_compensator_change           | constant; 10 spacing at the next window's end   | nothing
  *   hsep_*_read                       | constant                                        | nothing
  *   hsep_regression_fold              | n^2 / 2 times 7 operations, 2 n divisions       | nothing
  *   hsep_regression_solve             | n^2 / 2                                         | nothing

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
-from hybridsep.base.errors import FmuError
+from hybridsep.base.clock import check_communication_point, check_step_size
 from hybridsep.base.saved import Saved
 from hybridsep.base.settings import PARAMETERS
 from hybridsep.base.signals import check_position
@@ -15,8 +14,10 @@ from hybridsep.fmi.variables import modes_from
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.feed_drive import FeedDrive
-from hybridsep.plants.plant import Plant
+from hybridsep.plants.plant import Drive
 from hybridsep.plants.stage_drive import StageDrive
+
+_TIME_TOLERANCE = 0.5  # of a step: rounding of the importer's times
 
 
 class FeedDrivePy(slave.TableSlave):
@@ -31,13 +32,15 @@ class FeedDrivePy(slave.TableSlave):
         self.plant = self._new_plant()
         self.plant.reset(self.values["x_d"])
         self.x_meas = self.encoder.measure(self.plant.x)
+        self.end = self.start_time
 
     def advance(self, t: float, h: float) -> None:
         """Step the plant and measure it."""
-        if not math.isfinite(t):
-            raise FmuError(f"the communication point must be finite, got {t} s")
         check_position("x_d", self.values["x_d"], f" at t = {t:g} s")
+        check_step_size(h)
+        check_communication_point(t, self.end, _TIME_TOLERANCE * h)
         self.plant.step(self.values["x_d"], h)
+        self.end = t + h
         self.x_meas = self.encoder.measure(self.plant.x)
 
     def initial_value(self, name: str) -> float:
@@ -52,8 +55,8 @@ class FeedDrivePy(slave.TableSlave):
         return {"x": self.plant.x, "v": self.plant.v, "x_meas": self.x_meas}[name]
 
     def core_state(self) -> tuple[dict[str, Any], bytes]:
-        """Return the plant's state and the number of noise samples drawn."""
-        meta = {"plant": self.plant.state(), "n_draws": self.encoder.n_draws, "x_meas": self.x_meas}
+        """Return the plant's state, the end of the last step and the number of noise samples drawn."""
+        meta = {"plant": self.plant.state(), "end": self.end, "n_draws": self.encoder.n_draws, "x_meas": self.x_meas}
         return meta, b""
 
     def restore_core(self, meta: Mapping[str, Any], blob: bytes) -> None:
@@ -62,13 +65,13 @@ class FeedDrivePy(slave.TableSlave):
         plant, encoder = self._new_plant(), Encoder(self.values["noise_std"], self.values["seed"])
         plant.restore(saved.numbers("plant", len(plant.state())))
         encoder.n_draws, x_meas = saved.whole("n_draws"), saved.real("x_meas")
-        self.plant, self.encoder, self.x_meas = plant, encoder, x_meas
+        self.plant, self.encoder, self.x_meas, self.end = plant, encoder, x_meas, saved.real("end")
 
-    def _new_plant(self) -> Plant:
+    def _new_plant(self) -> Drive:
         values = self.values
         modes = modes_from(values)
         if modes:
-            friction_on = PARAMETERS["friction_on"].from_fmi(values["friction_on"])
-            model = ModalModel([Mode(**mode) for mode in modes])
-            return StageDrive(model, values["f"], values["kappa"], values["T_s"], friction_on)
+            chosen = {name: PARAMETERS[name].from_fmi(values[name]) for name in ("friction_on", "input_hold")}
+            numbers = {name: values[name] for name in ("f", "kappa", "T_s", "v_friction")}
+            return StageDrive(ModalModel([Mode(**mode) for mode in modes], values["dead_time"]), **numbers, **chosen)
         return FeedDrive(*(values[name] for name in ("m", "c", "k", "c_nl", "k_nl")))

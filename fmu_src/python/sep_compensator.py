@@ -34,6 +34,13 @@ class SepCompensatorPy(look_ahead_slave.LookAheadSlave):
         model, settings = self.physics_model(), CompensatorSettings.from_fmi(self.values)
         return SepCompensator(self.new_predictor(model), settings)
 
+    def retune(self) -> None:
+        """Take over ``compensate`` and ``change_max``."""
+        given = CompensatorSettings.from_fmi(self.values)
+        compensator = self.look_ahead.planner
+        assert isinstance(compensator, SepCompensator)
+        compensator.change(compensate=given.compensate, change_max=given.change_max)
+
 
 def _output(look_ahead: LookAhead, name: str) -> float | int:
     value = getattr(look_ahead, name)

@@ -15,6 +15,7 @@ from .command_demo import demo
 from .command_example_log import example_log
 from .command_fit import fit
 from .command_fleet import fleet
+from .command_hal import hal
 from .command_identify import identify
 from .command_init import init
 from .command_live import live
@@ -35,7 +36,22 @@ app = typer.Typer(
     rich_markup_mode=None,
     add_completion=False,
 )
-for _command in (fit, identify, tune, init, demo, build, cosim, system, backtest, report, live, fleet, example_log):
+for _command in (
+    fit,
+    identify,
+    tune,
+    init,
+    demo,
+    build,
+    cosim,
+    system,
+    hal,
+    backtest,
+    report,
+    live,
+    fleet,
+    example_log,
+):
     app.command()(_command)
 
 

@@ -7,10 +7,18 @@ from typing import Annotated
 
 import typer
 
-from ..fmi.compiler import TARGET_NAMES
 from ..fmi.flavours import FLAVOURS, FMI_VERSIONS
 from .failures import errors_console
-from .options import FlavourOption, FmiOption, ForceOption, JsonOption, TsOption, UnitOption, WeightsOption
+from .options import (
+    FlavourOption,
+    FmiOption,
+    ForceOption,
+    JsonOption,
+    TargetOption,
+    TsOption,
+    UnitOption,
+    WeightsOption,
+)
 
 __all__ = ["build"]
 
@@ -25,10 +33,7 @@ def build(
     ] = None,
     flavour: FlavourOption = FLAVOURS[0],
     fmi: FmiOption = FMI_VERSIONS[0],
-    target: Annotated[
-        list[str] | None,
-        typer.Option(help=f"Platform of a native FMU, may be repeated: {', '.join(TARGET_NAMES)}. All if left out."),
-    ] = None,
+    target: TargetOption = None,
     weights: WeightsOption = None,
     trajectory: Annotated[
         Path | None,
@@ -36,6 +41,13 @@ def build(
     ] = None,
     unit: UnitOption = None,
     T_s: TsOption = None,
+    windows: Annotated[
+        bool,
+        typer.Option(
+            "--windows/--no-windows",
+            help="Whether a HybridPredictor shows its whole window, 4·Np scalars or four arrays.",
+        ),
+    ] = True,
     out: Annotated[Path, typer.Option(help="Folder for the archives.")] = Path("dist"),
     force: ForceOption = False,
     as_json: JsonOption = False,
@@ -45,14 +57,15 @@ def build(
     The same machine gives the same bytes.
     """
     from ..fmi.archive import build_fmu
-    from ..fmi.jobs import extras_of, jobs_of
+    from ..fmi.jobs import extras_of, jobs_of, libraries_of
+    from ..fmi.libraries import library_paths, missing
     from ..machines.machine import machine_path
     from .overwrite import FMU, Output, check_outputs
     from .progress import progress_bar
     from .tables import console, print_json
 
     jobs = jobs_of(fmus or [], machine or [], flavour, target or [], fmi)
-    extras = extras_of(jobs, weights, trajectory, unit, T_s)
+    extras = extras_of(jobs, weights, trajectory, unit, T_s, windows=windows)
     inputs = {f"machine file {source}": machine_path(source) for source in machine or []}
     check_outputs(
         [Output("--out", out / f"{name}.fmu", FMU) for _, name, _, _ in jobs],
@@ -61,16 +74,22 @@ def build(
     )
     paths = []
     with progress_bar(as_json) as advance:
+        if flavour == "native":
+            needed = libraries_of(jobs, target or [])
+            compiling = iter(range(1, len(absent := missing(needed)) + 1))
+
+            def on_library(library: tuple[str, str]) -> None:
+                i = next(compiling)
+                text = f"compile {library[0]} for {library[1]}, {i} of {len(absent)}"
+                if as_json or errors_console.is_terminal:
+                    advance(text, (i - 1) / len(absent))
+                else:
+                    errors_console.print(text, soft_wrap=True)
+
+            library_paths(needed, on_library)
         for i, (axis, name, model, version) in enumerate(jobs):
             advance(name, i / len(jobs))
-
-            def on_target(platform: str, name: str = name, done: float = i / len(jobs)) -> None:
-                if as_json or errors_console.is_terminal:
-                    advance(f"{name}, {platform}", done)
-                else:
-                    errors_console.print(f"{name}: compile for {platform}", soft_wrap=True)
-
-            given = {"targets": target or None, "on_target": on_target, "fmi": version, **extras.get(model, {})}
+            given = {"targets": target or None, "fmi": version, **extras.get(model, {})}
             paths.append(build_fmu(axis, name, out, flavour, **given))
         advance("done", 1.0)
     if as_json:

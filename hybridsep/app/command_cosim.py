@@ -21,6 +21,7 @@ from .options import (
     ForceOption,
     JsonOption,
     MachineOption,
+    TrajectoryOption,
     TsOption,
     UnitOption,
     WeightsOption,
@@ -34,9 +35,7 @@ __all__ = ["cosim"]
 @takes_parameters(PREDICTOR_ENTRIES, COMPENSATOR_ENTRIES)
 def cosim(
     machine: MachineOption = DEFAULT_MACHINE,
-    trajectory: Annotated[
-        str, typer.Option(help=f"{', '.join(TRAJECTORIES)}, or a CSV, .npz or .mat file with the columns t and x_d.")
-    ] = "staircase",
+    trajectory: TrajectoryOption = None,
     unit: UnitOption = None,
     T_s: TsOption = None,
     compensate: Annotated[
@@ -71,7 +70,7 @@ def cosim(
     from ..base.apart import run_apart
     from ..cosim.importer import faulty
     from ..cosim.loop import cosimulate
-    from ..cosim.pairing import check_pair, read_command, values_to_build
+    from ..cosim.pairing import check_pair, default_trajectory, read_command, values_to_build
     from ..fmi.builds import build_here
     from ..machines.machine import load_machine, machine_path
     from .overwrite import PNG, RUNS, Output, check_outputs
@@ -82,6 +81,7 @@ def cosim(
         from ..evaluate.time_plots import prediction_figure, tracking_figure
 
     axis = load_machine(machine)
+    trajectory = trajectory or default_trajectory(machine)
     outputs = (Output("--out", out, RUNS), Output("--figure", figure, PNG))
     if compensate is not None:
         check("compensate", compensate, label="--compensate")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -61,6 +62,7 @@ def fit(
     from ..fit.files import fit_files
     from ..fit.fit import FitOptions
     from ..fit.fit import fit as fit_logs
+    from ..fit.next_steps import next_steps
     from ..fit.report import fit_report, judged_by
     from ..intake.finding import findings_table
     from ..intake.repair import changes, take_in
@@ -72,10 +74,10 @@ def fit(
     from .progress import progress_bar
     from .tables import console, print_json, print_written
 
-    name = checked_name(name) if name else machine_name(logs[0], reading.axis)
-    folder = out or Path(name)
+    machine = checked_name(name) if name else machine_name(logs[0], reading.axis)
+    folder = out or Path(machine)
     limits = drive_limits(parameters)
-    files = fit_files(folder, name, compensator=bool(limits), fmi=fmi)
+    files = fit_files(folder, machine, compensator=bool(limits), fmi=fmi)
     known = {entry: parameters[entry] for entry in KNOWN_ENTRIES if entry in parameters}
     inputs: dict[str, str | Path | None] = {f"log {path.name}": path for path in logs}
     outputs = [Output("--out", path, FIT_FILES) for path in files.values()]
@@ -96,7 +98,7 @@ def fit(
         show((f"{log.path.name}: {remark}" for remark in log.remarks), ())
     used, findings = take_in(found, fix=fix)
     with progress_bar(as_json) as advance:
-        options = FitOptions(Np, name, known=known, drive_limits=limits)
+        options = FitOptions(Np, machine, known=known, drive_limits=limits)
         result = fit_logs(used, folder, options, advance, changes=changes(findings), fmi=fmi)
         fit_report(result, used, findings).write(files["report"], figure)
     advice = recommendation(judged_by(result, used[0].shown))
@@ -109,6 +111,29 @@ def fit(
     console.print(f"\n{advice}")
     console.print("\n".join(f"{what}: {path}" for what, path in files.items()), soft_wrap=True)
     print_written(figure)
+    again = _again(logs, out, Np, name, reading, known, fix=fix)
+    console.print("\n".join(next_steps(result, files, again, fmi)), soft_wrap=True, highlight=False)
+
+
+def _again(
+    logs: Sequence[Path],
+    out: Path | None,
+    Np: int | None,
+    name: str | None,
+    reading: ReadingOptions,
+    known: Mapping[str, Any],
+    *,
+    fix: bool,
+) -> str:
+    """Return the command line of this fit, without its other outputs."""
+    given = {"out": out, "Np": Np, "name": name, **vars(reading), **known}
+    words = ["hybridsep", "fit", *map(str, logs)]
+    for option, value in given.items():
+        if value is True:
+            words.append(f"--{option}")
+        elif value is not None and value is not False:
+            words += [f"--{option}", str(value)]
+    return shlex.join([*words, "--fix"] if fix else words)
 
 
 def _print_fit(found: Fit, logs: Sequence[Log], findings: Mapping[str, Iterable[Finding]]) -> None:

@@ -80,11 +80,11 @@ def fleet(
     from contextlib import nullcontext
 
     from ..base.errors import ParameterError
-    from ..fleet.engine import check_engine, cluster, joblib_engine
     from ..fleet.page import write_page
     from ..fleet.results import Results
     from ..fleet.run import run_fleet
     from ..fleet.settings import FleetSettings
+    from ..parallel.engine import check_engine, cluster, joblib_engine
     from .progress import progress_bar
     from .tables import console
 

@@ -69,7 +69,7 @@ def init(
     What no option says is asked.
     """
     from ..fmi.archive import fmu_name
-    from ..fmi.builds import build_here
+    from ..fmi.builds import build_here, other_platforms
     from ..fmi.libraries import check_available
     from ..identify.model import machine_of
     from ..machines.machine import load_machine
@@ -118,6 +118,8 @@ def init(
         build_here(load_machine(out), "HybridPredictor", out.parent, FLAVOURS[0], fmi=fmi)
     for path in fmus:
         typer.echo(f"{path} written")
+    if fmi is not None and (note := other_platforms(fmus[0], out, fmi=fmi)):
+        typer.echo(note)
 
 
 def _asked(option: str, value: Any, question: str, default: Any) -> Any:

@@ -8,8 +8,17 @@ from typing import Annotated
 import typer
 
 from ..base.data_files import DEFAULT_MACHINE
-from ..fmi.compiler import TARGET_NAMES
-from .options import TRAJECTORIES, ForceOption, JsonOption, MachineOption, TsOption, UnitOption, WeightsOption
+from .options import (
+    TRAJECTORIES,
+    ForceOption,
+    JsonOption,
+    MachineOption,
+    TargetOption,
+    TrajectoryOption,
+    TsOption,
+    UnitOption,
+    WeightsOption,
+)
 
 __all__ = ["system"]
 
@@ -20,19 +29,14 @@ def system(
         bool,
         typer.Option("--compensate", help="A SepCompensator modifies the command; else a HybridPredictor predicts."),
     ] = False,
-    trajectory: Annotated[
-        str, typer.Option(help=f"{', '.join(TRAJECTORIES)}, or a CSV, .npz or .mat file with the columns t and x_d.")
-    ] = "staircase",
+    trajectory: TrajectoryOption = None,
     unit: UnitOption = None,
     T_s: TsOption = None,
     weights: WeightsOption = None,
     ssp: Annotated[
         str, typer.Option(help="Version of SSP: 1 with FMI 2.0 FMUs, or 2 with FMI 3.0 FMUs, for tools that read it.")
     ] = "1",
-    target: Annotated[
-        list[str] | None,
-        typer.Option(help=f"Platform of the FMUs, may be repeated: {', '.join(TARGET_NAMES)}. All if left out."),
-    ] = None,
+    target: TargetOption = None,
     out: Annotated[
         Path | None, typer.Option(help="The archive, .ssp; named after the machine in this folder if left out.")
     ] = None,
@@ -43,7 +47,7 @@ def system(
 
     Trajectory, predictor or compensator and drive, wired, with their parameters, for tools that read SSP.
     """
-    from ..cosim.pairing import read_command
+    from ..cosim.pairing import default_trajectory, read_command
     from ..fmi.libraries import check_available
     from ..fmi.system import build_system, check_system
     from ..machines.machine import load_machine, machine_path
@@ -52,6 +56,7 @@ def system(
     from .tables import console, print_json
 
     axis = load_machine(machine)
+    trajectory = trajectory or default_trajectory(machine)
     out = out or Path(f"{axis.name}.ssp")
     check_system(axis, compensate=compensate, ssp=ssp)
     command = read_command(trajectory, axis, unit, T_s)

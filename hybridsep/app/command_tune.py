@@ -54,7 +54,6 @@ def tune(
 
     The look-ahead is the controller's.
     """
-    from ..fleet.engine import cluster_of
     from ..intake.finding import findings_table
     from ..intake.repair import changes
     from ..logs.log import Log
@@ -62,6 +61,7 @@ def tune(
     from ..machines.machine import load_machine, machine_path
     from ..machines.seal import sealed
     from ..machines.text import machine_text
+    from ..parallel.engine import cluster_of
     from ..reports.extent import partly_used
     from ..tune.choice import with_window
     from ..tune.grid import TUNED, candidates, default_values

@@ -14,9 +14,11 @@ from typing import Annotated, Any
 
 import typer
 
+from ..base.data_files import COMMANDS
 from ..base.parameters import Parameter
 from ..base.ranges import GRAMMAR
 from ..base.settings import CompensatorSettings, PredictorSettings, Settings
+from ..fmi.compiler import TARGET_NAMES
 from ..fmi.flavours import FLAVOURS, FMI_CHOICES
 
 __all__ = [
@@ -42,6 +44,7 @@ __all__ = [
     "SavedOption",
     "SchedulerOption",
     "TimeColumnOption",
+    "TrajectoryOption",
     "TsOption",
     "UnitOption",
     "WeightsOption",
@@ -66,6 +69,13 @@ FlavourOption = Annotated[str, typer.Option(help=f"Flavour of the FMUs: {', '.jo
 FmiOption = Annotated[
     str,
     typer.Option(help=f"Version of FMI: {', '.join(FMI_CHOICES)}; FMUs of FMI 3.0 are native, their names have Fmi3."),
+]
+TargetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        help=f"Platform of native FMUs, may be repeated: {', '.join(TARGET_NAMES)}. If left out this machine's, or all "
+        "where their libraries are there."
+    ),
 ]
 TsOption = Annotated[
     float | None, typer.Option("--T_s", "--Ts", help="Sampling interval [s], for a file without a time column.")
@@ -120,6 +130,14 @@ SavedOption = Annotated[
 ]
 FigurePagesOption = Annotated[
     Path | None, typer.Option(help="PDF with the report's charts for print, a page each, one column wide.")
+]
+
+TrajectoryOption = Annotated[
+    str | None,
+    typer.Option(
+        help=f"{', '.join(TRAJECTORIES)}, or a CSV, .npz or .mat file with the columns t and x_d; if left out, "
+        f"{COMMANDS} beside the machine file, which fit writes, or else the staircase."
+    ),
 ]
 
 _LIST = "list_channels"

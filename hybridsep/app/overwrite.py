@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
+from ..base.data_files import COMMANDS_HEAD
 from ..base.errors import ParameterError
 from ..base.new_folders import make_folder
 from ..base.zip_files import ZIP_DAMAGE
@@ -27,6 +28,7 @@ __all__ = [
     "FIGURES",
     "FIT_FILES",
     "FMU",
+    "HAL_FILES",
     "MACHINE",
     "PDF",
     "PNG",
@@ -163,6 +165,7 @@ EXAMPLE_LOG = Kind("example log of hybridsep", _is_example)
 STATE = Kind("saved predictor", _begins_with(b"HSEP"))
 
 MACHINE = Kind("machine file that hybridsep wrote", is_as_written, edited_since)
+COMMANDS_TO_TRY = Kind("commands of hybridsep fit", _begins_with(COMMANDS_HEAD.encode()))
 STAGES = Kind("result of hybridsep fit", _begins_with(b'{\n  "hybridsep": "'))
 REPORT = Kind("report of hybridsep", _begins_with(b"<!DOCTYPE html>\n<!-- report of hybridsep -->"))
 SUMMARY = Kind("summary of hybridsep demo", _begins_with(b'{\n  "staircase": {'))
@@ -172,11 +175,17 @@ PDF = {".pdf": VECTOR_FIGURE}
 FIGURES = PNG | PDF | {".svg": VECTOR_FIGURE}
 RUNS = {".csv": RUN, ".npz": RUN}
 
-BY_ENDING = RUNS | FIGURES | {".fmu": FMU, ".state": STATE, ".json": SUMMARY}
+BY_ENDING = RUNS | FIGURES | {".fmu": FMU, ".state": STATE, ".json": SUMMARY, ".html": REPORT}
 """Kinds of the files that the library names itself."""
 
-FIT_FILES = {".toml": MACHINE, ".json": STAGES, ".html": REPORT, ".fmu": FMU, ".state": STATE}
+FIT_FILES = {".csv": COMMANDS_TO_TRY, ".toml": MACHINE, ".json": STAGES, ".html": REPORT, ".fmu": FMU, ".state": STATE}
 """Kinds of the files of ``hybridsep fit``."""
+
+HAL_FILES = {
+    ".bin": Kind("file of hybridsep hal", _begins_with(b"HSEP")),
+    ".c": Kind("HAL component of hybridsep", _begins_with(b"/* HAL component for LinuxCNC")),
+}
+"""Kinds of the files of ``hybridsep hal``."""
 
 
 def check_outputs(outputs: Iterable[Output], inputs: Mapping[str, str | Path | None], *, force: bool = False) -> None:

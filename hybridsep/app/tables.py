@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,8 @@ from rich.console import Console
 from rich.table import Table
 
 from ..base.metrics import shown_figure
-from ..demo.published import PRINTED
+from ..demo.tables import Table as CaseTable
+from ..demo.tables import compensation_table, prediction_table
 from ..logs.units import Shown, shown_in
 
 if TYPE_CHECKING:
@@ -35,23 +36,15 @@ __all__ = [
 console = Console(emoji=False, markup=False, highlight=False)
 """Standard output. Units and names of files may have brackets, which are text there, as in the tables."""
 
-PAPER_COLUMN = "× hold: RMS relative to holding the last residual; paper: physics → hybrid, reduction, as printed there"
-
 
 def print_predictions(summary: Mapping[str, Mapping[str, Any]]) -> None:
     """Print the prediction errors of the demo."""
-    title = "Prediction error, RMS in µm against the measured position"
-    table = _table_of_cases(title, PAPER_COLUMN, ("physics", "hold", "hybrid", "reduction", "× hold", "paper"))
-    for name, case in summary.items():
-        table.add_row(name, *_figures(case), _printed(PRINTED[name]))
-        for part in ("friction_alone", "stiffness_alone"):
-            if part in case:
-                table.add_row(f" {part.replace('_', ' ')}", *_figures(case[part]))
-    console.print(table)
-    console.print(
-        "The stage has the paper's Table 1 and a simulated disturbance, scaled to the printed physics figures: these "
-        "agree by construction, the hybrid's do not."
-    )
+    _print_table(prediction_table(summary))
+    if "spiral_x" in summary:
+        console.print(
+            "The stage has the paper's Table 1 and a simulated disturbance, scaled to the printed physics figures: "
+            "these agree by construction, the hybrid's do not."
+        )
     for name, case in summary.items():
         n, worse = case["n_batches"], case["batches_hybrid_worse"]
         text = f"{name}: of {n} windows the hybrid is worse than physics in {len(worse)}"
@@ -59,52 +52,31 @@ def print_predictions(summary: Mapping[str, Mapping[str, Any]]) -> None:
         console.print(
             f"{text}{f' (from {times} s on)' if worse else ''}, worse than hold in {case['n_batches_worse_than_hold']}"
         )
-    for name, case in summary.items():
-        console.print(f"\n{name}\n{case['verdict']}")
+        console.print(case["verdict"])
 
 
 def print_compensation(summary: Mapping[str, Mapping[str, Any]]) -> None:
     """Print the tracking errors of the demo's compensated runs."""
-    kinds = list(summary["staircase"]["compensation"])
-    title = "\nTracking error with compensation, RMS in µm of the true position"
-    caption = "warm: weights of an earlier run; contour: X and Y"
-    table = _table_of_cases(title, caption, [kind.replace("_", " ") for kind in kinds])
-    rows = {name: (name, "tracking_rms_um") for name, case in summary.items() if "compensation" in case}
-    rows["spiral, contour"] = ("spiral_x", "contour_rms_um")
-    for label, (name, figure) in rows.items():
-        compensation = summary[name]["compensation"]
-        table.add_row(label, *(shown_figure(compensation[kind][figure]) for kind in kinds))
-    console.print(table)
+    _print_table(compensation_table(summary))
 
 
-def _table_of_cases(title: str, caption: str, columns: Iterable[str]) -> Table:
-    """Return an empty table of the demo's cases, in the first column, and their figures; it fits 80 columns."""
+def _print_table(content: CaseTable) -> None:
+    """Print a table of the demo's cases; it fits 80 columns."""
     table = Table(
         "case",
-        title=title,
-        caption=caption,
+        title=f"\n{content.title}",
+        caption=content.note,
         box=box.SIMPLE,
         pad_edge=False,
         collapse_padding=True,
         show_edge=False,
     )
     table.columns[0].no_wrap = True
-    for column in columns:
+    for column in content.columns:
         table.add_column(column, justify="right", no_wrap=True)
-    return table
-
-
-def _figures(case: Mapping[str, Any]) -> list[str]:
-    """Return physics, hold, hybrid, reduction and ratio to hold of a case as text, a dash where there is no figure."""
-    figures = [shown_figure(case.get(name)) for name in ("rms_pb_um", "rms_hold_um", "rms_h_um")]
-    return [*figures, shown_figure(case.get("reduction_percent"), " %"), shown_figure(case.get("ratio_to_hold"))]
-
-
-def _printed(case: Mapping[str, float]) -> str:
-    """Return the paper's figures of a case as text, empty if there are none."""
-    if not case:
-        return ""
-    return f"{case['rms_pb_um']:g}→{case['rms_h_um']:g}, {case['reduction_percent']:g} %"
+    for row in content.rows:
+        table.add_row(*row)
+    console.print(table)
 
 
 PREDICTIONS = {"pb": "physics", "hold": "hold", "arx20": "ARX20", "arx40": "ARX40", "h": "hybrid"}

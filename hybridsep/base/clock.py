@@ -1,9 +1,11 @@
 """Sample clock: communication steps of any size, counted in samples of ``T_s``.
 
-The instants are ``t_k = start + k·T_s``. The clock keeps its own time, the compensated sum of the step sizes, because
-the importer's may be rounded or drift. An instant within ``δ = max(1e-6·T_s, 8 ulp(t))`` of a step's start belongs to
-that step, where the inputs of sample ``k`` are latched at ``t_k``; the sample is executed in the step whose end reaches
-``t_{k+1}``. The arithmetic is that of ``hsep_clock.c``, operation by operation.
+The clock keeps its own time, the compensated sum of the step sizes: the importer's may be rounded or drift. An instant
+within ``δ = max(0.05·T_s, 8 ulp(t))`` of a communication point, or half a step where that is less, is at that point,
+and the next one is counted from there: the grid of samples follows the importer's. Elsewhere instants are ``T_s``
+apart. An instant at a step's start belongs to that step, where the inputs of sample ``k`` are latched; the sample is
+executed in the step whose end reaches the next instant. The arithmetic is that of ``hsep_clock.c``, operation by
+operation.
 """
 
 from __future__ import annotations
@@ -14,42 +16,39 @@ from typing import NamedTuple
 
 from .errors import FmuError, ParameterError, StateError
 
-__all__ = ["STEP_MAX", "ClockStep", "SampleClock", "check_step_size"]
+__all__ = ["STEP_MAX", "ClockStep", "SampleClock", "check_communication_point", "check_step_size"]
 
 STEP_MAX = 100.0
 """Longest communication step, s, which bounds the cost of one step: 10⁷ samples at the shortest ``T_s``."""
 
-_TOLERANCE = 1e-6  # of T_s
+_TOLERANCE = 0.05  # of T_s: the importer's times may be whole nanoseconds or in single precision
+_NOTICED = 1e-3  # of T_s: deviations beyond it are warned of
 _SPACINGS = 8.0  # ulp(t): a few roundings of the importer's arithmetic
 _SPLIT = 134217729.0  # 2^27 + 1, splits a double into two halves (Veltkamp 1968)
 
 
 class SampleClock(NamedTuple):
-    """Time in samples since ``start``.
+    """Time in samples since the start.
 
     Attributes
     ----------
-    start, T_s : float
-        Start time and sampling interval, s.
+    T_s : float
+        Sampling interval, s.
     k : int
-        Index of the last instant reached, ``t_k``.
+        Index of the last instant reached.
     since : float
-        Time since ``t_k``, s; slightly below 0 where a step ended within δ before ``t_k``.
+        Time since that instant, s, ≥ 0; 0 where it is at the communication point.
     carry : float
         Accumulated rounding error of ``since``, s.
     end : float
         End of the last step in the importer's time, s.
-    latched : bool
-        Whether the inputs of sample ``k`` have been read.
     """
 
-    start: float
     T_s: float
     k: int
     since: float
     carry: float
     end: float
-    latched: bool
 
     @classmethod
     def begin(cls, start: float, T_s: float) -> SampleClock:
@@ -66,7 +65,12 @@ class SampleClock(NamedTuple):
             raise FmuError(
                 f"the start time must be small enough to resolve samples of T_s = {T_s:g} s, got {start:g} s"
             )
-        return cls(start, T_s, 0, 0.0, 0.0, start, False)
+        return cls(T_s, 0, 0.0, 0.0, start)
+
+    @property
+    def latched(self) -> bool:
+        """Whether the inputs of sample ``k`` have been read: a step began at its instant."""
+        return self.since > 0
 
     def stepped(self, t: float, h: float) -> ClockStep:
         """Return the communication step from ``t`` by ``h``, s, in samples.
@@ -79,21 +83,21 @@ class SampleClock(NamedTuple):
             If ``t`` is not where the last step ended.
         """
         check_step_size(h)
-        if not (math.isfinite(t) and abs(t - self.end) <= max(0.5 * self.T_s, _resolution(t))):
-            raise FmuError(f"the communication point must be {self.end!r} s, where the last step ended, got {t!r} s")
-        T_s = self.T_s
+        check_communication_point(t, self.end, 0.5 * self.T_s)
+        T_s, end = self.T_s, t + h
         since, carry = _add(self.since, self.carry, h)
-        now = self.start + (self.k * T_s + since)
-        # At times so large that doubles no longer resolve T_s / 4, δ is T_s / 4.
-        delta = min(max(_TOLERANCE * T_s, _resolution(now)), 0.25 * T_s)
+        # At times so large that doubles no longer resolve T_s / 4, δ is T_s / 4; of several points the nearest counts.
+        delta = min(max(_TOLERANCE * T_s, _resolution(end)), 0.25 * T_s, 0.5 * h)
         n = math.floor((since + delta) / T_s)
         since, carry = _take(since, carry, n, T_s)
         if since < -delta:  # the quotient was rounded up to the next instant
             n -= 1
             since, carry = _take(since, carry, -1, T_s)
-        latched = since > delta  # an instant within δ of the end belongs to the next step
-        after = SampleClock(self.start, T_s, self.k + n, since, carry, t + h, latched)
-        return ClockStep(after, n, n + latched - self.latched, (T_s if self.latched else 0.0) - self.since)
+        reached = n > 0 and since <= delta  # the instant is at this point, and belongs to the next step
+        moved = since if reached else 0.0
+        after = SampleClock(T_s, self.k + n, *((0.0, 0.0) if reached else (since, carry)), end)
+        n_latched = n + after.latched - self.latched
+        return ClockStep(after, n, n_latched, T_s - self.since if self.latched else 0.0, moved)
 
     def state(self) -> list[float]:
         """Return all fields as numbers."""
@@ -108,11 +112,11 @@ class SampleClock(NamedTuple):
         StateError
             If a field is out of range.
         """
-        start, T_s, k, since, carry, end, latched = map(float, state)
-        fits = all(map(math.isfinite, (start, T_s, end))) and T_s > 0 and abs(since) <= T_s
-        if not (fits and 0 <= k < 2**53 and k == int(k) and abs(carry) <= abs(since) and latched in (0, 1)):
+        T_s, k, since, carry, end = map(float, state)
+        fits = all(map(math.isfinite, (T_s, end))) and T_s > 0 and 0 <= since <= T_s
+        if not (fits and 0 <= k < 2**53 and k == int(k) and abs(carry) <= since):
             raise StateError(f"the saved clock is inconsistent: {list(state)}")
-        return cls(start, T_s, int(k), since, carry, end, bool(latched))
+        return cls(T_s, int(k), since, carry, end)
 
 
 class ClockStep(NamedTuple):
@@ -127,19 +131,48 @@ class ClockStep(NamedTuple):
     n_latched : int
         Instants at which inputs are latched in the step.
     first : float
-        Time from the start of the step to the first of them, s; may be slightly below 0.
+        Time from the start of the step to the first of them, s.
+    moved : float
+        Time by which the last instant lay before the step's end, where it was taken, s; below 0 behind it.
     """
 
     after: SampleClock
     n_samples: int
     n_latched: int
     first: float
+    moved: float
+
+    @property
+    def warning(self) -> str:
+        """What there is to say about an instant that was taken at a communication point; empty if it lay there."""
+        clock = self.after
+        if not abs(self.moved) > _NOTICED * clock.T_s:
+            return ""
+        return (
+            f"the communication point {clock.end:.9g} s is {abs(self.moved) / clock.T_s:.2g} samples of T_s = "
+            f"{clock.T_s:g} s {'behind' if self.moved > 0 else 'before'} a sampling instant, which is taken there: "
+            "samples follow the importer's points; a model of T_s needs steps of T_s"
+        )
 
 
 def check_step_size(h: float) -> None:
     """Raise ParameterError if ``h``, s, is not a valid communication step size."""
     if not 0 < h <= STEP_MAX:
         raise ParameterError(f"the communication step size must be > 0 and ≤ {STEP_MAX:g} s, got {float(h)!r}")
+
+
+def check_communication_point(t: float, end: float, tolerance: float) -> None:
+    """Raise FmuError if a step begins at ``t`` and the last one ended at ``end``, s, unless rounding tells them apart.
+
+    Parameters
+    ----------
+    t, end : float
+        In the importer's time, s.
+    tolerance : float
+        Largest difference that may be rounding, s; where doubles are coarser, a few of their spacings.
+    """
+    if not (math.isfinite(t) and abs(t - end) <= max(tolerance, _resolution(t))):
+        raise FmuError(f"the communication point must be {end!r} s, where the last step ended, got {t!r} s")
 
 
 def _resolution(t: float) -> float:

@@ -42,6 +42,8 @@ class Parameter:
         What each item means, in the same order.
     learned : bool
         Whether weights learned with one value are invalid for another: it shapes the features or the factor.
+    tunable : bool
+        Whether it may change in a run.
     """
 
     name: str
@@ -57,6 +59,7 @@ class Parameter:
     choices: tuple[str, ...] = ()
     meanings: tuple[str, ...] = ()
     learned: bool = False
+    tunable: bool = False
 
     @property
     def range_text(self) -> str:

@@ -176,17 +176,34 @@ class PredictorSettings(Settings):
     ELSEWHERE: ClassVar[tuple[str, ...]] = ("T_s", "input_hold")
 
     Np: int = whole(100, 1, 100_000, "samples in a look-ahead window")
-    p: int = whole(50, 1, 5000, "past residuals e_pb in the features", learned=True)
-    q: int = whole(3, 0, 5000, "past physics-based predictions x_pb in the features", learned=True)
-    lam: float = real(1e-12, 1e-40, 1e12, "m2", "ridge penalty on the weights", name="lambda", learned=True)
-    T_s: float = real(1e-3, 1e-5, 1.0, "s", "sampling interval", display_unit="ms", learned=True)
+    p: int = whole(
+        50,
+        1,
+        5000,
+        "number of past residuals e_pb (measured minus physics-based position) among the features",
+        learned=True,
+    )
+    q: int = whole(3, 0, 5000, "number of past physics-based predictions x_pb among the features", learned=True)
+    lam: float = real(
+        1e-12, 1e-40, 1e12, "m2", "ridge penalty on the weights of the residual model", name="lambda", learned=True
+    )
+    T_s: float = real(
+        1e-3, 1e-5, 1.0, "s", "sampling interval of command and measurement", display_unit="ms", learned=True
+    )
     t_init: float = real(
-        *(-1.0, 0.0, 1e6, "s", "warm-up: until then x_h = x_pb, while learning goes on"), automatic=-1.0
+        *(
+            -1.0,
+            0.0,
+            1e6,
+            "s",
+            "warm-up: until then the prediction x_h is the physics-based x_pb, while learning goes on",
+        ),
+        automatic=-1.0,
     )
     input_hold: str = choice(
         "zoh",
         {"zoh": "zero-order hold: constant until the next sample", "foh": "first-order hold: a straight line to it"},
-        "how x_d runs between samples, zero-order or first-order hold",
+        "how the command x_d runs between samples, zero-order or first-order hold",
         learned=True,
     )
     trust: bool = flag(
@@ -289,22 +306,27 @@ class CompensatorSettings(Settings):
         Whether the velocity of ``x_dm`` keeps the sign of that of ``x_d``: otherwise friction changes its sign too. It
         has no effect without ``limits``. Plans of a model with ``trust`` follow the friction and may turn.
     compensate : {"off", "physics", "hybrid"}
-        Best model allowed; ``"off"`` leaves the command unmodified.
+        Best model allowed; ``"off"`` leaves the command unmodified, and in a run lets the change fade.
     """
 
     OPTIONAL: ClassVar[tuple[str, ...]] = ("preview", "spacing", "change_max")
     ELSEWHERE: ClassVar[tuple[str, ...]] = ("limits", "change_max")
 
     preview: int | None = whole(
-        *(200, 8, 2000, "samples planned ahead, at least Np + 4·spacing + 3"), unless_given=None
+        *(200, 8, 2000, "samples of the command that are planned ahead, at least Np + 4·spacing + 3"), unless_given=None
     )
     spacing: int | None = whole(
-        *(2, 1, 1000, "samples between the knots of the change, a divisor of Np"), unless_given=None
+        *(2, 1, 1000, "samples between the knots of the spline that changes the command, a divisor of Np"),
+        unless_given=None,
     )
-    jerk_weight: float = real(1.0, 0.0, 1e12, "1", "weight of the change's jerk against the tracking error")
+    jerk_weight: float = real(
+        1.0, 0.0, 1e12, "1", "weight of the jerk of the command's change against the tracking error"
+    )
     limits: Limits | None = None
-    change_max: float | None = real(1e-3, 1e-12, 10.0, "m", "largest change of the command", display_unit="mm")
-    no_reversal: bool = flag(True, "whether x_dm never turns while the commanded position moves")
+    change_max: float | None = real(
+        1e-3, 1e-12, 10.0, "m", "largest change of the command", display_unit="mm", tunable=True
+    )
+    no_reversal: bool = flag(True, "whether the modified command never turns while the commanded position moves")
     compensate: str = choice(
         "hybrid",
         {
@@ -313,6 +335,7 @@ class CompensatorSettings(Settings):
             "hybrid": "the hybrid model",
         },
         "best model to compensate with",
+        tunable=True,
     )
 
     def for_window(self, Np: int) -> CompensatorSettings:
@@ -366,22 +389,35 @@ _OTHERS = (
     # One mode of eq. (15).
     real(None, 1e-3, 1e5, "Hz", "natural frequency of the mode", name="f_n", learned=True),
     real(None, 1e-6, 1e4, "1", "damping ratio of the mode", name="zeta", learned=True),
-    real(None, -1e15, 1e15, "1/s2", "numerator of the mode, constant term", name="alpha", learned=True),
-    real(None, -1e10, 1e10, "1/s", "numerator of the mode, factor of s", name="beta", learned=True),
+    real(
+        None,
+        -1e15,
+        1e15,
+        "1/s2",
+        "numerator of the mode's transfer function, constant term",
+        name="alpha",
+        learned=True,
+    ),
+    real(None, -1e10, 1e10, "1/s", "numerator of the mode's transfer function, factor of s", name="beta", learned=True),
     # The nonlinear drive of eq. (13).
-    real(None, 1e-6, 1e6, "kg", "moving mass", name="m"),
-    real(None, 1e-9, 1e12, "N.s/m", "damping", name="c"),
-    real(None, 1e-6, 1e15, "N/m", "stiffness", name="k"),
-    real(0.0, 0.0, 1e12, "N.s2/m2", "quadratic damping, force c_nl·v·|v|", name="c_nl"),
-    real(0.0, 0.0, 1e15, "N/m2", "quadratic stiffness, force k_nl·x·|x|", name="k_nl"),
+    real(None, 1e-6, 1e6, "kg", "moving mass of the drive", name="m"),
+    real(None, 1e-9, 1e12, "N.s/m", "damping of the drive, force per velocity relative to the command", name="c"),
+    real(None, 1e-6, 1e15, "N/m", "stiffness of the drive, force per distance from the command", name="k"),
+    real(0.0, 0.0, 1e12, "N.s2/m2", "quadratic damping of the drive, force c_nl·v·|v|", name="c_nl"),
+    real(0.0, 0.0, 1e15, "N/m2", "quadratic stiffness of the drive, force k_nl·x·|x|", name="k_nl"),
     # The stage's disturbance and the encoder.
     real(0.0, 0.0, 1.0, "m", "friction of the carriage, as an offset of the command", name="f", display_unit="um"),
     real(0.0, 0.0, 1e6, "1/m", "cable stiffness, an offset kappa·x·|x| of the command", name="kappa"),
     choice(
         "command",
         {"command": "the commanded velocity", "motion": "the actual velocity"},
-        "velocity of the friction: commanded or actual",
+        "velocity that the friction opposes: commanded or actual",
         name="friction_on",
+    ),
+    real(
+        *(2e-3, 1e-12, 1e4, "m/s", "velocity over which the friction changes sign"),
+        name="v_friction",
+        display_unit="mm/s",
     ),
     real(0.0, 0.0, 1.0, "m", "standard deviation of the encoder noise", name="noise_std", display_unit="um"),
     whole(0, 0, 2**31 - 1, "seed of the encoder noise", name="seed"),
@@ -394,7 +430,7 @@ _OTHERS = (
             "spiral_y": "Y axis of an Archimedean spiral",
             "samples": "the samples with which the FMU was built",
         },
-        "what is played",
+        "trajectory that is played",
         name="trajectory",
     ),
 )

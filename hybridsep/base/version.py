@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-__all__ = ["COMMIT_FILE", "__version__", "commit", "version_text"]
+__all__ = ["COMMIT_FILE", "VERSION_DATE", "__version__", "commit", "version_text"]
 
 __version__ = "0.1.0"
+
+VERSION_DATE = "2026-11-24"
+"""Day of the version, or while it is unreleased of its last renewal; FMUs name it as the day of their generation."""
 
 COMMIT_FILE = "hybridsep/_data/commit.txt"
 """Where wheel and sdist keep their commit, which ``hatch_build.py`` writes into them."""

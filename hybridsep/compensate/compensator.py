@@ -14,15 +14,19 @@ from that remainder: there is always a feasible plan, and where no other can be 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.errors import SignalError
+from ..base.errors import ParameterError, SignalError
 from ..base.saved import Saved
 from ..base.settings import CompensatorSettings, PredictorSettings
 from ..base.signals import Array, as_measured, as_published, as_samples
 from ..base.state import pack, unpack
+from ..base.threads import one_blas_thread
+from ..online.look_ahead import LookAhead
 from ..predict.predictor import HybridPredictor
 from ..predict.trust.disturbances import Disturbance
 from ..predict.trust.model import TrustedModel
@@ -41,13 +45,14 @@ RECOMMENDED = PredictorSettings(trust=False, Np=50, p=50, q=40, lam=1e-8, t_init
 compensator's defaults."""
 
 _KIND = "compensator"
+_TUNABLE = tuple(name for name, parameter in CompensatorSettings.parameters().items() if parameter.tunable)
 
 
 class SepCompensator:
     """Receding-horizon compensator that keeps learning in closed loop.
 
-    For each window, call :meth:`plan` with the commanded positions ahead, send its ``x_dm`` to the drive, then call
-    :meth:`update` with the measured positions.
+    Sample by sample, call :meth:`step`. Or for each window, call :meth:`plan` with the commanded positions ahead, send
+    its ``x_dm`` to the drive, then call :meth:`update` with the measured positions.
 
     Parameters
     ----------
@@ -72,11 +77,8 @@ class SepCompensator:
         assert settings.preview is not None
         assert settings.spacing is not None
         self.preview, self.spacing = settings.preview, settings.spacing
-        self.compensate = SepState[settings.compensate.upper()]
         self._basis = SplineBasis(self.preview, self.spacing)
-        bounds = DriveBounds(
-            self._basis, predictor.T_s, settings.limits, settings.change_max, no_reversal=settings.no_reversal
-        )
+        bounds = self._bounds(settings)
         self._planning: Planning
         if isinstance(predictor.residual, TrustedModel):
             predictor.residual.plan_ahead(self.preview)
@@ -97,6 +99,7 @@ class SepCompensator:
         lead_in : int
             Samples at rest before the trajectory, not learned.
         """
+        self._online: LookAhead | None = None
         predictor = self.predictor
         predictor.restart(start, t_init=t_init + lead_in * predictor.T_s if t_init > 0 else 0.0)
         self.lead_in = int(lead_in)
@@ -108,6 +111,73 @@ class SepCompensator:
         self._x_d_before = np.full(3, np.nan)
         self._pending: PendingPlan | None = None
 
+    @property
+    def compensate(self) -> SepState:
+        """Best model allowed."""
+        return SepState[self.settings.compensate.upper()]
+
+    def change(self, **settings: Any) -> None:
+        """Change settings in a run, from the next window on; no command jumps.
+
+        Every plan goes on from the rest of the last one, which keeps the drive's limits and ends at ``x_d``: with
+        ``compensate="off"`` that rest is followed, so the change of the command fades within the preview. Where it is
+        larger than a new ``change_max``, it is bounded by that rest.
+
+        Parameters
+        ----------
+        **settings
+            ``compensate`` or ``change_max``, as those of :class:`~hybridsep.base.settings.CompensatorSettings`.
+
+        Raises
+        ------
+        ParameterError
+            If one is out of its range, or fixed. Nothing is changed.
+        """
+        fixed = [name for name in settings if name not in _TUNABLE]
+        if fixed:
+            raise ParameterError(f"{', '.join(fixed)} cannot change in a run, {' and '.join(_TUNABLE)} can")
+        changed = replace(self.settings, **settings)
+        if changed != self.settings:
+            self.settings = changed
+            self._planning.adopt(self._bounds(changed), changed)
+
+    @property
+    def T_s(self) -> float:
+        """Sampling interval, s."""
+        return self.predictor.T_s
+
+    @property
+    def delay(self) -> int:
+        """Samples by which :meth:`step` delays the command: ``preview``."""
+        return self.preview
+
+    def step(self, x_d_ahead: float, x_meas: float) -> float:
+        """Process one sample and return the modified command of the next one, m: an online loop in one call.
+
+        It is a :class:`~hybridsep.online.look_ahead.LookAhead` over this compensator, which begins at the first call
+        after :meth:`restart`: there are predictions, errors and a state to save in it.
+
+        Parameters
+        ----------
+        x_d_ahead : float, m
+            Commanded position for ``preview`` samples later.
+        x_meas : float, m
+            Position measured now.
+
+        Raises
+        ------
+        SignalError
+            As :meth:`LookAhead.sample <hybridsep.online.look_ahead.LookAhead.sample>`.
+        """
+        online = self._online
+        if online is None:
+            start = self.predictor.start
+            online = LookAhead(self, float(x_d_ahead if start is None else start))
+            self._online = online  # making it restarts the compensator
+        online.sample(x_d_ahead, x_meas)
+        return online.x_dm
+
+    @one_blas_thread
     def plan(self, x_d: ArrayLike) -> PublishedWindow:
         """Plan the next window.
 
@@ -149,6 +219,7 @@ class SepCompensator:
             x_d, x_dm, prediction.x_pb, x_h, x_h_std, chosen.state, n_warm_up, n_followed, self._state_before
         )
 
+    @one_blas_thread
     def update(self, x: ArrayLike) -> None:
         """Learn from the measurement of the planned window.
 
@@ -176,6 +247,11 @@ class SepCompensator:
         self._state_before = pending.state
         self._hybrid_ended |= pending.ends_hybrid
         self._pending = None
+
+    def _bounds(self, settings: CompensatorSettings) -> DriveBounds:
+        return DriveBounds(
+            self._basis, self.predictor.T_s, settings.limits, settings.change_max, no_reversal=settings.no_reversal
+        )
 
     @property
     def is_planned(self) -> bool:

@@ -103,6 +103,10 @@ class Planning(ABC):
         self.Np = Np
         self.n_pinned = min(self.PINNED, Np // 2) // self.spacing
 
+    def adopt(self, bounds: DriveBounds, settings: CompensatorSettings) -> None:
+        """Plan within other bounds from the next window on; ``preview`` and ``spacing`` are the same."""
+        self.bounds, self.settings = bounds, settings
+
     @abstractmethod
     def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:
         """Return the best available plan on a model up to ``most``."""

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
+from ctypes import c_bool, c_double, c_int, c_int32, c_int64, c_uint32
+from functools import partial
 from math import prod
 from pathlib import Path
 from typing import Any, ClassVar
@@ -46,6 +48,12 @@ class Driver(ABC):
         Type of real numbers.
     access : mapping
         Type of a variable → type whose functions get and set it.
+    c_types : mapping
+        That type → type of C.
+    prefix : str
+        Begin of the functions' names.
+    sized : bool
+        Whether they are told the number of values, which is that of variables without arrays.
     state, deserialise : str
         What the version's functions call a state, and its deserialisation.
     """
@@ -54,6 +62,9 @@ class Driver(ABC):
     platform: ClassVar[str]
     real: ClassVar[str]
     access: ClassVar[Mapping[str, str]]
+    c_types: ClassVar[Mapping[str, Any]]
+    prefix: ClassVar[str]
+    sized: ClassVar[bool]
     state: ClassVar[str]
     deserialise: ClassVar[str]
 
@@ -73,15 +84,34 @@ class Driver(ABC):
     def begin(self, start_time: float, stop_time: float | None = None) -> None:
         """Set the experiment, s, and enter Initialization Mode."""
 
-    def get(self, variables: Sequence[Any]) -> list[Any]:
-        """Return the values of variables of one type, those of an array one after the other."""
-        references = [variable.valueReference for variable in variables]
-        return list(getattr(self.slave, f"get{self.access[variables[0].type]}")(references))
+    def reader(self, variables: Sequence[Any]) -> Callable[[], list[Any]]:
+        """Return a function that gets variables of one type in one FMI call, those of an array one after the other."""
+        call, values = self._prepared("Get", variables)
 
-    def set(self, variables: Sequence[Any], values: Sequence[Any]) -> None:
-        """Set variables of one type."""
-        references = [variable.valueReference for variable in variables]
-        getattr(self.slave, f"set{self.access[variables[0].type]}")(references, values)
+        def read() -> list[Any]:
+            call()
+            return list(values)
+
+        return read
+
+    def writer(self, variables: Sequence[Any]) -> Callable[[Sequence[Any]], None]:
+        """Return a function that sets variables of one type in one FMI call, those of an array one after the other."""
+        call, buffer = self._prepared("Set", variables)
+
+        def write(values: Sequence[Any]) -> None:
+            buffer[:] = values
+            call()
+
+        return write
+
+    def _prepared(self, verb: str, variables: Sequence[Any]) -> tuple[Callable[[], object], Any]:
+        """Return an FMI call that gets or sets variables, and the array of C that their values go through."""
+        kind = self.access[variables[0].type]
+        n = sum(prod(variable.shape or ()) for variable in variables)
+        references = (c_uint32 * len(variables))(*(variable.valueReference for variable in variables))
+        values = (self.c_types[kind] * n)()
+        arguments = (self.slave.component, references, len(variables), values, *((n,) if self.sized else ()))
+        return partial(getattr(self.slave, f"{self.prefix}{verb}{kind}"), *arguments), values
 
     def save(self) -> bytes:
         """Return the state, serialised."""
@@ -113,6 +143,8 @@ class _Fmi2Driver(Driver):
         "Enumeration": "Integer",
         "Boolean": "Boolean",
     }
+    c_types: ClassVar[Mapping[str, Any]] = {"Real": c_double, "Integer": c_int, "Boolean": c_int}
+    prefix, sized = "fmi2", False
     state, deserialise = "FMUstate", "deSerialize"
 
     def instantiate(self, log: Log) -> None:
@@ -140,6 +172,8 @@ class _Fmi3Driver(Driver):
         "Enumeration": "Int64",
         "Boolean": "Boolean",
     }
+    c_types: ClassVar[Mapping[str, Any]] = {"Float64": c_double, "Int32": c_int32, "Int64": c_int64, "Boolean": c_bool}
+    prefix, sized = "fmi3", True
     state, deserialise = "FMUState", "deserialize"
 
     def instantiate(self, log: Log) -> None:
@@ -150,11 +184,6 @@ class _Fmi3Driver(Driver):
 
     def begin(self, start_time: float, stop_time: float | None = None) -> None:
         self.slave.enterInitializationMode(startTime=start_time, stopTime=stop_time)
-
-    def get(self, variables: Sequence[Any]) -> list[Any]:
-        references = [variable.valueReference for variable in variables]
-        n = sum(prod(variable.shape or ()) for variable in variables)
-        return list(getattr(self.slave, f"get{self.access[variables[0].type]}")(references, n))
 
 
 DRIVERS: Mapping[str, type[_Fmi2Driver | _Fmi3Driver]] = {"2": _Fmi2Driver, "3": _Fmi3Driver}

@@ -58,9 +58,6 @@ class _OpenedFmu(AbstractContextManager["_OpenedFmu"]):
         """Return the sampling interval reported by the FMU, s, checked."""
         return float(check("T_s", self.fmu.get("T_s"), label=f"{self.name}: T_s"))
 
-    def _step(self, k: int, h: float) -> None:
-        self.fmu.step(self._start_time + k * h, h)
-
 
 class FmuController(_OpenedFmu):
     """A predictor or compensator FMU.
@@ -83,11 +80,13 @@ class FmuController(_OpenedFmu):
         self._initialise({"x_d_ahead": start, "x_meas": start})
         self.delay, self.Np, self.T_s = self._samples(self.kind.delay), self._samples("Np"), self._interval()
         self.late = self._samples("measurement_delay") if "measurement_delay" in fmu.variables else 0
-        self._get, self._set = fmu.real_reader(self.kind.outputs), fmu.real_writer(["x_d_ahead", "x_meas"])
+        self._get = fmu.reader([*self.kind.outputs, self.kind.state])
+        self._step = fmu.real_stepper(["x_d_ahead", "x_meas"])
 
     def outputs(self) -> tuple[tuple[float, ...], int]:
         """Return the positions of the kind's outputs, m, and the state, now."""
-        return tuple(self._get()), self.kind.lowest + int(self.fmu.get(self.kind.state))
+        *positions, state = self._get()
+        return tuple(positions), self.kind.lowest + int(state)
 
     def n_rejected(self) -> int:
         """Return how many measurements were missing or not plausible; 0 of an FMU that does not tell."""
@@ -95,8 +94,7 @@ class FmuController(_OpenedFmu):
 
     def step(self, k: int, x_d_ahead: float, x_meas: float) -> None:
         """Take in sample ``k``, m, and move on to the next."""
-        self._set([x_d_ahead, x_meas])
-        self._step(k, self.T_s)
+        self._step((x_d_ahead, x_meas), self._start_time + k * self.T_s, self.T_s)
 
 
 class FmuDrive(_OpenedFmu):
@@ -120,7 +118,7 @@ class FmuDrive(_OpenedFmu):
         self._initialise({"x_d": start})
         if "T_s" in self.fmu.variables:
             self.T_s = self._interval()
-        self._get, self._set = self.fmu.real_reader(["x", "x_meas"]), self.fmu.real_writer(["x_d"])
+        self._get, self._step = self.fmu.real_reader(["x", "x_meas"]), self.fmu.real_stepper(["x_d"])
 
     def outputs(self) -> tuple[float, float]:
         """Return the true and the measured position now, m."""
@@ -129,8 +127,7 @@ class FmuDrive(_OpenedFmu):
 
     def step(self, k: int, x_d: float, h: float) -> None:
         """Advance from sample ``k`` by ``h`` seconds with the command ``x_d``, m, held."""
-        self._set([x_d])
-        self._step(k, h)
+        self._step((x_d,), self._start_time + k * h, h)
 
 
 def check_controller(path: str | Path, kind: Kind) -> None:

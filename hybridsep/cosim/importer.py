@@ -11,7 +11,7 @@ import threading
 import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from tempfile import gettempdir, mkdtemp
 from typing import Any
@@ -183,9 +183,12 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
 
     @property
     def _open(self) -> Driver:
+        self._check_open()
+        return self._driver
+
+    def _check_open(self) -> None:
         if self._release is None or not self._release.alive:
             raise FmuError(f"{self.path.name}: the instance is closed; make a new FmuInstance")
-        return self._driver
 
     def __exit__(self, *error: object) -> None:
         self.close()
@@ -227,24 +230,50 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
         if variable.type == driver.real and not isinstance(value, (int, float)):
             raise FmuError(f"{self.path.name}: {name} must be a number, got {value!r}")
         self._check_type(variable)
-        self._call(driver.set, [variable], [value])
+        self._call(driver.writer([variable]), [value])
 
     def get(self, name: str) -> Any:
         """Return one variable; of an array a list."""
         driver, variable = self._open, self._variable(name)
         self._check_type(variable)
-        values = self._call(driver.get, [variable])
+        values = self._call(driver.reader([variable]))
         return values if variable.shape else values[0]
+
+    def real_stepper(self, names: Sequence[str]) -> Callable[[Sequence[float], float, float], None]:
+        """Return a function of values, ``t`` and ``h`` that sets these real numbers, in one FMI call, and steps."""
+        write = self._open.writer([self._variable(name) for name in names])
+        do_step = self.slave.doStep
+
+        def step(values: Sequence[float], t: float, h: float) -> None:
+            write(values)
+            do_step(t, h)
+
+        return partial(self._call_open, step)
 
     def real_writer(self, names: Sequence[str]) -> Callable[[Sequence[float]], None]:
         """Return a function that sets these real numbers in one FMI call."""
-        variables = [self._variable(name) for name in names]
-        return lambda values: self._call(self._open.set, variables, values)
+        return partial(self._call_open, self._open.writer([self._variable(name) for name in names]))
 
     def real_reader(self, names: Sequence[str]) -> Callable[[], list[float]]:
         """Return a function that gets these real numbers in one FMI call, those of an array one after the other."""
-        variables = [self._variable(name) for name in names]
-        return lambda: list(self._call(self._open.get, variables))
+        return partial(self._call_open, self._open.reader([self._variable(name) for name in names]))
+
+    def reader(self, names: Sequence[str]) -> Callable[[], list[Any]]:
+        """Return a function that gets these variables, none of them an array, in one FMI call for each type."""
+        of_type: dict[str, list[Any]] = {}
+        for name in names:
+            variable = self._variable(name)
+            self._check_type(variable)
+            of_type.setdefault(self._open.access[variable.type], []).append(variable)
+        reads = [self._open.reader(variables) for variables in of_type.values()]
+        got = [variable.name for variables in of_type.values() for variable in variables]
+        places = [got.index(name) for name in names]
+
+        def read() -> list[Any]:
+            values = [value for read_type in reads for value in read_type()]
+            return [values[place] for place in places]
+
+        return partial(self._call_open, read)
 
     def step(self, t: float, h: float) -> None:
         """Do one communication step from ``t`` by ``h`` seconds."""
@@ -271,6 +300,11 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
         if name not in self.variables:
             raise FmuError(f"{self.path.name} has no variable {name!r}")
         return self.variables[name]
+
+    def _call_open(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        """Call a function that was made for this instance, if it is still open."""
+        self._check_open()
+        return self._call(function, *arguments)
 
     @uninterrupted
     def _call(self, function: Callable[..., Any], *arguments: Any, **keywords: Any) -> Any:

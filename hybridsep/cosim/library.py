@@ -5,8 +5,12 @@ The adapters of FMUs (``fmus.py``) have the same attributes and methods.
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from collections import deque
+from typing import Any, Protocol
 
+from ..base.settings import check
+from ..base.signals import check_position
 from ..compensate.compensator import SepCompensator
 from ..online.look_ahead import LookAhead
 from ..plants.encoder import Encoder
@@ -14,7 +18,36 @@ from ..plants.plant import Plant
 from ..predict.predictor import HybridPredictor
 from .run import COMPENSATOR, PREDICTOR, Kind
 
-__all__ = ["LibraryController", "LibraryDrive"]
+__all__ = ["Compensator", "LibraryController", "LibraryDrive", "OwnController"]
+
+
+class Compensator(Protocol):
+    """Interface of a compensator of your own in a run; :class:`SepCompensator` has it too.
+
+    Attributes
+    ----------
+    T_s : float
+        Sampling interval, s.
+    delay : int
+        Samples by which it delays the command, its look-ahead, ≥ 1.
+    """
+
+    @property
+    def T_s(self) -> float:
+        """Sampling interval, s."""
+
+    @property
+    def delay(self) -> int:
+        """Samples by which it delays the command."""
+
+    def restart(self, start: float) -> None:
+        """Begin a run at rest at ``start``, m."""
+
+    def step(self, x_d_ahead: float, x_meas: float) -> float:
+        """Process one sample: the command for ``delay`` samples later and the position measured now, m.
+
+        Return the command of the next sample, m.
+        """
 
 
 class LibraryController:
@@ -65,6 +98,46 @@ class LibraryController:
     def step(self, k: int, x_d_ahead: float, x_meas: float) -> None:
         """Take in sample ``k``, m, and move on to the next."""
         self._look_ahead.sample(x_d_ahead, x_meas)
+
+
+class OwnController:
+    """A compensator of the user's own; a run has NaN for the predictions that it does not make.
+
+    Raises
+    ------
+    ParameterError
+        If ``T_s`` or ``delay`` is out of range.
+    """
+
+    name: str = "the compensator"
+    kind: Kind = COMPENSATOR
+    late: int = 0
+
+    def __init__(self, compensator: Compensator) -> None:
+        self._compensator = compensator
+        self.T_s: float = check("T_s", compensator.T_s, label="the compensator's T_s")
+        self.delay = self.Np = int(check("Np", compensator.delay, label="the compensator's delay"))
+
+    def initialise(self, start: float) -> None:
+        """Begin a run at rest at ``start``, m."""
+        self._compensator.restart(start)
+        self._x_dm, self._ahead = start, deque([start] * self.delay)
+
+    def outputs(self) -> tuple[tuple[float, ...], int]:
+        """Return the positions of the kind's outputs, m, and the state, now."""
+        return (self._x_dm, self._ahead[0], *(math.nan,) * 3), 0
+
+    def n_rejected(self) -> int:
+        """Return 0: it does not tell."""
+        return 0
+
+    def step(self, k: int, x_d_ahead: float, x_meas: float) -> None:
+        """Take in sample ``k``, m, and move on to the next."""
+        x_dm = float(self._compensator.step(x_d_ahead, x_meas))
+        check_position("the compensator's command", x_dm, f" at sample {k}")
+        self._x_dm = x_dm
+        self._ahead.append(x_d_ahead)
+        self._ahead.popleft()
 
 
 class LibraryDrive:

@@ -25,7 +25,7 @@ from ..compensate.compensator import SepCompensator
 from ..plants.encoder import Encoder
 from ..plants.plant import Plant
 from ..predict.predictor import HybridPredictor
-from .library import LibraryController, LibraryDrive
+from .library import Compensator, LibraryController, LibraryDrive, OwnController
 from .run import Run
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ Progress = Callable[[int, int], object]
 
 
 def cosimulate(
-    controller: str | Path | HybridPredictor | SepCompensator,
+    controller: str | Path | HybridPredictor | SepCompensator | Compensator,
     plant: str | Path | Plant,
     r: ArrayLike,
     *,
@@ -61,10 +61,11 @@ def cosimulate(
 
     Parameters
     ----------
-    controller : str, Path, HybridPredictor or SepCompensator
-        An FMU's archive, or an object of the library, which begins a run with what it has learned kept.
+    controller : str, Path, HybridPredictor, SepCompensator or Compensator
+        An FMU's archive, an object of the library, which begins a run with what it has learned kept, or your own:
+        :class:`~hybridsep.cosim.library.Compensator`.
     plant : str, Path or Plant
-        An FMU's archive, or an object of the library, which is reset to rest at ``r(0)``.
+        An FMU's archive, an object of the library, or one of your own; it is reset to rest at ``r(0)``.
     r : (n,) array_like, m
         Commanded positions at ``k·T_s``.
     controller_values, plant_values : mapping, optional
@@ -143,11 +144,11 @@ def cosimulate(
 
 
 def _controller(
-    controller: str | Path | HybridPredictor | SepCompensator,
+    controller: str | Path | HybridPredictor | SepCompensator | Compensator,
     values: Mapping[str, Any] | None,
     t_init: float | None,
     start_time: float,
-) -> FmuController | LibraryController:
+) -> FmuController | LibraryController | OwnController:
     """Return the loop's adapter of a controller."""
     if isinstance(controller, (str, Path)):
         from .fmus import FmuController  # fmpy is loaded where an FMU is
@@ -155,7 +156,10 @@ def _controller(
         _refuse(t_init, "t_init is for a controller of the library; an FMU's is among its controller_values")
         return FmuController(controller, values or {}, start_time)
     _refuse(values, "controller_values are for an FMU; make the controller with these parameters")
-    return LibraryController(controller, t_init)
+    if isinstance(controller, HybridPredictor | SepCompensator):
+        return LibraryController(controller, t_init)
+    _refuse(t_init, "t_init is for a controller of the library; a compensator of your own has none")
+    return OwnController(controller)
 
 
 def _drive(

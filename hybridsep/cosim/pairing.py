@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from ..base.data_files import COMMANDS
 from ..base.errors import ParameterError
 from ..base.signals import Array
 from ..fmi.archive import fmu_names
@@ -17,9 +18,16 @@ from ..plants.trajectory import PAPER_LIMITS, read_trajectory, spiral, staircase
 from .fmus import check_controller, check_plant
 from .run import COMPENSATOR, PREDICTOR
 
-__all__ = ["check_pair", "check_predictor", "read_command", "values_to_build"]
+__all__ = ["check_pair", "check_predictor", "default_trajectory", "read_command", "values_to_build"]
 
 _WEIGHTS = "--weights go into an FMU that is built here; leave out --predictor"
+
+
+def default_trajectory(machine: str | Path) -> str:
+    """Return what is played where nothing is given: a fit's commands beside the machine file, else the staircase."""
+    path = Path(machine)
+    commands = path.with_name(COMMANDS)
+    return str(commands) if path.suffix == ".toml" and commands.is_file() else "staircase"
 
 
 def read_command(trajectory: str, axis: Machine, unit: str | None, T_s: float | None) -> Array:
@@ -86,7 +94,10 @@ def check_pair(
     """
     models = fmu_names(axis, flavour).values()
     if plant is None and "FeedDrive" not in models:
-        raise ParameterError(f"machine {axis.name} has no plant; name a plant FMU with --plant")
+        raise ParameterError(
+            f"machine {axis.name} has no plant: `hybridsep fit` writes one from a log of the axis; or name a plant "
+            "FMU with --plant"
+        )
     if predictor is None and model not in models:
         raise ParameterError(
             f"machine {axis.name} has no [drive_limits], which a compensator must keep; add them, or name a "

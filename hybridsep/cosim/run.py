@@ -6,15 +6,19 @@ import csv
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.metrics import batch_rms, hold, largest, peak_derivatives, reduction_percent, rms, rms_ratio, shares
 from ..base.output import written_text, written_whole
+from ..base.shown_results import html_table, line_plot, one_line
 from ..base.signals import Array
 from ..compensate.plan import SepState
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["COMPENSATOR", "PREDICTOR", "RESULT_SUFFIXES", "Kind", "Run", "save_columns"]
 
@@ -71,9 +75,11 @@ COMPENSATOR = Kind(
 """The loop is closed: the drive gets the modified command."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Run:
     """Signals of a run, without the first fill of the look-ahead.
+
+    It prints as one line, and as a table in a notebook; :meth:`plot` draws its errors over time.
 
     Attributes
     ----------
@@ -115,6 +121,26 @@ class Run:
     Np: int
     n_rejected: int = 0
     measurement_delay: int = 0
+
+    def __repr__(self) -> str:
+        """Return the main figures in one line."""
+        return one_line("Run", self._figures())
+
+    def _repr_html_(self) -> str:
+        return html_table(f"Run of a {self.kind.name}", self._figures())
+
+    def plot(self) -> Figure:
+        """Return a matplotlib figure over time, µm: errors of the predictions, or the tracking error and the change."""
+        if self.kind == PREDICTOR:
+            lines = {"physics model": self.x_meas - self.x_pb, "hybrid": self.x_meas - self.x_h}
+        else:
+            lines = {"tracking error": self.error, "change of the command": self.change}
+        return line_plot(self.t, {name: 1e6 * line for name, line in lines.items()}, "t [s]", "[µm]")
+
+    def _figures(self) -> dict[str, float | int]:
+        summary = self.summary()
+        names = ("rms_pb_um", "rms_hold_um", "rms_h_um", "tracking_rms_um", "tracking_max_um", "change_max_um")
+        return {name: summary[name] for name in ("n_samples", *names) if name in summary}
 
     @property
     def active(self) -> NDArray[np.bool_]:

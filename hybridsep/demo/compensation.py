@@ -62,7 +62,7 @@ def compensate(
     label : str
         Name of the case.
     advance : callable
-        Called with it and the name of each compensated run before that.
+        Called with it and the name of each run before that.
 
     Returns
     -------
@@ -74,6 +74,7 @@ def compensate(
     """
     cold = build_here(machine, "SepCompensator", out / "fmus", flavour, fmi=fmi)
     weights = out / f"{machine.name}.state"
+    advance(f"{label}, a run to learn from")
     train(machine, command, weights)
     warm = build_here(machine, "SepCompensator", out / "fmus" / "warm", flavour, weights=weights, fmi=fmi)
     runs: Runs = {}

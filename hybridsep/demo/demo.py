@@ -13,28 +13,33 @@ from ..fmi.flavours import FMI_VERSIONS, versions_of
 from ..machines.machine import load_machine
 from .cases import MACHINES, Summary, read_recorded, recorded_case, spiral_case, staircase_case
 from .compensation import COMPENSATED
+from .page import write_page
 from .published import PRINTED
 
 __all__ = ["demo", "demo_files", "processor_time"]
 
 SEEDS = 10
+"""Noise seeds that a full demonstration's staircase is averaged over."""
 
-_PROCESSOR_TIME = {"native": (100.0, 2.0), "python": (1000.0, 20.0)}
-"""Processor time of a demonstration without any noise seed and for each, s, by flavour.
-
-Native took 112 s with one seed and 114 s with ten; Python's FMUs take about ten times as long.
-"""
+_PROCESSOR_TIME = {
+    ("native", False): "10 seconds",
+    ("native", True): "a minute",
+    ("python", False): "2 minutes",
+    ("python", True): "20 minutes",
+}
+"""Rough processor time of a demonstration, by flavour and whether it is a full one."""
 
 Progress = Callable[[str, float], object]
 
 
-def demo_files(out: str | Path, flavour: str, *, emps: bool, fmi: str = FMI_VERSIONS[0]) -> list[Path]:
+def demo_files(
+    out: str | Path, flavour: str, *, full: bool = False, emps: bool = False, fmi: str = FMI_VERSIONS[0]
+) -> list[Path]:
     """Return all files that :func:`demo` writes, with or without the recorded axis; ParameterError as there."""
     out = Path(out)
-    files = [
-        out / name for name in ("summary.json", "spiral.png", "spiral_contour.png", *(["emps.png"] if emps else []))
-    ]
-    for case, name in MACHINES.items():
+    own = ["index.html", "summary.json", *(["spiral.png", "spiral_contour.png"] if full else [])]
+    files = [out / name for name in (*own, *(["emps.png"] if emps else []))]
+    for case, name in MACHINES.items() if full else [*MACHINES.items()][:1]:
         files += [out / f"{case}{what}{end}" for what in ("", "_compensated") for end in (".csv", ".png")]
         files.append(out / f"{name}.state")
         names = [fmu_names(load_machine(name), flavour, version) for version in versions_of(fmi, flavour)]
@@ -46,23 +51,21 @@ def demo_files(out: str | Path, flavour: str, *, emps: bool, fmi: str = FMI_VERS
     return files
 
 
-def processor_time(seeds: int, flavour: str) -> str:
+def processor_time(flavour: str, full: bool = False) -> str:
     """Return roughly how much processor time a demonstration takes, in words."""
-    fixed, each = _PROCESSOR_TIME[flavour]
-    minutes = (fixed + each * seeds) / 60.0
-    return f"about {minutes:.0f} minutes" if minutes > 1.5 else "about a minute"
+    return f"about {_PROCESSOR_TIME[flavour, full]}"
 
 
 def demo(
     out: str | Path,
     *,
+    full: bool = False,
     emps: str | Path | None = None,
-    seeds: int = SEEDS,
     flavour: str | None = None,
     fmi: str = FMI_VERSIONS[0],
     progress: Progress = lambda message, fraction: None,
 ) -> Summary:
-    """Build the FMUs, co-simulate the staircase and the spiral, write figures and ``summary.json``.
+    """Build the FMUs, co-simulate the staircase, write figures, ``summary.json`` and ``index.html``.
 
     First the predictor beside the uncompensated drive, then the compensator in its place.
 
@@ -70,10 +73,11 @@ def demo(
     ----------
     out : str or Path
         Folder for FMUs, figures, results and ``summary.json``; made if needed.
+    full : bool
+        Average the staircase over :data:`SEEDS` noise seeds instead of running the first one, and co-simulate the
+        spiral's axes too.
     emps : str or Path, optional
         A ``DATA_EMPS.mat`` to replay too.
-    seeds : int
-        Noise seeds the staircase is averaged over, ≥ 1.
     flavour : {"native", "python"}, optional
         Flavour of the FMUs; native where their libraries are there, if left out.
     fmi : str
@@ -102,7 +106,9 @@ def demo(
     recorded = None if emps is None else read_recorded(emps)  # first: a refusal must not come after minutes of work
     out = Path(out)
     out.mkdir(parents=True, exist_ok=True)
-    total = seeds + 7 + 3 * len(COMPENSATED) + (recorded is not None)
+    seeds = SEEDS if full else 1
+    cases = len(MACHINES) if full else 1
+    total = seeds + 6 * full + cases * (1 + len(COMPENSATED)) + (recorded is not None)
     done = 0
 
     def advance(message: str) -> None:
@@ -110,11 +116,9 @@ def demo(
         progress(message, done / total)
         done += 1
 
-    advance("build the staircase's FMUs")
-    summary: Summary = {
-        "staircase": staircase_case(out, seeds, flavour, advance, fmi),
-        **spiral_case(out, flavour, advance, fmi),
-    }
+    summary: Summary = {"staircase": staircase_case(out, seeds, flavour, advance, fmi)}
+    if full:
+        summary |= spiral_case(out, flavour, advance, fmi)
     if recorded is not None:
         advance("EMPS, a recorded axis")
         summary["emps"] = recorded_case(recorded, out)
@@ -122,5 +126,6 @@ def demo(
         case["printed"] = PRINTED[name]
     with written_text(out / "summary.json") as file:
         file.write(json.dumps(summary, indent=2) + "\n")
+    write_page(out, summary, demo_files(out, flavour, full=full, emps=recorded is not None, fmi=fmi))
     progress("done", 1.0)
     return summary

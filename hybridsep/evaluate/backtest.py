@@ -10,18 +10,22 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base.errors import SignalError
 from ..base.metrics import RunningErrors, last_residual
+from ..base.shown_results import html_table, line_plot, one_line
 from ..base.signals import PREDICTION_MAX, Array, as_measured, as_samples
 from ..base.threads import one_blas_thread
 from ..predict.predictor import HybridPredictor
 from .scores import Score, Scores
 from .verdict import Tally
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["Backtest", "Batch", "backtest", "backtest_stream"]
 
@@ -62,9 +66,11 @@ class Batch(NamedTuple):
     rms_h: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Backtest(Scores):
     """Result of a replay over arrays: scores and predictions.
+
+    It prints as one line, and as a table in a notebook; :meth:`plot` draws the errors window by window.
 
     Attributes
     ----------
@@ -86,6 +92,32 @@ class Backtest(Scores):
     batch_rms_pb: Array
     batch_rms_hold: Array
     batch_rms_h: Array
+
+    def __repr__(self) -> str:
+        """Return the RMS errors in one line."""
+        return one_line("Backtest", self._figures())
+
+    def _repr_html_(self) -> str:
+        return html_table("Prediction errors of a replay", self._figures())
+
+    def plot(self) -> Figure:
+        """Return a matplotlib figure of the RMS errors of each window, µm."""
+        lines = {
+            name: 1e6 * errors
+            for name, errors in (
+                ("physics model", self.batch_rms_pb),
+                ("hold", self.batch_rms_hold),
+                ("hybrid", self.batch_rms_h),
+            )
+        }
+        return line_plot(np.arange(float(self.n_batches)), lines, "window", "RMS prediction error [µm]")
+
+    def _figures(self) -> dict[str, float | int]:
+        score = self.overall
+        errors = {"rms_pb_um": score.rms_pb, "rms_hold_um": score.rms_hold, "rms_h_um": score.rms_h}
+        return {"n_samples": score.n_samples, "n_batches": self.n_batches} | {
+            name: 1e6 * error for name, error in errors.items()
+        }
 
 
 OnBatch = Callable[[Batch], object]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import ParameterError, SignalError
-from ..base.metrics import rms
+from ..base.metrics import peak_derivatives, rms
 from ..base.settings import DRIVE_LIMIT_ENTRIES, Limits
 from ..compensate.expected import expected_errors
 from ..evaluate.report import Report
@@ -18,10 +18,28 @@ from ..logs.units import Shown
 from ..machines.machine import Machine
 from ..tune.recordings import Recording
 
-__all__ = ["COMPENSATE", "drive_limits", "expected_tracking", "tracking_lines", "write_tracking"]
+__all__ = [
+    "COMPENSATE",
+    "LIMITS_WORDS",
+    "MARGINS",
+    "drive_limits",
+    "estimated_limits",
+    "expected_tracking",
+    "tracking_lines",
+    "write_tracking",
+]
 
 COMPENSATE = "physics"
 """Model that a new compensator starts with: that of the hybrid is chosen when it has been seen to be the better one."""
+
+MARGINS = np.array([1.25, 2.0, 5.0])
+"""Limits of velocity, acceleration and jerk relative to a log's largest: those of the machines that come with it."""
+
+LIMITS_WORDS = (
+    f"estimates, {', '.join(f'{one:g}' for one in MARGINS.tolist())} times the largest velocity, acceleration and jerk "
+    "of the log; replace them by those of your drive, and take out estimated = true, before a compensator moves it"
+)
+"""What the limits of :func:`estimated_limits` are."""
 
 _HOW = (
     "An estimate: the compensator plans in closed loop on the identified model, to which the residual of the log is "
@@ -46,6 +64,25 @@ def drive_limits(given: Mapping[str, float]) -> dict[str, float]:
             f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
         )
     return found
+
+
+def estimated_limits(recordings: Sequence[Recording], T_s: float) -> dict[str, Any]:
+    """Return entries of ``[drive_limits]`` from the motion of the commands, marked as estimates; empty without motion.
+
+    They are :data:`MARGINS` times the largest velocity, acceleration and jerk; the command may change by twice the
+    largest servo error.
+    """
+    long = [one for one in recordings if len(one.x_d) > 3]
+    peaks = np.array([peak_derivatives(one.x_d, T_s) for one in long]).reshape(-1, 3).max(axis=0, initial=0.0)
+    error = max((float(np.nanmax(np.abs(one.x_d - one.x), initial=0.0)) for one in long), default=0.0)
+    values = dict(zip(DRIVE_LIMIT_ENTRIES, (*(MARGINS * peaks).tolist(), 2.0 * error), strict=True))
+    found: dict[str, Any] = {}
+    for name, value in values.items():
+        declared = DRIVE_LIMIT_ENTRIES[name]
+        if not value >= (declared.minimum or 0.0):
+            return {}
+        found[name] = min(float(f"{value:.4g}"), float(declared.maximum or value))
+    return {**found, "estimated": True}
 
 
 def expected_tracking(

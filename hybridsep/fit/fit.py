@@ -14,11 +14,13 @@ from ..base.errors import IdentificationError, ParameterError
 from ..base.metrics import rms_ratio, shown_figure
 from ..base.output import written_text
 from ..base.settings import PredictorSettings
+from ..base.threads import one_blas_thread
 from ..fmi.flavours import FMI_VERSIONS
 from ..identify.model import machine_of
 from ..identify.operation import SAMPLES_MIN, identify_operation, unit_gain_model
 from ..identify.segments import in_time
 from ..logs.log import Log
+from ..logs.units import Shown
 from ..machines.machine import Machine
 from ..machines.seal import sealed
 from ..machines.text import machine_text
@@ -28,8 +30,10 @@ from ..reports.step_times import step_times
 from ..tune.choice import choose_settings, settings_for, window_scores
 from ..tune.period import period_hint
 from ..tune.recordings import Recording, Replay, replay, split_log
-from .compensation import COMPENSATE, expected_tracking
-from .files import build_fmus, fit_files
+from .compensation import COMPENSATE, LIMITS_WORDS, estimated_limits, expected_tracking
+from .files import build_fmus, fit_files, write_commands
+from .origin import fit_origin
+from .plant import commands_to_try, identified_plant, plant_words
 from .stages import Stages, key_of
 
 __all__ = ["Fit", "FitOptions", "fit"]
@@ -82,6 +86,8 @@ class Fit:
         Files that were written.
     tracking : dict
         Tracking errors to be expected, of :func:`~hybridsep.fit.compensation.expected_tracking`; empty without limits.
+    plant : dict
+        Plant to try with, of :func:`~hybridsep.fit.plant.identified_plant`.
     """
 
     machine: Machine
@@ -93,6 +99,7 @@ class Fit:
     judged: Replay
     files: tuple[Path, ...]
     tracking: dict[str, float | None] = field(default_factory=dict)
+    plant: dict[str, Any] = field(default_factory=dict)
 
     def summary(self) -> dict[str, Any]:
         """Return plain values: errors in m over the samples that judge, settings, identification, step times in s.
@@ -114,10 +121,18 @@ class Fit:
             "verdict": str(verdict),
         }
         settings = {name: getattr(self.machine.predictor_settings, name) for name in ("Np", "p", "q")}
-        parts = {"identification": self.identification, "tried": self.choice, "over_Np": self.windows}
-        return {"judged": judged, "settings": settings, **parts, "step_times": self.steps, "tracking": self.tracking}
+        parts: dict[str, Any] = {"identification": self.identification, "tried": self.choice, "over_Np": self.windows}
+        return {
+            "judged": judged,
+            "settings": settings,
+            **parts,
+            "step_times": self.steps,
+            "tracking": self.tracking,
+            "plant": self.plant,
+        }
 
 
+@one_blas_thread
 def fit(
     logs: Sequence[Log],
     out: Path,
@@ -199,22 +214,25 @@ def fit(
     predictor = HybridPredictor(model, settings)
     replayed = replay(predictor, recordings, progress=within(0.8, 0.83, "judge on the second half"))
     judged = replace(replayed, offset=found["offset"]).with_peers(within(0.83, 0.85, "peers on the second half"))
-    machine = _machine(options, logs, model, settings, changes)
+    plant = stages.result("plant", lambda: identified_plant(model, settings, recordings))
+    limits = dict(options.drive_limits) or estimated_limits(recordings, T_s)
+    machine = _machine(options, logs, model, settings, changes, plant["entries"], limits)
     with written_text(files["machine file"]) as file:
-        file.write(sealed(machine_text(machine, comments=[found["structure"]]), "fit"))
+        file.write(sealed(machine_text(machine, comments=_comments(found, machine, plant, logs[0].shown)), "fit"))
+    write_commands(files["commands to try"], commands_to_try(recordings), T_s, logs[0].unit)
     predictor.save(files["trained predictor"])
     tracking: dict[str, float | None] = {}
     if compensates:
         estimate = within(0.85, 0.87, "tracking error with compensation")
         tracking = stages.result("tracking", lambda: expected_tracking(machine, recordings, estimate))
-    steps: dict[str, float] = {}
-    if fmus:
-        built = build_fmus(machine, files, within(0.87, 0.95, "build the FMUs"), fmi)
-        progress("time the FMU's steps", 0.95)
-        steps = step_times(built, recordings[0].x_d, recordings[0].x)
-    else:
+    if not fmus:
         files = {what: path for what, path in files.items() if path.suffix != ".fmu"}
-    result = Fit(machine, found, choice, windows, steps, options.share, judged, tuple(files.values()), tracking)
+    result = Fit(machine, found, choice, windows, {}, options.share, judged, tuple(files.values()), tracking, plant)
+    if fmus:
+        origin = fit_origin(machine, logs, found, result.summary()["judged"], share=options.share, changes=changes)
+        built = build_fmus(machine, files, within(0.87, 0.95, "build the FMUs"), fmi, origin)
+        progress("time the FMU's steps", 0.95)
+        result = replace(result, steps=step_times(built, recordings[0].x_d, recordings[0].x))
     stages.keep("judged", result.summary()["judged"])
     progress("done", 1.0)
     return result
@@ -315,17 +333,42 @@ def _chosen(choice: Sequence[dict[str, Any]]) -> tuple[int, int]:
 
 
 def _machine(
-    options: FitOptions, logs: Sequence[Log], model: ModalModel, settings: PredictorSettings, changes: Sequence[str]
+    options: FitOptions,
+    logs: Sequence[Log],
+    model: ModalModel,
+    settings: PredictorSettings,
+    changes: Sequence[str],
+    plant: Mapping[str, Any],
+    limits: Mapping[str, Any],
 ) -> Machine:
+    """Return the machine; without limits that are estimates where no compensator is possible with its look-ahead."""
     name = options.name
-    sections: dict[str, Any] = {}
-    if options.drive_limits:
-        sections = {"drive_limits": dict(options.drive_limits), "compensator": {"compensate": COMPENSATE}}
+    sections: dict[str, Any] = {"plant": {"kind": "identified", **plant}} if plant else {}
+    compensation = {"drive_limits": dict(limits), "compensator": {"compensate": COMPENSATE}} if limits else {}
     known = {key: value for key in ("period", "measurement_delay") if (value := getattr(settings, key))}
-    return machine_of(
-        *(model, settings.input_hold, settings.T_s, name, f"Axis {name}, identified"),
-        unit=logs[0].unit,
-        sources=[f"identified from {log.path.name}, {len(log.t)} samples" for log in logs] + list(changes),
-        predictor={"Np": settings.Np, "p": settings.p, "q": settings.q, **known},
-        **sections,
-    )
+
+    def made(more: Mapping[str, Any]) -> Machine:
+        return machine_of(
+            *(model, settings.input_hold, settings.T_s, name, f"Axis {name}, identified"),
+            unit=logs[0].unit,
+            sources=[f"identified from {log.path.name}, {len(log.t)} samples" for log in logs] + list(changes),
+            predictor={"Np": settings.Np, "p": settings.p, "q": settings.q, **known},
+            **{**sections, **more},
+        )
+
+    try:
+        return made(compensation)
+    except ParameterError:
+        if options.drive_limits or not limits:
+            raise
+        return made({})
+
+
+def _comments(found: Mapping[str, Any], machine: Machine, plant: Mapping[str, Any], shown: Shown) -> list[str]:
+    """Return the lines at the head of the machine file: the structure, and what is no measurement in it."""
+    lines = [found["structure"]]
+    if machine.plant is not None:
+        lines.append(f"[plant]: {plant_words(plant, shown)}")
+    if machine.drive_limits is not None and machine.drive_limits.estimated:
+        lines.append(f"[drive_limits]: {LIMITS_WORDS}")
+    return lines

@@ -15,7 +15,7 @@ from ..tune.recordings import Recording
 __all__ = ["Stages", "key_of"]
 
 
-_FORMAT = 2
+_FORMAT = 3
 """Number of what the stages hold; it is counted up where that changes."""
 
 

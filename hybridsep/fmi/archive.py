@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 import zipfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,12 @@ __all__ = ["archived", "build_fmu", "fmu_files", "fmu_name", "fmu_names"]
 _SUFFIX = {("native", "2"): "", ("native", "3"): "Fmi3", ("python", "2"): "Py"}
 _ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 _FIRST = ("modelDescription.xml", "SystemStructure.ssd")
+
+_LEVEL = 9
+"""Of zlib's deflate; fixed, as another level, like another implementation, gives other bytes for the same content."""
+
+_COMPRESSED = ".fmu"
+"""Suffix of what is stored as it is."""
 
 
 def fmu_names(machine: Machine, flavour: str = FLAVOURS[0], fmi: str = FMI_VERSIONS[0]) -> dict[str, str]:
@@ -68,8 +74,9 @@ def build_fmu(
     targets: Sequence[str] | None = None,
     samples: ArrayLike | None = None,
     weights: str | Path | None = None,
-    on_target: Callable[[str], object] = lambda _target: None,
     fmi: str = FMI_VERSIONS[0],
+    origin: Mapping[str, Any] | None = None,
+    windows: bool = True,
 ) -> Path:
     """Build one FMU.
 
@@ -85,16 +92,18 @@ def build_fmu(
         Flavour of the FMU.
     targets : sequence of str, optional
         Platforms of a native FMU's binaries: of :data:`hybridsep.fmi.compiler.TARGET_NAMES`, ``"host"`` being this
-        machine. If left out: all platforms, or this machine where neither their libraries nor ``ziglang`` is there.
+        machine. If left out: all platforms where their libraries are there, else this machine.
     samples : (n,) array_like, m, optional
         Trajectory 3 of ReferenceTrajectory, at the machine's ``T_s``; played unless another one is chosen.
     weights : str or Path, optional
         File of :meth:`HybridPredictor.save`, trained with the settings of this FMU, for a SepCompensator best in
         closed loop (``compensator.predictor.save(...)``): the FMU starts with these weights, without a warm-up.
-    on_target : callable, optional
-        Called with each platform, as ``x86_64-linux``, whose library is not there and has to be compiled.
     fmi : {"2", "3"}
         Version of FMI, 2.0 or 3.0; the Python flavour has 2.0 alone.
+    origin : mapping, optional
+        What the FMU was made from, plain values: the FMU carries it as meta data (SRMD, SSP Traceability).
+    windows : bool
+        Whether a HybridPredictor shows the samples of its window, ``4·Np`` scalars or four arrays.
 
     Returns
     -------
@@ -121,24 +130,31 @@ def build_fmu(
     for given, what, models in users:
         if given is not None and model not in models:
             raise FmuError(f"{what} are for a {' or a '.join(models)}, {name} is a {model}")
-    how: dict[str, Any] = (
-        {} if flavour == "python" else {"targets": targets, "samples": samples, "on_target": on_target, "fmi": fmi}
-    )
+    how: dict[str, Any] = {} if flavour == "python" else {"targets": targets, "samples": samples, "fmi": fmi}
     path = Path(out) / f"{name}.fmu"
     path.parent.mkdir(parents=True, exist_ok=True)
     with written_whole(path) as file:
-        file.write(archived(fmu_files(machine, model, name, flavour, weights=weights, **how)))
+        files = fmu_files(machine, model, name, flavour, weights=weights, origin=origin, windows=windows, **how)
+        file.write(archived(files))
     return path
 
 
 def fmu_files(
-    machine: Machine, model: str, name: str, flavour: str, *, weights: str | Path | None = None, **how: Any
+    machine: Machine,
+    model: str,
+    name: str,
+    flavour: str,
+    *,
+    weights: str | Path | None = None,
+    origin: Mapping[str, Any] | None = None,
+    windows: bool = True,
+    **how: Any,
 ) -> dict[str, bytes]:
     """Return the content of an FMU: archive name → content.
 
     Parameters
     ----------
-    machine, flavour, weights
+    machine, flavour, weights, origin, windows
         As in :func:`build_fmu`.
     model : str
         ``HybridPredictor``, ``FeedDrive``, …
@@ -154,15 +170,15 @@ def fmu_files(
     """
     trained = None if weights is None else load_trained(weights, machine, model)
     description = fmu_description(
-        machine, model, name, samples=how.get("samples") is not None, warm=trained is not None
+        machine, model, name, samples=how.get("samples") is not None, warm=trained is not None, windows=windows
     )
     if flavour == "native":
-        return native_flavour.files(machine, description, trained=trained, **how)
-    return python_flavour.files(machine, description, trained=trained)
+        return native_flavour.files(machine, description, trained=trained, origin=origin, **how)
+    return python_flavour.files(machine, description, trained=trained, origin=origin)
 
 
 def archived(files: Mapping[str, bytes]) -> bytes:
-    """Return a zip whose bytes depend on nothing but its content: stored, as compressed ones depend on the zlib.
+    """Return a zip whose bytes depend on its content, and on the zlib of this Python, alone.
 
     Parameters
     ----------
@@ -170,9 +186,10 @@ def archived(files: Mapping[str, bytes]) -> bytes:
         Archive name → content; what readers that stream look for comes first.
     """
     file = io.BytesIO()
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
+    with zipfile.ZipFile(file, "w") as archive:
         for arcname in sorted(files, key=lambda key: (key not in _FIRST, key)):
             entry = zipfile.ZipInfo(arcname, _ZIP_TIME)
-            entry.compress_type, entry.external_attr, entry.create_system = zipfile.ZIP_STORED, 0o644 << 16, 3
-            archive.writestr(entry, files[arcname])
+            entry.external_attr, entry.create_system = 0o644 << 16, 3
+            how = zipfile.ZIP_STORED if arcname.endswith(_COMPRESSED) else zipfile.ZIP_DEFLATED
+            archive.writestr(entry, files[arcname], how, _LEVEL)
     return file.getvalue()

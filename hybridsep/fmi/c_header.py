@@ -61,6 +61,11 @@ class Layout:
     windows: tuple[tuple[Variable, ...], ...]
 
     @property
+    def window(self) -> int:
+        """Samples in each window, 0 if there are none."""
+        return len(self.windows[0]) if self.windows else 0
+
+    @property
     def starts(self) -> list[float]:
         """Start values of single variables and modes, 0 for what is calculated; windows have none."""
         return [float(variable.start or 0.0) for variable in (*self.scalars, *self.modes)]
@@ -106,7 +111,6 @@ def c_header(description: Mapping[str, object], guid: str, fmi: str = FMI_VERSIO
         Version of FMI.
     """
     name, layout = str(description["name"]), layout_of(variables_of(description))
-    window = len(layout.windows[0]) if layout.windows else 0
     starts = ",\n".join(
         f"    {_double(start)} /* {variable.name} */"
         for start, variable in zip(layout.starts, (*layout.scalars, *layout.modes), strict=True)
@@ -118,7 +122,7 @@ def c_header(description: Mapping[str, object], guid: str, fmi: str = FMI_VERSIO
 
 #define HSEP_GUID {_string(guid)}
 #define HSEP_N_MODES {len(layout.modes) // len(_MODE)}
-#define HSEP_WINDOW {window} /* samples in each window */
+#define HSEP_WINDOW {layout.window} /* samples in each window, 0 where they are left out */
 #define HSEP_N_STARTS (HSEP_N_SCALARS + HSEP_MODE_NUMBERS * HSEP_N_MODES)
 #define HSEP_N_VARIABLES (HSEP_N_STARTS + HSEP_N_WINDOWS * HSEP_WINDOW)
 #define HSEP_N_VALUES (HSEP_N_VARIABLES + HSEP_N_INTERPOLATED)

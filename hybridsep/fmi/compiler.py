@@ -4,10 +4,11 @@ Two toolchains: the ``ziglang`` wheel (``python -m ziglang cc``) for all platfor
 the host. Both give the same bytes for the same sources: they compile in a folder of their own, by relative names,
 without build ids, dates or debug information.
 
-The folders follow FMI 2.0: ``linux64``, ``win64`` and ``darwin64`` mean x86, and every other platform goes by FMI 3.0's
-tuples. An ARM library is therefore in ``aarch64-linux`` alone, never in ``linux64``, where an importer on x86 would
-find it; importers on ARM that look in ``linux64`` only say that they cannot load it, and can compile ``sources/``.
-``darwin64`` holds one universal file, for importers that look nowhere else on either kind of Mac.
+Every library lies in one folder. In FMI 2.0 these are the names that it has: ``linux64``, ``win64``, ``win32`` and
+``darwin64``, all of them x86; a platform without one goes by FMI 3.0's tuple. An ARM library is therefore in
+``aarch64-linux``, never in ``linux64``, where an importer on x86 would find it; importers on ARM that look in
+``linux64`` only say that they cannot load it, and can compile ``sources/``. ``darwin64`` holds one universal file for
+both kinds of Mac, as importers look nowhere else on either.
 """
 
 from __future__ import annotations
@@ -65,15 +66,15 @@ class Target:
     ----------
     triple : str
         Zig's name of it.
-    folders : tuple of str
-        Where importers look for the library, below ``binaries/``.
+    folder : str
+        Where importers of FMI 2.0 look for the library, below ``binaries/``.
     suffix : str
     flags : tuple of str
         Options besides :func:`compile_flags`.
     """
 
     triple: str
-    folders: tuple[str, ...]
+    folder: str
     suffix: str
     flags: tuple[str, ...] = ()
 
@@ -82,15 +83,15 @@ _ELF = ("-fPIC", "-Wl,--build-id=none", "-lm", "-ldl")
 
 TARGETS: Mapping[str, Target] = {
     # glibc 2.17: every Linux distribution since 2014
-    "x86_64-linux": Target("x86_64-linux-gnu.2.17", ("linux64", "x86_64-linux"), ".so", _ELF),
-    "aarch64-linux": Target("aarch64-linux-gnu.2.17", ("aarch64-linux",), ".so", _ELF),
-    "x86_64-windows": Target("x86_64-windows-gnu", ("win64", "x86_64-windows"), ".dll"),
+    "x86_64-linux": Target("x86_64-linux-gnu.2.17", "linux64", ".so", _ELF),
+    "aarch64-linux": Target("aarch64-linux-gnu.2.17", "aarch64-linux", ".so", _ELF),
+    "x86_64-windows": Target("x86_64-windows-gnu", "win64", ".dll"),
     # SSE2, not the x87, whose extra digits would give other numbers
-    "x86-windows": Target("x86-windows-gnu", ("win32", "x86-windows"), ".dll", ("-msse2", "-mfpmath=sse")),
-    "x86_64-darwin": Target("x86_64-macos.11.0", ("x86_64-darwin",), ".dylib", ("-fPIC",)),
-    "aarch64-darwin": Target("aarch64-macos.11.0", ("aarch64-darwin",), ".dylib", ("-fPIC",)),
+    "x86-windows": Target("x86-windows-gnu", "win32", ".dll", ("-msse2", "-mfpmath=sse")),
+    "x86_64-darwin": Target("x86_64-macos.11.0", "darwin64", ".dylib", ("-fPIC",)),
+    "aarch64-darwin": Target("aarch64-macos.11.0", "darwin64", ".dylib", ("-fPIC",)),
 }
-"""All platforms; the two Macs together also give ``darwin64``."""
+"""All platforms; the two Macs share a universal file."""
 
 ALL_TARGETS = tuple(TARGETS)
 _MACS = ("x86_64-darwin", "aarch64-darwin")
@@ -103,7 +104,7 @@ _FMI2_PLATFORMS: Mapping[str, tuple[str, ...]] = {
 }
 """FMI 2.0's names of platforms, which users know."""
 
-TARGET_NAMES = ("host", *TARGETS, *_FMI2_PLATFORMS)
+TARGET_NAMES = ("host", "all", *TARGETS, *_FMI2_PLATFORMS)
 """Allowed targets."""
 
 
@@ -140,7 +141,8 @@ def expanded(targets: Sequence[str]) -> tuple[str, ...]:
     """
     if unknown := sorted(set(targets) - set(TARGET_NAMES)):
         raise FmuError(f"no target {', '.join(unknown)}; there are {', '.join(TARGET_NAMES)}")
-    keys = (key for target in targets for key in _FMI2_PLATFORMS.get(target, (target,)))
+    several = {**_FMI2_PLATFORMS, "all": ALL_TARGETS}
+    keys = (key for target in targets for key in several.get(target, (target,)))
     return tuple(dict.fromkeys(host_target() if key == "host" else key for key in keys))
 
 
@@ -159,13 +161,13 @@ def placed(libraries: Mapping[str, bytes], name: str, fmi: str = FMI_VERSIONS[0]
     if fmi == "3":
         return {f"{key}/{name}{TARGETS[key].suffix}": library for key, library in libraries.items()}
     files = {
-        f"{place}/{name}{TARGETS[key].suffix}": library
+        f"{TARGETS[key].folder}/{name}{TARGETS[key].suffix}": library
         for key, library in libraries.items()
-        for place in TARGETS[key].folders
+        if key not in _MACS
     }
     macs = [libraries[key] for key in _MACS if key in libraries]
     if macs:
-        files[f"darwin64/{name}.dylib"] = universal(macs) if len(macs) > 1 else macs[0]
+        files[f"{TARGETS[_MACS[0]].folder}/{name}.dylib"] = universal(macs) if len(macs) > 1 else macs[0]
     return files
 
 
@@ -202,7 +204,9 @@ def compiler_for(target: str) -> Compiler:
         zig = (sys.executable, "-m", "ziglang", "cc", "-target", TARGETS[target].triple, "-fno-sanitize=undefined")
         return Compiler(zig, f"ziglang {version('ziglang')}")
     if target != host_target():
-        raise FmuError("compiling for other platforms needs ziglang: pip install ziglang, or ask for the target host")
+        raise FmuError(
+            f"compiling for {target} needs ziglang: pip install {ZIG.replace(' ', '==')}, or ask for the target host"
+        )
     chosen = os.environ.get("CC", "").split()
     for command in (chosen, ["cc"], ["gcc"], ["clang"]):
         if command and shutil.which(command[0]):
@@ -215,7 +219,7 @@ def compiled(
     jobs: Mapping[tuple[str, str], tuple[Compiler, Mapping[str, bytes]]],
     on_job: Callable[[tuple[str, str]], object] = lambda _job: None,
 ) -> dict[tuple[str, str], bytes]:
-    """Compile and link ``all.c`` into stripped shared libraries, as many at a time as there are processors.
+    """Compile and link ``all.c`` into stripped shared libraries, always as many as there are processors.
 
     Parameters
     ----------
@@ -242,9 +246,9 @@ def compiled(
             output = f"{name}{TARGETS[target].suffix}"
             commands.append(([*compiler.command, *flags, "all.c", "-o", output, *TARGETS[target].flags], folder))
         keys = list(jobs)
-        done = run_together(commands, lambda i: on_job(keys[i]))
-        for (name, target), (arguments, _), (status, complaint) in zip(keys, commands, done, strict=False):
+        for i, (status, complaint) in run_together(commands, lambda i: on_job(keys[i])).items():
             if status != 0:
+                (name, target), (arguments, _) = keys[i], commands[i]
                 said = f"{' '.join(arguments)}\n{complaint.strip()}"
                 raise FmuError(f"{name} cannot be compiled for {TARGETS[target].triple}: {said}")
         return {

@@ -1,16 +1,23 @@
-"""Title and GUID of an FMU, for both flavours."""
+"""Title, author, date and GUID of an FMU, for both flavours."""
 
 from __future__ import annotations
 
 import hashlib
 import json
+import os
 import uuid
 from collections.abc import Mapping
+from datetime import datetime, timezone
 
+from ..base.errors import FmuError
+from ..base.version import VERSION_DATE
 from ..machines.machine import Machine
 from ..machines.paper import PAPER_SETTINGS
 
-__all__ = ["content_guid", "fmu_title", "paper_note"]
+__all__ = ["author", "content_guid", "copyright_notice", "fmu_title", "generation_time", "paper_note"]
+
+_AUTHOR = "the hybridsep authors"
+_YEAR = "2026"
 
 _TITLES = {
     "HybridPredictor": "linear hybrid model: predicts the drive's position one look-ahead window early",
@@ -31,6 +38,33 @@ def paper_note(machine: Machine, model: str) -> str:
         return ""
     settings = ", ".join(f"{name} = {json.dumps(value)}" for name, value in PAPER_SETTINGS[machine.name].items())
     return f"; the paper's settings are {settings}"
+
+
+def author() -> str:
+    """Return the author of the FMUs, as LICENSE names him."""
+    return _AUTHOR
+
+
+def copyright_notice() -> str:
+    """Return the line of LICENSE."""
+    return f"Copyright (c) {_YEAR}, {_AUTHOR}"
+
+
+def generation_time() -> str:
+    """Return ``generationDateAndTime``: the day of this version, or ``$SOURCE_DATE_EPOCH``, never the clock's.
+
+    Raises
+    ------
+    FmuError
+        If the variable is no number of seconds.
+    """
+    epoch = os.environ.get("SOURCE_DATE_EPOCH")
+    if not epoch:
+        return f"{VERSION_DATE}T00:00:00Z"
+    try:
+        return datetime.fromtimestamp(int(epoch), timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")
+    except (ValueError, OverflowError, OSError):
+        raise FmuError(f"SOURCE_DATE_EPOCH must be a number of seconds since 1970, got {epoch!r}; unset it") from None
 
 
 def content_guid(files: Mapping[str, bytes], description: Mapping[str, object]) -> str:

@@ -10,9 +10,12 @@ from numpy.typing import ArrayLike
 
 from ..machines.machine import Machine
 from .fmi3_variables import Fmi3Variable, fmi3_variables
-from .model_description import add_items, begun, document, types_of, variable_attributes
+from .model_description import add_items, begun, document, types_of, variable_attributes, xml_text
 
 __all__ = ["fmi3_description"]
+
+_OWN_STEPS = ("FeedDrive",)
+"""Models whose internal steps divide the communication step; all others sample at T_s."""
 
 
 def fmi3_description(
@@ -41,8 +44,12 @@ def fmi3_description(
     own_table = [each.variable for each in table]
     named = {"instantiationToken": token}
     root = begun("modelDescription3.xml", machine, description, own_table, named, generation_tool, samples)
-    _, _, types, _, _, variables, structure = root
+    simulation, _, types, _, _, variables, structure = root
+    if description["model"] not in _OWN_STEPS:
+        simulation.set("fixedInternalStepSize", xml_text(machine.T_s))
     for variable, attributes in types_of(own_table):
+        # fmpy up to 0.3.23 reads no EnumerationType that has a description; the variable and the items have theirs
+        del attributes["description"]
         add_items(ET.SubElement(types, "EnumerationType", attributes), variable)
     if not len(types):
         root.remove(types)

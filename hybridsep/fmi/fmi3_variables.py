@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from .c_header import layout_of
-from .variables import Variable, variables_of
+from .variables import Variable, shown_variables
 
 __all__ = ["Fmi3Variable", "fmi3_variables"]
 
@@ -45,7 +45,7 @@ def fmi3_variables(description: Mapping[str, object]) -> list[Fmi3Variable]:
     description : mapping
         ``model``, ``parameters``, ``modes`` and ``unit`` unless it is m.
     """
-    layout = layout_of(variables_of(description))
+    layout = layout_of(shown_variables(description))
     found = [Fmi3Variable(variable) for variable in (*layout.scalars, *layout.modes)]
     for window in layout.windows:
         name = window[0].name.partition("[")[0]

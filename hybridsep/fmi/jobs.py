@@ -12,11 +12,14 @@ from ..machines.agree import check_interval
 from ..machines.machine import Machine, load_machine, machine_names
 from ..plants.trajectory import read_trajectory
 from .archive import fmu_names
+from .c_header import kind_of
+from .compiler import expanded
+from .description import fmu_description
 from .flavours import FMI_VERSIONS, versions_of
-from .libraries import check_available
+from .libraries import Library, check_available, default_targets
 from .warm_start import load_trained
 
-__all__ = ["Job", "extras_of", "jobs_of"]
+__all__ = ["Job", "extras_of", "jobs_of", "libraries_of"]
 
 Job = tuple[Machine, str, str, str]
 """An FMU to build: its machine, name and model, and the version of FMI."""
@@ -50,10 +53,25 @@ def jobs_of(
     return [job for job in jobs if not fmus or job[1] in fmus]
 
 
+def libraries_of(jobs: Sequence[Job], targets: Sequence[str]) -> list[Library]:
+    """Return the libraries of native FMUs for some platforms, the default ones if none is named."""
+    kinds = dict.fromkeys(kind_of(fmu_description(axis, model, name)) for axis, name, model, _ in jobs)
+    return [(kind, target) for target in expanded(targets or default_targets()) for kind in kinds]
+
+
 def extras_of(
-    jobs: Sequence[Job], weights: Path | None, trajectory: Path | None, unit: str | None, T_s: float | None
+    jobs: Sequence[Job],
+    weights: Path | None,
+    trajectory: Path | None,
+    unit: str | None,
+    T_s: float | None,
+    *,
+    windows: bool = True,
 ) -> dict[str, dict[str, Any]]:
-    """Return weights or samples of a trajectory for one of the FMUs: model → keywords of ``build_fmu``."""
+    """Return what is special about some of the FMUs: model → keywords of ``build_fmu``.
+
+    Weights and the samples of a trajectory are for one of them; ``windows=False`` for all that have windows.
+    """
     extras: dict[str, dict[str, Any]] = {}
     check_reading(unit, T_s)
     if weights is not None:
@@ -65,6 +83,11 @@ def extras_of(
         samples, found = read_trajectory(trajectory, unit=unit, T_s=T_s)
         check_interval(trajectory.name, found, axis)
         extras[model] = {"samples": samples}
+    if not windows:
+        if not any(model == "HybridPredictor" for _, _, model, _ in jobs):
+            names = ", ".join(name for _, name, _, _ in jobs)
+            raise ParameterError(f"--no-windows is for a HybridPredictor, this would build {names}; leave it out")
+        extras["HybridPredictor"] = {**extras.get("HybridPredictor", {}), "windows": False}
     return extras
 
 

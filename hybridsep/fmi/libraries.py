@@ -1,9 +1,9 @@
 """Shared libraries of the native FMUs, one for each kind and platform.
 
 A library serves all FMUs of its kind: what one FMU differs in is read from its resources
-(:mod:`hybridsep.fmi.table_file`). A wheel carries the libraries of all platforms, which its build compiles
-(``hatch_build.py``). In a checkout they are compiled when it is installed or they are first asked for, and kept in
-``build/binaries`` by a hash of sources and compiler.
+(:mod:`hybridsep.fmi.table_file`). Building a wheel compiles some (``hatch_build.py``): this machine's, of a release
+those of all platforms. Others are compiled when they are first asked for and kept, by a hash of sources and compiler,
+in a checkout's ``build/binaries`` or the user's cache.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -20,17 +20,20 @@ from ..base.errors import FmuError
 from ..base.output import written_whole
 from .c_header import KINDS, kind_header
 from .c_sources import c_sources, fmi_headers
-from .compiler import ALL_TARGETS, FLAGS, TARGETS, ZIG, compiled, compiler_for, expanded
+from .compiler import ALL_TARGETS, FLAGS, TARGETS, ZIG, compiled, compiler_for, expanded, host_target
 
 __all__ = [
+    "Library",
     "check_available",
     "chosen_targets",
     "compilers_of",
     "default_targets",
     "has_native",
+    "is_kept_here",
     "kept",
     "libraries",
     "library_paths",
+    "missing",
     "ready_targets",
 ]
 
@@ -42,9 +45,7 @@ Library = tuple[str, str]
 """A kind and a platform, a key of :data:`hybridsep.fmi.compiler.TARGETS`."""
 
 
-def libraries(
-    kind: str, targets: Sequence[str], on_target: Callable[[str], object] = lambda _target: None
-) -> dict[str, bytes]:
+def libraries(kind: str, targets: Sequence[str]) -> dict[str, bytes]:
     """Return the libraries of a kind: platform → library.
 
     Parameters
@@ -53,15 +54,13 @@ def libraries(
         Of :data:`hybridsep.fmi.c_header.KINDS`.
     targets : sequence of str
         Of :data:`hybridsep.fmi.compiler.TARGET_NAMES`.
-    on_target : callable, optional
-        Called with each platform whose library has to be compiled, when its compilation begins.
 
     Raises
     ------
     FmuError
         If a target is unknown, or a library is not there and cannot be compiled.
     """
-    paths = library_paths([(kind, target) for target in expanded(targets)], lambda wanted: on_target(wanted[1]))
+    paths = library_paths([(kind, target) for target in expanded(targets)])
     return {target: path.read_bytes() for (_, target), path in paths.items()}
 
 
@@ -70,28 +69,34 @@ def library_paths(
 ) -> dict[Library, Path]:
     """Return the files of libraries; those that are not there are compiled and kept.
 
+    Parameters
+    ----------
+    wanted : sequence of pairs
+    on_library : callable, optional
+        Called with each library that has to be compiled, when its compilation begins.
+
     Raises
     ------
     FmuError
         As :func:`libraries`.
     """
-    found = {library: path for library in wanted if (path := kept(library)) is not None}
-    missing = [library for library in wanted if library not in found]
-    compilers = {target: compiler_for(target) for _, target in missing}
-    places = {library: _place(compilers[library[1]].name, library) for library in missing}
-    jobs = {
-        (kind, target): (compilers[target], _sources(kind))
-        for kind, target in missing
-        if not places[kind, target].is_file()
-    }
+    compilers = {target: compiler_for(target) for _, target in missing(wanted)}
+    jobs = {(kind, target): (compilers[target], _sources(kind)) for kind, target in missing(wanted)}
     made = compiled(jobs, on_library)
     for library, content in made.items():
-        places[library].parent.mkdir(parents=True, exist_ok=True)
-        with written_whole(places[library]) as file:
+        place = _place(compilers[library[1]].name, library)
+        place.parent.mkdir(parents=True, exist_ok=True)
+        with written_whole(place) as file:
             file.write(content)
     if made:
         _forget_old_versions()
-    return {library: found.get(library) or places[library] for library in wanted}
+    return {library: kept(library) or _place(compiler_for(library[1]).name, library) for library in wanted}
+
+
+def missing(wanted: Iterable[Library]) -> list[Library]:
+    """Return the libraries that have to be compiled; FmuError where no compiler is there for one."""
+    absent = [library for library in wanted if kept(library) is None]
+    return [one for one in absent if not _place(compiler_for(one[1]).name, one).is_file()]
 
 
 def kept(library: Library) -> Path | None:
@@ -99,6 +104,14 @@ def kept(library: Library) -> Path | None:
     shipped = _SHIPPED / library[0] / f"{library[1]}{TARGETS[library[1]].suffix}"
     places = (shipped, _place(ZIG, library))
     return next((place for place in places if place.is_file()), None)
+
+
+def is_kept_here(kind: str) -> bool:
+    """Return whether a kind's library for this machine is there, and need not be compiled."""
+    try:
+        return kept((kind, host_target())) is not None
+    except FmuError:  # a platform that no library is for
+        return False
 
 
 def compilers_of(kind: str, targets: Sequence[str]) -> list[str]:
@@ -135,29 +148,24 @@ def has_native() -> bool:
 
 
 def default_targets() -> tuple[str, ...]:
-    """Return the targets where none are asked for: :func:`chosen_targets`, or this one where they cannot be had."""
-    chosen = chosen_targets()
-    try:
-        check_available(chosen)
-    except FmuError:
-        return ("host",)
-    return chosen
+    """Return the targets where none are asked for: those of ``$HYBRIDSEP_TARGETS``, or else :func:`ready_targets`."""
+    return (os.environ.get("HYBRIDSEP_TARGETS") and chosen_targets()) or ready_targets()
 
 
 def chosen_targets() -> tuple[str, ...]:
-    """Return the platforms of ``$HYBRIDSEP_TARGETS``, names with commas or ``none``; all if it is not set.
+    """Return the platforms of ``$HYBRIDSEP_TARGETS``, names with commas or ``none``; this one if it is not set.
 
     Raises
     ------
     FmuError
-        If a name is unknown.
+        If a name is unknown, or none is set and this machine is none of the platforms.
     """
-    chosen = os.environ.get("HYBRIDSEP_TARGETS", "")
-    return expanded(() if chosen == "none" else chosen.split(",")) if chosen else ALL_TARGETS
+    chosen = os.environ.get("HYBRIDSEP_TARGETS") or "host"
+    return expanded(() if chosen == "none" else chosen.split(","))
 
 
 def ready_targets() -> tuple[str, ...]:
-    """Return the targets of FMUs for a command's own use: all platforms, or this one if they had to be compiled."""
+    """Return all platforms where nothing has to be compiled for that, else this one."""
     return ALL_TARGETS if all(map(_all_kept, ALL_TARGETS)) else ("host",)
 
 

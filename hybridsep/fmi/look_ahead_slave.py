@@ -37,6 +37,9 @@ class LookAheadSlave(TableSlave):
     def new_model(self) -> HybridPredictor | Planner:
         """Make the predictor or planner from the parameters as they are now, with what the resources have learned."""
 
+    def retune(self) -> None:
+        """Take over the tunable parameters, from the next window on."""
+
     def physics_model(self) -> ModalModel:
         """Return the physics model of the current parameters."""
         return ModalModel([Mode(**mode) for mode in modes_from(self.values)], self.values["dead_time"])
@@ -60,9 +63,8 @@ class LookAheadSlave(TableSlave):
 
     def advance(self, t: float, h: float) -> None:
         """Execute the samples that the step reaches."""
-        warning = self.inputs.advance(self.look_ahead, self.values["x_d_ahead"], self.values["x_meas"], t, h)
-        if warning:
-            self.warn_once(warning)
+        x_d_ahead, x_meas = self.values["x_d_ahead"], self.values["x_meas"]
+        self.warn_once(self.inputs.advance(self.look_ahead, x_d_ahead, x_meas, t, h, begin=self.retune))
 
     def core_state(self) -> tuple[dict[str, Any], bytes]:
         """Return the clock with the inputs of the sample in progress, and the look-ahead."""

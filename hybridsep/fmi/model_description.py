@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike
 
 from ..base.version import __version__
 from ..machines.machine import Machine
-from .content import fmu_title, paper_note
+from .content import author, copyright_notice, fmu_title, generation_time, paper_note
 from .experiment import stop_time
 from .flavours import FMI_VERSIONS
-from .variables import INTERPOLATED, Variable, variables_of
+from .variables import INTERPOLATED, Variable, shown_variables
 
 __all__ = [
     "add_items",
@@ -58,7 +58,7 @@ def model_description(
     samples : (n,) array_like, m, optional
         Trajectory that a ReferenceTrajectory was built with.
     """
-    table = variables_of(description)
+    table = shown_variables(description)
     root = begun("modelDescription.xml", machine, description, table, {"guid": guid}, generation_tool, samples)
     simulation, _, types, _, _, variables, structure = root
     simulation.attrib |= {
@@ -107,7 +107,10 @@ def begun(
         **token,
         "description": fmu_title(machine, model) + paper_note(machine, model),
         "version": __version__,
+        "author": author(),
+        "copyright": copyright_notice(),
         "generationTool": generation_tool,
+        "generationDateAndTime": generation_time(),
     }
     simulation.set("modelIdentifier", name)
     used = {variable.unit for variable in table}
@@ -188,7 +191,8 @@ def variable_attributes(
     own = {
         "name": variable.name,
         "valueReference": str(reference),
-        "description": variable.description,
+        # in a tool's flat list a description stands alone
+        "description": f"{variable.group}: {variable.description}" if variable.group else variable.description,
         "causality": variable.causality,
         "variability": variable.variability,
     }

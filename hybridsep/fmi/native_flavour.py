@@ -13,9 +13,8 @@ from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
@@ -29,14 +28,15 @@ from .c_header import c_header, kind_of
 from .c_sources import FMI_HEADERS, c_sources, fmi_headers
 from .compiler import placed
 from .content import content_guid
-from .description import fmu_description
 from .flavours import FMI_VERSIONS
 from .fmi3_description import fmi3_description
-from .host_fmu import host_fmu
 from .libraries import compilers_of, default_targets, libraries
 from .model_description import build_description, model_description
-from .pages import icon, index_page
-from .reference import has_reference, reference_files
+from .pages import compile_note, dependencies_note, icon, index_page, reference_note
+from .reference import has_reference
+from .reference_run import reference_run
+from .related_files import MANIFEST_FILE, manifest
+from .resource_data import RESOURCE_DATA_FILE, resource_data
 from .table_file import TABLE_FILE, table_file
 from .terminals import ICON_FILE, TERMINALS_FILE, terminals_and_icons
 
@@ -46,6 +46,17 @@ if TYPE_CHECKING:
 __all__ = ["files", "sources"]
 
 _TRAJECTORY_MAGIC = b"HSEPTRJ1"
+
+_DEPENDENCIES = """\
+What a platform must have besides the FMU:
+
+Linux, x86-64 and ARM64   the C library and libm, glibc 2.17 or newer
+Windows, 64 and 32 bit    the Universal C Runtime: part of Windows 10 and newer, an update of older ones (KB2999226)
+macOS, both kinds         macOS 11 or newer
+
+It starts no other program, opens no connection, and reads no file but its own resources.
+Elsewhere compile sources/all.c (documentation/index.html), which needs a C99 compiler and libm.
+"""
 _RUNTIME_LICENSES = """\
 Binaries that Zig compiled (extra/org.cyclonedx/bom.json) have parts of its run-time library:
 
@@ -62,7 +73,7 @@ def files(
     targets: Sequence[str] | None = None,
     samples: ArrayLike | None = None,
     trained: HybridPredictor | None = None,
-    on_target: Callable[[str], object] = lambda _target: None,
+    origin: Mapping[str, Any] | None = None,
     fmi: str = FMI_VERSIONS[0],
 ) -> dict[str, bytes]:
     """Return all files of one FMU: archive name → content.
@@ -72,10 +83,12 @@ def files(
     machine : Machine
     description : mapping
         ``model``, ``name``, ``parameters`` and ``modes``.
-    targets, samples, on_target, fmi
+    targets, samples, fmi
         As in :func:`hybridsep.fmi.archive.build_fmu`.
     trained : HybridPredictor, optional
         Trained predictor with which a HybridPredictor or SepCompensator starts warm.
+    origin : mapping, optional
+        As in :func:`hybridsep.fmi.archive.build_fmu`.
 
     Raises
     ------
@@ -87,8 +100,13 @@ def files(
     del content["sources/hsep_fmu.h"]  # names the GUID
     content |= {f"documentation/licenses/{file}": text for file, text in _licenses().items()}
     needs = "The FMU needs nothing but its own binary; on Windows before 10 also the Universal C Runtime (KB2999226)."
-    page = index_page(machine, description, needs, reference=has_reference(description), fmi=fmi)
-    content["documentation/index.html"] = page
+    content |= dependencies_note(_DEPENDENCIES)
+    reference = "this FMU" if has_reference(description) else None
+    if reference:
+        content |= reference_note(description)
+    content["documentation/index.html"] = index_page(
+        machine, description, needs, reference=reference, sources=compile_note(name, fmi), fmi=fmi
+    )
     if fmi == "3":
         content |= {ICON_FILE: icon(model), TERMINALS_FILE: terminals_and_icons(model)}
     else:
@@ -110,40 +128,15 @@ def files(
         content["modelDescription.xml"] = model_description(
             machine, description, guid, tool, native=True, samples=samples
         )
-    if has_reference(description):
-        content |= _reference(machine, description, guid, content, samples, trained)
+    if reference:
+        content |= reference_run(machine, description, guid, content, native=True, samples=samples, trained=trained)
+    if origin is not None:
+        content[RESOURCE_DATA_FILE] = resource_data(name, guid, origin)
     kind, targets = kind_of(description), targets or default_targets()
-    compiled = libraries(kind, targets, on_target)
+    compiled = libraries(kind, targets)
     content[BILL_FILE] = bill_of_materials(name, guid, native_parts(compilers_of(kind, targets), list(compiled)))
+    content[MANIFEST_FILE] = manifest(content)
     return content | {f"binaries/{path}": library for path, library in placed(compiled, name, fmi).items()}
-
-
-def _reference(
-    machine: Machine,
-    description: Mapping[str, object],
-    guid: str,
-    content: Mapping[str, bytes],
-    samples: ArrayLike | None,
-    trained: HybridPredictor | None,
-) -> dict[str, bytes]:
-    """Return the reference results of the FMU itself, where this machine can run it; else the library's.
-
-    Platforms differ in the last digits, so they stay out of the GUID, as the binaries do.
-    """
-    folder = "resources/"
-    resources = {file.removeprefix(folder): data for file, data in content.items() if file.startswith(folder)}
-    plant = None if machine.plant is None else fmu_description(machine, "FeedDrive", "drive")
-    with ExitStack() as running:
-        fmu = running.enter_context(host_fmu(description, guid, resources, machine.T_s))
-        if fmu is not None:
-            drive = None if plant is None else running.enter_context(host_fmu(plant, "{drive}", {}, machine.T_s))
-            return reference_files(machine, description, fmu, drive)
-    # what the library's models need loads slowly
-    from .reference_models import library_models
-
-    return reference_files(
-        machine, description, *library_models(machine, description, samples=samples, trained=trained)
-    )
 
 
 def sources(description: Mapping[str, object], guid: str, fmi: str = FMI_VERSIONS[0]) -> dict[str, bytes]:

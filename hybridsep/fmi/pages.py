@@ -11,18 +11,32 @@ from ..machines.machine import Machine
 from .content import fmu_title, paper_note
 from .flavours import FMI_VERSIONS
 from .fmi3_variables import fmi3_variables
+from .related_files import AGREEMENT, RELATED_FOLDER
 from .tables import grouped_table
-from .variables import variables_of
+from .variables import shown_variables
 
-__all__ = ["filled", "icon", "index_page"]
+__all__ = ["compile_note", "dependencies_note", "filled", "icon", "index_page", "reference_note"]
 
 _HERE = Path(__file__).parent
 
 _PARTNERS = {"SepCompensator": ("SepCompensator", "x_dm")}
 """FMU between trajectory and drive on the wiring diagram, and its output to the drive; else HybridPredictor, x_d."""
 
-_AGREEMENT_DIGITS = {"SepCompensator": 9}
-"""Decimals, m, to which the reference agrees; else 11. The iteration for a bounded plan amplifies rounding."""
+_PLAIN_NAMES = {"2": "-DFMI2_FUNCTION_PREFIX=", "3": "-DFMI3_OVERRIDE_FUNCTION_PREFIX"}
+"""Option with which the standard's headers give the FMI functions their plain names, by the version of FMI."""
+
+_REFERENCE_NOTE = """\
+The reference experiment of {name}, in extra/org.fmi-standard.fmi-ls-ref:
+
+fmi-ls-manifest.xml   the files with their roles and checksums (FMI-LS-REF 1.0.0-alpha.1)
+reference.exp         times, inputs and outputs (the Modelica Association's format of experiments)
+{inputs}{name}_ref.csv   outputs at every communication point
+{name}_ref.opt   the times again, as FMI's cross-check had them
+
+It is a smoke test: set nothing but the inputs, step by the stated step size, and compare the outputs. They agree within
+1e-{digits:02} m (of flags and numbers of windows: exactly), far below the tolerance of 1e-4 that is stated for tools.
+With other steps inputs are read at other times, and the outputs are others.
+"""
 
 _SOURCES = {
     "ReferenceTrajectory": (
@@ -50,8 +64,9 @@ def index_page(
     description: Mapping[str, object],
     needs: str,
     *,
-    reference: bool = False,
+    reference: str | None = None,
     limits: str = "",
+    sources: str = "",
     fmi: str = FMI_VERSIONS[0],
 ) -> bytes:
     """Return the documentation page of an FMU.
@@ -64,23 +79,24 @@ def index_page(
         ``model``, ``name``, ``parameters`` and ``modes``.
     needs : str
         Requirements of the FMU, one sentence.
-    reference : bool
-        Whether the archive has a reference result.
-    limits : str
-        Section on the limits of the FMU's flavour, HTML.
+    reference : str, optional
+        What the archive's reference result comes from; None if it has none.
+    limits, sources : str
+        Section on the limits of the FMU's flavour, and on compiling its sources, HTML.
     fmi : {"2", "3"}
         Version of FMI, whose types are named.
     """
     model, name = str(description["model"]), str(description["name"])
-    table = variables_of(description) if fmi == "2" else [each.shown for each in fmi3_variables(description)]
+    table = shown_variables(description) if fmi == "2" else [each.shown for each in fmi3_variables(description)]
     rows = "\n".join(
-        f'<tbody>\n<tr><th colspan="5" scope="rowgroup">{html.escape(heading)}</th></tr>\n{_rows(group)}\n</tbody>'
+        f'<tbody>\n<tr><th colspan="6" scope="rowgroup">{html.escape(heading)}</th></tr>\n{_rows(group)}\n</tbody>'
         for heading, group in grouped_table(table).items()
     )
     has_inputs = model != "ReferenceTrajectory"
-    inputs = f', fed with <a href="reference/{name}_in.csv">reference/{name}_in.csv</a>' if has_inputs else ""
-    digits = _AGREEMENT_DIGITS.get(model, 11)
-    sources = _SOURCES.get(model, machine.sources) or ("none is named in the machine file",)
+    table_of_inputs = f'<a href="../{RELATED_FOLDER}/{name}_in.csv">{name}_in.csv</a>'
+    run = {"folder": RELATED_FOLDER, "origin": reference, "inputs": f", fed with {table_of_inputs}" * has_inputs}
+    digits = AGREEMENT.get(model, 11)
+    named = _SOURCES.get(model, machine.sources) or ("none is named in the machine file",)
     partner, command = _PARTNERS.get(model, ("HybridPredictor", "x_d"))
     page = filled(
         "index",
@@ -91,12 +107,31 @@ def index_page(
         partner=partner,
         command=command,
         rows=rows,
-        reference=filled("reference", name=name, inputs=inputs, digits=digits) if reference else "",
+        reference=filled("reference", name=name, digits=digits, **run) if reference else "",
         limits=limits,
-        sources="\n".join(f"<li>{html.escape(source)}</li>" for source in sources),
+        compiling=sources,
+        sources="\n".join(f"<li>{html.escape(source)}</li>" for source in named),
     )
     return f"{page}\n".encode()
 
 
-def _rows(group: list[tuple[str, str, str, str, str]]) -> str:
+def compile_note(name: str, fmi: str) -> str:
+    """Return the section on compiling the sources of an FMU with a model identifier, HTML."""
+    return filled("compile", name=name, version=f"{fmi}.0", plain=_PLAIN_NAMES[fmi])
+
+
+def dependencies_note(text: str) -> dict[str, bytes]:
+    """Return the file that says what an FMU needs, FMI's name for it → its content."""
+    return {"documentation/externalDependencies.txt": text.encode()}
+
+
+def reference_note(description: Mapping[str, object]) -> dict[str, bytes]:
+    """Return the file that says how to use the reference experiment, LS-REF's name for it → its content."""
+    model, name = str(description["model"]), str(description["name"])
+    inputs = f"{name}_in.csv   inputs at every communication point\n" if model != "ReferenceTrajectory" else ""
+    text = _REFERENCE_NOTE.format(name=name, inputs=inputs, digits=AGREEMENT.get(model, 11))
+    return {"documentation/fmi-ls-ref.txt": text.encode()}
+
+
+def _rows(group: list[tuple[str, str, str, str, str, str]]) -> str:
     return "\n".join("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>" for row in group)

@@ -6,19 +6,25 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
+from tempfile import TemporaryFile
+from typing import IO
 
 from ..base.interrupt import uninterrupted
 
 __all__ = ["run_together"]
 
+_PAUSE = 0.02
+"""Time between two looks for commands that have ended, s."""
+
 
 def run_together(
     commands: Sequence[tuple[Sequence[str], Path]], on_start: Callable[[int], object] = lambda _i: None
-) -> list[tuple[int, str]]:
-    """Run commands, each in its folder, as many at a time as there are processors.
+) -> dict[int, tuple[int, str]]:
+    """Run commands, each in its folder, always as many as there are processors.
 
     Parameters
     ----------
@@ -28,49 +34,63 @@ def run_together(
 
     Returns
     -------
-    list of (int, str)
-        Exit status and standard error of each, up to the first that fails; then, as at Ctrl-C, the others are ended.
+    dict of int to (int, str)
+        Number of each command → its exit status and standard error, in the order in which they ended, up to the first
+        that fails; then, as at Ctrl-C, the others are ended.
     """
-    at_a_time, results = os.cpu_count() or 1, []
-    running: list[subprocess.Popen[str]] = []
+    at_a_time, results = os.cpu_count() or 1, {}
+    running: dict[int, tuple[subprocess.Popen[bytes], IO[bytes]]] = {}
+    waiting = list(range(len(commands)))
     try:
-        for i in range(0, len(commands), at_a_time):
-            for j, (command, folder) in enumerate(commands[i : i + at_a_time], i):
-                on_start(j)
-                _start(command, folder, running)
-            for process in running[i:]:
-                _, complaint = process.communicate()
-                results.append((process.returncode, complaint))
-                if process.returncode != 0:
+        while waiting or running:
+            while waiting and len(running) < at_a_time:
+                i = waiting.pop(0)
+                on_start(i)
+                _start(i, *commands[i], running)
+            ended = [i for i, (process, _) in running.items() if process.poll() is not None]
+            for i in ended:
+                results[i] = _taken(*running.pop(i))
+                if results[i][0] != 0:
                     return results
+            if not ended:
+                time.sleep(_PAUSE)
         return results
     finally:
-        for process in running:
-            if process.poll() is None:
-                _end(process)
+        for process, complaints in running.values():
+            _end(process)
+            complaints.close()
 
 
 @uninterrupted
-def _start(command: Sequence[str], folder: Path, running: list[subprocess.Popen[str]]) -> None:
+def _start(
+    i: int, command: Sequence[str], folder: Path, running: dict[int, tuple[subprocess.Popen[bytes], IO[bytes]]]
+) -> None:
     """Start a process and add it to those that run."""
-    running.append(
+    complaints = TemporaryFile()  # noqa: SIM115, a file rather than a pipe: nobody has to read it meanwhile
+    running[i] = (
         subprocess.Popen(
             command,
             cwd=folder,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
-            errors="replace",
+            stderr=complaints,
             start_new_session=True,  # a compiler has children of its own, which end with the group
-        )
+        ),
+        complaints,
     )
 
 
-def _end(process: subprocess.Popen[str]) -> None:
+def _taken(process: subprocess.Popen[bytes], complaints: IO[bytes]) -> tuple[int, str]:
+    """Return exit status and standard error of a process that has ended."""
+    with complaints:
+        complaints.seek(0)
+        return process.returncode, complaints.read().decode(errors="replace")
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
     if sys.platform == "win32":
         process.terminate()
     else:
         with suppress(ProcessLookupError):  # it has just ended
             os.killpg(process.pid, signal.SIGTERM)
-    process.communicate()
+    process.wait()

@@ -12,7 +12,7 @@ import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pythonfmu
 
@@ -23,8 +23,12 @@ from .bill_of_materials import BILL_FILE, bill_of_materials, python_parts
 from .content import content_guid
 from .imported import imported_modules
 from .model_description import model_description
-from .pages import filled, icon, index_page
+from .pages import dependencies_note, filled, icon, index_page, reference_note
 from .pythonfmu_limits import checked_version, pythonfmu_license
+from .reference import has_reference
+from .reference_run import reference_run
+from .related_files import MANIFEST_FILE, manifest
+from .resource_data import RESOURCE_DATA_FILE, resource_data
 
 if TYPE_CHECKING:
     from ..predict.predictor import HybridPredictor
@@ -37,12 +41,27 @@ _SLAVES = {
     "FeedDrive": "feed_drive.py",
 }
 
+_DEPENDENCIES = """\
+The importing tool's process must have
+
+Python   3.10 or newer, whose libpython the process has loaded, on Linux x86-64 or 64-bit Windows
+NumPy    1.24 or newer
+SciPy    1.11 or newer
+
+pythonfmu {} and the part of hybridsep that the FMU needs are in its resources. In a tool that is no Python itself the
+interpreter is found by the usual means: on Linux LD_PRELOAD with the path of libpython, PYTHONHOME, PYTHONPATH.
+"""
+
 _LAUNCHER = "launcher.py"
 """The module that pythonfmu loads first: an instance is refused where the slave cannot be loaded."""
 
 
 def files(
-    machine: Machine, description: Mapping[str, object], *, trained: HybridPredictor | None = None
+    machine: Machine,
+    description: Mapping[str, object],
+    *,
+    trained: HybridPredictor | None = None,
+    origin: Mapping[str, Any] | None = None,
 ) -> dict[str, bytes]:
     """Return all files of one FMU: archive name → content.
 
@@ -53,6 +72,8 @@ def files(
         ``model``, ``name``, ``parameters`` and ``modes``.
     trained : HybridPredictor, optional
         Trained predictor with which a HybridPredictor or SepCompensator starts warm.
+    origin : mapping, optional
+        As in :func:`hybridsep.fmi.archive.build_fmu`.
 
     Raises
     ------
@@ -69,7 +90,12 @@ def files(
     needs = "The FMU needs a Python 3 with NumPy and SciPy in the importing tool's process."
     limits = filled("pythonfmu_limits", version=version)
     content["model.png"] = icon(model)
-    content["documentation/index.html"] = index_page(machine, description, needs, limits=limits)
+    content |= dependencies_note(_DEPENDENCIES.format(version))
+    reference = "its native twin" if has_reference(description) else None
+    if reference:
+        content |= reference_note(description)
+    page = index_page(machine, description, needs, limits=limits, reference=reference)
+    content["documentation/index.html"] = page
     for source in ("linux64/libpythonfmu-export.so", "win64/pythonfmu-export.dll"):
         binary = Path(pythonfmu.__file__).parent / "resources" / "binaries" / source
         content[f"binaries/{Path(source).parent}/{name}{binary.suffix}"] = binary.read_bytes()
@@ -79,7 +105,12 @@ def files(
     content["resources/machine.json"] = json.dumps({**description, "content": guid}, indent=1, sort_keys=True).encode()
     tool = f"hybridsep {__version__} with pythonfmu {version}"
     content["modelDescription.xml"] = model_description(machine, description, guid, tool, native=False)
+    if reference:
+        content |= reference_run(machine, description, guid, content, native=False, trained=trained)
+    if origin is not None:
+        content[RESOURCE_DATA_FILE] = resource_data(name, guid, origin)
     content[BILL_FILE] = bill_of_materials(name, guid, python_parts(version))
+    content[MANIFEST_FILE] = manifest(content)
     return content
 
 

@@ -1,10 +1,10 @@
-"""Reference results in ``documentation/reference/``: inputs and expected outputs for importers.
+"""Reference experiment of an FMU: inputs and expected outputs for importers, in the folder of LS-REF.
 
-The files are named and written as the FMI cross-check has them: ``<name>_in.csv`` with the inputs at each
-communication point, ``<name>_ref.csv`` with the outputs there, ``<name>_ref.opt`` with the times of the run. All
-parameters have their start values. The outputs are the FMU's own where this machine can run it
-(:mod:`hybridsep.fmi.host_fmu`), else those of the library (:mod:`hybridsep.fmi.reference_models`); the tests compare
-both.
+``reference.exp`` describes it (:mod:`hybridsep.fmi.related_files`). The tables are named and written as the FMI
+cross-check had them: ``<name>_in.csv`` with the inputs at each communication point, ``<name>_ref.csv`` with the outputs
+there, ``<name>_ref.opt`` with the times of the run. All parameters have their start values. The outputs are the FMU's
+own where this machine can run it (:mod:`hybridsep.fmi.host_fmu`), else those of the library
+(:mod:`hybridsep.fmi.reference_models`); the tests compare both.
 """
 
 from __future__ import annotations
@@ -21,11 +21,10 @@ from ..base.signals import Array
 from ..machines.machine import Machine
 from ..plants.encoder import Encoder
 from ..plants.trajectory import staircase
+from .related_files import EXPERIMENT_FILE, RELATED_FOLDER, experiment
 from .variables import variables_of
 
-__all__ = ["REFERENCE_FOLDER", "ReferenceModel", "has_reference", "reference_files"]
-
-REFERENCE_FOLDER = "documentation/reference"
+__all__ = ["ReferenceModel", "has_reference", "reference_files"]
 
 _SAMPLES = 600
 """Length of a run; a look-ahead's is longer if its fill and warm-up are."""
@@ -69,7 +68,7 @@ def has_reference(description: Mapping[str, Any]) -> bool:
 def reference_files(
     machine: Machine, description: Mapping[str, Any], model: ReferenceModel, drive: ReferenceModel | None = None
 ) -> dict[str, bytes]:
-    """Return reference input, result and options of one FMU: archive name → content.
+    """Return experiment, input, result and options of one FMU: archive name → content.
 
     Parameters
     ----------
@@ -81,7 +80,8 @@ def reference_files(
         The machine's plant, behind a look-ahead; a linear drive 2 % off if left out.
     """
     table, T_s = variables_of(description), machine.T_s
-    names = [variable.name for variable in table if variable.causality == "output"]
+    outputs = {variable.name: variable.kind for variable in table if variable.causality == "output"}
+    names = list(outputs)
     given = [variable.name for variable in table if variable.causality == "input"]
     if description["model"] in ("HybridPredictor", "SepCompensator"):
         measure = _measurement(machine, drive)
@@ -91,14 +91,16 @@ def reference_files(
     else:
         rows = _played(model, [()] * (_SAMPLES + 1))
     times = [k * T_s for k in range(len(rows))]
-    base = f"{REFERENCE_FOLDER}/{description['name']}"
+    base = f"{RELATED_FOLDER}/{description['name']}"
     options = {"StartTime": 0.0, "StopTime": times[-1], "StepSize": T_s, "RelTol": _REL_TOL}
     files = {
-        f"{base}_ref.csv": _csv(times, names, [row[0] for row in rows], _RESULT_RESOLUTION),
+        f"{base}_ref.csv": _csv(times, outputs, [row[0] for row in rows], _RESULT_RESOLUTION),
         f"{base}_ref.opt": "".join(f"{name}, {number!r}\n" for name, number in options.items()).encode(),
     }
     if given:
-        files[f"{base}_in.csv"] = _csv(times, given, [row[1] for row in rows], _RESOLUTION)
+        files[f"{base}_in.csv"] = _csv(times, dict.fromkeys(given, "Real"), [row[1] for row in rows], _RESOLUTION)
+    name, model_name = str(description["name"]), str(description["model"])
+    files[EXPERIMENT_FILE] = experiment(name, model_name, options, inputs=bool(given))
     return files
 
 
@@ -168,11 +170,20 @@ def _command(machine: Machine, n: int) -> Array:
     return np.asarray(np.pad(command, (0, n - len(command)), mode="edge"))
 
 
-def _csv(times: Sequence[float], names: Sequence[str], rows: Sequence[Sequence[float]], decimals: int) -> bytes:
-    """Write columns over time, numbers so that they read back the same."""
-    head = ",".join(f'"{name}"' for name in ("time", *names))
+def _csv(times: Sequence[float], kinds: Mapping[str, str], rows: Sequence[Sequence[float]], decimals: int) -> bytes:
+    """Write columns over time, numbers so that they read back the same, whole ones and flags without a point.
+
+    ``kinds`` are those of the columns by name.
+    """
+    head = ",".join(f'"{name}"' for name in ("time", *kinds))
+    real = [kind == "Real" for kind in kinds.values()]
     lines = (
-        ",".join([repr(t), *(repr(round(float(number), decimals)) for number in row)])
+        ",".join(
+            [
+                repr(t),
+                *(repr(round(float(n), decimals) if is_real else int(n)) for n, is_real in zip(row, real, strict=True)),
+            ]
+        )
         for t, row in zip(times, rows, strict=True)
     )
     return "\n".join((head, *lines, "")).encode()

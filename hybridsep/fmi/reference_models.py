@@ -12,7 +12,7 @@ from ..base.signals import as_samples
 from ..machines.machine import Machine
 from ..online.look_ahead import LookAhead
 from ..plants.encoder import Encoder
-from ..plants.plant import Plant
+from ..plants.plant import Drive
 from ..plants.trajectory import staircase
 from ..predict.predictor import HybridPredictor
 from .reference import ReferenceModel
@@ -38,7 +38,7 @@ class _LookAheadModel:
 class _PlantModel:
     """A drive with its encoder."""
 
-    def __init__(self, plant: Plant, encoder: Encoder, T_s: float) -> None:
+    def __init__(self, plant: Drive, encoder: Encoder, T_s: float) -> None:
         self._plant, self._encoder, self._T_s = plant, encoder, T_s
         plant.reset(0.0)
 

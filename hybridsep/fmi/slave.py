@@ -77,6 +77,13 @@ def _read_description(resources: str) -> dict[str, Any]:
     return _LAST_READ[resources]
 
 
+class _References(dict[int, Any]):
+    """Variables by value reference; a reference to none is refused by its number and the range."""
+
+    def __missing__(self, reference: int) -> Any:
+        raise FmuError(f"value reference must be 0 … {len(self) - 1}, got {reference}")
+
+
 class TableSlave(Fmi2Slave):  # type: ignore[misc]
     """Slave whose variables come from its table and whose arithmetic is in the library.
 
@@ -93,11 +100,13 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
+        self.vars = _References()
         self.table_description = _read_description(self.resources)
         self.modelName = self.table_description["name"]
         self.table = variables_of(self.table_description)
         self.values: dict[str, Any] = {v.name: v.start for v in self.table if v.causality in ("input", "parameter")}
-        self.running = self.terminated = self.warned = False
+        self.running = self.terminated = False
+        self.warned: set[str] = set()
         self.start_time = 0.0
         self.stop_time: float | None = None
         for variable in self.table:
@@ -168,11 +177,12 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
         """Allow no more steps; values can still be read."""
         self.terminated = True
 
-    def warn_once(self, message: str) -> None:
-        """Log a warning, the first one of this instance alone."""
-        if not self.warned:
-            self.warned = True
-            self.log(f"{self.instance_name}: {message}", Fmi2Status.warning)
+    def warn_once(self, warnings: Mapping[str, str]) -> None:
+        """Log warnings, of each kind the first one of this instance alone."""
+        for kind, message in warnings.items():
+            if kind not in self.warned:
+                self.warned.add(kind)
+                self.log(f"{self.instance_name}: {message}", Fmi2Status.warning)
 
     # The whole state, not only the registered variables --------------------------------------------------------
 
@@ -252,7 +262,7 @@ class TableSlave(Fmi2Slave):  # type: ignore[misc]
         def assign(value: Any) -> None:
             if causality not in ("input", "parameter"):
                 raise FmuError(f"{name} is an {causality} variable and cannot be set")
-            if causality == "parameter" and self.running:
+            if causality == "parameter" and variable.variability == "fixed" and self.running:
                 raise FmuError(f"{name} is a fixed parameter and cannot be set after initialization, got {value!r}")
             self.values[name] = value
 

@@ -17,7 +17,7 @@ from .description import fmu_description
 from .flavours import FMI_VERSIONS
 from .fmi3_variables import fmi3_variables
 from .system_structure import SSP_VERSIONS, Component, Connection, parameter_set, system_structure
-from .variables import Variable, variables_of
+from .variables import Variable, shown_variables
 
 __all__ = ["build_system", "check_system"]
 
@@ -83,7 +83,7 @@ def build_system(
     for i, (part, kind) in enumerate(parts.items()):
         progress(kind, i / len(parts))
         name = fmu_name(kind, machine.name, "native", fmi)
-        how = {"targets": targets, "samples": samples if part == "reference" else None, "fmi": fmi}
+        how: dict[str, Any] = {"targets": targets, "samples": samples if part == "reference" else None, "fmi": fmi}
         files = fmu_files(machine, kind, name, "native", weights=weights if part == look_ahead else None, **how)
         content[f"resources/{name}.fmu"] = archived(files)
         warm = weights is not None and part == look_ahead
@@ -109,5 +109,5 @@ def build_system(
 def _variables(description: Mapping[str, Any], fmi: str) -> tuple[Variable, ...]:
     """Return an FMU's variables, of FMI 3.0 the scalar ones."""
     if fmi == FMI_VERSIONS[0]:
-        return tuple(variables_of(description))
+        return tuple(shown_variables(description))
     return tuple(each.variable for each in fmi3_variables(description) if each.size is None)

@@ -1,6 +1,7 @@
 """Documents of a system: ``SystemStructure.ssd`` and parameter sets, SSP 1.0 or 2.0, which has FMI 3.0's types.
 
 Enumerations are in neither: libcosim ends the process where it meets one. The FMUs' own start values hold for them.
+The system has no ``ssd:SystemGeometry``, which is optional: OMSimulator refuses a file with one.
 """
 
 from __future__ import annotations
@@ -96,8 +97,6 @@ def system_structure(
         _add_component(elements, component, i, sets[component.name])
     for connection in connections:
         _add_connection(wires, components, connection)
-    width = len(components) * (_WIDTH + _GAP) + _GAP
-    _add(system, "ssd:SystemGeometry", x1=0.0, y1=0.0, x2=width, y2=_HEIGHT + 2 * _GAP)
     master = {"description": "oms-ma", "stepSize": T_s, "absoluteTolerance": 1e-4, "relativeTolerance": 1e-4}
     annotation = _add(_add(system, "ssd:Annotations"), "ssc:Annotation", type="org.openmodelica")
     _add(_add(_add(annotation, "oms:Annotations"), "oms:SimulationInformation"), "oms:FixedStepMaster", **master)

@@ -1,8 +1,9 @@
 """Table ``resources/variables.bin`` of a native FMU: what a library that serves all FMUs of a kind reads of one.
 
-Layout, little-endian: ``HSEPVAR1``; as u64 the size of the file in bytes, the number of the kind's interface, the
-number of modes, and whether the axis is rotary; the GUID in 48 bytes, filled with zeros; as float64 the start values of
-single variables and of the modes' numbers; the CRC-32 of all before as u64.
+Layout, little-endian: ``HSEPVAR2``; as u64 the size of the file in bytes, the number of the kind's interface, the
+number of modes, whether the axis is rotary, and the samples of each window, 0 if it has none; the GUID in 48 bytes,
+filled with zeros; as float64 the start values of single variables and of the modes' numbers; the CRC-32 of all before
+as u64.
 """
 
 from __future__ import annotations
@@ -17,9 +18,9 @@ from .variables import variables_of
 __all__ = ["TABLE_FILE", "table_file"]
 
 TABLE_FILE = "variables.bin"
-_HEAD = struct.Struct("<8s4Q48s")
+_HEAD = struct.Struct("<8s5Q48s")
 _CHECKSUM = struct.Struct("<Q")
-_MAGIC = b"HSEPVAR1"
+_MAGIC = b"HSEPVAR2"
 
 
 def table_file(description: Mapping[str, object], guid: str) -> bytes:
@@ -28,7 +29,7 @@ def table_file(description: Mapping[str, object], guid: str) -> bytes:
     Parameters
     ----------
     description : mapping
-        ``model``, ``parameters``, ``modes`` and ``unit`` unless it is m.
+        ``model``, ``parameters``, ``modes``, ``unit`` unless it is m, and ``windows`` where they are left out.
     guid : str
         The modelDescription's.
     """
@@ -37,5 +38,6 @@ def table_file(description: Mapping[str, object], guid: str) -> bytes:
     size = _HEAD.size + len(starts) + _CHECKSUM.size
     n_modes = len(layout.modes) // 4
     angular = int(description.get("unit", "m") != "m")
-    content = _HEAD.pack(_MAGIC, size, interface_number(kind), n_modes, angular, guid.encode()) + starts
+    numbers = size, interface_number(kind), n_modes, angular, layout.window
+    content = _HEAD.pack(_MAGIC, *numbers, guid.encode()) + starts
     return content + _CHECKSUM.pack(zlib.crc32(content))

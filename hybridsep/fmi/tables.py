@@ -10,14 +10,14 @@ from .variables import Variable
 __all__ = ["grouped_table"]
 
 
-def grouped_table(table: Iterable[Variable]) -> dict[str, list[tuple[str, str, str, str, str]]]:
-    """Return ``(name, type and unit, display unit, start, meaning)`` by heading; enumerations with what items mean."""
-    groups: dict[str, list[tuple[str, str, str, str, str]]] = {}
+def grouped_table(table: Iterable[Variable]) -> dict[str, list[tuple[str, str, str, str, str, str]]]:
+    """Return ``(name, type and unit, display unit, start, range, meaning)`` by heading; items with what they mean."""
+    groups: dict[str, list[tuple[str, str, str, str, str, str]]] = {}
     for name, variable in _in_one_row(table).items():
         pairs = enumerate(zip(variable.items, variable.item_meanings, strict=True))
         items = ", ".join(f"{number} {item} ({meaning})" for number, (item, meaning) in pairs)
         meaning = f"{variable.description}: {items}" if items else variable.description
-        row = (name, _kind(variable), variable.display_unit or "", _start(variable), meaning)
+        row = (name, _kind(variable), variable.display_unit or "", _start(variable), _range(variable), meaning)
         groups.setdefault(variable.heading, []).append(row)
     return groups
 
@@ -38,3 +38,15 @@ def _start(variable: Variable) -> str:
     if variable.start is None:
         return ""
     return str(variable.start).lower() if variable.kind == "Boolean" else f"{variable.start:.10g}"
+
+
+def _range(variable: Variable) -> str:
+    """Return the allowed values, an automatic choice and the least value that is not 0 included."""
+    if variable.minimum is None or variable.maximum is None or variable.kind == "Boolean":
+        return ""
+    least = f"0 or {variable.nonzero:g}" if variable.nonzero else f"{variable.minimum:.10g}"
+    if variable.minimum == variable.maximum:
+        return least
+    if variable.automatic is not None:
+        least = f"{variable.automatic:g} or {least}"
+    return f"{least} … {variable.maximum:.10g}"

@@ -26,6 +26,7 @@ __all__ = [
     "modes_from",
     "plant_variables",
     "predictor_variables",
+    "shown_variables",
     "trajectory_variables",
     "variables_of",
 ]
@@ -135,7 +136,7 @@ def _parameter(parameter: Parameter, start: Value, *, group: str, label: str | N
         label or parameter.name,
         _KINDS[parameter.kind],
         "parameter",
-        "fixed",
+        "tunable" if parameter.tunable else "fixed",
         parameter.description,
         start=start,
         unit=parameter.unit if parameter.kind is float else None,
@@ -300,16 +301,20 @@ def plant_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping[str
     Parameters
     ----------
     parameters : mapping
-        Start values of ``m``, ``c``, ``k``, ``c_nl``, ``k_nl`` or of ``f``, ``kappa``, ``friction_on``, ``T_s``;
-        and of ``noise_std`` and ``seed``.
+        Start values of ``m``, ``c``, ``k``, ``c_nl``, ``k_nl`` or of ``f``, ``kappa``, ``friction_on``,
+        ``v_friction``, ``T_s``, ``dead_time``, ``input_hold``; and of ``noise_std`` and ``seed``.
     modes : sequence of mappings
         ``f_n``, ``zeta``, ``alpha``, ``beta`` of each mode.
     """
     velocity = Variable(
         "v", "Real", "output", "continuous", "true velocity", unit="m/s", display_unit="mm/s", nominal=1e-2
     )
-    own = ("f", "kappa", "friction_on", "T_s") if modes else ("m", "c", "k", "c_nl", "k_nl")
-    groups = {"Disturbance" if modes else "Drive": own, "Encoder": ("noise_std", "seed")}
+    drive: dict[str, tuple[str, ...]] = {"Drive": ("m", "c", "k", "c_nl", "k_nl")}
+    stage = {
+        "Disturbance": ("f", "kappa", "friction_on", "v_friction"),
+        "Command": ("T_s", "dead_time", "input_hold"),
+    }
+    groups = {**(stage if modes else drive), "Encoder": ("noise_std", "seed")}
     return [
         _position("x_d", "input", "commanded position, constant over a step", start=0.0),
         _position("x", "output", "true position", variability="continuous", initially_from=("x_d",)),
@@ -362,9 +367,38 @@ INTERPOLATED: dict[str, tuple[str, ...]] = {
 
 
 def variables_of(description: Mapping[str, object]) -> list[Variable]:
-    """Return the table that an FMU's ``machine.json`` describes: its model, parameters, modes and unit."""
+    """Return the table that an FMU's ``machine.json`` describes: its model, parameters, modes, unit and windows."""
     table = MODELS[str(description["model"])](description["parameters"], description["modes"])  # type: ignore[arg-type]
+    if not description.get("windows", True):
+        table = [variable for variable in table if variable.causality != "local"]
     return table if description.get("unit", "m") == "m" else [_angular(variable) for variable in table]
+
+
+def shown_variables(description: Mapping[str, object]) -> list[Variable]:
+    """Return :func:`variables_of` with the ranges that hold in one FMU, where its kind has wider ones.
+
+    A ReferenceTrajectory plays what lies in its archive: at the interval of its samples, and samples of the user's only
+    where it was built with some, which it then starts with.
+    """
+    table = variables_of(description)
+    if description["model"] != "ReferenceTrajectory":
+        return table
+    starts: Any = description["parameters"]
+    n = len(PARAMETERS["trajectory"].choices)
+    played = n if starts["trajectory"] == n - 1 else n - 1
+    own: dict[str, dict[str, Any]] = {
+        "T_s": {"minimum": starts["T_s"], "maximum": starts["T_s"]},
+        "trajectory": {"maximum": played - 1},
+    }
+    return [
+        replace(
+            variable,
+            items=variable.items[:played],
+            item_meanings=variable.item_meanings[:played],
+            **own.get(variable.name, {}),
+        )
+        for variable in table
+    ]
 
 
 def _angular(variable: Variable) -> Variable:

@@ -16,12 +16,13 @@ from ..base.errors import MachineError, ParameterError, brief, first_line, liste
 from ..base.settings import PARAMETERS, CompensatorSettings, Limits, PredictorSettings, Settings
 from ..model.physics import ModalModel, Mode
 from ..plants.feed_drive import FeedDrive
-from ..plants.plant import Plant
+from ..plants.plant import Drive
 from ..plants.stage_drive import StageDrive
 from .sections import (
     CompensatorSection,
     DriveLimitsSection,
     FeedDriveSection,
+    IdentifiedSection,
     LimitsSection,
     Line,
     LogSection,
@@ -57,7 +58,7 @@ class Machine(Section):
     physics: Physics
     predictor: PredictorSection = PredictorSection()
     compensator: CompensatorSection = CompensatorSection()
-    plant: Annotated[FeedDriveSection | StageSection, Field(discriminator="kind")] | None = None
+    plant: Annotated[FeedDriveSection | StageSection | IdentifiedSection, Field(discriminator="kind")] | None = None
     limits: LimitsSection | None = None
     drive_limits: DriveLimitsSection | None = None
     log: LogSection = LogSection()
@@ -68,10 +69,12 @@ class Machine(Section):
             raise ValueError("a plant of kind feed_drive needs [physics.spring_mass_damper]")
         if isinstance(self.plant, StageSection) and not self.physics.mode:
             raise ValueError("a plant of kind stage needs [[physics.mode]] entries")
-        if self.plant is not None and self.unit != "m":
-            raise ValueError("a machine with a plant must have unit = 'm': the plants are linear axes")
-        if self.plant is not None and self.physics.dead_time:
-            raise ValueError("a machine with a plant must have physics.dead_time = 0: the plants have none")
+        if isinstance(self.plant, FeedDriveSection | StageSection):
+            kind = self.plant.kind
+            if self.unit != "m":
+                raise ValueError(f"a machine with a plant of kind {kind} must have unit = 'm': it is a linear axis")
+            if self.physics.dead_time:
+                raise ValueError(f"a machine with a plant of kind {kind} must have physics.dead_time = 0: it has none")
         if self.plant is not None:
             self.new_plant()  # raises if the combination is out of range
         _ = self.model  # raises if the mode of m, c and k is out of range
@@ -109,6 +112,13 @@ class Machine(Section):
         if smd is not None:
             return ModalModel.spring_mass_damper(smd.m, smd.c, smd.k, self.physics.dead_time)
         return ModalModel([Mode(**mode.model_dump()) for mode in self.physics.mode], self.physics.dead_time)
+
+    @property
+    def plant_model(self) -> ModalModel:
+        """Linear part of the plant: ``G_pb``, or an identified plant's own modes."""
+        if isinstance(self.plant, IdentifiedSection) and self.plant.mode:
+            return ModalModel([Mode(**mode.model_dump()) for mode in self.plant.mode], self.physics.dead_time)
+        return self.model
 
     @property
     def predictor_settings(self) -> PredictorSettings:
@@ -161,8 +171,8 @@ class Machine(Section):
         own = self.new_predictor(self.compensator_predictor if predictor is None else predictor)
         return SepCompensator(own, self._compensation() if settings is None else settings)
 
-    def new_plant(self, **changes: float | str) -> Plant:
-        """Return the nonlinear plant; ``changes`` are values of its own section, such as ``c_nl`` or ``kappa``.
+    def new_plant(self, **changes: float | str) -> Drive:
+        """Return the plant; ``changes`` are values of its own section, such as ``c_nl`` or ``kappa``.
 
         Raises
         ------
@@ -173,11 +183,13 @@ class Machine(Section):
             raise MachineError(
                 f"machine {self.name} has no [plant] section: it cannot be simulated, only its log replayed"
             )
-        values = {**self.plant.model_dump(exclude={"kind", "noise_std", "seed"}), **changes}
+        values = {**self.plant.model_dump(exclude={"kind", "noise_std", "seed", "mode"}), **changes}
         if isinstance(self.plant, FeedDriveSection):
             assert self.physics.spring_mass_damper is not None  # by _plant_fits_physics
             return FeedDrive(**self.physics.spring_mass_damper.model_dump(), **values)
-        return StageDrive(self.model, **values, T_s=self.T_s)
+        if isinstance(self.plant, IdentifiedSection):
+            values = {"input_hold": self.physics.input_hold, **values}
+        return StageDrive(self.plant_model, **values, T_s=self.T_s)
 
     def fmi_parameters(self) -> dict[str, float | int | bool]:
         """Return the start values of the predictor FMU's scalar parameters, under their FMI names."""
@@ -241,7 +253,7 @@ class Machine(Section):
         """Return the drive's limits and the bound on the change of the command, m; None without ``[drive_limits]``."""
         if self.drive_limits is None:
             return None, None
-        return Limits(**self.drive_limits.model_dump(exclude={"change_max"})), self.drive_limits.change_max
+        return Limits(**self.drive_limits.model_dump(exclude={"change_max", "estimated"})), self.drive_limits.change_max
 
 
 def machine_names() -> list[str]:
@@ -307,7 +319,7 @@ def machine_from_table(content: Mapping[str, Any]) -> Machine:
 
 def _describe(problem: Any) -> str:
     """Return the message for one of pydantic's errors: entry, what was expected, what was found."""
-    steps = [step for step in problem["loc"] if step not in ("feed_drive", "stage")]
+    steps = [step for step in problem["loc"] if step not in ("feed_drive", "stage", "identified")]
     where = ""
     for step in steps:
         where += f"[{step + 1}]" if isinstance(step, int) else f".{step}" if where else str(step)
@@ -316,7 +328,7 @@ def _describe(problem: Any) -> str:
     if kind == "tuple_type" and where.endswith(".mode"):
         return f"{where} must be a list of modes: write [[{where}]], with double brackets"
     if kind == "union_tag_not_found":
-        return f"{where}.kind is missing: feed_drive or stage"
+        return f"{where}.kind is missing: feed_drive, stage or identified"
     if kind == "string_pattern_mismatch" and where != "name":
         return f"{where} must be one line of printable text that XML 1.0 allows, got {brief(problem['input'])}"
     if kind == "missing":

@@ -15,6 +15,7 @@ __all__ = [
     "DriveLimitsSection",
     "Entries",
     "FeedDriveSection",
+    "IdentifiedSection",
     "LimitsSection",
     "Line",
     "LogSection",
@@ -168,6 +169,18 @@ class StageSection(Section):
     seed: Whole = PARAMETERS["seed"].default
 
 
+class IdentifiedSection(Section):
+    """A plant to try with, no measurement: modes, those of ``[physics]`` if left out, and disturbances of a log."""
+
+    kind: Literal["identified"]
+    f: Number = PARAMETERS["f"].default
+    kappa: Number = PARAMETERS["kappa"].default
+    v_friction: Number = PARAMETERS["v_friction"].default
+    noise_std: Number = PARAMETERS["noise_std"].default
+    seed: Whole = PARAMETERS["seed"].default
+    mode: tuple[ModeSection, ...] = ()
+
+
 class LimitsSection(Section):
     """Velocity, acceleration and jerk of the reference trajectory, m/s, m/s², m/s³."""
 
@@ -177,9 +190,10 @@ class LimitsSection(Section):
 
 
 class DriveLimitsSection(LimitsSection):
-    """Limits of the drive for the modified command, wider than the trajectory's."""
+    """Limits of the drive for the modified command, wider than the trajectory's; ``estimated``: from a log's motion."""
 
     change_max: Number = PARAMETERS["change_max"].default
+    estimated: bool = False
 
 
 class LogSection(Entries):

@@ -6,7 +6,7 @@ outputs change at sampling instants only and stay causal. ``hsep_inputs.c`` is t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from ..base.clock import SampleClock
 from ..base.errors import SignalError
@@ -37,7 +37,15 @@ class LookAheadInputs:
         self.clock = SampleClock.begin(t_start, T_s)
         self._latched = (start, start)
 
-    def advance(self, look_ahead: LookAhead, x_d_ahead: float, x_meas: float, t: float, h: float) -> str:
+    def advance(
+        self,
+        look_ahead: LookAhead,
+        x_d_ahead: float,
+        x_meas: float,
+        t: float,
+        h: float,
+        begin: Callable[[], None] | None = None,
+    ) -> dict[str, str]:
         """Execute the samples that the communication step from ``t`` by ``h``, s, reaches.
 
         Parameters
@@ -45,11 +53,15 @@ class LookAheadInputs:
         look_ahead : LookAhead
         x_d_ahead, x_meas : float
             Inputs, m, constant over the step.
+        t, h : float
+            The step's start and size, s.
+        begin : function, optional
+            Called when the step is known to be valid, before its first sample; may refuse it.
 
         Returns
         -------
-        warning : str
-            Empty unless a sampling instant is no communication point.
+        warnings : dict of str
+            ``late`` where a sampling instant is no communication point, ``moved`` where it was taken at one beside it.
 
         Raises
         ------
@@ -61,6 +73,8 @@ class LookAheadInputs:
         step = self.clock.stepped(t, h)
         if step.n_latched:
             look_ahead.check(x_d_ahead, x_meas, self.clock.k + self.clock.latched)
+        if begin is not None:
+            begin()
         pending = self.clock.latched
         for _ in range(step.n_samples):
             if pending:  # the sample that an earlier step latched
@@ -72,13 +86,14 @@ class LookAheadInputs:
             self._latched = (x_d_ahead, x_meas)
         inside = step.n_latched > 1 - self.clock.latched  # t_k, where it is not read yet, is the step's start
         self.clock = step.after
-        if not inside:
-            return ""
-        late = min(step.first + (step.n_latched - 1) * self.clock.T_s, h)
-        return (
-            f"the step from {t:.9g} s by {h:.9g} s contains sampling instants of T_s = {self.clock.T_s:g} s between "
-            f"its ends: x_meas is read up to {late:g} s late, so a closed loop needs steps of T_s"
-        )
+        warnings = {"moved": step.warning} if step.warning else {}
+        if inside:
+            late = min(step.first + (step.n_latched - 1) * self.clock.T_s, h)
+            warnings["late"] = (
+                f"the step from {t:.9g} s by {h:.9g} s contains sampling instants of T_s = {self.clock.T_s:g} s "
+                f"between its ends: x_meas is read up to {late:g} s late, so a closed loop needs steps of T_s"
+            )
+        return warnings
 
     def state(self) -> list[float]:
         """Return the fields of the clock, then the inputs."""

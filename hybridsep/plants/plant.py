@@ -21,6 +21,7 @@ __all__ = [
     "INTERNAL_STEP",
     "RATE_MAX",
     "STATE_MAX",
+    "Drive",
     "Plant",
     "check_command",
     "check_step",
@@ -42,7 +43,7 @@ _STEPS_MAX = 1_000_000
 
 
 class Plant(Protocol):
-    """Interface of a simulated drive."""
+    """Interface of a simulated drive, all that a run needs; a class of your own with these three is one."""
 
     def reset(self, start: float = 0.0) -> None:
         """Reset the drive to rest at ``start``, m."""
@@ -53,6 +54,10 @@ class Plant(Protocol):
     @property
     def x(self) -> float:
         """True position, m."""
+
+
+class Drive(Plant, Protocol):
+    """Interface of the library's drives: a plant with a velocity, whose state can be saved."""
 
     @property
     def v(self) -> float:

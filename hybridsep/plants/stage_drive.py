@@ -6,27 +6,28 @@ import math
 
 from ..base.clock import SampleClock
 from ..base.errors import ParameterError, SignalError
-from ..base.settings import check
+from ..base.settings import PARAMETERS, check
 from ..model.physics import ModalModel, Mode
 from .motion_friction import velocity_under_friction
 from .plant import RATE_MAX, STATE_MAX, check_command, check_step, internal_steps
 
-__all__ = ["FRICTION_VELOCITY", "StageDrive"]
-
-FRICTION_VELOCITY = 2e-3
-"""Velocity scale of the friction's change of sign, m/s, a choice of the stand-in: the paper gives none."""
+__all__ = ["StageDrive"]
 
 
 class StageDrive:
     """Linear-motor stage: modal model with friction and cable stiffness as input disturbances.
 
-    ``x = G_pb (x_d − d)`` with ``d = f·tanh(v_f / 2 mm/s) + κ·x·|x|``. ``v_f`` is the commanded velocity, the backward
-    difference of ``x_d`` over ``T_s``, or the velocity of ``x`` itself.
+    ``x = G_pb (x_d − d)`` with ``d = f·tanh(v_f/v_friction) + κ·x·|x|``. ``v_f`` is the commanded velocity, the
+    backward difference of ``x_d`` over ``T_s``, or the velocity of ``x`` itself.
+
+    Without a dead time and held, a command acts at once; else it is sampled at the instants ``k·T_s``. A first-order
+    hold goes from the command before to that of now while there is a dead time, one sample of which this takes, and is
+    then that of the physics model; without one, which would need the next command, it goes on as it came.
 
     Parameters
     ----------
     model : ModalModel
-        ``G_pb``, eq. (15), without dead time.
+        ``G_pb``, eq. (15), with its dead time.
     f : float
         Friction as an offset of the command, m, ≥ 0.
     kappa : float
@@ -35,18 +36,32 @@ class StageDrive:
         Sampling interval of the command, s, for the commanded velocity.
     friction_on : {"command", "motion"}
         Velocity of the friction, the commanded or the actual one.
+    v_friction : float
+        Velocity over which the friction changes sign, m/s; 2 mm/s, a choice of the stand-in, as the paper gives none.
+    input_hold : {"zoh", "foh"}
+        Zero-order or first-order hold of the command.
     """
 
     def __init__(
-        self, model: ModalModel, f: float = 0.0, kappa: float = 0.0, T_s: float = 1e-3, friction_on: str = "command"
+        self,
+        model: ModalModel,
+        f: float = 0.0,
+        kappa: float = 0.0,
+        T_s: float = 1e-3,
+        friction_on: str = "command",
+        *,
+        v_friction: float = PARAMETERS["v_friction"].default,
+        input_hold: str = "zoh",
     ) -> None:
-        if model.dead_time:
-            raise ParameterError(f"the stage's model must have no dead time, got {model.dead_time} samples")
         self.model = model
         self.f: float = check("f", f)
         self.kappa: float = check("kappa", kappa)
         self.T_s: float = check("T_s", T_s)
         self.friction_on: str = check("friction_on", friction_on)
+        self.v_friction: float = check("v_friction", v_friction)
+        self.input_hold: str = check("input_hold", input_hold)
+        self._foh, self._late = self.input_hold == "foh", model.dead_time > 0
+        self._n_line = model.dead_time - (self._foh and self._late)
         self._friction_gain = self.f * sum(mode.beta for mode in model.modes)
         self._modes = [(mode.omega**2, 2 * mode.zeta * mode.omega, mode.alpha, mode.beta) for mode in model.modes]
         self._rate = max(map(_mode_rate, model.modes))
@@ -62,7 +77,8 @@ class StageDrive:
         """Reset the stage to rest at ``start``, m."""
         self._start = start
         self._z = [0.0] * (2 * len(self._modes))
-        self._last_x_d, self._v_d, self._v = 0.0, 0.0, 0.0
+        self._acting, self._last_x_d, self._v_d, self._v = 0.0, 0.0, 0.0, 0.0
+        self._line = [0.0] * self._n_line  # commands on their way through the dead time, the oldest first
         self._clock = SampleClock.begin(0.0, self.T_s)  # time since the reset
 
     @property
@@ -81,45 +97,63 @@ class StageDrive:
         check_step(h, self._rate)
         step = self._clock.stepped(self._clock.end, h)
         r, z, v = x_d - self._start, self._z, self._v
+        acting = self._acting if self._foh or self._late else r
         last_x_d, v_d, done = self._last_x_d, self._v_d, 0.0
-        # v_d is updated at the sampling instants, whatever the step size.
+        # The command is sampled, and v_d updated, at the sampling instants, whatever the step size.
         for i in range(step.n_latched + 1):
             end = max(done, step.first + i * self.T_s) if i < step.n_latched else h
             if end > done:
-                z, v = self._integrated(z, self._disturbed(r, v_d), end - done, v)
+                z, v = self._integrated(z, acting, v_d, end - done, v)
+                acting += self._going_on(v_d) * (end - done)
                 done = end
             if i < step.n_latched:
-                last_x_d, v_d = r, (r - last_x_d) / self.T_s
+                left = self._line[i] if i < self._n_line else r
+                v_d = (left - last_x_d) / self.T_s
+                acting = last_x_d if self._foh and self._late else left
+                last_x_d = left
         if not all(abs(s) < STATE_MAX for s in z):
             raise SignalError(f"the stage's state overflowed (command {x_d} m)")
-        self._z, self._v = z, self._position(self._derivative(z, self._disturbed(r, v_d), v))
-        self._last_x_d, self._v_d, self._clock = last_x_d, v_d, step.after
+        self._z, self._v = z, self._position(self._derivative(z, self._disturbed(acting, v_d), v))
+        n_entered = min(step.n_latched, self._n_line)
+        self._line = self._line[n_entered:] + [r] * n_entered
+        self._acting, self._last_x_d, self._v_d, self._clock = acting, last_x_d, v_d, step.after
 
     def state(self) -> list[float]:
-        """Return ``[start, last x_d, v_d, v, 7 numbers of the clock, z …]``."""
-        return [self._start, self._last_x_d, self._v_d, self._v, *self._clock.state(), *self._z]
+        """Return ``[start, acting and last x_d, v_d, v, 5 numbers of the clock, z …, x_d within the dead time …]``."""
+        moving = [self._acting, self._last_x_d, self._v_d, self._v]
+        return [self._start, *moving, *self._clock.state(), *self._z, *self._line]
 
     def restore(self, state: list[float]) -> None:
         """Restore a :meth:`state`."""
-        self._start, self._last_x_d, self._v_d, self._v = state[:4]
-        self._clock = SampleClock.from_state(state[4:11])
-        self._z = list(state[11:])
+        self._start, self._acting, self._last_x_d, self._v_d, self._v = state[:5]
+        self._clock = SampleClock.from_state(state[5:10])
+        end = 10 + 2 * len(self._modes)
+        self._z, self._line = list(state[10:end]), list(state[end:])
 
     def _disturbed(self, r: float, v_d: float) -> float:
         """Return the command disturbed by friction, if it is one of the commanded velocity."""
-        return r - self.f * math.tanh(v_d / FRICTION_VELOCITY) if self.friction_on == "command" else r
+        return r - self.f * math.tanh(v_d / self.v_friction) if self.friction_on == "command" else r
 
-    def _integrated(self, z: list[float], disturbed: float, time: float, v: float) -> tuple[list[float], float]:
-        """Return ``z`` after ``time``, s, with the command held, and a velocity of the last internal step."""
+    def _going_on(self, v_d: float) -> float:
+        """Return the velocity, m/s, with which the command goes on between two instants."""
+        return v_d if self._foh else 0.0
+
+    def _integrated(
+        self, z: list[float], acting: float, v_d: float, time: float, v: float
+    ) -> tuple[list[float], float]:
+        """Return ``z`` after ``time``, s, from the command that acts, and a velocity of the last internal step."""
         n = internal_steps(time, self._rate)
-        dt, f = time / n, self._derivative
+        dt, f, rate = time / n, self._derivative, self._going_on(v_d)
         half, sixth = dt / 2, dt / 6
-        for _ in range(n):
+        first = self._disturbed(acting, v_d)
+        for i in range(n):
+            disturbed = first + rate * (i * dt)
+            middle = disturbed + rate * half
             k1 = f(z, disturbed, v)
             v = self._position(k1)
-            k2 = f([s + half * k for s, k in zip(z, k1, strict=True)], disturbed, v)
-            k3 = f([s + half * k for s, k in zip(z, k2, strict=True)], disturbed, v)
-            k4 = f([s + dt * k for s, k in zip(z, k3, strict=True)], disturbed, v)
+            k2 = f([s + half * k for s, k in zip(z, k1, strict=True)], middle, v)
+            k3 = f([s + half * k for s, k in zip(z, k2, strict=True)], middle, v)
+            k4 = f([s + dt * k for s, k in zip(z, k3, strict=True)], disturbed + rate * dt, v)
             z = [s + sixth * (a + 2 * b + 2 * c + d) for s, a, b, c, d in zip(z, k1, k2, k3, k4, strict=True)]
         return z, v
 
@@ -142,8 +176,8 @@ class StageDrive:
             slope += (rate, u - two_zw * rate - w2 * z[i])
             i += 2
         if self.friction_on == "motion":
-            v = velocity_under_friction(self._position(slope), self._friction_gain, FRICTION_VELOCITY, v)
-            friction = self.f * math.tanh(v / FRICTION_VELOCITY)
+            v = velocity_under_friction(self._position(slope), self._friction_gain, self.v_friction, v)
+            friction = self.f * math.tanh(v / self.v_friction)
             slope[1::2] = [s - friction for s in slope[1::2]]
         return slope
 

@@ -21,14 +21,11 @@ class FeatureScales(NamedTuple):
         Largest magnitudes of the static features, those ahead included.
     step : float, m
         Largest change of the command from sample to sample, those ahead included.
-    n_rest : int
-        Samples ahead before the first motion of the run.
     """
 
     velocity: float
     largest: Array
     step: float
-    n_rest: int
 
 
 @dataclass(frozen=True)

@@ -116,10 +116,6 @@ class ResidualModel(ABC, Generic[AnyForecast]):
         """Return the forecast of a run that began in motion, with the commands and ``x_pb`` of that motion."""
         return replace(forecast, x_d=x_d, x_pb=x_pb)
 
-    def doubted(self, x_pb: Array) -> Array | None:
-        """Return the residual if a rejected measurement before the window is true, ``(n,)``, m; None if none was."""
-        return None
-
     @staticmethod
     @abstractmethod
     def check_sizes(saved: Saved, settings: PredictorSettings) -> None:

@@ -90,14 +90,11 @@ class PredictedError(NamedTuple):
         ``f_i(k)``; m² but for the first, which is 1.
     std : (n,) array, m
         Standard deviation of the error.
-    in_doubt : bool
-        Whether the measurement before it is doubted: what is wrong then tells nothing of the errors of other windows.
     """
 
     e_h: Array
     components: Array
     std: Array
-    in_doubt: bool = False
 
 
 class Uncertainty:
@@ -130,15 +127,7 @@ class Uncertainty:
         self.evidence = np.zeros(N_COMPONENTS)
         self.factor, self.ratio, self.recent = 1.0, 1.0, 0.0
 
-    def predict(
-        self,
-        x_pb: Array,
-        e_h: Array,
-        *,
-        last: float,
-        variance: Array | float,
-        doubted: Array | None = None,
-    ) -> PredictedError:
+    def predict(self, x_pb: Array, e_h: Array, *, last: float, variance: Array | float) -> PredictedError:
         """Return what is known of the error of the next window; nothing is changed.
 
         Parameters
@@ -149,8 +138,6 @@ class Uncertainty:
             Last measured residual.
         variance : (n,) array or float, m²
             What the residual model knows of its error.
-        doubted : (n,) array, m, optional
-            Residual if the rejected measurement before the window is true.
         """
         n = len(x_pb)
         bounded = e_h
@@ -165,11 +152,8 @@ class Uncertainty:
         gain = 1.0 / (1.0 + _FELT_FOR * self.Np)
         components[:, _FELT] = lfilter([gain], [1.0, gain - 1.0], components[:, _FELT], axis=0)
         c = self.factor * self.ratio ** self._from_middle(n)
-        std = c * np.sqrt(self._variance(components))
-        if doubted is not None:
-            std = np.sqrt(std**2 + np.minimum(np.abs(doubted - bounded), PREDICTION_MAX) ** 2)
-        std = np.minimum(std, PREDICTION_MAX)
-        return PredictedError(bounded, components, std, doubted is not None)
+        std = np.minimum(c * np.sqrt(self._variance(components)), PREDICTION_MAX)
+        return PredictedError(bounded, components, std)
 
     def learn(self, predicted: PredictedError, residuals: Array, accepted: NDArray[np.bool_]) -> None:
         """Learn from the measurement of a window.
@@ -182,8 +166,6 @@ class Uncertainty:
         accepted : (m,) array of bool
             Whether they count.
         """
-        if predicted.in_doubt:
-            return
         m = len(residuals)
         measured, e_h, components, std = residuals, predicted.e_h[:m], predicted.components[:m], predicted.std[:m]
         place = self._from_middle(m)

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from ..base.errors import ParameterError, SignalError
 from ..base.settings import PredictorSettings, samples_before
 from ..base.signals import Array, as_measured, as_samples
+from ..base.threads import one_blas_thread
 from ..model.physics import ModalModel
 from .forecast import FeatureScales, Forecast
 from .paper.model import PaperModel
@@ -98,6 +99,7 @@ class WindowPredictor:
         self.residual.restart()
         self.pending: PredictedWindow | None = None
 
+    @one_blas_thread
     def predict(self, x_d: ArrayLike, *, scales: FeatureScales | None = None) -> Prediction:
         """Predict the next window from its commands and all earlier measurements; eqs. (2), (4).
 
@@ -143,10 +145,10 @@ class WindowPredictor:
             np.where(active, forecast.e_h, 0.0),
             last=self.last_accepted_residual(),
             variance=np.where(active, forecast.variance, 0.0),
-            doubted=self.residual.doubted(forecast.x_pb),
         )
         return PredictedWindow(start, error, forecast)
 
+    @one_blas_thread
     def update(self, x: ArrayLike, *, learn: bool = True) -> None:
         """Learn from the measurement of the predicted window, or of its first samples; eq. (6).
 

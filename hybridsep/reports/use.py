@@ -60,8 +60,8 @@ signals = np.zeros(len(x_d) + {Np}, [("time", float), ("x_d_ahead", float), ("x_
 signals["time"] = {T_s!r} * np.arange(len(signals))
 signals["x_d_ahead"] = np.pad(x_d, (0, {Np}), mode="edge")  # enters {Np} samples before it is commanded ...
 signals["x_meas"] = np.pad(x_meas, ({Np}, 0), mode="edge")  # ... and measured
-result = simulate_fmu("{fmu}", stop_time=signals["time"][-1], step_size={T_s!r},
-                      output_interval={T_s!r}, input=signals, output=["x_d", "x_h", "x_h_std", "e_servo"])"""
+result = simulate_fmu("{fmu}", stop_time=signals["time"][-1], output_interval={T_s!r},
+                      input=signals, output=["x_d", "x_h", "x_h_std", "e_servo"])"""
 """Replay of a log with fmpy."""
 
 

@@ -15,8 +15,8 @@ from ..base.interrupt import starting_processes
 from ..base.metrics import rms_ratio
 from ..base.settings import PredictorSettings
 from ..base.signals import Array
-from ..fleet.engine import Engine
 from ..model.physics import ModalModel
+from ..parallel.engine import Engine
 from .choice import WORTH, window_sizes, with_window
 from .losses import Losses, Piece, replayed_losses
 

@@ -130,6 +130,7 @@ def test_build_for_both_versions_of_fmi(hybridsep: Run, tmp_path: Path) -> None:
     assert versions == ["2.0", "3.0"]
 
 
+@pytest.mark.slow
 def test_cosim_over_a_file(hybridsep: Run, tmp_path: Path) -> None:
     path = tmp_path / "command.csv"
     np.savetxt(
@@ -145,6 +146,7 @@ def test_cosim_over_a_file(hybridsep: Run, tmp_path: Path) -> None:
     assert json.loads(again)["rms_h_um"] != json.loads(out)["rms_h_um"]
 
 
+@pytest.mark.slow
 def test_cosim_with_compensation(hybridsep: Run, tmp_path: Path) -> None:
     options = ("--out", tmp_path / "run.csv", "--figure", tmp_path / "run.png")
     figures = {}
@@ -170,6 +172,7 @@ def test_cosim_with_compensation(hybridsep: Run, tmp_path: Path) -> None:
     assert hybridsep("cosim", "--compensate", "physics", "--flavour", "python", *sizes)[0] == 0
 
 
+@pytest.mark.slow
 def test_weights_for_a_compensator(hybridsep: Run, tmp_path: Path) -> None:
     machine, weights = load_machine("spring_mass_damper"), tmp_path / "trained.state"
     compensator = machine.new_compensator()
@@ -194,6 +197,7 @@ def test_weights_for_a_compensator(hybridsep: Run, tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_figure_of_a_prediction(hybridsep: Run, tmp_path: Path) -> None:
     figure = tmp_path / "made" / "run.png"
     assert hybridsep("cosim", "--flavour", "python", "--figure", figure)[0] == 0
@@ -233,7 +237,10 @@ def test_help_shows_units_and_ranges(hybridsep: Run) -> None:
         (["build", "--fmi", "4"], "--fmi must be one of 2, 3, both, got '4'"),
         (["build", "--fmi", "both", "--flavour", "python"], "--fmi both is for native FMUs, pythonfmu's are of FMI 2"),
         (["build", "FeedDriveFmi3", "--target", "host"], "; those of FMI 3.0 need --fmi 3"),
-        (["cosim", "-m", "emps", "--flavour", "python"], "machine emps has no plant; name a plant FMU with --plant"),
+        (
+            ["cosim", "-m", "emps", "--flavour", "python"],
+            "machine emps has no plant: `hybridsep fit` writes one from a log of the axis; or name a plant",
+        ),
         (["cosim", "--trajectory", "zigzag"], "zigzag"),
         (["cosim", "--out", "run.xlsx"], "--out must end in .csv or .npz, got 'run.xlsx'"),
         (["cosim", "--Np", "10"], "p must be 1 … Np = 10, got 50"),

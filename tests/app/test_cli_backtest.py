@@ -25,6 +25,7 @@ def spoiled(path: Path, *, n: int = 2500, gain: float = 1.0, offset: float = 0.0
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("gain", "offset", "words"),
     [
@@ -117,6 +118,7 @@ def test_rows_that_are_missing_behind_what_is_checked(
     assert "1 sample may be lost" in err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".png", ".pdf", ".svg"])
 def test_figures(hybridsep: Run, tmp_path: Path, suffix: str) -> None:
     log, figure = write_log(tmp_path / "log.csv", n=1000), tmp_path / f"figure{suffix}"

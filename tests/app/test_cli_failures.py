@@ -160,6 +160,7 @@ def command(*arguments: object, **keywords: Any) -> subprocess.CompletedProcess[
     return done
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
 @pytest.mark.parametrize("arguments", [["--help"], ["backtest", "{log}", "-m", MACHINE, "--json"]])
 def test_a_full_standard_output(tmp_path: Path, arguments: list[str]) -> None:
@@ -175,6 +176,7 @@ def test_a_full_standard_output(tmp_path: Path, arguments: list[str]) -> None:
     assert done.stderr.decode() == "error: cannot read or write standard output: No space left on device\n"
 
 
+@pytest.mark.slow
 @POSIX
 def test_a_reader_that_has_gone(tmp_path: Path) -> None:
     log = write_log(tmp_path / "log.csv", n=300)
@@ -186,6 +188,7 @@ def test_a_reader_that_has_gone(tmp_path: Path) -> None:
     assert b"error" not in done.stderr
 
 
+@pytest.mark.slow
 def test_an_ascii_terminal(tmp_path: Path) -> None:
     log = write_log(tmp_path / "log.csv", n=1000)
     ascii_only = {**os.environ, "PYTHONIOENCODING": "ascii", "COLUMNS": "200"}
@@ -197,6 +200,7 @@ def test_an_ascii_terminal(tmp_path: Path) -> None:
     assert b"p must be 1 ? Np = 100, got 200" in done.stderr
 
 
+@pytest.mark.slow
 @POSIX
 @pytest.mark.parametrize("streams", [">&-", "2>&-", "<&- >&- 2>&-"])
 def test_closed_standard_streams(tmp_path: Path, streams: str) -> None:

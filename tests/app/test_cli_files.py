@@ -142,6 +142,7 @@ def test_cosim_and_build_ask_too(hybridsep: Run, tmp_path: Path) -> None:
     assert hybridsep(*build)[0] == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments",
     [("init", "{out}", "--tau", "0.006"), ("identify", "{log}", "--out", "{out}")],

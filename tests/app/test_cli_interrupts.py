@@ -66,7 +66,7 @@ def test_ctrl_c_during_the_demo(tmp_path: Path) -> None:
     """The demo's FMUs are Python ones: a KeyboardInterrupt inside them would be fmi2Fatal."""
     out = tmp_path / "demo"
     last = out / "staircase.csv"
-    status, err = interrupted(["demo", "--flavour", "python", "--seeds", 1, "--out", out], last.exists)
+    status, err = interrupted(["demo", "--flavour", "python", "--out", out], last.exists)
     assert (status, err.strip().splitlines()[-1]) == (130, SAID)  # after the duration and the stages
     assert not [path for path in out.rglob("*") if path.name.startswith(".")]
     lines = last.read_text().splitlines()
@@ -74,6 +74,7 @@ def test_ctrl_c_during_the_demo(tmp_path: Path) -> None:
     assert len(lines) == 6002
 
 
+@pytest.mark.slow
 @POSIX
 @pytest.mark.skipif(find_spec("ziglang") is None, reason="needs ziglang")
 def test_ctrl_c_during_a_build_ends_the_compilers(tmp_path: Path) -> None:
@@ -83,14 +84,15 @@ def test_ctrl_c_during_a_build_ends_the_compilers(tmp_path: Path) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("TMPDIR", str(temporary))
         patch.setenv("HYBRIDSEP_LIBRARIES", str(tmp_path / "libraries"))
-        patch.delenv("HYBRIDSEP_TARGETS")
-        status, err = interrupted(["build", "HybridPredictor", "--out", out], lambda: list(temporary.rglob("all.c")))
+        arguments = ["build", "HybridPredictor", "--target", "all", "--out", out]
+        status, err = interrupted(arguments, lambda: list(temporary.rglob("all.c")))
     said = err.strip().splitlines()[-1]  # after the platforms
     assert (status, said) == (130, SAID)
     assert not out.exists()
     assert list(temporary.rglob("all.c")) == []
 
 
+@pytest.mark.slow
 @POSIX
 def test_ctrl_c_in_a_terminal_ends_the_processes_of_tune(tmp_path: Path) -> None:
     """A terminal sends it to all of them; half a minute of replays, two at a time."""
@@ -155,7 +157,7 @@ def test_commands_end_with_the_first_that_fails(tmp_path: Path, monkeypatch: pyt
     sleeping = "import os, time; os.symlink(str(os.getpid()), 'pid'); time.sleep(600)"
     never = "open('never', 'x')"
     commands = [([sys.executable, "-c", code], tmp_path) for code in (failing, sleeping, never)]
-    assert run_together(commands) == [(1, "no\n")]
+    assert run_together(commands) == {0: (1, "no\n")}
     with pytest.raises(ProcessLookupError):
         os.kill(int(str((tmp_path / "pid").readlink())), 0)
     assert [path.name for path in tmp_path.iterdir()] == ["pid"]

@@ -12,14 +12,18 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from built_once import built_once
 from places import EMPS, ROOT
 from rich.console import Console
 
 from hybridsep.app import tables
 from hybridsep.app.overwrite import BY_ENDING
+from hybridsep.base.metrics import shown_figure
+from hybridsep.demo import cases
 from hybridsep.demo.compensation import COMPENSATED
 from hybridsep.demo.demo import demo, demo_files
 from hybridsep.fmi.builds import default_flavour
+from hybridsep.plants.trajectory import spiral
 
 PAGE = (ROOT / "docs" / "evidence" / "figures.md").read_text(encoding="utf-8")
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -38,41 +42,139 @@ class Demonstration:
         return [self.summary[case]["compensation"][kind][figure] for kind in COMPENSATED]
 
 
-@pytest.fixture(scope="module")
-def shown(tmp_path_factory: pytest.TempPathFactory) -> Demonstration:
-    out = tmp_path_factory.mktemp("demo")
-    fractions: list[float] = []
-    emps = EMPS if EMPS.exists() else None
-    summary = demo(out, flavour=FLAVOUR, emps=emps, progress=lambda message, fraction: fractions.append(fraction))
-    return Demonstration(out, summary, fractions)
+def shown_once(folder: Path, *, full: bool, emps: Path | None) -> Demonstration:
+    """Run the demonstration once a session for all workers."""
+
+    def run(out: Path) -> None:
+        fractions: list[float] = []
+        demo(out / "demo", full=full, flavour=FLAVOUR, emps=emps, progress=lambda _, done: fractions.append(done))
+        (out / "fractions.json").write_text(json.dumps(fractions), encoding="utf-8")
+
+    out = built_once(folder, run)
+    summary = json.loads((out / "demo" / "summary.json").read_text(encoding="utf-8"))
+    return Demonstration(out / "demo", summary, json.loads((out / "fractions.json").read_text(encoding="utf-8")))
 
 
-def test_demo_writes_all_it_promises(shown: Demonstration) -> None:
-    assert json.loads((shown.out / "summary.json").read_text()) == shown.summary
-    assert set(shown.summary) - {"emps"} == set(CASES)
-    for case in shown.summary.values():
-        assert {"rms_pb_um", "rms_hold_um", "rms_h_um", "reduction_percent", "ratio_to_hold", "printed"} <= set(case)
-        assert case["verdict"].startswith("Better than the physics model: ")
-        assert case["rms_h_um"] < case["rms_pb_um"]
-        assert 0 < len(case["batches_hybrid_worse"]) < case["n_batches"] / 4  # the paper's honest part
-    figures = [*CASES, "spiral", "spiral_contour", *(f"{case}_compensated" for case in CASES)]
+@pytest.fixture(scope="session")
+def shown(session_folder: Path) -> Demonstration:
+    return shown_once(session_folder / "demo", full=False, emps=EMPS if EMPS.exists() else None)
+
+
+@pytest.fixture(scope="session")
+def full(session_folder: Path) -> Demonstration:
+    return shown_once(session_folder / "full demo", full=True, emps=None)
+
+
+def check_files(shown: Demonstration, figures: list[str], *, full: bool, emps: bool) -> None:
     for name in figures:
         assert (shown.out / f"{name}.png").read_bytes().startswith(PNG)
-    for name in CASES:
-        assert (shown.out / f"{name}_compensated.csv").read_text().startswith("t,x_d,x_dm,")
     written = {path for path in shown.out.rglob("*") if path.is_file()}
-    assert written == set(demo_files(shown.out, FLAVOUR, emps=EMPS.exists()))
+    assert written == set(demo_files(shown.out, FLAVOUR, full=full, emps=emps))
     assert all(BY_ENDING[path.suffix].recognises(path) for path in written)
-    assert len(list((shown.out / "fmus").glob("*.fmu"))) == 9
-    assert len(list((shown.out / "fmus" / "warm").glob("SepCompensator*.fmu"))) == 3
     assert shown.fractions == sorted(shown.fractions)
     assert shown.fractions[-1] == 1.0
     assert len(set(shown.fractions)) == len(shown.fractions)
 
 
-def test_staircase_error_reduction(shown: Demonstration) -> None:
+def check_case(case: dict[str, Any]) -> None:
+    assert {"rms_pb_um", "rms_hold_um", "rms_h_um", "reduction_percent", "ratio_to_hold", "printed"} <= set(case)
+    assert case["verdict"].startswith("Better than the physics model: ")
+    assert case["rms_h_um"] < case["rms_pb_um"]
+    assert 0 < len(case["batches_hybrid_worse"]) < case["n_batches"] / 4  # the paper's honest part
+
+
+@pytest.mark.slow
+def test_demo_writes_all_it_promises(shown: Demonstration) -> None:
+    assert list(shown.summary) == ["staircase", *(["emps"] if EMPS.exists() else [])]
+    for case in shown.summary.values():
+        check_case(case)
+    check_files(shown, ["staircase", "staircase_compensated"], full=False, emps=EMPS.exists())
+    assert (shown.out / "staircase_compensated.csv").read_text().startswith("t,x_d,x_dm,")
+    assert len(list((shown.out / "fmus").glob("*.fmu"))) == 3
+
+
+@pytest.mark.slow
+def test_the_index_page_leads_to_all_that_was_written(shown: Demonstration) -> None:
+    """The product's table first, the paper's model's after it, called so."""
+    page = (shown.out / "index.html").read_text(encoding="utf-8")
+    linked = set(re.findall(r'(?:href|src)="([^":]+)"', page))
+    written = {path.relative_to(shown.out).as_posix() for path in shown.out.rglob("*") if path.is_file()}
+    assert linked == written - {"index.html"}
+    titles = re.findall(r"<h2>(.*?)</h2>", page)
+    assert titles[0].startswith("Compensation: ")
+    assert titles[1].startswith("The paper&#x27;s model (trust = false): ")
+    figures = [f"<td>{shown_figure(figure)}</td>" for figure in shown.compensation("staircase", "tracking_rms_um")]
+    assert "".join(figures) in page
+    assert "<script" not in page
+    assert "http" not in page
+
+
+@pytest.mark.slow
+def test_demo_compensates(shown: Demonstration) -> None:
+    """Tracking RMS of the true position, µm: less from kind to kind."""
+    none, physics, cold, warm = shown.compensation("staircase", "tracking_rms_um")
+    assert 87.0 < none < 90.0
+    assert 15.0 < physics < 20.5
+    assert cold < 5.0
+    assert warm < 1.8
+    assert max(shown.compensation("staircase", "peak_jerk_m_s3")) <= 5000 * (1 + 1e-9)
+
+
+@pytest.mark.slow
+def test_compensation_in_the_readme(shown: Demonstration) -> None:
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    (row,) = re.findall(r"^\| compensation: `hybridsep demo --out demo` \|(.*)\|$", readme, re.MULTILINE)
+    figures = [float(figure) for figure in re.findall(r"[\d.]+", row)]
+    # What has been learned differs a little from one LAPACK to another.
+    assert figures == pytest.approx(shown.compensation("staircase", "tracking_rms_um"), rel=0.02, abs=0.06)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not EMPS.exists(), reason="needs ../shared/data/emps beside the repository")
+def test_demo_with_the_recorded_axis(shown: Demonstration) -> None:
+    assert shown.summary["emps"]["rms_h_um"] <= 5.55
+    assert (shown.out / "emps.png").read_bytes().startswith(PNG)
+
+
+@pytest.mark.slow
+def test_the_spirals_case_draws_both_axes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first half second; all of it at night."""
+    monkeypatch.setattr(cases, "spiral", lambda: [axis[:500] for axis in spiral()])
+    said: list[str] = []
+    summary = cases.spiral_case(tmp_path, FLAVOUR, said.append)
+    assert list(summary) == ["spiral_x", "spiral_y"]
+    assert len(said) == len(set(said)) == 2 * (1 + 2 + 1 + len(COMPENSATED))
+    for case in summary.values():
+        assert case["stiffness_alone"]["rms_pb_um"] < case["rms_pb_um"]
+        assert set(case["compensation"]) == set(COMPENSATED)
+    contours = [[case["compensation"][kind]["contour_rms_um"] for kind in COMPENSATED] for case in summary.values()]
+    assert contours[0] == contours[1]
+    assert contours[0][1] < contours[0][0]
+    written = {path for path in tmp_path.rglob("*") if path.is_file()}
+    assert written <= set(demo_files(tmp_path, FLAVOUR, full=True))
+    drawn = {path.stem for path in written if path.suffix == ".png"}
+    assert drawn == {
+        "spiral",
+        "spiral_contour",
+        *(f"spiral_{axis}{what}" for axis in "xy" for what in ("", "_compensated")),
+    }
+
+
+@pytest.mark.nightly
+def test_a_full_demo_writes_all_it_promises(full: Demonstration) -> None:
+    assert tuple(full.summary) == CASES
+    for case in full.summary.values():
+        check_case(case)
+    figures = [*CASES, "spiral", "spiral_contour", *(f"{case}_compensated" for case in CASES)]
+    check_files(full, figures, full=True, emps=False)
+    assert len(list((full.out / "fmus").glob("*.fmu"))) == 9
+    assert len(list((full.out / "fmus" / "warm").glob("SepCompensator*.fmu"))) == 3
+
+
+@pytest.mark.nightly
+def test_staircase_error_reduction(full: Demonstration) -> None:
     """Printed: physics 33.7 µm, hybrid 14.7 µm, reduction 56.4 %."""
-    mean = shown.summary["staircase"]
+    mean = full.summary["staircase"]
     assert mean["n_seeds"] == 10
     assert 33.6 < mean["rms_pb_um"] < 34.3
     assert 14.5 < mean["rms_h_um"] < 15.2
@@ -84,10 +186,11 @@ def test_staircase_error_reduction(shown: Demonstration) -> None:
     assert mean["servo_error_rms_um"] == pytest.approx(88.5, abs=0.1)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("axis", "printed", "tolerance", "most"), [("x", 22.0, 0.1, 13.3), ("y", 130.2, 0.5, 98.5)])
-def test_spiral_error_reduction(shown: Demonstration, axis: str, printed: float, tolerance: float, most: float) -> None:
+def test_spiral_error_reduction(full: Demonstration, axis: str, printed: float, tolerance: float, most: float) -> None:
     """Printed: X 22 → 13.7 µm, 38 %; Y 130.2 → 94.5 µm, 27 %; with Table 1 and friction scaled to the first figures."""
-    both = shown.summary[f"spiral_{axis}"]
+    both = full.summary[f"spiral_{axis}"]
     assert both["rms_pb_um"] == pytest.approx(printed, abs=tolerance)
     assert 0.9 * most < both["rms_h_um"] <= most
     # What one cause alone leaves to learn: the cable's stiffness is smooth, the friction jumps.
@@ -95,28 +198,16 @@ def test_spiral_error_reduction(shown: Demonstration, axis: str, printed: float,
     assert stiffness["reduction_percent"] > 70.0 > both["reduction_percent"] > friction["reduction_percent"] > 15.0
 
 
-def test_demo_compensates(shown: Demonstration) -> None:
-    """Tracking RMS of the true position, µm: less from kind to kind."""
+@pytest.mark.nightly
+def test_a_full_demo_compensates(full: Demonstration) -> None:
     for case in CASES:
-        figures = shown.compensation(case, "tracking_rms_um")
+        figures = full.compensation(case, "tracking_rms_um")
         assert figures == sorted(figures, reverse=True)
-    none, physics, cold, warm = shown.compensation("staircase", "tracking_rms_um")
-    assert 87.0 < none < 90.0
-    assert physics < 20.5
-    assert cold < 5.0
-    assert warm < 1.8
-    x, y = (shown.compensation(case, "tracking_rms_um") for case in ("spiral_x", "spiral_y"))
+    x, y = (full.compensation(case, "tracking_rms_um") for case in ("spiral_x", "spiral_y"))
     assert x[3] < 0.25 * x[1]
     assert y[3] < 0.6 * y[1]  # its physics model keeps the direction too
-    contour = shown.compensation("spiral_x", "contour_rms_um")
-    assert contour == shown.compensation("spiral_y", "contour_rms_um") == sorted(contour, reverse=True)
-    assert max(shown.compensation("staircase", "peak_jerk_m_s3")) <= 5000 * (1 + 1e-9)
-
-
-@pytest.mark.skipif(not EMPS.exists(), reason="needs ../shared/data/emps beside the repository")
-def test_demo_with_the_recorded_axis(shown: Demonstration) -> None:
-    assert shown.summary["emps"]["rms_h_um"] <= 5.55
-    assert (shown.out / "emps.png").read_bytes().startswith(PNG)
+    contour = full.compensation("spiral_x", "contour_rms_um")
+    assert contour == full.compensation("spiral_y", "contour_rms_um") == sorted(contour, reverse=True)
 
 
 def row_of(label: str, page: str = PAGE) -> list[float]:
@@ -125,15 +216,17 @@ def row_of(label: str, page: str = PAGE) -> list[float]:
     return [float(figure) for figure in re.findall(r"(?<=\| )[\d.]+(?= (?:% )?\|)", f"|{row}|")]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("case", "label"),
     [("staircase", "staircase, FMU"), ("spiral_x", "spiral, stage X"), ("spiral_y", "spiral, stage Y")],
 )
-def test_predictions_on_the_page(shown: Demonstration, case: str, label: str) -> None:
+def test_predictions_on_the_page(full: Demonstration, case: str, label: str) -> None:
     keys = ("rms_pb_um", "rms_hold_um", "rms_h_um", "reduction_percent", "ratio_to_hold")
-    assert row_of(label)[:5] == pytest.approx([shown.summary[case][key] for key in keys], abs=0.06)
+    assert row_of(label)[:5] == pytest.approx([full.summary[case][key] for key in keys], abs=0.06)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("case", "figure", "label"),
     [
@@ -143,18 +236,12 @@ def test_predictions_on_the_page(shown: Demonstration, case: str, label: str) ->
         ("spiral_x", "contour_rms_um", "spiral, contour error"),
     ],
 )
-def test_compensation_on_the_page(shown: Demonstration, case: str, figure: str, label: str) -> None:
+def test_compensation_on_the_page(full: Demonstration, case: str, figure: str, label: str) -> None:
     # What has been learned differs a little from one LAPACK to another.
-    assert row_of(label) == pytest.approx(shown.compensation(case, figure), rel=0.02, abs=0.06)
+    assert row_of(label) == pytest.approx(full.compensation(case, figure), rel=0.02, abs=0.06)
 
 
-def test_compensation_in_the_readme(shown: Demonstration) -> None:
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    (row,) = re.findall(r"^\| compensation: `hybridsep demo --out demo` \|(.*)\|$", readme, re.MULTILINE)
-    figures = [float(figure) for figure in re.findall(r"[\d.]+", row)]
-    assert figures == pytest.approx(shown.compensation("staircase", "tracking_rms_um"), rel=0.02, abs=0.06)
-
-
+@pytest.mark.slow
 def test_build_fmu_is_a_front_of_the_command_line(tmp_path: Path) -> None:
     command = [sys.executable, str(ROOT / "build_fmu.py"), "--machine", str(ROOT / "models" / "als25010_x.toml")]
     subprocess.run([*command, "--flavour", "python", "--out", str(tmp_path)], check=True, stdout=subprocess.DEVNULL)
@@ -165,12 +252,17 @@ def test_build_fmu_is_a_front_of_the_command_line(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_the_tables_fit_into_80_columns(shown: Demonstration, monkeypatch: pytest.MonkeyPatch) -> None:
     narrow = Console(width=80, record=True, file=io.StringIO())
     monkeypatch.setattr(tables, "console", narrow)
-    parts = {"friction_alone": shown.summary["spiral_y"], "stiffness_alone": shown.summary["spiral_y"]}
-    tables.print_predictions({**shown.summary, "spiral_y": {**shown.summary["spiral_y"], **parts}})
-    tables.print_compensation(shown.summary)
+    case = shown.summary["staircase"]
+    contours = {kind: {**figures, "contour_rms_um": 1234.56} for kind, figures in case["compensation"].items()}
+    axis = {**case, "friction_alone": case, "stiffness_alone": case, "compensation": contours}
+    summary = {**shown.summary, "spiral_x": axis, "spiral_y": axis}
+    tables.print_compensation(summary)
+    tables.print_predictions(summary)
     text = narrow.export_text()
     assert "…" not in text
+    assert max(map(len, text.splitlines())) <= 80
     assert "130.2→94.5, 27 %" in text

@@ -35,6 +35,7 @@ def test_the_intake_has_nothing_to_say_of_it() -> None:
     assert check(read_log(EXAMPLE)).findings == ()
 
 
+@pytest.mark.slow
 def test_it_is_what_its_script_makes() -> None:
     log = read_log(EXAMPLE)
     t, x_d, x_meas = example_log.table().T

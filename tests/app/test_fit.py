@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+import zipfile
 from dataclasses import replace
 from html import unescape
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -19,8 +22,10 @@ from hybridsep.cosim.fmus import FmuController
 from hybridsep.fit import fit as fitting
 from hybridsep.fit.files import fit_files
 from hybridsep.fit.fit import Fit, FitOptions, fit
+from hybridsep.fit.origin import sha256_of
 from hybridsep.fit.report import fit_report, judged_by
 from hybridsep.fit.stages import key_of
+from hybridsep.fmi.resource_data import RESOURCE_DATA_FILE
 from hybridsep.intake.repair import take_in
 from hybridsep.logs.units import shown_in
 from hybridsep.machines.naming import machine_name
@@ -43,6 +48,7 @@ def fitted(log: Path) -> Fit:
     return fit([read_log(log)], out, FitOptions(NP, "axis"))
 
 
+@pytest.mark.slow
 def test_the_figures_are_of_a_causal_replay_with_the_machine_file(fitted: Fit, log: Path) -> None:
     machine = load_machine(log.parent / "out" / "machine.toml")
     assert machine == fitted.machine
@@ -78,10 +84,28 @@ def test_the_fmus_begin_with_what_was_learned_from_the_log(fitted: Fit, log: Pat
         np.testing.assert_allclose(x_h[NP:], np.concatenate(expected), rtol=0, atol=1e-9)
 
 
+def test_the_fmus_name_the_log_the_settings_and_the_figures(fitted: Fit, log: Path, tmp_path: Path) -> None:
+    """By SRMD of SSP Traceability, so that whoever gets an FMU alone can find the log that it is from."""
+    results = json.loads((log.parent / "out" / "fit.json").read_text(encoding="utf-8"))
+    for path in (path for path in fitted.files if path.suffix == ".fmu"):
+        with zipfile.ZipFile(path) as archive:
+            root = ElementTree.fromstring(archive.read(RESOURCE_DATA_FILE))
+        entries = {entry.get("keyword"): entry.text for entry in root.iter() if entry.get("keyword")}
+        assert entries["log.1.file"] == "axis.csv"
+        assert entries["log.1.sha256"] == hashlib.sha256(log.read_bytes()).hexdigest()
+        assert entries["log.1.samples"] == str(N)
+        settings = fitted.machine.predictor_settings
+        assert [entries[f"settings.{name}"] for name in ("Np", "p", "q")] == [str(NP), str(settings.p), str(settings.q)]
+        assert float(entries["judged.rms_h"] or "nan") == results["judged"]["rms_h"]
+        assert entries["judged.best"] == results["judged"]["best"]
+    assert sha256_of(tmp_path / "gone.csv") == "unknown"
+
+
 def test_step_times_are_of_the_steps(fitted: Fit) -> None:
     assert 0.0 < fitted.steps["median"] <= fitted.steps["p99_9"] <= fitted.steps["largest"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick_fit")
 def test_a_second_run_goes_on_from_the_first(fitted: Fit, log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def never(*_arguments: object, **_options: object) -> None:
@@ -134,6 +158,7 @@ def test_the_reports_script_replays_a_log(
     assert np.sqrt(np.mean(error**2)) < 1.2 * fitted.judged.rms()[2]
 
 
+@pytest.mark.slow
 def test_the_command_line(hybridsep: Run, tmp_path: Path) -> None:
     log = write_rows(tmp_path / "my axis.csv", commanded()[:800], measured(0)[:800])
     pages = tmp_path / "charts.pdf"
@@ -239,6 +264,7 @@ def test_too_short_a_log_judges_nothing(tmp_path: Path, n: int, Np: int | None, 
     assert found.summary()["judged"]["verdict"].startswith("Nothing is judged: ")
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick_fit")
 def test_a_gap_in_motion_does_not_decide_the_verdict(tmp_path: Path) -> None:
     x_d, x = commanded()[:N], measured(0)[:N]
@@ -276,6 +302,7 @@ def test_missing_measurements(hybridsep: Run, tmp_path: Path) -> None:
         assert rms_h < 14e-6  # noise is 5 µm
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick_fit")
 def test_a_gap_is_said_to_be_handled(hybridsep: Run, tmp_path: Path) -> None:
     log = write_rows(tmp_path / "axis.csv", commanded()[:1200], measured(0)[:1200])
@@ -293,6 +320,7 @@ def test_a_gap_is_said_to_be_handled(hybridsep: Run, tmp_path: Path) -> None:
     assert "changed before" not in page
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick_fit")
 def test_a_rotary_axis_modulo_one_turn_is_unwrapped(hybridsep: Run, tmp_path: Path) -> None:
     """The staircase as four turns."""
@@ -322,6 +350,7 @@ def test_what_is_kept_is_of_the_samples_as_they_are_read(log: Path) -> None:
     assert key_of([replace(recording, x=recording.x.copy())], "m") in keys
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick_fit")
 def test_a_rotary_axis_stays_one_under_the_default_machines_name(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)

@@ -21,6 +21,7 @@ from hybridsep.fmi.libraries import ready_targets
 NP = 20
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick_fit")
 def test_fit_writes_trained_fmus_of_both_versions(hybridsep: Run, tmp_path: Path) -> None:
     x_d, x = commanded()[:1200], measured(0)[:1200]
@@ -69,6 +70,7 @@ def test_another_version_is_refused_before_any_work(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_the_demo_runs_fmus_of_either_version(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cases, "staircase", lambda T_s: commanded()[:500])
     summaries = {}

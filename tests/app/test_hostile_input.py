@@ -16,8 +16,10 @@ ROOT = Path(__file__).resolve().parents[2]
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX only: runs are forked")
 
 
-def test_damaged_files_are_read_or_refused(tmp_path: Path) -> None:
-    options = ["--n", "6", "--fmus", "4", "--seed", "7", "--keep", str(tmp_path / "findings")]
+@pytest.mark.slow
+@pytest.mark.parametrize("n", [2, pytest.param(12, marks=pytest.mark.nightly)])
+def test_damaged_files_are_read_or_refused(tmp_path: Path, n: int) -> None:
+    options = ["--n", str(n), "--fmus", str(n), "--seed", "7", "--keep", str(tmp_path / "findings")]
     command = [sys.executable, "-m", "benchmarks.hostile", *options]  # every kind
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     findings = tmp_path / "findings" / "findings.txt"

@@ -38,6 +38,7 @@ def is_png(path: Path) -> bool:
     return path.read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_a_log(hybridsep: Run, log: Path, tmp_path: Path) -> None:
     out, figure = tmp_path / "my_axis.toml", tmp_path / "log.png"
     status, printed, err = hybridsep("identify", log, "--out", out, "--figure", figure, "--name", "my_axis")

@@ -173,6 +173,7 @@ def in_a_namespace(*command: object) -> SimpleNamespace:
         pytest.skip("there is no unshare")
 
 
+@pytest.mark.slow
 def test_a_full_tmpfs_costs_the_new_file_only(tmp_path: Path) -> None:
     if in_a_namespace("mount", "-t", "tmpfs", "none", tmp_path).returncode:
         pytest.skip("a user may not mount a tmpfs here")

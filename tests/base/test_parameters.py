@@ -89,13 +89,13 @@ def test_the_largest_seed_is_in_its_message() -> None:
 @pytest.mark.parametrize(
     ("name", "text"),
     [
-        ("lambda", "ridge penalty on the weights [m2], 1e-40 … 1e+12"),
-        ("p", "past residuals e_pb in the features, 1 … 5000"),
-        ("alpha", "numerator of the mode, constant term [1/s2], -1e+15 … 1e+15"),
-        ("k_nl", "quadratic stiffness, force k_nl·x·|x| [N/m2], 0 … 1e+15"),
-        ("jerk_weight", "weight of the change's jerk against the tracking error, 0 … 1e+12"),
-        ("no_reversal", "whether x_dm never turns while the commanded position moves"),
-        ("input_hold", "how x_d runs between samples, zero-order or first-order hold, zoh or foh"),
+        ("lambda", "ridge penalty on the weights of the residual model [m2], 1e-40 … 1e+12"),
+        ("p", "number of past residuals e_pb (measured minus physics-based position) among the features, 1 … 5000"),
+        ("alpha", "numerator of the mode's transfer function, constant term [1/s2], -1e+15 … 1e+15"),
+        ("k_nl", "quadratic stiffness of the drive, force k_nl·x·|x| [N/m2], 0 … 1e+15"),
+        ("jerk_weight", "weight of the jerk of the command's change against the tracking error, 0 … 1e+12"),
+        ("no_reversal", "whether the modified command never turns while the commanded position moves"),
+        ("input_hold", "how the command x_d runs between samples, zero-order or first-order hold, zoh or foh"),
     ],
 )
 def test_help(name: str, text: str) -> None:

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
+from properties import examples
 
 from hybridsep.base.errors import HybridSepError, StateError
 from hybridsep.base.settings import PredictorSettings
@@ -76,7 +77,7 @@ def test_truncated_at_any_byte() -> None:
             HybridPredictor.from_bytes(PREDICTOR[:end])
 
 
-@settings(max_examples=400)
+@examples(400)
 @given(position=st.integers(0, len(PREDICTOR) - 1), flip=st.integers(1, 255))
 def test_a_flipped_byte(position: int, flip: int) -> None:
     damaged = bytearray(PREDICTOR)

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,17 +21,20 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from hybridsep import (
     Encoder,
     HybridPredictor,
+    SepCompensator,
     backtest,
     backtest_stream,
     cosimulate,
+    load_machine,
     paper_machine,
     simulate,
     staircase,
 )
 from hybridsep.base.settings import PredictorSettings
+from hybridsep.base.signals import Array
 from hybridsep.base.threads import one_blas_thread
 
-N = 2500
+N = 1600
 
 
 def blas_threads() -> set[int]:
@@ -59,6 +63,7 @@ def results() -> dict[str, str]:
     return {name: hashlib.sha256(signal.tobytes()).hexdigest() for name, signal in signals.items()}
 
 
+@pytest.mark.slow
 def test_results_do_not_depend_on_the_number_of_threads() -> None:
     script = f"import sys; sys.path[:0] = {[str(Path(__file__).parent), str(SUPPORT)]!r}\n"
     script += "import json, test_threads; print(json.dumps(test_threads.results()))"
@@ -89,6 +94,27 @@ def test_replays_and_loops_use_one_thread(two_threads: None, python_fmu: Callabl
     cosimulate(machine.new_compensator(), machine.new_plant(), x_d[:3], sensor=look_and_pass)
     cosimulate(python_fmu("HybridPredictorPy"), python_fmu("FeedDrivePy"), x_d[:3], progress=look)
     assert len(seen) > 100
+    assert set.union(*seen) == {1}
+    assert blas_threads() == {2}
+
+
+def test_windows_of_a_users_own_loop_use_one_thread(two_threads: None) -> None:
+    """Seen from a disturbance of the user's own, which is called where a window is predicted, planned and learned."""
+    seen: list[set[int]] = []
+
+    def disturbance(x: Array, v: Array) -> Array:
+        seen.append(blas_threads())
+        return v
+
+    machine = load_machine("spring_mass_damper")
+    x_d = staircase()[:400]
+    predictor = HybridPredictor(machine.model, replace(machine.predictor_settings, Np=50), disturbances=[disturbance])
+    predictor.predict(x_d[:50])
+    predictor.update(x_d[:50])
+    compensator = SepCompensator(predictor, machine.compensator_settings)
+    compensator.plan(x_d[: compensator.preview])
+    compensator.update(x_d[:50])
+    assert len(seen) > 4
     assert set.union(*seen) == {1}
     assert blas_threads() == {2}
 

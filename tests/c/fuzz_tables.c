@@ -13,7 +13,7 @@
 
 #define TABLE_MAX 65536             /* bytes of a mutated table */
 #define BLOCK_MAX ((size_t)1 << 22) /* bytes that the importer has for a block */
-#define GUID_PLACE 40
+#define GUID_PLACE 48
 #define STEP_SIZE 1e-3 /* s */
 
 typedef struct {
@@ -91,7 +91,7 @@ static void mutate_once(file_content *table)
     } else if (what < 8) {
         const size_t i = below(sizeof counts / sizeof *counts + 1);
         const uint64_t number = i < sizeof counts / sizeof *counts ? counts[i] : draw();
-        put(table, below(5), &number);
+        put(table, below(6), &number);
     } else if (what < 9) {
         const size_t left = below(table->size);
         memset(table->bytes + left, 0, table->size - left);

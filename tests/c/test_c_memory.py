@@ -18,8 +18,11 @@ LONG_RUN = ROOT / "benchmarks" / "long_run" / "run.py"
     platform.libc_ver()[0] != "glibc" or np.finfo(np.longdouble).eps > 2e-19,
     reason="the program stands in for glibc's malloc, and the exact weights need x86's extended precision",
 )
-def test_no_allocation_in_100_000_rows_and_10_000_steps() -> None:
-    command = [sys.executable, str(LONG_RUN), "--samples", "100000", "--steps", "10000"]
+@pytest.mark.slow
+@pytest.mark.parametrize("tenths", [1, pytest.param(10, marks=pytest.mark.nightly)])
+def test_no_allocation_in_many_rows_and_steps(tenths: int) -> None:
+    """Of 10 000 rows and 1000 steps, at night of ten times as many; with windows of all kinds in both."""
+    command = [sys.executable, str(LONG_RUN), "--samples", str(10_000 * tenths), "--steps", str(1000 * tenths)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     assert re.search(r"held +0 calls of the allocator after the initialization", done.stdout)

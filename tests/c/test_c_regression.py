@@ -93,6 +93,7 @@ def staircase_rows(p: int, q: int, n: int) -> tuple[Array, Array]:
     return np.column_stack(columns), e_pb[first : first + n]
 
 
+@pytest.mark.slow
 def test_the_weights_keep_their_digits_over_a_million_samples() -> None:
     # n = 55: 1e-9 relative against extended precision. m times the same rows are the rows times sqrt(m).
     rows, target = staircase_rows(50, 3, 5000)

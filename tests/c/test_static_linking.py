@@ -104,6 +104,7 @@ def run_shared(archives: dict[str, Path]) -> Array:
     return np.array(rows)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", MODELS)
 def test_nothing_but_the_fmi_functions_has_external_linkage(
     archives: dict[str, Path], headers: Path, tmp_path: Path, model: str
@@ -114,6 +115,7 @@ def test_nothing_but_the_fmi_functions_has_external_linkage(
     assert all(name.startswith(f"{model}_fmi2") for name in shown), shown
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("flags", "prefix"), [((), "FeedDriveFmi3_"), (("-DFMI3_OVERRIDE_FUNCTION_PREFIX",), "")])
 def test_fmi_3_has_the_prefix_of_its_own_headers(
     fmus: BuiltFmus, tmp_path: Path, flags: tuple[str, ...], prefix: str
@@ -127,6 +129,7 @@ def test_fmi_3_has_the_prefix_of_its_own_headers(
     assert all(name.startswith(f"{prefix}fmi3") for name in shown), shown
 
 
+@pytest.mark.slow
 def test_an_importer_may_choose_the_prefix(archives: dict[str, Path], headers: Path, tmp_path: Path) -> None:
     built = compile_all(archives["ReferenceTrajectory"], headers, tmp_path, "-DFMI2_FUNCTION_PREFIX=")
     shown = [symbol.name for symbol in elf.symbols(built) if symbol.defined and symbol.exported]
@@ -134,6 +137,7 @@ def test_an_importer_may_choose_the_prefix(archives: dict[str, Path], headers: P
     assert all(name.startswith("fmi2") for name in shown)
 
 
+@pytest.mark.slow
 def test_three_fmus_run_in_one_program(archives: dict[str, Path], headers: Path, tmp_path: Path) -> None:
     # Another optimisation than the libraries', to whose bits it comes all the same
     objects = [compile_all(archives[model], headers, tmp_path, "-O1") for model in MODELS]

@@ -40,6 +40,7 @@ def test_figures_with_the_recommended_settings() -> None:
         assert turned(loop.x_dm, loop.x_d) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings_", [{}, asdict(RECOMMENDED)], ids=["paper", "recommended"])
 @pytest.mark.parametrize("trouble", ["changed", "noise", "limits"])
 def test_trouble_never_makes_it_worse_than_physics(settings_: dict[str, Any], trouble: str) -> None:
@@ -103,6 +104,20 @@ def test_a_saved_state_goes_on_bit_for_bit(planned: bool, no_reversal: bool) -> 
 def test_parameters_out_of_range_are_named(values: dict[str, Any], message: str) -> None:
     with pytest.raises(ParameterError, match=message):
         SepCompensator(HybridPredictor(MODEL, PredictorSettings(trust=False)), CompensatorSettings(**values))
+
+
+def test_only_what_is_tunable_changes_in_a_run() -> None:
+    """How it fades, on every implementation: tests/suite/test_tunable.py."""
+    sep = compensator()
+    before = sep.to_bytes()
+    with pytest.raises(ParameterError, match="preview, spacing cannot change in a run, change_max and compensate can"):
+        sep.change(preview=300, spacing=1, compensate="off")
+    with pytest.raises(ParameterError, match="compensate must be one of off, physics, hybrid, got 'none'"):
+        sep.change(compensate="none")
+    assert sep.to_bytes() == before
+    sep.change(compensate="physics", change_max=None)
+    assert sep.compensate is SepState.PHYSICS
+    assert SepCompensator.from_bytes(sep.to_bytes()).settings == sep.settings
 
 
 def test_bad_samples_change_nothing() -> None:

@@ -31,6 +31,7 @@ def problems_of(monkeypatch: pytest.MonkeyPatch, seed: int, n: int, **fixed: flo
     return found  # type: ignore[return-value]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("seed", "n", "fixed"),
     [(34, 1100, {}), (38, 1000, {}), (233, 800, {"change_max": 1e-4})],
@@ -50,6 +51,7 @@ def test_the_minimum_is_that_of_another_solver(
         assert abs(0.5 * (x @ P @ x - expected @ P @ expected) - v @ (x - expected)) <= 1e-10 * cost
 
 
+@pytest.mark.slow
 def test_bounds_that_are_equal_or_nearly_so() -> None:
     """The rows' Gram matrix alone is singular, and with multipliers in it P is lost in its rounding."""
     rng = np.random.default_rng(0)
@@ -67,6 +69,7 @@ def test_bounds_that_are_equal_or_nearly_so() -> None:
     np.testing.assert_allclose(x, expected, rtol=0, atol=1e-7 * float(np.max(np.abs(expected))))
 
 
+@pytest.mark.slow
 def test_a_problem_without_active_bounds() -> None:
     P, v = np.diag([1.0, 4.0]), np.array([1.0, 2.0])
     x = minimise(P, v, np.eye(2), np.full(2, -9.0), np.full(2, 9.0), np.zeros(2), 2.0).x

@@ -7,15 +7,16 @@ import math
 import numpy as np
 import pytest
 from compensator_cases import compensator
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from properties import examples
 
 from hybridsep.base.errors import SignalError
 from hybridsep.compensate.compensator import SepState
 from hybridsep.compensate.paper_planning import has_stable_poles
 
 
-@settings(max_examples=200)
+@examples(200)
 @given(st.lists(st.floats(-1.5, 1.5), min_size=1, max_size=6), st.floats(-3, 3), st.floats(-3, 3))
 def test_step_down_recursion_agrees_with_the_roots(real: list[float], a: float, b: float) -> None:
     polynomial = np.convolve(np.poly(real), np.array([1.0, a, b]))

@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from built_once import BuiltFmus
 from compensator_cases import DRIVE_LIMITS, TS, beyond, compensator, move, turned
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from properties import examples
 
-from hybridsep.base.settings import Limits
+from hybridsep.base.settings import PARAMETERS, Limits
 from hybridsep.base.signals import Array
 from hybridsep.compensate.constraints import DriveBounds
 from hybridsep.compensate.splines import N_DECIDED, SplineBasis
 from hybridsep.cosim.loop import cosimulate
-from hybridsep.machines.machine import load_machine
-from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest, spiral
 
 
-@settings(max_examples=12)
+@pytest.mark.slow
+@examples(12)
 @given(
     st.integers(0, 2**31),
     st.sampled_from([1e-6, 1e-4, 1e-2]),
@@ -43,6 +42,7 @@ def test_a_command_never_turns_where_the_path_moves(seed: int, spread: float, li
     assert np.max(np.abs(x_dm[3:] - x_d[: len(x_dm) - 3])) <= 1e-3
 
 
+@pytest.mark.slow
 def test_only_the_velocity_where_the_path_moves_is_bounded_by_the_direction() -> None:
     basis, n, step = SplineBasis(80, 4), 80, 1e-5
     steps = np.concatenate((np.full(30, step), np.zeros(30), np.full(20, -step)))  # it moves from the first sample on
@@ -59,7 +59,8 @@ def test_only_the_velocity_where_the_path_moves_is_bounded_by_the_direction() ->
     np.testing.assert_array_equal(kept.rows, free.rows)
 
 
-@settings(max_examples=30)
+@pytest.mark.slow
+@examples(30)
 @given(st.integers(0, 2**31))
 def test_the_rest_of_a_plan_that_turned_is_still_a_plan(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -71,13 +72,16 @@ def test_the_rest_of_a_plan_that_turned_is_still_a_plan(seed: int) -> None:
     assert np.min(np.diff(move(80) + basis.values @ rest)) < -1e-6  # it does turn
 
 
-def test_friction_that_follows_the_command_makes_turning_dear() -> None:
-    """The stage's Y axis, physics model: 126.7 µm where the command keeps its direction, 128.4 where it need not."""
-    machine, r = load_machine("als25010_y"), spiral()[1]
-    found = {}
+@pytest.mark.slow
+def test_friction_that_follows_the_command_makes_turning_dear(fmus: BuiltFmus) -> None:
+    """The stage's Y axis, physics model: 126.7 µm where the command keeps its direction, 128.4 where it need not.
+
+    By the native FMUs, in a tenth of the library's time; they command as it does (cosim/test_compensator_fmus.py).
+    """
+    pair, found = (fmus("SepCompensator_als25010_y"), fmus("FeedDrive_als25010_y")), {}
     for keep in (True, False):
-        sep = machine.new_compensator(replace(machine.compensator_settings, compensate="physics", no_reversal=keep))
-        found[keep] = cosimulate(sep, machine.new_plant(), r, encoder=Encoder(1e-6, 0))
+        values = {"compensate": PARAMETERS["compensate"].to_fmi("physics"), "no_reversal": keep}
+        found[keep] = cosimulate(*pair, spiral()[1], controller_values=values)
     assert 1e6 * found[True].tracking_rms == pytest.approx(126.65, abs=0.5)
     assert 1e6 * found[False].tracking_rms == pytest.approx(128.39, abs=0.5)
     assert turned(found[True].x_dm, found[True].x_d) == 0

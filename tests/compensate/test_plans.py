@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from bounded_oracle import clarabel_minimum
 from compensator_cases import DRIVE_LIMITS, MODEL, TS, beyond, compensator, move, plant
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
+from properties import examples
 from scipy.linalg import toeplitz
 from scipy.optimize import nnls
 from staircase_data import commanded
@@ -65,7 +66,7 @@ def test_the_splines_end_so_that_what_follows_is_the_command_itself() -> None:
         assert values[:, N_DECIDED:].any(axis=0).all()
 
 
-@settings(max_examples=25)
+@examples(25)
 @example(11777665, 0.734375)  # an active bound is left by 0.2 % of it: the cost is within 4e-6 all the same
 @given(st.integers(0, 2**31), st.floats(0.05, 0.95))
 def test_a_bounded_plan_satisfies_the_optimality_conditions(seed: int, tightness: float) -> None:
@@ -128,7 +129,8 @@ def test_a_bounded_plan_costs_what_another_solver_finds(
     assert np.max(np.abs(bounded)) <= 1e-5
 
 
-@settings(max_examples=12)
+@pytest.mark.slow
+@examples(12)
 @given(st.integers(0, 2**31), st.sampled_from([1e-6, 1e-4, 1e-2]), st.sampled_from([PAPER_LIMITS, DRIVE_LIMITS]))
 def test_limits_hold_whatever_is_measured(seed: int, spread: float, limits: Limits) -> None:
     rng = np.random.default_rng(seed)
@@ -154,7 +156,7 @@ def test_what_is_left_of_a_plan_is_followed_when_there_is_no_other() -> None:
     ahead = np.concatenate((commanded()[950:], np.zeros(200)))
     plans = []
     for k in range(0, 500, 100):
-        sep.compensate = SepState.PHYSICS if k < 200 else SepState.OFF
+        sep.change(compensate="physics" if k < 200 else "off")
         plans.append(sep.plan(ahead[k : k + 200]))
         sep.update(plans[-1].x_pb)
     states = [plan.state for plan in plans]

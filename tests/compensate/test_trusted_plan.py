@@ -62,6 +62,7 @@ def plan_model(sep: SepCompensator, x_d: Array, late: int = 0) -> PlanModel:
     return PlanModel(trusted_model(sep.predictor), sep.predictor.state, x_d[:late], x_d[late:], x_d[late:])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("period", [0.0, 2e-3])
 def test_the_slope_is_that_of_the_prediction(period: float) -> None:
     sep = SepCompensator.from_bytes(learned(period))
@@ -83,12 +84,12 @@ def test_the_slope_is_that_of_the_prediction(period: float) -> None:
         assert np.max(np.abs(slope - expected)) < 0.05 * np.max(np.abs(expected))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("late", [1, 30])
 def test_late_commands_are_predicted_and_not_changed(late: int) -> None:
     """The preview after them is the end of a longer one, whose first commands stay as they are."""
     sep, n = SepCompensator.from_bytes(learned(2e-3)), 200
     x_d, basis = moves()[: late + n], SplineBasis(n, 2)
-    trusted_model(sep.predictor).rest.known = late  # the moves begin later
     whole, model = plan_model(sep, x_d), plan_model(sep, x_d, late)
     at, of_whole = model.predict(x_d[late:]), whole.predict(x_d)
     np.testing.assert_array_equal(model.position(at), whole.position(of_whole)[late:])
@@ -101,6 +102,7 @@ def test_late_commands_are_predicted_and_not_changed(late: int) -> None:
     np.testing.assert_allclose(model.slope(at, changes, passed, 0.01), expected[late:], rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_slopes_of_disturbances_of_the_user_are_followed() -> None:
     """Sines of the position of the user's own are those of the period, and plans with them the same."""
     turns = 2.0 * np.pi / 2e-3
@@ -133,6 +135,7 @@ def test_without_anything_learned_the_physics_model_plans() -> None:
     assert compensator(compensate="off").plan(x_d).state is SepState.OFF
 
 
+@pytest.mark.slow
 def test_plans_follow_friction_that_follows_the_command() -> None:
     physics = run(compensator(compensate="physics"))
     sep = compensator()
@@ -147,7 +150,7 @@ def test_plans_follow_friction_that_follows_the_command() -> None:
 def test_a_plan_that_is_predicted_to_be_worse_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
     x_d = moves()[:200]
     expected = SepCompensator.from_bytes(learned())
-    expected.compensate = SepState.PHYSICS
+    expected.change(compensate="physics")
     sep = SepCompensator.from_bytes(learned())
     assert sep.plan(x_d).state is SepState.HYBRID
     worse = np.full(3 + sep._basis.n_free, 1e-3)
@@ -210,6 +213,7 @@ def test_a_plan_runs_away_at_its_bound(at_bound: int, of_physics: int, error: fl
     assert runs_away(delta, other, error, 1e-4) is expected
 
 
+@pytest.mark.slow
 def test_an_outlier_of_a_millimetre_hardly_moves_the_command() -> None:
     def wrong(k: int, x_meas: float) -> float:
         return x_meas + (1e-3 if k == 430 else 0.0)
@@ -218,6 +222,7 @@ def test_an_outlier_of_a_millimetre_hardly_moves_the_command() -> None:
     assert np.max(np.abs(other.x_dm - sound.x_dm)) < 5e-6
 
 
+@pytest.mark.slow
 def test_missing_measurements_are_bridged() -> None:
     def missing(k: int, x_meas: float) -> float:
         return math.nan if 400 <= k < 460 or k % 97 == 0 else x_meas
@@ -227,6 +232,7 @@ def test_missing_measurements_are_bridged() -> None:
     assert found.tracking_rms < 0.8 * physics.tracking_rms
 
 
+@pytest.mark.slow
 def test_a_restored_compensator_goes_on() -> None:
     sep, x_d = SepCompensator.from_bytes(learned()), moves()
     plan = sep.plan(x_d[:200])
@@ -239,6 +245,7 @@ def test_a_restored_compensator_goes_on() -> None:
     np.testing.assert_array_equal(again[0].x_dm, again[1].x_dm)
 
 
+@pytest.mark.slow
 def test_positions_in_another_unit_are_commanded_the_same() -> None:
     def commands(unit: float) -> Array:
         limits = Limits(*(unit * limit for limit in (0.1, 16.0, 5000.0)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -49,12 +50,28 @@ def pair(flavour: str, fmus: BuiltFmus) -> Pair:
 
 
 @pytest.fixture(scope="module")
-def runs(pair: Pair) -> dict[str, Run]:
-    """The staircase with the paper's model and settings."""
-    return {
-        choice: cosimulate(*pair, staircase(), controller_values={**PAPER, "compensate": COMPENSATE.to_fmi(choice)})
-        for choice in COMPENSATE.choices
-    }
+def runs(fmus: BuiltFmus) -> Callable[[str, str], Run]:
+    """Return a function that gives the run of a flavour and a choice with the paper's model and settings.
+
+    The staircase, of the Python flavour, which is the library, its beginning.
+    """
+
+    @cache
+    def run(flavour: str, choice: str) -> Run:
+        controller, plant = (fmus(name_of(model, MACHINE, flavour)) for model in ("SepCompensator", "FeedDrive"))
+        r = staircase() if flavour == "native" else staircase()[:1500]
+        return cosimulate(controller, plant, r, controller_values={**PAPER, "compensate": COMPENSATE.to_fmi(choice)})
+
+    return run
+
+
+@cache
+def loop_of(choice: str) -> Run:
+    """Return the library's run with the same settings."""
+    values = {**MACHINE.fmi_compensator_parameters(), **PAPER, "compensate": COMPENSATE.to_fmi(choice)}
+    settings = CompensatorSettings.from_fmi(values)
+    compensator = MACHINE.new_compensator(settings, predictor=PredictorSettings.from_fmi(values))
+    return cosimulate(compensator, MACHINE.new_plant(), staircase(), encoder=Encoder(5e-6, 0))
 
 
 @pytest.fixture(scope="module")
@@ -67,6 +84,12 @@ def short(python_pair: Pair) -> Run:
     return cosimulate(*python_pair, staircase()[:600])
 
 
+def until_its_end_is_seen(run: Run) -> int | None:
+    """Return for how many samples a run is that of the whole staircase; None for all."""
+    n = len(run.x_d)
+    return None if n == len(staircase()) else n - int(MACHINE.fmi_compensator_parameters()["preview"])
+
+
 def assert_same(run: Run, loop: Run, n: int | None = None) -> None:
     """Compare two runs, or their first ``n`` samples."""
     for name in ("x_d", "x_dm", "x", "x_meas", "x_pb", "x_h", "x_h_std"):
@@ -75,35 +98,34 @@ def assert_same(run: Run, loop: Run, n: int | None = None) -> None:
     np.testing.assert_array_equal(run.state[:n], loop.state[:n])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("choice", "least", "most"), [("off", 87.0, 90.0), ("physics", 0.0, 20.5), ("hybrid", 0.0, 6.6)]
 )
-def test_staircase_tracking_error(runs: dict[str, Run], choice: str, least: float, most: float) -> None:
+def test_staircase_tracking_error(runs: Callable[[str, str], Run], choice: str, least: float, most: float) -> None:
     """µm of the true position, p = 50, q = 3, one noise seed."""
-    assert least <= runs[choice].summary()["tracking_rms_um"] <= most
+    assert least <= runs("native", choice).summary()["tracking_rms_um"] <= most
 
 
 @pytest.mark.parametrize("choice", COMPENSATE.choices)
-def test_the_drives_limits_are_kept(runs: dict[str, Run], choice: str) -> None:
+def test_the_drives_limits_are_kept(runs: Callable[[str, str], Run], choice: str) -> None:
     limits, change_max = MACHINE.command_limits()
     assert limits is not None
     assert change_max is not None
-    run = runs[choice]
+    run = runs("native", choice)
     for order, limit in enumerate((limits.velocity, limits.acceleration, limits.jerk), start=1):
         assert np.abs(np.diff(run.x_dm, order)).max() <= limit * MACHINE.T_s**order * (1 + 1e-9)
     assert np.abs(run.change).max() <= change_max
     assert run.summary()["change_max_um"] > 100.0 or choice == "off"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("choice", COMPENSATE.choices)
-def test_fmus_equal_the_library(runs: dict[str, Run], choice: str) -> None:
-    values = {**MACHINE.fmi_compensator_parameters(), **PAPER, "compensate": COMPENSATE.to_fmi(choice)}
-    settings = CompensatorSettings.from_fmi(values)
-    compensator = MACHINE.new_compensator(settings, predictor=PredictorSettings.from_fmi(values))
-    loop = cosimulate(compensator, MACHINE.new_plant(), staircase(), encoder=Encoder(5e-6, 0))
-    assert_same(runs[choice], loop)
-    np.testing.assert_array_equal(runs[choice].x_d, staircase())
-    assert runs[choice].t[0] == pytest.approx(0.2)
+def test_fmus_equal_the_library(runs: Callable[[str, str], Run], flavour: str, choice: str) -> None:
+    run = runs(flavour, choice)
+    assert_same(run, loop_of(choice), until_its_end_is_seen(run))
+    np.testing.assert_array_equal(run.x_d, staircase()[: len(run.x_d)])
+    assert run.t[0] == pytest.approx(0.2)
 
 
 @pytest.fixture(scope="module")
@@ -116,19 +138,20 @@ def by_library(tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Path, Run
     return cold, trained, warm
 
 
+@pytest.mark.slow
 def test_recommended_settings_cold_and_warm(
     flavour: str, pair: Pair, fmus: BuiltFmus, by_library: tuple[Run, Path, Run]
 ) -> None:
     first, weights, second = by_library
-    # The Python flavour is the library, whose figures these are: its beginning is enough, up to where it sees the end.
-    r = staircase() if flavour == "native" else staircase()[:2000]
-    same = None if flavour == "native" else len(r) - int(MACHINE.fmi_compensator_parameters()["preview"])
+    # The figures are the library's: the beginning is enough, up to where it sees the end.
+    r = staircase()[:2000] if flavour == "native" else staircase()[:1200]
     cold = cosimulate(*pair, r, plant_values={"seed": 1})
+    same = until_its_end_is_seen(cold)
     assert_same(cold, first, same)
     trained = fmus(name_of("SepCompensator", MACHINE, flavour), weights=weights)
     warm = cosimulate(trained, pair[1], r, plant_values={"seed": 2})
     assert_same(warm, second, same)
-    assert warm.summary()["share_hybrid"] == 1.0
+    assert second.summary()["share_hybrid"] == 1.0
     assert first.summary()["tracking_rms_um"] < 4.2
     assert second.summary()["tracking_rms_um"] < 0.6
 
@@ -224,6 +247,8 @@ def test_figures(short: Run, tmp_path: Path) -> None:
         assert path.read_bytes().startswith(PNG)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("flavour", ["native", pytest.param("python", marks=pytest.mark.nightly)])
 def test_the_direction_can_be_turned_off(flavour: str, fmus: BuiltFmus) -> None:
     """A fixed parameter of the FMU, without a rebuild; the library with the same settings commands the same."""
     machine, r = load_machine("als25010_y"), spiral()[1][:1500]

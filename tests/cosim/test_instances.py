@@ -119,6 +119,7 @@ def measure(folder: str) -> None:
     print(json.dumps({"per_instance": per_instance, "left": resident() - before}))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(platform.system() != "Linux", reason="resident memory is read from /proc, which is Linux's")
 def test_memory_is_that_of_the_arrays_and_cycles_leave_none(
     folder: Path, record_property: Callable[[str, object], None]
@@ -134,6 +135,7 @@ def test_memory_is_that_of_the_arrays_and_cycles_leave_none(
     assert measured["left"] < 4 * array_bytes()  # of 2000 cycles, each with a save, a restore and a reset
 
 
+@pytest.mark.slow
 def test_an_instance_asks_for_little_more_than_its_arrays(fmu: Library) -> None:
     """Allocated bytes of an instance, all of them freed with it."""
     component = started(fmu, b"an instance", 0.0)
@@ -146,20 +148,22 @@ def test_an_instance_asks_for_little_more_than_its_arrays(fmu: Library) -> None:
     assert not fmu.blocks
 
 
-def test_no_instance_sees_another(fmu: Library) -> None:
-    """A thousand, each with a motion of its own, sample by sample in turn, end where each ends when it is alone."""
-    inputs = np.stack([signals(i) for i in range(N_INSTANCES)])
-    together = [started(fmu, f"instance {i}".encode(), inputs[i, 0, 0]) for i in range(N_INSTANCES)]
+@pytest.mark.slow
+@pytest.mark.parametrize("n", [50, pytest.param(N_INSTANCES, marks=pytest.mark.nightly)])
+def test_no_instance_sees_another(fmu: Library, n: int) -> None:
+    """Many, each with a motion of its own, sample by sample in turn, end where each ends when it is alone."""
+    inputs = np.stack([signals(i) for i in range(n)])
+    together = [started(fmu, f"instance {i}".encode(), inputs[i, 0, 0]) for i in range(n)]
     for k in range(N_SAMPLES):
         for i, component in enumerate(together):
             sample(fmu, component, k, inputs[i, k])
     assert fmu.get(together[0], "hybrid_active")
     ends = [(fmu.save(component), fmu.reals(component)) for component in together]
-    assert len(set(ends)) == N_INSTANCES
+    assert len(set(ends)) == n
     for component in together:
         fmu.FreeInstance(component)
     assert not fmu.blocks
-    for i in range(N_INSTANCES):
+    for i in range(n):
         alone = started(fmu, b"alone", inputs[i, 0, 0])
         for k in range(N_SAMPLES):
             sample(fmu, alone, k, inputs[i, k])

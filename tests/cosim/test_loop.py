@@ -15,7 +15,7 @@ from hybridsep.base.errors import ParameterError
 from hybridsep.cosim.run import COMPENSATOR, PREDICTOR
 
 MACHINE = load_machine("spring_mass_damper")
-R = staircase()[:1500]
+R = staircase()[:1200]
 
 Fmu = Callable[[str], Path]
 
@@ -61,6 +61,7 @@ def test_what_the_controller_takes_for_late_arrives_late(python_fmu: Fmu) -> Non
     assert fmu.measurement_delay == late
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["HybridPredictor", "SepCompensator"])
 def test_library_and_fmu_take_each_others_place(python_fmu: Fmu, model: str) -> None:
     def new_controller() -> Any:

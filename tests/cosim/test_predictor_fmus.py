@@ -26,6 +26,7 @@ def run(pair: tuple[Path, Path]) -> Run:
     return cosimulate(*pair, staircase())
 
 
+@pytest.mark.slow
 def test_fmus_equal_the_library(run: Run) -> None:
     machine = load_machine("spring_mass_damper")
     x = simulate(machine.new_plant(), staircase(), machine.T_s)

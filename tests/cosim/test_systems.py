@@ -77,17 +77,27 @@ def test_the_structure_is_that_of_the_fmus(archive: Path, tmp_path: Path) -> Non
 
 
 def test_the_picture_is_tidy(archive: Path) -> None:
-    """Components stand side by side, within the system, and wires meet no component."""
+    """Components stand side by side, and wires meet no component."""
     root = etree.fromstring(content(archive)["SystemStructure.ssd"])
     boxes = [[float(box.get(key)) for key in ("x1", "x2", "y1", "y2")] for box in root.iter(f"{SSD}ElementGeometry")]
-    (whole,) = root.iter(f"{SSD}SystemGeometry")
     assert all(left[1] < right[0] for left, right in pairwise(boxes))
-    assert boxes[-1][1] < float(whole.get("x2"))
     wires = list(root.iter(f"{SSD}ConnectionGeometry"))
     assert len(wires) == 3
     for wire in wires:
         for x, y in zip(map(float, wire.get("pointsX").split()), map(float, wire.get("pointsY").split()), strict=True):
             assert not [box for box in boxes if box[0] < x < box[1] and box[2] < y < box[3]]
+
+
+@pytest.mark.slow
+def test_every_tag_is_one_that_omsimulator_takes(archive: Path) -> None:
+    """It refuses a file for one tag that it does not know, as ``ssd:SystemGeometry``, however legal."""
+    (system,) = etree.fromstring(content(archive)["SystemStructure.ssd"]).iter(f"{SSD}System")
+    tags = [element.tag.removeprefix(SSD) for element in system]
+    assert tags == ["Elements", "Connections", "Annotations"]
+    for component in system.iter(f"{SSD}Component"):
+        assert {part.tag.removeprefix(SSD) for part in component} == {
+            *("Connectors", "ElementGeometry", "ParameterBindings")
+        }
 
 
 def test_ssp_2_has_the_twins_of_fmi_3(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 from command_line import Run
 from places import ROOT
+from quick_fits import without_other_windows
 
 PAGES = [
     ROOT / "README.md",
@@ -24,8 +25,10 @@ RUN = re.compile(r"```(sh|python)\n(.*?)```", re.DOTALL)
 ELSEWHERE = ("python3 -m venv", "sphinx-build ", "hybridsep fit my_axis.csv --Np 100 --v_max ")
 """Begin of lines that others run: CI, ``test_demo``, ``test_site``, ``test_fit_compensation``."""
 FIT = "hybridsep fit my_axis.csv --Np 100"
+LOG = "hybridsep example-log --out my_axis.csv"
 ROWS = 3001
-"""Lines of the example log that are left when the README's fit is over: of the others it is tested that they work."""
+"""Lines of the example log that are left once it is written, and at night once the README's fit is over: of the others
+it is tested that they work."""
 
 
 def test_every_block_is_run_or_shown() -> None:
@@ -36,11 +39,25 @@ def test_every_block_is_run_or_shown() -> None:
             assert language == "sh" or not re.search(r"^(hybridsep|python) ", text, re.MULTILINE), page.name
 
 
+@pytest.mark.slow
+def test_fmpy_gets_the_communication_step_size() -> None:
+    """``step_size`` is nothing to a co-simulation, whose steps fmpy doubles until at most 1000 are left."""
+    calls = [
+        call
+        for page in PAGES
+        for call in re.findall(r"simulate_fmu\((.*?)\n\)", page.read_text(encoding="utf-8"), re.DOTALL)
+    ]
+    assert calls
+    assert all("output_interval=1e-3" in call and "step_size" not in call for call in calls)
+
+
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="the lines are those of a POSIX shell")
-@pytest.mark.usefixtures("quick_fit")
+@pytest.mark.parametrize("whole", [False, pytest.param(True, marks=pytest.mark.nightly)])
 def test_the_pages_run_from_first_to_last(
-    hybridsep: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    whole: bool, hybridsep: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    without_other_windows(monkeypatch)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     done: set[str] = set()
@@ -55,8 +72,9 @@ def test_the_pages_run_from_first_to_last(
                 else:
                     line(piece, hybridsep)
                     capsys.readouterr()
-                if piece == FIT:
+                if piece == FIT and whole:
                     assert_the_row_of_the_readme(tmp_path / "my_axis" / "fit.json")
+                if piece == (FIT if whole else LOG):
                     log = tmp_path / "my_axis.csv"
                     log.write_text("".join(log.read_text().splitlines(keepends=True)[:ROWS]))
     assert len([piece for piece in done if piece.startswith("hybridsep ")]) >= 12

@@ -13,7 +13,15 @@ DATED = ROOT / "docs" / "experiments"
 """Pages that tell of the code at their commit: names of files on them may have gone."""
 TOP = tuple(ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md"))
 PAGES = (*TOP, *sorted((ROOT / "docs").rglob("*.md")))
-FOLDERS = (".", "hybridsep", "fmu_src/c", "fmu_src/c/core", "benchmarks", "benchmarks/step_time")
+FOLDERS = (
+    ".",
+    "hybridsep",
+    "fmu_src/c",
+    "fmu_src/c/core",
+    "benchmarks",
+    "benchmarks/step_time",
+    "integrations/linuxcnc",
+)
 """Folders below which a page names files."""
 FILE = re.compile(r"(?<![\w*{./-])((?:[\w.-]+/)*[\w.-]+\.(?:py|c|h|toml|md))(?![\w*}])")
 ELSEWHERE = {
@@ -25,6 +33,7 @@ ELSEWHERE = {
     "sources/all.c",
     "FMI.c",
     "src/hal/utils/scope_files.c",
+    "linuxcnc/hsep.c",
 }
 """Files of the user, of an archive, of another project."""
 
@@ -45,6 +54,7 @@ def anchors(page: Path) -> set[str]:
     return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_links_lead_somewhere(page: Path) -> None:
     for target, anchor in links(page):
@@ -53,10 +63,15 @@ def test_links_lead_somewhere(page: Path) -> None:
         assert not anchor or anchor in anchors(place), (target, anchor)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", [page for page in PAGES if page.parent != DATED], ids=name_of)
 def test_files_on_the_page_exist(page: Path) -> None:
     names = set(FILE.findall(re.sub(r"\]\([^)]*\)", "]", page.read_text(encoding="utf-8")))) - ELSEWHERE
-    known = {path.name for folder in ("hybridsep", "fmu_src", "tests", "benchmarks") for path in files_in(folder)}
+    known = {
+        path.name
+        for folder in ("hybridsep", "fmu_src", "integrations", "tests", "benchmarks")
+        for path in files_in(folder)
+    }
     for name in names:
         found = any((ROOT / folder / name).is_file() for folder in FOLDERS)
         assert found or ("/" not in name and name in known), name
@@ -78,3 +93,11 @@ def test_the_front_is_short() -> None:
 
 def files_in(folder: str) -> list[Path]:
     return [path for path in (ROOT / folder).rglob("*.*") if path.is_file()]
+
+
+def test_the_page_about_the_tests_names_every_folder_and_what_they_share() -> None:
+    page = (ROOT / "tests" / "README.md").read_text(encoding="utf-8")
+    folders = {path.parent.name for path in (ROOT / "tests").glob("*/test_*.py")}
+    shared = {path.name for path in (ROOT / "tests" / "support").glob("*.py")}
+    assert len(folders) > 15
+    assert {name for name in folders | shared if f"`{name}`" not in page} == set()

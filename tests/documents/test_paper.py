@@ -24,6 +24,7 @@ def rms(error: np.ndarray) -> float:
     return 1e6 * float(np.sqrt(np.mean(error**2)))
 
 
+@pytest.mark.slow
 def test_readings_of_eqs_12_and_13() -> None:
     section = example("section_3_2")
     residual, in_mm = section["residual"], section["in_mm"]
@@ -33,6 +34,7 @@ def test_readings_of_eqs_12_and_13() -> None:
     assert rms(residual(in_mm(section["eq_13"]), staircase())) == pytest.approx(437.0, abs=1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("length", "ratio"), [(0.030, 1.1), (0.013, 1.02)])
 def test_the_hybrid_can_be_worse_on_the_whole(length: float, ratio: float) -> None:
     x_d = rest_to_rest(np.resize([0.0, length], 8), PAPER_LIMITS, dwell=0.3)
@@ -41,6 +43,7 @@ def test_the_hybrid_can_be_worse_on_the_whole(length: float, ratio: float) -> No
     assert poles[int(np.argmax(result.batch_rms_h))] > 1.0
 
 
+@pytest.mark.slow
 def test_where_on_the_spiral_the_hybrid_errs() -> None:
     section, x_d = example("section_4_2"), spiral()[1]
     x, result, _ = section["replay"](paper_machine("als25010_y"), x_d)
@@ -52,11 +55,13 @@ def test_where_on_the_spiral_the_hybrid_errs() -> None:
     assert rms(hybrid[-section["SLOWING"] :]) < 0.5 * rms(physics[-section["SLOWING"] :])  # the end
 
 
+@pytest.mark.slow
 def test_hz_read_as_rad_per_second_is_no_drive() -> None:
     model = paper_machine("als25010_x").model
     assert sum(mode.alpha / mode.f_n**2 for mode in model.modes) == pytest.approx((2 * np.pi) ** 2, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_commands_and_tests_on_the_page_exist() -> None:
     commands = re.findall(r"`((?:python|pytest) [^`]+)`", PAGE)
     assert len(commands) > 8

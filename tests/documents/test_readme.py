@@ -11,7 +11,6 @@ from pathlib import Path
 
 import pytest
 from places import ROOT
-from slow_tests import LONGEST
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
@@ -20,6 +19,7 @@ def blocks(language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
 
 
+@pytest.mark.slow
 def test_the_two_commands_come_first_and_ci_runs_the_second() -> None:
     first, second = (block.strip() for block in blocks("sh")[:2])
     assert "\n" not in first + second
@@ -27,6 +27,7 @@ def test_the_two_commands_come_first_and_ci_runs_the_second() -> None:
     assert second in (ROOT / ".ci" / "run").read_text().splitlines()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not shutil.which("bash"), reason="CI's script needs bash")
 def test_ci_prints_and_keeps_the_stacks_of_a_crash(tmp_path: Path) -> None:
     script = (ROOT / ".ci" / "run").read_text()
@@ -40,15 +41,13 @@ def test_ci_prints_and_keeps_the_stacks_of_a_crash(tmp_path: Path) -> None:
     assert (tmp_path / ".ci" / "run.log").read_text() == done.stdout
 
 
-def test_the_files_that_run_first_are_there() -> None:
-    assert [file for file in LONGEST if not (ROOT / "tests" / file).is_file()] == []
-
-
+@pytest.mark.slow
 def test_processes_of_tests_tell_where_they_crash() -> None:
     done = subprocess.run([sys.executable, "-c", "import os; os.abort()"], capture_output=True, text=True)
     assert "Fatal Python error: Aborted" in done.stderr
 
 
+@pytest.mark.slow
 def test_the_example_of_a_machine_file_is_valid(tmp_path: Path) -> None:
     from hybridsep import load_machine
 
@@ -59,8 +58,15 @@ def test_the_example_of_a_machine_file_is_valid(tmp_path: Path) -> None:
     assert load_machine(path).model.dc_gain == pytest.approx(1.0, abs=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    "example", sorted(path.name for path in (ROOT / "examples").glob("*.py") if "__main__" in path.read_text("utf-8"))
+    "example",
+    [
+        # machines/test_machine.py has it calibrate the stage
+        pytest.param(path.name, marks=[pytest.mark.nightly] if path.stem == "calibrate_stage" else [])
+        for path in sorted((ROOT / "examples").glob("*.py"))
+        if "__main__" in path.read_text("utf-8")
+    ],
 )
 def test_examples_run(example: str, tmp_path: Path) -> None:
     command = [sys.executable, "-W", "error", str(ROOT / "examples" / example)]

@@ -18,6 +18,7 @@ PORTS = {
 FMUS = ("ReferenceTrajectory", "HybridPredictor", "SepCompensator", "FeedDrive")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fmu", FMUS)
 def test_ports_are_the_fmus_in_their_order(fmu: str, fmus: BuiltFmus) -> None:
     variables = read_description(fmus(fmu)).modelVariables
@@ -25,6 +26,7 @@ def test_ports_are_the_fmus_in_their_order(fmu: str, fmus: BuiltFmus) -> None:
         assert PORTS[fmu, causality] == [v.name for v in variables if v.causality == causality]
 
 
+@pytest.mark.slow
 def test_wires_end_at_ports() -> None:
     text = SCRIPT.partition("wires = {")[2].partition("};")[0]
     wires = [line.strip().split(", ") for line in text.strip().splitlines()]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
@@ -77,6 +78,7 @@ def pages(site: Path) -> dict[str, Page]:
     return {name: Page((site / f"{name}.html").read_text(encoding="utf-8")) for name in NAMES}
 
 
+@pytest.mark.slow
 def test_no_page_loads_anything_from_elsewhere(site: Path, pages: dict[str, Page]) -> None:
     for name, page in pages.items():
         assert page.loads, name
@@ -89,6 +91,7 @@ def test_no_page_loads_anything_from_elsewhere(site: Path, pages: dict[str, Page
         assert not re.search(r"(fetch|open|import)\(\s*['\"`][^)]*https?://", path.read_text(encoding="utf-8")), path
 
 
+@pytest.mark.slow
 def test_links_lead_to_a_page_and_a_place_on_it(site: Path, pages: dict[str, Page]) -> None:
     n = 0
     for name, page in pages.items():
@@ -99,6 +102,7 @@ def test_links_lead_to_a_page_and_a_place_on_it(site: Path, pages: dict[str, Pag
     assert n > 1000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("question", "page", "anchor"),
     [
@@ -117,6 +121,7 @@ def test_two_clicks_from_the_first_page(pages: dict[str, Page], question: str, p
     assert not anchor or anchor in pages[page].anchors
 
 
+@pytest.mark.slow
 def test_every_page_is_reached_and_searched(site: Path, pages: dict[str, Page]) -> None:
     reached = {place for name, page in pages.items() for place, _ in inside(name, page) if place != name}
     assert set(NAMES) - reached == set()
@@ -124,17 +129,20 @@ def test_every_page_is_reached_and_searched(site: Path, pages: dict[str, Page]) 
     assert all(f'"{name}"' in index for name in NAMES)
 
 
+@pytest.mark.slow
 def test_pictures_have_words_and_mathematics_is_mathml(pages: dict[str, Page]) -> None:
     assert [(name, page.without_alt) for name, page in pages.items() if page.without_alt] == []
     for name in ("explanation/model", "explanation/trust", "explanation/compensation"):
         assert {"math", "msub", "mo"} <= pages[name].tags
 
 
+@pytest.mark.slow
 def test_the_reference_has_every_public_name(pages: dict[str, Page]) -> None:
     anchors = {anchor.rpartition(".")[2] for anchor in pages["reference/api"].anchors}
     assert set(hybridsep.__all__) - {"HybridSepError", "__version__"} <= anchors
 
 
+@pytest.mark.slow
 def test_light_and_dark(site: Path) -> None:
     page = (site / "index.html").read_text(encoding="utf-8")
     assert "theme-toggle" in page
@@ -149,3 +157,25 @@ def inside(name: str, page: Page) -> Iterator[tuple[str, str]]:
         target, anchor = urldefrag(link)
         place = os.path.normpath(Path(name).parent / unquote(target)) if target else name
         yield Path(place).as_posix().removesuffix(".html"), unquote(anchor)
+
+
+@pytest.mark.slow
+def test_a_search_finds_what_holds_today_not_dated_pages(site: Path) -> None:
+    index = json.loads((site / "searchindex.js").read_text(encoding="utf-8").removeprefix("Search.setIndex(")[:-1])
+    dated = {i for i, name in enumerate(index["docnames"]) if name.startswith("experiments/2")}
+    found = {i for places in index["terms"].values() for i in ([places] if isinstance(places, int) else places)}
+    assert dated
+    assert not dated & found
+
+
+@pytest.mark.slow
+def test_the_way_from_log_to_fmu_leads_the_how_to_pages(site: Path) -> None:
+    links = re.findall(r'href="(howto/[\w-]+)\.html"', (site / "index.html").read_text(encoding="utf-8"))
+    in_menu = links[links.index("howto/log-to-fmu") :]
+    assert in_menu[:2] == ["howto/log-to-fmu", "howto/read-the-report"]
+
+
+@pytest.mark.slow
+def test_each_command_has_a_page_of_its_own() -> None:
+    listed = set(re.findall(r"\(command-line/([\w-]+)\.md\)", (DOCS / "reference" / "command-line.md").read_text()))
+    assert listed == {path.stem for path in (DOCS / "reference" / "command-line").iterdir()}

@@ -10,9 +10,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from hold_oracle import held
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from places import EMPS
+from properties import examples
 
 from hybridsep.base.errors import SignalError
 from hybridsep.base.settings import PredictorSettings
@@ -157,7 +158,7 @@ def test_perfect_physics_leaves_nothing_to_reduce() -> None:
 
 
 @given(k=st.integers(60, 1009), step=st.floats(-1e-3, 1e-3))
-@settings(max_examples=25)
+@examples(25)
 def test_no_prediction_depends_on_what_is_measured_in_its_window_or_later(k: int, step: float) -> None:
     x_d, x = log()
     x_other = x.copy()
@@ -169,7 +170,7 @@ def test_no_prediction_depends_on_what_is_measured_in_its_window_or_later(k: int
 
 
 @given(cuts=st.lists(st.integers(0, 1010), max_size=30), Np=st.integers(5, 130))
-@settings(max_examples=40)
+@examples(40)
 def test_stream_equals_arrays_whatever_the_chunks(cuts: list[int], Np: int) -> None:
     x_d, x = log()
     edges = [0, *sorted(cuts), 1010]
@@ -208,6 +209,7 @@ def test_second_run_starts_warm() -> None:
     assert warm.overall.rms_h < cold.overall.rms_h
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_stream() -> None:
     x_d, x = log(1000)
 

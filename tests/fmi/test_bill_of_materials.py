@@ -32,7 +32,7 @@ def valid(bill: str) -> object:
 
 def bill_in(path: Path) -> dict[str, Any]:
     with zipfile.ZipFile(path) as archive:
-        assert [name for name in archive.namelist() if name.startswith("extra/")] == ["extra/org.cyclonedx/bom.json"]
+        assert "extra/org.cyclonedx/bom.json" in archive.namelist()
         text = archive.read(BILL_FILE).decode()
     assert valid(text) is None
     return dict(json.loads(text))

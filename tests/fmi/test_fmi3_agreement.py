@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from built_once import FMI3, NATIVE, BuiltFmus
+from built_once import FMI3, NATIVE, BuiltFmus, each_kind
 
 from hybridsep import build_fmu, cosimulate, load_machine, staircase
 from hybridsep.base.errors import FmuError
@@ -43,7 +43,8 @@ def drive(fmu: FmuInstance, steps: Sequence[int], h: float = 1e-3) -> list[bytes
     return rows
 
 
-@pytest.mark.parametrize("twins", FMI3, indirect=True)
+@pytest.mark.slow
+@pytest.mark.parametrize("twins", each_kind(FMI3), indirect=True)
 def test_all_values_are_the_same_bit_for_bit(twins: tuple[FmuInstance, FmuInstance]) -> None:
     new, old = twins
     assert reader(new)() == reader(old)()

@@ -1,4 +1,4 @@
-"""Binaries for other platforms against x86-64 Linux, under Wine and qemu where installed."""
+"""Binaries for other platforms against x86-64 Linux, under Wine and qemu where installed; of nights and releases."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 from foreign import compare
+
+pytestmark = [pytest.mark.nightly, pytest.mark.release]
 
 TOLERANCE = 1e-12  # m
 
@@ -21,6 +23,7 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     compare.end_wine(folder)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(
     (platform.system(), platform.machine()) != ("Linux", "x86_64"), reason="the comparison starts from x86-64 Linux"
 )

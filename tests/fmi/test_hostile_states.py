@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from properties import share
 
 from hybridsep.base.errors import HybridSepError, StateError
 from hybridsep.base.settings import CompensatorSettings, Limits, PredictorSettings
@@ -29,7 +30,7 @@ HOSTILE: list[Any] = [
     *(-0.5, 0.0, 1e-320, 1e-3, 1e99, 1e101, 1e308, float("nan"), float("inf"), float("-inf")),
 ]
 NUMBERS = [0.0, -1.0, 1e-320, 1e9, 1e99, 1e101, 1e308, np.nan, np.inf, -np.inf]
-EXAMPLES = 200
+EXAMPLES = share(200)
 MEMORY_MAX = 300e6  # bytes, for a state of a few kilobytes
 TIME_MAX = 20.0  # s
 
@@ -168,6 +169,7 @@ def mutated(blob: bytes, chance: random.Random) -> bytes:
     return sealed(json.dumps(header).encode(), body)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", STATES)
 def test_a_changed_state_with_a_right_checksum(kind: str) -> None:
     make, restore, use = STATES[kind]
@@ -196,12 +198,14 @@ def test_a_changed_state_with_a_right_checksum(kind: str) -> None:
     assert max(map(len, messages)) < 400
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("opening", [b"[", b'{"a":'])
 def test_a_header_that_is_nested_too_deeply(opening: bytes) -> None:
     with pytest.raises(StateError, match="header that cannot be read"):
         HybridPredictor.from_bytes(sealed(opening * 200_000, b""))
 
 
+@pytest.mark.slow
 def test_a_number_of_thousands_of_digits() -> None:
     header, body = opened(predictor_state())
     text = json.dumps(header).replace(f'"k": {header["meta"]["k"]}', '"k": ' + "9" * 5000).encode()
@@ -209,6 +213,7 @@ def test_a_number_of_thousands_of_digits() -> None:
         HybridPredictor.from_bytes(sealed(text, body))
 
 
+@pytest.mark.slow
 def test_what_is_allocated_follows_from_the_size_of_the_state() -> None:
     header, body = opened(predictor_state())
     tracemalloc.start()

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+import shlex
 import subprocess
+import sys
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -13,10 +15,19 @@ from places import ROOT
 
 from hybridsep.base.errors import FmuError
 from hybridsep.fmi import libraries as module
+from hybridsep.fmi.builds import other_platforms
 from hybridsep.fmi.c_header import KINDS
 from hybridsep.fmi.c_sources import c_sources
-from hybridsep.fmi.compiler import ALL_TARGETS, TARGETS, ZIG, compiler_for, expanded, host_target
-from hybridsep.fmi.libraries import chosen_targets, default_targets, has_native, kept, libraries, ready_targets
+from hybridsep.fmi.compiler import ALL_TARGETS, TARGETS, ZIG, Compiler, compiler_for, expanded, host_target
+from hybridsep.fmi.libraries import (
+    chosen_targets,
+    default_targets,
+    has_native,
+    kept,
+    libraries,
+    library_paths,
+    ready_targets,
+)
 
 ALL = [(kind, target) for kind in KINDS for target in ALL_TARGETS]
 
@@ -47,7 +58,9 @@ def test_without_compiler_and_libraries_build_says_what_to_do(without: Path, hyb
     assert "no C compiler: no ziglang and none of $CC, cc, gcc, clang; pip install ziglang" in " ".join(error.split())
     status, _, error = hybridsep("build", "FeedDrive", "--target", "win64", "--out", without)
     assert status == 2
-    assert "pip install ziglang, or ask for the target host" in " ".join(error.split())
+    pinned = ZIG.replace(" ", "==")
+    needs = f"compiling for x86_64-windows needs ziglang: pip install {pinned}, or ask for the target host"
+    assert needs in " ".join(error.split())
 
 
 def test_the_libraries_of_a_wheel_need_no_compiler(without: Path) -> None:
@@ -64,16 +77,60 @@ def test_platforms_can_be_left_out(without: Path, monkeypatch: pytest.MonkeyPatc
     fill(without / "shipped", ALL)
     monkeypatch.setenv("HYBRIDSEP_TARGETS", "win64,x86_64-linux")
     assert default_targets() == ("x86_64-windows", "x86_64-linux")
-    monkeypatch.setenv("HYBRIDSEP_TARGETS", "none")
-    assert chosen_targets() == ()
+
+
+def test_a_wheel_has_this_machines_libraries_unless_others_are_chosen(
+    without: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert chosen_targets() == (host_target(),)
+    for chosen, targets in (("all", ALL_TARGETS), ("none", ()), ("host,win32", (host_target(), "x86-windows"))):
+        monkeypatch.setenv("HYBRIDSEP_TARGETS", chosen)
+        assert chosen_targets() == targets
 
 
 def test_a_command_of_its_own_does_not_wait_for_other_platforms(without: Path) -> None:
     fill(without / "shipped", [(kind, host_target()) for kind in KINDS])
     assert has_native()
-    assert ready_targets() == ("host",)
-    with pytest.raises(FmuError, match="compiling for other platforms needs ziglang"):
+    assert default_targets() == ready_targets() == ("host",)
+    with pytest.raises(FmuError, match=r"compiling for .* needs ziglang"):
         libraries("FeedDrive", [target for target in ALL_TARGETS if target != host_target()])
+
+
+def test_the_line_for_all_platforms_builds_the_same_fmu(hybridsep: Run, tmp_path: Path) -> None:
+    """As ``init`` prints it, and ``fit``; run for this machine alone."""
+    _, said, _ = hybridsep("init", tmp_path / "axis.toml", "--tau", "0.01", "--fmi", "3")
+    line = said.splitlines()[-1].removeprefix(f"native FMUs are for {host_target()}; for all platforms: ")
+    program, *arguments = shlex.split(line)
+    assert program == "hybridsep"
+    fmu = tmp_path / "HybridPredictorFmi3_axis.fmu"
+    first = fmu.read_bytes()
+    fmu.unlink()
+    assert hybridsep(*("host" if word == "all" else word for word in arguments))[0] == 0
+    assert fmu.read_bytes() == first
+
+
+def test_nothing_is_said_of_platforms_where_all_are_there(without: Path) -> None:
+    fmu, machine, weights = Path("axis/HybridPredictor.fmu"), Path("axis/machine.toml"), Path("axis/trained.state")
+    line = f"build HybridPredictor --target all -m {machine} --weights {weights} --out axis"
+    assert other_platforms(fmu, machine, weights, "both").endswith(line)
+    fill(without / "shipped", ALL)
+    assert other_platforms(fmu, machine, weights) == ""
+
+
+def test_what_is_missing_is_compiled_once_all_of_it_together(without: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a wheel's installation in the user's cache; the compiler is a stand-in that makes a file of its arguments."""
+    fill(without / "shipped", [("FeedDrive", target) for target in ALL_TARGETS[:2]])
+    program = "import sys; open(sys.argv[sys.argv.index('-o') + 1], 'w').write(sys.argv[-1])"
+    compiler = Compiler((sys.executable, "-c", program), ZIG)
+    monkeypatch.setattr(module, "compiler_for", lambda target: compiler)
+    monkeypatch.setattr("hybridsep.fmi.compiler._understands", lambda command, flag: False)
+    wanted = [(kind, target) for target in ALL_TARGETS[:3] for kind in ("FeedDrive", "StageDrive")]
+    began: list[tuple[str, str]] = []
+    paths = library_paths(wanted, began.append)
+    assert began == [library for library in wanted if library not in [("FeedDrive", t) for t in ALL_TARGETS[:2]]]
+    assert all(path.is_relative_to(without / "kept") for library, path in paths.items() if library in began)
+    assert library_paths(wanted, began.append) == paths
+    assert len(began) == 4
 
 
 def test_what_was_compiled_is_kept_by_sources_and_compiler(without: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -104,12 +161,17 @@ def test_the_build_requirement_is_the_compiler_of_the_libraries() -> None:
 def test_names_of_platforms() -> None:
     assert expanded(("linux64", "host", "x86_64-linux", "win32"))[0] == "x86_64-linux"
     assert len(expanded(("linux64", "x86_64-linux"))) == 1
-    with pytest.raises(FmuError, match="no target sparc; there are host, x86_64-linux"):
+    assert expanded(("win32", "all"))[0] == "x86-windows"
+    assert set(expanded(("win32", "all"))) == set(ALL_TARGETS)
+    with pytest.raises(FmuError, match="no target sparc; there are host, all, x86_64-linux"):
         expanded(("sparc",))
 
 
 @pytest.mark.skipif(find_spec("ziglang") is None, reason="needs ziglang")
-@pytest.mark.parametrize("target", ALL_TARGETS)
+@pytest.mark.parametrize(
+    "target",
+    [pytest.param(target, marks=[] if target == "x86-windows" else [pytest.mark.release]) for target in ALL_TARGETS],
+)
 def test_the_look_ahead_fmus_compile_for_every_platform(tmp_path: Path, target: str) -> None:
     """Without optimisation; ``test_all_platforms`` links a drive's library, and libm is all that these need besides."""
     for kind in ("HybridPredictor", "SepCompensator"):

@@ -10,7 +10,7 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 import pytest
-from built_once import NATIVE, PYTHON, BuiltFmus
+from built_once import NATIVE, PYTHON, BuiltFmus, each_kind
 from fmi2_rules import RULES, variables_of, violations
 
 from hybridsep.base.data_files import data_folder
@@ -26,7 +26,8 @@ def description_of(path: Path) -> ET.Element:
         return ET.fromstring(archive.read("modelDescription.xml"))
 
 
-@pytest.mark.parametrize("name", [*NATIVE, *PYTHON])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", each_kind([*NATIVE, *PYTHON]))
 def test_archives_keep_the_rules_of_the_standard(fmus: BuiltFmus, name: str) -> None:
     path = fmus(name)
     root = description_of(path)
@@ -39,6 +40,38 @@ def test_archives_keep_the_rules_of_the_standard(fmus: BuiltFmus, name: str) -> 
     for source in root.iterfind("CoSimulation/SourceFiles/File"):
         assert f"sources/{source.get('name')}" in files
     assert {"modelDescription.xml", "documentation/index.html", "model.png"} <= set(files)
+
+
+GROUPS = {
+    "Predictor": ["Look-ahead and residual model", "Residual model with trust", "Physics model"],
+    "Compensator": ["Look-ahead and residual model", "Residual model with trust", "Compensation", "Physics model"],
+    "Drive": ["Drive", "Encoder"],
+    "Drive_als25010_x": ["Disturbance", "Encoder", "Physics model"],
+    "Trajectory": ["Trajectory"],
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "groups"),
+    [
+        ("HybridPredictor", "Predictor"),
+        ("HybridPredictorPy", "Predictor"),
+        ("SepCompensatorFmi3", "Compensator"),
+        ("FeedDrive", "Drive"),
+        ("FeedDrive_als25010_x", "Drive_als25010_x"),
+        ("ReferenceTrajectory", "Trajectory"),
+    ],
+)
+def test_parameters_are_grouped_and_described_alone(fmus: BuiltFmus, name: str, groups: str) -> None:
+    """A tool's flat list shows the paper's names, m or p; group and meaning stand in each description."""
+    variables = description_of(fmus(name)).findall("ModelVariables/*")
+    described = {v.get("name"): str(v.get("description")) for v in variables if v.get("causality") == "parameter"}
+    parts = [text.partition(": ") for text in described.values()]
+    found = [group for group, _, _ in parts]
+    assert [group for i, group in enumerate(found) if group not in found[:i]] == GROUPS[groups]
+    assert sorted(found, key=GROUPS[groups].index) == found
+    assert all(len(meaning.split()) > 2 for _, _, meaning in parts)
+    assert {"FeedDrive": {"m", "c", "k"}, "HybridPredictor": {"p", "q", "lambda"}}.get(name, set()) <= described.keys()
 
 
 def test_a_rotary_axis_keeps_the_rules(rotary: Machine) -> None:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from built_once import each_kind
 from driving import steps
 from fmpy.validation import validate_fmu
 from fmu_stream import FmuStream
@@ -40,7 +41,8 @@ def test_all_fmus_are_there() -> None:
     assert sorted(name for m in machine_names() for name in fmu_names(load_machine(m), "python")) == sorted(NAMES)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", each_kind(NAMES))
 def test_fmpy_finds_nothing_to_object_to(python_fmu: Fmu, name: str) -> None:
     assert validate_fmu(str(python_fmu(name))) == []
 
@@ -124,10 +126,11 @@ def test_interface_of_the_predictor(predictor: FmuInstance) -> None:
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "parameters"), [
     ("FeedDrivePy", {"m", "c", "k", "c_nl", "k_nl", "noise_std", "seed"}),
-    ("FeedDrivePy_als25010_y", {"f", "kappa", "friction_on", "T_s", "noise_std", "seed"}
-     | {f"mode[{i}].{key}" for i in (1, 2, 3, 4) for key in ("f_n", "zeta", "alpha", "beta")}),
+    ("FeedDrivePy_als25010_y", {"f", "kappa", "friction_on", "v_friction", "T_s", "dead_time", "input_hold"}
+     | {"noise_std", "seed"} | {f"mode[{i}].{key}" for i in (1, 2, 3, 4) for key in ("f_n", "zeta", "alpha", "beta")}),
 ])  # fmt: skip
 def test_interface_of_the_plants(python_fmu: Fmu, name: str, parameters: set[str]) -> None:
     with FmuInstance(python_fmu(name)) as instance:

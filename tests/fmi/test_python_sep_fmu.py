@@ -22,6 +22,7 @@ from hybridsep.fmi.archive import build_fmu
 from hybridsep.fmi.c_header import c_header
 from hybridsep.fmi.reference import reference_files
 from hybridsep.fmi.reference_models import library_models
+from hybridsep.fmi.related_files import RELATED_FOLDER
 from hybridsep.machines.machine import load_machine
 
 MACHINE = load_machine("spring_mass_damper")
@@ -114,7 +115,7 @@ def test_the_reference_result_is_what_the_fmu_gives(compensator: FmuInstance) ->
     files = reference_files(MACHINE, description, *library_models(MACHINE, description))
 
     def table(kind: str) -> tuple[list[str], Array]:
-        head, *rows = files[f"documentation/reference/SepCompensatorPy_{kind}.csv"].decode().splitlines()
+        head, *rows = files[f"{RELATED_FOLDER}/SepCompensatorPy_{kind}.csv"].decode().splitlines()
         return head.replace('"', "").split(","), np.array([row.split(",") for row in rows], dtype=float)
 
     (names, inputs), (results, expected) = table("in"), table("ref")
@@ -189,6 +190,7 @@ def travelling(path: Path) -> dict[str, str]:
         return {match[1]: archive.read(name).decode() for name, match in found if match}
 
 
+@pytest.mark.slow
 def test_each_fmu_carries_what_it_needs(python_fmu: Fmu, tmp_path: Path) -> None:
     mine = travelling(python_fmu("SepCompensatorPy"))
     assert {"compensate/compensator.py", "online/look_ahead.py", "base/settings.py", "fmi/slave.py"} < set(mine)

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import os
 import re
+import struct
 import subprocess
 import sys
+import sysconfig
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
+import fmpy
 import pytest
 import pythonfmu_calls
+from c_compiler import run_compiler
 from pythonfmu_calls import CAUGHT, KILLING
 
 from hybridsep import FmuInstance, build_fmu, load_machine
@@ -18,6 +24,8 @@ from hybridsep.base.errors import FmuError
 from hybridsep.fmi import pythonfmu_limits
 
 Fmu = Callable[[str], Path]
+
+HOST = Path(__file__).parent / "foreign" / "host.c"
 
 
 @pytest.fixture
@@ -51,6 +59,37 @@ def test_the_text_of_a_refusal_goes_to_stderr(folder: Path) -> None:
 
 
 @needs_linux
+@pytest.mark.skipif(not sysconfig.get_config_var("Py_ENABLE_SHARED"), reason="this Python has no shared libpython")
+def test_an_importer_without_python_can_be_given_one(python_fmu: Fmu, folder: Path, tmp_path: Path) -> None:
+    """As docs/howto/run-fmus.md says: a C program plays the FMU, and cannot without."""
+    host, headers = tmp_path / "host", Path(fmpy.__file__).with_name("c-code")
+    run_compiler([f"-I{headers}", "-D_GNU_SOURCE", HOST, "-ldl", "-o", host])
+    signals = tmp_path / "signals"
+    signals.write_bytes(struct.pack("<20d", *(1e-4 * k for k in range(20))))
+    (binary,) = (folder / "binaries" / "linux64").iterdir()
+    guid = ET.parse(folder / "modelDescription.xml").getroot().get("guid")
+    command = [host, binary, guid, f"file://{folder / 'resources'}", "0.001", "1", "0", "1", signals]
+    alone = subprocess.run(list(map(str, command)), capture_output=True, text=True)
+    assert "cannot load" in alone.stderr
+    given = {
+        "LD_PRELOAD": str(Path(sysconfig.get_config_var("LIBDIR")) / sysconfig.get_config_var("LDLIBRARY")),
+        "PYTHONHOME": sys.base_prefix,
+        "PYTHONPATH": ":".join(path for path in sys.path if path.endswith("site-packages")),
+    }
+    # It may abort when it ends: a limit on the page.
+    played = subprocess.run(list(map(str, command)), capture_output=True, text=True, env=os.environ | given)
+    shown = [float.fromhex(line) for line in played.stdout.split()]
+    with FmuInstance(python_fmu("FeedDrivePy")) as fmu:
+        fmu.initialise()
+        expected = []
+        for k in range(20):
+            fmu.set("x_d", 1e-4 * k)
+            fmu.step(k * 1e-3, 1e-3)
+            expected.append(fmu.get("x"))
+    assert shown == expected, played.stderr
+
+
+@needs_linux
 @pytest.mark.parametrize("case", KILLING)
 def test_what_ends_the_process_is_on_the_page(folder: Path, case: str) -> None:
     """A test that fails here may mean that pythonfmu has been mended: then the page needs less."""
@@ -67,6 +106,7 @@ def test_the_page_names_the_version(folder: Path) -> None:
     assert "an exit while the library is loaded" in page
     assert "the GUID and the type" in page
     assert "whether a state has been freed already" in page
+    assert "the bytes that <code>fmi2DeSerializeFMUstate</code> gets" in page
 
 
 def test_only_the_pythonfmu_that_the_slave_was_made_for_is_packed(

@@ -12,13 +12,14 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-from built_once import BuiltFmus
+from built_once import BuiltFmus, each_kind
 from fmpy.util import read_csv, read_ref_opt_file
 
 from hybridsep.fmi.archive import build_fmu, fmu_names
 from hybridsep.fmi.description import fmu_description
 from hybridsep.fmi.reference import reference_files
 from hybridsep.fmi.reference_models import library_model, library_models
+from hybridsep.fmi.related_files import RELATED_FOLDER
 from hybridsep.machines.machine import load_machine, machine_names
 
 NAMES = [(machine, name) for machine in machine_names() for name in fmu_names(load_machine(machine))]
@@ -26,12 +27,13 @@ TOLERANCE = {"HybridPredictor": 1e-11, "SepCompensator": 1e-9, "FeedDrive": 1e-1
 """m and m/s, as each FMU's page says."""
 
 
-@pytest.mark.parametrize(("machine", "name"), NAMES)
+@pytest.mark.slow
+@pytest.mark.parametrize(("machine", "name"), each_kind(NAMES))
 def test_fmpy_gets_the_reference_result(
     machine: str, name: str, fmus: BuiltFmus, folders: Callable[[str], Path]
 ) -> None:
     path, documentation = fmus(name), folders(name) / "documentation"
-    base = documentation / "reference" / name
+    base = folders(name) / RELATED_FOLDER / name
     options = read_ref_opt_file(f"{base}_ref.opt")
     expected = read_csv(f"{base}_ref.csv")
     inputs = read_csv(f"{base}_in.csv") if Path(f"{base}_in.csv").exists() else None
@@ -54,19 +56,24 @@ def test_fmpy_gets_the_reference_result(
     if model == "SepCompensator":
         assert set(expected["sep_state"]) == {1.0, 2.0}
         assert 0 < expected["rms_h"][-1] < 3e-4
+    last = (folders(name) / RELATED_FOLDER / f"{name}_ref.csv").read_text(encoding="utf-8").splitlines()[-1].split(",")
     if model == "HybridPredictor":
+        assert last[1 + outputs.index("hybrid_active")] == "1"  # as fmi-standard.org has it
         assert expected["hybrid_active"][-1] == 1.0
         assert 0 < expected["rms_h"][-1] < 1e-4
     page = (documentation / "index.html").read_text(encoding="utf-8")
     assert f"<sup>−{-np.log10(TOLERANCE[model]):.0f}</sup> m" in page
-    for link in re.findall(r'href="(reference/[^"]+)"', page):
+    links = re.findall(r'href="([^"]+)"', page)
+    assert len(links) >= 4
+    for link in links:
         assert (documentation / link).is_file()
 
 
-@pytest.mark.parametrize(("machine", "name"), NAMES)
+@pytest.mark.slow
+@pytest.mark.parametrize(("machine", "name"), each_kind(NAMES))
 def test_the_library_gives_the_reference_result(machine: str, name: str, folders: Callable[[str], Path]) -> None:
     """The files hold what the FMU gave when it was built."""
-    axis, base = load_machine(machine), folders(name) / "documentation" / "reference" / name
+    axis, base = load_machine(machine), folders(name) / RELATED_FOLDER / name
     model = fmu_names(axis)[name]
     reference = library_model(axis, fmu_description(axis, model, name))
     expected = np.genfromtxt(f"{base}_ref.csv", delimiter=",", skip_header=1)
@@ -80,6 +87,7 @@ def test_the_library_gives_the_reference_result(machine: str, name: str, folders
     np.testing.assert_allclose(found, expected[:, 1:], rtol=0, atol=TOLERANCE[model])
 
 
+@pytest.mark.slow
 def test_the_reference_is_short_and_the_same_every_time() -> None:
     machine = load_machine("spring_mass_damper")
     parameters = machine.fmi_parameters()
@@ -88,11 +96,13 @@ def test_the_reference_is_short_and_the_same_every_time() -> None:
     description["modes"] = [{"f_n": mode.f_n, "zeta": mode.zeta, "alpha": mode.alpha, "beta": mode.beta}]
     files = reference_files(machine, description, *library_models(machine, description))
     assert files == reference_files(machine, description, *library_models(machine, description))
-    assert sorted(files) == [f"documentation/reference/H_{kind}" for kind in ("in.csv", "ref.csv", "ref.opt")]
-    assert b"StopTime, 0.6\n" in files["documentation/reference/H_ref.opt"]
+    names = ("H_in.csv", "H_ref.csv", "H_ref.opt", "reference.exp")
+    assert sorted(files) == [f"{RELATED_FOLDER}/{file}" for file in names]
+    assert b"StopTime, 0.6\n" in files[f"{RELATED_FOLDER}/H_ref.opt"]
     assert sum(map(len, files.values())) < 120_000
 
 
+@pytest.mark.slow
 def test_the_reference_of_a_late_measurement_is_late() -> None:
     """Its compensator does as well as without delay: it is told what it gets."""
     machine = load_machine("spring_mass_damper")
@@ -103,26 +113,30 @@ def test_the_reference_of_a_late_measurement_is_late() -> None:
         parameters = changed.fmi_compensator_parameters()
         description = {"model": "SepCompensator", "name": "C", "parameters": parameters, "modes": modes}
         files = reference_files(changed, description, *library_models(changed, description))
-        table = np.genfromtxt(BytesIO(files["documentation/reference/C_ref.csv"]), delimiter=",", names=True)
+        table = np.genfromtxt(BytesIO(files[f"{RELATED_FOLDER}/C_ref.csv"]), delimiter=",", names=True)
         rms.append(float(table["rms_e"][-1]))
     assert rms[1] == pytest.approx(rms[0], rel=0.2)
 
 
+@pytest.mark.slow
 def test_given_samples_are_the_reference_of_their_trajectory(tmp_path: Path) -> None:
     machine = load_machine("spring_mass_damper")
     samples = [0.1, 0.2, 0.3]
     path = build_fmu(machine, "ReferenceTrajectory", tmp_path, targets=("host",), samples=samples)
     with zipfile.ZipFile(path) as archive:
-        rows = archive.read("documentation/reference/ReferenceTrajectory_ref.csv").decode().splitlines()
+        rows = archive.read(f"{RELATED_FOLDER}/ReferenceTrajectory_ref.csv").decode().splitlines()
     assert rows[1:5] == ["0.0,0.1", "0.001,0.2", "0.002,0.3", "0.003,0.3"]
     result = fmpy.simulate_fmu(str(path), stop_time=0.01, output_interval=1e-3)
     np.testing.assert_array_equal(result["r"][:4], [0.1, 0.2, 0.3, 0.3])
 
 
+@pytest.mark.slow
 def test_windows_that_no_short_run_can_show_have_no_reference(tmp_path: Path) -> None:
     machine = load_machine("spring_mass_damper")
     large = machine.model_copy(update={"predictor": machine.predictor.model_copy(update={"Np": 1001})})
     path = build_fmu(large, "HybridPredictor", tmp_path, targets=("host",))
     with zipfile.ZipFile(path) as archive:
-        assert not [name for name in archive.namelist() if name.startswith("documentation/reference")]
-        assert b"reference/" not in archive.read("documentation/index.html")
+        files = archive.namelist()
+        assert [file for file in files if file.startswith(RELATED_FOLDER)] == [f"{RELATED_FOLDER}/fmi-ls-manifest.xml"]
+        assert "documentation/fmi-ls-ref.txt" not in files
+        assert b"reference.exp" not in archive.read("documentation/index.html")

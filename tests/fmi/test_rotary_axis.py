@@ -41,7 +41,7 @@ def test_the_fmu_is_valid(tmp_path: Path) -> None:
 
 
 def test_a_plant_is_a_linear_axis(tmp_path: Path) -> None:
-    with pytest.raises(MachineError, match=r"a machine with a plant must have unit = 'm': the plants are linear axes"):
+    with pytest.raises(MachineError, match=r"a plant of kind feed_drive must have unit = 'm': it is a linear axis"):
         load_machine(rotary(tmp_path, "spring_mass_damper"))
     path = rotary(tmp_path)
     path.write_text(path.read_text(encoding="utf-8").replace('"rad"', '"deg"'), encoding="utf-8")

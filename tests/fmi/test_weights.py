@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 from c_core import CModel, refusal, write_weights
 from library_models import trained_predictor
+from properties import share
 from trusted_cases import trusted_model
 
 from hybridsep.app import cli
@@ -50,6 +51,7 @@ def build(flavour: str, out: Path, weights: Path | None = None, model: str = "Hy
     return build_fmu(MACHINE, name, out, flavour, targets=("host",), weights=weights)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_the_weights_are_in_the_resources_and_in_the_guid(flavour: str, tmp_path: Path, trained: Path) -> None:
     paths = [build(flavour, tmp_path / str(i), weights) for i, weights in enumerate((trained, trained, None))]
@@ -155,15 +157,17 @@ def mutations(content: bytes, count: int) -> Iterator[bytes]:
             yield bytes(changed)
 
 
+@pytest.mark.slow
 def test_no_mutation_of_the_file_is_accepted(trained: Path) -> None:
     content = weights_file(HybridPredictor.load(trained))
     predictor = MACHINE.new_predictor()
-    for changed in mutations(content, 20_000):
+    for changed in mutations(content, share(20_000)):
         with pytest.raises(StateError):
             restore_weights(predictor, changed)
     assert not predictor.weights.any()
 
 
+@pytest.mark.slow
 def test_no_mutation_of_the_file_is_accepted_in_c(tmp_path: Path) -> None:
     # A small factor, so that the head is hit as often as the triangle.
     rows = np.random.default_rng(1).normal(size=(40, 9))
@@ -171,11 +175,25 @@ def test_no_mutation_of_the_file_is_accepted_in_c(tmp_path: Path) -> None:
     file, model = tmp_path / WEIGHTS_FILE, CModel("predictor_2", {"p": 4, "q": 2, "Np": 8}, tmp_path)
     content = file.read_bytes()
     model.initialise()
-    for changed in mutations(content, 5000):
+    for changed in mutations(content, share(5000)):
         file.write_bytes(changed)
         assert refusal(model.initialise)
     file.write_bytes(content)
     model.initialise()
+
+
+def test_weights_in_memory_are_those_of_the_file(tmp_path: Path) -> None:
+    write_weights(tmp_path, "predictor_2", np.linalg.qr(np.eye(40, 9))[1], 40, p=4, q=2)
+    content = (tmp_path / WEIGHTS_FILE).read_bytes()
+    settings = {"p": 4, "q": 2, "Np": 8}
+    from_file = CModel("predictor_2", settings, tmp_path).initialise()
+    in_memory = CModel("predictor_2", settings)
+    for damaged in (content[:-8], content + b"\0", b"X" + content[1:]):
+        in_memory.context.weights, in_memory.context.weights_size = damaged, len(damaged)
+        assert "weights.bin must be a factor of learned rows" in refusal(in_memory.initialise)
+    in_memory.context.weights, in_memory.context.weights_size = content, len(content)
+    assert in_memory.initialise().state.tobytes() == from_file.state.tobytes()
+    assert from_file.state.tobytes() != CModel("predictor_2", settings).initialise().state.tobytes()
 
 
 TRUST = {"p": 4, "q": 2, "Np": 20, "trust": 1}
@@ -192,6 +210,7 @@ def trained_with_trust() -> HybridPredictor:
     return predictor
 
 
+@pytest.mark.slow
 def test_no_mutation_of_a_file_with_trust_is_accepted(tmp_path: Path) -> None:
     # Neither what fails the checksum nor, with another checksum, what has wrong numbers.
     content = weights_file(trained_with_trust())
@@ -206,21 +225,21 @@ def test_no_mutation_of_a_file_with_trust_is_accepted(tmp_path: Path) -> None:
     n_numbers = sum(sizes) + N_LEARNED
     errors = first + 8 * sum(sizes)
     assert struct.unpack_from("<Q", body, 32) == (n_numbers,)
-    spread, step, vibration = (int(places["sensor"]) + 8 * i for i in range(3))
     rows, noise, correlations = (int(places[name]) for name in ("n_rows", "noise_variances", "correlations"))
+    fastest = int(places["motion"]) + 16
     nonsense = [
-        *(body[:i] + struct.pack("<d", wrong) + body[i + 8 :] for i in (spread, step) for wrong in (-2.0, np.nan)),
-        body[:spread] + struct.pack("<d", np.inf) + body[spread + 8 :],
-        body[:step] + struct.pack("<d", 0.0) + body[step + 8 :],
-        body[:vibration] + struct.pack("<d", -1.0) + body[vibration + 8 :],
-        *(body[:i] + struct.pack("<d", wrong) + body[i + 8 :] for i in (rows, noise) for wrong in (-1.0, np.nan)),
+        *(
+            body[:i] + struct.pack("<d", wrong) + body[i + 8 :]
+            for i in (rows, noise, fastest)
+            for wrong in (-1.0, np.nan)
+        ),
         *(body[:i] + struct.pack("<d", 0.5) + body[i + 8 :] for i in (correlations, correlations + 8)),
         *(body[:i] + struct.pack("<d", -1.0) + body[i + 8 :] for i in (errors, errors + 8 * (N_LEARNED - 2))),
         *(body[:32] + struct.pack("<Q", n) + body[40:] for n in (0, n_numbers - 1, n_numbers + 1, 2**63)),
         body[:first] + body[first + 8 :],
         body[:first] + bytes(8) + body[first:],
     ]
-    for changed in (*mutations(content, 2000), *map(sealed, nonsense)):
+    for changed in (*mutations(content, share(2000)), *map(sealed, nonsense)):
         with pytest.raises(StateError):
             restore_weights(predictor, changed)
         file.write_bytes(changed)
@@ -284,6 +303,7 @@ def hybridsep(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
     return 0
 
 
+@pytest.mark.release
 def test_build_takes_weights_and_targets(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -53,6 +53,7 @@ def test_table_1_is_found_without_noise(axis: str) -> None:
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", ["x", "y"])
 @pytest.mark.parametrize("seed", [0, 1])
 def test_table_1_is_found_within_its_deviations(axis: str, seed: int) -> None:

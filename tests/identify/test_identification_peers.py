@@ -47,6 +47,7 @@ def test_poles_are_those_of_scikit_rf(axis: str) -> None:
     assert (np.abs(np.sort_complex(ours).real - others[0].real) < 4 * spread).all()
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_poles_are_among_those_of_sdypy_ema(axis: str) -> None:

@@ -67,6 +67,7 @@ def test_a_second_order_axis_is_found() -> None:
     assert difference(found, SECOND, "foh", x_d) < 1e-6
 
 
+@pytest.mark.slow
 def test_two_modes_are_found_with_a_gain() -> None:
     omegas = 2 * np.pi * np.array([25.0, 60.0])
     truth = ModalModel([Mode(25.0, 0.3, 0.72 * omegas[0] ** 2, 20.0), Mode(60.0, 0.1, 0.26 * omegas[1] ** 2, -10.0)])
@@ -327,6 +328,7 @@ def physics_error(found: IdentifiedModel, x_d: Array, x: Array) -> float:
     return float(np.sqrt(np.mean((x - x_pb)[len(x) // 2 :] ** 2)))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not EMPS.is_file(), reason=f"the recorded axis is not at {EMPS}")
 def test_the_recorded_axis_is_predicted() -> None:
     """At most 7.2 µm on the second half, where the published constants leave 15.4."""
@@ -337,6 +339,7 @@ def test_the_recorded_axis_is_predicted() -> None:
     assert physics_error(found, x_d, x) < 6.65e-6
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not RECORDINGS.is_dir(), reason=f"the recordings are not at {RECORDINGS}")
 @pytest.mark.parametrize(
     ("name", "limit"), [("cnc_a_axis1", 48e-6), ("cnc_a_axis2", 1.6e-6), ("xl330_kp200", 0.19), ("xl330_kp800", 0.25)]
@@ -348,6 +351,7 @@ def test_recordings_get_a_model(name: str, limit: float) -> None:
     assert physics_error(found, x_d, x) < limit
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not RECORDINGS.is_dir(), reason=f"the recordings are not at {RECORDINGS}")
 def test_a_half_at_rest_is_refused() -> None:
     x_d, x, T_s = half("cnc_a_axis6")

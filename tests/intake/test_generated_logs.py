@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from generated_logs import ACCUSED_BEFORE, COMMANDS, DRIVES, generated_log
+from places import SO101
 from spoiled_logs import FAULTS
+from standing_axes import clipped_axis, standing_axis
 
 from hybridsep import ModalModel, Mode
 from hybridsep.intake.check import check
+from hybridsep.intake.clipped import check_clipped
 from hybridsep.intake.finding import ERROR, NOTE
+from hybridsep.logs.log import read_log
 
 SEEDS = (*range(1000, 1033), 2105)
 """Of logs on which no threshold was chosen."""
@@ -118,6 +123,35 @@ def test_what_is_clipped_is_missing_or_cut_out() -> None:
     apart = check(spoiled, bridged=0).fixed()
     assert np.isfinite(apart.x_meas).all()
     assert len(apart.segments()) > 1
+
+
+@pytest.mark.parametrize("seed", range(1000, 1018))
+def test_an_axis_that_stands_by_friction_is_not_refused(seed: int) -> None:
+    intake = check(standing_axis(seed))
+    assert [finding.name for finding in intake.errors] == []
+    assert intake.usable
+
+
+@pytest.mark.skipif(not SO101.is_dir(), reason="needs ../shared/data/so101 beside the repository")
+@pytest.mark.parametrize("path", sorted(SO101.glob("*.csv")), ids=lambda path: path.stem)
+def test_a_recorded_arm_is_not_refused(path: Path) -> None:
+    intake = check(read_log(path, uniform=False))
+    assert [finding.name for finding in intake.errors] == []
+    assert intake.usable
+
+
+@pytest.mark.parametrize("seed", range(1000, 1018))
+def test_an_axis_that_is_clipped_is_refused(seed: int) -> None:
+    (finding,) = check_clipped(clipped_axis(seed))
+    assert finding.severity == ERROR, finding.words
+    assert finding.words.startswith("the measured position is clipped at ")
+
+
+def test_an_axis_that_stands_at_one_place_is_noted() -> None:
+    (finding,) = check_clipped(standing_axis(158))
+    assert (finding.severity, finding.fix) == (NOTE, None)
+    assert "stretches while its command goes further; the first is sample " in finding.words
+    assert "an axis that stands by friction or load does so" in finding.words
 
 
 def test_pasted_logs_are_kept_apart() -> None:

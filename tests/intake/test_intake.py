@@ -35,6 +35,7 @@ def names(findings: tuple[Finding, ...]) -> list[str]:
     return [finding.name for finding in findings]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", GOOD)
 def test_a_good_log_is_not_accused(name: str) -> None:
     log = needed(name)
@@ -56,8 +57,9 @@ def test_a_fault_is_found_and_named(name: str, fault: str) -> None:
         assert all(np.isfinite(value) for value in finding.evidence.values())
         assert all(len(x) == len(y) > 0 for x, y in finding.picture.lines.values())
         late = finding.name == "delay" and finding.evidence["delay"] > 0  # a model may have it as well
-        assert (finding.fix is None) == (finding.name == HOPELESS or late)
-        assert (finding.severity == "note") == late
+        noted = late or (finding.name == "clipped" and finding.evidence["n_stretches"] == 1)  # which may be friction
+        assert (finding.fix is None) == (finding.name == HOPELESS or noted)
+        assert (finding.severity == "note") == noted
         assert str(finding).startswith(f"{finding.severity}: {finding.name}: {finding.words}.")
         pickle.loads(pickle.dumps(finding))
     # A time that is taken out leaves a gap.
@@ -308,6 +310,7 @@ def test_what_is_no_wrapping_is_not_unwrapped() -> None:
     assert names(check(spiky).findings) == ["outliers"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["staircase", "random drive 3", "random drive 15", "random drive 33"])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_following_error_is_no_velocity(name: str, sign: float) -> None:

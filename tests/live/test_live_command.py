@@ -110,6 +110,7 @@ def test_what_is_refused(tmp_path: Path, fmus: BuiltFmus, hybridsep: Run) -> Non
         assert words in err
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C is a signal")
 def test_the_page_stays_until_ctrl_c(tmp_path: Path) -> None:
     log = write_log(tmp_path / "log.csv", n=400)
@@ -130,6 +131,7 @@ def test_the_page_stays_until_ctrl_c(tmp_path: Path) -> None:
     assert "400 samples, 0 missing" in out
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C is a signal")
 def test_ctrl_c_ends_a_stream() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:

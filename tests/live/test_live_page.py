@@ -133,6 +133,7 @@ def test_the_page_asks_this_machine_alone(page: Page) -> None:
         assert fetch(page, one)[0] == 200
 
 
+@pytest.mark.slow
 def test_it_is_bound_to_this_machine(page: Page) -> None:
     with socket.socket() as other, pytest.raises(OSError, match=r"."):
         other.connect(("127.0.0.2", page.port))
@@ -160,6 +161,7 @@ def test_bokeh_is_an_extra(monkeypatch: pytest.MonkeyPatch) -> None:
         Page(TITLE, SHOWN)
 
 
+@pytest.mark.slow
 def test_a_session_follows_what_its_page_asks_for(monkeypatch: pytest.MonkeyPatch) -> None:
     from bokeh.document import Document
 

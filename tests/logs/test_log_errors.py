@@ -68,6 +68,7 @@ def test_given_ts_must_agree_with_the_time(tmp_path: Path) -> None:
 # Columns and values
 
 
+@pytest.mark.slow
 @FORMATS
 def test_missing_columns(tmp_path: Path, suffix: str) -> None:
     data = columns()
@@ -177,6 +178,7 @@ def test_too_short(tmp_path: Path, suffix: str, n: int, came: str, T_s: float | 
         open_log(path, T_s=T_s)
 
 
+@pytest.mark.slow
 @FORMATS
 def test_millimetres_taken_for_metres(tmp_path: Path, suffix: str) -> None:
     data = columns()
@@ -194,6 +196,7 @@ def test_millimetres_taken_for_metres(tmp_path: Path, suffix: str) -> None:
         read_log(write(path, data), unit="mm")
 
 
+@pytest.mark.slow
 @FORMATS
 def test_encoder_counts(tmp_path: Path, suffix: str) -> None:
     data = columns()
@@ -289,6 +292,7 @@ class TooLarge(MatSource):
         raise MemoryError("too much")
 
 
+@pytest.mark.slow
 def test_a_reader_that_crashes_is_told_of(tmp_path: Path) -> None:
     path = write(tmp_path / "log.mat", columns())
     with pytest.raises(LogError, match="not a MATLAB file: SciPy crashed on it with SIGSEGV"):

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from log_files import EVERY_FORMAT, FORMATS, columns, write, write_csv
 from places import EMPS
+from properties import examples
 
 from hybridsep.logs.log import LogReader, open_log, read_log
 
@@ -125,7 +126,7 @@ def test_interval_is_the_mean_rounded_sensibly(tmp_path: Path, T_s: float) -> No
 
 
 @given(seed=st.integers(0, 2**32 - 1), n=st.integers(1000, 30_000))
-@settings(max_examples=20)
+@examples(20)
 def test_jitter_of_a_clock_does_not_move_the_interval(
     seed: int, n: int, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
@@ -135,7 +136,7 @@ def test_jitter_of_a_clock_does_not_move_the_interval(
 
 
 @given(seed=st.integers(0, 2**32 - 1), n=st.integers(1000, 20_000), rows_lost=st.sampled_from([0, 100]))
-@settings(max_examples=30)
+@examples(30)
 def test_the_interval_of_a_clock_that_jitters(
     seed: int, n: int, rows_lost: int, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
@@ -167,6 +168,7 @@ def test_a_median_between_two_intervals_that_differ_much(tmp_path: Path) -> None
     assert read_log(path, uniform=False).T_s == 5.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".csv", ".npz"])
 def test_memory_does_not_grow_with_the_log(tmp_path: Path, suffix: str) -> None:
     peaks = []

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from log_files import write_csv
+from properties import examples
 
 from hybridsep.base.errors import LogError
 from hybridsep.intake.check import check
@@ -104,7 +105,7 @@ START = st.integers(0, 2**31 * SECOND)  # 1970 to 2038
 
 
 @given(spelling=SPELLINGS, start=START, steps=st.lists(st.integers(1, 40 * SECOND), min_size=1, max_size=30))
-@settings(max_examples=150)
+@examples(150)
 def test_stamps_are_seconds_since_the_first(
     spelling: Spelling, start: int, steps: list[int], tmp_path_factory: pytest.TempPathFactory
 ) -> None:
@@ -122,7 +123,7 @@ def test_stamps_are_seconds_since_the_first(
 
 
 @given(start=START, n=st.integers(2, 60), step=st.integers(1, 20 * 3600 * SECOND), block=st.integers(1, 20))
-@settings(max_examples=50)
+@examples(50)
 @pytest.mark.parametrize("date", ["", "%d.%m.%Y ", "%d/%m/%Y ", "%m/%d/%y "])
 def test_midnights_in_blocks_of_any_size(
     date: str, start: int, n: int, step: int, block: int, tmp_path_factory: pytest.TempPathFactory
@@ -371,7 +372,7 @@ def test_datetimes_of_numpy(tmp_path: Path) -> None:
 
 
 @given(cells=st.lists(st.text("0123456789:./-, TZAPMapm+'", max_size=24), min_size=1, max_size=8))
-@settings(max_examples=300)
+@examples(300)
 def test_any_text_is_read_or_refused(cells: list[str], tmp_path_factory: pytest.TempPathFactory) -> None:
     rows = [*(f"2026-03-05 10:20:{i:02d}" for i in range(12)), *(cell.strip() for cell in cells)]
     path = write_csv(tmp_path_factory.mktemp("any") / "log.csv", table(rows, ";"))

@@ -77,6 +77,7 @@ def test_the_stage_is_table_1(axis: str, gain: float) -> None:
     assert machine.plant.kappa == pytest.approx(1.5e3 * machine.plant.f, rel=1e-12)  # 1.5e-3 mm⁻²
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("axis", "printed"), [("x", 22.0), ("y", 130.2)])
 def test_the_stages_friction_is_calibrated(axis: str, printed: float) -> None:
     machine, x_d = load_machine(f"als25010_{axis}"), dict(zip("xy", spiral(), strict=True))[axis]
@@ -145,7 +146,7 @@ def test_a_file_with_defaults(tmp_path: Path) -> None:
         ('sources = ["measured"]', "sources = []", "sources"),
         ("[predictor]", "[predictor]\n[predictor]", "not valid TOML"),
         ("[[physics.mode]]", "[physics.mode]", r"physics.mode must be a list of modes: write \[\[physics.mode\]\]"),
-        ('kind = "stage"', "", "plant.kind is missing: feed_drive or stage"),
+        ('kind = "stage"', "", "plant.kind is missing: feed_drive, stage or identified"),
         ('title = "An axis"', 'title = "An \\u0001 axis"', "title must be one line of printable text"),
         ("T_s = 0.002", "T_s = true", "T_s must be a number, got True"),
         ("T_s = 0.002", 'T_s = "0.002"', "T_s must be a number, got '0.002'"),
@@ -316,8 +317,8 @@ def test_what_a_machine_does_not_have() -> None:
     assert load_machine("als25010_x").trajectory_limits().velocity == 0.08
 
 
-def test_a_plant_and_a_dead_time_exclude_each_other(tmp_path: Path) -> None:
-    with pytest.raises(MachineError, match="dead_time = 0"):
+def test_a_stage_and_a_dead_time_exclude_each_other(tmp_path: Path) -> None:
+    with pytest.raises(MachineError, match=r"plant of kind stage must have physics\.dead_time = 0: it has none"):
         load_machine(write(tmp_path, GOOD.replace("[[physics.mode]]", "[physics]\ndead_time = 2\n[[physics.mode]]")))
 
 

@@ -8,9 +8,10 @@ from collections.abc import Callable
 import numpy as np
 import oracle
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from modal_cases import CASES, HOLDS, LIGHT, OVER, TS, UNDER, Array, command, transfer_function
+from properties import examples
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
@@ -109,7 +110,7 @@ class TestDiscretisation:
         np.testing.assert_array_equal(x_d, kept[1])
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(
     lengths=st.lists(st.integers(1, 2 * BLOCK_MAX + 3), min_size=1, max_size=6),
     dead_time=st.sampled_from([0, 1, 5, 300]),

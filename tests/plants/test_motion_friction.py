@@ -13,12 +13,14 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from hybridsep import ModalModel, Mode, load_machine, simulate
+from hybridsep.base.settings import PARAMETERS
 from hybridsep.plants import stage_drive
 from hybridsep.plants.motion_friction import velocity_under_friction
-from hybridsep.plants.stage_drive import FRICTION_VELOCITY, StageDrive
+from hybridsep.plants.stage_drive import StageDrive
 from hybridsep.plants.trajectory import spiral, staircase
 
 Array = NDArray[np.float64]
+FRICTION_VELOCITY = PARAMETERS["v_friction"].default
 TS = 1e-3
 
 
@@ -64,6 +66,7 @@ def test_the_motion_is_integrated_to_a_nanometre() -> None:
     assert np.max(np.abs(x - truth)) < 1e-9
 
 
+@pytest.mark.slow
 def test_the_error_on_the_x_axis_hardly_depends_on_the_internal_step(monkeypatch: pytest.MonkeyPatch) -> None:
     # Where β < 0 the friction's change of sign is a jump, so that a motion is resolved to micrometres only.
     machine, x_d = load_machine("als25010_x"), spiral()[0][:700]

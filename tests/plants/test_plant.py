@@ -6,13 +6,14 @@ import math
 
 import numpy as np
 import pytest
+from c_core import STAGE_DRIVE, STAGE_MODES, CModel
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from hybridsep import Encoder, ModalModel, Mode, load_machine, simulate
 from hybridsep.base.errors import ParameterError, SignalError
 from hybridsep.plants.feed_drive import FeedDrive
-from hybridsep.plants.stage_drive import FRICTION_VELOCITY, StageDrive
+from hybridsep.plants.stage_drive import StageDrive
 from hybridsep.plants.trajectory import spiral, staircase
 
 Array = NDArray[np.float64]
@@ -57,7 +58,7 @@ def test_the_stage_is_integrated_to_less_than_a_nanometre(axis: str) -> None:
     def slope(t: float, z: Array, k: int, r: float) -> list[float]:
         x = position(z)
         # x = G_pb (x_d − d), d = f tanh(v_d / 2 mm/s) + κ x |x|
-        u = r - stage.f * math.tanh(v_d[k] / FRICTION_VELOCITY) - stage.kappa * x * abs(x)
+        u = r - stage.f * math.tanh(v_d[k] / 2e-3) - stage.kappa * x * abs(x)
         out: list[float] = []
         for i, mode in enumerate(modes):
             out += [z[2 * i + 1], u - 2 * mode.zeta * mode.omega * z[2 * i + 1] - mode.omega**2 * z[2 * i]]
@@ -77,6 +78,38 @@ def test_without_nonlinearity_the_plants_are_their_models() -> None:
     discrete = modal.discretise(TS)
     x_pb, _ = discrete.forced_response(discrete.rest(), x_d)
     np.testing.assert_allclose(simulate(StageDrive(modal), x_d, TS), x_pb, atol=1e-10)
+
+
+@pytest.mark.parametrize(("hold", "dead_time"), [("zoh", 1), ("zoh", 3), ("foh", 0), ("foh", 1), ("foh", 3)])
+def test_a_stage_delays_and_holds_the_command_as_its_model(hold: str, dead_time: int) -> None:
+    x_d = staircase()[:600] + 0.1
+    model = ModalModel([Mode(**mode) for mode in STAGE_MODES], dead_time)
+    discrete = model.discretise(TS, hold)
+    x_pb = discrete.forced_response(discrete.rest(), x_d - x_d[0])[0] + x_d[0]
+    plant = StageDrive(model, T_s=TS, input_hold=hold)
+    x = simulate(plant, x_d, TS)
+    # Without a dead time a first-order hold would need the next command: it goes on as it came.
+    held = np.max(np.abs(simulate(StageDrive(model, T_s=TS), x_d, TS) - x_pb))
+    assert np.max(np.abs(x - x_pb)) < (0.25 * held if (hold, dead_time) == ("foh", 0) else 1e-9)
+    assert np.max(np.abs(x - x_d)) > 1e-5
+    values = {**STAGE_DRIVE, "f": 8e-6, "v_friction": 5e-3, "noise_std": 0.0, "dead_time": dead_time}
+    core = CModel("stage_drive", {**values, "input_hold": ["zoh", "foh"].index(hold)})
+    core["x_d"] = x_d[0]
+    core.start_values()
+    core.initialise(0.0)
+    plant = StageDrive(model, 8e-6, values["kappa"], TS, v_friction=5e-3, input_hold=hold)
+    plant.reset(float(x_d[0]))
+    for k, command in enumerate(x_d[:300].tolist()):
+        if k == 150:
+            other = StageDrive(model, 8e-6, values["kappa"], TS, v_friction=5e-3, input_hold=hold)
+            other.restore(plant.state())
+            plant = other
+            core.check_state(core.state.tobytes())
+        core["x_d"] = command
+        for i in range(2):  # the command is sampled at the instants, whatever the step
+            core.step((k + i / 2) * TS, TS / 2)
+            plant.step(command, TS / 2)
+            assert core["x"] == pytest.approx(plant.x, abs=1e-12)
 
 
 @pytest.mark.parametrize("f_n", [25.0, 500.0, 2000.0, 5000.0])
@@ -154,8 +187,8 @@ def test_what_cannot_be_is_refused() -> None:
         FeedDrive(1.0, 1.0, -1.0)
     with pytest.raises(ParameterError, match=r"kappa must be 0 … 1000000 1/m, got -0.1"):
         StageDrive(ModalModel([Mode(10, 0.5, 1.0)]), kappa=-0.1)
-    with pytest.raises(ParameterError, match="must have no dead time, got 2 samples"):
-        StageDrive(ModalModel([Mode(10, 0.5, 1.0)], dead_time=2))
+    with pytest.raises(ParameterError, match=r"v_friction must be 1e-12 … 10000 m/s, got 0"):
+        StageDrive(ModalModel([Mode(10, 0.5, 1.0)]), v_friction=0.0)
     with pytest.raises(ParameterError, match=r"step size must be > 0 and ≤ 100 s, got 0.0"):
         FeedDrive(1.0, 1.0, 1.0).step(0.0, 0.0)
     with pytest.raises(ParameterError, match=r"step size must be > 0 and ≤ 100 s, got 1000000000.0"):

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from properties import examples
 
 from hybridsep.base.errors import LogError, ParameterError, SignalError
 from hybridsep.base.settings import Limits
@@ -41,7 +42,7 @@ def test_a_move_starts_as_its_jerk_says() -> None:
     np.testing.assert_allclose(x_d[:9], 1000.0 * t**3 / 6, atol=1e-15)
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(
     positions=st.lists(st.floats(-0.5, 0.5), min_size=2, max_size=5),
     velocity=st.floats(0.01, 1.0),

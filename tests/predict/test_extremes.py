@@ -18,6 +18,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from library_models import library_compensator
 from places import ROOT
+from properties import share
 
 from hybridsep.app import cli
 from hybridsep.base.errors import HybridSepError, MachineError, ParameterError
@@ -28,7 +29,7 @@ from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.online.look_ahead import LookAhead
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.feed_drive import FeedDrive
-from hybridsep.plants.plant import Plant
+from hybridsep.plants.plant import Drive
 from hybridsep.plants.stage_drive import StageDrive
 from hybridsep.plants.trajectory import rest_to_rest
 from hybridsep.predict.predictor import HybridPredictor
@@ -44,7 +45,7 @@ MODE = ("f_n", "zeta", "alpha", "beta")
 FEED_DRIVE = ("m", "c", "k", "c_nl", "k_nl", "noise_std")
 STAGE = ("f", "kappa", "T_s", "noise_std")
 
-bounded = settings(max_examples=100, deadline=timedelta(seconds=20), suppress_health_check=list(HealthCheck))
+bounded = settings(max_examples=share(100), deadline=timedelta(seconds=20), suppress_health_check=list(HealthCheck))
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -131,6 +132,7 @@ def check_c_model(model: CModel, samples: Any, step: float) -> None:
         assert np.isfinite(model.values).all()
 
 
+@pytest.mark.slow
 @bounded
 @given(values_of(*LEARNING), modes_of(2), positions, st.sampled_from([0, 1]))
 def test_the_predictor(learning: dict[str, float], modes: dict[str, float], samples: Any, hold: int) -> None:
@@ -148,6 +150,7 @@ def test_the_predictor(learning: dict[str, float], modes: dict[str, float], samp
     refused(values, run)
 
 
+@pytest.mark.slow
 @bounded
 @given(values_of(*LEARNING), modes_of(2), positions, st.sampled_from([0, 1]))
 def test_the_predictor_in_c(learning: dict[str, float], modes: dict[str, float], samples: Any, hold: int) -> None:
@@ -156,6 +159,7 @@ def test_the_predictor_in_c(learning: dict[str, float], modes: dict[str, float],
     refused(values, lambda: check_c_model(model, samples, values["T_s"]))
 
 
+@pytest.mark.slow
 @bounded
 @given(values_of(*LEARNING, *TRUST), modes_of(2), positions, st.sampled_from([0, 1]))
 def test_the_predictor_with_trust_in_c(
@@ -166,6 +170,7 @@ def test_the_predictor_with_trust_in_c(
     refused(values, lambda: check_c_model(model, samples, values["T_s"]))
 
 
+@pytest.mark.slow
 @bounded
 @given(values_of(*LEARNING, *PLANNING), modes_of(1), positions)
 def test_the_compensator(values: dict[str, float], modes: dict[str, float], samples: Any) -> None:
@@ -179,6 +184,7 @@ def test_the_compensator(values: dict[str, float], modes: dict[str, float], samp
     refused({**values, **modes}, run)
 
 
+@pytest.mark.slow
 @bounded
 @given(values_of(*LEARNING, *PLANNING), modes_of(1), positions)
 def test_the_compensator_in_c(values: dict[str, float], modes: dict[str, float], samples: Any) -> None:
@@ -186,7 +192,7 @@ def test_the_compensator_in_c(values: dict[str, float], modes: dict[str, float],
     refused({**values, **modes}, lambda: check_c_model(model, samples, values["T_s"]))
 
 
-def check_plant(plant: Plant, noise_std: float, samples: Any, h: float) -> None:
+def check_plant(plant: Drive, noise_std: float, samples: Any, h: float) -> None:
     encoder = Encoder(noise_std)
     for x_d, _ in samples.tolist():
         plant.step(x_d, h)
@@ -194,6 +200,7 @@ def check_plant(plant: Plant, noise_std: float, samples: Any, h: float) -> None:
         assert all(map(math.isfinite, outputs)), outputs
 
 
+@pytest.mark.slow
 @bounded
 @given(values_of(*FEED_DRIVE), positions, st.floats(-9, -3).map(lambda e: 10.0**e))
 def test_the_feed_drive(values: dict[str, float], samples: Any, h: float) -> None:
@@ -204,6 +211,7 @@ def test_the_feed_drive(values: dict[str, float], samples: Any, h: float) -> Non
     refused(values, run)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("friction_on", ["command", "motion"])
 @bounded
 @given(values_of(*STAGE), modes_of(2), positions, st.floats(-9, -3).map(lambda e: 10.0**e))
@@ -215,6 +223,7 @@ def test_the_stage(friction_on: str, values: dict[str, float], modes: dict[str, 
     refused({**values, **modes}, run)
 
 
+@pytest.mark.slow
 @bounded
 @given(values_of(*FEED_DRIVE), positions, st.floats(-12, 3).map(lambda e: 10.0**e))
 def test_the_feed_drive_in_c(values: dict[str, float], samples: Any, h: float) -> None:
@@ -222,6 +231,7 @@ def test_the_feed_drive_in_c(values: dict[str, float], samples: Any, h: float) -
     refused(values, lambda: check_c_model(model, samples[:10], h))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("friction_on", [0, 1])
 @bounded
 @given(values_of(*STAGE), modes_of(2), positions, st.floats(-12, 3).map(lambda e: 10.0**e))
@@ -271,6 +281,7 @@ REFUSED = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "entry", "value", "message"), REFUSED)
 def test_a_machine_is_refused_by_name(name: str, entry: str, value: str, message: str, tmp_path: Path) -> None:
     with pytest.raises(MachineError) as caught:
@@ -278,6 +289,7 @@ def test_a_machine_is_refused_by_name(name: str, entry: str, value: str, message
     assert message in str(caught.value)
 
 
+@pytest.mark.slow
 def test_a_build_of_what_cannot_be_ends_at_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -291,6 +303,7 @@ def test_a_build_of_what_cannot_be_ends_at_once(
     assert "k must be 1e-06 … 1e+15 N/m, got 1e+308" in " ".join(capsys.readouterr().err.split())
 
 
+@pytest.mark.slow
 def test_a_trajectory_of_too_many_samples_is_refused() -> None:
     with pytest.raises(
         ParameterError, match=r"fewer than 2000000 samples, got 1e\+07 s at T_s = 0.001 s; raise its limits"
@@ -298,6 +311,7 @@ def test_a_trajectory_of_too_many_samples_is_refused() -> None:
         rest_to_rest([0.0, 0.01], Limits(1e-9, 1.0, 1.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", c_core.DESCRIPTIONS)
 def test_every_parameter_of_an_fmu_has_both_bounds(name: str) -> None:
     for variable in variables_of(c_core.DESCRIPTIONS[name]):

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import oracle
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from properties import examples
 
 from hybridsep.base.signals import Array
 from hybridsep.predict.regression import RidgeRegression
@@ -34,7 +35,7 @@ def stacked_cost(w: Array, rows: Array, target: Array, penalties: Array) -> floa
     return float(np.sum((target - rows @ w) ** 2) + np.sum(penalties * w**2))
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(
     kind=st.sampled_from(["independent", "lags"]),
     n=st.integers(1, 14),
@@ -79,7 +80,7 @@ def test_penalised_solves_the_stacked_system(
     )
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(n=st.integers(1, 10), k=st.integers(1, 60), seed=st.integers(0, 2**32 - 1))
 def test_leverage_is_the_variance_of_a_prediction(n: int, k: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -92,7 +93,7 @@ def test_leverage_is_the_variance_of_a_prediction(n: int, k: int, seed: int) -> 
     np.testing.assert_allclose(regression.penalised(penalties).leverage(phi), expected, rtol=1e-9)
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(
     weights=st.lists(st.floats(0.01, 1.0), min_size=1, max_size=5), lam=st.sampled_from([1e-6, 1e-2, 1.0]), n=st.just(5)
 )

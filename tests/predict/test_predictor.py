@@ -9,9 +9,10 @@ import numpy as np
 import oracle
 import pytest
 import staircase_data as staircase
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from predictor_cases import MODEL, Array, replay, small_signals, trained
+from properties import examples
 
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.model.physics import ModalModel, Mode
@@ -110,7 +111,7 @@ def test_warm_up_counts_samples_inside_a_window(t_init: float, count: int) -> No
     np.testing.assert_array_equal(x_pb[:10], x_h[:10])
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(data=st.data(), Np=st.integers(1, 12), windows=st.integers(0, 8), hold=st.sampled_from(["zoh", "foh"]))
 def test_operator_equals_predict(data: st.DataObject, Np: int, windows: int, hold: str) -> None:
     p, q = data.draw(st.integers(1, Np), "p"), data.draw(st.integers(0, Np - 1), "q")
@@ -145,7 +146,7 @@ def test_operator_is_lower_triangular_toeplitz_and_of_a_window_by_default() -> N
     np.testing.assert_allclose(operator.G_h, np.array(columns).T, rtol=0, atol=1e-12)
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(change=st.integers(0, 9), size=st.floats(1e-6, 10.0))
 def test_a_future_command_changes_nothing_earlier(change: int, size: float) -> None:
     predictor = trained(50, input_hold="foh")

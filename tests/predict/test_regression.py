@@ -9,9 +9,10 @@ import numpy as np
 import oracle
 import pytest
 import staircase_data as staircase
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from properties import examples
 
 from hybridsep.base.errors import ParameterError, SignalError
 from hybridsep.base.settings import PredictorSettings
@@ -46,7 +47,7 @@ def test_the_oracles_agree_with_sixty_digits(lam: float) -> None:
         assert relative_error(extended.astype(np.float64), exact) < max(1e-8 * digits, 4e-16)
 
 
-@settings(max_examples=80)
+@examples(80)
 @given(
     n=st.integers(1, 12),
     batches=st.lists(st.integers(1, 30), min_size=1, max_size=8),
@@ -69,7 +70,7 @@ def test_batches_of_any_size_give_the_direct_solution(n: int, batches: list[int]
     assert regression.residual_sum == pytest.approx(minimum, rel=1e-9, abs=1e-12)
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(order=st.permutations(range(40)))
 def test_the_order_of_rows_does_not_matter(order: list[int]) -> None:
     rows, target = problem(40, 6)
@@ -161,6 +162,7 @@ def test_parameters_out_of_range(n: int, lam: float, message: str) -> None:
     assert str(caught.value) == message
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("p", "q", "tolerance"), [(50, 3, 1e-9), (100, 99, 1e-7)])
 def test_weights_after_the_staircase_against_extended_precision(p: int, q: int, tolerance: float) -> None:
     n, lam = 6000, 1e-12

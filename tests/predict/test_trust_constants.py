@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from hybridsep.predict.trust import guard
 from hybridsep.predict.trust.constants import CONSTANTS
 from hybridsep.predict.trust.model import COMMAND, DOUBTING, HOLD, LAGGED, STATIC
+from hybridsep.predict.trust.reach import Reach
 
 ROOT = Path(__file__).parents[2]
 LIBRARY = sorted((ROOT / "hybridsep/predict/trust").glob("*.py"))
@@ -82,9 +82,8 @@ def members(header: str, struct: str) -> list[str]:
     return re.findall(r"(\w+)(?:\[[^\]]*\])?(?=[,;])", found[1])
 
 
-def test_the_guards_state_has_the_same_names() -> None:
-    expected = {"patience", "patience_standing", "held", "before", *guard._COUNTS, *guard._NUMBERS}
-    assert set(members("hsep_guard.h", "hsep_guard")) == expected
+def test_what_is_known_of_the_reach_has_the_same_names() -> None:
+    assert tuple(members("hsep_reach.h", "hsep_reach")) == Reach._fields
 
 
 def test_stack_expert_and_scale_have_the_same_names() -> None:

@@ -110,6 +110,7 @@ def test_a_first_reversal_falls_back() -> None:
     assert rms((x - x_h)[later]) < 0.2 * rms((x - x_pb)[later])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("n", "measured"), [(250, None), (37, None), (100, 30), (1, None), (100, 1)])
 def test_windows_of_other_lengths(n: int, measured: int | None) -> None:
     """What is learned does not depend on the windows: the rows are those of the measured samples."""

@@ -45,6 +45,7 @@ def test_staircase() -> None:
     assert warm <= 5.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("axis", "cold_most", "warm_most"), [("x", 5.5, 1.1), ("y", 33.0, 1.4)])
 def test_spiral_of_the_stage(axis: str, cold_most: float, warm_most: float) -> None:
     """Noise: 1 µm; the physics model alone: 22.0 and 130.2 µm."""
@@ -53,6 +54,7 @@ def test_spiral_of_the_stage(axis: str, cold_most: float, warm_most: float) -> N
     assert warm <= warm_most
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not EMPS.is_file(), reason="needs ../shared/data/emps beside the repository")
 def test_recorded_axis() -> None:
     """The physics model alone: 15.45 µm."""

@@ -90,9 +90,10 @@ def test_missing_samples_are_refused_by_the_paper_s_model(drive: RandomDrive) ->
     assert not results[OFFSET_STEP].refused
 
 
+@pytest.mark.slow
 def test_command_line(capsys: pytest.CaptureFixture[str], tmp_path_factory: pytest.TempPathFactory) -> None:
     cache = tmp_path_factory.mktemp("drives") / "positions.npz"
-    arguments = ["--n", "1", "--processes", "1", "--faults", "--cache", str(cache)]
+    arguments = ["--n", "1", "--processes", "1", "--core", "--faults", "--cache", str(cache)]
     main(arguments)
     first = capsys.readouterr().out
     assert "1 random drives, predictor: default" in first

@@ -7,14 +7,13 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
+from benchmarks.random_drives.core import core_outputs
 from benchmarks.random_drives.generator import SEED, random_drives
 from benchmarks.random_drives.replay import Replay, replay
 from hybridsep.base.metrics import coverage
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
-from hybridsep.evaluate.backtest import backtest
 from hybridsep.model.physics import ModalModel
-from hybridsep.predict.predictor import HybridPredictor
 
 N, N_INTERVALS = 40, 8
 
@@ -27,13 +26,13 @@ class Replays:
     errors: list[Array] = field(default_factory=list)
     deviations: list[Array] = field(default_factory=list)
 
-    def run(self, _predictor: str, model: ModalModel, settings: PredictorSettings, x_d: Array, x_meas: Array) -> Array:
-        """Replay with the drive's settings, as ``library_replay`` does, and keep what the intervals need."""
-        result = backtest(HybridPredictor(model, settings), x_d, x_meas)
+    def run(self, predictor: str, model: ModalModel, settings: PredictorSettings, x_d: Array, x_meas: Array) -> Array:
+        """Replay with the C core, as which the library predicts (``test_replay.py``), and keep what intervals need."""
+        x_h, x_h_std = core_outputs(predictor, model, settings, x_d, x_meas, ("x_h", "x_h_std"))
         if len(self.errors) < N_INTERVALS:
-            self.errors.append(x_meas - result.x_h)
-            self.deviations.append(result.x_h_std)
-        return result.x_h
+            self.errors.append(x_meas - x_h)
+            self.deviations.append(x_h_std)
+        return np.asarray(x_h)
 
 
 @pytest.fixture(scope="module")
@@ -43,6 +42,7 @@ def replays() -> Replays:
     return found
 
 
+@pytest.mark.slow
 def test_no_drive_is_worse_than_by_physics(replays: Replays) -> None:
     ratios = np.array([result.ratio for result in replays.results])
     assert len(ratios) == N
@@ -51,6 +51,7 @@ def test_no_drive_is_worse_than_by_physics(replays: Replays) -> None:
     assert np.median(ratios) <= 0.265
 
 
+@pytest.mark.slow
 def test_intervals_cover_what_they_say(replays: Replays) -> None:
     """Pooled over 300 drives they do within 2 points (``benchmarks/intervals.py``); these are few."""
     errors, deviations = np.concatenate(replays.errors), np.concatenate(replays.deviations)

@@ -170,6 +170,7 @@ def test_the_motor_has_no_more_force_than_its_limit() -> None:
     assert drive.x == pytest.approx(0.02, abs=1e-3)  # it arrives, without windup
 
 
+@pytest.mark.slow
 def test_internal_steps_are_short_enough(recipes: list[Recipe]) -> None:
     for recipe in recipes[:30]:
         coarse, fine = response(recipe, recipe.axis), response(recipe, recipe.axis, INTERNAL_STEP / 4)

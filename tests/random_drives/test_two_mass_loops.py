@@ -33,12 +33,14 @@ def x_d(recipe: Recipe) -> Array:
     return settings_of(recipe)[2]
 
 
+@pytest.mark.slow
 def test_off_is_the_drive_alone(recipe: Recipe, x_d: Array) -> None:
     loop = closed_loop(recipe, recipe.axis, "off")
     assert np.array_equal(loop.x_dm, x_d)
     assert largest(loop.x - TwoMassDrive(recipe.axis, float(x_d[0])).run(x_d)) < 1e-12
 
 
+@pytest.mark.slow
 def test_the_physics_models_plans_do_not_depend_on_the_measurement(recipe: Recipe, x_d: Array) -> None:
     planned = closed_loop(recipe, recipe.axis, "physics")
     assert largest(planned.x_dm - x_d) > 1e-4
@@ -94,6 +96,7 @@ def test_a_drive_that_the_compensator_refuses_counts_as_infinite() -> None:
     assert table[-1].split() == ["all", "0.5", "inf", "inf", "0.5", "inf", "inf", "inf", "inf", "inf", "50.0", "%"]
 
 
+@pytest.mark.slow
 def test_command_line(capsys: pytest.CaptureFixture[str]) -> None:
     main(["--first", str(CHEAP), "--n", "1", "--only", SOUND, "--processes", "1"])
     printed = capsys.readouterr().out

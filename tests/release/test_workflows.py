@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from places import ROOT
+from properties import LEFT_OUT
 from ruamel.yaml import YAML
 
 from hybridsep.base.version import __version__
@@ -25,10 +26,10 @@ def content(path: Path) -> Any:
     return YAML(typ="safe").load(path.read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize("path", WORKFLOWS, ids=lambda path: path.name)
-def test_workflows_keep_to_their_schema(path: Path) -> None:
-    schema = "vendor.gitlab-ci" if path == GITLAB else "vendor.github-workflows"
-    check = [sys.executable, "-m", "check_jsonschema", "--builtin-schema", schema, str(path)]
+@pytest.mark.slow
+@pytest.mark.parametrize(("schema", "paths"), [("vendor.gitlab-ci", [GITLAB]), ("vendor.github-workflows", GITHUB)])
+def test_workflows_keep_to_their_schema(schema: str, paths: list[Path]) -> None:
+    check = [sys.executable, "-m", "check_jsonschema", "--builtin-schema", schema, *map(str, paths)]
     done = subprocess.run(check, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
 
@@ -42,12 +43,14 @@ def test_actions_are_pinned_and_there_are_no_secrets(path: Path) -> None:
 
 
 def test_the_checks_run_on_every_system() -> None:
-    checks, release = map(content, GITHUB)
+    checks, nightly, release = map(content, GITHUB)
     runners = [each["os"] for each in checks["jobs"]["checks"]["strategy"]["matrix"]["include"]]
     assert {runner.split("-")[0] for runner in runners} == {"ubuntu", "windows", "macos"}
     assert ".ci/run" in [step.get("run") for step in checks["jobs"]["checks"]["steps"]]
-    assert release["jobs"]["build"]["needs"] == "checks"
+    assert release["jobs"]["build"]["needs"] == ["checks", "nightly"]
     assert release["jobs"]["checks"]["uses"] == f"./{GITHUB[0].relative_to(ROOT).as_posix()}"
+    assert release["jobs"]["nightly"]["uses"] == f"./{GITHUB[1].relative_to(ROOT).as_posix()}"
+    assert ".ci/nightly" in [step.get("run") for step in nightly["jobs"]["nightly"]["steps"]]
     for path in GITHUB:
         assert content(path)["permissions"] == {"contents": "read"}
 
@@ -56,6 +59,7 @@ def test_the_checks_run_on_every_system() -> None:
         script = gitlab[job].get("script", gitlab[".checks"]["script"])
         assert gitlab[job]["extends"] == ".checks"
         assert any(".ci/run" in line for line in script)
+    assert ".ci/nightly" in gitlab["nightly"]["script"]
     assert gitlab["stages"].index(gitlab["release"]["stage"]) > gitlab["stages"].index(gitlab[".checks"]["stage"])
 
 
@@ -67,6 +71,15 @@ def test_the_oldest_python_is_among_them() -> None:
     assert oldest[0] in content(GITLAB)["linux"]["parallel"]["matrix"][0]["PYTHON"]
 
 
+def test_what_a_contributors_run_leaves_out_runs_every_night(pytestconfig: pytest.Config) -> None:
+    """All marks that tests/conftest.py deselects, and all properties, with all their examples."""
+    (chosen,) = re.findall(r'pytest -m "(.+)"', (ROOT / ".ci" / "nightly").read_text(encoding="utf-8"))
+    assert {*LEFT_OUT, "hypothesis"} == set(chosen.split(" or "))
+    assert set(LEFT_OUT) < {line.partition(":")[0] for line in pytestconfig.getini("markers")}
+    assert any("schedule" in str(rule) for rule in content(GITLAB)["nightly"]["rules"])
+    assert re.search(r"^  schedule:$", GITHUB[1].read_text(encoding="utf-8"), re.MULTILINE)
+
+
 @pytest.mark.skipif(not shutil.which("bash"), reason="the scripts are bash's")
 def test_a_release_has_all_platforms_and_what_workflows_keep() -> None:
     path = ROOT / ".ci" / "release"
@@ -76,7 +89,7 @@ def test_a_release_has_all_platforms_and_what_workflows_keep() -> None:
     (kept,) = re.findall(r" out=(\S+)$", path.read_text(encoding="utf-8"), re.MULTILINE)
     assert content(GITLAB)["release"]["artifacts"]["paths"] == [kept]
     assert [
-        step["with"]["path"] for step in content(GITHUB[1])["jobs"]["build"]["steps"] if "path" in step.get("with", {})
+        step["with"]["path"] for step in content(GITHUB[2])["jobs"]["build"]["steps"] if "path" in step.get("with", {})
     ] == [kept]
 
 

@@ -53,14 +53,23 @@ def named(values: object) -> str:
     return ",".join(f"{key}={value:g}" for key, value in values.items()) if isinstance(values, dict) else str(values)
 
 
+@pytest.mark.slow
 @on_all((PREDICTOR,), needs="agreement")
-@pytest.mark.parametrize("start", [0.0, 0.1])
-@pytest.mark.parametrize(("p", "q"), [(50, 3), (100, 99)])
+@pytest.mark.parametrize(
+    ("p", "q", "start"),
+    [
+        (50, 3, 0.0),
+        (100, 99, 0.1),
+        pytest.param(50, 3, 0.1, marks=pytest.mark.nightly),
+        pytest.param(100, 99, 0.0, marks=pytest.mark.nightly),
+    ],
+)
 def test_the_staircase_is_predicted_as_by_the_library(new_stream: StreamMaker, p: int, q: int, start: float) -> None:
     loop = assert_agreement(new_stream, 6001, {"p": p, "q": q}, 1e-11, start=start)
     assert 5e-6 < loop.column(PREDICTOR, "rms_h")[-1] < 1.5e-5
 
 
+@pytest.mark.slow
 @on_all((STAGE_PREDICTOR,), needs="agreement")
 @pytest.mark.parametrize(
     "values",
@@ -81,15 +90,16 @@ def test_every_parameter_predicts_as_in_the_library(new_stream: StreamMaker, val
 
 
 @on_all((PREDICTOR,), needs="agreement")
-@pytest.mark.parametrize("start", [0.0, 0.1])
+@pytest.mark.parametrize("start", [0.0, pytest.param(0.1, marks=pytest.mark.nightly)])
 def test_the_staircase_is_predicted_with_trust_as_by_the_library(new_stream: StreamMaker, start: float) -> None:
     loop = assert_agreement(new_stream, 2550, {"trust": True, "t_init": -1.0}, 1e-12, start=start)
     assert (loop.column(PREDICTOR, "hybrid_active")[100:] == 1.0).all()  # no warm-up
     assert loop.column(PREDICTOR, "rms_h")[-1] < 0.5 * loop.column(PREDICTOR, "rms_pb")[-1]
 
 
+@pytest.mark.slow
 @on_all((STAGE_PREDICTOR,), needs="agreement")
-@pytest.mark.parametrize("path", ["staircase", "spiral"])
+@pytest.mark.parametrize("path", ["spiral", pytest.param("staircase", marks=pytest.mark.nightly)])
 @pytest.mark.parametrize(
     "values",
     [
@@ -140,7 +150,7 @@ def test_faulty_measurements_are_judged_as_by_the_library(new_stream: StreamMake
 
 
 @on_all((COMPENSATOR,), needs="agreement")
-@pytest.mark.parametrize("start", [0.0, 0.1])
+@pytest.mark.parametrize("start", [0.0, pytest.param(0.1, marks=pytest.mark.nightly)])
 def test_the_staircase_is_compensated_as_by_the_library(new_stream: StreamMaker, start: float) -> None:
     # The limits act in some windows.
     loop = assert_agreement(new_stream, 4000, PAPER, 1e-11, start=start)
@@ -148,6 +158,7 @@ def test_the_staircase_is_compensated_as_by_the_library(new_stream: StreamMaker,
     assert 4e-6 < loop.column(COMPENSATOR, "rms_e")[-1] < 1.5e-5
 
 
+@pytest.mark.slow
 @on_all((COMPENSATOR,), needs="agreement")
 @pytest.mark.parametrize(
     "values",
@@ -176,6 +187,7 @@ def test_every_parameter_compensates_as_in_the_library(new_stream: StreamMaker, 
     assert_agreement(new_stream, 300 if values.get("Np") == 1 else 1250, values, 1e-9)
 
 
+@pytest.mark.slow
 @on_all((STAGE_COMPENSATOR,), needs="agreement")
 @pytest.mark.parametrize(
     "values",
@@ -187,7 +199,7 @@ def test_the_stage_is_compensated_as_by_the_library(new_stream: StreamMaker, val
 
 
 @on_all((COMPENSATOR,), needs="agreement")
-@pytest.mark.parametrize("start", [0.0, 0.1])
+@pytest.mark.parametrize("start", [0.1, pytest.param(0.0, marks=pytest.mark.nightly)])
 def test_the_staircase_is_compensated_with_trust_as_by_the_library(new_stream: StreamMaker, start: float) -> None:
     loop = assert_agreement(new_stream, 2450, {}, 1e-11, start=start)
     assert set(loop.column(COMPENSATOR, "sep_state")) == {1.0, 2.0}
@@ -195,6 +207,7 @@ def test_the_staircase_is_compensated_with_trust_as_by_the_library(new_stream: S
     assert (loop.column(COMPENSATOR, "x_h_std") > 0.0).all()
 
 
+@pytest.mark.slow
 @on_all((COMPENSATOR,), needs="agreement")
 @pytest.mark.parametrize(
     "values",

@@ -123,6 +123,7 @@ def named(values: dict[str, Any]) -> str:
     return ",".join(f"{key}={value:g}" for key, value in values.items())
 
 
+@pytest.mark.slow
 @on_all((PREDICTOR,), needs="agreement")
 @pytest.mark.parametrize("inputs", [late, cut])
 @pytest.mark.parametrize(

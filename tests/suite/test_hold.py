@@ -34,7 +34,7 @@ def disturbed(model: str, delay: int, *, missing: bool) -> tuple[Array, Array]:
     return x_d, x
 
 
-@on_all((PREDICTOR, COMPENSATOR), needs="figures")
+@on_all((PREDICTOR, COMPENSATOR))
 @pytest.mark.parametrize(
     "more",
     [

@@ -167,27 +167,46 @@ def test_a_step_size_that_cannot_be_changes_nothing(new_stream: StreamMaker, h: 
     stream.step(0.05, T_S)
 
 
-@on_adapters((*LOOK_AHEADS, TRAJECTORY))
-@pytest.mark.parametrize("t", [0.0, 0.0506, 0.0494, 1e9, math.nan, math.inf, -math.inf])
-def test_a_step_from_another_time_changes_nothing(new_stream: StreamMaker, t: float) -> None:
-    stream = new_stream()
+ANOTHER_TIME = pytest.mark.parametrize("t", [0.0, 0.0506, 0.0494, 1e9, math.nan, math.inf, -math.inf])
+
+
+def assert_no_step_from(stream: Stream, t: float) -> None:
     initialise(stream)
     steps(stream, 0, 50)
     message = f"the communication point must be 0.05 s, where the last step ended, got {t} s"
     assert_refused(stream, t, T_S, message)
-    stream.step(0.05, T_S)
+    stream.step(0.0496 if t < 0.05 else 0.0504, T_S)  # rounding, of an importer that means it badly
+
+
+@on_adapters((*LOOK_AHEADS, TRAJECTORY))
+@ANOTHER_TIME
+def test_a_step_from_another_time_changes_nothing(new_stream: StreamMaker, t: float) -> None:
+    assert_no_step_from(new_stream(), t)
 
 
 @on_adapters(PLANTS, needs="a plant's time")
-def test_a_plant_starts_no_step_at_infinity(new_stream: StreamMaker) -> None:
+@ANOTHER_TIME
+def test_a_plants_step_from_another_time_changes_nothing(new_stream: StreamMaker, t: float) -> None:
+    assert_no_step_from(new_stream(), t)
+
+
+@on_adapters(PLANTS, needs="a plant's time")
+def test_a_plant_goes_back_by_a_saved_state_alone(new_stream: StreamMaker) -> None:
     stream = new_stream()
-    stream.initialise({})
-    assert_refused(stream, math.inf, T_S, "the communication point must be finite, got inf s")
+    stream.initialise({}, start=5.0)
+    stream.step(5.0, 2 * T_S)
+    blob = stream.save()
+    stream.step(5.002, T_S)
+    assert_refused(stream, 5.002, T_S, "the communication point must be 5.003 s, where the last step ended, got 5.002")
+    stream.restore(blob)
+    assert_refused(stream, 5.003, T_S, "the communication point must be 5.002 s, where the last step ended, got 5.003")
+    stream.step(5.002, T_S)
 
 
 BAD_POSITIONS = [(math.nan, "finite"), (math.inf, "finite"), (-math.inf, "finite"), (1e30, "within ±1000 m")]
 
 
+@pytest.mark.slow
 @on_adapters(LOOK_AHEADS)
 @pytest.mark.parametrize("name", ["x_d_ahead", "x_meas"])
 @pytest.mark.parametrize(("value", "expected"), BAD_POSITIONS)

@@ -89,6 +89,7 @@ def test_rollback_is_exact_while_a_late_measurement_is_planned_from(
     assert_exact(new_stream, SHORT[COMPENSATOR] | {"trust": True, "measurement_delay": 35} | limits)
 
 
+@pytest.mark.slow
 @every
 @pytest.mark.parametrize("cut", [1, 19, 20, 21, 57, 203])
 def test_a_state_goes_on_in_a_second_instance(new_stream: StreamMaker, cut: int) -> None:
@@ -145,6 +146,7 @@ def test_a_reset_ends_trust(new_stream: StreamMaker) -> None:
     assert steps(stream, 0, 150) == with_trust
 
 
+@pytest.mark.slow
 @on_all((PREDICTOR,))
 def test_states_go_on_in_another_process(new_stream: StreamMaker, fmus: BuiltFmus, tmp_path: Path) -> None:
     expected = {}

@@ -52,6 +52,7 @@ def led(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.slow
 @on_adapters(LOOK_AHEADS)
 def test_a_warm_run_is_the_librarys_second_run(new_stream: StreamMaker, weights: Trained) -> None:
     # 1e-11 m at every sample; a pythonfmu FMU is the library.

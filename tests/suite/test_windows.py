@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from functools import cache
+from typing import Any
 
 import numpy as np
 import oracle
@@ -10,7 +12,7 @@ import pytest
 from by_window import plans, predictions
 from driving import SHORT, closed_loop, initialise, replay
 from staircase_data import TS, C, K, M
-from stream import COMPENSATOR, LIBRARY, LOOK_AHEADS, OUTPUTS, PREDICTOR, PYTHON, Value
+from stream import COMPENSATOR, LIBRARY, LOOK_AHEADS, OUTPUTS, PREDICTOR, PYTHON, Array, Value
 from streams import StreamMaker, on_all
 
 from hybridsep.base.metrics import hold
@@ -39,15 +41,24 @@ def test_predictions_are_those_of_the_delayed_log(new_stream: StreamMaker, start
     np.testing.assert_array_equal(shown["hybrid_active"][100 : 100 + n] == 1.0, active)
 
 
+@pytest.mark.slow
+@cache
+def directly_solved(n: int) -> Array:
+    """Return the prediction of the staircase by the oracle.
+
+    It shares no code with the library and solves each batch from all its rows.
+    """
+    loop = closed_loop(PREDICTOR, n, {})
+    numerator, denominator = np.array([C / M, K / M]), np.array([1.0, C / M, K / M])
+    settings: dict[str, Any] = {"T_s": TS, "Np": 100, "p": 50, "q": 3, "lam": 1e-12, "t_init": 0.3}
+    return np.array(oracle.run(numerator, denominator, loop.r[:-100], loop.x[100:], **settings).x_h)
+
+
 @on_all((PREDICTOR,))
 def test_the_staircase_is_predicted_as_by_the_directly_solved_problem(new_stream: StreamMaker) -> None:
-    # The oracle shares no code with the library and solves each batch from all its rows.
     shown = shown_by(new_stream, 6001, {})
-    numerator, denominator = np.array([C / M, K / M]), np.array([1.0, C / M, K / M])
-    x_d, x = shown["r"][:-100], shown["x_meas"][100:]
-    truth = oracle.run(numerator, denominator, x_d, x, T_s=TS, Np=100, p=50, q=3, lam=1e-12, t_init=0.3)
     tolerance = 1e-12 if new_stream.implementation in (LIBRARY, PYTHON) else 1e-11
-    assert np.max(np.abs(shown["x_h"][100:-1] - np.array(truth.x_h))) < tolerance
+    assert np.max(np.abs(shown["x_h"][100:-1] - directly_solved(6001))) < tolerance
 
 
 @on_all((COMPENSATOR,))
@@ -98,6 +109,7 @@ def test_windows_show_the_batch(new_stream: StreamMaker, Np: int, n: int) -> Non
     np.testing.assert_array_equal(stream.window("x_d_window")[:length], loop.r[n - Np : n - Np + length])
 
 
+@pytest.mark.slow
 @on_all((PREDICTOR,))
 def test_an_offset_changes_no_prediction(new_stream: StreamMaker) -> None:
     shown, moved = (shown_by(new_stream, 2500, {}, start) for start in (0.0, 0.1))

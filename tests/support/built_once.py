@@ -5,8 +5,11 @@ from __future__ import annotations
 import hashlib
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
+
+import pytest
 
 from hybridsep import build_fmu, fmu_names, load_machine, machine_names
 from hybridsep.fmi.flavours import FLAVOURS
@@ -23,6 +26,24 @@ NATIVE = [name for name, (_, flavour, fmi) in _FMUS.items() if (flavour, fmi) ==
 PYTHON = [name for name, (_, flavour, _) in _FMUS.items() if flavour == "python"]
 FMI3 = [name for name, (_, _, fmi) in _FMUS.items() if fmi == "3"]
 """Names of all FMUs of all machines, the native ones by their version of FMI."""
+
+
+def each_kind(values: Sequence[str] | Sequence[tuple[str, ...]]) -> list[Any]:
+    """Return names of FMUs, or tuples that end in one, as pytest parameters; those of some machines run at night.
+
+    The stage's Y drive differs from its X drive in numbers alone, and the rotary machine from the default one.
+    """
+    return [
+        pytest.param(*((value,) if isinstance(value, str) else value), marks=_AT_NIGHT if _only_numbers(value) else [])
+        for value in values
+    ]
+
+
+_AT_NIGHT = [pytest.mark.nightly]
+
+
+def _only_numbers(value: str | tuple[str, ...]) -> bool:
+    return (value if isinstance(value, str) else value[-1]).endswith(("_als25010_y", "_emps"))
 
 
 SHARED_BUILDS = "HYBRIDSEP_TESTS_BUILDS"

@@ -56,7 +56,17 @@ STAGE_MODES = [asdict(mode) for mode in load_machine("als25010_x").model.modes]
 """The stage's X axis, Table 1."""
 PREDICTOR = {**defaults({**PREDICTOR_SETTINGS, **TRUST_SETTINGS}), "trust": 0}  # the paper's model
 FEED_DRIVE = {"m": 1.0, "c": 15.7, "k": 24674.0, "c_nl": 100.0, "k_nl": 1000.0, "noise_std": 5e-6, "seed": 0}
-STAGE_DRIVE = {"f": 1.4211e-5, "kappa": 0.0213165, "friction_on": 0, "T_s": 1e-3, "noise_std": 1e-6, "seed": 7}
+STAGE_DRIVE = {
+    "f": 1.4211e-5,
+    "kappa": 0.0213165,
+    "friction_on": 0,
+    "v_friction": 2e-3,
+    "T_s": 1e-3,
+    "dead_time": 0,
+    "input_hold": 0,
+    "noise_std": 1e-6,
+    "seed": 7,
+}
 
 COMPENSATOR = {**defaults({**PREDICTOR_SETTINGS, **TRUST_SETTINGS, **COMPENSATOR_SETTINGS}), "trust": 0}
 
@@ -122,6 +132,8 @@ class Context(ctypes.Structure):
         ("guid", ctypes.c_char_p),
         ("angular", ctypes.c_int),
         ("resources", ctypes.c_char_p),
+        ("weights", ctypes.c_char_p),
+        ("weights_size", ctypes.c_size_t),
     )
 
 
@@ -243,7 +255,7 @@ def write_weights(folder: Path, name: str, factor: Array, n_samples: int, **sett
     names = (*PREDICTOR_SETTINGS, "trust", "period")
     learned = {key: values[key] for key in names if PARAMETERS[key].learned}
     learned |= {f"mode[{i}].{key}": value for i, mode in enumerate(modes, start=1) for key, value in mode.items()}
-    content = b"HSEPWG11" + struct.pack("<4Q", len(learned), len(modes), n_samples, N_LEARNED)
+    content = b"HSEPWG12" + struct.pack("<4Q", len(learned), len(modes), n_samples, N_LEARNED)
     content += b"".join(struct.pack("<24sd", key.encode(), value) for key, value in learned.items())
     content += Uncertainty(values["lambda"], int(values["Np"])).learned().astype("<f8").tobytes()
     content += np.concatenate([factor[i, i:] for i in range(len(factor))]).astype("<f8").tobytes()

@@ -1,14 +1,15 @@
 """ReferenceTrajectory → a look-ahead FMU → FeedDrive over the staircase, in one importer after the other.
 
 Run as a program, so that an importer's threads and libraries live in a process of their own:
-``python tests/support/importers_closed_system.py IMPORTER SYSTEM FOLDER OUT.npy``. FOLDER holds the three FMUs; OUT.npy
-gets what :func:`run` returns.
+``python tests/support/importers_closed_system.py IMPORTER SYSTEM FOLDER …`` runs systems one after the other. A FOLDER
+holds three FMUs, and gets what :func:`run` returns as rows.npy.
 """
 
 from __future__ import annotations
 
 import ctypes
 import json
+import os
 import platform
 import re
 import sys
@@ -58,6 +59,8 @@ class ClosedSystem:
         Minuend and subtrahend of the errors whose RMS values over the whole trajectory the guide states.
     suffix : str
         What the names of the FMUs end in: Fmi3 of those of FMI 3.0.
+    n_samples : int
+        Of the trajectory, as far as it is played.
     """
 
     look_ahead: str
@@ -69,6 +72,7 @@ class ClosedSystem:
     figures: tuple[str, ...]
     errors: tuple[tuple[str, str], ...]
     suffix: str = ""
+    n_samples: int = N_SAMPLES
 
     @property
     def key(self) -> str:
@@ -113,7 +117,7 @@ class ClosedSystem:
     @property
     def n_steps(self) -> int:
         """Steps to the trajectory's last sample."""
-        return N_SAMPLES - 1 + self.delay
+        return self.n_samples - 1 + self.delay
 
 
 SYSTEMS = {
@@ -286,4 +290,8 @@ def run(importer: str, system: ClosedSystem, folder: Path) -> Array:
 
 
 if __name__ == "__main__":
-    np.save(sys.argv[4], run(sys.argv[1], (SYSTEMS | FMI3_SYSTEMS)[sys.argv[2]], Path(sys.argv[3])))
+    for key, place in zip(sys.argv[2::2], map(Path, sys.argv[3::2]), strict=True):
+        played = np.load(place / "command.npy") if (place / "command.npy").exists() else staircase()
+        system = replace((SYSTEMS | FMI3_SYSTEMS)[key], n_samples=len(played))
+        os.chdir(place)
+        np.save("rows.npy", run(sys.argv[1], system, place))

@@ -20,7 +20,7 @@ from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.online.look_ahead import LookAhead
 from hybridsep.plants.encoder import Encoder
 from hybridsep.plants.feed_drive import FeedDrive
-from hybridsep.plants.plant import Plant, simulate
+from hybridsep.plants.plant import Drive, simulate
 from hybridsep.plants.stage_drive import StageDrive
 from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.paper.model import PaperModel
@@ -46,12 +46,12 @@ def library_compensator(values: Mapping[str, Any]) -> SepCompensator:
     return SepCompensator(library_predictor(values), CompensatorSettings.from_fmi(values))
 
 
-def library_plant(values: Mapping[str, Any]) -> Plant:
+def library_plant(values: Mapping[str, Any]) -> Drive:
     """Return the stage where there are modes among the values, the nonlinear drive otherwise."""
     if modes := modes_from(values):
-        model = ModalModel([Mode(**mode) for mode in modes])
-        friction_on = PARAMETERS["friction_on"].from_fmi(values["friction_on"])
-        return StageDrive(model, values["f"], values["kappa"], values["T_s"], friction_on)
+        chosen = {name: PARAMETERS[name].from_fmi(values[name]) for name in ("friction_on", "input_hold")}
+        numbers = {name: values[name] for name in ("f", "kappa", "T_s", "v_friction")}
+        return StageDrive(ModalModel([Mode(**mode) for mode in modes], values["dead_time"]), **numbers, **chosen)
     return FeedDrive(*(values[name] for name in ("m", "c", "k", "c_nl", "k_nl")))
 
 

@@ -11,7 +11,9 @@ from library_models import library_look_ahead, library_plant, numbered, restored
 from stream import CANNOT, LIBRARY, OUTPUTS, Array, RefusedStreamError, Value, description_of, kind_of
 
 from hybridsep import HybridSepError
+from hybridsep.base.settings import CompensatorSettings
 from hybridsep.base.state import pack, unpack
+from hybridsep.compensate.compensator import SepCompensator
 from hybridsep.online.look_ahead_inputs import LookAheadInputs
 from hybridsep.plants.encoder import Encoder
 
@@ -85,8 +87,13 @@ class LookAheadStream(LibraryStream):
     def step(self, t: float, h: float) -> None:
         with refusing():
             inputs = float(self._values["x_d_ahead"]), float(self._values["x_meas"])
-            if warning := self._clock.advance(self._look_ahead, *inputs, t, h):
-                self._warnings.append(warning)
+            self._warnings += self._clock.advance(self._look_ahead, *inputs, t, h, begin=self._tune).values()
+
+    def _tune(self) -> None:
+        compensator = self._look_ahead.planner
+        if isinstance(compensator, SepCompensator):
+            given = CompensatorSettings.from_fmi(self._values)
+            compensator.change(compensate=given.compensate, change_max=given.change_max)
 
     def outputs(self) -> list[float]:
         return [float(getattr(self._look_ahead, name)) for name in OUTPUTS[self._kind]]

@@ -8,3 +8,4 @@ SUPPORT = Path(__file__).resolve().parent
 ROOT = SUPPORT.parents[1]
 EMPS = ROOT.parent / "shared" / "data" / "emps" / "DATA_EMPS.mat"
 RECORDINGS = ROOT.parent / "shared" / "data" / "recordings"
+SO101 = ROOT.parent / "shared" / "data" / "so101"

@@ -92,6 +92,26 @@ def freed_state(importer: Importer) -> None:
     assert state.value
 
 
+def damaged_state(importer: Importer) -> None:
+    """pythonfmu takes any bytes for a state; they are refused when it is set, and the instance goes on."""
+    component, state = importer.initialised(), c_void_p()
+    assert importer.library.DeSerializeFMUstate(component, b"garbage", 7, byref(state)) == OK
+    assert importer.library.SetFMUstate(component, state) == FATAL
+    assert "saved state" in importer.library.messages[-1][2]
+    assert importer.library.DoStep(component, 0.0, 1e-3, 1) == OK
+
+
+def unknown_reference(importer: Importer) -> None:
+    component, value = importer.initialised(), c_double()
+    assert importer.library.GetReal(component, (c_uint * 1)(9999), 1, byref(value)) == FATAL
+    said = importer.library.messages[-1][2]
+    assert "value reference must be 0 … " in said
+    assert "got 9999" in said
+    assert importer.library.SetReal(component, (c_uint * 1)(9999), 1, byref(value)) == FATAL
+    assert "got 9999" in importer.library.messages[-1][2]
+    assert importer.library.GetReal(component, (c_uint * 1)(0), 1, byref(value)) == OK
+
+
 def refused_experiments(importer: Importer) -> None:
     component = importer.instantiate()
     for start, stop, message in (
@@ -182,7 +202,15 @@ def refusals_with_logging_off(importer: Importer) -> None:
 CAUGHT: dict[str, Callable[[Importer], object]] = {
     function.__name__: function
     for function in (
-        *(foreign_guid, freed_state, refused_experiments, lost_description, interrupted_steps),
+        *(
+            foreign_guid,
+            freed_state,
+            damaged_state,
+            unknown_reference,
+            refused_experiments,
+            lost_description,
+            interrupted_steps,
+        ),
         *(missing_library, lost_slave, refusals_with_logging_off),
     )
 }

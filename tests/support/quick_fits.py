@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import pytest
 
-__all__ = ["without_other_windows"]
+__all__ = ["without_other_settings", "without_other_windows"]
 
 
 def without_other_windows(patch: pytest.MonkeyPatch) -> None:
     """Let ``fit`` judge the controller's look-ahead alone, none that are shorter or longer: a third of its time."""
     patch.setattr("hybridsep.tune.choice._WINDOWS", (1.0,))
+
+
+def without_other_settings(patch: pytest.MonkeyPatch) -> None:
+    """Let ``fit`` try the default settings alone: a fifth of its time."""
+    patch.setattr("hybridsep.tune.choice._SHARES", ())
+    patch.setattr("hybridsep.tune.choice._Q", ())

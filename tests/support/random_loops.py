@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from hybridsep.machines.machine import load_machine
 from hybridsep.online.look_ahead import LookAhead
 from hybridsep.plants.encoder import Encoder
-from hybridsep.plants.plant import Plant
+from hybridsep.plants.plant import Drive
 from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest
 
 Array = NDArray[np.float64]
@@ -59,7 +59,7 @@ class Loop:
         """Key of :data:`c_core.DESCRIPTIONS`."""
         return f"compensator_{self.machine}"
 
-    def drive(self) -> tuple[Plant, Encoder]:
+    def drive(self) -> tuple[Drive, Encoder]:
         """Return the plant, at rest at the start, and its encoder."""
         machine = load_machine(self.machine)
         assert machine.plant is not None

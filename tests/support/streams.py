@@ -16,10 +16,27 @@ from core_stream import CoreStream
 from fmu_stream import FmuStream
 from library_models import learned_file
 from library_stream import LookAheadStream, PlantStream
-from stream import CANNOT, CORE, FMI3, IMPLEMENTATIONS, LIBRARY, NATIVE, PYTHON, TRAJECTORY, Stream, machine_of
+from stream import (
+    CANNOT,
+    CORE,
+    FMI3,
+    IMPLEMENTATIONS,
+    LIBRARY,
+    NATIVE,
+    PYTHON,
+    STAGE,
+    STAGE_COMPENSATOR,
+    STAGE_PREDICTOR,
+    TRAJECTORY,
+    Stream,
+    machine_of,
+)
 
 from hybridsep.fmi.weights import WEIGHTS_FILE
 from hybridsep.plants.trajectory import staircase
+
+STAGES = (STAGE, STAGE_PREDICTOR, STAGE_COMPENSATOR)
+"""Models of the stage's X drive, which differ from the default machine's in modes and settings."""
 
 
 class StreamMaker:
@@ -85,13 +102,23 @@ def fmu_name(model: str, implementation: str) -> str:
 def cases(models: Sequence[str], *, needs: str = "", adapters: bool = False) -> list[Any]:
     """Return pytest parameters ``(implementation, model)`` for all that there are, and that can do what is needed.
 
-    With ``adapters`` the FMI 3.0 FMU of the first model is among them.
+    With ``adapters`` the FMI 3.0 FMU of the first model is among them. What a pythonfmu FMU computes is the library's,
+    and what a native FMU computes the C core's: the former runs one set of a test's other parameters, and the latter
+    where a test is of agreement (``one_set``); the other sets run at night.
     """
+    once = (PYTHON, NATIVE) if needs == "agreement" else (PYTHON,)
     pairs = [(implementation, model) for implementation in IMPLEMENTATIONS for model in models]
     if adapters:
         pairs.append((FMI3, models[0]))
     return [
-        pytest.param((implementation, model), id=f"{implementation}-{model}")
+        pytest.param(
+            (implementation, model),
+            id=f"{implementation}-{model}",
+            marks=[
+                *([pytest.mark.one_set] if implementation in once else []),
+                *([pytest.mark.slow] if implementation == PYTHON or model in STAGES else []),
+            ],
+        )
         for implementation, model in pairs
         if not {(implementation, model), (implementation, needs)} & CANNOT.keys()
     ]

@@ -73,6 +73,7 @@ def test_the_error_over_windows_is_that_of_as_many_lags_as_fit() -> None:
     assert list(over_windows(MODEL, short, PAPER)) == [4, 10, 20]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("trust", [False, True])
 def test_the_result_is_the_same_for_any_number_of_processes(trust: bool) -> None:
     candidates = [replace(one, trust=trust) for one in CANDIDATES]

@@ -8,7 +8,7 @@ from predictor_cases import MODEL, small_signals
 
 from hybridsep.base.errors import SignalError
 from hybridsep.base.settings import PredictorSettings
-from hybridsep.fleet.engine import cluster, joblib_engine
+from hybridsep.parallel.engine import cluster, joblib_engine
 from hybridsep.tune.joint import Logs, over_windows, tune
 
 LOGS: Logs = {"one": [small_signals(300)], "two": [small_signals(130, seed=1), small_signals(90, seed=2)]}

@@ -65,8 +65,8 @@ HSEP_API hsep_status hsep_call_step(void *component, const hsep_call *call, doub
     if (status == HSEP_REFUSED) {
         return hsep_refuse(instance, "%s", message);
     }
-    if (status == HSEP_WARNED && !warning->warned) {
-        warning->warned = 1;
+    if (((unsigned)status & ~warning->warned) != 0) {
+        warning->warned |= (unsigned)status;
         hsep_log(instance, HSEP_LOG_WARNING, "%s: %s", call->name, message);
     }
     return HSEP_OK;

@@ -19,7 +19,8 @@ HSEP_API hsep_status hsep_call_phase(void *component, const hsep_call *call, hse
 /* End the initialization. */
 HSEP_API hsep_status hsep_call_initialise(void *component, const hsep_call *call);
 
-/* Do a communication step from t by h, s; the model's warning is logged once an instance, not at each of many steps. */
+/* Do a communication step from t by h, s; the model's warnings are logged once an instance, each kind, not at every
+ * step. */
 HSEP_API hsep_status hsep_call_step(void *component, const hsep_call *call, double t, double h);
 
 /* As after the instantiation. */

@@ -34,7 +34,7 @@ struct hsep_component {
     void (*logger)(void); /* the importer's, of the type of the version; may be NULL */
     void *environment;
     unsigned categories; /* bits of hsep_category that reach the logger */
-    int warned;          /* whether the model has warned of a step */
+    unsigned warned;     /* bits of hsep_status: what the model has warned of in steps */
 };
 
 /* A call that belongs to an instance, and the bits of the phases in which it is legal. */

@@ -66,8 +66,8 @@ HSEP_API void hsep_instance_reset(hsep_instance *instance);
  * again. */
 HSEP_API hsep_status hsep_instance_initialise(hsep_instance *instance, const char *call, char message[]);
 
-/* Do a communication step from t by h, s; time derivatives of inputs count for it alone. HSEP_WARNED as
- * hsep_model_step. */
+/* Do a communication step from t by h, s; time derivatives of inputs count for it alone. Warnings as
+ * hsep_model_step's. */
 HSEP_API hsep_status hsep_instance_step(hsep_instance *instance, const char *call, double t, double h, char message[]);
 
 /* Give all memory back, the instance's too. */

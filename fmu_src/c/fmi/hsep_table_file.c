@@ -11,14 +11,21 @@
 #include <string.h>
 
 #define TABLE_FILE "variables.bin"
-#define TABLE_MAGIC "HSEPVAR1"
+#define TABLE_MAGIC "HSEPVAR2"
+
+/* Samples of each window, if the FMU shows them. */
+#if HSEP_N_WINDOWS > 0
+#define TABLE_WINDOW(starts) ((starts)[HSEP_VR_Np])
+#else
+#define TABLE_WINDOW(starts) 0.0
+#endif
 
 typedef struct {
-    uint64_t size, kind, n_modes, angular;
+    uint64_t size, kind, n_modes, angular, window;
     char guid[HSEP_GUID_SIZE];
 } table_head;
 
-HSEP_ASSERT_WORDS(table_head, 10);
+HSEP_ASSERT_WORDS(table_head, 11);
 
 /* What an instance keeps of the file. */
 typedef struct {
@@ -71,10 +78,11 @@ static hsep_status table_fill(hsep_context *context, const table_content *conten
     if (hsep_check_parameters(context, content->starts, message) > 0) {
         return HSEP_REFUSED;
     }
-#if HSEP_N_WINDOWS > 0
-    context->window = (size_t)content->starts[HSEP_VR_Np];
+    if (content->head.window > 0 && (double)content->head.window != TABLE_WINDOW(content->starts)) {
+        return hsep_message_add(message, "its windows must be of Np samples, or left out");
+    }
+    context->window = (size_t)content->head.window;
     context->n_variables += HSEP_N_WINDOWS * context->window;
-#endif
     return HSEP_OK;
 }
 

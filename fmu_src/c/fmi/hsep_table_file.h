@@ -1,8 +1,9 @@
 /* The table of one FMU in its resources, where one binary serves all FMUs of a kind (HSEP_TABLE_IN_RESOURCES).
  *
- * The resource variables.bin, little-endian: "HSEPVAR1"; as uint64 the size of the file in bytes, HSEP_INTERFACE, the
- * number of modes, and whether the axis is rotary; the GUID in HSEP_GUID_SIZE bytes, filled with zeros; as doubles the
- * start values of the single variables and of the numbers of the modes; the CRC-32 of all before as uint64.
+ * The resource variables.bin, little-endian: "HSEPVAR2"; as uint64 the size of the file in bytes, HSEP_INTERFACE, the
+ * number of modes, whether the axis is rotary, and the samples of each window, 0 if there is none; the GUID in
+ * HSEP_GUID_SIZE bytes, filled with zeros; as doubles the start values of the single variables and of the numbers of
+ * the modes; the CRC-32 of all before as uint64.
  *
  * Names, kinds and ranges are the binary's own, so no file can allow what the models do not.
  */

@@ -10,9 +10,11 @@ static size_t fmi3_before_windows(const hsep_context *context)
     return context->n_scalars + HSEP_MODE_NUMBERS * context->n_modes;
 }
 
+static size_t fmi3_n_windows(const hsep_context *context) { return context->window > 0 ? HSEP_N_WINDOWS : 0; }
+
 static size_t fmi3_n_variables(const hsep_context *context)
 {
-    return fmi3_before_windows(context) + HSEP_N_WINDOWS + 1;
+    return fmi3_before_windows(context) + fmi3_n_windows(context) + 1;
 }
 
 /* The time has no place: its value is the experiment's. */
@@ -25,7 +27,7 @@ static hsep_found fmi3_find(const hsep_context *context, size_t reference)
     if (reference < before) {
         return (hsep_found){.row = hsep_table_row(context, reference), .place = reference, .count = 1};
     }
-    if (reference == before + HSEP_N_WINDOWS) {
+    if (reference == before + fmi3_n_windows(context)) {
         return (hsep_found){.row = &fmi3_time, .place = context->n_variables, .count = 1};
     }
     const size_t place = before + (reference - before) * context->window;

@@ -79,29 +79,34 @@ static int check_allows(const hsep_variable *v, double value)
            (value >= v->minimum && value <= v->maximum && (value == 0.0 || fabs(value) >= v->nonzero));
 }
 
-HSEP_API int hsep_check_parameters(const hsep_context *context, const double values[], char message[])
+HSEP_API int hsep_check_parameter(const hsep_context *context, size_t i, const double values[], char message[])
 {
     char number[HSEP_NUMBER_SIZE], name[HSEP_NAME_SIZE], range[96];
+    const hsep_variable *v = hsep_table_row(context, i);
+    const double value = values[i];
+    const int whole = v->kind == HSEP_INTEGER || v->kind == HSEP_ENUMERATION;
+    if (isfinite(value) && !(whole && value != floor(value)) && check_allows(v, value)) {
+        return 1;
+    }
+    hsep_table_name(context, i, name);
+    hsep_number(number, value, v->kind);
+    if (!isfinite(value)) {
+        hsep_message_add(message, "%s must be finite, got %s", name, number);
+    } else if (whole && value != floor(value)) {
+        hsep_message_add(message, "%s must be a whole number, got %s", name, number);
+    } else {
+        check_range_text(range, sizeof range, v, hsep_table_unit(context, i));
+        hsep_message_add(message, "%s must be %s, got %s", name, range, number);
+    }
+    return 0;
+}
+
+HSEP_API int hsep_check_parameters(const hsep_context *context, const double values[], char message[])
+{
     int problems = 0;
     for (size_t i = 0; i < context->n_variables; i++) {
-        const hsep_variable *v = hsep_table_row(context, i);
-        const double value = values[i];
-        if (v->causality != HSEP_PARAMETER) {
-            continue;
-        }
-        hsep_table_name(context, i, name);
-        hsep_number(number, value, v->kind);
-        if (!isfinite(value)) {
-            hsep_message_add(message, "%s must be finite, got %s", name, number);
-        } else if ((v->kind == HSEP_INTEGER || v->kind == HSEP_ENUMERATION) && value != floor(value)) {
-            hsep_message_add(message, "%s must be a whole number, got %s", name, number);
-        } else if (!check_allows(v, value)) {
-            check_range_text(range, sizeof range, v, hsep_table_unit(context, i));
-            hsep_message_add(message, "%s must be %s, got %s", name, range, number);
-        } else {
-            continue;
-        }
-        problems++;
+        const int is_parameter = hsep_table_row(context, i)->causality == HSEP_PARAMETER;
+        problems += is_parameter && !hsep_check_parameter(context, i, values, message);
     }
     return problems;
 }
@@ -194,16 +199,38 @@ HSEP_API hsep_status hsep_check_step_size(double h, char message[])
         hsep_number(number, h, HSEP_REAL));
 }
 
-HSEP_API hsep_status hsep_check_step(const hsep_clock *clock, double t, double h, hsep_clock_step *step, char message[])
+HSEP_API hsep_status hsep_check_point(double end, double t, double tolerance, char message[])
 {
     char expected[HSEP_NUMBER_SIZE], got[HSEP_NUMBER_SIZE];
+    if (hsep_clock_follows(end, t, tolerance)) {
+        return HSEP_OK;
+    }
+    return hsep_message_add(
+        message, "the communication point must be %s s, where the last step ended, got %s s",
+        hsep_number(expected, end, HSEP_REAL), hsep_number(got, t, HSEP_REAL));
+}
+
+HSEP_API hsep_status hsep_check_step(const hsep_clock *clock, double t, double h, hsep_clock_step *step, char message[])
+{
     if (hsep_check_step_size(h, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     if (!hsep_clock_count(clock, t, h, step)) {
-        return hsep_message_add(
-            message, "the communication point must be %s s, where the last step ended, got %s s",
-            hsep_number(expected, clock->end, HSEP_REAL), hsep_number(got, t, HSEP_REAL));
+        return hsep_check_point(clock->end, t, 0.5 * clock->T_s, message);
     }
     return HSEP_OK;
+}
+
+HSEP_API hsep_status hsep_check_moved(const hsep_clock_step *step, char message[])
+{
+    const hsep_clock *clock = &step->after;
+    if (!step->noticed) {
+        return HSEP_OK;
+    }
+    hsep_message_add(
+        message,
+        "the communication point %.9g s is %.2g samples of T_s = %g s %s a sampling instant, which is taken there: "
+        "samples follow the importer's points; a model of T_s needs steps of T_s",
+        clock->end, fabs(step->moved) / clock->T_s, clock->T_s, step->moved > 0.0 ? "behind" : "before");
+    return HSEP_WARNED_MOVED;
 }

@@ -24,6 +24,9 @@ HSEP_API hsep_status hsep_message_add(char message[], const char *format, ...);
 /* Write the shortest decimal number that reads back as value, whole ones of a real with ".0"; return text. */
 HSEP_API const char *hsep_number(char text[HSEP_NUMBER_SIZE], double value, hsep_kind kind);
 
+/* Check a parameter alone, by its place in the table; return whether it is in its range, else with a message. */
+HSEP_API int hsep_check_parameter(const hsep_context *context, size_t i, const double values[], char message[]);
+
 /* Check every parameter alone, the range being the table's; return how many are wrong, each added to message. */
 HSEP_API int hsep_check_parameters(const hsep_context *context, const double values[], char message[]);
 
@@ -52,8 +55,14 @@ HSEP_API hsep_status hsep_check_clock(hsep_clock *clock, double t_start, double 
 /* Check the size of a communication step, s. */
 HSEP_API hsep_status hsep_check_step_size(double h, char message[]);
 
+/* Check that a step begins at t where the last one ended, at end, s; tolerance as that of hsep_clock_follows. */
+HSEP_API hsep_status hsep_check_point(double end, double t, double tolerance, char message[]);
+
 /* Check that the step from t by h, s, comes next, and count it. */
 HSEP_API hsep_status
 hsep_check_step(const hsep_clock *clock, double t, double h, hsep_clock_step *step, char message[]);
+
+/* HSEP_WARNED_MOVED, with a message, where a step has taken an instant at its end that lies beside it; else HSEP_OK. */
+HSEP_API hsep_status hsep_check_moved(const hsep_clock_step *step, char message[]);
 
 #endif

@@ -29,16 +29,16 @@ HSEP_API hsep_status hsep_inputs_count(
     const hsep_inputs *self, hsep_input x_d_ahead, hsep_input x_meas, int may_miss, double t, double h,
     hsep_inputs_step *step, char message[])
 {
-    *step = (hsep_inputs_step){.x_d_ahead = x_d_ahead, .x_meas = x_meas};
+    *step = (hsep_inputs_step){.x_d_ahead = x_d_ahead, .x_meas = x_meas, .pending = hsep_clock_latched(&self->clock)};
     if (hsep_check_step(&self->clock, t, h, &step->counted, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     if (step->counted.n_latched == 0) {
-        return HSEP_OK;
+        return hsep_check_moved(&step->counted, message);
     }
     /* Inputs are linear in time, so the first and the last one bound them all. */
     const double after[2] = {step->counted.first, inputs_last(&step->counted)};
-    const double sample = (double)(self->clock.k + self->clock.latched);
+    const double sample = (double)(self->clock.k + step->pending);
     for (int i = 0; i < 2; i++) {
         const double ahead = inputs_at(x_d_ahead, after[i]), measured = inputs_at(x_meas, after[i]);
         const int missing = may_miss && isnan(measured);
@@ -47,6 +47,7 @@ HSEP_API hsep_status hsep_inputs_count(
             return HSEP_REFUSED;
         }
     }
+    const hsep_status status = hsep_check_moved(&step->counted, message);
     if (step->counted.inside) {
         hsep_message_add(
             message,
@@ -54,22 +55,22 @@ HSEP_API hsep_status hsep_inputs_count(
             "up to "
             "%g s late, so a closed loop needs steps of T_s",
             t, h, self->clock.T_s, fmin(after[1], h));
-        return HSEP_WARNED;
+        return status == HSEP_OK ? HSEP_WARNED_LATE : HSEP_WARNED_BOTH;
     }
-    return HSEP_OK;
+    return status;
 }
 
 HSEP_API int hsep_inputs_next(hsep_inputs *self, hsep_inputs_step *step)
 {
-    if (self->clock.latched == 0 && step->n_latched < step->counted.n_latched) {
+    if (!step->pending && step->n_latched < step->counted.n_latched) {
         const double after = step->counted.first + (double)step->n_latched * self->clock.T_s;
         self->x_d_ahead = inputs_at(step->x_d_ahead, after);
         self->x_meas = inputs_at(step->x_meas, after);
-        self->clock.latched = 1;
+        step->pending = 1;
         step->n_latched++;
     }
     if (step->n_executed < step->counted.n_samples) {
-        self->clock.latched = 0;
+        step->pending = 0;
         self->clock.k++;
         step->n_executed++;
         return 1;

@@ -17,7 +17,7 @@ typedef struct {
     double x_d_ahead, x_meas; /* m, of the sample in progress */
 } hsep_inputs;
 
-HSEP_ASSERT_WORDS(hsep_inputs, 9);
+HSEP_ASSERT_WORDS(hsep_inputs, 7);
 
 /* What the importer has set for a step: an input and its time derivative. */
 typedef struct {
@@ -30,6 +30,7 @@ typedef struct {
     hsep_clock_step counted;
     hsep_input x_d_ahead, x_meas;
     int64_t n_latched, n_executed; /* of those that the step has */
+    int pending;                   /* whether the inputs of the next sample are latched */
 } hsep_inputs_step;
 
 /* Begin at t_start, s, with the drive at rest at start, m. Fails if one of them is not finite, the time is too large to
@@ -37,8 +38,8 @@ typedef struct {
 HSEP_API hsep_status hsep_inputs_init(hsep_inputs *self, double t_start, double T_s, double start, char message[]);
 
 /* Count a step from t by h, s, and check the inputs that it latches; self is unchanged. may_miss: whether x_meas may be
- * NaN, which is missing. Fails if one of them cannot be taken in, or t and h do not fit. HSEP_WARNED: an instant is no
- * communication point. */
+ * NaN, which is missing. Fails if one of them cannot be taken in, or t and h do not fit. HSEP_WARNED_LATE: an instant
+ * is no communication point; HSEP_WARNED_MOVED: one was taken at a point beside it; or both. */
 HSEP_API hsep_status hsep_inputs_count(
     const hsep_inputs *self, hsep_input x_d_ahead, hsep_input x_meas, int may_miss, double t, double h,
     hsep_inputs_step *step, char message[]);

@@ -21,7 +21,11 @@
 typedef enum {
     HSEP_OK = 0,
     HSEP_REFUSED = 1, /* the call cannot be done; the state is unchanged unless said otherwise, the message says why */
-    HSEP_WARNED = 2   /* the call is done; the message is a warning */
+    HSEP_WARNED = 2,  /* the call is done; the message is a warning */
+    /* of a step: inputs were read at an instant that is no communication point; one was taken at a point beside it */
+    HSEP_WARNED_LATE = 4,
+    HSEP_WARNED_MOVED = 8,
+    HSEP_WARNED_BOTH = HSEP_WARNED_LATE | HSEP_WARNED_MOVED
 } hsep_status;
 
 typedef enum { HSEP_REAL, HSEP_INTEGER, HSEP_ENUMERATION, HSEP_BOOLEAN, HSEP_N_KINDS } hsep_kind;
@@ -50,12 +54,14 @@ typedef struct {
     const hsep_variable *variables; /* rows of the table: n_scalars, HSEP_MODE_NUMBERS if it has modes, windows */
     size_t n_scalars;
     size_t n_modes;
-    size_t window; /* samples in each window */
+    size_t window; /* samples in each window, 0 where they are left out */
     size_t n_variables;
     const double *starts; /* (n_scalars + HSEP_MODE_NUMBERS n_modes,), 0 for what is calculated; so are the windows */
     const char *guid;
     int angular;           /* whether it is a rotary axis */
     const char *resources; /* folder with a trailing slash, decoded; NULL if there is none */
+    const void *weights;   /* content of weights.bin in memory, taken instead of the resources' file; NULL: the file */
+    size_t weights_size;   /* bytes */
 } hsep_context;
 
 /* Check the parameters in values, alone and together, and return the size of the state, bytes.
@@ -75,7 +81,7 @@ HSEP_API hsep_status hsep_model_initialise(
  * unchanged, if an output would not be a finite number, because the learned recursion diverges: every later step fails
  * then, until another state is set or the model is initialised. A drive's step in
  * which the state overflows leaves it unchanged.
- * Warns if inputs are read at an instant that is no communication point.
+ * HSEP_WARNED_LATE or _MOVED: as they say, the message too.
  * Cost: bounded by the parameters and h/T_s, the same at the first and at the 10^9th call; allocates nothing. */
 HSEP_API hsep_status
 hsep_model_step(const hsep_context *context, void *state, double values[], double t, double h, char message[]);

@@ -35,6 +35,12 @@ HSEP_API int hsep_online_check(const double values[], char message[]);
 /* Read the settings of this model alone, after all parameters were checked and the common ones read. */
 HSEP_API void hsep_online_read(const double values[], hsep_online_parameters *parameters);
 
+/* Check the tunable parameters; return how many are out of their range, each added to message. */
+HSEP_API int hsep_online_check_tuned(const hsep_context *context, const double values[], char message[]);
+
+/* Take them over from the next window on. */
+HSEP_API void hsep_online_tune(hsep_online *self, const double values[]);
+
 /* Begin, after learned weights were loaded. */
 HSEP_API void hsep_online_begin(hsep_online *self);
 

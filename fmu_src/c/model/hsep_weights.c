@@ -8,7 +8,7 @@
 #include <string.h>
 
 #define WEIGHTS_FILE "weights.bin"
-#define WEIGHTS_MAGIC "HSEPWG11"
+#define WEIGHTS_MAGIC "HSEPWG12"
 #define WEIGHTS_CHUNK 512 /* bytes that are summed up at once, a multiple of 8 */
 
 typedef struct {
@@ -25,17 +25,43 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(weights_setting, 4);
 
-/* Whether the file is whole: its last 8 bytes are the checksum of the others. size: of all of it, bytes. It is put back
- * to its beginning. */
-static int weights_whole(FILE *file, double *size)
+/* The bytes of weights.bin, in memory or in the resources. */
+typedef struct {
+    FILE *file; /* NULL: in memory */
+    const unsigned char *bytes;
+    size_t left;
+} weights_source;
+
+/* Read up to so many bytes; return how many there were. */
+static size_t weights_read_some(weights_source *source, void *to, size_t size)
+{
+    if (source->file != NULL) {
+        return fread(to, 1, size, source->file);
+    }
+    const size_t read = size < source->left ? size : source->left;
+    memcpy(to, source->bytes, read);
+    source->bytes += read;
+    source->left -= read;
+    return read;
+}
+
+static int weights_read(weights_source *source, void *to, size_t size)
+{
+    return weights_read_some(source, to, size) == size;
+}
+
+/* Whether it is whole: its last 8 bytes are the checksum of the others. size: of all of it, bytes. It is put back to its
+ * beginning. */
+static int weights_whole(weights_source *source, double *size)
 {
     unsigned char bytes[WEIGHTS_CHUNK + sizeof(uint64_t)];
     uint32_t crc = 0;
     uint64_t sum = 0;
     size_t held = 0; /* of the bytes: the last 8 so far may be the checksum */
+    const weights_source begin = *source;
     *size = 0.0;
     for (;;) {
-        const size_t read = fread(bytes + held, 1, sizeof bytes - held, file);
+        const size_t read = weights_read_some(source, bytes + held, sizeof bytes - held);
         *size += (double)read;
         held += read;
         if (held < sizeof bytes) {
@@ -45,7 +71,8 @@ static int weights_whole(FILE *file, double *size)
         held -= WEIGHTS_CHUNK;
         memcpy(bytes, bytes + WEIGHTS_CHUNK, held);
     }
-    if (held < sizeof sum || fseek(file, 0, SEEK_SET) != 0) {
+    *source = begin;
+    if (held < sizeof sum || (source->file != NULL && fseek(source->file, 0, SEEK_SET) != 0)) {
         return 0;
     }
     memcpy(&sum, bytes + held - sizeof sum, sizeof sum);
@@ -65,7 +92,7 @@ static void weights_compare(const char *name, double learned, double got, hsep_k
 /* Read the settings of the file and compare them with those of the table: 0 if it is damaged. A setting that the table
  * has not is 0 here; modes that only one side has are told by their number. */
 static int weights_compare_settings(
-    FILE *file, const hsep_context *context, const double values[], uint64_t n_settings, char message[])
+    weights_source *source, const hsep_context *context, const double values[], uint64_t n_settings, char message[])
 {
     uint64_t n_missing = 0;
     for (size_t i = 0; i < context->n_variables; i++) {
@@ -73,7 +100,7 @@ static int weights_compare_settings(
     }
     for (uint64_t i = 0; i < n_settings; i++) {
         weights_setting setting;
-        if (fread(&setting, sizeof setting, 1, file) != 1 || setting.name[sizeof setting.name - 1] != '\0') {
+        if (!weights_read(source, &setting, sizeof setting) || setting.name[sizeof setting.name - 1] != '\0') {
             return 0;
         }
         const size_t place = hsep_table_place(context, setting.name);
@@ -90,24 +117,24 @@ static int weights_compare_settings(
 }
 
 /* Read what has been learned besides the factors, by the residual model and of the errors. 0 if it is damaged. */
-static int weights_take_learned(FILE *file, hsep_residual_model *model, hsep_uncertainty *uncertainty)
+static int weights_take_learned(weights_source *source, hsep_residual_model *model, hsep_uncertainty *uncertainty)
 {
     for (uint64_t i = 0; i < hsep_residual_n_learned(model); i++) {
-        if (fread(hsep_residual_learned(model, i), sizeof(double), 1, file) != 1) {
+        if (!weights_read(source, hsep_residual_learned(model, i), sizeof(double))) {
             return 0;
         }
     }
     double *errors = hsep_uncertainty_learned(uncertainty);
-    return fread(errors, sizeof(double), HSEP_N_UNCERTAINTY, file) == HSEP_N_UNCERTAINTY &&
-           hsep_uncertainty_sound(uncertainty) && hsep_residual_sound(model);
+    return weights_read(source, errors, HSEP_N_UNCERTAINTY * sizeof(double)) && hsep_uncertainty_sound(uncertainty) &&
+           hsep_residual_sound(model);
 }
 
 /* Read a factor row after row through the regression's own row: 0 if it is damaged. */
-static int weights_take_factor(FILE *file, hsep_regression *regression, uint64_t n_samples)
+static int weights_take_factor(weights_source *source, hsep_regression *regression, uint64_t n_samples)
 {
     for (uint64_t i = 0; i <= regression->n; i++) {
         const size_t left = (size_t)(regression->n + 1 - i);
-        if (fread(hsep_regression_row(regression), sizeof(double), left, file) != left ||
+        if (!weights_read(source, hsep_regression_row(regression), left * sizeof(double)) ||
             !hsep_regression_load(regression, i)) {
             return 0;
         }
@@ -129,26 +156,26 @@ static double weights_size(const weights_head *head, hsep_residual_model *model)
 
 /* Read the file: 0 if it is damaged; with a message, if it was learned with other settings. */
 static int weights_take(
-    FILE *file, const hsep_context *context, const double values[], uint64_t n_modes, hsep_predictor *predictor,
-    char message[])
+    weights_source *source, const hsep_context *context, const double values[], uint64_t n_modes,
+    hsep_predictor *predictor, char message[])
 {
     hsep_residual_model *model = hsep_predictor_model(predictor);
     weights_head head;
     double size = 0.0;
-    if (!weights_whole(file, &size) || fread(&head, sizeof head, 1, file) != 1 ||
+    if (!weights_whole(source, &size) || !weights_read(source, &head, sizeof head) ||
         memcmp(head.magic, WEIGHTS_MAGIC, sizeof head.magic) != 0) {
         return 0;
     }
     weights_compare("the number of modes", (double)head.n_modes, (double)n_modes, HSEP_INTEGER, message);
-    if (!weights_compare_settings(file, context, values, head.n_settings, message) || message[0] != '\0') {
+    if (!weights_compare_settings(source, context, values, head.n_settings, message) || message[0] != '\0') {
         return 0;
     }
     if (head.n_learned != HSEP_N_UNCERTAINTY + hsep_residual_n_learned(model) || size != weights_size(&head, model) ||
-        !weights_take_learned(file, model, hsep_predictor_uncertainty(predictor))) {
+        !weights_take_learned(source, model, hsep_predictor_uncertainty(predictor))) {
         return 0;
     }
     for (uint64_t i = 0; i < hsep_residual_n_factors(model); i++) {
-        if (!weights_take_factor(file, hsep_residual_factor(model, i), head.n_samples)) {
+        if (!weights_take_factor(source, hsep_residual_factor(model, i), head.n_samples)) {
             return 0;
         }
     }
@@ -159,12 +186,17 @@ static int weights_take(
 HSEP_API hsep_status hsep_weights_load(
     const hsep_context *context, const double values[], uint64_t n_modes, hsep_predictor *predictor, char message[])
 {
-    FILE *file = hsep_resource_open(context, WEIGHTS_FILE);
-    if (file == NULL) {
-        return HSEP_OK;
+    weights_source source = {.bytes = context->weights, .left = context->weights_size};
+    if (source.bytes == NULL) {
+        source.file = hsep_resource_open(context, WEIGHTS_FILE);
+        if (source.file == NULL) {
+            return HSEP_OK;
+        }
     }
-    const int taken = weights_take(file, context, values, n_modes, predictor, message);
-    fclose(file);
+    const int taken = weights_take(&source, context, values, n_modes, predictor, message);
+    if (source.file != NULL) {
+        fclose(source.file);
+    }
     if (!taken && message[0] == '\0') {
         hsep_message_add(message, WEIGHTS_FILE " must be a factor of learned rows; it is damaged or truncated");
     }

@@ -1,6 +1,6 @@
 /* Warm start from weights that were learned before the simulation.
  *
- * The resource weights.bin, little-endian: "HSEPWG10"; the numbers of settings, of modes, of learned samples and of
+ * The resource weights.bin, little-endian: "HSEPWG12"; the numbers of settings, of modes, of learned samples and of
  * what has been learned besides the factors, as uint64; each setting that shapes the features and the factor, its name
  * in 24 bytes and its value as a double; as doubles the numbers of a residual model that can be trusted, as
  * hsep_residual_learned has them, and those of hsep_uncertainty_learned; the upper triangle of each factor
@@ -14,7 +14,7 @@
 #include "hsep_model.h"
 #include "hsep_predictor.h"
 
-/* Take over what the resources hold, if they do. Fails if it is damaged, or was learned with other settings,
+/* Take over what the context has in memory or, where it has nothing there, the resources, if they do. Fails if it is damaged, or was learned with other settings,
  * each of which is named. */
 HSEP_API hsep_status hsep_weights_load(
     const hsep_context *context, const double values[], uint64_t n_modes, hsep_predictor *predictor, char message[]);

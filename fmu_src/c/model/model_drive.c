@@ -16,9 +16,11 @@
 #include <string.h>
 
 static const double drive_seed_max = 2147483647.0;
+static const double drive_time_tolerance = 0.5; /* of a step: rounding of the importer's times */
 
 typedef struct {
     hsep_state_header header;
+    double end; /* s, of the last step in the importer's time */
     hsep_encoder encoder;
     hsep_drive drive; /* its arrays may follow */
 } drive_state;
@@ -52,6 +54,7 @@ HSEP_API hsep_status hsep_model_initialise(
         hsep_check_start_time(t_start, message) != HSEP_OK || hsep_model_check_start(values, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
+    self->end = t_start;
     hsep_encoder_init(&self->encoder, values[HSEP_VR_noise_std], (uint64_t)values[HSEP_VR_seed]);
     hsep_drive_begin(context, &self->drive, values);
     drive_write_outputs(self, values);
@@ -64,22 +67,17 @@ static hsep_status drive_check_step(const drive_state *self, double x_d, double 
 {
     char number[HSEP_NUMBER_SIZE];
     const double rate = HSEP_DRIVE(rate)(&self->drive);
-    if (hsep_check_position("x_d", x_d, " at t = %g s", t, message) != HSEP_OK) {
+    if (hsep_check_position("x_d", x_d, " at t = %g s", t, message) != HSEP_OK ||
+        hsep_check_step_size(h, message) != HSEP_OK ||
+        hsep_check_point(self->end, t, drive_time_tolerance * h, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
-    if (!isfinite(t)) {
-        hsep_message_add(
-            message, "the communication point must be finite, got %s s", hsep_number(number, t, HSEP_REAL));
-    } else if (hsep_check_step_size(h, message) != HSEP_OK) {
-        return HSEP_REFUSED;
-    } else if (h > hsep_plant_step_max(rate)) {
-        hsep_message_add(
+    if (h > hsep_plant_step_max(rate)) {
+        return hsep_message_add(
             message, "the step size must be at most %g s for a drive as fast as %g 1/s, got %s; make several steps",
             hsep_plant_step_max(rate), rate, hsep_number(number, h, HSEP_REAL));
-    } else {
-        return HSEP_OK;
     }
-    return HSEP_REFUSED;
+    return HSEP_OK;
 }
 
 HSEP_API hsep_status
@@ -93,6 +91,7 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
         hsep_drive_step(&self->drive, x_d, h, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
+    self->end = t + h;
     drive_write_outputs(self, values);
     return HSEP_OK;
 }
@@ -129,13 +128,15 @@ HSEP_API hsep_status hsep_model_check_state(
 {
     size_t expected = 0;
     hsep_encoder encoder;
+    double end = 0.0;
     if (hsep_model_size(context, values, &expected, message) != HSEP_OK ||
         hsep_state_check(context, values, state, size, HSEP_DRIVE_KIND, expected, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     memcpy(&encoder, (const char *)state + offsetof(drive_state, encoder), sizeof encoder);
+    memcpy(&end, (const char *)state + offsetof(drive_state, end), sizeof end);
     const size_t before = offsetof(drive_state, drive);
-    const int valid = hsep_within(&encoder.noise_std, 1, HSEP_PREDICTION_MAX) &&
+    const int valid = isfinite(end) && hsep_within(&encoder.noise_std, 1, HSEP_PREDICTION_MAX) &&
                       hsep_drive_valid(context, (const char *)state + before, size - before, values);
     return valid ? HSEP_OK : hsep_state_damaged(message);
 }

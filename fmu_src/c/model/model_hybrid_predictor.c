@@ -22,6 +22,14 @@ HSEP_API void hsep_online_read(const double values[], hsep_online_parameters *pa
     parameters->n_init = (double)settings->Np + hsep_warm_up_samples(t_init, settings->T_s);
 }
 
+HSEP_API int hsep_online_check_tuned(const hsep_context *context, const double values[], char message[])
+{
+    (void)context, (void)values, (void)message; /* it has none */
+    return 0;
+}
+
+HSEP_API void hsep_online_tune(hsep_online *self, const double values[]) { (void)self, (void)values; }
+
 HSEP_API void hsep_online_begin(hsep_online *self) { (void)self; }
 
 HSEP_API hsep_predictor *hsep_online_predictor(hsep_online *self) { return self; }

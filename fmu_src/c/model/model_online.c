@@ -104,7 +104,8 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
     int window = 0;
     hsep_inputs_step step;
     message[0] = '\0';
-    if (hsep_check_divergence((hsep_divergence)predictor->divergence, message) != HSEP_OK) { /* of an earlier step */
+    if (hsep_check_divergence((hsep_divergence)predictor->divergence, message) != HSEP_OK || /* of an earlier step */
+        hsep_online_check_tuned(context, values, message) > 0) {
         return HSEP_REFUSED;
     }
     const hsep_status status =
@@ -112,6 +113,7 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
     if (status == HSEP_REFUSED) {
         return HSEP_REFUSED;
     }
+    hsep_online_tune(&self->online, values);
     while (hsep_inputs_next(&self->inputs, &step)) {
         window |= HSEP_ONLINE(sample)(&self->online, self->inputs.x_d_ahead, self->inputs.x_meas);
         if (hsep_check_divergence((hsep_divergence)predictor->divergence, message) != HSEP_OK) {

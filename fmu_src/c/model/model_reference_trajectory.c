@@ -2,8 +2,8 @@
  *
  * The samples are those of the resource trajectory_<n>.bin, n being the parameter trajectory:
  *   "HSEPTRJ1", their number as uint64, T_s as double, s, then the samples as doubles, m, all little-endian.
- * Sample k is the output at t_k = t_start + k T_s; after the last one it stays. The samples are part of the state,
- * so a state's size follows from the file.
+ * Sample k is the output from instant k on (hsep_clock.h); after the last one it stays. The samples are part of the
+ * state, so a state's size follows from the file.
  */
 #include "hsep_fmu.h"
 
@@ -132,7 +132,7 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
     }
     self->clock = step.after;
     values[HSEP_VR_r] = hsep_trajectory_position(&self->trajectory, self->clock.k);
-    return HSEP_OK;
+    return hsep_check_moved(&step, message);
 }
 
 HSEP_API hsep_status hsep_model_check_start(const double values[], char message[])

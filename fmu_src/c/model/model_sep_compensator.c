@@ -61,6 +61,17 @@ HSEP_API void hsep_online_read(const double values[], hsep_online_parameters *pa
     parameters->compensate = (hsep_sep_state)settings.compensate;
 }
 
+HSEP_API int hsep_online_check_tuned(const hsep_context *context, const double values[], char message[])
+{
+    return !hsep_check_parameter(context, HSEP_VR_compensate, values, message) +
+           !hsep_check_parameter(context, HSEP_VR_change_max, values, message);
+}
+
+HSEP_API void hsep_online_tune(hsep_online *self, const double values[])
+{
+    hsep_compensator_change(self, (hsep_sep_state)values[HSEP_VR_compensate], values[HSEP_VR_change_max]);
+}
+
 HSEP_API void hsep_online_begin(hsep_online *self) { hsep_compensator_begin(self); }
 
 HSEP_API hsep_predictor *hsep_online_predictor(hsep_online *self) { return hsep_compensator_predictor(self); }

@@ -11,10 +11,23 @@
 /* Work space for a step lies behind the stage: zeros between steps. */
 static size_t stage_work_size(uint64_t n_modes) { return (size_t)(HSEP_STAGE_WORK * n_modes) * sizeof(double); }
 
+static hsep_stage_settings stage_settings(const double values[])
+{
+    return (hsep_stage_settings){
+        .f = values[HSEP_VR_f],
+        .kappa = values[HSEP_VR_kappa],
+        .v_friction = values[HSEP_VR_v_friction],
+        .friction_on = (uint64_t)values[HSEP_VR_friction_on],
+        .dead_time = (uint64_t)values[HSEP_VR_dead_time],
+        .input_hold = (uint64_t)values[HSEP_VR_input_hold],
+    };
+}
+
 HSEP_API hsep_status hsep_drive_check(const hsep_context *context, const double values[], double *bytes, char message[])
 {
     const hsep_mode *modes = hsep_table_modes(context, values);
-    *bytes = hsep_stage_size(context->n_modes) + (double)stage_work_size(context->n_modes);
+    const hsep_stage_settings settings = stage_settings(values);
+    *bytes = hsep_stage_size(context->n_modes, &settings) + (double)stage_work_size(context->n_modes);
     for (size_t i = 0; i < context->n_modes; i++) {
         const double rate = hsep_plant_mode_rate(&modes[i]);
         if (rate > HSEP_PLANT_RATE_MAX) {
@@ -29,14 +42,14 @@ HSEP_API hsep_status hsep_drive_check(const hsep_context *context, const double 
 
 HSEP_API void hsep_drive_begin(const hsep_context *context, hsep_drive *self, const double values[])
 {
+    const hsep_stage_settings settings = stage_settings(values);
     hsep_stage_init(
-        self, hsep_table_modes(context, values), context->n_modes, values[HSEP_VR_f], values[HSEP_VR_kappa],
-        (hsep_friction_on)values[HSEP_VR_friction_on], values[HSEP_VR_T_s], values[HSEP_VR_x_d]);
+        self, hsep_table_modes(context, values), context->n_modes, &settings, values[HSEP_VR_T_s], values[HSEP_VR_x_d]);
 }
 
 HSEP_API hsep_status hsep_drive_step(hsep_drive *self, double x_d, double h, char message[])
 {
-    double *work = hsep_at(self, (uint64_t)hsep_stage_size(self->n_modes) / sizeof(double));
+    double *work = hsep_at(self, (uint64_t)hsep_stage_size(self->n_modes, &self->settings) / sizeof(double));
     const int done = hsep_stage_step(self, x_d, h, work);
     memset(work, 0, stage_work_size(self->n_modes));
     if (!done) {
@@ -51,13 +64,12 @@ HSEP_API int hsep_drive_valid(const hsep_context *context, const void *block, si
 {
     hsep_stage stage;
     memcpy(&stage, block, sizeof stage);
-    const double numbers[] = {stage.f,   stage.kappa, stage.friction_gain, stage.start, stage.last_x_d,
-                              stage.v_d, stage.v};
+    const hsep_stage_settings settings = stage_settings(values);
+    const double numbers[] = {stage.friction_gain, stage.start, stage.acting, stage.last_x_d, stage.v_d, stage.v};
     return hsep_within(numbers, sizeof numbers / sizeof *numbers, HSEP_PREDICTION_MAX) &&
            hsep_within(
                (const char *)block + sizeof stage, (bytes - sizeof stage) / sizeof(double), HSEP_PREDICTION_MAX) &&
-           hsep_stage_valid(block, context->n_modes) && stage.friction_on == (uint64_t)values[HSEP_VR_friction_on] &&
-           stage.clock.T_s == values[HSEP_VR_T_s];
+           hsep_stage_valid(block, context->n_modes, &settings) && stage.clock.T_s == values[HSEP_VR_T_s];
 }
 
 #else

@@ -22,6 +22,8 @@ class CommandFeatures:
         Of the physics model, in samples.
     p : int
         Lags.
+    last_lag : float
+        Prior variance of the weight of the last increment, relative to that of the first.
 
     Attributes
     ----------
@@ -29,11 +31,14 @@ class CommandFeatures:
         Number of features, ``p + 2``.
     n_before : int
         Commands before a window that its features need.
+    shares : (n,) array
+        Effect that a feature may have, relative to the largest: an old increment explains less than a recent one.
     """
 
-    def __init__(self, dead_time: int, p: int) -> None:
+    def __init__(self, dead_time: int, p: int, last_lag: float) -> None:
         self.dead_time, self.p = dead_time, p
         self.n, self.n_before = p + 2, dead_time + p + 1
+        self.shares = np.concatenate(([1.0], np.sqrt(last_lag ** (np.arange(p + 1) / p))))
 
     def late(self, before: Array, x_d: Array) -> Array:
         """Return the commands ``d`` samples ago over a window, ``(n,)``, m.

@@ -27,11 +27,12 @@ class TrustConstants:
         First weights of the experts with and without lags; hold and command begin with none: with 0.2 for the command's
         the worst drives are worse.
     lags_of_command : int
-        Most lags of the command's expert, and of its increments: with 50 instead of 20 errors are 2 % less on drives of
-        modes, 8 % more on those of two masses, and a third less where the physics model is bad; more than 36 cost more
-        than four million instructions in the dearest sample.
+        Lags of the command's expert, and of its increments, which may reach beyond the window before: with 50 instead
+        of 20 errors are 2 % less on drives of modes, 8 % more on those of two masses, and a third less where the
+        physics model is bad; more than 36 cost more than four million instructions in the dearest sample.
     last_lag : float
-        Prior variance of the weight of the last lag, relative to that of the first: the residual's memory fades.
+        Prior variance of the weight of the last lag, and of the command's last increment, relative to that of the
+        first: memory fades. Without it for the increments a CNC axis that outgrows them has three times the error.
     least_noise : float
         Bound on the least variance of the noise relative to the largest mean square of a window: a larger ``lambda``
         would prevent any learning.
@@ -61,24 +62,11 @@ class TrustConstants:
         six to the next: half a decade, which neighbours interpolate within.
     difference_share : float
         Effect of a disturbance's first difference relative to its own: it only corrects the timing.
-    spreads, resolution, small, ripple : float
-        Plausible deviation of a measurement: in mean deviations, in steps of the sensor's resolution, and relative to
-        the largest residual and to the predicted motion of a sample.
-    pace : float
-        Plausible change of the residual from sample to sample, relative to the predicted motion or the vibration.
-    vibration_noise : float
-        Median change of the residual from sample to sample that noise makes, in mean deviations: white noise 1.4.
-    stood_more : float
-        Motion under which an axis is believed to stand, relative to the largest under which it has stood by itself:
-        with 2 two servos with stiction have 1.4 and 2 times the error.
-    stood_residual : float
-        Bound on that motion, relative to the largest residual so far: without, the stuck sensor of a drive that had
-        stood at a reversal was believed, with 2.9 times the physics model's error after it.
-    patience, patience_standing : float
-        Time, s, after which another level is believed, two windows at least, and the first time, after which an axis
-        that stands is: an encoder may be held for half a second.
-    rise, fall : float
-        Rates at which the mean deviation follows that of a window; the vibration rises at once, and falls as it does.
+    reach_residuals, reach_steps : float
+        Largest residual that is believed: relative to the largest so far, and in steps of the fastest motion of the
+        physics model so far on top of it.
+    patience : float
+        Time, s, after which a value beyond it is believed: a sensor may read zero for half a second.
     """
 
     kappa: float = 1.0
@@ -103,18 +91,9 @@ class TrustConstants:
     friction_least: float = 0.01
     friction_ratio: float = 3.1622776601683795
     difference_share: float = 0.03
-    spreads: float = 12.0
-    resolution: float = 3.0
-    small: float = 0.01
-    ripple: float = 0.1
-    pace: float = 2.0
-    vibration_noise: float = 2.0
-    stood_more: float = 5.0
-    stood_residual: float = 4.0
-    patience: float = 0.05
-    patience_standing: float = 0.6
-    rise: float = 0.5
-    fall: float = 0.02
+    reach_residuals: float = 2.0
+    reach_steps: float = 2.0
+    patience: float = 1.0
 
 
 CONSTANTS = TrustConstants()

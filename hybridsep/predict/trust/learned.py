@@ -33,6 +33,6 @@ LEARNED: dict[str, Range] = {
     "cross": Range(-PREDICTION_MAX),
     "evidence": Range(),
 }
-"""Ranges by name: rows of the factors; scales of velocity, m/s, and of the command's steps, m; sizes of the residuals
-of the physics model and of the command; of each expert noise, m², and correlation; largest features; and the stack. The
-sensor's numbers follow them, with ranges that its guard knows."""
+"""Ranges by name: rows of the factors; scales of velocity, m/s, of the command's steps and of the physics model's, m;
+sizes of the residuals of the physics model and of the command; of each expert noise, m², and correlation; largest
+features; and the stack."""

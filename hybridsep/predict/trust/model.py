@@ -28,8 +28,7 @@ from .constants import CONSTANTS, TrustConstants
 from .disturbances import LEAST_VELOCITY, Disturbance, StaticFeatures, StaticState
 from .experts import Evidence, EvidenceOfRuns, Expert, ExpertPrediction, ResidualScale, SolvedExpert, lags
 from .forecast import TrustedForecast
-from .guard import SensorGuard
-from .rest import RestBefore
+from .reach import Reach, reached
 from .stack import Stack
 
 __all__ = ["COMMAND", "DOUBTING", "HOLD", "LAGGED", "STATIC", "RunState", "TrustedModel"]
@@ -96,7 +95,7 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         self.settings, self.constants, self.preview = settings, constants, settings.Np
         p = settings.p
         self.static = StaticFeatures(discrete, settings.q, settings.period, own, constants)
-        self.command = CommandFeatures(discrete.dead_time, min(p, constants.lags_of_command))
+        self.command = CommandFeatures(discrete.dead_time, constants.lags_of_command, constants.last_lag)
         self.experts = {LAGGED: self._expert(LAGGED), STATIC: Expert(self.static.shares, 0, constants)}
         self.experts |= {COMMAND: self._expert(COMMAND), DOUBTING: self._expert(LAGGED)}
         self.leading = LAGGED
@@ -106,7 +105,7 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         self.largest = np.zeros(self.static.n)
         self.velocity_scale = self.largest_step = 0.0
         self.scale, self.scale_of_command = ResidualScale(), ResidualScale()
-        self.guard = SensorGuard(settings.Np, settings.T_s, constants)
+        self.reach = Reach()
         self.restart()
 
     def restart(self) -> None:
@@ -115,9 +114,8 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         no: NDArray[np.bool_] = np.zeros(p, dtype=np.bool_)
         commands, past_of_command = np.zeros(self.command.n_before), np.zeros(self.command.p)
         self.run = RunState(self.static.rest(), commands, np.zeros(p), past_of_command, no)
-        self.guard.restart()
+        self.reach = Reach(self.reach.fastest)
         self.n_rejected = 0
-        self.rest = RestBefore(self.settings.measurement_delay)
         for evidence in (self.evidence, self.evidence_of_command):
             evidence.begin_run(self.constants.carried * self.settings.Np)
         self.lead(self._leader)
@@ -139,7 +137,7 @@ class TrustedModel(ResidualModel[TrustedForecast]):
     def _expert(self, expert: int) -> Expert:
         """Return a new expert with lags, of the kind of LAGGED or COMMAND."""
         if expert == COMMAND:
-            return Expert(np.ones(self.command.n), self.command.p, self.constants)
+            return Expert(self.command.shares, self.command.p, self.constants)
         return Expert(self.static.shares, self.settings.p, self.constants)
 
     def is_of_command(self, expert: int) -> bool:
@@ -279,13 +277,8 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         return min(scales.step / self.largest_step, self.constants.growth)
 
     def _rows(self, x_d: Array, x_pb: Array, x: Array, scales: FeatureScales) -> Array:
-        """Return the static features to predict with, ``(n, n_static)``; ``x``: position that the stiffness acts at.
-
-        The constant that earlier runs have trained is that of motion: before the first one of this run it is 0.
-        """
+        """Return the static features to predict with, ``(n, n_static)``; ``x``: position that the stiffness acts at."""
         rows, _ = self.static.rows(self.run.static, x_d, x_pb, x, scales.velocity)
-        if self.doubts:
-            rows[: scales.n_rest, 0] = 0.0
         return rows
 
     def scales(self, x_d: Array, x_pb: Array, path: Array | None = None) -> FeatureScales:
@@ -309,8 +302,7 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         velocity_scale = peak if outgrown else self.velocity_scale
         rows, _ = self.static.rows(static, x_d, x_pb, x_pb, velocity_scale)
         before = np.zeros(self.static.n) if outgrown else self.largest
-        n_rest = self.rest.ahead(x_d if path is None else path, len(x_d))
-        return FeatureScales(velocity_scale, np.maximum(before, np.abs(rows).max(axis=0)), step, n_rest)
+        return FeatureScales(velocity_scale, np.maximum(before, np.abs(rows).max(axis=0)), step)
 
     def solved(self, scales: FeatureScales) -> dict[int, SolvedExpert]:
         """Return the experts that know something, with their weights."""
@@ -362,20 +354,18 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         if forecast.scales.velocity != self.velocity_scale:  # outgrown
             self._end_doubt()
             self.evidence.forget()
-        self.velocity_scale, self.largest, self.largest_step, n_rest = forecast.scales
+        self.velocity_scale, self.largest, self.largest_step = forecast.scales
         run, x_d, x_pb = self.run, forecast.x_d[:m], forecast.x_pb[:m]
-        accepted = self.guard.accepts(x, x_pb, self.scale.largest)
+        before, largest, T_s = float(run.static.x_pb[-1]), self.scale.largest, self.settings.T_s
+        accepted, self.reach = reached(self.reach, x, x_pb, before, largest, T_s, self.constants)
         e = _bridged(self.last, x - x_pb, accepted)
         e_0 = e + x_pb - self.command.late(run.commands, x_d)
         rows, static = self.static.rows(run.static, x_d, x_pb, x_pb + e, self.velocity_scale)
         bridged: NDArray[np.bool_] = np.concatenate((run.bridged, ~accepted))
-        # What a held sensor may show is followed, once it is believed, and not learned.
-        learnable = accepted & ~self.guard.suspect
-        if fold and learnable.any():
+        if fold and accepted.any():
             n_bridged = np.convolve(bridged[:-1].astype(np.float64), np.ones(p), "valid")
-            self._fold(rows, x_d, e, e_0, learnable & (n_bridged <= _BRIDGED))
-            self._judge(forecast, e, e_0, learnable)
-        self.rest.pass_by(m, n_rest)
+            self._fold(rows, x_d, e, e_0, accepted & (n_bridged <= _BRIDGED))
+            self._judge(forecast, e, e_0, accepted)
         self.n_rejected += m - int(accepted.sum())
         self.run = RunState(
             static,
@@ -429,10 +419,6 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         self.evidence.believe_earlier()
         self.evidence_of_command.believe_earlier()
         self.stack.forget(DOUBTING)
-
-    def doubted(self, x_pb: Array) -> Array | None:
-        """Return the residual if the rejected measurement before the window is true, ``(n,)``, m; None if none was."""
-        return self.guard.doubted(x_pb, self.scale.largest)
 
 
 def _bridged(last: float, measured: Array, accepted: NDArray[np.bool_]) -> Array:

@@ -15,10 +15,9 @@ from ..residual_model import SavedFields, WindowInputs
 from .disturbances import LEAST_VELOCITY, StaticState
 from .experts import Evidence, ResidualScale
 from .forecast import TrustedForecast
-from .guard import N_STATE
 from .learned import LEARNED
 from .model import COMMAND, LAGGED, TrustedModel
-from .rest import N_REST
+from .reach import Reach
 
 __all__ = ["SavedTrustedModel"]
 
@@ -52,6 +51,8 @@ class SavedTrustedModel(TrustedModel):
                 self.evidence.this.regression.n_samples, self.evidence_of_command.this.regression.n_samples
             ),
             "n_rejected": self.n_rejected,
+            "n_missing": self.reach.n_missing,
+            "n_beyond": self.reach.n_beyond,
             "leading": self.leading,
             "look_ahead": self.preview + self.settings.measurement_delay,
         }
@@ -68,8 +69,6 @@ class SavedTrustedModel(TrustedModel):
             "past": run.past,
             "past_of_command": run.past_of_command,
             "bridged": run.bridged.astype(np.float64),
-            "guard": np.array(self.guard.state()),
-            "rest": np.array(self.rest.state()),
         }
         for name, evidence in (("", self.evidence), ("_of_command", self.evidence_of_command)):
             if evidence.earlier is not None:
@@ -86,7 +85,7 @@ class SavedTrustedModel(TrustedModel):
         if leading not in (LAGGED, COMMAND):
             raise saved.error("leading must be the place of an expert with lags")
         self.lead(leading)
-        learned = {name: saved.array(name, *one.shape, finite=False) for name, one in self.learned().items()}
+        learned = {name: saved.array(name, *one.shape) for name, one in self.learned().items()}
         if (problem := self._unsound(learned)) is not None:
             raise saved.error(problem)
         if learned["n_rows"].max() > n_samples:
@@ -112,33 +111,31 @@ class SavedTrustedModel(TrustedModel):
             bridged=saved.array("bridged", len(run.bridged)) > 0.0,
         )
         self.n_rejected = saved.whole("n_rejected")
-        with saved.consistent():
-            self.guard.restore(saved.array("guard", N_STATE, finite=False))
-            self.rest.restore(saved.array("rest", N_REST))
+        self.reach = self.reach._replace(n_missing=saved.whole("n_missing"), n_beyond=saved.whole("n_beyond"))
 
     def saved_forecast(self, forecast: TrustedForecast) -> SavedFields:
         """Return the scales of a forecast, which a compensator has from its preview."""
         scales = forecast.scales
         arrays = {"pending_scales": np.array([scales.velocity, scales.step, *scales.largest])}
-        return SavedFields({"pending_rest": scales.n_rest}, arrays, {})
+        return SavedFields({}, arrays, {})
 
     def restored_forecast(self, saved: Saved, window: WindowInputs) -> TrustedForecast:
         """Return the forecast of :meth:`saved_forecast`; StateError if it is inconsistent."""
         velocity, step, *largest = saved.array("pending_scales", 2 + self.static.n).tolist()
         if min(velocity, step, *largest) < 0.0:
             raise saved.error("the scales of the pending window must be ≥ 0")
-        scales = FeatureScales(velocity, np.array(largest), step, saved.whole("pending_rest"))
+        scales = FeatureScales(velocity, np.array(largest), step)
         forecast = self.forecast(window, scales)
         if not np.isfinite(forecast.e_h).all():
             raise saved.error("the prediction of the pending window must be finite")
         return forecast
 
     def learned(self) -> dict[str, Array]:
-        """Return what has been learned besides the regression, in the order of :data:`LEARNED`, then the sensor."""
+        """Return what has been learned besides the regression, in the order of :data:`LEARNED`."""
         stack, experts = self.stack, self.experts.values()
         return {
             "n_rows": np.array([self.evidence.n_rows, self.evidence_of_command.n_rows]),
-            "motion": np.array([self.velocity_scale, self.largest_step]),
+            "motion": np.array([self.velocity_scale, self.largest_step, self.reach.fastest]),
             "scale": np.array(self.scale),
             "scale_of_command": np.array(self.scale_of_command),
             "noise_variances": np.array([expert.noise_variance for expert in experts]),
@@ -148,7 +145,6 @@ class SavedTrustedModel(TrustedModel):
             "gram": stack.gram,
             "cross": stack.cross,
             "evidence": stack.evidence,
-            "sensor": self.guard.learned(),
         }
 
     def is_sound(self, learned: Mapping[str, Array]) -> bool:
@@ -160,8 +156,6 @@ class SavedTrustedModel(TrustedModel):
         for name, (least, most) in LEARNED.items():
             if not ((learned[name] >= least) & (learned[name] <= most)).all():  # NaN too
                 return f"{name} must be {least:g} … {most:g}"
-        if not self.guard.is_sound(learned["sensor"]):
-            return "sensor must be a spread, a step and motions"
         if learned["weights"].sum() > 1.0 + _ROUNDING:
             return "the sum of weights must be at most 1"
         return None
@@ -169,7 +163,8 @@ class SavedTrustedModel(TrustedModel):
     def restore_learned(self, learned: Mapping[str, Array]) -> None:
         """Restore the numbers of :meth:`learned`, which are sound."""
         self.evidence.this.n_rows, self.evidence_of_command.this.n_rows = learned["n_rows"].tolist()
-        self.velocity_scale, self.largest_step = learned["motion"].tolist()
+        self.velocity_scale, self.largest_step, fastest = learned["motion"].tolist()
+        self.reach = Reach(fastest)
         self.scale = ResidualScale(*learned["scale"].tolist())
         self.scale_of_command = ResidualScale(*learned["scale_of_command"].tolist())
         for expert, noise, correlation in zip(
@@ -179,7 +174,6 @@ class SavedTrustedModel(TrustedModel):
         self.largest, stack = learned["largest"], self.stack
         stack.weights, stack.gram, stack.cross = learned["weights"], learned["gram"], learned["cross"]
         stack.evidence = learned["evidence"]
-        self.guard.restore_learned(learned["sensor"])
 
 
 def _earlier(saved: Saved, name: str, n_features: int) -> Evidence | None:

@@ -128,7 +128,7 @@ def _held(r: Array, n: int) -> Array:
 def play(out: Path, model: str, platform: Platform, given: Array) -> Array:
     """Return the outputs of an FMU on a platform, ``(n_samples, n_outputs)``, m."""
     folder, target = out / model, TARGETS[platform.target]
-    (library,) = (folder / "binaries" / target.folders[-1]).iterdir()
+    (library,) = (folder / "binaries" / target.folder).iterdir()
     description = ET.parse(folder / "modelDescription.xml").getroot()
     references = {str(v.get("name")): str(v.get("valueReference")) for v in description.iter("ScalarVariable")}
     given_file = folder / "signals.bin"

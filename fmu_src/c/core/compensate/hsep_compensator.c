@@ -199,8 +199,19 @@ static void compensator_plan_trusted(hsep_compensator *self)
     self->solving = 1;
 }
 
+HSEP_API void hsep_compensator_change(hsep_compensator *self, hsep_sep_state compensate, double change_max)
+{
+    self->compensate_next = (uint64_t)compensate;
+    self->change_max_next = change_max;
+}
+
 HSEP_API void hsep_compensator_begin(hsep_compensator *self)
 {
+    hsep_planner *planner = hsep_compensator_planner(self);
+    self->compensate = self->compensate_next;
+    if (hsep_planner_splines(planner)->share[0] != 1.0 / self->change_max_next) {
+        hsep_planner_limit_change(planner, self->change_max_next);
+    }
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     hsep_predictor_begin(predictor);
     if (self->trusted) {

@@ -41,10 +41,12 @@ typedef struct {
 } hsep_compensator_parameters;
 
 typedef struct {
-    uint64_t compensate; /* hsep_sep_state, the best model allowed */
-    uint64_t state;      /* hsep_sep_state of the window, */
-    uint64_t before;     /* and of the window before, whose plan the first samples follow with trust */
-    uint64_t solving;    /* whether its plan is being solved */
+    uint64_t compensate;      /* hsep_sep_state, the best model allowed in the window, */
+    uint64_t compensate_next; /* and from the next one on */
+    double change_max_next;   /* m, of the command, likewise */
+    uint64_t state;           /* hsep_sep_state of the window, */
+    uint64_t before;          /* and of the window before, whose plan the first samples follow with trust */
+    uint64_t solving;         /* whether its plan is being solved */
     /* Offsets in doubles from the beginning of the struct */
     uint64_t x_dm;      /* (Np,) m, the window: modified commands */
     uint64_t trial_x;   /* (preview + q,) m, x_pb of a trial, newest first; then the hybrid model's filtered spline */
@@ -56,7 +58,7 @@ typedef struct {
     uint64_t trusted; /* the planner on the residual model that can be trusted; 0: the paper's */
 } hsep_compensator;
 
-HSEP_ASSERT_WORDS(hsep_compensator, 13);
+HSEP_ASSERT_WORDS(hsep_compensator, 15);
 
 typedef struct {
     hsep_predictor_outputs predicted; /* x_h: of the model that planned the window; with trust that of its model */
@@ -85,6 +87,12 @@ HSEP_API void hsep_compensator_begin(hsep_compensator *self);
 /* Whether a block, in any alignment and of hsep_compensator_size(parameters) bytes, is a valid state for these
  * parameters at sample k: its layout is that of hsep_compensator_init, and every index lies within it. */
 HSEP_API int hsep_compensator_valid(const void *block, const hsep_compensator_parameters *parameters, uint64_t k);
+
+/* Other settings from the next window on; no command jumps. compensate: the best model allowed; change_max, m, > 0.
+ * Every plan goes on from the rest of the last one, which keeps the drive's limits and ends at x_d: with compensate off
+ * that rest is followed, and where it is larger than change_max it is the bound. Constant cost; where change_max
+ * differs 10 spacing operations more at the window's end. */
+HSEP_API void hsep_compensator_change(hsep_compensator *self, hsep_sep_state compensate, double change_max);
 
 /* Process sample k, both inputs finite, m, and advance to k + 1; return whether a new window has begun. */
 HSEP_API int hsep_compensator_sample(hsep_compensator *self, double x_d_ahead, double x_meas);

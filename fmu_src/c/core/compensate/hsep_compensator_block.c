@@ -3,6 +3,7 @@
 
 #include "hsep_range.h"
 
+#include <math.h>
 #include <stddef.h>
 #include <string.h>
 
@@ -29,7 +30,6 @@ static double compensator_lay_out(hsep_compensator *self, const hsep_compensator
     const hsep_residual_parameters model = hsep_predictor_model_parameters(predictor);
     const hsep_trusted_parameters trusted = hsep_residual_trusted_parameters(&model);
     double end = HSEP_WORDS(hsep_compensator);
-    self->compensate = (uint64_t)parameters->compensate;
     self->x_dm = hsep_take(&end, (double)predictor->settings.Np);
     self->trial_x = hsep_take(&end, preview + (double)predictor->settings.q);
     self->trial_e = hsep_take(&end, preview + (double)predictor->settings.p);
@@ -60,6 +60,8 @@ HSEP_API void hsep_compensator_init(hsep_compensator *self, const hsep_compensat
         const hsep_trusted_parameters trusted = hsep_residual_trusted_parameters(&model);
         hsep_trusted_planner_init(hsep_compensator_trusted(self), &trusted, &parameters->planner, start);
     }
+    self->compensate = self->compensate_next = (uint64_t)parameters->compensate;
+    self->change_max_next = parameters->planner.limit[0];
     self->state = self->before = self->compensate > HSEP_SEP_PHYSICS ? HSEP_SEP_PHYSICS : self->compensate;
     /* The spline filtered by the physics model from rest, which is constant. */
     hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
@@ -83,8 +85,10 @@ HSEP_API int hsep_compensator_valid(const void *block, const hsep_compensator_pa
     memcpy(&got, block, sizeof got);
     (void)compensator_lay_out(&got, parameters); /* changes nothing where it is sound */
     memcpy(&online, hsep_at_bytes(block, got.predictor), sizeof online);
-    return memcmp(&got, block, sizeof got) == 0 && got.state <= HSEP_SEP_HYBRID && got.before <= HSEP_SEP_HYBRID &&
-           got.solving <= 1 && (got.solving || online.n_published == predictor->settings.Np) &&
+    return memcmp(&got, block, sizeof got) == 0 && got.compensate <= HSEP_SEP_HYBRID &&
+           got.compensate_next <= HSEP_SEP_HYBRID && got.change_max_next > 0.0 && isfinite(got.change_max_next) &&
+           got.state <= HSEP_SEP_HYBRID && got.before <= HSEP_SEP_HYBRID && got.solving <= 1 &&
+           (got.solving || online.n_published == predictor->settings.Np) &&
            (online.divergence ||
             hsep_within(hsep_at_bytes(block, got.x_dm), predictor->settings.Np, HSEP_PREDICTION_MAX)) &&
            hsep_physics_valid(hsep_at_bytes(block, got.trial), predictor->n_modes, predictor->settings.dead_time) &&

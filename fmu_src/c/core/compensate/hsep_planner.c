@@ -58,6 +58,11 @@ HSEP_API int hsep_planner_valid(const void *block, const hsep_planner_parameters
            hsep_interior_valid(hsep_at_bytes(block, got.interior), got.n_pinned);
 }
 
+HSEP_API void hsep_planner_limit_change(hsep_planner *self, double change_max)
+{
+    hsep_splines_limit((hsep_splines *)hsep_at(self, self->splines), 0, change_max);
+}
+
 HSEP_API uint64_t hsep_planner_pinned(const hsep_planner *self)
 {
     return self->n_pinned * hsep_planner_splines(self)->spacing;

@@ -48,6 +48,9 @@ HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameter
 /* Whether a block, in any alignment, is one that hsep_planner_init with these parameters began. */
 HSEP_API int hsep_planner_valid(const void *block, const hsep_planner_parameters *parameters);
 
+/* Another largest |delta| from the next plan on, m; where the rest of the last plan is larger, that bounds it. */
+HSEP_API void hsep_planner_limit_change(hsep_planner *self, double change_max);
+
 /* How many samples a bounded plan leaves as they are, the time there is for its steps; and the steps it may need. */
 HSEP_API uint64_t hsep_planner_pinned(const hsep_planner *self);
 

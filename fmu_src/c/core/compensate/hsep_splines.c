@@ -64,17 +64,24 @@ HSEP_API void hsep_splines_init(hsep_splines *self, uint64_t preview, uint64_t s
         b[k] = splines_b((double)k / (double)spacing);
     }
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        self->share[order] = 1.0 / limit[order];
-        double *e = hsep_at(self, self->differences[order]);
-        for (uint64_t k = 0; k < width + 3; k++) {
-            const double at[HSEP_ORDERS] = {
-                k < width ? b[k] : 0.0, k >= 1 && k - 1 < width ? b[k - 1] : 0.0,
-                k >= 2 && k - 2 < width ? b[k - 2] : 0.0, k >= 3 ? b[k - 3] : 0.0};
-            const double difference[HSEP_ORDERS] = {
-                at[0], at[0] - at[1], (at[0] - at[1]) - (at[1] - at[2]),
-                ((at[0] - at[1]) - (at[1] - at[2])) - ((at[1] - at[2]) - (at[2] - at[3]))};
-            e[k] = difference[order] * self->share[order];
-        }
+        hsep_splines_limit(self, order, limit[order]);
+    }
+}
+
+HSEP_API void hsep_splines_limit(hsep_splines *self, unsigned order, double limit)
+{
+    const uint64_t width = 4 * self->spacing;
+    const double *b = hsep_splines_shape(self);
+    double *e = hsep_at(self, self->differences[order]);
+    self->share[order] = 1.0 / limit;
+    for (uint64_t k = 0; k < width + 3; k++) {
+        const double at[HSEP_ORDERS] = {
+            k < width ? b[k] : 0.0, k >= 1 && k - 1 < width ? b[k - 1] : 0.0, k >= 2 && k - 2 < width ? b[k - 2] : 0.0,
+            k >= 3 ? b[k - 3] : 0.0};
+        const double difference[HSEP_ORDERS] = {
+            at[0], at[0] - at[1], (at[0] - at[1]) - (at[1] - at[2]),
+            ((at[0] - at[1]) - (at[1] - at[2])) - ((at[1] - at[2]) - (at[2] - at[3]))};
+        e[k] = difference[order] * self->share[order];
     }
 }
 

@@ -38,6 +38,9 @@ HSEP_API double hsep_splines_size(uint64_t preview, uint64_t spacing);
 HSEP_API void hsep_splines_init(
     hsep_splines *self, uint64_t preview, uint64_t spacing, const double limit[HSEP_ORDERS]);
 
+/* Another limit of an order from now on, m a sample to that power. Cost: 10 spacing operations. */
+HSEP_API void hsep_splines_limit(hsep_splines *self, unsigned order, double limit);
+
 /* Whether a block, in any alignment, is one that hsep_splines_init with these parameters began. */
 HSEP_API int hsep_splines_valid(const void *block, uint64_t preview, uint64_t spacing);
 

@@ -5,12 +5,11 @@
 #include <math.h>
 #include <string.h>
 
-static const double plant_internal_step = 1e-4;     /* s */
-static const double plant_friction_velocity = 2e-3; /* m/s, over which the stage's friction changes sign */
-static const double plant_steps_per_time = 16.0;    /* internal steps in the fastest time constant */
-static const double plant_steps_max = 1e6;          /* internal steps of one step */
-static const double plant_state_max = 1e100;        /* of a drive's state: outputs and their squares stay finite */
-static const double plant_tolerance = 1e-6;         /* of an internal step */
+static const double plant_internal_step = 1e-4;  /* s */
+static const double plant_steps_per_time = 16.0; /* internal steps in the fastest time constant */
+static const double plant_steps_max = 1e6;       /* internal steps of one step */
+static const double plant_state_max = 1e100;     /* of a drive's state: outputs and their squares stay finite */
+static const double plant_tolerance = 1e-6;      /* of an internal step */
 static const double plant_two_pi = 6.283185307179586;
 
 /* Number of internal steps for a step of h seconds: the fewest that are at most 0.1 ms and 1/(16 rate) long. */
@@ -78,13 +77,19 @@ HSEP_API int hsep_feed_drive_step(hsep_feed_drive *self, double x_d, double h, d
     return 1;
 }
 
-/* Set what follows from the number of modes; return the bytes of the block. */
-static double stage_lay_out(hsep_stage *self, uint64_t n_modes)
+/* Set what follows from the number of modes and the settings; return the bytes of the block. */
+static double stage_lay_out(hsep_stage *self, uint64_t n_modes, const hsep_stage_settings *settings)
 {
     double end = HSEP_WORDS(hsep_stage);
+    self->settings = *settings;
     self->n_modes = n_modes;
+    self->n_line = settings->dead_time;
+    if (settings->input_hold == HSEP_FIRST_ORDER_HOLD && settings->dead_time > 0) {
+        self->n_line -= 1; /* the way from the command before to that of now takes a sample */
+    }
     self->modes = hsep_take(&end, (double)n_modes * HSEP_WORDS(hsep_stage_mode));
     self->z = hsep_take(&end, 2.0 * (double)n_modes);
+    self->line = hsep_take(&end, (double)self->n_line);
     return end * sizeof(double);
 }
 
@@ -93,28 +98,30 @@ static const hsep_stage_mode *stage_modes(const hsep_stage *self)
     return (const hsep_stage_mode *)hsep_at_const(self, self->modes);
 }
 
-HSEP_API double hsep_stage_size(uint64_t n_modes) { return stage_lay_out(&(hsep_stage){0}, n_modes); }
+HSEP_API double hsep_stage_size(uint64_t n_modes, const hsep_stage_settings *settings)
+{
+    return stage_lay_out(&(hsep_stage){0}, n_modes, settings);
+}
 
-HSEP_API int hsep_stage_valid(const void *block, uint64_t n_modes)
+HSEP_API int hsep_stage_valid(const void *block, uint64_t n_modes, const hsep_stage_settings *settings)
 {
     hsep_stage got;
     memcpy(&got, block, sizeof got);
-    (void)stage_lay_out(&got, n_modes); /* changes nothing where it is sound */
-    return memcmp(&got, block, sizeof got) == 0 && hsep_clock_valid(&got.clock);
+    (void)stage_lay_out(&got, n_modes, settings); /* changes nothing where it is sound */
+    return memcmp(&got, block, sizeof got) == 0 && hsep_clock_valid(&got.clock) &&
+           (got.oldest < got.n_line || got.oldest == 0);
 }
 
 HSEP_API void hsep_stage_init(
-    hsep_stage *self, const hsep_mode modes[], uint64_t n_modes, double f, double kappa, hsep_friction_on friction_on,
-    double T_s, double start)
+    hsep_stage *self, const hsep_mode modes[], uint64_t n_modes, const hsep_stage_settings *settings, double T_s,
+    double start)
 {
-    self->f = f;
-    self->kappa = kappa;
-    self->friction_on = (uint64_t)friction_on;
     self->friction_gain = 0.0;
     self->start = start;
-    self->last_x_d = self->v_d = self->v = 0.0;
+    self->acting = self->last_x_d = self->v_d = self->v = 0.0;
+    self->oldest = 0;
     (void)hsep_clock_init(&self->clock, 0.0, T_s);
-    (void)stage_lay_out(self, n_modes);
+    (void)stage_lay_out(self, n_modes, settings);
     hsep_stage_mode *stage = (hsep_stage_mode *)hsep_at(self, self->modes);
     for (uint64_t i = 0; i < n_modes; i++) {
         const double omega = plant_two_pi * modes[i].f_n;
@@ -124,8 +131,9 @@ HSEP_API void hsep_stage_init(
         stage[i].beta = modes[i].beta;
         self->friction_gain += modes[i].beta;
     }
-    self->friction_gain *= f;
+    self->friction_gain *= settings->f;
     memset(hsep_at(self, self->z), 0, (size_t)(2 * n_modes) * sizeof(double));
+    memset(hsep_at(self, self->line), 0, (size_t)self->n_line * sizeof(double));
 }
 
 /* sum alpha z + beta z' over the modes, z: (2 n_modes,). */
@@ -145,33 +153,42 @@ static void plant_stage_slope(const hsep_stage *s, const double z[], double dist
 {
     const hsep_stage_mode *mode = stage_modes(s);
     const double x = plant_position(s, z);
-    const double u = disturbed - s->kappa * x * fabs(x);
+    const double u = disturbed - s->settings.kappa * x * fabs(x);
     for (uint64_t i = 0; i < s->n_modes; i++) {
         /* z'' + 2 zeta omega z' + omega^2 z = u, eq. (15) */
         slope[2 * i] = z[2 * i + 1];
         slope[2 * i + 1] = u - mode[i].two_zeta_omega * z[2 * i + 1] - mode[i].omega2 * z[2 * i];
     }
-    if (s->friction_on == HSEP_FRICTION_MOTION) {
-        v = hsep_friction_velocity(plant_position(s, slope), s->friction_gain, plant_friction_velocity, v);
-        const double friction = s->f * tanh(v / plant_friction_velocity);
+    if (s->settings.friction_on == HSEP_FRICTION_MOTION) {
+        v = hsep_friction_velocity(plant_position(s, slope), s->friction_gain, s->settings.v_friction, v);
+        const double friction = s->settings.f * tanh(v / s->settings.v_friction);
         for (uint64_t i = 0; i < s->n_modes; i++) {
             slope[2 * i + 1] -= friction;
         }
     }
 }
 
-/* The command after the carriage's friction, d = f tanh(v_d / 2 mm/s), if it is that of the commanded velocity. */
+/* The command after the carriage's friction, d = f tanh(v_d / v_friction), if it is that of the commanded velocity. */
 static double plant_disturbed(const hsep_stage *s, double r, double v_d)
 {
-    return s->friction_on == HSEP_FRICTION_COMMAND ? r - s->f * tanh(v_d / plant_friction_velocity) : r;
+    const hsep_stage_settings *of = &s->settings;
+    return of->friction_on == HSEP_FRICTION_COMMAND ? r - of->f * tanh(v_d / of->v_friction) : r;
 }
 
-/* One Runge-Kutta step of z, (size,), with three more vectors of work space behind it. *v, m/s: a velocity shortly
- * before; that at its beginning. */
-static void plant_stage_internal_step(const hsep_stage *s, double z[], double disturbed, double dt, double *v)
+/* The velocity, m/s, with which the command goes on between two instants. */
+static double plant_going_on(const hsep_stage *s, double v_d)
+{
+    return s->settings.input_hold == HSEP_FIRST_ORDER_HOLD ? v_d : 0.0;
+}
+
+/* One Runge-Kutta step of z, (size,), with three more vectors of work space behind it, under a command that goes on by
+ * rate, m/s. *v, m/s: a velocity shortly before; that at its beginning. */
+static void plant_stage_internal_step(
+    const hsep_stage *s, double z[], double disturbed, double rate, double dt, double *v)
 {
     static const double weight[4] = {1.0, 2.0, 2.0, 1.0};
     const double reach[4] = {dt / 2.0, dt / 2.0, dt, 0.0}; /* from z to where the next slope is taken */
+    const double time[4] = {0.0, dt / 2.0, dt / 2.0, dt};
     const uint64_t size = 2 * s->n_modes;
     double *slope = z + size, *at = slope + size, *sum = at + size;
     for (uint64_t i = 0; i < size; i++) {
@@ -179,7 +196,7 @@ static void plant_stage_internal_step(const hsep_stage *s, double z[], double di
         sum[i] = 0.0;
     }
     for (int stage = 0; stage < 4; stage++) {
-        plant_stage_slope(s, at, disturbed, *v, slope);
+        plant_stage_slope(s, at, disturbed + rate * time[stage], *v, slope);
         if (stage == 0) {
             *v = plant_position(s, slope);
         }
@@ -203,35 +220,58 @@ HSEP_API double hsep_stage_rate(const hsep_stage *self)
     return rate;
 }
 
-/* Integrate z over time, s, with the command r, m from the start, and the commanded velocity v_d held; *v, m/s, is a
- * velocity of the last internal step. */
-static void plant_stage_integrate(const hsep_stage *s, double z[], double r, double v_d, double time, double *v)
+/* Integrate z over time, s, from the command that acts, m from the start, with the commanded velocity v_d held; *v, m/s,
+ * is a velocity of the last internal step. */
+static void plant_stage_integrate(const hsep_stage *s, double z[], double acting, double v_d, double time, double *v)
 {
-    const double n = plant_internal_steps(time, hsep_stage_rate(s)), disturbed = plant_disturbed(s, r, v_d);
+    const double n = plant_internal_steps(time, hsep_stage_rate(s)), disturbed = plant_disturbed(s, acting, v_d);
+    const double dt = time / n, rate = plant_going_on(s, v_d);
     for (double i = 0.0; i < n; i += 1.0) {
-        plant_stage_internal_step(s, z, disturbed, time / n, v);
+        plant_stage_internal_step(s, z, disturbed + rate * (i * dt), rate, dt, v);
+    }
+}
+
+/* The command that leaves the dead time at instant i of a step with the command r, m from the start. */
+static double plant_leaving(const hsep_stage *s, int64_t i, double r)
+{
+    const double *line = hsep_at_const(s, s->line);
+    return (uint64_t)i < s->n_line ? line[(s->oldest + (uint64_t)i) % s->n_line] : r;
+}
+
+/* Take the command r, m from the start, into the dead time at n instants. */
+static void plant_enter(hsep_stage *s, int64_t n, double r)
+{
+    double *line = hsep_at(s, s->line);
+    for (uint64_t i = 0; i < (uint64_t)n && i < s->n_line; i++) {
+        line[s->oldest] = r;
+        s->oldest = (s->oldest + 1) % s->n_line;
     }
 }
 
 HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work[])
 {
     const double r = x_d - self->start;
+    const int foh = self->settings.input_hold == HSEP_FIRST_ORDER_HOLD, late = self->settings.dead_time > 0;
+    double acting = foh || late ? self->acting : r;
     double last_x_d = self->last_x_d, v_d = self->v_d, v = self->v, done = 0.0;
     const size_t z_size = (size_t)(2 * self->n_modes) * sizeof(double);
     double *z = work, *slope = work + 2 * self->n_modes;
     hsep_clock_step step;
     (void)hsep_clock_count(&self->clock, self->clock.end, h, &step);
     memcpy(z, hsep_at(self, self->z), z_size);
-    /* v_d is updated at the sampling instants, whatever the step size. */
+    /* The command is sampled, and v_d updated, at the sampling instants, whatever the step size. */
     for (int64_t i = 0; i <= step.n_latched; i++) {
         const double next = i < step.n_latched ? fmax(done, step.first + (double)i * self->clock.T_s) : h;
         if (next > done) {
-            plant_stage_integrate(self, z, r, v_d, next - done, &v);
+            plant_stage_integrate(self, z, acting, v_d, next - done, &v);
+            acting += plant_going_on(self, v_d) * (next - done);
             done = next;
         }
         if (i < step.n_latched) {
-            v_d = (r - last_x_d) / self->clock.T_s;
-            last_x_d = r;
+            const double left = plant_leaving(self, i, r);
+            v_d = (left - last_x_d) / self->clock.T_s;
+            acting = foh && late ? last_x_d : left;
+            last_x_d = left;
         }
     }
     for (uint64_t i = 0; i < 2 * self->n_modes; i++) {
@@ -239,9 +279,11 @@ HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work
             return 0;
         }
     }
-    plant_stage_slope(self, z, plant_disturbed(self, r, v_d), v, slope);
+    plant_stage_slope(self, z, plant_disturbed(self, acting, v_d), v, slope);
     self->v = plant_position(self, slope);
     memcpy(hsep_at(self, self->z), z, z_size);
+    plant_enter(self, step.n_latched, r);
+    self->acting = acting;
     self->last_x_d = last_x_d;
     self->v_d = v_d;
     self->clock = step.after;

@@ -52,36 +52,52 @@ typedef struct {
 /* Velocity of the stage's friction: the commanded one, the backward difference of x_d over T_s, or the actual one. */
 typedef enum { HSEP_FRICTION_COMMAND = 0, HSEP_FRICTION_MOTION = 1 } hsep_friction_on;
 
-/* x = G_pb (x_d - d) with d = f tanh(v_f / 2 mm/s) + kappa x|x|; v_f is the velocity of the friction. */
+/* What a stage is besides its modes. */
 typedef struct {
     double f, kappa;      /* m, 1/m */
+    double v_friction;    /* m/s, > 0, over which the friction changes sign */
     uint64_t friction_on; /* hsep_friction_on */
+    uint64_t dead_time;   /* samples */
+    uint64_t input_hold;  /* hsep_input_hold */
+} hsep_stage_settings;
+
+/* x = G_pb (x_d - d) with d = f tanh(v_f / v_friction) + kappa x|x|; v_f is the velocity of the friction. Without a dead
+ * time and held, a command acts at once; else it is sampled at the instants. A first-order hold goes from the command
+ * before to that of now while there is a dead time, one sample of which this takes; without one it goes on as it came. */
+typedef struct {
+    hsep_stage_settings settings;
     double friction_gain; /* m/s, velocity that the whole friction takes away at once, f sum beta */
     double start;         /* position of rest, m */
     hsep_clock clock;     /* of the instants at which the command is sampled, from the reset */
-    double last_x_d, v_d; /* m from start, at the last instant; m/s */
+    double acting;        /* m from start, command that acts now */
+    double last_x_d, v_d; /* m from start, command of the last instant behind the dead time; m/s */
     double v;             /* m/s */
     uint64_t n_modes;
+    uint64_t n_line, oldest; /* commands on their way through the dead time; place of the oldest */
     /* Offsets in doubles from the beginning of the struct */
     uint64_t modes; /* hsep_stage_mode[n_modes] */
     uint64_t z;     /* (2 n_modes,) z and z' of each, m s^2 and m s */
+    uint64_t line;  /* (n_line,) m from start */
 } hsep_stage;
 
 HSEP_ASSERT_WORDS(hsep_feed_drive, 9);
 HSEP_ASSERT_WORDS(hsep_stage_mode, 4);
-HSEP_ASSERT_WORDS(hsep_stage, 18);
+HSEP_ASSERT_WORDS(hsep_stage_settings, 6);
+HSEP_ASSERT_WORDS(hsep_stage, 23);
 
 #define HSEP_STAGE_WORK 8 /* doubles of work space for each mode */
 
-HSEP_API double hsep_stage_size(uint64_t n_modes); /* bytes of the block, counted in double */
+/* Bytes of the block, counted in double. */
+HSEP_API double hsep_stage_size(uint64_t n_modes, const hsep_stage_settings *settings);
 
-/* Whether a block, in any alignment, is one that hsep_stage_init with so many modes began, with a valid clock. */
-HSEP_API int hsep_stage_valid(const void *block, uint64_t n_modes);
+/* Whether a block, in any alignment, is one that hsep_stage_init with so many modes and these settings began, with a
+ * valid clock. */
+HSEP_API int hsep_stage_valid(const void *block, uint64_t n_modes, const hsep_stage_settings *settings);
 
 /* Reset the stage to rest at start, m. modes: (n_modes,). */
 HSEP_API void hsep_stage_init(
-    hsep_stage *self, const hsep_mode modes[], uint64_t n_modes, double f, double kappa, hsep_friction_on friction_on,
-    double T_s, double start);
+    hsep_stage *self, const hsep_mode modes[], uint64_t n_modes, const hsep_stage_settings *settings, double T_s,
+    double start);
 
 /* Advance by h, s, at most hsep_plant_step_max, with the command x_d, m, held. work: (HSEP_STAGE_WORK n_modes,).
  * Fails, and returns 0 with the state unchanged, if the state overflows. */

@@ -2,17 +2,20 @@
 
 #include <math.h>
 
-static const double clock_tolerance = 1e-6;    /* of T_s */
-static const double clock_spacings = 8.0;      /* of doubles at t: a few roundings of the importer's arithmetic */
+static const double clock_tolerance = 0.05; /* of T_s: importers' times may be whole nanoseconds or single precision */
+static const double clock_noticed = 1e-3;   /* of T_s: deviations beyond it are warned of */
+static const double clock_spacings = 8.0;   /* of doubles at t: a few roundings of the importer's arithmetic */
 static const double clock_split = 134217729.0; /* 2^27 + 1, splits a double into two halves (Veltkamp 1968) */
 static const double clock_samples_max = 9007199254740992.0; /* 2^53: counted exactly in a double */
 
 static double clock_resolution(double t) { return clock_spacings * (nextafter(fabs(t), HUGE_VAL) - fabs(t)); }
 
-/* delta at t, s; T_s / 4 at times so large that doubles no longer resolve it. */
-static double clock_delta(const hsep_clock *self, double t)
+/* delta at the end of a step by h to t, s; T_s / 4 at times so large that doubles no longer resolve it. Of several
+ * points the nearest counts. */
+static double clock_delta(const hsep_clock *self, double t, double h)
 {
-    return fmin(fmax(clock_tolerance * self->T_s, clock_resolution(t)), 0.25 * self->T_s);
+    const double delta = fmax(clock_tolerance * self->T_s, clock_resolution(t));
+    return fmin(fmin(delta, 0.25 * self->T_s), 0.5 * h);
 }
 
 /* Compensated sum since + carry + time: Knuth's two-sum, then renormalised. */
@@ -35,36 +38,46 @@ static void clock_take(hsep_clock *self, double n)
 
 HSEP_API int hsep_clock_init(hsep_clock *self, double start, double T_s)
 {
-    *self = (hsep_clock){.start = start, .T_s = T_s, .end = start};
+    *self = (hsep_clock){.T_s = T_s, .end = start};
     return clock_resolution(start) <= 0.25 * T_s;
 }
+
+HSEP_API int hsep_clock_follows(double end, double t, double tolerance)
+{
+    return fabs(t - end) <= fmax(tolerance, clock_resolution(t));
+}
+
+HSEP_API int hsep_clock_latched(const hsep_clock *self) { return self->since > 0.0; }
 
 HSEP_API int hsep_clock_count(const hsep_clock *self, double t, double h, hsep_clock_step *step)
 {
     *step = (hsep_clock_step){.after = *self};
-    if (!(fabs(t - self->end) <= fmax(0.5 * self->T_s, clock_resolution(t)))) {
+    if (!hsep_clock_follows(self->end, t, 0.5 * self->T_s)) {
         return 0;
     }
     hsep_clock *after = &step->after;
+    const int latched = hsep_clock_latched(self);
     clock_add(after, h);
     after->end = t + h;
-    const double now = self->start + ((double)self->k * self->T_s + after->since);
-    const double delta = clock_delta(self, now);
+    const double delta = clock_delta(self, after->end, h);
     clock_take(after, floor((after->since + delta) / self->T_s));
     if (after->since < -delta) { /* the quotient was rounded up to the next instant */
         clock_take(after, -1.0);
     }
-    after->latched = after->since > delta; /* an instant within delta of the end belongs to the next step */
     step->n_samples = after->k - self->k;
-    step->n_latched = step->n_samples + after->latched - self->latched;
-    step->first = (self->latched ? self->T_s : 0.0) - self->since;
-    step->inside = step->n_latched > 1 - self->latched; /* t_k, where it is not read yet, is the step's start */
+    if (step->n_samples > 0 && after->since <= delta) { /* the instant is at this point, and belongs to the next step */
+        step->moved = after->since;
+        step->noticed = fabs(step->moved) > clock_noticed * self->T_s;
+        after->since = after->carry = 0.0;
+    }
+    step->n_latched = step->n_samples + hsep_clock_latched(after) - latched;
+    step->first = latched ? self->T_s - self->since : 0.0;
+    step->inside = step->n_latched > 1 - latched; /* where it is not read yet, the last instant is the step's start */
     return 1;
 }
 
 HSEP_API int hsep_clock_valid(const hsep_clock *self)
 {
-    return isfinite(self->start) && self->T_s > 0.0 && isfinite(self->T_s) && self->k >= 0 &&
-           (double)self->k < clock_samples_max && fabs(self->since) <= self->T_s &&
-           fabs(self->carry) <= fabs(self->since) && isfinite(self->end) && (self->latched == 0 || self->latched == 1);
+    return self->T_s > 0.0 && isfinite(self->T_s) && self->k >= 0 && (double)self->k < clock_samples_max &&
+           self->since >= 0.0 && self->since <= self->T_s && fabs(self->carry) <= self->since && isfinite(self->end);
 }

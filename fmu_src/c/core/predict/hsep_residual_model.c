@@ -140,7 +140,6 @@ HSEP_API void hsep_residual_signal(hsep_residual_model *self, hsep_uncertainty_s
     hsep_trusted *trusted = hsep_residual_trusted(self);
     if (trusted != NULL) {
         signals->variance = hsep_at(trusted, trusted->variance) + (trusted->n - self->n);
-        signals->doubt = hsep_guard_doubt(&trusted->guard, trusted->scale.largest);
     }
 }
 

@@ -9,17 +9,17 @@
 #define HSEP_PREDICTOR_SETTINGS(SETTING) \
     /* samples in a look-ahead window */ \
     SETTING(uint64_t, Np) \
-    /* past residuals e_pb in the features */ \
+    /* number of past residuals e_pb (measured minus physics-based position) among the features */ \
     SETTING(uint64_t, p) \
-    /* past physics-based predictions x_pb in the features */ \
+    /* number of past physics-based predictions x_pb among the features */ \
     SETTING(uint64_t, q) \
-    /* ridge penalty on the weights, m2 */ \
+    /* ridge penalty on the weights of the residual model, m2 */ \
     SETTING(double, lambda) \
-    /* sampling interval, s */ \
+    /* sampling interval of command and measurement, s */ \
     SETTING(double, T_s) \
-    /* warm-up: until then x_h = x_pb, while learning goes on, s */ \
+    /* warm-up: until then the prediction x_h is the physics-based x_pb, while learning goes on, s */ \
     SETTING(double, t_init) \
-    /* how x_d runs between samples, zero-order or first-order hold: 0 zoh, 1 foh */ \
+    /* how the command x_d runs between samples, zero-order or first-order hold: 0 zoh, 1 foh */ \
     SETTING(uint64_t, input_hold) \
     /* whole samples by which the measured position is late */ \
     SETTING(uint64_t, measurement_delay) \
@@ -39,11 +39,11 @@
     SETTING(double, period)
 
 #define HSEP_COMPENSATOR_SETTINGS(SETTING) \
-    /* samples planned ahead, at least Np + 4 spacing + 3 */ \
+    /* samples of the command that are planned ahead, at least Np + 4 spacing + 3 */ \
     SETTING(uint64_t, preview) \
-    /* samples between the knots of the change, a divisor of Np */ \
+    /* samples between the knots of the spline that changes the command, a divisor of Np */ \
     SETTING(uint64_t, spacing) \
-    /* weight of the change's jerk against the tracking error */ \
+    /* weight of the jerk of the command's change against the tracking error */ \
     SETTING(double, jerk_weight) \
     /* largest velocity of the modified command, m/s */ \
     SETTING(double, v_max) \
@@ -53,7 +53,7 @@
     SETTING(double, j_max) \
     /* largest change of the command, m */ \
     SETTING(double, change_max) \
-    /* whether x_dm never turns while the commanded position moves */ \
+    /* whether the modified command never turns while the commanded position moves */ \
     SETTING(uint64_t, no_reversal) \
     /* best model to compensate with: 0 off, 1 physics, 2 hybrid */ \
     SETTING(uint64_t, compensate)

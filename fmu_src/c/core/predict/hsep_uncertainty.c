@@ -81,7 +81,7 @@ HSEP_API int hsep_uncertainty_valid(const void *block, uint64_t Np, uint64_t n)
     hsep_uncertainty got;
     memcpy(&got, block, sizeof got);
     (void)uncertainty_lay_out(&got, Np, n); /* changes nothing where it is sound */
-    return memcmp(&got, block, sizeof got) == 0 && hsep_uncertainty_sound(&got) && got.in_doubt <= 1;
+    return memcmp(&got, block, sizeof got) == 0 && hsep_uncertainty_sound(&got);
 }
 
 HSEP_API double *hsep_uncertainty_learned(hsep_uncertainty *self) { return self->theta; }
@@ -144,7 +144,6 @@ HSEP_API void hsep_uncertainty_predict(
     if (first == 0) {
         memset(felt, 0, sizeof self->felt);
         self->last = signals->e_h[n];
-        self->in_doubt = signals->doubt.kind != HSEP_NO_DOUBT;
     }
     for (uint64_t k = first; k < last; k++) { /* in time, from the last measured sample on */
         published[n - 1 - k] = k < signals->n_physics ? 0.0 : signals->e_h[n - 1 - k];
@@ -156,13 +155,7 @@ HSEP_API void hsep_uncertainty_predict(
             f[place] = felt[place];
         }
         const double c = self->factor * pow(self->ratio, uncertainty_from_middle(self, k));
-        double deviation = c * sqrt(uncertainty_variance(self, f));
-        if (self->in_doubt) {
-            const double x_pb = signals->doubt.kind == HSEP_STANDS ? signals->x_pb[n - 1 - k] : 0.0;
-            const double otherwise = uncertainty_square(signals->doubt.value - x_pb - published[n - 1 - k]);
-            deviation = sqrt(deviation * deviation + otherwise);
-        }
-        std[n - 1 - k] = fmin(deviation, HSEP_PREDICTION_MAX);
+        std[n - 1 - k] = fmin(c * sqrt(uncertainty_variance(self, f)), HSEP_PREDICTION_MAX);
     }
 }
 
@@ -237,7 +230,7 @@ HSEP_API void hsep_uncertainty_learn(hsep_uncertainty *self, const double e[], c
             uncertainty_add(&sums, e[j], e[j] - e_h[j], std[j], uncertainty_from_middle(self, self->Np - 1 - j));
         }
     }
-    if (self->in_doubt || !(sums.squares > 0.0)) { /* nothing to learn a scale from */
+    if (!(sums.squares > 0.0)) { /* nothing to learn a scale from */
         return;
     }
     uncertainty_follow(self, &sums);

@@ -15,7 +15,6 @@
 #define HSEP_UNCERTAINTY_H
 
 #include "hsep_api.h"
-#include "hsep_guard.h"
 #include "hsep_layout.h"
 
 #include <stdint.h>
@@ -31,7 +30,6 @@ typedef struct {
     double ratio;                       /* c at its end relative to that at its beginning */
     double recent;                      /* m2, recent mean square of the residual; 0 before the first window */
     uint64_t n;                         /* samples that are predicted */
-    uint64_t in_doubt;                  /* whether the guard doubted them */
     double last;                        /* m, last measured residual before them */
     double felt[HSEP_N_COMPONENTS];     /* m2, averages of what is felt for a while, up to the last one of them */
     /* Offsets in doubles from the beginning of the struct */
@@ -40,7 +38,7 @@ typedef struct {
     uint64_t std;        /* (n,) m, standard deviation of the error */
 } hsep_uncertainty;
 
-HSEP_ASSERT_WORDS(hsep_uncertainty, 7 + HSEP_N_COMPONENTS + HSEP_N_UNCERTAINTY);
+HSEP_ASSERT_WORDS(hsep_uncertainty, 6 + HSEP_N_COMPONENTS + HSEP_N_UNCERTAINTY);
 
 /* Bytes of the block, counted in double so that no size can overflow. */
 HSEP_API double hsep_uncertainty_size(uint64_t Np, uint64_t n);
@@ -65,7 +63,6 @@ typedef struct {
     const double *e_h;      /* (n + 1,) m, predicted residual, behind it the last measured one */
     uint64_t n_physics;     /* leading samples where it is not published */
     const double *variance; /* (n,) m2, what the residual model knows of its error, or NULL */
-    hsep_doubt doubt;       /* what the guard doubts; the same in all calls for a window */
 } hsep_uncertainty_signals;
 
 /* Predict the errors of samples first ... last - 1; first is 0, or where the last call ended. The first samples are at

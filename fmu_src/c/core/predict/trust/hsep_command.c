@@ -2,13 +2,9 @@
 
 #include "hsep_trust_constants.h"
 
+#include <math.h>
 #include <stddef.h>
 #include <string.h>
-
-HSEP_API uint64_t hsep_command_lags(uint64_t p)
-{
-    return p < HSEP_TRUST_LAGS_OF_COMMAND ? p : HSEP_TRUST_LAGS_OF_COMMAND;
-}
 
 /* Set what follows from the parameters; return the bytes of the block. */
 static double command_lay_out(hsep_command *self, const hsep_predictor_settings *settings, uint64_t n)
@@ -16,7 +12,7 @@ static double command_lay_out(hsep_command *self, const hsep_predictor_settings 
     double end = HSEP_WORDS(hsep_command);
     self->n = n;
     self->dead_time = settings->dead_time;
-    self->p = hsep_command_lags(settings->p);
+    self->p = HSEP_TRUST_LAGS_OF_COMMAND;
     self->count = self->p + 2;
     self->n_before = settings->dead_time + self->p + 1;
     self->commands = hsep_take(&end, (double)n + (double)settings->dead_time + (double)self->p + 1.0);
@@ -41,6 +37,11 @@ HSEP_API int hsep_command_valid(const void *block, const hsep_predictor_settings
     memcpy(&got, block, sizeof got);
     (void)command_lay_out(&got, settings, n); /* changes nothing where it is sound */
     return memcmp(&got, block, sizeof got) == 0;
+}
+
+HSEP_API double hsep_command_share(const hsep_command *self, uint64_t feature)
+{
+    return feature > 0 ? sqrt(pow(HSEP_TRUST_LAST_LAG, (double)(feature - 1) / (double)self->p)) : 1.0;
 }
 
 HSEP_API void hsep_command_take(hsep_command *self, const double x_d[], uint64_t m)

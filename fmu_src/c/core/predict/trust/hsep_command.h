@@ -18,7 +18,7 @@
 typedef struct {
     uint64_t n;         /* samples of a prediction */
     uint64_t dead_time; /* samples */
-    uint64_t p;         /* lags, and increments after the first: those of the settings, as far as they are used */
+    uint64_t p;         /* lags, and increments after the first, whatever those of the settings are */
     uint64_t count;     /* features without lags, p + 2 */
     uint64_t n_before;  /* commands before a window that its features need */
     /* Offsets in doubles from the beginning of the struct */
@@ -29,9 +29,6 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_command, 7);
 
-/* Lags of the command's expert, where p is the largest one of the settings. */
-HSEP_API uint64_t hsep_command_lags(uint64_t p);
-
 /* Bytes of the block, counted in double so that no size can overflow; n: samples of a prediction. */
 HSEP_API double hsep_command_size(const hsep_predictor_settings *settings, uint64_t n);
 
@@ -40,6 +37,9 @@ HSEP_API void hsep_command_init(hsep_command *self, const hsep_predictor_setting
 
 /* Whether a block, in any alignment, is one that hsep_command_init with these parameters began. */
 HSEP_API int hsep_command_valid(const void *block, const hsep_predictor_settings *settings, uint64_t n);
+
+/* Effect that a feature may have, relative to the largest: an old increment explains less than a recent one. */
+HSEP_API double hsep_command_share(const hsep_command *self, uint64_t feature);
 
 /* Take in the commands of the m samples that come next, (m,), m, m <= n, and fill their rows; may be tried again with
  * others. */

@@ -14,12 +14,13 @@
 #define HSEP_TRUST_FIRST_LAGGED 0.5
 #define HSEP_TRUST_FIRST_STATIC 0.5
 
-/* Most lags of the command's expert, and of its increments: with 50 instead of 20 errors are 2 % less on drives of
- * modes, 8 % more on those of two masses, and a third less where the physics model is bad; more than 36 cost more
- * than four million instructions in the dearest sample. */
+/* Lags of the command's expert, and of its increments, which may reach beyond the window before: with 50 instead of
+ * 20 errors are 2 % less on drives of modes, 8 % more on those of two masses, and a third less where the physics
+ * model is bad; more than 36 cost more than four million instructions in the dearest sample. */
 #define HSEP_TRUST_LAGS_OF_COMMAND 36
 
-/* Prior variance of the weight of the last lag, relative to that of the first: the residual's memory fades. */
+/* Prior variance of the weight of the last lag, and of the command's last increment, relative to that of the first:
+ * memory fades. Without it for the increments a CNC axis that outgrows them has three times the error. */
 #define HSEP_TRUST_LAST_LAG 0.005
 
 /* Bound on the least variance of the noise relative to the largest mean square of a window: a larger lambda would
@@ -67,34 +68,12 @@
 /* Effect of a disturbance's first difference relative to its own: it only corrects the timing. */
 #define HSEP_TRUST_DIFFERENCE_SHARE 0.03
 
-/* Plausible deviation of a measurement: in mean deviations, in steps of the sensor's resolution, and relative to the
- * largest residual and to the predicted motion of a sample. */
-#define HSEP_TRUST_SPREADS 12.0
-#define HSEP_TRUST_RESOLUTION 3.0
-#define HSEP_TRUST_SMALL 0.01
-#define HSEP_TRUST_RIPPLE 0.1
+/* Largest residual that is believed: relative to the largest so far, and in steps of the fastest motion of the
+ * physics model so far on top of it. */
+#define HSEP_TRUST_REACH_RESIDUALS 2.0
+#define HSEP_TRUST_REACH_STEPS 2.0
 
-/* Plausible change of the residual from sample to sample, relative to the predicted motion or the vibration. */
-#define HSEP_TRUST_PACE 2.0
-
-/* Median change of the residual from sample to sample that noise makes, in mean deviations: white noise 1.4. */
-#define HSEP_TRUST_VIBRATION_NOISE 2.0
-
-/* Motion under which an axis is believed to stand, relative to the largest under which it has stood by itself: with
- * 2 two servos with stiction have 1.4 and 2 times the error. */
-#define HSEP_TRUST_STOOD_MORE 5.0
-
-/* Bound on that motion, relative to the largest residual so far: without, the stuck sensor of a drive that had stood
- * at a reversal was believed, with 2.9 times the physics model's error after it. */
-#define HSEP_TRUST_STOOD_RESIDUAL 4.0
-
-/* Time, s, after which another level is believed, two windows at least, and the first time, after which an axis that
- * stands is: an encoder may be held for half a second. */
-#define HSEP_TRUST_PATIENCE 0.05
-#define HSEP_TRUST_PATIENCE_STANDING 0.6
-
-/* Rates at which the mean deviation follows that of a window; the vibration rises at once, and falls as it does. */
-#define HSEP_TRUST_RISE 0.5
-#define HSEP_TRUST_FALL 0.02
+/* Time, s, after which a value beyond it is believed: a sensor may read zero for half a second. */
+#define HSEP_TRUST_PATIENCE 1.0
 
 #endif

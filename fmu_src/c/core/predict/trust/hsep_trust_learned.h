@@ -1,5 +1,5 @@
 /* Least and most of what the residual model with trust has learned, generated from
- * hybridsep/predict/trust/learned.py; the sensor's are those of its guard. */
+ * hybridsep/predict/trust/learned.py. */
 #ifndef HSEP_TRUST_LEARNED_H
 #define HSEP_TRUST_LEARNED_H
 

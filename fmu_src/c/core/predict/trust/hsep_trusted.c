@@ -94,6 +94,7 @@ HSEP_API void hsep_trusted_restart(hsep_trusted *self)
     trusted_begin_run(self, HSEP_OF_COMMAND);
     const hsep_expert_place leading = hsep_stack_leader(&self->stack);
     hsep_trusted_lead(self, leading);
+    self->reach.n_missing = self->reach.n_beyond = 0;
     hsep_stack_forget(&self->stack, HSEP_DOUBTING);
     if (hsep_trusted_doubts(self)) {
         trusted_set_noise(self, HSEP_DOUBTING, hsep_trusted_expert(self, leading));
@@ -144,7 +145,7 @@ static void trusted_of_command(hsep_trusted *self, const double x_pb[], const do
  * lags that stand for samples without a measurement are not. */
 static uint64_t trusted_learned_rows(const hsep_trusted *self, double learned[])
 {
-    const double *learnable = hsep_at_const(self, self->learnable);
+    const double *accepted = hsep_at_const(self, self->accepted);
     const double *bridged = hsep_at_const(self, self->bridged);
     double n_bridged = 0.0; /* among the lags of the row */
     uint64_t count = 0;
@@ -152,7 +153,7 @@ static uint64_t trusted_learned_rows(const hsep_trusted *self, double learned[])
         n_bridged += bridged[self->Np + i];
     }
     for (uint64_t j = self->Np; j-- > 0;) {
-        learned[j] = learnable[j] > 0.0 && n_bridged <= trusted_bridged;
+        learned[j] = accepted[j] > 0.0 && n_bridged <= trusted_bridged;
         count += learned[j] > 0.0;
         n_bridged += bridged[j] - bridged[j + self->p];
     }
@@ -196,7 +197,7 @@ static void trusted_fold_window(hsep_trusted *self, const double e[])
 /* Update the weights of the stack with the samples that were published, of those accepted. */
 static void trusted_judge_stack(hsep_trusted *self, const double e[])
 {
-    const double *learnable = hsep_at(self, self->learnable);
+    const double *accepted = hsep_at(self, self->accepted);
     const uint64_t first = self->late < self->Np ? self->late : 0;
     double products[HSEP_N_EXPERTS + 1][HSEP_N_EXPERTS + 1] = {{0.0}}, n = 0.0;
     for (uint64_t j = 0; j < self->Np - first; j++) {
@@ -205,12 +206,12 @@ static void trusted_judge_stack(hsep_trusted *self, const double e[])
             of_sample[i] = hsep_trusted_stacked(self, (hsep_expert_place)i, self->n - self->Np + j);
         }
         of_sample[HSEP_N_EXPERTS] = e[j];
-        for (int i = 0; learnable[j] > 0.0 && i <= HSEP_N_EXPERTS; i++) {
+        for (int i = 0; accepted[j] > 0.0 && i <= HSEP_N_EXPERTS; i++) {
             for (int l = 0; l <= HSEP_N_EXPERTS; l++) {
                 products[i][l] += of_sample[i] * of_sample[l];
             }
         }
-        n += learnable[j];
+        n += accepted[j];
     }
     if (n > 0.0) {
         hsep_stack_update(&self->stack, products, n, self->least_variance);
@@ -230,12 +231,12 @@ static void trusted_forget_earlier_runs(hsep_trusted *self)
 /* Judge the experts and their stack by the measurement of their window, of which count samples are learned. */
 static void trusted_judge(hsep_trusted *self, const double e[], double count)
 {
-    const double *learnable = hsep_at(self, self->learnable), *e_0 = hsep_at(self, self->e_0);
+    const double *accepted = hsep_at(self, self->accepted), *e_0 = hsep_at(self, self->e_0);
     for (uint64_t i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
         if (self->predicted[i]) {
             hsep_expert_judge(
                 hsep_trusted_expert(self, (hsep_expert_place)i), hsep_trusted_is_of_command(self, i) ? e_0 : e,
-                learnable, self->given_variance);
+                accepted, self->given_variance);
         }
     }
     trusted_judge_stack(self, e);
@@ -247,8 +248,8 @@ static void trusted_judge(hsep_trusted *self, const double e[], double count)
             trusted_end_doubt(self);
         }
     }
-    hsep_residual_scale_follow(&self->scale, e, learnable, self->Np, count);
-    hsep_residual_scale_follow(&self->scale_of_command, e_0, learnable, self->Np, count);
+    hsep_residual_scale_follow(&self->scale, e, accepted, self->Np, count);
+    hsep_residual_scale_follow(&self->scale_of_command, e_0, accepted, self->Np, count);
 }
 
 HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const double x_d[], const double x_pb[])
@@ -290,45 +291,26 @@ static void trusted_take_rows(hsep_trusted *self, const double x_d[], const doub
         hsep_disturbances_command(disturbances, x_d, x_pb, self->Np, self->velocity_scale, rows);
     }
     hsep_disturbances_motion(disturbances, x_pb, x, self->Np, rows);
-    for (uint64_t k = 0; k < self->n_rest && k < self->Np; k++) { /* learned, but not used, at rest */
-        rows[k * self->n_static] = 1.0;
-    }
     hsep_disturbances_end(disturbances);
     hsep_command_take(hsep_trusted_command(self), x_d, self->Np);
     trusted_of_command(self, x_pb, e);
-}
-
-/* What a held sensor may show is followed, once it is believed, and not learned. Set which are; return how many.
- */
-static double trusted_leave_out_suspect(hsep_trusted *self)
-{
-    const double *accepted = hsep_at(self, self->accepted);
-    double *learnable = hsep_at(self, self->learnable), count = 0.0;
-    for (uint64_t j = 0; j < self->Np; j++) {
-        learnable[j] = accepted[j] > 0.0 && !(learnable[j] > 0.0) ? 1.0 : 0.0;
-        count += learnable[j];
-    }
-    return count;
 }
 
 HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_d[], const double x_pb[], double e[], int fold)
 {
     double *bridged = hsep_at(self, self->bridged), *e_0 = hsep_at(self, self->e_0);
     trusted_take_scales(self);
-    hsep_guard_accept(
-        &self->guard, hsep_at(self, self->measured), x_pb, self->Np, self->scale.largest, hsep_at(self, self->x),
-        hsep_at(self, self->accepted), hsep_at(self, self->learnable));
+    hsep_reach_judge(
+        &self->reach, hsep_at(self, self->measured), x_pb, hsep_trusted_disturbances(self)->before.x_pb[0], self->Np,
+        self->scale.largest, self->T_s, hsep_at(self, self->accepted));
     const double count = trusted_bridge(self, x_pb, e);
     self->n_rejected += self->Np - (uint64_t)count;
     trusted_take_rows(self, x_d, x_pb, e);
-    const double n_learnable = trusted_leave_out_suspect(self);
-    if (fold && n_learnable > 0.0) {
+    if (fold && count > 0.0) {
         trusted_fold_window(self, e);
-        trusted_judge(self, e, n_learnable);
+        trusted_judge(self, e, count);
     }
     hsep_command_end(hsep_trusted_command(self), self->Np);
-    self->at_rest = self->n_rest >= self->Np;
-    self->known_rest = self->n_rest > self->Np ? self->n_rest - self->Np : 0;
     memcpy(bridged + self->Np, bridged, (size_t)self->p * sizeof(double)); /* p <= Np: they do not overlap */
-    memcpy(e_0 + self->Np, e_0, (size_t)hsep_trusted_command(self)->p * sizeof(double));
+    memmove(e_0 + self->Np, e_0, (size_t)hsep_trusted_command(self)->p * sizeof(double));
 }

@@ -20,10 +20,10 @@
 #include "hsep_command.h"
 #include "hsep_disturbances.h"
 #include "hsep_expert.h"
-#include "hsep_guard.h"
 #include "hsep_layout.h"
 #include "hsep_penalised.h"
 #include "hsep_physics.h"
+#include "hsep_reach.h"
 #include "hsep_regression.h"
 #include "hsep_settings.h"
 #include "hsep_stack.h"
@@ -68,19 +68,15 @@ typedef struct {
     double growth;                      /* and by how much that of the command may be larger: as its largest step is */
     uint64_t predicted[HSEP_N_EXPERTS]; /* whether an expert knows something */
     uint64_t leading; /* expert that led when earlier runs ended, HSEP_LAGGED or HSEP_COMMAND: its counterpart doubts */
-    hsep_guard guard;
+    hsep_reach reach;
     uint64_t n_rejected; /* samples of this run that were not accepted */
-    uint64_t at_rest;    /* whether the command has not moved in this run yet, in what was learned, */
-    uint64_t known_rest; /* how many samples behind these are at rest as well (0 if it has), */
-    uint64_t n_rest;     /* and how many of those predicted, the first ones */
     /* Offsets in doubles from the beginning of the struct */
     uint64_t largest;          /* (n_static,) largest magnitudes of the features without lags */
     uint64_t forecast_largest; /* (n_static,) those with the window that is predicted */
     uint64_t scales;           /* (max(n_static, p of the command + 2),) prior standard deviations of weights, work */
     uint64_t x;                /* (n,) m, position */
     uint64_t measured;         /* (Np,) m, measured position, NaN where missing */
-    uint64_t accepted;         /* (Np,) whether it is plausible */
-    uint64_t learnable;        /* (Np,) whether it is learned: plausible, and not of a sensor that may be held */
+    uint64_t accepted;         /* (Np,) whether it is believed */
     uint64_t bridged;          /* (Np + p,) whether a residual stands for one that is not */
     uint64_t e_0;              /* (Np + p of the command,) m, residual of the command */
     uint64_t stacked;          /* (2, n) m, what the command's expert and the doubting one, where it is of the command,
@@ -97,7 +93,7 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(
     hsep_trusted,
-    42 + 4 * HSEP_N_EVIDENCE + 2 * HSEP_N_EXPERTS + (sizeof(hsep_stack) + sizeof(hsep_guard)) / sizeof(double));
+    38 + 4 * HSEP_N_EVIDENCE + 2 * HSEP_N_EXPERTS + (sizeof(hsep_stack) + sizeof(hsep_reach)) / sizeof(double));
 
 /* Features, those without lags first. */
 HSEP_API uint64_t hsep_trusted_n(const hsep_predictor_settings *settings, const hsep_trust_settings *trust);
@@ -163,7 +159,7 @@ HSEP_API void hsep_trusted_measure(hsep_trusted *self, uint64_t k, double x);
 HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const double x_d[], const double x_pb[]);
 
 /* Learn that window. x_d: its commands, (Np,), m; e: (Np + p,), m, becomes its residuals; where the measurement is not
- * plausible, between those beside it; behind it those before it; fold: whether it is learned, the next window starts
+ * believed, between those beside it; behind it those before it; fold: whether it is learned, the next window starts
  * from it in any case. Cost: that of hsep_block_fold with Np rows of physics, of command, and in a warm run of
  * doubt. */
 HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_d[], const double x_pb[], double e[], int fold);

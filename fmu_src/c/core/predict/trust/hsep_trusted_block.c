@@ -2,9 +2,9 @@
 #include "hsep_trusted.h"
 
 #include "hsep_range.h"
+#include "hsep_trust_constants.h"
 #include "hsep_trust_learned.h"
 
-#include <float.h>
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
@@ -39,7 +39,7 @@ HSEP_API uint64_t hsep_trusted_n(const hsep_predictor_settings *settings, const 
 /* Features of the rows of some evidence. */
 static uint64_t trusted_n_features(const hsep_trusted *self, uint64_t evidence)
 {
-    return evidence == HSEP_OF_COMMAND ? 2 * hsep_command_lags(self->p) + 2 : self->n_static + self->p;
+    return evidence == HSEP_OF_COMMAND ? 2 * HSEP_TRUST_LAGS_OF_COMMAND + 2 : self->n_static + self->p;
 }
 
 HSEP_API int hsep_trusted_is_of_command(const hsep_trusted *self, uint64_t expert)
@@ -50,7 +50,7 @@ HSEP_API int hsep_trusted_is_of_command(const hsep_trusted *self, uint64_t exper
 static hsep_expert_shape trusted_shape(const hsep_trusted *self, uint64_t expert)
 {
     const int of_command = hsep_trusted_is_of_command(self, expert);
-    const uint64_t p = of_command ? hsep_command_lags(self->p) : self->p;
+    const uint64_t p = of_command ? HSEP_TRUST_LAGS_OF_COMMAND : self->p;
     const uint64_t n_static = of_command ? p + 2 : self->n_static;
     return (hsep_expert_shape){self->Np, self->n, n_static, expert == HSEP_STATIC ? 0 : p};
 }
@@ -80,7 +80,7 @@ static double trusted_lay_out(hsep_trusted *self, const hsep_trusted_parameters 
     const hsep_predictor_settings *settings = parameters->settings;
     const hsep_trust_settings *trust = parameters->trust;
     const double Np = (double)settings->Np, n = (double)parameters->n, p = (double)settings->p;
-    const double p_of_command = (double)hsep_command_lags(settings->p);
+    const double p_of_command = (double)HSEP_TRUST_LAGS_OF_COMMAND;
     const double n_static = (double)hsep_disturbances_n(settings->q, trust->period);
     double end = HSEP_WORDS(hsep_trusted);
     self->Np = settings->Np;
@@ -99,7 +99,6 @@ static double trusted_lay_out(hsep_trusted *self, const hsep_trusted_parameters 
     self->x = hsep_take(&end, n);
     self->measured = hsep_take(&end, Np);
     self->accepted = hsep_take(&end, Np);
-    self->learnable = hsep_take(&end, Np);
     self->bridged = hsep_take(&end, Np + p);
     self->e_0 = hsep_take(&end, Np + p_of_command);
     self->stacked = hsep_take(&end, 2.0 * n);
@@ -133,10 +132,7 @@ HSEP_API void hsep_trusted_init(hsep_trusted *self, const hsep_trusted_parameter
     memset(self, 0, (size_t)hsep_trusted_size(parameters));
     (void)trusted_lay_out(self, parameters);
     self->leading = HSEP_LAGGED;
-    self->at_rest = 1;
-    self->known_rest = parameters->settings->measurement_delay;
     hsep_stack_init(&self->stack);
-    hsep_guard_init(&self->guard, self->Np, self->T_s);
     hsep_disturbances_init(
         hsep_trusted_disturbances(self), parameters->settings, parameters->trust->period, parameters->modes,
         parameters->n_modes, parameters->planned, start);
@@ -162,13 +158,9 @@ HSEP_API void hsep_trusted_lead(hsep_trusted *self, hsep_expert_place expert)
 HSEP_API int hsep_trusted_valid(const void *block, const hsep_trusted_parameters *parameters)
 {
     hsep_trusted got;
-    hsep_guard guard;
     memcpy(&got, block, sizeof got);
     (void)trusted_lay_out(&got, parameters); /* changes nothing where it is sound */
-    hsep_guard_init(&guard, got.Np, got.T_s);
     int sound = memcmp(&got, block, sizeof got) == 0 && (got.leading == HSEP_LAGGED || got.leading == HSEP_COMMAND) &&
-                got.at_rest <= 1 && got.known_rest <= got.n && got.n_rest <= got.n &&
-                got.guard.patience == guard.patience && got.guard.patience_standing == guard.patience_standing &&
                 hsep_disturbances_valid(
                     hsep_at_bytes(block, got.disturbances), parameters->settings, parameters->trust->period,
                     parameters->n_modes, parameters->planned) &&
@@ -194,7 +186,7 @@ typedef struct {
     double least, most;
 } trusted_part;
 
-#define TRUSTED_PARTS 24
+#define TRUSTED_PARTS 21
 
 /* What rounding may have added to the sum of the stack's weights. */
 static const double trusted_rounding = 1e-6;
@@ -207,6 +199,7 @@ static void trusted_list(hsep_trusted *self, trusted_part parts[TRUSTED_PARTS])
         {self->n_rows, HSEP_N_EVIDENCE, HSEP_LEARNED_N_ROWS},
         {&self->velocity_scale, 1, HSEP_LEARNED_MOTION},
         {&self->largest_step, 1, HSEP_LEARNED_MOTION},
+        {&self->reach.fastest, 1, HSEP_LEARNED_MOTION},
         {&self->scale.largest_square, 1, HSEP_LEARNED_SCALE},
         {&self->scale.largest, 1, HSEP_LEARNED_SCALE},
         {&self->scale_of_command.largest_square, 1, HSEP_LEARNED_SCALE_OF_COMMAND},
@@ -216,11 +209,7 @@ static void trusted_list(hsep_trusted *self, trusted_part parts[TRUSTED_PARTS])
         {stack->weights, HSEP_N_EXPERTS, HSEP_LEARNED_WEIGHTS},
         {stack->gram, HSEP_N_EXPERTS * HSEP_N_EXPERTS, HSEP_LEARNED_GRAM},
         {stack->cross, HSEP_N_EXPERTS, HSEP_LEARNED_CROSS},
-        {stack->evidence, 2, HSEP_LEARNED_EVIDENCE},
-        {&self->guard.spread, 1, -1.0, DBL_MAX},
-        {&self->guard.held.step, 1, 0.0, HUGE_VAL},
-        {&self->guard.vibration, 1, 0.0, DBL_MAX},
-        {&self->guard.stood, 1, 0.0, DBL_MAX}};
+        {stack->evidence, 2, HSEP_LEARNED_EVIDENCE}};
     memcpy(parts, before, sizeof before);
     parts += sizeof before / sizeof before[0];
     for (uint64_t i = HSEP_LAGGED; i < HSEP_N_EXPERTS; i++) {
@@ -257,10 +246,9 @@ HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i)
 HSEP_API int hsep_trusted_sound(hsep_trusted *self)
 {
     trusted_part parts[TRUSTED_PARTS];
-    const double spread = self->guard.spread;
     double sum = 0.0;
+    int sound = 1;
     trusted_list(self, parts);
-    int sound = self->guard.held.step > 0.0 && (spread == -1.0 || spread >= 0.0);
     for (int i = 0; i < TRUSTED_PARTS; i++) {
         for (uint64_t j = 0; j < parts[i].n; j++) { /* NaN is in no range */
             sound = sound && parts[i].first[j] >= parts[i].least && parts[i].first[j] <= parts[i].most;

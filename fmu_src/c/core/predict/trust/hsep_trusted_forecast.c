@@ -48,20 +48,6 @@ static int trusted_outgrown(hsep_trusted *self, const double x_d[], const double
     return outgrown;
 }
 
-/* How many of the next samples are before the first motion of the run. path: commands of the last n_path of them. */
-static uint64_t trusted_rest_ahead(const hsep_trusted *self, const double path[], uint64_t n_path)
-{
-    const uint64_t late = self->n - n_path;
-    uint64_t k = 0;
-    if (!self->at_rest || self->known_rest < late) {
-        return self->known_rest;
-    }
-    while (k < n_path && !(fabs(path[n_path - 1 - k]) > 0.0)) {
-        k++;
-    }
-    return late + k;
-}
-
 /* Largest magnitude of a feature of an expert, that of the window to predict included, and its share. */
 static double trusted_largest(hsep_trusted *self, hsep_expert_place expert, uint64_t feature)
 {
@@ -92,7 +78,8 @@ static void trusted_solve(hsep_trusted *self, hsep_expert_place place, const hse
     hsep_expert *expert = hsep_trusted_expert(self, place);
     double *scales = hsep_at(self, self->scales);
     for (uint64_t i = 0; i < expert->n_static; i++) {
-        const double share = of_command ? 1.0 : hsep_disturbances_share(hsep_trusted_disturbances(self), i);
+        const double share = of_command ? hsep_command_share(hsep_trusted_command(self), i)
+                                        : hsep_disturbances_share(hsep_trusted_disturbances(self), i);
         scales[i] = effect * share / fmax(trusted_largest(self, place, i), trusted_least);
     }
     const hsep_expert_evidence solved = {
@@ -151,7 +138,6 @@ static void trusted_scale(
             largest[i] = fmax(largest[i], fabs(rows[i]));
         }
     }
-    self->n_rest = trusted_rest_ahead(self, path != NULL ? path : x_d, path != NULL ? n_path : self->n);
     self->bound = HSEP_TRUST_BOUND * self->scale.largest;
     self->growth = trusted_growth(self);
     self->hold = fmin(fmax(last_residual, -self->bound), self->bound);
@@ -187,10 +173,6 @@ static void trusted_by_physics(hsep_trusted *self, const double x_pb[], const do
 {
     double *x = hsep_at(self, self->x), *rows = hsep_at(self, self->rows);
     hsep_expert *first = hsep_trusted_expert(self, HSEP_STATIC);
-    const uint64_t n_rest = hsep_trusted_doubts(self) ? self->n_rest : 0;
-    for (uint64_t k = 0; k < n_rest; k++) { /* the constant that earlier runs have trained is that of motion */
-        rows[k * self->n_static] = 0.0;
-    }
     hsep_expert_predict(first, rows, past, self->scale.largest_square, self->bound, varied > 0 ? self->n : 0);
     for (uint64_t j = 0; j < self->n; j++) {
         x[j] = x_pb[j] + hsep_at(first, first->e_h)[j];

@@ -1,0 +1,65 @@
+"""Command ``hybridsep hal``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .options import ForceOption, WeightsOption
+
+__all__ = ["hal"]
+
+
+def hal(
+    machine: Annotated[list[str], typer.Argument(help="Machine files (.toml) or names, an axis each.")],
+    out: Annotated[Path, typer.Option(help="Folder for the component's sources and the folders of the axes.")] = Path(
+        "linuxcnc"
+    ),
+    predictor: Annotated[
+        bool, typer.Option("--predictor", help="The component that predicts alone; it needs no limits of the drive.")
+    ] = False,
+    weights: WeightsOption = None,
+    force: ForceOption = False,
+) -> None:
+    """Write the HAL component for LinuxCNC, and the axes that it loads.
+
+    It is compiled there: sudo halcompile --install linuxcnc/hsep.c
+
+    The component (compensator, or predictor) is the same for all machines; each axis has a folder of its name that
+    ``loadrt hsep axes=`` takes.
+    """
+    from ..base.errors import ParameterError
+    from ..base.new_folders import make_folder
+    from ..base.output import written_whole
+    from ..fmi.hal import COMPONENTS, axis_files, component_files
+    from ..fmi.warm_start import load_trained
+    from ..machines.machine import load_machine
+    from .overwrite import HAL_FILES, Output, check_outputs
+
+    model = "HybridPredictor" if predictor else "SepCompensator"
+    axes = [load_machine(source) for source in machine]
+    names = [axis.name for axis in axes]
+    if len(set(names)) < len(names):
+        raise ParameterError(f"each axis must have a name of its own, got {', '.join(names)}")
+    if weights is not None and len(axes) > 1:
+        raise ParameterError(f"--weights are those of one axis, got {len(axes)} machines; write them one by one")
+    component = COMPONENTS[model]
+    trained = None if weights is None else load_trained(weights, axes[0], model)
+    files = {out / name: content for name, content in component_files(model).items()}
+    for axis in axes:
+        files |= {out / axis.name / name: content for name, content in axis_files(axis, model, trained).items()}
+    check_outputs(
+        [Output("--out", path, HAL_FILES) for path in files if path.parent.name != f"{component}_sources"],
+        {"saved predictor": weights},
+        force=force,
+    )
+    for path, content in files.items():
+        make_folder(path.parent)
+        with written_whole(path) as file:
+            file.write(content)
+    typer.echo(
+        f"{out / component}.c written, with its sources; install it: sudo halcompile --install {out / component}.c"
+    )
+    typer.echo(f"loadrt {component} axes={','.join(str((out / name).resolve()) for name in names)}")

@@ -1,0 +1,1 @@
+"""The paper's cases, co-simulated: what ``hybridsep demo`` runs."""

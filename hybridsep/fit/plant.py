@@ -1,0 +1,261 @@
+"""Plant that a fit leaves to try with: modes, friction and stiffness, fitted together to the log (output error).
+
+``x = G (x_d − d)`` with ``d = f·tanh(v_d/v_friction) + κ·x·|x|``, from the identified model on. It is kept where it is
+better on the last third of what trains, else the identified model alone is the plant. It is no measurement: a
+compensator is tried on a disturbance that it has features for, so what comes out is optimistic.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from ..base.errors import ParameterError
+from ..base.metrics import rms
+from ..base.settings import PARAMETERS, PredictorSettings
+from ..base.signals import Array
+from ..identify.segments import in_time
+from ..intake.relation import noise_std
+from ..intake.samples import resolution
+from ..logs.units import Shown
+from ..model.discrete import DiscreteModel
+from ..model.physics import ModalModel, Mode
+from ..plants.stage_drive import StageDrive
+from ..tune.recordings import Recording
+
+__all__ = ["commands_to_try", "identified_plant", "plant_words"]
+
+_FITTED = 2 / 3
+"""Share of the samples that train which is fitted to; the others choose."""
+
+_WORTH = 0.9
+"""Error relative to that of the identified model alone from which a disturbance is kept."""
+
+_EVALUATIONS = 30
+"""Most evaluations of a fit; the example log's needs 30, a third of a second."""
+
+_SETTLED = 0.01
+"""What is left of an initial motion where samples begin to count."""
+
+_TRIED_MAX = 20_000
+"""Most samples of the commands to try with: 20 s at 1 kHz, which a co-simulation takes seconds for."""
+
+_MOVES = 0.25
+"""Share of the whole way from which the part that judges is tried with."""
+
+_AT_REST = 1e-3
+"""Velocity at rest, relative to the largest."""
+
+_MODE_STEPS, _MODE_REACH = (0.1, 0.3, 0.05, 0.05), (1.0, 2.0, 1.0, 1.0)
+"""Steps and bounds of a mode's changes: log f_n, log zeta, alpha/ω² and beta/ω."""
+
+_SMALLEST_SPREAD = 1e-3
+"""Least velocity over which friction changes sign, relative to the largest commanded one."""
+
+
+class _Disturbed(NamedTuple):
+    """A model and its disturbances."""
+
+    model: ModalModel
+    f: float
+    kappa: float
+    v_friction: float
+
+    def entries(self) -> dict[str, Any]:
+        """Return the entries of the section ``[plant]``."""
+        return {
+            "f": float(f"{self.f:.5g}"),
+            "kappa": float(f"{self.kappa:.5g}"),
+            "v_friction": float(f"{self.v_friction:.5g}"),
+            "mode": [{name: float(f"{value:.7g}") for name, value in asdict(one).items()} for one in self.model.modes],
+        }
+
+
+class _Piece:
+    """Piece of a recording, relative to its first command.
+
+    Attributes
+    ----------
+    u, x, v_d : (n,) array
+        Commands and measured positions, m; commanded velocity, m/s.
+    path : (n,) array, m
+        Position by the identified model, which the stiffness acts at.
+    fitted, choosing, judging : (n,) array of bool
+        Samples that are fitted to, that choose, and that judge.
+    """
+
+    def __init__(self, discrete: DiscreteModel, recording: Recording, late: int) -> None:
+        x_d, x = in_time(recording.x_d, recording.x, late)
+        self.u, self.x = x_d - x_d[:1], x - x_d[:1]
+        self.v_d = np.diff(self.u, prepend=0.0) / discrete.T_s
+        self.path = discrete.forced_response(discrete.rest(), self.u)[0]
+        n, n_train = np.arange(len(x_d)), recording.n_train
+        known = ~np.isnan(x) & (n >= min(_memory(discrete), n_train // 4))
+        self.fitted = known & (n < _FITTED * n_train)
+        self.choosing = known & (n >= _FITTED * n_train) & (n < n_train)
+        self.judging = known & (n >= recording.judges_from)
+
+    def error(self, discrete: DiscreteModel, plant: _Disturbed) -> Array:
+        """Return what was measured less the plant's position, ``(n,)``, m, with an offset that is the sensor's."""
+        disturbance = plant.f * np.tanh(self.v_d / plant.v_friction) + plant.kappa * self.path * np.abs(self.path)
+        return np.asarray(self.x - discrete.forced_response(discrete.rest(), self.u - disturbance)[0])
+
+
+def identified_plant(model: ModalModel, settings: PredictorSettings, recordings: Sequence[Recording]) -> dict[str, Any]:
+    """Return the plant of a fit as plain values.
+
+    Parameters
+    ----------
+    model : ModalModel
+        ``G_pb`` as identified.
+    settings : PredictorSettings
+        For sampling interval, hold and delay of the measurement.
+    recordings : sequence of Recording
+
+    Returns
+    -------
+    dict
+        ``entries`` of the section ``[plant]``; ``rms`` and ``rms_pb``, m, RMS of what was measured less the plant and
+        less the physics model, over the samples that judge, without their offset, None where there are none; ``reason``
+        why there is no plant to this model, empty if there is one.
+    """
+    try:
+        StageDrive(model, T_s=settings.T_s, input_hold=settings.input_hold)
+    except ParameterError as error:
+        return {"entries": {}, "rms": None, "rms_pb": None, "reason": str(error)}
+    discrete = model.discretise(settings.T_s, settings.input_hold)
+    pieces = [_Piece(discrete, one, settings.measurement_delay) for one in recordings if len(one.x_d) > 1]
+    alone = _Disturbed(model, 0.0, 0.0, PARAMETERS["v_friction"].default)
+    candidates = [alone, *_refined(alone, settings, pieces)]
+    errors = [_rms_of(settings, one, pieces, "choosing") for one in candidates]
+    least = [math.inf if error is None else error for error in errors]
+    best = int(np.argmin(least))
+    if not least[best] < _WORTH * least[0]:
+        best = 0
+    chosen = candidates[best]
+    entries = {**(chosen.entries() if best else {}), "noise_std": float(f"{_noise(settings, chosen, pieces):.3g}")}
+    rms_pb, rms_plant = (_rms_of(settings, one, pieces, "judging") for one in (alone, chosen))
+    return {"entries": entries, "rms": rms_plant, "rms_pb": rms_pb, "reason": ""}
+
+
+def plant_words(plant: Mapping[str, Any], shown: Shown) -> str:
+    """Return what the plant is, and how far it follows the log, in words."""
+    disturbed = "mode" in plant["entries"]
+    words = "the identified model " + ("refitted with the friction and stiffness of the log" if disturbed else "alone")
+    if plant["rms"] is not None:
+        words += f"; it follows the half that trained nothing to {shown.words(plant['rms'], '.3g')} RMS"
+        words += f" (physics model {shown.words(plant['rms_pb'], '.3g')})" if disturbed else ""
+    return f"{words}. A plant to try with, no measurement: results on it are optimistic"
+
+
+def commands_to_try(recordings: Sequence[Recording]) -> Array:
+    """Return commands of a log to try with, m: at most 20 000, of one stretch, from rest to rest where it rests.
+
+    They are of the part that judges where there is motion enough.
+    """
+    one = max(recordings, key=lambda one: _path(one.x_d))
+    found = one.x_d[one.judges_from :]
+    if _path(found) < _MOVES * _path(one.x_d):
+        found = one.x_d
+    steps = np.abs(np.diff(found))
+    at_rest = np.flatnonzero(steps <= _AT_REST * steps.max(initial=0.0))
+    begin = int(at_rest[0]) if len(at_rest) else 0
+    found = found[begin : begin + _TRIED_MAX]
+    ends = at_rest[(at_rest > begin) & (at_rest < begin + len(found))] - begin + 1
+    last = int(ends[-1]) if len(ends) else 0
+    return found[:last] if last > len(found) // 2 else found
+
+
+def _path(x_d: Array) -> float:
+    """Return how far a command goes in all, m."""
+    return float(np.abs(np.diff(x_d)).sum())
+
+
+def _memory(discrete: DiscreteModel) -> int:
+    """Return after how many samples the model has forgotten how it began."""
+    slowest = float(np.abs(np.linalg.eigvals(discrete.A)).max(initial=0.0))
+    return discrete.dead_time + (math.ceil(math.log(_SETTLED) / math.log(slowest)) if 0.0 < slowest < 1.0 else 0)
+
+
+def _refined(alone: _Disturbed, settings: PredictorSettings, pieces: Sequence[_Piece]) -> list[_Disturbed]:
+    """Return modes fitted together with friction, and with friction and stiffness; without what cannot be."""
+    fitted = [piece for piece in pieces if piece.fitted.any()]
+    fastest = max((float(np.abs(piece.v_d).max()) for piece in fitted), default=0.0)
+    reach = max((float(np.abs(piece.path).max()) for piece in fitted), default=0.0)
+    scale = _rms_of(settings, alone, pieces, "fitted") or 0.0
+    if not (scale > 0.0 and reach > 0.0 and fastest * _SMALLEST_SPREAD >= (PARAMETERS["v_friction"].minimum or 0.0)):
+        return []
+    n = 4 * len(alone.model.modes)
+
+    def plant(theta: Array) -> _Disturbed:
+        modes = [_moved(mode, *theta[4 * i : 4 * i + 4].tolist()) for i, mode in enumerate(alone.model.modes)]
+        f, kappa, spread = theta[n:].tolist()
+        moved = ModalModel(modes, alone.model.dead_time)
+        return _Disturbed(moved, scale * f, scale * kappa / reach**2, fastest * math.exp(spread))
+
+    found = []
+    for with_stiffness in (False, True):
+
+        def residual(theta: Array, most: float = 1.0 if with_stiffness else 0.0) -> Array:
+            one = plant(theta)
+            one = one._replace(kappa=most * one.kappa)
+            errors = _errors(settings, one, fitted, "fitted")
+            return np.concatenate([(error - error.mean()) / scale for error in errors])
+
+        modes = len(alone.model.modes)
+        start = np.concatenate((np.zeros(n), [0.5, 0.5 * with_stiffness, math.log(0.02)]))
+        bound = np.concatenate((np.tile(_MODE_REACH, modes), [1e3, 1e3, 0.0]))
+        least = np.concatenate((-np.tile(_MODE_REACH, modes), [0.0, 0.0, math.log(_SMALLEST_SPREAD)]))
+        steps = np.concatenate((np.tile(_MODE_STEPS, modes), np.ones(3)))
+        start[n + 1] = max(start[n + 1], 1e-9)
+        try:
+            done = least_squares(residual, start, bounds=(least, bound), x_scale=steps, max_nfev=_EVALUATIONS)
+            one = plant(done.x)
+            one = one if with_stiffness else one._replace(kappa=0.0)
+            StageDrive(one.model, one.f, one.kappa, settings.T_s, v_friction=one.v_friction)
+        except (ParameterError, ValueError):  # a mode out of range, or an error that overflowed
+            continue
+        found.append(one)
+    return found
+
+
+def _moved(mode: Mode, frequency: float, damping: float, alpha: float, beta: float) -> Mode:
+    """Return a mode with changes of log f_n, log zeta, alpha/ω² and beta/ω."""
+    w = mode.omega
+    return Mode(
+        mode.f_n * math.exp(frequency), mode.zeta * math.exp(damping), mode.alpha + alpha * w**2, mode.beta + beta * w
+    )
+
+
+def _errors(settings: PredictorSettings, plant: _Disturbed, pieces: Sequence[_Piece], part: str) -> list[Array]:
+    """Return the errors of a plant over a part of each piece, m."""
+    discrete = plant.model.discretise(settings.T_s, settings.input_hold)
+    return [piece.error(discrete, plant)[getattr(piece, part)] for piece in pieces]
+
+
+def _rms_of(settings: PredictorSettings, plant: _Disturbed, pieces: Sequence[_Piece], part: str) -> float | None:
+    """Return the RMS error of a plant over a part of all pieces, m, less the mean error of what was fitted to."""
+    discrete = plant.model.discretise(settings.T_s, settings.input_hold)
+    parts = []
+    for piece in pieces:
+        error = piece.error(discrete, plant)
+        of_offset = piece.fitted if piece.fitted.any() else getattr(piece, part)
+        if getattr(piece, part).any():
+            parts.append(error[getattr(piece, part)] - error[of_offset].mean())
+    return rms(np.concatenate(parts)) if parts else None
+
+
+def _noise(settings: PredictorSettings, plant: _Disturbed, pieces: Sequence[_Piece]) -> float:
+    """Return the standard deviation of the measurement noise, m: at least that of the resolution."""
+    discrete = plant.model.discretise(settings.T_s, settings.input_hold)
+    found = []
+    for piece in pieces:
+        known = ~np.isnan(piece.x)
+        x, e = piece.x[known], piece.error(discrete, plant)[known]
+        found.append(max(min(noise_std(x), noise_std(e)), resolution(x) / math.sqrt(12.0)))
+    return min(float(np.median(found)), float(PARAMETERS["noise_std"].maximum or 1.0)) if found else 0.0

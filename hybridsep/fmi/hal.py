@@ -1,0 +1,72 @@
+"""HAL component for LinuxCNC: its sources, and the folder of an axis that it loads.
+
+The component (``integrations/linuxcnc/hsep.c``) is one file over the C core, for ``halcompile``; what one axis differs
+in is read from a folder when the component is loaded, as an FMU reads its resources: the table ``variables.bin`` and,
+of an axis that starts warm, ``weights.bin``.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..base.data_files import data_folder
+from ..base.errors import FmuError
+from ..machines.machine import Machine
+from .c_header import kind_header
+from .c_sources import c_sources
+from .content import content_guid
+from .description import fmu_description
+from .table_file import TABLE_FILE, table_file
+
+if TYPE_CHECKING:
+    from ..predict.predictor import HybridPredictor
+
+__all__ = ["COMPONENTS", "axis_files", "component_files"]
+
+COMPONENTS = {"SepCompensator": "hsep", "HybridPredictor": "hsep_predictor"}
+"""Name of the component of each model."""
+
+
+def component_files(model: str) -> dict[str, bytes]:
+    """Return the sources of the component: name → content, ``<component>.c`` to be given to ``halcompile``.
+
+    Parameters
+    ----------
+    model : {"SepCompensator", "HybridPredictor"}
+    """
+    name = COMPONENTS[model]
+    text = (data_folder("integrations") / "linuxcnc" / "hsep.c").read_text(encoding="utf-8")
+    sources = {**c_sources(versions=()), "hsep_fmu.h": kind_header(model).encode()}
+    return {
+        f"{name}.c": text.replace('"sources/all.c"', f'"{name}_sources/all.c"').encode(),
+        **{f"{name}_sources/{file}": content for file, content in sources.items()},
+    }
+
+
+def axis_files(machine: Machine, model: str, trained: HybridPredictor | None = None) -> dict[str, bytes]:
+    """Return the files of an axis' folder: name → content.
+
+    Parameters
+    ----------
+    machine : Machine
+    model : {"SepCompensator", "HybridPredictor"}
+    trained : HybridPredictor, optional
+        What an earlier run has learned.
+
+    Raises
+    ------
+    FmuError
+        If a compensator is asked for a machine without limits of its drive.
+    """
+    if model == "SepCompensator" and machine.drive_limits is None:
+        raise FmuError(
+            f"the compensator needs what the drive allows: [drive_limits] in the machine file of {machine.name}; "
+            "--predictor writes the component that predicts alone"
+        )
+    description = fmu_description(machine, model, machine.name, warm=trained is not None)
+    files: dict[str, bytes] = {}
+    if trained is not None:
+        from .weights import WEIGHTS_FILE, weights_file
+
+        files[WEIGHTS_FILE] = weights_file(trained)
+    return {TABLE_FILE: table_file(description, content_guid(files, description)), **files}

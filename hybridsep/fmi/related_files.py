@@ -1,0 +1,104 @@
+"""Reference experiment of an FMU as FMI's layered standard LS-REF has it: ``extra/org.fmi-standard.fmi-ls-ref/``.
+
+The manifest names the files beside the model and what each is for, as fmi-ls-ref 1.0.0-alpha.1 has it. The experiment
+is one of the Modelica Association's format of experiments (ma-hs-experiments), to which fmi-ls-ref leaves it: times,
+inputs and expected outputs. Neither is released yet; both are written as their schemas are.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from pathlib import PurePosixPath
+from xml.etree import ElementTree as ET
+
+from .bill_of_materials import BILL_FILE
+from .model_description import document, xml_text
+from .resource_data import RESOURCE_DATA_FILE
+
+__all__ = ["AGREEMENT", "EXPERIMENT_FILE", "MANIFEST_FILE", "RELATED_FOLDER", "experiment", "manifest"]
+
+RELATED_FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
+MANIFEST_FILE = f"{RELATED_FOLDER}/fmi-ls-manifest.xml"
+EXPERIMENT_FILE = f"{RELATED_FOLDER}/reference.exp"
+
+AGREEMENT: Mapping[str, int] = {"SepCompensator": 9}
+"""Decimals, m, to which a model's reference agrees; else 11. The iteration for a bounded plan amplifies rounding."""
+
+_LAYER = "http://fmi-standard.org/fmi-ls-manifest"
+_NAMED = {
+    "name": "org.fmi-standard.fmi-ls-ref",
+    "version": "1.0.0-alpha.1",
+    "description": "Layered Standard providing information on related files included in an FMU.",
+}
+_ELSEWHERE = {
+    BILL_FILE: ("application/vnd.cyclonedx+json", "meta-data", "software bill of materials"),
+    RESOURCE_DATA_FILE: ("application/x-srmd-meta-data", "meta-data", "log, settings and figures of the fit"),
+}
+"""Files of other folders, if they are there: type, role and description."""
+
+
+def experiment(name: str, model: str, options: Mapping[str, float], *, inputs: bool) -> bytes:
+    """Return the reference experiment.
+
+    Parameters
+    ----------
+    name : str
+        Model identifier; the tables are ``<name>_in.csv`` and ``<name>_ref.csv``.
+    model : str
+        ``HybridPredictor``, ``FeedDrive``, …
+    options : mapping
+        ``StartTime``, ``StopTime`` and ``StepSize``, s, and ``RelTol``.
+    inputs : bool
+        Whether it has any.
+    """
+    root = ET.Element("Experiments", name=name, description="reference run of the FMU with all its start values")
+    digits = AGREEMENT.get(model, 11)
+    attributes = {
+        "name": "reference",
+        "description": f"outputs agree within 1e-{digits:02} m where the communication step size is the stated one",
+        "tolerance": xml_text(options["RelTol"]),
+    }
+    one = ET.SubElement(root, "Experiment", attributes)
+    times = {f"{key[0].lower()}{key[1:]}": xml_text(options[key]) for key in ("StartTime", "StopTime", "StepSize")}
+    ET.SubElement(one, "TransientSimulation", times)
+    if inputs:
+        ET.SubElement(one, "Stimuli", source=f"{name}_in.csv")
+    ET.SubElement(one, "References", source=f"{name}_ref.csv")
+    return document(root)
+
+
+def manifest(files: Mapping[str, bytes]) -> bytes:
+    """Return the manifest of an FMU.
+
+    Parameters
+    ----------
+    files : mapping
+        Archive name → content, of the whole archive but the manifest.
+    """
+    ET.register_namespace("fmi-ls", _LAYER)
+    root = ET.Element("fmiReferences", {f"{{{_LAYER}}}fmi-ls-{key}": text for key, text in _NAMED.items()})
+    for file in sorted(files):
+        place = PurePosixPath(file)
+        if str(place.parent) == RELATED_FOLDER:
+            _add(root, files[file], place.name, *_own(place.name))
+        elif file in _ELSEWHERE:
+            _add(root, files[file], f"../{place.parent.name}/{place.name}", *_ELSEWHERE[file])
+    return document(root)
+
+
+def _own(file: str) -> tuple[str, str, str]:
+    """Return type, role and description of a file of the reference experiment."""
+    if file.endswith(".exp"):
+        return "application/x-ma-hs-experiments", "experiment/smoke-test", "reference experiment"
+    if file.endswith("_ref.csv"):
+        return "text/csv", "result", "outputs of the reference experiment"
+    if file.endswith("_in.csv"):
+        return "text/csv", "other", "inputs of the reference experiment"
+    return "text/plain", "configuration", "times of the reference experiment, as FMI's cross-check had them"
+
+
+def _add(root: ET.Element, content: bytes, source: str, kind: str, role: str, description: str) -> None:
+    attributes = {"type": kind, "source": source, "role": role, "description": description}
+    checksum = {"checksum": hashlib.sha3_256(content).hexdigest(), "checksumType": "SHA3-256"}
+    ET.SubElement(root, "Related", attributes | checksum)

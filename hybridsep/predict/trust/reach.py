@@ -1,0 +1,76 @@
+"""Reach: a measurement is believed, unless the axis cannot have got there.
+
+The residual of an axis grows from sample to sample by no more than the axis and its model move. A value whose residual
+is beyond twice the largest so far, by more than a few of the fastest steps of the model, is missing. So are the values
+after it, until as many within reach have followed as there were beyond it: an axis passes by the zero that its sensor
+reads. After a second the axis has been moved, or its sensor set, and the value is believed.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.signals import Array
+from .constants import TrustConstants
+
+__all__ = ["Reach", "reached"]
+
+
+class Reach(NamedTuple):
+    """What is known of the motion.
+
+    Attributes
+    ----------
+    fastest : float, m
+        Largest change of ``x_pb`` from sample to sample so far.
+    n_missing : int
+        Samples since the last one that was believed.
+    n_beyond : int
+        Of these, values out of reach, less those within it that followed.
+    """
+
+    fastest: float = 0.0
+    n_missing: int = 0
+    n_beyond: int = 0
+
+
+def reached(
+    reach: Reach, x: Array, x_pb: Array, before: float, largest: float, T_s: float, constants: TrustConstants
+) -> tuple[NDArray[np.bool_], Reach]:
+    """Return whether each sample of a window is believed, ``(n,)`` bool, and the reach after it.
+
+    Before the first motion, and over the first window that has a residual, all are.
+
+    Parameters
+    ----------
+    reach : Reach
+    x : (n,) array, m
+        Measured positions, NaN where missing.
+    x_pb : (n,) array, m
+        Their physics-based prediction.
+    before : float, m
+        The last prediction before them.
+    largest : float, m
+        Largest residual believed before them.
+    T_s : float, s
+    constants : TrustConstants
+    """
+    fastest = max(reach.fastest, float(np.abs(np.diff(x_pb, prepend=before)).max()))
+    known = largest > 0.0 and fastest > 0.0
+    believed, n_missing, n_beyond = np.isfinite(x), reach.n_missing, reach.n_beyond
+    residuals, patience = np.abs(x - x_pb), math.ceil(constants.patience / T_s)
+    for k, e in enumerate(residuals.tolist()):
+        n_missing += 1
+        if not believed[k]:
+            continue
+        beyond = e > constants.reach_residuals * largest + constants.reach_steps * fastest
+        n_beyond = n_beyond + 1 if known and beyond else max(n_beyond - 1, 0)
+        if n_beyond > 0 and n_missing <= patience:
+            believed[k] = False
+        else:
+            n_missing, n_beyond, largest = 0, 0, max(largest, e)
+    return believed, Reach(fastest, n_missing, n_beyond)

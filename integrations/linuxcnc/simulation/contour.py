@@ -1,0 +1,189 @@
+"""Contour error of G-code programs in LinuxCNC, on simulated drives: without, physics, hybrid cold and warm.
+
+    python integrations/linuxcnc/simulation/contour.py --out cnc [--user NAME] [circle spiral pocket]
+
+It needs LinuxCNC 2.9 with its headers (Debian: linuxcnc-uspace, linuxcnc-uspace-dev) and installs two HAL components;
+LinuxCNC itself refuses root, so that root names an ordinary ``--user``. Half a minute a program.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from hybridsep.base.metrics import largest, rms
+from hybridsep.base.signals import Array
+
+HERE = Path(__file__).resolve().parent
+AXES = ("x", "y")
+CASES = {"off": {"ENABLE": 0}, "physics": {"MODEL": 1}, "hybrid cold": {}, "hybrid warm": {}}
+"""Cases by name, with the entries of machine.ini's [HSEP] that they change."""
+
+COLUMNS = ("n", *(f"{axis}_{name}" for name in ("out", "delayed", "fb", "pos", "predicted", "state") for axis in AXES))
+REACH = 80
+"""Samples to either side among which the nearest part of the path is looked for."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Samples of all servo periods in motion.
+
+    Attributes
+    ----------
+    out, delayed, fb, pos : (n, 2) array, mm
+        Command to the drives, the command as it came, and measured and true positions.
+    state : (n, 2) array
+        The component's.
+    n_lost : int
+        Samples that the sampler has lost.
+    """
+
+    out: Array
+    delayed: Array
+    fb: Array
+    pos: Array
+    state: Array
+    n_lost: int
+
+    @classmethod
+    def read(cls, path: Path) -> Samples:
+        """Read a file of run.py's."""
+        table = np.loadtxt(path, skiprows=1)
+        columns = dict(zip(COLUMNS, table.T, strict=True))
+        pairs = {
+            name: np.column_stack([columns[f"{axis}_{name}"] for axis in AXES])
+            for name in ("out", "delayed", "fb", "pos", "state")
+        }
+        moving = np.flatnonzero(np.abs(np.diff(pairs["delayed"], axis=0)).sum(axis=1) > 0.0)
+        part = slice(moving[0], moving[-1] + REACH)
+        n_lost = int(table[-1, 0] - table[0, 0]) + 1 - len(table)
+        return cls(**{name: pair[part] for name, pair in pairs.items()}, n_lost=n_lost)
+
+    def contour_errors(self) -> Array:
+        """Return the distance of each true position to the commanded path, ``(n,)``, mm."""
+        n = len(self.pos)
+        least = np.full(n, np.inf)
+        for shift in range(-REACH, REACH):
+            at = np.clip(np.arange(n) + shift, 0, n - 2)
+            begin, along = self.delayed[at], self.delayed[at + 1] - self.delayed[at]
+            length = np.maximum(np.sum(along**2, axis=1), 1e-30)
+            share = np.clip(np.sum((self.pos - begin) * along, axis=1) / length, 0.0, 1.0)
+            least = np.minimum(least, np.linalg.norm(self.pos - begin - share[:, None] * along, axis=1))
+        return least
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the programs, print the table and draw the errors."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("programs", nargs="*", default=["circle", "spiral", "pocket"])
+    parser.add_argument("--out", type=Path, required=True, help="folder for logs, machine files and the figure")
+    parser.add_argument("--user", help="ordinary user that LinuxCNC runs as, for root")
+    given = parser.parse_args(arguments)
+    given.out.mkdir(parents=True, exist_ok=True)
+    install(given.out)
+    print("| contour error, µm: RMS (largest) | " + " | ".join(CASES) + " |\n|---|" + "---|" * len(CASES))
+    found: dict[str, dict[str, Array]] = {}
+    for program in given.programs:
+        samples = run_cases(program, given.out, given.user)
+        found[program] = {case: one.contour_errors() for case, one in samples.items()}
+        cells = [f"{1e3 * rms(error):.1f} ({1e3 * largest(error):.0f})" for error in found[program].values()]
+        print(f"| {program} | " + " | ".join(cells) + " |", flush=True)
+        lost = sum(one.n_lost for one in samples.values())
+        if lost:
+            print(f"{lost} samples were lost", file=sys.stderr)
+    draw(found, given.out / "contour.png")
+
+
+def install(out: Path) -> None:
+    """Write the component and the axes, and install it and the simulated drive."""
+    hybridsep("hal", *(str(HERE / f"{axis}.toml") for axis in AXES), "--out", str(out / "hal"))
+    for source in (out / "hal" / "hsep.c", HERE / "hsep_sim_drive.comp"):
+        command = ["halcompile", "--install", str(source.resolve())]
+        subprocess.run(command if os.geteuid() == 0 else ["sudo", *command], check=True, capture_output=True)
+
+
+def run_cases(program: str, out: Path, user: str | None) -> dict[str, Samples]:
+    """Run a program in all cases; the warm one has learned what the cold one has seen."""
+    found = {}
+    for case, entries in CASES.items():
+        log = out / f"{program}_{case.replace(' ', '_')}.txt"
+        if case == "hybrid warm":
+            train(out / f"{program}_hybrid_cold.txt", out)
+        run(f"{program}.ngc", log, out, entries, user)
+        found[case] = Samples.read(log)
+        if case == "hybrid warm":
+            for axis in AXES:
+                (out / "hal" / axis / "weights.bin").unlink()
+    return found
+
+
+def train(log: Path, out: Path) -> None:
+    """Give the axes what a predictor learns from a log."""
+    for axis in AXES:
+        machine, state = str(HERE / f"{axis}.toml"), str(out / f"{axis}.state")
+        columns = ("--x_d", f"{axis}_out", "--x", f"{axis}_fb", "--unit", "mm", "--T_s", "0.001")
+        hybridsep("backtest", str(log), "--machine", machine, *columns, "--as-is", "--save", state)
+        hybridsep("hal", machine, "--out", str(out / "hal"), "--weights", state)
+
+
+def run(program: str, log: Path, out: Path, entries: Mapping[str, int], user: str | None) -> str:
+    """Run LinuxCNC once, with entries of [HSEP] changed; return what it printed."""
+    folder = out.resolve() / "run"
+    shutil.rmtree(folder, ignore_errors=True)
+    shutil.copytree(HERE, folder)
+    for axis in AXES:
+        shutil.copytree(out / "hal" / axis, folder / axis)
+    text = (folder / "machine.ini").read_text(encoding="utf-8")
+    for name, number in entries.items():
+        text = re.sub(rf"^{name} = .*$", f"{name} = {number}", text, flags=re.MULTILINE)
+    (folder / "machine.ini").write_text(text, encoding="utf-8")
+    environment = {**os.environ, "HSEP_PROGRAM": program, "HSEP_SAMPLES": str(folder / "samples.txt")}
+    command = ["linuxcnc", "-r", "machine.ini"]
+    if user is not None:
+        for path in (folder, *folder.rglob("*")):
+            shutil.chown(path, user)
+        environment["HOME"] = str(folder)
+        command = ["runuser", "-u", user, "--", *command]
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=300.0)
+    printed = done.stdout + done.stderr
+    if done.returncode != 0 or not (folder / "samples.txt").is_file():
+        raise SystemExit(f"linuxcnc {program} failed:\n{printed}")
+    shutil.copyfile(folder / "samples.txt", log)
+    return printed
+
+
+def hybridsep(*arguments: str) -> None:
+    """Run a command of hybridsep."""
+    command = [sys.executable, "-c", "from hybridsep.app.cli import main; main()", *arguments, "--force"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode != 0:
+        raise SystemExit(f"hybridsep {' '.join(arguments)}: {done.stderr}")
+
+
+def draw(found: Mapping[str, Mapping[str, Array]], path: Path) -> None:
+    """Draw the contour errors of each program over time."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    figure, plots = pyplot.subplots(len(found), figsize=(9.0, 2.6 * len(found)), squeeze=False, layout="constrained")
+    for plot, (program, errors) in zip(plots[:, 0], found.items(), strict=True):
+        for case, error in errors.items():
+            plot.plot(1e-3 * np.arange(len(error)), 1e3 * error, lw=0.8, label=f"{case}: {1e3 * rms(error):.1f} µm RMS")
+        plot.set(title=program, ylabel="contour error [µm]", xlabel="time [s]")
+        plot.legend(loc="upper right", fontsize="small")
+    figure.savefig(path, dpi=130)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,110 @@
+"""What the tests reach of the C sources, counted by gcc: ``pytest --c-coverage FOLDER``.
+
+The C core's test libraries and programs and the native FMUs' libraries of this machine are compiled with counters, by a
+wrapper of gcc 11 or newer that gives each compilation a folder of its own below FOLDER; afterwards gcov's counts are
+added up over all of them, line by line and branch by branch. Processes that are killed write no counts.
+"""
+
+from __future__ import annotations
+
+import gzip
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from c_compiler import C_SOURCES
+
+_WRAPPER = """#!/bin/sh
+for argument in "$@"; do
+    case $argument in --version | -print* | -M* | -E) exec gcc "$@" ;; esac
+done
+exec gcc "$@" -O0 --coverage -fprofile-update=atomic -Wno-missing-profile -dumpdir "$(mktemp -d '{folder}/XXXXXXXX')/"
+"""
+
+
+def count_in(folder: Path) -> None:
+    """Let all that this process and its children compile for this machine count in a folder, which must be new."""
+    from hybridsep.fmi import libraries
+    from hybridsep.fmi.c_header import KINDS
+    from hybridsep.fmi.compiler import ZIG, host_target
+
+    folder.mkdir(parents=True)
+    wrapper = folder.absolute() / "gcc"
+    wrapper.write_text(_WRAPPER.replace("{folder}", str(folder.absolute())))
+    wrapper.chmod(0o755)
+    os.environ["CC"] = str(wrapper)
+    kept = folder.absolute() / "libraries"
+    if libraries._cache().is_dir():
+        shutil.copytree(libraries._cache(), kept)
+    os.environ["HYBRIDSEP_LIBRARIES"] = str(kept)
+    for kind in KINDS:
+        library = libraries._place(ZIG, (kind, host_target()))
+        library.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory() as place:
+            for name, content in libraries._sources(kind).items():
+                (Path(place) / name).write_bytes(content)
+            flags = ["-std=c99", "-ffp-contract=off", "-fvisibility=hidden", "-D_GNU_SOURCE", "-fPIC", "-shared", "-I."]
+            subprocess.run([wrapper, *flags, "all.c", "-o", library, "-lm"], cwd=place, check=True)
+
+
+def table(folder: Path) -> str:
+    """Return lines and branches reached, by file, as text."""
+    lines: dict[str, dict[int, int]] = {}
+    branches: dict[str, dict[tuple[int, int], int]] = {}
+    ours = {path.name for path in C_SOURCES.rglob("*.[ch]")}
+    for report in _reports(folder):
+        for file in report["files"]:
+            name = Path(file["file"]).name
+            if name not in ours:
+                continue
+            counted, taken = lines.setdefault(name, {}), branches.setdefault(name, {})
+            for line in file["lines"]:
+                number = line["line_number"]
+                counted[number] = counted.get(number, 0) + line["count"]
+                for i, branch in enumerate(line["branches"]):
+                    taken[number, i] = taken.get((number, i), 0) + branch["count"]
+    (folder / "missed.json").write_text(
+        json.dumps(
+            {
+                name: [
+                    [n for n, count in sorted(lines[name].items()) if not count],
+                    [place for place, count in sorted(branches[name].items()) if not count],
+                ]
+                for name in sorted(lines)
+            }
+        )
+    )
+    rows = [f"{'C file':36}{'lines':>8}{'missed':>8}{'branches':>10}{'missed':>8}"]
+    total = [0, 0, 0, 0]
+    for name in sorted(lines):
+        figures = [
+            len(lines[name]),
+            sum(not count for count in lines[name].values()),
+            len(branches[name]),
+            sum(not count for count in branches[name].values()),
+        ]
+        total = [a + b for a, b in zip(total, figures, strict=True)]
+        rows.append("{:36}{:8}{:8}{:10}{:8}".format(name, *figures))
+    rows.append("{:36}{:8}{:8}{:10}{:8}".format("all", *total))
+    if total[0]:
+        rows.append(f"lines {100 - 100 * total[1] / total[0]:.2f} %, branches {100 - 100 * total[3] / total[2]:.2f} %")
+    return "\n".join(rows)
+
+
+def _reports(folder: Path) -> Iterator[dict[str, Any]]:
+    for counts in folder.glob("*/*.gcda"):
+        done = subprocess.run(
+            ["gcov", "--json-format", "--stdout", "--branch-probabilities", counts],
+            cwd=counts.parent,
+            capture_output=True,
+            check=False,
+        )
+        if done.returncode == 0:
+            text = gzip.decompress(done.stdout) if done.stdout[:2] == b"\x1f\x8b" else done.stdout
+            for line in text.splitlines():
+                yield json.loads(line)

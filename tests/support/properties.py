@@ -1,0 +1,34 @@
+"""What a contributor's run leaves out, and how many examples a property is tried on: a sixth, all of them at night."""
+
+from __future__ import annotations
+
+from hypothesis import HealthCheck, settings
+
+__all__ = ["LEFT_OUT", "examples", "share", "take_profile"]
+
+LEFT_OUT = ("nightly", "release")
+"""Marks of tests that run where they are named in ``-m``, or by their own names."""
+
+_SHARE = 6
+_all = False
+
+
+def take_profile(*, all_of_them: bool) -> None:
+    """Choose for this process, before test files are imported."""
+    global _all
+    _all = all_of_them
+    # No test fails because something else keeps the cores busy.
+    settings.register_profile(
+        "patient", deadline=None, suppress_health_check=[HealthCheck.too_slow], max_examples=share(100)
+    )
+    settings.load_profile("patient")
+
+
+def share(number: int) -> int:
+    """Return how many of a number of examples run."""
+    return number if _all else -(-number // _SHARE)
+
+
+def examples(number: int) -> settings:
+    """Return the decorator of a property that is tried on a number of examples, or on a sixth of it."""
+    return settings(max_examples=share(number))
