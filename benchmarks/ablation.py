@@ -1,10 +1,13 @@
 """Ablation of the model with trust: each of its rules switched off, or its constant changed, one at a time.
 
-    python -m benchmarks.ablation [--emps DATA_EMPS.mat] [--recordings FOLDER] [--n 12] [--seed 7] [--only TEXT]
+    python -m benchmarks.ablation [--emps DATA_EMPS.mat] [--recordings FOLDER] [--so101 FOLDER] [--n 12]
+                                  [--only TEXT] [--lines] [--jobs 2]
 
-Cases of ``benchmarks/trust.py`` and random drives of both generators, whole runs, cold and warm; RMS relative to the
-physics model's, geometric means and the worst cold one. Constants may be chosen on ``cnc_a_*``, ``xl330_sin_sin_*``,
-the simulated cases and drives of one seed; the others judge. Half an hour for all of it.
+Axes of ``benchmarks/yardstick.py``, replayed by the C core with some of its lines changed. The first row has the
+errors relative to what an axis is judged by, geometric means of cold and warm runs and the worst lines; the others have
+what a change makes of them, by factors. A rule stays if without it a group that judges is worse by 2 %, or a line by a
+third. A second table has the intervals: their score at 90 % relative to the first row, and the coverage of 50, 90 and
+95 %.
 """
 
 from __future__ import annotations
@@ -12,62 +15,130 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # benchmarks are no part of the package
 
 import numpy as np
+from joblib import Parallel, delayed
 
-from benchmarks.random_drives.generators import GENERATORS
-from benchmarks.trust import cases
-from hybridsep.base.metrics import rms
-from hybridsep.base.settings import PredictorSettings
-from hybridsep.base.signals import Array
-from hybridsep.evaluate.backtest import backtest
-from hybridsep.model.physics import ModalModel
-from hybridsep.predict.predictor import HybridPredictor
-from hybridsep.predict.trust.constants import CONSTANTS, TrustConstants
-from hybridsep.predict.trust.saved import SavedTrustedModel
+from benchmarks.core_variant import Changes, CoreVariant
+from benchmarks.yardstick import Axis, Errors, Folders, errors_of, logs_of, simulations_of
+from hybridsep.base.errors import SignalError
+from hybridsep.predict.trust.constants import CONSTANTS
 
-CHOOSE = ("cnc_a", "xl330_sin_sin")
-"""Beginnings of the names of recordings that constants may be chosen on."""
+TRUST = "predict/trust/"
+STACK, START = TRUST + "hsep_stack.c", TRUST + "hsep_start.c"
+LEARNING, FORECAST, BLOCK = (TRUST + f"hsep_trusted{part}.c" for part in ("", "_forecast", "_block"))
 
-COPIES = "raw_jitter"
-"""Part of the name of a recording that is a copy of another."""
 
-VARIANTS = {
-    "as it is": CONSTANTS,
-    "rows are independent": replace(CONSTANTS, correlation_max=1.0),
-    "predictions hardly bounded": replace(CONSTANTS, bound=100.0, bound_of_command=100.0),
-    "velocities never outgrown": replace(CONSTANTS, growth=1e12, growth_learned=1e12),
-    "earlier runs never doubted": replace(CONSTANTS, doubt=2.0),
-    "earlier runs sooner doubted": replace(CONSTANTS, doubt=0.25),
-    "every measurement is believed": replace(CONSTANTS, reach_steps=1e12),
-    "5 lags of the command": replace(CONSTANTS, lags_of_command=5),
-    "50 lags of the command": replace(CONSTANTS, lags_of_command=50),
-    "kappa 0.3": replace(CONSTANTS, kappa=0.3),
-    "kappa 3": replace(CONSTANTS, kappa=3.0),
-    "gamma 0.9": replace(CONSTANTS, gamma=0.9),
-    "gamma 0.98": replace(CONSTANTS, gamma=0.98),
-    "L from the first": replace(CONSTANTS, first_lagged=1.0, first_static=0.0),
-    "S from the first": replace(CONSTANTS, first_lagged=0.0, first_static=1.0),
+def constants(**values: float) -> Changes:
+    """Return the change of constants, by their names in the dataclass."""
+    return {
+        TRUST + "hsep_trust_constants.h": [
+            (f"HSEP_TRUST_{name.upper()} {getattr(CONSTANTS, name)!r}\n", f"HSEP_TRUST_{name.upper()} {value!r}\n")
+            for name, value in values.items()
+        ]
+    }
+
+
+def together(*changes: Changes) -> Changes:
+    """Return several changes as one."""
+    found: dict[str, list[tuple[str, str]]] = {}
+    for change in changes:
+        for path, pairs in change.items():
+            found.setdefault(path, []).extend(pairs)
+    return found
+
+
+def without_component(i: int) -> Changes:
+    """Return intervals without one of their components."""
+    last = "    f[3] = stacked ? signals->variance[j] : 0.0;"
+    return {"predict/hsep_uncertainty.c": [(last, f"{last}\n    f[{i}] = 0.0;")]}
+
+
+NO_LEAP: Changes = {"predict/hsep_uncertainty.c": [("uncertainty_far_share = 0.5;", "uncertainty_far_share = 2.0;")]}
+
+NO_DOUBTING: Changes = {
+    FORECAST: [
+        ("self->predicted[HSEP_DOUBTING] = self->predicted[self->leading]", "self->predicted[HSEP_DOUBTING] = 0"),
+    ],
+    LEARNING: [("        hsep_stack_copy(&self->stack, leading, HSEP_DOUBTING);\n", "")],
+    **constants(doubt=2.0),
+}
+
+NO_STATIC = together(
+    constants(first_lagged=1.0, first_static=0.0),
+    {
+        FORECAST: [
+            (
+                "self->predicted[HSEP_LAGGED] = self->predicted[HSEP_STATIC] = known;",
+                "self->predicted[HSEP_LAGGED] = known;",
+            ),
+            (
+                "(const hsep_expert_place[]){HSEP_LAGGED, HSEP_STATIC}, 2);",
+                "(const hsep_expert_place[]){HSEP_LAGGED}, 1);",
+            ),
+            ("    if (self->predicted[HSEP_STATIC]) {\n", "    if (self->predicted[HSEP_LAGGED]) {\n"),
+            ("*first = hsep_trusted_expert(self, HSEP_STATIC);", "*first = hsep_trusted_expert(self, HSEP_LAGGED);"),
+        ]
+    },
+)
+
+VARIANTS: Mapping[str, Changes] = {
+    "no static expert S": NO_STATIC,
+    "no doubting expert D": NO_DOUBTING,
+    "no D, earlier runs count for 3 windows": together(NO_DOUBTING, constants(carried=3.0)),
+    "earlier runs never forgotten": constants(doubt=2.0),
+    "earlier runs never forgotten, doubted for good": constants(doubt=2.0, doubt_over=2.0),
+    "A's bound does not grow": {
+        FORECAST: [("    if (!(self->largest_step > 0.0 && hsep_stack_leader", "    if (!(0 && hsep_stack_leader")]
+    },
+    "features never begin anew": {
+        FORECAST: [
+            (
+                "    double most = (learned ? HSEP_TRUST_GROWTH_LEARNED : HSEP_TRUST_GROWTH)",
+                "    (void)learned;\n    double most = 1e12",
+            )
+        ]
+    },
+    "features begin anew at 1000 times": {
+        FORECAST: [("(learned ? HSEP_TRUST_GROWTH_LEARNED : HSEP_TRUST_GROWTH)", "(learned ? 1000.0 : 1000.0)")]
+    },
+    "rows are independent": constants(correlation_max=1.0),
+    "no first differences of disturbances": constants(difference_share=1e-6),
+    "first differences as large": constants(difference_share=1.0),
+    "last lag as the first": constants(last_lag=1.0),
+    "noise at first the least one": constants(first_noise=1e-6),
+    "least noise the first one": constants(least_noise=0.01),
+    "predictions hardly bounded": constants(bound=100.0, bound_of_command=100.0),
+    "A bounded as all others": constants(bound_of_command=1.2),
+    "no shrinking": {
+        TRUST + "hsep_expert.c": [
+            (
+                "    return self->largest_square / (self->largest_square + variance);",
+                "    (void)self, (void)variance;\n    return 1.0;",
+            )
+        ]
+    },
+    "stiffness acts at x_pb": {FORECAST: [("x[j] = x_pb[j] + hsep_at(first, first->e_h)[j];", "x[j] = x_pb[j];")]},
+    "A: 20 lags": constants(lags_of_command=20),
+    "runs begin at rest": {START: [("    if (known < start_samples", "    if (1 || known < start_samples")]},
+    "L from the first": constants(first_lagged=1.0, first_static=0.0),
+    "S from the first": constants(first_lagged=0.0, first_static=1.0),
+    "kappa 0.3": constants(kappa=0.3),
+    "kappa 3": constants(kappa=3.0),
+    "gamma 0.9": constants(gamma=0.9),
+    "gamma 0.98": constants(gamma=0.98),
+    "interval: no leap": NO_LEAP,
+    **{
+        f"interval: no {name}": without_component(i)
+        for i, name in enumerate(("noise", "timing", "change", "variance of the experts"))
+    },
 }
 """What is tried, by name."""
-
-
-@dataclass(frozen=True)
-class Axis:
-    """Axis, its commands and measured positions of a cold and a warm run, ``(n,)``, m, and the group it belongs to."""
-
-    group: str
-    name: str
-    model: ModalModel
-    settings: PredictorSettings
-    x_d: Array
-    x_meas: tuple[Array, Array]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -75,57 +146,68 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--emps", type=Path, help="DATA_EMPS.mat")
     parser.add_argument("--recordings", type=Path, help="folder of recordings, *.csv with the columns t, x_d, x")
+    parser.add_argument("--so101", type=Path, help="folder of recordings of the arm, likewise")
     parser.add_argument("--n", type=int, default=12, help="random drives of each generator")
-    parser.add_argument("--seed", type=int, default=7, help="of the random drives")
     parser.add_argument("--only", default="", help="rows whose name has this text")
     parser.add_argument("--lines", action="store_true", help="a line for each axis, too")
+    parser.add_argument("--jobs", type=int, default=2, help="processes")
     given = parser.parse_args(arguments)
-    axes = list(axes_of(given.emps, given.recordings, given.n, given.seed))
-    groups = sorted({axis.group for axis in axes})
-    print("| cold / warm, × physics | " + " | ".join(groups) + " |\n|---|" + "---|" * len(groups))
-    for name, constants in VARIANTS.items():
-        if given.only not in name:
-            continue
-        errors = [relative_errors(axis, constants) for axis in axes]
-        print(_row(name, axes, errors, groups), flush=True)
-        for axis, (cold, warm) in zip(axes, errors, strict=True) if given.lines else ():
-            print(f"  {axis.name:44} {cold:.3f} {warm:.3f}")
+    parallel = Parallel(n_jobs=given.jobs)
+    axes: list[Axis] = parallel(delayed(make)() for make in logs_of(Folders(given.emps, given.recordings, given.so101)))
+    axes += simulations_of(given.n)
+    tried = {"as it is": {}, **{name: change for name, change in VARIANTS.items() if given.only in name}}
+    results = parallel(delayed(all_errors)(axes, CoreVariant(change)) for change in tried.values())
+    print("\n".join(tables(axes, dict(zip(tried, results, strict=True)), lines=given.lines)))
 
 
-def axes_of(emps: Path | None, recordings: Path | None, n: int, seed: int) -> Iterator[Axis]:
-    """Yield all axes."""
-    for case in cases(emps, recordings):
-        if COPIES in case.name:
-            continue
-        group = "simulated"
-        if case.x_meas[0] is case.x_meas[1]:
-            group = "recordings to choose on" if case.name.startswith(CHOOSE) else "recordings that judge"
-        yield Axis(group, case.name, case.model, replace(case.settings, trust=True, t_init=-1.0), case.x_d, case.x_meas)
-    for kind, generator in GENERATORS.items():
-        for drive in generator.drives_at(range(n), generator.true_positions(range(n), seed=seed), seed):
-            both = (drive.x_meas, drive.x_meas)
-            yield Axis(f"drives, {kind}", f"{kind} {drive.index}", drive.model, drive.settings, drive.x_d, both)
+def all_errors(axes: Sequence[Axis], core: CoreVariant) -> list[Errors]:
+    """Return the errors on all axes; infinite where a prediction diverges."""
+    found = []
+    for axis in axes:
+        try:
+            found.append(errors_of(axis, core.replay))
+        except SignalError:
+            found.append(Errors(np.inf, np.inf, np.inf, (0.0, 0.0, 0.0)))
+    return found
 
 
-def relative_errors(axis: Axis, constants: TrustConstants) -> tuple[float, float]:
-    """Return the errors cold and warm relative to the physics model's in the cold run."""
-    predictor = HybridPredictor(axis.model, axis.settings)
-    predictor.residual = SavedTrustedModel(predictor.settings, predictor.discrete, (), constants)
-    cold = backtest(predictor, axis.x_d, axis.x_meas[0])
-    predictor.restart()
-    warm = backtest(predictor, axis.x_d, axis.x_meas[1])
-    physics = rms(axis.x_meas[0] - cold.x_pb)
-    return rms(axis.x_meas[0] - cold.x_h) / physics, rms(axis.x_meas[1] - warm.x_h) / physics
+def tables(axes: Sequence[Axis], results: Mapping[str, Sequence[Errors]], *, lines: bool = False) -> Iterator[str]:
+    """Yield the lines of the tables, in Markdown."""
+    groups = list(dict.fromkeys(axis.group for axis in axes))
+    base = next(iter(results.values()))
+    rule = "|---|" + "---|" * len(groups)
+    yield f"| cold / warm (worst) | {' | '.join(groups)} |\n{rule}"
+    for name, errors in results.items():
+        factors = np.array([one[:2] for one in errors])
+        if errors is not base:
+            factors /= np.array([one[:2] for one in base])
+        yield _row(name, [_errors(factors[_of(axes, group)]) for group in groups])
+        for axis, (cold, warm) in zip(axes, factors, strict=True) if lines else ():
+            yield f"  {axis.name:44} {cold:.3f} {warm:.3f}"
+    yield f"\n| score (coverage of 50, 90, 95 %) | {' | '.join(groups)} |\n{rule}"
+    for name, errors in results.items():
+        scores = np.array([one.score for one in errors]) / np.array([one.score for one in base])
+        within = np.array([one.within for one in errors])
+        yield _row(name, [_intervals(scores[_of(axes, group)], within[_of(axes, group)]) for group in groups])
 
 
-def _row(name: str, axes: Sequence[Axis], errors: Sequence[tuple[float, float]], groups: Sequence[str]) -> str:
-    """Return a row: geometric means of each group, and the worst cold one."""
-    cells = []
-    for group in groups:
-        of_group = np.array([one for axis, one in zip(axes, errors, strict=True) if axis.group == group])
-        cold, warm = np.exp(np.mean(np.log(of_group), axis=0))
-        cells.append(f"{cold:.3f} / {warm:.3f} (worst {of_group[:, 0].max():.2f})")
-    return f"| {name} | " + " | ".join(cells) + " |"
+def _of(axes: Sequence[Axis], group: str) -> list[int]:
+    return [i for i, axis in enumerate(axes) if axis.group == group]
+
+
+def _row(name: str, cells: Sequence[str]) -> str:
+    return f"| {name} | {' | '.join(cells)} |"
+
+
+def _errors(of_group: np.ndarray) -> str:
+    """Return the geometric means of errors, cold and warm, ``(n, 2)``, and the worst ones."""
+    (cold, warm), worst = np.exp(np.mean(np.log(of_group), axis=0)), of_group.max(axis=0)
+    return f"{cold:.3f} / {warm:.3f} ({worst[0]:.2f} / {worst[1]:.2f})"
+
+
+def _intervals(scores: np.ndarray, within: np.ndarray) -> str:
+    """Return the geometric mean of scores, ``(n,)``, and the mean coverage, ``(n, 3)``, %."""
+    return f"{np.exp(np.mean(np.log(scores))):.3f} ({' '.join(f'{one:.0f}' for one in within.mean(axis=0))})"
 
 
 if __name__ == "__main__":

@@ -27,7 +27,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # benchmarks are n
 
 import numpy as np
 
-from benchmarks.random_drives.generator import random_drives
+from benchmarks.random_drives.generator import SEED, random_drives
 from benchmarks.random_drives.simulation import simulate as simulate_many
 from benchmarks.trust import SEEDS, Case, cases, simulated
 from hybridsep.base.metrics import rms
@@ -164,19 +164,25 @@ def _of_windows(error: Array, Np: int, samples: slice) -> Array:
 
 def changes(n: int) -> Iterator[tuple[str, float, float]]:
     """Yield names and RMS errors after a while, warm and cold, of plants that have changed before the warm run."""
+    for case in changed_plants(n):
+        yield case.name, *_warm_and_cold(case)
+
+
+def changed_plants(n: int, seed: int | None = None) -> Iterator[Case]:
+    """Yield cases whose plant has changed before the warm run; ``n`` of them are random drives."""
     drive, stage = load_machine("spring_mass_damper"), load_machine("als25010_x")
     for name, factors in CHANGES.items():
-        yield name, *_relearned(drive, _scaled(drive.new_plant(), factors), staircase())
+        yield _changed(name, drive, _scaled(drive.new_plant(), factors), staircase())
     for name, factors in STAGE_CHANGES.items():
-        yield name, *_relearned(stage, _scaled(stage.new_plant(), factors), spiral()[0])
-    for drawn in random_drives(range(n)):
+        yield _changed(name, stage, _scaled(stage.new_plant(), factors), spiral()[0])
+    for drawn in random_drives(range(n), SEED if seed is None else seed):
         modes = [
             replace(mode, f_n=DETUNED * mode.f_n, alpha=DETUNED**2 * mode.alpha) for mode in drawn.true_model.modes
         ]
         x = simulate_many([ModalModel(modes)], [drawn.disturbances], [drawn.x_d])[0]
         x_meas = x + drawn.noise_std * np.random.default_rng(drawn.index).standard_normal(len(x))
-        case = Case("", drawn.model, PredictorSettings(), drawn.x_d, (drawn.x_meas, x_meas))
-        yield f"drive {drawn.index}, frequencies × {DETUNED:g}", *_warm_and_cold(case)
+        name = f"drive {drawn.index}, frequencies × {DETUNED:g}"
+        yield Case(name, drawn.model, PredictorSettings(), drawn.x_d, (drawn.x_meas, x_meas))
 
 
 def _scaled(plant: Plant, factors: dict[str, float]) -> Plant:
@@ -187,12 +193,12 @@ def _scaled(plant: Plant, factors: dict[str, float]) -> Plant:
     return changed
 
 
-def _relearned(machine: Machine, changed: Plant, x_d: Array) -> tuple[float, float]:
-    """Return RMS errors, warm and cold, on a changed plant of a machine."""
+def _changed(name: str, machine: Machine, changed: Plant, x_d: Array) -> Case:
+    """Return the case of a machine's plant that is changed before the warm run."""
     assert machine.plant is not None
-    before = simulated("", machine, x_d)
+    before = simulated(name, machine, x_d)
     after = Encoder(machine.plant.noise_std, 1000).measure_all(simulate(changed, x_d, machine.T_s))
-    return _warm_and_cold(replace(before, x_meas=(before.x_meas[0], after)))
+    return replace(before, x_meas=(before.x_meas[0], after))
 
 
 def _warm_and_cold(case: Case) -> tuple[float, float]:

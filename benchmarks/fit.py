@@ -1,6 +1,6 @@
 """``hybridsep fit`` over logs of several machines, judged on their second halves beside what needs no hybrid.
 
-    python benchmarks/fit.py [--emps DATA_EMPS.mat] [--recordings FOLDER]      (ten minutes)
+    python benchmarks/fit.py [--emps DATA_EMPS.mat] [--recordings FOLDER] [--windows 100 20]      (ten minutes)
 
 RMS of the second half, which trained nothing, in 1e-6 of the log's unit. A first-order lag with dead time, fitted to
 the first half by least squares, and its last residual held over the window; the physics model's last residual held;
@@ -83,11 +83,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--emps", type=Path, help="DATA_EMPS.mat")
     parser.add_argument("--recordings", type=Path, help="folder with recorded logs, CSV")
+    parser.add_argument("--windows", type=int, nargs="+", default=WINDOWS, help="samples in a window, Np")
     given = parser.parse_args(arguments)
     print(f"| log | Np | {' | '.join(COLUMNS)} |\n|---|{'---|' * (len(COLUMNS) + 1)}")
     rows = []
     for log in logs(given.emps, given.recordings):
-        for Np in WINDOWS:
+        for Np in given.windows:
             try:
                 rows.append(row(log, Np))
                 print(rows[-1], flush=True)
@@ -109,7 +110,7 @@ def row(log: Log, Np: int) -> Row:
     """Return a row of the table."""
     used, _ = take_in([log], fix=False)
     with tempfile.TemporaryDirectory() as folder:
-        found = fit(used, Path(folder), FitOptions(Np, machine_name(log.path)))
+        found = fit(used, Path(folder), FitOptions(Np, machine_name(log.path)), fmus=False)
     rms = {one.name: 1e6 * one.rms for one in found.judged.scored()}
     return Row(log.path.stem, Np, rms, recommendation(judged_by(found, used[0].shown)))
 

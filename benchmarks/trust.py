@@ -177,14 +177,20 @@ def random_moves(seed: int) -> Array:
 
 
 def recorded(path: Path, Np: int) -> Case:
-    """Return the case of a recording, resampled where its intervals vary, with a model fitted to it."""
-    t, x_d, x = np.genfromtxt(path, delimiter=",", names=("t", "x_d", "x"), skip_header=1, unpack=True)
+    """Return the case of a recording with a model fitted to it."""
+    x_d, x, T_s = even(path)
+    settings = PredictorSettings(trust=False, Np=Np, p=min(50, Np), T_s=T_s)
+    return Case(f"{path.stem}, Np = {Np}", fitted_model(x_d, x, T_s), settings, x_d, (x, x))
+
+
+def even(path: Path) -> tuple[Array, Array, float]:
+    """Return commanded and measured positions of a recording, m, and its T_s, s; resampled where intervals vary."""
+    t, x_d, x = np.loadtxt(path, delimiter=",", skiprows=1, usecols=(0, 1, 2), unpack=True)
     T_s = round(float(np.median(np.diff(t))), 6)
     if np.ptp(np.diff(t)) > 0.1 * T_s:
         even = np.arange(t[0], t[-1], T_s)
         x_d, x = np.interp(even, t, x_d), np.interp(even, t, x)
-    settings = PredictorSettings(trust=False, Np=Np, p=min(50, Np), T_s=T_s)
-    return Case(f"{path.stem}, Np = {Np}", fitted_model(x_d, x, T_s), settings, x_d, (x, x))
+    return np.ascontiguousarray(x_d), np.ascontiguousarray(x), T_s
 
 
 def fitted_model(x_d: Array, x: Array, T_s: float) -> ModalModel:

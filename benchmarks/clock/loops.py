@@ -33,13 +33,13 @@ FLAVOURS = {"2.0": ("", "native", "2"), "3.0": ("Fmi3", "native", "3"), "Python"
 
 
 def exact(n: int, T_s: float) -> tuple[Array, Array]:
-    return T_s * np.arange(n, dtype=np.float64), np.full(n, T_s, dtype=np.float64)
+    return np.arange(n, dtype=np.float64) * T_s, np.full(n, T_s)
 
 
 def whole_nanoseconds(n: int, T_s: float) -> tuple[Array, Array]:
     """Return steps of a whole number of them, as libcosim's."""
     step = round(T_s * 1e9) * 1e-9
-    return step * np.arange(n, dtype=np.float64), np.full(n, step, dtype=np.float64)
+    return np.arange(n, dtype=np.float64) * step, np.full(n, step)
 
 
 def rounded_to_nanoseconds(n: int, T_s: float) -> tuple[Array, Array]:

@@ -117,13 +117,13 @@ FINDINGS: Mapping[str, Explanation] = {
     ),
     "outliers": Explanation(
         "Single samples are far from their neighbours: glitches of the encoder or of the transmission.",
-        "Repaired by `fit` and `--fix`, which interpolate. With `trust = true` those out of reach are rejected.",
+        "Repaired by `fit` and `--fix`, which interpolate. With `trust = true` the guard rejects them online.",
     ),
     "clipped": Explanation(
         "The measured position stops dead at a limit and leaves it at speed, while the command moves on, at both ends "
         "or many times, though the axis had followed closer before: the recorder's range ends there. As a note: it "
         "stands there once or by less, as an axis does that friction or load keeps from its command.",
-        "`--fix` treats the samples as missing. Record with a larger range or another scaling. A note needs no remedy.",
+        "`--fix` treats the samples as missing. Record with a larger range or another scaling. A note needs none.",
     ),
     "stuck samples": Explanation(
         "The measured position stands still and then jumps: the sensor or its transmission froze.",

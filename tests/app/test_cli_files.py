@@ -268,8 +268,8 @@ def test_a_log_that_ends_badly_costs_no_result(hybridsep: Run, tmp_path: Path, l
 
 
 def test_the_demos_list_of_files_needs_no_demo(tmp_path: Path) -> None:
-    files = demo.demo_files(tmp_path, "python", emps=True)
-    assert len(files) == len(set(files)) == 4 + 3 * (4 + 1 + 3 + 1)
+    files = demo.demo_files(tmp_path, "python", full=True, emps=True)
+    assert len(files) == len(set(files)) == 5 + 3 * (4 + 1 + 3 + 1)
 
 
 def test_a_file_that_has_the_folders_name_is_named(hybridsep: Run, tmp_path: Path, log: Path) -> None:

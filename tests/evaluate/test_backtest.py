@@ -226,8 +226,8 @@ def test_memory_does_not_grow_with_the_stream() -> None:
         return highest
 
     peak(1)  # what is imported or cached on first use
-    # Peaks differ by some kB, whatever their length; one number kept for each sample would be 240 kB.
-    assert peak(40) < peak(10) + 20_000
+    # Peaks differ by some kB, whatever their length; one number kept for each sample would be 96 kB.
+    assert peak(16) < peak(4) + 20_000
 
 
 @pytest.mark.parametrize(

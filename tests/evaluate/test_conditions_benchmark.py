@@ -40,7 +40,7 @@ def test_runs_are_cut_where_they_move(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_changed_plant_is_relearned_as_from_nothing() -> None:
     machine = load_machine("spring_mass_damper")
     changed = conditions._scaled(machine.new_plant(), {"k": 1.2})
-    warm, cold = conditions._relearned(machine, changed, staircase()[:4000])
+    warm, cold = conditions._warm_and_cold(conditions._changed("", machine, changed, staircase()[:4000]))
     assert warm < 1.02 * cold
     assert 5e-6 < cold < 1e-5  # the noise and more
 

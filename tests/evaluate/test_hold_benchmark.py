@@ -10,9 +10,14 @@ from places import EMPS, RECORDINGS
 from benchmarks import hold
 
 LOGS = [EMPS, *(sorted(RECORDINGS.glob("*.csv")) if RECORDINGS.is_dir() else []), RECORDINGS / "cnc_a_capture.json"]
+EACH_KIND = ("cnc_a_axis1", "cnc_a_capture", "xl330_kp100_raw_jitter")
+"""A recording of each device and reader; of all recordings at night."""
 
 
-@pytest.mark.parametrize("log", LOGS, ids=lambda log: str(log.stem))
+@pytest.mark.parametrize(
+    "log",
+    [pytest.param(log, id=log.stem, marks=[] if log.stem in EACH_KIND else [pytest.mark.nightly]) for log in LOGS],
+)
 def test_hold_is_what_follows_from_the_columns_of_a_recording(log: Path, tmp_path: Path) -> None:
     if not log.is_file():
         pytest.skip("the recorded axes are not here: ../shared/data, beside the repository")

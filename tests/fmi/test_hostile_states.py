@@ -30,7 +30,7 @@ HOSTILE: list[Any] = [
     *(-0.5, 0.0, 1e-320, 1e-3, 1e99, 1e101, 1e308, float("nan"), float("inf"), float("-inf")),
 ]
 NUMBERS = [0.0, -1.0, 1e-320, 1e9, 1e99, 1e101, 1e308, np.nan, np.inf, -np.inf]
-EXAMPLES = share(200)
+EXAMPLES = share(600)
 MEMORY_MAX = 300e6  # bytes, for a state of a few kilobytes
 TIME_MAX = 20.0  # s
 

@@ -46,7 +46,7 @@ GROUPS = {
     "Predictor": ["Look-ahead and residual model", "Residual model with trust", "Physics model"],
     "Compensator": ["Look-ahead and residual model", "Residual model with trust", "Compensation", "Physics model"],
     "Drive": ["Drive", "Encoder"],
-    "Drive_als25010_x": ["Disturbance", "Encoder", "Physics model"],
+    "Drive_als25010_x": ["Disturbance", "Command", "Encoder", "Physics model"],
     "Trajectory": ["Trajectory"],
 }
 

@@ -97,16 +97,6 @@ def test_the_commands_expert_is_doubted_where_it_led() -> None:
     assert not model.doubts
 
 
-def test_doubt_ends_once_this_run_outweighs_the_earlier_ones() -> None:
-    x_d = cycles(14 * PERIOD)
-    e = friction(x_d)
-    warm = learned(x_d[: 2 * PERIOD], e[: 2 * PERIOD])
-    run(warm, x_d[:PERIOD], (physics(x_d) + e)[:PERIOD])
-    assert trusted_model(warm).doubts
-    run(warm, x_d[PERIOD:], (physics(x_d) + e)[PERIOD:])
-    assert not trusted_model(warm).doubts
-
-
 def test_a_cold_run_doubts_nothing() -> None:
     predictor = trusted()
     assert not trusted_model(predictor).doubts

@@ -55,8 +55,6 @@ class TrustConstants:
     doubt : float
         Weight of that expert in the stack from which on earlier runs are forgotten: with 0.5 plants that have not
         changed are worse by 2 %.
-    doubt_over : float
-        Rows of this run relative to all from which on there is nothing left to doubt.
     friction_least, friction_ratio : float
         Least velocity of the friction's change of sign relative to the velocity scale, and the ratio from one of the
         six to the next: half a decade, which neighbours interpolate within.
@@ -87,7 +85,6 @@ class TrustConstants:
     carried: float = 30.0
     less: float = 0.003
     doubt: float = 0.7
-    doubt_over: float = 0.8
     friction_least: float = 0.01
     friction_ratio: float = 3.1622776601683795
     difference_share: float = 0.03

@@ -91,7 +91,7 @@ class Evidence:
 
 
 class EvidenceOfRuns:
-    """Rows of this run and, as long as they are doubted, those of earlier ones apart.
+    """Rows of this run and, as they are doubted, those of earlier ones apart.
 
     Parameters
     ----------

@@ -352,8 +352,9 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         """
         m, p = len(x), self.settings.p
         if forecast.scales.velocity != self.velocity_scale:  # outgrown
-            self._end_doubt()
             self.evidence.forget()
+            self.evidence_of_command.believe_earlier()
+            self.stack.forget(DOUBTING)
         self.velocity_scale, self.largest, self.largest_step = forecast.scales
         run, x_d, x_pb = self.run, forecast.x_d[:m], forecast.x_pb[:m]
         before, largest, T_s = float(run.static.x_pb[-1]), self.scale.largest, self.settings.T_s
@@ -398,12 +399,8 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         published = accepted & (np.arange(len(e)) >= late) if late < len(e) else accepted
         if published.any():
             self.stack.update(forecast.stacked[:, : len(e)][:, published], e[published], self.settings.lam)
-        if not self.doubts:
-            return
-        if self.stack.weights[DOUBTING] > self.constants.doubt:
+        if self.doubts and self.stack.weights[DOUBTING] > self.constants.doubt:
             self._forget_earlier_runs()
-        elif self.evidence.this.n_rows > self.constants.doubt_over * self.n_rows:
-            self._end_doubt()
 
     def _forget_earlier_runs(self) -> None:
         """Let all experts go on with this run alone, and judge them anew."""
@@ -413,12 +410,6 @@ class TrustedModel(ResidualModel[TrustedForecast]):
             self.experts[expert].restart()
         self.experts[self.leading].take_over(self.experts[DOUBTING])
         self.stack.restart()
-
-    def _end_doubt(self) -> None:
-        """Go on with what earlier runs have trained as with what this one has."""
-        self.evidence.believe_earlier()
-        self.evidence_of_command.believe_earlier()
-        self.stack.forget(DOUBTING)
 
 
 def _bridged(last: float, measured: Array, accepted: NDArray[np.bool_]) -> Array:

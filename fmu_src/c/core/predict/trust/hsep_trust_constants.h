@@ -57,9 +57,6 @@
  * are worse by 2 %. */
 #define HSEP_TRUST_DOUBT 0.7
 
-/* Rows of this run relative to all from which on there is nothing left to doubt. */
-#define HSEP_TRUST_DOUBT_OVER 0.8
-
 /* Least velocity of the friction's change of sign relative to the velocity scale, and the ratio from one of the six
  * to the next: half a decade, which neighbours interpolate within. */
 #define HSEP_TRUST_FRICTION_LEAST 0.01

@@ -1,7 +1,6 @@
 /* Learning of a residual model that can be trusted. */
 #include "hsep_trusted.h"
 
-#include "hsep_penalised.h"
 #include "hsep_trust_constants.h"
 #include "hsep_wide.h"
 
@@ -12,64 +11,6 @@
 /* Lags of a row that may stand for samples without a measurement. */
 static const double trusted_bridged = 3.0;
 
-/* Forget all rows of some evidence. */
-static void trusted_forget(hsep_trusted *self, hsep_evidence evidence)
-{
-    hsep_regression *regression = hsep_trusted_evidence(self, evidence);
-    hsep_regression_init(regression, regression->n, HSEP_NO_PENALTY);
-    self->n_rows[evidence] = self->n_earlier[evidence] = 0.0;
-}
-
-HSEP_API void hsep_trusted_gather(hsep_trusted *self, hsep_evidence evidence, double weight, hsep_regression *to)
-{
-    const hsep_regression *of_run = hsep_trusted_evidence(self, evidence);
-    const hsep_regression *earlier = hsep_trusted_earlier(self, evidence);
-    const size_t size = (size_t)hsep_regression_size(of_run->n);
-    if (self->n_rows[evidence] > 0.0) {
-        memmove(to, of_run, size);
-        hsep_penalised_add(to, earlier, weight, hsep_at(self, self->work));
-    } else {
-        memcpy(to, earlier, size);
-        if (weight < 1.0) {
-            hsep_regression_discount(to, weight);
-        }
-    }
-}
-
-/* Go on with all rows of some evidence as with those of this run. */
-static void trusted_believe_earlier(hsep_trusted *self, hsep_evidence evidence)
-{
-    if (self->n_earlier[evidence] > 0.0) {
-        hsep_trusted_gather(self, evidence, 1.0, hsep_trusted_evidence(self, evidence));
-        self->n_rows[evidence] += self->n_earlier[evidence];
-        self->n_earlier[evidence] = 0.0;
-    }
-}
-
-/* Weigh all rows of some evidence so far by kept. */
-static void trusted_discount(hsep_trusted *self, hsep_evidence evidence, double kept)
-{
-    if (kept < 1.0) {
-        hsep_regression_discount(hsep_trusted_evidence(self, evidence), kept);
-        hsep_regression_discount(hsep_trusted_earlier(self, evidence), kept);
-        self->n_rows[evidence] *= kept;
-        self->n_earlier[evidence] *= kept;
-    }
-}
-
-/* Begin another run: all rows so far are of earlier ones. */
-static void trusted_begin_run(hsep_trusted *self, hsep_evidence evidence)
-{
-    const hsep_regression *regression = hsep_trusted_evidence(self, evidence);
-    const double most = HSEP_TRUST_CARRIED * (double)self->Np;
-    trusted_believe_earlier(self, evidence);
-    trusted_discount(self, evidence, most / fmax(self->n_rows[evidence], most));
-    const double n_rows = self->n_rows[evidence];
-    memcpy(hsep_trusted_earlier(self, evidence), regression, (size_t)hsep_regression_size(regression->n));
-    trusted_forget(self, evidence);
-    self->n_earlier[evidence] = n_rows;
-}
-
 /* Take over what is known of the errors of another expert; NULL: nothing is. */
 static void trusted_set_noise(hsep_trusted *self, hsep_expert_place of, const hsep_expert *other)
 {
@@ -78,20 +19,10 @@ static void trusted_set_noise(hsep_trusted *self, hsep_expert_place of, const hs
     expert->correlation = other != NULL ? other->correlation : 1.0;
 }
 
-/* Go on with what earlier runs have trained as with what this one has. */
-static void trusted_end_doubt(hsep_trusted *self)
-{
-    trusted_believe_earlier(self, HSEP_OF_PHYSICS);
-    trusted_believe_earlier(self, HSEP_OF_COMMAND);
-    hsep_stack_forget(&self->stack, HSEP_DOUBTING);
-}
-
-HSEP_API int hsep_trusted_doubts(const hsep_trusted *self) { return self->n_earlier[HSEP_OF_PHYSICS] > 0.0; }
-
 HSEP_API void hsep_trusted_restart(hsep_trusted *self)
 {
-    trusted_begin_run(self, HSEP_OF_PHYSICS);
-    trusted_begin_run(self, HSEP_OF_COMMAND);
+    hsep_trusted_begin_run(self, HSEP_OF_PHYSICS);
+    hsep_trusted_begin_run(self, HSEP_OF_COMMAND);
     const hsep_expert_place leading = hsep_stack_leader(&self->stack);
     hsep_trusted_lead(self, leading);
     self->reach.n_missing = self->reach.n_beyond = 0;
@@ -171,7 +102,7 @@ static void trusted_fold(
     const double *learned = hsep_at(self, self->x);
     double *work = hsep_at(self, self->work);
     uint64_t b = 0;
-    trusted_discount(self, evidence, self->kept);
+    hsep_trusted_discount(self, evidence, self->kept);
     for (uint64_t j = self->Np; j-- > 0; rows += n_static) {
         if (learned[j] > 0.0) {
             double *row = hsep_block_fold_row(work, n, b++);
@@ -240,13 +171,8 @@ static void trusted_judge(hsep_trusted *self, const double e[], double count)
         }
     }
     trusted_judge_stack(self, e);
-    if (hsep_trusted_doubts(self)) {
-        const double n_rows = self->n_rows[HSEP_OF_PHYSICS], n_all = n_rows + self->n_earlier[HSEP_OF_PHYSICS];
-        if (self->stack.weights[HSEP_DOUBTING] > HSEP_TRUST_DOUBT) {
-            trusted_forget_earlier_runs(self);
-        } else if (n_rows > HSEP_TRUST_DOUBT_OVER * n_all) {
-            trusted_end_doubt(self);
-        }
+    if (hsep_trusted_doubts(self) && self->stack.weights[HSEP_DOUBTING] > HSEP_TRUST_DOUBT) {
+        trusted_forget_earlier_runs(self);
     }
     hsep_residual_scale_follow(&self->scale, e, accepted, self->Np, count);
     hsep_residual_scale_follow(&self->scale_of_command, e_0, accepted, self->Np, count);
@@ -270,8 +196,9 @@ HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const double x_d[
 static void trusted_take_scales(hsep_trusted *self)
 {
     if (self->forecast_scale != self->velocity_scale) {
-        trusted_end_doubt(self);
-        trusted_forget(self, HSEP_OF_PHYSICS);
+        hsep_trusted_forget(self, HSEP_OF_PHYSICS);
+        hsep_trusted_believe_earlier(self, HSEP_OF_COMMAND);
+        hsep_stack_forget(&self->stack, HSEP_DOUBTING);
     }
     self->velocity_scale = self->forecast_scale;
     self->largest_step = self->forecast_step;

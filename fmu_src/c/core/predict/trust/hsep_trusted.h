@@ -132,6 +132,19 @@ HSEP_API double *hsep_trusted_learned(hsep_trusted *self, uint64_t i);
 /* Whether these numbers are in range. */
 HSEP_API int hsep_trusted_sound(hsep_trusted *self);
 
+/* Whether this run doubts earlier ones. */
+HSEP_API int hsep_trusted_doubts(const hsep_trusted *self);
+
+/* Rows of this run, and of earlier ones weighed by weight, in to, which may be the regression of this run's. */
+HSEP_API void hsep_trusted_gather(hsep_trusted *self, hsep_evidence evidence, double weight, hsep_regression *to);
+
+/* Forget all rows of some evidence; go on with all of them as with those of this run; weigh all so far by kept; begin
+ * another run, of which all so far are earlier ones, at a bounded weight. */
+HSEP_API void hsep_trusted_forget(hsep_trusted *self, hsep_evidence evidence);
+HSEP_API void hsep_trusted_believe_earlier(hsep_trusted *self, hsep_evidence evidence);
+HSEP_API void hsep_trusted_discount(hsep_trusted *self, hsep_evidence evidence, double kept);
+HSEP_API void hsep_trusted_begin_run(hsep_trusted *self, hsep_evidence evidence);
+
 /* Predict the residual e, (n + p,), m, in samples 0 ... last - 1 of those that come next; behind it the last ones, as
  * measured. x_d: commands, x_pb: physics-based prediction, (n,), m; path: unmodified commands of the last n_path of
  * them, m, of a compensator; or NULL. Cost: m^3 / 6 multiply-adds for each expert's m
@@ -163,12 +176,6 @@ HSEP_API void hsep_trusted_begin_in_motion(hsep_trusted *self, const double x_d[
  * from it in any case. Cost: that of hsep_block_fold with Np rows of physics, of command, and in a warm run of
  * doubt. */
 HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_d[], const double x_pb[], double e[], int fold);
-
-/* Rows of this run, and of earlier ones weighed by weight, in to, which may be the regression of this run's. */
-HSEP_API void hsep_trusted_gather(hsep_trusted *self, hsep_evidence evidence, double weight, hsep_regression *to);
-
-/* Whether this run doubts earlier ones. */
-HSEP_API int hsep_trusted_doubts(const hsep_trusted *self);
 
 /* Discount what earlier runs have learned, and begin to doubt it: a machine may have changed meanwhile. */
 HSEP_API void hsep_trusted_restart(hsep_trusted *self);

@@ -1,0 +1,66 @@
+/* Replay of two runs by a predictor, the second one with what the first one has learned. */
+#include "hsep_predictor.h"
+#include "hsep_range.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* A run: commands and measured positions, (n,), m, and what is predicted of them with its standard deviation. */
+typedef struct {
+    uint64_t n;
+    const double *x_d, *x;
+    double *x_h, *std;
+} replayed_run;
+
+static int replay_run(hsep_predictor *predictor, const replayed_run *run)
+{
+    const uint64_t Np = predictor->Np;
+    for (uint64_t k = 0; k < run->n + Np && predictor->divergence == HSEP_CONVERGES; k++) {
+        const double x_d_ahead = run->x_d[k < run->n ? k : run->n - 1];
+        hsep_predictor_sample(predictor, x_d_ahead, k >= Np ? run->x[k - Np] : run->x_d[0]);
+        if (k + 1 >= Np && k + 1 < run->n + Np) {
+            hsep_predictor_outputs outputs;
+            hsep_predictor_read(predictor, &outputs);
+            run->x_h[k + 1 - Np] = outputs.x_h;
+            run->std[k + 1 - Np] = outputs.x_h_std;
+        }
+    }
+    return predictor->divergence == HSEP_CONVERGES;
+}
+
+/* As a warm start does it, by way of a file. */
+static void replay_take_over(hsep_predictor *predictor, hsep_predictor *trained)
+{
+    hsep_residual_model *to = hsep_predictor_model(predictor), *from = hsep_predictor_model(trained);
+    for (uint64_t i = 0; i < hsep_residual_n_learned(to); i++) {
+        *hsep_residual_learned(to, i) = *hsep_residual_learned(from, i);
+    }
+    for (uint64_t i = 0; i < hsep_residual_n_factors(to); i++) {
+        hsep_regression *factor = hsep_residual_factor(from, i);
+        memcpy(hsep_residual_factor(to, i), factor, (size_t)hsep_regression_size(factor->n));
+    }
+    memcpy(
+        hsep_uncertainty_learned(hsep_predictor_uncertainty(predictor)),
+        hsep_uncertainty_learned(hsep_predictor_uncertainty(trained)), HSEP_N_UNCERTAINTY * sizeof(double));
+    hsep_residual_restart(to);
+}
+
+/* Return whether both runs were predicted without divergence. */
+int replay(const hsep_predictor_parameters *parameters, const replayed_run *first, const replayed_run *second)
+{
+    const size_t size = (size_t)hsep_predictor_size(parameters);
+    hsep_predictor *trained = malloc(size), *predictor = malloc(size);
+    int sound = trained != NULL && predictor != NULL;
+    if (sound) {
+        hsep_predictor_init(trained, parameters, first->x_d[0]);
+        sound = replay_run(trained, first);
+    }
+    if (sound && second->n > 0) {
+        hsep_predictor_init(predictor, parameters, second->x_d[0]);
+        replay_take_over(predictor, trained);
+        sound = replay_run(predictor, second);
+    }
+    free(trained);
+    free(predictor);
+    return sound;
+}
