@@ -7,8 +7,8 @@
  * run has learned. Both are read when the component is loaded. It is named after its folder.
  *
  * In each period the pins take the outputs of this sample, which were computed in the period before, then the sample
- * (cmd, fb) is processed: cmd is the command that the drive is to have in `look-ahead` periods, fb the position measured
- * at the begin of this period. So a log of out and fb, sampled in one thread, is what hybridsep fit expects.
+ * (cmd, fb) is processed: cmd is the command that the drive is to have in `look-ahead` periods, fb the position
+ * measured at the begin of this period. So a log of out and fb, sampled in one thread, is what hybridsep fit expects.
  *
  * Real time: axis_step allocates nothing, locks nothing and opens no file; its cost is that of hsep_compensator_sample
  * (hsep.h). A begin (active rises, or the command jumps) costs some 100 us more: the state is filled anew.

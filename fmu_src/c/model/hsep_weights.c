@@ -50,8 +50,8 @@ static int weights_read(weights_source *source, void *to, size_t size)
     return weights_read_some(source, to, size) == size;
 }
 
-/* Whether it is whole: its last 8 bytes are the checksum of the others. size: of all of it, bytes. It is put back to its
- * beginning. */
+/* Whether it is whole: its last 8 bytes are the checksum of the others. size: of all of it, bytes. It is put back to
+ * its beginning. */
 static int weights_whole(weights_source *source, double *size)
 {
     unsigned char bytes[WEIGHTS_CHUNK + sizeof(uint64_t)];

@@ -14,8 +14,8 @@
 #include "hsep_model.h"
 #include "hsep_predictor.h"
 
-/* Take over what the context has in memory or, where it has nothing there, the resources, if they do. Fails if it is damaged, or was learned with other settings,
- * each of which is named. */
+/* Take over what the context has in memory or, where it has nothing there, the resources, if they do. Fails if it is
+ * damaged, or was learned with other settings, each of which is named. */
 HSEP_API hsep_status hsep_weights_load(
     const hsep_context *context, const double values[], uint64_t n_modes, hsep_predictor *predictor, char message[]);
 

@@ -220,8 +220,8 @@ HSEP_API double hsep_stage_rate(const hsep_stage *self)
     return rate;
 }
 
-/* Integrate z over time, s, from the command that acts, m from the start, with the commanded velocity v_d held; *v, m/s,
- * is a velocity of the last internal step. */
+/* Integrate z over time, s, from the command that acts, m from the start, with the commanded velocity v_d held; *v,
+ * m/s, is a velocity of the last internal step. */
 static void plant_stage_integrate(const hsep_stage *s, double z[], double acting, double v_d, double time, double *v)
 {
     const double n = plant_internal_steps(time, hsep_stage_rate(s)), disturbed = plant_disturbed(s, acting, v_d);
