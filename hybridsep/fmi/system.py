@@ -84,10 +84,11 @@ def build_system(
         progress(kind, i / len(parts))
         name = fmu_name(kind, machine.name, "native", fmi)
         how: dict[str, Any] = {"targets": targets, "samples": samples if part == "reference" else None, "fmi": fmi}
+        how["windows"] = False  # no connectors, and thousands of errors of one importer's
         files = fmu_files(machine, kind, name, "native", weights=weights if part == look_ahead else None, **how)
         content[f"resources/{name}.fmu"] = archived(files)
         warm = weights is not None and part == look_ahead
-        description = fmu_description(machine, kind, name, samples=part == "reference", warm=warm)
+        description = fmu_description(machine, kind, name, samples=part == "reference", warm=warm, windows=False)
         components.append(Component(part, f"{name}.fmu", _variables(description, fmi)))
         sets[part] = f"{machine.name}_{part}.ssv"
         content[f"resources/{sets[part]}"] = parameter_set(components[-1], ssp)
