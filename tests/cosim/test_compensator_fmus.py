@@ -45,11 +45,6 @@ def flavour(request: pytest.FixtureRequest) -> str:
 
 
 @pytest.fixture(scope="module")
-def pair(flavour: str, fmus: BuiltFmus) -> Pair:
-    return fmus(name_of("SepCompensator", MACHINE, flavour)), fmus(name_of("FeedDrive", MACHINE, flavour))
-
-
-@pytest.fixture(scope="module")
 def runs(fmus: BuiltFmus) -> Callable[[str, str], Run]:
     """Return a function that gives the run of a flavour and a choice with the paper's model and settings.
 
@@ -139,9 +134,9 @@ def by_library(tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Path, Run
 
 
 @pytest.mark.slow
-def test_recommended_settings_cold_and_warm(
-    flavour: str, pair: Pair, fmus: BuiltFmus, by_library: tuple[Run, Path, Run]
-) -> None:
+@pytest.mark.parametrize("flavour", ["native", pytest.param("python", marks=pytest.mark.nightly)])
+def test_recommended_settings_cold_and_warm(flavour: str, fmus: BuiltFmus, by_library: tuple[Run, Path, Run]) -> None:
+    pair = fmus(name_of("SepCompensator", MACHINE, flavour)), fmus(name_of("FeedDrive", MACHINE, flavour))
     first, weights, second = by_library
     # The figures are the library's: the beginning is enough, up to where it sees the end.
     r = staircase()[:2000] if flavour == "native" else staircase()[:1200]

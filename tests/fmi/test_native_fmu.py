@@ -249,7 +249,14 @@ def drive(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["HybridPredictor", "FeedDrive_als25010_x", "ReferenceTrajectory", "FeedDriveFmi3"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "HybridPredictor",
+        "FeedDriveFmi3",
+        *(pytest.param(name, marks=pytest.mark.nightly) for name in ("FeedDrive_als25010_x", "ReferenceTrajectory")),
+    ],
+)
 def test_the_archive_without_binaries_can_be_compiled(
     fmus: BuiltFmus, tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -9,7 +9,7 @@ import pytest
 from driving import T_S
 from hold_oracle import held
 from staircase_data import commanded
-from stream import COMPENSATOR, OUTPUTS, PREDICTOR, Array, Value, machine_of
+from stream import COMPENSATOR, NATIVE, OUTPUTS, PREDICTOR, Array, Value, machine_of
 from streams import StreamMaker, on_all
 
 from hybridsep.plants.encoder import Encoder
@@ -34,7 +34,7 @@ def disturbed(model: str, delay: int, *, missing: bool) -> tuple[Array, Array]:
     return x_d, x
 
 
-@on_all((PREDICTOR, COMPENSATOR))
+@on_all((PREDICTOR, COMPENSATOR), alike=(NATIVE,))
 @pytest.mark.parametrize(
     "more",
     [

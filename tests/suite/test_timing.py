@@ -19,6 +19,7 @@ from stream import (
     CANNOT,
     COMPENSATOR,
     LOOK_AHEADS,
+    NATIVE,
     PLANTS,
     PREDICTOR,
     TRAJECTORY,
@@ -31,7 +32,7 @@ N_SAMPLES = 260
 
 Clock = list[Fraction]
 
-every = on_all((*LOOK_AHEADS, TRAJECTORY))
+every = on_all((*LOOK_AHEADS, TRAJECTORY), alike=(NATIVE,))  # its clock is the C core's
 
 
 def steps_of(pattern: str) -> list[Fraction]:

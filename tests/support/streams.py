@@ -99,14 +99,14 @@ def fmu_name(model: str, implementation: str) -> str:
     return f"{kind}{_SUFFIX[implementation]}{separator}{machine}"
 
 
-def cases(models: Sequence[str], *, needs: str = "", adapters: bool = False) -> list[Any]:
+def cases(models: Sequence[str], *, needs: str = "", adapters: bool = False, alike: Sequence[str] = ()) -> list[Any]:
     """Return pytest parameters ``(implementation, model)`` for all that there are, and that can do what is needed.
 
     With ``adapters`` the FMI 3.0 FMU of the first model is among them. What a pythonfmu FMU computes is the library's,
     and what a native FMU computes the C core's: the former runs one set of a test's other parameters, and the latter
-    where a test is of agreement (``one_set``); the other sets run at night.
+    where a test is of agreement or says so by ``alike`` (``one_set``); the other sets run at night.
     """
-    once = (PYTHON, NATIVE) if needs == "agreement" else (PYTHON,)
+    once = (PYTHON, NATIVE) if needs == "agreement" else (PYTHON, *alike)
     pairs = [(implementation, model) for implementation in IMPLEMENTATIONS for model in models]
     if adapters:
         pairs.append((FMI3, models[0]))
@@ -124,9 +124,9 @@ def cases(models: Sequence[str], *, needs: str = "", adapters: bool = False) -> 
     ]
 
 
-def on_all(models: Sequence[str], *, needs: str = "") -> pytest.MarkDecorator:
+def on_all(models: Sequence[str], *, needs: str = "", alike: Sequence[str] = ()) -> pytest.MarkDecorator:
     """Return the mark of a test that takes ``new_stream``, on all implementations."""
-    return pytest.mark.parametrize("new_stream", cases(models, needs=needs), indirect=True)
+    return pytest.mark.parametrize("new_stream", cases(models, needs=needs, alike=alike), indirect=True)
 
 
 def on_adapters(models: Sequence[str], *, needs: str = "") -> pytest.MarkDecorator:
