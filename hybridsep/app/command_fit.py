@@ -69,7 +69,7 @@ def fit(
     from ..logs.log import read_log
     from ..machines.naming import checked_name, machine_name
     from ..reports.judged import recommendation
-    from .log_intake import show
+    from .log_intake import different_logs, show
     from .overwrite import FIT_FILES, PDF, Output, check_outputs
     from .progress import progress_bar
     from .tables import console, print_json, print_written
@@ -94,6 +94,7 @@ def fit(
         )
         for path in logs
     ]
+    found = different_logs(found)
     for log in found:
         show((f"{log.path.name}: {remark}" for remark in log.remarks), ())
     used, findings = take_in(found, fix=fix)

@@ -6,16 +6,18 @@ Status 2 for an error, 130 after Ctrl-C, 1 where the reader of standard output h
 from __future__ import annotations
 
 import os
+import shlex
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import typer
 from rich.console import Console
 from typer.core import TyperGroup
 
-from ..base.errors import HybridSepError, brief
+from ..base.errors import HybridSepError, LogError, brief
 from ..base.interrupt import interrupts_between_calls
 from ..base.new_folders import remove_empty_folders
 from ..base.version import version_text
@@ -41,6 +43,8 @@ class Commands(TyperGroup):
         except typer.BadParameter as error:
             from pydantic import ValidationError
 
+            if type(error).__name__ == "MissingParameter" and getattr(error.param, "name", "") == "machine":
+                error.message = _machine_files(sys.argv[2:])
             cause = error.__cause__
             if isinstance(cause, ValidationError):  # in older versions of typer the message has the value
                 first = cause.errors()[0]
@@ -49,6 +53,26 @@ class Commands(TyperGroup):
             raise
         finally:
             remove_empty_folders()
+
+
+def _to_paste(error: HybridSepError) -> list[str]:
+    """Return this command with each of the options that would put an error right, to paste."""
+    options = error.options if isinstance(error, LogError) else ()
+    given = shlex.join(sys.argv[1:])
+    width = max((len(option) for option, _ in options), default=0)
+    return [f"  hybridsep {given} {option:{width}}  # {meaning}" for option, meaning in options]
+
+
+def _machine_files(arguments: Sequence[str]) -> str:
+    """Return which machine files fit wrote for a command's log, or that it writes one, in words."""
+    logs = [Path(one) for one in arguments if not one.startswith("-")]
+    folders = [folder for log in logs for folder in (log.with_suffix(""), Path(log.stem), log.parent)]
+    found = list(dict.fromkeys(str(one) for folder in folders if (one := folder / "machine.toml").is_file()))
+    others = sorted(str(one) for one in Path().glob("*/machine.toml"))
+    if found or others:
+        return f"There is {' and '.join(found or others[:3])}: add -m {shlex.quote((found or others)[0])}"
+    log = shlex.quote(str(logs[0])) if logs else "LOG"
+    return f"It is the axis's machine file, which hybridsep fit {log} writes, or the name of one of the library's"
 
 
 class Interrupted(BaseException):
@@ -73,7 +97,7 @@ def run(app: Callable[[], object]) -> int:
         _abandon_stdout()
         return 1
     except HybridSepError as error:
-        return _fail(str(error))
+        return _fail("\n".join([str(error), *_to_paste(error)]))
     except OSError as error:
         if error.filename is None:  # files name theirs
             _abandon_stdout()

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..base.errors import LogError, ParameterError
 from ..intake.check import Intake, apply, check
 from ..intake.finding import Finding
-from ..intake.repair import MISSING, applied, check_measured
+from ..intake.repair import MISSING, applied, check_measured, options_of
 from ..intake.times import BRIDGED_MAX
 from ..logs.log import Log, LogReader, open_log
 from ..machines.agree import check_interval, check_unit
@@ -18,7 +20,7 @@ from ..machines.machine import Machine
 from .failures import errors_console
 from .options import ReadingOptions
 
-__all__ = ["Reading", "open_checked", "reading_of", "show"]
+__all__ = ["Reading", "different_logs", "open_checked", "reading_of", "show"]
 
 CHECKED_MAX = 2_000_000
 """Samples that are checked at most; a longer log is replayed in bounded memory all the same."""
@@ -95,10 +97,12 @@ def open_checked(
     if not fix and not any(finding.name == "time order" for finding in intake.errors):
         check_interval(path.name, reader.T_s, machine)
     if intake.errors and not (fix or as_is):
-        raise LogError(
+        error = LogError(
             f"{path}: errors computed from this log would be invalid: {'; '.join(f.words for f in intake.errors)}. "
             "Apply the fixes with --fix, correct the log or the options it is read with, or go on with --as-is"
         )
+        error.options = options_of(intake.errors)
+        raise error
     if fix:
         intake = replace(intake, findings=tuple(applied(finding) for finding in intake.findings))
     show(reader.remarks, intake.findings)
@@ -113,6 +117,22 @@ def open_checked(
     if not (as_is or reader.is_even):  # behind what was checked
         open_log(path, **reading)
     return reader, intake
+
+
+def different_logs(logs: Sequence[Log]) -> list[Log]:
+    """Return the logs without those that have the samples of one before; it is said of each that is left out."""
+    kept: list[Log] = []
+    for log in logs:
+        same = [
+            one
+            for one in kept
+            if np.array_equal(one.x_d, log.x_d) and np.array_equal(one.x_meas, log.x_meas, equal_nan=True)
+        ]
+        if same:
+            show([f"{log.path} has the samples of {same[0].path}: it counts once"], ())
+        else:
+            kept.append(log)
+    return kept
 
 
 def show(remarks: Iterable[str], findings: Iterable[Finding]) -> None:

@@ -181,7 +181,9 @@ def fit(
     judging = max(len(recording.x) - recording.n_train for recording in recordings)
     if options.Np is not None and options.Np > judging:
         raise ParameterError(
-            f"--Np must be at most {judging}, the longest stretch of samples that judges, got {options.Np}; record more"
+            f"--Np must be at most {judging}, got {options.Np}: the first half of each log trains, and the "
+            f"longest stretch of what tests has {judging} samples; give a smaller --Np, or a log of {2 * options.Np} "
+            "samples or more"
         )
     default = replace(settings_for(Np, T_s, "zoh"), **options.known)
     compensates = bool(options.drive_limits)

@@ -36,11 +36,14 @@ class Fix:
         Log → log.
     meaning : bool
         Whether positions mean something else afterwards, so that a controller must change its own alike.
+    options : tuple of (str, str)
+        Options of the command line, one of which puts it right as well, each with what it means.
     """
 
     words: str
     change: Callable[[Log], Log] = field(repr=False)
     meaning: bool = False
+    options: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..base.signals import Array
 from ..intake import fixes
 from ..logs.log import Log
+from ..logs.units import UNIT_OPTIONS
 from .finding import ERROR, HOPELESS, NOTE, WARNING, Finding, Fix, Picture
 from .relation import noise_std
 
@@ -134,7 +135,7 @@ def check_unit(log: Log) -> Iterator[Finding]:
         f"read in m there are {shown}, more than a feed axis has: the positions are rather in mm (--unit mm), µm "
         "(--unit um), or deg of a rotary axis (--unit deg)"
     )
-    fix = Fix("read both positions as mm", partial(fixes.scaled, factor=1e-3), meaning=True)
+    fix = Fix("read both positions as mm", partial(fixes.scaled, factor=1e-3), meaning=True, options=UNIT_OPTIONS)
     yield Finding("unit", ERROR, words, {**evidence, "factor": 1e-3}, _positions(log, "Positions as read"), fix)
 
 

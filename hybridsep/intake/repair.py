@@ -12,7 +12,7 @@ from ..logs.log import Log
 from .check import apply, check
 from .finding import ERROR, HOPELESS, Finding
 
-__all__ = ["MISSING", "applied", "changed_by", "changes", "check_measured", "take_in"]
+__all__ = ["MISSING", "applied", "changed_by", "changes", "check_measured", "options_of", "take_in"]
 
 _REPAIRED = ("time order", "gaps", "jitter", "lost rows", "outliers", "stuck samples", "repeated samples")
 """Findings about samples, not about what they mean: their fixes lose nothing that could be learned from."""
@@ -39,6 +39,7 @@ def take_in(logs: Sequence[Log], *, fix: bool) -> tuple[list[Log], Mapping[str, 
     used, all_findings = [], {}
     for log in logs:
         check_measured(log)
+        _check_motion(log)
         findings = check(log).findings
         repaired = [finding for finding in findings if (fix and finding.name != MISSING) or finding.name in _REPAIRED]
         left = [
@@ -48,10 +49,28 @@ def take_in(logs: Sequence[Log], *, fix: bool) -> tuple[list[Log], Mapping[str, 
         ]
         if left:
             hint = " (--fix does it)" if all(finding.fix for finding in left) else ""
-            raise LogError(f"{log.path}: " + "; ".join(finding.plain for finding in left) + hint)
+            error = LogError(f"{log.path}: " + "; ".join(finding.plain for finding in left) + hint)
+            error.options = options_of(left)
+            raise error
         used.append(apply(log, repaired))
         all_findings[log.path.name] = tuple(applied(one) if one in repaired else one for one in findings)
     return used, all_findings
+
+
+def _check_motion(log: Log) -> None:
+    """Raise LogError if the axis is never commanded to move, or never moves."""
+    still = [name for name, x in (("commanded", log.x_d), ("measured", log.x_meas)) if np.nanmax(x) == np.nanmin(x)]
+    if still:
+        raise LogError(
+            f"{log.path}: the {' and the '.join(still)} position never change{'s' if len(still) == 1 else ''}: an axis "
+            "at rest shows neither its model nor its errors; record it while it moves over the travel that is used, or "
+            "name other columns (--x-d NAME, --x NAME)"
+        )
+
+
+def options_of(findings: Iterable[Finding]) -> tuple[tuple[str, str], ...]:
+    """Return the options of the command line that put findings right, each with what it means."""
+    return tuple(option for finding in findings if finding.fix for option in finding.fix.options)
 
 
 def check_measured(log: Log) -> None:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 
 from ..base.errors import LogError, brief, listed
 from .source import Source
+from .text_layout import is_number
 from .units import POSITION_UNITS, TIME_UNITS, Unit, plain_name, position_unit, stated_unit, time_unit
 
-__all__ = ["COUNT", "ROLES", "Column", "choose_columns"]
+__all__ = ["COUNT", "ROLES", "Column", "choose_columns", "roles_of"]
 
 COUNT = "such as unit='0.1um' (--unit 0.1um)"
 """Example of the unit of a log in encoder counts, for messages."""
@@ -126,6 +128,17 @@ def _name(source: Source, role: str, given: str | None) -> str | None:
     return None
 
 
+def roles_of(source: Source) -> dict[str, str]:
+    """Return the names of the columns that are read without a word of the user's, by role, as far as there are any."""
+    found = {}
+    for role in ROLES:
+        with suppress(LogError):  # there are several
+            name = _name(source, role, None)
+            if name is not None:
+                found[role] = name
+    return found
+
+
 def _only_clock(source: Source) -> str | None:
     """Return the only column of timestamps, whatever its name; None if there are none or several."""
     twins = {twin for one in source.twins.values() for twin in one}
@@ -147,6 +160,12 @@ def _option(role: str) -> str:
 def _missing(source: Source, names: Mapping[str, str]) -> LogError:
     """Return the error of columns that are not there, by role."""
     there = listed(source.names)
+    if source.names and all(is_number(name.partition("#")[0]) for name in source.names):
+        kinds = "t,x_d,x" if len(source.names) == 3 else "t,x_d,x and what the others are"
+        raise LogError(
+            f"{source.path}: has no line of names, its first line is numbers ({there}); put one above, such as "
+            f"{kinds}: time, commanded and measured position, with units if they are not SI, as in x_d [mm]"
+        )
     what = ", ".join(repr(name) if name == role else f"{brief(name)} ({role})" for role, name in names.items())
     which, it = (f"column {what} is", "it") if len(names) == 1 else (f"columns {what} are", "them")
     options = " ".join(f"--{_option(role)} NAME" for role in names)

@@ -45,6 +45,9 @@ READERS: tuple[type[Source], ...] = (
 
 _HEAD = 4096
 
+_TEXT = (".csv", ".txt", ".log")
+"""Ends of the names of texts, in which no reader but theirs can say what is damaged."""
+
 _SAVE = "save its columns t, x_d and x as CSV"
 _PANDAS = "pandas.read_{}('{{path}}').to_csv('log.csv', index=False)"
 
@@ -108,7 +111,12 @@ def _reader(path: Path, head: bytes) -> type[Source]:
     if READERS[-1].recognises(head):
         return READERS[-1]
     named = [reader for reader in READERS[:-1] if path.name.lower().endswith(reader.endings)]
+    known = ", ".join(dict.fromkeys(reader.format for reader in READERS))
+    if named and path.name.lower().endswith(_TEXT):
+        raise LogError(
+            f"{path}: is binary, though its name is that of a text: none of the formats that are read "
+            f"({known}); {_SAVE}"
+        )
     if named:
         return named[-1]  # its message says what is damaged
-    known = ", ".join(dict.fromkeys(reader.format for reader in READERS))
     raise LogError(f"{path}: is in no format that is read ({known}); {_SAVE}")

@@ -18,7 +18,7 @@ from .gaps import row_interval
 from .rates import on_one_clock
 from .source import NEEDS_TRUST, Block
 from .time_axis import TimeAxis
-from .units import POSITION_UNITS, Shown, position_unit, shown_of, stated_unit
+from .units import POSITION_UNITS, UNIT_OPTIONS, Shown, position_unit, shown_of, stated_unit
 
 __all__ = ["Log", "LogReader", "check_reading", "open_log", "read_log"]
 
@@ -214,10 +214,12 @@ class LogReader:
             smaller = _SMALLER.get(column.unit.name)
             hint = f"; if the log is in {smaller}, say unit='{smaller}' (--unit {smaller})" if smaller else ""
             hint += f", if it is in encoder counts, the length of one, {COUNT}" if smaller and si == "m" else ""
-            raise LogError(
+            error = LogError(
                 f"{self.path}: column {brief(column.name)} read in {column.unit.name} spans {span:.4g} {si}, more than "
                 f"{largest:g} {si}{hint}"
             )
+            error.options = () if column.stated else UNIT_OPTIONS
+            raise error
 
     def _check_twins(self) -> None:
         """Raise LogError if a column that is read occurs several times, with values that differ.

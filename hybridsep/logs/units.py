@@ -10,6 +10,7 @@ from dataclasses import dataclass
 __all__ = [
     "POSITION_UNITS",
     "TIME_UNITS",
+    "UNIT_OPTIONS",
     "Shown",
     "Unit",
     "plain_name",
@@ -49,6 +50,9 @@ POSITION_UNITS: Mapping[str, Unit] = {
     **_units("rad", {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180, "rev": 2 * math.pi}),
 }
 """Units of positions by name; a log's positions are read in metres, or in radians where their unit is an angle."""
+
+UNIT_OPTIONS = (("--unit mm", "a linear axis in mm"), ("--unit deg", "a rotary axis or a joint in degrees"))
+"""Options that say the unit of a log that states none, each with what it means."""
 
 TIME_UNITS: Mapping[str, Unit] = _units("s", {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0})
 """Units of times by name."""

@@ -1,0 +1,95 @@
+"""Messages that say what a file is and what to type."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import Run, write_log, write_rows
+from staircase_data import commanded, measured
+
+
+@pytest.mark.parametrize("scale", [1e3, 6e4])  # refused by the checks, and by the reader
+def test_a_log_without_units_is_refused_with_lines_to_paste(tmp_path: Path, hybridsep: Run, scale: float) -> None:
+    log = write_log(tmp_path / "joint 3.csv", header="t,goal,present", scale=scale)
+    given = ("fit", log, "--x-d", "goal", "--x", "present")
+    status, out, err = hybridsep(*given, "--out", tmp_path / "fit")
+    assert (status, out) == (2, "")
+    lines = [line.strip() for line in err.splitlines() if line.startswith("  hybridsep ")]
+    command = shlex.split(lines[0], comments=True)
+    assert command == ["hybridsep", *map(str, given), "--out", str(tmp_path / "fit"), "--unit", "mm"]
+    assert lines[0].endswith("# a linear axis in mm")
+    assert shlex.split(lines[1], comments=True)[-2:] == ["--unit", "deg"]
+    assert "joint" in lines[1]
+
+
+def test_a_replay_is_refused_with_lines_to_paste(tmp_path: Path, hybridsep: Run) -> None:
+    log = write_log(tmp_path / "axis.csv", scale=1e3)
+    status, _, err = hybridsep("backtest", log, "-m", "spring_mass_damper")
+    assert status == 2
+    assert f"  hybridsep backtest {log} -m spring_mass_damper --unit mm " in err
+
+
+def test_a_binary_file_says_what_it_is(tmp_path: Path, hybridsep: Run) -> None:
+    log = tmp_path / "axis.csv"
+    log.write_bytes(np.random.default_rng(0).bytes(5000))
+    status, _, err = hybridsep("fit", log)
+    assert status == 2
+    assert "axis.csv: is binary, though its name is that of a text" in err
+
+
+def test_a_log_without_names_says_what_to_put_above(tmp_path: Path, hybridsep: Run) -> None:
+    log = tmp_path / "axis.csv"
+    np.savetxt(log, np.zeros((20, 3)), delimiter=",", fmt="%g")
+    status, _, err = hybridsep("fit", log)
+    assert status == 2
+    assert "axis.csv: has no line of names, its first line is numbers ('0', '0#2', '0#3'); put one above" in err
+    assert "such as t,x_d,x: time, commanded and measured position" in err
+
+
+def test_a_machine_file_that_fit_wrote_is_named(
+    tmp_path: Path, hybridsep: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_log(Path("axis.csv"), n=20)
+    status, _, err = hybridsep("backtest", "axis.csv")
+    assert status == 2
+    assert "It is the axis's machine file, which hybridsep fit axis.csv writes" in " ".join(err.split())
+    Path("axis").mkdir()
+    Path("axis/machine.toml").touch()
+    for command in ("backtest", "report", "live"):
+        status, _, err = hybridsep(command, "axis.csv")
+        assert status == 2
+        assert "There is axis/machine.toml: add -m axis/machine.toml" in " ".join(err.split())
+
+
+def test_channels_of_a_text_are_told(tmp_path: Path, hybridsep: Run) -> None:
+    status, out, err = hybridsep(
+        "fit", write_log(tmp_path / "axis.csv", header="t [s],x_d [m],x [m]"), "--list-channels"
+    )
+    assert (status, err) == (0, "")
+    rows = [line.split() for line in out.splitlines() if line.strip()]
+    assert ["x_d", "[m]", "m", "2500", "0.001", "commanded"] in rows
+    assert "name it" not in out
+    log = write_log(tmp_path / "odd.csv", header="t,goal,present")
+    status, out, _ = hybridsep("fit", log, "--list-channels")
+    assert status == 0
+    words = "none is read as the commanded and measured position; name it: hybridsep fit "
+    assert f"{words}{log} --x-d NAME --x NAME" in out
+
+
+def test_a_log_at_rest_is_refused(tmp_path: Path, hybridsep: Run) -> None:
+    log = write_rows(tmp_path / "axis.csv", np.full(600, 0.1), np.full(600, 0.1))
+    status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit")
+    assert (status, out) == (2, "")
+    assert "axis.csv: the commanded and the measured position never change: an axis at rest shows neither" in err
+    assert not (tmp_path / "fit" / "machine.toml").exists()
+
+
+def test_the_same_log_twice_counts_once(tmp_path: Path, hybridsep: Run) -> None:
+    logs = [write_rows(tmp_path / name, commanded()[:800], measured(0)[:800]) for name in ("a.csv", "b.csv")]
+    status, _, err = hybridsep("fit", *logs, "--Np", 500, "--out", tmp_path / "fit")
+    assert status == 2  # a refusal that comes behind, and soon
+    assert f"note: {logs[1]} has the samples of {logs[0]}: it counts once" in err
