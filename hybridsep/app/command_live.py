@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -20,6 +20,7 @@ from .options import (
 )
 
 if TYPE_CHECKING:
+    from ..intake.finding import Finding
     from ..logs.units import Shown
 
 __all__ = ["live"]
@@ -49,6 +50,9 @@ def live(
         Path | None, typer.Option(help="Predictor FMU; the native one, built from the machine, if left out.")
     ] = None,
     weights: WeightsOption = None,
+    cold: Annotated[
+        bool, typer.Option("--cold", help="Start without the trained.state that lies beside the machine file.")
+    ] = False,
     *,
     reading: ReadingOptions,
     parameters: dict[str, Any],
@@ -63,6 +67,7 @@ def live(
     from ..cosim.fmus import FmuController
     from ..cosim.pairing import check_predictor, values_to_build
     from ..fmi.builds import build_here
+    from ..live.first_seconds import FirstSeconds
     from ..live.open_source import open_source
     from ..live.page import Page
     from ..live.plotjuggler import PlotJuggler
@@ -73,10 +78,20 @@ def live(
     from .log_intake import reading_of
 
     axis = load_machine(machine)
+    if weights is None and predictor is None and not cold:
+        weights = _trained(machine, parameters)
     check_predictor(axis, predictor, weights)
     values = values_to_build(axis, "HybridPredictor", parameters) if predictor is None else parameters
     how = reading_of(axis, reading, may_miss=axis.changed("predictor", parameters).predictor_settings.trust)
     run = LiveRun({}, 0)
+
+    def say(findings: Sequence[Finding]) -> None:
+        for one in findings:
+            errors_console.print(f"the first seconds: {one}", soft_wrap=True)
+
+    def watch(T_s: float, Np: int) -> FirstSeconds:
+        return FirstSeconds(axis.unit, T_s, Np, stated=how["unit"] is not None, say=say)
+
     with ExitStack() as stack:
         sinks: list[Sink] = [] if plotjuggler is None else [PlotJuggler(plotjuggler, axis.name)]
         origin = stack.enter_context(open_source(source, axis, how, speed))
@@ -88,7 +103,8 @@ def live(
             if served is not None:
                 sinks.append(served)
                 errors_console.print(f"page: {served.address}", soft_wrap=True)
-            run = run_live(origin, FmuController(ahead, values, 0.0), sinks, ends=(Interrupted, KeyboardInterrupt))
+            controller = FmuController(ahead, values, 0.0)
+            run = run_live(origin, controller, sinks, ends=(Interrupted, KeyboardInterrupt), watch=watch)
             _print_run(run.status, shown, as_json=as_json)
             if served is not None and served.n_dropped:
                 errors_console.print(f"note: the page was too slow for {served.n_dropped} samples")
@@ -98,6 +114,20 @@ def live(
         except (Interrupted, KeyboardInterrupt):  # before the first sample, or while the page is looked at
             if not run.status:
                 _print_run({}, shown, as_json=as_json)
+
+
+def _trained(machine: str, parameters: Mapping[str, Any]) -> Path | None:
+    """Return the state that fit left beside a machine file, None if there is none; say which start it is."""
+    from .failures import errors_console
+
+    state = Path(machine).with_name("trained.state")
+    if not (Path(machine).is_file() and state.is_file()):
+        return None
+    if parameters:
+        errors_console.print(f"note: starts cold, as {state} is of other parameters than those given", soft_wrap=True)
+        return None
+    errors_console.print(f"note: starts warm, from {state} (--cold starts without)", soft_wrap=True)
+    return state
 
 
 def _print_run(status: Mapping[str, Any], shown: Shown, *, as_json: bool) -> None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 from ..cosim.fmus import FmuController
 from .core import LiveCore, Row
+from .first_seconds import FirstSeconds
 from .order import Order
 from .sample import Sample
 from .source import LiveSource
@@ -60,6 +61,7 @@ def run_live(
     sinks: Sequence[Sink],
     *,
     ends: tuple[type[BaseException], ...] = (),
+    watch: Callable[[float, int], FirstSeconds] | None = None,
 ) -> LiveRun:
     """Run an FMU on a source until it ends.
 
@@ -72,6 +74,8 @@ def run_live(
         They get every row, and are told of the end, by an error too.
     ends : tuple of type
         Exceptions, such as that of Ctrl-C, which end a run as its source would.
+    watch : callable, optional
+        Sampling interval, s, and samples in a window → what checks the first seconds.
 
     Raises
     ------
@@ -79,7 +83,7 @@ def run_live(
         If a sample is refused, or commands are missing.
     """
     with controller:
-        run, interrupted = _Run(sinks), False
+        run, interrupted = _Run(sinks, watch), False
         try:
             for sample in source.samples():
                 if sample is not None:
@@ -98,8 +102,9 @@ def run_live(
 class _Run:
     """State of a run."""
 
-    def __init__(self, sinks: Sequence[Sink]) -> None:
-        self._sinks = sinks
+    def __init__(self, sinks: Sequence[Sink], watch: Callable[[float, int], FirstSeconds] | None) -> None:
+        self._sinks, self._watch = sinks, watch
+        self._first: FirstSeconds | None = None
         self._core: LiveCore | None = None
         self._order: Order | None = None
         self._rows: list[Row] = []
@@ -111,9 +116,12 @@ class _Run:
         if self._core is None or self._order is None:
             self._core = LiveCore(controller, sample)
             self._order = Order(self._core.T_s)
+            self._first = self._watch(self._core.T_s, self._core.Np) if self._watch is not None else None
             for sink in self._sinks:
                 sink.begin(self._core.experts, self._core.T_s, self._core.delay)
         for ready in self._order.take(sample):
+            if self._first is not None:
+                self._first.take(ready)
             row = self._core.step(ready)
             if row is not None:
                 self._rows.append(row)
@@ -135,6 +143,8 @@ class _Run:
 
     def end(self, message: str) -> None:
         """Give the last rows to the sinks, and tell them the end."""
+        if self._first is not None:
+            self._first.finish()
         self._send()
         for sink in self._sinks:
             sink.end(message)
