@@ -36,7 +36,10 @@ from .origin import fit_origin
 from .plant import commands_to_try, identified_plant, plant_words
 from .stages import Stages, key_of
 
-__all__ = ["Fit", "FitOptions", "fit"]
+__all__ = ["REPEATS", "Fit", "FitOptions", "fit"]
+
+REPEATS = "the residual repeats every"
+"""Beginning of the finding that a period would help, which names its option."""
 
 _LOOK_AHEAD = 0.1
 """Look-ahead, s, of a controller of which nothing is known."""
@@ -304,7 +307,7 @@ def _repeats(model: ModalModel, recordings: Sequence[Recording], settings: Predi
     scale, unit = log.shown.error(hint.rms_without)
     before, after = shown_figure(scale * hint.rms_without), shown_figure(scale * hint.rms_with)
     return [
-        f"the residual repeats every {factor * hint.period:.6g} {position}: with --period {hint.period:g} the hybrid's "
+        f"{REPEATS} {factor * hint.period:.6g} {position}: with --period {hint.period:g} the hybrid's "
         f"error would go from {before} to {after} {unit}, by replays of the half that trains"
     ]
 

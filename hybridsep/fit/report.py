@@ -20,7 +20,7 @@ from ..reports.sections import COLOURS, NAMES, write_changes, write_errors, writ
 from ..reports.use import write_use
 from ..tune.choice import WORTH
 from .compensation import write_tracking
-from .fit import Fit
+from .fit import REPEATS, Fit
 
 __all__ = ["fit_report", "judged_by"]
 
@@ -32,7 +32,8 @@ _SETTLING = (
 
 def judged_by(fit: Fit, shown: Shown) -> Judged:
     """Return the replay that judges a fit as it is reported, in the units of its logs."""
-    return Judged(fit.judged, fit.machine.T_s, shown, "the log's second half", share=1.0 - fit.share)
+    period = next((one for one in fit.identification["findings"] if one.startswith(REPEATS)), "")
+    return Judged(fit.judged, fit.machine.T_s, shown, "the log's second half", share=1.0 - fit.share, period=period)
 
 
 def fit_report(fit: Fit, logs: Sequence[Log], findings: Mapping[str, Sequence[Finding]]) -> Report:

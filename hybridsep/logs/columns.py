@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from ..base.errors import LogError, brief, listed
 from .source import Source
 from .text_layout import is_number
+from .timestamps import stamp_kind
 from .units import POSITION_UNITS, TIME_UNITS, Unit, plain_name, position_unit, stated_unit, time_unit
 
 __all__ = ["COUNT", "ROLES", "Column", "choose_columns", "roles_of"]
@@ -160,7 +161,7 @@ def _option(role: str) -> str:
 def _missing(source: Source, names: Mapping[str, str]) -> LogError:
     """Return the error of columns that are not there, by role."""
     there = listed(source.names)
-    if source.names and all(is_number(name.partition("#")[0]) for name in source.names):
+    if source.names and all(is_number(one) or stamp_kind(one) for one in (name.partition("#")[0] for name in source.names)):
         kinds = "t,x_d,x" if len(source.names) == 3 else "t,x_d,x and what the others are"
         raise LogError(
             f"{source.path}: has no line of names, its first line is numbers ({there}); put one above, such as "

@@ -23,6 +23,11 @@ _STANDSTILL = 1e-3
 """Commanded motion of a sample, relative to the largest, below which the axis is at rest."""
 
 
+_LEARNS = 0.8
+"""Ratio of the hybrid's errors, relative to the best, of the later and the earlier half of what tests, below which a
+longer log is said to help."""
+
+
 @dataclass(frozen=True)
 class Judged:
     """Replay as it is reported.
@@ -38,6 +43,8 @@ class Judged:
         What judges, such as "the log's second half".
     share : float
         Share of a log's samples that judges.
+    period : str
+        That the residual repeats with the position, and the option that says so, in words; empty where it does not.
     """
 
     replay: Replay
@@ -45,6 +52,7 @@ class Judged:
     shown: Shown
     part: str
     share: float = 1.0
+    period: str = ""
 
     @cached_property
     def unit(self) -> tuple[float, str]:
@@ -83,11 +91,11 @@ def recommendation(judged: Judged) -> str:
     if best.name == plain.name or against >= 1.0 - ALIKE:
         return (
             f"Do not use the hybrid on what this log shows: {ratio:.2f} × the error of {peer}, which is best, {by}"
-            f"{_more_motion(judged)}."
+            f"{_more_motion(judged)}.{_what_would_help(judged)}"
         )
     return (
         f"Best on what this log shows is {peer}: the hybrid has {ratio:.2f} × its error, and {against:.2f} × that of "
-        f"{_IN_WORDS[plain.name]}, {by}{_more_motion(judged)}."
+        f"{_IN_WORDS[plain.name]}, {by}{_more_motion(judged)}.{_what_would_help(judged)}"
     )
 
 
@@ -105,6 +113,40 @@ def _more_motion(judged: Judged) -> str:
     if moving >= LITTLE_MOTION:
         return ""
     return f"; the axis moves in {100 * moving:.2g} % of the samples: record more motion"
+
+
+def _what_would_help(judged: Judged) -> str:
+    """Return what would make the hybrid better than the others, as far as the replay shows it; empty without any."""
+    replay, hints = judged.replay, []
+    names = [one.name for one in replay.scored()]
+    for n in (replay.Np // 2, replay.Np // 4, replay.Np // 10):
+        *others, hybrid = replay.rms_within(n) if n else [math.nan, math.nan]
+        best = int(np.argmin(others))
+        if hybrid < (1.0 - ALIKE) * others[best]:
+            peer = _IN_WORDS.get(names[best], names[best])
+            hints.append(
+                f"a smaller look-ahead: over the first {n} of {replay.Np} samples of the windows it has "
+                f"{hybrid / others[best]:.2f} × the error of {peer} (--Np {n})"
+            )
+            break
+    early, late = _ratios(judged)
+    if late < _LEARNS * early:
+        hints.append(
+            f"a longer log: its error falls from {early:.2f} to {late:.2f} × that of the best from half to half"
+        )
+    if judged.period:
+        hints.append(judged.period)
+    return f" What may help: {'; '.join(hints)}." if hints else ""
+
+
+def _ratios(judged: Judged) -> tuple[float, float]:
+    """Return the hybrid's error in that of the best of the others over both halves of what tests."""
+    best, hybrid = judged.replay.best().errors, judged.replay.scored()[-1].errors
+    known = ~np.isnan(best) & ~np.isnan(hybrid)
+    halves = [np.array_split(one[known] ** 2, 2) for one in (hybrid, best)]
+    means = [[float(np.mean(half)) if half.size else math.nan for half in one] for one in halves]
+    early, late = (math.sqrt(one / other) if other > 0.0 else math.nan for one, other in zip(*means, strict=True))
+    return early, late
 
 
 def peers_in_words(judged: Judged) -> str:

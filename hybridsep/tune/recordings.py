@@ -196,6 +196,11 @@ class Replay:
                 found[:, i] = np.sqrt(np.mean(at**2, axis=1))
         return found
 
+    def rms_within(self, n: int) -> list[float]:
+        """Return the RMS of each of :meth:`scored` over the first n samples of every window, m; NaN without any."""
+        place = self._parts([np.arange(len(recording.x)) % self.Np for recording in self.recordings], False)
+        return [_rms(one.errors[place < n]) for one in self.scored()]
+
     def window_errors(self) -> tuple[Indices, Array]:
         """Return the first sample of each window that judges, and the RMS of each prediction over it.
 
