@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from ..base.errors import LogError, brief, listed
 from .source import Source
 from .text_layout import is_number
+from .timestamps import stamp_kind
 from .units import POSITION_UNITS, TIME_UNITS, Unit, plain_name, position_unit, stated_unit, time_unit
 
 __all__ = ["COUNT", "ROLES", "Column", "choose_columns", "roles_of"]
@@ -160,7 +161,8 @@ def _option(role: str) -> str:
 def _missing(source: Source, names: Mapping[str, str]) -> LogError:
     """Return the error of columns that are not there, by role."""
     there = listed(source.names)
-    if source.names and all(is_number(name.partition("#")[0]) for name in source.names):
+    plain = [name.partition("#")[0] for name in source.names]
+    if plain and all(is_number(name) or stamp_kind(name) for name in plain):
         kinds = "t,x_d,x" if len(source.names) == 3 else "t,x_d,x and what the others are"
         raise LogError(
             f"{source.path}: has no line of names, its first line is numbers ({there}); put one above, such as "
@@ -170,7 +172,7 @@ def _missing(source: Source, names: Mapping[str, str]) -> LogError:
     which, it = (f"column {what} is", "it") if len(names) == 1 else (f"columns {what} are", "them")
     options = " ".join(f"--{_option(role)} NAME" for role in names)
     other = " (or --T_s SECONDS instead of --t)" if "t" in names else ""
-    return LogError(f"{source.path}: {which} missing, the file has {there}; name {it}: {options}{other}{source.advice}")
+    return LogError(f"{source.path}: {which} missing, the file has {there}; name {it}: {options}{other}")
 
 
 def _stated(source: Source, name: str) -> str:

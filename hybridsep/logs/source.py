@@ -91,8 +91,6 @@ class Source(ABC):
         Axes that :meth:`choose_axis` takes, where the format names several.
     remarks : list of str
         What was chosen for the reader that the user may want to change.
-    advice : str
-        Addition to the message about a missing column.
     measured : str
         Column of the measured position.
     may_miss : bool
@@ -113,7 +111,6 @@ class Source(ABC):
         self.times: Mapping[str, str] = {}
         self.axes: Sequence[str] = ()
         self.remarks: list[str] = []
-        self.advice = ""
         self.measured, self.may_miss = "", False
 
     @staticmethod

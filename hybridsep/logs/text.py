@@ -82,8 +82,6 @@ class TextSource(Source):
         }
         self.stamps = frozenset(self.names[i] for i in layout.clocks)
         self._dates = {i: date for i, date in layout.clocks.items() if date is not None}
-        if all(is_number(name) or stamp_kind(name) for name in self.names):
-            self.advice = f"; line {layout.header} must hold the column names, it holds numbers"
 
     @staticmethod
     def recognises(head: bytes) -> bool:

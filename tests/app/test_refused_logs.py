@@ -57,7 +57,7 @@ def test_a_refused_run_leaves_no_folder_and_takes_none_that_was_there(hybridsep:
 
 def test_a_refusal_names_its_file_and_itself_once(hybridsep: Run, tmp_path: Path) -> None:
     """It began with "error: clipped.csv: error: clipped: "."""
-    x = np.clip(measured(0)[:3000], None, 4e-3)
+    x = np.clip(measured(0)[:3000], 4e-3, 2e-2)
     clipped, turned = (write_rows(tmp_path / f"{name}.csv", commanded()[:3000], x) for name in ("clipped", "turned"))
     write_rows(turned, commanded()[:3000], -measured(0)[:3000])
     for log, finding in ((clipped, "clipped"), (turned, "sign")):

@@ -88,7 +88,7 @@ def test_missing_columns(tmp_path: Path, suffix: str) -> None:
 
 def test_csv_without_names(tmp_path: Path) -> None:
     path = write_csv(tmp_path / "log.csv", "0,1,2\n1,2,3\n")
-    with pytest.raises(LogError, match=r"has '0', '1', '2'.*line 1 must hold the column names, it holds numbers"):
+    with pytest.raises(LogError, match=r"has no line of names, its first line is numbers \('0', '1', '2'\)"):
         open_log(path)
 
 

@@ -338,7 +338,7 @@ def test_what_is_no_date_is_refused_with_its_column(tmp_path: Path, date: str, m
             "t,x_d,x\n0,10:20:30,2\n1,10:20:31,2\n",
             r"column 'x_d' must be a position, it holds timestamps; name another",
         ),
-        ("10:20:30,1,2\n10:20:31,3,4\n", r"line 1 must hold the column names, it holds numbers"),
+        ("10:20:30,1,2\n10:20:31,3,4\n", r"has no line of names, its first line is numbers"),
         ("t,x_d,x\n10:20:31,1,2\n10:20:30,3,4\n", r"line 3: time 't' runs backwards: a value above 0 s .* got -1 s"),
     ],
 )
