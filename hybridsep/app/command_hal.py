@@ -23,7 +23,7 @@ def hal(
     weights: WeightsOption = None,
     force: ForceOption = False,
 ) -> None:
-    """Write the HAL component for LinuxCNC, and the axes that it loads.
+    """Write the HAL component for LinuxCNC, and its axes.
 
     It is compiled there: sudo halcompile --install linuxcnc/hsep.c
 

@@ -198,7 +198,9 @@ class Replay:
 
     def rms_within(self, n: int) -> list[float]:
         """Return the RMS of each of :meth:`scored` over the first n samples of every window, m; NaN without any."""
-        place = self._parts([np.arange(len(recording.x)) % self.Np for recording in self.recordings], False)
+        place = self._parts(
+            [np.arange(len(recording.x), dtype=np.float64) % self.Np for recording in self.recordings], False
+        )
         return [_rms(one.errors[place < n]) for one in self.scored()]
 
     def window_errors(self) -> tuple[Indices, Array]:
