@@ -92,20 +92,8 @@ VARIANTS: Mapping[str, Changes] = {
     "no doubting expert D": NO_DOUBTING,
     "no D, earlier runs count for 3 windows": together(NO_DOUBTING, constants(carried=3.0)),
     "earlier runs never forgotten": constants(doubt=2.0),
-    "earlier runs never forgotten, doubted for good": constants(doubt=2.0, doubt_over=2.0),
     "A's bound does not grow": {
         FORECAST: [("    if (!(self->largest_step > 0.0 && hsep_stack_leader", "    if (!(0 && hsep_stack_leader")]
-    },
-    "features never begin anew": {
-        FORECAST: [
-            (
-                "    double most = (learned ? HSEP_TRUST_GROWTH_LEARNED : HSEP_TRUST_GROWTH)",
-                "    (void)learned;\n    double most = 1e12",
-            )
-        ]
-    },
-    "features begin anew at 1000 times": {
-        FORECAST: [("(learned ? HSEP_TRUST_GROWTH_LEARNED : HSEP_TRUST_GROWTH)", "(learned ? 1000.0 : 1000.0)")]
     },
     "rows are independent": constants(correlation_max=1.0),
     "no first differences of disturbances": constants(difference_share=1e-6),
