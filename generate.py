@@ -6,16 +6,21 @@ when one is out of date.
 
 from __future__ import annotations
 
+import ast
+import itertools
 import re
 import textwrap
 from collections.abc import Mapping
 from dataclasses import asdict
 from inspect import cleandoc
 from pathlib import Path
+from typing import Any
 
 from docs.reference_pages import pages
 from hybridsep.base.parameters import Parameter
 from hybridsep.fmi.variables import COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS, TRUST_SETTINGS
+from hybridsep.predict import start_in_motion, uncertainty
+from hybridsep.predict.trust import disturbances, experts, model, stack
 from hybridsep.predict.trust.constants import CONSTANTS
 from hybridsep.predict.trust.learned import LEARNED
 
@@ -23,6 +28,24 @@ ROOT = Path(__file__).resolve().parent
 SETTINGS_HEADER = ROOT / "fmu_src" / "c" / "core" / "predict" / "hsep_settings.h"
 CONSTANTS_HEADER = ROOT / "fmu_src" / "c" / "core" / "predict" / "trust" / "hsep_trust_constants.h"
 LEARNED_HEADER = CONSTANTS_HEADER.with_name("hsep_trust_learned.h")
+DECLARED_HEADER = SETTINGS_HEADER.with_name("hsep_predict_constants.h")
+
+DECLARED = {
+    "uncertainty": uncertainty,
+    "start": start_in_motion,
+    "expert": experts,
+    "stack": stack,
+    "trusted": model,
+    "disturbances": disturbances,
+}
+"""Modules whose constants the C core has, those with a name of their own and a reason behind them, by C's prefix."""
+
+OF_LIBRARY = (
+    *("N_COMPONENTS", "N_LEARNED", "_SHARE_LEAST", "_SHARE_MOST", "_NO_PENALTY"),
+    *("_N_FRICTION", "_N_LASTING", "_N_PERIODIC", "_OWN_MAX", "_OWN_REACH"),
+    *("HOLD", "LAGGED", "STATIC", "COMMAND", "DOUBTING"),
+)
+"""Constants of these modules that C has not, or among its layouts."""
 
 
 def generated() -> dict[Path, str]:
@@ -31,6 +54,7 @@ def generated() -> dict[Path, str]:
         SETTINGS_HEADER: settings_header(),
         CONSTANTS_HEADER: constants_header(),
         LEARNED_HEADER: learned_header(),
+        DECLARED_HEADER: declared_header(),
     }
     return headers | pages()
 
@@ -103,6 +127,43 @@ def learned_header() -> str:
 
 #endif
 """
+
+
+def declared_header() -> str:
+    """Return the C header of the constants that modules of the library declare beside what they compute."""
+    parts = []
+    for prefix, module in DECLARED.items():
+        body = ast.parse(Path(module.__file__ or "").read_text(encoding="utf-8")).body
+        for statement, reason in itertools.pairwise(body):
+            if not (isinstance(statement, ast.Assign) and isinstance(reason, ast.Expr)):
+                continue
+            target = statement.targets[0]
+            names = [one.id for one in ast.walk(target) if isinstance(one, ast.Name) and one.id.isupper()]
+            used = [name for name in names if name not in OF_LIBRARY]
+            if not used:
+                continue
+            text = " ".join(cleandoc(ast.literal_eval(reason.value)).replace("`", "").split())
+            text = text.replace("λ", "lambda").replace("²", "2")
+            lines = textwrap.wrap(f"{text} */", 114)
+            defines = [
+                f"#define HSEP_{prefix.upper()}_{name.lstrip('_')} {_initialiser(getattr(module, name))}"
+                for name in used
+            ]
+            parts.append("\n".join(["/* " + "\n * ".join(lines), *defines]))
+    return f"""/* Constants of predictions and their errors, generated from modules of hybridsep/predict. */
+#ifndef HSEP_PREDICT_CONSTANTS_H
+#define HSEP_PREDICT_CONSTANTS_H
+
+{chr(10).join(f"{part}{chr(10)}" for part in parts)}
+#endif
+"""
+
+
+def _initialiser(value: Any) -> str:
+    """Return a number, or what stands between the braces of an array's initialiser."""
+    if not isinstance(value, tuple):
+        return repr(value)
+    return ", ".join(f"{{{_initialiser(one)}}}" if isinstance(one, tuple) else _initialiser(one) for one in value)
 
 
 def _list(name: str, settings: Mapping[str, Parameter]) -> str:

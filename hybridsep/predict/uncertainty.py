@@ -45,8 +45,10 @@ _FELT = (1, 3)
 _FELT_FOR = 0.2
 """Time constant of their averaging, in windows."""
 
-_SHARE_LEAST, _SHARE_MOST = 1e-9 * np.array(_SHARES), 1e4 * np.array(_SHARES)
-"""Bounds on the variance relative to its cause."""
+_LEAST_SHARE, _MOST_SHARE = 1e-9, 1e4
+"""Bounds on the variance relative to its cause, relative to the first one."""
+
+_SHARE_LEAST, _SHARE_MOST = _LEAST_SHARE * np.array(_SHARES), _MOST_SHARE * np.array(_SHARES)
 
 _FLOOR = 1e-6
 """Least variance relative to the recent mean square of the residual."""

@@ -1,48 +1,15 @@
 #include "hsep_uncertainty.h"
 
+#include "hsep_predict_constants.h"
 #include "hsep_range.h"
 #include "hsep_vector.h"
 
 #include <math.h>
 #include <string.h>
 
-/* First variance of the error relative to that of its causes: timing, change since the last residual, variance of the
- * experts; bounds relative to it. */
-static const double uncertainty_shares[HSEP_N_COMPONENTS] = {0.0, 4.0, 0.3, 2.0};
-static const double uncertainty_share_least = 1e-9, uncertainty_share_most = 1e4;
-
-/* Components that are felt for a while: timing, variance of the experts; time constant of their averaging, windows. */
-static const int uncertainty_felt[] = {1, 3};
-static const double uncertainty_felt_for = 0.2;
-
-/* First variance of a noise that is not known, relative to lambda. */
-static const double uncertainty_unknown_noise = 25.0;
-
-/* Least variance relative to the recent mean square of the residual; and in m2, so that no divisor is 0. */
-static const double uncertainty_floor = 1e-6, uncertainty_least = 1e-100;
-
-/* Largest square of an error, relative to its variance, that counts; least change of a component in one window. */
-static const double uncertainty_outlying = 16.0, uncertainty_vanishing = 0.01;
-
-/* Factor by which the mean square of the residual fades from window to window. */
-static const double uncertainty_recent = 0.9;
-
-/* The same of evidence; evidence that the first values count for, in windows; step of expectation maximisation. */
-static const double uncertainty_memory = 0.97, uncertainty_first_evidence = 0.2, uncertainty_step = 6.0;
-
-/* Standard deviations, and the probability that a normal error exceeds them. */
-static const double uncertainty_levels[][2] = {{0.6745, 0.5}, {1.645, 0.1}, {1.96, 0.05}};
-
-/* Standard deviations, and the share of a window's errors beyond them from which on all variances are too small by
- * their square: the machine or the sensor has changed. */
-static const double uncertainty_far = 4.0, uncertainty_far_share = 0.5;
-
-/* Change of ln c in the middle of a window from one window to the next per share of errors; bound on it. */
-static const double uncertainty_factor_rate = 0.03, uncertainty_factor_max = 4.0;
-
-/* c at the end of a window relative to its beginning: the first one, the change of its logarithm per share of errors,
- * weighted by their distance from the middle, and bound. */
-static const double uncertainty_ratio = 1.2, uncertainty_ratio_rate = 0.8, uncertainty_ratio_max = 16.0;
+static const double uncertainty_shares[HSEP_N_COMPONENTS] = {0.0, HSEP_UNCERTAINTY_SHARES};
+static const int uncertainty_felt[] = {HSEP_UNCERTAINTY_FELT};
+static const double uncertainty_levels[][2] = {HSEP_UNCERTAINTY_LEVELS};
 
 /* Set what follows from the parameters; return the bytes of the block. */
 static double uncertainty_lay_out(hsep_uncertainty *self, uint64_t Np, uint64_t n)
@@ -64,7 +31,7 @@ HSEP_API double hsep_uncertainty_size(uint64_t Np, uint64_t n)
 HSEP_API double hsep_uncertainty_first_variance(double lambda, double noise_std)
 {
     return noise_std > 0.0 ? fmax(lambda, noise_std * noise_std)
-                           : fmin(uncertainty_unknown_noise * lambda, HSEP_PREDICTION_MAX);
+                           : fmin(HSEP_UNCERTAINTY_UNKNOWN_NOISE * lambda, HSEP_PREDICTION_MAX);
 }
 
 HSEP_API void hsep_uncertainty_init(hsep_uncertainty *self, uint64_t Np, uint64_t n, double variance)
@@ -90,12 +57,12 @@ HSEP_API int hsep_uncertainty_sound(const hsep_uncertainty *self)
 {
     double learned[HSEP_N_UNCERTAINTY];
     memcpy(learned, (const char *)self + sizeof self->Np, sizeof learned);
-    int sound = self->factor >= 1.0 / uncertainty_factor_max && self->factor <= uncertainty_factor_max &&
-                self->ratio >= 1.0 / uncertainty_ratio_max && self->ratio <= uncertainty_ratio_max;
+    int sound = self->factor >= 1.0 / HSEP_UNCERTAINTY_FACTOR_MAX && self->factor <= HSEP_UNCERTAINTY_FACTOR_MAX &&
+                self->ratio >= 1.0 / HSEP_UNCERTAINTY_RATIO_MAX && self->ratio <= HSEP_UNCERTAINTY_RATIO_MAX;
     for (int i = 0; i < HSEP_N_UNCERTAINTY; i++) {
         const double share = i < HSEP_N_COMPONENTS ? uncertainty_shares[i] : 0.0;
-        const double least = uncertainty_share_least * share;
-        const double most = share > 0.0 ? uncertainty_share_most * share : HSEP_PREDICTION_MAX;
+        const double least = HSEP_UNCERTAINTY_LEAST_SHARE * share;
+        const double most = share > 0.0 ? HSEP_UNCERTAINTY_MOST_SHARE * share : HSEP_PREDICTION_MAX;
         sound = sound && learned[i] >= least && learned[i] <= most;
     }
     return sound;
@@ -105,7 +72,7 @@ HSEP_API int hsep_uncertainty_sound(const hsep_uncertainty *self)
 static double uncertainty_variance(const hsep_uncertainty *self, const double components[])
 {
     return hsep_dot(self->theta, components, HSEP_N_COMPONENTS) +
-           (uncertainty_floor * self->recent + uncertainty_least);
+           (HSEP_UNCERTAINTY_FLOOR * self->recent + HSEP_UNCERTAINTY_LEAST_VARIANCE);
 }
 
 static double uncertainty_square(double value)
@@ -139,7 +106,7 @@ HSEP_API void hsep_uncertainty_predict(
     hsep_uncertainty *self, const hsep_uncertainty_signals *signals, uint64_t first, uint64_t last)
 {
     const uint64_t n = self->n;
-    const double gain = 1.0 / (1.0 + uncertainty_felt_for * (double)self->Np);
+    const double gain = 1.0 / (1.0 + HSEP_UNCERTAINTY_FELT_FOR * (double)self->Np);
     double *published = hsep_at(self, self->e_h), *std = hsep_at(self, self->std), *felt = self->felt;
     if (first == 0) {
         memset(felt, 0, sizeof self->felt);
@@ -175,7 +142,7 @@ static void uncertainty_add(uncertainty_sums *sums, double e, double error, doub
     sums->count += 1.0;
     sums->squares += e * e;
     sums->errors += error * error;
-    sums->far += fabs(error) / std > uncertainty_far ? 1.0 : 0.0;
+    sums->far += fabs(error) / std > HSEP_UNCERTAINTY_FAR ? 1.0 : 0.0;
     sums->missed += missed;
     sums->missed_late += missed * place;
 }
@@ -186,17 +153,17 @@ static void uncertainty_follow(hsep_uncertainty *self, const uncertainty_sums *s
 {
     const double count = sums->count, mean_square = fmin(sums->squares / count, HSEP_PREDICTION_MAX);
     if (self->recent > 0.0) {
-        for (int i = 0; i < HSEP_N_COMPONENTS && sums->far / count > uncertainty_far_share; i++) {
-            self->theta[i] *= uncertainty_far * uncertainty_far;
+        for (int i = 0; i < HSEP_N_COMPONENTS && sums->far / count > HSEP_UNCERTAINTY_FAR_SHARE; i++) {
+            self->theta[i] *= HSEP_UNCERTAINTY_FAR * HSEP_UNCERTAINTY_FAR;
         }
-        const double factor = self->factor * exp(uncertainty_factor_rate * (sums->missed / count));
-        const double ratio = self->ratio * exp(uncertainty_ratio_rate * (sums->missed_late / count));
-        self->factor = fmin(fmax(factor, 1.0 / uncertainty_factor_max), uncertainty_factor_max);
-        self->ratio = fmin(fmax(ratio, 1.0 / uncertainty_ratio_max), uncertainty_ratio_max);
-        self->recent = uncertainty_recent * self->recent + (1.0 - uncertainty_recent) * mean_square;
+        const double factor = self->factor * exp(HSEP_UNCERTAINTY_FACTOR_RATE * (sums->missed / count));
+        const double ratio = self->ratio * exp(HSEP_UNCERTAINTY_RATIO_RATE * (sums->missed_late / count));
+        self->factor = fmin(fmax(factor, 1.0 / HSEP_UNCERTAINTY_FACTOR_MAX), HSEP_UNCERTAINTY_FACTOR_MAX);
+        self->ratio = fmin(fmax(ratio, 1.0 / HSEP_UNCERTAINTY_RATIO_MAX), HSEP_UNCERTAINTY_RATIO_MAX);
+        self->recent = HSEP_UNCERTAINTY_RECENT * self->recent + (1.0 - HSEP_UNCERTAINTY_RECENT) * mean_square;
     } else {
         self->recent = mean_square;
-        self->ratio = uncertainty_ratio;
+        self->ratio = HSEP_UNCERTAINTY_RATIO;
         self->theta[0] = fmin(sums->errors / count, HSEP_PREDICTION_MAX);
     }
 }
@@ -208,13 +175,14 @@ static void uncertainty_step_by(
 {
     for (int i = 0; i < HSEP_N_COMPONENTS; i++) {
         const double windows = total[i] / (double)self->Np, share = uncertainty_shares[i];
-        self->evidence[i] = uncertainty_memory * self->evidence[i] + windows;
-        const double change = fmax(total[i] > 0.0 ? seen[i] / total[i] : 1.0, uncertainty_vanishing);
-        const double step = fmin(uncertainty_step * windows / (self->evidence[i] + uncertainty_first_evidence), 1.0);
+        self->evidence[i] = HSEP_UNCERTAINTY_MEMORY * self->evidence[i] + windows;
+        const double change = fmax(total[i] > 0.0 ? seen[i] / total[i] : 1.0, HSEP_UNCERTAINTY_VANISHING);
+        const double step =
+            fmin(HSEP_UNCERTAINTY_STEP * windows / (self->evidence[i] + HSEP_UNCERTAINTY_FIRST_EVIDENCE), 1.0);
         const double theta = self->theta[i] * pow(change, step);
-        self->theta[i] = share == 0.0
-                             ? fmin(fmax(theta, uncertainty_floor * self->recent), HSEP_PREDICTION_MAX)
-                             : fmin(fmax(theta, uncertainty_share_least * share), uncertainty_share_most * share);
+        self->theta[i] =
+            share == 0.0 ? fmin(fmax(theta, HSEP_UNCERTAINTY_FLOOR * self->recent), HSEP_PREDICTION_MAX)
+                         : fmin(fmax(theta, HSEP_UNCERTAINTY_LEAST_SHARE * share), HSEP_UNCERTAINTY_MOST_SHARE * share);
     }
 }
 
@@ -237,7 +205,7 @@ HSEP_API void hsep_uncertainty_learn(hsep_uncertainty *self, const double e[], c
     for (uint64_t j = 0; j < self->Np; j++, f += HSEP_N_COMPONENTS) {
         if (accepted == NULL || accepted[j] > 0.0) {
             const double variance = uncertainty_variance(self, f);
-            const double error = e[j] - e_h[j], relative = fmin(error * error / variance, uncertainty_outlying);
+            const double error = e[j] - e_h[j], relative = fmin(error * error / variance, HSEP_UNCERTAINTY_OUTLYING);
             for (int i = 0; i < HSEP_N_COMPONENTS; i++) {
                 const double share = f[i] * self->theta[i] / variance;
                 total[i] += share;

@@ -1,11 +1,11 @@
 #include "hsep_disturbances.h"
 
+#include "hsep_predict_constants.h"
 #include "hsep_trust_constants.h"
 
 #include <math.h>
 #include <string.h>
 
-#define DISTURBANCES_DIFFERENCES 3
 #define DISTURBANCES_TOGETHER 64 /* samples that are filtered in one go */
 
 #define DISTURBANCES_SPREAD_2 (HSEP_TRUST_FRICTION_LEAST * HSEP_TRUST_FRICTION_RATIO * HSEP_TRUST_FRICTION_RATIO)
@@ -26,7 +26,8 @@ HSEP_API uint64_t hsep_disturbances_count(double period)
 
 HSEP_API uint64_t hsep_disturbances_n(uint64_t q, double period)
 {
-    return 2 + (q < DISTURBANCES_DIFFERENCES ? q : DISTURBANCES_DIFFERENCES) + 2 * hsep_disturbances_count(period);
+    return 2 + (q < HSEP_DISTURBANCES_DIFFERENCES ? q : HSEP_DISTURBANCES_DIFFERENCES) +
+           2 * hsep_disturbances_count(period);
 }
 
 HSEP_API double hsep_disturbances_share(const hsep_disturbances *self, uint64_t feature)
@@ -104,7 +105,7 @@ HSEP_API void hsep_disturbances_restart(hsep_disturbances *self, const double x_
         before->filtered[i] = 0.0;
     }
     before->x_d = 2.0 * x_d[n - 1] - x_d[n - 2];
-    for (int i = 0; i <= DISTURBANCES_DIFFERENCES; i++) {
+    for (int i = 0; i <= HSEP_DISTURBANCES_DIFFERENCES; i++) {
         before->x_pb[i] = x_pb[n - 1] - (x_pb[n - 2] - x_pb[n - 1]) * (double)(i + 1);
     }
 }
@@ -155,12 +156,12 @@ static void disturbances_rewind(hsep_disturbances *self, uint64_t first, uint64_
 /* Put 1, x_pb(k) and its differences into a row. x_pb: the last four, newest first. */
 static void disturbances_differences(const hsep_disturbances *self, const double x_pb[], double row[])
 {
-    double d[DISTURBANCES_DIFFERENCES + 1];
+    double d[HSEP_DISTURBANCES_DIFFERENCES + 1];
     memcpy(d, x_pb, sizeof d);
     row[0] = 1.0;
     for (uint64_t i = 0; i <= self->n_differences; i++) {
         row[1 + i] = d[0];
-        for (uint64_t j = 0; j + i < DISTURBANCES_DIFFERENCES; j++) {
+        for (uint64_t j = 0; j + i < HSEP_DISTURBANCES_DIFFERENCES; j++) {
             d[j] -= d[j + 1];
         }
     }
@@ -204,7 +205,7 @@ HSEP_API void hsep_disturbances_command(
             j--;
             v_d[k] = (x_d[j] - now->x_d) / self->T_s;
             now->x_d = x_d[j];
-            for (int i = DISTURBANCES_DIFFERENCES; i > 0; i--) {
+            for (int i = HSEP_DISTURBANCES_DIFFERENCES; i > 0; i--) {
                 now->x_pb[i] = now->x_pb[i - 1];
             }
             now->x_pb[0] = x_pb[j];

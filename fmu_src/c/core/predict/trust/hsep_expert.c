@@ -1,19 +1,13 @@
 #include "hsep_expert.h"
 
 #include "hsep_penalised.h"
+#include "hsep_predict_constants.h"
 #include "hsep_trust_constants.h"
 #include "hsep_vector.h"
 #include "hsep_wide.h"
 
 #include <math.h>
 #include <string.h>
-
-/* Bound on the impulse response of a recursion, on the variance relative to the square of the bound on a prediction,
- * and on the correlation that a window shows. */
-static const double expert_diverged = 1e6;
-
-/* Largest lag within a window, relative to the bound on a prediction: what is beyond has diverged. */
-static const double expert_lag_bound = 10.0;
 
 HSEP_API void hsep_residual_scale_follow(
     hsep_residual_scale *self, const double residuals[], const double accepted[], uint64_t n, double count)
@@ -118,7 +112,7 @@ static void expert_free_run(hsep_expert *self, const double rows[], const double
     memcpy(unshrunk + n, past, (size_t)self->p * sizeof(double));
     expert_run(self, run);
     for (uint64_t j = 0; j < n; j++) {
-        unshrunk[j] = isfinite(run[j]) ? expert_bounded(run[j], expert_lag_bound * self->bound) : 0.0;
+        unshrunk[j] = isfinite(run[j]) ? expert_bounded(run[j], HSEP_EXPERT_LAG_BOUND * self->bound) : 0.0;
     }
 }
 
@@ -132,13 +126,13 @@ static void expert_respond(hsep_expert *self)
     expert_run(self, response);
     for (uint64_t i = 0; i < n; i++) {
         const double at = response[n - 1 - i];
-        const double within = isnan(at) ? expert_diverged : expert_bounded(at, expert_diverged);
+        const double within = isnan(at) ? HSEP_EXPERT_DIVERGED : expert_bounded(at, HSEP_EXPERT_DIVERGED);
         squares[i] = within * within;
     }
 }
 
 /* Largest variance that counts, m2. */
-static double expert_most(const hsep_expert *self) { return expert_diverged * self->bound * self->bound; }
+static double expert_most(const hsep_expert *self) { return HSEP_EXPERT_DIVERGED * self->bound * self->bound; }
 
 /* Variance of sample k of a prediction: that of the rows, carried through the impulse response; wide: hsep_is_wide. */
 static double expert_variance(hsep_expert *self, const double row_of_k[], uint64_t k, int wide)
@@ -209,7 +203,7 @@ HSEP_API void hsep_expert_judge(hsep_expert *self, const double measured[], cons
     }
     self->noise_variance = given > 0.0 ? given : self->rows_variance;
     if (self->noise_variance > 0.0) {
-        const double seen = fmin(sum * sum / n / self->noise_variance, expert_diverged);
+        const double seen = fmin(sum * sum / n / self->noise_variance, HSEP_EXPERT_DIVERGED);
         self->correlation += HSEP_TRUST_CORRELATION_RATE * (seen - self->correlation);
         self->correlation = fmin(fmax(self->correlation, 1.0), HSEP_TRUST_CORRELATION_MAX);
     }

@@ -1,11 +1,10 @@
 #include "hsep_stack.h"
 
+#include "hsep_predict_constants.h"
 #include "hsep_trust_constants.h"
 
 #include <math.h>
 #include <string.h>
-
-static const double stack_least_square = 1e-300; /* m2, mean square that counts as 0 */
 
 static const double stack_first[HSEP_N_EXPERTS] = {0.0, HSEP_TRUST_FIRST_LAGGED, HSEP_TRUST_FIRST_STATIC, 0.0, 0.0};
 
@@ -114,7 +113,7 @@ HSEP_API void hsep_stack_update(
         self->cross[i] = HSEP_TRUST_GAMMA * self->cross[i] + products[i][HSEP_N_EXPERTS];
         best = fmin(best, self->evidence[0] - 2.0 * self->cross[i] + H[i][i]);
     }
-    const double square = fmax(fmax(best / self->evidence[1], least), stack_least_square);
+    const double square = fmax(fmax(best / self->evidence[1], least), HSEP_STACK_LEAST_SQUARE);
     const double ridge = HSEP_TRUST_KAPPA * square * n;
     for (int i = 0; i < HSEP_N_EXPERTS; i++) {
         H[i][i] += ridge;

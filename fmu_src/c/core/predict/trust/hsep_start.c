@@ -1,21 +1,11 @@
 #include "hsep_start.h"
 
+#include "hsep_predict_constants.h"
 #include "hsep_regression.h"
 
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
-
-/* Commanded velocity of the first sample relative to the largest of the window, from which on an axis may have been in
- * motion: from rest a jerk-limited command needs time. */
-static const double start_moving = 0.05;
-
-/* Samples for each number of the state that are needed to estimate it. */
-static const uint64_t start_samples = 4;
-
-/* Ridge penalty on the change of the state, relative to a response of unit gain: modes that decay at once are not
- * determined. */
-static const double start_damping = 1e-3;
 
 static const double start_two_pi = 6.283185307179586;
 
@@ -63,7 +53,7 @@ HSEP_API void hsep_start_init(hsep_start *self, const hsep_start_parameters *par
     hsep_physics_init(
         (hsep_physics *)hsep_at(self, self->trial), parameters->modes, parameters->n_modes, parameters->dead_time,
         parameters->T_s, parameters->input_hold);
-    hsep_regression_init((hsep_regression *)hsep_at(self, self->regression), self->n_states, start_damping);
+    hsep_regression_init((hsep_regression *)hsep_at(self, self->regression), self->n_states, HSEP_START_DAMPING);
 }
 
 HSEP_API int hsep_start_valid(const void *block, const hsep_start_parameters *parameters)
@@ -101,11 +91,11 @@ static double start_step(const hsep_start *self, const double x_d[], const doubl
     for (uint64_t k = late; k < self->Np; k++) {
         known += isfinite(e[self->Np - 1 - k]) ? 1 : 0;
     }
-    if (known < start_samples * self->n_states || first == 0) {
+    if (known < HSEP_START_SAMPLES * self->n_states || first == 0) {
         return 0.0;
     }
     const double step = x_d[first - 1] - x_d[first];
-    return fabs(step) > start_moving * peak ? step : 0.0;
+    return fabs(step) > HSEP_START_MOVING * peak ? step : 0.0;
 }
 
 /* Fold the residuals that the motion leaves, and the responses to the states, into the regression. */
@@ -113,7 +103,7 @@ static void start_fold(hsep_start *self, const double e[])
 {
     hsep_regression *regression = (hsep_regression *)hsep_at(self, self->regression);
     const double *response = hsep_at(self, self->response), *responses = hsep_at(self, self->responses);
-    hsep_regression_init(regression, self->n_states, start_damping);
+    hsep_regression_init(regression, self->n_states, HSEP_START_DAMPING);
     for (uint64_t k = 0; k < self->Np; k++) {
         double *row = hsep_regression_row(regression);
         const double measured = e[self->Np - 1 - k];

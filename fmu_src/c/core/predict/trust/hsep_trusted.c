@@ -1,15 +1,13 @@
 /* Learning of a residual model that can be trusted. */
 #include "hsep_trusted.h"
 
+#include "hsep_predict_constants.h"
 #include "hsep_trust_constants.h"
 #include "hsep_wide.h"
 
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
-
-/* Lags of a row that may stand for samples without a measurement. */
-static const double trusted_bridged = 3.0;
 
 /* Take over what is known of the errors of another expert; NULL: nothing is. */
 static void trusted_set_noise(hsep_trusted *self, hsep_expert_place of, const hsep_expert *other)
@@ -84,7 +82,7 @@ static uint64_t trusted_learned_rows(const hsep_trusted *self, double learned[])
         n_bridged += bridged[self->Np + i];
     }
     for (uint64_t j = self->Np; j-- > 0;) {
-        learned[j] = accepted[j] > 0.0 && n_bridged <= trusted_bridged;
+        learned[j] = accepted[j] > 0.0 && n_bridged <= HSEP_TRUSTED_BRIDGED;
         count += learned[j] > 0.0;
         n_bridged += bridged[j] - bridged[j + self->p];
     }

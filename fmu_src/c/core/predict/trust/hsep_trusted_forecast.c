@@ -1,15 +1,11 @@
 /* Prediction by a residual model that can be trusted. */
 #include "hsep_trusted.h"
 
+#include "hsep_predict_constants.h"
 #include "hsep_trust_constants.h"
 
 #include <math.h>
 #include <stddef.h>
-
-/* Velocity, m/s, below which a command is at rest: ratios of smaller ones may underflow. */
-static const double trusted_least_velocity = 1e-200;
-
-static const double trusted_least = 1e-150; /* magnitude of a feature that counts as 0 */
 
 /* Experts of the physics model's residual, that without lags first: the stiffness acts at the position, which the
  * physics model alone does not give well enough. */
@@ -43,7 +39,7 @@ static int trusted_outgrown(hsep_trusted *self, const double x_d[], const double
         peak = fmax(peak / self->T_s, self->velocity_scale);
         most = self->velocity_scale;
     }
-    const int outgrown = peak > fmax(most, trusted_least_velocity);
+    const int outgrown = peak > fmax(most, HSEP_DISTURBANCES_LEAST_VELOCITY);
     self->forecast_scale = outgrown ? peak : self->velocity_scale;
     return outgrown;
 }
@@ -80,7 +76,7 @@ static void trusted_solve(hsep_trusted *self, hsep_expert_place place, const hse
     for (uint64_t i = 0; i < expert->n_static; i++) {
         const double share = of_command ? hsep_command_share(hsep_trusted_command(self), i)
                                         : hsep_disturbances_share(hsep_trusted_disturbances(self), i);
-        scales[i] = effect * share / fmax(trusted_largest(self, place, i), trusted_least);
+        scales[i] = effect * share / fmax(trusted_largest(self, place, i), HSEP_EXPERT_LEAST);
     }
     const hsep_expert_evidence solved = {
         .regression = regression,
