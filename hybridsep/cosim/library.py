@@ -22,15 +22,7 @@ __all__ = ["Compensator", "LibraryController", "LibraryDrive", "OwnController"]
 
 
 class Compensator(Protocol):
-    """Interface of a compensator of your own in a run; :class:`SepCompensator` has it too.
-
-    Attributes
-    ----------
-    T_s : float
-        Sampling interval, s.
-    delay : int
-        Samples by which it delays the command, its look-ahead, ≥ 1.
-    """
+    """Interface of a compensator of your own in a run; :class:`SepCompensator` has it too."""
 
     @property
     def T_s(self) -> float:
@@ -38,7 +30,7 @@ class Compensator(Protocol):
 
     @property
     def delay(self) -> int:
-        """Samples by which it delays the command."""
+        """Samples by which it delays the command, its look-ahead, ≥ 1."""
 
     def restart(self, start: float) -> None:
         """Begin a run at rest at ``start``, m."""
