@@ -5,7 +5,7 @@
 
 Axes of ``benchmarks/yardstick.py``, replayed by the C core with some of its lines changed. The first row has the
 errors relative to what an axis is judged by, geometric means of cold and warm runs and the worst lines; the others have
-what a change makes of them, by factors. A rule stays if without it a group that judges is worse by 2 %, or a line by a
+what a change makes of them, by factors. A rule stays if without it a test group is worse by 2 %, or a line by a
 third. A second table has the intervals: their score at 90 % relative to the first row, and the coverage of 50, 90 and
 95 %.
 """

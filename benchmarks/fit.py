@@ -2,7 +2,7 @@
 
     python benchmarks/fit.py [--emps DATA_EMPS.mat] [--recordings FOLDER] [--windows 100 20]      (ten minutes)
 
-RMS of the second half, which trained nothing, in 1e-6 of the log's unit. A first-order lag with dead time, fitted to
+RMS of the second half, which is held out, in 1e-6 of the log's unit. A first-order lag with dead time, fitted to
 the first half by least squares, and its last residual held over the window; the physics model's last residual held;
 ARX of 20 and 40 lags, frozen after the first half / refitted before each window; the identified physics model with
 its offset; the hybrid that the first half trained. The ratio is to the best of the others, and the advice is what

@@ -72,11 +72,11 @@ class Axis:
     x : tuple of two (n,) arrays, m
         Measured positions of the cold run and of the warm one after it.
     first : int
-        First sample that judges.
+        First test sample.
     split : bool
-        Whether the warm run is of the samples that judge alone, after one of those before them; else of all samples.
+        Whether the warm run is of the test samples alone, after one of the samples before them; else of all samples.
     best : float, m
-        RMS error, over the samples that judge, of what the errors are relative to; those of the warm run are relative
+        RMS error, over the test samples, of what the errors are relative to; those of the warm run are relative
         to ``best_warm``.
     best_warm : float, m
     """

@@ -163,9 +163,7 @@ def _print_fit(found: Fit, logs: Sequence[Log], findings: Mapping[str, Iterable[
             console.print(f"{name}: {finding}")
     scale, error = shown.error(found.judged.rms()[0])
     model, settings = found.identification, found.machine.predictor_settings
-    table = Table(
-        "prediction by", title=f"Error on samples that trained nothing [{error}]", box=box.SIMPLE, pad_edge=False
-    )
+    table = Table("prediction by", title=f"Error on held-out samples [{error}]", box=box.SIMPLE, pad_edge=False)
     table.add_column("RMS", justify="right")
     for one in found.judged.scored():
         table.add_row(one.name, "diverged" if one.diverged else shown_figure(scale * one.rms))

@@ -38,7 +38,7 @@ class Piece(NamedTuple):
     x_d, x : (n,) array, m
         Commanded and measured positions, the latter NaN where missing.
     n_train : int
-        Leading samples that train.
+        Leading training samples.
     first : int
         First sample that is predicted, the beginning of a window.
     """
@@ -86,7 +86,7 @@ def predict_peers(
 ) -> tuple[Peer, ...]:
     """Return the peers' predictions of all windows from each piece's ``first`` on.
 
-    The lag and a frozen ARX are fitted to the leading samples that train; without any there are none of them. A
+    The lag and a frozen ARX are fitted to the leading training samples; without any there are none of them. A
     refitted ARX is fitted before each window to all samples so far.
 
     Parameters

@@ -88,7 +88,7 @@ def estimated_limits(recordings: Sequence[Recording], T_s: float) -> dict[str, A
 def expected_tracking(
     machine: Machine, recordings: Sequence[Recording], progress: Callable[[float], object]
 ) -> dict[str, float | None]:
-    """Return the RMS of commanded minus measured position over the samples that judge, m.
+    """Return the RMS of commanded minus measured position over the test samples, m.
 
     ``none`` is measured, ``physics`` and ``hybrid`` are estimates with each model; None where a plan diverges.
     """

@@ -1,4 +1,4 @@
-"""From recorded logs to FMUs: identification, choice of settings, judgement on samples that trained nothing."""
+"""From recorded logs to FMUs: identification, choice of settings, test on held-out samples."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class FitOptions:
     name : str
         The machine's.
     share : float
-        Share of each log's samples that trains; the rest judges.
+        Share of each log's samples for training; the rest is held out for the test.
     known : mapping
         What is known of the axis: entries of ``[predictor]`` such as ``period`` and ``measurement_delay``.
     drive_limits : mapping
@@ -82,9 +82,9 @@ class Fit:
     identification, choice, windows, steps : plain values
         As in ``fit.json``.
     share : float
-        Share of each log's samples that trained.
+        Share of each log's samples that were for training.
     judged : Replay
-        Replay of the logs; what judges trained neither the physics model nor the choice.
+        Replay of the logs; its test samples are held out from the physics model and from the choice.
     files : tuple of Path
         Files that were written.
     tracking : dict
@@ -105,7 +105,7 @@ class Fit:
     plant: dict[str, Any] = field(default_factory=dict)
 
     def summary(self) -> dict[str, Any]:
-        """Return plain values: errors in m over the samples that judge, settings, identification, step times in s.
+        """Return plain values: errors in m over the test samples, settings, identification, step times in s.
 
         The physics model is judged with the offset that was identified beside it, which the FMU's ``x_pb`` has not.
         ``ratio`` is the hybrid's error relative to that of the best of physics model, hold and peers.
@@ -148,9 +148,9 @@ def fit(
 ) -> Fit:
     """Identify an axis from its logs, choose settings, judge them, and build its FMUs.
 
-    The first half of each log trains: the physics model is identified from it, and settings are chosen by causal
-    replays of it. Then the whole is replayed, causally; its second half judges. What the predictor has learned at the
-    end is the state with which the FMUs start.
+    The first half of each log is for training: the physics model is identified from it, and settings are chosen by
+    causal replays of it. Then the whole is replayed, causally; its second half is the test. What the predictor has
+    learned at the end is the state with which the FMUs start.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def fit(
     ------
     ParameterError
         If ``fmi`` is another word, the logs are sampled differently or in different units, or ``Np`` does not fit into
-        what judges.
+        the test part.
     SignalError
         If a log is too short to be split.
     """
@@ -265,7 +265,7 @@ def _identified(
     logs: Sequence[Log],
     progress: Callable[[float], object],
 ) -> dict[str, Any]:
-    """Return the identification from the samples that train, as plain values, in the units of the logs."""
+    """Return the identification from the training samples, as plain values, in the units of the logs."""
     training = [in_time(*one.training, settings.measurement_delay) for one in recordings if one.n_train > 1]
     n, n_all = (sum(lengths) for lengths in zip(*((one.n_train, len(one.x)) for one in recordings), strict=True))
     try:
@@ -288,7 +288,7 @@ def _identified(
 
 
 def _what_trains(recordings: Sequence[Recording], logs: Sequence[Log]) -> str:
-    """Return what the samples that train are, in words: where all of it rests, all of the log."""
+    """Return what the training samples are, in words: where all of it rests, all of the log."""
     log = "this log" if len(logs) == 1 else "these logs"
     return log if all(np.ptp(one.x_d) == 0 for one in recordings) else f"the first half of {log}"
 
@@ -308,7 +308,7 @@ def _repeats(model: ModalModel, recordings: Sequence[Recording], settings: Predi
     before, after = shown_figure(scale * hint.rms_without), shown_figure(scale * hint.rms_with)
     return [
         f"{REPEATS} {factor * hint.period:.6g} {position}: with --period {hint.period:g} the hybrid's "
-        f"error would go from {before} to {after} {unit}, by replays of the half that trains"
+        f"error would go from {before} to {after} {unit}, by replays of the training half"
     ]
 
 

@@ -35,7 +35,7 @@ def fit_origin(
     identification, judged : mapping
         As in ``fit.json``.
     share : float
-        Share of each log's samples that trained.
+        Share of each log's samples that were for training.
     changes : sequence of str
         What was done to the logs' positions before.
     """

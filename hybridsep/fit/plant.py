@@ -31,7 +31,7 @@ from ..tune.recordings import Recording
 __all__ = ["commands_to_try", "identified_plant", "plant_words"]
 
 _FITTED = 2 / 3
-"""Share of the samples that train which is fitted to; the others choose."""
+"""Share of the training samples that the fit takes; the others choose."""
 
 _WORTH = 0.9
 """Error relative to that of the identified model alone from which a disturbance is kept."""
@@ -46,7 +46,7 @@ _TRIED_MAX = 20_000
 """Most samples of the commands to try with: 20 s at 1 kHz, which a co-simulation takes seconds for."""
 
 _MOVES = 0.25
-"""Share of the whole way from which the part that judges is tried with."""
+"""Share of the whole way from which the test part is tried with."""
 
 _AT_REST = 1e-3
 """Velocity at rest, relative to the largest."""
@@ -86,7 +86,7 @@ class _Piece:
     path : (n,) array, m
         Position by the identified model, which the stiffness acts at.
     fitted, choosing, judging : (n,) array of bool
-        Samples that are fitted to, that choose, and that judge.
+        Samples for fitting, for choosing, and for the test.
     """
 
     def __init__(self, discrete: DiscreteModel, recording: Recording, late: int) -> None:
@@ -121,7 +121,7 @@ def identified_plant(model: ModalModel, settings: PredictorSettings, recordings:
     -------
     dict
         ``entries`` of the section ``[plant]``; ``rms`` and ``rms_pb``, m, RMS of what was measured less the plant and
-        less the physics model, over the samples that judge, without their offset, None where there are none; ``reason``
+        less the physics model, over the test samples, without their offset, None where there are none; ``reason``
         why there is no plant to this model, empty if there is one.
     """
     try:
@@ -148,7 +148,7 @@ def plant_words(plant: Mapping[str, Any], shown: Shown) -> str:
     disturbed = "mode" in plant["entries"]
     words = "the identified model " + ("refitted with the friction and stiffness of the log" if disturbed else "alone")
     if plant["rms"] is not None:
-        words += f"; it follows the half that trained nothing to {shown.words(plant['rms'], '.3g')} RMS"
+        words += f"; it follows the held-out half to {shown.words(plant['rms'], '.3g')} RMS"
         words += f" (physics model {shown.words(plant['rms_pb'], '.3g')})" if disturbed else ""
     return f"{words}. A plant to try with, no measurement: results on it are optimistic"
 
@@ -156,7 +156,7 @@ def plant_words(plant: Mapping[str, Any], shown: Shown) -> str:
 def commands_to_try(recordings: Sequence[Recording]) -> Array:
     """Return commands of a log to try with, m: at most 20 000, of one stretch, from rest to rest where it rests.
 
-    They are of the part that judges where there is motion enough.
+    They are of the test part where there is motion enough.
     """
     one = max(recordings, key=lambda one: _path(one.x_d))
     found = one.x_d[one.judges_from :]

@@ -26,7 +26,7 @@ __all__ = ["fit_report", "judged_by"]
 
 
 _SETTLING = (
-    " The window after a gap does not judge: there no model knows the state of the axis, and a controller has no gaps."
+    " The window after a gap is no test window: no model knows the state of the axis there; a controller has no gaps."
 )
 
 
@@ -59,7 +59,7 @@ def fit_report(fit: Fit, logs: Sequence[Log], findings: Mapping[str, Sequence[Fi
     write_errors(
         report,
         judged,
-        "Tested on samples that trained nothing",
+        "Tested on held-out samples",
         "The first half of each log trained the physics model and chose the settings; these are the errors of the "
         "second half." + (_SETTLING if any(one.judges_from > one.n_train for one in fit.judged.recordings) else ""),
     )
@@ -120,7 +120,7 @@ def _write_identification(report: Report, fit: Fit, judged: Judged) -> None:
             for other in found["alternatives"]
         ]
         report.table(["structure", "parameters", f"fitted [{unit}]", f"held out [{unit}]", ""], rows, words=4)
-        report.paragraph("RMS of the simulated position within the half that trains.", "dim")
+        report.paragraph("RMS of the simulated position within the training half.", "dim")
     report.bullets(found["findings"])
 
 

@@ -164,7 +164,7 @@ def _hindrance(segments: Sequence[Segment]) -> str:
     if n < sum(len(segment.u) for segment in segments) and min(n_fitted, n_judging) < SAMPLES_MIN // 4:
         return (
             f"too many measured positions are missing: {n_fitted} are left in the part that is fitted to, {n_judging} "
-            "in the part that judges"
+            "in the test part"
         )
     u = np.concatenate([u - u.mean() for u, _ in measured])
     y = np.concatenate([y - y.mean() for _, y in measured])

@@ -40,9 +40,9 @@ class Judged:
     shown : Shown
         Units in which positions are shown.
     part : str
-        What judges, such as "the log's second half".
+        What the test is on, such as "the log's second half".
     share : float
-        Share of a log's samples that judges.
+        Share of a log's samples that are test samples.
     period : str
         That the residual repeats with the position, and the option that says so, in words; empty where it does not.
     """
@@ -61,16 +61,16 @@ class Judged:
 
 
 def whole_log_words(*, warm: bool) -> str:
-    """Return what a replay of a whole log is judged by, in words: other samples than those that judge a fit."""
+    """Return what a replay of a whole log is tested on, in words: more samples than a fit is."""
     began = "began with what an earlier run had learned" if warm else "began without any knowledge"
     return (
-        f"The predictor {began}, and the whole log judges; hybridsep fit judges its second half alone, when "
+        f"The predictor {began}, and the whole log is the test; hybridsep fit tests on its second half alone, when "
         "the first has been learned."
     )
 
 
 def recommendation(judged: Judged) -> str:
-    """Return what to do, in words; with caution where few windows judge.
+    """Return what to do, in words; with caution where there are few test windows.
 
     The hybrid is recommended where it is better than each of physics model, hold and peers alone.
     """
@@ -94,7 +94,7 @@ def recommendation(judged: Judged) -> str:
     if ratio < 1.0 - ALIKE:
         return f"Use the hybrid: its error is {ratio:.2f} × that of {peer}, the best of the others, {by}."
     if ratio <= 1.0 + ALIKE:
-        return f"The hybrid does no harm and no good here: {ratio:.2f} × the error of {peer}, {by}."
+        return f"The hybrid is neither better nor worse here: {ratio:.2f} × the error of {peer}, {by}."
     plain = min(others[:2], key=lambda one: one.rms)  # physics model and hold, which need no other model
     against = hybrid.rms / plain.rms
     if best.name == plain.name or against >= 1.0 - ALIKE:
@@ -109,7 +109,7 @@ def recommendation(judged: Judged) -> str:
 
 
 def _enough(judged: Judged) -> str:
-    """Return how long a recording would do, in words: its windows that judge, and one that began before."""
+    """Return how long a recording would do, in words: its test windows, and one before them."""
     seconds = (WINDOWS_ENOUGH + 1) * judged.replay.Np * judged.T_s / judged.share
     return f"record at least {math.ceil(round(10 * seconds, 6)) / 10:g} s"
 

@@ -52,7 +52,7 @@ class Tried:
     ----------
     settings : PredictorSettings
     rms_h : float
-        RMS of the hybrid's error over the later half of the samples that train, m; infinite if it diverged. The
+        RMS of the hybrid's error over the later half of the training samples, m; infinite if it diverged. The
         earlier half says who learns fastest, but machines run warm.
     """
 
@@ -83,7 +83,7 @@ class WindowScore:
     ----------
     Np : int
     rms_pb, rms_hold, rms_h : float
-        RMS over the samples that judge, m; of the physics model with its offset.
+        RMS over the test samples, m; of the physics model with its offset.
     """
 
     Np: int
@@ -118,7 +118,7 @@ def choose_settings(
     settings: PredictorSettings,
     progress: Callable[[float], object] = lambda _done: None,
 ) -> Choice:
-    """Return the settings with the least error of causal replays over the samples that train.
+    """Return the settings with the least error of causal replays over the training samples.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ class PeriodHint:
     ----------
     period : float, m
     rms_without, rms_with : float
-        RMS of the hybrid over the later half of the samples that train, m, by causal replays.
+        RMS of the hybrid over the later half of the training samples, m, by causal replays.
     """
 
     period: float
@@ -38,7 +38,7 @@ class PeriodHint:
 
 
 def period_hint(model: ModalModel, recordings: Sequence[Recording], settings: PredictorSettings) -> PeriodHint | None:
-    """Return the hint, from the samples that train; None where nothing repeats, or the predictor gains little.
+    """Return the hint, from the training samples; None where nothing repeats, or the predictor gains little.
 
     Parameters
     ----------

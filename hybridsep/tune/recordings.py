@@ -1,4 +1,4 @@
-"""Recordings of which the first part trains and the later part judges, and their replay."""
+"""Recordings in two parts, for training and for testing, and their replay."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Recording:
     x_d, x : (n,) array, m
         Commanded and measured positions.
     n_train : int
-        Leading samples that train; the others judge.
+        Leading training samples; the others are test samples.
     n_settling : int
         Leading samples that do not judge, as after a gap no model knows the state of the axis.
     """
@@ -44,16 +44,16 @@ class Recording:
 
     @property
     def training(self) -> tuple[Array, Array]:
-        """Commanded and measured positions of the part that trains."""
+        """Commanded and measured positions of the training part."""
         return self.x_d[: self.n_train], self.x[: self.n_train]
 
     @property
     def judges_from(self) -> int:
-        """First sample that judges."""
+        """First test sample."""
         return max(self.n_train, self.n_settling)
 
     def first_judged(self, Np: int) -> int:
-        """Return the first sample of the first window of ``Np`` that begins among those that judge."""
+        """Return the first sample of the first window of ``Np`` that begins in the test part."""
         return -(-self.judges_from // Np) * Np
 
 
@@ -64,9 +64,9 @@ def split_log(pieces: Iterable[tuple[Array, Array]], share: float, n_settling: i
     ----------
     pieces : iterable of two (n,) arrays, m
     share : float
-        Share of the samples that trains.
+        Share of the samples that are for training.
     n_settling : int
-        Samples after each gap that do not judge, unless fewer than half of those that judge were left.
+        Samples after each gap that are no test samples, unless fewer than half of the test samples were left.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def split_log(pieces: Iterable[tuple[Array, Array]], share: float, n_settling: i
 
 @dataclass(frozen=True)
 class Scored:
-    """Errors of a prediction over the samples that judge.
+    """Errors of a prediction over the test samples.
 
     Attributes
     ----------
@@ -114,8 +114,8 @@ class Scored:
 class Replay:
     """Causal replay of recordings one after the other, what is learned kept.
 
-    The same samples judge everywhere: the whole windows from the first one that begins among those that judge, and the
-    shorter one at a recording's end.
+    The test samples are the same everywhere: the whole windows from the first one that begins in the test part, and
+    the shorter one at a recording's end.
 
     Attributes
     ----------
@@ -127,9 +127,9 @@ class Replay:
     delay : int
         Samples by which the measurements are late; as many at a recording's beginning are of before it, and missing.
     offset : float
-        Measured minus modelled position, m, that was identified beside the physics model, and is judged with it.
+        Measured minus modelled position, m, identified beside the physics model and tested with it.
     peers : tuple of Peer
-        What the hybrid is judged by besides physics model and hold.
+        What the hybrid is compared with besides physics model and hold.
     """
 
     recordings: tuple[Recording, ...]
@@ -140,12 +140,12 @@ class Replay:
     peers: tuple[Peer, ...] = ()
 
     def with_peers(self, progress: Callable[[float], object] = lambda _done: None) -> Replay:
-        """Return the replay with the peers' predictions of the samples that judge."""
+        """Return the replay with the peers' predictions of the test samples."""
         pieces = [Piece(one.x_d, one.x, one.n_train, one.first_judged(self.Np)) for one in self.recordings]
         return replace(self, peers=predict_peers(pieces, self.Np, delay=self.delay, progress=progress))
 
     def joined(self, name: str, *, training: bool = False) -> Array:
-        """Return a signal of a :class:`Backtest` over all samples that judge, or over those that train, ``(n,)``."""
+        """Return a signal of a :class:`Backtest` over all test samples, or over the training samples, ``(n,)``."""
         return self._parts([getattr(result, name) for result in self.results], training)
 
     def commands(self) -> Array:
@@ -153,7 +153,7 @@ class Replay:
         return self._parts([recording.x_d for recording in self.recordings], False)
 
     def errors(self, *, training: bool = False) -> Array:
-        """Return ``x`` minus each of :data:`PREDICTIONS` over the samples that judge, or train, ``(3, n)``, m.
+        """Return ``x`` minus each of :data:`PREDICTIONS` over the test samples, or the training samples, ``(3, n)``, m.
 
         NaN where a measurement is missing. The physics model is judged with its offset.
         """
@@ -165,13 +165,13 @@ class Replay:
         return [_rms(row) for row in self.errors(training=training)]
 
     def scored(self) -> list[Scored]:
-        """Return the errors of physics model, hold, every peer, and the hybrid, over the samples that judge."""
+        """Return the errors of physics model, hold, every peer, and the hybrid, over the test samples."""
         x, (pb, hold, h) = self._measured(False), self.errors()
         peers = [Scored(one.title, x - self._parts(one.predictions, False), one.diverged) for one in self.peers]
         return [Scored("physics model", pb), Scored("hold", hold), *peers, Scored("hybrid", h)]
 
     def best_ways(self) -> list[Peer]:
-        """Return the peers, each fitted in the way that is better over the samples that judge; none that diverged."""
+        """Return the peers, each fitted in the way that is better over the test samples; none that diverged."""
         rms = {id(peer): one.rms for peer, one in zip(self.peers, self.scored()[2:-1], strict=True)}
         best: dict[str, Peer] = {}
         for peer in sorted(self.peers, key=lambda peer: rms[id(peer)]):
@@ -180,7 +180,7 @@ class Replay:
         return [peer for peer in self.peers if best.get(peer.name) is peer]
 
     def best(self) -> Scored:
-        """Return the best of physics model, hold and peers over the samples that judge."""
+        """Return the best of physics model, hold and peers over the test samples."""
         return min(self.scored()[:-1], key=lambda one: one.rms)
 
     def horizon(self) -> Array:
@@ -204,12 +204,12 @@ class Replay:
         return [_rms(one.errors[place < n]) for one in self.scored()]
 
     def window_errors(self) -> tuple[Indices, Array]:
-        """Return the first sample of each window that judges, and the RMS of each prediction over it.
+        """Return the first sample of each test window, and the RMS of each prediction over it.
 
         Returns
         -------
         begins : (n,) array of int
-            Counted in the samples that judge.
+            Counted in test samples.
         rms : (3, n) array, m
             NaN where nothing was measured.
         """
@@ -220,7 +220,7 @@ class Replay:
         return np.array(begins, dtype=np.intp), np.reshape(found, (-1, len(PREDICTIONS))).T
 
     def verdict(self) -> Verdict:
-        """Return the verdict on the samples that judge."""
+        """Return the verdict on the test samples."""
         peers = self.best_ways()
         tally = Tally(self.Np, [peer.title for peer in peers])
         for x_d, x, predictions, _ in self._windows(peers):
@@ -232,7 +232,7 @@ class Replay:
         return [[result.x_pb + self.offset, result.x_hold, result.x_h] for result in self.results]
 
     def _windows(self, peers: Sequence[Peer]) -> Iterator[tuple[Array, Array, Array, int]]:
-        """Yield command, measurement, predictions and place in what judges, of each window that judges.
+        """Yield command, measurement, predictions and place among the test samples, of each test window.
 
         The predictions, ``(3 + peers, m)``, are in the order of a :class:`Tally`.
         """
@@ -281,7 +281,7 @@ def replay(
         It is at the beginning of a run; another begins with each further recording.
     recordings : sequence of Recording
     training : bool
-        Whether only the parts that train are replayed.
+        Whether only the training parts are replayed.
     progress : callable, optional
         Called with the fraction done.
 

@@ -1,4 +1,4 @@
-"""``hybridsep fit``: from a log to files that work, on samples that trained nothing; what is refused, and going on."""
+"""``hybridsep fit``: from a log to files that work, on held-out samples; what is refused, and going on."""
 
 from __future__ import annotations
 
@@ -182,7 +182,7 @@ def test_the_command_line(hybridsep: Run, tmp_path: Path) -> None:
     assert "Judged by 10 windows only." in out
     assert "So far the hybrid is " in out
     assert "judged by 10 windows only: record at least 1.7 s." in " ".join(out.split())
-    assert "trained nothing [µm]" in " ".join(out.split())
+    assert "held-out samples [µm]" in " ".join(out.split())
     machine = tmp_path / "fit" / "machine.toml"
     edited = machine.read_text(encoding="utf-8").replace("dead_time = ", "dead_time = 1")
     machine.write_text(edited, encoding="utf-8")
@@ -209,7 +209,7 @@ def test_a_flipped_sign_is_refused_until_it_is_fixed(hybridsep: Run, tmp_path: P
     done = "axis.csv: sign: reverse the measured position's sign; the controller must do the same"
     assert load_machine(tmp_path / "fit" / "machine.toml").sources == ("identified from axis.csv, 800 samples", done)
     page = unescape((tmp_path / "fit" / "report.html").read_text(encoding="utf-8"))
-    assert page.index(done) < page.index("Tested on samples that trained nothing")
+    assert page.index(done) < page.index("Tested on held-out samples")
     np.testing.assert_allclose(used[0].x_meas, measured(0)[:800], atol=1e-15)
 
 
@@ -233,7 +233,7 @@ def test_a_log_that_cannot_train_a_model_is_predicted_by_its_command(tmp_path: P
 
 @pytest.mark.usefixtures("quick_fit")
 def test_a_half_that_rests_is_named(tmp_path: Path) -> None:
-    """It was the log whose commanded position does not move, where only the half that trains rests."""
+    """It was the log whose commanded position does not move, where only the training half rests."""
     rest = np.full(300, commanded()[0])
     noise = np.random.default_rng(0).normal(0, 1e-6, 300)
     x_d, x = np.concatenate((rest, commanded()[:300])), np.concatenate((rest + noise, measured(0)[:300]))
@@ -287,7 +287,7 @@ def test_a_gap_in_motion_does_not_decide_the_verdict(tmp_path: Path) -> None:
 def test_missing_measurements(hybridsep: Run, tmp_path: Path) -> None:
     x_d, x = commanded()[:N], measured(0)[:N]
     x[np.random.default_rng(3).integers(0, N, 25)] = np.nan
-    x[2050:2070] = np.nan  # in motion, in the half that judges
+    x[2050:2070] = np.nan  # in motion, in the test half
     n = int(np.isnan(x).sum())
     rows = "\n".join(f"{k * 1e-3:.3f},{x_d[k]:.9f},{'' if np.isnan(x[k]) else f'{x[k]:.9f}'}" for k in range(N))
     path = tmp_path / "axis.csv"

@@ -26,7 +26,7 @@ NP = 20
 
 
 def arx_rms(x_d: Array, x: Array, n: int) -> float:
-    """Return the RMS of an ARX of ``n`` lags, fitted again before each window that judges."""
+    """Return the RMS of an ARX of ``n`` lags, fitted again before each test window."""
     first = -(-round(0.5 * len(x)) // NP) * NP
     errors = [
         x[k : k + NP] - free_run_by_definition(arx_by_definition(x_d, x, n, k), x_d, x, n, k, min(k + NP, len(x)))
@@ -88,7 +88,7 @@ def test_a_headline_says_share_rate_and_the_logs_own_unit(hybridsep: Run, tmp_pa
     head = "800 of 1600 samples (50 %), 1.6 s at 500 Hz (recorded at 1000 Hz)"
     assert f"axis.csv: {head}, travel 60 deg" in words
     assert "Np = 40 (80 ms)" in words
-    assert "trained nothing [mdeg]" in words
+    assert "held-out samples [mdeg]" in words
     written = (tmp_path / "fit" / "report.html").read_text(encoding="utf-8")
     page, drawn = unescape(written.partition('id="packed"')[0]), scripts(written)
     assert head in page.partition("<h2>")[0]

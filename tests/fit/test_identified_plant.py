@@ -69,7 +69,7 @@ def test_commands_go_from_rest_to_rest_and_move() -> None:
     assert len(tried) <= len(x_d) // 2
     assert np.ptp(tried) > 0.01
     assert max(abs(np.diff(tried[:2])[0]), abs(np.diff(tried[-2:])[0])) < 1e-3 * np.abs(np.diff(x_d)).max()
-    still = np.concatenate((x_d, np.full(3 * len(x_d), x_d[-1])))  # all motion is in the half that trains
+    still = np.concatenate((x_d, np.full(3 * len(x_d), x_d[-1])))  # all motion is in the training half
     assert np.ptp(commands_to_try([Recording(still, still, len(still) // 2)])) == np.ptp(x_d)
 
 
