@@ -280,7 +280,7 @@ def test_a_gap_in_motion_does_not_decide_the_verdict(tmp_path: Path) -> None:
     all_windows = replay(found.machine.new_predictor(), split_log(pieces, 0.5)).rms()
     assert found.judged.rms()[2] < 0.8 * all_windows[2]
     fit_report(found, used, findings).write(tmp_path / "report.html")
-    assert "The window after a gap does not judge" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "The window after a gap is no test window" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.usefixtures("quick_fit")
