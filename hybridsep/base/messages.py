@@ -117,7 +117,7 @@ FINDINGS: Mapping[str, Explanation] = {
     ),
     "outliers": Explanation(
         "Single samples are far from their neighbours: glitches of the encoder or of the transmission.",
-        "Repaired by `fit` and `--fix`, which interpolate. With `trust = true` the guard rejects them online.",
+        "Repaired by `fit` and `--fix`, which interpolate. With `trust = true` reach rejects them online.",
     ),
     "clipped": Explanation(
         "The measured position stops dead at a limit and leaves it at speed, while the command moves on, at both ends "

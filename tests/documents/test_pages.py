@@ -29,6 +29,8 @@ ELSEWHERE = {
     "machine.toml",
     "tuned.toml",
     "my_axis/machine.toml",
+    "x/machine.toml",
+    "y/machine.toml",
     "all.c",
     "sources/all.c",
     "FMI.c",
