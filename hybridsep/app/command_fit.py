@@ -39,13 +39,9 @@ def fit(
     ] = None,
     Np: Annotated[
         int | None,
-        typer.Option(
-            "--Np", "--np", min=1, help="Samples of the controller's look-ahead; those of 100 ms if left out."
-        ),
+        typer.Option("--Np", "--np", min=1, help="Samples of the controller's look-ahead; 100 ms if left out."),
     ] = None,
-    name: Annotated[
-        str | None, typer.Option(help="Name of the axis; that of the log, and of --axis, if left out.")
-    ] = None,
+    name: Annotated[str | None, typer.Option(help="Name of the axis; the log's, with --axis, if left out.")] = None,
     *,
     reading: ReadingOptions,
     parameters: dict[str, Any],

@@ -48,9 +48,7 @@ def fleet(
     ] = None,
     Np: Annotated[
         int | None,
-        typer.Option(
-            "--Np", "--np", min=1, help="Samples of the controllers' look-ahead; those of 100 ms if left out."
-        ),
+        typer.Option("--Np", "--np", min=1, help="Samples of the controllers' look-ahead; 100 ms if left out."),
     ] = None,
     axis: Annotated[
         list[str] | None, typer.Option(help="Axis that is read of logs with several; all of them if left out.")

@@ -49,9 +49,7 @@ def identify(
     ] = "auto",
     out: Annotated[Path | None, typer.Option(help="Machine file to write.")] = None,
     figure: Annotated[Path | None, typer.Option(help="PNG to draw.")] = None,
-    name: Annotated[
-        str | None, typer.Option(help="Name of the machine in its file; that of the file if left out.")
-    ] = None,
+    name: Annotated[str | None, typer.Option(help="Name of the machine in its file; the file's if left out.")] = None,
     fix: Annotated[
         bool, typer.Option("--fix", help="Apply what puts a finding of the checks of a log right, and go on.")
     ] = False,

@@ -102,7 +102,7 @@ def tune(
         pieces[name] = [(segment.x_d, segment.x_meas) for segment in log.segments()]
         findings[name], changed_logs[name] = findings_table(intake.findings), intake.findings
         partly += [line] if (line := partly_used(log)) else []
-        shown = shown_of(log.file_unit, given.unit)  # that of the last log
+        shown = shown_of(log.file_unit, given.unit)  # the last log's
     with cluster_of(workers, scheduler) as engine, progress_bar(as_json) as advance:
         jobs = n_processors() if jobs is None else jobs
         tuning = tune_on(

@@ -1,6 +1,6 @@
 """Options of the command line's commands; ranges and units come from the declarations of parameters.
 
-What a command works with is imported when it runs, so that its help, and that of the others, needs none of it.
+What a command works with is imported when it runs, so that no command's help needs any of it.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ UnitOption = Annotated[
     str | None,
     typer.Option(
         help="Unit of the positions in the file: m, mm, um, nm, in, or of a rotary axis rad, mrad, urad, deg, rev, or "
-        "a multiple of one (0.1um), such as an encoder's count; that of the columns' names (x [mm]) or m if left out."
+        "a multiple of one (0.1um), such as an encoder's count; from the columns' names (x [mm]), or m, if left out."
     ),
 ]
 TimeColumnOption = Annotated[str | None, typer.Option("--t", help="Name of the time column.")]

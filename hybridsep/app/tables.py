@@ -106,7 +106,7 @@ def print_scores(
     unit : {"m", "rad"}
         Unit of the axis's positions.
     shown : Shown, optional
-        Units of the table; those of ``unit`` if left out.
+        Units of the table; ``unit``'s if left out.
     more : mapping, optional
     """
     if as_json:

@@ -143,7 +143,7 @@ FINDINGS: Mapping[str, Explanation] = {
         "Name the columns with `--x_d` and `--x`.",
     ),
     "columns swapped": Explanation(
-        "The column of the commanded position lags behind that of the measured one and is noisier.",
+        "The column of the commanded position lags behind the measured position's column and is noisier.",
         "Exchange `--x_d` and `--x`, or let `--fix` do it.",
     ),
     "following error": Explanation(

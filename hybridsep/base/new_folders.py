@@ -25,7 +25,7 @@ def make_folder(folder: Path) -> None:
 
 
 def remove_empty_folders() -> None:
-    """Remove those of the folders that were made which have nothing in them."""
+    """Remove the folders that were made and are empty."""
     for folder in _made:
         with suppress(OSError):
             folder.rmdir()

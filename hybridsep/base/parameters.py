@@ -119,7 +119,7 @@ class Parameter:
         return self.choices.index(value) if self.choices else value
 
     def from_fmi(self, value: Any) -> Any:
-        """Return the parameter's value from that of an FMU's variable; ParameterError if there is none."""
+        """Return the parameter's value from an FMU variable's value; ParameterError if there is none."""
         if not self.choices:
             return value
         number = self._number(value, self.name)

@@ -34,7 +34,7 @@ def parse_range(text: str, parameter: Parameter) -> tuple[Any, ...]:
 
 
 def _values(part: str, option: str, *, whole: bool) -> list[float]:
-    """Return the values of a part between commas: one, or those of a range."""
+    """Return the values of a part between commas: one, or all of a range."""
     fields = part.split(":")
     if len(fields) == 1:
         return [_number(part, part, option)]

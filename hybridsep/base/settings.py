@@ -1,7 +1,7 @@
 """Declarations of all parameters: settings of predictor and compensator, and quantities of machines.
 
 The library's checks, the machine files' entries, the FMUs' variables, the saved states, the check of a warm start, the
-command line's help and the C core's settings are derived from here. Joint constraints are those of section 2 of the
+command line's help and the C core's settings are derived from here. Joint constraints are from section 2 of the
 paper: ``0 ≤ q < Np`` and ``1 ≤ p ≤ Np``.
 
 The ranges of physical quantities are a few powers of ten wider than any feed drive needs, and narrow enough that no

@@ -42,7 +42,7 @@ class PaperPlanning(Planning):
         return ChosenPlan(SepState.OFF, preview.rest, None)
 
     def published(self, prediction: Prediction, state: SepState, most: SepState) -> PublishedPosition:
-        """Return the model's position where it planned, else that of the physics model."""
+        """Return the model's position where it planned, else the physics model's."""
         x_h, Np = prediction.x_pb.copy(), len(prediction.x_pb)
         if state is SepState.HYBRID:
             return PublishedPosition(as_published(x_h + prediction.e_h, "x_h"), prediction.x_h_std, 0, 0)

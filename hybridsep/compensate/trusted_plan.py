@@ -5,7 +5,7 @@ friction that follows the command changes its sign with the command's velocity. 
 of the linearised model (Gauss-Newton); a step that does not lower the cost is repeated with a penalty on the change of
 velocity (Levenberg-Marquardt). A plan is made while its first samples act, which follow the last one; steps, tries and
 the solver's steps are limited, so that their work fits into those samples. Predictions are shrunk by their variance, so
-where the model knows nothing the plan is that of the physics model.
+where the model knows nothing the plan is the physics model's.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def runs_away(delta: Array, of_physics: Array, error: float, change_max: float) 
     Parameters
     ----------
     delta, of_physics : (Np,) arrays, m
-        Changes of the command by the plan, and by that of the physics model.
+        Changes of the command by the plan, and by the physics model's.
     error : float, m
         RMS error that the plan leaves, by its own model.
     change_max : float, m

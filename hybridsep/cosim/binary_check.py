@@ -33,7 +33,7 @@ def check_binary(path: Path, system: str | None = None, machine: str | None = No
     ----------
     path : Path
     system, machine : str, optional
-        As :func:`platform.system` and :func:`platform.machine` name them; those of this computer if left out.
+        As :func:`platform.system` and :func:`platform.machine` name them; this computer's if left out.
 
     Raises
     ------

@@ -85,7 +85,7 @@ class Driver(ABC):
         """Set the experiment, s, and enter Initialization Mode."""
 
     def reader(self, variables: Sequence[Any]) -> Callable[[], list[Any]]:
-        """Return a function that gets variables of one type in one FMI call, those of an array one after the other."""
+        """Return a function that gets variables of one type in one FMI call, an array's one after the other."""
         call, values = self._prepared("Get", variables)
 
         def read() -> list[Any]:
@@ -95,7 +95,7 @@ class Driver(ABC):
         return read
 
     def writer(self, variables: Sequence[Any]) -> Callable[[Sequence[Any]], None]:
-        """Return a function that sets variables of one type in one FMI call, those of an array one after the other."""
+        """Return a function that sets variables of one type in one FMI call, an array's one after the other."""
         call, buffer = self._prepared("Set", variables)
 
         def write(values: Sequence[Any]) -> None:

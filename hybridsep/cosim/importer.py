@@ -255,7 +255,7 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
         return partial(self._call_open, self._open.writer([self._variable(name) for name in names]))
 
     def real_reader(self, names: Sequence[str]) -> Callable[[], list[float]]:
-        """Return a function that gets these real numbers in one FMI call, those of an array one after the other."""
+        """Return a function that gets these real numbers in one FMI call, an array's one after the other."""
         return partial(self._call_open, self._open.reader([self._variable(name) for name in names]))
 
     def reader(self, names: Sequence[str]) -> Callable[[], list[Any]]:

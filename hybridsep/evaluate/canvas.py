@@ -52,7 +52,7 @@ def draw_line(axes: Axes, x: ArrayLike, y: ArrayLike, linewidth: float = 0.9, **
 
 
 def legend_above(axes: Axes, handles: Sequence[Any] | None = None) -> None:
-    """Put a panel's legend above it, where it hides nothing; entries are those of the panel if left out."""
+    """Put a panel's legend above it, where it hides nothing; entries are the panel's if left out."""
     if handles is None:
         handles = axes.get_legend_handles_labels()[0]
     axes.legend(

@@ -36,7 +36,7 @@ class Score:
 
     @property
     def ratio_to_hold(self) -> float:
-        """RMS of the hybrid relative to that of the hold baseline."""
+        """RMS of the hybrid relative to the hold baseline's."""
         return rms_ratio(self.rms_h, self.rms_hold)
 
     @property

@@ -58,7 +58,7 @@ class Verdict:
     peers : tuple of str
         Their names, :data:`PEERS` first.
     ratios : tuple of float
-        RMS error of the hybrid relative to that of each peer.
+        RMS error of the hybrid relative to each peer's.
     worse : tuple of tuples of str
         Places where it is worse than each peer.
     judged : tuple of str
@@ -83,12 +83,12 @@ class Verdict:
 
     @property
     def ratio_pb(self) -> float:
-        """RMS error of the hybrid relative to that of the physics model."""
+        """RMS error of the hybrid relative to the physics model's."""
         return self.ratios[0]
 
     @property
     def ratio_hold(self) -> float:
-        """RMS error of the hybrid relative to that of the hold baseline."""
+        """RMS error of the hybrid relative to the hold baseline's."""
         return self.ratios[1]
 
     def __str__(self) -> str:
@@ -145,7 +145,7 @@ class Tally:
         x_d, x : (n,) array, m
             Commanded and measured positions, NaN where missing.
         predictions : (3 or more, n) array, m
-            ``x_pb``, ``x_hold``, those of further peers, and ``x_h``.
+            ``x_pb``, ``x_hold``, further peers' predictions, and ``x_h``.
         """
         speed = np.empty(len(x_d))
         speed[0] = 0.0 if math.isnan(self._last_x_d) else abs(x_d[0] - self._last_x_d)

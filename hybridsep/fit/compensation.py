@@ -30,14 +30,14 @@ __all__ = [
 ]
 
 COMPENSATE = "physics"
-"""Model that a new compensator starts with: that of the hybrid is chosen when it has been seen to be the better one."""
+"""Model that a new compensator starts with: the user chooses the hybrid when he has seen it to be better."""
 
 MARGINS = np.array([1.25, 2.0, 5.0])
 """Limits of velocity, acceleration and jerk relative to a log's largest: those of the machines that come with it."""
 
 LIMITS_WORDS = (
     f"estimates, {', '.join(f'{one:g}' for one in MARGINS.tolist())} times the largest velocity, acceleration and jerk "
-    "of the log; replace them by those of your drive, and take out estimated = true, before a compensator moves it"
+    "of the log; replace them by your drive's, and take out estimated = true, before a compensator moves it"
 )
 """What the limits of :func:`estimated_limits` are."""
 

@@ -54,7 +54,7 @@ class FitOptions:
     Attributes
     ----------
     Np : int, optional
-        Samples of the controller's look-ahead; those of 0.1 s if left out.
+        Samples of the controller's look-ahead; 0.1 s of them if left out.
     name : str
         The machine's.
     share : float
@@ -108,7 +108,7 @@ class Fit:
         """Return plain values: errors in m over the test samples, settings, identification, step times in s.
 
         The physics model is judged with the offset that was identified beside it, which the FMU's ``x_pb`` has not.
-        ``ratio`` is the hybrid's error relative to that of the best of physics model, hold and peers.
+        ``ratio`` is the hybrid's error relative to the error of the best of physics model, hold and peers.
         """
         rms_pb, rms_hold, rms_h = self.judged.rms()
         verdict, best = self.judged.verdict(), self.judged.best()

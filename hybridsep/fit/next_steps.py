@@ -51,7 +51,7 @@ def next_steps(found: Fit, files: Mapping[str, Path], again: str, fmi: str) -> l
     if limits is not None and limits.estimated:
         names = [(one.name, getattr(limits, entry)) for entry, one in DRIVE_LIMIT_ENTRIES.items()]
         known = [f"--{name} {value:g}" for name, value in names[: len(Limits.parameters())]]
-        lines.append("  # a compensator FMU for the drive; the limits are estimates: put in those of your drive")
+        lines.append("  # a compensator FMU for the drive; the limits are estimates: put in your drive's")
         lines.append(f"  {again} {' '.join(known)}")
     native = next((path for what, path in files.items() if what.startswith("native FMU")), None)
     note = other_platforms(native, files["machine file"], files["trained predictor"], fmi) if native else ""

@@ -34,7 +34,7 @@ _FITTED = 2 / 3
 """Share of the training samples that the fit takes; the others choose."""
 
 _WORTH = 0.9
-"""Error relative to that of the identified model alone from which a disturbance is kept."""
+"""Error relative to the identified model's alone from which a disturbance is kept."""
 
 _EVALUATIONS = 30
 """Most evaluations of a fit; the example log's needs 30, a third of a second."""

@@ -50,7 +50,7 @@ class Stages:
             self.results = before
 
     def result(self, name: str, make: Callable[[], Any]) -> Any:
-        """Return the result of a stage: that of an earlier run, or what ``make`` returns, plain values."""
+        """Return the result of a stage: an earlier run's, or what ``make`` returns, plain values."""
         if name not in self.results:
             self.keep(name, make())
         return self.results[name]

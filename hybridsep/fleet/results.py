@@ -33,7 +33,7 @@ COLUMNS: Mapping[str, str] = {
 
 
 def key_of(log: str, axis: str, settings: str) -> str:
-    """Return the key of a row: a hash of those of the log's content and of the settings, and the axis."""
+    """Return the key of a row: a hash of the hashes of the log's content and of the settings, and the axis."""
     return hashlib.sha256(f"{log}\0{axis}\0{settings}".encode()).hexdigest()
 
 

@@ -42,7 +42,7 @@ class LogFile:
     stamp : str
         Changes with the content: time of the last change, or an object's ETag.
     recorded : str
-        Day, ISO: the date in the path, else that of the last change; empty if the store knows none.
+        Day, ISO: the date in the path, else the day of the last change; empty if the store knows none.
     """
 
     url: str

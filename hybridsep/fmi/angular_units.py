@@ -15,9 +15,9 @@ _ANGULAR = {
     "um": "urad",
     "mm/s": "deg/s",
 }
-"""Unit of a linear axis, or unit in which it is shown → that of a rotary one."""
+"""Unit of a linear axis, or unit in which it is shown → unit of a rotary axis."""
 
 
 def angular_unit(unit: str | None) -> str | None:
-    """Return the unit of a rotary axis for that of a linear one; the same if it has no length."""
+    """Return the unit of a rotary axis for the unit of a linear one; the same if it has no length."""
     return _ANGULAR.get(unit, unit) if unit is not None else None

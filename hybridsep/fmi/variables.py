@@ -45,7 +45,7 @@ TRUST_SETTINGS: Mapping[str, Parameter] = {name: _PREDICTOR[name] for name in Pr
 """Parameters of the residual model with trust, of both."""
 
 COMPENSATOR_SETTINGS: Mapping[str, Parameter] = CompensatorSettings.fmi_parameters()
-"""Parameters of a SepCompensator besides those of its predictor."""
+"""Parameters of a SepCompensator besides its predictor's."""
 
 _HOLD = "the same for x_pb plus the residual before the window, held"
 _REJECTED = "measurements that were missing or not plausible, with trust; counted window by window"

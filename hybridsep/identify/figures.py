@@ -39,7 +39,7 @@ def operation_figure(
     path : str or Path
         The PNG.
     shown : Shown, optional
-        Units in which errors are drawn; those of the model if left out.
+        Units in which errors are drawn; the model's if left out.
     """
     scale, unit = (shown or shown_in(found.unit)).error(found.rms)
     figure = Figure(figsize=(9.0, 8.5), layout="constrained")

@@ -50,7 +50,7 @@ class IdentifiedResponse:
     frequency : (n,) array, Hz
         Lines that were used.
     response, fitted : (n,) array of complex
-        Measured response, and that of the model.
+        Measured response, and the model's.
     noise : float
         Standard deviation of a line's error in multiples of its given one, or of its magnitude if none was given.
     criteria : tuple of (int, float, float)

@@ -78,7 +78,7 @@ def identify_operation(
     unit : {"m", "rad"}
         Unit of the positions, for estimates.
     shown : Shown, optional
-        Units in which findings say errors; those of ``unit`` if left out.
+        Units in which findings say errors; ``unit``'s if left out.
     part : str
         What the recordings are, for findings and errors.
     progress : callable, optional

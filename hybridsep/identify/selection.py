@@ -138,7 +138,7 @@ def held_out(segment: Segment) -> Indices:
 
 
 def choose(candidates: Sequence[Candidate]) -> Candidate:
-    """Return the simplest candidate whose held-out error is that of the best one within its standard error.
+    """Return the simplest candidate whose held-out error equals the best one's within its standard error.
 
     A larger one of these is taken where it fits the first part much better. Of two that differ in whether the static
     gain is 1, the one with the estimated gain is taken if its error is smaller on the first part and no larger on the

@@ -53,7 +53,7 @@ class Reading(NamedTuple):
     columns : mapping
         The stream's names of ``"t"``, ``"x_d"`` and ``"x"``, where they are others.
     unit : str, optional
-        Unit of the positions; that of the names or SI if left out.
+        Unit of the positions; from the names, or SI, if left out.
     si : {"m", "rad"}
         Unit of the machine.
     """

@@ -80,7 +80,7 @@ def standard_error(deviation: float, n: int, n_pieces: int = 1) -> float:
     Parameters
     ----------
     deviation : float
-        Relative standard deviation of the intervals: √2 times that of the times.
+        Relative standard deviation of the intervals: √2 times the times' deviation.
     n : int
         Intervals.
     n_pieces : int

@@ -127,7 +127,7 @@ class Machine(Section):
 
     @property
     def compensator_predictor(self) -> PredictorSettings:
-        """Settings of the compensator's own predictor: those of the predictor where the section has no others."""
+        """Settings of the compensator's own predictor: the predictor's where the section has none."""
         own = self._compensator_entries(PredictorSettings)
         return PredictorSettings(**{**self.predictor.given(), **own}, **self._sampling)
 

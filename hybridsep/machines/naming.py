@@ -12,7 +12,7 @@ __all__ = ["checked_name", "machine_name"]
 
 
 def machine_name(path: Path, axis: str | None = None) -> str:
-    """Return a machine's name from that of a log, and of the axis that is read of it."""
+    """Return a machine's name from the names of a log and of the axis that is read from it."""
     name = re.sub(r"[^A-Za-z0-9]+", "_", f"{path.name.partition('.')[0]} {axis or ''}").strip("_")
     return name if re.match(r"[A-Za-z]", name) else f"axis_{name}".rstrip("_")
 

@@ -165,7 +165,7 @@ def read_trajectory(
     column : str
         The command's name in the file.
     unit : str, optional
-        Unit of the command; that of the column's name, or m, if left out.
+        Unit of the command; from the column's name, or m, if left out.
     T_s : float, optional
         Sampling interval, s, for a file without a time column.
 

@@ -41,7 +41,7 @@ _Q = (1,)
 """Numbers of lags ``q`` of the physics-based position that are tried besides the default."""
 
 _WINDOWS = (0.2, 0.5, 1.0, 2.0)
-"""Windows over which the error is shown, in those of the controller."""
+"""Lengths of window over which the error is shown, relative to the controller's."""
 
 
 @dataclass(frozen=True)
