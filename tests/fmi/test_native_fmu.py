@@ -224,7 +224,7 @@ def test_universal_files() -> None:
 
 
 def test_unknown_targets_are_named(tmp_path: Path) -> None:
-    with pytest.raises(FmuError, match="no target sparc; there are host, x86_64-linux"):
+    with pytest.raises(FmuError, match="no target sparc; there are host, all, x86_64-linux"):
         build_fmu(load_machine("spring_mass_damper"), "FeedDrive", tmp_path, targets=("sparc",))
 
 
