@@ -3,7 +3,7 @@
     python -m benchmarks.pictures [--only fit_report.png] [--chromium PATH]
 
 ``pictures.json`` beside them keeps each picture's hash and the figures that it shows; ``tests/documents`` compares both
-with what the commands give now, so that a picture older than its figures is told. The two pages, report and live view, need
+with what the commands give now, so that a picture older than its figures is told. Report and live view need
 Chromium, Debian's package or any other. Some five minutes for all.
 """
 
