@@ -16,6 +16,7 @@ from built_once import built_once
 from places import EMPS, ROOT
 from rich.console import Console
 
+from benchmarks.pictures import RECORD, demonstrated
 from hybridsep.app import tables
 from hybridsep.app.overwrite import BY_ENDING
 from hybridsep.base.metrics import shown_figure
@@ -127,6 +128,12 @@ def test_compensation_in_the_readme(shown: Demonstration) -> None:
     figures = [float(figure) for figure in re.findall(r"[\d.]+", row)]
     # What has been learned differs a little from one LAPACK to another.
     assert figures == pytest.approx(shown.compensation("staircase", "tracking_rms_um"), rel=0.02, abs=0.06)
+
+
+@pytest.mark.slow
+def test_the_pictures_of_the_pages_show_these_figures(shown: Demonstration) -> None:
+    recorded = json.loads(RECORD.read_text(encoding="utf-8"))["staircase_compensated.png"]["figures"]
+    assert demonstrated(shown.summary) == pytest.approx(recorded, rel=0.02), "python -m benchmarks.pictures"
 
 
 @pytest.mark.slow

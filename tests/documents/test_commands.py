@@ -16,6 +16,8 @@ from command_line import Run
 from places import ROOT
 from quick_fits import without_other_windows
 
+from benchmarks.pictures import RECORD, judged_figures
+
 PAGES = [
     ROOT / "README.md",
     *sorted((ROOT / "docs" / "start").glob("*.md")),
@@ -103,6 +105,8 @@ def assert_the_row_of_the_readme(results: Path) -> None:
     assert [float(figure) for figure in re.findall(r"[\d.]+", row)] == pytest.approx(
         [1e6 * rms for rms in found], rel=0.02
     )
+    pictured = json.loads(RECORD.read_text(encoding="utf-8"))["fit_report.png"]["figures"]
+    assert judged_figures(judged) == pytest.approx(pictured, rel=2e-3), "python -m benchmarks.pictures"
 
 
 def python(text: str, page: Path) -> None:
