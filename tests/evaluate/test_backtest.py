@@ -226,8 +226,10 @@ def test_memory_does_not_grow_with_the_stream() -> None:
         return highest
 
     peak(1)  # what is imported or cached on first use
-    # Peaks differ by some kB, whatever their length; one number kept for each sample would be 96 kB.
-    assert peak(16) < peak(4) + 20_000
+    # Peaks differ by some kB, whatever their length; one number kept for each sample would be 96 kB. What other tests
+    # have left behind may be freed or made meanwhile: it is in one peak, not in all.
+    most = peak(4) + 20_000
+    assert any(peak(16) < most for _ in range(3))
 
 
 @pytest.mark.parametrize(
