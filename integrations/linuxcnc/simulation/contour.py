@@ -151,8 +151,7 @@ def run(program: str, log: Path, out: Path, entries: Mapping[str, int], user: st
     if user is not None:
         for path in (folder, *folder.rglob("*")):
             shutil.chown(path, user)
-        environment["HOME"] = str(folder)
-        command = ["runuser", "-u", user, "--", *command]
+        command = ["runuser", "-u", user, "--", "env", f"HOME={folder}", *command]
     done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=300.0)
     printed = done.stdout + done.stderr
     if done.returncode != 0 or not (folder / "samples.txt").is_file():
