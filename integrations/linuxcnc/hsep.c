@@ -31,6 +31,13 @@ MODULE_AUTHOR("the authors of hybridsep");
 MODULE_DESCRIPTION("Servo error pre-compensation with a linear hybrid model");
 MODULE_LICENSE("Dual BSD/GPL");
 
+/* The component is named as its module: loadrt waits for it */
+#if defined(HSEP_MODEL_SEP_COMPENSATOR)
+#define HSEP_COMPONENT "hsep"
+#else
+#define HSEP_COMPONENT "hsep_predictor"
+#endif
+
 #define HSEP_AXES 9        /* as many joints as LinuxCNC has */
 #define HSEP_FADE 500      /* periods within which the change of a command fades after a fault */
 #define HSEP_JUMP 1.5      /* a command that moves by more than so many times the largest step is another position */
@@ -69,7 +76,7 @@ typedef struct {
 } axis_data;
 
 static const hsep_words axis_words = {
-    .instantiate = "loadrt hsep", .location = "axes", .location_form = "a folder written by hybridsep hal"};
+    .instantiate = "loadrt " HSEP_COMPONENT, .location = "axes", .location_form = "a folder written by hybridsep hal"};
 
 static axis_data axis_all[HSEP_AXES];
 static int axis_component = -1;
@@ -120,7 +127,7 @@ static int axis_begin(axis_data *self, double command)
     if (hsep_model_initialise(
             &instance->context, instance->state, instance->state_size, instance->values, 0.0, axis_message) ==
         HSEP_REFUSED) {
-        rtapi_print_msg(RTAPI_MSG_ERR, "hsep.%s: %s\n", instance->name, axis_message);
+        rtapi_print_msg(RTAPI_MSG_ERR, HSEP_COMPONENT ".%s: %s\n", instance->name, axis_message);
         return 0;
     }
     for (size_t i = 0; i < self->n_ring; i++) {
@@ -145,7 +152,7 @@ static void axis_process(axis_data *self, double command, double feedback)
     if (hsep_model_step(
             &self->instance.context, self->instance.state, self->instance.values, t, T_s, axis_message) ==
         HSEP_REFUSED) {
-        rtapi_print_msg(RTAPI_MSG_ERR, "hsep.%s: %s\n", self->instance.name, axis_message);
+        rtapi_print_msg(RTAPI_MSG_ERR, HSEP_COMPONENT ".%s: %s\n", self->instance.name, axis_message);
         self->faulty = 1;
         self->fading = HSEP_FADE;
     }
@@ -261,11 +268,12 @@ static int axis_open(axis_data *self, const char *folder)
     instance->release = free;
     axis_message[0] = '\0';
     if (name[0] == '\0') {
-        rtapi_print_msg(RTAPI_MSG_ERR, "hsep: axes must be folders without a slash at the end, got %s\n", folder);
+        rtapi_print_msg(
+            RTAPI_MSG_ERR, HSEP_COMPONENT ": axes must be folders without a slash at the end, got %s\n", folder);
         return 0;
     }
     if (hsep_open(instance, name, folder, axis_message) == HSEP_REFUSED) {
-        rtapi_print_msg(RTAPI_MSG_ERR, "hsep: %s\n", axis_message);
+        rtapi_print_msg(RTAPI_MSG_ERR, HSEP_COMPONENT ": %s\n", axis_message);
         return 0;
     }
     size_t size = 0;
@@ -273,8 +281,8 @@ static int axis_open(axis_data *self, const char *folder)
     instance->context.weights = self->weights;
     instance->context.weights_size = size;
     hsep_instance_reset(instance);
-    if (hsep_instance_initialise(instance, "loadrt hsep", axis_message) != HSEP_OK) {
-        rtapi_print_msg(RTAPI_MSG_ERR, "hsep.%s: %s\n", name, axis_message);
+    if (hsep_instance_initialise(instance, "loadrt " HSEP_COMPONENT, axis_message) != HSEP_OK) {
+        rtapi_print_msg(RTAPI_MSG_ERR, HSEP_COMPONENT ".%s: %s\n", name, axis_message);
         return 0;
     }
 #if defined(HSEP_MODEL_SEP_COMPENSATOR)
@@ -284,7 +292,7 @@ static int axis_open(axis_data *self, const char *folder)
 #endif
     self->ring = calloc(self->n_ring, sizeof *self->ring);
     if (self->ring == NULL) {
-        rtapi_print_msg(RTAPI_MSG_ERR, "hsep.%s: no memory for its commands\n", name);
+        rtapi_print_msg(RTAPI_MSG_ERR, HSEP_COMPONENT ".%s: no memory for its commands\n", name);
         return 0;
     }
     return 1;
@@ -299,24 +307,24 @@ static int axis_export(axis_data *self)
     if (pins == NULL) {
         return -1;
     }
-    int bad = hal_pin_float_newf(HAL_IN, &pins->cmd, id, "hsep.%s.cmd", name);
-    bad |= hal_pin_float_newf(HAL_IN, &pins->fb, id, "hsep.%s.fb", name);
-    bad |= hal_pin_bit_newf(HAL_IN, &pins->active, id, "hsep.%s.active", name);
-    bad |= hal_pin_bit_newf(HAL_IN, &pins->enable, id, "hsep.%s.enable", name);
-    bad |= hal_pin_bit_newf(HAL_IN, &pins->reset, id, "hsep.%s.reset", name);
-    bad |= hal_pin_float_newf(HAL_OUT, &pins->out, id, "hsep.%s.out", name);
-    bad |= hal_pin_float_newf(HAL_OUT, &pins->delayed, id, "hsep.%s.delayed", name);
-    bad |= hal_pin_float_newf(HAL_OUT, &pins->fb_joint, id, "hsep.%s.fb-joint", name);
-    bad |= hal_pin_float_newf(HAL_OUT, &pins->predicted, id, "hsep.%s.predicted", name);
-    bad |= hal_pin_float_newf(HAL_OUT, &pins->error, id, "hsep.%s.error", name);
-    bad |= hal_pin_float_newf(HAL_OUT, &pins->std_dev, id, "hsep.%s.std", name);
-    bad |= hal_pin_s32_newf(HAL_OUT, &pins->state, id, "hsep.%s.state", name);
-    bad |= hal_param_float_newf(HAL_RW, &pins->scale, id, "hsep.%s.scale", name);
-    bad |= hal_param_u32_newf(HAL_RW, &pins->model, id, "hsep.%s.model", name);
-    bad |= hal_param_u32_newf(HAL_RO, &pins->look_ahead, id, "hsep.%s.look-ahead", name);
-    bad |= hal_param_u32_newf(HAL_RO, &pins->rejected, id, "hsep.%s.rejected", name);
+    int bad = hal_pin_float_newf(HAL_IN, &pins->cmd, id, HSEP_COMPONENT ".%s.cmd", name);
+    bad |= hal_pin_float_newf(HAL_IN, &pins->fb, id, HSEP_COMPONENT ".%s.fb", name);
+    bad |= hal_pin_bit_newf(HAL_IN, &pins->active, id, HSEP_COMPONENT ".%s.active", name);
+    bad |= hal_pin_bit_newf(HAL_IN, &pins->enable, id, HSEP_COMPONENT ".%s.enable", name);
+    bad |= hal_pin_bit_newf(HAL_IN, &pins->reset, id, HSEP_COMPONENT ".%s.reset", name);
+    bad |= hal_pin_float_newf(HAL_OUT, &pins->out, id, HSEP_COMPONENT ".%s.out", name);
+    bad |= hal_pin_float_newf(HAL_OUT, &pins->delayed, id, HSEP_COMPONENT ".%s.delayed", name);
+    bad |= hal_pin_float_newf(HAL_OUT, &pins->fb_joint, id, HSEP_COMPONENT ".%s.fb-joint", name);
+    bad |= hal_pin_float_newf(HAL_OUT, &pins->predicted, id, HSEP_COMPONENT ".%s.predicted", name);
+    bad |= hal_pin_float_newf(HAL_OUT, &pins->error, id, HSEP_COMPONENT ".%s.error", name);
+    bad |= hal_pin_float_newf(HAL_OUT, &pins->std_dev, id, HSEP_COMPONENT ".%s.std", name);
+    bad |= hal_pin_s32_newf(HAL_OUT, &pins->state, id, HSEP_COMPONENT ".%s.state", name);
+    bad |= hal_param_float_newf(HAL_RW, &pins->scale, id, HSEP_COMPONENT ".%s.scale", name);
+    bad |= hal_param_u32_newf(HAL_RW, &pins->model, id, HSEP_COMPONENT ".%s.model", name);
+    bad |= hal_param_u32_newf(HAL_RO, &pins->look_ahead, id, HSEP_COMPONENT ".%s.look-ahead", name);
+    bad |= hal_param_u32_newf(HAL_RO, &pins->rejected, id, HSEP_COMPONENT ".%s.rejected", name);
     char function[HAL_NAME_LEN + 1]; /* hal_export_functf came with LinuxCNC 2.9 */
-    bad |= rtapi_snprintf(function, sizeof function, "hsep.%s", name) >= (int)sizeof function;
+    bad |= rtapi_snprintf(function, sizeof function, HSEP_COMPONENT ".%s", name) >= (int)sizeof function;
     bad |= hal_export_funct(function, axis_step, self, 1, 0, id);
     if (bad == 0) {
         pins->scale = 1000.0; /* mm */
@@ -348,7 +356,7 @@ static void axis_free(void)
 
 int rtapi_app_main(void)
 {
-    axis_component = hal_init("hsep");
+    axis_component = hal_init(HSEP_COMPONENT);
     if (axis_component < 0) {
         return axis_component;
     }
@@ -360,7 +368,8 @@ int rtapi_app_main(void)
         }
     }
     if (axis_all[0].pins == NULL) {
-        rtapi_print_msg(RTAPI_MSG_ERR, "hsep: axes= must name at least one folder written by hybridsep hal\n");
+        rtapi_print_msg(
+            RTAPI_MSG_ERR, HSEP_COMPONENT ": axes= must name at least one folder written by hybridsep hal\n");
         hal_exit(axis_component);
         return -1;
     }

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import pwd
 import shutil
+import subprocess
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -96,6 +97,24 @@ def test_the_contour_of_a_circle_is_compensated(installed: Path) -> None:
     assert all(one.n_lost == 0 for one in samples.values())
     assert set(np.unique(samples["off"].state)) <= {0, 1}
     assert 3 in samples["hybrid cold"].state
+
+
+@pytest.mark.nightly
+@pytest.mark.skipif(bool(can_run()), reason=can_run())
+def test_both_components_load_side_by_side(installed: Path) -> None:
+    contour.hybridsep("hal", "emps", "--predictor", "--out", str(installed / "hal"))
+    source = str(installed / "hal" / "hsep_predictor.c")
+    subprocess.run(["halcompile", "--install", source], check=True, capture_output=True)
+    loaded = installed / "both.hal"
+    loaded.write_text(
+        f"loadrt hsep axes={installed}/hal/x\nloadrt hsep_predictor axes={installed}/hal/emps\nshow pin\n"
+    )
+    home = installed / "home"
+    home.mkdir()
+    shutil.chown(home, USER)
+    command = ["runuser", "-u", USER, "--", "env", f"HOME={home}", "halrun", "-f", str(loaded)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60.0)
+    assert {"hsep.x.out", "hsep_predictor.emps.predicted"} <= set(done.stdout.split()), done.stderr
 
 
 @pytest.mark.nightly
