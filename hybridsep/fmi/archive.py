@@ -29,7 +29,7 @@ _SUFFIX = {("native", "2"): "", ("native", "3"): "Fmi3", ("python", "2"): "Py"}
 _ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 _FIRST = ("modelDescription.xml", "SystemStructure.ssd")
 
-_LEVEL = 9
+_LEVEL = 6
 """Of zlib's deflate; fixed, as another level, like another implementation, gives other bytes for the same content."""
 
 _COMPRESSED = ".fmu"

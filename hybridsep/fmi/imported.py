@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 __all__ = ["imported_modules"]
@@ -35,8 +35,10 @@ def imported_modules(script: Path) -> dict[str, bytes]:
     return dict(sorted({**found, **{folder.as_posix(): b"" for folder in folders}}.items()))
 
 
-def _imports(source: bytes, place: tuple[str, ...]) -> Iterator[Path]:
-    """Yield the modules of this package that a module in the folder ``place`` names at its top level."""
+@cache
+def _imports(source: bytes, place: tuple[str, ...]) -> tuple[Path, ...]:
+    """Return the modules of this package that a module in the folder ``place`` names at its top level."""
+    found: list[Path] = []
     for statement in ast.parse(source).body:
         if not isinstance(statement, ast.ImportFrom):
             continue
@@ -48,6 +50,7 @@ def _imports(source: bytes, place: tuple[str, ...]) -> Iterator[Path]:
         else:
             continue
         if (_PACKAGE / Path(*parts)).with_suffix(".py").is_file():
-            yield Path(*parts).with_suffix(".py")
+            found.append(Path(*parts).with_suffix(".py"))
         else:
-            yield from (Path(*parts, alias.name).with_suffix(".py") for alias in statement.names)
+            found += [Path(*parts, alias.name).with_suffix(".py") for alias in statement.names]
+    return tuple(found)

@@ -91,17 +91,27 @@ def simplex_minimum(hessian: Array, linear: Array) -> Array:
     n = len(linear)
     best, least = np.zeros(n), 0.0
     for size in range(1, n + 1):
-        for support in combinations(range(n), size):
-            H, free = hessian[np.ix_(support, support)], linear[list(support)]
-            try:
-                inverse = np.linalg.solve(H, np.column_stack((free, np.ones(size))))
-            except np.linalg.LinAlgError:  # singular: a smaller set does as well
-                continue
-            found = inverse[:, 0]
-            if found.sum() > 1.0:  # then Σπ = 1 is active
-                found = found - (found.sum() - 1.0) / inverse[:, 1].sum() * inverse[:, 1]
-            cost = float(0.5 * found @ H @ found - free @ found)
-            if (found >= 0.0).all() and cost < least:
-                best, least = np.zeros(n), cost
-                best[list(support)] = found
+        supports = np.array(list(combinations(range(n), size)))
+        H, free = hessian[supports[:, :, None], supports[:, None, :]], linear[supports]
+        inverse = _solved(H, np.stack((free, np.ones_like(free)), axis=-1))
+        found, of_ones = inverse[..., 0], inverse[..., 1]
+        excess = found.sum(axis=-1) - 1.0
+        active = excess > 0.0  # then Σπ = 1
+        found[active] -= (excess / of_ones.sum(axis=-1))[active, None] * of_ones[active]
+        cost = 0.5 * np.einsum("si,sij,sj->s", found, H, found) - np.einsum("si,si->s", free, found)
+        cost[~(found >= 0.0).all(axis=-1)] = np.inf
+        first = int(cost.argmin())
+        if cost[first] < least:
+            best, least = np.zeros(n), float(cost[first])
+            best[supports[first]] = found[first]
     return best
+
+
+def _solved(H: Array, right: Array) -> Array:
+    """Solve systems side by side, ``(m, k, k)`` and ``(m, k, 2)``; one that is singular gives NaN."""
+    try:
+        return np.asarray(np.linalg.solve(H, right))
+    except np.linalg.LinAlgError:  # of one system, but for all
+        if len(H) == 1:
+            return np.full_like(right, np.nan)
+        return np.concatenate([_solved(H[i : i + 1], right[i : i + 1]) for i in range(len(H))])
