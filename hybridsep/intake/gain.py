@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache, partial
+
+import numpy as np
 
 from ..base.signals import Array
 from ..intake import fixes
@@ -84,6 +86,13 @@ def runs_against(x_d: Array, x: Array) -> DeadTime | None:
 
 def _modes(x_d: Array, x: Array) -> tuple[DeadTime, DeadTime]:
     """Return the best modes of positive and of negative gain; with a dead time where there is none without it."""
+    return _modes_of(x_d.tobytes(), x.tobytes())
+
+
+@lru_cache(maxsize=4)
+def _modes_of(commanded: bytes, measured: bytes) -> tuple[DeadTime, DeadTime]:
+    """Fit them once for all checks of a log, whose largest part it is."""
+    x_d, x = np.frombuffer(commanded), np.frombuffer(measured)
     same, against = (fit_dead_time(x_d, x, None, sign) for sign in (1.0, -1.0))
     if min(same.unexplained, against.unexplained) > _EXPLAINED:
         same, against = (fit_dead_time(x_d, x, _LATE, sign) for sign in (1.0, -1.0))
