@@ -148,7 +148,9 @@ def test_cosim_over_a_file(hybridsep: Run, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_cosim_with_compensation(hybridsep: Run, tmp_path: Path) -> None:
-    options = ("--out", tmp_path / "run.csv", "--figure", tmp_path / "run.png")
+    """Over the first moves of the staircase; the figures of all of it are the demo's."""
+    command = write_rows(tmp_path / "command.csv", commanded()[:2000], commanded()[:2000])
+    options = ("--trajectory", command, "--out", tmp_path / "run.csv", "--figure", tmp_path / "run.png")
     figures = {}
     for kind in ("off", "physics", "hybrid"):
         status, out, _ = hybridsep("cosim", "--compensate", kind, *options, "--json")
@@ -156,19 +158,18 @@ def test_cosim_with_compensation(hybridsep: Run, tmp_path: Path) -> None:
         summary = json.loads(out)
         assert summary[f"share_{kind}"] > 0.9
         figures[kind] = summary["tracking_rms_um"]
-    assert 87.0 < figures["off"] < 90.0
-    assert figures["hybrid"] < 4.2 < 19.0 < figures["physics"] < 20.5
+    assert figures["hybrid"] < 0.5 * figures["physics"] < 0.2 * figures["off"]
     assert (tmp_path / "run.csv").read_text().startswith("t,x_d,x_dm,x,")
     assert (tmp_path / "run.png").read_bytes().startswith(b"\x89PNG")
     fmus = ("--predictor", tmp_path / "SepCompensator.fmu", "--plant", tmp_path / "FeedDrive.fmu")
     assert hybridsep("build", "SepCompensator", "FeedDrive", "--target", "host", "--out", tmp_path)[0] == 0
-    status, out, _ = hybridsep("cosim", "--compensate", "hybrid", *fmus)
+    status, out, _ = hybridsep("cosim", "--compensate", "hybrid", "--trajectory", command, *fmus)
     assert status == 0
     assert f"{figures['hybrid']:.2f}" in out
-    assert "planned by the hybrid 98.8%" in out
+    assert "planned by the hybrid 9" in out
     # Preview and knots follow a window of another length.
-    path = write_rows(tmp_path / "command.csv", commanded()[:1500], commanded()[:1500])
-    sizes = ("--Np", 25, "--p", 20, "--q", 3, "--trajectory", path)
+    short = write_rows(tmp_path / "short.csv", commanded()[:400], commanded()[:400])
+    sizes = ("--Np", 25, "--p", 20, "--q", 3, "--trajectory", short)
     assert hybridsep("cosim", "--compensate", "physics", "--flavour", "python", *sizes)[0] == 0
 
 

@@ -127,10 +127,10 @@ def test_ctrl_c_in_a_terminal_ends_the_processes_of_tune(tmp_path: Path) -> None
         time.sleep(0.05)
         if not children.exists() and time.monotonic() > begun + 5.0:  # no /proc
             break
-    time.sleep(5.0)  # one that comes while they start is lost
+    time.sleep(2.0)  # one that comes while they start is lost
     os.killpg(process.pid, signal.SIGINT)
     try:
-        _, err = process.communicate(timeout=20)
+        _, err = process.communicate(timeout=10)
     except subprocess.TimeoutExpired:  # on a busy machine they start later
         os.killpg(process.pid, signal.SIGINT)
         _, err = process.communicate(timeout=60)

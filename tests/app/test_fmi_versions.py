@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import Run, write_rows
+from quick_fits import without_other_settings, without_other_windows
 from staircase_data import commanded, measured
 
 from hybridsep import build_fmu, load_machine
@@ -22,9 +23,12 @@ NP = 20
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("quick_fit")
-def test_fit_writes_trained_fmus_of_both_versions(hybridsep: Run, tmp_path: Path) -> None:
-    x_d, x = commanded()[:1200], measured(0)[:1200]
+def test_fit_writes_trained_fmus_of_both_versions(
+    hybridsep: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    without_other_windows(monkeypatch)
+    without_other_settings(monkeypatch)
+    x_d, x = commanded()[:800], measured(0)[:800]
     log = write_rows(tmp_path / "axis.csv", x_d, x)
     limits = ("--v_max", "0.2", "--a_max", "20", "--j_max", "5000", "--change_max", "0.001")
     status, out, _ = hybridsep("fit", log, "--Np", NP, "--fmi", "both", "--out", tmp_path / "fit", *limits)
