@@ -25,7 +25,7 @@ def noise(seed: int) -> Any:
 
 
 @pytest.mark.filterwarnings("ignore")  # the package's own
-@pytest.mark.parametrize("axis", ["x", "y"])
+@pytest.mark.parametrize("axis", ["x", pytest.param("y", marks=pytest.mark.nightly)])
 def test_poles_are_those_of_scikit_rf(axis: str) -> None:
     from skrf import Frequency, Network
     from skrf.vectorFitting import VectorFitting

@@ -80,7 +80,7 @@ def test_whatever_a_state_holds_outputs_are_finite(name: str) -> None:
     drive_on(model, 0, 47)
     state, chance, ends = model.state.copy(), np.random.default_rng(3), Counter[str]()
     for value in (np.nan, -np.inf, 1e90, 1e200, 1e308):
-        for place in chance.permutation(len(state))[:900]:
+        for place in chance.permutation(len(state))[:500]:
             model.state = state.copy()
             model.state[place] = value
             try:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 from trusted_cases import PERIOD, cycles, friction, physics, run, trusted, trusted_model
 
-from benchmarks.random_drives.generator import random_drive
+from benchmarks.random_drives.generator import RandomDrive, random_drives
 from benchmarks.random_drives.simulation import simulate
 from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel
@@ -31,17 +32,28 @@ def learned(x_d: Array, e: Array) -> HybridPredictor:
     return predictor
 
 
-def slower(index: int) -> tuple[Array, Array]:
-    """Return commanded and measured positions, (n,), m, of a random drive whose frequencies fell by a tenth."""
-    drive = random_drive(index)
-    modes = [replace(mode, f_n=0.9 * mode.f_n, alpha=0.81 * mode.alpha) for mode in drive.true_model.modes]
-    x = simulate([ModalModel(modes)], [drive.disturbances], [drive.x_d])[0]
-    return drive.x_d, x + drive.noise_std * np.random.default_rng(index).standard_normal(len(x))
+@cache
+def slower(indices: tuple[int, ...] = (35, 40)) -> dict[int, tuple[RandomDrive, Array]]:
+    """Return drives by their index, with positions measured after their frequencies have fallen by a tenth, (n,), m.
+
+    Side by side they take as long as one.
+    """
+    drives = dict(zip(indices, random_drives(indices), strict=True))
+    models = [
+        ModalModel([replace(mode, f_n=0.9 * mode.f_n, alpha=0.81 * mode.alpha) for mode in drive.true_model.modes])
+        for drive in drives.values()
+    ]
+    moved = simulate(models, [drive.disturbances for drive in drives.values()], [one.x_d for one in drives.values()])
+    return {
+        index: (drive, x + drive.noise_std * np.random.default_rng(index).standard_normal(len(x)))
+        for (index, drive), x in zip(drives.items(), moved, strict=True)
+    }
 
 
-@pytest.mark.parametrize("index", [26, 40])
+@pytest.mark.slow
+@pytest.mark.parametrize("index", [pytest.param(26, marks=pytest.mark.nightly), 40])
 def test_a_random_drive_whose_frequencies_fell_by_a_tenth_is_relearned(index: int) -> None:
-    drive, (_, x_meas) = random_drive(index), slower(index)
+    drive, x_meas = (slower() if index in slower() else slower((index,)))[index]
     warm = HybridPredictor(drive.model)
     run(warm, drive.x_d, drive.x_meas)
     warm.restart()
@@ -82,9 +94,10 @@ def test_doubt_begins_with_little_of_earlier_runs_and_the_evidence_of_the_expert
     assert model.experts[DOUBTING].noise_variance == model.experts[LAGGED].noise_variance > 0.0
 
 
+@pytest.mark.slow
 def test_the_commands_expert_is_doubted_where_it_led() -> None:
     """On a plant whose frequencies fall by a tenth; with a doubt of L alone A kept its earlier runs, at 3.3 times."""
-    drive, (x_d, x_meas) = random_drive(35), slower(35)
+    drive, x_meas = slower()[35]
     warm = HybridPredictor(drive.model)
     run(warm, drive.x_d, drive.x_meas)
     warm.restart()
@@ -92,7 +105,7 @@ def test_the_commands_expert_is_doubted_where_it_led() -> None:
     assert model.leading == COMMAND
     assert model.stack.gram[DOUBTING, DOUBTING] == model.stack.gram[COMMAND, COMMAND] > 0.0
     assert model.experts[DOUBTING].noise_variance == model.experts[COMMAND].noise_variance > 0.0
-    error, cold = (rms((x_meas - run(one, x_d, x_meas))[2000:]) for one in (warm, HybridPredictor(drive.model)))
+    error, cold = (rms((x_meas - run(one, drive.x_d, x_meas))[2000:]) for one in (warm, HybridPredictor(drive.model)))
     assert error <= 1.8 * cold
     assert not model.doubts
 
