@@ -62,8 +62,8 @@ def test_the_example_of_a_machine_file_is_valid(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "example",
     [
-        # machines/test_machine.py has it calibrate the stage
-        pytest.param(path.name, marks=[pytest.mark.nightly] if path.stem == "calibrate_stage" else [])
+        # machines/test_machine.py has it calibrate the stage, test_paper.py what section_4_2.py shows
+        pytest.param(path.name, marks=[pytest.mark.nightly] if path.stem in ("calibrate_stage", "section_4_2") else [])
         for path in sorted((ROOT / "examples").glob("*.py"))
         if "__main__" in path.read_text("utf-8")
     ],
