@@ -55,11 +55,9 @@ def together(*changes: Changes) -> Changes:
 
 def without_component(i: int) -> Changes:
     """Return intervals without one of their components."""
-    last = "    f[3] = stacked ? signals->variance[j] : 0.0;"
+    last = "    f[2] = stacked ? signals->variance[j] : 0.0;"
     return {"predict/hsep_uncertainty.c": [(last, f"{last}\n    f[{i}] = 0.0;")]}
 
-
-NO_LEAP: Changes = {"predict/hsep_uncertainty.c": [("uncertainty_far_share = 0.5;", "uncertainty_far_share = 2.0;")]}
 
 NO_DOUBTING: Changes = {
     FORECAST: [
@@ -95,6 +93,7 @@ VARIANTS: Mapping[str, Changes] = {
     "A's bound does not grow": {
         FORECAST: [("    if (!(self->largest_step > 0.0 && hsep_stack_leader", "    if (!(0 && hsep_stack_leader")]
     },
+    "features never begin anew": constants(outgrown=1e300),
     "rows are independent": constants(correlation_max=1.0),
     "no first differences of disturbances": constants(difference_share=1e-6),
     "first differences as large": constants(difference_share=1.0),
@@ -113,17 +112,16 @@ VARIANTS: Mapping[str, Changes] = {
     },
     "stiffness acts at x_pb": {FORECAST: [("x[j] = x_pb[j] + hsep_at(first, first->e_h)[j];", "x[j] = x_pb[j];")]},
     "A: 20 lags": constants(lags_of_command=20),
-    "runs begin at rest": {START: [("    if (known < start_samples", "    if (1 || known < start_samples")]},
+    "runs begin at rest": {START: [("    if (known < HSEP_START_SAMPLES", "    if (1 || known < HSEP_START_SAMPLES")]},
     "L from the first": constants(first_lagged=1.0, first_static=0.0),
     "S from the first": constants(first_lagged=0.0, first_static=1.0),
     "kappa 0.3": constants(kappa=0.3),
     "kappa 3": constants(kappa=3.0),
     "gamma 0.9": constants(gamma=0.9),
     "gamma 0.98": constants(gamma=0.98),
-    "interval: no leap": NO_LEAP,
     **{
         f"interval: no {name}": without_component(i)
-        for i, name in enumerate(("noise", "timing", "change", "variance of the experts"))
+        for i, name in enumerate(("noise", "timing", "variance of the experts"))
     },
 }
 """What is tried, by name."""

@@ -1,6 +1,6 @@
 """Weights file ``resources/weights.bin`` of an FMU that starts warm: the factors of a trained predictor.
 
-Layout, little-endian: ``HSEPWG12``; the numbers of settings, of modes, of learned samples and of what has been learned
+Layout, little-endian: ``HSEPWG13``; the numbers of settings, of modes, of learned samples and of what has been learned
 besides the factors, as u64; each setting that shapes the features and the factors (with others the weights mean
 something else), its name in 24 bytes and its value as float64; as float64 the numbers of a residual model that can be
 trusted and those of the errors' variance; the upper triangle of each factor ``[R z; 0 ρ]`` by rows, of a residual model
@@ -24,7 +24,7 @@ from ..predict.uncertainty import Uncertainty
 __all__ = ["WEIGHTS_FILE", "learned_settings", "restore_weights", "weights_file"]
 
 WEIGHTS_FILE = "weights.bin"
-_MAGIC = b"HSEPWG12"
+_MAGIC = b"HSEPWG13"
 _HEAD = struct.Struct("<8s4Q")
 _SETTING = struct.Struct("<24sd")
 _CHECKSUM = struct.Struct("<Q")

@@ -1,11 +1,11 @@
 """Uncertainty of a prediction: the variance of its error against the measured position, learned from earlier windows.
 
-The variance at sample ``k`` of a window is a sum of four components, ``v(k) = Σ_i θ_i f_i(k)``, of what errors come
-with: measurement noise; timing, the squared difference of ``x_pb`` from sample to sample; a change since the last
-measured residual, ``(e_h − e)²``; and what the residual model knows of itself, the variance of the mixture of its
-experts. All are known before the window is measured, so that the variance is small at standstill and large at a
-reversal. Timing and that variance are felt after they have happened, and for a while: they are averaged over the
-samples before, from the last measured one on. The published standard deviation is ``c(k)·√v``.
+The variance at sample ``k`` of a window is a sum of three components, ``v(k) = Σ_i θ_i f_i(k)``, of what errors come
+with: measurement noise; timing, the squared difference of ``x_pb`` from sample to sample; and what the residual model
+knows of itself, the variance of the mixture of its experts. All are known before the window is measured, so that the
+variance is small at standstill and large in motion. Timing and that variance are felt after they have happened, and for
+a while: they are averaged over the samples before, from the last measured one on. The published standard deviation is
+``c(k)·√v``.
 
 After each window every ``θ_i`` takes a step of expectation maximisation for normal errors of that variance (variance
 components: Dempster, Laird, Rubin, J. R. Stat. Soc. B 39 (1977)). The factor ``c(k)``, which changes exponentially from
@@ -28,8 +28,8 @@ from ..base.signals import PREDICTION_MAX, Array
 
 __all__ = ["N_COMPONENTS", "N_LEARNED", "PredictedError", "Uncertainty", "first_variance"]
 
-_SHARES = (4.0, 0.3, 2.0)
-"""First variance of the error relative to that of its causes: timing, change, variance of the experts."""
+_SHARES = (4.0, 2.0)
+"""First variance of the error relative to that of its causes: timing, variance of the experts."""
 
 N_COMPONENTS = 1 + len(_SHARES)
 
@@ -39,11 +39,8 @@ N_LEARNED = 2 * N_COMPONENTS + 3
 _UNKNOWN_NOISE = 25.0
 """First variance of a noise that is not known, relative to λ."""
 
-_FELT = (1, 3)
-"""Components that are felt for a while: timing, variance of the experts."""
-
 _FELT_FOR = 0.2
-"""Time constant of their averaging, in windows."""
+"""Time constant of the averaging of timing and variance of the experts, in windows."""
 
 _LEAST_SHARE, _MOST_SHARE = 1e-9, 1e4
 """Bounds on the variance relative to its cause, relative to the first one."""
@@ -68,10 +65,6 @@ step of expectation maximisation, which alone would be slow where components are
 
 _LEVELS = ((0.6745, 0.5), (1.645, 0.1), (1.96, 0.05))
 """Standard deviations, and the probability that a normal error exceeds them."""
-
-_FAR, _FAR_SHARE = 4.0, 0.5
-"""Standard deviations, and the share of a window's errors beyond them from which on all variances are too small by
-their square: the machine or the sensor has changed."""
 
 _FACTOR_RATE, _FACTOR_MAX = 0.03, 4.0
 """Change of ``ln c`` in the middle of a window from one window to the next per share of errors; bound on it."""
@@ -129,15 +122,13 @@ class Uncertainty:
         self.evidence = np.zeros(N_COMPONENTS)
         self.factor, self.ratio, self.recent = 1.0, 1.0, 0.0
 
-    def predict(self, x_pb: Array, e_h: Array, *, last: float, variance: Array | float) -> PredictedError:
+    def predict(self, x_pb: Array, e_h: Array, variance: Array | float) -> PredictedError:
         """Return what is known of the error of the next window; nothing is changed.
 
         Parameters
         ----------
         x_pb, e_h : (n,) array, m
             Physics-based prediction and published residual, relative to the start.
-        last : float, m
-            Last measured residual.
         variance : (n,) array or float, m²
             What the residual model knows of its error.
         """
@@ -148,11 +139,10 @@ class Uncertainty:
         components = np.empty((n, N_COMPONENTS))
         components[:, 0] = 1.0
         _set_differences(components[:, 1], x_pb)
-        components[:, 2] = bounded - last
-        components[:, 1:3] = np.minimum(np.abs(components[:, 1:3]), PREDICTION_MAX) ** 2
-        components[:, 3] = variance
+        components[:, 1] = np.minimum(np.abs(components[:, 1]), PREDICTION_MAX) ** 2
+        components[:, 2] = variance
         gain = 1.0 / (1.0 + _FELT_FOR * self.Np)
-        components[:, _FELT] = lfilter([gain], [1.0, gain - 1.0], components[:, _FELT], axis=0)
+        components[:, 1:] = lfilter([gain], [1.0, gain - 1.0], components[:, 1:], axis=0)
         c = self.factor * self.ratio ** self._from_middle(n)
         std = np.minimum(c * np.sqrt(self._variance(components)), PREDICTION_MAX)
         return PredictedError(bounded, components, std)
@@ -218,8 +208,6 @@ class Uncertainty:
 
     def _calibrate(self, relative: Array, place: Array) -> None:
         """Follow how many errors, relative to their deviations, are beyond the intervals, and where."""
-        if np.count_nonzero(relative > _FAR) > _FAR_SHARE * len(relative):
-            self.theta *= _FAR**2
         missed = sum((relative > z) - beyond for z, beyond in _LEVELS)
         factor = self.factor * math.exp(_FACTOR_RATE * float(np.mean(missed)))
         ratio = self.ratio * math.exp(_RATIO_RATE * float(np.mean(missed * place)))

@@ -143,8 +143,7 @@ class WindowPredictor:
         error = self.uncertainty.predict(
             forecast.x_pb,
             np.where(active, forecast.e_h, 0.0),
-            last=self.last_accepted_residual(),
-            variance=np.where(active, forecast.variance, 0.0),
+            np.where(active, forecast.variance, 0.0),
         )
         return PredictedWindow(start, error, forecast)
 

@@ -151,6 +151,19 @@ def test_missing_samples_are_counted_and_bridged() -> None:
     assert rms(np.concatenate(errors[10:])) < 0.05 * rms(e_pb[1000:])
 
 
+def test_rows_with_many_bridged_lags_are_not_learned_each_expert_by_its_own_lags() -> None:
+    model = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
+    predictor = HybridPredictor(model, PredictorSettings(trust=True, p=10))
+    x = staircase()[: 2 * NP]
+    for i in range(0, 2 * NP, NP):
+        predictor.predict(x[i : i + NP])
+        predictor.update(np.where(np.arange(NP) // 8 == 11, np.nan, x[i : i + NP]))  # 8 missing, 4 more before the end
+    learned = trusted_model(predictor)
+    # After the first gap the next p − 3 rows are left out, after the second one the 4 that are left of the window.
+    assert learned.evidence.n_rows == 2 * (NP - 8) - (10 - 3 + 4)
+    assert learned.evidence_of_command.n_rows == 2 * (NP - 8) - (CONSTANTS.lags_of_command - 3 + 4)
+
+
 def test_without_trust_a_missing_sample_is_an_error() -> None:
     predictor = HybridPredictor(ModalModel.spring_mass_damper(1.0, 15.7, 24674.0), PredictorSettings(trust=False))
     predictor.predict(np.zeros(NP))

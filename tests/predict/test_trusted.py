@@ -13,6 +13,7 @@ from hybridsep.base.errors import ParameterError
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.predict.predictor import HybridPredictor
+from hybridsep.predict.trust.constants import CONSTANTS
 from hybridsep.predict.trust.model import COMMAND, LAGGED, STATIC
 
 NOISE = 1e-7  # m
@@ -38,15 +39,30 @@ def test_a_residual_that_is_a_feature_is_predicted_to_the_noise() -> None:
 
 
 def test_what_was_learned_is_kept_while_the_velocity_grows() -> None:
-    """Without that, physics alone is left in the window whose velocity is 30 times that of the first one."""
+    """Without that, physics alone is left in the window whose velocity outgrows that of the first one."""
     k = np.arange(4500.0)
-    x_d = np.asarray(5e-3 * (k / 4500.0) ** 2 * np.sin(2.0 * np.pi * 2e-3 * k))
+    x_d = np.asarray(5e-3 * (k / 4500.0) ** 1.8 * np.sin(2.0 * np.pi * 2e-3 * k))
+    velocity = np.abs(np.diff(x_d))
+    assert 500.0 < velocity.max() / velocity[:100].max() < CONSTANTS.outgrown
     x_pb = physics(x_d)
     x = x_pb + friction(x_d) + NOISE * np.random.default_rng(0).normal(size=len(k))
     x_h = run(trusted(), x_d, x)
     for window in range(25, 45):
         seen = slice(100 * window, 100 * (window + 1))
         assert rms((x - x_h)[seen]) < 0.5 * rms((x - x_pb)[seen]), window
+
+
+def test_the_rounding_of_a_command_at_rest_is_outgrown() -> None:
+    """Without that, it would set the scale of the friction's velocities for the whole run."""
+    x_d, _, x = with_friction(2 * PERIOD)
+    x_d = np.concatenate((np.zeros(500), x_d)) + 1e-12 * np.random.default_rng(2).normal(size=500 + len(x_d))
+    x = np.concatenate((np.zeros(500), x))
+    predictor = trusted()
+    run(predictor, x_d[:500], x[:500])
+    assert 0.0 < trusted_model(predictor).velocity_scale < 1e-8
+    x_h = run(predictor, x_d[500:], x[500:])
+    assert trusted_model(predictor).velocity_scale > 1e-2
+    assert rms((x[500:] - x_h)[PERIOD:]) < 10 * NOISE
 
 
 @pytest.mark.parametrize(("rate", "grown"), [(1.03, 400), (1.06, 200)])

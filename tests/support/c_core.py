@@ -255,7 +255,7 @@ def write_weights(folder: Path, name: str, factor: Array, n_samples: int, **sett
     names = (*PREDICTOR_SETTINGS, "trust", "period")
     learned = {key: values[key] for key in names if PARAMETERS[key].learned}
     learned |= {f"mode[{i}].{key}": value for i, mode in enumerate(modes, start=1) for key, value in mode.items()}
-    content = b"HSEPWG12" + struct.pack("<4Q", len(learned), len(modes), n_samples, N_LEARNED)
+    content = b"HSEPWG13" + struct.pack("<4Q", len(learned), len(modes), n_samples, N_LEARNED)
     content += b"".join(struct.pack("<24sd", key.encode(), value) for key, value in learned.items())
     content += Uncertainty(values["lambda"], int(values["Np"])).learned().astype("<f8").tobytes()
     content += np.concatenate([factor[i, i:] for i in range(len(factor))]).astype("<f8").tobytes()

@@ -1,6 +1,6 @@
 /* Warm start from weights that were learned before the simulation.
  *
- * The resource weights.bin, little-endian: "HSEPWG12"; the numbers of settings, of modes, of learned samples and of
+ * The resource weights.bin, little-endian: "HSEPWG13"; the numbers of settings, of modes, of learned samples and of
  * what has been learned besides the factors, as uint64; each setting that shapes the features and the factor, its name
  * in 24 bytes and its value as a double; as doubles the numbers of a residual model that can be trusted, as
  * hsep_residual_learned has them, and those of hsep_uncertainty_learned; the upper triangle of each factor

@@ -42,11 +42,13 @@ class TrustConstants:
         Bound on the rows that count as one, and how fast their number follows: without, recordings are 1 to 4 % worse.
     bound, bound_of_command : float
         Largest prediction relative to the largest residual so far, of the physics model and of the command: what is
-        larger was never seen. Where the command's expert leads, its bound grows with its steps, by up to ``growth``:
-        without, CNC axes that creep before a motion have 3 and 4 times the error.
-    growth, growth_learned, learned : float
-        Growth of the commanded velocity that makes the static features begin anew, as they were learned at a creep: the
-        first until rows of ``learned`` windows are learned, then the second.
+        larger was never seen. Where the command's expert leads, its bound grows with its steps: without,
+        CNC axes that creep before a motion have 3 and 4 times the error.
+    growth : float
+        Largest growth of that bound.
+    outgrown : float
+        Growth of the commanded velocity that makes the static features begin anew, as they were learned at a creep:
+        without, the rounding of a command at rest sets their scale, and drives have to 1.4 times the error.
     carried : float
         Largest weight of earlier runs when another begins, in windows: a machine may have changed meanwhile.
     less : float
@@ -80,8 +82,7 @@ class TrustConstants:
     bound: float = 1.2
     bound_of_command: float = 2.0
     growth: float = 30.0
-    growth_learned: float = 1000.0
-    learned: float = 15.0
+    outgrown: float = 1000.0
     carried: float = 30.0
     less: float = 0.003
     doubt: float = 0.7

@@ -51,8 +51,8 @@ class RunState(NamedTuple):
         Last commands, oldest first, for the ``p_A`` lags of the command's expert.
     past, past_of_command : (p,) and (p_A,) array, m
         Last residuals of the physics model, and of the command; newest first.
-    bridged : (p,) array of bool
-        Which of these stand for samples without a measurement.
+    bridged : (max(p, p_A),) array of bool
+        Whether the last ones stand for samples without a measurement, oldest first.
     """
 
     static: StaticState
@@ -111,7 +111,7 @@ class TrustedModel(ResidualModel[TrustedForecast]):
     def restart(self) -> None:
         """Begin another run, at rest; what was learned is kept."""
         p = self.settings.p
-        no: NDArray[np.bool_] = np.zeros(p, dtype=np.bool_)
+        no: NDArray[np.bool_] = np.zeros(max(p, self.command.p), dtype=np.bool_)
         commands, past_of_command = np.zeros(self.command.n_before), np.zeros(self.command.p)
         self.run = RunState(self.static.rest(), commands, np.zeros(p), past_of_command, no)
         self.reach = Reach(self.reach.fastest)
@@ -293,8 +293,7 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         """
         c, static = self.constants, self.run.static
         peak = self.static.peak_velocity(static, x_d)
-        growth = c.growth_learned if self.n_rows >= c.learned * self.settings.Np else c.growth
-        outgrown = peak > max(growth * self.velocity_scale, LEAST_VELOCITY)
+        outgrown = peak > max(c.outgrown * self.velocity_scale, LEAST_VELOCITY)
         step = max(self.largest_step, peak * self.settings.T_s)
         if path is not None and self.n_rows == 0.0:
             peak = max(float(np.abs(np.diff(path)).max(initial=0.0)) / self.settings.T_s, self.velocity_scale)
@@ -350,7 +349,7 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         fold : bool
             Whether they are learned; the next window starts from them in any case.
         """
-        m, p = len(x), self.settings.p
+        m = len(x)
         if forecast.scales.velocity != self.velocity_scale:  # outgrown
             self.evidence.forget()
             self.evidence_of_command.believe_earlier()
@@ -364,29 +363,28 @@ class TrustedModel(ResidualModel[TrustedForecast]):
         rows, static = self.static.rows(run.static, x_d, x_pb, x_pb + e, self.velocity_scale)
         bridged: NDArray[np.bool_] = np.concatenate((run.bridged, ~accepted))
         if fold and accepted.any():
-            n_bridged = np.convolve(bridged[:-1].astype(np.float64), np.ones(p), "valid")
-            self._fold(rows, x_d, e, e_0, accepted & (n_bridged <= _BRIDGED))
+            self._fold(rows, x_d, e, e_0, bridged)
             self._judge(forecast, e, e_0, accepted)
         self.n_rejected += m - int(accepted.sum())
         self.run = RunState(
             static,
             np.concatenate((run.commands, x_d))[m:],
-            np.concatenate((e[::-1], run.past))[:p],
+            np.concatenate((e[::-1], run.past))[: self.settings.p],
             np.concatenate((e_0[::-1], run.past_of_command))[: self.command.p],
-            bridged[-p:],
+            bridged[m:],
         )
         return accepted
 
-    def _fold(self, rows: Array, x_d: Array, e: Array, e_0: Array, learned: NDArray[np.bool_]) -> None:
+    def _fold(self, rows: Array, x_d: Array, e: Array, e_0: Array, bridged: NDArray[np.bool_]) -> None:
         """Update the experts' evidence with a window's rows of static features."""
-        lagged = lags(self.run.past, e)[learned]
-        of_command = self.command.rows(self.run.commands, x_d)[learned]
         if self.settings.forgetting > 0.0:
             for evidence in (self.evidence, self.evidence_of_command):
                 evidence.discount(math.exp(-len(e) * self.settings.T_s / self.settings.forgetting))
-        self.evidence.this.learn(rows[learned], lagged, e[learned])
-        lagged = lags(self.run.past_of_command, e_0)[learned]
-        self.evidence_of_command.this.learn(of_command, lagged, e_0[learned])
+        learned = _learnable(bridged, len(e), self.settings.p)
+        self.evidence.this.learn(rows[learned], lags(self.run.past, e)[learned], e[learned])
+        learned, of_command = _learnable(bridged, len(e), self.command.p), self.command.rows(self.run.commands, x_d)
+        lagged = lags(self.run.past_of_command, e_0)
+        self.evidence_of_command.this.learn(of_command[learned], lagged[learned], e_0[learned])
 
     def _judge(self, forecast: TrustedForecast, e: Array, e_0: Array, accepted: NDArray[np.bool_]) -> None:
         """Judge the experts and their stack by the measurement of their window."""
@@ -410,6 +408,12 @@ class TrustedModel(ResidualModel[TrustedForecast]):
             self.experts[expert].restart()
         self.experts[self.leading].take_over(self.experts[DOUBTING])
         self.stack.restart()
+
+
+def _learnable(bridged: NDArray[np.bool_], n: int, p: int) -> NDArray[np.bool_]:
+    """Return which of the last ``n`` samples were measured, as were all but a few of their ``p`` lags."""
+    n_bridged = np.convolve(bridged[-n - p : -1].astype(np.float64), np.ones(p), "valid")
+    return np.asarray(~bridged[-n:] & (n_bridged <= _BRIDGED))
 
 
 def _bridged(last: float, measured: Array, accepted: NDArray[np.bool_]) -> Array:

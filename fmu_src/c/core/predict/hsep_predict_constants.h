@@ -2,16 +2,13 @@
 #ifndef HSEP_PREDICT_CONSTANTS_H
 #define HSEP_PREDICT_CONSTANTS_H
 
-/* First variance of the error relative to that of its causes: timing, change, variance of the experts. */
-#define HSEP_UNCERTAINTY_SHARES 4.0, 0.3, 2.0
+/* First variance of the error relative to that of its causes: timing, variance of the experts. */
+#define HSEP_UNCERTAINTY_SHARES 4.0, 2.0
 
 /* First variance of a noise that is not known, relative to lambda. */
 #define HSEP_UNCERTAINTY_UNKNOWN_NOISE 25.0
 
-/* Components that are felt for a while: timing, variance of the experts. */
-#define HSEP_UNCERTAINTY_FELT 1, 3
-
-/* Time constant of their averaging, in windows. */
+/* Time constant of the averaging of timing and variance of the experts, in windows. */
 #define HSEP_UNCERTAINTY_FELT_FOR 0.2
 
 /* Bounds on the variance relative to its cause, relative to the first one. */
@@ -39,11 +36,6 @@
 
 /* Standard deviations, and the probability that a normal error exceeds them. */
 #define HSEP_UNCERTAINTY_LEVELS {0.6745, 0.5}, {1.645, 0.1}, {1.96, 0.05}
-
-/* Standard deviations, and the share of a window's errors beyond them from which on all variances are too small by
- * their square: the machine or the sensor has changed. */
-#define HSEP_UNCERTAINTY_FAR 4.0
-#define HSEP_UNCERTAINTY_FAR_SHARE 0.5
 
 /* Change of ln c in the middle of a window from one window to the next per share of errors; bound on it. */
 #define HSEP_UNCERTAINTY_FACTOR_RATE 0.03

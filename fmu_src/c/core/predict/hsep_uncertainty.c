@@ -8,7 +8,6 @@
 #include <string.h>
 
 static const double uncertainty_shares[HSEP_N_COMPONENTS] = {0.0, HSEP_UNCERTAINTY_SHARES};
-static const int uncertainty_felt[] = {HSEP_UNCERTAINTY_FELT};
 static const double uncertainty_levels[][2] = {HSEP_UNCERTAINTY_LEVELS};
 
 /* Set what follows from the parameters; return the bytes of the block. */
@@ -75,12 +74,6 @@ static double uncertainty_variance(const hsep_uncertainty *self, const double co
            (HSEP_UNCERTAINTY_FLOOR * self->recent + HSEP_UNCERTAINTY_LEAST_VARIANCE);
 }
 
-static double uncertainty_square(double value)
-{
-    const double magnitude = fmin(fabs(value), HSEP_PREDICTION_MAX);
-    return magnitude * magnitude;
-}
-
 /* Place of sample k in a usual window, from -1/2 at its beginning to 1/2 at its end. */
 static double uncertainty_from_middle(const hsep_uncertainty *self, uint64_t k)
 {
@@ -97,9 +90,9 @@ static void uncertainty_at(
     const uint64_t newer = j + 1 == n && j > 0 ? j - 1 : j, older = newer + 1 < n ? newer + 1 : newer;
     const int stacked = signals->variance != NULL && n - 1 - j >= signals->n_physics;
     f[0] = 1.0;
-    f[1] = uncertainty_square(x_pb[newer] - x_pb[older]);
-    f[2] = uncertainty_square(hsep_at_const(self, self->e_h)[j] - self->last);
-    f[3] = stacked ? signals->variance[j] : 0.0;
+    const double change = fmin(fabs(x_pb[newer] - x_pb[older]), HSEP_PREDICTION_MAX);
+    f[1] = change * change;
+    f[2] = stacked ? signals->variance[j] : 0.0;
 }
 
 HSEP_API void hsep_uncertainty_predict(
@@ -110,16 +103,14 @@ HSEP_API void hsep_uncertainty_predict(
     double *published = hsep_at(self, self->e_h), *std = hsep_at(self, self->std), *felt = self->felt;
     if (first == 0) {
         memset(felt, 0, sizeof self->felt);
-        self->last = signals->e_h[n];
     }
     for (uint64_t k = first; k < last; k++) { /* in time, from the last measured sample on */
         published[n - 1 - k] = k < signals->n_physics ? 0.0 : signals->e_h[n - 1 - k];
         double *f = hsep_at(self, self->components) + (n - 1 - k) * HSEP_N_COMPONENTS;
         uncertainty_at(self, signals, n - 1 - k, f);
-        for (size_t i = 0; i < sizeof uncertainty_felt / sizeof *uncertainty_felt; i++) {
-            const int place = uncertainty_felt[i];
-            felt[place] += gain * (f[place] - felt[place]);
-            f[place] = felt[place];
+        for (int i = 1; i < HSEP_N_COMPONENTS; i++) { /* all but the noise */
+            felt[i] += gain * (f[i] - felt[i]);
+            f[i] = felt[i];
         }
         const double c = self->factor * pow(self->ratio, uncertainty_from_middle(self, k));
         std[n - 1 - k] = fmin(c * sqrt(uncertainty_variance(self, f)), HSEP_PREDICTION_MAX);
@@ -128,8 +119,8 @@ HSEP_API void hsep_uncertainty_predict(
 
 /* What is summed over the samples that count. */
 typedef struct {
-    double count, squares, errors, far; /* samples; squares of residuals and errors, m2; errors far beyond */
-    double missed, missed_late;         /* beyond the intervals, more than there may be; weighted by their place */
+    double count, squares, errors; /* samples; squares of residuals and errors, m2 */
+    double missed, missed_late;    /* beyond the intervals, more than there may be; weighted by their place */
 } uncertainty_sums;
 
 /* Add a sample that is measured. */
@@ -142,7 +133,6 @@ static void uncertainty_add(uncertainty_sums *sums, double e, double error, doub
     sums->count += 1.0;
     sums->squares += e * e;
     sums->errors += error * error;
-    sums->far += fabs(error) / std > HSEP_UNCERTAINTY_FAR ? 1.0 : 0.0;
     sums->missed += missed;
     sums->missed_late += missed * place;
 }
@@ -153,9 +143,6 @@ static void uncertainty_follow(hsep_uncertainty *self, const uncertainty_sums *s
 {
     const double count = sums->count, mean_square = fmin(sums->squares / count, HSEP_PREDICTION_MAX);
     if (self->recent > 0.0) {
-        for (int i = 0; i < HSEP_N_COMPONENTS && sums->far / count > HSEP_UNCERTAINTY_FAR_SHARE; i++) {
-            self->theta[i] *= HSEP_UNCERTAINTY_FAR * HSEP_UNCERTAINTY_FAR;
-        }
         const double factor = self->factor * exp(HSEP_UNCERTAINTY_FACTOR_RATE * (sums->missed / count));
         const double ratio = self->ratio * exp(HSEP_UNCERTAINTY_RATIO_RATE * (sums->missed_late / count));
         self->factor = fmin(fmax(factor, 1.0 / HSEP_UNCERTAINTY_FACTOR_MAX), HSEP_UNCERTAINTY_FACTOR_MAX);

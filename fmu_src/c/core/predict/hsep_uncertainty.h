@@ -1,12 +1,12 @@
 /* Uncertainty of a prediction: the variance of its error against the measured position, learned from earlier windows.
  *
- * The variance of a sample is a sum of four components, v = sum_i theta_i f_i, of what errors come with: measurement
- * noise; timing, the squared difference of x_pb; a change since the last measured residual; and what the residual model
- * knows of itself, the variance of the mixture of its experts. Timing and that variance are felt after they have
- * happened, and for a while: they are averaged over the samples before, from the last measured one on. The standard
- * deviation is c sqrt(v). After each window theta takes a step of expectation maximisation for normal errors of that
- * variance, and c, which changes exponentially from the beginning to the end of
- * a window, moves until intervals of 50, 90 and 95 % miss as many errors as they may, together.
+ * The variance of a sample is a sum of three components, v = sum_i theta_i f_i, of what errors come with: measurement
+ * noise; timing, the squared difference of x_pb; and what the residual model knows of itself, the variance of the
+ * mixture of its experts. Timing and that variance are felt after they have happened, and for a while: they are averaged
+ * over the samples before, from the last measured one on. The standard deviation is c sqrt(v). After each window theta
+ * takes a step of expectation maximisation for normal errors of that variance, and c, which changes exponentially from
+ * the beginning to the end of a window, moves until intervals of 50, 90 and 95 % miss as many errors as they may,
+ * together.
  *
  * Signals are kept newest first: sample k of the n that are predicted is at place n - 1 - k. The first Np of them are
  * learned. Memory is one block, without pointers. Reentrant; allocates nothing. Cost of a window: 50 n operations each.
@@ -19,7 +19,7 @@
 
 #include <stdint.h>
 
-#define HSEP_N_COMPONENTS 4
+#define HSEP_N_COMPONENTS 3
 #define HSEP_N_UNCERTAINTY (2 * HSEP_N_COMPONENTS + 3) /* numbers that are learned, each >= 0 */
 
 typedef struct {
@@ -30,7 +30,6 @@ typedef struct {
     double ratio;                       /* c at its end relative to that at its beginning */
     double recent;                      /* m2, recent mean square of the residual; 0 before the first window */
     uint64_t n;                         /* samples that are predicted */
-    double last;                        /* m, last measured residual before them */
     double felt[HSEP_N_COMPONENTS];     /* m2, averages of what is felt for a while, up to the last one of them */
     /* Offsets in doubles from the beginning of the struct */
     uint64_t e_h;        /* (n,) m, residual of the window as published */
@@ -38,7 +37,7 @@ typedef struct {
     uint64_t std;        /* (n,) m, standard deviation of the error */
 } hsep_uncertainty;
 
-HSEP_ASSERT_WORDS(hsep_uncertainty, 6 + HSEP_N_COMPONENTS + HSEP_N_UNCERTAINTY);
+HSEP_ASSERT_WORDS(hsep_uncertainty, 5 + HSEP_N_COMPONENTS + HSEP_N_UNCERTAINTY);
 
 /* Bytes of the block, counted in double so that no size can overflow. */
 HSEP_API double hsep_uncertainty_size(uint64_t Np, uint64_t n);
@@ -60,7 +59,7 @@ HSEP_API int hsep_uncertainty_sound(const hsep_uncertainty *self);
 /* Signals that tell of a prediction's error. */
 typedef struct {
     const double *x_pb;     /* (n,) m, physics-based prediction */
-    const double *e_h;      /* (n + 1,) m, predicted residual, behind it the last measured one */
+    const double *e_h;      /* (n,) m, predicted residual */
     uint64_t n_physics;     /* leading samples where it is not published */
     const double *variance; /* (n,) m2, what the residual model knows of its error, or NULL */
 } hsep_uncertainty_signals;

@@ -35,16 +35,17 @@
 #define HSEP_TRUST_CORRELATION_RATE 0.1
 
 /* Largest prediction relative to the largest residual so far, of the physics model and of the command: what is
- * larger was never seen. Where the command's expert leads, its bound grows with its steps, by up to growth: without,
- * CNC axes that creep before a motion have 3 and 4 times the error. */
+ * larger was never seen. Where the command's expert leads, its bound grows with its steps: without, CNC axes that
+ * creep before a motion have 3 and 4 times the error. */
 #define HSEP_TRUST_BOUND 1.2
 #define HSEP_TRUST_BOUND_OF_COMMAND 2.0
 
-/* Growth of the commanded velocity that makes the static features begin anew, as they were learned at a creep: the
- * first until rows of learned windows are learned, then the second. */
+/* Largest growth of that bound. */
 #define HSEP_TRUST_GROWTH 30.0
-#define HSEP_TRUST_GROWTH_LEARNED 1000.0
-#define HSEP_TRUST_LEARNED 15.0
+
+/* Growth of the commanded velocity that makes the static features begin anew, as they were learned at a creep:
+ * without, the rounding of a command at rest sets their scale, and drives have to 1.4 times the error. */
+#define HSEP_TRUST_OUTGROWN 1000.0
 
 /* Largest weight of earlier runs when another begins, in windows: a machine may have changed meanwhile. */
 #define HSEP_TRUST_CARRIED 30.0

@@ -70,35 +70,34 @@ static void trusted_of_command(hsep_trusted *self, const double x_pb[], const do
     }
 }
 
-/* Which rows of the window are learned, (Np,), by their places, and their number. Those with many
- * lags that stand for samples without a measurement are not. */
-static uint64_t trusted_learned_rows(const hsep_trusted *self, double learned[])
+/* Which rows of the window with p lags are learned, (Np,), by their places, and their number. Those with many lags that
+ * stand for samples without a measurement are not. */
+static uint64_t trusted_learned_rows(const hsep_trusted *self, uint64_t p, double learned[])
 {
     const double *accepted = hsep_at_const(self, self->accepted);
     const double *bridged = hsep_at_const(self, self->bridged);
     double n_bridged = 0.0; /* among the lags of the row */
     uint64_t count = 0;
-    for (uint64_t i = 0; i < self->p; i++) {
+    for (uint64_t i = 0; i < p; i++) {
         n_bridged += bridged[self->Np + i];
     }
     for (uint64_t j = self->Np; j-- > 0;) {
         learned[j] = accepted[j] > 0.0 && n_bridged <= HSEP_TRUSTED_BRIDGED;
         count += learned[j] > 0.0;
-        n_bridged += bridged[j] - bridged[j + self->p];
+        n_bridged += bridged[j] - bridged[j + p];
     }
     return count;
 }
 
-/* Update some evidence with the rows [features without lags | lags | residual] of the window that are learned, count of
- * them. rows: (Np, n_static); e: (Np + lags,), m. */
-static void trusted_fold(
-    hsep_trusted *self, hsep_evidence evidence, const double rows[], const double e[], uint64_t count)
+/* Update some evidence with the rows [features without lags | lags | residual] of the window that are learned.
+ * rows: (Np, n_static); e: (Np + lags,), m. */
+static void trusted_fold(hsep_trusted *self, hsep_evidence evidence, const double rows[], const double e[])
 {
     hsep_regression *regression = hsep_trusted_evidence(self, evidence);
     const uint64_t n = regression->n, p = evidence == HSEP_OF_COMMAND ? hsep_trusted_command(self)->p : self->p;
     const uint64_t n_static = n - p;
-    const double *learned = hsep_at(self, self->x);
-    double *work = hsep_at(self, self->work);
+    double *learned = hsep_at(self, self->x), *work = hsep_at(self, self->work); /* x is not needed any more */
+    const uint64_t count = trusted_learned_rows(self, p, learned);
     uint64_t b = 0;
     hsep_trusted_discount(self, evidence, self->kept);
     for (uint64_t j = self->Np; j-- > 0; rows += n_static) {
@@ -117,10 +116,8 @@ static void trusted_fold(
 static void trusted_fold_window(hsep_trusted *self, const double e[])
 {
     hsep_command *command = hsep_trusted_command(self);
-    const double *rows = hsep_at(self, self->rows);
-    const uint64_t count = trusted_learned_rows(self, hsep_at(self, self->x)); /* which is not needed any more */
-    trusted_fold(self, HSEP_OF_PHYSICS, rows, e, count);
-    trusted_fold(self, HSEP_OF_COMMAND, hsep_at(command, command->rows), hsep_at(self, self->e_0), count);
+    trusted_fold(self, HSEP_OF_PHYSICS, hsep_at(self, self->rows), e);
+    trusted_fold(self, HSEP_OF_COMMAND, hsep_at(command, command->rows), hsep_at(self, self->e_0));
 }
 
 /* Update the weights of the stack with the samples that were published, of those accepted. */
@@ -223,6 +220,7 @@ static void trusted_take_rows(hsep_trusted *self, const double x_d[], const doub
 
 HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_d[], const double x_pb[], double e[], int fold)
 {
+    const uint64_t p = self->p, of_command = hsep_trusted_command(self)->p;
     double *bridged = hsep_at(self, self->bridged), *e_0 = hsep_at(self, self->e_0);
     trusted_take_scales(self);
     hsep_reach_judge(
@@ -236,6 +234,6 @@ HSEP_API void hsep_trusted_learn(hsep_trusted *self, const double x_d[], const d
         trusted_judge(self, e, count);
     }
     hsep_command_end(hsep_trusted_command(self), self->Np);
-    memcpy(bridged + self->Np, bridged, (size_t)self->p * sizeof(double)); /* p <= Np: they do not overlap */
-    memmove(e_0 + self->Np, e_0, (size_t)hsep_trusted_command(self)->p * sizeof(double));
+    memmove(bridged + self->Np, bridged, (size_t)(p > of_command ? p : of_command) * sizeof(double));
+    memmove(e_0 + self->Np, e_0, (size_t)of_command * sizeof(double));
 }

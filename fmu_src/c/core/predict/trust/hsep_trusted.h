@@ -77,7 +77,7 @@ typedef struct {
     uint64_t x;                /* (n,) m, position */
     uint64_t measured;         /* (Np,) m, measured position, NaN where missing */
     uint64_t accepted;         /* (Np,) whether it is believed */
-    uint64_t bridged;          /* (Np + p,) whether a residual stands for one that is not */
+    uint64_t bridged;          /* (Np + max(p, p of the command),) whether a residual stands for one that is not */
     uint64_t e_0;              /* (Np + p of the command,) m, residual of the command */
     uint64_t stacked;          /* (2, n) m, what the command's expert and the doubting one, where it is of the command,
                                 * predict of that of the physics model */

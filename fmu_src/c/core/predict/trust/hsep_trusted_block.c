@@ -99,7 +99,7 @@ static double trusted_lay_out(hsep_trusted *self, const hsep_trusted_parameters 
     self->x = hsep_take(&end, n);
     self->measured = hsep_take(&end, Np);
     self->accepted = hsep_take(&end, Np);
-    self->bridged = hsep_take(&end, Np + p);
+    self->bridged = hsep_take(&end, Np + fmax(p, p_of_command));
     self->e_0 = hsep_take(&end, Np + p_of_command);
     self->stacked = hsep_take(&end, 2.0 * n);
     self->variance = hsep_take(&end, n);

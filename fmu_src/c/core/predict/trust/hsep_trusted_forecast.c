@@ -28,8 +28,7 @@ static int trusted_outgrown(hsep_trusted *self, const double x_d[], const double
     const hsep_disturbances *disturbances = hsep_trusted_disturbances(self);
     double peak = hsep_disturbances_peak_velocity(disturbances, x_d, self->n);
     const double n_rows = self->n_rows[HSEP_OF_PHYSICS] + self->n_earlier[HSEP_OF_PHYSICS];
-    const int learned = n_rows >= HSEP_TRUST_LEARNED * (double)self->Np;
-    double most = (learned ? HSEP_TRUST_GROWTH_LEARNED : HSEP_TRUST_GROWTH) * self->velocity_scale;
+    double most = HSEP_TRUST_OUTGROWN * self->velocity_scale;
     self->forecast_step = fmax(self->largest_step, peak * self->T_s);
     if (path != NULL && n_rows == 0.0) {
         peak = 0.0;
