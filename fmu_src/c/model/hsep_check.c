@@ -8,9 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double check_warm_up_tolerance = 1e-6; /* samples */
-static const double check_warm_up = 0.3;            /* s, where it is automatic */
-static const double check_position_max = 1e3;       /* m */
+static const double check_position_max = 1e3; /* m */
 
 HSEP_API hsep_status hsep_message_add(char message[], const char *format, ...)
 {
@@ -124,17 +122,6 @@ HSEP_API int hsep_check_lags(double Np, double p, double q, char message[])
         problems++;
     }
     return problems;
-}
-
-HSEP_API double hsep_warm_up(double t_init, int trust)
-{
-    const double automatic = trust ? 0.0 : check_warm_up;
-    return t_init < 0.0 ? automatic : t_init;
-}
-
-HSEP_API double hsep_warm_up_samples(double t_init, double T_s)
-{
-    return fmax(0.0, ceil(t_init / T_s - check_warm_up_tolerance));
 }
 
 HSEP_API hsep_status hsep_check_divergence(hsep_divergence divergence, char message[])
