@@ -98,9 +98,9 @@ typedef struct {
  * fit into memory. */
 HSEP_API size_t hsep_predictor_size(const hsep_parameters *parameters);
 
-/* Begin with the drive at rest at start, m. weights: content of a file weights.bin in any alignment, weights_size bytes,
- * as `hybridsep hal --weights` and an FMU's resources have it, or NULL: cold. Weights that are refused change nothing:
- * the block has begun cold. */
+/* Begin with the drive at rest at start, m. weights: content of a file weights.bin in any alignment, so many bytes, as
+ * `hybridsep hal --weights` and an FMU's resources have it, or NULL: cold. Weights that are refused change nothing: the
+ * block has begun cold. */
 HSEP_API hsep_began hsep_predictor_init(
     hsep_predictor *self, const hsep_parameters *parameters, double start, const void *weights, size_t weights_size);
 

@@ -2,9 +2,9 @@
  *
  *     replay LOG.csv NP F_N ZETA [WEIGHTS.bin]
  *
- * LOG.csv: a header with the columns x_d and x_meas (commanded and measured position, m, or [mm] or [um] as it says), a
- * row each 1 ms, as hybridsep example-log writes it. F_N, Hz, and ZETA: the drive's linear model, one mode with unit gain. WEIGHTS.bin: what an earlier run has
- * learned (hybridsep hal --weights).
+ * LOG.csv: a header with the columns x_d and x_meas (commanded and measured position, m, or [mm] or [um] as it says),
+ * a row each 1 ms, as hybridsep example-log writes it. F_N, Hz, and ZETA: the drive's linear model, one mode with unit
+ * gain. WEIGHTS.bin: what an earlier run has learned (hybridsep hal --weights).
  */
 #include "hsep.h"
 

@@ -2,6 +2,8 @@
 
 #ifndef HSEP_NO_FILES
 
+#include "hsep_text.h"
+
 #include <string.h>
 
 #ifdef _WIN32
@@ -16,7 +18,7 @@ HSEP_API FILE *hsep_resource_open(const hsep_context *context, const char *name)
     if (context->resources == NULL) {
         return NULL;
     }
-    const int length = snprintf(path, sizeof path, "%s%s", context->resources, name);
+    const int length = hsep_text(path, sizeof path, "%s%s", context->resources, name);
     if (length < 0 || (size_t)length >= sizeof path) {
         return NULL;
     }
